@@ -1,0 +1,122 @@
+//! Triangle meshes as files have them, and boxes.
+
+use crate::Vec3;
+
+/// Points and the triangles between them; nothing is promised about closedness, orientation or finiteness.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriMesh {
+    /// Positions, mm.
+    pub points: Vec<Vec3>,
+    /// Corner indices into `points`, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriMesh {
+    /// The three corners of triangle `face`.
+    pub fn corners(&self, face: usize) -> [Vec3; 3] {
+        self.triangles[face].map(|v| self.points[v as usize])
+    }
+
+    /// Cross product of two edges of `face`: its normal times twice its area.
+    pub fn area_vector_doubled(&self, face: usize) -> Vec3 {
+        let [a, b, c] = self.corners(face);
+        (b - a).cross(c - a)
+    }
+
+    /// Area of triangle `face`, mm².
+    pub fn face_area(&self, face: usize) -> f64 {
+        0.5 * self.area_vector_doubled(face).length()
+    }
+
+    /// Unit normal of `face`; zero for a degenerate triangle.
+    pub fn face_normal(&self, face: usize) -> Vec3 {
+        self.area_vector_doubled(face).normalize_or_zero()
+    }
+
+    /// Mean of the three corners of `face`.
+    pub fn face_center(&self, face: usize) -> Vec3 {
+        let [a, b, c] = self.corners(face);
+        (a + b + c) / 3.0
+    }
+
+    /// Total area, mm².
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len()).map(|f| self.face_area(f)).sum()
+    }
+
+    /// Signed volume, mm³: positive where a closed mesh is oriented outwards.
+    pub fn signed_volume(&self) -> f64 {
+        let origin = self.points.first().copied().unwrap_or_default();
+        let sixfold: f64 = (0..self.triangles.len())
+            .map(|f| {
+                let [a, b, c] = self.corners(f).map(|p| p - origin);
+                a.dot(b.cross(c))
+            })
+            .sum();
+        sixfold / 6.0
+    }
+
+    /// The smallest box around all points; empty where there are none.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around(self.points.iter().copied())
+    }
+}
+
+/// An axis-aligned box, mm. Empty where `min > max`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Least corner.
+    pub min: Vec3,
+    /// Greatest corner.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The box that contains nothing.
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// The smallest box around `points`.
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+    }
+
+    /// The box moved outwards by `by_mm` on all sides.
+    pub fn grown(self, by_mm: f64) -> Self {
+        Self { min: self.min - by_mm, max: self.max + by_mm }
+    }
+
+    /// The smallest box around both.
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Whether the closed boxes share a point.
+    pub fn intersects(self, other: Self) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+
+    /// Whether `p` lies in the closed box.
+    pub fn contains(self, p: Vec3) -> bool {
+        p.cmpge(self.min).all() && p.cmple(self.max).all()
+    }
+
+    /// Edge lengths, mm; zero where empty.
+    pub fn size(self) -> Vec3 {
+        (self.max - self.min).max(Vec3::ZERO)
+    }
+
+    /// Length of the space diagonal, mm.
+    pub fn diagonal(self) -> f64 {
+        self.size().length()
+    }
+
+    /// Middle of the box.
+    pub fn center(self) -> Vec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    /// Squared distance from `p` to the closed box; 0 inside.
+    pub fn distance_sq(self, p: Vec3) -> f64 {
+        (p - p.clamp(self.min, self.max)).length_squared()
+    }
+}

@@ -1,0 +1,94 @@
+//! What every stage gets first: where to say how far it is, where to warn, and whether to stop.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use crate::PatchId;
+
+/// The user asked to stop; nothing was kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("stopped by the user")]
+pub struct Cancelled;
+
+/// Something the user should know that did not stop the job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Warning {
+    /// Stable name for machines, for example `"seam-without-connector"`.
+    pub code: String,
+    /// For people: what, where, what to do.
+    pub message: String,
+    /// The pieces it concerns.
+    pub pieces: Vec<PatchId>,
+    /// Where, mm in assembly space.
+    pub at: Option<[f64; 3]>,
+}
+
+/// How far the job is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Progress<'a> {
+    /// A stage begins, with so many steps (0 where unknown).
+    Stage {
+        /// What a person reads.
+        name: &'a str,
+        /// Steps to come.
+        n_steps: usize,
+    },
+    /// One more step of the current stage is done.
+    Step,
+    /// A line worth keeping, such as why another round begins.
+    Note(&'a str),
+}
+
+/// Progress, cancellation and warnings of one job. Stages borrow it and never keep it.
+pub struct Ctx<'a> {
+    report: &'a (dyn Fn(Progress<'_>) + Sync),
+    stop: &'a AtomicBool,
+    warnings: Mutex<Vec<Warning>>,
+}
+
+impl<'a> Ctx<'a> {
+    /// A context that tells `report` how far it is and ends soon after `stop` becomes true.
+    pub fn new(report: &'a (dyn Fn(Progress<'_>) + Sync), stop: &'a AtomicBool) -> Self {
+        Self { report, stop, warnings: Mutex::new(Vec::new()) }
+    }
+
+    /// A stage of `n_steps` steps begins (0: unknown); fails where the user asked to stop.
+    pub fn stage(&self, name: &str, n_steps: usize) -> Result<(), Cancelled> {
+        (self.report)(Progress::Stage { name, n_steps });
+        self.check()
+    }
+
+    /// One step of the stage is done; fails where the user asked to stop.
+    pub fn step(&self) -> Result<(), Cancelled> {
+        (self.report)(Progress::Step);
+        self.check()
+    }
+
+    /// A line worth keeping.
+    pub fn note(&self, text: &str) {
+        (self.report)(Progress::Note(text));
+    }
+
+    /// Fails where the user asked to stop; long loops call it now and then.
+    pub fn check(&self) -> Result<(), Cancelled> {
+        if self.stop.load(Ordering::Relaxed) { Err(Cancelled) } else { Ok(()) }
+    }
+
+    /// Keeps a warning for the plan and the report.
+    pub fn warn(&self, warning: Warning) {
+        self.warnings.lock().expect("no holder of this lock panics").push(warning);
+    }
+
+    /// Takes the warnings so far, in the order they came; equal ones once.
+    pub fn take_warnings(&self) -> Vec<Warning> {
+        let mut seen: Vec<Warning> = Vec::new();
+        for w in std::mem::take(&mut *self.warnings.lock().expect("no holder of this lock panics")) {
+            if !seen.contains(&w) {
+                seen.push(w);
+            }
+        }
+        seen
+    }
+}

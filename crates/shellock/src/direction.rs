@@ -1,0 +1,68 @@
+//! The 26 directions along which pieces come and go (Sect. 6.2).
+
+use serde::{Deserialize, Serialize};
+use shellock_geom::Vec3;
+
+/// One of the 26 directions from a grid cell to its neighbours: 6 axial, 12 in-plane diagonal, 8 space diagonal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct LatticeDirection(u8);
+
+impl LatticeDirection {
+    /// How many there are.
+    pub const COUNT: usize = 26;
+
+    /// All of them, in order of their index.
+    pub fn all() -> impl Iterator<Item = Self> + Clone {
+        (0..Self::COUNT as u8).map(Self)
+    }
+
+    /// Position in [`Self::all`], in [0, 26).
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// The step to the neighbouring cell: components in {−1, 0, 1}, not all 0.
+    pub fn step(self) -> [i32; 3] {
+        // Cell 13 of the 3 × 3 × 3 block is the middle, which is no direction.
+        let cell = i32::from(self.0) + i32::from(self.0 >= 13);
+        [cell / 9 - 1, cell / 3 % 3 - 1, cell % 3 - 1]
+    }
+
+    /// Unit vector in world space.
+    pub fn unit(self) -> Vec3 {
+        let [x, y, z] = self.step();
+        Vec3::new(f64::from(x), f64::from(y), f64::from(z)).normalize()
+    }
+
+    /// The direction that points the other way.
+    pub fn opposite(self) -> Self {
+        Self(25 - self.0)
+    }
+
+    /// The direction nearest to `v`; the lowest index where several are.
+    pub fn nearest(v: Vec3) -> Self {
+        let mut best = Self(0);
+        for d in Self::all() {
+            if d.unit().dot(v) > best.unit().dot(v) + 1e-12 {
+                best = d;
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opposite_directions_cancel_and_all_differ() {
+        let steps: std::collections::BTreeSet<_> = LatticeDirection::all().map(LatticeDirection::step).collect();
+        assert_eq!(steps.len(), 26);
+        for d in LatticeDirection::all() {
+            assert_eq!(d.opposite().step(), d.step().map(|x| -x));
+            assert_eq!(LatticeDirection::nearest(d.unit()), d);
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Names of pieces, and arrays that can only be indexed by them.
+
+use std::marker::PhantomData;
+use std::ops::{Index, IndexMut};
+
+use serde::{Deserialize, Serialize};
+
+/// A patch of the outer surface, and the piece that carries it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct PatchId(pub u32);
+
+impl From<usize> for PatchId {
+    fn from(i: usize) -> Self {
+        Self(u32::try_from(i).expect("patches are counted in hundreds"))
+    }
+}
+
+impl From<PatchId> for usize {
+    fn from(id: PatchId) -> Self {
+        id.0 as usize
+    }
+}
+
+impl std::fmt::Display for PatchId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// A `Vec<T>` with one element an id, indexed by the id alone.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct IdVec<I, T> {
+    items: Vec<T>,
+    #[serde(skip)]
+    id: PhantomData<I>,
+}
+
+impl<I: From<usize> + Into<usize>, T> IdVec<I, T> {
+    /// One element for each of `n` ids, made from the id.
+    pub fn from_fn(n: usize, make: impl FnMut(I) -> T) -> Self {
+        (0..n).map(I::from).map(make).collect()
+    }
+
+    /// How many ids there are.
+    pub fn len(&self) -> usize {
+        self.items.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.items.is_empty()
+    }
+
+    /// All ids in order.
+    pub fn ids(&self) -> impl Iterator<Item = I> + use<I, T> {
+        (0..self.items.len()).map(I::from)
+    }
+
+    /// Ids and elements in order.
+    pub fn iter(&self) -> impl Iterator<Item = (I, &T)> {
+        self.items.iter().enumerate().map(|(i, x)| (I::from(i), x))
+    }
+
+    /// The elements in order of their ids.
+    pub fn as_slice(&self) -> &[T] {
+        &self.items
+    }
+}
+
+impl<I, T> FromIterator<T> for IdVec<I, T> {
+    fn from_iter<It: IntoIterator<Item = T>>(iter: It) -> Self {
+        Self { items: iter.into_iter().collect(), id: PhantomData }
+    }
+}
+
+impl<I: Into<usize>, T> Index<I> for IdVec<I, T> {
+    type Output = T;
+    fn index(&self, id: I) -> &T {
+        &self.items[id.into()]
+    }
+}
+
+impl<I: Into<usize>, T> IndexMut<I> for IdVec<I, T> {
+    fn index_mut(&mut self, id: I) -> &mut T {
+        &mut self.items[id.into()]
+    }
+}
