@@ -6,7 +6,10 @@
 pub mod context;
 pub mod direction;
 pub mod ids;
+pub mod plan;
+pub mod surface;
 
 pub use context::{Cancelled, Ctx, Warning};
 pub use direction::LatticeDirection;
 pub use ids::{IdVec, PatchId};
+pub use surface::{Seam, SegmentedSurface};

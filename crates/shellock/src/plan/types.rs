@@ -1,0 +1,85 @@
+//! What a plan is, and what keeps one from being found.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{LatticeDirection, PatchId};
+
+/// One piece of a plan and the direction along which it leaves everything installed before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InstallationStep {
+    /// The piece that is put in.
+    pub piece: PatchId,
+    /// The unit step along which it separates; it is installed along the opposite. Without meaning for the first piece.
+    pub separation: LatticeDirection,
+}
+
+/// The order in which pieces are installed, first to last, each with its direction. The last piece is the key.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InstallationPlan {
+    /// First to last; every piece once; at least two.
+    pub steps: Vec<InstallationStep>,
+}
+
+impl InstallationPlan {
+    /// The piece installed last, the only one that can be taken out.
+    pub fn key(&self) -> PatchId {
+        self.steps[self.steps.len() - 1].piece
+    }
+
+    /// Position of `piece` in the order, 0 for the first installed.
+    pub fn position(&self, piece: PatchId) -> usize {
+        self.steps.iter().position(|s| s.piece == piece).expect("a plan names every piece once")
+    }
+
+    /// The separation direction of `piece`.
+    pub fn separation(&self, piece: PatchId) -> LatticeDirection {
+        self.steps[self.position(piece)].separation
+    }
+
+    /// Steps in the order of taking apart: key first, first-installed last.
+    pub fn removal(&self) -> impl Iterator<Item = InstallationStep> + '_ {
+        self.steps.iter().rev().copied()
+    }
+}
+
+/// What earlier rounds taught: the search must respect all of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PlanConstraints {
+    /// Pairs (lower id first) whose connectors came out too small to hold: they touch, but join nothing.
+    pub weak_contacts: BTreeSet<(PatchId, PatchId)>,
+    /// Directions that a piece must not take, because its path rubbed.
+    pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
+    /// Whole plans that failed for a reason that none of the above says.
+    pub rejected: Vec<InstallationPlan>,
+}
+
+/// `by` prevents `piece` from leaving.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Blocker {
+    /// The piece that should leave.
+    pub piece: PatchId,
+    /// The piece in its way.
+    pub by: PatchId,
+    /// Where, mm in assembly space.
+    pub at: [f64; 3],
+    /// Share of `piece` that `by` occludes along the best direction, in [0, 1].
+    pub occluded: f64,
+}
+
+/// The answer of the search. Both are results, not errors.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlanOutcome {
+    /// A plan that keeps every condition.
+    Found(InstallationPlan),
+    /// None was found.
+    Infeasible {
+        /// Why, for people.
+        reason: String,
+        /// Who is in whose way; empty where paths are free but no plan locks.
+        blockers: Vec<Blocker>,
+        /// Articulation pieces of the contact graph: splitting one of them may help.
+        articulations: Vec<PatchId>,
+    },
+}
