@@ -1,0 +1,231 @@
+//! Mesh booleans. The only file that names the boolean library.
+//!
+//! A [`Volume`] is a possibly empty region of space bounded by a manifold mesh; unions, intersections and differences of
+//! volumes are volumes, always. The library promises the topology of its results; [`Volume::to_mesh`] hands them on.
+
+use manifold_rust::csg_tree::CsgNode;
+use manifold_rust::linalg::Vec3 as V;
+use manifold_rust::manifold::Manifold;
+use manifold_rust::types::{Error, MeshGL64, OpType};
+
+use crate::{Aabb, Solid, TriMesh, Vec3};
+
+/// A region bounded by a manifold mesh; may be empty, may have several bodies, may have cavities.
+#[derive(Clone)]
+pub struct Volume(Manifold);
+
+/// The boolean library refused a mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the mesh bounds no volume: {reason}")]
+pub struct NotAVolume {
+    reason: String,
+}
+
+fn v(p: Vec3) -> V {
+    V::new(p.x, p.y, p.z)
+}
+
+impl Volume {
+    /// The region that contains nothing.
+    pub fn empty() -> Self {
+        Self(Manifold::empty())
+    }
+
+    /// The region inside a solid.
+    ///
+    /// Fails where the solid's surface is pinched in a way that the library does not take.
+    pub fn from_solid(solid: &Solid) -> Result<Self, NotAVolume> {
+        Self::from_closed_mesh(solid.mesh())
+    }
+
+    /// The region inside a closed, oriented mesh, which may be empty or have cavities.
+    pub fn from_closed_mesh(mesh: &TriMesh) -> Result<Self, NotAVolume> {
+        if mesh.triangles.is_empty() {
+            return Ok(Self::empty());
+        }
+        let gl = MeshGL64 {
+            num_prop: 3,
+            vert_properties: mesh.points.iter().flat_map(|p| p.to_array()).collect(),
+            tri_verts: mesh.triangles.iter().flatten().map(|&i| u64::from(i)).collect(),
+            ..MeshGL64::default()
+        };
+        let made = Manifold::from_mesh_gl64(&gl);
+        match made.status() {
+            Error::NoError => Ok(Self(made)),
+            other => Err(NotAVolume { reason: format!("{other:?}") }),
+        }
+    }
+
+    /// Convex hull of `points`; empty where they lie in a plane.
+    pub fn hull(points: &[Vec3]) -> Self {
+        let points: Vec<V> = points.iter().map(|&p| v(p)).collect();
+        let hull = Manifold::hull(&points);
+        if hull.status() == Error::NoError && hull.volume() > 0.0 { Self(hull) } else { Self::empty() }
+    }
+
+    /// Box from `b.min` to `b.max`.
+    pub fn cuboid(b: Aabb) -> Self {
+        Self(Manifold::cube(v(b.size()), false).translate(v(b.min)))
+    }
+
+    /// Union of all `parts`; cost follows their mutual overlap.
+    pub fn union_all(parts: Vec<Self>) -> Self {
+        let mut parts: Vec<Self> = parts.into_iter().filter(|p| !p.is_empty()).collect();
+        match parts.len() {
+            0 => Self::empty(),
+            1 => parts.remove(0),
+            _ => {
+                let leaves = parts.into_iter().map(|p| CsgNode::leaf(p.0.into_impl())).collect();
+                Self(Manifold::from_impl(CsgNode::op_n(OpType::Add, leaves).evaluate()))
+            }
+        }
+    }
+
+    /// What lies in either.
+    pub fn union(&self, other: &Self) -> Self {
+        match (self.is_empty(), other.is_empty()) {
+            (true, _) => other.clone(),
+            (_, true) => self.clone(),
+            _ => Self(self.0.union(&other.0)),
+        }
+    }
+
+    /// What lies in both.
+    pub fn intersect(&self, other: &Self) -> Self {
+        if !self.boxes_meet(other) {
+            return Self::empty();
+        }
+        Self(self.0.intersection(&other.0))
+    }
+
+    /// What lies in `self` and not in `other`.
+    pub fn subtract(&self, other: &Self) -> Self {
+        if !self.boxes_meet(other) {
+            return self.clone();
+        }
+        Self(self.0.difference(&other.0))
+    }
+
+    /// The part inside `cutter` and the part outside it: an exact partition.
+    pub fn split(&self, cutter: &Self) -> (Self, Self) {
+        if !self.boxes_meet(cutter) {
+            return (Self::empty(), self.clone());
+        }
+        let (inside, outside) = self.0.split(&cutter.0);
+        (Self(inside), Self(outside))
+    }
+
+    /// The region moved by `by` mm.
+    pub fn translate(&self, by: Vec3) -> Self {
+        Self(self.0.translate(v(by)))
+    }
+
+    /// Fewer triangles for the same shape within `tolerance_mm`; stays manifold.
+    pub fn simplify(&self, tolerance_mm: f64) -> Self {
+        Self(self.0.simplify(tolerance_mm))
+    }
+
+    /// Enclosed volume, mm³.
+    pub fn volume(&self) -> f64 {
+        if self.is_empty() { 0.0 } else { self.0.volume() }
+    }
+
+    /// Surface area, mm².
+    pub fn area(&self) -> f64 {
+        if self.is_empty() { 0.0 } else { self.0.surface_area() }
+    }
+
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// How many triangles bound it.
+    pub fn n_triangles(&self) -> usize {
+        self.0.num_tri()
+    }
+
+    /// Euler genus of the whole boundary; meaningful for one body.
+    pub fn genus(&self) -> i32 {
+        self.0.genus()
+    }
+
+    /// The smallest box around it.
+    pub fn bounds(&self) -> Aabb {
+        if self.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let b = self.0.bounding_box();
+        Aabb { min: Vec3::new(b.min.x, b.min.y, b.min.z), max: Vec3::new(b.max.x, b.max.y, b.max.z) }
+    }
+
+    /// Connected boundary surfaces, largest volume first; a cavity comes out as a component of negative volume.
+    pub fn components(&self) -> Vec<Self> {
+        let mut parts: Vec<Self> = self.0.decompose().into_iter().map(Self).collect();
+        parts.sort_by(|a, b| b.volume().total_cmp(&a.volume()));
+        parts
+    }
+
+    /// The boundary as a mesh; no points where empty.
+    pub fn to_mesh(&self) -> TriMesh {
+        if self.is_empty() {
+            return TriMesh::default();
+        }
+        let gl = self.0.get_mesh_gl64(-1);
+        let step = usize::try_from(gl.num_prop).expect("three properties a point");
+        TriMesh {
+            points: gl.vert_properties.chunks_exact(step).map(|c| Vec3::new(c[0], c[1], c[2])).collect(),
+            triangles: gl
+                .tri_verts
+                .chunks_exact(3)
+                .map(|t| [t[0], t[1], t[2]].map(|i| u32::try_from(i).expect("the library counts points in 32 bits")))
+                .collect(),
+        }
+    }
+
+    fn boxes_meet(&self, other: &Self) -> bool {
+        !self.is_empty() && !other.is_empty() && self.bounds().intersects(other.bounds())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube(min: Vec3, size: f64) -> Volume {
+        Volume::cuboid(Aabb { min, max: min + size })
+    }
+
+    #[test]
+    fn volumes_add_up() {
+        let (a, b) = (cube(Vec3::ZERO, 2.0), cube(Vec3::splat(0.7), 2.0));
+        let (union, common) = (a.union(&b).volume(), a.intersect(&b).volume());
+        assert!((union + common - a.volume() - b.volume()).abs() < 1e-12);
+        let (inside, outside) = a.split(&b);
+        assert!((inside.volume() + outside.volume() - 8.0).abs() < 1e-12);
+        assert!((Volume::union_all(vec![a, b, Volume::empty()]).volume() - union).abs() < 1e-12);
+    }
+
+    #[test]
+    fn disjoint_and_empty_operands_are_answers() {
+        let (a, b) = (cube(Vec3::ZERO, 1.0), cube(Vec3::splat(5.0), 1.0));
+        assert!(a.intersect(&b).is_empty());
+        assert_eq!(a.subtract(&Volume::empty()).volume(), a.volume());
+        assert_eq!(a.union(&b).components().len(), 2);
+        assert!(Volume::hull(&[Vec3::ZERO, Vec3::X, Vec3::Y]).is_empty());
+    }
+
+    #[test]
+    fn hulls_that_share_a_face_become_one_body() {
+        let slab = |x0: f64, x1: f64| {
+            let corners: Vec<Vec3> = [x0, x1]
+                .into_iter()
+                .flat_map(|x| [(0.0, 0.0), (1.1, 0.1), (0.3, 0.9), (1.3, 1.2)].map(|(y, z)| Vec3::new(x, y, z)))
+                .collect();
+            Volume::hull(&corners)
+        };
+        let joined = Volume::union_all((0..5).map(|i| slab(f64::from(i) * 0.7, f64::from(i + 1) * 0.7)).collect());
+        assert_eq!(joined.components().len(), 1);
+        assert!((joined.volume() - 5.0 * slab(0.0, 0.7).volume()).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,295 @@
+//! A bounding-volume hierarchy over triangles: nearest points, and nearest distances by group.
+
+use crate::{Aabb, TriMesh, Vec3};
+
+/// Triangles a leaf holds at most. Four was the fastest of 1 … 8 on 200 k triangles (closest-point queries).
+const LEAF_SIZE: usize = 4;
+/// Bins of the surface-area heuristic; more gave under 1 % fewer visits.
+const N_BINS: usize = 16;
+
+#[derive(Clone, Copy)]
+struct Node {
+    bounds: Aabb,
+    /// First triangle of a leaf (in `order`), or index of the left child; the right child follows it.
+    first: u32,
+    /// Triangles of a leaf; 0 for an inner node.
+    count: u32,
+    /// The group that all triangles below share, or [`MIXED`].
+    group: u32,
+}
+
+const MIXED: u32 = u32::MAX;
+
+/// Triangles sorted into nested boxes. Built in O(n log n); every answer is exact.
+pub struct TriangleBvh {
+    nodes: Vec<Node>,
+    /// Corners in leaf order, so that a leaf reads memory in sequence.
+    corners: Vec<[Vec3; 3]>,
+    faces: Vec<u32>,
+    groups: Vec<u32>,
+}
+
+/// Where the nearest point lies on its triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feature {
+    /// On corner 0, 1 or 2.
+    Corner(u8),
+    /// On the edge that starts at corner 0, 1 or 2.
+    Edge(u8),
+    /// Inside.
+    Face,
+}
+
+/// The nearest point of a mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearest {
+    /// Squared distance, mm².
+    pub distance_sq: f64,
+    /// The triangle.
+    pub face: u32,
+    /// The point on it.
+    pub point: Vec3,
+    /// Which part of the triangle the point is on.
+    pub feature: Feature,
+}
+
+impl TriangleBvh {
+    /// Sorts all triangles of `mesh`; one group.
+    pub fn new(mesh: &TriMesh) -> Self {
+        Self::with_groups(mesh, &[])
+    }
+
+    /// Sorts all triangles of `mesh`; `group_of_face` (one a triangle, or empty for a single group) serves
+    /// [`Self::nearest_by_group`].
+    pub fn with_groups(mesh: &TriMesh, group_of_face: &[u32]) -> Self {
+        let n = mesh.triangles.len();
+        let boxes: Vec<Aabb> = (0..n).map(|f| Aabb::around(mesh.corners(f))).collect();
+        let centers: Vec<Vec3> = boxes.iter().map(|b| b.center()).collect();
+        let mut order: Vec<u32> = (0..u32::try_from(n).expect("faces are counted in 32 bits")).collect();
+        let group = |f: u32| group_of_face.get(f as usize).copied().unwrap_or(0);
+        let mut nodes = vec![Node { bounds: Aabb::EMPTY, first: 0, count: 0, group: 0 }];
+        let mut todo = vec![(0usize, 0usize, n)];
+        while let Some((at, from, to)) = todo.pop() {
+            let range = &mut order[from..to];
+            let bounds = range.iter().fold(Aabb::EMPTY, |b, &f| b.union(boxes[f as usize]));
+            let shared = range.first().map_or(0, |&f| group(f));
+            let group = if range.iter().all(|&f| group(f) == shared) { shared } else { MIXED };
+            let split = if range.len() <= LEAF_SIZE { None } else { Some(partition(range, &boxes, &centers)) };
+            match split {
+                None => nodes[at] = Node { bounds, first: from as u32, count: (to - from) as u32, group },
+                Some(middle) => {
+                    let left = nodes.len();
+                    nodes[at] = Node { bounds, first: left as u32, count: 0, group };
+                    nodes.extend([Node { bounds, first: 0, count: 0, group: MIXED }; 2]);
+                    todo.push((left, from, from + middle));
+                    todo.push((left + 1, from + middle, to));
+                }
+            }
+        }
+        Self {
+            nodes,
+            corners: order.iter().map(|&f| mesh.corners(f as usize)).collect(),
+            groups: order.iter().map(|&f| group(f)).collect(),
+            faces: order,
+        }
+    }
+
+    /// The nearest point within `√limit_sq` mm of `q`, if there is one. Ties go to the triangle found first, which
+    /// depends on the mesh alone.
+    pub fn nearest(&self, q: Vec3, limit_sq: f64) -> Option<Nearest> {
+        let mut best: Option<Nearest> = None;
+        let mut limit = limit_sq;
+        let mut stack = [(0u32, 0.0f64); 64];
+        let mut top = usize::from(!self.faces.is_empty());
+        while top > 0 {
+            top -= 1;
+            let (at, near) = stack[top];
+            if near > limit {
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            if node.count > 0 {
+                for i in node.first as usize..(node.first + node.count) as usize {
+                    let (point, feature) = nearest_on_triangle(self.corners[i], q);
+                    let distance_sq = point.distance_squared(q);
+                    if distance_sq < limit || (best.is_none() && distance_sq <= limit) {
+                        limit = distance_sq;
+                        best = Some(Nearest { distance_sq, face: self.faces[i], point, feature });
+                    }
+                }
+                continue;
+            }
+            let [a, b] = [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
+            let (closer, farther) = if a.1 <= b.1 { (a, b) } else { (b, a) };
+            for child in [farther, closer] {
+                if child.1 <= limit {
+                    stack[top] = child;
+                    top += 1;
+                }
+            }
+        }
+        best
+    }
+
+    /// Squared distances, mm², from `q` to the groups that come within `√limit_sq` of it: (group, distance²), sorted by
+    /// group, each group once. `found` is cleared first and reused.
+    pub fn nearest_by_group(&self, q: Vec3, limit_sq: f64, found: &mut Vec<(u32, f64)>) {
+        found.clear();
+        let mut stack = [(0u32, 0.0f64); 64];
+        let mut top = usize::from(!self.faces.is_empty());
+        let known = |found: &[(u32, f64)], g: u32| found.iter().find(|e| e.0 == g).map_or(limit_sq, |e| e.1);
+        while top > 0 {
+            top -= 1;
+            let (at, near) = stack[top];
+            let node = &self.nodes[at as usize];
+            if near > if node.group == MIXED { limit_sq } else { known(found, node.group) } {
+                continue;
+            }
+            if node.count > 0 {
+                for i in node.first as usize..(node.first + node.count) as usize {
+                    let d = nearest_on_triangle(self.corners[i], q).0.distance_squared(q);
+                    match found.iter_mut().find(|e| e.0 == self.groups[i]) {
+                        Some(entry) => entry.1 = entry.1.min(d),
+                        None if d <= limit_sq => found.push((self.groups[i], d)),
+                        None => {}
+                    }
+                }
+                continue;
+            }
+            let [a, b] = [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
+            let (closer, farther) = if a.1 <= b.1 { (a, b) } else { (b, a) };
+            for child in [farther, closer] {
+                if child.1 <= limit_sq {
+                    stack[top] = child;
+                    top += 1;
+                }
+            }
+        }
+        found.sort_unstable_by_key(|e| e.0);
+    }
+}
+
+/// Splits `faces` in place where the surface-area heuristic is least; returns how many go left (never 0 or all).
+fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3]) -> usize {
+    let span = Aabb::around(faces.iter().map(|&f| centers[f as usize]));
+    let size = span.size();
+    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+    let width = size[axis];
+    let half = faces.len() / 2;
+    let by_center = |a: &u32, b: &u32| centers[*a as usize][axis].total_cmp(&centers[*b as usize][axis]).then(a.cmp(b));
+    if width <= 0.0 || faces.len() < 16 {
+        faces.select_nth_unstable_by(half, by_center);
+        return half;
+    }
+    let bin_of =
+        |f: u32| (((centers[f as usize][axis] - span.min[axis]) / width * N_BINS as f64) as usize).min(N_BINS - 1);
+    let mut bins = [(Aabb::EMPTY, 0usize); N_BINS];
+    for &f in faces.iter() {
+        let bin = &mut bins[bin_of(f)];
+        *bin = (bin.0.union(boxes[f as usize]), bin.1 + 1);
+    }
+    let half_area = |b: Aabb| {
+        let s = b.size();
+        s.x * s.y + s.y * s.z + s.z * s.x
+    };
+    let cost_of = |part: &[(Aabb, usize)]| {
+        let (b, n) = part.iter().fold((Aabb::EMPTY, 0), |acc, x| (acc.0.union(x.0), acc.1 + x.1));
+        (half_area(b) * n as f64, n)
+    };
+    let best = (1..N_BINS)
+        .filter_map(|cut| {
+            let (left, right) = (cost_of(&bins[..cut]), cost_of(&bins[cut..]));
+            (left.1 > 0 && right.1 > 0).then_some((cut, left.0 + right.0))
+        })
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    match best {
+        None => {
+            faces.select_nth_unstable_by(half, by_center);
+            half
+        }
+        Some((cut, _)) => {
+            // A stable partition keeps the order, and so the tree, a function of the mesh alone.
+            let (left, right): (Vec<u32>, Vec<u32>) = faces.iter().partition(|&&f| bin_of(f) < cut);
+            faces[..left.len()].copy_from_slice(&left);
+            faces[left.len()..].copy_from_slice(&right);
+            left.len()
+        }
+    }
+}
+
+/// The point of triangle `abc` nearest to `q`, and where on the triangle it is. [Ericson2005, 5.1.5]
+pub fn nearest_on_triangle([a, b, c]: [Vec3; 3], q: Vec3) -> (Vec3, Feature) {
+    let (ab, ac, aq) = (b - a, c - a, q - a);
+    let (d1, d2) = (ab.dot(aq), ac.dot(aq));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return (a, Feature::Corner(0));
+    }
+    let bq = q - b;
+    let (d3, d4) = (ab.dot(bq), ac.dot(bq));
+    if d3 >= 0.0 && d4 <= d3 {
+        return (b, Feature::Corner(1));
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (a + ab * (d1 / (d1 - d3)), Feature::Edge(0));
+    }
+    let cq = q - c;
+    let (d5, d6) = (ab.dot(cq), ac.dot(cq));
+    if d6 >= 0.0 && d5 <= d6 {
+        return (c, Feature::Corner(2));
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (a + ac * (d2 / (d2 - d6)), Feature::Edge(2));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Feature::Edge(1));
+    }
+    let scale = 1.0 / (va + vb + vc);
+    (a + ab * (vb * scale) + ac * (vc * scale), Feature::Face)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::RngExt;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::SeedableRng;
+
+    fn soup(n: usize, rng: &mut ChaCha8Rng) -> TriMesh {
+        let mut p = || Vec3::new(rng.random(), rng.random(), rng.random());
+        let mut mesh = TriMesh::default();
+        for i in 0..n as u32 {
+            let a = p();
+            mesh.points.extend([a, a + 0.1 * p(), a + 0.1 * p()]);
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+        }
+        mesh
+    }
+
+    #[test]
+    fn nearest_agrees_with_brute_force_overall_and_by_group() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mesh = soup(400, &mut rng);
+        let groups: Vec<u32> = (0..400).map(|f| f / 90).collect();
+        let bvh = TriangleBvh::with_groups(&mesh, &groups);
+        let mut found = Vec::new();
+        for _ in 0..300 {
+            let q = Vec3::new(rng.random(), rng.random(), rng.random()) * 1.6 - 0.3;
+            let distance = |f: usize| nearest_on_triangle(mesh.corners(f), q).0.distance_squared(q);
+            let all: f64 = (0..400).map(distance).fold(f64::INFINITY, f64::min);
+            assert_eq!(bvh.nearest(q, f64::INFINITY).unwrap().distance_sq, all);
+            let limit = 0.09;
+            bvh.nearest_by_group(q, limit, &mut found);
+            let expected: Vec<(u32, f64)> = (0..5u32)
+                .map(|g| {
+                    let faces = (0..400).filter(|&f| groups[f] == g);
+                    (g, faces.map(distance).fold(f64::INFINITY, f64::min))
+                })
+                .filter(|e| e.1 <= limit)
+                .collect();
+            assert_eq!(found, expected);
+        }
+    }
+}
