@@ -3,11 +3,16 @@
 //! This crate knows no patch, piece, plan or printer. Lengths are millimetres unless a name says otherwise; fields are
 //! positive inside; triangles are counter-clockwise seen from outside.
 
+pub mod band;
 pub mod boolean;
 pub mod bvh;
+pub mod marching_cubes;
 pub mod mesh;
+pub mod signed_distance;
 pub mod solid;
+pub mod sweep;
 
+pub use band::Band;
 pub use boolean::Volume;
 pub use glam::DVec3 as Vec3;
 pub use mesh::{Aabb, TriMesh};
