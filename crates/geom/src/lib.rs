@@ -6,8 +6,10 @@
 pub mod band;
 pub mod boolean;
 pub mod bvh;
+pub mod level_cut;
 pub mod marching_cubes;
 pub mod mesh;
+pub mod rounding;
 pub mod signed_distance;
 pub mod solid;
 pub mod sweep;

@@ -1,0 +1,125 @@
+//! From exact meshes to the 32-bit coordinates that files hold, without losing what makes them printable.
+
+use std::collections::HashMap;
+
+use crate::{Solid, TriMesh, Vec3, Volume};
+
+/// Edges shorter than this collapse before rounding, mm. A 32-bit coordinate of 150 mm has steps of 1.5e-5 mm.
+const SHORT_MM: f64 = 1e-4;
+/// Points that would fall together without being joined by an edge are moved inwards by this much, mm: far above the
+/// steps of the format, far below what any printer resolves.
+const APART_MM: f64 = 2e-3;
+/// Rounds of collapsing and moving apart. On all test models three were enough.
+const MAX_ROUNDS: usize = 10;
+
+/// Why a region has no printable 32-bit mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NotPrintable {
+    /// Nothing is left.
+    #[error("nothing is left of the body")]
+    Empty,
+    /// Distinct points still fall together after all rounds.
+    #[error("the surface still touches itself at {count} points after rounding, first at ({:.3}, {:.3}, {:.3})", at.x, at.y, at.z)]
+    Touches {
+        /// How many.
+        count: usize,
+        /// The first.
+        at: Vec3,
+    },
+    /// The rounded mesh bounds no volume.
+    #[error("the rounded surface is not closed: {0}")]
+    NotSolid(String),
+}
+
+/// The boundary of `volume` with coordinates that 32-bit floats hold exactly, and no two points at the same place: a
+/// program that merges equal points, as slicers do, sees the same manifold.
+///
+/// Points move by at most a few µm, and only where the surface touches itself or has edges under [`SHORT_MM`].
+pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
+    if volume.is_empty() {
+        return Err(NotPrintable::Empty);
+    }
+    let mut mesh = rounded(&volume.to_mesh());
+    let mut touching = coincident(&mesh);
+    for round in 0..MAX_ROUNDS {
+        if touching.is_empty() {
+            break;
+        }
+        move_apart(&mut mesh, &touching, APART_MM * (1.0 + 0.37 * round as f64));
+        let again = Volume::from_closed_mesh(&mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))?;
+        mesh = rounded(&again.simplify(SHORT_MM).to_mesh());
+        touching = coincident(&mesh);
+    }
+    if let Some(first) = touching.first() {
+        return Err(NotPrintable::Touches { count: touching.len(), at: mesh.points[first[0] as usize] });
+    }
+    Solid::new(mesh).map(Solid::into_mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))
+}
+
+fn rounded(mesh: &TriMesh) -> TriMesh {
+    // Adding 0 turns −0 into 0, so equal points have equal bits.
+    let round = |x: f64| f64::from(x as f32) + 0.0;
+    TriMesh {
+        points: mesh.points.iter().map(|p| Vec3::new(round(p.x), round(p.y), round(p.z))).collect(),
+        triangles: mesh.triangles.clone(),
+    }
+}
+
+/// Groups of different points at the same place, ordered by their first member.
+fn coincident(mesh: &TriMesh) -> Vec<Vec<u32>> {
+    let mut at: HashMap<[u64; 3], Vec<u32>> = HashMap::with_capacity(mesh.points.len());
+    for (v, p) in mesh.points.iter().enumerate() {
+        at.entry(p.to_array().map(f64::to_bits)).or_default().push(v as u32);
+    }
+    let mut groups: Vec<Vec<u32>> = at.into_values().filter(|g| g.len() > 1).collect();
+    groups.sort_unstable();
+    groups
+}
+
+/// Moves every point of every group inwards, unless an edge joins it to its twin (then the edge is left to collapse).
+fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
+    let group_of: HashMap<u32, usize> =
+        groups.iter().enumerate().flat_map(|(g, members)| members.iter().map(move |&v| (v, g))).collect();
+    let mut normals: HashMap<u32, Vec3> = HashMap::new();
+    let mut joined: HashMap<u32, bool> = HashMap::new();
+    for (f, t) in mesh.triangles.iter().enumerate() {
+        for &v in t.iter().filter(|v| group_of.contains_key(v)) {
+            *normals.entry(v).or_default() += mesh.area_vector_doubled(f);
+            let twin = t.iter().any(|w| *w != v && group_of.get(w) == group_of.get(&v));
+            *joined.entry(v).or_default() |= twin;
+        }
+    }
+    for members in groups {
+        for (rank, v) in members.iter().enumerate() {
+            if !joined.get(v).copied().unwrap_or(false) {
+                let inwards = -normals.get(v).copied().unwrap_or_default().normalize_or_zero();
+                // Ranks differ, so that members with the same normal part too.
+                mesh.points[*v as usize] += inwards * by_mm * (1.0 + 0.5 * rank as f64);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Aabb;
+
+    #[test]
+    fn boxes_that_touch_along_an_edge_come_apart() {
+        let a = Volume::cuboid(Aabb { min: Vec3::ZERO, max: Vec3::ONE });
+        let b = Volume::cuboid(Aabb { min: Vec3::new(1.0, 1.0, 0.0), max: Vec3::new(2.0, 2.0, 1.0) });
+        let both = a.union(&b);
+        let mesh = printable(&both).unwrap();
+        assert!(coincident(&mesh).is_empty());
+        assert!((mesh.signed_volume() - 2.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn coordinates_are_exactly_what_32_bits_hold() {
+        let v = Volume::cuboid(Aabb { min: Vec3::splat(0.1), max: Vec3::splat(140.3) });
+        for p in &printable(&v).unwrap().points {
+            assert!(p.to_array().iter().all(|&x| f64::from(x as f32) == x));
+        }
+    }
+}
