@@ -165,6 +165,12 @@ impl Band {
         Some(at)
     }
 
+    /// The up to six nodes next to `node` along the axes.
+    pub fn face_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        let along_x = [-1, 1].into_iter().filter_map(move |dx| self.neighbour(node, [dx, 0, 0]));
+        along_x.chain(self.sides[node as usize].into_iter().filter(|&n| n != NONE))
+    }
+
     /// Trilinear value of `field` at `p`; corners outside the band do not count. `None` where all eight are missing.
     pub fn sample(&self, field: &[f32], p: Vec3) -> Option<f64> {
         let q = (p - self.origin) / self.cell_mm;

@@ -3,9 +3,13 @@
 //! After Yao, Chen, Xu, Wang, "Interlocking-shell pieces", 2017. The stages, in the only direction that data flows:
 //! segmentation → plan → body → connector → piece → verify → report.
 
+pub mod body;
+pub mod connector;
 pub mod context;
 pub mod direction;
 pub mod ids;
+pub mod params;
+pub mod piece;
 pub mod plan;
 pub mod surface;
 

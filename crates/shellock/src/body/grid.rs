@@ -1,0 +1,174 @@
+//! The grid that bodies are computed on: depth below the surface, and distances to the patches.
+
+use rayon::prelude::*;
+use shellock_geom::band::{Band, GridTooFine};
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::marching_cubes::{OffBand, contour};
+use shellock_geom::signed_distance::SignedDistance;
+use shellock_geom::{Aabb, Solid, Vec3, Volume};
+
+use super::BodyParams;
+use crate::{PatchId, SegmentedSurface};
+
+/// Values are cut off this far from the level, in cells: nothing farther than a few cells shapes a contour, and bounded
+/// fields interpolate without jumps.
+const CUTOFF_CELLS: f64 = 6.0;
+/// Width of the band outside the surface, in cells: the cuts must reach past the surface.
+const OUTSIDE_CELLS: f64 = 2.5;
+/// Simplification of the inner surface, mm. The eye and the printer see neither; booleans run on far fewer triangles.
+const INNER_TOLERANCE_MM: f64 = 0.01;
+
+/// Nodes near the model's surface and their depth below it. Depends on the model alone.
+pub struct ShellGrid {
+    /// The nodes.
+    pub band: Band,
+    /// Signed distance to the surface, mm, positive inside: φ0.
+    pub depth: Vec<f32>,
+    /// Wall thickness H, mm.
+    pub thickness_mm: f64,
+    /// Depth to which the band reaches, mm.
+    pub reach_mm: f64,
+}
+
+/// Why the wall cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// Too many steps along one axis.
+    #[error(transparent)]
+    TooFine(#[from] GridTooFine),
+    /// A mesh that the boolean library does not take.
+    #[error(
+        "the model's surface touches itself in a way that cannot be cut: {0}; separate the touching parts or repair the mesh"
+    )]
+    Surface(String),
+    /// Nothing of the model is deeper than the wall is thick.
+    #[error(
+        "the model is nowhere thicker than two walls of {thickness_mm} mm, so there is nothing to hollow out; print it solid, make it larger or choose a thinner wall"
+    )]
+    NoCavity {
+        /// Wall thickness asked for, mm.
+        thickness_mm: f64,
+    },
+}
+
+impl ShellGrid {
+    /// Lays the band of `model`, from a little outside to `below_wall_mm` below the wall.
+    pub fn new(params: &BodyParams, model: &Solid, below_wall_mm: f64) -> Result<Self, GridError> {
+        let cell = params.cell_mm();
+        let reach_mm = params.thickness_mm + below_wall_mm.max(3.0 * cell);
+        let distance = SignedDistance::new(model);
+        let (band, depth) = Band::along(&distance, model.mesh().bounds(), cell, OUTSIDE_CELLS * cell, reach_mm)?;
+        Ok(Self { band, depth, thickness_mm: params.thickness_mm, reach_mm })
+    }
+
+    /// The region deeper than `depth_mm`.
+    pub fn deeper_than(&self, depth_mm: f64) -> Volume {
+        let field: Vec<f32> = self.depth.iter().map(|d| d - depth_mm as f32).collect();
+        let mesh = contour(&self.band, &field, OffBand::LikeNeighbours);
+        Volume::from_closed_mesh(&mesh).expect("contours are manifold").simplify(INNER_TOLERANCE_MM)
+    }
+
+    /// Greatest absolute value kept in fields, mm.
+    pub fn cutoff_mm(&self) -> f32 {
+        (CUTOFF_CELLS * self.band.cell_mm()) as f32
+    }
+
+    /// Whether a node is deep enough below the wall that no body reaches it.
+    pub(super) fn is_below_wall(&self, node: usize) -> bool {
+        f64::from(self.depth[node]) > self.thickness_mm + OUTSIDE_CELLS * self.band.cell_mm()
+    }
+}
+
+/// For each node of the wall, the distances to the patches near it: sparse, since most nodes see one patch alone.
+pub struct PatchDistances {
+    /// Entries of node n are `start[n] .. start[n + 1]`.
+    start: Vec<u32>,
+    entries: Vec<(u32, f32)>,
+}
+
+impl PatchDistances {
+    /// Measures from every node of the wall to every patch that comes within twice the cutoff of its nearest one.
+    pub fn measure(grid: &ShellGrid, surface: &SegmentedSurface) -> Self {
+        let groups: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
+        let bvh = TriangleBvh::with_groups(&surface.mesh, &groups);
+        let span = 2.0 * f64::from(grid.cutoff_mm());
+        let chunk = 4096;
+        let n = grid.band.len();
+        let parts: Vec<(Vec<u32>, Vec<(u32, f32)>)> = (0..n.div_ceil(chunk))
+            .into_par_iter()
+            .map(|c| {
+                let (mut counts, mut entries, mut found) = (Vec::with_capacity(chunk), Vec::new(), Vec::new());
+                for node in c * chunk..((c + 1) * chunk).min(n) {
+                    if grid.is_below_wall(node) {
+                        counts.push(0);
+                        continue;
+                    }
+                    let limit = f64::from(grid.depth[node].abs()) * 1.0001 + 1e-4 + span;
+                    bvh.nearest_by_group(grid.band.position(node), limit * limit, &mut found);
+                    counts.push(found.len() as u32);
+                    entries.extend(found.iter().map(|&(g, d)| (g, d.sqrt() as f32)));
+                }
+                (counts, entries)
+            })
+            .collect();
+        let (mut start, mut entries) = (vec![0u32], Vec::new());
+        for (counts, part) in parts {
+            for count in counts {
+                start.push(start[start.len() - 1] + count);
+            }
+            entries.extend(part);
+        }
+        Self { start, entries }
+    }
+
+    /// `½ (min over remaining j ≠ p of d_j − d_p)` at every node, cut off at ±`cutoff`: positive nearer to `p`.
+    /// `remains[j]` says whether patch j is still there.
+    pub fn preference(&self, p: PatchId, remains: &[bool], cutoff: f32) -> Vec<f32> {
+        (0..self.start.len() - 1)
+            .into_par_iter()
+            .map(|node| {
+                let entries = &self.entries[self.start[node] as usize..self.start[node + 1] as usize];
+                let (mut own, mut others) = (f32::INFINITY, f32::INFINITY);
+                for &(patch, d) in entries {
+                    if patch == p.0 {
+                        own = d;
+                    } else if remains[patch as usize] {
+                        others = others.min(d);
+                    }
+                }
+                // Far from both it does not matter: the node belongs to a piece that has left.
+                if own == f32::INFINITY { -cutoff } else { (0.5 * (others - own)).clamp(-cutoff, cutoff) }
+            })
+            .collect()
+    }
+}
+
+/// A field on the nodes of a box.
+#[derive(Clone, Debug)]
+pub struct LocalField {
+    nodes: Vec<u32>,
+    values: Vec<f32>,
+}
+
+impl LocalField {
+    /// The part of `field` in `room`.
+    pub fn cut_out(band: &Band, field: &[f32], room: Aabb) -> Self {
+        let nodes = band.nodes_in(room);
+        let values = nodes.iter().map(|&n| field[n as usize]).collect();
+        Self { nodes, values }
+    }
+
+    /// The whole field again, `elsewhere` at all other nodes.
+    pub fn spread(&self, band: &Band, elsewhere: f32) -> Vec<f32> {
+        let mut field = vec![elsewhere; band.len()];
+        for (&n, &v) in self.nodes.iter().zip(&self.values) {
+            field[n as usize] = v;
+        }
+        field
+    }
+}
+
+/// Outward unit normal of the offset surface through `p`; zero where the depth field has no slope.
+pub(crate) fn outward(grid: &ShellGrid, p: Vec3) -> Vec3 {
+    -grid.band.gradient(&grid.depth, p).normalize_or_zero()
+}

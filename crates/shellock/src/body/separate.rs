@@ -1,0 +1,295 @@
+//! Splitting the wall, piece by piece, in the order of taking apart.
+
+use rayon::prelude::*;
+use shellock_geom::band::Band;
+use shellock_geom::level_cut::{Side, cut_at_zero};
+use shellock_geom::marching_cubes::{OffBand, contour};
+use shellock_geom::sweep::Sweeper;
+use shellock_geom::{Aabb, Solid, TriMesh, Volume};
+
+use super::BodyParams;
+use super::grid::{GridError, LocalField, PatchDistances, ShellGrid};
+use crate::plan::InstallationPlan;
+use crate::{Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
+
+/// Outer skin of a piece that other pieces' paths must not take from it, in cells. [geometry notes: 1.5]
+const SKIN_CELLS: f64 = 1.5;
+/// What remains is grown by this many cells before it is swept, so that interpolation leaves no rub.
+const MARGIN_CELLS: f64 = 0.15;
+/// Simplification of the cutting surfaces, mm.
+const CUT_TOLERANCE_MM: f64 = 0.008;
+/// The taper of the wall gap begins this far outside the surface, mm: the two sides of a cut then keep a few µm apart even
+/// at the rim, and no boolean meets coincident faces.
+const RIM_LEAD_MM: f64 = 0.05;
+/// Fragments of a body up to this volume are dropped, mm³; more is worth a warning.
+const CHIP_MM3: f64 = 0.5;
+
+/// The separated bodies and what later stages need of the separation.
+pub struct ShellBodies {
+    /// The body of each piece, one connected volume.
+    pub bodies: IdVec<PatchId, Volume>,
+    /// The inner surface of the wall, each triangle with the piece behind it; `None` where there is no cavity.
+    pub inner: Option<SegmentedSurface>,
+    /// Where a piece may have no connectors: positive where bodies lie in its way out, or where it would lie in a later
+    /// piece's way. On the nodes around its patch.
+    pub barred: IdVec<PatchId, LocalField>,
+}
+
+/// Splits the wall of `model` along the plan. The result is a partition of the wall but for the gap inside the seams.
+pub fn build(
+    ctx: &Ctx,
+    params: &BodyParams,
+    model: &Solid,
+    grid: &ShellGrid,
+    distances: &PatchDistances,
+    plan: &InstallationPlan,
+    rooms: &IdVec<PatchId, Aabb>,
+) -> Result<ShellBodies, BodyError> {
+    ctx.stage("bodies", plan.steps.len())?;
+    let outer = Volume::from_solid(model).map_err(|e| GridError::Surface(e.to_string()))?;
+    let cavity = grid.deeper_than(grid.thickness_mm);
+    if cavity.is_empty() {
+        return Err(GridError::NoCavity { thickness_mm: grid.thickness_mm }.into());
+    }
+    let mut work = Separation::new(params, grid, distances, plan.steps.len());
+    let mut inner = InnerSurface::new(grid);
+    let mut rest = outer.subtract(&cavity);
+    let mut bodies: Vec<Option<Volume>> = vec![None; plan.steps.len()];
+    let mut barred: Vec<Option<LocalField>> = vec![None; plan.steps.len()];
+    for step in plan.removal() {
+        let p = step.piece;
+        let is_last = work.n_left() == 1;
+        if is_last {
+            bodies[usize::from(p)] = Some(whole_body(ctx, p, &rest));
+            barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &work.in_later_ways, rooms[p]));
+            inner.give_rest(p);
+        } else {
+            let cut = work.cut(p, step.separation);
+            let (keep, leave) = rayon::join(|| work.tool(&cut, 1.0), || work.tool(&cut, -1.0));
+            let (body, next) = rayon::join(|| rest.intersect(&keep), || rest.subtract(&leave));
+            bodies[usize::from(p)] = Some(whole_body(ctx, p, &body));
+            rest = next;
+            inner.give(p, &cut, &grid.band);
+            let in_way = work.remove(p, step.separation, &cut);
+            barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
+        }
+        ctx.step()?;
+    }
+    let every = "every piece of a plan is removed once";
+    Ok(ShellBodies {
+        bodies: bodies.into_iter().map(|b| b.expect(every)).collect(),
+        inner: inner.finish(plan.steps.len()),
+        barred: barred.into_iter().map(|b| b.expect(every)).collect(),
+    })
+}
+
+/// Why the wall cannot be split.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BodyError {
+    /// The grid or the model's surface.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] crate::Cancelled),
+}
+
+/// The largest connected part of `body`.
+fn whole_body(ctx: &Ctx, p: PatchId, body: &Volume) -> Volume {
+    let parts = body.components();
+    // Cavities come as parts of negative volume; a wall body has none unless the model has.
+    let dropped: f64 = parts.iter().skip(1).map(Volume::volume).filter(|v| *v > 0.0).sum();
+    if dropped > CHIP_MM3 {
+        ctx.warn(Warning {
+            code: "body-in-parts".into(),
+            message: format!("piece {p}: fragments of {dropped:.1} mm³ were cut off from its body and dropped"),
+            pieces: vec![p],
+            at: parts.get(1).map(|c| c.bounds().center().to_array()),
+        });
+    }
+    parts.into_iter().next().unwrap_or_else(Volume::empty)
+}
+
+/// The state between two removals.
+struct Separation<'a> {
+    params: &'a BodyParams,
+    grid: &'a ShellGrid,
+    distances: &'a PatchDistances,
+    sweeper: Sweeper<'a>,
+    remains: Vec<bool>,
+    /// Positive where the material is that has not left, apart from the wall's own limits.
+    rest: Vec<f32>,
+    /// Positive where a later piece passes on its way out, or lies.
+    in_later_ways: Vec<f32>,
+}
+
+impl<'a> Separation<'a> {
+    fn new(params: &'a BodyParams, grid: &'a ShellGrid, distances: &'a PatchDistances, n_pieces: usize) -> Self {
+        let cutoff = grid.cutoff_mm();
+        Self {
+            params,
+            grid,
+            distances,
+            sweeper: Sweeper::new(&grid.band),
+            remains: vec![true; n_pieces],
+            rest: vec![cutoff; grid.band.len()],
+            in_later_ways: vec![-cutoff; grid.band.len()],
+        }
+    }
+
+    fn n_left(&self) -> usize {
+        self.remains.iter().filter(|r| **r).count()
+    }
+
+    /// The wall, positive inside, extended outwards by `beyond_mm`.
+    fn wall(&self, node: usize, beyond_mm: f32) -> f32 {
+        let depth = self.grid.depth[node];
+        (depth + beyond_mm).min(self.grid.thickness_mm as f32 - depth)
+    }
+
+    /// `g_p`: positive on the side of p.
+    fn cut(&self, p: PatchId, separation: LatticeDirection) -> Vec<f32> {
+        let cutoff = self.grid.cutoff_mm();
+        let cell = self.grid.band.cell_mm() as f32;
+        let (skin_mm, margin) = (SKIN_CELLS as f32 * cell, MARGIN_CELLS as f32 * cell);
+        let along = separation.step();
+        let phi = self.distances.preference(p, &self.remains, cutoff);
+        let at = |node: usize, side: f32| self.wall(node, cell).min(side).min(self.rest[node]);
+        let skin: Vec<f32> = (0..phi.len())
+            .into_par_iter()
+            .map(|n| at(n, phi[n]).min(skin_mm - self.grid.depth[n]).max(-cutoff))
+            .collect();
+        let ahead_of_skin = self.sweeper.max_ahead(&skin, along.map(|x| -x));
+        let staying: Vec<f32> = (0..phi.len())
+            .into_par_iter()
+            .map(|n| (at(n, -phi[n]).min(-ahead_of_skin[n]) + margin).max(-cutoff))
+            .collect();
+        let behind_staying = self.sweeper.max_ahead(&staying, along);
+        let mut g: Vec<f32> =
+            (0..phi.len()).into_par_iter().map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n])).collect();
+        self.give_fragments_back(&mut g);
+        g
+    }
+
+    /// Leaves one connected part on each side of the cut: a fragment goes to the side that surrounds it.
+    fn give_fragments_back(&self, g: &mut [f32]) {
+        let away = 0.3 * self.grid.band.cell_mm() as f32;
+        for side in [1.0f32, -1.0] {
+            let is_member = |n: usize, g: &[f32]| self.wall(n, 0.0) > 0.0 && self.rest[n] > 0.0 && side * g[n] > 0.0;
+            for fragment in minor_components(&self.grid.band, |n| is_member(n, g)) {
+                for n in fragment {
+                    g[n as usize] = -side * away;
+                }
+            }
+        }
+    }
+
+    /// A solid to cut with: what lies on p's side of the cut, less (`side` = 1) or more (−1) the gap inside the wall.
+    fn tool(&self, g: &[f32], side: f32) -> Volume {
+        let cell = self.grid.band.cell_mm() as f32;
+        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
+        let field: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| {
+                let depth = self.grid.depth[n];
+                let taper = ((depth + RIM_LEAD_MM as f32) / rim).clamp(-1.0, 1.0);
+                // Nothing is cut below the wall or where earlier removals took everything.
+                let limits = (self.grid.thickness_mm as f32 + 1.8 * cell - depth).min(self.rest[n] + 2.5 * cell);
+                (g[n] - side * gap * taper).min(limits)
+            })
+            .collect();
+        let mesh: TriMesh = contour(&self.grid.band, &field, OffBand::Outside);
+        Volume::from_closed_mesh(&mesh).expect("contours are manifold").simplify(CUT_TOLERANCE_MM)
+    }
+
+    /// Takes p away; returns where p may have no connectors.
+    fn remove(&mut self, p: PatchId, separation: LatticeDirection, g: &[f32]) -> Vec<f32> {
+        let cutoff = self.grid.cutoff_mm();
+        let along = separation.step();
+        let body: Vec<f32> =
+            (0..g.len()).into_par_iter().map(|n| self.wall(n, 0.0).min(g[n]).min(self.rest[n]).max(-cutoff)).collect();
+        self.remains[usize::from(p)] = false;
+        self.rest.par_iter_mut().zip(g).for_each(|(r, g)| *r = r.min(-g));
+        let staying: Vec<f32> =
+            (0..g.len()).into_par_iter().map(|n| self.wall(n, 0.0).min(self.rest[n]).max(-cutoff)).collect();
+        let (behind_staying, ahead_of_p) = rayon::join(
+            || self.sweeper.max_ahead(&staying, along),
+            || self.sweeper.max_ahead(&body, along.map(|x| -x)),
+        );
+        let in_way = behind_staying.iter().zip(&self.in_later_ways).map(|(a, b)| a.max(*b)).collect();
+        self.in_later_ways.par_iter_mut().zip(&ahead_of_p).for_each(|(w, a)| *w = w.max(*a));
+        in_way
+    }
+}
+
+/// Connected components of the nodes for which `is_member` holds, all but the largest; connected across cell edges.
+fn minor_components(band: &Band, is_member: impl Fn(usize) -> bool + Sync) -> Vec<Vec<u32>> {
+    let member: Vec<bool> = (0..band.len()).into_par_iter().map(&is_member).collect();
+    let mut seen = vec![false; band.len()];
+    let mut components: Vec<Vec<u32>> = Vec::new();
+    for seed in 0..band.len() {
+        if !member[seed] || seen[seed] {
+            continue;
+        }
+        seen[seed] = true;
+        let mut component = vec![seed as u32];
+        let mut next = 0;
+        while next < component.len() {
+            for node in band.face_neighbours(component[next]) {
+                if member[node as usize] && !std::mem::replace(&mut seen[node as usize], true) {
+                    component.push(node);
+                }
+            }
+            next += 1;
+        }
+        components.push(component);
+    }
+    components.sort_by_key(|c| std::cmp::Reverse(c.len()));
+    components.split_off(components.len().min(1))
+}
+
+/// The inner surface of the wall while its owners are found.
+struct InnerSurface {
+    mesh: TriMesh,
+    owner: Vec<Option<PatchId>>,
+}
+
+impl InnerSurface {
+    fn new(grid: &ShellGrid) -> Self {
+        let field: Vec<f32> = grid.depth.iter().map(|d| d - grid.thickness_mm as f32).collect();
+        let mesh = contour(&grid.band, &field, OffBand::LikeNeighbours);
+        let owner = vec![None; mesh.triangles.len()];
+        Self { mesh, owner }
+    }
+
+    /// Gives to `p` what lies on its side of the cut `g`.
+    fn give(&mut self, p: PatchId, g: &[f32], band: &Band) {
+        let values: Vec<f64> = self.mesh.points.par_iter().map(|&x| band.sample(g, x).unwrap_or(-1.0)).collect();
+        let cut = cut_at_zero(&self.mesh, &values, |face| self.owner[face].is_none());
+        self.owner = cut
+            .source_face
+            .iter()
+            .zip(&cut.side)
+            .map(|(&source, side)| match side {
+                Side::Positive => Some(p),
+                Side::Negative => None,
+                Side::Bystander => self.owner[source as usize],
+            })
+            .collect();
+        self.mesh = cut.mesh;
+    }
+
+    fn give_rest(&mut self, p: PatchId) {
+        self.owner.iter_mut().for_each(|o| *o = o.or(Some(p)));
+    }
+
+    fn finish(self, n_patches: usize) -> Option<SegmentedSurface> {
+        let n = self.mesh.triangles.len();
+        (n > 0).then(|| SegmentedSurface {
+            mesh: self.mesh,
+            patch_of_face: self.owner.into_iter().map(|o| o.expect("the last piece took the rest")).collect(),
+            source_face: (0..n as u32).collect(),
+            n_patches,
+        })
+    }
+}

@@ -1,0 +1,68 @@
+//! Connectors under the seams (Sect. 4.2): a pin on one piece, a channel around it on the other.
+//!
+//! Cross-section of a seam, seen along its tangent, for a piece that leaves straight outwards (left) and one that slides
+//! away sideways (right); M male, F female:
+//!
+//! ```text
+//!      outside                          outside
+//!  ─────────┬─────────              ─────────┬─────────
+//!   M M M M │ F F F F                M M M M │ F F F F
+//!  ───────┐M│F┌───────              ──────┐M └────────┐F
+//!      F┌┐│M│F│     cavity                │M M M M M┐ │F
+//!      F│└┘ ┘F│                           └───────┐M│ │F
+//!      F└─────┘                            F└─────┴─┘─┘F
+//! ```
+//!
+//! A run of connectors is one profile swept along the seam; its shape changes smoothly with the angle between the
+//! separation direction and the surface. The socket is the swept pin grown by the clearance, so the pin can leave along
+//! the separation direction and along no other.
+
+mod frame;
+mod profile;
+mod run;
+
+pub use frame::{Curve, curves};
+pub use profile::{Part, Section};
+pub use run::{Contact, Run, Station, runs};
+
+use crate::params::ParamProblem;
+
+/// How connectors are made. Lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConnectorParams {
+    /// Connector size D: depth and width of the channel. [1.5, 6]; 2.5.
+    ///
+    /// The published range is 2–4 mm (Eq. 3); walls of channel and pin come out at about 0.45 D.
+    pub size_mm: f64,
+    /// Gap between mating faces. [0.03, 0.6]; 0.12.
+    ///
+    /// Resin printers hold 0.05–0.15 mm a side, filament printers want 0.15–0.3.
+    pub clearance_mm: f64,
+    /// Thinnest wall left standing. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
+    pub min_wall_mm: f64,
+}
+
+impl Default for ConnectorParams {
+    fn default() -> Self {
+        Self { size_mm: 2.5, clearance_mm: 0.12, min_wall_mm: 0.4 }
+    }
+}
+
+impl ConnectorParams {
+    /// Room below the wall that connectors may take, mm: a channel under the steepest backward seam is as deep.
+    pub fn room_mm(&self) -> f64 {
+        2.1 * self.size_mm + self.clearance_mm
+    }
+
+    /// Every value out of range.
+    pub fn problems(&self) -> Vec<ParamProblem> {
+        [
+            ParamProblem::unless_within("connector size", "mm", self.size_mm, 1.5, 6.0),
+            ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
+            ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}

@@ -1,0 +1,120 @@
+//! The cross-section of a connector.
+
+use shellock_geom::Vec3;
+
+use super::{ConnectorParams, Station};
+
+/// A rectangle of the cross-section: from `n0` to `n1` along the frame's `n`, from `s0` to `s1` along ŝ, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Least coordinate along `n`.
+    pub n0: f64,
+    /// Greatest coordinate along `n`.
+    pub n1: f64,
+    /// Least coordinate along ŝ.
+    pub s0: f64,
+    /// Greatest coordinate along ŝ.
+    pub s1: f64,
+}
+
+impl Part {
+    /// The rectangle with all sides moved outwards.
+    pub fn grown(self, by_mm: f64) -> Self {
+        Self { n0: self.n0 - by_mm, n1: self.n1 + by_mm, s0: self.s0 - by_mm, s1: self.s1 + by_mm }
+    }
+
+    /// Its four corners at a station.
+    pub fn corners(self, at: &Station) -> [Vec3; 4] {
+        [(self.n0, self.s0), (self.n1, self.s0), (self.n1, self.s1), (self.n0, self.s1)]
+            .map(|(n, s)| at.point + n * at.n + s * at.s)
+    }
+}
+
+/// The cross-section at a station: convex parts whose unions are the male and the female half.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section {
+    /// The pin below the seam; then, where the male leaves sideways, the foot that joins it to its body.
+    pub male: [Option<Part>; 2],
+    /// Bottom, far wall and near wall of the channel.
+    pub female: [Option<Part>; 3],
+}
+
+/// Below this angle between ŝ and the surface normal, in radians, the pin is a tongue and needs a foot: at −40°.
+const TONGUE_ANGLE: f64 = -0.698;
+/// How far parts reach into the wall they hang from, mm.
+const ROOT_MM: f64 = 0.6;
+
+impl Section {
+    /// The cross-section for the angle `T` of a station: −90° a tongue under the female (forward connector), 0 a pin that
+    /// pulls straight out, up to 60° backward.
+    ///
+    /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across the seam.
+    pub fn at(params: &ConnectorParams, station: &Station) -> Self {
+        let (d, c) = (params.size_mm, params.clearance_mm);
+        let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
+        // Stretch along ŝ; ŝ leans against the seam by the angle whose cosine is `depth`.
+        let k = 1.0 / station.depth.max(0.4);
+        let (pin_width, foot_width) = (0.5 * d, 0.5 * d);
+        let (wall, bottom) = (0.5 * d - c, 0.45 * d);
+        let lean = pin_width * backward.tan();
+        let pin_depth = (0.6 * d + lean) * k;
+        let top_male = d.min(pin_width * forward.min(1.48).tan() + ROOT_MM) * k;
+        let is_tongue = station.theta < TONGUE_ANGLE;
+        let top_near = if is_tongue { 0.0 } else { (foot_width * backward.tan() + 0.5) * k };
+        let (c_s, floor) = (c * k, -pin_depth - c * k - bottom * k);
+        let far = -pin_width - c - wall;
+        Self {
+            male: [
+                Some(Part { n0: -pin_width, n1: -c, s0: -pin_depth, s1: top_male }),
+                is_tongue.then_some(Part { n0: -pin_width, n1: ROOT_MM, s0: 0.35, s1: top_male }),
+            ],
+            female: [
+                Some(Part { n0: far, n1: foot_width, s0: floor, s1: -pin_depth - c_s }),
+                Some(Part { n0: far, n1: -pin_width - c, s0: floor, s1: -lean * k - c_s }),
+                Some(Part { n0: 0.0, n1: foot_width, s0: floor, s1: top_near }),
+            ],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn station(theta_degrees: f64) -> Station {
+        Station {
+            point: Vec3::ZERO,
+            tangent: Vec3::X,
+            n: Vec3::Y,
+            s: Vec3::Z,
+            theta: theta_degrees.to_radians(),
+            depth: 1.0,
+            arc_mm: 0.0,
+        }
+    }
+
+    #[test]
+    fn pin_and_channel_keep_the_clearance_at_every_angle() {
+        let params = ConnectorParams::default();
+        for degrees in (-90..=60).step_by(5) {
+            let section = Section::at(&params, &station(f64::from(degrees)));
+            let pin = section.male[0].unwrap();
+            for wall in section.female.iter().flatten() {
+                let gap_n = (wall.n0 - pin.n1).max(pin.n0 - wall.n1);
+                let gap_s = (wall.s0 - pin.s1).max(pin.s0 - wall.s1);
+                assert!(gap_n.max(gap_s) >= params.clearance_mm - 1e-12, "at {degrees}°: {wall:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_wall_is_thinner_than_the_least() {
+        let params = ConnectorParams::default();
+        for degrees in (-90..=60).step_by(5) {
+            let section = Section::at(&params, &station(f64::from(degrees)));
+            for part in section.male.iter().chain(&section.female).flatten() {
+                assert!((part.n1 - part.n0).min(part.s1 - part.s0) >= params.min_wall_mm, "at {degrees}°: {part:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Where connectors can be, and the runs they form.
+
+use shellock_geom::Vec3;
+
+use super::frame::Curve;
+use super::{ConnectorParams, Section};
+use crate::PatchId;
+use crate::plan::InstallationPlan;
+
+/// Steepest backward angle T that gives a sound pin, rad: 60°.
+const STEEPEST: f64 = 1.047;
+/// Where the separation direction runs along the seam by more than this (|ŝ·u|), a connector is too shallow to hold.
+const SHALLOWEST: f64 = 0.9;
+/// The male role changes sides only where |ŝ·N| exceeds this, so that it does not flicker along a run.
+const ROLE_HYSTERESIS: f64 = 0.1;
+/// Frames that turn by more than this between neighbouring points, rad, cannot be swept.
+const SHARPEST_TURN: f64 = 0.42;
+/// Free seam at the ends of a curve, in connector sizes: other seams' connectors come there.
+const END_GAP: f64 = 1.5;
+/// Shortest run, in connector sizes.
+const SHORTEST_RUN: f64 = 1.2;
+/// A cell of a run may leave its curve by this much, mm, turn by this much, rad, and be this long, mm.
+const CELL_SAG_MM: f64 = 0.03;
+const CELL_TURN: f64 = 0.12;
+const CELL_LENGTH_MM: f64 = 6.0;
+/// Share of a section's sample points that must be free for a connector to be worth making there.
+const LEAST_FREE: f64 = 0.6;
+
+/// A place on a run, with the frame of its cross-section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Station {
+    /// On the edge between the wall and the inner surface.
+    pub point: Vec3,
+    /// Unit tangent `u` of the seam.
+    pub tangent: Vec3,
+    /// Unit vector from male to female, perpendicular to `u` and ŝ.
+    pub n: Vec3,
+    /// ŝ: unit direction in which the male leaves the female.
+    pub s: Vec3,
+    /// T: angle from the outward normal to ŝ, seen along the seam, positive towards the female; rad in [−π/2, π/2].
+    pub theta: f64,
+    /// Length of ŝ across the seam, in (0, 1].
+    pub depth: f64,
+    /// Distance along the curve, mm.
+    pub arc_mm: f64,
+}
+
+/// One stretch of connector: a pin of `male` in a channel of `female`.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The piece with the pin.
+    pub male: PatchId,
+    /// The piece with the channel.
+    pub female: PatchId,
+    /// Sections to sweep through, in order; two or more.
+    pub stations: Vec<Station>,
+}
+
+impl Run {
+    /// Length along the seam, mm.
+    pub fn length(&self) -> f64 {
+        self.stations.windows(2).map(|w| w[0].point.distance(w[1].point)).sum()
+    }
+
+    /// The middle station's place.
+    pub fn middle(&self) -> Vec3 {
+        self.stations[self.stations.len() / 2].point
+    }
+}
+
+/// What a seam between two pieces offers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contact {
+    /// The piece installed later.
+    pub later: PatchId,
+    /// The piece installed earlier.
+    pub earlier: PatchId,
+    /// Length of the seam on the inner surface, mm.
+    pub length_mm: f64,
+    /// Length on which angles, ends and turns allow a connector, mm.
+    pub usable_mm: f64,
+    /// A point in its middle.
+    pub at: Vec3,
+}
+
+/// The runs along all curves, and what each curve offered. `is_free(piece, point)` says whether `piece` may have material
+/// at a point below the wall; `None` where the point lies in or above the wall and does not count.
+pub fn runs(
+    params: &ConnectorParams,
+    plan: &InstallationPlan,
+    curves: &[Curve],
+    is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
+) -> (Vec<Run>, Vec<Contact>) {
+    let (mut runs, mut contacts) = (Vec::new(), Vec::new());
+    for curve in curves {
+        let separation = plan.separation(curve.later).unit();
+        let later_is_male = roles(curve, separation);
+        let stations: Vec<Station> =
+            (0..curve.points.len()).map(|i| station(curve, i, separation, later_is_male[i])).collect();
+        let mut allowed = allowed(params, curve, &stations, &later_is_male);
+        let step = |i: usize| stations[i].point.distance(stations[i + 1].point);
+        contacts.push(Contact {
+            later: curve.later,
+            earlier: curve.earlier,
+            length_mm: (0..stations.len() - 1).map(step).sum(),
+            usable_mm: (0..stations.len() - 1).filter(|&i| allowed[i] && allowed[i + 1]).map(step).sum(),
+            at: curve.points[curve.points.len() / 2],
+        });
+        for i in 0..stations.len() {
+            let (male, female) = sides(curve, later_is_male[i]);
+            allowed[i] = allowed[i] && has_room(params, &stations[i], male, female, is_free);
+        }
+        for (from, to) in stretches(&allowed, &later_is_male) {
+            let run = thinned(&stations[from..=to]);
+            let (male, female) = sides(curve, later_is_male[from]);
+            if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN * params.size_mm {
+                runs.push(Run { male, female, stations: run });
+            }
+        }
+    }
+    (runs, contacts)
+}
+
+fn sides(curve: &Curve, later_is_male: bool) -> (PatchId, PatchId) {
+    if later_is_male { (curve.later, curve.earlier) } else { (curve.earlier, curve.later) }
+}
+
+/// Whether the later piece carries the pin at each point: where it leaves outwards.
+fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
+    let outwards: Vec<f64> = curve.normals.iter().map(|n| n.dot(separation)).collect();
+    let mut role = outwards.iter().find(|o| o.abs() > ROLE_HYSTERESIS).is_none_or(|o| *o > 0.0);
+    outwards
+        .iter()
+        .map(|&o| {
+            if o.abs() > ROLE_HYSTERESIS {
+                role = o > 0.0;
+            }
+            role
+        })
+        .collect()
+}
+
+fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool) -> Station {
+    let (u, normal) = (curve.tangents[i], curve.normals[i]);
+    let (s, to_female) = if later_is_male { (separation, curve.across[i]) } else { (-separation, -curve.across[i]) };
+    let across = s - s.dot(u) * u;
+    let depth = across.length();
+    let flat = across.normalize_or_zero();
+    let theta = flat.dot(to_female).atan2(flat.dot(normal));
+    let n = (theta.cos() * to_female - theta.sin() * normal).normalize_or_zero();
+    let arc_mm = curve.points[..=i].windows(2).map(|w| w[0].distance(w[1])).sum();
+    Station { point: curve.points[i], tangent: u, n, s, theta, depth, arc_mm }
+}
+
+/// Where ends, roles, angles and turns allow a connector.
+fn allowed(params: &ConnectorParams, curve: &Curve, stations: &[Station], later_is_male: &[bool]) -> Vec<bool> {
+    let n = stations.len();
+    let length = stations[n - 1].arc_mm;
+    let end = END_GAP * params.size_mm;
+    let turns = |i: usize, j: usize| stations[i].n.dot(stations[j].n) < SHARPEST_TURN.cos();
+    (0..n)
+        .map(|i| {
+            let s = &stations[i];
+            let clear_of_ends = curve.is_loop || (s.arc_mm >= end && s.arc_mm <= length - end);
+            let near = i.saturating_sub(1)..=(i + 1).min(n - 1);
+            let same_role = near.clone().all(|j| later_is_male[j] == later_is_male[i]);
+            let gentle = near.clone().all(|j| !turns(i, j));
+            // Just below −90° is a tongue that hysteresis kept; anything beyond is the other side's pin.
+            let sound = s.theta <= STEEPEST && s.theta >= -1.75;
+            clear_of_ends && same_role && gentle && sound && s.s.dot(s.tangent).abs() <= SHALLOWEST
+        })
+        .collect()
+}
+
+/// Whether both halves keep most of their section.
+fn has_room(
+    params: &ConnectorParams,
+    station: &Station,
+    male: PatchId,
+    female: PatchId,
+    is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
+) -> bool {
+    let section = Section::at(params, station);
+    let halves: [(PatchId, &[Option<super::Part>]); 2] = [(male, &section.male), (female, &section.female)];
+    halves.iter().all(|(piece, parts)| {
+        let (mut free, mut all) = (0.0, 0.0);
+        for part in parts.iter().flatten() {
+            for (a, b) in (0..9).map(|i| (f64::from(i % 3), f64::from(i / 3))) {
+                let n = part.n0 + (part.n1 - part.n0) * (0.5 + a) / 3.0;
+                let s = part.s0 + (part.s1 - part.s0) * (0.5 + b) / 3.0;
+                if let Some(ok) = is_free(*piece, station.point + n * station.n + s * station.s) {
+                    all += 1.0;
+                    free += f64::from(u8::from(ok));
+                }
+            }
+        }
+        all > 0.0 && free >= LEAST_FREE * all
+    })
+}
+
+/// Maximal stretches of allowed points with one role, as index ranges with both ends.
+fn stretches(allowed: &[bool], role: &[bool]) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut from = 0;
+    while from < allowed.len() {
+        let mut to = from;
+        while to + 1 < allowed.len() && allowed[to] && allowed[to + 1] && role[to + 1] == role[from] {
+            to += 1;
+        }
+        if allowed[from] && to > from {
+            found.push((from, to));
+        }
+        from = to + 1;
+    }
+    found
+}
+
+/// The fewest stations whose cells follow the run within the sag and turn limits.
+fn thinned(stations: &[Station]) -> Vec<Station> {
+    let mut kept = vec![stations[0]];
+    let mut from = 0;
+    for to in 2..stations.len() {
+        let (a, b) = (&stations[from], &stations[to]);
+        let chord = (b.point - a.point).normalize_or_zero();
+        let sags = stations[from + 1..to].iter().any(|s| {
+            let off = s.point - a.point;
+            (off - off.dot(chord) * chord).length() > CELL_SAG_MM
+        });
+        let turns = a.n.dot(b.n) < CELL_TURN.cos() || (a.theta - b.theta).abs() > CELL_TURN;
+        if sags || turns || b.arc_mm - a.arc_mm > CELL_LENGTH_MM {
+            from = to - 1;
+            kept.push(stations[from]);
+        }
+    }
+    kept.push(stations[stations.len() - 1]);
+    kept
+}

@@ -1,0 +1,140 @@
+//! Half connectors as volumes, and what is carved from them.
+
+use rayon::prelude::*;
+use shellock_geom::{Aabb, Vec3, Volume};
+
+use crate::connector::{ConnectorParams, Part, Run, Section, Station};
+use crate::{LatticeDirection, PatchId};
+
+/// The socket is grown by this much less than the clearance, mm: the channel's section already keeps the clearance, and
+/// faces that would coincide stay apart.
+const SOCKET_SLACK_MM: f64 = 0.02;
+
+/// Which half of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Half {
+    Male,
+    Female,
+}
+
+/// The corners of one convex cell of a run.
+type Cell = [Vec3; 8];
+
+/// The convex cells of one half: for each part of the section, one between each two stations. With `grown_mm`, every cell
+/// is larger by that on all sides, lengthwise at the run's ends.
+fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Cell> {
+    let last = run.stations.len() - 1;
+    let sections: Vec<(Station, Vec<Option<Part>>)> = run
+        .stations
+        .iter()
+        .enumerate()
+        .map(|(i, station)| {
+            let section = Section::at(params, station);
+            let parts = match half {
+                Half::Male => section.male.to_vec(),
+                Half::Female => section.female.to_vec(),
+            };
+            let lengthwise = if i == 0 {
+                -grown_mm
+            } else if i == last {
+                grown_mm
+            } else {
+                0.0
+            };
+            let moved = Station { point: station.point + lengthwise * station.tangent, ..*station };
+            (moved, parts.into_iter().map(|p| p.map(|p| p.grown(grown_mm))).collect())
+        })
+        .collect();
+    let mut cells = Vec::new();
+    for pair in sections.windows(2) {
+        for (a, b) in pair[0].1.iter().zip(&pair[1].1) {
+            if let (Some(a), Some(b)) = (a, b) {
+                let (a, b) = (a.corners(&pair[0].0), b.corners(&pair[1].0));
+                cells.push([a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]);
+            }
+        }
+    }
+    cells
+}
+
+/// One half of a run as it is before anything is carved.
+pub(super) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Volume {
+    Volume::union_all(cells(params, run, half, 0.0).iter().map(|c| Volume::hull(c)).collect())
+}
+
+/// What a piece sweeps with its half connectors on its way out.
+pub(super) struct Wake {
+    cells: Vec<(Cell, Aabb)>,
+    along: Vec3,
+}
+
+impl Wake {
+    /// The wake of all half connectors of `piece`.
+    pub(super) fn of(params: &ConnectorParams, runs: &[Run], piece: PatchId, separation: LatticeDirection) -> Self {
+        let grown = params.clearance_mm - SOCKET_SLACK_MM.min(0.5 * params.clearance_mm);
+        let cells = runs
+            .iter()
+            .flat_map(|run| {
+                let male = (run.male == piece).then(|| cells(params, run, Half::Male, grown));
+                let female = (run.female == piece).then(|| cells(params, run, Half::Female, grown));
+                male.into_iter().chain(female).flatten()
+            })
+            .map(|cell| (cell, Aabb::around(cell)))
+            .collect();
+        Self { cells, along: separation.unit() }
+    }
+
+    /// The parts of the wake that can meet `room`, each cut to the distances at which it does.
+    fn meeting(&self, room: Aabb, far_mm: f64) -> Vec<Volume> {
+        self.cells
+            .iter()
+            .filter_map(|(cell, bounds)| {
+                let (from, to) = distances_that_meet(*bounds, self.along, room, far_mm)?;
+                let ends: Vec<Vec3> =
+                    [from, to].iter().flat_map(|t| cell.iter().map(move |c| *c + *t * self.along)).collect();
+                Some(Volume::hull(&ends))
+            })
+            .collect()
+    }
+}
+
+/// The least and greatest t in [0, `far_mm`] for which `moving + t·along` meets `room`.
+fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm: f64) -> Option<(f64, f64)> {
+    let (mut from, mut to) = (0.0f64, far_mm);
+    for axis in 0..3 {
+        let (low, high) = (room.min[axis] - moving.max[axis], room.max[axis] - moving.min[axis]);
+        let speed = along[axis];
+        if speed == 0.0 {
+            if low > 0.0 || high < 0.0 {
+                return None;
+            }
+        } else {
+            let (a, b) = (low / speed, high / speed);
+            from = from.max(a.min(b));
+            to = to.min(a.max(b));
+        }
+    }
+    (from <= to).then_some((from, to))
+}
+
+/// `volume` less everything that `wakes` sweep through it.
+pub(super) fn carved(volume: &Volume, wakes: &[Wake], far_mm: f64) -> Volume {
+    let room = volume.bounds();
+    let swept: Vec<Volume> = wakes.par_iter().flat_map_iter(|w| w.meeting(room, far_mm)).collect();
+    if swept.is_empty() { volume.clone() } else { volume.subtract(&Volume::union_all(swept)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_meets_a_room_exactly_between_two_distances() {
+        let cube = |x: f64| Aabb { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 1.0, 1.0, 1.0) };
+        let (from, to) = distances_that_meet(cube(0.0), Vec3::X, cube(5.0), 100.0).unwrap();
+        assert_eq!((from, to), (4.0, 6.0));
+        assert_eq!(distances_that_meet(cube(0.0), -Vec3::X, cube(5.0), 100.0), None);
+        assert_eq!(distances_that_meet(cube(0.0), Vec3::X, cube(5.0), 3.0), None);
+        assert_eq!(distances_that_meet(cube(0.0), Vec3::Y, cube(5.0), 100.0), None);
+    }
+}

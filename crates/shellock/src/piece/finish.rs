@@ -1,0 +1,162 @@
+//! From bodies and runs to printable meshes.
+
+use rayon::prelude::*;
+use shellock_geom::marching_cubes::{OffBand, contour};
+use shellock_geom::rounding::{NotPrintable, printable};
+use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
+
+use super::carve::{Half, Wake, carved, whole_half};
+use crate::body::{ShellBodies, ShellGrid};
+use crate::connector::{ConnectorParams, Run};
+use crate::plan::InstallationPlan;
+use crate::{Cancelled, Ctx, IdVec, PatchId};
+
+/// How far connectors reach into the wall they hang from, mm.
+const ROOT_MM: f64 = 0.4;
+/// A run of which less than this share of either half survives the carving is given up, both halves.
+const LEAST_KEPT: f64 = 0.3;
+/// Simplification of the carving surfaces, mm.
+const CARVE_TOLERANCE_MM: f64 = 0.01;
+
+/// How one run came out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// The piece with the pin.
+    pub male: PatchId,
+    /// The piece with the channel.
+    pub female: PatchId,
+    /// Length along the seam, mm; 0 where the run was given up.
+    pub length_mm: f64,
+    /// Volume of the pin and of the channel below the wall, mm³, after carving.
+    pub volume_mm3: [f64; 2],
+    /// Share of each half that survived the carving, in [0, 1].
+    pub kept: [f64; 2],
+    /// Its middle.
+    pub at: Vec3,
+}
+
+/// The finished pieces.
+pub struct Finished {
+    /// One closed mesh a piece, with coordinates that 32-bit floats hold.
+    pub meshes: IdVec<PatchId, TriMesh>,
+    /// One joint a run.
+    pub joints: Vec<Joint>,
+}
+
+/// Why a piece could not be finished.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PieceError {
+    /// Its surface cannot be written.
+    #[error("piece {piece}: {reason}")]
+    NotPrintable {
+        /// The piece.
+        piece: PatchId,
+        /// What is wrong with it.
+        reason: NotPrintable,
+    },
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Both halves of a run while they are carved.
+#[derive(Clone)]
+struct Halves {
+    raw: [f64; 2],
+    carved: [Volume; 2],
+}
+
+/// Carves every half connector in the order of taking apart and joins it to its body.
+pub fn make(
+    ctx: &Ctx,
+    params: &ConnectorParams,
+    grid: &ShellGrid,
+    shell: &ShellBodies,
+    plan: &InstallationPlan,
+    runs: &[Run],
+    rooms: &IdVec<PatchId, Aabb>,
+) -> Result<Finished, PieceError> {
+    ctx.stage("connectors", plan.steps.len())?;
+    let below = grid.deeper_than(grid.thickness_mm - ROOT_MM);
+    let far_mm = rooms.as_slice().iter().fold(Aabb::EMPTY, |b, r| b.union(*r)).diagonal();
+    let mut halves = vec![Halves { raw: [0.0; 2], carved: [Volume::empty(), Volume::empty()] }; runs.len()];
+    let mut wakes: Vec<Wake> = Vec::new();
+    for step in plan.removal() {
+        let q = step.piece;
+        let room = rooms[q].grown(-grid.band.cell_mm());
+        let space = below.intersect(&Volume::cuboid(room)).subtract(&barred(params, grid, shell, q));
+        let mine: Vec<(usize, usize)> = (0..runs.len())
+            .flat_map(|r| {
+                let male = (runs[r].male == q).then_some((r, 0));
+                male.into_iter().chain((runs[r].female == q).then_some((r, 1)))
+            })
+            .collect();
+        let made: Vec<(f64, Volume)> = mine
+            .par_iter()
+            .map(|&(r, h)| {
+                let whole = whole_half(params, &runs[r], [Half::Male, Half::Female][h]);
+                let in_cavity = whole.intersect(&below);
+                (in_cavity.volume(), carved(&whole.intersect(&space), &wakes, far_mm))
+            })
+            .collect();
+        for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
+            halves[r].raw[h] = raw;
+            halves[r].carved[h] = volume;
+        }
+        wakes.push(Wake::of(params, runs, q, step.separation));
+        ctx.step()?;
+    }
+    let joints: Vec<Joint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
+    let meshes = join_to_bodies(ctx, shell, plan, &joints, &halves)?;
+    Ok(Finished { meshes, joints })
+}
+
+/// Where `q` may have no connector, grown by the clearance.
+fn barred(params: &ConnectorParams, grid: &ShellGrid, shell: &ShellBodies, q: PatchId) -> Volume {
+    let mut field = shell.barred[q].spread(&grid.band, -grid.cutoff_mm());
+    let (clearance, ceiling) = (params.clearance_mm as f32, (grid.thickness_mm - 2.0 * ROOT_MM) as f32);
+    // Only what lies below the wall matters.
+    field.par_iter_mut().zip(&grid.depth).for_each(|(f, d)| *f = (*f + clearance).min(d - ceiling));
+    let mesh = contour(&grid.band, &field, OffBand::Outside);
+    Volume::from_closed_mesh(&mesh).expect("contours are manifold").simplify(CARVE_TOLERANCE_MM)
+}
+
+fn joint(run: &Run, halves: &Halves) -> Joint {
+    let volume_mm3 = [halves.carved[0].volume(), halves.carved[1].volume()];
+    let kept = std::array::from_fn(|h| if halves.raw[h] > 0.0 { volume_mm3[h] / halves.raw[h] } else { 0.0 });
+    let holds = kept.iter().all(|k| *k >= LEAST_KEPT);
+    let length_mm = if holds { run.length() } else { 0.0 };
+    Joint { male: run.male, female: run.female, length_mm, volume_mm3, kept, at: run.middle() }
+}
+
+fn join_to_bodies(
+    ctx: &Ctx,
+    shell: &ShellBodies,
+    plan: &InstallationPlan,
+    joints: &[Joint],
+    halves: &[Halves],
+) -> Result<IdVec<PatchId, TriMesh>, PieceError> {
+    ctx.stage("pieces", plan.steps.len())?;
+    let ids: Vec<PatchId> = shell.bodies.ids().collect();
+    let meshes: Vec<Result<TriMesh, PieceError>> = ids
+        .par_iter()
+        .map(|&q| {
+            let mut parts = vec![shell.bodies[q].clone()];
+            for (joint, half) in joints.iter().zip(halves).filter(|(j, _)| j.length_mm > 0.0) {
+                if joint.male == q {
+                    parts.push(half.carved[0].clone());
+                }
+                if joint.female == q {
+                    parts.push(half.carved[1].clone());
+                }
+            }
+            let united = Volume::union_all(parts);
+            // What hangs on nothing is a chip that carving cut loose.
+            let piece = united.components().into_iter().next().unwrap_or_else(Volume::empty);
+            let mesh = printable(&piece).map_err(|reason| PieceError::NotPrintable { piece: q, reason });
+            ctx.step()?;
+            mesh
+        })
+        .collect();
+    meshes.into_iter().collect()
+}
