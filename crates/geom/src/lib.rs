@@ -3,9 +3,14 @@
 //! This crate knows no patch, piece, plan or printer. Lengths are millimetres unless a name says otherwise; fields are
 //! positive inside; triangles are counter-clockwise seen from outside.
 
+pub mod laplacian;
 pub mod mesh;
 pub mod solid;
+pub mod sparse;
+pub mod subdivide;
+pub mod topology;
 
 pub use glam::DVec3 as Vec3;
 pub use mesh::{Aabb, TriMesh};
 pub use solid::{NotSolid, Solid};
+pub use topology::{HalfEdge, Topology};
