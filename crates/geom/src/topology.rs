@@ -16,7 +16,11 @@ pub struct Topology {
 impl Topology {
     /// Pairs the half-edges of `solid`; O(n log n).
     pub fn new(solid: &Solid) -> Self {
-        let mesh = solid.mesh();
+        Self::of_mesh(solid.mesh()).expect("a solid is closed")
+    }
+
+    /// Pairs the half-edges of `mesh`; `None` where some have no opposite or several.
+    pub fn of_mesh(mesh: &TriMesh) -> Option<Self> {
         let mut edges: Vec<(u64, HalfEdge)> = (0..mesh.triangles.len() as u32 * 3)
             .into_par_iter()
             .map(|h| {
@@ -26,11 +30,15 @@ impl Topology {
             .collect();
         edges.par_sort_unstable();
         let mut opposite = vec![0; edges.len()];
-        for pair in edges.chunks_exact(2) {
-            opposite[pair[0].1 as usize] = pair[1].1;
-            opposite[pair[1].1 as usize] = pair[0].1;
+        for pair in edges.chunk_by(|x, y| x.0 == y.0) {
+            let &[(_, g), (_, h)] = pair else { return None };
+            if ends(mesh, g).0 == ends(mesh, h).0 {
+                return None;
+            }
+            opposite[g as usize] = h;
+            opposite[h as usize] = g;
         }
-        Self { opposite }
+        Some(Self { opposite })
     }
 
     /// The same edge as seen from the triangle on its other side.

@@ -3,12 +3,16 @@
 //! After Yao, Chen, Xu, Wang, "Interlocking-shell pieces", 2017. The stages, in the only direction that data flows:
 //! segmentation → plan → body → connector → piece → verify → report.
 
+pub mod contact_graph;
 pub mod context;
 pub mod direction;
 pub mod ids;
 pub mod plan;
+mod seams;
+pub mod segmentation;
 pub mod surface;
 
+pub use contact_graph::{Contact, ContactGraph};
 pub use context::{Cancelled, Ctx, Warning};
 pub use direction::LatticeDirection;
 pub use ids::{IdVec, PatchId};
