@@ -6,16 +6,21 @@
 pub mod band;
 pub mod boolean;
 pub mod bvh;
+pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;
 pub mod mesh;
 pub mod rounding;
 pub mod signed_distance;
 pub mod solid;
+pub mod sparse;
+pub mod subdivide;
 pub mod sweep;
+pub mod topology;
 
 pub use band::Band;
 pub use boolean::Volume;
 pub use glam::DVec3 as Vec3;
 pub use mesh::{Aabb, TriMesh};
 pub use solid::{NotSolid, Solid};
+pub use topology::{HalfEdge, Topology};

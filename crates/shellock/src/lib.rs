@@ -5,14 +5,18 @@
 
 pub mod body;
 pub mod connector;
+pub mod contact_graph;
 pub mod context;
 pub mod direction;
 pub mod ids;
 pub mod params;
 pub mod piece;
 pub mod plan;
+mod seams;
+pub mod segmentation;
 pub mod surface;
 
+pub use contact_graph::{Contact, ContactGraph};
 pub use context::{Cancelled, Ctx, Warning};
 pub use direction::LatticeDirection;
 pub use ids::{IdVec, PatchId};

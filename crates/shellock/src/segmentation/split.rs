@@ -1,0 +1,200 @@
+//! Divides one patch into two connected halves.
+//!
+//! Candidates are planes through the patch's middle, along and across its principal axes, and geodesic Voronoi cells of two far points.
+//! A plane that contains a limb's axis cuts it lengthwise; a plane through several holes of a body makes disks of it at once. The
+//! candidate with the fewest faults of topology, then of shape, wins.
+
+use nalgebra::{Matrix3, SymmetricEigen};
+use shellock_geom::topology::ends;
+use shellock_geom::{HalfEdge, Solid, Topology, TriMesh, Vec3};
+
+use super::FaceLabels;
+use super::dual_graph::DualGraph;
+use crate::seams::{seam_half_edges, stretches};
+use crate::{ContactGraph, LatticeDirection, PatchId};
+
+/// What one fault of topology weighs against shape: more than the worst shape.
+const FAULT: f64 = 4.0;
+/// What areas of x : 1 weigh: the squared difference over the sum; 1 at worst.
+const UNEVENNESS: f64 = 1.5;
+/// What the new seam weighs, in roots of the patch's area: 1 for a square cut along its side.
+const SEAM_LENGTH: f64 = 0.3;
+
+/// A labelled mesh whose patches can be divided.
+pub(super) struct Divider<'a> {
+    pub mesh: &'a TriMesh,
+    pub topology: &'a Topology,
+    pub faces: &'a DualGraph,
+    pub min_piece_mm2: f64,
+}
+
+/// A way to divide a patch: the triangles of the part that gets a new number.
+pub(super) struct Division {
+    pub cost: f64,
+    pub moved: Vec<u32>,
+}
+
+/// Divides `patch` into two connected halves of similar area by a short seam, mostly across its longest direction; the new half
+/// gets the number `labels.n_patches()`. `None` where the patch is one triangle, or is not there.
+pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
+    let topology = Topology::new(solid);
+    let faces = DualGraph::of_faces(solid.mesh(), &topology, super::dual_graph::CreaseCost::NONE);
+    let divider = Divider { mesh: solid.mesh(), topology: &topology, faces: &faces, min_piece_mm2: 0.0 };
+    let mut label = labels.as_slice().to_vec();
+    let division = divider.best(&mut label, labels.n_patches(), patch.0, &[], |_, _| 0.0)?;
+    division.moved.iter().for_each(|&f| label[f as usize] = labels.n_patches() as u32);
+    Some(FaceLabels { patch_of_face: label, n_patches: labels.n_patches() + 1 })
+}
+
+impl Divider<'_> {
+    /// The cheapest division of `patch`; `label` is the same afterwards. `pairs` are far points that Voronoi halves are tried with, and
+    /// `faults` counts what else is wrong with a labelling, given with the seams inside the patch.
+    pub fn best(
+        &self,
+        label: &mut [u32],
+        n_patches: usize,
+        patch: u32,
+        pairs: &[[u32; 2]],
+        faults: impl Fn(&[u32], &[HalfEdge]) -> f64,
+    ) -> Option<Division> {
+        let members: Vec<u32> = (0..label.len() as u32).filter(|&f| label[f as usize] == patch).collect();
+        if members.len() < 2 {
+            return None;
+        }
+        let area: f64 = members.iter().map(|&f| self.faces.area[f as usize]).sum();
+        let mut best: Option<Division> = None;
+        let candidates = self.plane_halves(&members).chain(self.voronoi_halves(label, &members, pairs));
+        for moved in candidates.collect::<Vec<_>>() {
+            moved.iter().for_each(|&f| label[f as usize] = n_patches as u32);
+            self.join_islands(label, &members, [patch, n_patches as u32]);
+            let moved: Vec<u32> = members.iter().copied().filter(|&f| label[f as usize] != patch).collect();
+            let moved_mm2: f64 = moved.iter().map(|&f| self.faces.area[f as usize]).sum();
+            if moved_mm2.min(area - moved_mm2) >= self.min_piece_mm2 && !moved.is_empty() && moved.len() < members.len()
+            {
+                let seam: Vec<HalfEdge> = seam_half_edges(self.topology, label, members.iter().copied())
+                    .into_iter()
+                    .filter(|&h| label[self.topology.opposite(h) as usize / 3] == n_patches as u32)
+                    .collect();
+                let length: f64 = seam.iter().map(|&h| self.edge_length(h)).sum();
+                let euler = euler_characteristics(self.mesh, self.topology, label, n_patches + 1);
+                let holes: i64 = [patch as usize, n_patches].iter().map(|&p| (1 - euler[p]).abs()).sum();
+                let cost = FAULT * (holes as f64 + faults(label, &seam))
+                    + UNEVENNESS * ((area - 2.0 * moved_mm2) / area).powi(2)
+                    + SEAM_LENGTH * length / area.sqrt();
+                if best.as_ref().is_none_or(|b| cost < b.cost) {
+                    best = Some(Division { cost, moved });
+                }
+            }
+            members.iter().for_each(|&f| label[f as usize] = patch);
+        }
+        best
+    }
+
+    fn edge_length(&self, h: HalfEdge) -> f64 {
+        let (a, b) = ends(self.mesh, h);
+        self.mesh.points[a as usize].distance(self.mesh.points[b as usize])
+    }
+
+    /// Triangles on the positive side of planes through the middle, normal to the 13 lattice directions of the principal frame.
+    fn plane_halves(&self, members: &[u32]) -> impl Iterator<Item = Vec<u32>> {
+        let area: f64 = members.iter().map(|&f| self.faces.area[f as usize]).sum();
+        let weighted = |f: u32| self.faces.center[f as usize] * self.faces.area[f as usize];
+        let middle = members.iter().map(|&f| weighted(f)).sum::<Vec3>() / area.max(f64::MIN_POSITIVE);
+        let mut spread = Matrix3::zeros();
+        for &f in members {
+            let d = nalgebra::Vector3::from((self.faces.center[f as usize] - middle).to_array());
+            spread += d * d.transpose() * self.faces.area[f as usize];
+        }
+        let axes = SymmetricEigen::new(spread).eigenvectors;
+        LatticeDirection::all().take(LatticeDirection::COUNT / 2).map(move |d| {
+            let normal = axes * nalgebra::Vector3::from(d.unit().to_array());
+            let normal = Vec3::new(normal.x, normal.y, normal.z);
+            let is_in_front = |f: &u32| (self.faces.center[*f as usize] - middle).dot(normal) > 0.0;
+            members.iter().copied().filter(is_in_front).collect()
+        })
+    }
+
+    /// What is nearer to the second point of each pair; also of the two ends of the patch.
+    fn voronoi_halves(&self, label: &[u32], members: &[u32], pairs: &[[u32; 2]]) -> Vec<Vec<u32>> {
+        let patch = label[members[0] as usize];
+        let inside = |f: u32| label[f as usize] == patch;
+        let farthest_from = |f: u32| {
+            let (distance, _) = self.faces.grow(&[(f, 1.0)], inside);
+            let farther = |a: u32, b: u32| if distance[b as usize] > distance[a as usize] { b } else { a };
+            members.iter().copied().filter(|&m| distance[m as usize].is_finite()).fold(f, farther)
+        };
+        let end = farthest_from(members[0]);
+        let ends = [end, farthest_from(end)];
+        let all = pairs.iter().chain([&ends]).filter(|p| p[0] != p[1]);
+        all.map(|&[p, q]| {
+            let (_, owner) = self.faces.grow(&[(p, 1.0), (q, 1.0)], inside);
+            members.iter().copied().filter(|&f| owner[f as usize] == 1).collect()
+        })
+        .collect()
+    }
+
+    /// Makes both halves connected: what is not in the largest part of its half joins the other one.
+    fn join_islands(&self, label: &mut [u32], members: &[u32], halves: [u32; 2]) {
+        for side in 0..2 {
+            let (own, other) = (halves[side], halves[1 - side]);
+            let mut parts: Vec<(f64, Vec<u32>)> = Vec::new();
+            for &start in members {
+                if label[start as usize] != own {
+                    continue;
+                }
+                let mut part = vec![start];
+                label[start as usize] = u32::MAX;
+                let mut next = 0;
+                while next < part.len() {
+                    for g in self.topology.neighbours(part[next]) {
+                        if label[g as usize] == own {
+                            label[g as usize] = u32::MAX;
+                            part.push(g);
+                        }
+                    }
+                    next += 1;
+                }
+                parts.push((part.iter().map(|&f| self.faces.area[f as usize]).sum(), part));
+            }
+            let main = (0..parts.len()).fold(0, |best, i| if parts[i].0 > parts[best].0 { i } else { best });
+            for (i, (_, part)) in parts.iter().enumerate() {
+                part.iter().for_each(|&f| label[f as usize] = if i == main { own } else { other });
+            }
+        }
+    }
+}
+
+/// Corners − edges + triangles of each patch, its border included: 1 for a disk, 0 for a ring, 2 for a closed surface.
+pub(super) fn euler_characteristics(mesh: &TriMesh, topology: &Topology, label: &[u32], n_patches: usize) -> Vec<i64> {
+    const UNSEEN: u32 = u32::MAX;
+    const MIXED: u32 = u32::MAX - 1;
+    let mut of_point = vec![UNSEEN; mesh.points.len()];
+    // Twice the characteristic: 2 F − (3 F + B) + 2 (inner corners + B), as each of B border edges has one border corner.
+    let mut doubled = vec![0i64; n_patches];
+    for (face, t) in mesh.triangles.iter().enumerate() {
+        let k = label[face];
+        doubled[k as usize] -= 1;
+        for (corner, &v) in t.iter().enumerate() {
+            let seen = &mut of_point[v as usize];
+            *seen = if *seen == UNSEEN || *seen == k { k } else { MIXED };
+            if label[topology.opposite((3 * face + corner) as u32) as usize / 3] != k {
+                doubled[k as usize] += 1;
+            }
+        }
+    }
+    of_point.iter().filter(|&&k| k < MIXED).for_each(|&k| doubled[k as usize] += 2);
+    doubled.into_iter().map(|d| d / 2).collect()
+}
+
+/// The graph of contacts of a labelling whose seams zigzag along triangles.
+pub(super) fn raw_contact_graph(
+    divider: &Divider<'_>,
+    label: &[u32],
+    n_patches: usize,
+    seam: &[HalfEdge],
+    min_contact_mm: f64,
+) -> ContactGraph {
+    let found = stretches(divider.mesh, divider.topology, label, seam);
+    let lengths = found.iter().map(|s| (PatchId(s.a), PatchId(s.b), s.length(divider.mesh)));
+    ContactGraph::from_stretches(n_patches, min_contact_mm, lengths)
+}
