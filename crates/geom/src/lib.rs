@@ -3,8 +3,11 @@
 //! This crate knows no patch, piece, plan or printer. Lengths are millimetres unless a name says otherwise; fields are
 //! positive inside; triangles are counter-clockwise seen from outside.
 
+pub mod check;
+pub mod io;
 pub mod mesh;
 pub mod solid;
+pub mod weld;
 
 pub use glam::DVec3 as Vec3;
 pub use mesh::{Aabb, TriMesh};
