@@ -32,7 +32,8 @@ pub fn weld(mesh: &TriMesh) -> Welded {
 /// The mesh with its own indexing where that is closed and manifold, else welded.
 ///
 /// Welding can break a mesh that is sound as indexed but touches itself: along a touching edge four triangles would meet.
-/// Unused points and triangles that name a point twice are dropped in any case.
+/// Unused points and triangles that name a point twice are dropped in any case. Where a triangle has two corners in the
+/// same place the file was rounded, not glued: its indexing is not trusted.
 ///
 /// # Panics
 /// Where a triangle names a missing point.
@@ -40,7 +41,17 @@ pub fn close(mesh: &TriMesh) -> Welded {
     let as_indexed = reindex(mesh, &(0..mesh.points.len() as u32).collect::<Vec<_>>());
     // In a closed mesh each point has at least two triangles: an STL, where it has one, need not be looked at further.
     let may_be_closed = 2 * as_indexed.mesh.points.len() <= 3 * as_indexed.mesh.triangles.len();
-    if may_be_closed && inspect_edges(&as_indexed.mesh).is_closed() { as_indexed } else { weld(mesh) }
+    let has_collapsed = || {
+        (0..as_indexed.mesh.triangles.len()).any(|face| {
+            let [a, b, c] = as_indexed.mesh.corners(face);
+            a == b || b == c || c == a
+        })
+    };
+    if may_be_closed && !has_collapsed() && inspect_edges(&as_indexed.mesh).is_closed() {
+        as_indexed
+    } else {
+        weld(mesh)
+    }
 }
 
 /// For each point the first one of equal coordinates.

@@ -64,6 +64,31 @@ pub enum InputError {
     /// More than one closed surface; the largest first.
     #[error("{}", Several(.0))]
     Bodies(Vec<Body>),
+    /// More open edges than triangles: a soup, or cracks everywhere.
+    #[error(
+        "the triangles do not hang together: {} on {}, first near {}; \
+         their corners do not meet exactly: merge points by distance in a modelling program",
+        plural(*count, "open edge", "open edges"), plural(*n_faces, "triangle", "triangles"), Coordinates(*at)
+    )]
+    Loose {
+        /// Edges with one triangle.
+        count: usize,
+        /// How many triangles there are.
+        n_faces: usize,
+        /// Middle of the first edge.
+        at: Vec3,
+    },
+    /// Points that fell together broke the surface.
+    #[error(
+        "{count} of {n_faces} triangles have no size, since their corners are in the same place; the coordinates were \
+         rounded too coarsely: move the model near the origin where it was made and export it with more digits"
+    )]
+    Collapsed {
+        /// Triangles with two equal corners.
+        count: usize,
+        /// How many triangles the file has.
+        n_faces: usize,
+    },
     /// The surface touches itself in points.
     #[error(
         "the surface touches itself in {}, first at {}; \

@@ -80,11 +80,11 @@ pub struct Body {
 /// Returns for each triangle of the solid its number in `mesh`, ascending. O(n log n).
 pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
     check_points(mesh)?;
-    let Welded { mesh, kept_face, .. } = close(mesh);
+    let Welded { mesh, kept_face, n_collapsed } = close(mesh);
     if mesh.triangles.is_empty() {
         return Err(InputError::Empty);
     }
-    refuse(&inspect(&mesh))?;
+    refuse(&inspect(&mesh), mesh.triangles.len(), n_collapsed)?;
     match Solid::new(mesh) {
         Ok(solid) => Ok((solid, kept_face)),
         Err(reason) => Err(InputError::NotSolid(reason)),
@@ -92,8 +92,13 @@ pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
 }
 
 /// The first trouble of a mesh in the order in which a person would mend it.
-fn refuse(Inspection { edges, pinched, bodies }: &Inspection) -> Result<(), InputError> {
+fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result<(), InputError> {
+    let Inspection { edges, pinched, bodies } = inspection;
     let at = |spots: &Spots| (spots.count, spots.first);
+    // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
+    if !edges.is_closed() && 100 * n_collapsed > n_faces {
+        return Err(InputError::Collapsed { count: n_collapsed, n_faces: n_faces + n_collapsed });
+    }
     if let (count @ 1.., at) = at(&edges.shared) {
         return Err(InputError::Shared { count, at, n_copies: edges.n_copies });
     }
@@ -101,6 +106,9 @@ fn refuse(Inspection { edges, pinched, bodies }: &Inspection) -> Result<(), Inpu
         return Err(InputError::Turned { count, at });
     }
     if let (count @ 1.., at) = at(&edges.open) {
+        if count > n_faces {
+            return Err(InputError::Loose { count, n_faces, at });
+        }
         return Err(InputError::Open { count, n_holes: edges.n_holes, at });
     }
     if bodies.len() > 1 {
@@ -185,13 +193,29 @@ impl Side {
 
 /// All sides, those of an edge next to each other.
 fn sides(mesh: &TriMesh) -> Vec<Side> {
-    let mut sides = Vec::with_capacity(3 * mesh.triangles.len());
-    for (&[a, b, c], face) in mesh.triangles.iter().zip(0_u32..) {
-        for (from, to, k) in [(a, b, 0), (b, c, 1), (c, a, 2)] {
-            sides.push(Side { low: from.min(to), high: from.max(to), corner: 3 * face + k });
-        }
+    let all = || {
+        mesh.triangles.iter().zip(0_u32..).flat_map(|(&[a, b, c], face)| {
+            [(a, b, 0), (b, c, 1), (c, a, 2)].map(|(from, to, k)| Side {
+                low: from.min(to),
+                high: from.max(to),
+                corner: 3 * face + k,
+            })
+        })
+    };
+    // Sides of the same lower point are put next to each other by counting; the few of a point are sorted then, which
+    // is several times faster than sorting all.
+    let mut begin = vec![0_u32; mesh.points.len() + 1];
+    all().for_each(|side| begin[side.low as usize + 1] += 1);
+    for point in 0..mesh.points.len() {
+        begin[point + 1] += begin[point];
     }
-    sides.par_sort_unstable();
+    let mut next = begin.clone();
+    let mut sides = vec![Side { low: 0, high: 0, corner: 0 }; 3 * mesh.triangles.len()];
+    for side in all() {
+        sides[next[side.low as usize] as usize] = side;
+        next[side.low as usize] += 1;
+    }
+    begin.windows(2).for_each(|range| sides[range[0] as usize..range[1] as usize].sort_unstable());
     sides
 }
 
@@ -270,8 +294,9 @@ fn bodies(mesh: &TriMesh, faces: &mut Groups) -> Vec<Body> {
         let [a, b, c] = corners.map(|p| p - origins[body_of[root] as usize]);
         body.n_faces += 1;
         body.bounds = body.bounds.union(Aabb::around(corners));
-        body.signed_volume += a.dot(b.cross(c)) / 6.0;
+        body.signed_volume += a.dot(b.cross(c));
     }
+    bodies.iter_mut().for_each(|body| body.signed_volume /= 6.0);
     bodies.sort_by(|a, b| b.bounds.diagonal().total_cmp(&a.bounds.diagonal()));
     bodies
 }

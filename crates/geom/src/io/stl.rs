@@ -65,6 +65,8 @@ pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
                 in_facet = false;
             }
             (b"solid" | b"endsolid" | b"color", false) => {}
+            // Half a word at the very end.
+            (_, true) if lines.rest().is_empty() => break,
             (_, true) => return Err(malformed(at, "\"vertex\" or \"endfacet\"", first)),
             (_, false) => return Err(malformed(at, "\"facet\" or \"endsolid\"", first)),
         }

@@ -70,18 +70,16 @@ fn read_points(element: &Element, source: &mut impl Source, polygons: &mut Polyg
             return Err(ReadError::Unsupported { what: "a PLY file whose points lack x, y or z", at: element.at });
         }
     }
+    let axis_of = |name: &str| ["x", "y", "z"].iter().position(|&axis| axis == name);
+    let columns: Vec<_> = element.properties.iter().map(|p| (p.kind, axis_of(&p.name))).collect();
     polygons.reserve(element.count, 0);
     for _ in 0..element.count {
         let at = source.place();
         let mut coordinates = [0.0; 3];
-        for property in &element.properties {
-            let Kind::Scalar(scalar) = property.kind else {
-                skip(property.kind, source)?;
-                continue;
-            };
-            let value = source.next(scalar)?;
-            if let Some(axis) = ["x", "y", "z"].iter().position(|&name| property.name == name) {
-                coordinates[axis] = value;
+        for &(kind, axis) in &columns {
+            match (kind, axis) {
+                (Kind::Scalar(scalar), Some(axis)) => coordinates[axis] = source.next(scalar)?,
+                _ => skip(kind, source)?,
             }
         }
         polygons.add_point(coordinates, at)?;
