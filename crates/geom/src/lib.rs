@@ -9,6 +9,8 @@ pub mod bvh;
 pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;
+pub mod check;
+pub mod io;
 pub mod mesh;
 pub mod rounding;
 pub mod signed_distance;
@@ -17,6 +19,7 @@ pub mod sparse;
 pub mod subdivide;
 pub mod sweep;
 pub mod topology;
+pub mod weld;
 
 pub use band::Band;
 pub use boolean::Volume;

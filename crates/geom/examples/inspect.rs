@@ -1,0 +1,41 @@
+//! Prints what the readers and the check make of mesh files and `.seg` files: `inspect FILE…`.
+
+use std::path::Path;
+use std::time::Instant;
+
+use shellock_geom::{check, io};
+
+fn main() {
+    for path in std::env::args().skip(1) {
+        let start = Instant::now();
+        let verdict = verdict(Path::new(&path));
+        println!("{path}: {verdict} [{} ms]", start.elapsed().as_millis());
+    }
+}
+
+fn verdict(path: &Path) -> String {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => return format!("cannot be read: {error}"),
+    };
+    let extension = path.extension().and_then(|e| e.to_str());
+    if extension == Some("seg") {
+        return match io::read_labels(&bytes) {
+            Ok(labels) => format!("{} labels", labels.len()),
+            Err(error) => format!("refused: {error}"),
+        };
+    }
+    let loaded = match io::read_mesh(&bytes, extension) {
+        Ok(loaded) => loaded,
+        Err(error) => return format!("refused: {error}"),
+    };
+    let labels = if loaded.face_labels.is_some() { ", labelled" } else { "" };
+    let read = format!("{}, {} triangles{labels}", loaded.format, loaded.mesh.triangles.len());
+    match check::into_solid(&loaded.mesh) {
+        Ok((solid, _)) => {
+            let size = solid.mesh().bounds().size();
+            format!("{read}: one body of {:.4} × {:.4} × {:.4}, volume {:.6}", size.x, size.y, size.z, solid.volume())
+        }
+        Err(error) => format!("{read}: refused: {error}"),
+    }
+}

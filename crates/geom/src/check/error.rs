@@ -1,0 +1,184 @@
+//! Refusals in words.
+
+use std::fmt;
+
+use super::Body;
+use crate::{NotSolid, Vec3};
+
+/// Why a mesh is not one solid body: what, how many, where (file units), and what to do.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InputError {
+    /// There is nothing, or nothing that has an area.
+    #[error("the model has no triangles; export it again as a surface mesh")]
+    Empty,
+    /// A coordinate is NaN or infinite.
+    #[error(
+        "{count} points have a coordinate that is not a number, the first is point {vertex} (from 0); \
+         repair the model where it was made"
+    )]
+    NotFinite {
+        /// The first such point.
+        vertex: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Edges with more than two triangles.
+    #[error(
+        "{} more than two triangles, first near {}{}; \
+         the surface touches or doubles itself there: remove doubled faces and merge the parts in a modelling program",
+        plural(*count, "edge has", "edges have"), Coordinates(*at), copies(*n_copies)
+    )]
+    Shared {
+        /// How many edges.
+        count: usize,
+        /// Middle of the first.
+        at: Vec3,
+        /// Triangles that stand there a second time.
+        n_copies: usize,
+    },
+    /// Neighbours of opposite orientation.
+    #[error(
+        "{} two triangles that face opposite ways, first near {}; \
+         one of them is inside out: let a modelling program recalculate the normals (outside)",
+        plural(*count, "edge joins", "edges join"), Coordinates(*at)
+    )]
+    Turned {
+        /// How many edges.
+        count: usize,
+        /// Middle of the first.
+        at: Vec3,
+    },
+    /// The surface has holes.
+    #[error(
+        "the surface is not closed: {} ({}), first near {}; fill the holes in a modelling program",
+        plural(*n_holes, "hole", "holes"), plural(*count, "open edge", "open edges"), Coordinates(*at)
+    )]
+    Open {
+        /// Edges with one triangle.
+        count: usize,
+        /// Groups of them.
+        n_holes: usize,
+        /// Middle of the first edge.
+        at: Vec3,
+    },
+    /// More than one closed surface; the largest first.
+    #[error("{}", Several(.0))]
+    Bodies(Vec<Body>),
+    /// More open edges than triangles: a soup, or cracks everywhere.
+    #[error(
+        "the triangles do not hang together: {} on {}, first near {}; \
+         their corners do not meet exactly: merge points by distance in a modelling program",
+        plural(*count, "open edge", "open edges"), plural(*n_faces, "triangle", "triangles"), Coordinates(*at)
+    )]
+    Loose {
+        /// Edges with one triangle.
+        count: usize,
+        /// How many triangles there are.
+        n_faces: usize,
+        /// Middle of the first edge.
+        at: Vec3,
+    },
+    /// Points that fell together broke the surface.
+    #[error(
+        "{count} of {n_faces} triangles have no size, since their corners are in the same place; the coordinates were \
+         rounded too coarsely: move the model near the origin where it was made and export it with more digits"
+    )]
+    Collapsed {
+        /// Triangles with two equal corners.
+        count: usize,
+        /// How many triangles the file has.
+        n_faces: usize,
+    },
+    /// The surface touches itself in points.
+    #[error(
+        "the surface touches itself in {}, first at {}; \
+         move the touching parts a little apart or into each other and merge them in a modelling program",
+        plural(*count, "single point", "single points"), Coordinates(*at)
+    )]
+    Pinched {
+        /// How many points.
+        count: usize,
+        /// The first.
+        at: Vec3,
+    },
+    /// All triangles face inwards.
+    #[error(
+        "the model is inside out: all its triangles face inwards; flip the normals (flip the faces) and export it again"
+    )]
+    InsideOut,
+    /// Closed, but without inside.
+    #[error("the model is flat: its surface encloses no volume; give it a thickness")]
+    Flat,
+    /// What [`crate::Solid::new`] finds beyond the above.
+    #[error("{0}; export the model again")]
+    NotSolid(NotSolid),
+}
+
+/// How many bodies a message lists.
+const N_LISTED: usize = 3;
+
+struct Several<'a>(&'a [Body]);
+
+impl fmt::Display for Several<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(bodies) = self;
+        write!(f, "the model consists of {} separate bodies: ", bodies.len())?;
+        for (i, body) in bodies.iter().take(N_LISTED).enumerate() {
+            let (size, separator) = (body.bounds.size(), if i > 0 { ", " } else { "" });
+            write!(
+                f,
+                "{separator}{} of {} × {} × {} around {}",
+                plural(body.n_faces, "triangle", "triangles"),
+                Short(size.x),
+                Short(size.y),
+                Short(size.z),
+                Coordinates(body.bounds.center()),
+            )?;
+            if body.signed_volume < 0.0 {
+                let inside = bodies[0].bounds.contains(body.bounds.min) && bodies[0].bounds.contains(body.bounds.max);
+                f.write_str(if i > 0 && inside { " (a cavity)" } else { " (inside out)" })?;
+            }
+        }
+        if bodies.len() > N_LISTED {
+            write!(f, " and {} smaller", bodies.len() - N_LISTED)?;
+        }
+        f.write_str("; keep one of them, or unite those that overlap into one")
+    }
+}
+
+struct Coordinates(Vec3);
+
+impl fmt::Display for Coordinates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "({}, {}, {})", Short(self.0.x), Short(self.0.y), Short(self.0.z))
+    }
+}
+
+/// A length with four significant digits, whatever the unit of the file; three decimals from 1 upwards.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        if size >= 1e9 || (size > 0.0 && size < 1e-6) {
+            return write!(f, "{:.3e}", self.0);
+        }
+        let decimals =
+            if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 9).max(i32::from(size < 1e4)) };
+        let text = format!("{:.*}", decimals as usize, self.0);
+        let trimmed = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        f.write_str(trimmed)
+    }
+}
+
+fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+fn copies(n_copies: usize) -> String {
+    if n_copies == 0 {
+        String::new()
+    } else {
+        format!(" ({} there twice)", plural(n_copies, "triangle is", "triangles are"))
+    }
+}

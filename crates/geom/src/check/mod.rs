@@ -1,0 +1,305 @@
+//! Is it one body? What is wrong with a surface, counted and placed, in words for the person who made it.
+//!
+//! [`inspect`] counts, [`into_solid`] decides. Not checked here: faces that cross each other, and thin walls.
+
+mod error;
+mod groups;
+
+pub use error::InputError;
+
+use rayon::slice::ParallelSliceMut;
+
+use crate::weld::{Welded, close};
+use crate::{Aabb, NotSolid, Solid, TriMesh, Vec3};
+use groups::Groups;
+
+/// What a mesh is, as far as its triangles and their neighbours tell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inspection {
+    /// The edges.
+    pub edges: Edges,
+    /// Points where several fans of triangles touch.
+    pub pinched: Spots,
+    /// Groups of triangles connected over edges, the one of the largest box first.
+    pub bodies: Vec<Body>,
+}
+
+/// Edges that are no plain seam between two triangles.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Edges {
+    /// Edges with one triangle.
+    pub open: Spots,
+    /// Groups of open edges connected over points: the holes, where holes do not touch.
+    pub n_holes: usize,
+    /// Edges with more than two triangles.
+    pub shared: Spots,
+    /// Edges whose two triangles face opposite ways.
+    pub turned: Spots,
+    /// Triangles over the same three points as an earlier one.
+    pub n_copies: usize,
+}
+
+impl Edges {
+    /// Whether each edge joins two triangles of the same orientation.
+    pub fn is_closed(&self) -> bool {
+        self.open.count == 0 && self.shared.count == 0 && self.turned.count == 0
+    }
+}
+
+/// How often something occurs, and one place.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spots {
+    /// How often.
+    pub count: usize,
+    /// Where, file units; the origin if `count` is 0.
+    pub first: Vec3,
+}
+
+impl Spots {
+    fn add(&mut self, at: Vec3) {
+        if self.count == 0 {
+            self.first = at;
+        }
+        self.count += 1;
+    }
+}
+
+/// Triangles connected over edges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Body {
+    /// How many triangles.
+    pub n_faces: usize,
+    /// The box around them, file units.
+    pub bounds: Aabb,
+    /// Enclosed volume, file units cubed; below 0 where inside out, meaningless where open.
+    pub signed_volume: f64,
+}
+
+/// Makes one body of a mesh as read: merges equal points where needed, and refuses what is not one closed surface.
+///
+/// Returns for each triangle of the solid its number in `mesh`, ascending. O(n log n).
+pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
+    check_points(mesh)?;
+    let Welded { mesh, kept_face, n_collapsed } = close(mesh);
+    if mesh.triangles.is_empty() {
+        return Err(InputError::Empty);
+    }
+    refuse(&inspect(&mesh), mesh.triangles.len(), n_collapsed)?;
+    match Solid::new(mesh) {
+        Ok(solid) => Ok((solid, kept_face)),
+        Err(reason) => Err(InputError::NotSolid(reason)),
+    }
+}
+
+/// The first trouble of a mesh in the order in which a person would mend it.
+fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result<(), InputError> {
+    let Inspection { edges, pinched, bodies } = inspection;
+    let at = |spots: &Spots| (spots.count, spots.first);
+    // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
+    if !edges.is_closed() && 100 * n_collapsed > n_faces {
+        return Err(InputError::Collapsed { count: n_collapsed, n_faces: n_faces + n_collapsed });
+    }
+    if let (count @ 1.., at) = at(&edges.shared) {
+        return Err(InputError::Shared { count, at, n_copies: edges.n_copies });
+    }
+    if let (count @ 1.., at) = at(&edges.turned) {
+        return Err(InputError::Turned { count, at });
+    }
+    if let (count @ 1.., at) = at(&edges.open) {
+        if count > n_faces {
+            return Err(InputError::Loose { count, n_faces, at });
+        }
+        return Err(InputError::Open { count, n_holes: edges.n_holes, at });
+    }
+    if bodies.len() > 1 {
+        return Err(InputError::Bodies(bodies.clone()));
+    }
+    if let (count @ 1.., at) = at(pinched) {
+        return Err(InputError::Pinched { count, at });
+    }
+    match bodies.first() {
+        Some(body) if body.signed_volume < 0.0 => Err(InputError::InsideOut),
+        Some(body) if body.signed_volume == 0.0 => Err(InputError::Flat),
+        _ => Ok(()),
+    }
+}
+
+fn check_points(mesh: &TriMesh) -> Result<(), InputError> {
+    let n_points = mesh.points.len();
+    for (face, triangle) in mesh.triangles.iter().enumerate() {
+        if let Some(&vertex) = triangle.iter().find(|&&v| v as usize >= n_points) {
+            return Err(InputError::NotSolid(NotSolid::MissingPoint { face, vertex, n_points }));
+        }
+    }
+    let mut bad = mesh.points.iter().enumerate().filter(|(_, p)| !p.is_finite());
+    match bad.next() {
+        Some((vertex, _)) => Err(InputError::NotFinite { vertex, count: 1 + bad.count() }),
+        None => Ok(()),
+    }
+}
+
+/// Counts bodies, holes and defects of a mesh whose equal points are merged. O(n log n).
+///
+/// # Panics
+/// Where a triangle names a missing point.
+pub fn inspect(mesh: &TriMesh) -> Inspection {
+    let sides = sides(mesh);
+    let mut faces = Groups::of(mesh.triangles.len());
+    // Corners of the same point belong to one fan where an edge joins their triangles.
+    let mut corners = Groups::of(3 * mesh.triangles.len());
+    for edge in sides.chunk_by(Side::same_edge) {
+        for side in &edge[1..] {
+            faces.unite(edge[0].corner / 3, side.corner / 3);
+            for end in [edge[0].low, edge[0].high] {
+                corners.unite(edge[0].corner_at(mesh, end), side.corner_at(mesh, end));
+            }
+        }
+    }
+    Inspection {
+        edges: count_edges(mesh, &sides),
+        pinched: pinched(mesh, &mut corners),
+        bodies: bodies(mesh, &mut faces),
+    }
+}
+
+/// The part of [`inspect`] about edges.
+pub(crate) fn inspect_edges(mesh: &TriMesh) -> Edges {
+    count_edges(mesh, &sides(mesh))
+}
+
+/// A triangle's side: from corner `corner` (three times the face, plus 0, 1 or 2) to the next.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    low: u32,
+    high: u32,
+    corner: u32,
+}
+
+impl Side {
+    fn same_edge(&self, other: &Self) -> bool {
+        (self.low, self.high) == (other.low, other.high)
+    }
+
+    /// Which of the two corners of this side is at point `end`.
+    fn corner_at(&self, mesh: &TriMesh, end: u32) -> u32 {
+        let (face, k) = (self.corner / 3, self.corner % 3);
+        if mesh.triangles[face as usize][k as usize] == end { self.corner } else { 3 * face + (k + 1) % 3 }
+    }
+
+    fn runs_up(&self, mesh: &TriMesh) -> bool {
+        self.corner_at(mesh, self.low) == self.corner
+    }
+}
+
+/// All sides, those of an edge next to each other.
+fn sides(mesh: &TriMesh) -> Vec<Side> {
+    let all = || {
+        mesh.triangles.iter().zip(0_u32..).flat_map(|(&[a, b, c], face)| {
+            [(a, b, 0), (b, c, 1), (c, a, 2)].map(|(from, to, k)| Side {
+                low: from.min(to),
+                high: from.max(to),
+                corner: 3 * face + k,
+            })
+        })
+    };
+    // Sides of the same lower point are put next to each other by counting; the few of a point are sorted then, which
+    // is several times faster than sorting all.
+    let mut begin = vec![0_u32; mesh.points.len() + 1];
+    all().for_each(|side| begin[side.low as usize + 1] += 1);
+    for point in 0..mesh.points.len() {
+        begin[point + 1] += begin[point];
+    }
+    let mut next = begin.clone();
+    let mut sides = vec![Side { low: 0, high: 0, corner: 0 }; 3 * mesh.triangles.len()];
+    for side in all() {
+        sides[next[side.low as usize] as usize] = side;
+        next[side.low as usize] += 1;
+    }
+    begin.windows(2).for_each(|range| sides[range[0] as usize..range[1] as usize].sort_unstable());
+    sides
+}
+
+fn count_edges(mesh: &TriMesh, sides: &[Side]) -> Edges {
+    let mut edges = Edges::default();
+    let mut open_ends = Vec::new();
+    let mut has_shared = false;
+    for edge in sides.chunk_by(Side::same_edge) {
+        let [low, high] = [edge[0].low, edge[0].high];
+        let middle = || 0.5 * (mesh.points[low as usize] + mesh.points[high as usize]);
+        match edge {
+            [one] => {
+                edges.open.add(middle());
+                open_ends.push((one.low, one.high));
+            }
+            [one, other] if low != high && one.runs_up(mesh) != other.runs_up(mesh) => {}
+            [_, _] if low != high => edges.turned.add(middle()),
+            _ => {
+                edges.shared.add(middle());
+                has_shared = true;
+            }
+        }
+    }
+    edges.n_holes = count_holes(mesh.points.len(), &open_ends);
+    edges.n_copies = if has_shared { count_copies(mesh) } else { 0 };
+    edges
+}
+
+fn count_holes(n_points: usize, open_ends: &[(u32, u32)]) -> usize {
+    if open_ends.is_empty() {
+        return 0;
+    }
+    let mut points = Groups::of(n_points);
+    open_ends.iter().for_each(|&(a, b)| points.unite(a, b));
+    let mut holes: Vec<u32> = open_ends.iter().map(|&(a, _)| points.find(a)).collect();
+    holes.sort_unstable();
+    holes.dedup();
+    holes.len()
+}
+
+fn count_copies(mesh: &TriMesh) -> usize {
+    let mut corner_sets = mesh.triangles.clone();
+    corner_sets.iter_mut().for_each(|t| t.sort_unstable());
+    corner_sets.par_sort_unstable();
+    corner_sets.windows(2).filter(|pair| pair[0] == pair[1]).count()
+}
+
+fn pinched(mesh: &TriMesh, corners: &mut Groups) -> Spots {
+    let mut fan_of = vec![None; mesh.points.len()];
+    let mut is_pinched = vec![false; mesh.points.len()];
+    for (&point, corner) in mesh.triangles.as_flattened().iter().zip(0_u32..) {
+        let fan = corners.find(corner);
+        is_pinched[point as usize] |= *fan_of[point as usize].get_or_insert(fan) != fan;
+    }
+    let mut spots = Spots::default();
+    mesh.points.iter().zip(is_pinched).filter(|(_, pinched)| *pinched).for_each(|(p, _)| spots.add(*p));
+    spots
+}
+
+fn bodies(mesh: &TriMesh, faces: &mut Groups) -> Vec<Body> {
+    /// A group that has no body yet.
+    const NEW: u32 = u32::MAX;
+    let mut body_of = vec![NEW; mesh.triangles.len()];
+    let mut bodies: Vec<Body> = Vec::new();
+    // A local origin keeps the volume exact far away from 0.
+    let mut origins = Vec::new();
+    for face in 0..mesh.triangles.len() {
+        let root = faces.find(face as u32) as usize;
+        let corners = mesh.corners(face);
+        if body_of[root] == NEW {
+            body_of[root] = bodies.len() as u32;
+            bodies.push(Body { n_faces: 0, bounds: Aabb::EMPTY, signed_volume: 0.0 });
+            origins.push(corners[0]);
+        }
+        let body = &mut bodies[body_of[root] as usize];
+        let [a, b, c] = corners.map(|p| p - origins[body_of[root] as usize]);
+        body.n_faces += 1;
+        body.bounds = body.bounds.union(Aabb::around(corners));
+        body.signed_volume += a.dot(b.cross(c));
+    }
+    bodies.iter_mut().for_each(|body| body.signed_volume /= 6.0);
+    bodies.sort_by(|a, b| b.bounds.diagonal().total_cmp(&a.bounds.diagonal()));
+    bodies
+}
+
+#[cfg(test)]
+mod tests;

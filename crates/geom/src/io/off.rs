@@ -1,0 +1,72 @@
+//! OFF: points and polygons as text. Normals and colours (NOFF, COFF, face colours) are passed over.
+
+use super::polygons::Polygons;
+use super::text::{Lines, malformed, point, whole, without_bom, without_comment, words};
+use super::{Format, Loaded, Place, ReadError};
+
+/// Fewest bytes a point takes: `0 0 0` and a line end.
+const POINT_BYTES: u64 = 6;
+/// Fewest bytes a face takes: `3 0 0 0` and a line end.
+const FACE_BYTES: u64 = 8;
+
+/// Reads an OFF of three dimensions, one point or face a line; the first word may be missing.
+pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
+    let mut lines = Lines::of(without_bom(bytes));
+    let (n_points, n_faces) = read_counts(&mut lines)?;
+
+    let mut polygons = Polygons::counted_from(0);
+    polygons.reserve(n_points, n_faces);
+    for _ in 0..n_points {
+        let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff { at: lines.place(), within: "the points" })?;
+        polygons.add_point(point(&mut words(line), at)?, at)?;
+    }
+    let mut corners = Vec::new();
+    for _ in 0..n_faces {
+        let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff { at: lines.place(), within: "the faces" })?;
+        let mut words = words(line);
+        let n_corners = whole(words.next(), at, "the number of corners of a face")?;
+        corners.clear();
+        for _ in 0..n_corners {
+            let index = whole(words.next(), at, "the number of a point")?;
+            corners.push(polygons.corner(index, at)?);
+        }
+        polygons.add_polygon(&corners, at)?;
+    }
+    polygons.finish(Format::Off, None)
+}
+
+/// The counts of points and faces, on the line of the first word or the next; what the bytes cannot back is refused.
+fn read_counts(lines: &mut Lines) -> Result<(usize, usize), ReadError> {
+    let cut_off = |lines: &Lines| ReadError::CutOff { at: lines.place(), within: "the header" };
+    let (mut at, mut line) = next_line(lines).ok_or_else(|| cut_off(lines))?;
+    let first = words(line).next().unwrap_or_default().to_ascii_lowercase();
+    if let Some(prefix) = first.strip_suffix(b"off") {
+        if prefix.contains(&b'4') || prefix.contains(&b'n') && prefix != b"n" && !prefix.ends_with(b"cn") {
+            return Err(ReadError::Unsupported { what: "an OFF file of more than three dimensions", at });
+        }
+        line = &line.trim_ascii_start()[first.len()..];
+        if words(line).next().is_none() {
+            (at, line) = next_line(lines).ok_or_else(|| cut_off(lines))?;
+        }
+    }
+    let mut words = words(line);
+    let mut count = |what, expected, bytes_each| {
+        let word = words.next();
+        if word.is_some_and(|word| word.eq_ignore_ascii_case(b"binary")) {
+            return Err(ReadError::Unsupported { what: "a binary OFF file", at });
+        }
+        let promised =
+            u64::try_from(whole(word, at, expected)?).map_err(|_| malformed(at, expected, word.unwrap_or_default()))?;
+        // The last line may lack its end.
+        let room = (lines.rest().len() as u64 + 1) / bytes_each;
+        if promised > room { Err(ReadError::TooFewBytes { at, what, promised, room }) } else { Ok(promised as usize) }
+    };
+    let n_points = count("points", "the number of points", POINT_BYTES)?;
+    let n_faces = count("faces", "the number of faces", FACE_BYTES)?;
+    Ok((n_points, n_faces))
+}
+
+/// The next line that says something.
+fn next_line<'a>(lines: &mut Lines<'a>) -> Option<(Place, &'a [u8])> {
+    lines.map(|(at, line)| (at, without_comment(line))).find(|(_, line)| words(line).next().is_some())
+}

@@ -1,0 +1,106 @@
+//! Lines, words and numbers of text formats, with the place kept for messages.
+
+use super::{Place, ReadError};
+
+/// Characters of a wrong word that a message quotes at most.
+const QUOTED_CHARS: usize = 40;
+
+/// The lines of a text with their numbers from 1; each of LF, CRLF and CR ends a line.
+#[derive(Clone)]
+pub(super) struct Lines<'a> {
+    rest: &'a [u8],
+    n_done: usize,
+}
+
+impl<'a> Lines<'a> {
+    pub(super) fn of(bytes: &'a [u8]) -> Self {
+        Self { rest: without_bom(bytes), n_done: 0 }
+    }
+
+    /// What follows the last line handed out.
+    pub(super) fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    /// The place of the last line handed out.
+    pub(super) fn place(&self) -> Place {
+        Place::Line(self.n_done)
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = (Place, &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        let end = self.rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(self.rest.len());
+        let (line, after) = self.rest.split_at(end);
+        self.rest = after.strip_prefix(b"\r\n").unwrap_or_else(|| after.get(1..).unwrap_or_default());
+        self.n_done += 1;
+        Some((self.place(), line))
+    }
+}
+
+/// The bytes after the UTF-8 byte order mark, if there is one.
+pub(super) fn without_bom(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
+}
+
+/// The words of a line.
+pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// The part of a line before `#`.
+pub(super) fn without_comment(line: &[u8]) -> &[u8] {
+    line.split(|&b| b == b'#').next().unwrap_or_default()
+}
+
+/// The error "expected … found …", with `found` shortened and made printable.
+pub(super) fn malformed(at: Place, expected: &'static str, found: &[u8]) -> ReadError {
+    let shown: String = String::from_utf8_lossy(&found[..found.len().min(4 * QUOTED_CHARS)])
+        .chars()
+        .take(QUOTED_CHARS)
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
+    let ellipsis = if found.len() > shown.len() { "…" } else { "" };
+    ReadError::Malformed { at, expected, found: shown + ellipsis }
+}
+
+/// The next word as a finite coordinate.
+pub(super) fn coordinate(word: Option<&[u8]>, at: Place) -> Result<f64, ReadError> {
+    let word = word.unwrap_or_default();
+    match parse::<f64>(word) {
+        Some(value) if value.is_finite() => Ok(value),
+        Some(_) => Err(ReadError::NotFinite { at }),
+        // C libraries write "1.#QNAN" and "-nan(ind)", which are no Rust floats.
+        None if word.contains(&b'#') || word.to_ascii_lowercase().windows(3).any(|w| w == b"nan" || w == b"inf") => {
+            Err(ReadError::NotFinite { at })
+        }
+        None => Err(malformed(at, "a number", word)),
+    }
+}
+
+/// Three coordinates from the next three words.
+pub(super) fn point<'a>(words: &mut impl Iterator<Item = &'a [u8]>, at: Place) -> Result<[f64; 3], ReadError> {
+    Ok([coordinate(words.next(), at)?, coordinate(words.next(), at)?, coordinate(words.next(), at)?])
+}
+
+/// The next word as a whole number; `3.0` is one.
+pub(super) fn whole(word: Option<&[u8]>, at: Place, expected: &'static str) -> Result<i64, ReadError> {
+    let word = word.unwrap_or_default();
+    parse::<i64>(word).or_else(|| parse::<f64>(word).and_then(whole_of)).ok_or_else(|| malformed(at, expected, word))
+}
+
+/// `value` as an integer where it is one that a float holds exactly.
+pub(super) fn whole_of(value: f64) -> Option<i64> {
+    /// All integers up to here are floats, 2⁵³.
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    (value.fract() == 0.0 && value.abs() <= EXACT).then_some(value as i64)
+}
+
+fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}

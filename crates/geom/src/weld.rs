@@ -1,0 +1,133 @@
+//! Merging of equal points, so that triangles know their neighbours.
+//!
+//! Only points of exactly equal coordinates are merged (−0 equals 0): an STL writes each corner of a triangle anew, bit for
+//! bit. Points that merely lie close together stay apart; closing such cracks is repair, not reading.
+
+use rayon::slice::ParallelSliceMut;
+
+use crate::check::inspect_edges;
+use crate::{TriMesh, Vec3};
+
+/// A mesh after merging.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Welded {
+    /// Points in the order of their first appearance, all used; triangles in the old order.
+    pub mesh: TriMesh,
+    /// For each triangle its number before; ascending.
+    pub kept_face: Vec<u32>,
+    /// Triangles dropped because two of their corners became one.
+    pub n_collapsed: usize,
+}
+
+/// Merges points of equal coordinates, drops triangles that collapse thereby and points that no triangle uses.
+///
+/// The result does not depend on the number of threads. O(n log n).
+///
+/// # Panics
+/// Where a triangle names a missing point.
+pub fn weld(mesh: &TriMesh) -> Welded {
+    reindex(mesh, &first_equal(&mesh.points))
+}
+
+/// The mesh with its own indexing where that is closed and manifold, else welded.
+///
+/// Welding can break a mesh that is sound as indexed but touches itself: along a touching edge four triangles would meet.
+/// Unused points and triangles that name a point twice are dropped in any case. Where a triangle has two corners in the
+/// same place the file was rounded, not glued: its indexing is not trusted.
+///
+/// # Panics
+/// Where a triangle names a missing point.
+pub fn close(mesh: &TriMesh) -> Welded {
+    let as_indexed = reindex(mesh, &(0..mesh.points.len() as u32).collect::<Vec<_>>());
+    // In a closed mesh each point has at least two triangles: an STL, where it has one, need not be looked at further.
+    let may_be_closed = 2 * as_indexed.mesh.points.len() <= 3 * as_indexed.mesh.triangles.len();
+    let has_collapsed = || {
+        (0..as_indexed.mesh.triangles.len()).any(|face| {
+            let [a, b, c] = as_indexed.mesh.corners(face);
+            a == b || b == c || c == a
+        })
+    };
+    if may_be_closed && !has_collapsed() && inspect_edges(&as_indexed.mesh).is_closed() {
+        as_indexed
+    } else {
+        weld(mesh)
+    }
+}
+
+/// For each point the first one of equal coordinates.
+fn first_equal(points: &[Vec3]) -> Vec<u32> {
+    // Adding 0 turns −0 into 0 and changes nothing else, so equal coordinates have equal bits.
+    let mut sorted: Vec<([u64; 3], u32)> =
+        points.iter().zip(0..).map(|(p, i)| (p.to_array().map(|x| (x + 0.0).to_bits()), i)).collect();
+    sorted.par_sort_unstable();
+    let mut first = vec![0; points.len()];
+    for equal in sorted.chunk_by(|a, b| a.0 == b.0) {
+        equal.iter().for_each(|(_, i)| first[*i as usize] = equal[0].1);
+    }
+    first
+}
+
+/// Replaces each point by `stands_for` of it, then drops what collapses and what is unused.
+fn reindex(mesh: &TriMesh, stands_for: &[u32]) -> Welded {
+    let mut kept_face = Vec::with_capacity(mesh.triangles.len());
+    let mut triangles = Vec::with_capacity(mesh.triangles.len());
+    let mut is_used = vec![false; mesh.points.len()];
+    for (face, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = triangle.map(|v| stands_for[v as usize]);
+        if a == b || b == c || c == a {
+            continue;
+        }
+        [a, b, c].iter().for_each(|&v| is_used[v as usize] = true);
+        triangles.push([a, b, c]);
+        kept_face.push(face as u32);
+    }
+
+    let mut new_index = vec![0; mesh.points.len()];
+    let mut points = Vec::new();
+    for (old, _) in is_used.iter().enumerate().filter(|(_, used)| **used) {
+        new_index[old] = points.len() as u32;
+        points.push(mesh.points[old]);
+    }
+    triangles.iter_mut().for_each(|t| *t = t.map(|v| new_index[v as usize]));
+    let n_collapsed = mesh.triangles.len() - triangles.len();
+    Welded { mesh: TriMesh { points, triangles }, kept_face, n_collapsed }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(coordinates: &[[f64; 3]]) -> Vec<Vec3> {
+        coordinates.iter().copied().map(Vec3::from_array).collect()
+    }
+
+    #[test]
+    fn equal_points_merge_and_minus_zero_is_zero() {
+        let mesh = TriMesh {
+            points: points(&[
+                [9.0; 3],
+                [0.0; 3],
+                [1.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [1.0, -0.0, 0.0],
+                [-0.0; 3],
+                [1.0; 3],
+            ]),
+            triangles: vec![[1, 2, 3], [5, 4, 6], [1, 5, 6]],
+        };
+        let welded = weld(&mesh);
+        assert_eq!(welded.mesh.points, points(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0; 3]]));
+        assert_eq!(welded.mesh.triangles, [[0, 1, 2], [0, 1, 3]]);
+        assert_eq!((welded.kept_face, welded.n_collapsed), (vec![0, 1], 1));
+    }
+
+    #[test]
+    fn neighbouring_floats_stay_apart() {
+        let next = 1.0_f64.next_up();
+        let mesh = TriMesh {
+            points: points(&[[1.0, 0.0, 0.0], [next, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+            triangles: vec![[0, 1, 2]],
+        };
+        assert_eq!(weld(&mesh).mesh, mesh);
+    }
+}
