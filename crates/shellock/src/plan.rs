@@ -1,5 +1,31 @@
 //! Which piece goes in when and along which direction (Sect. 6).
+//!
+//! [`survey`] measures the segmented surface once: who occludes whom along the 26 directions, how good a connector each
+//! seam could carry, how flat each piece is. [`search`] then finds the plan, again and again where later stages object.
+//!
+//! Where we leave the paper: a plan must also pass the cluster test ([`cluster`]), which the paper leaves to simulation;
+//! seams too short for a connector join nothing; and the key is never cut anew here, only chosen.
 
+pub mod cluster;
+pub mod contact;
+mod diagnose;
+mod draw;
+mod improve;
+pub mod key;
+pub mod occlusion;
+mod params;
+mod piece_set;
+pub mod score;
+mod search;
+mod space;
+mod survey;
+#[cfg(test)]
+mod testing;
 pub mod types;
 
+pub use params::PlanParams;
+pub use piece_set::PieceSet;
+pub use score::{PlanScore, score};
+pub use search::search;
+pub use survey::{PlanSurvey, survey};
 pub use types::{Blocker, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome};

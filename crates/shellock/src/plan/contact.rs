@@ -1,0 +1,339 @@
+//! How good a connector each seam could carry, for either order of its two pieces and all 26 directions (Eq. 4).
+//!
+//! At a sample of the seam: `u` tangent, `N` outward normal made perpendicular to `u`, `v` perpendicular to both, from the
+//! later piece p to the earlier q; `s` the direction along which p leaves. The connector of the paper becomes shallow where
+//! `s` runs along the seam and leans backward where `s` points towards q:
+//!
+//! ```text
+//!        N, T = 0: pulls straight out          the male piece is p where s · N ≥ 0,
+//!   forward ↖ ↑ ↗ backward                     else q, which leaves p along ŝ = −s
+//!      ───p───┼───q───▶ v
+//! ```
+//!
+//! Limits: seams lie on the outer surface, connectors on the inner one, where carving may shift the line.
+
+use shellock_geom::Vec3;
+
+use super::PlanParams;
+use crate::{LatticeDirection, PatchId, Seam, SegmentedSurface};
+
+/// Distance between samples of a seam, mm: below the size of any connector.
+const SAMPLE_STEP_MM: f64 = 2.0;
+
+/// Most `|s · u|` that a connector bears; beyond, it is too shallow to hold.
+const MAX_ALONG_SEAM: f64 = 0.9;
+
+/// Most backward angle T that a connector bears, rad (60°); beyond, it is ill-shaped.
+const MAX_BACKWARD_RAD: f64 = std::f64::consts::FRAC_PI_3;
+
+/// How clearly, as `|s · N|`, a sample must ask for the other male piece before a run of connectors ends there.
+const ROLE_HYSTERESIS: f64 = 0.1;
+
+/// Room kept free at both ends of an open seam, where three pieces meet, in connector sizes D.
+const END_MARGIN_SIZES: f64 = 1.5;
+
+/// Shortest run of connectors that holds, in connector sizes D.
+///
+/// On the test models shorter runs left too little volume after carving, and pieces came loose.
+const SHORTEST_RUN_SIZES: f64 = 2.5;
+
+/// What the seams between two pieces offer for one order and one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Joint {
+    /// Weight `w` of Eq. 4, mean over the seams' length; in [β, 1 + β], lower is better.
+    ///
+    /// The mean and not a high quantile: a seam around a piece has some stretch along any `s`, so quantiles are all near 1.
+    pub weight: f64,
+    /// Share of the seams' length on which a connector can be made, in [0, 1].
+    pub usable: f64,
+    /// Longest single run of connectors, mm.
+    pub run_mm: f64,
+    /// Whether that run is long enough to hold.
+    pub holds: bool,
+}
+
+/// Two pieces that touch along seams.
+#[derive(Clone, Debug)]
+pub struct Contact {
+    /// The piece with the lower id.
+    pub a: PatchId,
+    /// The piece with the higher id.
+    pub b: PatchId,
+    /// Length of all seams between the two, mm.
+    pub length_mm: f64,
+    /// By who is later (a, then b) and by direction.
+    joints: [[Joint; LatticeDirection::COUNT]; 2],
+}
+
+/// A short piece of seam, in the frame of connectors.
+#[derive(Clone, Copy)]
+struct Sample {
+    tangent: Vec3,
+    normal: Vec3,
+    /// Perpendicular to both, from the piece with the lower id to the other.
+    across: Vec3,
+    length_mm: f64,
+    /// Whether it is far enough from the ends of an open seam.
+    has_room: bool,
+}
+
+impl Contact {
+    /// What joins the two where `later` is installed after the other and leaves along `s`.
+    pub fn joint(&self, later: PatchId, s: LatticeDirection) -> &Joint {
+        &self.joints[usize::from(later != self.a)][s.index()]
+    }
+
+    /// The piece of the contact that is not `piece`.
+    pub fn other(&self, piece: PatchId) -> PatchId {
+        if piece == self.a { self.b } else { self.a }
+    }
+
+    /// Whether any order and direction makes a joint that holds.
+    pub fn can_hold(&self) -> bool {
+        self.joints.iter().flatten().any(|j| j.holds)
+    }
+
+    /// A contact whose joints come from a function of the later piece and the direction; for made-up cases.
+    #[cfg(test)]
+    pub fn made_up(a: PatchId, b: PatchId, joint: impl Fn(PatchId, LatticeDirection) -> Joint) -> Self {
+        let joints = [a, b].map(|p| std::array::from_fn(|i| joint(p, LatticeDirection::all().nth(i).unwrap())));
+        Self { a, b, length_mm: 20.0, joints }
+    }
+}
+
+/// The contacts of all pairs that share a seam, sorted by pair.
+pub fn contacts(params: &PlanParams, surface: &SegmentedSurface, seams: &[Seam]) -> Vec<Contact> {
+    let edges = patch_border(surface);
+    let mut sampled: Vec<(PatchId, PatchId, Vec<Sample>, bool)> = seams
+        .iter()
+        .map(|seam| (seam.a, seam.b, samples(params, seam, a_is_left(seam, &edges)), seam.is_loop()))
+        .collect();
+    sampled.sort_by_key(|s| (s.0, s.1));
+    sampled.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).filter_map(|group| contact(params, group)).collect()
+}
+
+fn contact(params: &PlanParams, seams: &[(PatchId, PatchId, Vec<Sample>, bool)]) -> Option<Contact> {
+    let (a, b, ..) = seams.first()?;
+    let length_mm = seams.iter().flat_map(|s| &s.2).map(|s| s.length_mm).sum();
+    if length_mm <= 0.0 {
+        return None;
+    }
+    let lines: Vec<(&[Sample], bool)> = seams.iter().map(|s| (s.2.as_slice(), s.3)).collect();
+    let joints = [1.0, -1.0].map(|side| {
+        std::array::from_fn(|i| {
+            // The frame of b later than a is that of a later with v turned round.
+            let s = LatticeDirection::all().nth(i).expect("26 directions").unit();
+            joint(params, &lines, side, s)
+        })
+    });
+    Some(Contact { a: *a, b: *b, length_mm, joints })
+}
+
+/// What `lines` offer along `s`; `side` = 1 where the piece with the lower id is later, else −1.
+fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: Vec3) -> Joint {
+    let (mut weight, mut usable, mut length_mm, mut run_mm) = (0.0, 0.0, 0.0, 0.0_f64);
+    for &(samples, is_loop) in lines {
+        for x in samples {
+            let w = s.dot(x.tangent).abs().max((side * s.dot(x.across)).max(0.0)) + params.beta;
+            weight += w * x.length_mm;
+            length_mm += x.length_mm;
+            if carries(x, side, s) {
+                usable += x.length_mm;
+            }
+        }
+        run_mm = run_mm.max(longest_run_mm(samples, is_loop, side, s));
+    }
+    let holds = run_mm >= SHORTEST_RUN_SIZES * params.connector_size_mm;
+    Joint { weight: weight / length_mm, usable: usable / length_mm, run_mm, holds }
+}
+
+/// Whether a connector can be made at `x`.
+fn carries(x: &Sample, side: f64, s: Vec3) -> bool {
+    // s' is s without its part along the seam; where q is the male piece both s and v turn, so their product stays.
+    let (outwards, towards_female) = (s.dot(x.normal).abs(), side * s.dot(x.across));
+    x.has_room && s.dot(x.tangent).abs() <= MAX_ALONG_SEAM && towards_female.atan2(outwards) <= MAX_BACKWARD_RAD
+}
+
+/// Length of the longest row of samples that carry connectors with the same male piece.
+fn longest_run_mm(samples: &[Sample], is_loop: bool, side: f64, s: Vec3) -> f64 {
+    // A loop is walked twice, so that a run across its first point is seen whole; no run is longer than the loop.
+    let whole: f64 = samples.iter().map(|x| x.length_mm).sum();
+    let rounds = if is_loop { 2 } else { 1 };
+    let (mut longest, mut run) = (0.0_f64, 0.0_f64);
+    let mut role = 0.0;
+    for x in samples.iter().cycle().take(rounds * samples.len()) {
+        let outwards = s.dot(x.normal);
+        let flips = role * outwards < 0.0 && outwards.abs() > ROLE_HYSTERESIS;
+        if flips || role == 0.0 {
+            role = outwards.signum();
+        }
+        if flips || !carries(x, side, s) {
+            run = 0.0;
+        }
+        if carries(x, side, s) {
+            run += x.length_mm;
+        }
+        longest = longest.max(run);
+    }
+    longest.min(whole)
+}
+
+/// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame.
+fn samples(params: &PlanParams, seam: &Seam, a_is_left: bool) -> Vec<Sample> {
+    let total = seam.length();
+    if seam.points.len() < 2 || seam.normals.len() != seam.points.len() || total <= 0.0 || !total.is_finite() {
+        return Vec::new();
+    }
+    let n = (total / SAMPLE_STEP_MM).ceil().max(1.0);
+    let margin = if seam.is_loop() { 0.0 } else { END_MARGIN_SIZES * params.connector_size_mm };
+    let stations: Vec<(Vec3, Vec3)> = resampled(seam, total, n as usize);
+    let mut out = Vec::with_capacity(n as usize);
+    for (i, w) in stations.windows(2).enumerate() {
+        let Some(tangent) = (w[1].0 - w[0].0).try_normalize() else { continue };
+        let Some(normal) = (w[0].1 + w[1].1).reject_from_normalized(tangent).try_normalize() else { continue };
+        let middle = (i as f64 + 0.5) * total / n;
+        let has_room = middle >= margin && middle <= total - margin;
+        // N × u points to the left, where the surface is seen from outside.
+        let across = if a_is_left { -normal.cross(tangent) } else { normal.cross(tangent) };
+        out.push(Sample { tangent, normal, across, length_mm: total / n, has_room });
+    }
+    out
+}
+
+/// `n` + 1 points and normals at equal distances along the seam.
+fn resampled(seam: &Seam, total: f64, n: usize) -> Vec<(Vec3, Vec3)> {
+    let mut out = Vec::with_capacity(n + 1);
+    let (mut i, mut before) = (0, 0.0);
+    for k in 0..=n {
+        let target = total * k as f64 / n as f64;
+        let mut step = seam.points[i].distance(seam.points[i + 1]);
+        while before + step < target && i + 2 < seam.points.len() {
+            before += step;
+            i += 1;
+            step = seam.points[i].distance(seam.points[i + 1]);
+        }
+        let t = if step > 0.0 { ((target - before) / step).clamp(0.0, 1.0) } else { 0.0 };
+        out.push((seam.points[i].lerp(seam.points[i + 1], t), seam.normals[i].lerp(seam.normals[i + 1], t)));
+    }
+    out
+}
+
+/// A triangle edge between two patches; `left` and `right` as seen from outside.
+struct BorderEdge {
+    left: PatchId,
+    right: PatchId,
+    middle: Vec3,
+    along: Vec3,
+}
+
+/// Whether the seam's lower patch lies to its left: the vote of nine places, each asking the nearest border edge.
+fn a_is_left(seam: &Seam, edges: &[BorderEdge]) -> bool {
+    let pair = |e: &&BorderEdge| (e.left.min(e.right), e.left.max(e.right)) == (seam.a, seam.b);
+    let start = edges.partition_point(|e| (e.left.min(e.right), e.left.max(e.right)) < (seam.a, seam.b));
+    let of_pair: Vec<&BorderEdge> = edges[start..].iter().take_while(pair).collect();
+    let n_segments = seam.points.len().saturating_sub(1);
+    let mut vote = 0.0;
+    for k in 0..n_segments.min(9) {
+        let i = k * n_segments / n_segments.min(9);
+        let (from, to) = (seam.points[i], seam.points[i + 1]);
+        let middle = 0.5 * (from + to);
+        let nearest = of_pair
+            .iter()
+            .min_by(|x, y| x.middle.distance_squared(middle).total_cmp(&y.middle.distance_squared(middle)));
+        if let Some(e) = nearest {
+            let same_way = e.along.normalize_or_zero().dot((to - from).normalize_or_zero());
+            vote += if e.left == seam.a { same_way } else { -same_way };
+        }
+    }
+    vote >= 0.0
+}
+
+/// All edges between patches, sorted by pair.
+fn patch_border(surface: &SegmentedSurface) -> Vec<BorderEdge> {
+    let mesh = &surface.mesh;
+    // Only edges between two points that several patches share can be border: a small part of a fine mesh.
+    let mut first = vec![None; mesh.points.len()];
+    let mut is_shared = vec![false; mesh.points.len()];
+    for (t, &patch) in mesh.triangles.iter().zip(&surface.patch_of_face) {
+        for &v in t {
+            is_shared[v as usize] |= *first[v as usize].get_or_insert(patch) != patch;
+        }
+    }
+    let mut directed = Vec::new();
+    for (t, &patch) in mesh.triangles.iter().zip(&surface.patch_of_face) {
+        for (u, v) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            if is_shared[u as usize] && is_shared[v as usize] {
+                directed.push((u.min(v), u.max(v), u > v, patch));
+            }
+        }
+    }
+    directed.sort_unstable();
+    let mut edges = Vec::new();
+    for pair in directed.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+        if let &[(u, v, false, left), (_, _, true, right)] = pair
+            && left != right
+        {
+            let (from, to) = (mesh.points[u as usize], mesh.points[v as usize]);
+            edges.push(BorderEdge { left, right, middle: 0.5 * (from + to), along: to - from });
+        }
+    }
+    edges.sort_by_key(|e| (e.left.min(e.right), e.left.max(e.right)));
+    edges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::testing::{label, seams, sphere};
+
+    fn cap_contact(height: f64) -> Contact {
+        let surface = label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > height));
+        let mut found = contacts(&PlanParams::default(), &surface, &seams(&surface));
+        assert_eq!(found.len(), 1);
+        found.remove(0)
+    }
+
+    #[test]
+    fn a_level_seam_is_best_left_upwards_and_worst_sideways() {
+        let contact = cap_contact(0.0);
+        let cap = contact.b;
+        assert!((contact.length_mm - std::f64::consts::TAU * 50.0).abs() < 1.0);
+        let up = contact.joint(cap, LatticeDirection::nearest(Vec3::Z));
+        // On the equator +z is −v for the upper half: a pure forward connector, weight β.
+        assert!((up.weight - 0.1).abs() < 0.02, "{up:?}");
+        assert!(up.holds && up.usable > 0.99);
+        assert!((up.run_mm - contact.length_mm).abs() < 1e-6);
+        let down = contact.joint(cap, LatticeDirection::nearest(-Vec3::Z));
+        assert!((down.weight - 1.1).abs() < 0.02 && down.usable < 0.01 && !down.holds, "{down:?}");
+        let side = contact.joint(cap, LatticeDirection::nearest(Vec3::X));
+        // |s·u| = |sin φ| ≤ 0.9 on 71 % of the circle.
+        assert!((side.usable - 0.713).abs() < 0.03, "{side:?}");
+        assert!((side.weight - (std::f64::consts::FRAC_2_PI + 0.1)).abs() < 0.03);
+    }
+
+    #[test]
+    fn swapping_the_order_and_the_direction_leaves_the_joint_as_it_is() {
+        let contact = cap_contact(20.0);
+        for s in LatticeDirection::all() {
+            let (x, y) = (contact.joint(contact.b, s), contact.joint(contact.a, s.opposite()));
+            assert!((x.weight - y.weight).abs() < 1e-12 && (x.usable - y.usable).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn an_open_seam_loses_both_ends_and_a_short_one_joins_nothing() {
+        let line = |length_mm: f64| Seam {
+            a: PatchId(0),
+            b: PatchId(1),
+            points: (0..=20).map(|i| Vec3::X * (length_mm * f64::from(i) / 20.0)).collect(),
+            normals: vec![Vec3::Z; 21],
+        };
+        let params = PlanParams::default();
+        let up = |length_mm: f64| {
+            let samples = samples(&params, &line(length_mm), true);
+            joint(&params, &[(&samples, false)], 1.0, Vec3::Z)
+        };
+        assert!((up(40.0).run_mm - 32.5).abs() <= SAMPLE_STEP_MM);
+        assert!(up(40.0).holds && !up(12.0).holds);
+    }
+}

@@ -1,0 +1,207 @@
+//! Which piece can be the key: the flattest, sliding out within its plane (Sect. 6.1).
+
+use nalgebra::Matrix3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use shellock_geom::Vec3;
+
+use super::{PlanParams, PlanSurvey};
+use crate::{IdVec, LatticeDirection, PatchId, SegmentedSurface};
+
+/// Planes tried per piece.
+const N_PLANES: usize = 64;
+
+/// Faces looked at per piece, so that a fine mesh costs no more than a coarse one.
+const MAX_FACES: usize = 3000;
+
+/// Farthest from the plane, as share of the model's longest edge, that a face lies on it: 1.2 mm at 150 mm.
+const INLIER_SHARE: f64 = 0.008;
+
+/// Least cosine between a face and the plane it lies on (26°).
+const INLIER_COSINE: f64 = 0.9;
+
+/// Directions tried within the plane (Sect. 6.1).
+const N_IN_PLANE: usize = 8;
+
+/// Least share of a piece on its plane for a good key; below, its connectors cannot run straight.
+const FLAT_SHARE: f64 = 0.5;
+
+/// How much less a key on top is liked than one underneath.
+const VISIBLE_COST: f64 = 0.25;
+
+/// The plane nearest to a piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flatness {
+    /// Outward unit normal of the plane; zero where the piece has no area.
+    pub normal: Vec3,
+    /// Share of the piece's area on the plane, in [0, 1].
+    pub share: f64,
+}
+
+impl Flatness {
+    /// Of a piece without area.
+    pub const NONE: Self = Self { normal: Vec3::ZERO, share: 0.0 };
+
+    /// Whether the piece makes a good key.
+    pub fn is_flat(self) -> bool {
+        self.share >= FLAT_SHARE
+    }
+
+    /// Up to eight lattice directions nearest to the plane's own, without repeats, in order round the plane.
+    pub fn in_plane(self) -> Vec<LatticeDirection> {
+        if self.normal == Vec3::ZERO {
+            return Vec::new();
+        }
+        let (x, y) = self.normal.any_orthonormal_pair();
+        let mut directions = Vec::new();
+        for k in 0..N_IN_PLANE {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / N_IN_PLANE as f64).sin_cos();
+            let s = LatticeDirection::nearest(cos * x + sin * y);
+            if !directions.contains(&s) {
+                directions.push(s);
+            }
+        }
+        directions
+    }
+}
+
+/// A face as RANSAC sees it.
+#[derive(Clone, Copy)]
+struct Spot {
+    center: Vec3,
+    normal: Vec3,
+    area: f64,
+}
+
+/// The nearest plane of every piece by RANSAC over its faces, refined by least squares; a random stream per piece.
+pub fn flatness(params: &PlanParams, surface: &SegmentedSurface) -> IdVec<PatchId, Flatness> {
+    let mut faces = vec![Vec::new(); surface.n_patches];
+    for (face, &patch) in surface.patch_of_face.iter().enumerate() {
+        faces[usize::from(patch)].push(face);
+    }
+    let tolerance_mm = INLIER_SHARE * surface.mesh.bounds().size().max_element();
+    let flats: Vec<Flatness> = faces
+        .par_iter()
+        .enumerate()
+        .map(|(patch, faces)| {
+            let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
+            rng.set_stream(patch as u64);
+            let spot = |&f: &usize| Spot {
+                center: surface.mesh.face_center(f),
+                normal: surface.mesh.face_normal(f),
+                area: surface.mesh.face_area(f),
+            };
+            let spots: Vec<Spot> = faces.iter().step_by(faces.len().div_ceil(MAX_FACES).max(1)).map(spot).collect();
+            nearest_plane(&spots, tolerance_mm, &mut rng)
+        })
+        .collect();
+    flats.into_iter().collect()
+}
+
+fn nearest_plane(spots: &[Spot], tolerance_mm: f64, rng: &mut ChaCha8Rng) -> Flatness {
+    let total: f64 = spots.iter().map(|s| s.area).sum();
+    if total <= 0.0 || !total.is_finite() {
+        return Flatness::NONE;
+    }
+    let lies_on =
+        |s: &Spot, at: Vec3, n: Vec3| (s.center - at).dot(n).abs() < tolerance_mm && s.normal.dot(n) > INLIER_COSINE;
+    let share = |at: Vec3, n: Vec3| spots.iter().filter(|s| lies_on(s, at, n)).map(|s| s.area).sum::<f64>() / total;
+    let mut best = (Flatness::NONE, Vec3::ZERO);
+    for _ in 0..N_PLANES {
+        let Spot { center, normal, .. } = spots[rng.random_range(0..spots.len())];
+        let found = share(center, normal);
+        if found > best.0.share {
+            best = (Flatness { normal, share: found }, center);
+        }
+    }
+    let inliers: Vec<Spot> = spots.iter().copied().filter(|s| lies_on(s, best.1, best.0.normal)).collect();
+    if let Some((at, normal)) = least_squares_plane(&inliers, best.0.normal) {
+        let found = share(at, normal);
+        if found > best.0.share {
+            best.0 = Flatness { normal, share: found };
+        }
+    }
+    best.0
+}
+
+/// Centre and unit normal of the plane with least squared distance, by area, turned towards `towards`.
+fn least_squares_plane(spots: &[Spot], towards: Vec3) -> Option<(Vec3, Vec3)> {
+    let area: f64 = spots.iter().map(|s| s.area).sum();
+    if area <= 0.0 {
+        return None;
+    }
+    let center = spots.iter().map(|s| s.center * s.area).sum::<Vec3>() / area;
+    let mut spread = Matrix3::<f64>::zeros();
+    for s in spots {
+        let d = s.center - center;
+        let d = nalgebra::Vector3::new(d.x, d.y, d.z);
+        spread += s.area * d * d.transpose();
+    }
+    let eigen = spread.symmetric_eigen();
+    let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    let normal = Vec3::new(least[0], least[1], least[2]).try_normalize()?;
+    Some((center, if normal.dot(towards) < 0.0 { -normal } else { normal }))
+}
+
+/// One way to choose the key: a piece and the directions it may take.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeyChoice {
+    /// The piece.
+    pub piece: PatchId,
+    /// The directions to try, all of one kind.
+    pub directions: Vec<LatticeDirection>,
+    /// Whether the piece is flat enough for straight connectors.
+    pub is_flat: bool,
+}
+
+/// All choices, best first: flat pieces within their plane, then along other directions, then pieces that are not flat.
+///
+/// Pieces are ranked by share on the plane times the root of their area, hidden ones first.
+pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
+    let up = Vec3::from(params.up).normalize_or_zero();
+    let rank = |p: PatchId| {
+        let hidden = 0.5 * (1.0 - survey.mean_normal[p].dot(up));
+        survey.flatness[p].share * survey.area_mm2[p].sqrt() * (1.0 - VISIBLE_COST * (1.0 - hidden))
+    };
+    let mut pieces: Vec<PatchId> = survey.area_mm2.ids().filter(|&p| params.key.is_none_or(|k| k == p)).collect();
+    pieces.sort_by(|&x, &y| rank(y).total_cmp(&rank(x)).then(x.cmp(&y)));
+    let (flat, other): (Vec<PatchId>, Vec<PatchId>) = pieces.into_iter().partition(|&p| survey.flatness[p].is_flat());
+    let mut choices = Vec::new();
+    for pieces in [flat, other] {
+        for within_plane in [true, false] {
+            for &piece in &pieces {
+                let plane = survey.flatness[piece];
+                let in_plane = plane.in_plane();
+                let directions = if within_plane {
+                    in_plane
+                } else {
+                    LatticeDirection::all().filter(|s| !in_plane.contains(s)).collect()
+                };
+                choices.push(KeyChoice { piece, directions, is_flat: plane.is_flat() });
+            }
+        }
+    }
+    choices
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::testing::{label, sphere};
+
+    #[test]
+    fn the_flat_face_of_a_clipped_ball_is_the_flattest_piece_and_slides_level() {
+        let mut mesh = sphere(5, Vec3::splat(50.0));
+        for p in &mut mesh.points {
+            p.z = p.z.max(-30.0);
+        }
+        let surface = label(mesh, 3, |p| if p.z <= -30.0 { 2 } else { u32::from(p.x > 0.0) });
+        let flat = flatness(&PlanParams::default(), &surface);
+        assert!(flat[PatchId(2)].share > 0.99 && flat[PatchId(0)].share < 0.4);
+        assert!(flat[PatchId(2)].normal.dot(-Vec3::Z) > 0.999);
+        let level = flat[PatchId(2)].in_plane();
+        assert_eq!(level.len(), 8);
+        assert!(level.iter().all(|s| s.step()[2] == 0));
+    }
+}

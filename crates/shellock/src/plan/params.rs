@@ -1,0 +1,86 @@
+//! What the user may set about planning.
+
+use serde::{Deserialize, Serialize};
+use shellock_geom::Vec3;
+
+use crate::PatchId;
+
+/// How plans are judged and searched. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PlanParams {
+    /// Seed of all random streams of the stage; the same seed gives the same plan on any number of threads.
+    pub seed: u64,
+    /// Connector size D that seams must have room for. [1, 10]; 2.5.
+    pub connector_size_mm: f64,
+    /// Floor β of the connector weight (Eq. 4). [0, 1]; 0.1.
+    ///
+    /// Keeps a perfect connector from costing nothing at all.
+    pub beta: f64,
+    /// Share of a piece that another may occlude while it still counts as free. [0, 0.2]; 0.01. Carving absorbs it.
+    pub occlusion_tolerance: f64,
+    /// The tolerance tried, with a warning, where the first gives no plan. [`occlusion_tolerance`, 0.2]; 0.03.
+    ///
+    /// [`occlusion_tolerance`]: Self::occlusion_tolerance
+    pub relaxed_tolerance: f64,
+    /// The piece to be the key; the flattest that works where `None`.
+    pub key: Option<PatchId>,
+    /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
+    pub up: [f64; 3],
+    /// Plans that the random search compares. [1, 100 000]; 300.
+    pub n_plans: usize,
+    /// Pieces that the random search may take off in all before it gives up. [1, 10⁸]; 200 000.
+    ///
+    /// About 1 s on two cores with 10 pieces; plans that exist show up within some hundreds.
+    pub max_tries: usize,
+}
+
+impl Default for PlanParams {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            connector_size_mm: 2.5,
+            beta: 0.1,
+            occlusion_tolerance: 0.01,
+            relaxed_tolerance: 0.03,
+            key: None,
+            up: [0.0, 0.0, 1.0],
+            n_plans: 300,
+            max_tries: 200_000,
+        }
+    }
+}
+
+impl PlanParams {
+    /// Every problem at once, in words that say what to do; empty where all is well.
+    pub fn problems(&self) -> Vec<String> {
+        let mut problems = Vec::new();
+        let mut range = |name: &str, value: f64, low: f64, high: f64| {
+            if !(low..=high).contains(&value) {
+                problems.push(format!("`{name}` is {value}; choose a value in [{low}, {high}]"));
+            }
+        };
+        range("connector_size_mm", self.connector_size_mm, 1.0, 10.0);
+        range("beta", self.beta, 0.0, 1.0);
+        range("occlusion_tolerance", self.occlusion_tolerance, 0.0, 0.2);
+        range("relaxed_tolerance", self.relaxed_tolerance, self.occlusion_tolerance, 0.2);
+        range("n_plans", self.n_plans as f64, 1.0, 1e5);
+        range("max_tries", self.max_tries as f64, 1.0, 1e8);
+        if Vec3::from(self.up).try_normalize().is_none() {
+            problems.push("`up` has no direction; give a vector such as (0, 0, 1)".into());
+        }
+        problems
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_in_range_and_every_fault_is_named() {
+        assert_eq!(PlanParams::default().problems(), Vec::<String>::new());
+        let bad = PlanParams { beta: -1.0, n_plans: 0, up: [0.0; 3], ..PlanParams::default() };
+        assert_eq!(bad.problems().len(), 3);
+    }
+}

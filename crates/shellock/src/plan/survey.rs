@@ -1,0 +1,74 @@
+//! What planning needs to know of the surface, measured once: later rounds only change the constraints.
+
+use shellock_geom::Vec3;
+
+use super::contact::{Contact, contacts};
+use super::key::{Flatness, flatness};
+use super::occlusion::Occlusion;
+use super::{PieceSet, PlanParams};
+use crate::{Cancelled, Ctx, IdVec, PatchId, Seam, SegmentedSurface};
+
+/// Everything that [`search`](super::search) reads of the surface.
+#[derive(Clone, Debug)]
+pub struct PlanSurvey {
+    /// How many pieces there are.
+    pub n_pieces: usize,
+    /// Who is in whose way.
+    pub occlusion: Occlusion,
+    /// Pairs that share a seam, sorted.
+    pub contacts: Vec<Contact>,
+    /// Mean outward normal of each piece, by area: length in [0, 1], near 1 where the piece is flat.
+    pub mean_normal: IdVec<PatchId, Vec3>,
+    /// Area of each piece, mm².
+    pub area_mm2: IdVec<PatchId, f64>,
+    /// The plane nearest to each piece.
+    pub flatness: IdVec<PatchId, Flatness>,
+    /// The floor β that the contacts were weighed with.
+    pub beta: f64,
+}
+
+/// Measures `surface`. With more than [`PieceSet::MAX_PIECES`] pieces only their number, which the search refuses.
+pub fn survey(
+    ctx: &Ctx<'_>,
+    params: &PlanParams,
+    surface: &SegmentedSurface,
+    seams: &[Seam],
+) -> Result<PlanSurvey, Cancelled> {
+    ctx.stage("who is in whose way", 3)?;
+    let n_pieces = surface.n_patches;
+    let mut survey = PlanSurvey::empty(n_pieces, params.beta);
+    if n_pieces > PieceSet::MAX_PIECES {
+        return Ok(survey);
+    }
+    survey.occlusion = Occlusion::measure(surface);
+    ctx.step()?;
+    survey.contacts = contacts(params, surface, seams);
+    ctx.step()?;
+    survey.area_mm2 = surface.areas();
+    survey.mean_normal = mean_normals(surface, &survey.area_mm2);
+    survey.flatness = flatness(params, surface);
+    ctx.step()?;
+    Ok(survey)
+}
+
+impl PlanSurvey {
+    fn empty(n_pieces: usize, beta: f64) -> Self {
+        Self {
+            n_pieces,
+            occlusion: Occlusion::default(),
+            contacts: Vec::new(),
+            mean_normal: IdVec::from_fn(0, |_| Vec3::ZERO),
+            area_mm2: IdVec::from_fn(0, |_| 0.0),
+            flatness: IdVec::from_fn(0, |_| Flatness::NONE),
+            beta,
+        }
+    }
+}
+
+fn mean_normals(surface: &SegmentedSurface, area_mm2: &IdVec<PatchId, f64>) -> IdVec<PatchId, Vec3> {
+    let mut sums = vec![Vec3::ZERO; surface.n_patches];
+    for (face, &patch) in surface.patch_of_face.iter().enumerate() {
+        sums[usize::from(patch)] += 0.5 * surface.mesh.area_vector_doubled(face);
+    }
+    sums.into_iter().zip(area_mm2.as_slice()).map(|(v, &a)| if a > 0.0 { v / a } else { Vec3::ZERO }).collect()
+}
