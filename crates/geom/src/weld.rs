@@ -3,8 +3,6 @@
 //! Only points of exactly equal coordinates are merged (−0 equals 0): an STL writes each corner of a triangle anew, bit for
 //! bit. Points that merely lie close together stay apart; closing such cracks is repair, not reading.
 
-use rayon::slice::ParallelSliceMut;
-
 use crate::check::inspect_edges;
 use crate::{TriMesh, Vec3};
 
@@ -21,7 +19,7 @@ pub struct Welded {
 
 /// Merges points of equal coordinates, drops triangles that collapse thereby and points that no triangle uses.
 ///
-/// The result does not depend on the number of threads. O(n log n).
+/// The result is the same on every run. O(n log n) at worst, near O(n) on real meshes.
 ///
 /// # Panics
 /// Where a triangle names a missing point.
@@ -57,14 +55,44 @@ pub fn close(mesh: &TriMesh) -> Welded {
 /// For each point the first one of equal coordinates.
 fn first_equal(points: &[Vec3]) -> Vec<u32> {
     // Adding 0 turns −0 into 0 and changes nothing else, so equal coordinates have equal bits.
-    let mut sorted: Vec<([u64; 3], u32)> =
-        points.iter().zip(0..).map(|(p, i)| (p.to_array().map(|x| (x + 0.0).to_bits()), i)).collect();
-    sorted.par_sort_unstable();
+    let bits = |i: u32| points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
+    // Equal points get into the same bucket by a hash, and within the few points of a bucket sorting finds them. Buckets
+    // that a hostile file overfills cost a sort, not a square.
+    let n_bits = points.len().next_power_of_two().ilog2().max(1);
+    let bucket_of: Vec<u32> = (0..points.len() as u32).map(|i| (hash(bits(i)) >> (64 - n_bits)) as u32).collect();
+    let mut begin = vec![0_u32; (1 << n_bits) + 1];
+    bucket_of.iter().for_each(|&bucket| begin[bucket as usize + 1] += 1);
+    for bucket in 1..begin.len() {
+        begin[bucket] += begin[bucket - 1];
+    }
+    let mut next = begin.clone();
+    let mut order = vec![0_u32; points.len()];
+    for (&bucket, i) in bucket_of.iter().zip(0..) {
+        order[next[bucket as usize] as usize] = i;
+        next[bucket as usize] += 1;
+    }
+
     let mut first = vec![0; points.len()];
-    for equal in sorted.chunk_by(|a, b| a.0 == b.0) {
-        equal.iter().for_each(|(_, i)| first[*i as usize] = equal[0].1);
+    for range in begin.windows(2) {
+        let bucket = &mut order[range[0] as usize..range[1] as usize];
+        bucket.sort_unstable_by_key(|&i| (bits(i), i));
+        for equal in bucket.chunk_by(|&i, &j| bits(i) == bits(j)) {
+            equal.iter().for_each(|&i| first[i as usize] = equal[0]);
+        }
     }
     first
+}
+
+/// Spreads coordinates over 64 bits, the upper ones best.
+fn hash(bits: [u64; 3]) -> u64 {
+    /// 2⁶⁴ over the golden ratio, odd: the usual multiplier of multiplicative hashing.
+    const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
+    bits.iter()
+        .fold(0, |h: u64, &b| {
+            let mixed = (h ^ b).wrapping_mul(MULTIPLIER);
+            mixed ^ (mixed >> 29)
+        })
+        .wrapping_mul(MULTIPLIER)
 }
 
 /// Replaces each point by `stands_for` of it, then drops what collapses and what is unused.

@@ -107,7 +107,7 @@ fn a_pinched_point_is_found() {
             points.push(Vec3::new(r * turn(i, n).cos(), r * turn(i, n).sin(), turn(j, m).sin()));
         }
     }
-    let at = |i: u32, j: u32| if i % n == 0 { 0 } else { 1 + (i % n - 1) * m + j % m };
+    let at = |i: u32, j: u32| if i.is_multiple_of(n) { 0 } else { 1 + (i % n - 1) * m + j % m };
     let quads = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
     let triangles = quads
         .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]])
