@@ -6,11 +6,11 @@
 pub mod band;
 pub mod boolean;
 pub mod bvh;
+pub mod check;
+pub mod io;
 pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;
-pub mod check;
-pub mod io;
 pub mod mesh;
 pub mod rounding;
 pub mod signed_distance;
