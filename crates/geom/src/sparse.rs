@@ -11,6 +11,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
+use rayon::prelude::*;
 
 /// A symmetric matrix by its upper triangle, in compressed columns.
 #[derive(Clone, Debug)]
@@ -48,7 +49,7 @@ impl SparseSymmetric {
                 (e.0, e.1) = (e.1, e.0);
             }
         }
-        entries.sort_by_key(|e| (e.1, e.0));
+        entries.par_sort_by_key(|e| (e.1, e.0));
         let mut matrix = Self { n, column_start: vec![0; n + 1], row: Vec::new(), value: Vec::new() };
         for same in entries.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             matrix.row.push(same[0].0);

@@ -99,6 +99,12 @@ impl ContactGraph {
         self.parts().len() <= 1 && self.articulation_pieces().is_empty()
     }
 
+    /// How far from 2-connected: parts too many, three times, and those that come of taking each single piece away; 0 where it is.
+    pub fn n_faults(&self) -> usize {
+        let hanging = (0..self.n_patches).map(|p| self.parts_without(PatchId::from(p)).len().saturating_sub(1));
+        3 * self.parts().len().saturating_sub(1) + hanging.sum::<usize>()
+    }
+
     fn parts_avoiding(&self, without: Option<PatchId>) -> Vec<Vec<PatchId>> {
         let mut part: Vec<usize> = (0..self.n_patches).collect();
         fn root(part: &mut [usize], mut i: usize) -> usize {

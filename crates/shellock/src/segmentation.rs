@@ -204,7 +204,10 @@ pub enum LabelOrigin {
 /// How often mending is repeated with a stricter limit when smoothing shortened a contact below the limit.
 const MAX_MEND_ROUNDS: usize = 4;
 /// How much stricter each repetition is.
-const STRICTER: f64 = 1.25;
+const STRICTER: f64 = 1.15;
+
+/// How many clusterings automatic segmentation tries before it is content with one that hangs together only once.
+const MAX_AUTOMATIC_TRIES: u64 = 4;
 
 /// The whole stage: labels (the user's, or automatic ones), mended, smoothed and cut; `source_face` names triangles of `solid`.
 ///
@@ -217,28 +220,54 @@ pub fn segment(
 ) -> Result<SegmentedSurface, SegmentationError> {
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
     let (fine, source_face) = halve_long_edges(params, solid);
-    let (labels, origin) = match given {
-        Some(labels) => (labels.inherited(&source_face), LabelOrigin::User),
-        None => (auto_labels(ctx, params, &fine)?, LabelOrigin::Automatic),
-    };
-    let mut labels = labels;
-    let mut strict = params.clone();
-    let mut round = 0;
-    let mut surface = loop {
-        labels = mend(ctx, &strict, &fine, &labels, origin)?;
-        let surface = smooth_and_cut(ctx, params, &fine, &labels)?;
-        round += 1;
-        let graph = surface.contact_graph(params.min_contact_mm);
-        if graph.is_two_connected() || round == MAX_MEND_ROUNDS {
-            if !graph.is_two_connected() {
-                warn_weak_graph(ctx, &graph);
+    let (faults, mut surface) = match given {
+        Some(labels) => held_twice(ctx, params, &fine, labels.inherited(&source_face), LabelOrigin::User)?,
+        None => {
+            let mut best: Option<(usize, SegmentedSurface)> = None;
+            for attempt in 0..MAX_AUTOMATIC_TRIES {
+                let reseeded = SegmentationParams { seed: params.seed.wrapping_add(attempt << 32), ..params.clone() };
+                let labels = auto_labels(ctx, &reseeded, &fine)?;
+                let (faults, surface) = held_twice(ctx, params, &fine, labels, LabelOrigin::Automatic)?;
+                if best.as_ref().is_none_or(|b| faults < b.0) {
+                    best = Some((faults, surface));
+                }
+                if faults == 0 {
+                    break;
+                }
             }
-            break surface;
+            best.expect("there is at least one try")
         }
-        strict.min_contact_mm *= STRICTER;
     };
+    if faults > 0 {
+        warn_weak_graph(ctx, &surface.contact_graph(params.min_contact_mm));
+    }
     surface.source_face.iter_mut().for_each(|f| *f = source_face[*f as usize]);
     Ok(surface)
+}
+
+/// Mends, smooths and cuts until the smooth seams hold every piece twice; the best round and its faults where none does.
+fn held_twice(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    solid: &Solid,
+    mut labels: FaceLabels,
+    origin: LabelOrigin,
+) -> Result<(usize, SegmentedSurface), SegmentationError> {
+    let mut strict = params.clone();
+    let mut best: Option<(usize, SegmentedSurface)> = None;
+    for _ in 0..MAX_MEND_ROUNDS {
+        labels = mend(ctx, &strict, solid, &labels, origin)?;
+        let surface = smooth_and_cut(ctx, params, solid, &labels)?;
+        let faults = surface.contact_graph(params.min_contact_mm).n_faults();
+        if best.as_ref().is_none_or(|b| faults < b.0) {
+            best = Some((faults, surface));
+        }
+        if faults == 0 {
+            break;
+        }
+        strict.min_contact_mm *= STRICTER;
+    }
+    Ok(best.expect("there is at least one round"))
 }
 
 fn warn_weak_graph(ctx: &Ctx, graph: &crate::ContactGraph) {

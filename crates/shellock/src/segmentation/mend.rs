@@ -14,6 +14,9 @@ use crate::{ContactGraph, Ctx, PatchId, Warning};
 /// How much longer a seam along triangle edges is than the smooth one: 4/π for random directions on a square grid.
 const ZIGZAG: f64 = 1.27;
 
+/// How much larger than the smallest piece a half must be, as smoothing takes from narrow patches.
+const SPLIT_RESERVE: f64 = 2.0;
+
 /// The labels with patches divided until each is a disk and no piece alone holds others, or until `max_splits` or `min_piece_mm2`
 /// forbid more. Pieces that touch nothing long enough join a neighbour. Old patches keep their numbers unless some are joined.
 ///
@@ -28,8 +31,12 @@ pub fn mend(
 ) -> Result<FaceLabels, SegmentationError> {
     let topology = Topology::new(solid);
     let faces = DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE);
-    let divider =
-        Divider { mesh: solid.mesh(), topology: &topology, faces: &faces, min_piece_mm2: params.min_piece_mm2 };
+    let divider = Divider {
+        mesh: solid.mesh(),
+        topology: &topology,
+        faces: &faces,
+        min_piece_mm2: SPLIT_RESERVE * params.min_piece_mm2,
+    };
     let mut work = Work {
         divider,
         label: labels.as_slice().to_vec(),
@@ -79,14 +86,6 @@ fn weakest_link(work: &Work, graph: &ContactGraph) -> Option<(u32, u32)> {
     Some((inner.0, outer.0))
 }
 
-/// How far a graph is from 2-connected: the parts too many, over all pieces that could be taken away.
-fn graph_faults(graph: &ContactGraph) -> f64 {
-    let n_parts = graph.parts().len() - 1;
-    let hanging: usize =
-        (0..graph.n_patches()).map(|p| graph.parts_without(PatchId::from(p)).len().saturating_sub(1)).sum();
-    (hanging + 3 * n_parts) as f64
-}
-
 impl Work<'_> {
     fn seam(&self) -> Vec<HalfEdge> {
         seam_half_edges(self.divider.topology, &self.label, 0..self.label.len() as u32)
@@ -107,6 +106,7 @@ impl Work<'_> {
                 faulty.push((faults, k as u32));
             }
         }
+        let n_parts = graph.parts().len();
         faulty.sort_by_key(|&(faults, k)| (std::cmp::Reverse(faults), k));
         for (_, patch) in faulty {
             let parts = graph.parts_without(PatchId(patch));
@@ -124,7 +124,10 @@ impl Work<'_> {
                     let o = divider.topology.opposite(h);
                     if label[h as usize / 3] < label[o as usize / 3] { h } else { o }
                 });
-                graph_faults(&raw_contact_graph(divider, label, n + 1, &all.collect::<Vec<_>>(), min_contact_mm))
+                let seams: Vec<HalfEdge> = all.collect();
+                let after = raw_contact_graph(divider, label, n + 1, &seams, min_contact_mm);
+                // A half that nothing holds would be joined again, and so on without end.
+                if after.parts().len() > n_parts { f64::INFINITY } else { after.n_faults() as f64 }
             };
             let Some(division) = divider.best(&mut self.label, n, patch, &pairs, faults) else { continue };
             self.warn(

@@ -48,7 +48,7 @@ pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option
 
 impl Divider<'_> {
     /// The cheapest division of `patch`; `label` is the same afterwards. `pairs` are far points that Voronoi halves are tried with, and
-    /// `faults` counts what else is wrong with a labelling, given with the seams inside the patch.
+    /// `faults` counts what else is wrong with a labelling, given with the seams inside the patch; infinite forbids it.
     pub fn best(
         &self,
         label: &mut [u32],
@@ -81,7 +81,7 @@ impl Divider<'_> {
                 let cost = FAULT * (holes as f64 + faults(label, &seam))
                     + UNEVENNESS * ((area - 2.0 * moved_mm2) / area).powi(2)
                     + SEAM_LENGTH * length / area.sqrt();
-                if best.as_ref().is_none_or(|b| cost < b.cost) {
+                if cost.is_finite() && best.as_ref().is_none_or(|b| cost < b.cost) {
                     best = Some(Division { cost, moved });
                 }
             }

@@ -41,7 +41,8 @@ pub fn user_labels(
     let mut parts = Parts::new(solid.mesh(), &topology, &label);
     parts.merge_islands(ctx, params, &names);
     parts.merge_small(ctx, params, &names);
-    let cleaned = FaceLabels::from_connected(&topology, &parts.sort_key());
+    // Parts are numbered by label already, so the patches follow the order of the labels.
+    let cleaned = FaceLabels::from_connected(&topology, &parts.part_of_face);
     if cleaned.n_patches() < 2 {
         return Err(SegmentationError::AllTooSmall { min_piece_mm2: params.min_piece_mm2 });
     }
@@ -135,12 +136,6 @@ impl<'a> Parts<'a> {
         self.area[into] += std::mem::take(&mut self.area[part]);
         self.n_faces[into] += std::mem::take(&mut self.n_faces[part]);
         true
-    }
-
-    /// For each triangle a number that orders parts by label.
-    fn sort_key(&self) -> Vec<u32> {
-        // Parts are numbered by label already.
-        self.part_of_face.clone()
     }
 
     fn warn(&self, ctx: &Ctx, code: &str, part: usize, message: String) {
