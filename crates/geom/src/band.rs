@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use crate::signed_distance::SignedDistance;
+use crate::signed_distance::{SignedDistance, SurfaceDistance};
 use crate::{Aabb, Vec3};
 
 /// No such node.
@@ -47,20 +47,22 @@ pub struct GridTooFine {
 
 impl Band {
     /// The nodes with a signed distance in [−`outside_mm`, `inside_mm`] to the surface within `bounds`, and that distance
-    /// (positive inside) as a first field.
+    /// (positive inside) as a first field. Where a block of nodes lies deeper than `exact_mm`, its distances are
+    /// extrapolated from its middle to first order: deep nodes only need to exist.
     pub fn along(
         surface: &SignedDistance,
         bounds: Aabb,
         cell_mm: f64,
         outside_mm: f64,
         inside_mm: f64,
+        exact_mm: f64,
     ) -> Result<(Self, Vec<f32>), GridTooFine> {
         let room = bounds.grown(outside_mm + 2.0 * cell_mm);
         let dims = room.size().to_array().map(|s| (s / cell_mm).ceil() as usize + 1);
         if dims.iter().any(|&n| n > usize::from(u16::MAX) - 1) {
             return Err(GridTooFine { cell_mm, size_mm: bounds.size().max_element() });
         }
-        let rule = BandRule { surface, origin: room.min, cell_mm, dims, outside_mm, inside_mm };
+        let rule = BandRule { surface, origin: room.min, cell_mm, dims, outside_mm, inside_mm, exact_mm };
         let blocks = rule.blocks();
         let mut found: Vec<(u64, f32)> = blocks.par_iter().flat_map_iter(|&b| rule.nodes_of(b)).collect();
         found.par_sort_unstable_by_key(|n| n.0);
@@ -215,6 +217,7 @@ struct BandRule<'a> {
     dims: [usize; 3],
     outside_mm: f64,
     inside_mm: f64,
+    exact_mm: f64,
 }
 
 /// Nodes along an edge of a coarse block, and of the fine blocks it is refined into.
@@ -227,12 +230,12 @@ impl BandRule<'_> {
     }
 
     /// Signed distance at the middle of a block where the block can contain nodes of the band.
-    fn reach(&self, corner: [usize; 3], edge: usize) -> Option<f64> {
+    fn reach(&self, corner: [usize; 3], edge: usize) -> Option<SurfaceDistance> {
         let half = 0.5 * (edge - 1) as f64 * self.cell_mm;
         let radius = half * 3f64.sqrt();
         let farthest = self.inside_mm.max(self.outside_mm) + radius;
-        let d = self.surface.at(self.position(corner) + half, farthest)?.signed_mm;
-        (d >= -self.outside_mm - radius && d <= self.inside_mm + radius).then_some(d)
+        let d = self.surface.at(self.position(corner) + half, farthest)?;
+        (d.signed_mm >= -self.outside_mm - radius && d.signed_mm <= self.inside_mm + radius).then_some(d)
     }
 
     fn blocks(&self) -> Vec<[usize; 3]> {
@@ -253,17 +256,25 @@ impl BandRule<'_> {
     fn nodes_of(&self, corner: [usize; 3]) -> Vec<(u64, f32)> {
         let mut nodes = Vec::new();
         let Some(middle) = self.reach(corner, FINE) else { return nodes };
-        let center = self.position(corner) + 0.5 * (FINE - 1) as f64 * self.cell_mm;
+        let half = 0.5 * (FINE - 1) as f64 * self.cell_mm;
+        let center = self.position(corner) + half;
+        let is_deep = middle.signed_mm > self.exact_mm + half * 3f64.sqrt();
+        let inwards = (center - middle.point).normalize_or_zero();
         let [nx, ny, nz] = self.dims;
         for k in corner[2]..(corner[2] + FINE).min(nz) {
             for j in corner[1]..(corner[1] + FINE).min(ny) {
                 for i in corner[0]..(corner[0] + FINE).min(nx) {
                     let p = self.position([i, j, k]);
-                    // Distance is 1-Lipschitz: the middle's answer bounds the search.
-                    let bound = (middle.abs() + p.distance(center)) * (1.0 + 1e-9) + 1e-9;
-                    let Some(d) = self.surface.at(p, bound) else { continue };
-                    if d.signed_mm >= -self.outside_mm && d.signed_mm <= self.inside_mm {
-                        nodes.push((((k * ny + j) * nx + i) as u64, d.signed_mm as f32));
+                    let signed_mm = if is_deep {
+                        middle.signed_mm + (p - center).dot(inwards)
+                    } else {
+                        // Distance is 1-Lipschitz: the middle's answer bounds the search.
+                        let bound = (middle.signed_mm.abs() + p.distance(center)) * (1.0 + 1e-9) + 1e-9;
+                        let Some(d) = self.surface.at(p, bound) else { continue };
+                        d.signed_mm
+                    };
+                    if signed_mm >= -self.outside_mm && signed_mm <= self.inside_mm {
+                        nodes.push((((k * ny + j) * nx + i) as u64, signed_mm as f32));
                     }
                 }
             }
@@ -281,7 +292,7 @@ pub(crate) mod tests {
     pub(crate) fn cube_band() -> (Band, Vec<f32>) {
         let b = Aabb { min: Vec3::ZERO, max: Vec3::splat(8.0) };
         let solid = Solid::new(Volume::cuboid(b).to_mesh()).unwrap();
-        Band::along(&SignedDistance::new(&solid), b, 0.5, 1.3, 2.6).unwrap()
+        Band::along(&SignedDistance::new(&solid), b, 0.5, 1.3, 2.6, 2.6).unwrap()
     }
 
     #[test]

@@ -22,7 +22,7 @@ const INNER_TOLERANCE_MM: f64 = 0.01;
 pub struct ShellGrid {
     /// The nodes.
     pub band: Band,
-    /// Signed distance to the surface, mm, positive inside: φ0.
+    /// Signed distance to the surface, mm, positive inside: φ0. Exact down to a few cells below the wall.
     pub depth: Vec<f32>,
     /// Wall thickness H, mm.
     pub thickness_mm: f64,
@@ -57,7 +57,9 @@ impl ShellGrid {
         let cell = params.cell_mm();
         let reach_mm = params.thickness_mm + below_wall_mm.max(3.0 * cell);
         let distance = SignedDistance::new(model);
-        let (band, depth) = Band::along(&distance, model.mesh().bounds(), cell, OUTSIDE_CELLS * cell, reach_mm)?;
+        let exact_mm = params.thickness_mm + (OUTSIDE_CELLS + 1.0) * cell;
+        let bounds = model.mesh().bounds();
+        let (band, depth) = Band::along(&distance, bounds, cell, OUTSIDE_CELLS * cell, reach_mm, exact_mm)?;
         Ok(Self { band, depth, thickness_mm: params.thickness_mm, reach_mm })
     }
 

@@ -66,11 +66,16 @@ pub fn build(
         } else {
             let cut = work.cut(p, step.separation);
             let (keep, leave) = rayon::join(|| work.tool(&cut, 1.0), || work.tool(&cut, -1.0));
-            let (body, next) = rayon::join(|| rest.intersect(&keep), || rest.subtract(&leave));
-            bodies[usize::from(p)] = Some(whole_body(ctx, p, &body));
-            rest = next;
-            inner.give(p, &cut, &grid.band);
-            let in_way = work.remove(p, step.separation, &cut);
+            // Booleans, the inner surface and the fields do not wait for each other.
+            let (parts, in_way) = rayon::join(
+                || rest.split(&leave),
+                || {
+                    inner.give(p, &cut, &grid.band);
+                    work.remove(p, step.separation, &cut)
+                },
+            );
+            bodies[usize::from(p)] = Some(whole_body(ctx, p, &parts.0.intersect(&keep)));
+            rest = parts.1;
             barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
         }
         ctx.step()?;

@@ -20,12 +20,11 @@ pub(super) enum Half {
 /// The corners of one convex cell of a run.
 type Cell = [Vec3; 8];
 
-/// The convex cells of one half: for each part of the section, one between each two stations. With `grown_mm`, every cell
-/// is larger by that on all sides, lengthwise at the run's ends.
-fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Cell> {
+/// The corners of each part of one half's section, station by station. With `grown_mm`, every part is larger by that on all
+/// sides, lengthwise at the run's ends.
+fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Vec<Option<[Vec3; 4]>>> {
     let last = run.stations.len() - 1;
-    let sections: Vec<(Station, Vec<Option<Part>>)> = run
-        .stations
+    run.stations
         .iter()
         .enumerate()
         .map(|(i, station)| {
@@ -42,14 +41,17 @@ fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
                 0.0
             };
             let moved = Station { point: station.point + lengthwise * station.tangent, ..*station };
-            (moved, parts.into_iter().map(|p| p.map(|p| p.grown(grown_mm))).collect())
+            parts.into_iter().map(|part: Option<Part>| part.map(|p| p.grown(grown_mm).corners(&moved))).collect()
         })
-        .collect();
+        .collect()
+}
+
+/// The convex cells of one half, grown: for each part of the section, one between each two stations.
+fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Cell> {
     let mut cells = Vec::new();
-    for pair in sections.windows(2) {
-        for (a, b) in pair[0].1.iter().zip(&pair[1].1) {
+    for pair in rings(params, run, half, grown_mm).windows(2) {
+        for (a, b) in pair[0].iter().zip(&pair[1]) {
             if let (Some(a), Some(b)) = (a, b) {
-                let (a, b) = (a.corners(&pair[0].0), b.corners(&pair[1].0));
                 cells.push([a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]);
             }
         }
@@ -59,7 +61,18 @@ fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
 
 /// One half of a run as it is before anything is carved.
 pub(super) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Volume {
-    Volume::union_all(cells(params, run, half, 0.0).iter().map(|c| Volume::hull(c)).collect())
+    let rings = rings(params, run, half, 0.0);
+    let n_parts = rings[0].len();
+    let lofts = (0..n_parts).flat_map(|part| {
+        // A part that some sections lack gives several lofts.
+        let line: Vec<Option<[Vec3; 4]>> = rings.iter().map(|r| r[part]).collect();
+        let stretches: Vec<Volume> = line
+            .split(Option::is_none)
+            .map(|stretch| Volume::loft(&stretch.iter().flatten().map(|c| c.to_vec()).collect::<Vec<_>>()))
+            .collect();
+        stretches
+    });
+    Volume::union_all(lofts.collect())
 }
 
 /// What a piece sweeps with its half connectors on its way out.

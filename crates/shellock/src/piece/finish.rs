@@ -14,7 +14,7 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 /// How far connectors reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.4;
 /// A run of which less than this share of either half survives the carving is given up, both halves.
-const LEAST_KEPT: f64 = 0.3;
+const LEAST_KEPT: f64 = 0.25;
 /// Simplification of the carving surfaces, mm.
 const CARVE_TOLERANCE_MM: f64 = 0.01;
 
@@ -77,28 +77,23 @@ pub fn make(
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<Finished, PieceError> {
     ctx.stage("connectors", plan.steps.len())?;
-    let below = grid.deeper_than(grid.thickness_mm - ROOT_MM);
     let far_mm = rooms.as_slice().iter().fold(Aabb::EMPTY, |b, r| b.union(*r)).diagonal();
     let mut halves = vec![Halves { raw: [0.0; 2], carved: [Volume::empty(), Volume::empty()] }; runs.len()];
     let mut wakes: Vec<Wake> = Vec::new();
     for step in plan.removal() {
         let q = step.piece;
-        let room = rooms[q].grown(-grid.band.cell_mm());
-        let space = below.intersect(&Volume::cuboid(room)).subtract(&barred(params, grid, shell, q));
         let mine: Vec<(usize, usize)> = (0..runs.len())
             .flat_map(|r| {
                 let male = (runs[r].male == q).then_some((r, 0));
                 male.into_iter().chain((runs[r].female == q).then_some((r, 1)))
             })
             .collect();
-        let made: Vec<(f64, Volume)> = mine
-            .par_iter()
-            .map(|&(r, h)| {
-                let whole = whole_half(params, &runs[r], [Half::Male, Half::Female][h]);
-                let in_cavity = whole.intersect(&below);
-                (in_cavity.volume(), carved(&whole.intersect(&space), &wakes, far_mm))
-            })
-            .collect();
+        let whole: Vec<Volume> =
+            mine.par_iter().map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h])).collect();
+        let boxes: Vec<Aabb> = whole.iter().map(Volume::bounds).collect();
+        let space = space(params, grid, shell, q, &boxes);
+        let made: Vec<(f64, Volume)> =
+            whole.par_iter().map(|whole| (whole.volume(), carved(&whole.intersect(&space), &wakes, far_mm))).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
             halves[r].carved[h] = volume;
@@ -111,12 +106,21 @@ pub fn make(
     Ok(Finished { meshes, joints })
 }
 
-/// Where `q` may have no connector, grown by the clearance.
-fn barred(params: &ConnectorParams, grid: &ShellGrid, shell: &ShellBodies, q: PatchId) -> Volume {
-    let mut field = shell.barred[q].spread(&grid.band, -grid.cutoff_mm());
-    let (clearance, ceiling) = (params.clearance_mm as f32, (grid.thickness_mm - 2.0 * ROOT_MM) as f32);
-    // Only what lies below the wall matters.
-    field.par_iter_mut().zip(&grid.depth).for_each(|(f, d)| *f = (*f + clearance).min(d - ceiling));
+/// Where the half connectors of `q` may be, within `boxes`: below the wall, a root's depth into it, and the clearance away
+/// from whatever its way out or a later piece's takes.
+fn space(params: &ConnectorParams, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
+    let barred = shell.barred[q].spread(&grid.band, grid.cutoff_mm());
+    let (clearance, ceiling) = (params.clearance_mm as f32, (grid.thickness_mm - ROOT_MM) as f32);
+    let boxes: Vec<Aabb> = boxes.iter().map(|b| b.grown(2.0 * grid.band.cell_mm())).collect();
+    let outside = -(grid.band.cell_mm() as f32);
+    let field: Vec<f32> = (0..grid.band.len())
+        .into_par_iter()
+        .map(|n| {
+            let free = (grid.depth[n] - ceiling).min(-barred[n] - clearance);
+            let is_near = || boxes.iter().any(|b| b.contains(grid.band.position(n)));
+            if free > outside && is_near() { free } else { free.min(outside) }
+        })
+        .collect();
     let mesh = contour(&grid.band, &field, OffBand::Outside);
     Volume::from_closed_mesh(&mesh).expect("contours are manifold").simplify(CARVE_TOLERANCE_MM)
 }
@@ -141,7 +145,7 @@ fn join_to_bodies(
     let meshes: Vec<Result<TriMesh, PieceError>> = ids
         .par_iter()
         .map(|&q| {
-            let mut parts = vec![shell.bodies[q].clone()];
+            let mut parts = Vec::new();
             for (joint, half) in joints.iter().zip(halves).filter(|(j, _)| j.length_mm > 0.0) {
                 if joint.male == q {
                     parts.push(half.carved[0].clone());
@@ -150,7 +154,7 @@ fn join_to_bodies(
                     parts.push(half.carved[1].clone());
                 }
             }
-            let united = Volume::union_all(parts);
+            let united = shell.bodies[q].union(&Volume::union_all(parts));
             // What hangs on nothing is a chip that carving cut loose.
             let piece = united.components().into_iter().next().unwrap_or_else(Volume::empty);
             let mesh = printable(&piece).map_err(|reason| PieceError::NotPrintable { piece: q, reason });
