@@ -17,6 +17,8 @@ mod params;
 mod piece_set;
 pub mod score;
 mod search;
+#[cfg(test)]
+mod search_tests;
 mod space;
 mod survey;
 #[cfg(test)]

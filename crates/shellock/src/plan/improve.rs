@@ -5,7 +5,7 @@ use super::space::Space;
 use super::{InstallationPlan, score};
 use crate::{LatticeDirection, PatchId};
 
-/// Improvements after which a plan is left as it is; test models needed at most 15.
+/// Improvements after which a plan is left as it is: a bound on time, since each one lowers the cost anyway.
 const MAX_IMPROVEMENTS: usize = 100;
 
 /// Cost gain that counts; below, rounding decides.

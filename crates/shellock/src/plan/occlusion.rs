@@ -19,7 +19,7 @@ use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
 /// Pixels along the longest edge of the surface's box: 0.6 mm at 150 mm.
 ///
-/// The cost is the same for any size of model; at half the pixel size no plan of the test models changed its freedom.
+/// The number of rays, and so the cost per layer of surface, is the same for any size of model.
 const PIXELS_ACROSS: f64 = 250.0;
 
 /// How much deeper than p, in pixels, a point of q must be to count as ahead: 0.02 mm at 150 mm.
@@ -94,7 +94,7 @@ impl Occlusion {
     #[cfg(test)]
     pub fn block(&mut self, p: PatchId, q: PatchId, s: LatticeDirection) {
         let at = self.at(p, q);
-        self.tables[s.index()].occluded_mm2[at] = 1.0;
+        self.tables[s.index()].occluded_mm2[at] = self.total_mm2(p, s);
         self.tables[s.index()].first_hit[at] = Some((0.0, Vec3::ZERO));
     }
 

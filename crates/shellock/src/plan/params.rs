@@ -31,7 +31,7 @@ pub struct PlanParams {
     pub n_plans: usize,
     /// Pieces that the random search may take off in all before it gives up. [1, 10⁸]; 200 000.
     ///
-    /// About 1 s on two cores with 10 pieces; plans that exist show up within some hundreds.
+    /// A bound on hopeless cases, for each of the two tolerances; where plans exist the search ends long before.
     pub max_tries: usize,
 }
 

@@ -1,0 +1,220 @@
+//! The search against brute force, on made-up and on real surfaces.
+
+use std::sync::atomic::AtomicBool;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use shellock_geom::Vec3;
+
+use super::contact::{Contact, Joint};
+use super::key::{Flatness, KeyChoice, choices};
+use super::occlusion::Occlusion;
+use super::space::Space;
+use super::testing::{label, seams, sphere, voronoi};
+use super::*;
+use crate::{Ctx, IdVec, LatticeDirection, PatchId};
+
+fn on_ctx<T>(run: impl FnOnce(&Ctx<'_>) -> T) -> T {
+    let stop = AtomicBool::new(false);
+    run(&Ctx::new(&|_| {}, &stop))
+}
+
+fn searched(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> PlanOutcome {
+    on_ctx(|ctx| search(ctx, params, survey, constraints)).unwrap()
+}
+
+fn surveyed(surface: &crate::SegmentedSurface) -> PlanSurvey {
+    on_ctx(|ctx| survey(ctx, &PlanParams::default(), surface, &seams(surface))).unwrap()
+}
+
+/// A survey out of nothing: random contacts, joints, and few free directions.
+fn made_up(n: usize, edges: &[(u32, u32)], share_free: f64, rng: &mut ChaCha8Rng) -> PlanSurvey {
+    let mut occlusion = Occlusion::none(n);
+    for p in (0..n).map(PatchId::from) {
+        for s in LatticeDirection::all() {
+            for q in (0..n).map(PatchId::from).filter(|&q| q != p) {
+                // Only some lattice directions are ever free, to keep brute force short.
+                if s.index() % 5 != 0 || rng.random_range(0.0..1.0) > share_free {
+                    occlusion.block(p, q, s);
+                }
+            }
+        }
+    }
+    let contacts = edges
+        .iter()
+        .map(|&(a, b)| {
+            let mut tables = [(); 2].map(|()| [(); LatticeDirection::COUNT].map(|()| random_joint(rng)));
+            tables[0].reverse();
+            Contact::made_up(PatchId(a), PatchId(b), move |p, s| tables[usize::from(p.0 != a)][s.index()])
+        })
+        .collect();
+    PlanSurvey {
+        n_pieces: n,
+        occlusion,
+        contacts,
+        mean_normal: IdVec::from_fn(n, |_: PatchId| Vec3::new(0.1, 0.2, 0.3)),
+        area_mm2: IdVec::from_fn(n, |p: PatchId| 100.0 + f64::from(p.0)),
+        flatness: IdVec::from_fn(n, |p: PatchId| Flatness { normal: Vec3::Z, share: f64::from(p.0 % 2) }),
+        beta: 0.1,
+    }
+}
+
+fn random_joint(rng: &mut ChaCha8Rng) -> Joint {
+    let usable = rng.random_range(0.0..1.0);
+    Joint { weight: rng.random_range(0.1..1.1), usable, run_mm: 20.0 * usable, holds: usable > 0.2 }
+}
+
+/// All allowed plans with a key among `keys`, by trying every order and direction; the best cost.
+fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
+    fn extend(space: &Space<'_>, removal: &mut Vec<InstallationStep>, keys: &[KeyChoice], best: &mut Option<f64>) {
+        let left = removal.iter().fold(space.all(), |l, s| l.minus(PieceSet::one(s.piece)));
+        if left.is_empty() {
+            let plan = InstallationPlan { steps: removal.iter().rev().copied().collect() };
+            if space.allows(&plan) {
+                let cost = space.cost(&plan);
+                *best = Some(best.map_or(cost, |b: f64| b.min(cost)));
+            }
+            return;
+        }
+        for piece in left.iter() {
+            let rest = left.minus(PieceSet::one(piece));
+            for separation in LatticeDirection::all() {
+                let is_key_step = removal.is_empty();
+                let is_choice = |k: &KeyChoice| k.piece == piece && k.directions.contains(&separation);
+                let is_last = rest.is_empty();
+                if (is_key_step && !keys.iter().any(is_choice))
+                    || (is_last && separation.index() > 0)
+                    || (!is_last && !space.is_free(piece, separation, rest))
+                {
+                    continue;
+                }
+                removal.push(InstallationStep { piece, separation });
+                extend(space, removal, keys, best);
+                removal.pop();
+            }
+        }
+    }
+    let mut best = None;
+    extend(space, &mut Vec::new(), keys, &mut best);
+    best
+}
+
+#[test]
+fn small_cases_are_found_iff_they_exist_and_with_the_best_cost_of_their_key() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let params = PlanParams::default();
+    let (mut n_found, mut n_none) = (0, 0);
+    for round in 0..60 {
+        let n = 3 + round % 3;
+        let all: Vec<(u32, u32)> = (0..n as u32).flat_map(|a| (a + 1..n as u32).map(move |b| (a, b))).collect();
+        let edges: Vec<(u32, u32)> = all.into_iter().filter(|_| rng.random_range(0.0..1.0) < 0.85).collect();
+        let survey = made_up(n, &edges, if n == 5 { 0.55 } else { 0.6 }, &mut rng);
+        let constraints = PlanConstraints::default();
+        let space = Space::new(&survey, &constraints, params.relaxed_tolerance);
+        let keys = choices(&params, &survey);
+        match searched(&params, &survey, &constraints) {
+            PlanOutcome::Infeasible { .. } => {
+                assert_eq!(brute_force(&space, &keys), None, "round {round}");
+                n_none += 1;
+            }
+            PlanOutcome::Found(plan) => {
+                assert!(space.allows(&plan));
+                let key = keys
+                    .iter()
+                    .find(|k| k.piece == plan.key() && k.directions.contains(&plan.separation(plan.key())))
+                    .unwrap();
+                let best = brute_force(&space, std::slice::from_ref(key)).unwrap();
+                assert!(space.cost(&plan) <= best + 1e-9, "round {round}: {} > {best}", space.cost(&plan));
+                n_found += 1;
+            }
+        }
+    }
+    assert!(n_found >= 10 && n_none >= 10, "{n_found} found, {n_none} not: the cases must be of both kinds");
+}
+
+#[test]
+fn where_one_piece_joins_two_parts_no_plan_locks() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let params = PlanParams::default();
+    // A bow tie: 2 joins the pairs 0–1 and 3–4.
+    let edges = [(0, 1), (0, 2), (1, 2), (2, 3), (2, 4), (3, 4)];
+    for _ in 0..5 {
+        let survey = made_up(5, &edges, 0.6, &mut rng);
+        let constraints = PlanConstraints::default();
+        let space = Space::new(&survey, &constraints, params.relaxed_tolerance);
+        assert_eq!(brute_force(&space, &choices(&params, &survey)), None);
+        let PlanOutcome::Infeasible { articulations, .. } = searched(&params, &survey, &constraints) else {
+            panic!("an articulation piece lets no plan lock")
+        };
+        assert_eq!(articulations, [PatchId(2)]);
+    }
+}
+
+#[test]
+fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
+    let survey = surveyed(&voronoi(sphere(5, Vec3::new(50.0, 55.0, 70.0)), 10, 1));
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| searched(&PlanParams::default(), &survey, &PlanConstraints::default()))
+    };
+    let PlanOutcome::Found(plan) = on(1) else { panic!("ten cells of a ball have a plan") };
+    assert_eq!(on(2), PlanOutcome::Found(plan.clone()));
+    let constraints = PlanConstraints::default();
+    assert!(Space::new(&survey, &constraints, 0.03).allows(&plan));
+}
+
+#[test]
+fn what_earlier_rounds_forbid_is_kept_to() {
+    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let params = PlanParams { n_plans: 40, ..PlanParams::default() };
+    let mut constraints = PlanConstraints::default();
+    for _ in 0..4 {
+        let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("enough is left") };
+        assert!(!constraints.rejected.contains(&plan));
+        assert!(plan.steps[1..].iter().all(|s| !constraints.forbidden.contains(&(s.piece, s.separation))));
+        constraints.forbidden.insert((plan.steps[3].piece, plan.steps[3].separation));
+        constraints.rejected.push(plan);
+    }
+    // Contacts that hold nothing: with all of one piece's contacts weak, it hangs on nothing.
+    let weak = survey.contacts.iter().filter(|c| c.a == PatchId(0)).map(|c| (c.a, c.b));
+    constraints.weak_contacts.extend(weak);
+    assert!(matches!(searched(&params, &survey, &constraints), PlanOutcome::Infeasible { .. }));
+}
+
+#[test]
+fn who_is_blocked_all_round_is_named_with_the_place() {
+    // A pea in its pod cannot be had with free paths: make every direction of every piece blocked.
+    let mut survey =
+        surveyed(&label(sphere(4, Vec3::splat(50.0)), 4, |p| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0)));
+    for s in LatticeDirection::all() {
+        for (p, q) in (0..4).flat_map(|p| (0..4).map(move |q| (PatchId(p), PatchId(q)))).filter(|(p, q)| p != q) {
+            survey.occlusion.block(p, q, s);
+        }
+    }
+    let outcome = searched(&PlanParams::default(), &survey, &PlanConstraints::default());
+    let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else { panic!("nothing can leave") };
+    assert!(!blockers.is_empty(), "{reason}");
+}
+
+#[test]
+fn one_piece_and_too_many_are_refused_in_words() {
+    let survey = surveyed(&label(sphere(2, Vec3::splat(50.0)), 1, |_| 0));
+    assert!(matches!(
+        searched(&PlanParams::default(), &survey, &PlanConstraints::default()),
+        PlanOutcome::Infeasible { .. }
+    ));
+    let survey = surveyed(&label(sphere(2, Vec3::splat(50.0)), 200, |_| 0));
+    let outcome = searched(&PlanParams::default(), &survey, &PlanConstraints::default());
+    assert!(matches!(outcome, PlanOutcome::Infeasible { reason, .. } if reason.contains("200")));
+}
+
+#[test]
+fn two_hemispheres_have_a_plan() {
+    let survey = surveyed(&label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
+    let constraints = PlanConstraints::default();
+    let PlanOutcome::Found(plan) = searched(&PlanParams::default(), &survey, &constraints) else {
+        panic!("either leaves along the axis")
+    };
+    let up = plan.separation(plan.key()).step()[2];
+    assert_eq!(up, if plan.key() == PatchId(1) { 1 } else { -1 });
+}
