@@ -3,6 +3,7 @@
 //! This crate knows no patch, piece, plan or printer. Lengths are millimetres unless a name says otherwise; fields are
 //! positive inside; triangles are counter-clockwise seen from outside.
 
+pub mod contour;
 pub mod mesh;
 pub mod solid;
 

@@ -5,6 +5,7 @@
 
 pub mod context;
 pub mod direction;
+pub mod figure;
 pub mod ids;
 pub mod plan;
 pub mod surface;
