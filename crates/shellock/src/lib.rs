@@ -8,6 +8,7 @@ pub mod direction;
 pub mod figure;
 pub mod ids;
 pub mod plan;
+pub mod report;
 pub mod surface;
 
 pub use context::{Cancelled, Ctx, Warning};
