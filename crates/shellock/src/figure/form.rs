@@ -6,7 +6,7 @@ use glam::DQuat;
 use shellock_geom::{Aabb, Vec3};
 
 /// A simple body.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Form {
     Ellipsoid {
         center: Vec3,
@@ -16,6 +16,8 @@ pub(super) enum Form {
     },
     /// The hull of two balls.
     RoundCone { a: Vec3, b: Vec3, radius_a: f64, radius_b: f64 },
+    /// A tube of varying thickness: rounded cones from each (point, radius) to the next.
+    Chain { stations: Vec<(Vec3, f64)> },
     /// A torus around the z axis through `center`.
     Ring { center: Vec3, radius: f64, thickness: f64 },
 }
@@ -40,16 +42,13 @@ impl Sculpture {
 
     /// Adds a form and its mirror image across x = 0.
     pub fn add_pair(&mut self, form: Form, blend: f64) -> &mut Self {
-        self.add(form, blend).add(form.mirrored(), blend)
+        let mirrored = form.mirrored();
+        self.add(form, blend).add(mirrored, blend)
     }
 
-    /// Adds rounded cones through `stations` of (point, radius).
+    /// Adds a tube through `stations` of (point, radius), bent smoothly.
     pub fn add_chain(&mut self, stations: &[(Vec3, f64)], blend: f64) -> &mut Self {
-        for w in stations.windows(2) {
-            let [(a, radius_a), (b, radius_b)] = [w[0], w[1]];
-            self.add(Form::RoundCone { a, b, radius_a, radius_b }, blend);
-        }
-        self
+        self.add(Form::Chain { stations: spline(stations) }, blend)
     }
 
     /// Positive inside.
@@ -68,6 +67,30 @@ impl Sculpture {
         let grown = all.grown(0.25 * widest_blend);
         Aabb { min: grown.min.with_z(0.0), max: grown.max }
     }
+}
+
+/// Steps between two stations of a tube; more only cost time at the bends that figures have.
+const SPLINE_STEPS: usize = 4;
+
+/// Points and radii along the Catmull-Rom spline through `stations`.
+fn spline(stations: &[(Vec3, f64)]) -> Vec<(Vec3, f64)> {
+    let last = stations.len() - 1;
+    if last < 2 {
+        return stations.to_vec();
+    }
+    let at = |i: usize| stations[i.min(last)].0.extend(stations[i.min(last)].1);
+    let mut curve = vec![stations[0]];
+    for i in 0..last {
+        let [before, a, b, after] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
+        for step in 1..=SPLINE_STEPS {
+            let t = step as f64 / SPLINE_STEPS as f64;
+            let [rise, bend, twist] =
+                [b - before, 2.0 * before - 5.0 * a + 4.0 * b - after, 3.0 * (a - b) + after - before];
+            let q = a + 0.5 * t * (rise + t * (bend + t * twist));
+            curve.push((q.truncate(), q.w));
+        }
+    }
+    curve
 }
 
 /// The greater of both, raised by up to `width / 4` where they are equal; exact where they differ by `width` or more.
@@ -93,9 +116,9 @@ impl Form {
         Self::Ellipsoid { center, half_axes, turn: about(Vec3::Z, z) * about(Vec3::Y, y) * about(Vec3::X, x) }
     }
 
-    fn mirrored(self) -> Self {
+    fn mirrored(&self) -> Self {
         let flip = |p: Vec3| p.with_x(-p.x);
-        match self {
+        match *self {
             Self::Ellipsoid { center, half_axes, turn } => Self::Ellipsoid {
                 center: flip(center),
                 half_axes,
@@ -103,6 +126,9 @@ impl Form {
             },
             Self::RoundCone { a, b, radius_a, radius_b } => {
                 Self::RoundCone { a: flip(a), b: flip(b), radius_a, radius_b }
+            }
+            Self::Chain { ref stations } => {
+                Self::Chain { stations: stations.iter().map(|&(p, radius)| (flip(p), radius)).collect() }
             }
             Self::Ring { center, radius, thickness } => Self::Ring { center: flip(center), radius, thickness },
         }
@@ -118,6 +144,15 @@ impl Form {
                 if slope < 1e-9 { half_axes.min_element() } else { k * (1.0 - k) / slope }
             }
             Self::RoundCone { a, b, radius_a, radius_b } => round_cone(p, a, b, radius_a, radius_b),
+            Self::Chain { ref stations } => stations.windows(2).fold(f64::NEG_INFINITY, |value, w| {
+                let [(a, radius_a), (b, radius_b)] = [w[0], w[1]];
+                // No closer than the ball around both ends: spares most of the work.
+                let reach = 0.5 * a.distance(b) + radius_a.max(radius_b);
+                if reach - p.distance(0.5 * (a + b)) <= value {
+                    return value;
+                }
+                value.max(round_cone(p, a, b, radius_a, radius_b))
+            }),
             Self::Ring { center, radius, thickness } => {
                 let q = p - center;
                 thickness - (q.truncate().length() - radius).hypot(q.z)
@@ -134,6 +169,9 @@ impl Form {
                 Aabb { min: center - reach, max: center + reach }
             }
             Self::RoundCone { a, b, radius_a, radius_b } => around(a, radius_a).union(around(b, radius_b)),
+            Self::Chain { ref stations } => {
+                stations.iter().fold(Aabb::EMPTY, |b, &(p, radius)| b.union(around(p, radius)))
+            }
             Self::Ring { center, radius, thickness } => {
                 let reach = Vec3::new(radius + thickness, radius + thickness, thickness);
                 Aabb { min: center - reach, max: center + reach }
@@ -154,7 +192,7 @@ fn round_cone(p: Vec3, a: Vec3, b: Vec3, radius_a: f64, radius_b: f64) -> f64 {
     let y = (p - a - x * axis).length();
     // Where the normal of the cone through p meets the axis, it leaves the axis at a fixed slope.
     let (sin, cos) = (taper / length, (1.0 - (taper / length).powi(2)).sqrt());
-    let foot = x + y * sin / cos;
+    let foot = x - y * sin / cos;
     if foot <= 0.0 {
         radius_a - x.hypot(y)
     } else if foot >= length {
