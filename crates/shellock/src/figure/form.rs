@@ -25,7 +25,14 @@ pub(super) enum Form {
 /// Forms united one after the other, each with its own blend, and cut off below z = 0.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sculpture {
-    parts: Vec<(Form, f64)>,
+    parts: Vec<Part>,
+}
+
+#[derive(Clone, Debug)]
+struct Part {
+    form: Form,
+    blend: f64,
+    bounds: Aabb,
 }
 
 /// Radius of the fillet at the edge of the base, units.
@@ -36,7 +43,8 @@ const FOOT_FILLET: f64 = 2.0;
 impl Sculpture {
     /// Adds a form; `blend` is the width, in units, over which it runs into what is there.
     pub fn add(&mut self, form: Form, blend: f64) -> &mut Self {
-        self.parts.push((form, blend));
+        let bounds = form.bounds();
+        self.parts.push(Part { form, blend, bounds });
         self
     }
 
@@ -54,16 +62,19 @@ impl Sculpture {
     /// Positive inside.
     pub fn value(&self, p: Vec3) -> f64 {
         let mut value = f64::NEG_INFINITY;
-        for (form, blend) in &self.parts {
-            value = smooth_max(value, form.value(p), *blend);
+        for part in &self.parts {
+            // What is that far behind the nearest form has no part in the blend.
+            if part.bounds.distance_sq(p).sqrt() < part.blend - value {
+                value = smooth_max(value, part.form.value(p), part.blend);
+            }
         }
         -smooth_max(-value, -p.z, FOOT_FILLET)
     }
 
     /// A box that contains the figure.
     pub fn bounds(&self) -> Aabb {
-        let all = self.parts.iter().fold(Aabb::EMPTY, |b, (form, _)| b.union(form.bounds()));
-        let widest_blend = self.parts.iter().map(|part| part.1).fold(0.0, f64::max);
+        let all = self.parts.iter().fold(Aabb::EMPTY, |b, part| b.union(part.bounds));
+        let widest_blend = self.parts.iter().map(|part| part.blend).fold(0.0, f64::max);
         let grown = all.grown(0.25 * widest_blend);
         Aabb { min: grown.min.with_z(0.0), max: grown.max }
     }
