@@ -33,7 +33,7 @@ export function buildPanel(header, meshes, order, on) {
   const modes = element("div", "modes");
   const modeButtons = MODES.map(([mode, text]) => button(text, text, () => on.mode(mode)));
   modes.append(...modeButtons);
-  const apart = slider("Spread", 0.7, on.apart);
+  const apart = slider("Spread", 0.8, on.apart);
   const steps = stepControls(meshes.length, on);
   const cut = cutControls(on);
   tools.append(modes, apart.holder, steps.holder, cut.holder, button("Reset view", "Reset view", on.home));

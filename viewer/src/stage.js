@@ -19,7 +19,7 @@ export class Stage {
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(32, 1, 1, 1e5);
     this.camera.up.copy(UP);
-    this.scene.add(new HemisphereLight(0xffffff, 0x8d8a94, 1.5), this.camera);
+    this.scene.add(new HemisphereLight(0xffffff, 0x9a97a2, 1.8), this.camera);
     // Lights hang on the camera: the side one looks at is always lit.
     for (const [at, strength] of [[[-1.2, 1.4, 1], 1.9], [[1.5, -0.3, 0.6], 0.5]]) {
       const light = new DirectionalLight(0xffffff, strength);
@@ -87,7 +87,7 @@ export class Stage {
     const half = (this.camera.fov * Math.PI) / 360;
     const narrow = Math.min(1, this.camera.aspect);
     this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(direction.clone().normalize(), (0.56 * size) / Math.sin(half) / narrow);
+    this.camera.position.copy(center).addScaledVector(direction.clone().normalize(), (0.49 * size) / Math.sin(half) / narrow);
     this.camera.near = this.size / 500;
     this.camera.far = this.size * 60;
     this.camera.updateProjectionMatrix();

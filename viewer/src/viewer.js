@@ -19,7 +19,7 @@ function start() {
   }
   const order = meshes.map((_, i) => i).sort((a, b) => meshes[a].step - meshes[b].step);
   // apart: 0 … 1 · step: how many have arrived, with the share of the one on its way
-  const state = { mode: "together", apart: 0.7, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0 };
+  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0 };
   const panel = buildPanel(header, meshes, order, {
     mode: (mode) => { setMode(mode); },
     apart: (share) => { state.apart = share; update(); },
@@ -44,7 +44,7 @@ function start() {
   }
 
   function fit() {
-    stage?.fit(state.mode === "apart" ? 1 : 0);
+    stage?.fit(state.mode === "apart" ? state.apart : 0);
   }
 
   function choose(i) {
