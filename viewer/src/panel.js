@@ -93,7 +93,7 @@ function stepControls(count, on) {
   const holder = element("div", "steps");
   const playing = button("▶", "Play", on.play);
   const text = element("span", "count");
-  holder.append(button("⏮", "First step", () => on.goTo(1)), button("◀", "Previous step", () => on.step(-1)), playing, button("▶|", "Next step", () => on.step(1)), text);
+  holder.append(button("|◀", "First step", () => on.goTo(1)), button("◀", "Previous step", () => on.step(-1)), playing, button("▶|", "Next step", () => on.step(1)), text);
   return {
     holder,
     update(state, name) {

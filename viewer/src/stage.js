@@ -13,6 +13,7 @@ const UP = new Vector3(0, 0, 1);
 export class Stage {
   constructor(holder, meshes) {
     this.holder = holder;
+    this.room = 0;
     this.renderer = new WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     holder.prepend(this.renderer.domElement);
@@ -69,8 +70,15 @@ export class Stage {
     if (!w || !h) return;
     this.renderer.setSize(w, h);
     this.camera.aspect = w / h;
-    this.camera.updateProjectionMatrix();
+    // What stands at the bottom of the canvas covers nothing: the picture's middle moves up.
+    this.camera.setViewOffset(w, h, 0, this.room / 2, w, h);
     this.draw();
+  }
+
+  /** Keeps so many CSS pixels free at the bottom. */
+  leaveRoom(pixels) {
+    this.room = Math.min(pixels, this.holder.clientHeight / 2);
+    this.#resize();
   }
 
   /** Draws soon; many calls make one frame. */
@@ -85,7 +93,8 @@ export class Stage {
 
   lookFrom(direction, center = this.center, size = this.size) {
     const half = (this.camera.fov * Math.PI) / 360;
-    const narrow = Math.min(1, this.camera.aspect);
+    const free = 1 - this.room / (this.holder.clientHeight || 1);
+    const narrow = Math.min(free, this.camera.aspect);
     this.controls.target.copy(center);
     this.camera.position.copy(center).addScaledVector(direction.clone().normalize(), (0.49 * size) / Math.sin(half) / narrow);
     this.camera.near = this.size / 500;
@@ -102,12 +111,12 @@ export class Stage {
     this.lookFrom(side.normalize().add(new Vector3(0, 0, 0.25)), place, 0.45 * this.size);
   }
 
-  /** Camera distance that fits meshes moved by `share` of their shifts. */
-  fit(share) {
+  /** Fits meshes moved by `share` of their shifts, with room around for `air` times their size. */
+  fit(share, air = 1) {
     const box = new Box3();
     for (const item of this.items) box.union(item.box.clone().translate(item.shift.clone().multiplyScalar(share)));
     const from = this.camera.position.clone().sub(this.controls.target);
-    this.lookFrom(from, box.getCenter(new Vector3()), box.getSize(new Vector3()).length());
+    this.lookFrom(from, box.getCenter(new Vector3()), air * box.getSize(new Vector3()).length());
   }
 
   place(i, offset) {
@@ -123,7 +132,7 @@ export class Stage {
       material.opacity = faint ? 0.12 : 1;
       material.depthWrite = !faint;
     }
-    skin.emissive.set(lit ? 0xffffff : 0).multiplyScalar(lit ? 0.16 : 0);
+    skin.emissive.copy(skin.color).multiplyScalar(lit ? 0.45 : 0);
   }
 
   /** Cuts away a share of the scene along an axis: x and z from the far end, y from the near end; 0 cuts nothing. */
@@ -154,7 +163,7 @@ export class Stage {
   mark(place) {
     this.marks.clear();
     if (place) {
-      const ball = new Mesh(new SphereGeometry(0.012 * this.size, 24, 16), new MeshBasicMaterial({ color: 0xd33c2f, depthTest: false, transparent: true, opacity: 0.85, side: DoubleSide }));
+      const ball = new Mesh(new SphereGeometry(0.006 * this.size, 24, 16), new MeshBasicMaterial({ color: 0xd33c2f, depthTest: false, transparent: true, opacity: 0.85, side: DoubleSide }));
       ball.position.copy(place);
       ball.renderOrder = 10;
       this.marks.add(ball);

@@ -44,7 +44,7 @@ function start() {
   }
 
   function fit() {
-    stage?.fit(state.mode === "apart" ? state.apart : 0);
+    stage?.fit(state.mode === "apart" ? state.apart : 0, state.mode === "steps" ? 1.3 : 1);
   }
 
   function choose(i) {
@@ -57,9 +57,15 @@ function start() {
     stop();
     const from = Math.max(0, Math.min(meshes.length, step) - 1);
     const forwards = step > state.step && step <= meshes.length;
-    state.mode = "steps";
+    enterSteps();
     if (forwards) fly(from, () => {});
     else { state.step = Math.max(0, Math.min(meshes.length, step)); update(); }
+  }
+
+  function enterSteps() {
+    if (state.mode === "steps") return;
+    state.mode = "steps";
+    fit();
   }
 
   // One mesh comes in: state.step goes from `from` to `from + 1`.
@@ -75,7 +81,7 @@ function start() {
   }
 
   function play() {
-    state.mode = "steps";
+    enterSteps();
     state.playing = true;
     const next = (from) => {
       if (from >= meshes.length) return stop();
@@ -100,7 +106,7 @@ function start() {
 
   function arrange(flying) {
     const travelled = state.step - Math.ceil(state.step) + 1;
-    const way = 0.7 * stage.size;
+    const way = 0.55 * stage.size;
     meshes.forEach((m, i) => {
       const arrived = state.mode !== "steps" || order.indexOf(i) < Math.ceil(state.step);
       const offset = new Vector3();
@@ -123,6 +129,10 @@ function start() {
   }
 
   if (stage) {
+    const tools = document.getElementById("tools");
+    new ResizeObserver(() => stage.leaveRoom(tools.offsetHeight + 16)).observe(tools);
+    stage.leaveRoom(tools.offsetHeight + 16);
+    fit();
     const label = element("div", "label");
     holder.append(label);
     stage.afterDraw = () => {

@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn figures_are_single_solids_that_stand_flat() {
         for figure in Figure::ALL {
-            let solid = make(figure, 150.0, 3.0);
+            let solid = make(figure, 150.0, 4.0);
             let mesh = solid.mesh();
             assert_eq!(n_components(mesh), 1, "{figure:?}");
             assert!((mesh.bounds().size().max_element() - 150.0).abs() < 1e-9);
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn the_same_figure_comes_out_each_time() {
-        assert_eq!(make(Figure::Squirrel, 150.0, 4.0), make(Figure::Squirrel, 150.0, 4.0));
+        assert_eq!(make(Figure::Squirrel, 150.0, 6.0), make(Figure::Squirrel, 150.0, 6.0));
     }
 
     fn n_components(mesh: &shellock_geom::TriMesh) -> usize {

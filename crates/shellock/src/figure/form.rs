@@ -84,7 +84,7 @@ impl Sculpture {
 const SPLINE_STEPS: usize = 4;
 
 /// Points and radii along the Catmull-Rom spline through `stations`.
-fn spline(stations: &[(Vec3, f64)]) -> Vec<(Vec3, f64)> {
+pub(super) fn spline(stations: &[(Vec3, f64)]) -> Vec<(Vec3, f64)> {
     let last = stations.len() - 1;
     if last < 2 {
         return stations.to_vec();
