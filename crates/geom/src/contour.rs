@@ -102,7 +102,7 @@ impl Grid {
     fn triangles(&self, vertex_of_edge: &[u32]) -> Vec<[u32; 3]> {
         let cases: Vec<Vec<[usize; 3]>> = (0..256).map(triangles_of_case).collect();
         let strides = self.strides();
-        let corner_offset = |corner: usize| (0..3).map(|a| (corner >> a & 1) * strides[a]).sum::<usize>();
+        let corner_offset = |corner: usize| (0..3).map(|a| ((corner >> a) & 1) * strides[a]).sum::<usize>();
         let vertex_at = |cell: usize, edge: usize| {
             let (corner, axis) = edge_start(edge);
             vertex_of_edge[3 * (cell + corner_offset(corner)) + axis]
@@ -259,7 +259,7 @@ mod tests {
         // Every sign pattern occurs: a hash of the grid point decides.
         let noise = |p: Vec3| {
             let q = (p * 2.0).round().as_i64vec3();
-            let mix = (q.x * 73_856_093 ^ q.y * 19_349_663 ^ q.z * 83_492_791).wrapping_mul(2_654_435_761) >> 7;
+            let mix = ((q.x * 73_856_093) ^ (q.y * 19_349_663) ^ (q.z * 83_492_791)).wrapping_mul(2_654_435_761) >> 7;
             (mix & 1023) as f64 - 511.5
         };
         let grid = Grid::sample(BOX, 0.5, &noise);
