@@ -132,7 +132,7 @@ pub(super) fn octopus() -> Sculpture {
     let mut octopus = Sculpture::default();
     octopus
         .add(Form::ellipsoid(at(0.0, 4.0, 84.0), at(36.0, 38.0, 44.0)), 0.0)
-        .add(Form::ellipsoid(at(0.0, 0.0, 38.0), at(31.0, 31.0, 30.0)), 12.0)
+        .add(Form::ellipsoid(at(0.0, 0.0, 30.0), at(32.0, 32.0, 36.0)), 12.0)
         .add_pair(Form::ball(at(16.0, -30.0, 66.0), 10.0), 3.0)
         .add_pair(Form::ball(at(17.5, -38.5, 67.0), 5.0), 1.0);
     for arm in 0..8 {
@@ -145,7 +145,7 @@ pub(super) fn octopus() -> Sculpture {
         let stations = [
             station(14.0, 0.0, 26.0, 15.0),
             station(36.0, 0.0, 12.0, 12.5),
-            station(54.0, 0.08, 8.0, 10.5),
+            station(54.0, 0.08, 7.0, 10.5),
             station(68.0, 0.26, 10.0, 9.0),
             station(74.0, 0.46, 19.0, 7.5),
             station(67.0, 0.62, 27.0, 6.0),

@@ -171,12 +171,15 @@ fn draw(band: &mut Band, facet: &Facet) {
     let greatest = |v: [f32; 3]| v[0].max(v[1]).max(v[2]);
     let (x_first, x_last) = (sample_after(least(xs)), sample_after(greatest(xs)));
     let (y_first, y_last) = (sample_after(least(ys)), sample_after(greatest(ys)));
+    // Both weights are linear in x and y.
+    let per_area = 1.0 / doubled_area;
+    let wb_of = |dx: f32, dy: f32| (dx * (c[1] - a[1]) - dy * (c[0] - a[0])) * per_area;
+    let wc_of = |dx: f32, dy: f32| (dy * (b[0] - a[0]) - dx * (b[1] - a[1])) * per_area;
     for y in y_first.max(band.first_row())..y_last.min(band.end_row()) {
-        let py = y as f32 + 0.5;
+        let dy = y as f32 + 0.5 - a[1];
         for x in x_first.max(0)..x_last.min(band.width() as i64) {
-            let px = x as f32 + 0.5;
-            let wb = ((px - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (py - a[1])) / doubled_area;
-            let wc = ((b[0] - a[0]) * (py - a[1]) - (px - a[0]) * (b[1] - a[1])) / doubled_area;
+            let dx = x as f32 + 0.5 - a[0];
+            let (wb, wc) = (wb_of(dx, dy), wc_of(dx, dy));
             let wa = 1.0 - wb - wc;
             if wa < 0.0 || wb < 0.0 || wc < 0.0 {
                 continue;

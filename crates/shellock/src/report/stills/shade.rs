@@ -81,8 +81,8 @@ pub(super) fn line_between(before: Sample, here: Sample, after: Sample) -> f32 {
     if before.mesh != here.mesh || after.mesh != here.mesh {
         return 0.85;
     }
-    let unit = |n: [f32; 3]| n.map(|x| x / dot(n, n).sqrt().max(1e-12));
-    let cos = dot(unit(before.normal), unit(after.normal));
+    let (m, n) = (before.normal, after.normal);
+    let cos = dot(m, n) / (dot(m, m) * dot(n, n)).sqrt().max(1e-12);
     ((CREASE_COS - cos) * 2.5).clamp(0.0, 0.55)
 }
 
