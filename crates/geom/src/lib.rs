@@ -7,6 +7,7 @@ pub mod band;
 pub mod boolean;
 pub mod bvh;
 pub mod check;
+pub mod contour;
 pub mod io;
 pub mod laplacian;
 pub mod level_cut;

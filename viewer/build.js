@@ -1,0 +1,33 @@
+// Bundles the viewer into dist/, which is committed: Rust embeds it, so building Shellock needs no node.
+import { readFile } from "node:fs/promises";
+import { fileURLToPath } from "node:url";
+import * as esbuild from "esbuild";
+
+const here = new URL("./", import.meta.url);
+const path = (name) => fileURLToPath(new URL(name, here));
+
+/** The files of dist/ and their texts. */
+export async function bundle() {
+  // Pages carry the bundle on their own, so three's whole notice goes with it.
+  const notice = await readFile(path("node_modules/three/LICENSE"), "utf8");
+  const result = await esbuild.build({
+    entryPoints: [path("src/viewer.js"), path("src/viewer.css")],
+    outdir: path("dist"),
+    banner: { js: `/*! three.js\n${notice.trim()}\n*/` },
+    bundle: true,
+    minify: true,
+    format: "iife",
+    target: "es2022",
+    write: false,
+  });
+  return result.outputFiles;
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  const { mkdir, writeFile } = await import("node:fs/promises");
+  await mkdir(path("dist"), { recursive: true });
+  for (const file of await bundle()) {
+    await writeFile(file.path, file.text);
+    console.log(`${file.path}: ${(file.contents.length / 1024).toFixed(0)} kB`);
+  }
+}

@@ -1,0 +1,169 @@
+// The lists and controls beside the canvas. All text goes in as text, never as markup.
+
+export function element(tag, className, text) {
+  const e = document.createElement(tag);
+  if (className) e.className = className;
+  if (text !== undefined) e.textContent = text;
+  return e;
+}
+
+function button(text, label, action) {
+  const b = element("button", "", text);
+  b.type = "button";
+  b.title = label;
+  b.setAttribute("aria-label", label);
+  b.addEventListener("click", action);
+  return b;
+}
+
+function slider(label, value, action) {
+  const holder = element("label", "slider", label);
+  const input = element("input");
+  Object.assign(input, { type: "range", min: 0, max: 1, step: 0.005, value });
+  input.addEventListener("input", () => action(Number(input.value)));
+  holder.append(input);
+  return { holder, input };
+}
+
+const MODES = [["together", "Assembled"], ["apart", "Exploded"], ["steps", "Step by step"]];
+
+export function buildPanel(header, meshes, order, on) {
+  const panel = document.getElementById("panel");
+  const tools = document.getElementById("tools");
+  const modes = element("div", "modes");
+  const modeButtons = MODES.map(([mode, text]) => button(text, text, () => on.mode(mode)));
+  modes.append(...modeButtons);
+  const apart = slider("Spread", 0.8, on.apart);
+  const steps = stepControls(meshes.length, on);
+  const cut = cutControls(on);
+  tools.append(modes, apart.holder, steps.holder, cut.holder, button("Reset view", "Reset view", on.home));
+  panel.append(element("h1", "", header.title), summary(header));
+  const list = meshList(header, meshes, order, on);
+  panel.append(list.holder);
+  if (header.notes.length) panel.append(noteList(header, on));
+  if (header.facts.length) panel.append(section("Facts", table(header.facts)));
+  if (header.checks.length) panel.append(section("Checks", checkTable(header.checks)));
+  return {
+    update(state, flying) {
+      MODES.forEach(([mode], i) => modeButtons[i].setAttribute("aria-pressed", state.mode === mode));
+      apart.holder.hidden = state.mode !== "apart";
+      apart.input.value = state.apart;
+      cut.input.value = state.cut;
+      steps.update(state, flying === undefined ? "" : meshes[flying].name);
+      list.update(state, flying);
+    },
+  };
+}
+
+function summary({ checks, notes }) {
+  const line = element("p", "summary");
+  const failed = checks.filter((c) => !c.ok).length;
+  if (checks.length) {
+    line.append(element("span", failed ? "pill bad" : "pill good", failed ? `${failed} of ${checks.length} checks FAIL` : `${checks.length} checks ok`));
+  }
+  if (notes.length) line.append(element("span", "pill warn", notes.length === 1 ? "1 warning" : `${notes.length} warnings`));
+  return line;
+}
+
+function section(title, ...content) {
+  const s = element("section");
+  s.append(element("h2", "", title), ...content);
+  return s;
+}
+
+function table(rows) {
+  const t = element("table");
+  for (const [name, value] of rows) {
+    const row = t.insertRow();
+    row.append(element("th", "", name), element("td", "", value));
+  }
+  return t;
+}
+
+function checkTable(checks) {
+  const t = element("table", "checks");
+  for (const { name, ok, figure } of checks) {
+    const row = t.insertRow();
+    row.append(element("td", ok ? "mark good" : "mark bad", ok ? "ok" : "FAIL"), element("th", "", name), element("td", "", figure));
+  }
+  return t;
+}
+
+function stepControls(count, on) {
+  const holder = element("div", "steps");
+  const playing = button("▶", "Play", on.play);
+  const text = element("span", "count");
+  holder.append(button("|◀", "First step", () => on.goTo(1)), button("◀", "Previous step", () => on.step(-1)), playing, button("▶|", "Next step", () => on.step(1)), text);
+  return {
+    holder,
+    update(state, name) {
+      holder.hidden = state.mode !== "steps";
+      playing.textContent = state.playing ? "❚❚" : "▶";
+      text.textContent = `${Math.ceil(state.step)} / ${count}  ${name}`;
+    },
+  };
+}
+
+function cutControls(on) {
+  let axis = 1;
+  const cut = slider("Look inside", 0, (share) => on.cut(axis, share));
+  const select = element("select");
+  select.setAttribute("aria-label", "Direction of the cut");
+  for (const [value, text] of [[1, "from the front"], [0, "from the side"], [2, "from above"]]) {
+    const option = element("option", "", text);
+    option.value = value;
+    select.append(option);
+  }
+  select.addEventListener("change", () => { axis = Number(select.value); on.cut(axis, Number(cut.input.value)); });
+  const holder = element("div", "cut");
+  holder.append(cut.holder, select);
+  return { holder, input: cut.input };
+}
+
+function meshList(header, meshes, order, on) {
+  const list = element("ol", "meshes");
+  const rows = new Map();
+  for (const i of order) {
+    const m = meshes[i];
+    const row = element("li", "mesh");
+    const pick = button("", `Select ${m.name}`, () => on.choose(row.classList.contains("chosen") ? -1 : i));
+    pick.className = "pick";
+    const dot = element("span", "dot");
+    dot.style.background = `rgb(${m.color.join(",")})`;
+    pick.append(element("span", "number", String(m.step + 1)), dot, element("span", "name", m.name));
+    if (m.badge) pick.append(element("span", "badge", m.badge));
+    const eye = button("hide", `Hide or show ${m.name}`, () => on.toggle(i));
+    eye.className = "eye";
+    const details = element("div", "details");
+    details.append(table(m.facts), button("Only this", `Show only ${m.name}`, on.alone));
+    row.append(pick, eye, details);
+    list.append(row);
+    rows.set(i, { row, eye });
+  }
+  const holder = section(`${header.meshes_title} (${meshes.length})`, list, button("Show all", "Show all", on.showAll));
+  return {
+    holder,
+    update(state, flying) {
+      for (const [i, { row, eye }] of rows) {
+        const chosen = state.chosen === i;
+        if (chosen && !row.classList.contains("chosen")) row.scrollIntoView?.({ block: "nearest" });
+        row.classList.toggle("chosen", chosen);
+        row.classList.toggle("flying", flying === i);
+        row.classList.toggle("gone", state.hidden.has(i));
+        eye.textContent = state.hidden.has(i) ? "show" : "hide";
+      }
+    },
+  };
+}
+
+function noteList(header, on) {
+  const list = element("ul", "notes");
+  for (const note of header.notes) {
+    const item = element("li");
+    const b = button("", note.at ? "Show the place" : note.title, () => on.note(note));
+    b.append(element("strong", "", note.title), element("span", "", note.text));
+    item.append(b);
+    list.append(item);
+  }
+  return section("Warnings", list);
+}

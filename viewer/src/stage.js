@@ -1,0 +1,196 @@
+// The 3D half: meshes, arrows and marks on a canvas. Knows nothing of the panel beside it.
+
+import {
+  ArrowHelper, Box3, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, BackSide, FrontSide,
+  Group, HemisphereLight, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Plane, Raycaster, Scene,
+  SphereGeometry, Vector2, Vector3, WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { shadedCorners } from "./data.js";
+
+const UP = new Vector3(0, 0, 1);
+
+export class Stage {
+  constructor(holder, meshes) {
+    this.holder = holder;
+    this.room = 0;
+    this.renderer = new WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    holder.prepend(this.renderer.domElement);
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(32, 1, 1, 1e5);
+    this.camera.up.copy(UP);
+    this.scene.add(new HemisphereLight(0xffffff, 0x9a97a2, 1.8), this.camera);
+    // Lights hang on the camera: the side one looks at is always lit.
+    for (const [at, strength] of [[[-1.2, 1.4, 1], 1.9], [[1.5, -0.3, 0.6], 0.5]]) {
+      const light = new DirectionalLight(0xffffff, strength);
+      light.position.set(...at);
+      this.camera.add(light, light.target);
+    }
+    this.clip = new Plane(new Vector3(0, -1, 0), Infinity);
+    this.renderer.localClippingEnabled = true;
+    this.items = meshes.map((m) => this.#add(m));
+    this.box = new Box3();
+    for (const item of this.items) this.box.union(item.box);
+    this.center = this.box.getCenter(new Vector3());
+    this.size = this.box.getSize(new Vector3()).length() || 1;
+    this.marks = new Group();
+    this.scene.add(this.marks);
+    this.arrow = new ArrowHelper(UP, this.center, 1, 0xd33c2f);
+    this.arrow.visible = false;
+    this.scene.add(this.arrow);
+    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
+    this.controls.addEventListener("change", () => this.draw());
+    new ResizeObserver(() => this.#resize()).observe(holder);
+    this.#resize();
+    this.lookFrom(new Vector3(0.62, -0.95, 0.42));
+  }
+
+  #add(m) {
+    const { corners, normals } = shadedCorners(m.positions, m.indices);
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(corners, 3));
+    geometry.setAttribute("normal", new BufferAttribute(normals, 3));
+    geometry.computeBoundingBox();
+    geometry.computeBoundingSphere();
+    const color = new Color(...m.color.map((c) => c / 255)).convertSRGBToLinear();
+    const clippingPlanes = [this.clip];
+    const skin = new MeshStandardMaterial({ color, roughness: 0.62, metalness: 0, side: FrontSide, clippingPlanes });
+    // The back of a closed surface shows only where a plane cuts it; unlit, it looks like the face of the cut.
+    const cut = new MeshBasicMaterial({ color: color.clone().multiplyScalar(0.55), side: BackSide, clippingPlanes });
+    const group = new Group();
+    group.add(new Mesh(geometry, skin), new Mesh(geometry, cut));
+    this.scene.add(group);
+    const box = geometry.boundingBox.clone();
+    return { group, skin, cut, box, center: box.getCenter(new Vector3()), shift: new Vector3(...m.shift), travel: new Vector3(...m.travel) };
+  }
+
+  #resize() {
+    const { clientWidth: w, clientHeight: h } = this.holder;
+    if (!w || !h) return;
+    this.renderer.setSize(w, h);
+    this.camera.aspect = w / h;
+    // What stands at the bottom of the canvas covers nothing: the picture's middle moves up.
+    this.camera.setViewOffset(w, h, 0, this.room / 2, w, h);
+    this.draw();
+  }
+
+  /** Keeps so many CSS pixels free at the bottom. */
+  leaveRoom(pixels) {
+    this.room = Math.min(pixels, this.holder.clientHeight / 2);
+    this.#resize();
+  }
+
+  /** Draws soon; many calls make one frame. */
+  draw() {
+    if (this.pending) return;
+    this.pending = requestAnimationFrame(() => {
+      this.pending = 0;
+      this.renderer.render(this.scene, this.camera);
+      this.afterDraw?.();
+    });
+  }
+
+  lookFrom(direction, center = this.center, size = this.size) {
+    const half = (this.camera.fov * Math.PI) / 360;
+    const free = 1 - this.room / (this.holder.clientHeight || 1);
+    const narrow = Math.min(free, this.camera.aspect);
+    this.controls.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(direction.clone().normalize(), (0.49 * size) / Math.sin(half) / narrow);
+    this.camera.near = this.size / 500;
+    this.camera.far = this.size * 60;
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.draw();
+  }
+
+  /** Turns to a place, from the side of the middle of the scene it lies on. */
+  lookAt(place) {
+    const side = place.clone().sub(this.center);
+    if (side.lengthSq() < 1e-12) side.set(0.6, -1, 0.4);
+    this.lookFrom(side.normalize().add(new Vector3(0, 0, 0.25)), place, 0.45 * this.size);
+  }
+
+  /** Fits meshes moved by `share` of their shifts, with room around for `air` times their size. */
+  fit(share, air = 1) {
+    const box = new Box3();
+    for (const item of this.items) box.union(item.box.clone().translate(item.shift.clone().multiplyScalar(share)));
+    const from = this.camera.position.clone().sub(this.controls.target);
+    this.lookFrom(from, box.getCenter(new Vector3()), air * box.getSize(new Vector3()).length());
+  }
+
+  place(i, offset) {
+    this.items[i].group.position.copy(offset);
+  }
+
+  /** How a mesh shows: hidden, faint (seen through), lit up. */
+  show(i, { hidden = false, faint = false, lit = false }) {
+    const { group, skin, cut } = this.items[i];
+    group.visible = !hidden;
+    for (const material of [skin, cut]) {
+      material.transparent = faint;
+      material.opacity = faint ? 0.12 : 1;
+      material.depthWrite = !faint;
+    }
+    skin.emissive.copy(skin.color).multiplyScalar(lit ? 0.45 : 0);
+  }
+
+  /** Cuts away a share of the scene along an axis: x and z from the far end, y from the near end; 0 cuts nothing. */
+  cutAt(axis, share) {
+    const away = axis === 1 ? -1 : 1;
+    const [low, high] = [this.box.min.getComponent(axis), this.box.max.getComponent(axis)];
+    const at = away > 0 ? high - share * (high - low) : low + share * (high - low);
+    this.clip.normal.set(0, 0, 0).setComponent(axis, -away);
+    this.clip.constant = share > 0 ? away * at : 1e9;
+    this.draw();
+  }
+
+  showArrow(i, length) {
+    const { travel, center } = this.items[i];
+    this.arrow.visible = travel.lengthSq() > 0;
+    if (!this.arrow.visible) return;
+    const direction = travel.clone().normalize();
+    const from = center.clone().addScaledVector(direction, -length);
+    this.arrow.position.copy(from);
+    this.arrow.setDirection(direction);
+    this.arrow.setLength(0.85 * length, 0.07 * this.size, 0.035 * this.size);
+    for (const part of [this.arrow.line, this.arrow.cone]) {
+      part.material.depthTest = false;
+      part.renderOrder = 9;
+    }
+  }
+
+  mark(place) {
+    this.marks.clear();
+    if (place) {
+      const ball = new Mesh(new SphereGeometry(0.006 * this.size, 24, 16), new MeshBasicMaterial({ color: 0xd33c2f, depthTest: false, transparent: true, opacity: 0.85, side: DoubleSide }));
+      ball.position.copy(place);
+      ball.renderOrder = 10;
+      this.marks.add(ball);
+    }
+    this.draw();
+  }
+
+  /** The visible mesh under a point of the window, or −1. */
+  pick(clientX, clientY) {
+    const r = this.renderer.domElement.getBoundingClientRect();
+    const at = new Vector2(((clientX - r.left) / r.width) * 2 - 1, 1 - ((clientY - r.top) / r.height) * 2);
+    const ray = new Raycaster();
+    ray.setFromCamera(at, this.camera);
+    let best = { distance: Infinity, i: -1 };
+    this.items.forEach(({ group }, i) => {
+      if (!group.visible) return;
+      for (const hit of ray.intersectObject(group.children[0])) {
+        if (hit.distance < best.distance && this.clip.distanceToPoint(hit.point) >= 0) best = { distance: hit.distance, i };
+      }
+    });
+    return best.i;
+  }
+
+  /** Where a place stands on the canvas, in CSS pixels; `null` behind the viewer. */
+  onScreen(place) {
+    const p = place.clone().project(this.camera);
+    if (p.z > 1) return null;
+    return [((p.x + 1) / 2) * this.holder.clientWidth, ((1 - p.y) / 2) * this.holder.clientHeight];
+  }
+}

@@ -1,0 +1,60 @@
+// A page as the Rust side writes it, with two small meshes: so the viewer can be tested on its own.
+import { readFile } from "node:fs/promises";
+
+function cube(center, half) {
+  const corners = [...Array(8).keys()].map((c) => [0, 1, 2].map((a) => (c >> a & 1 ? 65535 : 0)));
+  const quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+  const triangles = quads.flatMap(([a, b, c, d]) => [a, b, c, a, c, d]);
+  return { corners: Uint16Array.from(corners.flat()), triangles: Uint16Array.from(triangles), min: center.map((x) => x - half), max: center.map((x) => x + half) };
+}
+
+export async function samplePage() {
+  const parts = [];
+  let offset = 0;
+  const add = (array) => {
+    const at = offset;
+    const bytes = Buffer.alloc(Math.ceil(array.byteLength / 4) * 4);
+    Buffer.from(array.buffer).copy(bytes);
+    parts.push(bytes);
+    offset += bytes.length;
+    return at;
+  };
+  const meshes = [[-6, 0, 5], [6, 0, 5]].map((center, i) => {
+    const { corners, triangles, min, max } = cube(center, 5);
+    return {
+      name: `mesh ${i} <b>`, badge: i ? "last" : null, color: [60 + 120 * i, 120, 200 - 120 * i], step: i,
+      travel: [i ? -1 : 1, 0, 0], shift: [i ? 8 : -8, 0, 0], facts: [["Side", "10 mm"]],
+      points: { offset: add(corners), count: 8, min, max }, triangles: { offset: add(triangles), count: 12, bytes: 2 },
+    };
+  });
+  const header = {
+    title: "Two cubes </script>", meshes_title: "Meshes", meshes, facts: [["Count", "2"]],
+    checks: [{ name: "closed", ok: true, figure: "2 of 2" }, { name: "apart", ok: false, figure: "2 mm" }],
+    notes: [{ title: "corner", text: "look here", at: [11, 5, 10] }, { title: "general", text: "no place", at: null }],
+  };
+  const dist = (name) => readFile(new URL(`../dist/${name}`, import.meta.url), "utf8");
+  return `<!doctype html><meta charset="utf-8"><title>t</title><style>${await dist("viewer.css")}</style>
+<main id="view"><div id="stage"></div><div id="tools"></div></main><aside id="panel"></aside>
+<script type="application/json" id="header">${JSON.stringify(header).replaceAll("<", "\\u003c")}</script>
+<script type="text/plain" id="arrays">${Buffer.concat(parts).toString("base64")}</script>
+<script>
+addEventListener("error", (e) => { document.documentElement.dataset.error = e.message; });
+const say = console.error; console.error = (...a) => { document.documentElement.dataset.error = a.join(" "); say(...a); };
+</script>
+<script>${await dist("viewer.js")}</script>
+<script>
+// Counts what the canvas shows and clicks through every control, for the test to read from the dumped page.
+setTimeout(() => {
+  const canvas = document.querySelector("canvas");
+  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height }).getContext("2d");
+  copy.drawImage(canvas, 0, 0);
+  const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data;
+  let covered = 0;
+  for (let i = 3; i < pixels.length; i += 4) covered += pixels[i] > 127;
+  document.documentElement.dataset.covered = (covered / (pixels.length / 4)).toFixed(4);
+  for (const b of document.querySelectorAll("button")) b.click();
+  for (const key of ["ArrowRight", "ArrowLeft", " ", "Escape"]) dispatchEvent(new KeyboardEvent("keydown", { key }));
+  document.documentElement.dataset.clicked = document.querySelectorAll("button").length;
+}, 1500);
+</script>`;
+}
