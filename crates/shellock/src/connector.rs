@@ -18,10 +18,12 @@
 //! the separation direction and along no other.
 
 mod frame;
+mod free;
 mod profile;
 mod run;
 
 pub use frame::{Curve, curves};
+pub use free::has_no_bar;
 pub use profile::{Part, Section};
 pub use run::{Contact, Run, Station, runs};
 

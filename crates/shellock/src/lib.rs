@@ -8,15 +8,18 @@ pub mod connector;
 pub mod contact_graph;
 pub mod context;
 pub mod direction;
+pub mod feedback;
 pub mod figure;
 pub mod ids;
 pub mod params;
 pub mod piece;
+pub mod pipeline;
 pub mod plan;
 pub mod report;
 mod seams;
 pub mod segmentation;
 pub mod surface;
+pub mod verify;
 
 pub use contact_graph::{Contact, ContactGraph};
 pub use context::{Cancelled, Ctx, Warning};

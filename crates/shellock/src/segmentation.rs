@@ -270,6 +270,25 @@ fn held_twice(
     Ok(best.expect("there is at least one round"))
 }
 
+/// The same surface with `patch` divided in two, mended and smoothed again; `None` where it cannot be divided.
+///
+/// The feedback loop asks for this where no plan takes the piece out or holds it. Patches may be renumbered.
+pub fn divide(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    surface: &SegmentedSurface,
+    patch: PatchId,
+) -> Option<SegmentedSurface> {
+    let solid = Solid::new(surface.mesh.clone()).ok()?;
+    let label: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
+    let labels = FaceLabels::from_connected(&Topology::new(&solid), &label);
+    let divided = split_piece(&solid, &labels, patch)?;
+    let mended = mend(ctx, params, &solid, &divided, LabelOrigin::Automatic).ok()?;
+    let mut next = smooth_and_cut(ctx, params, &solid, &mended).ok()?;
+    next.source_face.iter_mut().for_each(|f| *f = surface.source_face[*f as usize]);
+    Some(next)
+}
+
 fn warn_weak_graph(ctx: &Ctx, graph: &crate::ContactGraph) {
     let pieces = graph.articulation_pieces();
     let list = pieces.iter().map(|p| format!("\"{p}\"")).collect::<Vec<_>>().join(", ");

@@ -1,0 +1,259 @@
+//! The whole job: from a closed mesh to interlocking pieces that were verified.
+//!
+//! Feedback goes one way: what a finished kit teaches becomes a constraint for the next round of planning; when plans run
+//! out, the segmentation is mended at the piece to blame, and planning starts afresh.
+
+use shellock_geom::{Aabb, Solid, TriMesh};
+
+use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
+use crate::connector::{ConnectorParams, Contact, has_no_bar};
+use crate::feedback::{Lesson, lessons};
+use crate::piece::{Joint, PieceError};
+use crate::plan::{
+    Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey,
+};
+use crate::segmentation::{SegmentationError, SegmentationParams};
+use crate::verify::{Verification, VerifyParams};
+use crate::{Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, body, connector, piece, plan, segmentation, verify};
+
+/// Everything that may be set. Each stage's parameters are declared beside it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Params {
+    /// How the surface is divided.
+    pub segmentation: SegmentationParams,
+    /// How plans are judged and searched.
+    pub plan: PlanParams,
+    /// How the wall is made and cut.
+    pub body: BodyParams,
+    /// How connectors are made.
+    pub connector: ConnectorParams,
+    /// How the finished kit is judged.
+    pub verify: VerifyParams,
+    /// How often a kit that failed its verification is planned and made again.
+    pub rounds: Rounds,
+}
+
+/// Bounds of the feedback loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rounds {
+    /// Kits made for one segmentation, at most. ≥ 1; 4.
+    pub kits: usize,
+    /// Segmentations mended after the first, at most; 4.
+    pub mendings: usize,
+}
+
+impl Default for Rounds {
+    fn default() -> Self {
+        Self { kits: 4, mendings: 4 }
+    }
+}
+
+impl Params {
+    /// Every problem of every stage, in words.
+    pub fn problems(&self) -> Vec<String> {
+        let words = |p: Vec<crate::params::ParamProblem>| p.into_iter().map(|p| p.to_string());
+        let mut problems: Vec<String> = words(self.body.problems()).chain(words(self.connector.problems())).collect();
+        problems.extend(self.segmentation.problems());
+        problems.extend(self.plan.problems());
+        problems
+    }
+
+    /// The parameters with what one stage owns and others need set alike everywhere.
+    fn agreed(&self) -> Self {
+        let mut p = self.clone();
+        p.plan.connector_size_mm = p.connector.size_mm;
+        p.verify.clearance_mm = p.connector.clearance_mm.max(2.0 * p.body.wall_gap_mm);
+        p
+    }
+}
+
+/// A finished kit.
+pub struct Design {
+    /// The segmented surface it was made from.
+    pub surface: SegmentedSurface,
+    /// Order and directions.
+    pub plan: InstallationPlan,
+    /// One printable mesh a piece, in assembled position, mm.
+    pub pieces: IdVec<PatchId, TriMesh>,
+    /// Connector runs and how they came out.
+    pub joints: Vec<Joint>,
+    /// What the seams offered.
+    pub contacts: Vec<Contact>,
+    /// The verdict on the finished meshes.
+    pub verification: Verification,
+}
+
+/// How the job ended.
+pub enum DesignOutcome {
+    /// There is a kit. Whether it passed is in its verification.
+    Made(Box<Design>),
+    /// No plan was found for any segmentation.
+    NoPlan {
+        /// Why, for people.
+        reason: String,
+        /// Who is in whose way.
+        blockers: Vec<Blocker>,
+    },
+}
+
+/// Why the job could not be done.
+#[derive(Debug, thiserror::Error)]
+pub enum DesignError {
+    /// The surface cannot be divided.
+    #[error(transparent)]
+    Segmentation(#[from] SegmentationError),
+    /// The wall cannot be made.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A piece cannot be finished.
+    #[error(transparent)]
+    Piece(#[from] PieceError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<GridError> for DesignError {
+    fn from(e: GridError) -> Self {
+        Self::Body(e.into())
+    }
+}
+
+/// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds
+/// are used up; then the best of them is returned, its failures told.
+pub fn design(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    labels: Option<&[i64]>,
+) -> Result<DesignOutcome, DesignError> {
+    let params = &params.agreed();
+    let mut surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
+    ctx.stage("grid", 0)?;
+    let grid = ShellGrid::new(&params.body, model, params.connector.room_mm())?;
+    let mut best: Option<Design> = None;
+    for mending in 0..=params.rounds.mendings {
+        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &mut best)?;
+        let blamed = match attempt {
+            Attempt::Passed => break,
+            Attempt::Failed { blamed, .. } => blamed,
+        };
+        if mending == params.rounds.mendings {
+            return Ok(finish(best, attempt));
+        }
+        let Some(mended) = blamed.iter().find_map(|&p| segmentation::divide(ctx, &params.segmentation, &surface, p)) else {
+            return Ok(finish(best, attempt));
+        };
+        ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
+        surface = mended;
+    }
+    Ok(finish(best, Attempt::Passed))
+}
+
+/// How one segmentation went.
+enum Attempt {
+    Passed,
+    Failed {
+        reason: String,
+        blockers: Vec<Blocker>,
+        /// Pieces whose division may help, most promising first.
+        blamed: Vec<PatchId>,
+    },
+}
+
+fn finish(best: Option<Design>, attempt: Attempt) -> DesignOutcome {
+    match (best, attempt) {
+        (Some(design), _) => DesignOutcome::Made(Box::new(design)),
+        (None, Attempt::Failed { reason, blockers, .. }) => DesignOutcome::NoPlan { reason, blockers },
+        (None, Attempt::Passed) => unreachable!("what passed was kept"),
+    }
+}
+
+/// Plans and makes kits of one segmentation until one passes or nothing new can be tried. Keeps the kit with the fewest
+/// failures in `best`.
+fn with_segmentation(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    grid: &ShellGrid,
+    surface: &SegmentedSurface,
+    best: &mut Option<Design>,
+) -> Result<Attempt, DesignError> {
+    let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams())?;
+    ctx.stage("distances to the patches", 0)?;
+    let distances = PatchDistances::measure(grid, surface);
+    let mut constraints = PlanConstraints::default();
+    let mut blamed = Vec::new();
+    for kit in 0..params.rounds.kits {
+        let plan = match plan::search(ctx, &params.plan, &survey, &constraints)? {
+            PlanOutcome::Found(plan) => plan,
+            PlanOutcome::Infeasible { reason, blockers, articulations } => {
+                let pieces = articulations.into_iter().chain(blockers.iter().map(|b| b.piece));
+                blamed.extend(pieces);
+                return Ok(Attempt::Failed { reason, blockers, blamed });
+            }
+        };
+        let design = make(ctx, params, model, grid, &distances, surface, plan)?;
+        let is_better = best.as_ref().is_none_or(|b| failures(&design) < failures(b));
+        let learned: Vec<Lesson> = lessons(&design, params);
+        let passed = design.verification.passed();
+        if is_better {
+            *best = Some(design);
+        }
+        if passed {
+            return Ok(Attempt::Passed);
+        }
+        for lesson in &learned {
+            if kit + 1 < params.rounds.kits {
+                ctx.note(&format!("another plan: {lesson}"));
+            }
+            blamed.extend(lesson.blamed());
+            lesson.teach(&mut constraints);
+        }
+    }
+    let reason = "no kit passed its verification within the allowed rounds".into();
+    Ok(Attempt::Failed { reason, blockers: Vec::new(), blamed })
+}
+
+fn failures(design: &Design) -> usize {
+    design.verification.checks.iter().filter(|c| !c.ok).count()
+}
+
+/// Makes and verifies the kit of one plan.
+pub fn make(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    grid: &ShellGrid,
+    distances: &PatchDistances,
+    surface: &SegmentedSurface,
+    plan: InstallationPlan,
+) -> Result<Design, DesignError> {
+    let rooms = rooms(params, surface);
+    let shell = body::build(ctx, &params.body, model, grid, distances, &plan, &rooms)?;
+    let curves = shell.inner.as_ref().map_or(Vec::new(), |inner| connector::curves(grid, inner, &plan));
+    let is_free = has_no_bar(&params.connector, grid, &shell);
+    let (runs, contacts) = connector::runs(&params.connector, &plan, &curves, &is_free);
+    let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms)?;
+    let verification = verify::verify(ctx, &params.verify, model, &finished.meshes, &plan)?;
+    Ok(Design {
+        surface: surface.clone(),
+        plan,
+        pieces: finished.meshes,
+        joints: finished.joints,
+        contacts,
+        verification,
+    })
+}
+
+/// The box around each patch and all connectors its piece can have.
+fn rooms(params: &Params, surface: &SegmentedSurface) -> IdVec<PatchId, Aabb> {
+    /// Carving shifts seams by less than this, mm.
+    const SHIFT_MM: f64 = 2.0;
+    let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
+    for (face, &p) in surface.patch_of_face.iter().enumerate() {
+        rooms[p] = rooms[p].union(Aabb::around(surface.mesh.corners(face)));
+    }
+    let reach = params.body.thickness_mm + params.connector.room_mm() + SHIFT_MM;
+    rooms.as_slice().iter().map(|r| r.grown(reach)).collect()
+}
