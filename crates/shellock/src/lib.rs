@@ -8,6 +8,7 @@ pub mod direction;
 pub mod ids;
 pub mod plan;
 pub mod surface;
+pub mod verify;
 
 pub use context::{Cancelled, Ctx, Warning};
 pub use direction::LatticeDirection;
