@@ -167,6 +167,69 @@ impl TriangleBvh {
         }
         found.sort_unstable_by_key(|e| e.0);
     }
+
+    /// The first triangle that the ray from `origin` along the unit vector `direction` meets within `limit_mm`, and how
+    /// far that is, mm. Both sides count; triangles parallel to the ray do not.
+    pub fn first_hit(&self, origin: Vec3, direction: Vec3, limit_mm: f64) -> Option<(u32, f64)> {
+        let mut best: Option<(u32, f64)> = None;
+        let mut limit = limit_mm;
+        let mut stack = [0u32; 64];
+        let mut top = usize::from(!self.faces.is_empty());
+        while top > 0 {
+            top -= 1;
+            let node = &self.nodes[stack[top] as usize];
+            if !ray_meets_box(node.bounds, origin, direction, limit) {
+                continue;
+            }
+            if node.count == 0 {
+                stack[top] = node.first;
+                stack[top + 1] = node.first + 1;
+                top += 2;
+                continue;
+            }
+            for i in node.first as usize..(node.first + node.count) as usize {
+                if let Some(t) = ray_meets_triangle(self.corners[i], origin, direction)
+                    && t <= limit
+                {
+                    limit = t;
+                    best = Some((self.faces[i], t));
+                }
+            }
+        }
+        best
+    }
+}
+
+fn ray_meets_box(b: Aabb, origin: Vec3, direction: Vec3, limit: f64) -> bool {
+    let (mut from, mut to) = (0.0f64, limit);
+    for axis in 0..3 {
+        if direction[axis] == 0.0 {
+            if origin[axis] < b.min[axis] || origin[axis] > b.max[axis] {
+                return false;
+            }
+            continue;
+        }
+        let (p, q) = ((b.min[axis] - origin[axis]) / direction[axis], (b.max[axis] - origin[axis]) / direction[axis]);
+        (from, to) = (from.max(p.min(q)), to.min(p.max(q)));
+    }
+    // The slack covers rounding of the divisions, so that a flat box is not missed.
+    from <= to + 1e-9 * (1.0 + to.abs())
+}
+
+/// Distance along the ray, ≥ 0. [MollerTrumbore1997]
+fn ray_meets_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Option<f64> {
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let det = ab.dot(p);
+    if det == 0.0 {
+        return None;
+    }
+    let from_a = origin - a;
+    let u = from_a.dot(p) / det;
+    let q = from_a.cross(ab);
+    let v = direction.dot(q) / det;
+    let t = ac.dot(q) / det;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0).then_some(t)
 }
 
 /// Splits `faces` in place where the surface-area heuristic is least; returns how many go left (never 0 or all).
@@ -291,5 +354,24 @@ mod tests {
                 .collect();
             assert_eq!(found, expected);
         }
+    }
+
+    #[test]
+    fn rays_meet_the_same_triangle_as_by_brute_force() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mesh = soup(400, &mut rng);
+        let bvh = TriangleBvh::new(&mesh);
+        let mut n_hits = 0;
+        for _ in 0..300 {
+            let mut p = || Vec3::new(rng.random(), rng.random(), rng.random());
+            let (origin, direction) = (p(), (p() - 0.5).normalize());
+            let all = (0..400u32).filter_map(|f| {
+                ray_meets_triangle(mesh.corners(f as usize), origin, direction).map(|t| (f, t)).filter(|h| h.1 <= 0.7)
+            });
+            let expected = all.min_by(|a, b| a.1.total_cmp(&b.1));
+            n_hits += usize::from(expected.is_some());
+            assert_eq!(bvh.first_hit(origin, direction, 0.7), expected);
+        }
+        assert!(n_hits > 50);
     }
 }

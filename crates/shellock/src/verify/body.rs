@@ -1,0 +1,174 @@
+//! Whether each piece is one printable solid.
+
+use rayon::prelude::*;
+use shellock_geom::{TriMesh, Vec3, Volume};
+
+use super::{Check, Finding};
+use crate::{Cancelled, Ctx, IdVec, PatchId};
+
+/// Points nearer than this become one, mm: what readers of STL files do. At the size of prints it merges bitwise equal
+/// single-precision points and, near the origin, a few more.
+const MERGE_MM: f64 = 1e-8;
+/// A component of less volume is a crumb that no slicer prints, mm³. Cavities come out negative and are no bodies.
+const CRUMB_MM3: f64 = 0.01;
+
+/// A piece as a reader of its file sees it.
+pub struct Body {
+    /// Equal points merged, collapsed triangles dropped.
+    pub mesh: TriMesh,
+    /// The region inside; `None` where the mesh bounds none.
+    pub volume: Option<Volume>,
+}
+
+/// What a sorted list of edges says about a mesh.
+struct EdgeUse {
+    /// Edges used more often one way than the other.
+    n_unbalanced: usize,
+    /// Edges of more than two triangles, and the middle of the first one.
+    shared: Option<(usize, Vec3)>,
+}
+
+/// Reads all pieces and checks them one by one.
+pub fn check(
+    ctx: &Ctx,
+    pieces: &IdVec<PatchId, TriMesh>,
+) -> Result<(IdVec<PatchId, Body>, Vec<Check>, Vec<Finding>), Cancelled> {
+    let ids: Vec<PatchId> = pieces.ids().collect();
+    let checked: Vec<(Body, Vec<Finding>)> = ids
+        .into_par_iter()
+        .map(|piece| {
+            ctx.check()?;
+            Ok(check_piece(piece, &pieces[piece]))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let (bodies, findings): (Vec<Body>, Vec<Vec<Finding>>) = checked.into_iter().unzip();
+    let findings: Vec<Finding> = findings.into_iter().flatten().collect();
+    let check = |name: &str, concerns: fn(&Finding) -> bool| {
+        let n = findings.iter().filter(|f| concerns(f)).count();
+        Check::new(name, n == 0, format!("{n} of {} pieces fail", bodies.len()))
+    };
+    let checks = vec![
+        check("every piece closed, oriented", |f| matches!(f, Finding::NotClosed { .. })),
+        check("no edge shared by four faces", |f| matches!(f, Finding::SharedEdges { .. })),
+        check("every piece one connected body", |f| matches!(f, Finding::SeveralBodies { .. })),
+    ];
+    Ok((bodies.into_iter().collect(), checks, findings))
+}
+
+fn check_piece(piece: PatchId, mesh: &TriMesh) -> (Body, Vec<Finding>) {
+    let mut findings = Vec::new();
+    let is_sound = mesh.points.iter().all(|p| p.is_finite())
+        && mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.points.len());
+    let mesh = if is_sound { merged(mesh) } else { TriMesh::default() };
+    let edges = edge_use(&mesh);
+    if let Some((count, at)) = edges.shared {
+        findings.push(Finding::SharedEdges { piece, count, at: at.to_array() });
+    }
+    let is_closed = edges.n_unbalanced == 0 && mesh.signed_volume() > 0.0;
+    let volume = if is_closed { Volume::from_closed_mesh(&mesh).ok().filter(|v| !v.is_empty()) } else { None };
+    match &volume {
+        None => findings.push(Finding::NotClosed { piece }),
+        Some(volume) => {
+            let count = volume.components().iter().filter(|c| c.volume() > CRUMB_MM3).count();
+            if count != 1 {
+                findings.push(Finding::SeveralBodies { piece, count });
+            }
+        }
+    }
+    (Body { mesh, volume }, findings)
+}
+
+/// `mesh` with equal points made one and triangles that collapse by it left out. Points keep their first order.
+fn merged(mesh: &TriMesh) -> TriMesh {
+    let cell = |p: Vec3| p.to_array().map(|x| (f64::from(x as f32) / MERGE_MM).round() as i64);
+    let mut by_place: Vec<([i64; 3], u32)> = mesh.points.iter().map(|&p| cell(p)).zip(0..).collect();
+    by_place.sort_unstable();
+    let mut name = vec![0u32; mesh.points.len()];
+    for equal in by_place.chunk_by(|a, b| a.0 == b.0) {
+        for e in equal {
+            name[e.1 as usize] = equal[0].1;
+        }
+    }
+    let triangles = mesh.triangles.iter().map(|t| t.map(|v| name[v as usize]));
+    let triangles: Vec<[u32; 3]> = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    let mut is_used = vec![false; mesh.points.len()];
+    triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+    let mut rank = vec![0u32; mesh.points.len()];
+    let mut points = Vec::new();
+    for (v, &p) in mesh.points.iter().enumerate().filter(|(v, _)| is_used[*v]) {
+        rank[v] = points.len() as u32;
+        points.push(p);
+    }
+    TriMesh { points, triangles: triangles.into_iter().map(|t| t.map(|v| rank[v as usize])).collect() }
+}
+
+fn edge_use(mesh: &TriMesh) -> EdgeUse {
+    let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * mesh.triangles.len());
+    for &[a, b, c] in &mesh.triangles {
+        edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
+    }
+    edges.sort_unstable();
+    let mut found = EdgeUse { n_unbalanced: 0, shared: None };
+    for uses in edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+        let forwards = uses.iter().filter(|e| e.2).count();
+        found.n_unbalanced += usize::from(2 * forwards != uses.len());
+        if uses.len() > 2 {
+            let middle = 0.5 * (mesh.points[uses[0].0 as usize] + mesh.points[uses[0].1 as usize]);
+            found.shared = Some(found.shared.map_or((1, middle), |(n, at)| (n + 1, at)));
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shellock_geom::Aabb;
+
+    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
+        Volume::cuboid(Aabb { min: min.into(), max: max.into() })
+    }
+
+    fn joined(parts: &[TriMesh]) -> TriMesh {
+        let mut all = TriMesh::default();
+        for part in parts {
+            let first = all.points.len() as u32;
+            all.points.extend(&part.points);
+            all.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+        }
+        all
+    }
+
+    #[test]
+    fn each_defect_of_a_piece_is_found() {
+        let found = |mesh: &TriMesh| check_piece(PatchId(3), mesh).1;
+        let cube = cuboid([0.0; 3], [2.0; 3]).to_mesh();
+        assert!(found(&cube).is_empty());
+
+        let mut open = cube.clone();
+        open.triangles.pop();
+        assert_eq!(found(&open), [Finding::NotClosed { piece: PatchId(3) }]);
+
+        let mut nan = cube.clone();
+        nan.points[0].x = f64::NAN;
+        assert_eq!(found(&nan), [Finding::NotClosed { piece: PatchId(3) }]);
+        assert_eq!(found(&TriMesh::default()), [Finding::NotClosed { piece: PatchId(3) }]);
+
+        let apart = joined(&[cube.clone(), cuboid([5.0; 3], [6.0; 3]).to_mesh()]);
+        assert_eq!(found(&apart), [Finding::SeveralBodies { piece: PatchId(3), count: 2 }]);
+
+        // Two cubes that touch along an edge: closed, but the edge has four faces.
+        let touching = joined(&[cube, cuboid([2.0, 2.0, 0.0], [4.0, 4.0, 2.0]).to_mesh()]);
+        let shared = found(&touching);
+        assert!(
+            matches!(shared[0], Finding::SharedEdges { count: 1, at, .. } if at == [2.0, 2.0, 1.0]),
+            "{shared:?}"
+        );
+    }
+
+    #[test]
+    fn a_cavity_is_no_second_body() {
+        let hollow = cuboid([0.0; 3], [4.0; 3]).subtract(&cuboid([1.0; 3], [3.0; 3]));
+        assert!(check_piece(PatchId(0), &hollow.to_mesh()).1.is_empty());
+    }
+}

@@ -1,0 +1,71 @@
+//! Where the finished pieces face each other closely enough to hold each other.
+
+use rayon::prelude::*;
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::{Aabb, Vec3};
+
+use super::body::Body;
+use super::sample;
+use crate::{Cancelled, Ctx, IdVec, PatchId};
+
+/// Distance between neighbouring samples, mm: several on every side of a 2 mm connector.
+const SPACING_MM: f64 = 0.7;
+/// Least and most samples on one piece.
+const N_SAMPLES: (f64, f64) = (2_000.0, 60_000.0);
+/// What may come on top of the clearance between faces that still count as touching, mm: a printer's error.
+const REACH_MM: f64 = 0.15;
+/// Faces whose normals have a greater dot product do not face each other (26° from opposite).
+const FACING: f64 = -0.9;
+/// Most contacts that are kept; every k-th of a longer list.
+const MOST_CONTACTS: usize = 20_000;
+
+/// A point of piece `a` that piece `b` lies against.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact {
+    /// The piece the point is on.
+    pub a: PatchId,
+    /// The piece it faces.
+    pub b: PatchId,
+    /// Position, mm.
+    pub point: Vec3,
+    /// Unit normal of `a` at the point, towards `b`.
+    pub normal: Vec3,
+}
+
+/// All contacts, in order of `a`, then along its surface, then of `b`.
+pub fn find(
+    ctx: &Ctx,
+    bodies: &IdVec<PatchId, Body>,
+    clearance_mm: f64,
+    seed: u64,
+) -> Result<Vec<Contact>, Cancelled> {
+    let reach_mm = clearance_mm + REACH_MM;
+    let ids: Vec<PatchId> = bodies.ids().collect();
+    let trees: Vec<(TriangleBvh, Aabb)> = ids
+        .par_iter()
+        .map(|&id| (TriangleBvh::new(&bodies[id].mesh), bodies[id].mesh.bounds().grown(reach_mm)))
+        .collect();
+    let found: Vec<Vec<Contact>> = ids
+        .par_iter()
+        .map(|&a| {
+            ctx.check()?;
+            let mesh = &bodies[a].mesh;
+            let n = (mesh.area() / (SPACING_MM * SPACING_MM)).clamp(N_SAMPLES.0, N_SAMPLES.1) as usize;
+            let samples = sample::on_surface(mesh, n, seed.wrapping_add(u64::from(a.0)));
+            let mut contacts = Vec::new();
+            for s in samples {
+                for &b in ids.iter().filter(|&&b| b != a && trees[usize::from(b)].1.contains(s.point)) {
+                    if let Some(near) = trees[usize::from(b)].0.nearest(s.point, reach_mm * reach_mm)
+                        && s.normal.dot(bodies[b].mesh.face_normal(near.face as usize)) < FACING
+                    {
+                        contacts.push(Contact { a, b, point: s.point, normal: s.normal });
+                    }
+                }
+            }
+            Ok(contacts)
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let all: Vec<Contact> = found.into_iter().flatten().collect();
+    let keep_every = all.len().div_ceil(MOST_CONTACTS).max(1);
+    Ok(all.into_iter().step_by(keep_every).collect())
+}

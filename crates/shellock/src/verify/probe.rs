@@ -1,0 +1,105 @@
+//! Whether each piece but the key is held in every direction by the others.
+//!
+//! Each piece is pushed a small step in 66 directions and must run into the rest. Rays through the piece estimate how
+//! much; an exact boolean decides where the estimate is near the limit.
+
+use rayon::prelude::*;
+use shellock_geom::{Aabb, Vec3, Volume};
+
+use super::body::Body;
+use super::columns::{Columns, Frame, Grid};
+use super::{Check, Finding};
+use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId};
+
+/// Overlap that holds a piece, mm³. The acceptance test asks for 0.5.
+const HOLD_MM3: f64 = 0.55;
+/// Estimated overlap from which a piece is held, mm³. Even one ray in [`PIXEL_MM`] squared then meets it a dozen times.
+const SURELY_HELD_MM3: f64 = 5.0;
+/// Estimated overlap below which a piece is called loose, mm³: on the strict side of the limit, whatever the error.
+const SURELY_LOOSE_MM3: f64 = 0.1;
+/// Ray spacing, mm.
+const PIXEL_MM: f64 = 0.5;
+/// Most rays across the longer side of a piece's shadow.
+const MOST_PIXELS: f64 = 600.0;
+/// Directions spread over the sphere, besides the 26 of the lattice.
+const N_SPHERE: usize = 40;
+/// Rays parallel to no face of a common model.
+const RAYS: Vec3 = Vec3::new(0.3713, 0.5219, 0.7680);
+
+/// Pushes every piece but `key` by three clearances and 0.6 mm.
+pub fn check(
+    ctx: &Ctx,
+    bodies: &IdVec<PatchId, Body>,
+    key: PatchId,
+    clearance_mm: f64,
+) -> Result<(Check, Vec<Finding>), Cancelled> {
+    let step_mm = 3.0 * clearance_mm + 0.6;
+    let directions = directions();
+    let frame = Frame::along(RAYS.normalize());
+    let projected: Vec<Vec<Vec3>> =
+        bodies.iter().map(|(_, b)| b.mesh.points.iter().map(|&p| frame.project(p)).collect()).collect();
+    let ids: Vec<PatchId> = bodies.ids().filter(|&id| id != key).collect();
+    let loose: Vec<Option<Finding>> = ids
+        .into_par_iter()
+        .map(|piece| {
+            ctx.check()?;
+            let free = free_directions(bodies, &projected, &frame, piece, step_mm, &directions);
+            Ok((!free.is_empty()).then_some(Finding::Loose { piece, directions: free }))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let findings: Vec<Finding> = loose.into_iter().flatten().collect();
+    let figure = format!("{} pieces loose in some of {} directions", findings.len(), directions.len());
+    Ok((Check::new("every piece but the key is blocked", findings.is_empty(), figure), findings))
+}
+
+/// The 26 lattice directions and 40 on a spiral over the sphere.
+fn directions() -> Vec<Vec3> {
+    let spiral = (0..N_SPHERE).map(|i| {
+        let i = i as f64 + 0.5;
+        let (turn, z) = (std::f64::consts::PI * (1.0 + 5f64.sqrt()) * i, 1.0 - 2.0 * i / N_SPHERE as f64);
+        let radius = (1.0 - z * z).sqrt();
+        Vec3::new(radius * turn.cos(), radius * turn.sin(), z)
+    });
+    LatticeDirection::all().map(LatticeDirection::unit).chain(spiral).collect()
+}
+
+fn free_directions(
+    bodies: &IdVec<PatchId, Body>,
+    projected: &[Vec<Vec3>],
+    frame: &Frame,
+    piece: PatchId,
+    step_mm: f64,
+    directions: &[Vec3],
+) -> Vec<[f64; 3]> {
+    let Some(own) = &bodies[piece].volume else { return Vec::new() };
+    let room = own.bounds().grown(step_mm);
+    let others: Vec<(PatchId, &Volume)> = bodies
+        .iter()
+        .filter_map(|(id, b)| Some((id, b.volume.as_ref()?)))
+        .filter(|(id, v)| *id != piece && v.bounds().intersects(room))
+        .collect();
+    let points = &projected[usize::from(piece)];
+    let shadow = Aabb::around(points.iter().copied()).grown(step_mm);
+    let grid = Grid::covering(shadow, PIXEL_MM.max(shadow.size().truncate().max_element() / MOST_PIXELS));
+    let around: Vec<Columns> = others
+        .iter()
+        .map(|(id, _)| Columns::of(&grid, &projected[usize::from(*id)], &bodies[*id].mesh.triangles, Vec3::ZERO))
+        .collect();
+    let is_held = |direction: Vec3| {
+        let step = direction * step_mm;
+        let moved = Columns::of(&grid, points, &bodies[piece].mesh.triangles, frame.project(step));
+        let length: f64 = around.iter().map(|other| moved.common_length_mm(other)).sum();
+        let estimate_mm3 = length * grid.cell_mm2();
+        estimate_mm3 >= SURELY_HELD_MM3
+            || (estimate_mm3 > SURELY_LOOSE_MM3 && is_held_exactly(&own.translate(step), &others))
+    };
+    directions.iter().filter(|&&d| !is_held(d)).map(|d| d.to_array()).collect()
+}
+
+fn is_held_exactly(moved: &Volume, others: &[(PatchId, &Volume)]) -> bool {
+    let mut sum = 0.0;
+    others.iter().any(|(_, other)| {
+        sum += moved.intersect(other).volume();
+        sum >= HOLD_MM3
+    })
+}
