@@ -9,9 +9,7 @@ use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, has_no_bar};
 use crate::feedback::{Lesson, lessons};
 use crate::piece::{Joint, PieceError};
-use crate::plan::{
-    Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey,
-};
+use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::verify::{Verification, VerifyParams};
 use crate::{Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, body, connector, piece, plan, segmentation, verify};
@@ -121,12 +119,7 @@ impl From<GridError> for DesignError {
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds
 /// are used up; then the best of them is returned, its failures told.
-pub fn design(
-    ctx: &Ctx,
-    params: &Params,
-    model: &Solid,
-    labels: Option<&[i64]>,
-) -> Result<DesignOutcome, DesignError> {
+pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
     let params = &params.agreed();
     let mut surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
     ctx.stage("grid", 0)?;
@@ -134,14 +127,15 @@ pub fn design(
     let mut best: Option<Design> = None;
     for mending in 0..=params.rounds.mendings {
         let attempt = with_segmentation(ctx, params, model, &grid, &surface, &mut best)?;
-        let blamed = match attempt {
+        let blamed = match &attempt {
             Attempt::Passed => break,
-            Attempt::Failed { blamed, .. } => blamed,
+            Attempt::Failed { blamed, .. } => blamed.clone(),
         };
         if mending == params.rounds.mendings {
             return Ok(finish(best, attempt));
         }
-        let Some(mended) = blamed.iter().find_map(|&p| segmentation::divide(ctx, &params.segmentation, &surface, p)) else {
+        let Some(mended) = blamed.iter().find_map(|&p| segmentation::divide(ctx, &params.segmentation, &surface, p))
+        else {
             return Ok(finish(best, attempt));
         };
         ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));

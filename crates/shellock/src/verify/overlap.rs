@@ -35,7 +35,8 @@ pub fn check_pairs(ctx: &Ctx, bodies: &IdVec<PatchId, Body>) -> Result<(Check, V
         .map(|&(a, b)| {
             ctx.check()?;
             let common = solid[a].1.intersect(solid[b].1);
-            Ok((common.volume(), common.bounds().center()))
+            // The mesh's own sum, because the library's depends on the number of threads.
+            Ok((common.to_mesh().signed_volume(), common.bounds().center()))
         })
         .collect::<Result<_, Cancelled>>()?;
     let (mut worst, mut findings) = (0.0f64, Vec::new());

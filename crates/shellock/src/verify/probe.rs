@@ -99,7 +99,7 @@ fn free_directions(
 fn is_held_exactly(moved: &Volume, others: &[(PatchId, &Volume)]) -> bool {
     let mut sum = 0.0;
     others.iter().any(|(_, other)| {
-        sum += moved.intersect(other).volume();
+        sum += moved.intersect(other).to_mesh().signed_volume();
         sum >= HOLD_MM3
     })
 }
