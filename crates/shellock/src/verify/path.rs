@@ -20,8 +20,9 @@ use shellock_geom::{Aabb, Vec3, Volume};
 
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
-use super::{Check, Finding};
-use crate::{Cancelled, Ctx, IdVec, InstallationStep, PatchId};
+use super::{Check, Finding, rounded};
+use crate::plan::InstallationStep;
+use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Overlap on the way that is still rounding, mm³. The acceptance test allows 0.5 at the travels it tries.
 const RUB_MM3: f64 = 0.45;
@@ -172,21 +173,17 @@ fn rub_at(
     partners: &[(PatchId, &Volume)],
 ) -> Option<Finding> {
     let moved = moving.translate(travel);
-    let hits: Vec<(PatchId, Volume)> = partners.iter().map(|&(id, v)| (id, moved.intersect(v))).collect();
-    let exceeds = |v: f64, a: f64| v > RUB_MM3 && 2.0 * v / a > RUB_MM;
-    let total = hits.iter().fold((0.0, 0.0), |sum, (_, h)| (sum.0 + h.volume(), sum.1 + h.area()));
-    if !exceeds(total.0, total.1) && !hits.iter().any(|(_, h)| exceeds(h.volume(), h.area())) {
+    let measured = |hit: Volume| (rounded(hit.volume()), rounded(hit.area()), hit.bounds().center());
+    let hits: Vec<(PatchId, (f64, f64, Vec3))> =
+        partners.iter().map(|&(id, v)| (id, measured(moved.intersect(v)))).collect();
+    let exceeds = |volume: f64, area: f64| volume > RUB_MM3 && 2.0 * volume / area > RUB_MM;
+    let total = hits.iter().fold((0.0, 0.0), |sum, (_, h)| (sum.0 + h.0, sum.1 + h.1));
+    if !exceeds(total.0, total.1) && !hits.iter().any(|(_, h)| exceeds(h.0, h.1)) {
         return None;
     }
-    let (against, hit) = hits.iter().max_by(|a, b| a.1.volume().total_cmp(&b.1.volume()))?;
-    Some(Finding::PathRubs {
-        piece,
-        against: *against,
-        travel_mm,
-        thickness_mm: 2.0 * hit.volume() / hit.area(),
-        volume_mm3: hit.volume(),
-        at: hit.bounds().center().to_array(),
-    })
+    let &(against, (volume_mm3, area, at)) = hits.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let thickness_mm = rounded(2.0 * volume_mm3 / area);
+    Some(Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, at: at.to_array() })
 }
 
 #[cfg(test)]
@@ -214,8 +211,7 @@ mod tests {
         for s in [Vec3::X, Vec3::new(1.0, -1.0, 0.0).normalize(), Vec3::new(1.0, 1.0, 1.0).normalize()] {
             let (p, q) = (random_boxes(&mut rng, Vec3::ZERO), random_boxes(&mut rng, s * 4.0));
             let frame = Frame::along(s);
-            let project =
-                |m: &Volume| -> Vec<Vec3> { m.to_mesh().points.iter().map(|&x| frame.project(x)).collect() };
+            let project = |m: &Volume| -> Vec<Vec3> { m.to_mesh().points.iter().map(|&x| frame.project(x)).collect() };
             let points = project(&p);
             let grid = Grid::covering(Aabb::around(points.iter().copied()), 0.1);
             let own = Columns::of(&grid, &points, &p.to_mesh().triangles, Vec3::ZERO);

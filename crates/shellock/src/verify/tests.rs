@@ -1,1 +1,182 @@
+//! Small assemblies of boxes whose verdict is known by thought.
 
+use std::sync::atomic::AtomicBool;
+
+use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
+
+use super::*;
+use crate::plan::InstallationStep;
+use crate::{LatticeDirection, PatchId};
+
+/// Half the gap between faces, mm.
+const HALF_GAP_MM: f64 = 0.05;
+
+fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
+    Volume::cuboid(Aabb { min: Vec3::new(x[0], y[0], z[0]), max: Vec3::new(x[1], y[1], z[1]) })
+}
+
+fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
+    let gap = 2.0 * HALF_GAP_MM;
+    let wide = |[low, high]: [f64; 2]| [low - gap, high + gap];
+    cuboid(wide(x), wide(y), wide(z))
+}
+
+fn as_written(v: &Volume) -> TriMesh {
+    let mut mesh = v.to_mesh();
+    mesh.points.iter_mut().for_each(|p| *p = p.as_vec3().as_dvec3());
+    mesh
+}
+
+struct Kit {
+    model: Solid,
+    pieces: IdVec<PatchId, TriMesh>,
+    plan: InstallationPlan,
+}
+
+impl Kit {
+    /// `directions`: the way out of each piece, in order of installation, which is the order of the pieces.
+    fn new(model: Volume, pieces: &[Volume], directions: &[Vec3]) -> Self {
+        let steps = directions.iter().enumerate();
+        let steps = steps
+            .map(|(i, &d)| InstallationStep { piece: PatchId(i as u32), separation: LatticeDirection::nearest(d) })
+            .collect();
+        Self {
+            model: Solid::new(model.to_mesh()).unwrap(),
+            pieces: pieces.iter().map(as_written).collect(),
+            plan: InstallationPlan { steps },
+        }
+    }
+
+    fn verdict(&self) -> Verification {
+        let (report, stop) = (|_: crate::context::Progress<'_>| {}, AtomicBool::new(false));
+        let params = VerifyParams { clearance_mm: 2.0 * HALF_GAP_MM, seed: 0 };
+        verify(&Ctx::new(&report, &stop), &params, &self.model, &self.pieces, &self.plan).unwrap()
+    }
+}
+
+const ALL: [f64; 2] = [0.0, 30.0];
+
+/// A cube in three parts: a base with a T-shaped groove that ends blind at x = 10, a lid whose T-shaped tongue slides in
+/// along −x, and a pin through both, pushed in along −z.
+fn pinned_lid(pin: [[f64; 2]; 3]) -> [Volume; 3] {
+    let (stem, foot) = (([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]), ([10.0, 30.0], [7.0, 23.0], [5.0, 9.0]));
+    let hole = grown(pin[0], pin[1], [pin[2][0], 40.0]);
+    let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([p.0[0], 40.0], p.1, p.2);
+    let base = cuboid(ALL, ALL, [0.0, 15.0 - HALF_GAP_MM]).subtract(&open(stem)).subtract(&open(foot)).subtract(&hole);
+    let lid = Volume::union_all(vec![
+        cuboid(ALL, ALL, [15.0 + HALF_GAP_MM, 30.0]),
+        cuboid(stem.0, stem.1, stem.2),
+        cuboid(foot.0, foot.1, foot.2),
+    ])
+    .subtract(&hole);
+    [base, lid, cuboid(pin[0], pin[1], pin[2])]
+}
+
+const PIN: [[f64; 2]; 3] = [[17.0, 24.0], [13.0, 17.0], [1.0, 30.0]];
+
+fn pinned_kit(change: impl FnOnce(&mut [Volume; 3])) -> Kit {
+    let mut pieces = pinned_lid(PIN);
+    change(&mut pieces);
+    Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z])
+}
+
+#[test]
+fn of_a_pinned_lid_only_the_key_can_move_and_only_outwards() {
+    let verdict = pinned_kit(|_| {}).verdict();
+    let failed: Vec<&str> = verdict.checks.iter().filter(|c| !c.ok).map(|c| c.name.as_str()).collect();
+    assert_eq!(failed, ["nothing moves, key alone held (6 dof)"], "{verdict:#?}");
+    let [Finding::KeyLeaves { motion }] = &verdict.findings[..] else { panic!("{:?}", verdict.findings) };
+    assert_eq!(motion.piece, PatchId(2));
+    assert!(Vec3::from(motion.velocity).distance(Vec3::Z) < 1e-3, "{motion:?}");
+}
+
+#[test]
+fn a_tongue_leaves_its_groove_one_way_only() {
+    let [base, lid, _] = pinned_lid([[50.0, 51.0], [50.0, 51.0], [50.0, 51.0]]);
+    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[base, lid, cuboid([60.0, 61.0], ALL, ALL)], &[Vec3::X; 3]);
+    let verdict = kit.verdict();
+    let lid_free = verdict.findings.iter().find_map(|f| match f {
+        Finding::Loose { piece: PatchId(1), directions } => Some(directions.clone()),
+        _ => None,
+    });
+    assert_eq!(lid_free, Some(vec![[1.0, 0.0, 0.0]]));
+}
+
+#[test]
+fn a_path_through_a_wall_is_caught_with_place_and_partner() {
+    let mut kit = pinned_kit(|_| {});
+    kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X);
+    let verdict = kit.verdict();
+    let rub = verdict.findings.iter().find(|f| matches!(f, Finding::PathRubs { .. }));
+    let Some(Finding::PathRubs { piece, against, at, volume_mm3, .. }) = rub else { panic!("{verdict:#?}") };
+    assert_eq!((*piece, *against), (PatchId(1), PatchId(0)));
+    assert!(at[0] < 11.0 && at[2] > 5.0 && at[2] < 16.0 && *volume_mm3 > 100.0, "{rub:?}");
+}
+
+#[test]
+fn a_pin_that_misses_the_base_leaves_it_loose() {
+    let verdict = pinned_kit(|pieces| pieces[2] = cuboid(PIN[0], PIN[1], [20.0, 30.0])).verdict();
+    // The pin still holds the lid; the base slips off both along −x, and only the finite push can see it, because the
+    // base is the piece that the infinitesimal test holds.
+    assert_eq!(verdict.findings[0], Finding::Loose { piece: PatchId(0), directions: vec![[-1.0, 0.0, 0.0]] });
+}
+
+#[test]
+fn a_piece_moved_by_more_than_the_gap_overlaps() {
+    let verdict = pinned_kit(|pieces| pieces[1] = pieces[1].translate(Vec3::new(0.0, 0.2, 0.0))).verdict();
+    let overlaps =
+        verdict.findings.iter().filter(|f| matches!(f, Finding::Overlap { a: PatchId(0), b: PatchId(1), .. }));
+    assert_eq!(overlaps.count(), 1, "{:?}", verdict.findings);
+    assert!(verdict.findings.iter().any(|f| matches!(f, Finding::Outside { .. })));
+}
+
+#[test]
+fn sliders_in_a_straight_groove_move_together_though_each_is_enclosed() {
+    // A tube along x, open at both ends, with three blocks in a row: the key is the middle one.
+    let hole = grown([-5.0, 35.0], [10.0, 20.0], [10.0, 20.0]);
+    let tube = cuboid(ALL, ALL, ALL).subtract(&hole);
+    let block = |from: f64, to: f64| cuboid([from, to], [10.0, 20.0], [10.0, 20.0]);
+    let pieces = [tube, block(0.0, 9.9), block(20.0, 30.0), block(10.0, 19.9)];
+    let kit = Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::NEG_X, Vec3::X, Vec3::X]);
+    let verdict = kit.verdict();
+    let motions = verdict.findings.iter().find_map(|f| match f {
+        Finding::ClusterMoves { motions } => Some(motions.clone()),
+        _ => None,
+    });
+    let motions = motions.expect("both outer blocks can slide away from the key");
+    assert!(motions.iter().all(|m| m.velocity[0].abs() > 0.99 && m.velocity[1].abs() < 1e-3), "{motions:?}");
+}
+
+#[test]
+fn a_missing_lid_is_a_lost_surface_and_a_broken_plan() {
+    let mut kit = pinned_kit(|_| {});
+    kit.pieces = kit.pieces.as_slice()[..2].iter().cloned().collect();
+    let verdict = kit.verdict();
+    assert!(verdict.findings.contains(&Finding::PlanBroken { piece: PatchId(2) }));
+    let mut kit = pinned_kit(|pieces| pieces[1] = cuboid([40.0, 41.0], ALL, ALL));
+    kit.plan.steps.clear();
+    let verdict = kit.verdict();
+    assert!(verdict.findings.iter().any(|f| matches!(f, Finding::SurfaceLost { fraction, .. } if *fraction > 0.3)));
+}
+
+#[test]
+fn any_input_gives_a_verdict() {
+    let mut kit = pinned_kit(|pieces| pieces[1] = Volume::empty());
+    assert!(kit.verdict().findings.contains(&Finding::NotClosed { piece: PatchId(1) }));
+    kit.pieces = IdVec::from_fn(3, |_| TriMesh { points: vec![], triangles: vec![[0, 1, 2]] });
+    assert_eq!(
+        kit.verdict().checks.iter().filter(|c| c.ok).map(|c| c.name.as_str()).next(),
+        Some("plan names every piece once")
+    );
+    assert!(!kit.verdict().passed());
+}
+
+#[test]
+fn the_verdict_is_the_same_on_one_thread_and_on_two_and_survives_json() {
+    let kit = pinned_kit(|pieces| pieces[1] = pieces[1].translate(Vec3::new(0.07, 0.13, 0.0)));
+    let on = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(|| kit.verdict());
+    let (one, two) = (on(1), on(2));
+    assert_eq!(one, two);
+    assert_eq!(serde_json::to_string(&one).unwrap(), serde_json::to_string(&two).unwrap());
+    assert_eq!(serde_json::from_str::<Verification>(&serde_json::to_string(&one).unwrap()).unwrap(), one);
+}
