@@ -31,6 +31,9 @@ use contact::Contact;
 use motion::{Freedom, Twist};
 pub use thin::{ThinShare, thin_share};
 
+/// Difference of two motions, whose fastest component is 1, that counts as none.
+const SAME_MOTION: f64 = 0.02;
+
 /// How the finished kit is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerifyParams {
@@ -142,10 +145,18 @@ pub enum Finding {
         /// Unit vectors along which nothing holds it.
         directions: Vec<[f64; 3]>,
     },
-    /// Pieces move together, by however little, while the key and the first piece are held.
+    /// Pieces move, alone or together, by however little, while the key (and the first piece, where the check says so)
+    /// is held.
     ClusterMoves {
         /// Who moves and how.
         motions: Vec<Motion>,
+    },
+    /// With the key alone held, all other pieces leave it as one rigid body: the key's own way out, seen from the key.
+    ///
+    /// Every key that can be taken out along exactly parallel walls has such a motion, so no other plan mends it.
+    KeyLeaves {
+        /// How the key moves against the rest.
+        motion: Motion,
     },
     /// Parts of the model's surface are on no piece.
     SurfaceLost {
@@ -206,12 +217,14 @@ pub fn verify(
     verdict.add(probe::check(ctx, &bodies, plan.key(), params.clearance_mm)?);
 
     let contacts = contact::find(ctx, &bodies, params.clearance_mm, params.seed)?;
-    for (name, freedom) in [
-        ("no cluster slides, key in place (translations)", Freedom::Translations),
-        ("nothing moves, key in place (6 dof)", Freedom::Rigid),
+    let (key, first) = (plan.key(), plan.steps[0].piece);
+    for (name, held, freedom) in [
+        ("no cluster slides, key and first held (translations)", &[key, first][..], Freedom::Translations),
+        ("nothing moves, key and first held (6 dof)", &[key, first], Freedom::Rigid),
+        ("nothing moves, key alone held (6 dof)", &[key], Freedom::Rigid),
     ] {
         ctx.check()?;
-        verdict.add(check_motion(name, &bodies, &contacts, plan, 0.5 * length_mm, freedom));
+        verdict.add(check_motion(name, &bodies, &contacts, held, 0.5 * length_mm, freedom));
     }
     Ok(verdict)
 }
@@ -231,21 +244,35 @@ fn check_plan(pieces: &IdVec<PatchId, TriMesh>, plan: &InstallationPlan) -> (Che
     (Check::new("plan names every piece once", ok, format!("{} steps, {} pieces", named.len(), pieces.len())), wrong)
 }
 
-/// Whether anything moves while the key stays in its seat, that is, while it and the first piece are held.
+/// Whether anything moves while `held`, the key first, stay where they are.
 ///
-/// With the key alone held, all others together can always leave it backwards along its own direction.
+/// Holding the key and the first piece is the physical question: the key stays in its seat. With the key alone held
+/// all others can leave it backwards along its own direction, unless the unevenness of real walls prevents it; the
+/// acceptance test asks that too, so it is asked here, and answered by a finding of its own.
 fn check_motion(
     name: &str,
     bodies: &IdVec<PatchId, Body>,
     contacts: &[Contact],
-    plan: &InstallationPlan,
+    held: &[PatchId],
     scale_mm: f64,
     freedom: Freedom,
 ) -> (Check, Option<Finding>) {
-    let held = [plan.key(), plan.steps[0].piece];
-    let moving = motion::free_motion(contacts, bodies.len(), &held, scale_mm, freedom);
-    let motion = |t: &Twist| Motion { piece: t.piece, velocity: t.velocity.to_array(), spin: t.spin.to_array() };
+    let moving = motion::free_motion(contacts, bodies.len(), held, scale_mm, freedom);
     let figure = format!("{} pieces move; {} contacts", moving.len(), contacts.len());
-    let finding = (!moving.is_empty()).then(|| Finding::ClusterMoves { motions: moving.iter().map(motion).collect() });
+    let named = |t: &Twist| Motion { piece: t.piece, velocity: t.velocity.to_array(), spin: t.spin.to_array() };
+    let is_same = |s: &Twist, t: &Twist| s.velocity.distance(t.velocity) + s.spin.distance(t.spin) < SAME_MOTION;
+    let finding = match moving.first() {
+        None => None,
+        Some(t) if held.len() == 1 && moving.len() + 1 == bodies.len() && moving.iter().all(|s| is_same(s, t)) => {
+            let of_key = Twist { piece: held[0], velocity: -t.velocity, spin: -t.spin };
+            Some(Finding::KeyLeaves { motion: named(&of_key) })
+        }
+        Some(_) => Some(Finding::ClusterMoves { motions: moving.iter().map(named).collect() }),
+    };
     (Check::new(name, moving.is_empty(), figure), finding)
+}
+
+/// `x` to six decimals. The boolean library adds up volumes and areas in an order that depends on the number of threads.
+fn rounded(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
 }

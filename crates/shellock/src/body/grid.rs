@@ -160,6 +160,13 @@ impl LocalField {
         Self { nodes, values }
     }
 
+    /// Raises `field` to this one's values where those are greater.
+    pub(super) fn raise(&self, field: &mut [f32]) {
+        for (&n, &v) in self.nodes.iter().zip(&self.values) {
+            field[n as usize] = field[n as usize].max(v);
+        }
+    }
+
     /// The whole field again, `elsewhere` at all other nodes.
     pub fn spread(&self, band: &Band, elsewhere: f32) -> Vec<f32> {
         let mut field = vec![elsewhere; band.len()];

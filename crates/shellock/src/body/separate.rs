@@ -10,14 +10,12 @@ use shellock_geom::{Aabb, Solid, TriMesh, Volume};
 use super::BodyParams;
 use super::grid::{GridError, LocalField, PatchDistances, ShellGrid};
 use crate::plan::InstallationPlan;
-use crate::{Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
+use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
 
 /// Outer skin of a piece that other pieces' paths must not take from it, in cells. [geometry notes: 1.5]
 const SKIN_CELLS: f64 = 1.5;
 /// What remains is grown by this many cells before it is swept, so that interpolation leaves no rub.
 const MARGIN_CELLS: f64 = 0.15;
-/// Simplification of the cutting surfaces, mm.
-const CUT_TOLERANCE_MM: f64 = 0.008;
 /// The taper of the wall gap begins this far outside the surface, mm: the two sides of a cut then keep a few µm apart even
 /// at the rim, and no boolean meets coincident faces.
 const RIM_LEAD_MM: f64 = 0.05;
@@ -45,47 +43,90 @@ pub fn build(
     plan: &InstallationPlan,
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<ShellBodies, BodyError> {
-    ctx.stage("bodies", plan.steps.len())?;
     let outer = Volume::from_solid(model).map_err(|e| GridError::Surface(e.to_string()))?;
     let cavity = grid.deeper_than(grid.thickness_mm);
     if cavity.is_empty() {
         return Err(GridError::NoCavity { thickness_mm: grid.thickness_mm }.into());
     }
-    let mut work = Separation::new(params, grid, distances, plan.steps.len());
+    ctx.stage("cuts", plan.steps.len())?;
+    let mut fields = Separation::new(params, grid, distances, plan.steps.len());
     let mut inner = InnerSurface::new(grid);
-    let mut rest = outer.subtract(&cavity);
-    let mut bodies: Vec<Option<Volume>> = vec![None; plan.steps.len()];
+    let mut cuts: Vec<Cut> = Vec::new();
     let mut barred: Vec<Option<LocalField>> = vec![None; plan.steps.len()];
     for step in plan.removal() {
         let p = step.piece;
-        let is_last = work.n_left() == 1;
-        if is_last {
-            bodies[usize::from(p)] = Some(whole_body(ctx, p, &rest));
-            barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &work.in_later_ways, rooms[p]));
+        let in_way = if fields.n_left() == 1 {
             inner.give_rest(p);
+            cuts.push(Cut { piece: p, field: None });
+            fields.in_later_ways.clone()
         } else {
-            let cut = work.cut(p, step.separation);
-            let (keep, leave) = rayon::join(|| work.tool(&cut, 1.0), || work.tool(&cut, -1.0));
-            // Booleans, the inner surface and the fields do not wait for each other.
-            let (parts, in_way) = rayon::join(
-                || rest.split(&leave),
-                || {
-                    inner.give(p, &cut, &grid.band);
-                    work.remove(p, step.separation, &cut)
-                },
-            );
-            bodies[usize::from(p)] = Some(whole_body(ctx, p, &parts.0.intersect(&keep)));
-            rest = parts.1;
-            barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
-        }
+            let g = fields.cut(p, step.separation);
+            let local = || LocalField::cut_out(&grid.band, &g, rooms[p]);
+            let ((), local) = rayon::join(|| inner.give(p, &g, &grid.band), local);
+            cuts.push(Cut { piece: p, field: Some(local) });
+            fields.remove(p, step.separation, &g)
+        };
+        barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
         ctx.step()?;
     }
-    let every = "every piece of a plan is removed once";
+    ctx.stage("bodies", plan.steps.len())?;
+    let wall = outer.subtract(&cavity);
+    let mut parts = split(&Splitter { ctx, params, grid }, wall, &cuts)?;
+    parts.sort_by_key(|(p, _)| *p);
     Ok(ShellBodies {
-        bodies: bodies.into_iter().map(|b| b.expect(every)).collect(),
+        bodies: parts.into_iter().map(|(p, part)| whole_body(ctx, p, &part)).collect(),
         inner: inner.finish(plan.steps.len()),
-        barred: barred.into_iter().map(|b| b.expect(every)).collect(),
+        barred: barred.into_iter().map(|b| b.expect("every piece of a plan is removed once")).collect(),
     })
+}
+
+/// A piece and the field of its cut, positive on its side; the first-installed piece has none.
+struct Cut {
+    piece: PatchId,
+    field: Option<LocalField>,
+}
+
+struct Splitter<'a> {
+    ctx: &'a Ctx<'a>,
+    params: &'a BodyParams,
+    grid: &'a ShellGrid,
+}
+
+/// Divides `wall` among the pieces of `cuts`, which stand in the order of taking apart: first into the earlier and the later
+/// half of them, then each half on its own. Every triangle so takes part in log n booleans, not in n.
+fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId, Volume)>, Cancelled> {
+    if let [only] = cuts {
+        with.ctx.step()?;
+        return Ok(vec![(only.piece, wall)]);
+    }
+    with.ctx.check()?;
+    let (leaving, staying) = cuts.split_at(cuts.len() / 2);
+    let (keep, leave) = rayon::join(|| with.tool(leaving, 1.0), || with.tool(leaving, -1.0));
+    let (theirs, rest) = wall.split(&leave);
+    drop((wall, leave));
+    let (a, b) = rayon::join(|| split(with, theirs.intersect(&keep), leaving), || split(with, rest, staying));
+    let mut parts = a?;
+    parts.extend(b?);
+    Ok(parts)
+}
+
+impl Splitter<'_> {
+    /// A solid to cut with: what lies on the side of any of `leaving`, less (`side` = 1) or more (−1) the gap inside the wall.
+    fn tool(&self, leaving: &[Cut], side: f32) -> Volume {
+        let cell = self.grid.band.cell_mm() as f32;
+        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
+        let mut field = vec![-self.grid.cutoff_mm(); self.grid.band.len()];
+        for cut in leaving {
+            cut.field.as_ref().expect("only the last piece has no cut").raise(&mut field);
+        }
+        field.par_iter_mut().zip(&self.grid.depth).for_each(|(g, &depth)| {
+            let taper = ((depth + RIM_LEAD_MM as f32) / rim).clamp(-1.0, 1.0);
+            // Nothing is cut below the wall.
+            *g = (*g - side * gap * taper).min(self.grid.thickness_mm as f32 + 1.8 * cell - depth);
+        });
+        let mesh: TriMesh = contour(&self.grid.band, &field, OffBand::Outside);
+        Volume::from_closed_mesh(&mesh).expect("contours are manifold")
+    }
 }
 
 /// Why the wall cannot be split.
@@ -187,24 +228,6 @@ impl<'a> Separation<'a> {
                 }
             }
         }
-    }
-
-    /// A solid to cut with: what lies on p's side of the cut, less (`side` = 1) or more (−1) the gap inside the wall.
-    fn tool(&self, g: &[f32], side: f32) -> Volume {
-        let cell = self.grid.band.cell_mm() as f32;
-        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
-        let field: Vec<f32> = (0..g.len())
-            .into_par_iter()
-            .map(|n| {
-                let depth = self.grid.depth[n];
-                let taper = ((depth + RIM_LEAD_MM as f32) / rim).clamp(-1.0, 1.0);
-                // Nothing is cut below the wall or where earlier removals took everything.
-                let limits = (self.grid.thickness_mm as f32 + 1.8 * cell - depth).min(self.rest[n] + 2.5 * cell);
-                (g[n] - side * gap * taper).min(limits)
-            })
-            .collect();
-        let mesh: TriMesh = contour(&self.grid.band, &field, OffBand::Outside);
-        Volume::from_closed_mesh(&mesh).expect("contours are manifold").simplify(CUT_TOLERANCE_MM)
     }
 
     /// Takes p away; returns where p may have no connectors.

@@ -15,8 +15,6 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 const ROOT_MM: f64 = 0.4;
 /// A run of which less than this share of either half survives the carving is given up, both halves.
 const LEAST_KEPT: f64 = 0.25;
-/// Simplification of the carving surfaces, mm.
-const CARVE_TOLERANCE_MM: f64 = 0.01;
 
 /// How one run came out.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,7 +120,7 @@ fn space(params: &ConnectorParams, grid: &ShellGrid, shell: &ShellBodies, q: Pat
         })
         .collect();
     let mesh = contour(&grid.band, &field, OffBand::Outside);
-    Volume::from_closed_mesh(&mesh).expect("contours are manifold").simplify(CARVE_TOLERANCE_MM)
+    Volume::from_closed_mesh(&mesh).expect("contours are manifold")
 }
 
 fn joint(run: &Run, halves: &Halves) -> Joint {

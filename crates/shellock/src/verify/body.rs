@@ -69,7 +69,7 @@ fn check_piece(piece: PatchId, mesh: &TriMesh) -> (Body, Vec<Finding>) {
     match &volume {
         None => findings.push(Finding::NotClosed { piece }),
         Some(volume) => {
-            let count = volume.components().iter().filter(|c| c.volume() > CRUMB_MM3).count();
+            let count = volume.components().iter().filter(|c| c.to_mesh().signed_volume() > CRUMB_MM3).count();
             if count != 1 {
                 findings.push(Finding::SeveralBodies { piece, count });
             }
@@ -160,10 +160,7 @@ mod tests {
         // Two cubes that touch along an edge: closed, but the edge has four faces.
         let touching = joined(&[cube, cuboid([2.0, 2.0, 0.0], [4.0, 4.0, 2.0]).to_mesh()]);
         let shared = found(&touching);
-        assert!(
-            matches!(shared[0], Finding::SharedEdges { count: 1, at, .. } if at == [2.0, 2.0, 1.0]),
-            "{shared:?}"
-        );
+        assert!(matches!(shared[0], Finding::SharedEdges { count: 1, at, .. } if at == [2.0, 2.0, 1.0]), "{shared:?}");
     }
 
     #[test]

@@ -218,8 +218,7 @@ mod tests {
             };
             let (p, q) = (projected(&holed), projected(&other));
             let grid = Grid::covering(Aabb::around(p.0.iter().copied()), 0.1);
-            let (p, q) =
-                (Columns::of(&grid, &p.0, &p.1, Vec3::ZERO), Columns::of(&grid, &q.0, &q.1, Vec3::ZERO));
+            let (p, q) = (Columns::of(&grid, &p.0, &p.1, Vec3::ZERO), Columns::of(&grid, &q.0, &q.1, Vec3::ZERO));
             let (volume, common) = (p.length_mm() * grid.cell_mm2(), p.common_length_mm(&q) * grid.cell_mm2());
             assert!((volume - holed.volume()).abs() < 0.5, "{volume}");
             assert!((common - holed.intersect(&other).volume()).abs() < 0.3, "{common}");

@@ -33,12 +33,7 @@ pub struct Contact {
 }
 
 /// All contacts, in order of `a`, then along its surface, then of `b`.
-pub fn find(
-    ctx: &Ctx,
-    bodies: &IdVec<PatchId, Body>,
-    clearance_mm: f64,
-    seed: u64,
-) -> Result<Vec<Contact>, Cancelled> {
+pub fn find(ctx: &Ctx, bodies: &IdVec<PatchId, Body>, clearance_mm: f64, seed: u64) -> Result<Vec<Contact>, Cancelled> {
     let reach_mm = clearance_mm + REACH_MM;
     let ids: Vec<PatchId> = bodies.ids().collect();
     let trees: Vec<(TriangleBvh, Aabb)> = ids

@@ -5,7 +5,7 @@ use shellock_geom::{Aabb, Solid, Vec3, Volume};
 
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
-use super::{Check, Finding};
+use super::{Check, Finding, rounded};
 use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 
 /// Common volume of two pieces that is still rounding, mm³; the acceptance test's limit.
@@ -35,8 +35,7 @@ pub fn check_pairs(ctx: &Ctx, bodies: &IdVec<PatchId, Body>) -> Result<(Check, V
         .map(|&(a, b)| {
             ctx.check()?;
             let common = solid[a].1.intersect(solid[b].1);
-            // The mesh's own sum, because the library's depends on the number of threads.
-            Ok((common.to_mesh().signed_volume(), common.bounds().center()))
+            Ok((rounded(common.volume()), common.bounds().center()))
         })
         .collect::<Result<_, Cancelled>>()?;
     let (mut worst, mut findings) = (0.0f64, Vec::new());
@@ -74,7 +73,7 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
             (piece.length_mm() - piece.common_length_mm(&whole)) * grid.cell_mm2()
         })
         .collect();
-    let volume_mm3: f64 = outside.iter().sum();
+    let volume_mm3 = rounded(outside.iter().sum());
     let ok = volume_mm3 <= OUTSIDE_FRACTION * model.volume();
     let check = Check::new("nothing outside the model", ok, format!("{volume_mm3:.3} mm³"));
     (check, (!ok).then_some(Finding::Outside { volume_mm3 }))

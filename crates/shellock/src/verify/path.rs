@@ -20,7 +20,7 @@ use shellock_geom::{Aabb, Vec3, Volume};
 
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
-use super::{Check, Finding};
+use super::{Check, Finding, rounded};
 use crate::plan::InstallationStep;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -173,11 +173,7 @@ fn rub_at(
     partners: &[(PatchId, &Volume)],
 ) -> Option<Finding> {
     let moved = moving.translate(travel);
-    // Volumes and areas of the meshes, because the library's own sums depend on the number of threads.
-    let measured = |hit: Volume| {
-        let mesh = hit.to_mesh();
-        (mesh.signed_volume(), mesh.area(), hit.bounds().center())
-    };
+    let measured = |hit: Volume| (rounded(hit.volume()), rounded(hit.area()), hit.bounds().center());
     let hits: Vec<(PatchId, (f64, f64, Vec3))> =
         partners.iter().map(|&(id, v)| (id, measured(moved.intersect(v)))).collect();
     let exceeds = |volume: f64, area: f64| volume > RUB_MM3 && 2.0 * volume / area > RUB_MM;
@@ -186,7 +182,7 @@ fn rub_at(
         return None;
     }
     let &(against, (volume_mm3, area, at)) = hits.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    let thickness_mm = 2.0 * volume_mm3 / area;
+    let thickness_mm = rounded(2.0 * volume_mm3 / area);
     Some(Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, at: at.to_array() })
 }
 
@@ -215,8 +211,7 @@ mod tests {
         for s in [Vec3::X, Vec3::new(1.0, -1.0, 0.0).normalize(), Vec3::new(1.0, 1.0, 1.0).normalize()] {
             let (p, q) = (random_boxes(&mut rng, Vec3::ZERO), random_boxes(&mut rng, s * 4.0));
             let frame = Frame::along(s);
-            let project =
-                |m: &Volume| -> Vec<Vec3> { m.to_mesh().points.iter().map(|&x| frame.project(x)).collect() };
+            let project = |m: &Volume| -> Vec<Vec3> { m.to_mesh().points.iter().map(|&x| frame.project(x)).collect() };
             let points = project(&p);
             let grid = Grid::covering(Aabb::around(points.iter().copied()), 0.1);
             let own = Columns::of(&grid, &points, &p.to_mesh().triangles, Vec3::ZERO);

@@ -8,7 +8,7 @@ use shellock_geom::{Aabb, Vec3, Volume};
 
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
-use super::{Check, Finding};
+use super::{Check, Finding, rounded};
 use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId};
 
 /// Overlap that holds a piece, mm³. The acceptance test asks for 0.5.
@@ -99,7 +99,7 @@ fn free_directions(
 fn is_held_exactly(moved: &Volume, others: &[(PatchId, &Volume)]) -> bool {
     let mut sum = 0.0;
     others.iter().any(|(_, other)| {
-        sum += moved.intersect(other).to_mesh().signed_volume();
+        sum += rounded(moved.intersect(other).volume());
         sum >= HOLD_MM3
     })
 }
