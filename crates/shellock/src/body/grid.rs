@@ -16,7 +16,7 @@ const CUTOFF_CELLS: f64 = 6.0;
 /// Width of the band outside the surface, in cells: the cuts must reach past the surface.
 const OUTSIDE_CELLS: f64 = 2.5;
 /// Simplification of the inner surface, mm. The eye and the printer see neither; booleans run on far fewer triangles.
-const INNER_TOLERANCE_MM: f64 = 0.04;
+const INNER_TOLERANCE_MM: f64 = 0.05;
 
 /// Nodes near the model's surface and their depth below it. Depends on the model alone.
 pub struct ShellGrid {

@@ -49,7 +49,7 @@ pub fn build(
         return Err(GridError::NoCavity { thickness_mm: grid.thickness_mm }.into());
     }
     ctx.stage("cuts", plan.steps.len())?;
-    let mut fields = Separation::new(params, grid, distances, plan.steps.len());
+    let mut fields = Separation::new(grid, distances, plan.steps.len());
     let mut inner = InnerSurface::new(grid);
     let mut cuts: Vec<Cut> = Vec::new();
     let mut barred: Vec<Option<LocalField>> = vec![None; plan.steps.len()];
@@ -121,8 +121,9 @@ impl Splitter<'_> {
         }
         field.par_iter_mut().zip(&self.grid.depth).for_each(|(g, &depth)| {
             let taper = ((depth + RIM_LEAD_MM as f32) / rim).clamp(-1.0, 1.0);
-            // Nothing is cut below the wall.
-            *g = (*g - side * gap * taper).min(self.grid.thickness_mm as f32 + 1.8 * cell - depth);
+            // Nothing is cut below the wall or far outside; smooth limits give fewer triangles than the band's border.
+            let limits = (self.grid.thickness_mm as f32 + 1.8 * cell - depth).min(depth + 1.8 * cell);
+            *g = (*g - side * gap * taper).min(limits);
         });
         let mesh: TriMesh = contour(&self.grid.band, &field, OffBand::Outside);
         Volume::from_closed_mesh(&mesh).expect("contours are manifold")
@@ -158,7 +159,6 @@ fn whole_body(ctx: &Ctx, p: PatchId, body: &Volume) -> Volume {
 
 /// The state between two removals.
 struct Separation<'a> {
-    params: &'a BodyParams,
     grid: &'a ShellGrid,
     distances: &'a PatchDistances,
     sweeper: Sweeper<'a>,
@@ -170,10 +170,9 @@ struct Separation<'a> {
 }
 
 impl<'a> Separation<'a> {
-    fn new(params: &'a BodyParams, grid: &'a ShellGrid, distances: &'a PatchDistances, n_pieces: usize) -> Self {
+    fn new(grid: &'a ShellGrid, distances: &'a PatchDistances, n_pieces: usize) -> Self {
         let cutoff = grid.cutoff_mm();
         Self {
-            params,
             grid,
             distances,
             sweeper: Sweeper::new(&grid.band),
