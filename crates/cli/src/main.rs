@@ -1,3 +1,71 @@
-//! The command line of Shellock.
+//! The command line of Shellock: arguments → parameters → library → files.
 
-fn main() {}
+mod args;
+mod build;
+mod failure;
+mod input;
+mod output;
+mod progress;
+mod stages;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Parser;
+use clap::error::ErrorKind;
+use serde_json::json;
+
+use args::{Cli, Command};
+use failure::Failure;
+
+/// What every command gets.
+pub struct Session {
+    /// Whether to print one JSON object instead of text.
+    pub is_json: bool,
+    /// Becomes true with Ctrl-C.
+    pub stop: Arc<AtomicBool>,
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            let is_help = matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
+            let _ = e.print();
+            return ExitCode::from(if is_help { 0 } else { 2 });
+        }
+    };
+    let session = Session { is_json: cli.json, stop: Arc::new(AtomicBool::new(false)) };
+    let stop = Arc::clone(&session.stop);
+    // Without a handler Ctrl-C would still end the program, only less tidily.
+    let _ = ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed));
+    if let Some(n) = cli.threads {
+        if let Err(e) = rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build_global() {
+            eprintln!("warning: --threads {n} was not taken: {e}");
+        }
+    }
+    match run(&session, cli.command) {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => {
+            let code = failure.exit_code();
+            if session.is_json {
+                println!("{}", json!({ "status": "error", "error": failure.to_string(), "exit_code": code }));
+            }
+            eprintln!("error: {failure}");
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn run(session: &Session, command: Command) -> Result<u8, Failure> {
+    match command {
+        Command::Build { model, options, out } => build::build(session, &model, &options, out),
+        Command::Demo { figure, options, out } => build::demo(session, &figure, &options, out),
+        Command::Segment { model, options, out } => stages::segment(session, &model, &options, &out),
+        Command::Plan { model, options } => stages::plan(session, &model, &options),
+        Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
+        Command::Inspect { model } => stages::inspect(session, &model),
+        Command::Figure { name, out, size } => stages::figure(&name, &out, size),
+    }
+}

@@ -1,0 +1,179 @@
+//! What can be said on the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use shellock::pipeline::Params;
+
+/// Exit codes, shown in the help.
+const EXIT_CODES: &str = "Exit codes: 0 made and verified · 1 made, but a check failed · 2 the input or an argument is wrong · \
+3 no plan could be found · 4 a file could not be written · 130 stopped with Ctrl-C (nothing is left behind)";
+
+/// Turns a closed 3D model into hollow pieces that lock each other without glue.
+#[derive(Parser)]
+#[command(name = "shellock", version, about, after_help = EXIT_CODES)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+    /// Print one JSON object on standard output instead of text
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Threads to use; the result does not depend on it [default: all]
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Make the whole kit of a model: pieces, plan, 3MF, viewer page
+    Build {
+        /// STL, OBJ, PLY or OFF file of one closed surface
+        model: PathBuf,
+        #[command(flatten)]
+        options: Options,
+        #[command(flatten)]
+        out: Out,
+    },
+    /// Make the kit of a figure that comes with the program
+    Demo {
+        /// Which figure: squirrel, cat, teddy, octopus, dinosaur, vase or torus
+        #[arg(long, default_value = "squirrel", value_name = "NAME")]
+        figure: String,
+        #[command(flatten)]
+        options: Options,
+        #[command(flatten)]
+        out: Out,
+    },
+    /// Only divide the surface; write it with one label a triangle (.ply), or the labels of the model's faces (.seg)
+    Segment {
+        /// STL, OBJ, PLY or OFF file of one closed surface
+        model: PathBuf,
+        #[command(flatten)]
+        options: Options,
+        /// Where to write: a .ply or .seg file
+        #[arg(short, long, value_name = "FILE")]
+        out: PathBuf,
+    },
+    /// Only divide and plan: print the order and the directions
+    Plan {
+        /// STL, OBJ, PLY or OFF file of one closed surface, such as a .ply that `segment` wrote
+        model: PathBuf,
+        #[command(flatten)]
+        options: Options,
+    },
+    /// Check a finished kit again from its files
+    Verify {
+        /// Folder of the kit
+        kit: PathBuf,
+        /// The model it was made from [default: the file named in its plan.json]
+        model: Option<PathBuf>,
+    },
+    /// Say what a file holds and whether it can be made
+    Inspect {
+        /// STL, OBJ, PLY or OFF file
+        model: PathBuf,
+    },
+    /// Write one of the figures that come with the program
+    Figure {
+        /// Which: squirrel, cat, teddy, octopus, dinosaur, vase or torus
+        name: String,
+        /// Where to write: a .stl or .ply file
+        #[arg(short, long, value_name = "FILE")]
+        out: PathBuf,
+        /// Longest side, mm
+        #[arg(long, default_value_t = 150.0, value_name = "MM")]
+        size: f64,
+    },
+}
+
+/// Where a kit goes.
+#[derive(Args)]
+pub struct Out {
+    /// Folder to write [default: the model's name with "-kit", or "shellock-demo"]
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace the folder if it holds an earlier kit
+    #[arg(short, long)]
+    pub force: bool,
+}
+
+/// An axis of the file.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    /// Its index and unit vector.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+#[derive(Args)]
+pub struct Options {
+    /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
+    #[arg(long, value_name = "MM", help_heading = "Size", conflicts_with_all = ["height", "scale"])]
+    pub size: Option<f64>,
+    /// Height of the made thing along --up, mm
+    #[arg(long, value_name = "MM", help_heading = "Size", conflicts_with = "scale")]
+    pub height: Option<f64>,
+    /// Millimetres a file unit
+    #[arg(long, value_name = "F", help_heading = "Size")]
+    pub scale: Option<f64>,
+    /// Which axis of the file points up
+    #[arg(long, value_enum, default_value = "z", help_heading = "Size")]
+    pub up: Axis,
+    /// One label a face: a .seg file (one integer a line) or a .ply with a face property; a label is a piece
+    #[arg(long, value_name = "FILE", help_heading = "Pieces")]
+    pub labels: Option<PathBuf>,
+    /// About how many pieces to make where there are no labels [default: from the size, 10 for a 150 mm figure]
+    #[arg(long, value_name = "N", help_heading = "Pieces")]
+    pub pieces: Option<usize>,
+    /// The piece that goes in last and can be taken out again [default: the flattest that works]
+    #[arg(long, value_name = "PIECE", help_heading = "Pieces")]
+    pub key: Option<u32>,
+    /// Wall thickness, mm, 0.8 to 10
+    #[arg(long, value_name = "MM", default_value_t = Params::default().body.thickness_mm, help_heading = "Make")]
+    pub thickness: f64,
+    /// Connector size, mm, 1.5 to 6
+    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.size_mm, help_heading = "Make")]
+    pub connector: f64,
+    /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament
+    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]
+    pub clearance: f64,
+    /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
+    #[arg(long, value_name = "MM", default_value_t = Params::default().body.wall_gap_mm, help_heading = "Make")]
+    pub wall_gap: f64,
+    /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported
+    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.min_wall_mm, help_heading = "Make")]
+    pub min_wall: f64,
+    /// Spacing of the grid behind the walls, mm [default: thickness / 2.5]
+    #[arg(long, value_name = "MM", help_heading = "Make")]
+    pub grid: Option<f64>,
+    /// Seed of all random choices: the same seed gives the same kit
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Make")]
+    pub seed: u64,
+}
+
+impl Options {
+    /// The library's parameters.
+    pub fn params(&self) -> Params {
+        let mut p = Params::default();
+        p.segmentation.n_pieces = self.pieces;
+        p.segmentation.seed = self.seed;
+        p.plan.seed = self.seed;
+        p.plan.key = self.key.map(shellock::PatchId);
+        p.plan.up = std::array::from_fn(|axis| f64::from(u8::from(axis == self.up.index())));
+        p.body.thickness_mm = self.thickness;
+        p.body.wall_gap_mm = self.wall_gap;
+        p.body.cell_mm = self.grid;
+        p.connector.size_mm = self.connector;
+        p.connector.clearance_mm = self.clearance;
+        p.connector.min_wall_mm = self.min_wall;
+        p.verify.seed = self.seed;
+        p
+    }
+}

@@ -1,0 +1,131 @@
+//! `build` and `demo`: the whole job.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+use serde_json::json;
+use shellock::pipeline::{Design, DesignOutcome, Params, design};
+use shellock::verify::Verification;
+use shellock::{Ctx, Warning};
+
+use crate::Session;
+use crate::args::{Options, Out};
+use crate::failure::Failure;
+use crate::input::{self, Model};
+use crate::output::{Destination, Summary, files};
+use crate::progress::Display;
+
+/// `shellock build`.
+pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
+    let params = checked(options)?;
+    let stem = file.file_stem().map_or_else(|| "model".into(), |s| s.to_string_lossy().into_owned());
+    let to = Destination::new(out.out.unwrap_or_else(|| PathBuf::from(format!("{stem}-kit"))), out.force)?;
+    let model = input::model(file, options)?;
+    make(session, &model, options, &params, &to)
+}
+
+/// `shellock demo`.
+pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Result<u8, Failure> {
+    let params = checked(options)?;
+    let to = Destination::new(out.out.unwrap_or_else(|| PathBuf::from("shellock-demo")), out.force)?;
+    let model = input::figure(figure, options)?;
+    make(session, &model, options, &params, &to)
+}
+
+/// The parameters, or all that is wrong with them.
+pub fn checked(options: &Options) -> Result<Params, Failure> {
+    let params = options.params();
+    let problems = params.problems();
+    if problems.is_empty() { Ok(params) } else { Err(Failure::Wrong(problems.join("\nerror: "))) }
+}
+
+fn make(session: &Session, model: &Model, options: &Options, params: &Params, to: &Destination) -> Result<u8, Failure> {
+    if !session.is_json {
+        let s = model.solid.mesh().bounds().size();
+        println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
+        model.notes.iter().for_each(|n| println!("note: {n}"));
+    }
+    let display = Display::new(session.is_json);
+    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let ctx = Ctx::new(&report, &session.stop);
+    let outcome = design(&ctx, params, &model.solid, model.labels.as_deref());
+    display.finish();
+    let made = match outcome? {
+        DesignOutcome::Made(made) => made,
+        DesignOutcome::NoPlan { reason, blockers } => return Err(no_plan(&reason, &blockers)),
+    };
+    let warnings = ctx.take_warnings();
+    let (files, summary) = files(model, options, params, &made, &warnings);
+    if session.stop.load(Ordering::Relaxed) {
+        return Err(Failure::Stopped);
+    }
+    to.write(&files)?;
+    let code = u8::from(!made.verification.passed());
+    if session.is_json {
+        print_json(to, model, &made, &summary, &warnings, code);
+    } else {
+        print_text(to, &made, params, &summary, &warnings);
+    }
+    Ok(code)
+}
+
+fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> Failure {
+    let mut text = format!("no plan was found: {reason}");
+    for b in blockers {
+        let [x, y, z] = b.at;
+        let share = 100.0 * b.occluded;
+        text += &format!(
+            "\n  piece {} is in the way of piece {} at ({x:.1}, {y:.1}, {z:.1}) mm: it hides {share:.0} % of it",
+            b.by, b.piece
+        );
+    }
+    Failure::NoPlan(text)
+}
+
+fn print_json(to: &Destination, model: &Model, made: &Design, summary: &Summary, warnings: &[Warning], code: u8) {
+    let value = json!({
+        "status": if code == 0 { "verified" } else { "failed" },
+        "out": to.folder(), "notes": model.notes,
+        "pieces": made.pieces.len(), "key_piece": made.plan.key(),
+        "volume_ratio": summary.volume_ratio, "connector_share": summary.connector_share,
+        "thin_share": summary.thin_share,
+        "checks": made.verification.checks, "findings": made.verification.findings,
+        "warnings": warnings, "exit_code": code,
+    });
+    println!("{value}");
+}
+
+fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summary, warnings: &[Warning]) {
+    println!(
+        "{} pieces, the last is piece {}; walls {} mm; material {:.0} % of the solid model",
+        made.pieces.len(),
+        made.plan.key(),
+        params.body.thickness_mm,
+        100.0 * summary.volume_ratio
+    );
+    println!("connectors on {:.0} % of the seam length that fits any", 100.0 * summary.connector_share);
+    print_verdict(&made.verification);
+    for w in warnings {
+        let place = w.at.map_or_else(String::new, |[x, y, z]| format!(" at ({x:.1}, {y:.1}, {z:.1}) mm"));
+        println!("warning: {}{place}", w.message);
+    }
+    if summary.thin_share > 0.002 {
+        let percent = 100.0 * summary.thin_share;
+        println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", params.connector.min_wall_mm);
+    }
+    println!("written to {}: open report.html in a browser, print pieces/*.stl", to.folder().display());
+}
+
+/// Each check on a line, and loudly what failed and where.
+pub fn print_verdict(verdict: &Verification) {
+    for c in &verdict.checks {
+        println!("{}  {:52} {}", if c.ok { "ok  " } else { "FAIL" }, c.name, c.figure);
+    }
+    if !verdict.passed() {
+        eprintln!("FAILED: this kit does not hold together as it should; do not print it. What failed, and where:");
+        for finding in &verdict.findings {
+            let text = serde_json::to_string(finding).unwrap_or_else(|_| format!("{finding:?}"));
+            eprintln!("  {text}");
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! How a command can end badly, and the exit code of each way.
+
+use std::path::{Path, PathBuf};
+
+use shellock::pipeline::DesignError;
+use shellock_geom::check::InputError;
+use shellock_geom::io::ReadError;
+
+/// Why a command failed; each message says what to do where something can be done.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    #[error("{}: {source}", path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("{}: {source}", path.display())]
+    NotAMesh { path: PathBuf, source: ReadError },
+    #[error("{}: {source}", path.display())]
+    NotOneBody { path: PathBuf, source: InputError },
+    #[error("{0}")]
+    Wrong(String),
+    #[error("{0}")]
+    NoPlan(String),
+    #[error("{}: {source}; nothing was written", path.display())]
+    Unwritable { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    #[error("stopped; nothing was written")]
+    Stopped,
+}
+
+impl From<shellock::Cancelled> for Failure {
+    fn from(_: shellock::Cancelled) -> Self {
+        Self::Stopped
+    }
+}
+
+impl Failure {
+    /// The process exit code.
+    pub fn exit_code(&self) -> u8 {
+        use shellock::body::BodyError;
+        use shellock::piece::PieceError;
+        use shellock::segmentation::SegmentationError;
+        match self {
+            Self::Stopped
+            | Self::Design(
+                DesignError::Cancelled(_)
+                | DesignError::Body(BodyError::Cancelled(_))
+                | DesignError::Piece(PieceError::Cancelled(_))
+                | DesignError::Segmentation(SegmentationError::Cancelled(_)),
+            ) => 130,
+            Self::NoPlan(_) => 3,
+            Self::Unwritable { .. } | Self::Design(DesignError::Piece(_)) => 4,
+            _ => 2,
+        }
+    }
+
+    /// A file that could not be written.
+    pub fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
+        move |source| Self::Unwritable { path: path.to_owned(), source }
+    }
+}

@@ -1,0 +1,253 @@
+//! A finished kit as files.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use shellock::pipeline::{Design, Params};
+use shellock::report::{ReportCheck, ReportData, ReportPiece, html, palette, pieces_picture};
+use shellock::verify::thin_share;
+use shellock::{PatchId, Warning};
+use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
+use shellock_geom::{TriMesh, Vec3};
+
+use crate::args::{Axis, Options};
+use crate::failure::Failure;
+use crate::input::Model;
+
+/// Figures of a kit that people and machines ask for.
+pub struct Summary {
+    /// Material of all pieces over the solid model's.
+    pub volume_ratio: f64,
+    /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].
+    pub connector_share: f64,
+    /// Greatest share of a piece's volume that is thinner than the thinnest wall.
+    pub thin_share: f64,
+}
+
+/// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
+pub struct Destination {
+    folder: PathBuf,
+    may_replace: bool,
+}
+
+impl Destination {
+    /// Refuses a folder with content, unless it holds an earlier kit and `force` is set.
+    pub fn new(folder: PathBuf, force: bool) -> Result<Self, Failure> {
+        let has_content = fs::read_dir(&folder).is_ok_and(|mut d| d.next().is_some());
+        let is_kit = folder.join("plan.json").is_file();
+        let refuse = |why: &str| Err(Failure::Wrong(format!("{} {why}", folder.display())));
+        if folder.exists() && !folder.is_dir() {
+            return refuse("is a file; choose a folder with -o");
+        }
+        if has_content && !is_kit {
+            return refuse("holds files that are no kit; choose another folder with -o");
+        }
+        if has_content && !force {
+            return refuse("holds a kit already; choose another folder with -o, or --force to replace it");
+        }
+        Ok(Self { folder, may_replace: force })
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Writes all files; the folder appears whole or not at all.
+    pub fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+        let parent = match self.folder.parent() {
+            Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        fs::create_dir_all(&parent).map_err(Failure::unwritable(&parent))?;
+        let temporary =
+            tempfile::Builder::new().prefix(".shellock-").tempdir_in(&parent).map_err(Failure::unwritable(&parent))?;
+        let made = temporary.path().join("kit");
+        for (name, bytes) in files {
+            let path = made.join(name);
+            if let Some(folder) = path.parent() {
+                fs::create_dir_all(folder).map_err(Failure::unwritable(folder))?;
+            }
+            fs::write(&path, bytes).map_err(Failure::unwritable(&path))?;
+        }
+        if self.folder.exists() {
+            // The earlier kit steps aside until the new one stands.
+            let aside = temporary.path().join("earlier");
+            let is_kit = self.folder.join("plan.json").is_file();
+            if self.may_replace && is_kit {
+                fs::rename(&self.folder, &aside).map_err(Failure::unwritable(&self.folder))?;
+            } else {
+                fs::remove_dir(&self.folder).map_err(Failure::unwritable(&self.folder))?;
+            }
+        }
+        fs::rename(&made, &self.folder).map_err(Failure::unwritable(&self.folder))
+    }
+}
+
+/// All files of a kit, and its figures.
+pub fn files(
+    model: &Model,
+    options: &Options,
+    params: &Params,
+    design: &Design,
+    warnings: &[Warning],
+) -> (Vec<(String, Vec<u8>)>, Summary) {
+    let thin: Vec<f64> =
+        design.pieces.as_slice().iter().map(|m| thin_share(m, params.connector.min_wall_mm).share).collect();
+    let volume: f64 = design.pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
+    let usable: f64 = design.contacts.iter().map(|c| c.usable_mm).sum();
+    let made: f64 = design.joints.iter().map(|j| j.length_mm).sum();
+    let summary = Summary {
+        volume_ratio: volume / model.solid.volume(),
+        connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
+        thin_share: thin.iter().copied().fold(0.0, f64::max),
+    };
+    let plan = plan_json(model, params, design, warnings, &summary, &thin);
+    let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
+    text.push('\n');
+    let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
+    for (p, mesh) in design.pieces.iter() {
+        files.push((piece_file(p), write_stl_binary(mesh)));
+    }
+    let names: Vec<String> = design.pieces.ids().map(|p| format!("piece {p}")).collect();
+    let objects: Vec<NamedObject> = design
+        .pieces
+        .iter()
+        .zip(&names)
+        .map(|((p, mesh), name)| NamedObject { name, color: palette::color(design.plan.position(p)), mesh })
+        .collect();
+    files.push(("assembly.3mf".into(), write_3mf(&objects)));
+    let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
+    files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
+    let (page, picture) = report(model, options, params, design, warnings, &summary);
+    files.push(("report.html".into(), page));
+    files.push(("pieces.png".into(), picture));
+    (files, summary)
+}
+
+fn piece_file(p: PatchId) -> String {
+    format!("pieces/piece-{:02}.stl", p.0)
+}
+
+fn plan_json(
+    model: &Model,
+    params: &Params,
+    design: &Design,
+    warnings: &[Warning],
+    summary: &Summary,
+    thin: &[f64],
+) -> Value {
+    let plan = &design.plan;
+    let pieces: Vec<Value> = design
+        .pieces
+        .iter()
+        .map(|(p, mesh)| {
+            let neighbours: BTreeSet<PatchId> = design
+                .contacts
+                .iter()
+                .filter_map(|c| if c.later == p { Some(c.earlier) } else { (c.earlier == p).then_some(c.later) })
+                .collect();
+            json!({
+                "id": p, "file": piece_file(p), "neighbors": neighbours, "volume_mm3": mesh.signed_volume(),
+                "installation_direction": (-plan.separation(p).unit() + 0.0).to_array(),
+                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize],
+            })
+        })
+        .collect();
+    let joints: Vec<Value> = design
+        .joints
+        .iter()
+        .map(|j| {
+            json!({ "male": j.male, "female": j.female, "length_mm": j.length_mm, "volume_mm3": j.volume_mm3,
+                    "kept": j.kept, "at": j.at.to_array() })
+        })
+        .collect();
+    let contacts: Vec<Value> = design
+        .contacts
+        .iter()
+        .map(|c| {
+            json!({ "later": c.later, "earlier": c.earlier, "length_mm": c.length_mm, "usable_mm": c.usable_mm,
+                    "at": c.at.to_array() })
+        })
+        .collect();
+    json!({
+        "format": "shellock-plan", "version": 1, "units": "mm", "program": env!("CARGO_PKG_VERSION"),
+        "input": { "file": model.name, "sha256": model.sha256, "transform": model.transform },
+        "seed": params.plan.seed,
+        "shell_thickness": params.body.thickness_mm,
+        "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
+        "connector_size": params.connector.size_mm,
+        "wall_gap": params.body.wall_gap_mm,
+        "min_wall": params.connector.min_wall_mm,
+        "key_piece": plan.key(),
+        "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
+        "volume_ratio": summary.volume_ratio,
+        "connector_share": summary.connector_share,
+        "pieces": pieces, "joints": joints, "contacts": contacts,
+        "verification": { "passed": design.verification.passed(), "checks": design.verification.checks,
+                          "findings": design.verification.findings },
+        "warnings": warnings,
+    })
+}
+
+/// The page and the picture. Both show the model standing on its feet: `up` becomes z.
+fn report(
+    model: &Model,
+    options: &Options,
+    params: &Params,
+    design: &Design,
+    warnings: &[Warning],
+    summary: &Summary,
+) -> (Vec<u8>, Vec<u8>) {
+    let stand = |v: Vec3| match options.up {
+        Axis::X => Vec3::new(-v.z, v.y, v.x),
+        Axis::Y => Vec3::new(v.x, -v.z, v.y),
+        Axis::Z => v,
+    };
+    let standing: Vec<TriMesh> = design
+        .pieces
+        .as_slice()
+        .iter()
+        .map(|m| TriMesh { points: m.points.iter().map(|&p| stand(p)).collect(), triangles: m.triangles.clone() })
+        .collect();
+    let warnings: Vec<Warning> = warnings
+        .iter()
+        .map(|w| Warning { at: w.at.map(|at| stand(Vec3::from_array(at)).to_array()), ..w.clone() })
+        .collect();
+    let plan = &design.plan;
+    let pieces: Vec<ReportPiece> = design
+        .pieces
+        .ids()
+        .map(|p| ReportPiece {
+            id: p.0,
+            name: format!("piece {p}"),
+            color: palette::color(plan.position(p)),
+            mesh: &standing[p.0 as usize],
+            installation_direction: stand(-plan.separation(p).unit()).to_array(),
+            order: plan.position(p),
+            is_key: plan.key() == p,
+            facts: vec![("volume".into(), format!("{:.1} cm³", standing[p.0 as usize].signed_volume() / 1000.0))],
+        })
+        .collect();
+    let picture = pieces_picture(&pieces).png();
+    let size = model.solid.mesh().bounds().size();
+    let facts = vec![
+        ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
+        ("pieces".into(), design.pieces.len().to_string()),
+        ("wall".into(), format!("{} mm", params.body.thickness_mm)),
+        ("connectors".into(), format!("{} mm", params.connector.size_mm)),
+        ("clearance".into(), format!("{} mm", params.connector.clearance_mm)),
+        ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
+        ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
+    ];
+    let checks = design
+        .verification
+        .checks
+        .iter()
+        .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
+        .collect();
+    let data = ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings };
+    (html(&data).into_bytes(), picture)
+}

@@ -1,0 +1,69 @@
+//! Progress on standard error.
+
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use shellock::context::Progress;
+
+/// Shows stages as they come: a bar on a terminal, plain lines elsewhere, nothing when quiet.
+pub struct Display {
+    bar: Mutex<Option<ProgressBar>>,
+    is_terminal: bool,
+    is_quiet: bool,
+}
+
+impl Display {
+    /// A display; `is_quiet` shows nothing.
+    pub fn new(is_quiet: bool) -> Self {
+        Self { bar: Mutex::new(None), is_terminal: std::io::stderr().is_terminal(), is_quiet }
+    }
+
+    /// What the library reports.
+    pub fn show(&self, progress: Progress<'_>) {
+        if self.is_quiet {
+            return;
+        }
+        let mut bar = self.bar.lock().expect("no holder of this lock panics");
+        match progress {
+            Progress::Stage { name, n_steps } if self.is_terminal => {
+                if let Some(old) = bar.take() {
+                    old.finish_and_clear();
+                }
+                *bar = Some(stage_bar(name, n_steps));
+            }
+            Progress::Stage { name, .. } => eprintln!("{name} …"),
+            Progress::Step => {
+                if let Some(bar) = bar.as_ref() {
+                    bar.inc(1);
+                }
+            }
+            Progress::Note(text) => match bar.as_ref() {
+                Some(bar) => bar.println(text),
+                None => eprintln!("{text}"),
+            },
+        }
+    }
+
+    /// Takes the last bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = self.bar.lock().expect("no holder of this lock panics").take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn stage_bar(name: &str, n_steps: usize) -> ProgressBar {
+    let (bar, template) = if n_steps > 0 {
+        (ProgressBar::new(n_steps as u64), "{elapsed:>4} {msg} {wide_bar} {pos}/{len}")
+    } else {
+        (ProgressBar::new_spinner(), "{elapsed:>4} {msg} {spinner}")
+    };
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.set_message(name.to_owned());
+    bar.enable_steady_tick(Duration::from_millis(120));
+    bar
+}

@@ -1,0 +1,243 @@
+//! Each stage alone, from what an earlier one wrote.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use shellock::plan::{InstallationPlan, InstallationStep, PlanOutcome, score, search, survey};
+use shellock::verify::VerifyParams;
+use shellock::{Ctx, IdVec, LatticeDirection, PatchId, segmentation};
+use shellock_geom::check::{inspect as inspection, into_solid};
+use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
+use shellock_geom::weld::weld;
+use shellock_geom::{Solid, TriMesh, Vec3};
+
+use crate::Session;
+use crate::args::Options;
+use crate::build::{checked, print_verdict};
+use crate::failure::Failure;
+use crate::input::{self, load, read};
+use crate::progress::Display;
+
+/// Writes one file: whole or not at all.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let temporary = tempfile::Builder::new().prefix(".shellock-").tempfile_in(parent);
+    let temporary = temporary.map_err(Failure::unwritable(path))?;
+    fs::write(temporary.path(), bytes).map_err(Failure::unwritable(path))?;
+    temporary.persist(path).map(|_| ()).map_err(|e| Failure::Unwritable { path: path.to_owned(), source: e.error })
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_ascii_lowercase())
+}
+
+/// `shellock segment`.
+pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) -> Result<u8, Failure> {
+    let params = checked(options)?;
+    let kind = extension(out);
+    if kind != "ply" && kind != "seg" {
+        return Err(Failure::Wrong(format!("{}: choose a name that ends in .ply or .seg", out.display())));
+    }
+    let model = input::model(file, options)?;
+    let display = Display::new(session.is_json);
+    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let ctx = Ctx::new(&report, &session.stop);
+    let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
+        .map_err(shellock::pipeline::DesignError::from)?;
+    display.finish();
+    let bytes = if kind == "ply" {
+        let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
+        write_ply(&surface.mesh, Some(&labels))
+    } else {
+        write_labels(&labels_of_file(&model, &surface))
+    };
+    write(out, &bytes)?;
+    let warnings = ctx.take_warnings();
+    if session.is_json {
+        println!("{}", json!({ "status": "done", "out": out, "pieces": surface.n_patches, "warnings": warnings }));
+    } else {
+        warnings.iter().for_each(|w| println!("warning: {}", w.message));
+        println!("{} pieces, written to {}", surface.n_patches, out.display());
+    }
+    Ok(0)
+}
+
+/// For each face of the file, the patch that has most of its area; faces that were dropped get patch 0.
+fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) -> Vec<u32> {
+    let mut best = vec![(0.0f64, 0u32); model.n_file_faces];
+    let mut area = vec![0.0; surface.n_patches];
+    let mut from = 0;
+    let mut order: Vec<usize> = (0..surface.mesh.triangles.len()).collect();
+    order.sort_by_key(|&f| surface.source_face[f]);
+    while from < order.len() {
+        let source = surface.source_face[order[from]];
+        let to = from + order[from..].iter().take_while(|&&f| surface.source_face[f] == source).count();
+        area.iter_mut().for_each(|a| *a = 0.0);
+        for &f in &order[from..to] {
+            area[surface.patch_of_face[f].0 as usize] += surface.mesh.face_area(f);
+        }
+        let (patch, &share) =
+            area.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).expect("there is at least one patch");
+        let entry = &mut best[model.file_face[source as usize] as usize];
+        if share > entry.0 {
+            *entry = (share, patch as u32);
+        }
+        from = to;
+    }
+    best.into_iter().map(|b| b.1).collect()
+}
+
+/// `shellock plan`.
+pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
+    let params = checked(options)?;
+    let model = input::model(file, options)?;
+    let display = Display::new(session.is_json);
+    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let ctx = Ctx::new(&report, &session.stop);
+    let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
+        .map_err(shellock::pipeline::DesignError::from)?;
+    let tables = survey(&ctx, &params.plan, &surface, &surface.seams())?;
+    let constraints = shellock::plan::PlanConstraints::default();
+    let outcome = search(&ctx, &params.plan, &tables, &constraints)?;
+    display.finish();
+    match outcome {
+        PlanOutcome::Infeasible { reason, .. } => Err(Failure::NoPlan(format!("no plan was found: {reason}"))),
+        PlanOutcome::Found(found) => {
+            let score = score(&tables, &constraints, &found);
+            if session.is_json {
+                let order: Vec<PatchId> = found.steps.iter().map(|s| s.piece).collect();
+                let steps: Vec<Value> = found
+                    .steps
+                    .iter()
+                    .map(|s| json!({ "piece": s.piece, "separation": s.separation.step() }))
+                    .collect();
+                println!(
+                    "{}",
+                    json!({ "status": "found", "installation_order": order, "steps": steps, "score": score.value })
+                );
+            } else {
+                for (i, s) in found.steps.iter().enumerate() {
+                    let d = -s.separation.unit() + 0.0;
+                    println!("{:3}. piece {:3} moves in along ({:+.2}, {:+.2}, {:+.2})", i + 1, s.piece, d.x, d.y, d.z);
+                }
+                println!("score {:.3} (lower is better)", score.value);
+                ctx.take_warnings().iter().for_each(|w| println!("warning: {}", w.message));
+            }
+            Ok(0)
+        }
+    }
+}
+
+/// `shellock verify`.
+pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8, Failure> {
+    let path = kit.join("plan.json");
+    let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
+    let text = read(&path)?;
+    let plan: Value = serde_json::from_slice(&text).map_err(|e| broken(&format!("not a plan: {e}")))?;
+    let (pieces, order) = pieces_of(kit, &plan).map_err(|f| match f {
+        Failure::Wrong(what) => broken(&what),
+        other => other,
+    })?;
+    let named = plan["input"]["file"].as_str().unwrap_or_default();
+    let model_path = model.map_or_else(|| PathBuf::from(named), Path::to_owned);
+    let (loaded, _) = load(&model_path)?;
+    let (solid, _) = into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody { path: model_path, source })?;
+    let t: Vec<f64> = plan["input"]["transform"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+    if t.len() != 16 {
+        return Err(broken("input.transform is not 16 numbers"));
+    }
+    let mut mesh = solid.into_mesh();
+    for p in &mut mesh.points {
+        *p = Vec3::from_array(std::array::from_fn(|r| {
+            t[4 * r] * p.x + t[4 * r + 1] * p.y + t[4 * r + 2] * p.z + t[4 * r + 3]
+        }));
+    }
+    let solid = Solid::new(mesh).map_err(|e| broken(&format!("with its transform the model is no solid: {e}")))?;
+    let params = VerifyParams {
+        clearance_mm: plan["clearance"].as_f64().unwrap_or_default(),
+        seed: plan["seed"].as_u64().unwrap_or_default(),
+    };
+    let display = Display::new(session.is_json);
+    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let ctx = Ctx::new(&report, &session.stop);
+    let verdict = shellock::verify::verify(&ctx, &params, &solid, &pieces, &order)?;
+    display.finish();
+    let code = u8::from(!verdict.passed());
+    if session.is_json {
+        println!(
+            "{}",
+            json!({ "passed": verdict.passed(), "checks": verdict.checks, "findings": verdict.findings, "exit_code": code })
+        );
+    } else {
+        print_verdict(&verdict);
+    }
+    Ok(code)
+}
+
+/// The meshes and the order that a plan file names.
+fn pieces_of(kit: &Path, plan: &Value) -> Result<(IdVec<PatchId, TriMesh>, InstallationPlan), Failure> {
+    let wrong = |what: String| Failure::Wrong(what);
+    let list = plan["pieces"].as_array().ok_or_else(|| wrong("there is no list of pieces".into()))?;
+    let mut meshes = Vec::new();
+    let mut directions = Vec::new();
+    for (i, piece) in list.iter().enumerate() {
+        if piece["id"].as_u64() != Some(i as u64) {
+            return Err(wrong(format!("piece number {i} does not have the id {i}")));
+        }
+        let file = piece["file"].as_str().ok_or_else(|| wrong(format!("piece {i} names no file")))?;
+        let (loaded, _) = load(&kit.join(file))?;
+        meshes.push(weld(&loaded.mesh).mesh);
+        let d: Vec<f64> =
+            piece["installation_direction"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+        let [x, y, z] = d[..] else { return Err(wrong(format!("piece {i} has no installation direction"))) };
+        directions.push(LatticeDirection::nearest(-Vec3::new(x, y, z)));
+    }
+    let order = plan["installation_order"].as_array().ok_or_else(|| wrong("there is no installation order".into()))?;
+    let steps = order
+        .iter()
+        .map(|id| {
+            let piece = id.as_u64().filter(|&i| i < meshes.len() as u64);
+            let piece = piece.ok_or_else(|| wrong(format!("the installation order names {id}, which is no piece")))?;
+            Ok(InstallationStep { piece: PatchId(piece as u32), separation: directions[piece as usize] })
+        })
+        .collect::<Result<_, Failure>>()?;
+    Ok((meshes.into_iter().collect(), InstallationPlan { steps }))
+}
+
+/// `shellock inspect`.
+pub fn inspect(session: &Session, file: &Path) -> Result<u8, Failure> {
+    let (loaded, _) = load(file)?;
+    let size = loaded.mesh.bounds().size();
+    let found = inspection(&weld(&loaded.mesh).mesh);
+    let verdict = into_solid(&loaded.mesh);
+    if session.is_json {
+        let error = verdict.as_ref().err().map(ToString::to_string);
+        let value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
+            "size": size.to_array(), "open_edges": found.edges.open.count, "shared_edges": found.edges.shared.count,
+            "has_labels": loaded.face_labels.is_some(), "can_be_made": verdict.is_ok(), "error": error });
+        println!("{value}");
+    } else {
+        println!("{} file, {} faces, {} bodies", loaded.format, loaded.n_file_faces(), found.bodies.len());
+        println!("size {:.4} × {:.4} × {:.4} file units", size.x, size.y, size.z);
+        println!("{} open edges, {} shared edges", found.edges.open.count, found.edges.shared.count);
+    }
+    verdict.map_err(|source| Failure::NotOneBody { path: file.to_owned(), source })?;
+    if !session.is_json {
+        println!("one closed body: it can be made");
+    }
+    Ok(0)
+}
+
+/// `shellock figure`.
+pub fn figure(name: &str, out: &Path, size_mm: f64) -> Result<u8, Failure> {
+    let solid = input::shellock_figure(name, size_mm)?;
+    let bytes = match extension(out).as_str() {
+        "stl" => write_stl_binary(solid.mesh()),
+        "ply" => write_ply(solid.mesh(), None),
+        _ => return Err(Failure::Wrong(format!("{}: choose a name that ends in .stl or .ply", out.display()))),
+    };
+    write(out, &bytes)?;
+    println!("{name}, {size_mm} mm, {} triangles, written to {}", solid.mesh().triangles.len(), out.display());
+    Ok(0)
+}
