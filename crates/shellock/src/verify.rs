@@ -190,7 +190,8 @@ impl Verification {
 
 /// Judges the finished `pieces` of `model` and their plan. Every ending but a stop is an answer.
 ///
-/// A function of its arguments alone, on any number of threads. About a second for ten pieces of 20 000 triangles.
+/// A function of its arguments alone, on any number of threads. Ten pieces of 26 000 triangles take 3.5 s on two cores where every
+/// contact is doubtful, because no joint has a gap or a connector; most of it goes into the pushes.
 pub fn verify(
     ctx: &Ctx,
     params: &VerifyParams,
@@ -202,7 +203,8 @@ pub fn verify(
     let mut verdict = Verification::default();
     verdict.add(check_plan(pieces, plan));
     let is_plan = verdict.passed();
-    let (bodies, checks, findings) = body::check(ctx, pieces)?;
+    let bodies = body::read(ctx, pieces)?;
+    let (checks, findings) = body::check(&bodies);
     verdict.checks.extend(checks);
     verdict.findings.extend(findings);
 
@@ -272,7 +274,7 @@ fn check_motion(
     (Check::new(name, moving.is_empty(), figure), finding)
 }
 
-/// `x` to six decimals. The boolean library adds up volumes and areas in an order that depends on the number of threads.
+/// `x` to six decimals: no printer or judge sees more, and the order in which threads add up does not show.
 fn rounded(x: f64) -> f64 {
     (x * 1e6).round() / 1e6
 }

@@ -18,6 +18,8 @@ pub struct Body {
     pub mesh: TriMesh,
     /// The region inside; `None` where the mesh bounds none.
     pub volume: Option<Volume>,
+    /// What is wrong with it.
+    defects: Vec<Finding>,
 }
 
 /// What a sorted list of edges says about a mesh.
@@ -28,21 +30,19 @@ struct EdgeUse {
     shared: Option<(usize, Vec3)>,
 }
 
-/// Reads all pieces and checks them one by one.
-pub fn check(
-    ctx: &Ctx,
-    pieces: &IdVec<PatchId, TriMesh>,
-) -> Result<(IdVec<PatchId, Body>, Vec<Check>, Vec<Finding>), Cancelled> {
+/// Reads all pieces and examines them one by one.
+pub fn read(ctx: &Ctx, pieces: &IdVec<PatchId, TriMesh>) -> Result<IdVec<PatchId, Body>, Cancelled> {
     let ids: Vec<PatchId> = pieces.ids().collect();
-    let checked: Vec<(Body, Vec<Finding>)> = ids
-        .into_par_iter()
-        .map(|piece| {
-            ctx.check()?;
-            Ok(check_piece(piece, &pieces[piece]))
-        })
-        .collect::<Result<_, Cancelled>>()?;
-    let (bodies, findings): (Vec<Body>, Vec<Vec<Finding>>) = checked.into_iter().unzip();
-    let findings: Vec<Finding> = findings.into_iter().flatten().collect();
+    let read = ids.into_par_iter().map(|piece| {
+        ctx.check()?;
+        Ok(read_piece(piece, &pieces[piece]))
+    });
+    Ok(read.collect::<Result<Vec<Body>, Cancelled>>()?.into_iter().collect())
+}
+
+/// The verdict over all pieces.
+pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
+    let findings: Vec<Finding> = bodies.iter().flat_map(|(_, b)| b.defects.iter().cloned()).collect();
     let check = |name: &str, concerns: fn(&Finding) -> bool| {
         let n = findings.iter().filter(|f| concerns(f)).count();
         Check::new(name, n == 0, format!("{n} of {} pieces fail", bodies.len()))
@@ -52,30 +52,30 @@ pub fn check(
         check("no edge shared by four faces", |f| matches!(f, Finding::SharedEdges { .. })),
         check("every piece one connected body", |f| matches!(f, Finding::SeveralBodies { .. })),
     ];
-    Ok((bodies.into_iter().collect(), checks, findings))
+    (checks, findings)
 }
 
-fn check_piece(piece: PatchId, mesh: &TriMesh) -> (Body, Vec<Finding>) {
-    let mut findings = Vec::new();
+fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
+    let mut defects = Vec::new();
     let is_sound = mesh.points.iter().all(|p| p.is_finite())
         && mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.points.len());
     let mesh = if is_sound { merged(mesh) } else { TriMesh::default() };
     let edges = edge_use(&mesh);
     if let Some((count, at)) = edges.shared {
-        findings.push(Finding::SharedEdges { piece, count, at: at.to_array() });
+        defects.push(Finding::SharedEdges { piece, count, at: at.to_array() });
     }
     let is_closed = edges.n_unbalanced == 0 && mesh.signed_volume() > 0.0;
     let volume = if is_closed { Volume::from_closed_mesh(&mesh).ok().filter(|v| !v.is_empty()) } else { None };
     match &volume {
-        None => findings.push(Finding::NotClosed { piece }),
+        None => defects.push(Finding::NotClosed { piece }),
         Some(volume) => {
             let count = volume.components().iter().filter(|c| c.to_mesh().signed_volume() > CRUMB_MM3).count();
             if count != 1 {
-                findings.push(Finding::SeveralBodies { piece, count });
+                defects.push(Finding::SeveralBodies { piece, count });
             }
         }
     }
-    (Body { mesh, volume }, findings)
+    Body { mesh, volume, defects }
 }
 
 /// `mesh` with equal points made one and triangles that collapse by it left out. Points keep their first order.
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn each_defect_of_a_piece_is_found() {
-        let found = |mesh: &TriMesh| check_piece(PatchId(3), mesh).1;
+        let found = |mesh: &TriMesh| read_piece(PatchId(3), mesh).defects;
         let cube = cuboid([0.0; 3], [2.0; 3]).to_mesh();
         assert!(found(&cube).is_empty());
 
@@ -166,6 +166,6 @@ mod tests {
     #[test]
     fn a_cavity_is_no_second_body() {
         let hollow = cuboid([0.0; 3], [4.0; 3]).subtract(&cuboid([1.0; 3], [3.0; 3]));
-        assert_eq!(check_piece(PatchId(0), &hollow.to_mesh()).1, []);
+        assert_eq!(read_piece(PatchId(0), &hollow.to_mesh()).defects, []);
     }
 }

@@ -3,6 +3,8 @@
 //! Each piece is pushed a small step in 66 directions and must run into the rest. Rays through the piece estimate how
 //! much; an exact boolean decides where the estimate is near the limit.
 
+use std::cell::LazyCell;
+
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Vec3, Volume};
 
@@ -13,14 +15,12 @@ use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId};
 
 /// Overlap that holds a piece, mm³. The acceptance test asks for 0.5.
 const HOLD_MM3: f64 = 0.55;
-/// Estimated overlap from which a piece is held, mm³. Even one ray in [`PIXEL_MM`] squared then meets it a dozen times.
-const SURELY_HELD_MM3: f64 = 5.0;
+/// Ray spacings, mm, each with the estimated overlap, mm³, from which a piece is held: some thirty rays meet it then.
+const LEVELS: [(f64, f64); 2] = [(0.5, 6.0), (0.2, 1.2)];
 /// Estimated overlap below which a piece is called loose, mm³: on the strict side of the limit, whatever the error.
 const SURELY_LOOSE_MM3: f64 = 0.1;
-/// Ray spacing, mm.
-const PIXEL_MM: f64 = 0.5;
-/// Most rays across the longer side of a piece's shadow.
-const MOST_PIXELS: f64 = 600.0;
+/// Most rays across the longer side of a piece's shadow; larger prints get wider spacings.
+const MOST_PIXELS: f64 = 1200.0;
 /// Directions spread over the sphere, besides the 26 of the lattice.
 const N_SPHERE: usize = 40;
 /// Rays parallel to no face of a common model.
@@ -80,18 +80,28 @@ fn free_directions(
         .collect();
     let points = &projected[usize::from(piece)];
     let shadow = Aabb::around(points.iter().copied()).grown(step_mm);
-    let grid = Grid::covering(shadow, PIXEL_MM.max(shadow.size().truncate().max_element() / MOST_PIXELS));
-    let around: Vec<Columns> = others
-        .iter()
-        .map(|(id, _)| Columns::of(&grid, &projected[usize::from(*id)], &bodies[*id].mesh.triangles, Vec3::ZERO))
-        .collect();
+    let levels = LEVELS.map(|(spacing_mm, surely_held_mm3)| {
+        let grid = Grid::covering(shadow, spacing_mm.max(shadow.size().truncate().max_element() / MOST_PIXELS));
+        let columns = move |&(id, _): &(PatchId, &Volume)| {
+            Columns::of(&grid, &projected[usize::from(id)], &bodies[id].mesh.triangles, Vec3::ZERO)
+        };
+        let others = &others;
+        (grid, surely_held_mm3, LazyCell::new(move || others.iter().map(columns).collect::<Vec<Columns>>()))
+    });
     let is_held = |direction: Vec3| {
         let step = direction * step_mm;
-        let moved = Columns::of(&grid, points, &bodies[piece].mesh.triangles, frame.project(step));
-        let length: f64 = around.iter().map(|other| moved.common_length_mm(other)).sum();
-        let estimate_mm3 = length * grid.cell_mm2();
-        estimate_mm3 >= SURELY_HELD_MM3
-            || (estimate_mm3 > SURELY_LOOSE_MM3 && is_held_exactly(&own.translate(step), &others))
+        for (grid, surely_held_mm3, around) in &levels {
+            let moved = Columns::of(grid, points, &bodies[piece].mesh.triangles, frame.project(step));
+            let length: f64 = around.iter().map(|other| moved.common_length_mm(other)).sum();
+            let estimate_mm3 = length * grid.cell_mm2();
+            if estimate_mm3 >= *surely_held_mm3 {
+                return true;
+            }
+            if estimate_mm3 < SURELY_LOOSE_MM3 {
+                return false;
+            }
+        }
+        is_held_exactly(&own.translate(step), &others)
     };
     directions.iter().filter(|&&d| !is_held(d)).map(|d| d.to_array()).collect()
 }
