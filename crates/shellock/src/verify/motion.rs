@@ -27,7 +27,8 @@ const MOVES: f64 = 0.05;
 const VIOLATION: f64 = 1e-6;
 /// A contact whose part outside the span of the active ones is a smaller share of it adds nothing but rounding.
 const INDEPENDENT: f64 = 1e-9;
-/// Rounds for each unknown before the search ends undecided; the assemblies tried needed under 4.
+/// Rounds for each unknown before the search ends undecided, which counts as a motion. A guard against endless rounds
+/// by rounding; how many real assemblies need has not been measured.
 const ROUNDS: usize = 30;
 
 /// Which motions of a piece are considered.

@@ -28,8 +28,8 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 const RUB_MM3: f64 = 0.45;
 /// Mean thickness `2V/A` of an overlap on the way that is still rounding, mm. The acceptance test allows 0.03.
 const RUB_MM: f64 = 0.027;
-/// Share of the two limits at which rays call for the exact answer: rays through 0.25 mm pixels err by at most 30 % on
-/// the smallest overlap that counts.
+/// Share of the two limits at which rays call for the exact answer. A margin against the sampling error of the rays, not
+/// a bound: an overlap thinner than a pixel is met in proportion to its area only on average.
 const IN_DOUBT: f64 = 0.5;
 /// Ray spacing, mm.
 const PIXEL_MM: f64 = 0.25;
