@@ -36,7 +36,7 @@ pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Res
 pub fn checked(options: &Options) -> Result<Params, Failure> {
     let params = options.params();
     let problems = params.problems();
-    if problems.is_empty() { Ok(params) } else { Err(Failure::Wrong(problems.join("\nerror: "))) }
+    if problems.is_empty() { Ok(params.agreed()) } else { Err(Failure::Wrong(problems.join("\nerror: "))) }
 }
 
 fn make(session: &Session, model: &Model, options: &Options, params: &Params, to: &Destination) -> Result<u8, Failure> {

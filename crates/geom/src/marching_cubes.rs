@@ -117,7 +117,7 @@ impl Contour<'_> {
                     let there = at + (c & 1) + width * (c >> 1 & 1);
                     *value = if c < 4 { low.value(there) } else { high.value(there) };
                 }
-                let missing = corner.iter().any(|v| *v == f32::NEG_INFINITY);
+                let missing = corner.contains(&f32::NEG_INFINITY);
                 if missing && self.off_band == OffBand::LikeNeighbours {
                     continue;
                 }

@@ -57,8 +57,11 @@ impl Params {
     }
 
     /// The parameters with what one stage owns and others need set alike everywhere.
-    fn agreed(&self) -> Self {
+    pub fn agreed(&self) -> Self {
+        /// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
+        const CONTACT_SIZES: f64 = 5.6;
         let mut p = self.clone();
+        p.segmentation.min_contact_mm = CONTACT_SIZES * p.connector.size_mm;
         p.plan.connector_size_mm = p.connector.size_mm;
         p.verify.clearance_mm = p.connector.clearance_mm.max(2.0 * p.body.wall_gap_mm);
         p

@@ -81,11 +81,14 @@ impl ShellGrid {
     }
 }
 
+/// A patch and its distance, mm.
+type Entry = (u32, f32);
+
 /// For each node of the wall, the distances to the patches near it: sparse, since most nodes see one patch alone.
 pub struct PatchDistances {
     /// Entries of node n are `start[n] .. start[n + 1]`.
     start: Vec<u32>,
-    entries: Vec<(u32, f32)>,
+    entries: Vec<Entry>,
 }
 
 impl PatchDistances {
@@ -96,7 +99,7 @@ impl PatchDistances {
         let span = 2.0 * f64::from(grid.cutoff_mm());
         let chunk = 4096;
         let n = grid.band.len();
-        let parts: Vec<(Vec<u32>, Vec<(u32, f32)>)> = (0..n.div_ceil(chunk))
+        let parts: Vec<(Vec<u32>, Vec<Entry>)> = (0..n.div_ceil(chunk))
             .into_par_iter()
             .map(|c| {
                 let (mut counts, mut entries, mut found) = (Vec::with_capacity(chunk), Vec::new(), Vec::new());

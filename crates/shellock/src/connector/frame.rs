@@ -53,7 +53,7 @@ fn curve(grid: &ShellGrid, bvh: &TriangleBvh, seam: &Seam, plan: &InstallationPl
         .zip(&tangents)
         .map(|(n, u)| (n - n.dot(*u) * *u).normalize_or_zero())
         .collect();
-    if normals.iter().any(|n| *n == Vec3::ZERO) {
+    if normals.contains(&Vec3::ZERO) {
         return None;
     }
     let a_is_later = plan.position(seam.a) > plan.position(seam.b);
