@@ -40,10 +40,10 @@ fn main() -> ExitCode {
     let stop = Arc::clone(&session.stop);
     // Without a handler Ctrl-C would still end the program, only less tidily.
     let _ = ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed));
-    if let Some(n) = cli.threads {
-        if let Err(e) = rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build_global() {
-            eprintln!("warning: --threads {n} was not taken: {e}");
-        }
+    if let Some(n) = cli.threads
+        && let Err(e) = rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build_global()
+    {
+        eprintln!("warning: --threads {n} was not taken: {e}");
     }
     match run(&session, cli.command) {
         Ok(code) => ExitCode::from(code),
