@@ -12,7 +12,11 @@
 //!
 //! Limits: seams lie on the outer surface, connectors on the inner one, where carving may shift the line.
 
+mod hold;
+
 use shellock_geom::Vec3;
+
+pub use hold::{HoldTable, N_PUSHES, Pushes};
 
 use super::PlanParams;
 use crate::{LatticeDirection, PatchId, Seam, SegmentedSurface};
@@ -63,6 +67,7 @@ pub struct Contact {
     pub length_mm: f64,
     /// By who is later (a, then b) and by direction.
     joints: [[Joint; LatticeDirection::COUNT]; 2],
+    hold: HoldTable,
 }
 
 /// A short piece of seam, in the frame of connectors.
@@ -83,6 +88,11 @@ impl Contact {
         &self.joints[usize::from(later != self.a)][s.index()]
     }
 
+    /// What the two hold each other by in that case; `None` for contacts out of nothing.
+    pub fn hold(&self, later: PatchId, s: LatticeDirection) -> Option<&Pushes> {
+        self.hold.pushes(usize::from(later != self.a), s)
+    }
+
     /// The piece of the contact that is not `piece`.
     pub fn other(&self, piece: PatchId) -> PatchId {
         if piece == self.a { self.b } else { self.a }
@@ -97,7 +107,7 @@ impl Contact {
     #[cfg(test)]
     pub fn made_up(a: PatchId, b: PatchId, joint: impl Fn(PatchId, LatticeDirection) -> Joint) -> Self {
         let joints = [a, b].map(|p| std::array::from_fn(|i| joint(p, LatticeDirection::all().nth(i).unwrap())));
-        Self { a, b, length_mm: 20.0, joints }
+        Self { a, b, length_mm: 20.0, joints, hold: HoldTable::default() }
     }
 }
 
@@ -119,14 +129,15 @@ fn contact(params: &PlanParams, seams: &[(PatchId, PatchId, Vec<Sample>, bool)])
         return None;
     }
     let lines: Vec<(&[Sample], bool)> = seams.iter().map(|s| (s.2.as_slice(), s.3)).collect();
-    let joints = [1.0, -1.0].map(|side| {
+    let joints: [[Joint; LatticeDirection::COUNT]; 2] = [1.0, -1.0].map(|side| {
         std::array::from_fn(|i| {
             // The frame of b later than a is that of a later with v turned round.
             let s = LatticeDirection::all().nth(i).expect("26 directions").unit();
             joint(params, &lines, side, s)
         })
     });
-    Some(Contact { a: *a, b: *b, length_mm, joints })
+    let hold = HoldTable::new(params, &lines, |order, s| joints[order][s.index()].holds);
+    Some(Contact { a: *a, b: *b, length_mm, joints, hold })
 }
 
 /// What `lines` offer along `s`; `side` = 1 where the piece with the lower id is later, else −1.

@@ -2,8 +2,10 @@
 //!
 //! A stand-in for the paper's metrics (Sect. 5), which need simulated connectors: like them it is a bottleneck over the
 //! pieces, and like Eq. 6 the cost of a piece depends only on the directions along its own boundaries. The metrics of a
-//! later stage may rank the same plans anew; [`score`] is the one place to change.
+//! later stage may rank the same plans anew; [`score`] is the one place to change. Pieces that the verification would find
+//! loose cost more than anything else: see [`contact`](super::contact).
 
+use super::contact::N_PUSHES;
 use super::{InstallationPlan, PlanConstraints, PlanSurvey};
 use crate::{IdVec, PatchId};
 
@@ -20,13 +22,23 @@ const INWARD_COST: f64 = 0.25;
 /// Enough to choose among plans that share a bottleneck, too little to trade the bottleneck away.
 const MEAN_SHARE: f64 = 0.25;
 
+/// Estimated hold from which a piece counts as held, mm³: three times what the verification asks for.
+pub(super) const HELD_MM3: f64 = 1.5;
+
+/// What a piece that is not held at all costs, in units of Eq. 4's weight.
+///
+/// A loose piece costs a whole second round, so a tenth of the target outweighs most of what else can differ.
+const LOOSE_COST: f64 = 20.0;
+
 /// How good a plan is; lower is better.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanScore {
-    /// Cost of the worst piece plus a smaller part of the mean, about in [0.1, 2.5].
+    /// Cost of the worst piece plus a smaller part of the mean, about in [0.1, 2.5]; more by up to 25 where one is loose.
     pub value: f64,
     /// Cost of each piece, in [β, 2 + β).
     pub pieces: IdVec<PatchId, f64>,
+    /// Estimated overlap, mm³, with which each piece resists the push that it resists least; infinite for the key.
+    pub hold_mm3: IdVec<PatchId, f64>,
 }
 
 /// Costs of `plan`: of each piece the mean over its seams, by length, of Eq. 4's weight and of what cannot be used.
@@ -40,11 +52,18 @@ pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &Installa
     }
     let mut cost = vec![0.0; n];
     let mut length_mm = vec![0.0; n];
+    let mut pushed = vec![[0.0_f32; N_PUSHES]; n];
     for contact in &survey.contacts {
         let (a, b) = (usize::from(contact.a), usize::from(contact.b));
         let later = if position[a] > position[b] { contact.a } else { contact.b };
         let is_weak = constraints.weak_contacts.contains(&(contact.a, contact.b));
         let contact_cost = contact_cost(survey, contact, later, separation[usize::from(later)], is_weak);
+        let s = separation[usize::from(later)];
+        if let Some(hold) = contact.hold(later, s).filter(|_| !is_weak) {
+            for (piece, held) in [later, contact.other(later)].into_iter().zip(hold) {
+                pushed[usize::from(piece)].iter_mut().zip(held).for_each(|(sum, mm3)| *sum += mm3);
+            }
+        }
         for p in [a, b] {
             cost[p] += contact_cost * contact.length_mm;
             length_mm[p] += contact.length_mm;
@@ -59,7 +78,18 @@ pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &Installa
     }
     let worst = cost.iter().copied().fold(0.0, f64::max);
     let mean = cost.iter().sum::<f64>() / n as f64;
-    PlanScore { value: worst + MEAN_SHARE * mean, pieces: cost.into_iter().collect() }
+    let least = |p: usize| pushed[p].iter().copied().fold(f32::INFINITY, f32::min);
+    let hold_mm3: IdVec<PatchId, f64> =
+        (0..n).map(|p| if position[p] == n - 1 { f64::INFINITY } else { f64::from(least(p)) }).collect();
+    let value = worst + MEAN_SHARE * mean + loose_cost(&hold_mm3);
+    PlanScore { value, pieces: cost.into_iter().collect(), hold_mm3 }
+}
+
+/// Cost of pieces that are held less than they should be: of the loosest one, and a smaller part of the mean.
+fn loose_cost(hold_mm3: &IdVec<PatchId, f64>) -> f64 {
+    let missing = || hold_mm3.as_slice().iter().map(|h| (1.0 - h / HELD_MM3).max(0.0));
+    let mean = missing().sum::<f64>() / hold_mm3.len() as f64;
+    LOOSE_COST * (missing().fold(0.0, f64::max) + MEAN_SHARE * mean)
 }
 
 /// Cost of one contact where `later` leaves along `s`; a contact that joins nothing costs as much as any can.
@@ -108,5 +138,27 @@ mod tests {
         }
         // Weight β = 0.1 for both pieces, nothing unusable.
         assert!((value(up) - 0.125).abs() < 0.03);
+    }
+
+    /// Hold of a plate in the +z plane, whose only neighbour, all round it, leaves later along `s`.
+    fn hold_of_plate(s: Vec3, is_weak: bool) -> f64 {
+        let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z < 0.0));
+        let stop = std::sync::atomic::AtomicBool::new(false);
+        let ctx = crate::Ctx::new(&|_| {}, &stop);
+        let survey = survey(&ctx, &PlanParams::default(), &surface, &seams(&surface)).unwrap();
+        let separation = LatticeDirection::nearest(s);
+        let steps = [0, 1].map(|p| InstallationStep { piece: PatchId(p), separation }).to_vec();
+        let mut constraints = PlanConstraints::default();
+        if is_weak {
+            constraints.weak_contacts.insert((PatchId(0), PatchId(1)));
+        }
+        score(&survey, &constraints, &InstallationPlan { steps }).hold_mm3[PatchId(0)]
+    }
+
+    #[test]
+    fn a_piece_is_loose_opposite_to_its_only_later_neighbour_and_without_connectors() {
+        // The later one leaves along −z, so the plate may go along +z; across, nothing gives.
+        assert!(hold_of_plate(-Vec3::Z, false) < 1e-3);
+        assert_eq!(hold_of_plate(-Vec3::Z, true), 0.0);
     }
 }

@@ -1,0 +1,119 @@
+//! How firmly a contact resists the pushes of the verification, estimated before anything is built.
+//!
+//! The finished kit is judged by pushing every piece a small step in 66 directions; a push must run into the other pieces.
+//! Here the overlap is estimated from the seam samples that carry connectors. In the cross-section of a connector, with ŝ
+//! the direction in which the male leaves and `n` perpendicular to it, a motion `m` of the male meets
+//!
+//! ```text
+//!   along ±n:  a side of the channel   (|m·n| − c) · pin depth
+//!   along −ŝ:  the floor               (−m·ŝ − c) · pin width
+//!   along +ŝ:  nothing
+//! ```
+//!
+//! and the walls where the later piece is pushed at the earlier one across a seam that does not lean.
+//!
+//! Limits: carving and bars shorten runs, which one factor stands for; ends of runs resist nothing here.
+
+use rayon::prelude::*;
+use shellock_geom::Vec3;
+
+use super::{Sample, carries};
+use crate::LatticeDirection;
+use crate::plan::PlanParams;
+
+/// Directions of the verification's pushes.
+pub const N_PUSHES: usize = LatticeDirection::COUNT + N_SPHERE;
+
+/// Pushes spread over the sphere, besides the 26 of the lattice; as in the verification.
+const N_SPHERE: usize = 40;
+
+/// Length of a push beyond three clearances, mm; as in the verification.
+const PUSH_MM: f64 = 0.6;
+
+/// Depth and width of a pin, in connector sizes.
+const PIN_DEPTH_SIZES: f64 = 0.6;
+const PIN_WIDTH_SIZES: f64 = 0.5;
+
+/// Gap between walls, mm, and height of the wall that counts: half of the usual 2 mm, since walls are rounded and carved.
+const WALL_GAP_MM: f64 = 0.1;
+const WALL_HEIGHT_MM: f64 = 1.0;
+
+/// Share of the estimate that is counted: carving takes 10 to 30 % of the joints, and their ends are cut short.
+const LEFT_SHARE: f64 = 0.6;
+
+/// What one order and direction of a contact holds, mm³ by push: when the later piece is pushed, and the earlier one.
+pub type Pushes = [[f32; N_PUSHES]; 2];
+
+/// Estimates for both orders and all directions.
+#[derive(Clone, Debug, Default)]
+pub struct HoldTable(Vec<Pushes>);
+
+/// The directions of the pushes: 26 of the lattice and 40 on a spiral over the sphere; as in the verification.
+pub fn pushes() -> [Vec3; N_PUSHES] {
+    let spiral = (0..N_SPHERE).map(|i| {
+        let i = i as f64 + 0.5;
+        let (turn, z) = (std::f64::consts::PI * (1.0 + 5f64.sqrt()) * i, 1.0 - 2.0 * i / N_SPHERE as f64);
+        let radius = (1.0 - z * z).sqrt();
+        Vec3::new(radius * turn.cos(), radius * turn.sin(), z)
+    });
+    let mut all = LatticeDirection::all().map(LatticeDirection::unit).chain(spiral);
+    std::array::from_fn(|_| all.next().expect("as many as N_PUSHES"))
+}
+
+impl HoldTable {
+    /// The table of a contact with these seams; `holds(order, s)` is whether its runs are long enough there.
+    pub(super) fn new(
+        params: &PlanParams,
+        lines: &[(&[Sample], bool)],
+        holds: impl Fn(usize, LatticeDirection) -> bool + Sync,
+    ) -> Self {
+        let pushes = pushes();
+        let cases: Vec<(usize, LatticeDirection)> =
+            [0, 1].into_iter().flat_map(|order| LatticeDirection::all().map(move |s| (order, s))).collect();
+        let table = cases.into_par_iter().map(|(order, s)| {
+            let mut held = [[0.0; N_PUSHES]; 2];
+            let side = if order == 0 { 1.0 } else { -1.0 };
+            if holds(order, s) {
+                for x in lines.iter().flat_map(|l| l.0).filter(|x| carries(x, side, s.unit())) {
+                    add(params, x, side, s.unit(), &pushes, &mut held);
+                }
+            }
+            held.map(|pushes| pushes.map(|mm3| mm3 as f32))
+        });
+        Self(table.collect())
+    }
+
+    /// What the contact holds; `order` is 0 where the piece with the lower id is later. `None` where nothing was measured.
+    pub fn pushes(&self, order: usize, s: LatticeDirection) -> Option<&Pushes> {
+        self.0.get(order * LatticeDirection::COUNT + s.index())
+    }
+}
+
+/// Adds what the connector at `x` holds, mm³.
+fn add(
+    params: &PlanParams,
+    x: &Sample,
+    side: f64,
+    s: Vec3,
+    pushes: &[Vec3; N_PUSHES],
+    held: &mut [[f64; N_PUSHES]; 2],
+) {
+    let (size, gap, step) = (params.connector_size_mm, params.clearance_mm, 3.0 * params.clearance_mm + PUSH_MM);
+    // The male leaves along +s if it is the later piece, else along −s; so does the sign of its motion.
+    let role = if s.dot(x.normal) >= 0.0 { 1.0 } else { -1.0 };
+    let leaves = (role * s).reject_from_normalized(x.tangent).normalize_or_zero();
+    let n = leaves.cross(x.tangent);
+    let across = side * x.across;
+    let (depth, width) = (PIN_DEPTH_SIZES * size, PIN_WIDTH_SIZES * size - gap);
+    let is_forward = s.dot(across) <= 0.0;
+    for (held, sign) in held.iter_mut().zip([1.0, -1.0]) {
+        for (held, &push) in held.iter_mut().zip(pushes) {
+            let later = sign * step * push;
+            let male = role * later;
+            let sides = (male.dot(n).abs() - gap).max(0.0) * depth;
+            let floor = (-male.dot(leaves) - gap).max(0.0) * width;
+            let walls = if is_forward { (later.dot(across) - WALL_GAP_MM).max(0.0) * WALL_HEIGHT_MM } else { 0.0 };
+            *held += LEFT_SHARE * (sides + floor + walls) * x.length_mm;
+        }
+    }
+}
