@@ -63,6 +63,7 @@ impl Params {
         let mut p = self.clone();
         p.segmentation.min_contact_mm = CONTACT_SIZES * p.connector.size_mm;
         p.plan.connector_size_mm = p.connector.size_mm;
+        p.plan.clearance_mm = p.connector.clearance_mm;
         p.verify.clearance_mm = p.connector.clearance_mm.max(2.0 * p.body.wall_gap_mm);
         p
     }

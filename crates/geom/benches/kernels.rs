@@ -1,0 +1,70 @@
+//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans.
+
+use divan::{Bencher, black_box};
+use shellock_geom::band::Band;
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::contour::contour as dense;
+use shellock_geom::marching_cubes::{OffBand, contour};
+use shellock_geom::signed_distance::SignedDistance;
+use shellock_geom::sweep::Sweeper;
+use shellock_geom::{Aabb, Solid, Vec3, Volume};
+
+fn main() {
+    divan::main();
+}
+
+fn ball() -> Solid {
+    let bounds = Aabb { min: Vec3::splat(-51.0), max: Vec3::splat(51.0) };
+    Solid::new(dense(bounds, 1.0, |p| 50.0 - p.length())).expect("a ball is closed")
+}
+
+fn band(solid: &Solid) -> (Band, Vec<f32>) {
+    Band::along(&SignedDistance::new(solid), solid.mesh().bounds(), 0.8, 2.0, 7.0, 5.0).expect("small grid")
+}
+
+#[divan::bench]
+fn build_bvh(bencher: Bencher) {
+    let ball = ball();
+    bencher.bench(|| TriangleBvh::new(black_box(ball.mesh())));
+}
+
+#[divan::bench]
+fn nearest_100k(bencher: Bencher) {
+    let ball = ball();
+    let bvh = TriangleBvh::new(ball.mesh());
+    let queries: Vec<Vec3> = (0..100_000u32)
+        .map(|i| {
+            let t = f64::from(i);
+            Vec3::new((t * 0.37).sin(), (t * 0.73).cos(), (t * 0.11).sin()).normalize()
+                * (46.0 + 8.0 * (t * 0.19).fract())
+        })
+        .collect();
+    bencher.bench(|| queries.iter().filter_map(|&q| bvh.nearest(q, 100.0)).map(|n| n.distance_sq).sum::<f64>());
+}
+
+#[divan::bench]
+fn lay_band(bencher: Bencher) {
+    let ball = ball();
+    bencher.bench(|| band(black_box(&ball)));
+}
+
+#[divan::bench]
+fn sweep_diagonal(bencher: Bencher) {
+    let (band, depth) = band(&ball());
+    let sweeper = Sweeper::new(&band);
+    bencher.bench(|| sweeper.max_ahead(black_box(&depth), [1, 1, 1]));
+}
+
+#[divan::bench]
+fn contour_offset(bencher: Bencher) {
+    let (band, depth) = band(&ball());
+    let field: Vec<f32> = depth.iter().map(|d| d - 2.0).collect();
+    bencher.bench(|| contour(&band, black_box(&field), OffBand::LikeNeighbours));
+}
+
+#[divan::bench]
+fn subtract_ball(bencher: Bencher) {
+    let a = Volume::from_solid(&ball()).expect("a solid");
+    let b = a.translate(Vec3::new(13.1, 7.3, 3.7));
+    bencher.bench(|| black_box(&a).subtract(&b));
+}
