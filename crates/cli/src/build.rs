@@ -54,17 +54,17 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
         DesignOutcome::Made(made) => made,
         DesignOutcome::NoPlan { reason, blockers } => return Err(no_plan(&reason, &blockers)),
     };
-    let warnings = ctx.take_warnings();
-    let (files, summary) = files(model, options, params, &made, &warnings);
+    let warnings = &made.warnings;
+    let (files, summary) = files(model, options, params, &made, warnings);
     if session.stop.load(Ordering::Relaxed) {
         return Err(Failure::Stopped);
     }
     to.write(&files)?;
     let code = u8::from(!made.verification.passed());
     if session.is_json {
-        print_json(to, model, &made, &summary, &warnings, code);
+        print_json(to, model, &made, &summary, warnings, code);
     } else {
-        print_text(to, &made, params, &summary, &warnings);
+        print_text(to, &made, params, &summary, warnings);
     }
     Ok(code)
 }

@@ -12,7 +12,9 @@ use crate::piece::{Joint, PieceError};
 use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::verify::{Verification, VerifyParams};
-use crate::{Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, body, connector, piece, plan, segmentation, verify};
+use crate::{
+    Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece, plan, segmentation, verify,
+};
 
 /// Everything that may be set. Each stage's parameters are declared beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,6 +85,8 @@ pub struct Design {
     pub contacts: Vec<Contact>,
     /// The verdict on the finished meshes.
     pub verification: Verification,
+    /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
+    pub warnings: Vec<Warning>,
 }
 
 /// How the job ended.
@@ -126,11 +130,12 @@ impl From<GridError> for DesignError {
 pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
     let params = &params.agreed();
     let mut surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
+    let mut warned = ctx.take_warnings();
     ctx.stage("grid", 0)?;
     let grid = ShellGrid::new(&params.body, model, params.connector.room_mm())?;
     let mut best: Option<Design> = None;
     for mending in 0..=params.rounds.mendings {
-        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &mut best)?;
+        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &warned, &mut best)?;
         let blamed = match &attempt {
             Attempt::Passed => break,
             Attempt::Failed { blamed, .. } => blamed.clone(),
@@ -144,6 +149,7 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
         };
         ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
         surface = mended;
+        warned.extend(ctx.take_warnings());
     }
     Ok(finish(best, Attempt::Passed))
 }
@@ -175,6 +181,7 @@ fn with_segmentation(
     model: &Solid,
     grid: &ShellGrid,
     surface: &SegmentedSurface,
+    warned: &[Warning],
     best: &mut Option<Design>,
 ) -> Result<Attempt, DesignError> {
     let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams())?;
@@ -191,7 +198,8 @@ fn with_segmentation(
                 return Ok(Attempt::Failed { reason, blockers, blamed });
             }
         };
-        let design = make(ctx, params, model, grid, &distances, surface, plan)?;
+        let mut design = make(ctx, params, model, grid, &distances, surface, plan)?;
+        design.warnings.splice(0..0, warned.iter().cloned());
         let is_better = best.as_ref().is_none_or(|b| failures(&design) < failures(b));
         let learned: Vec<Lesson> = lessons(&design, params);
         let passed = design.verification.passed();
@@ -234,6 +242,7 @@ pub fn make(
     let (runs, contacts) = connector::runs(&params.connector, &plan, &curves, &is_free);
     let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms)?;
     let verification = verify::verify(ctx, &params.verify, model, &finished.meshes, &plan)?;
+    warn_of_bare_seams(ctx, params, &contacts, &finished.joints);
     Ok(Design {
         surface: surface.clone(),
         plan,
@@ -241,7 +250,27 @@ pub fn make(
         joints: finished.joints,
         contacts,
         verification,
+        warnings: ctx.take_warnings(),
     })
+}
+
+/// Says which long seams came out without any connector.
+fn warn_of_bare_seams(ctx: &Ctx, params: &Params, contacts: &[Contact], joints: &[Joint]) {
+    for contact in contacts.iter().filter(|c| c.length_mm >= params.segmentation.min_contact_mm) {
+        let pair = [contact.later, contact.earlier];
+        let joins = |j: &&Joint| pair.contains(&j.male) && pair.contains(&j.female);
+        if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
+            ctx.warn(Warning {
+                code: "seam-without-connector".into(),
+                message: format!(
+                    "the seam of {:.0} mm between pieces {} and {} has no connector; other seams hold these pieces",
+                    contact.length_mm, contact.later, contact.earlier
+                ),
+                pieces: pair.to_vec(),
+                at: Some(contact.at.to_array()),
+            });
+        }
+    }
 }
 
 /// The box around each patch and all connectors its piece can have.
