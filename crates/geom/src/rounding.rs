@@ -39,7 +39,7 @@ pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
     if volume.is_empty() {
         return Err(NotPrintable::Empty);
     }
-    let mut mesh = rounded(&volume.to_mesh());
+    let mut mesh = in_canonical_order(&rounded(&volume.to_mesh()));
     let mut touching = coincident(&mesh);
     for round in 0..MAX_ROUNDS {
         if touching.is_empty() {
@@ -47,7 +47,7 @@ pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
         }
         move_apart(&mut mesh, &touching, APART_MM * (1.0 + 0.37 * round as f64));
         let again = Volume::from_closed_mesh(&mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))?;
-        mesh = rounded(&again.simplify(SHORT_MM).to_mesh());
+        mesh = in_canonical_order(&rounded(&again.simplify(SHORT_MM).to_mesh()));
         touching = coincident(&mesh);
     }
     if let Some(first) = touching.first() {
@@ -63,6 +63,37 @@ fn rounded(mesh: &TriMesh) -> TriMesh {
         points: mesh.points.iter().map(|p| Vec3::new(round(p.x), round(p.y), round(p.z))).collect(),
         triangles: mesh.triangles.clone(),
     }
+}
+
+/// The same mesh with points sorted by coordinates and triangles by their corners, the lowest first. The boolean library
+/// orders its output by numbers that it gives to meshes as they are made, which depends on how threads happen to run.
+fn in_canonical_order(mesh: &TriMesh) -> TriMesh {
+    let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    let key = |v: &u32| mesh.points[*v as usize].to_array();
+    order.sort_by(|a, b| {
+        let (a, b) = (key(a), key(b));
+        a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
+    });
+    let mut rank = vec![0u32; order.len()];
+    for (new, &old) in order.iter().enumerate() {
+        rank[old as usize] = new as u32;
+    }
+    let mut triangles: Vec<[u32; 3]> = mesh
+        .triangles
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|v| rank[v as usize]);
+            if a < b && a < c {
+                [a, b, c]
+            } else if b < c {
+                [b, c, a]
+            } else {
+                [c, a, b]
+            }
+        })
+        .collect();
+    triangles.sort_unstable();
+    TriMesh { points: order.iter().map(|&v| mesh.points[v as usize]).collect(), triangles }
 }
 
 /// Groups of different points at the same place, ordered by their first member.
