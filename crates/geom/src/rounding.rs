@@ -34,7 +34,7 @@ pub enum NotPrintable {
 /// The boundary of `volume` with coordinates that 32-bit floats hold exactly, and no two points at the same place: a
 /// program that merges equal points, as slicers do, sees the same manifold.
 ///
-/// Points move by at most a few µm, and only where the surface touches itself or has edges under [`SHORT_MM`].
+/// Points move by at most a few µm, and only where the surface touches itself or has edges under 0.1 µm.
 pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
     if volume.is_empty() {
         return Err(NotPrintable::Empty);

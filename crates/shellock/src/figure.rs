@@ -1,6 +1,6 @@
 //! Closed models made by code, for the demo, the tests and the measurements: nothing has to be downloaded.
 //!
-//! Each figure is a smooth union of ellipsoids, rounded cones and rings ([`form`]), stands on z = 0 and looks along −y.
+//! Each figure is a smooth union of ellipsoids, rounded cones and rings (module `form`), stands on z = 0 and looks along −y.
 //! All are drawn 150 units high or wide with nothing thinner than 9 units, so that at 150 mm there is room for a wall of 2 mm
 //! with connectors.
 

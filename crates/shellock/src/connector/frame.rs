@@ -21,7 +21,7 @@ pub struct Curve {
     pub later: PatchId,
     /// The piece installed earlier.
     pub earlier: PatchId,
-    /// Points about [`STEP_MM`] apart. A loop's last point is its first.
+    /// Points about 1 mm apart. A loop's last point is its first.
     pub points: Vec<Vec3>,
     /// Unit tangents `u`.
     pub tangents: Vec<Vec3>,
