@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use serde_json::json;
+use shellock::context::Progress;
 use shellock::pipeline::{Design, DesignOutcome, Params, design};
 use shellock::verify::Verification;
 use shellock::{Ctx, Warning};
@@ -46,16 +47,20 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
         model.notes.iter().for_each(|n| println!("note: {n}"));
     }
     let display = Display::new(session.is_json);
-    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let report = |p: Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let outcome = design(&ctx, params, &model.solid, model.labels.as_deref());
-    display.finish();
-    let made = match outcome? {
+    let outcome = design(&ctx, params, &model.solid, model.labels.as_deref()).inspect_err(|_| display.finish())?;
+    let made = match outcome {
         DesignOutcome::Made(made) => made,
-        DesignOutcome::NoPlan { reason, blockers } => return Err(no_plan(&reason, &blockers)),
+        DesignOutcome::NoPlan { reason, blockers } => {
+            display.finish();
+            return Err(no_plan(&reason, &blockers));
+        }
     };
     let warnings = &made.warnings;
+    display.show(Progress::Stage { name: "files and pictures", n_steps: 0 });
     let (files, summary) = files(model, options, params, &made, warnings);
+    display.finish();
     if session.stop.load(Ordering::Relaxed) {
         return Err(Failure::Stopped);
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{ReportCheck, ReportData, ReportPiece, html, palette, pieces_picture};
@@ -95,7 +96,7 @@ pub fn files(
     warnings: &[Warning],
 ) -> (Vec<(String, Vec<u8>)>, Summary) {
     let thin: Vec<f64> =
-        design.pieces.as_slice().iter().map(|m| thin_share(m, params.connector.min_wall_mm).share).collect();
+        design.pieces.as_slice().par_iter().map(|m| thin_share(m, params.connector.min_wall_mm).share).collect();
     let volume: f64 = design.pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
     let usable: f64 = design.contacts.iter().map(|c| c.usable_mm).sum();
     let made: f64 = design.joints.iter().map(|j| j.length_mm).sum();
@@ -111,6 +112,18 @@ pub fn files(
     for (p, mesh) in design.pieces.iter() {
         files.push((piece_file(p), write_stl_binary(mesh)));
     }
+    let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
+    let (archive, (page, picture)) =
+        rayon::join(|| assembly(design), || report(model, options, params, design, warnings, &summary));
+    files.push(("assembly.3mf".into(), archive));
+    files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
+    files.push(("report.html".into(), page));
+    files.push(("pieces.png".into(), picture));
+    (files, summary)
+}
+
+/// All pieces in place, named and coloured.
+fn assembly(design: &Design) -> Vec<u8> {
     let names: Vec<String> = design.pieces.ids().map(|p| format!("piece {p}")).collect();
     let objects: Vec<NamedObject> = design
         .pieces
@@ -118,13 +131,7 @@ pub fn files(
         .zip(&names)
         .map(|((p, mesh), name)| NamedObject { name, color: palette::color(design.plan.position(p)), mesh })
         .collect();
-    files.push(("assembly.3mf".into(), write_3mf(&objects)));
-    let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
-    files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
-    let (page, picture) = report(model, options, params, design, warnings, &summary);
-    files.push(("report.html".into(), page));
-    files.push(("pieces.png".into(), picture));
-    (files, summary)
+    write_3mf(&objects)
 }
 
 fn piece_file(p: PatchId) -> String {
@@ -231,7 +238,6 @@ fn report(
             facts: vec![("volume".into(), format!("{:.1} cm³", standing[p.0 as usize].signed_volume() / 1000.0))],
         })
         .collect();
-    let picture = pieces_picture(&pieces).png();
     let size = model.solid.mesh().bounds().size();
     let facts = vec![
         ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
@@ -249,5 +255,5 @@ fn report(
         .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
         .collect();
     let data = ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings };
-    (html(&data).into_bytes(), picture)
+    rayon::join(|| html(&data).into_bytes(), || pieces_picture(&data.pieces).png())
 }

@@ -8,6 +8,7 @@ use manifold_rust::linalg::Vec3 as V;
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{Error, MeshGL64, OpType};
 
+use crate::topology::{Topology, components};
 use crate::{Aabb, Solid, TriMesh, Vec3};
 
 /// A region bounded by a manifold mesh; may be empty, may have several bodies, may have cavities.
@@ -191,6 +192,29 @@ impl Volume {
         parts
     }
 
+    /// The region bounded by those connected boundary surfaces whose points `keep` accepts.
+    pub fn retain(&self, keep: impl Fn(&[Vec3]) -> bool) -> Self {
+        let mesh = self.to_mesh();
+        let Some(topology) = Topology::of_mesh(&mesh) else { return self.clone() };
+        let (component, n) = components(&topology, |_, _| true);
+        let mut points: Vec<Vec<Vec3>> = vec![Vec::new(); n];
+        let mut is_told = vec![false; mesh.points.len()];
+        for (triangle, &c) in mesh.triangles.iter().zip(&component) {
+            for &v in triangle {
+                if !std::mem::replace(&mut is_told[v as usize], true) {
+                    points[c as usize].push(mesh.points[v as usize]);
+                }
+            }
+        }
+        let is_kept: Vec<bool> = points.iter().map(|p| keep(p)).collect();
+        if is_kept.iter().all(|k| *k) {
+            return self.clone();
+        }
+        let kept = mesh.triangles.iter().zip(&component).filter(|(_, c)| is_kept[**c as usize]).map(|(t, _)| *t);
+        let part = TriMesh { triangles: kept.collect(), points: mesh.points }.without_unused_points();
+        Self::from_closed_mesh(&part).expect("a closed part of a manifold is a manifold")
+    }
+
     /// The boundary as a mesh; no points where empty.
     pub fn to_mesh(&self) -> TriMesh {
         if self.is_empty() {
@@ -238,6 +262,14 @@ mod tests {
         assert_eq!(a.subtract(&Volume::empty()).volume(), a.volume());
         assert_eq!(a.union(&b).components().len(), 2);
         assert!(Volume::hull(&[Vec3::ZERO, Vec3::X, Vec3::Y]).is_empty());
+    }
+
+    #[test]
+    fn retaining_is_choosing_among_bodies() {
+        let both = cube(Vec3::ZERO, 1.0).union(&cube(Vec3::splat(5.0), 2.0));
+        assert!((both.retain(|p| p.iter().all(|p| p.x < 3.0)).volume() - 1.0).abs() < 1e-12);
+        assert!((both.retain(|_| true).volume() - 9.0).abs() < 1e-12);
+        assert!(both.retain(|_| false).is_empty());
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod boolean;
 pub mod bvh;
 pub mod check;
 pub mod contour;
+pub mod decimate;
 pub mod io;
 pub mod laplacian;
 pub mod level_cut;

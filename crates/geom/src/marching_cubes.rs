@@ -30,7 +30,22 @@ const NONE: u32 = u32::MAX;
 /// Closed where `off_band` is [`OffBand::Outside`], or where the level set keeps inside the band. Work and memory follow
 /// the band and two layers of its box.
 pub fn contour(band: &Band, field: &[f32], off_band: OffBand) -> TriMesh {
-    let mut out = Contour { band, off_band, mesh: TriMesh::default() };
+    contour_cutting(band, field, off_band, Corners::Positive)
+}
+
+/// Which corners are cut apart where a face of a cell leaves it open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Corners {
+    /// Those inside.
+    Positive,
+    /// Those outside: the contour of `f` then has the triangles of the contour of `−f`, turned over, so that two fields
+    /// that mean opposite sides of one surface agree on it.
+    Negative,
+}
+
+/// [`contour`] that cuts `apart` the corners on one side of the surface.
+pub fn contour_cutting(band: &Band, field: &[f32], off_band: OffBand, apart: Corners) -> TriMesh {
+    let mut out = Contour { band, off_band, apart, mesh: TriMesh::default() };
     let mut low = Layer::read(band, field, -1);
     for k in -1..band.dims[2] as i64 {
         let mut high = Layer::read(band, field, k + 1);
@@ -47,7 +62,7 @@ struct Layer {
     values: Vec<f32>,
     /// Vertex on the edge from a node along x, y and (to the next layer) z.
     edges: [Vec<u32>; 3],
-    /// Filled x range of each row, border included; empty where first > last.
+    /// In each row, the x range of positive nodes: no cell off it is crossed. Empty where first > last.
     spans: Vec<(usize, usize)>,
 }
 
@@ -73,8 +88,13 @@ impl Layer {
                 let (x0, n, first) = (run.i0 as usize + 1, run.len as usize, run.first as usize);
                 let at = (j + 1) * width + x0;
                 layer.values[at..at + n].copy_from_slice(&field[first..first + n]);
-                let span = &mut layer.spans[j + 1];
-                *span = (span.0.min(x0), span.1.max(x0 + n - 1));
+                let is_positive = |v: &f32| *v > 0.0;
+                let values = &field[first..first + n];
+                if let (Some(a), Some(b)) = (values.iter().position(is_positive), values.iter().rposition(is_positive))
+                {
+                    let span = &mut layer.spans[j + 1];
+                    *span = (span.0.min(x0 + a), span.1.max(x0 + b));
+                }
             }
         }
         layer
@@ -97,6 +117,7 @@ impl Layer {
 struct Contour<'a> {
     band: &'a Band,
     off_band: OffBand,
+    apart: Corners,
     mesh: TriMesh,
 }
 
@@ -130,6 +151,9 @@ impl Contour<'_> {
     }
 
     fn cell(&mut self, [i, j]: [usize; 2], k: i64, corner: &[f32; 8], case: usize, low: &mut Layer, high: &mut Layer) {
+        let is_turned = self.apart == Corners::Negative;
+        let case = if is_turned { 255 - case } else { case };
+        let first = self.mesh.triangles.len();
         for polygon in &table()[case] {
             let ids: Vec<u32> = polygon.edges.iter().map(|&e| self.vertex([i, j], k, corner, e, low, high)).collect();
             if polygon.fan {
@@ -139,6 +163,9 @@ impl Contour<'_> {
                 let hub = self.add(center);
                 self.mesh.triangles.extend((0..ids.len()).map(|n| [hub, ids[n], ids[(n + 1) % ids.len()]]));
             }
+        }
+        if is_turned {
+            self.mesh.triangles[first..].iter_mut().for_each(|t| t.swap(1, 2));
         }
     }
 
@@ -165,7 +192,7 @@ impl Contour<'_> {
             return *slot;
         }
         // A node off the band counts as one cell below the level.
-        let value = |c: usize| f64::from(corner[c]).max(-self.band.cell_mm);
+        let value = |c: usize| if corner[c].is_finite() { f64::from(corner[c]) } else { -self.band.cell_mm };
         let (va, vb) = (value(a), value(b));
         let t = (va / (va - vb)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
         let mut node =
@@ -278,9 +305,25 @@ mod tests {
                 (x >> 40) as f32 / (1u64 << 23) as f32 - 1.0
             })
             .collect();
-        let mesh = contour(&band, &noise, OffBand::Outside);
-        assert!(mesh.triangles.len() > 10_000);
-        Solid::new(mesh).unwrap();
+        for apart in [Corners::Positive, Corners::Negative] {
+            let mesh = contour_cutting(&band, &noise, OffBand::Outside, apart);
+            assert!(mesh.triangles.len() > 10_000);
+            Solid::new(mesh).unwrap();
+        }
+    }
+
+    #[test]
+    fn opposite_fields_agree_on_their_surface() {
+        let (band, phi) = cube_band();
+        let noisy = |n: usize| (phi[n] - 1.1) + 0.4 * ((n * 7919 % 101) as f32 / 50.0 - 1.0);
+        let field: Vec<f32> = (0..phi.len()).map(noisy).collect();
+        let negated: Vec<f32> = field.iter().map(|f| -f).collect();
+        let a = contour(&band, &field, OffBand::LikeNeighbours);
+        let b = contour_cutting(&band, &negated, OffBand::LikeNeighbours, Corners::Negative);
+        assert_eq!(a.points.len(), b.points.len());
+        assert!(a.points.iter().zip(&b.points).all(|(a, b)| a.distance(*b) < 1e-9));
+        assert_eq!(a.triangles.len(), b.triangles.len());
+        assert!(a.triangles.iter().zip(&b.triangles).all(|(a, b)| *a == [b[0], b[2], b[1]]));
     }
 
     #[test]

@@ -216,9 +216,8 @@ pub fn verify(
     }
     let length_mm = model.mesh().bounds().diagonal();
     verdict.add(path::check(ctx, &bodies, &plan.steps, length_mm)?);
-    verdict.add(probe::check(ctx, &bodies, plan.key(), params.clearance_mm)?);
-
     let contacts = contact::find(ctx, &bodies, params.clearance_mm, params.seed)?;
+    verdict.add(probe::check(ctx, &bodies, &contacts, plan.key(), params.clearance_mm)?);
     let (key, first) = (plan.key(), plan.steps[0].piece);
     for (name, held, freedom) in [
         ("no cluster slides, key and first held (translations)", &[key, first][..], Freedom::Translations),

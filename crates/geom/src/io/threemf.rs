@@ -34,7 +34,7 @@ pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
     let model = model_xml(objects);
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
-        .compression_level(Some(6))
+        .compression_level(Some(1))
         .last_modified_time(DateTime::DEFAULT)
         .unix_permissions(0o644)
         .system(System::Unix)

@@ -1,11 +1,14 @@
 //! Splitting the wall, piece by piece, in the order of taking apart.
 
+use std::cell::Cell;
+
 use rayon::prelude::*;
 use shellock_geom::band::Band;
+use shellock_geom::decimate::decimate;
 use shellock_geom::level_cut::{Side, cut_at_zero};
-use shellock_geom::marching_cubes::{OffBand, contour};
+use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_cutting};
 use shellock_geom::sweep::Sweeper;
-use shellock_geom::{Aabb, Solid, TriMesh, Volume};
+use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 use super::BodyParams;
 use super::grid::{GridError, LocalField, PatchDistances, ShellGrid};
@@ -16,9 +19,21 @@ use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, 
 const SKIN_CELLS: f64 = 1.5;
 /// What remains is grown by this many cells before it is swept, so that interpolation leaves no rub.
 const MARGIN_CELLS: f64 = 0.15;
-/// The taper of the wall gap begins this far outside the surface, mm: the two sides of a cut then keep a few µm apart even
-/// at the rim, and no boolean meets coincident faces.
-const RIM_LEAD_MM: f64 = 0.05;
+/// Share of the wall gap that is left at the rim: the two sides of a cut keep a few µm apart there.
+const RIM_LEAST: f64 = 0.1;
+/// Cutting tools are simplified by at most this share of the gap and this many mm where they cut, so that paths stay free,
+/// and by more where they end outside the wall, farther from it than so many cells.
+const GAP_SHARE: f64 = 0.2;
+const CUT_TOLERANCE_MM: f64 = 0.02;
+const FREE_TOLERANCE_MM: f64 = 0.05;
+const TIGHT_CELLS: f64 = 1.2;
+/// Collars end this far from the wall, in cells.
+const LIMIT_CELLS: f32 = 1.8;
+const LIMIT_SLOPE: f32 = 5.0;
+/// Width of a collar beyond the cut, in cells; one is enough for its contour to end where the cut is.
+const COLLAR_CELLS: usize = 3;
+/// A part that reaches farther than this to both sides of a cut, in cells, was not separated by it.
+const LEAK_CELLS: f64 = 0.5;
 /// Fragments of a body up to this volume are dropped, mm³; more is worth a warning.
 const CHIP_MM3: f64 = 0.5;
 
@@ -101,32 +116,104 @@ fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId
     }
     with.ctx.check()?;
     let (leaving, staying) = cuts.split_at(cuts.len() / 2);
-    let (keep, leave) = rayon::join(|| with.tool(leaving, 1.0), || with.tool(leaving, -1.0));
-    let (theirs, rest) = wall.split(&leave);
-    drop((wall, leave));
-    let (a, b) = rayon::join(|| split(with, theirs.intersect(&keep), leaving), || split(with, rest, staying));
+    let g = with.preference(leaving);
+    let (theirs, rest) = rayon::join(|| with.side(&wall, &g, 1.0), || with.side(&wall, &g, -1.0));
+    drop((wall, g));
+    let (a, b) = rayon::join(|| split(with, theirs, leaving), || split(with, rest, staying));
     let mut parts = a?;
     parts.extend(b?);
     Ok(parts)
 }
 
 impl Splitter<'_> {
-    /// A solid to cut with: what lies on the side of any of `leaving`, less (`side` = 1) or more (−1) the gap inside the wall.
-    fn tool(&self, leaving: &[Cut], side: f32) -> Volume {
-        let cell = self.grid.band.cell_mm() as f32;
-        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
-        let mut field = vec![-self.grid.cutoff_mm(); self.grid.band.len()];
+    /// Positive on the side of any of `leaving`.
+    fn preference(&self, leaving: &[Cut]) -> Vec<f32> {
+        let mut g = vec![-self.grid.cutoff_mm(); self.grid.band.len()];
         for cut in leaving {
-            cut.field.as_ref().expect("only the last piece has no cut").raise(&mut field);
+            cut.field.as_ref().expect("only the last piece has no cut").raise(&mut g);
         }
-        field.par_iter_mut().zip(&self.grid.depth).for_each(|(g, &depth)| {
-            let taper = ((depth + RIM_LEAD_MM as f32) / rim).clamp(-1.0, 1.0);
-            // Nothing is cut below the wall or far outside; smooth limits give fewer triangles than the band's border.
-            let limits = (self.grid.thickness_mm as f32 + 1.8 * cell - depth).min(depth + 1.8 * cell);
-            *g = (*g - side * gap * taper).min(limits);
+        g
+    }
+
+    /// The part of `wall` where `sign · g` is positive, less the gap.
+    ///
+    /// A collar along the cut, on the other side of it, is taken out of the wall; then the wall falls apart, and what lies
+    /// on the wanted side is kept. The collar has far fewer triangles than the whole other side. Should its simplified
+    /// form not separate the sides, the full one does.
+    fn side(&self, wall: &Volume, g: &[f32], sign: f32) -> Volume {
+        // Both sides' collars see the same side of the cut, so that they have the same triangles there.
+        let apart = if sign > 0.0 { Corners::Positive } else { Corners::Negative };
+        let full = contour_cutting(&self.grid.band, &self.collar_field(g, sign), OffBand::Outside, apart);
+        let simple = self.simplified(full.clone(), g, sign);
+        self.half(wall, &simple, g, sign).or_else(|| self.half(wall, &full, g, sign)).unwrap_or_else(Volume::empty)
+    }
+
+    /// The parts of `wall` less `collar` on the wanted side; `None` where a part lies on both.
+    fn half(&self, wall: &Volume, collar: &TriMesh, g: &[f32], sign: f32) -> Option<Volume> {
+        let collar = Volume::from_closed_mesh(collar).expect("contours are manifold");
+        let leaks = Cell::new(false);
+        let half = wall.subtract(&collar).retain(|points| {
+            let h = points.iter().filter_map(|&p| self.grid.band.sample(g, p)).map(|g| f64::from(sign) * g);
+            let (least, most) = h.fold((0.0f64, 0.0f64), |(a, b), h| (a.min(h), b.max(h)));
+            leaks.set(leaks.get() || most.min(-least) > LEAK_CELLS * self.grid.band.cell_mm());
+            most > -least
         });
-        let mesh: TriMesh = contour(&self.grid.band, &field, OffBand::Outside);
-        Volume::from_closed_mesh(&mesh).expect("contours are manifold")
+        (!leaks.get()).then_some(half)
+    }
+
+    fn simplified(&self, collar: TriMesh, g: &[f32], sign: f32) -> TriMesh {
+        let h = |p: Vec3| self.grid.band.sample(g, p).map_or(0.0, |g| f64::from(sign) * g);
+        let tolerance: Vec<f64> = collar.points.par_iter().map(|&p| self.tolerance_mm(p, h(p))).collect();
+        decimate(collar, &tolerance)
+    }
+
+    /// Positive in the collar: from the gap's border on the side of `sign` to some cells on the other side of the cut.
+    fn collar_field(&self, g: &[f32], sign: f32) -> Vec<f32> {
+        let (cell, cutoff) = (self.grid.band.cell_mm() as f32, self.grid.cutoff_mm());
+        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
+        let is_own = |n: u32| sign * g[n as usize] > 0.0;
+        // Nothing is cut below the wall or far outside; cuts are unknown there. The limits are so steep that within a cell
+        // of the wall they are above all values of the cut: both sides' collars must agree there.
+        let limits = |n: usize| {
+            let depth = self.grid.depth[n];
+            let inside = (self.grid.thickness_mm as f32 + LIMIT_CELLS * cell - depth).min(depth + LIMIT_CELLS * cell);
+            inside * LIMIT_SLOPE
+        };
+        let mut field: Vec<f32> =
+            (0..g.len() as u32).into_par_iter().map(|n| if is_own(n) { cutoff } else { -cell }).collect();
+        let mut front: Vec<u32> = (0..g.len() as u32)
+            .into_par_iter()
+            .filter(|&n| is_own(n) && limits(n as usize) > 0.0)
+            .filter(|&n| self.grid.band.face_neighbours(n).any(|m| !is_own(m) && limits(m as usize) > 0.0))
+            .collect();
+        for _ in 0..COLLAR_CELLS {
+            let beyond: Vec<u32> = front.iter().flat_map(|&n| self.grid.band.face_neighbours(n)).collect();
+            front.clear();
+            for n in beyond {
+                if field[n as usize] < 0.0 {
+                    field[n as usize] = cutoff;
+                    front.push(n);
+                }
+            }
+        }
+        field.par_iter_mut().enumerate().for_each(|(n, f)| {
+            let taper = (self.grid.depth[n] / rim).clamp(RIM_LEAST as f32, 1.0);
+            *f = f.min(gap * taper - sign * g[n]).min(limits(n));
+        });
+        field
+    }
+
+    /// How much a collar may be simplified at `p`, mm, where `sign · g` is `h`: well within the gap where it cuts, freely
+    /// where it meets nothing that stays.
+    fn tolerance_mm(&self, p: Vec3, h: f64) -> f64 {
+        let cell = self.grid.band.cell_mm();
+        let (params, reach) = (self.params, TIGHT_CELLS * cell);
+        let depth = self.grid.band.sample(&self.grid.depth, p).unwrap_or(f64::NEG_INFINITY);
+        if h < -0.4 * cell || depth < -reach || depth > params.thickness_mm + reach {
+            return FREE_TOLERANCE_MM;
+        }
+        let taper = (depth / params.rim_mm).clamp(0.0, 1.0);
+        (GAP_SHARE * params.wall_gap_mm * taper).min(CUT_TOLERANCE_MM)
     }
 }
 

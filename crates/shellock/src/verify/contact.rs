@@ -30,6 +30,10 @@ pub struct Contact {
     pub point: Vec3,
     /// Unit normal of `a` at the point, towards `b`.
     pub normal: Vec3,
+    /// Distance to `b`, mm.
+    pub gap_mm: f64,
+    /// Area of `a` that the point stands for, mm².
+    pub area_mm2: f64,
 }
 
 /// All contacts, in order of `a`, then along its surface, then of `b`.
@@ -47,13 +51,15 @@ pub fn find(ctx: &Ctx, bodies: &IdVec<PatchId, Body>, clearance_mm: f64, seed: u
             let mesh = &bodies[a].mesh;
             let n = (mesh.area() / (SPACING_MM * SPACING_MM)).clamp(N_SAMPLES.0, N_SAMPLES.1) as usize;
             let samples = sample::on_surface(mesh, n, seed.wrapping_add(u64::from(a.0)));
+            let area_mm2 = mesh.area() / n as f64;
             let mut contacts = Vec::new();
             for s in samples {
                 for &b in ids.iter().filter(|&&b| b != a && trees[usize::from(b)].1.contains(s.point)) {
                     if let Some(near) = trees[usize::from(b)].0.nearest(s.point, reach_mm * reach_mm)
                         && s.normal.dot(bodies[b].mesh.face_normal(near.face as usize)) < FACING
                     {
-                        contacts.push(Contact { a, b, point: s.point, normal: s.normal });
+                        let gap_mm = near.distance_sq.sqrt();
+                        contacts.push(Contact { a, b, point: s.point, normal: s.normal, gap_mm, area_mm2 });
                     }
                 }
             }
@@ -62,5 +68,6 @@ pub fn find(ctx: &Ctx, bodies: &IdVec<PatchId, Body>, clearance_mm: f64, seed: u
         .collect::<Result<_, Cancelled>>()?;
     let all: Vec<Contact> = found.into_iter().flatten().collect();
     let keep_every = all.len().div_ceil(MOST_CONTACTS).max(1);
-    Ok(all.into_iter().step_by(keep_every).collect())
+    let standing_for_more = |c: Contact| Contact { area_mm2: c.area_mm2 * keep_every as f64, ..c };
+    Ok(all.into_iter().step_by(keep_every).map(standing_for_more).collect())
 }

@@ -287,7 +287,14 @@ mod tests {
     fn random_contacts(rng: &mut ChaCha8Rng, n_pieces: u32, n: usize) -> Vec<Contact> {
         let mut unit = || Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
         let mut contacts: Vec<Contact> = (0..n)
-            .map(|_| Contact { a: PatchId(0), b: PatchId(0), point: unit(), normal: unit().normalize() })
+            .map(|_| Contact {
+                a: PatchId(0),
+                b: PatchId(0),
+                point: unit(),
+                normal: unit().normalize(),
+                gap_mm: 0.0,
+                area_mm2: 1.0,
+            })
             .collect();
         for c in &mut contacts {
             c.a = PatchId(rng.random_range(0..n_pieces));
@@ -343,7 +350,14 @@ mod tests {
             for (p, q) in [(0.9, 0.8), (0.9, -0.8), (-0.7, 0.8), (-0.7, -0.8)] {
                 for side in [1.0, -1.0] {
                     let point = center + n * side + u * p + v * q;
-                    contacts.push(Contact { a: PatchId(a), b: PatchId(b), point, normal: n * side });
+                    contacts.push(Contact {
+                        a: PatchId(a),
+                        b: PatchId(b),
+                        point,
+                        normal: n * side,
+                        gap_mm: 0.0,
+                        area_mm2: 1.0,
+                    });
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Whether each piece but the key is held in every direction by the others.
 //!
-//! Each piece is pushed a small step in 66 directions and must run into the rest. Rays through the piece estimate how
-//! much; an exact boolean decides where the estimate is near the limit.
+//! Each piece is pushed a small step in 66 directions and must run into the rest. Where its contacts face the push, they
+//! tell how much; elsewhere rays through the piece do, and an exact boolean decides near the limit.
 
 use std::cell::LazyCell;
 
@@ -10,6 +10,7 @@ use shellock_geom::{Aabb, Vec3, Volume};
 
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
+use super::contact::Contact;
 use super::{Check, Finding, rounded};
 use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId};
 
@@ -20,6 +21,10 @@ const HOLD_MM3: f64 = 0.55;
 const LEVELS: [(f64, f64); 2] = [(0.5, 6.0), (0.2, 1.2)];
 /// Estimated overlap below which a piece is called loose, mm³: on the strict side of the limit, whatever the error.
 const SURELY_LOOSE_MM3: f64 = 0.1;
+/// Overlap told by contacts from which a piece is held, mm³: ten times the limit. Each contact counts with its area and the
+/// depth to which it is pushed, up to this many mm, which no wall is thinner than.
+const CONTACTS_HOLD_MM3: f64 = 5.5;
+const CONTACT_DEPTH_MM: f64 = 0.4;
 /// Most rays across the longer side of a piece's shadow; larger prints get wider spacings.
 const MOST_PIXELS: f64 = 1200.0;
 /// Directions spread over the sphere, besides the 26 of the lattice.
@@ -31,6 +36,7 @@ const RAYS: Vec3 = Vec3::new(0.3713, 0.5219, 0.7680);
 pub fn check(
     ctx: &Ctx,
     bodies: &IdVec<PatchId, Body>,
+    contacts: &[Contact],
     key: PatchId,
     clearance_mm: f64,
 ) -> Result<(Check, Vec<Finding>), Cancelled> {
@@ -44,13 +50,23 @@ pub fn check(
         .into_par_iter()
         .map(|piece| {
             ctx.check()?;
-            let free = free_directions(bodies, &projected, &frame, piece, step_mm, &directions);
+            let own: Vec<&Contact> = contacts.iter().filter(|c| c.a == piece).collect();
+            let doubtful: Vec<Vec3> =
+                directions.iter().copied().filter(|d| !contacts_hold(&own, *d * step_mm)).collect();
+            let free = free_directions(bodies, &projected, &frame, piece, step_mm, &doubtful);
             Ok((!free.is_empty()).then_some(Finding::Loose { piece, directions: free }))
         })
         .collect::<Result<_, Cancelled>>()?;
     let findings: Vec<Finding> = loose.into_iter().flatten().collect();
     let figure = format!("{} pieces loose in some of {} directions", findings.len(), directions.len());
     Ok((Check::new("every piece but the key is blocked", findings.is_empty(), figure), findings))
+}
+
+/// Whether the contacts of a piece alone show that a push by `step` is held.
+fn contacts_hold(contacts: &[&Contact], step: Vec3) -> bool {
+    let overlap_mm3: f64 =
+        contacts.iter().map(|c| c.area_mm2 * (c.normal.dot(step) - c.gap_mm).clamp(0.0, CONTACT_DEPTH_MM)).sum();
+    overlap_mm3 >= CONTACTS_HOLD_MM3
 }
 
 /// The 26 lattice directions and 40 on a spiral over the sphere.

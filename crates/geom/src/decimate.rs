@@ -1,0 +1,337 @@
+//! Fewer triangles for nearly the same surface.
+//!
+//! Edges collapse by quadric error [Garland and Heckbert 1997]. The quadric of a vertex sums, over the
+//! planes of all input triangles that it stands for, the squared distance times the triangle's share of a mean triangle.
+//! Divided by the sum of shares this is the mean square distance; beyond [`MOST_SHARES`] the divisor stays the same, so
+//! that a bump in a wide plain is not averaged away.
+
+use glam::DMat3;
+use rayon::prelude::*;
+
+use crate::topology::{HalfEdge, Topology};
+use crate::{TriMesh, Vec3};
+
+/// Mean triangles over which a squared distance is averaged at most: no vertex is farther than √30 tolerances from the
+/// plane of a triangle of mean size that it stands for.
+const MOST_SHARES: f64 = 30.0;
+/// Pull towards the middle of the edge, against the weight of one mean triangle: settles where flat surroundings leave the
+/// place of the new vertex open.
+const PULL: f64 = 1e-3;
+/// Share of the squared edge length in the cost of a collapse, so that flat places lose short edges first.
+const SHORT_FIRST: f64 = 1e-5;
+/// What the first rounds may use of the squared tolerance: cheap collapses come before dear ones.
+const EARLY_SHARES: [f64; 3] = [0.1, 0.3, 0.6];
+/// A round that removes a smaller share of the vertices is the last.
+const WORTH_A_ROUND: f64 = 0.02;
+/// Twenty halvings are enough for any mesh.
+const MOST_ROUNDS: u32 = 20;
+/// No round is this late.
+const GONE: u32 = u32::MAX;
+/// A triangle's normal turns by less than 60° in one collapse.
+const LEAST_COS: f64 = 0.5;
+/// No collapse makes a triangle whose height is a smaller share of its longest edge than this, unless it was worse before.
+const LEAST_HEIGHT: f64 = 0.03;
+
+/// `mesh` with edges collapsed where the vertex that remains stays, in the mean, within the smaller `tolerance_mm` of both
+/// ends (mm, one a point; 0 keeps the point) of the planes of the triangles it stands for.
+///
+/// For closed manifold meshes, and closed manifold is what comes out; anything else comes back unchanged. In each of some
+/// rounds every vertex takes part in one collapse at most, the cheapest of its edges: no queue, and even triangles.
+/// Sequential, so that the same mesh gives the same bytes.
+pub fn decimate(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
+    assert_eq!(mesh.points.len(), tolerance_mm.len(), "one tolerance a point");
+    let Some(mut state) = Decimation::new(&mesh, tolerance_mm) else { return mesh };
+    let mut alive: Vec<u32> = (0..mesh.points.len() as u32).filter(|&v| tolerance_mm[v as usize] > 0.0).collect();
+    for round in 1..=MOST_ROUNDS {
+        let share = EARLY_SHARES.get(round as usize - 1).copied().unwrap_or(1.0);
+        let n_before = alive.len();
+        for &v in &alive {
+            state.collapse_cheapest(v, round, share);
+        }
+        alive.retain(|&v| state.is_alive(v));
+        let n_gone = n_before - alive.len();
+        if round as usize > EARLY_SHARES.len() && n_gone as f64 <= WORTH_A_ROUND * n_before as f64 {
+            break;
+        }
+    }
+    state.finish()
+}
+
+/// A symmetric 4 × 4 form: weighted squared distance to planes.
+#[derive(Clone, Copy)]
+struct Quadric {
+    a: DMat3,
+    b: Vec3,
+    c: f64,
+    shares: f64,
+}
+
+impl Quadric {
+    const ZERO: Self = Self { a: DMat3::ZERO, b: Vec3::ZERO, c: 0.0, shares: 0.0 };
+
+    fn of_plane(normal: Vec3, through: Vec3, weight: f64) -> Self {
+        let d = -normal.dot(through);
+        let a = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
+        Self { a: a * weight, b: normal * (d * weight), c: d * d * weight, shares: weight }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, shares: self.shares + other.shares }
+    }
+
+    /// Mean square distance of `x` to the planes, mm².
+    fn at(&self, x: Vec3) -> f64 {
+        (x.dot(self.a * x) + 2.0 * self.b.dot(x) + self.c).max(0.0) / self.shares.clamp(f64::MIN_POSITIVE, MOST_SHARES)
+    }
+
+    /// The minimum, drawn a little towards `middle`.
+    fn least(&self, middle: Vec3) -> Vec3 {
+        let a = self.a + DMat3::from_diagonal(Vec3::splat(PULL));
+        middle - a.inverse() * (self.a * middle + self.b)
+    }
+}
+
+struct Decimation {
+    /// Points relative to the middle of the mesh.
+    points: Vec<Vec3>,
+    middle: Vec3,
+    /// Start of each half-edge; meaningless for dead ones.
+    start: Vec<u32>,
+    opposite: Vec<HalfEdge>,
+    is_dead: Vec<bool>,
+    /// One half-edge out of each vertex.
+    out: Vec<HalfEdge>,
+    quadrics: Vec<Quadric>,
+    tolerance: Vec<f64>,
+    /// The last round in which a vertex took part in a collapse; [`GONE`] where it was merged into another.
+    round: Vec<u32>,
+}
+
+fn prev(h: HalfEdge) -> HalfEdge {
+    Topology::next(Topology::next(h))
+}
+
+impl Decimation {
+    fn new(mesh: &TriMesh, tolerance_mm: &[f64]) -> Option<Self> {
+        let topology = Topology::of_mesh(mesh)?;
+        let n_half_edges = topology.n_half_edges() as u32;
+        let middle = mesh.bounds().center();
+        let start: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+        let mut out = vec![HalfEdge::MAX; mesh.points.len()];
+        for (h, &v) in start.iter().enumerate() {
+            out[v as usize] = h as HalfEdge;
+        }
+        let mean_area = mesh.area() / mesh.triangles.len().max(1) as f64;
+        let mut quadrics = vec![Quadric::ZERO; mesh.points.len()];
+        for (face, corners) in mesh.triangles.iter().enumerate() {
+            let weight = mesh.face_area(face) / mean_area;
+            let q = Quadric::of_plane(mesh.face_normal(face), mesh.points[corners[0] as usize] - middle, weight);
+            for &v in corners {
+                quadrics[v as usize] = quadrics[v as usize].plus(q);
+            }
+        }
+        let state = Self {
+            points: mesh.points.iter().map(|p| *p - middle).collect(),
+            middle,
+            start,
+            opposite: (0..n_half_edges).map(|h| topology.opposite(h)).collect(),
+            is_dead: vec![false; mesh.triangles.len()],
+            out,
+            quadrics,
+            tolerance: tolerance_mm.to_vec(),
+            round: vec![0; mesh.points.len()],
+        };
+        state.has_disks_only().then_some(state)
+    }
+
+    /// Whether the triangles at each vertex form one fan.
+    fn has_disks_only(&self) -> bool {
+        let n_reached: usize = (0..self.points.len() as u32)
+            .into_par_iter()
+            .filter(|&v| self.out[v as usize] != HalfEdge::MAX)
+            .map(|v| self.around(v).count())
+            .sum();
+        n_reached == self.start.len()
+    }
+
+    fn ends(&self, h: HalfEdge) -> [u32; 2] {
+        [self.start[h as usize], self.start[Topology::next(h) as usize]]
+    }
+
+    /// The half-edges out of `v`.
+    fn around(&self, v: u32) -> impl Iterator<Item = HalfEdge> + '_ {
+        let first = self.out[v as usize];
+        let mut next = Some(first);
+        std::iter::from_fn(move || {
+            let h = next?;
+            let turned = self.opposite[prev(h) as usize];
+            next = (turned != first).then_some(turned);
+            Some(h)
+        })
+    }
+
+    fn is_alive(&self, v: u32) -> bool {
+        self.round[v as usize] != GONE
+    }
+
+    /// Collapses the cheapest edge at `v` among those within `share` of the squared tolerance, if neither end took part
+    /// in a collapse of this round.
+    fn collapse_cheapest(&mut self, v: u32, round: u32, share: f64) {
+        if self.round[v as usize] >= round {
+            return;
+        }
+        let cheapest = self
+            .around(v)
+            .filter(|&h| self.round[self.ends(h)[1] as usize] < round)
+            .filter_map(|h| self.placed(h, share).map(|(at, cost)| (h, at, cost)))
+            .min_by(|a, b| a.2.total_cmp(&b.2));
+        if let Some((h, at, _)) = cheapest
+            && self.may_collapse(h, at)
+        {
+            self.collapse(h, at, round);
+        }
+    }
+
+    /// Where the ends of `h` would meet and what that costs; `None` where the error exceeds `share` of what is tolerated.
+    fn placed(&self, h: HalfEdge, share: f64) -> Option<(Vec3, f64)> {
+        let [u, v] = self.ends(h).map(|x| x as usize);
+        let limit = self.tolerance[u].min(self.tolerance[v]);
+        if limit <= 0.0 {
+            return None;
+        }
+        let q = self.quadrics[u].plus(self.quadrics[v]);
+        let at = q.least(0.5 * (self.points[u] + self.points[v]));
+        let error = q.at(at);
+        let cost = error + SHORT_FIRST * self.points[u].distance_squared(self.points[v]);
+        (error <= share * limit * limit && at.is_finite()).then_some((at, cost))
+    }
+
+    /// Whether the surface stays manifold and no triangle turns over or becomes a needle.
+    fn may_collapse(&self, h: HalfEdge, at: Vec3) -> bool {
+        let [u, v] = self.ends(h);
+        let sides = [h, self.opposite[h as usize]].map(|h| self.start[prev(h) as usize]);
+        let n_common =
+            self.around(u).map(|a| self.ends(a)[1]).filter(|&w| self.around(v).any(|b| self.ends(b)[1] == w)).count();
+        n_common == 2
+            && sides[0] != sides[1]
+            && sides.iter().all(|&w| self.around(w).nth(3).is_some())
+            && [(u, v), (v, u)].iter().all(|&(moved, gone)| self.keeps_shape(moved, gone, at))
+    }
+
+    fn keeps_shape(&self, moved: u32, gone: u32, at: Vec3) -> bool {
+        let p = self.points[moved as usize];
+        self.around(moved).all(|h| {
+            let (b, c) = (self.ends(h)[1], self.start[prev(h) as usize]);
+            if b == gone || c == gone {
+                return true;
+            }
+            let (b, c) = (self.points[b as usize], self.points[c as usize]);
+            let (before, after) = ((b - p).cross(c - p), (b - at).cross(c - at));
+            let (old, new) = (before.length(), after.length());
+            let height = |doubled_area: f64, p: Vec3| {
+                doubled_area / b.distance_squared(c).max(p.distance_squared(b)).max(p.distance_squared(c))
+            };
+            before.dot(after) > LEAST_COS * old * new && height(new, at) >= LEAST_HEIGHT.min(height(old, p))
+        })
+    }
+
+    /// Merges the end of `h` into its start, at `at`.
+    fn collapse(&mut self, h: HalfEdge, at: Vec3, round: u32) {
+        let [u, v] = self.ends(h);
+        let fan: Vec<HalfEdge> = self.around(v).collect();
+        for a in fan {
+            self.start[a as usize] = u;
+        }
+        for side in [h, self.opposite[h as usize]] {
+            let (a, b) = (self.opposite[Topology::next(side) as usize], self.opposite[prev(side) as usize]);
+            self.opposite[a as usize] = b;
+            self.opposite[b as usize] = a;
+            self.is_dead[side as usize / 3] = true;
+            for kept in [a, b] {
+                self.out[self.start[kept as usize] as usize] = kept;
+            }
+        }
+        let [u, v] = [u, v].map(|x| x as usize);
+        self.points[u] = at;
+        self.quadrics[u] = self.quadrics[u].plus(self.quadrics[v]);
+        self.tolerance[u] = self.tolerance[u].min(self.tolerance[v]);
+        (self.round[u], self.round[v]) = (round, GONE);
+    }
+
+    fn finish(self) -> TriMesh {
+        let mut name = vec![u32::MAX; self.points.len()];
+        let mut mesh = TriMesh::default();
+        for (corners, _) in self.start.chunks_exact(3).zip(&self.is_dead).filter(|(_, dead)| !**dead) {
+            let triangle = [corners[0], corners[1], corners[2]].map(|v| {
+                let name = &mut name[v as usize];
+                if *name == u32::MAX {
+                    *name = mesh.points.len() as u32;
+                    mesh.points.push(self.points[v as usize] + self.middle);
+                }
+                *name
+            });
+            mesh.triangles.push(triangle);
+        }
+        mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contour::contour;
+    use crate::{Aabb, Solid};
+
+    fn body(size: f64, distance: impl Fn(Vec3) -> f64 + Sync) -> TriMesh {
+        contour(Aabb { min: Vec3::splat(-size), max: Vec3::splat(size) }, size / 20.0, distance)
+    }
+
+    #[test]
+    fn a_ball_loses_most_triangles_and_stays_a_ball() {
+        let ball = body(11.0, |p| 10.0 - p.length());
+        let n = ball.points.len();
+        let few = decimate(ball.clone(), &vec![0.05; n]);
+        assert!(4 * few.triangles.len() < ball.triangles.len(), "{} of {}", few.triangles.len(), ball.triangles.len());
+        let solid = Solid::new(few).expect("closed");
+        for p in &solid.mesh().points {
+            assert!((p.length() - 10.0).abs() < 0.12, "{}", p.length());
+        }
+        for f in 0..solid.mesh().triangles.len() {
+            assert!((solid.mesh().face_center(f).length() - 10.0).abs() < 0.15);
+        }
+    }
+
+    #[test]
+    fn a_cube_becomes_few_triangles_with_its_corners_kept() {
+        let cube = body(3.0, |p| 2.0 - p.abs().max_element());
+        let n = cube.points.len();
+        let few = decimate(cube.clone(), &vec![1e-6; n]);
+        assert!(10 * few.triangles.len() < cube.triangles.len());
+        assert!((few.signed_volume() - cube.signed_volume()).abs() < 1e-6);
+        assert!(Solid::new(few).is_ok());
+    }
+
+    #[test]
+    fn points_without_tolerance_stay() {
+        let ball = body(11.0, |p| 10.0 - p.length());
+        let tolerance: Vec<f64> = ball.points.iter().map(|p| if p.x > 0.0 { 0.0 } else { 0.1 }).collect();
+        let few = decimate(ball.clone(), &tolerance);
+        let right = |m: &TriMesh| {
+            let mut bits: Vec<[i64; 3]> =
+                m.points.iter().filter(|p| p.x > 0.0).map(|p| p.to_array().map(|x| (x * 1e9).round() as i64)).collect();
+            bits.sort_unstable();
+            bits
+        };
+        assert_eq!(right(&few), right(&ball));
+        assert!(few.points.len() < ball.points.len());
+    }
+
+    #[test]
+    fn a_tetrahedron_and_an_open_sheet_come_back() {
+        let p = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].to_vec();
+        let tetrahedron = TriMesh { points: p.clone(), triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] };
+        let sheet = TriMesh { points: p, triangles: vec![[0, 2, 1]] };
+        assert_eq!(decimate(tetrahedron.clone(), &[9.0; 4]).triangles.len(), 4);
+        assert_eq!(decimate(sheet.clone(), &[9.0; 4]), sheet);
+    }
+}
