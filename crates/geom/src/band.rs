@@ -125,6 +125,11 @@ impl Band {
         self.origin + self.cell_mm * Vec3::new(i, j, k)
     }
 
+    /// Which block of `edge`³ nodes of the whole grid `node` belongs to.
+    pub fn block(&self, node: usize, edge: u16) -> [u16; 3] {
+        self.coords[node].map(|x| x / edge)
+    }
+
     /// The node at grid coordinates `[i, j, k]`, if the band has it.
     pub(crate) fn node_at(&self, [i, j, k]: [i64; 3]) -> Option<u32> {
         let [nx, ny, nz] = self.dims.map(|n| n as i64);

@@ -236,7 +236,7 @@ pub fn make(
     plan: InstallationPlan,
 ) -> Result<Design, DesignError> {
     let rooms = rooms(params, surface);
-    let shell = body::build(ctx, &params.body, model, grid, distances, &plan, &rooms)?;
+    let shell = body::build(ctx, &params.body, grid, distances, &plan, &rooms)?;
     let curves = shell.inner.as_ref().map_or(Vec::new(), |inner| connector::curves(grid, inner, &plan));
     let is_free = has_no_bar(&params.connector, grid, &shell);
     let (runs, contacts) = connector::runs(&params.connector, &plan, &curves, &is_free);

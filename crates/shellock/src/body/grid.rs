@@ -30,6 +30,8 @@ pub struct ShellGrid {
     pub thickness_mm: f64,
     /// Depth to which the band reaches, mm.
     pub reach_mm: f64,
+    /// The model less its cavity.
+    pub wall: Volume,
 }
 
 /// Why the wall cannot be made.
@@ -62,15 +64,13 @@ impl ShellGrid {
         let exact_mm = params.thickness_mm + (OUTSIDE_CELLS + 1.0) * cell;
         let bounds = model.mesh().bounds();
         let (band, depth) = Band::along(&distance, bounds, cell, OUTSIDE_CELLS * cell, reach_mm, exact_mm)?;
-        Ok(Self { band, depth, thickness_mm: params.thickness_mm, reach_mm })
-    }
-
-    /// The region deeper than `depth_mm`.
-    pub fn deeper_than(&self, depth_mm: f64) -> Volume {
-        let field: Vec<f32> = self.depth.iter().map(|d| d - depth_mm as f32).collect();
-        let mesh = contour(&self.band, &field, OffBand::LikeNeighbours);
-        let tolerance = vec![INNER_TOLERANCE_MM; mesh.points.len()];
-        Volume::from_closed_mesh(&decimate(mesh, &tolerance)).expect("contours are manifold")
+        let thickness_mm = params.thickness_mm;
+        let (outer, cavity) = rayon::join(|| Volume::from_solid(model), || deeper_than(&band, &depth, thickness_mm));
+        if cavity.is_empty() {
+            return Err(GridError::NoCavity { thickness_mm });
+        }
+        let wall = outer.map_err(|e| GridError::Surface(e.to_string()))?.subtract(&cavity);
+        Ok(Self { band, depth, thickness_mm, reach_mm, wall })
     }
 
     /// Greatest absolute value kept in fields, mm.
@@ -82,6 +82,14 @@ impl ShellGrid {
     pub(super) fn is_below_wall(&self, node: usize) -> bool {
         f64::from(self.depth[node]) > self.thickness_mm + OUTSIDE_CELLS * self.band.cell_mm()
     }
+}
+
+/// The region deeper than `depth_mm`, with few triangles.
+fn deeper_than(band: &Band, depth: &[f32], depth_mm: f64) -> Volume {
+    let field: Vec<f32> = depth.iter().map(|d| d - depth_mm as f32).collect();
+    let mesh = contour(band, &field, OffBand::LikeNeighbours);
+    let tolerance = vec![INNER_TOLERANCE_MM; mesh.points.len()];
+    Volume::from_closed_mesh(&decimate(mesh, &tolerance)).expect("contours are manifold")
 }
 
 /// A patch and its distance, mm.
@@ -100,6 +108,7 @@ impl PatchDistances {
         let groups: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
         let bvh = TriangleBvh::with_groups(&surface.mesh, &groups);
         let span = 2.0 * f64::from(grid.cutoff_mm());
+        let lonely = LonelyBlocks::find(grid, &bvh, span);
         let chunk = 4096;
         let n = grid.band.len();
         let parts: Vec<(Vec<u32>, Vec<Entry>)> = (0..n.div_ceil(chunk))
@@ -109,6 +118,11 @@ impl PatchDistances {
                 for node in c * chunk..((c + 1) * chunk).min(n) {
                     if grid.is_below_wall(node) {
                         counts.push(0);
+                        continue;
+                    }
+                    if let Some(patch) = lonely.patch_at(grid.band.block(node, BLOCK)) {
+                        counts.push(1);
+                        entries.push((patch, grid.depth[node].abs()));
                         continue;
                     }
                     let limit = f64::from(grid.depth[node].abs()) * 1.0001 + 1e-4 + span;
@@ -148,6 +162,46 @@ impl PatchDistances {
                 if own == f32::INFINITY { -cutoff } else { (0.5 * (others - own)).clamp(-cutoff, cutoff) }
             })
             .collect()
+    }
+}
+
+/// Nodes along an edge of the blocks that are asked for their patches at once.
+const BLOCK: u16 = 4;
+
+/// Blocks of nodes that see one patch alone, most of all: their nodes' distance to it is the depth.
+struct LonelyBlocks {
+    /// Block and patch, sorted by block.
+    patch_of: Vec<([u16; 3], u32)>,
+}
+
+impl LonelyBlocks {
+    /// A node sees the patches that come nearer than its nearest one and `span` mm.
+    fn find(grid: &ShellGrid, bvh: &TriangleBvh, span: f64) -> Self {
+        let is_asked = |&n: &usize| !grid.is_below_wall(n);
+        let mut members: Vec<([u16; 3], u32)> = (0..grid.band.len())
+            .into_par_iter()
+            .filter(is_asked)
+            .map(|n| (grid.band.block(n, BLOCK), n as u32))
+            .collect();
+        members.par_sort_unstable();
+        let blocks: Vec<&[([u16; 3], u32)]> = members.chunk_by(|a, b| a.0 == b.0).collect();
+        let patch_of = blocks
+            .par_iter()
+            .filter_map(|block| {
+                let node = block[block.len() / 2].1 as usize;
+                let radius = f64::from(BLOCK - 1) * 3f64.sqrt() * grid.band.cell_mm();
+                // Whatever a node of the block sees is at most twice the way there farther from this one.
+                let limit = f64::from(grid.depth[node].abs()) * 1.0001 + 1e-4 + span + 2.0 * radius;
+                let mut found = Vec::new();
+                bvh.nearest_by_group(grid.band.position(node), limit * limit, &mut found);
+                (found.len() == 1).then(|| (block[0].0, found[0].0))
+            })
+            .collect();
+        Self { patch_of }
+    }
+
+    fn patch_at(&self, block: [u16; 3]) -> Option<u32> {
+        self.patch_of.binary_search_by_key(&block, |e| e.0).ok().map(|at| self.patch_of[at].1)
     }
 }
 

@@ -8,7 +8,7 @@ use shellock_geom::decimate::decimate;
 use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_cutting};
 use shellock_geom::sweep::Sweeper;
-use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
+use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use super::BodyParams;
 use super::grid::{GridError, LocalField, PatchDistances, ShellGrid};
@@ -48,21 +48,15 @@ pub struct ShellBodies {
     pub barred: IdVec<PatchId, LocalField>,
 }
 
-/// Splits the wall of `model` along the plan. The result is a partition of the wall but for the gap inside the seams.
+/// Splits the wall along the plan. The result is a partition of the wall but for the gap inside the seams.
 pub fn build(
     ctx: &Ctx,
     params: &BodyParams,
-    model: &Solid,
     grid: &ShellGrid,
     distances: &PatchDistances,
     plan: &InstallationPlan,
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<ShellBodies, BodyError> {
-    let outer = Volume::from_solid(model).map_err(|e| GridError::Surface(e.to_string()))?;
-    let cavity = grid.deeper_than(grid.thickness_mm);
-    if cavity.is_empty() {
-        return Err(GridError::NoCavity { thickness_mm: grid.thickness_mm }.into());
-    }
     ctx.stage("cuts", plan.steps.len())?;
     let mut fields = Separation::new(grid, distances, plan.steps.len());
     let mut inner = InnerSurface::new(grid);
@@ -85,8 +79,7 @@ pub fn build(
         ctx.step()?;
     }
     ctx.stage("bodies", plan.steps.len())?;
-    let wall = outer.subtract(&cavity);
-    let mut parts = split(&Splitter { ctx, params, grid }, wall, &cuts)?;
+    let mut parts = split(&Splitter { ctx, params, grid }, grid.wall.clone(), &cuts)?;
     parts.sort_by_key(|(p, _)| *p);
     Ok(ShellBodies {
         bodies: parts.into_iter().map(|(p, part)| whole_body(ctx, p, &part)).collect(),
@@ -306,13 +299,13 @@ impl<'a> Separation<'a> {
     /// Leaves one connected part on each side of the cut: a fragment goes to the side that surrounds it.
     fn give_fragments_back(&self, g: &mut [f32]) {
         let away = 0.3 * self.grid.band.cell_mm() as f32;
-        for side in [1.0f32, -1.0] {
-            let is_member = |n: usize, g: &[f32]| self.wall(n, 0.0) > 0.0 && self.rest[n] > 0.0 && side * g[n] > 0.0;
-            for fragment in minor_components(&self.grid.band, |n| is_member(n, g)) {
-                for n in fragment {
-                    g[n as usize] = -side * away;
-                }
-            }
+        let fragments = |side: f32| {
+            let is_member = |n: usize| self.wall(n, 0.0) > 0.0 && self.rest[n] > 0.0 && side * g[n] > 0.0;
+            minor_components(&self.grid.band, is_member)
+        };
+        let (gained, lost) = rayon::join(|| fragments(1.0), || fragments(-1.0));
+        for (side, fragments) in [(1.0, gained), (-1.0, lost)] {
+            fragments.iter().flatten().for_each(|&n| g[n as usize] = -side * away);
         }
     }
 
@@ -378,7 +371,12 @@ impl InnerSurface {
 
     /// Gives to `p` what lies on its side of the cut `g`.
     fn give(&mut self, p: PatchId, g: &[f32], band: &Band) {
-        let values: Vec<f64> = self.mesh.points.par_iter().map(|&x| band.sample(g, x).unwrap_or(-1.0)).collect();
+        let mut is_open = vec![false; self.mesh.points.len()];
+        for (triangle, _) in self.mesh.triangles.iter().zip(&self.owner).filter(|(_, owner)| owner.is_none()) {
+            triangle.iter().for_each(|&v| is_open[v as usize] = true);
+        }
+        let value = |(&x, open): (&Vec3, &bool)| if *open { band.sample(g, x).unwrap_or(-1.0) } else { -1.0 };
+        let values: Vec<f64> = self.mesh.points.par_iter().zip(&is_open).map(value).collect();
         let cut = cut_at_zero(&self.mesh, &values, |face| self.owner[face].is_none());
         self.owner = cut
             .source_face
