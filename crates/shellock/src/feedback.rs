@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use crate::connector::Contact;
 use crate::pipeline::{Design, Params};
 use crate::plan::{InstallationPlan, PlanConstraints};
 use crate::verify::Finding;
@@ -21,6 +20,10 @@ pub enum Lesson {
         pair: (PatchId, PatchId),
         /// Length of their connectors, mm.
         length_mm: f64,
+        /// Length of the seams between them on the inner side of the wall, mm.
+        seam_mm: f64,
+        /// Length of these on which ends, angles and turns allow connectors, mm.
+        usable_mm: f64,
     },
     /// A piece rubs on its way along a direction.
     RubbingPath {
@@ -28,6 +31,14 @@ pub enum Lesson {
         piece: PatchId,
         /// The direction.
         separation: LatticeDirection,
+        /// The earlier piece that is worst in its way.
+        against: PatchId,
+        /// How far from its place, mm.
+        travel_mm: f64,
+        /// Mean thickness of the overlap, mm.
+        thickness_mm: f64,
+        /// Volume of the overlap, mm³.
+        volume_mm3: f64,
     },
     /// The plan as a whole failed.
     FailedPlan {
@@ -45,8 +56,9 @@ impl Lesson {
             Self::WeakContact { pair, .. } => {
                 constraints.weak_contacts.insert(*pair);
             }
-            Self::RubbingPath { piece, separation } => {
+            Self::RubbingPath { piece, separation, against, .. } => {
                 constraints.forbidden.insert((*piece, *separation));
+                *constraints.rubbed.entry((*piece, *against)).or_default() += 1;
             }
             Self::FailedPlan { plan, .. } => constraints.rejected.push(plan.clone()),
         }
@@ -65,10 +77,14 @@ impl Lesson {
 impl std::fmt::Display for Lesson {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::WeakContact { pair: (a, b), length_mm } => {
-                write!(f, "connectors between pieces {a} and {b} came out only {length_mm:.1} mm long")
-            }
-            Self::RubbingPath { piece, .. } => write!(f, "piece {piece} rubs on its way in"),
+            Self::WeakContact { pair: (a, b), length_mm, seam_mm, usable_mm } => write!(
+                f,
+                "connectors between pieces {a} and {b} came out only {length_mm:.1} mm long; their seam has {seam_mm:.1} mm, {usable_mm:.1} mm of them fit for connectors"
+            ),
+            Self::RubbingPath { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => write!(
+                f,
+                "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
+            ),
             Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
             Self::FailedPlan { loose, .. } => {
                 let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
@@ -87,8 +103,9 @@ pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
     let mut learned = Vec::new();
     for finding in &design.verification.findings {
         match finding {
-            Finding::PathRubs { piece, .. } => {
-                learned.push(Lesson::RubbingPath { piece: *piece, separation: design.plan.separation(*piece) });
+            &Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => {
+                let separation = design.plan.separation(piece);
+                learned.push(Lesson::RubbingPath { piece, separation, against, travel_mm, thickness_mm, volume_mm3 });
             }
             Finding::Loose { piece, .. } => loose.push(*piece),
             Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| m.piece)),
@@ -104,18 +121,20 @@ pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
 
 /// Contacts of loose pieces whose connectors are too short: they must not be counted on again.
 fn weak_contacts(design: &Design, params: &Params, loose: &[PatchId]) -> Vec<Lesson> {
-    let mut length: BTreeMap<(PatchId, PatchId), f64> = BTreeMap::new();
+    let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 3]> = BTreeMap::new();
     let ordered = |a: PatchId, b: PatchId| (a.min(b), a.max(b));
-    for Contact { later, earlier, .. } in &design.contacts {
-        length.entry(ordered(*later, *earlier)).or_default();
+    for contact in &design.contacts {
+        let of_pair = lengths.entry(ordered(contact.later, contact.earlier)).or_default();
+        of_pair[1] += contact.length_mm;
+        of_pair[2] += contact.usable_mm;
     }
     for joint in &design.joints {
-        *length.entry(ordered(joint.male, joint.female)).or_default() += joint.length_mm;
+        lengths.entry(ordered(joint.male, joint.female)).or_default()[0] += joint.length_mm;
     }
-    length
+    lengths
         .into_iter()
         .filter(|((a, b), _)| loose.contains(a) || loose.contains(b))
-        .filter(|(_, length_mm)| *length_mm < LEAST_JOINT * params.connector.size_mm)
-        .map(|(pair, length_mm)| Lesson::WeakContact { pair, length_mm })
+        .filter(|(_, [length_mm, ..])| *length_mm < LEAST_JOINT * params.connector.size_mm)
+        .map(|(pair, [length_mm, seam_mm, usable_mm])| Lesson::WeakContact { pair, length_mm, seam_mm, usable_mm })
         .collect()
 }

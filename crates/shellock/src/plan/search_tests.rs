@@ -61,7 +61,12 @@ fn made_up(n: usize, edges: &[(u32, u32)], share_free: f64, rng: &mut ChaCha8Rng
 
 fn random_joint(rng: &mut ChaCha8Rng) -> Joint {
     let usable = rng.random_range(0.0..1.0);
-    Joint { weight: rng.random_range(0.1..1.1), usable, run_mm: 20.0 * usable, holds: usable > 0.2 }
+    Joint {
+        weight: rng.random_range(0.1..1.1),
+        usable,
+        run_mm: if usable > 0.2 { 20.0 } else { 0.0 },
+        holds: usable > 0.2,
+    }
 }
 
 /// All allowed plans with a key among `keys`, by trying every order and direction; the best cost.

@@ -1,6 +1,6 @@
 //! What a plan is, and what keeps one from being found.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +51,8 @@ pub struct PlanConstraints {
     pub weak_contacts: BTreeSet<(PatchId, PatchId)>,
     /// Directions that a piece must not take, because its path rubbed.
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
+    /// How often a piece rubbed against an earlier one; twice, along two directions, and it must go in before it.
+    pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason that none of the above says.
     pub rejected: Vec<InstallationPlan>,
 }
