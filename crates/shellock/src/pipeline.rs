@@ -169,6 +169,16 @@ struct Kits {
     n_left: usize,
 }
 
+impl Kits {
+    /// Counts a kit and keeps it where it is the best so far.
+    fn add(&mut self, design: Design) {
+        self.n_left -= 1;
+        if self.best.as_ref().is_none_or(|b| failures(&design) < failures(b)) {
+            self.best = Some(design);
+        }
+    }
+}
+
 /// How one segmentation went.
 enum Attempt {
     Passed,
@@ -224,12 +234,9 @@ fn with_segmentation(
         ctx.stage("distances to the patches", 0)?;
         let distances = distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
         let design = make(ctx, params, model, grid, distances, surface, plan)?;
-        kits.n_left -= 1;
         let learned: Vec<Lesson> = lessons(&design, params);
         let passed = design.verification.passed();
-        if kits.best.as_ref().is_none_or(|b| failures(&design) < failures(b)) {
-            kits.best = Some(design);
-        }
+        kits.add(design);
         if passed {
             return Ok(Attempt::Passed);
         }

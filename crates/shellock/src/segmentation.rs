@@ -274,7 +274,8 @@ impl LabelOrigin {
     fn cost(self, labels: &FaceLabels, surface: &SegmentedSurface) -> f64 {
         let (before, after) = (labels.n_patches() as f64, surface.n_patches as f64);
         match self {
-            Self::Automatic => (after - before).abs(),
+            // Fewer pieces are larger than what was asked for, and not only more work.
+            Self::Automatic => (after - before).max(2.0 * (before - after)),
             Self::User => {
                 let n_lost = Changes::between(labels, surface).n_lost() as f64;
                 LOST_LABEL_COST * n_lost + (after + n_lost - before)

@@ -40,7 +40,7 @@ const LOOSE_COST: f64 = 20.0;
 pub struct PlanScore {
     /// Cost of the worst piece plus a smaller part of the mean, about in [0.1, 2.5]; more by up to 25 where one is loose.
     pub value: f64,
-    /// Cost of each piece, in [β, 2 + β).
+    /// Cost of each piece, in [β, 2 + β) and more where others occlude it on its way.
     pub pieces: IdVec<PatchId, f64>,
     /// Estimated overlap, mm³, with which each piece resists the push that it resists least; infinite for the key.
     pub hold_mm3: IdVec<PatchId, f64>,
@@ -75,13 +75,7 @@ pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &Installa
         }
     }
     for (p, cost) in cost.iter_mut().enumerate() {
-        *cost /= length_mm[p].max(f64::MIN_POSITIVE);
-        // The first piece never leaves, and the key slides out along the surface.
-        if position[p] != 0 && position[p] != n - 1 {
-            *cost += inward_cost(survey, PatchId::from(p), separation[p]);
-        }
-        let earlier = (0..n).filter(|&q| position[q] < position[p]).map(PatchId::from);
-        *cost += occluded_cost(survey, PatchId::from(p), separation[p], earlier);
+        *cost = *cost / length_mm[p].max(f64::MIN_POSITIVE) + path_cost(survey, &position, p, separation[p]);
     }
     let worst = cost.iter().copied().fold(0.0, f64::max);
     let mean = cost.iter().sum::<f64>() / n as f64;
@@ -90,6 +84,16 @@ pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &Installa
         (0..n).map(|p| if position[p] == n - 1 { f64::INFINITY } else { f64::from(least(p)) }).collect();
     let value = worst + MEAN_SHARE * mean + loose_cost(&hold_mm3);
     PlanScore { value, pieces: cost.into_iter().collect(), hold_mm3 }
+}
+
+/// Cost of the way of piece `p` along `s`, out of the pieces with a lower `position`.
+fn path_cost(survey: &PlanSurvey, position: &[usize], p: usize, s: crate::LatticeDirection) -> f64 {
+    let piece = PatchId::from(p);
+    // The first piece never leaves, and the key slides out along the surface.
+    let is_between = position[p] != 0 && position[p] != position.len() - 1;
+    let inward = if is_between { inward_cost(survey, piece, s) } else { 0.0 };
+    let earlier = (0..position.len()).filter(|&q| position[q] < position[p]).map(PatchId::from);
+    inward + occluded_cost(survey, piece, s, earlier)
 }
 
 /// Cost of pieces that are held less than they should be: of the loosest one, and a smaller part of the mean.

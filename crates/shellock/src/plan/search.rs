@@ -58,7 +58,7 @@ pub fn search(
         let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys)?;
         if let PlanOutcome::Found(plan) = outcome {
             if i > 0 {
-                warn_of_short_joints(ctx, &plan, sizes * params.connector_size_mm);
+                warn_of_short_joints(ctx, sizes * params.connector_size_mm);
             }
             return Ok(PlanOutcome::Found(plan));
         }
@@ -93,12 +93,11 @@ fn with_any_tolerance(
     }
 }
 
-fn warn_of_short_joints(ctx: &Ctx<'_>, plan: &InstallationPlan, shortest_mm: f64) {
+fn warn_of_short_joints(ctx: &Ctx<'_>, shortest_mm: f64) {
     ctx.warn(Warning {
         code: "short-joints".into(),
         message: format!(
-            "no plan locks with long joints alone; some may now be as short as {shortest_mm:.1} mm, so handle the {} pieces with care",
-            plan.steps.len()
+            "no plan locks with long joints alone, so joints from {shortest_mm:.1} mm on count too; they hold less firmly"
         ),
         pieces: Vec::new(),
         at: None,

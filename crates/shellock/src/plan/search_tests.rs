@@ -187,6 +187,20 @@ fn what_earlier_rounds_forbid_is_kept_to() {
 }
 
 #[test]
+fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
+    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let params = PlanParams { n_plans: 40, ..PlanParams::default() };
+    let mut constraints = PlanConstraints::default();
+    let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("a ball has a plan") };
+    let (earlier, later) = (plan.steps[2].piece, plan.steps[5].piece);
+    constraints.rubbed.insert((later, earlier), 1);
+    assert_eq!(searched(&params, &survey, &constraints), PlanOutcome::Found(plan));
+    constraints.rubbed.insert((later, earlier), 2);
+    let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("enough is left") };
+    assert!(plan.position(later) < plan.position(earlier));
+}
+
+#[test]
 fn who_is_blocked_all_round_is_named_with_the_place() {
     // A pea in its pod cannot be had with free paths: make every direction of every piece blocked.
     let mut survey =

@@ -12,7 +12,7 @@ const MAIN_SHARE: f64 = 0.5;
 pub(super) struct Changes {
     /// For each label the pieces that are mainly its own.
     pieces_of: Vec<Vec<PatchId>>,
-    /// For each piece the labels that lie mainly in it.
+    /// For each piece the labels that lie mainly in it, and the one that it lies mainly in.
     labels_of: Vec<Vec<usize>>,
 }
 
@@ -30,7 +30,7 @@ impl Changes {
         let is_own = |label: usize, piece: usize| common[label][piece] > MAIN_SHARE * of_piece[piece];
         let is_within = |label: usize, piece: usize| common[label][piece] > MAIN_SHARE * of_label[label];
         let own = |label| (0..n_pieces).filter(move |&p| is_own(label, p)).map(PatchId::from).collect();
-        let within = |piece| (0..n_labels).filter(move |&l| is_within(l, piece)).collect();
+        let within = |piece| (0..n_labels).filter(move |&l| is_within(l, piece) || is_own(l, piece)).collect();
         Self { pieces_of: (0..n_labels).map(own).collect(), labels_of: (0..n_pieces).map(within).collect() }
     }
 
