@@ -14,17 +14,8 @@ const LEAST_JOINT: f64 = 1.2;
 /// One thing learned.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lesson {
-    /// The connectors between two pieces came out too short to hold.
-    WeakContact {
-        /// The pieces, lower id first.
-        pair: (PatchId, PatchId),
-        /// Length of their connectors, mm.
-        length_mm: f64,
-        /// Length of the seams between them on the inner side of the wall, mm.
-        seam_mm: f64,
-        /// Length of these on which ends, angles and turns allow connectors, mm.
-        usable_mm: f64,
-    },
+    /// Connectors came out too short to hold.
+    WeakJoints(Vec<WeakJoint>),
     /// A piece rubs on its way along a direction.
     RubbingPath {
         /// The piece.
@@ -49,12 +40,27 @@ pub enum Lesson {
     },
 }
 
+/// What two pieces hold each other by is too little, where the later one leaves along this direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WeakJoint {
+    /// The piece installed later.
+    pub later: PatchId,
+    /// The piece installed earlier.
+    pub earlier: PatchId,
+    /// The later piece's direction.
+    pub separation: LatticeDirection,
+    /// Length of their connectors, mm.
+    pub length_mm: f64,
+    /// Length of their seams on the inner side of the wall, mm.
+    pub seam_mm: f64,
+}
+
 impl Lesson {
     /// Adds what was learned to what plans must respect.
     pub fn teach(&self, constraints: &mut PlanConstraints) {
         match self {
-            Self::WeakContact { pair, .. } => {
-                constraints.weak_contacts.insert(*pair);
+            Self::WeakJoints(joints) => {
+                constraints.weak_joints.extend(joints.iter().map(|j| (j.later, j.earlier, j.separation)));
             }
             Self::RubbingPath { piece, separation, against, .. } => {
                 constraints.forbidden.insert((*piece, *separation));
@@ -67,7 +73,7 @@ impl Lesson {
     /// The pieces whose division may help.
     pub fn blamed(&self) -> Vec<PatchId> {
         match self {
-            Self::WeakContact { .. } => Vec::new(),
+            Self::WeakJoints(_) => Vec::new(),
             Self::RubbingPath { piece, .. } => vec![*piece],
             Self::FailedPlan { loose, .. } => loose.clone(),
         }
@@ -77,10 +83,14 @@ impl Lesson {
 impl std::fmt::Display for Lesson {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::WeakContact { pair: (a, b), length_mm, seam_mm, usable_mm } => write!(
-                f,
-                "connectors between pieces {a} and {b} came out only {length_mm:.1} mm long; their seam has {seam_mm:.1} mm, {usable_mm:.1} mm of them fit for connectors"
-            ),
+            Self::WeakJoints(joints) => {
+                let line = |j: &WeakJoint| {
+                    let WeakJoint { later, earlier, length_mm, seam_mm, .. } = j;
+                    format!("{later} and {earlier} ({length_mm:.1} mm on {seam_mm:.0} mm of seam)")
+                };
+                let list: Vec<String> = joints.iter().map(line).collect();
+                write!(f, "connectors came out too short between pieces {}", list.join(", "))
+            }
             Self::RubbingPath { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => write!(
                 f,
                 "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
@@ -114,27 +124,30 @@ pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
     }
     loose.sort_unstable();
     loose.dedup();
-    learned.extend(weak_contacts(design, params, &loose));
+    learned.extend(weak_joints(design, params).filter(|_| !loose.is_empty()));
     learned.push(Lesson::FailedPlan { plan: design.plan.clone(), loose });
     learned
 }
 
-/// Contacts of loose pieces whose connectors are too short: they must not be counted on again.
-fn weak_contacts(design: &Design, params: &Params, loose: &[PatchId]) -> Vec<Lesson> {
-    let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 3]> = BTreeMap::new();
-    let ordered = |a: PatchId, b: PatchId| (a.min(b), a.max(b));
+/// Pairs whose connectors are too short: they must not be counted on again in this way.
+fn weak_joints(design: &Design, params: &Params) -> Option<Lesson> {
+    let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
+    let by_order = |a: PatchId, b: PatchId| {
+        if design.plan.position(a) > design.plan.position(b) { (a, b) } else { (b, a) }
+    };
     for contact in &design.contacts {
-        let of_pair = lengths.entry(ordered(contact.later, contact.earlier)).or_default();
-        of_pair[1] += contact.length_mm;
-        of_pair[2] += contact.usable_mm;
+        lengths.entry(by_order(contact.later, contact.earlier)).or_default()[1] += contact.length_mm;
     }
     for joint in &design.joints {
-        lengths.entry(ordered(joint.male, joint.female)).or_default()[0] += joint.length_mm;
+        lengths.entry(by_order(joint.male, joint.female)).or_default()[0] += joint.length_mm;
     }
-    lengths
-        .into_iter()
-        .filter(|((a, b), _)| loose.contains(a) || loose.contains(b))
-        .filter(|(_, [length_mm, ..])| *length_mm < LEAST_JOINT * params.connector.size_mm)
-        .map(|(pair, [length_mm, seam_mm, usable_mm])| Lesson::WeakContact { pair, length_mm, seam_mm, usable_mm })
-        .collect()
+    let is_weak = |length_mm: f64| length_mm < LEAST_JOINT * params.connector.size_mm;
+    let weak = lengths.into_iter().filter(|(_, [length_mm, _])| is_weak(*length_mm));
+    let joints: Vec<WeakJoint> = weak
+        .map(|((later, earlier), [length_mm, seam_mm])| {
+            let separation = design.plan.separation(later);
+            WeakJoint { later, earlier, separation, length_mm, seam_mm }
+        })
+        .collect();
+    (!joints.is_empty()).then_some(Lesson::WeakJoints(joints))
 }

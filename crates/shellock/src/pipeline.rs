@@ -64,8 +64,8 @@ impl Params {
     pub fn agreed(&self) -> Self {
         /// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
         const CONTACT_SIZES: f64 = 5.6;
-        /// Seams round thin limbs get the shortest run there is, 1.2, between gaps of 0.9.
-        const LEAST_CONTACT_SIZES: f64 = 3.2;
+        /// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides; below this nothing was left.
+        const LEAST_CONTACT_SIZES: f64 = 4.2;
         let mut p = self.clone();
         p.segmentation.min_contact_mm = CONTACT_SIZES * p.connector.size_mm;
         p.segmentation.least_contact_mm = LEAST_CONTACT_SIZES * p.connector.size_mm;

@@ -123,7 +123,7 @@ impl Draw<'_> {
         for &i in &self.space.contacts_of[usize::from(piece)] {
             let contact = &self.space.survey.contacts[i];
             if rest.contains(contact.other(piece)) {
-                let is_weak = self.space.constraints.weak_contacts.contains(&(contact.a, contact.b));
+                let is_weak = self.space.constraints.is_weak(piece, contact.other(piece), s);
                 cost += contact_cost(self.space.survey, contact, piece, s, is_weak) * contact.length_mm;
                 length_mm += contact.length_mm;
             }

@@ -61,9 +61,9 @@ pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &Installa
     for contact in &survey.contacts {
         let (a, b) = (usize::from(contact.a), usize::from(contact.b));
         let later = if position[a] > position[b] { contact.a } else { contact.b };
-        let is_weak = constraints.weak_contacts.contains(&(contact.a, contact.b));
-        let contact_cost = contact_cost(survey, contact, later, separation[usize::from(later)], is_weak);
         let s = separation[usize::from(later)];
+        let is_weak = constraints.is_weak(later, contact.other(later), s);
+        let contact_cost = contact_cost(survey, contact, later, s, is_weak);
         if let Some(hold) = contact.hold(later, s).filter(|_| !is_weak) {
             for (piece, held) in [later, contact.other(later)].into_iter().zip(hold) {
                 pushed[usize::from(piece)].iter_mut().zip(held).for_each(|(sum, mm3)| *sum += mm3);

@@ -45,7 +45,7 @@ impl<'a> Space<'a> {
             let is_weak = constraints.weak_contacts.contains(&(c.a, c.b));
             for (p, q) in [(c.a, c.b), (c.b, c.a)] {
                 contacts_of[usize::from(p)].push(i);
-                for s in LatticeDirection::all().filter(|&s| !is_weak && c.joint(p, s).holds) {
+                for s in LatticeDirection::all().filter(|&s| c.joint(p, s).holds && !constraints.is_weak(p, q, s)) {
                     let set = &mut joins[usize::from(p)][s.index()];
                     *set = set.union(PieceSet::one(q));
                 }
