@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use crate::connector::Contact;
 use crate::pipeline::{Design, Params};
 use crate::plan::{InstallationPlan, PlanConstraints};
 use crate::verify::Finding;
@@ -15,19 +14,22 @@ const LEAST_JOINT: f64 = 1.2;
 /// One thing learned.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lesson {
-    /// The connectors between two pieces came out too short to hold.
-    WeakContact {
-        /// The pieces, lower id first.
-        pair: (PatchId, PatchId),
-        /// Length of their connectors, mm.
-        length_mm: f64,
-    },
+    /// Connectors came out too short to hold.
+    WeakJoints(Vec<WeakJoint>),
     /// A piece rubs on its way along a direction.
     RubbingPath {
         /// The piece.
         piece: PatchId,
         /// The direction.
         separation: LatticeDirection,
+        /// The earlier piece that is worst in its way.
+        against: PatchId,
+        /// How far from its place, mm.
+        travel_mm: f64,
+        /// Mean thickness of the overlap, mm.
+        thickness_mm: f64,
+        /// Volume of the overlap, mm³.
+        volume_mm3: f64,
     },
     /// The plan as a whole failed.
     FailedPlan {
@@ -38,15 +40,31 @@ pub enum Lesson {
     },
 }
 
+/// What two pieces hold each other by is too little, where the later one leaves along this direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WeakJoint {
+    /// The piece installed later.
+    pub later: PatchId,
+    /// The piece installed earlier.
+    pub earlier: PatchId,
+    /// The later piece's direction.
+    pub separation: LatticeDirection,
+    /// Length of their connectors, mm.
+    pub length_mm: f64,
+    /// Length of their seams on the inner side of the wall, mm.
+    pub seam_mm: f64,
+}
+
 impl Lesson {
     /// Adds what was learned to what plans must respect.
     pub fn teach(&self, constraints: &mut PlanConstraints) {
         match self {
-            Self::WeakContact { pair, .. } => {
-                constraints.weak_contacts.insert(*pair);
+            Self::WeakJoints(joints) => {
+                constraints.weak_joints.extend(joints.iter().map(|j| (j.later, j.earlier, j.separation)));
             }
-            Self::RubbingPath { piece, separation } => {
+            Self::RubbingPath { piece, separation, against, .. } => {
                 constraints.forbidden.insert((*piece, *separation));
+                *constraints.rubbed.entry((*piece, *against)).or_default() += 1;
             }
             Self::FailedPlan { plan, .. } => constraints.rejected.push(plan.clone()),
         }
@@ -55,7 +73,7 @@ impl Lesson {
     /// The pieces whose division may help.
     pub fn blamed(&self) -> Vec<PatchId> {
         match self {
-            Self::WeakContact { .. } => Vec::new(),
+            Self::WeakJoints(_) => Vec::new(),
             Self::RubbingPath { piece, .. } => vec![*piece],
             Self::FailedPlan { loose, .. } => loose.clone(),
         }
@@ -65,10 +83,18 @@ impl Lesson {
 impl std::fmt::Display for Lesson {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::WeakContact { pair: (a, b), length_mm } => {
-                write!(f, "connectors between pieces {a} and {b} came out only {length_mm:.1} mm long")
+            Self::WeakJoints(joints) => {
+                let line = |j: &WeakJoint| {
+                    let WeakJoint { later, earlier, length_mm, seam_mm, .. } = j;
+                    format!("{later} and {earlier} ({length_mm:.1} mm on {seam_mm:.0} mm of seam)")
+                };
+                let list: Vec<String> = joints.iter().map(line).collect();
+                write!(f, "connectors came out too short between pieces {}", list.join(", "))
             }
-            Self::RubbingPath { piece, .. } => write!(f, "piece {piece} rubs on its way in"),
+            Self::RubbingPath { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => write!(
+                f,
+                "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
+            ),
             Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
             Self::FailedPlan { loose, .. } => {
                 let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
@@ -87,8 +113,9 @@ pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
     let mut learned = Vec::new();
     for finding in &design.verification.findings {
         match finding {
-            Finding::PathRubs { piece, .. } => {
-                learned.push(Lesson::RubbingPath { piece: *piece, separation: design.plan.separation(*piece) });
+            &Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => {
+                let separation = design.plan.separation(piece);
+                learned.push(Lesson::RubbingPath { piece, separation, against, travel_mm, thickness_mm, volume_mm3 });
             }
             Finding::Loose { piece, .. } => loose.push(*piece),
             Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| m.piece)),
@@ -97,25 +124,30 @@ pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
     }
     loose.sort_unstable();
     loose.dedup();
-    learned.extend(weak_contacts(design, params, &loose));
+    learned.extend(weak_joints(design, params).filter(|_| !loose.is_empty()));
     learned.push(Lesson::FailedPlan { plan: design.plan.clone(), loose });
     learned
 }
 
-/// Contacts of loose pieces whose connectors are too short: they must not be counted on again.
-fn weak_contacts(design: &Design, params: &Params, loose: &[PatchId]) -> Vec<Lesson> {
-    let mut length: BTreeMap<(PatchId, PatchId), f64> = BTreeMap::new();
-    let ordered = |a: PatchId, b: PatchId| (a.min(b), a.max(b));
-    for Contact { later, earlier, .. } in &design.contacts {
-        length.entry(ordered(*later, *earlier)).or_default();
+/// Pairs whose connectors are too short: they must not be counted on again in this way.
+fn weak_joints(design: &Design, params: &Params) -> Option<Lesson> {
+    let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
+    let by_order = |a: PatchId, b: PatchId| {
+        if design.plan.position(a) > design.plan.position(b) { (a, b) } else { (b, a) }
+    };
+    for contact in &design.contacts {
+        lengths.entry(by_order(contact.later, contact.earlier)).or_default()[1] += contact.length_mm;
     }
     for joint in &design.joints {
-        *length.entry(ordered(joint.male, joint.female)).or_default() += joint.length_mm;
+        lengths.entry(by_order(joint.male, joint.female)).or_default()[0] += joint.length_mm;
     }
-    length
-        .into_iter()
-        .filter(|((a, b), _)| loose.contains(a) || loose.contains(b))
-        .filter(|(_, length_mm)| *length_mm < LEAST_JOINT * params.connector.size_mm)
-        .map(|(pair, length_mm)| Lesson::WeakContact { pair, length_mm })
-        .collect()
+    let is_weak = |length_mm: f64| length_mm < LEAST_JOINT * params.connector.size_mm;
+    let weak = lengths.into_iter().filter(|(_, [length_mm, _])| is_weak(*length_mm));
+    let joints: Vec<WeakJoint> = weak
+        .map(|((later, earlier), [length_mm, seam_mm])| {
+            let separation = design.plan.separation(later);
+            WeakJoint { later, earlier, separation, length_mm, seam_mm }
+        })
+        .collect();
+    (!joints.is_empty()).then_some(Lesson::WeakJoints(joints))
 }

@@ -40,11 +40,13 @@ pub struct Rounds {
     pub kits: usize,
     /// Segmentations mended after the first, at most; 4.
     pub mendings: usize,
+    /// Kits made of all segmentations, at most. ≥ 1; 8.
+    pub kits_in_all: usize,
 }
 
 impl Default for Rounds {
     fn default() -> Self {
-        Self { kits: 4, mendings: 4 }
+        Self { kits: 4, mendings: 4, kits_in_all: 8 }
     }
 }
 
@@ -62,8 +64,13 @@ impl Params {
     pub fn agreed(&self) -> Self {
         /// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
         const CONTACT_SIZES: f64 = 5.6;
+        /// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides; below this nothing was left.
+        const LEAST_CONTACT_SIZES: f64 = 4.2;
         let mut p = self.clone();
         p.segmentation.min_contact_mm = CONTACT_SIZES * p.connector.size_mm;
+        p.segmentation.least_contact_mm = LEAST_CONTACT_SIZES * p.connector.size_mm;
+        p.segmentation.wall_mm = p.body.thickness_mm;
+        p.plan.wall_mm = p.body.thickness_mm;
         p.plan.connector_size_mm = p.connector.size_mm;
         p.plan.clearance_mm = p.connector.clearance_mm;
         p.verify.clearance_mm = p.connector.clearance_mm.max(2.0 * p.body.wall_gap_mm);
@@ -130,28 +137,46 @@ impl From<GridError> for DesignError {
 pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
     let params = &params.agreed();
     let mut surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
-    let mut warned = ctx.take_warnings();
     ctx.stage("grid", 0)?;
     let grid = ShellGrid::new(&params.body, model, params.connector.room_mm())?;
-    let mut best: Option<Design> = None;
-    for mending in 0..=params.rounds.mendings {
-        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &warned, &mut best)?;
-        let blamed = match &attempt {
-            Attempt::Passed => break,
-            Attempt::Failed { blamed, .. } => blamed.clone(),
-        };
-        if mending == params.rounds.mendings {
-            return Ok(finish(best, attempt));
+    let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all };
+    let mut mending = 0;
+    let attempt = loop {
+        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &mut kits)?;
+        let Attempt::Failed { blamed, .. } = &attempt else { break attempt };
+        if mending == params.rounds.mendings || kits.n_left == 0 {
+            break attempt;
         }
-        let Some(mended) = blamed.iter().find_map(|&p| segmentation::divide(ctx, &params.segmentation, &surface, p))
-        else {
-            return Ok(finish(best, attempt));
-        };
+        // Dividing comes first, as it keeps the user's labels; what it did not help by half of the rounds is joined.
+        let is_hopeless = kits.best.is_none() && 2 * mending >= params.rounds.mendings;
+        let divided = || blamed.iter().find_map(|&p| segmentation::divide(ctx, &params.segmentation, &surface, p));
+        let united = || blamed.iter().find_map(|&p| segmentation::unite(ctx, &params.segmentation, &surface, p));
+        let mended = if is_hopeless { united() } else { divided() };
+        let Some(mended) = mended else { break attempt };
         ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
         surface = mended;
-        warned.extend(ctx.take_warnings());
+        mending += 1;
+    };
+    // Warnings of segmentations and plans that were given up go with them.
+    ctx.take_warnings();
+    finish(ctx, params, model, labels, kits.best, attempt)
+}
+
+/// The kits made so far.
+struct Kits {
+    /// The one with the fewest failures, the earliest of several.
+    best: Option<Design>,
+    n_left: usize,
+}
+
+impl Kits {
+    /// Counts a kit and keeps it where it is the best so far.
+    fn add(&mut self, design: Design) {
+        self.n_left -= 1;
+        if self.best.as_ref().is_none_or(|b| failures(&design) < failures(b)) {
+            self.best = Some(design);
+        }
     }
-    Ok(finish(best, Attempt::Passed))
 }
 
 /// How one segmentation went.
@@ -165,47 +190,53 @@ enum Attempt {
     },
 }
 
-fn finish(best: Option<Design>, attempt: Attempt) -> DesignOutcome {
-    match (best, attempt) {
-        (Some(design), _) => DesignOutcome::Made(Box::new(design)),
+fn finish(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    labels: Option<&[i64]>,
+    best: Option<Design>,
+    attempt: Attempt,
+) -> Result<DesignOutcome, DesignError> {
+    Ok(match (best, attempt) {
+        (Some(mut design), _) => {
+            segmentation::tell(ctx, &params.segmentation, model, labels, &design.surface)?;
+            design.warnings.splice(0..0, ctx.take_warnings());
+            DesignOutcome::Made(Box::new(design))
+        }
         (None, Attempt::Failed { reason, blockers, .. }) => DesignOutcome::NoPlan { reason, blockers },
         (None, Attempt::Passed) => unreachable!("what passed was kept"),
-    }
+    })
 }
 
-/// Plans and makes kits of one segmentation until one passes or nothing new can be tried. Keeps the kit with the fewest
-/// failures in `best`.
+/// Plans and makes kits of one segmentation until one passes or nothing new can be tried.
 fn with_segmentation(
     ctx: &Ctx,
     params: &Params,
     model: &Solid,
     grid: &ShellGrid,
     surface: &SegmentedSurface,
-    warned: &[Warning],
-    best: &mut Option<Design>,
+    kits: &mut Kits,
 ) -> Result<Attempt, DesignError> {
     let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams())?;
-    ctx.stage("distances to the patches", 0)?;
-    let distances = PatchDistances::measure(grid, surface);
+    let mut distances: Option<PatchDistances> = None;
     let mut constraints = PlanConstraints::default();
     let mut blamed = Vec::new();
-    for kit in 0..params.rounds.kits {
+    for kit in 0..params.rounds.kits.min(kits.n_left) {
+        ctx.take_warnings();
         let plan = match plan::search(ctx, &params.plan, &survey, &constraints)? {
             PlanOutcome::Found(plan) => plan,
             PlanOutcome::Infeasible { reason, blockers, articulations } => {
-                let pieces = articulations.into_iter().chain(blockers.iter().map(|b| b.piece));
-                blamed.extend(pieces);
+                blamed.splice(0..0, articulations.into_iter().chain(blockers.iter().map(|b| b.piece)));
                 return Ok(Attempt::Failed { reason, blockers, blamed });
             }
         };
-        let mut design = make(ctx, params, model, grid, &distances, surface, plan)?;
-        design.warnings.splice(0..0, warned.iter().cloned());
-        let is_better = best.as_ref().is_none_or(|b| failures(&design) < failures(b));
+        ctx.stage("distances to the patches", 0)?;
+        let distances = distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
+        let design = make(ctx, params, model, grid, distances, surface, plan)?;
         let learned: Vec<Lesson> = lessons(&design, params);
         let passed = design.verification.passed();
-        if is_better {
-            *best = Some(design);
-        }
+        kits.add(design);
         if passed {
             return Ok(Attempt::Passed);
         }

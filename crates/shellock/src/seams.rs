@@ -103,7 +103,15 @@ impl SegmentedSurface {
     /// # Panics
     /// As [`Self::seams`].
     pub fn contact_graph(&self, min_contact_mm: f64) -> ContactGraph {
-        let lengths = self.seams().into_iter().map(|s| (s.a, s.b, s.length()));
+        self.contact_graph_below(0.0, min_contact_mm)
+    }
+
+    /// The same with lengths measured on the inner side of a wall of `wall_mm`, where connectors are.
+    ///
+    /// # Panics
+    /// As [`Self::seams`].
+    pub fn contact_graph_below(&self, wall_mm: f64, min_contact_mm: f64) -> ContactGraph {
+        let lengths = self.seams().into_iter().map(|s| (s.a, s.b, s.length_below(wall_mm)));
         ContactGraph::from_stretches(self.n_patches, min_contact_mm, lengths)
     }
 }

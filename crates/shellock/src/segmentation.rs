@@ -5,6 +5,7 @@
 //! mending most labelled models have no plan that locks (see [`crate::contact_graph`]).
 
 mod auto;
+mod changes;
 mod cut;
 mod dual_graph;
 mod mend;
@@ -18,10 +19,13 @@ use shellock_geom::topology::{components, ends};
 use shellock_geom::{Solid, Topology};
 
 pub use auto::auto_labels;
+pub use changes::tell;
 pub use mend::mend;
 pub use smooth::smooth_and_cut;
 pub use split::split_piece;
 pub use user::user_labels;
+
+use changes::Changes;
 
 use crate::{Cancelled, Ctx, PatchId, SegmentedSurface};
 
@@ -37,6 +41,12 @@ pub struct SegmentationParams {
     pub smoothing_mm2: f64,
     /// Shortest single seam stretch that counts as a contact. [0, 100]; 9: 3.5 connectors of 2.5 mm, as a run loses 1.5 at each end.
     pub min_contact_mm: f64,
+    /// Shortest such stretch where longer ones would take too many pieces. [0, [`min_contact_mm`]]; 9.
+    ///
+    /// [`min_contact_mm`]: Self::min_contact_mm
+    pub least_contact_mm: f64,
+    /// Depth at which those stretches are measured, where connectors are. [0, 10]; 0, the outer surface.
+    pub wall_mm: f64,
     /// Smallest patch, mm². [1, 10 000]; 60: a smaller piece has no room for connectors on two sides. Smaller ones are merged.
     pub min_piece_mm2: f64,
     /// Edges longer than this are halved before patches are drawn. [0.5, 100]; 5: a tenth of a patch's width.
@@ -52,6 +62,8 @@ impl Default for SegmentationParams {
             seed: 0,
             smoothing_mm2: 7.0,
             min_contact_mm: 9.0,
+            least_contact_mm: 9.0,
+            wall_mm: 0.0,
             min_piece_mm2: 60.0,
             max_edge_mm: 5.0,
             max_splits: 40,
@@ -69,6 +81,8 @@ impl SegmentationParams {
         for (name, value, low, high) in [
             ("smoothing_mm2", self.smoothing_mm2, 0.0, 100.0),
             ("min_contact_mm", self.min_contact_mm, 0.0, 100.0),
+            ("least_contact_mm", self.least_contact_mm, 0.0, 100.0),
+            ("wall_mm", self.wall_mm, 0.0, 10.0),
             ("min_piece_mm2", self.min_piece_mm2, 1.0, 10_000.0),
             ("max_edge_mm", self.max_edge_mm, 0.5, 100.0),
         ] {
@@ -192,26 +206,26 @@ impl FaceLabels {
     }
 }
 
-/// Whose patches are changed: a user is told, an automatic choice is just improved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LabelOrigin {
-    /// The user gave one label a triangle.
-    User,
-    /// [`auto_labels`] made them.
-    Automatic,
-}
-
 /// How often mending is repeated with a stricter limit when smoothing shortened a contact below the limit.
 const MAX_MEND_ROUNDS: usize = 4;
 /// How much stricter each repetition is.
 const STRICTER: f64 = 1.15;
 
-/// How many clusterings automatic segmentation tries before it is content with one that hangs together only once.
+/// How many clusterings automatic segmentation tries before it is content with the best so far.
 const MAX_AUTOMATIC_TRIES: u64 = 4;
+
+/// Limits that contacts are held against in turn, from `min_contact_mm` down to `least_contact_mm`.
+const N_CONTACT_LIMITS: usize = 3;
+
+/// What is paid for a fault of the graph, for a label that lost its piece to another, and for each step to shorter contacts, in pieces
+/// that mending may add instead. A kit with a fault does not lock; the other two are a matter of taste.
+const FAULT_COST: f64 = 100.0;
+const LOST_LABEL_COST: f64 = 8.0;
+const SHORTER_COST: f64 = 2.0;
 
 /// The whole stage: labels (the user's, or automatic ones), mended, smoothed and cut; `source_face` names triangles of `solid`.
 ///
-/// Warns `weak-graph` where some piece still holds others alone.
+/// Warns as [`tell`] does.
 pub fn segment(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -220,29 +234,100 @@ pub fn segment(
 ) -> Result<SegmentedSurface, SegmentationError> {
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
     let (fine, source_face) = halve_long_edges(params, solid);
-    let (faults, mut surface) = match given {
-        Some(labels) => held_twice(ctx, params, &fine, labels.inherited(&source_face), LabelOrigin::User)?,
+    let mut surface = match given {
+        Some(labels) => {
+            let labels = labels.inherited(&source_face);
+            let (_, surface) = best_contacts(ctx, params, &fine, &labels, LabelOrigin::User)?;
+            surface
+        }
         None => {
-            let mut best: Option<(usize, SegmentedSurface)> = None;
+            let mut best: Option<(f64, SegmentedSurface)> = None;
             for attempt in 0..MAX_AUTOMATIC_TRIES {
                 let reseeded = SegmentationParams { seed: params.seed.wrapping_add(attempt << 32), ..params.clone() };
                 let labels = auto_labels(ctx, &reseeded, &fine)?;
-                let (faults, surface) = held_twice(ctx, params, &fine, labels, LabelOrigin::Automatic)?;
-                if best.as_ref().is_none_or(|b| faults < b.0) {
-                    best = Some((faults, surface));
+                let (cost, surface) = best_contacts(ctx, params, &fine, &labels, LabelOrigin::Automatic)?;
+                let enough = LabelOrigin::Automatic.good_cost(labels.n_patches());
+                if best.as_ref().is_none_or(|b| cost < b.0) {
+                    best = Some((cost, surface));
                 }
-                if faults == 0 {
+                if cost <= enough {
                     break;
                 }
             }
-            best.expect("there is at least one try")
+            best.expect("there is at least one try").1
         }
     };
-    if faults > 0 {
-        warn_weak_graph(ctx, &surface.contact_graph(params.min_contact_mm));
-    }
     surface.source_face.iter_mut().for_each(|f| *f = source_face[*f as usize]);
+    tell(ctx, params, solid, labels, &surface)?;
     Ok(surface)
+}
+
+/// Whose patches are changed: a user wants to find the labels again, an automatic choice should have the number of pieces asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LabelOrigin {
+    User,
+    Automatic,
+}
+
+impl LabelOrigin {
+    /// What the changes from `labels` to `surface` cost, in pieces.
+    fn cost(self, labels: &FaceLabels, surface: &SegmentedSurface) -> f64 {
+        let (before, after) = (labels.n_patches() as f64, surface.n_patches as f64);
+        match self {
+            // Fewer pieces are larger than what was asked for, and not only more work.
+            Self::Automatic => (after - before).max(2.0 * (before - after)),
+            Self::User => {
+                let n_lost = Changes::between(labels, surface).n_lost() as f64;
+                LOST_LABEL_COST * n_lost + (after + n_lost - before)
+            }
+        }
+    }
+
+    /// A cost with which nothing else is tried, for `n` patches in the beginning.
+    fn good_cost(self, n: usize) -> f64 {
+        match self {
+            Self::Automatic => 2.0 + 0.25 * n as f64,
+            Self::User => f64::max(4.0, 0.5 * n as f64),
+        }
+    }
+}
+
+/// The limits that contacts are held against in turn, mm.
+fn contact_limits(params: &SegmentationParams) -> Vec<f64> {
+    let (most, least) = (params.min_contact_mm, params.least_contact_mm.min(params.min_contact_mm));
+    let step = (most - least) / (N_CONTACT_LIMITS - 1) as f64;
+    let mut limits: Vec<f64> = (0..N_CONTACT_LIMITS).map(|i| most - step * i as f64).collect();
+    limits.dedup();
+    limits
+}
+
+/// The limit that the contacts of `surface` keep, mm: the longest with which the fewest pieces hold others alone.
+fn kept_limit_mm(params: &SegmentationParams, surface: &SegmentedSurface) -> f64 {
+    let faults = |limit_mm: &f64| surface.contact_graph_below(params.wall_mm, *limit_mm).n_faults();
+    contact_limits(params).into_iter().min_by_key(faults).expect("there is at least one limit")
+}
+
+/// Mends `labels` for long contacts, and for shorter ones where those cost too much; the cheapest surface and its cost.
+fn best_contacts(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    solid: &Solid,
+    labels: &FaceLabels,
+    origin: LabelOrigin,
+) -> Result<(f64, SegmentedSurface), SegmentationError> {
+    let mut best: Option<(f64, SegmentedSurface)> = None;
+    for (i, limit_mm) in contact_limits(params).into_iter().enumerate() {
+        let limited = SegmentationParams { min_contact_mm: limit_mm, ..params.clone() };
+        let (faults, surface) = held_twice(ctx, &limited, solid, labels.clone())?;
+        let cost = FAULT_COST * faults as f64 + origin.cost(labels, &surface) + SHORTER_COST * i as f64;
+        if best.as_ref().is_none_or(|b| cost < b.0) {
+            best = Some((cost, surface));
+        }
+        if cost <= origin.good_cost(labels.n_patches()) {
+            break;
+        }
+    }
+    Ok(best.expect("there is at least one limit"))
 }
 
 /// Mends, smooths and cuts until the smooth seams hold every piece twice; the best round and its faults where none does.
@@ -251,14 +336,13 @@ fn held_twice(
     params: &SegmentationParams,
     solid: &Solid,
     mut labels: FaceLabels,
-    origin: LabelOrigin,
 ) -> Result<(usize, SegmentedSurface), SegmentationError> {
     let mut strict = params.clone();
     let mut best: Option<(usize, SegmentedSurface)> = None;
     for _ in 0..MAX_MEND_ROUNDS {
-        labels = mend(ctx, &strict, solid, &labels, origin)?;
+        labels = mend(ctx, &strict, solid, &labels)?;
         let surface = smooth_and_cut(ctx, params, solid, &labels)?;
-        let faults = surface.contact_graph(params.min_contact_mm).n_faults();
+        let faults = surface.contact_graph_below(params.wall_mm, params.min_contact_mm).n_faults();
         if best.as_ref().is_none_or(|b| faults < b.0) {
             best = Some((faults, surface));
         }
@@ -279,27 +363,44 @@ pub fn divide(
     surface: &SegmentedSurface,
     patch: PatchId,
 ) -> Option<SegmentedSurface> {
+    changed(ctx, params, surface, |solid, labels| split_piece(solid, labels, patch))
+}
+
+/// The same surface with `patch` joined to the neighbour it has the longest seam with, mended and smoothed again; `None` where there
+/// would be one piece left.
+///
+/// The feedback loop asks for this where dividing did not help. Patches may be renumbered.
+pub fn unite(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    surface: &SegmentedSurface,
+    patch: PatchId,
+) -> Option<SegmentedSurface> {
+    let graph = surface.contact_graph(0.0);
+    let touching = graph.contacts().iter().filter(|c| c.a == patch || c.b == patch);
+    let longest = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm))?;
+    let into = if longest.a == patch { longest.b } else { longest.a };
+    changed(ctx, params, surface, |solid, labels| {
+        let label: Vec<u32> = labels.as_slice().iter().map(|&k| if k == patch.0 { into.0 } else { k }).collect();
+        let joined = FaceLabels::from_connected(&Topology::new(solid), &label);
+        (joined.n_patches() > 1).then_some(joined)
+    })
+}
+
+fn changed(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    surface: &SegmentedSurface,
+    change: impl Fn(&Solid, &FaceLabels) -> Option<FaceLabels>,
+) -> Option<SegmentedSurface> {
+    let limited = SegmentationParams { min_contact_mm: kept_limit_mm(params, surface), ..params.clone() };
     let solid = Solid::new(surface.mesh.clone()).ok()?;
     let label: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
     let labels = FaceLabels::from_connected(&Topology::new(&solid), &label);
-    let divided = split_piece(&solid, &labels, patch)?;
-    let mended = mend(ctx, params, &solid, &divided, LabelOrigin::Automatic).ok()?;
+    let mended = mend(ctx, &limited, &solid, &change(&solid, &labels)?).ok()?;
     let mut next = smooth_and_cut(ctx, params, &solid, &mended).ok()?;
     next.source_face.iter_mut().for_each(|f| *f = surface.source_face[*f as usize]);
     Some(next)
-}
-
-fn warn_weak_graph(ctx: &Ctx, graph: &crate::ContactGraph) {
-    let pieces = graph.articulation_pieces();
-    let list = pieces.iter().map(|p| format!("\"{p}\"")).collect::<Vec<_>>().join(", ");
-    ctx.warn(crate::Warning {
-        code: "weak-graph".into(),
-        message: format!(
-            "pieces {list} alone hold others, which may come loose: give other labels or raise max_splits"
-        ),
-        pieces,
-        at: None,
-    });
 }
 
 /// Halves edges until none is longer than the limit, which grows with models far larger than 300 mm to bound their triangles.

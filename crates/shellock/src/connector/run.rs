@@ -6,6 +6,7 @@ use super::frame::Curve;
 use super::{ConnectorParams, Section};
 use crate::PatchId;
 use crate::plan::InstallationPlan;
+use crate::plan::contact::end_gap_mm;
 
 /// Steepest backward angle T that gives a sound pin, rad: 60°.
 const STEEPEST: f64 = 1.047;
@@ -15,8 +16,6 @@ const SHALLOWEST: f64 = 0.9;
 const ROLE_HYSTERESIS: f64 = 0.1;
 /// Frames that turn by more than this between neighbouring points, rad, cannot be swept.
 const SHARPEST_TURN: f64 = 0.42;
-/// Free seam at the ends of a curve, in connector sizes: other seams' connectors come there.
-const END_GAP: f64 = 1.5;
 /// Shortest run, in connector sizes.
 const SHORTEST_RUN: f64 = 1.2;
 /// A cell of a run may leave its curve by this much, mm, turn by this much, rad, and be this long, mm.
@@ -156,7 +155,7 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool) -> St
 fn allowed(params: &ConnectorParams, curve: &Curve, stations: &[Station], later_is_male: &[bool]) -> Vec<bool> {
     let n = stations.len();
     let length = stations[n - 1].arc_mm;
-    let end = END_GAP * params.size_mm;
+    let end = end_gap_mm(params.size_mm, length);
     let turns = |i: usize, j: usize| stations[i].n.dot(stations[j].n) < SHARPEST_TURN.cos();
     (0..n)
         .map(|i| {

@@ -10,19 +10,23 @@
 //!      ───p───┼───q───▶ v
 //! ```
 //!
-//! Limits: seams lie on the outer surface, connectors on the inner one, where carving may shift the line.
+//! Limits: seams lie on the outer surface, connectors on the inner one, where carving may shift the line; what else than the two pieces is
+//! in a connector's way shows only later.
 
+mod bars;
 mod hold;
 
+use rayon::prelude::*;
 use shellock_geom::Vec3;
 
+use bars::{Barred, Bars};
 pub use hold::{HoldTable, N_PUSHES, Pushes};
 
 use super::PlanParams;
 use crate::{LatticeDirection, PatchId, Seam, SegmentedSurface};
 
 /// Distance between samples of a seam, mm: below the size of any connector.
-const SAMPLE_STEP_MM: f64 = 2.0;
+const SAMPLE_STEP_MM: f64 = 1.0;
 
 /// Most `|s · u|` that a connector bears; beyond, it is too shallow to hold.
 const MAX_ALONG_SEAM: f64 = 0.9;
@@ -33,13 +37,21 @@ const MAX_BACKWARD_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// How clearly, as `|s · N|`, a sample must ask for the other male piece before a run of connectors ends there.
 const ROLE_HYSTERESIS: f64 = 0.1;
 
-/// Room kept free at both ends of an open seam, where three pieces meet, in connector sizes D.
-const END_MARGIN_SIZES: f64 = 1.5;
+/// Room kept free at both ends of an open seam, where three pieces meet, in connector sizes D: least, most, and in between the share of
+/// the seam. The connectors of three seams have room side by side with the most; with the least they take a part of each other.
+const END_GAP_SIZES: [f64; 2] = [0.9, 1.5];
+const END_GAP_SHARE: f64 = 0.27;
 
-/// Shortest run of connectors that holds, in connector sizes D.
+/// Room kept free of connectors of `size_mm` at both ends of an open seam of `length_mm` on the inner side of the wall, mm.
+pub fn end_gap_mm(size_mm: f64, length_mm: f64) -> f64 {
+    (END_GAP_SHARE * length_mm).clamp(END_GAP_SIZES[0] * size_mm, END_GAP_SIZES[1] * size_mm)
+}
+
+/// Shortest runs of connectors that count as holding, in connector sizes D: the first is asked for as long as plans exist with it.
 ///
-/// With both end margins an open seam must be 5.5 D long. A cat's piece whose connectors were too short came loose.
-const SHORTEST_RUN_SIZES: f64 = 2.5;
+/// With the gaps at its ends an open seam must be 5.5, 4.1 or 3 D long. A cat's piece whose connectors were too short came loose. Thin
+/// limbs have no longer seams than for the last, the shortest run that is made; what turns and carving leave of it, a kit must show.
+pub(super) const SHORTEST_RUN_SIZES: [f64; 3] = [2.5, 1.85, 1.2];
 
 /// What the seams between two pieces offer for one order and one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,7 +64,7 @@ pub struct Joint {
     pub usable: f64,
     /// Longest single run of connectors, mm.
     pub run_mm: f64,
-    /// Whether that run is long enough to hold.
+    /// Whether that run is long enough to hold, see [`Contact::count_runs_from`].
     pub holds: bool,
 }
 
@@ -80,6 +92,7 @@ struct Sample {
     length_mm: f64,
     /// Whether it is far enough from the ends of an open seam.
     has_room: bool,
+    barred: Barred,
 }
 
 impl Contact {
@@ -88,14 +101,22 @@ impl Contact {
         &self.joints[usize::from(later != self.a)][s.index()]
     }
 
-    /// What the two hold each other by in that case; `None` for contacts out of nothing.
+    /// What the two hold each other by in that case; `None` where the joint does not hold and for contacts out of nothing.
     pub fn hold(&self, later: PatchId, s: LatticeDirection) -> Option<&Pushes> {
+        if !self.joint(later, s).holds {
+            return None;
+        }
         self.hold.pushes(usize::from(later != self.a), s)
     }
 
     /// The piece of the contact that is not `piece`.
     pub fn other(&self, piece: PatchId) -> PatchId {
         if piece == self.a { self.b } else { self.a }
+    }
+
+    /// Lets exactly the joints hold whose run is at least `shortest_mm` long; not shorter than the survey's shortest of all.
+    pub fn count_runs_from(&mut self, shortest_mm: f64) {
+        self.joints.iter_mut().flatten().for_each(|j| j.holds = j.run_mm >= shortest_mm);
     }
 
     /// Whether any order and direction makes a joint that holds.
@@ -114,10 +135,12 @@ impl Contact {
 /// The contacts of all pairs that share a seam, sorted by pair.
 pub fn contacts(params: &PlanParams, surface: &SegmentedSurface, seams: &[Seam]) -> Vec<Contact> {
     let edges = patch_border(surface);
-    let mut sampled: Vec<(PatchId, PatchId, Vec<Sample>, bool)> = seams
-        .iter()
-        .map(|seam| (seam.a, seam.b, samples(params, seam, a_is_left(seam, &edges)), seam.is_loop()))
-        .collect();
+    let bars = Bars::new(params, surface);
+    let sampled = |seam: &Seam| {
+        let found = samples(params, seam, a_is_left(seam, &edges), bars.as_ref());
+        (seam.a, seam.b, found, seam.is_loop())
+    };
+    let mut sampled: Vec<(PatchId, PatchId, Vec<Sample>, bool)> = seams.par_iter().map(sampled).collect();
     sampled.sort_by_key(|s| (s.0, s.1));
     sampled.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).filter_map(|group| contact(params, group)).collect()
 }
@@ -132,20 +155,22 @@ fn contact(params: &PlanParams, seams: &[(PatchId, PatchId, Vec<Sample>, bool)])
     let joints: [[Joint; LatticeDirection::COUNT]; 2] = [1.0, -1.0].map(|side| {
         std::array::from_fn(|i| {
             // The frame of b later than a is that of a later with v turned round.
-            let s = LatticeDirection::all().nth(i).expect("26 directions").unit();
+            let s = LatticeDirection::all().nth(i).expect("26 directions");
             joint(params, &lines, side, s)
         })
     });
-    let hold = HoldTable::new(params, &lines, |order, s| joints[order][s.index()].holds);
+    let least_mm = SHORTEST_RUN_SIZES[SHORTEST_RUN_SIZES.len() - 1] * params.connector_size_mm;
+    let hold = HoldTable::new(params, &lines, |order, s| joints[order][s.index()].run_mm >= least_mm);
     Some(Contact { a: *a, b: *b, length_mm, joints, hold })
 }
 
 /// What `lines` offer along `s`; `side` = 1 where the piece with the lower id is later, else −1.
-fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: Vec3) -> Joint {
+fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: LatticeDirection) -> Joint {
     let (mut weight, mut usable, mut length_mm, mut run_mm) = (0.0, 0.0, 0.0, 0.0_f64);
     for &(samples, is_loop) in lines {
         for x in samples {
-            let w = s.dot(x.tangent).abs().max((side * s.dot(x.across)).max(0.0)) + params.beta;
+            let along = s.unit();
+            let w = along.dot(x.tangent).abs().max((side * along.dot(x.across)).max(0.0)) + params.beta;
             weight += w * x.length_mm;
             length_mm += x.length_mm;
             if carries(x, side, s) {
@@ -154,26 +179,30 @@ fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: Vec3) -
         }
         run_mm = run_mm.max(longest_run_mm(samples, is_loop, side, s));
     }
-    let holds = run_mm >= SHORTEST_RUN_SIZES * params.connector_size_mm;
+    let holds = run_mm >= SHORTEST_RUN_SIZES[0] * params.connector_size_mm;
     Joint { weight: weight / length_mm, usable: usable / length_mm, run_mm, holds }
 }
 
 /// Whether a connector can be made at `x`.
-fn carries(x: &Sample, side: f64, s: Vec3) -> bool {
+fn carries(x: &Sample, side: f64, s: LatticeDirection) -> bool {
+    if x.barred.has(usize::from(side < 0.0), s) {
+        return false;
+    }
+    let s = s.unit();
     // s' is s without its part along the seam; where q is the male piece both s and v turn, so their product stays.
     let (outwards, towards_female) = (s.dot(x.normal).abs(), side * s.dot(x.across));
     x.has_room && s.dot(x.tangent).abs() <= MAX_ALONG_SEAM && towards_female.atan2(outwards) <= MAX_BACKWARD_RAD
 }
 
 /// Length of the longest row of samples that carry connectors with the same male piece.
-fn longest_run_mm(samples: &[Sample], is_loop: bool, side: f64, s: Vec3) -> f64 {
+fn longest_run_mm(samples: &[Sample], is_loop: bool, side: f64, s: LatticeDirection) -> f64 {
     // A loop is walked twice, so that a run across its first point is seen whole; no run is longer than the loop.
     let whole: f64 = samples.iter().map(|x| x.length_mm).sum();
     let rounds = if is_loop { 2 } else { 1 };
     let (mut longest, mut run) = (0.0_f64, 0.0_f64);
     let mut role = 0.0;
     for x in samples.iter().cycle().take(rounds * samples.len()) {
-        let outwards = s.dot(x.normal);
+        let outwards = s.unit().dot(x.normal);
         let flips = role * outwards < 0.0 && outwards.abs() > ROLE_HYSTERESIS;
         if flips || role == 0.0 {
             role = outwards.signum();
@@ -189,42 +218,27 @@ fn longest_run_mm(samples: &[Sample], is_loop: bool, side: f64, s: Vec3) -> f64 
     longest.min(whole)
 }
 
-/// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame.
-fn samples(params: &PlanParams, seam: &Seam, a_is_left: bool) -> Vec<Sample> {
-    let total = seam.length();
-    if seam.points.len() < 2 || seam.normals.len() != seam.points.len() || total <= 0.0 || !total.is_finite() {
-        return Vec::new();
-    }
-    let n = (total / SAMPLE_STEP_MM).ceil().max(1.0);
-    let margin = if seam.is_loop() { 0.0 } else { END_MARGIN_SIZES * params.connector_size_mm };
-    let stations: Vec<(Vec3, Vec3)> = resampled(seam, total, n as usize);
-    let mut out = Vec::with_capacity(n as usize);
-    for (i, w) in stations.windows(2).enumerate() {
+/// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame; lengths are those on the inner side of the wall.
+fn samples(params: &PlanParams, seam: &Seam, a_is_left: bool, bars: Option<&Bars<'_>>) -> Vec<Sample> {
+    let n = (seam.length() / SAMPLE_STEP_MM).ceil().max(1.0);
+    let stations: Vec<(Vec3, Vec3)> = seam.resampled(n as usize);
+    let inner = seam.below(params.wall_mm, seam.length() / n);
+    let lengths: Vec<f64> = inner.windows(2).map(|w| w[0].distance(w[1])).collect();
+    let total: f64 = lengths.iter().sum();
+    let margin = if seam.is_loop() { 0.0 } else { end_gap_mm(params.connector_size_mm, total) };
+    let mut out = Vec::with_capacity(lengths.len());
+    let mut before = 0.0;
+    for (w, length_mm) in stations.windows(2).zip(lengths) {
+        let middle = before + 0.5 * length_mm;
+        before += length_mm;
         let Some(tangent) = (w[1].0 - w[0].0).try_normalize() else { continue };
         let Some(normal) = (w[0].1 + w[1].1).reject_from_normalized(tangent).try_normalize() else { continue };
-        let middle = (i as f64 + 0.5) * total / n;
         let has_room = middle >= margin && middle <= total - margin;
         // N × u points to the left, where the surface is seen from outside.
         let across = if a_is_left { -normal.cross(tangent) } else { normal.cross(tangent) };
-        out.push(Sample { tangent, normal, across, length_mm: total / n, has_room });
-    }
-    out
-}
-
-/// `n` + 1 points and normals at equal distances along the seam.
-fn resampled(seam: &Seam, total: f64, n: usize) -> Vec<(Vec3, Vec3)> {
-    let mut out = Vec::with_capacity(n + 1);
-    let (mut i, mut before) = (0, 0.0);
-    for k in 0..=n {
-        let target = total * k as f64 / n as f64;
-        let mut step = seam.points[i].distance(seam.points[i + 1]);
-        while before + step < target && i + 2 < seam.points.len() {
-            before += step;
-            i += 1;
-            step = seam.points[i].distance(seam.points[i + 1]);
-        }
-        let t = if step > 0.0 { ((target - before) / step).clamp(0.0, 1.0) } else { 0.0 };
-        out.push((seam.points[i].lerp(seam.points[i + 1], t), seam.normals[i].lerp(seam.normals[i + 1], t)));
+        let barred = |bars: &Bars<'_>| bars.at([seam.a, seam.b], 0.5 * (w[0].0 + w[1].0), normal, across);
+        let barred = bars.filter(|_| has_room).map(barred).unwrap_or_default();
+        out.push(Sample { tangent, normal, across, length_mm, has_room, barred });
     }
     out
 }
@@ -341,8 +355,8 @@ mod tests {
         };
         let params = PlanParams::default();
         let up = |length_mm: f64| {
-            let samples = samples(&params, &line(length_mm), true);
-            joint(&params, &[(&samples, false)], 1.0, Vec3::Z)
+            let samples = samples(&params, &line(length_mm), true, None);
+            joint(&params, &[(&samples, false)], 1.0, LatticeDirection::nearest(Vec3::Z))
         };
         assert!((up(40.0).run_mm - 32.5).abs() <= SAMPLE_STEP_MM);
         assert!(up(40.0).holds && !up(12.0).holds);

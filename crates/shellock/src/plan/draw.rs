@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::cluster::{DirectedJoint, loose_part_fused};
 use super::key::KeyChoice;
-use super::score::{contact_cost, inward_cost};
+use super::score::{contact_cost, inward_cost, occluded_cost};
 use super::space::Space;
 use super::{InstallationPlan, InstallationStep, PieceSet};
 use crate::{LatticeDirection, PatchId};
@@ -123,11 +123,14 @@ impl Draw<'_> {
         for &i in &self.space.contacts_of[usize::from(piece)] {
             let contact = &self.space.survey.contacts[i];
             if rest.contains(contact.other(piece)) {
-                let is_weak = self.space.constraints.weak_contacts.contains(&(contact.a, contact.b));
+                let is_weak = self.space.constraints.is_weak(piece, contact.other(piece), s);
                 cost += contact_cost(self.space.survey, contact, piece, s, is_weak) * contact.length_mm;
                 length_mm += contact.length_mm;
             }
         }
-        cost / f64::max(length_mm, f64::MIN_POSITIVE) + inward_cost(self.space.survey, piece, s)
+        let survey = self.space.survey;
+        cost / f64::max(length_mm, f64::MIN_POSITIVE)
+            + inward_cost(survey, piece, s)
+            + occluded_cost(survey, piece, s, rest.iter())
     }
 }

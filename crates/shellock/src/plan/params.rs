@@ -13,6 +13,8 @@ pub struct PlanParams {
     pub seed: u64,
     /// Connector size D that seams must have room for. [1, 10]; 2.5.
     pub connector_size_mm: f64,
+    /// Wall thickness: seams are as long as on the inner side of the wall, where connectors are. [0, 10]; 0, the outer surface.
+    pub wall_mm: f64,
     /// Gap between mating faces. [0.03, 0.6]; 0.12. What a push must cross before it is resisted.
     pub clearance_mm: f64,
     /// Floor β of the connector weight (Eq. 4). [0, 1]; 0.1.
@@ -42,6 +44,7 @@ impl Default for PlanParams {
         Self {
             seed: 0,
             connector_size_mm: 2.5,
+            wall_mm: 0.0,
             clearance_mm: 0.12,
             beta: 0.1,
             occlusion_tolerance: 0.01,
@@ -64,6 +67,7 @@ impl PlanParams {
             }
         };
         range("connector_size_mm", self.connector_size_mm, 1.0, 10.0);
+        range("wall_mm", self.wall_mm, 0.0, 10.0);
         range("clearance_mm", self.clearance_mm, 0.03, 0.6);
         range("beta", self.beta, 0.0, 1.0);
         range("occlusion_tolerance", self.occlusion_tolerance, 0.0, 0.2);

@@ -12,6 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::contact::SHORTEST_RUN_SIZES;
 use super::draw::{Drawn, draw};
 use super::improve::improve;
 use super::key::{KeyChoice, choices};
@@ -36,8 +37,9 @@ const FIRST_STREAM: u64 = 1 << 32;
 
 /// The best plan found for `survey` under `constraints`, or why there is none.
 ///
-/// Warns with `occlusion-tolerance-raised` and `key-not-flat`. Not promised: that the plan is the best there is, or that
-/// none exists where none was found (but where the reason is the contacts', none does).
+/// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised`, `short-joints` and
+/// `key-not-flat`. Not promised: that the plan is the best there is, or that none exists where none was found (but where the reason is
+/// the contacts', none does).
 pub fn search(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -48,23 +50,58 @@ pub fn search(
     if let Some(reason) = out_of_range(survey.n_pieces) {
         return Ok(PlanOutcome::Infeasible { reason, blockers: Vec::new(), articulations: Vec::new() });
     }
+    let keys = choices(params, survey);
+    let mut first_answer = None;
+    for (i, sizes) in SHORTEST_RUN_SIZES.into_iter().enumerate() {
+        let mut counted = survey.clone();
+        counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes * params.connector_size_mm));
+        let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys)?;
+        if let PlanOutcome::Found(plan) = outcome {
+            if i > 0 {
+                warn_of_short_joints(ctx, sizes * params.connector_size_mm);
+            }
+            return Ok(PlanOutcome::Found(plan));
+        }
+        // What is wrong with all joints that hold well says best what to change.
+        first_answer.get_or_insert(outcome);
+    }
+    Ok(first_answer.expect("there is at least one length"))
+}
+
+fn with_any_tolerance(
+    ctx: &Ctx<'_>,
+    params: &PlanParams,
+    survey: &PlanSurvey,
+    constraints: &PlanConstraints,
+    keys: &[KeyChoice],
+) -> Result<PlanOutcome, Cancelled> {
     let strict = Space::new(survey, constraints, params.occlusion_tolerance);
     if let Some(outcome) = diagnose::structural(&strict) {
         return Ok(outcome);
     }
-    let keys = choices(params, survey);
-    if let Ok((plan, key)) = with_any_key(ctx, params, &strict, &keys)? {
+    if let Ok((plan, key)) = with_any_key(ctx, params, &strict, keys)? {
         warn_of(ctx, &plan, key, None);
         return Ok(PlanOutcome::Found(plan));
     }
     let relaxed = Space::new(survey, constraints, params.relaxed_tolerance);
-    match with_any_key(ctx, params, &relaxed, &keys)? {
+    match with_any_key(ctx, params, &relaxed, keys)? {
         Ok((plan, key)) => {
             warn_of(ctx, &plan, key, Some(params.relaxed_tolerance));
             Ok(PlanOutcome::Found(plan))
         }
         Err(stuck) => Ok(diagnose::stuck(&relaxed, stuck)),
     }
+}
+
+fn warn_of_short_joints(ctx: &Ctx<'_>, shortest_mm: f64) {
+    ctx.warn(Warning {
+        code: "short-joints".into(),
+        message: format!(
+            "no plan locks with long joints alone, so joints from {shortest_mm:.1} mm on count too; they hold less firmly"
+        ),
+        pieces: Vec::new(),
+        at: None,
+    });
 }
 
 fn out_of_range(n_pieces: usize) -> Option<String> {

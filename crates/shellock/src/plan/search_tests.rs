@@ -61,7 +61,12 @@ fn made_up(n: usize, edges: &[(u32, u32)], share_free: f64, rng: &mut ChaCha8Rng
 
 fn random_joint(rng: &mut ChaCha8Rng) -> Joint {
     let usable = rng.random_range(0.0..1.0);
-    Joint { weight: rng.random_range(0.1..1.1), usable, run_mm: 20.0 * usable, holds: usable > 0.2 }
+    Joint {
+        weight: rng.random_range(0.1..1.1),
+        usable,
+        run_mm: if usable > 0.2 { 20.0 } else { 0.0 },
+        holds: usable > 0.2,
+    }
 }
 
 /// All allowed plans with a key among `keys`, by trying every order and direction; the best cost.
@@ -179,6 +184,20 @@ fn what_earlier_rounds_forbid_is_kept_to() {
     let weak = survey.contacts.iter().filter(|c| c.a == PatchId(0)).map(|c| (c.a, c.b));
     constraints.weak_contacts.extend(weak);
     assert!(matches!(searched(&params, &survey, &constraints), PlanOutcome::Infeasible { .. }));
+}
+
+#[test]
+fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
+    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let params = PlanParams { n_plans: 40, ..PlanParams::default() };
+    let mut constraints = PlanConstraints::default();
+    let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("a ball has a plan") };
+    let (earlier, later) = (plan.steps[2].piece, plan.steps[5].piece);
+    constraints.rubbed.insert((later, earlier), 1);
+    assert_eq!(searched(&params, &survey, &constraints), PlanOutcome::Found(plan));
+    constraints.rubbed.insert((later, earlier), 2);
+    let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("enough is left") };
+    assert!(plan.position(later) < plan.position(earlier));
 }
 
 #[test]

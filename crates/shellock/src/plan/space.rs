@@ -7,6 +7,10 @@ use crate::{LatticeDirection, PatchId};
 /// Per piece and direction.
 type ByDirection<T> = Vec<[T; LatticeDirection::COUNT]>;
 
+/// How often a piece may rub against an earlier one before another order is asked for: the seam between the two is then at fault, not
+/// the direction.
+const MOST_RUBS: usize = 2;
+
 /// What the search asks, in bits. Holds at most [`PieceSet::MAX_PIECES`] pieces.
 pub(super) struct Space<'a> {
     pub survey: &'a PlanSurvey,
@@ -28,7 +32,9 @@ impl<'a> Space<'a> {
         let ids = || (0..n).map(PatchId::from);
         let blocks = ids()
             .map(|p| {
-                let blockers = |s| ids().filter(|&q| q != p && survey.occlusion.share(p, q, s) > tolerance).collect();
+                let rubs = |q| constraints.rubbed.get(&(p, q)).is_some_and(|&times| times >= MOST_RUBS);
+                let is_blocked = |q, s| survey.occlusion.share(p, q, s) > tolerance || rubs(q);
+                let blockers = |s| ids().filter(|&q| q != p && is_blocked(q, s)).collect();
                 by_direction(blockers)
             })
             .collect();
@@ -39,7 +45,7 @@ impl<'a> Space<'a> {
             let is_weak = constraints.weak_contacts.contains(&(c.a, c.b));
             for (p, q) in [(c.a, c.b), (c.b, c.a)] {
                 contacts_of[usize::from(p)].push(i);
-                for s in LatticeDirection::all().filter(|&s| !is_weak && c.joint(p, s).holds) {
+                for s in LatticeDirection::all().filter(|&s| c.joint(p, s).holds && !constraints.is_weak(p, q, s)) {
                     let set = &mut joins[usize::from(p)][s.index()];
                     *set = set.union(PieceSet::one(q));
                 }

@@ -1,6 +1,6 @@
 //! What a plan is, and what keeps one from being found.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -49,10 +49,22 @@ impl InstallationPlan {
 pub struct PlanConstraints {
     /// Pairs (lower id first) whose connectors came out too small to hold: they touch, but join nothing.
     pub weak_contacts: BTreeSet<(PatchId, PatchId)>,
+    /// The same for a later piece, an earlier one and the direction of the later one alone; along others they may hold.
+    pub weak_joints: BTreeSet<(PatchId, PatchId, LatticeDirection)>,
     /// Directions that a piece must not take, because its path rubbed.
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
+    /// How often a piece rubbed against an earlier one; twice, along two directions, and it must go in before it.
+    pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason that none of the above says.
     pub rejected: Vec<InstallationPlan>,
+}
+
+impl PlanConstraints {
+    /// Whether nothing joins the two where `later` leaves along `s`.
+    pub fn is_weak(&self, later: PatchId, earlier: PatchId, s: LatticeDirection) -> bool {
+        let pair = (later.min(earlier), later.max(earlier));
+        self.weak_contacts.contains(&pair) || self.weak_joints.contains(&(later, earlier, s))
+    }
 }
 
 /// `by` prevents `piece` from leaving.

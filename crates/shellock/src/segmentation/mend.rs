@@ -1,15 +1,16 @@
 //! Makes all patches disks and their contacts 2-connected, by dividing the patches that stand in the way.
 //!
 //! A piece that alone holds others is divided through its seam with them, so that two pieces hold them; a ring around a limb is divided
-//! lengthwise, as it could hardly be put on otherwise. See [`crate::contact_graph`] for why.
+//! lengthwise, as it could hardly be put on otherwise. See [`crate::contact_graph`] for why. Where no division helps, because the seam is
+//! too short for two contacts, what hangs on a piece is joined to it.
 
 use shellock_geom::{HalfEdge, Solid, Topology};
 
 use super::dual_graph::{CreaseCost, DualGraph};
-use super::split::{Divider, euler_characteristics, raw_contact_graph};
-use super::{FaceLabels, LabelOrigin, SegmentationError, SegmentationParams};
+use super::split::{Divider, Division, euler_characteristics, raw_contact_graph};
+use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::seams::seam_half_edges;
-use crate::{ContactGraph, Ctx, PatchId, Warning};
+use crate::{ContactGraph, Ctx, PatchId};
 
 /// How much longer a seam along triangle edges is than the smooth one: 4/π for random directions on a square grid.
 const ZIGZAG: f64 = 1.27;
@@ -17,17 +18,19 @@ const ZIGZAG: f64 = 1.27;
 /// How much larger than the smallest piece a half must be, as smoothing takes from narrow patches.
 const SPLIT_RESERVE: f64 = 2.0;
 
+/// Divisions in a row that may leave as many faults as before: a handle or a patch with several holes needs some before one helps.
+const MAX_IDLE_DIVISIONS: usize = 3;
+
 /// The labels with patches divided until each is a disk and no piece alone holds others, or until `max_splits` or `min_piece_mm2`
-/// forbid more. Pieces that touch nothing long enough join a neighbour. Old patches keep their numbers unless some are joined.
+/// forbid more. Pieces that touch nothing long enough join a neighbour, and so do those that hang on one piece by a seam too short for
+/// two contacts. Old patches keep their numbers unless some are joined.
 ///
-/// Warns `piece-split` and `piece-joined` where the labels are the user's. The result may still fall short; ask
-/// [`SegmentedSurface::contact_graph`](crate::SegmentedSurface::contact_graph).
+/// The result may still fall short; ask [`SegmentedSurface::contact_graph`](crate::SegmentedSurface::contact_graph).
 pub fn mend(
     ctx: &Ctx,
     params: &SegmentationParams,
     solid: &Solid,
     labels: &FaceLabels,
-    origin: LabelOrigin,
 ) -> Result<FaceLabels, SegmentationError> {
     let topology = Topology::new(solid);
     let faces = DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE);
@@ -43,24 +46,26 @@ pub fn mend(
         n_patches: labels.n_patches(),
         min_contact_mm: params.min_contact_mm * ZIGZAG,
     };
+    let mut best = (work.n_faults(), FaceLabels { patch_of_face: work.label.clone(), n_patches: work.n_patches });
+    let mut n_idle = 0;
     for _ in 0..params.max_splits {
         ctx.check()?;
         let seam = work.seam();
         let graph = work.graph(&seam);
         if let Some((loose, into)) = weakest_link(&work, &graph) {
-            work.warn(
-                ctx,
-                origin,
-                "piece-joined",
-                loose,
-                "touches its neighbours too shortly for a connector and joins one",
-            );
             work.join(loose, into);
-        } else if !work.divide_worst(ctx, origin, &seam, &graph) {
+        } else if !work.divide_worst(&seam, &graph, n_idle < MAX_IDLE_DIVISIONS) && !work.join_hanging(&seam, &graph) {
             break;
         }
+        let n_faults = work.n_faults();
+        if n_faults < best.0 {
+            best = (n_faults, FaceLabels { patch_of_face: work.label.clone(), n_patches: work.n_patches });
+            n_idle = 0;
+        } else {
+            n_idle += 1;
+        }
     }
-    Ok(FaceLabels { patch_of_face: work.label, n_patches: work.n_patches })
+    Ok(best.1)
 }
 
 struct Work<'a> {
@@ -76,8 +81,7 @@ fn weakest_link(work: &Work, graph: &ContactGraph) -> Option<(u32, u32)> {
     if parts.len() < 2 || graph.n_patches() <= 2 {
         return None;
     }
-    let mut areas = vec![0.0; work.n_patches];
-    work.label.iter().enumerate().for_each(|(f, &k)| areas[k as usize] += work.divider.faces.area[f]);
+    let areas = work.areas();
     let area = |part: &[PatchId]| part.iter().map(|p| areas[p.0 as usize]).sum::<f64>();
     let smallest = parts.iter().min_by(|p, q| area(p).total_cmp(&area(q)))?;
     let crossing = graph.contacts().iter().filter(|c| smallest.contains(&c.a) != smallest.contains(&c.b));
@@ -95,57 +99,78 @@ impl Work<'_> {
         raw_contact_graph(&self.divider, &self.label, self.n_patches, seam, self.min_contact_mm)
     }
 
-    /// Divides the patch with most faults that can be divided; false where there is none.
-    fn divide_worst(&mut self, ctx: &Ctx, origin: LabelOrigin, seam: &[HalfEdge], graph: &ContactGraph) -> bool {
+    fn areas(&self) -> Vec<f64> {
+        let mut areas = vec![0.0; self.n_patches];
+        self.label.iter().enumerate().for_each(|(f, &k)| areas[k as usize] += self.divider.faces.area[f]);
+        areas
+    }
+
+    /// By how much each patch differs from a disk.
+    fn holes(&self) -> Vec<usize> {
         let euler = euler_characteristics(self.divider.mesh, self.divider.topology, &self.label, self.n_patches);
-        let mut faulty: Vec<(usize, u32)> = Vec::new();
-        for (k, &characteristic) in euler.iter().enumerate() {
-            let hanging = graph.parts_without(PatchId::from(k)).len().saturating_sub(1);
-            let faults = (1 - characteristic).unsigned_abs() as usize + hanging;
-            if faults > 0 {
-                faulty.push((faults, k as u32));
+        euler.into_iter().map(|characteristic| (1 - characteristic).unsigned_abs() as usize).collect()
+    }
+
+    /// Faults of the graph and of all patches.
+    fn n_faults(&self) -> usize {
+        self.graph(&self.seam()).n_faults() + self.holes().iter().sum::<usize>()
+    }
+
+    /// Divides the patch with most faults whose division leaves fewer of them, or, `may_idle`, a patch that is no disk in any way;
+    /// false where there is none.
+    fn divide_worst(&mut self, seam: &[HalfEdge], graph: &ContactGraph, may_idle: bool) -> bool {
+        let holes = self.holes();
+        let hanging = |k: usize| graph.parts_without(PatchId::from(k)).len().saturating_sub(1);
+        let mut faulty: Vec<(usize, u32)> = (0..self.n_patches).map(|k| (holes[k] + hanging(k), k as u32)).collect();
+        faulty.retain(|&(faults, _)| faults > 0);
+        faulty.sort_by_key(|&(faults, k)| (std::cmp::Reverse(faults), k));
+        let mut idle = None;
+        for (_, patch) in faulty {
+            let n_before = graph.n_faults() + holes[patch as usize];
+            let Some(division) = self.best_division(seam, graph, patch) else { continue };
+            if division.n_faults < n_before as f64 {
+                self.apply(&division);
+                return true;
+            }
+            if may_idle && holes[patch as usize] > 0 {
+                idle = idle.or(Some(division));
             }
         }
+        idle.is_some_and(|division| {
+            self.apply(&division);
+            true
+        })
+    }
+
+    fn apply(&mut self, division: &Division) {
+        division.moved.iter().for_each(|&f| self.label[f as usize] = self.n_patches as u32);
+        self.n_patches += 1;
+    }
+
+    /// The best way to divide `patch`, mostly through its seams with what hangs on it.
+    fn best_division(&mut self, seam: &[HalfEdge], graph: &ContactGraph, patch: u32) -> Option<Division> {
         let n_parts = graph.parts().len();
-        faulty.sort_by_key(|&(faults, k)| (std::cmp::Reverse(faults), k));
-        for (_, patch) in faulty {
-            let parts = graph.parts_without(PatchId(patch));
-            // A part that no counted contact ties to this patch cannot be reached by dividing it.
-            let pairs: Vec<[u32; 2]> = if parts.len() > 1 {
-                parts.iter().filter_map(|s| self.far_points(seam, patch, s)).collect()
-            } else {
-                Vec::new()
-            };
-            let n = self.n_patches;
-            let (divider, min_contact_mm) = (&self.divider, self.min_contact_mm);
-            let faults = |label: &[u32], inner: &[HalfEdge]| {
-                // Numbers grew, so an old seam edge may now have its higher number on its own side.
-                let all = seam.iter().chain(inner).map(|&h| {
-                    let o = divider.topology.opposite(h);
-                    if label[h as usize / 3] < label[o as usize / 3] { h } else { o }
-                });
-                let seams: Vec<HalfEdge> = all.collect();
-                let after = raw_contact_graph(divider, label, n + 1, &seams, min_contact_mm);
-                // A half that nothing holds would be joined again, and so on without end.
-                if after.parts().len() > n_parts { f64::INFINITY } else { after.n_faults() as f64 }
-            };
-            let Some(division) = divider.best(&mut self.label, n, patch, &pairs, faults) else { continue };
-            self.warn(
-                ctx,
-                origin,
-                "piece-split",
-                patch,
-                if parts.len() > 1 {
-                    "alone would hold other pieces, which could then slide off together, and is divided"
-                } else {
-                    "is not a disk but has holes or runs around a limb, so it could not be put on, and is divided"
-                },
-            );
-            division.moved.iter().for_each(|&f| self.label[f as usize] = n as u32);
-            self.n_patches += 1;
-            return true;
-        }
-        false
+        let parts = graph.parts_without(PatchId(patch));
+        // A part that no counted contact ties to this patch cannot be reached by dividing it.
+        let pairs: Vec<[u32; 2]> = if parts.len() > 1 {
+            parts.iter().filter_map(|s| self.far_points(seam, patch, s)).collect()
+        } else {
+            Vec::new()
+        };
+        let n = self.n_patches;
+        let (divider, min_contact_mm) = (&self.divider, self.min_contact_mm);
+        let faults = |label: &[u32], inner: &[HalfEdge]| {
+            // Numbers grew, so an old seam edge may now have its higher number on its own side.
+            let all = seam.iter().chain(inner).map(|&h| {
+                let o = divider.topology.opposite(h);
+                if label[h as usize / 3] < label[o as usize / 3] { h } else { o }
+            });
+            let seams: Vec<HalfEdge> = all.collect();
+            let after = raw_contact_graph(divider, label, n + 1, &seams, min_contact_mm);
+            // A half that nothing holds would be joined again, and so on without end.
+            if after.parts().len() > n_parts { f64::INFINITY } else { after.n_faults() as f64 }
+        };
+        divider.best(&mut self.label, n, patch, &pairs, faults)
     }
 
     /// Two triangles of `patch`, far apart along its seam with the pieces of `part`.
@@ -167,6 +192,49 @@ impl Work<'_> {
         Some([one, farthest(one)?])
     }
 
+    /// Joins a piece that hangs on another to it, or one to the piece it holds alone: of the pairs that leave the fewest faults the one
+    /// with the smallest piece. False where none leaves fewer.
+    fn join_hanging(&mut self, seam: &[HalfEdge], graph: &ContactGraph) -> bool {
+        if self.n_patches <= 2 {
+            return false;
+        }
+        let articulations = graph.articulation_pieces();
+        let areas = self.areas();
+        let n_before = graph.n_faults() + self.holes().iter().sum::<usize>();
+        let mut best: Option<(usize, f64, u32, u32)> = None;
+        for contact in graph.contacts().iter().filter(|c| graph.counts(c)) {
+            if !articulations.contains(&contact.a) && !articulations.contains(&contact.b) {
+                continue;
+            }
+            let (a, b) = (contact.a.0, contact.b.0);
+            let (small, large) = if areas[a as usize] <= areas[b as usize] { (a, b) } else { (b, a) };
+            let n_faults = self.faults_if_joined(seam, small, large);
+            let area = areas[small as usize];
+            if n_faults < n_before && best.is_none_or(|x| (n_faults, area) < (x.0, x.1)) {
+                best = Some((n_faults, area, small, large));
+            }
+        }
+        best.is_some_and(|(_, _, small, large)| {
+            self.join(small, large);
+            true
+        })
+    }
+
+    fn faults_if_joined(&self, seam: &[HalfEdge], small: u32, large: u32) -> usize {
+        let last = self.n_patches as u32 - 1;
+        let number = |k: u32| if k == small { large } else { k };
+        let number = |k: u32| if number(k) == last && small != last { small } else { number(k) };
+        let label: Vec<u32> = self.label.iter().map(|&k| number(k)).collect();
+        let side = |h: HalfEdge| label[h as usize / 3];
+        let oriented = seam.iter().map(|&h| (h, self.divider.topology.opposite(h)));
+        let seam: Vec<HalfEdge> =
+            oriented.filter(|&(h, o)| side(h) != side(o)).map(|(h, o)| if side(h) < side(o) { h } else { o }).collect();
+        let n = self.n_patches - 1;
+        let graph = raw_contact_graph(&self.divider, &label, n, &seam, self.min_contact_mm);
+        let euler = euler_characteristics(self.divider.mesh, self.divider.topology, &label, n);
+        graph.n_faults() + euler.into_iter().map(|x| (1 - x).unsigned_abs() as usize).sum::<usize>()
+    }
+
     /// Gives `loose` to `into`; the last number takes the one that became free.
     fn join(&mut self, loose: u32, into: u32) {
         let last = self.n_patches as u32 - 1;
@@ -177,18 +245,5 @@ impl Work<'_> {
         }
         self.label.iter_mut().filter(|k| **k == last).for_each(|k| *k = loose);
         self.n_patches -= 1;
-    }
-
-    fn warn(&self, ctx: &Ctx, origin: LabelOrigin, code: &str, patch: u32, what: &str) {
-        if origin == LabelOrigin::Automatic {
-            return;
-        }
-        let face = self.label.iter().position(|&k| k == patch);
-        ctx.warn(Warning {
-            code: code.into(),
-            message: format!("piece \"{patch}\" {what}"),
-            pieces: vec![PatchId(patch)],
-            at: face.map(|f| self.divider.mesh.face_center(f).to_array()),
-        });
     }
 }

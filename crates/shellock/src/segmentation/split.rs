@@ -20,6 +20,9 @@ const UNEVENNESS: f64 = 1.5;
 /// What the new seam weighs, in roots of the patch's area: 1 for a square cut along its side.
 const SEAM_LENGTH: f64 = 0.3;
 
+/// Most parts around a patch for which seams through two of them at once are tried, as their number grows with the square.
+const MOST_PAIRED: usize = 10;
+
 /// A labelled mesh whose patches can be divided.
 pub(super) struct Divider<'a> {
     pub mesh: &'a TriMesh,
@@ -31,6 +34,8 @@ pub(super) struct Divider<'a> {
 /// A way to divide a patch: the triangles of the part that gets a new number.
 pub(super) struct Division {
     pub cost: f64,
+    /// What is wrong with the topology afterwards.
+    pub n_faults: f64,
     pub moved: Vec<u32>,
 }
 
@@ -78,11 +83,12 @@ impl Divider<'_> {
                 let length: f64 = seam.iter().map(|&h| self.edge_length(h)).sum();
                 let euler = euler_characteristics(self.mesh, self.topology, label, n_patches + 1);
                 let holes: i64 = [patch as usize, n_patches].iter().map(|&p| (1 - euler[p]).abs()).sum();
-                let cost = FAULT * (holes as f64 + faults(label, &seam))
+                let n_faults = holes as f64 + faults(label, &seam);
+                let cost = FAULT * n_faults
                     + UNEVENNESS * ((area - 2.0 * moved_mm2) / area).powi(2)
                     + SEAM_LENGTH * length / area.sqrt();
                 if cost.is_finite() && best.as_ref().is_none_or(|b| cost < b.cost) {
-                    best = Some(Division { cost, moved });
+                    best = Some(Division { cost, n_faults, moved });
                 }
             }
             members.iter().for_each(|&f| label[f as usize] = patch);
@@ -114,7 +120,8 @@ impl Divider<'_> {
         })
     }
 
-    /// What is nearer to the second point of each pair; also of the two ends of the patch.
+    /// What is nearer to the second point of each pair; also of the two ends of the patch. For every two pairs also what is nearer to one
+    /// point of each than to the others: a seam through two limbs at once.
     fn voronoi_halves(&self, label: &[u32], members: &[u32], pairs: &[[u32; 2]]) -> Vec<Vec<u32>> {
         let patch = label[members[0] as usize];
         let inside = |f: u32| label[f as usize] == patch;
@@ -125,12 +132,21 @@ impl Divider<'_> {
         };
         let end = farthest_from(members[0]);
         let ends = [end, farthest_from(end)];
-        let all = pairs.iter().chain([&ends]).filter(|p| p[0] != p[1]);
-        all.map(|&[p, q]| {
-            let (_, owner) = self.faces.grow(&[(p, 1.0), (q, 1.0)], inside);
-            members.iter().copied().filter(|&f| owner[f as usize] == 1).collect()
-        })
-        .collect()
+        let mut sources: Vec<Vec<u32>> = pairs.iter().chain([&ends]).map(|p| p.to_vec()).collect();
+        // With two parts in all, the rest and what hangs, one seam is all there is to go through.
+        for (i, p) in pairs.iter().enumerate().filter(|_| (3..=MOST_PAIRED).contains(&pairs.len())) {
+            sources.extend(
+                pairs[..i].iter().flat_map(|q| [[q[0], p[0], q[1], p[1]], [q[0], p[1], q[1], p[0]]].map(Vec::from)),
+            );
+        }
+        let nearer_to_second = |sources: Vec<u32>| {
+            let n_first = sources.len() / 2;
+            let sources: Vec<(u32, f64)> = sources.into_iter().map(|f| (f, 1.0)).collect();
+            let (_, owner) = self.faces.grow(&sources, inside);
+            let is_second = |f: &u32| (n_first..sources.len()).contains(&(owner[*f as usize] as usize));
+            members.iter().copied().filter(is_second).collect()
+        };
+        sources.into_iter().filter(|s| s[0] != s[s.len() / 2]).map(nearer_to_second).collect()
     }
 
     /// Makes both halves connected: what is not in the largest part of its half joins the other one.

@@ -97,6 +97,35 @@ fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
     assert_patches_are_connected(&surface);
 }
 
+/// Segments the arms' labels with limits between which a seam half round an arm lies.
+fn segment_thin_arms(least_contact_mm: f64) -> (SegmentationParams, SegmentedSurface, Vec<crate::Warning>) {
+    let solid = limbed();
+    let params = SegmentationParams { min_contact_mm: 45.0, least_contact_mm, ..Default::default() };
+    let (surface, warnings) = with_ctx(|ctx| {
+        let surface = segment(ctx, &params, &solid, Some(&arm_labels(&solid))).unwrap();
+        (surface, ctx.take_warnings())
+    });
+    (params, surface, warnings)
+}
+
+#[test]
+fn arms_too_thin_for_two_contacts_join_their_neighbour_and_the_user_is_told_where() {
+    let (params, surface, warnings) = segment_thin_arms(45.0);
+    assert!(surface.n_patches < 5);
+    assert!(surface.contact_graph(params.min_contact_mm).is_two_connected());
+    assert!(warnings.iter().any(|w| w.code == "piece-joined" && w.at.is_some()));
+    assert_patches_are_connected(&surface);
+}
+
+#[test]
+fn shorter_contacts_count_before_labels_are_joined_and_the_user_is_told() {
+    let (params, surface, warnings) = segment_thin_arms(15.0);
+    assert!(surface.n_patches > 5);
+    assert!(surface.contact_graph(params.least_contact_mm).is_two_connected());
+    let codes: Vec<&str> = warnings.iter().map(|w| w.code.as_str()).collect();
+    assert_eq!(codes, ["piece-split", "short-contacts"]);
+}
+
 #[test]
 fn other_numbers_for_the_same_patches_give_the_same_seams() {
     let solid = limbed();

@@ -74,7 +74,7 @@ impl HoldTable {
             let mut held = [[0.0; N_PUSHES]; 2];
             let side = if order == 0 { 1.0 } else { -1.0 };
             if holds(order, s) {
-                for x in lines.iter().flat_map(|l| l.0).filter(|x| carries(x, side, s.unit())) {
+                for x in lines.iter().flat_map(|l| l.0).filter(|x| carries(x, side, s)) {
                     add(params, x, side, s.unit(), &pushes, &mut held);
                 }
             }

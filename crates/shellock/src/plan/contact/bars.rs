@@ -1,0 +1,100 @@
+//! Which connectors of a pair would have the other piece's wall in their way.
+//!
+//! Below the wall, half a connector deep, each piece has its half. The later piece's half must not meet the earlier piece on its way out;
+//! nor may the later piece's far wall sweep over the earlier piece's half:
+//!
+//! ```text
+//!   ─────a──────┬──────b─────        a later, leaving along s: barred where
+//!          x_a  │  x_b               the ray from x_a along s meets b, or
+//!                                    the ray from x_b along −s meets a
+//!   ─────a─────────────b─────
+//! ```
+//!
+//! Round thin limbs, where the far wall is near, this leaves little more than the limb's axis. Limits: only the two pieces of the seam are
+//! looked at, as the order of the others is not known yet.
+
+use shellock_geom::Vec3;
+use shellock_geom::bvh::TriangleBvh;
+
+use crate::plan::PlanParams;
+use crate::{LatticeDirection, PatchId, SegmentedSurface};
+
+/// Where a half connector is looked at, in connector sizes: below the wall and beside the seam.
+const DEPTH_SIZES: f64 = 0.5;
+const BESIDE_SIZES: f64 = 0.5;
+/// The wall above the connector is no obstacle: what the ray meets within this multiple of the distance to a flat one.
+const LOCAL_WALL: f64 = 1.3;
+/// Least cosine between a ray and the surface normal at which the ray leaves through the wall above.
+const LEAVES_ABOVE: f64 = 0.3;
+/// Walls that a ray is followed through, and the step past each, mm.
+const MOST_WALLS: usize = 8;
+const PAST_WALL_MM: f64 = 0.01;
+
+/// The surface as rays see it.
+pub(super) struct Bars<'a> {
+    surface: &'a SegmentedSurface,
+    bvh: TriangleBvh,
+    wall_mm: f64,
+    size_mm: f64,
+    far_mm: f64,
+}
+
+/// A bit for each order (0 where the piece with the lower id is later) and direction that is barred.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Barred(u64);
+
+impl Barred {
+    /// Whether the later piece cannot leave along `s` with a connector here.
+    pub fn has(self, order: usize, s: LatticeDirection) -> bool {
+        self.0 >> (order * LatticeDirection::COUNT + s.index()) & 1 == 1
+    }
+}
+
+impl<'a> Bars<'a> {
+    /// `None` where walls have no thickness, so that there is no room to look at.
+    pub fn new(params: &PlanParams, surface: &'a SegmentedSurface) -> Option<Self> {
+        (params.wall_mm > 0.0).then(|| Self {
+            surface,
+            bvh: TriangleBvh::new(&surface.mesh),
+            wall_mm: params.wall_mm,
+            size_mm: params.connector_size_mm,
+            far_mm: surface.mesh.bounds().diagonal(),
+        })
+    }
+
+    /// What bars a connector between `a` and `b` below `point` of the outer surface; `across` leads from a to b.
+    pub fn at(&self, [a, b]: [PatchId; 2], point: Vec3, normal: Vec3, across: Vec3) -> Barred {
+        let below = point - (self.wall_mm + DEPTH_SIZES * self.size_mm) * normal;
+        let beside = BESIDE_SIZES * self.size_mm * across;
+        let (in_a, in_b) = (below - beside, below + beside);
+        let mut barred = 0;
+        for s in LatticeDirection::all() {
+            let back = s.opposite();
+            if self.meets(in_a, normal, s, b) {
+                barred |= 1 << s.index() | 1 << (LatticeDirection::COUNT + back.index());
+            }
+            if self.meets(in_b, normal, s, a) {
+                barred |= 1 << back.index() | 1 << (LatticeDirection::COUNT + s.index());
+            }
+        }
+        Barred(barred)
+    }
+
+    /// Whether the ray from `origin` along `s` meets `patch`, the wall right above not counted.
+    fn meets(&self, origin: Vec3, normal: Vec3, s: LatticeDirection, patch: PatchId) -> bool {
+        let along = s.unit();
+        let up = along.dot(normal);
+        let height_mm = self.wall_mm + DEPTH_SIZES * self.size_mm;
+        let mut travel_mm = if up > LEAVES_ABOVE { LOCAL_WALL * height_mm / up } else { 0.0 };
+        for _ in 0..MOST_WALLS {
+            let Some((face, on_mm)) = self.bvh.first_hit(origin + travel_mm * along, along, self.far_mm) else {
+                return false;
+            };
+            if self.surface.patch_of_face[face as usize] == patch {
+                return true;
+            }
+            travel_mm += on_mm + PAST_WALL_MM;
+        }
+        false
+    }
+}
