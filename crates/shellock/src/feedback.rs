@@ -31,6 +31,13 @@ pub enum Lesson {
         /// Volume of the overlap, mm³.
         volume_mm3: f64,
     },
+    /// All other pieces leave the key as one.
+    BadKey {
+        /// The key.
+        key: PatchId,
+        /// Its direction.
+        separation: LatticeDirection,
+    },
     /// The plan as a whole failed.
     FailedPlan {
         /// The plan.
@@ -66,6 +73,10 @@ impl Lesson {
                 constraints.forbidden.insert((*piece, *separation));
                 *constraints.rubbed.entry((*piece, *against)).or_default() += 1;
             }
+            Self::BadKey { key, separation } => {
+                constraints.bad_keys.insert(*key);
+                constraints.forbidden.insert((*key, *separation));
+            }
             Self::FailedPlan { plan, .. } => constraints.rejected.push(plan.clone()),
         }
     }
@@ -75,6 +86,7 @@ impl Lesson {
         match self {
             Self::WeakJoints(_) => Vec::new(),
             Self::RubbingPath { piece, .. } => vec![*piece],
+            Self::BadKey { key, .. } => vec![*key],
             Self::FailedPlan { loose, .. } => loose.clone(),
         }
     }
@@ -95,6 +107,7 @@ impl std::fmt::Display for Lesson {
                 f,
                 "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
             ),
+            Self::BadKey { key, .. } => write!(f, "all other pieces can leave the key, piece {key}, as one"),
             Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
             Self::FailedPlan { loose, .. } => {
                 let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
@@ -116,6 +129,10 @@ pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
             &Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => {
                 let separation = design.plan.separation(piece);
                 learned.push(Lesson::RubbingPath { piece, separation, against, travel_mm, thickness_mm, volume_mm3 });
+            }
+            Finding::KeyLeaves { motion } => {
+                let separation = design.plan.separation(motion.piece);
+                learned.push(Lesson::BadKey { key: motion.piece, separation });
             }
             Finding::Loose { piece, .. } => loose.push(*piece),
             Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| m.piece)),

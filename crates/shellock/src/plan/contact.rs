@@ -337,6 +337,18 @@ mod tests {
     }
 
     #[test]
+    fn round_a_thin_limb_the_far_wall_leaves_only_ways_along_it() {
+        let surface = label(sphere(5, Vec3::new(7.0, 7.0, 60.0)), 2, |p| u32::from(p.z > 0.0));
+        let share = |wall_mm: f64, s: Vec3| {
+            let params = PlanParams { wall_mm, ..PlanParams::default() };
+            let contact = contacts(&params, &surface, &seams(&surface)).remove(0);
+            contact.joint(contact.b, LatticeDirection::nearest(s)).usable
+        };
+        assert!(share(0.0, Vec3::X) > 0.6 && share(2.0, Vec3::X) < 0.2);
+        assert!(share(2.0, Vec3::Z) > 0.99);
+    }
+
+    #[test]
     fn swapping_the_order_and_the_direction_leaves_the_joint_as_it_is() {
         let contact = cap_contact(20.0);
         for s in LatticeDirection::all() {

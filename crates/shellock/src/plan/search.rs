@@ -152,6 +152,9 @@ fn with_any_key<'k>(
         if tries_left == 0 {
             break;
         }
+        if params.key.is_none() && space.constraints.bad_keys.contains(&key.piece) {
+            continue;
+        }
         match with_key(ctx, params, space, key, &mut tries_left)? {
             Ok((_, plan)) => return Ok(Ok((plan, key))),
             Err(left) if left.len() < stuck.len() => stuck = left,

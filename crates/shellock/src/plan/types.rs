@@ -53,6 +53,8 @@ pub struct PlanConstraints {
     pub weak_joints: BTreeSet<(PatchId, PatchId, LatticeDirection)>,
     /// Directions that a piece must not take, because its path rubbed.
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
+    /// Pieces that held nothing as the key: all others left them as one. Kept to unless the user chose the key.
+    pub bad_keys: BTreeSet<PatchId>,
     /// How often a piece rubbed against an earlier one; twice, along two directions, and it must go in before it.
     pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason that none of the above says.

@@ -6,8 +6,8 @@
 //! ```text
 //!   ─────a──────┬──────b─────        a later, leaving along s: barred where
 //!          x_a  │  x_b               the ray from x_a along s meets b, or
-//!                                    the ray from x_b along −s meets a
-//!   ─────a─────────────b─────
+//!                                    the ray from x_b along −s meets a, or,
+//!   ─────a─────────────b─────        as b's channel reaches to x_a if a has the pin, from x_a along −s a
 //! ```
 //!
 //! Round thin limbs, where the far wall is near, this leaves little more than the limb's axis. Limits: only the two pieces of the seam are
@@ -67,34 +67,39 @@ impl<'a> Bars<'a> {
         let below = point - (self.wall_mm + DEPTH_SIZES * self.size_mm) * normal;
         let beside = BESIDE_SIZES * self.size_mm * across;
         let (in_a, in_b) = (below - beside, below + beside);
+        let seen = |origin: Vec3| LatticeDirection::all().map(|s| self.met(origin, normal, s, [a, b])).collect();
+        let (from_a, from_b): (Vec<[bool; 2]>, Vec<[bool; 2]>) = (seen(in_a), seen(in_b));
         let mut barred = 0;
         for s in LatticeDirection::all() {
-            let back = s.opposite();
-            if self.meets(in_a, normal, s, b) {
-                barred |= 1 << s.index() | 1 << (LatticeDirection::COUNT + back.index());
-            }
-            if self.meets(in_b, normal, s, a) {
-                barred |= 1 << back.index() | 1 << (LatticeDirection::COUNT + s.index());
+            let (on, back) = (s.index(), s.opposite().index());
+            let later_is_male = s.unit().dot(normal) >= 0.0;
+            // By order: what the later and the earlier piece's side see, and which of the two patches they are.
+            for (order, (later, earlier, own, other)) in
+                [(&from_a, &from_b, 0, 1), (&from_b, &from_a, 1, 0)].into_iter().enumerate()
+            {
+                // The channel reaches under the male's wall, so one of the halves is on the other's side as well.
+                let channel = if later_is_male { later[back][own] } else { earlier[on][other] };
+                if later[on][other] || earlier[back][own] || channel {
+                    barred |= 1 << (order * LatticeDirection::COUNT + on);
+                }
             }
         }
         Barred(barred)
     }
 
-    /// Whether the ray from `origin` along `s` meets `patch`, the wall right above not counted.
-    fn meets(&self, origin: Vec3, normal: Vec3, s: LatticeDirection, patch: PatchId) -> bool {
+    /// Which of two patches the ray from `origin` along `s` meets, the wall right above not counted.
+    fn met(&self, origin: Vec3, normal: Vec3, s: LatticeDirection, patches: [PatchId; 2]) -> [bool; 2] {
         let along = s.unit();
         let up = along.dot(normal);
         let height_mm = self.wall_mm + DEPTH_SIZES * self.size_mm;
         let mut travel_mm = if up > LEAVES_ABOVE { LOCAL_WALL * height_mm / up } else { 0.0 };
+        let mut met = [false; 2];
         for _ in 0..MOST_WALLS {
-            let Some((face, on_mm)) = self.bvh.first_hit(origin + travel_mm * along, along, self.far_mm) else {
-                return false;
-            };
-            if self.surface.patch_of_face[face as usize] == patch {
-                return true;
-            }
+            let Some((face, on_mm)) = self.bvh.first_hit(origin + travel_mm * along, along, self.far_mm) else { break };
+            let patch = self.surface.patch_of_face[face as usize];
+            met = [met[0] || patch == patches[0], met[1] || patch == patches[1]];
             travel_mm += on_mm + PAST_WALL_MM;
         }
-        false
+        met
     }
 }
