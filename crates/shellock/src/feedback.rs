@@ -31,6 +31,15 @@ pub enum Lesson {
         /// Volume of the overlap, mm³.
         volume_mm3: f64,
     },
+    /// A piece would have to leave most of its wall behind.
+    Blocked {
+        /// The piece.
+        piece: PatchId,
+        /// Its direction.
+        separation: LatticeDirection,
+        /// Share of its wall that it could take along, in [0, 1].
+        kept: f64,
+    },
     /// All other pieces leave the key as one.
     BadKey {
         /// The key.
@@ -73,6 +82,9 @@ impl Lesson {
                 constraints.forbidden.insert((*piece, *separation));
                 *constraints.rubbed.entry((*piece, *against)).or_default() += 1;
             }
+            Self::Blocked { piece, separation, .. } => {
+                constraints.forbidden.insert((*piece, *separation));
+            }
             Self::BadKey { key, separation } => {
                 constraints.bad_keys.insert(*key);
                 constraints.forbidden.insert((*key, *separation));
@@ -85,7 +97,7 @@ impl Lesson {
     pub fn blamed(&self) -> Vec<PatchId> {
         match self {
             Self::WeakJoints(_) => Vec::new(),
-            Self::RubbingPath { piece, .. } => vec![*piece],
+            Self::RubbingPath { piece, .. } | Self::Blocked { piece, .. } => vec![*piece],
             Self::BadKey { key, .. } => vec![*key],
             Self::FailedPlan { loose, .. } => loose.clone(),
         }
@@ -107,6 +119,9 @@ impl std::fmt::Display for Lesson {
                 f,
                 "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
             ),
+            Self::Blocked { piece, kept, .. } => {
+                write!(f, "piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)
+            }
             Self::BadKey { key, .. } => write!(f, "all other pieces can leave the key, piece {key}, as one"),
             Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
             Self::FailedPlan { loose, .. } => {

@@ -209,6 +209,9 @@ fn finish(
     })
 }
 
+/// Plans of one segmentation that may be given up because a piece could not take its wall along; they cost seconds.
+const MOST_BLOCKED: usize = 8;
+
 /// Plans and makes kits of one segmentation until one passes or nothing new can be tried.
 fn with_segmentation(
     ctx: &Ctx,
@@ -222,7 +225,9 @@ fn with_segmentation(
     let mut distances: Option<PatchDistances> = None;
     let mut constraints = PlanConstraints::default();
     let mut blamed = Vec::new();
-    for kit in 0..params.rounds.kits.min(kits.n_left) {
+    let most_kits = params.rounds.kits.min(kits.n_left);
+    let (mut kit, mut n_blocked) = (0, 0);
+    while kit < most_kits && n_blocked < MOST_BLOCKED {
         ctx.take_warnings();
         let plan = match plan::search(ctx, &params.plan, &survey, &constraints)? {
             PlanOutcome::Found(plan) => plan,
@@ -233,7 +238,18 @@ fn with_segmentation(
         };
         ctx.stage("distances to the patches", 0)?;
         let distances = distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
-        let design = make(ctx, params, model, grid, distances, surface, plan)?;
+        let design = match make(ctx, params, model, grid, distances, surface, plan) {
+            Err(DesignError::Body(BodyError::Blocked { piece, separation, kept })) => {
+                let lesson = Lesson::Blocked { piece, separation, kept };
+                ctx.note(&format!("another plan: {lesson}"));
+                blamed.extend(lesson.blamed());
+                lesson.teach(&mut constraints);
+                n_blocked += 1;
+                continue;
+            }
+            made => made?,
+        };
+        kit += 1;
         let learned: Vec<Lesson> = lessons(&design, params);
         let passed = design.verification.passed();
         kits.add(design);
@@ -241,7 +257,7 @@ fn with_segmentation(
             return Ok(Attempt::Passed);
         }
         for lesson in &learned {
-            if kit + 1 < params.rounds.kits {
+            if kit < params.rounds.kits {
                 ctx.note(&format!("another plan: {lesson}"));
             }
             blamed.extend(lesson.blamed());

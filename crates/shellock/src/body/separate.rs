@@ -32,8 +32,14 @@ const LIMIT_CELLS: f32 = 1.8;
 const LIMIT_SLOPE: f32 = 5.0;
 /// Width of a collar beyond the cut, in cells; one is enough for its contour to end where the cut is.
 const COLLAR_CELLS: usize = 3;
-/// A part that reaches farther than this to both sides of a cut, in cells, was not separated by it.
-const LEAK_CELLS: f64 = 0.5;
+/// A part of which so many points (or 0.5 %) lie farther than a cell on either side of a cut was not separated by it.
+const MOST_STRAY: usize = 10;
+/// Rounds of giving fragments to the other side of a cut; new ones can appear where p must keep out of the way of what it
+/// gave. A fragment that is given lies this far on the other side, in cells.
+const MOST_GIVINGS: usize = 3;
+const GIVEN_CELLS: f64 = 0.45;
+/// A piece that could take less than this share of its wall along is not made.
+const LEAST_KEPT: f64 = 0.5;
 /// Fragments of a body up to this volume are dropped, mm³; more is worth a warning.
 const CHIP_MM3: f64 = 0.5;
 
@@ -70,6 +76,10 @@ pub fn build(
             fields.in_later_ways.clone()
         } else {
             let g = fields.cut(p, step.separation);
+            let kept = fields.kept_share(p, &g);
+            if kept < LEAST_KEPT {
+                return Err(BodyError::Blocked { piece: p, separation: step.separation, kept });
+            }
             let local = || LocalField::cut_out(&grid.band, &g, rooms[p]);
             let ((), local) = rayon::join(|| inner.give(p, &g, &grid.band), local);
             cuts.push(Cut { piece: p, field: Some(local) });
@@ -131,27 +141,53 @@ impl Splitter<'_> {
     /// The part of `wall` where `sign · g` is positive, less the gap.
     ///
     /// A collar along the cut, on the other side of it, is taken out of the wall; then the wall falls apart, and what lies
-    /// on the wanted side is kept. The collar has far fewer triangles than the whole other side. Should its simplified
-    /// form not separate the sides, the full one does.
+    /// on the wanted side is kept. The collar has far fewer triangles than a whole side. Should it not separate the sides,
+    /// the whole side cuts.
     fn side(&self, wall: &Volume, g: &[f32], sign: f32) -> Volume {
         // Both sides' collars see the same side of the cut, so that they have the same triangles there.
         let apart = if sign > 0.0 { Corners::Positive } else { Corners::Negative };
-        let full = contour_cutting(&self.grid.band, &self.collar_field(g, sign), OffBand::Outside, apart);
-        let simple = self.simplified(full.clone(), g, sign);
-        self.half(wall, &simple, g, sign).or_else(|| self.half(wall, &full, g, sign)).unwrap_or_else(Volume::empty)
+        let collar = contour_cutting(&self.grid.band, &self.collar_field(g, sign), OffBand::Outside, apart);
+        let collar = Volume::from_closed_mesh(&self.simplified(collar, g, sign)).expect("contours are manifold");
+        self.half(&wall.subtract(&collar), g, sign).unwrap_or_else(|| wall.intersect(&self.whole_side(g, sign)))
     }
 
-    /// The parts of `wall` less `collar` on the wanted side; `None` where a part lies on both.
-    fn half(&self, wall: &Volume, collar: &TriMesh, g: &[f32], sign: f32) -> Option<Volume> {
-        let collar = Volume::from_closed_mesh(collar).expect("contours are manifold");
+    /// The parts of `apart` on the wanted side; `None` where a part lies on both.
+    fn half(&self, apart: &Volume, g: &[f32], sign: f32) -> Option<Volume> {
+        let cell = self.grid.band.cell_mm();
         let leaks = Cell::new(false);
-        let half = wall.subtract(&collar).retain(|points| {
-            let h = points.iter().filter_map(|&p| self.grid.band.sample(g, p)).map(|g| f64::from(sign) * g);
-            let (least, most) = h.fold((0.0f64, 0.0f64), |(a, b), h| (a.min(h), b.max(h)));
-            leaks.set(leaks.get() || most.min(-least) > LEAK_CELLS * self.grid.band.cell_mm());
-            most > -least
+        let half = apart.retain(|points| {
+            // Samples beside jumps of g may have the wrong sign; most have not.
+            let (mut sum, mut n_beyond) = (0.0, [0usize; 2]);
+            for h in points.iter().filter_map(|&p| self.grid.band.sample(g, p)).map(|g| f64::from(sign) * g) {
+                sum += h;
+                n_beyond[0] += usize::from(h > cell);
+                n_beyond[1] += usize::from(h < -cell);
+            }
+            let n_stray = n_beyond[0].min(n_beyond[1]);
+            leaks.set(leaks.get() || n_stray > MOST_STRAY.max(points.len() / 200));
+            sum > 0.0
         });
         (!leaks.get()).then_some(half)
+    }
+
+    /// All of the wanted side, less the gap.
+    fn whole_side(&self, g: &[f32], sign: f32) -> Volume {
+        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
+        let field: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| {
+                let taper = (self.grid.depth[n] / rim).clamp(RIM_LEAST as f32, 1.0);
+                (sign * g[n] - gap * taper).min(self.limits(n))
+            })
+            .collect();
+        Volume::from_closed_mesh(&contour(&self.grid.band, &field, OffBand::Outside)).expect("contours are manifold")
+    }
+
+    /// Positive where tools reach. Nothing is cut below the wall or far outside: cuts are unknown there. The limits are so
+    /// steep that within a cell of the wall they are above all values of the cut: both sides' collars must agree there.
+    fn limits(&self, n: usize) -> f32 {
+        let (depth, reach) = (self.grid.depth[n], LIMIT_CELLS * self.grid.band.cell_mm() as f32);
+        (self.grid.thickness_mm as f32 + reach - depth).min(depth + reach) * LIMIT_SLOPE
     }
 
     fn simplified(&self, collar: TriMesh, g: &[f32], sign: f32) -> TriMesh {
@@ -165,19 +201,12 @@ impl Splitter<'_> {
         let (cell, cutoff) = (self.grid.band.cell_mm() as f32, self.grid.cutoff_mm());
         let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
         let is_own = |n: u32| sign * g[n as usize] > 0.0;
-        // Nothing is cut below the wall or far outside; cuts are unknown there. The limits are so steep that within a cell
-        // of the wall they are above all values of the cut: both sides' collars must agree there.
-        let limits = |n: usize| {
-            let depth = self.grid.depth[n];
-            let inside = (self.grid.thickness_mm as f32 + LIMIT_CELLS * cell - depth).min(depth + LIMIT_CELLS * cell);
-            inside * LIMIT_SLOPE
-        };
         let mut field: Vec<f32> =
             (0..g.len() as u32).into_par_iter().map(|n| if is_own(n) { cutoff } else { -cell }).collect();
         let mut front: Vec<u32> = (0..g.len() as u32)
             .into_par_iter()
-            .filter(|&n| is_own(n) && limits(n as usize) > 0.0)
-            .filter(|&n| self.grid.band.face_neighbours(n).any(|m| !is_own(m) && limits(m as usize) > 0.0))
+            .filter(|&n| is_own(n) && self.limits(n as usize) > 0.0)
+            .filter(|&n| self.grid.band.face_neighbours(n).any(|m| !is_own(m) && self.limits(m as usize) > 0.0))
             .collect();
         for _ in 0..COLLAR_CELLS {
             let beyond: Vec<u32> = front.iter().flat_map(|&n| self.grid.band.face_neighbours(n)).collect();
@@ -191,7 +220,7 @@ impl Splitter<'_> {
         }
         field.par_iter_mut().enumerate().for_each(|(n, f)| {
             let taper = (self.grid.depth[n] / rim).clamp(RIM_LEAST as f32, 1.0);
-            *f = f.min(gap * taper - sign * g[n]).min(limits(n));
+            *f = f.min(gap * taper - sign * g[n]).min(self.limits(n));
         });
         field
     }
@@ -216,6 +245,16 @@ pub enum BodyError {
     /// The grid or the model's surface.
     #[error(transparent)]
     Grid(#[from] GridError),
+    /// Most of a piece lies behind others on its way out, so that it would have to leave that behind.
+    #[error("piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)]
+    Blocked {
+        /// The piece.
+        piece: PatchId,
+        /// The direction in which it was to leave.
+        separation: LatticeDirection,
+        /// Share of its wall that is free, in [0, 1].
+        kept: f64,
+    },
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] crate::Cancelled),
@@ -292,21 +331,42 @@ impl<'a> Separation<'a> {
         let behind_staying = self.sweeper.max_ahead(&staying, along);
         let mut g: Vec<f32> =
             (0..phi.len()).into_par_iter().map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n])).collect();
-        self.give_fragments_back(&mut g);
+        // What is given back stays, and p keeps out of its way too.
+        for _ in 0..MOST_GIVINGS {
+            if !self.give_fragments_back(&mut g) {
+                break;
+            }
+            let staying: Vec<f32> = (0..g.len()).into_par_iter().map(|n| at(n, -g[n]).max(-cutoff)).collect();
+            let behind = self.sweeper.max_ahead(&staying, along);
+            g.par_iter_mut().zip(&behind).for_each(|(g, behind)| *g = g.min(-behind));
+        }
         g
     }
 
-    /// Leaves one connected part on each side of the cut: a fragment goes to the side that surrounds it.
-    fn give_fragments_back(&self, g: &mut [f32]) {
-        let away = 0.3 * self.grid.band.cell_mm() as f32;
+    /// Share of the wall under the patch of `p` that is on p's side of the cut `g`, in [0, 1].
+    fn kept_share(&self, p: PatchId, g: &[f32]) -> f64 {
+        let phi = self.distances.preference(p, &self.remains, self.grid.cutoff_mm());
+        let is_own = |&n: &usize| phi[n] > 0.0 && self.wall(n, 0.0) > 0.0 && self.rest[n] > 0.0;
+        let (own, kept) = (0..g.len())
+            .into_par_iter()
+            .filter(is_own)
+            .map(|n| (1usize, usize::from(g[n] > 0.0)))
+            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        kept as f64 / own.max(1) as f64
+    }
+
+    /// Gives each fragment of either side to the other side, which surrounds it. Returns whether there were any.
+    fn give_fragments_back(&self, g: &mut [f32]) -> bool {
+        let away = GIVEN_CELLS as f32 * self.grid.band.cell_mm() as f32;
         let fragments = |side: f32| {
             let is_member = |n: usize| self.wall(n, 0.0) > 0.0 && self.rest[n] > 0.0 && side * g[n] > 0.0;
             minor_components(&self.grid.band, is_member)
         };
         let (gained, lost) = rayon::join(|| fragments(1.0), || fragments(-1.0));
-        for (side, fragments) in [(1.0, gained), (-1.0, lost)] {
+        for (side, fragments) in [(1.0, &gained), (-1.0, &lost)] {
             fragments.iter().flatten().for_each(|&n| g[n as usize] = -side * away);
         }
+        !(gained.is_empty() && lost.is_empty())
     }
 
     /// Takes p away; returns where p may have no connectors.
