@@ -77,10 +77,7 @@ impl Divider<'_> {
             let moved_mm2 = area_of(&moved);
             let is_division = !moved.is_empty() && moved.len() < members.len();
             if is_division && moved_mm2.min(area - moved_mm2) >= self.min_piece_mm2 {
-                let seam: Vec<HalfEdge> = seam_half_edges(self.topology, label, members.iter().copied())
-                    .into_iter()
-                    .filter(|&h| label[self.topology.opposite(h) as usize / 3] == n_patches as u32)
-                    .collect();
+                let seam = self.seam_beside(label, &members, n_patches as u32);
                 let length: f64 = seam.iter().map(|&h| self.edge_length(h)).sum();
                 let euler = euler_characteristics(self.mesh, self.topology, label, n_patches + 1);
                 let holes = (1 - euler[patch as usize]).abs() + (1 - euler[n_patches]).abs();
@@ -95,6 +92,13 @@ impl Divider<'_> {
             members.iter().for_each(|&f| label[f as usize] = patch);
         }
         best
+    }
+
+    /// The half-edges between `members` and the patch `other`, which has a higher number.
+    fn seam_beside(&self, label: &[u32], members: &[u32], other: u32) -> Vec<HalfEdge> {
+        let mut seam = seam_half_edges(self.topology, label, members.iter().copied());
+        seam.retain(|&h| label[self.topology.opposite(h) as usize / 3] == other);
+        seam
     }
 
     fn edge_length(&self, h: HalfEdge) -> f64 {
