@@ -104,6 +104,13 @@ impl Lesson {
     }
 }
 
+impl Lesson {
+    /// The pieces that came out loose.
+    pub fn loose(&self) -> Vec<PatchId> {
+        if let Self::FailedPlan { loose, .. } = self { loose.clone() } else { Vec::new() }
+    }
+}
+
 impl std::fmt::Display for Lesson {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {

@@ -36,7 +36,7 @@ pub struct Params {
 /// Bounds of the feedback loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
-    /// Kits made for one segmentation, at most. ≥ 1; 4.
+    /// Kits made for one segmentation, at most. ≥ 1; 3.
     pub kits: usize,
     /// Segmentations mended after the first, at most; 4.
     pub mendings: usize,
@@ -46,7 +46,7 @@ pub struct Rounds {
 
 impl Default for Rounds {
     fn default() -> Self {
-        Self { kits: 4, mendings: 4, kits_in_all: 8 }
+        Self { kits: 3, mendings: 4, kits_in_all: 8 }
     }
 }
 
@@ -143,15 +143,12 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
     let mut mending = 0;
     let attempt = loop {
         let attempt = with_segmentation(ctx, params, model, &grid, &surface, &mut kits)?;
-        let Attempt::Failed { blamed, .. } = &attempt else { break attempt };
+        let Attempt::Failed { blamed, loose, .. } = &attempt else { break attempt };
         if mending == params.rounds.mendings || kits.n_left == 0 {
             break attempt;
         }
-        // Dividing comes first, as it keeps the user's labels; what it did not help by half of the rounds is joined.
         let is_hopeless = kits.best.is_none() && 2 * mending >= params.rounds.mendings;
-        let divided = || blamed.iter().find_map(|&p| segmentation::divide(ctx, &params.segmentation, &surface, p));
-        let united = || blamed.iter().find_map(|&p| segmentation::unite(ctx, &params.segmentation, &surface, p));
-        let mended = if is_hopeless { united() } else { divided() };
+        let mended = mended(ctx, params, &surface, blamed, loose, is_hopeless);
         let Some(mended) = mended else { break attempt };
         ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
         surface = mended;
@@ -160,6 +157,31 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
     // Warnings of segmentations and plans that were given up go with them.
     ctx.take_warnings();
     finish(ctx, params, model, labels, kits.best, attempt)
+}
+
+/// The surface with other pieces, which may do better.
+///
+/// Dividing comes first, as it keeps the user's labels. What came loose where seams are short would only get shorter ones: it is joined
+/// to a neighbour; so is what stood in the way of every plan until half of the rounds were gone.
+fn mended(
+    ctx: &Ctx,
+    params: &Params,
+    surface: &SegmentedSurface,
+    blamed: &[PatchId],
+    loose: &[PatchId],
+    is_hopeless: bool,
+) -> Option<SegmentedSurface> {
+    /// Pieces joined at once; more would change what holds.
+    const MOST_JOINED: usize = 2;
+    let params = &params.segmentation;
+    let divided = || blamed.iter().find_map(|&p| segmentation::divide(ctx, params, surface, p));
+    let united = |pieces: &[PatchId]| segmentation::unite(ctx, params, surface, pieces);
+    if is_hopeless {
+        return blamed.iter().find_map(|&p| united(&[p]));
+    }
+    let is_thin = !loose.is_empty() && segmentation::has_short_contacts(params, surface);
+    let joined = is_thin.then(|| united(&loose[..loose.len().min(MOST_JOINED)])).flatten();
+    joined.or_else(divided)
 }
 
 /// The kits made so far.
@@ -187,6 +209,8 @@ enum Attempt {
         blockers: Vec<Blocker>,
         /// Pieces whose division may help, most promising first.
         blamed: Vec<PatchId>,
+        /// Pieces that came out loose in the last kit.
+        loose: Vec<PatchId>,
     },
 }
 
@@ -224,7 +248,7 @@ fn with_segmentation(
     let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams())?;
     let mut distances: Option<PatchDistances> = None;
     let mut constraints = PlanConstraints::default();
-    let mut blamed = Vec::new();
+    let (mut blamed, mut loose) = (Vec::new(), Vec::new());
     let most_kits = params.rounds.kits.min(kits.n_left);
     let (mut kit, mut n_blocked) = (0, 0);
     while kit < most_kits && n_blocked < MOST_BLOCKED {
@@ -233,7 +257,7 @@ fn with_segmentation(
             PlanOutcome::Found(plan) => plan,
             PlanOutcome::Infeasible { reason, blockers, articulations } => {
                 blamed.splice(0..0, articulations.into_iter().chain(blockers.iter().map(|b| b.piece)));
-                return Ok(Attempt::Failed { reason, blockers, blamed });
+                return Ok(Attempt::Failed { reason, blockers, blamed, loose });
             }
         };
         ctx.stage("distances to the patches", 0)?;
@@ -251,21 +275,19 @@ fn with_segmentation(
         };
         kit += 1;
         let learned: Vec<Lesson> = lessons(&design, params);
-        let passed = design.verification.passed();
         kits.add(design);
-        if passed {
+        if learned.is_empty() {
             return Ok(Attempt::Passed);
         }
-        for lesson in &learned {
-            if kit < params.rounds.kits {
-                ctx.note(&format!("another plan: {lesson}"));
-            }
-            blamed.extend(lesson.blamed());
-            lesson.teach(&mut constraints);
+        blamed.extend(learned.iter().flat_map(Lesson::blamed));
+        loose = learned.iter().flat_map(Lesson::loose).collect();
+        if kit < params.rounds.kits {
+            learned.iter().for_each(|lesson| ctx.note(&format!("another plan: {lesson}")));
         }
+        learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
     }
     let reason = "no kit passed its verification within the allowed rounds".into();
-    Ok(Attempt::Failed { reason, blockers: Vec::new(), blamed })
+    Ok(Attempt::Failed { reason, blockers: Vec::new(), blamed, loose })
 }
 
 fn failures(design: &Design) -> usize {

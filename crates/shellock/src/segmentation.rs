@@ -366,25 +366,35 @@ pub fn divide(
     changed(ctx, params, surface, |solid, labels| split_piece(solid, labels, patch))
 }
 
-/// The same surface with `patch` joined to the neighbour it has the longest seam with, mended and smoothed again; `None` where there
-/// would be one piece left.
+/// The same surface with each of `patches` joined to the neighbour it has the longest seam with, mended and smoothed again; `None` where
+/// there would be one piece left, or nothing is joined.
 ///
 /// The feedback loop asks for this where dividing did not help. Patches may be renumbered.
 pub fn unite(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
-    patch: PatchId,
+    patches: &[PatchId],
 ) -> Option<SegmentedSurface> {
     let graph = surface.contact_graph(0.0);
-    let touching = graph.contacts().iter().filter(|c| c.a == patch || c.b == patch);
-    let longest = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm))?;
-    let into = if longest.a == patch { longest.b } else { longest.a };
+    let mut number: Vec<u32> = (0..surface.n_patches as u32).collect();
+    for &patch in patches {
+        let touching = graph.contacts().iter().filter(|c| c.a == patch || c.b == patch);
+        let longest = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm))?;
+        let into = number[usize::from(if longest.a == patch { longest.b } else { longest.a })];
+        let own = number[usize::from(patch)];
+        number.iter_mut().filter(|k| **k == own).for_each(|k| *k = into);
+    }
     changed(ctx, params, surface, |solid, labels| {
-        let label: Vec<u32> = labels.as_slice().iter().map(|&k| if k == patch.0 { into.0 } else { k }).collect();
+        let label: Vec<u32> = labels.as_slice().iter().map(|&k| number[k as usize]).collect();
         let joined = FaceLabels::from_connected(&Topology::new(solid), &label);
-        (joined.n_patches() > 1).then_some(joined)
+        (1 < joined.n_patches() && joined.n_patches() < surface.n_patches).then_some(joined)
     })
+}
+
+/// Whether some of the contacts that hold `surface` together are shorter than wanted.
+pub fn has_short_contacts(params: &SegmentationParams, surface: &SegmentedSurface) -> bool {
+    kept_limit_mm(params, surface) < params.min_contact_mm
 }
 
 fn changed(

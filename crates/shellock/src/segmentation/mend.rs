@@ -34,19 +34,15 @@ pub fn mend(
 ) -> Result<FaceLabels, SegmentationError> {
     let topology = Topology::new(solid);
     let faces = DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE);
-    let divider = Divider {
-        mesh: solid.mesh(),
-        topology: &topology,
-        faces: &faces,
-        min_piece_mm2: SPLIT_RESERVE * params.min_piece_mm2,
-    };
+    let min_piece_mm2 = SPLIT_RESERVE * params.min_piece_mm2;
+    let divider = Divider { mesh: solid.mesh(), topology: &topology, faces: &faces, min_piece_mm2 };
     let mut work = Work {
         divider,
         label: labels.as_slice().to_vec(),
         n_patches: labels.n_patches(),
         min_contact_mm: params.min_contact_mm * ZIGZAG,
     };
-    let mut best = (work.n_faults(), FaceLabels { patch_of_face: work.label.clone(), n_patches: work.n_patches });
+    let mut best = (work.n_faults(), work.labels());
     let mut n_idle = 0;
     for _ in 0..params.max_splits {
         ctx.check()?;
@@ -59,7 +55,7 @@ pub fn mend(
         }
         let n_faults = work.n_faults();
         if n_faults < best.0 {
-            best = (n_faults, FaceLabels { patch_of_face: work.label.clone(), n_patches: work.n_patches });
+            best = (n_faults, work.labels());
             n_idle = 0;
         } else {
             n_idle += 1;
@@ -91,6 +87,10 @@ fn weakest_link(work: &Work, graph: &ContactGraph) -> Option<(u32, u32)> {
 }
 
 impl Work<'_> {
+    fn labels(&self) -> FaceLabels {
+        FaceLabels { patch_of_face: self.label.clone(), n_patches: self.n_patches }
+    }
+
     fn seam(&self) -> Vec<HalfEdge> {
         seam_half_edges(self.divider.topology, &self.label, 0..self.label.len() as u32)
     }

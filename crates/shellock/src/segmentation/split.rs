@@ -66,23 +66,21 @@ impl Divider<'_> {
         if members.len() < 2 {
             return None;
         }
-        let area: f64 = members.iter().map(|&f| self.faces.area[f as usize]).sum();
+        let area_of = |faces: &[u32]| faces.iter().map(|&f| self.faces.area[f as usize]).sum::<f64>();
+        let area = area_of(&members);
         let mut best: Option<Division> = None;
         let candidates = self.plane_halves(&members).chain(self.voronoi_halves(label, &members, pairs));
         for moved in candidates.collect::<Vec<_>>() {
             moved.iter().for_each(|&f| label[f as usize] = n_patches as u32);
             self.join_islands(label, &members, [patch, n_patches as u32]);
             let moved: Vec<u32> = members.iter().copied().filter(|&f| label[f as usize] != patch).collect();
-            let moved_mm2: f64 = moved.iter().map(|&f| self.faces.area[f as usize]).sum();
-            if moved_mm2.min(area - moved_mm2) >= self.min_piece_mm2 && !moved.is_empty() && moved.len() < members.len()
-            {
-                let seam: Vec<HalfEdge> = seam_half_edges(self.topology, label, members.iter().copied())
-                    .into_iter()
-                    .filter(|&h| label[self.topology.opposite(h) as usize / 3] == n_patches as u32)
-                    .collect();
+            let moved_mm2 = area_of(&moved);
+            let is_division = !moved.is_empty() && moved.len() < members.len();
+            if is_division && moved_mm2.min(area - moved_mm2) >= self.min_piece_mm2 {
+                let seam = self.seam_beside(label, &members, n_patches as u32);
                 let length: f64 = seam.iter().map(|&h| self.edge_length(h)).sum();
                 let euler = euler_characteristics(self.mesh, self.topology, label, n_patches + 1);
-                let holes: i64 = [patch as usize, n_patches].iter().map(|&p| (1 - euler[p]).abs()).sum();
+                let holes = (1 - euler[patch as usize]).abs() + (1 - euler[n_patches]).abs();
                 let n_faults = holes as f64 + faults(label, &seam);
                 let cost = FAULT * n_faults
                     + UNEVENNESS * ((area - 2.0 * moved_mm2) / area).powi(2)
@@ -94,6 +92,13 @@ impl Divider<'_> {
             members.iter().for_each(|&f| label[f as usize] = patch);
         }
         best
+    }
+
+    /// The half-edges between `members` and the patch `other`, which has a higher number.
+    fn seam_beside(&self, label: &[u32], members: &[u32], other: u32) -> Vec<HalfEdge> {
+        let mut seam = seam_half_edges(self.topology, label, members.iter().copied());
+        seam.retain(|&h| label[self.topology.opposite(h) as usize / 3] == other);
+        seam
     }
 
     fn edge_length(&self, h: HalfEdge) -> f64 {
