@@ -2,7 +2,7 @@
 //!
 //! Edges collapse by quadric error [Garland and Heckbert 1997]. The quadric of a vertex sums, over the
 //! planes of all input triangles that it stands for, the squared distance times the triangle's share of a mean triangle.
-//! Divided by the sum of shares this is the mean square distance; beyond [`MOST_SHARES`] the divisor stays the same, so
+//! Divided by the sum of shares this is the mean square distance; beyond 30 shares the divisor stays the same, so
 //! that a bump in a wide plain is not averaged away.
 
 use glam::DMat3;

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use shellock_geom::band::{Band, GridTooFine};
+use shellock_geom::boolean::NotAVolume;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::decimate::decimate;
 use shellock_geom::marching_cubes::{OffBand, contour};
@@ -45,6 +46,11 @@ pub enum GridError {
         "the model's surface touches itself in a way that cannot be cut: {0}; separate the touching parts or repair the mesh"
     )]
     Surface(String),
+    /// The inner side of the wall is not closed.
+    #[error(
+        "inside and outside of the model cannot be told apart everywhere, so it cannot be hollowed out: its surface crosses itself; make its parts one solid (a boolean union) and try again"
+    )]
+    NoInside,
     /// Nothing of the model is deeper than the wall is thick.
     #[error(
         "the model is nowhere thicker than two walls of {thickness_mm} mm, so there is nothing to hollow out; print it solid, make it larger or choose a thinner wall"
@@ -66,6 +72,7 @@ impl ShellGrid {
         let (band, depth) = Band::along(&distance, bounds, cell, OUTSIDE_CELLS * cell, reach_mm, exact_mm)?;
         let thickness_mm = params.thickness_mm;
         let (outer, cavity) = rayon::join(|| Volume::from_solid(model), || deeper_than(&band, &depth, thickness_mm));
+        let cavity = cavity.map_err(|_| GridError::NoInside)?;
         if cavity.is_empty() {
             return Err(GridError::NoCavity { thickness_mm });
         }
@@ -85,11 +92,11 @@ impl ShellGrid {
 }
 
 /// The region deeper than `depth_mm`, with few triangles.
-fn deeper_than(band: &Band, depth: &[f32], depth_mm: f64) -> Volume {
+fn deeper_than(band: &Band, depth: &[f32], depth_mm: f64) -> Result<Volume, NotAVolume> {
     let field: Vec<f32> = depth.iter().map(|d| d - depth_mm as f32).collect();
     let mesh = contour(band, &field, OffBand::LikeNeighbours);
     let tolerance = vec![INNER_TOLERANCE_MM; mesh.points.len()];
-    Volume::from_closed_mesh(&decimate(mesh, &tolerance)).expect("contours are manifold")
+    Volume::from_closed_mesh(&decimate(mesh, &tolerance))
 }
 
 /// A patch and its distance, mm.
