@@ -8,7 +8,6 @@ use manifold_rust::linalg::Vec3 as V;
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{Error, MeshGL64, OpType};
 
-use crate::topology::{Topology, components};
 use crate::{Aabb, Solid, TriMesh, Vec3};
 
 /// A region bounded by a manifold mesh; may be empty, may have several bodies, may have cavities.
@@ -193,26 +192,16 @@ impl Volume {
     }
 
     /// The region bounded by those connected boundary surfaces whose points `keep` accepts.
-    pub fn retain(&self, keep: impl Fn(&[Vec3]) -> bool) -> Self {
-        let mesh = self.to_mesh();
-        let Some(topology) = Topology::of_mesh(&mesh) else { return self.clone() };
-        let (component, n) = components(&topology, |_, _| true);
-        let mut points: Vec<Vec<Vec3>> = vec![Vec::new(); n];
-        let mut is_told = vec![false; mesh.points.len()];
-        for (triangle, &c) in mesh.triangles.iter().zip(&component) {
-            for &v in triangle {
-                if !std::mem::replace(&mut is_told[v as usize], true) {
-                    points[c as usize].push(mesh.points[v as usize]);
-                }
-            }
-        }
-        let is_kept: Vec<bool> = points.iter().map(|p| keep(p)).collect();
-        if is_kept.iter().all(|k| *k) {
-            return self.clone();
-        }
-        let kept = mesh.triangles.iter().zip(&component).filter(|(_, c)| is_kept[**c as usize]).map(|(t, _)| *t);
-        let part = TriMesh { triangles: kept.collect(), points: mesh.points }.without_unused_points();
-        Self::from_closed_mesh(&part).expect("a closed part of a manifold is a manifold")
+    pub fn retain(&self, keep: impl Fn(&mut dyn Iterator<Item = Vec3>) -> bool) -> Self {
+        let parts = self.0.decompose();
+        let n_parts = parts.len();
+        let is_kept = |part: &Manifold| {
+            let gl = part.get_mesh_gl64(-1);
+            let step = usize::try_from(gl.num_prop).expect("three properties a point");
+            keep(&mut gl.vert_properties.chunks_exact(step).map(|c| Vec3::new(c[0], c[1], c[2])))
+        };
+        let kept: Vec<Manifold> = parts.into_iter().filter(is_kept).collect();
+        if kept.len() == n_parts { self.clone() } else { Self(Manifold::compose(&kept)) }
     }
 
     /// The boundary as a mesh; no points where empty.
@@ -267,7 +256,7 @@ mod tests {
     #[test]
     fn retaining_is_choosing_among_bodies() {
         let both = cube(Vec3::ZERO, 1.0).union(&cube(Vec3::splat(5.0), 2.0));
-        assert!((both.retain(|p| p.iter().all(|p| p.x < 3.0)).volume() - 1.0).abs() < 1e-12);
+        assert!((both.retain(|mut p| Iterator::all(&mut p, |p| p.x < 3.0)).volume() - 1.0).abs() < 1e-12);
         assert!((both.retain(|_| true).volume() - 9.0).abs() < 1e-12);
         assert!(both.retain(|_| false).is_empty());
     }

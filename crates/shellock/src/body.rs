@@ -1,7 +1,7 @@
 //! Shell bodies: the wall of the model, split into pieces that can leave (Sect. 4.1, Eq. 1).
 //!
-//! The wall `model − inner region` is split in the order of taking apart, key first, so the bodies are an exact partition
-//! of it: no splinter, no overlap, and the outer triangles stay the model's own. Each cut is the zero level of a field
+//! The wall `model − inner region` is split in the order of taking apart, key first, so the bodies are a partition of it but
+//! for the gap in the seams, and the outer triangles stay the model's own. Each cut is the zero level of a field
 //!
 //! ```text
 //! φ_p = ½ (min_j d_j − d_p)                      nearer to patch p than to any patch j that remains
@@ -11,11 +11,14 @@
 //! ```
 //!
 //! so that along every line in direction s all remaining material comes before p: p leaves freely by construction.
-//! Inside, the two sides of a cut keep a small gap that tapers to nothing at the outer rim.
+//! Fragments that a cut leaves on either side are given to the other one, which p then keeps out of the way of. Inside, the
+//! two sides of a cut keep a small gap that tapers to a tenth of it (some µm) at the outer rim.
 //! Where outer patches hide each other a little, only the seam shifts. The first-installed piece is what is left.
 
 mod grid;
 mod separate;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use grid::outward;
 pub use grid::{GridError, LocalField, PatchDistances, ShellGrid};
@@ -37,7 +40,7 @@ pub struct BodyParams {
     pub cell_mm: Option<f64>,
     /// Gap that each side of a seam leaves inside the wall. [0, 0.4]; 0.05.
     pub wall_gap_mm: f64,
-    /// Depth over which that gap grows from nothing at the outer rim. (0, 5]; 1.
+    /// Depth over which that gap grows from a tenth at the outer rim. [0.05, 5]; 1.
     pub rim_mm: f64,
 }
 

@@ -15,6 +15,7 @@ pub mod params;
 pub mod piece;
 pub mod pipeline;
 pub mod plan;
+pub mod push;
 pub mod report;
 mod seams;
 pub mod segmentation;

@@ -117,6 +117,9 @@ pub enum DesignError {
     Segmentation(#[from] SegmentationError),
     /// The wall cannot be made.
     #[error(transparent)]
+    Grid(#[from] GridError),
+    /// The wall cannot be split.
+    #[error(transparent)]
     Body(#[from] BodyError),
     /// A piece cannot be finished.
     #[error(transparent)]
@@ -124,12 +127,6 @@ pub enum DesignError {
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-}
-
-impl From<GridError> for DesignError {
-    fn from(e: GridError) -> Self {
-        Self::Body(e.into())
-    }
 }
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds

@@ -22,7 +22,7 @@ mod search_tests;
 mod space;
 mod survey;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 pub mod types;
 
 pub use params::PlanParams;

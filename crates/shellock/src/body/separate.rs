@@ -11,7 +11,7 @@ use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use super::BodyParams;
-use super::grid::{GridError, LocalField, PatchDistances, ShellGrid};
+use super::grid::{LocalField, PatchDistances, ShellGrid};
 use crate::plan::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
 
@@ -27,12 +27,12 @@ const GAP_SHARE: f64 = 0.2;
 const CUT_TOLERANCE_MM: f64 = 0.02;
 const FREE_TOLERANCE_MM: f64 = 0.05;
 const TIGHT_CELLS: f64 = 1.2;
-/// Collars end this far from the wall, in cells.
+/// Collars end this far from the wall, in cells, in a field that falls by this much a mm.
 const LIMIT_CELLS: f32 = 1.8;
 const LIMIT_SLOPE: f32 = 5.0;
 /// Width of a collar beyond the cut, in cells; one is enough for its contour to end where the cut is.
 const COLLAR_CELLS: usize = 3;
-/// A part of which so many points (or 0.5 %) lie farther than a cell on either side of a cut was not separated by it.
+/// A part was not separated by a cut where more of its points than this, and than 0.5 %, lie beyond a cell on each side.
 const MOST_STRAY: usize = 10;
 /// Rounds of giving fragments to the other side of a cut; new ones can appear where p must keep out of the way of what it
 /// gave. A fragment that is given lies this far on the other side, in cells.
@@ -157,14 +157,15 @@ impl Splitter<'_> {
         let leaks = Cell::new(false);
         let half = apart.retain(|points| {
             // Samples beside jumps of g may have the wrong sign; most have not.
-            let (mut sum, mut n_beyond) = (0.0, [0usize; 2]);
-            for h in points.iter().filter_map(|&p| self.grid.band.sample(g, p)).map(|g| f64::from(sign) * g) {
+            let (mut sum, mut n_points, mut n_beyond) = (0.0, 0, [0usize; 2]);
+            for h in points.filter_map(|p| self.grid.band.sample(g, p)).map(|g| f64::from(sign) * g) {
                 sum += h;
+                n_points += 1;
                 n_beyond[0] += usize::from(h > cell);
                 n_beyond[1] += usize::from(h < -cell);
             }
             let n_stray = n_beyond[0].min(n_beyond[1]);
-            leaks.set(leaks.get() || n_stray > MOST_STRAY.max(points.len() / 200));
+            leaks.set(leaks.get() || n_stray > MOST_STRAY.max(n_points / 200));
             sum > 0.0
         });
         (!leaks.get()).then_some(half)
@@ -180,7 +181,10 @@ impl Splitter<'_> {
                 (sign * g[n] - gap * taper).min(self.limits(n))
             })
             .collect();
-        Volume::from_closed_mesh(&contour(&self.grid.band, &field, OffBand::Outside)).expect("contours are manifold")
+        // The same corners as the other side's collar cuts apart.
+        let apart = if sign > 0.0 { Corners::Negative } else { Corners::Positive };
+        let mesh = contour_cutting(&self.grid.band, &field, OffBand::Outside, apart);
+        Volume::from_closed_mesh(&mesh).expect("contours are manifold")
     }
 
     /// Positive where tools reach. Nothing is cut below the wall or far outside: cuts are unknown there. The limits are so
@@ -242,9 +246,6 @@ impl Splitter<'_> {
 /// Why the wall cannot be split.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BodyError {
-    /// The grid or the model's surface.
-    #[error(transparent)]
-    Grid(#[from] GridError),
     /// Most of a piece lies behind others on its way out, so that it would have to leave that behind.
     #[error("piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)]
     Blocked {

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use shellock_geom::Vec3;
 
 use bars::{Barred, Bars};
-pub use hold::{HoldTable, N_PUSHES, Pushes};
+pub use hold::{HoldTable, Pushes};
 
 use super::PlanParams;
 use crate::{LatticeDirection, PatchId, Seam, SegmentedSurface};

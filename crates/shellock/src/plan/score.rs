@@ -5,8 +5,8 @@
 //! later stage may rank the same plans anew; [`score`] is the one place to change. Pieces that the verification would find
 //! loose cost more than anything else: see [`contact`](super::contact).
 
-use super::contact::N_PUSHES;
 use super::{InstallationPlan, PlanConstraints, PlanSurvey};
+use crate::push::N_PUSHES;
 use crate::{IdVec, PatchId};
 
 /// What the share of seam without connectors costs, in units of Eq. 4's weight.

@@ -12,7 +12,7 @@ use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
 use super::contact::Contact;
 use super::{Check, Finding, rounded};
-use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId};
+use crate::{Cancelled, Ctx, IdVec, PatchId, push};
 
 /// Overlap that holds a piece, mm³. The acceptance test asks for 0.5.
 const HOLD_MM3: f64 = 0.55;
@@ -27,8 +27,6 @@ const CONTACTS_HOLD_MM3: f64 = 5.5;
 const CONTACT_DEPTH_MM: f64 = 0.4;
 /// Most rays across the longer side of a piece's shadow; larger prints get wider spacings.
 const MOST_PIXELS: f64 = 1200.0;
-/// Directions spread over the sphere, besides the 26 of the lattice.
-const N_SPHERE: usize = 40;
 /// Rays parallel to no face of a common model.
 const RAYS: Vec3 = Vec3::new(0.3713, 0.5219, 0.7680);
 
@@ -40,8 +38,8 @@ pub fn check(
     key: PatchId,
     clearance_mm: f64,
 ) -> Result<(Check, Vec<Finding>), Cancelled> {
-    let step_mm = 3.0 * clearance_mm + 0.6;
-    let directions = directions();
+    let step_mm = push::length_mm(clearance_mm);
+    let directions = push::directions();
     let frame = Frame::along(RAYS.normalize());
     let projected: Vec<Vec<Vec3>> =
         bodies.iter().map(|(_, b)| b.mesh.points.iter().map(|&p| frame.project(p)).collect()).collect();
@@ -67,17 +65,6 @@ fn contacts_hold(contacts: &[&Contact], step: Vec3) -> bool {
     let overlap_mm3: f64 =
         contacts.iter().map(|c| c.area_mm2 * (c.normal.dot(step) - c.gap_mm).clamp(0.0, CONTACT_DEPTH_MM)).sum();
     overlap_mm3 >= CONTACTS_HOLD_MM3
-}
-
-/// The 26 lattice directions and 40 on a spiral over the sphere.
-fn directions() -> Vec<Vec3> {
-    let spiral = (0..N_SPHERE).map(|i| {
-        let i = i as f64 + 0.5;
-        let (turn, z) = (std::f64::consts::PI * (1.0 + 5f64.sqrt()) * i, 1.0 - 2.0 * i / N_SPHERE as f64);
-        let radius = (1.0 - z * z).sqrt();
-        Vec3::new(radius * turn.cos(), radius * turn.sin(), z)
-    });
-    LatticeDirection::all().map(LatticeDirection::unit).chain(spiral).collect()
 }
 
 fn free_directions(

@@ -20,15 +20,7 @@ use shellock_geom::Vec3;
 use super::{Sample, carries};
 use crate::LatticeDirection;
 use crate::plan::PlanParams;
-
-/// Directions of the verification's pushes.
-pub const N_PUSHES: usize = LatticeDirection::COUNT + N_SPHERE;
-
-/// Pushes spread over the sphere, besides the 26 of the lattice; as in the verification.
-const N_SPHERE: usize = 40;
-
-/// Length of a push beyond three clearances, mm; as in the verification.
-const PUSH_MM: f64 = 0.6;
+use crate::push::{self, N_PUSHES};
 
 /// Depth and width of a pin, in connector sizes.
 const PIN_DEPTH_SIZES: f64 = 0.6;
@@ -48,18 +40,6 @@ pub type Pushes = [[f32; N_PUSHES]; 2];
 #[derive(Clone, Debug, Default)]
 pub struct HoldTable(Vec<Pushes>);
 
-/// The directions of the pushes: 26 of the lattice and 40 on a spiral over the sphere; as in the verification.
-pub fn pushes() -> [Vec3; N_PUSHES] {
-    let spiral = (0..N_SPHERE).map(|i| {
-        let i = i as f64 + 0.5;
-        let (turn, z) = (std::f64::consts::PI * (1.0 + 5f64.sqrt()) * i, 1.0 - 2.0 * i / N_SPHERE as f64);
-        let radius = (1.0 - z * z).sqrt();
-        Vec3::new(radius * turn.cos(), radius * turn.sin(), z)
-    });
-    let mut all = LatticeDirection::all().map(LatticeDirection::unit).chain(spiral);
-    std::array::from_fn(|_| all.next().expect("as many as N_PUSHES"))
-}
-
 impl HoldTable {
     /// The table of a contact with these seams; `holds(order, s)` is whether its runs are long enough there.
     pub(super) fn new(
@@ -67,7 +47,7 @@ impl HoldTable {
         lines: &[(&[Sample], bool)],
         holds: impl Fn(usize, LatticeDirection) -> bool + Sync,
     ) -> Self {
-        let pushes = pushes();
+        let pushes = push::directions();
         let cases: Vec<(usize, LatticeDirection)> =
             [0, 1].into_iter().flat_map(|order| LatticeDirection::all().map(move |s| (order, s))).collect();
         let table = cases.into_par_iter().map(|(order, s)| {
@@ -98,7 +78,7 @@ fn add(
     pushes: &[Vec3; N_PUSHES],
     held: &mut [[f64; N_PUSHES]; 2],
 ) {
-    let (size, gap, step) = (params.connector_size_mm, params.clearance_mm, 3.0 * params.clearance_mm + PUSH_MM);
+    let (size, gap, step) = (params.connector_size_mm, params.clearance_mm, push::length_mm(params.clearance_mm));
     // The male leaves along +s if it is the later piece, else along −s; so does the sign of its motion.
     let role = if s.dot(x.normal) >= 0.0 { 1.0 } else { -1.0 };
     let leaves = (role * s).reject_from_normalized(x.tangent).normalize_or_zero();
