@@ -1,0 +1,112 @@
+//! Thin-walled parts and the stations of the seams between them.
+//!
+//! ```text
+//!                 N                     station: one point of each side at the same place;
+//!                 ▲                     u the seam's tangent (towards the reader or away),
+//!   ───part a───┬─┼─▶───part b───       N the outward normal, v = `across` from side a to side b
+//!               │  v
+//!            male's pin, in a channel of the female; the male may leave along ŝ = `leaves`,
+//!            and the two may slide along u; every other relative motion is blocked
+//! ```
+
+use shellock_geom::Vec3;
+
+/// The two sides of a station.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Side a, where `across` starts.
+    A,
+    /// Side b, where `across` leads.
+    B,
+}
+
+/// Both, a first.
+pub const SIDES: [Side; 2] = [Side::A, Side::B];
+
+impl Side {
+    /// 0 for a, 1 for b.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The other one.
+    pub fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+}
+
+/// Parts by their outer surface, triangulated coarsely enough for mechanics, and the stations of their seams. Lengths in mm.
+#[derive(Clone, Debug, Default)]
+pub struct ShellAssembly {
+    /// Points of the outer surface; each is one part's own, so where parts touch there are several at one place.
+    pub points: Vec<Vec3>,
+    /// Outward unit normal at each point; the same for all points at one place.
+    pub normals: Vec<Vec3>,
+    /// The part of each point, in [0, `n_parts`).
+    pub part_of_point: Vec<u32>,
+    /// Oriented outwards; the three points of a triangle are of one part.
+    pub triangles: Vec<[u32; 3]>,
+    /// How many parts there are.
+    pub n_parts: usize,
+    /// Places inside seams (not their ends) where two parts touch, in order along each seam.
+    pub stations: Vec<Station>,
+    /// Pairs of stations that follow each other on a seam, by a triangle edge on either side.
+    pub steps: Vec<[u32; 2]>,
+}
+
+/// A place on a seam with its frame: three unit vectors perpendicular to each other, u × `across` = ± N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Station {
+    /// The point of side a and the point of side b.
+    pub points: [u32; 2],
+    /// Along the seam.
+    pub tangent: Vec3,
+    /// Out of the surface.
+    pub normal: Vec3,
+    /// In the surface, from side a to side b.
+    pub across: Vec3,
+    /// Length of seam that the station stands for, mm.
+    pub length_mm: f64,
+}
+
+/// What a plan makes of one station.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    /// The side with the pin.
+    pub male: Side,
+    /// Unit vector perpendicular to the tangent along which the male may leave the female: ŝ. In the half space of the
+    /// outward normal, or across it; never into the surface.
+    pub leaves: Vec3,
+    /// Unit vector along which side a is pulled by the separation force; side b is pulled the other way.
+    pub pull_on_a: Vec3,
+    /// Weight w of Eq. 4, > 0.
+    pub weight: f64,
+}
+
+/// What a solver found for one plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Opening {
+    /// Distance between the male and the female at each station, mm; 0 where there is no joint.
+    pub opening_mm: Vec<f64>,
+    /// `−max w d` over the stations (Sect. 5.1), mm; higher is better.
+    pub quality_mm: f64,
+    /// The station that decides the quality.
+    pub worst: Option<u32>,
+}
+
+impl Opening {
+    /// Rates the distances `opening_mm` at stations joined by `joints`.
+    pub fn rated(joints: &[Option<Joint>], opening_mm: Vec<f64>) -> Self {
+        let rated = joints.iter().zip(&opening_mm).map(|(j, d)| j.map_or(0.0, |j| j.weight * d));
+        let mut worst: Option<(u32, f64)> = None;
+        for (i, value) in (0..).zip(rated) {
+            if joints[i as usize].is_some() && worst.is_none_or(|w| value > w.1) {
+                worst = Some((i, value));
+            }
+        }
+        Self { opening_mm, quality_mm: -worst.map_or(0.0, |w| w.1), worst: worst.map(|w| w.0) }
+    }
+}

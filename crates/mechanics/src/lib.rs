@@ -1,0 +1,11 @@
+//! Static mechanics of thin-walled parts that are joined along seams.
+//!
+//! [`ShellAssembly`] says what there is: parts, and the stations of the seams between them. [`Joint`] says what a plan makes
+//! of each station. From both, the solvers compute how far the seams open under a uniform separation force. This crate
+//! knows parts and stations, but neither patches nor plans.
+
+pub mod assembly;
+pub mod material;
+
+pub use assembly::{Joint, Opening, SIDES, ShellAssembly, Side, Station};
+pub use material::Material;
