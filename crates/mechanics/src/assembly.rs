@@ -110,3 +110,12 @@ impl Opening {
         Self { opening_mm, quality_mm: -worst.map_or(0.0, |w| w.1), worst: worst.map(|w| w.0) }
     }
 }
+
+/// Whether the parts hold together under the separation force.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Resistance {
+    /// They do, and open so far.
+    Holds(Opening),
+    /// These parts (ascending) can be pulled off without any resistance, the fixed part held.
+    Separable(Vec<u32>),
+}

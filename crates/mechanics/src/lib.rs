@@ -7,5 +7,5 @@
 pub mod assembly;
 pub mod material;
 
-pub use assembly::{Joint, Opening, SIDES, ShellAssembly, Side, Station};
+pub use assembly::{Joint, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
