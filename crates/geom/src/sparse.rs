@@ -61,6 +61,31 @@ impl SparseSymmetric {
         }
         matrix
     }
+
+    /// Number of rows.
+    pub fn n_rows(&self) -> usize {
+        self.n
+    }
+
+    /// The matrix times `x`.
+    ///
+    /// # Panics
+    /// Where `x` has fewer numbers than the matrix rows.
+    pub fn times(&self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; self.n];
+        for (column, ends) in self.column_start.windows(2).enumerate() {
+            let mut sum = 0.0;
+            for i in ends[0] as usize..ends[1] as usize {
+                let (row, value) = (self.row[i] as usize, self.value[i]);
+                sum += value * x[row];
+                if row != column {
+                    y[row] += value * x[column];
+                }
+            }
+            y[column] += sum;
+        }
+        y
+    }
 }
 
 /// The Cholesky factor of a matrix, kept for many right-hand sides.

@@ -6,6 +6,9 @@
 
 pub mod assembly;
 pub mod material;
+pub mod neighbourhood;
+pub mod surface;
 
 pub use assembly::{Joint, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
+pub use surface::{SurfaceModel, SurfaceParams, SurfaceSolution};
