@@ -3,6 +3,8 @@
 //! The only file that names the sparse solver. The order of elimination is approximate minimum degree: on the Laplacian of
 //! a surface it costs a tenth of nested dissection, which pays only where one pattern is factorised often.
 
+use std::sync::Arc;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -62,9 +64,20 @@ impl SparseSymmetric {
         matrix
     }
 
-    /// Number of rows.
-    pub fn n_rows(&self) -> usize {
-        self.n
+    /// Where the values of a place of the matrix are in [`values_mut`](Self::values_mut); `None` where it has none.
+    pub fn position(&self, row: u32, column: u32) -> Option<usize> {
+        let (row, column) = (row.min(column), row.max(column) as usize);
+        let (start, end) = (self.column_start[column] as usize, self.column_start[column + 1] as usize);
+        self.row[start..end].binary_search(&row).ok().map(|i| start + i)
+    }
+
+    /// The values at all places, to be changed.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.value
+    }
+
+    fn pattern(&self) -> SymbolicSparseColMatRef<'_, u32> {
+        SymbolicSparseColMatRef::new_checked(self.n, self.n, &self.column_start, None, &self.row)
     }
 
     /// The matrix times `x`.
@@ -88,24 +101,41 @@ impl SparseSymmetric {
     }
 }
 
+/// The order of elimination of a pattern, for all matrices that have it.
+#[derive(Clone, Debug)]
+pub struct EliminationOrder(Arc<SymbolicCholesky<u32>>);
+
+impl EliminationOrder {
+    /// Looks at the places of `matrix` alone, not at its values.
+    pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseError> {
+        let n = matrix.n;
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        factorize_symbolic_cholesky(matrix.pattern(), Side::Upper, SymmetricOrdering::Amd, params)
+            .map(|symbolic| Self(Arc::new(symbolic)))
+            .map_err(|_| SparseError::TooLarge { n })
+    }
+}
+
 /// The Cholesky factor of a matrix, kept for many right-hand sides.
 #[derive(Debug)]
 pub struct Cholesky {
-    symbolic: SymbolicCholesky<u32>,
+    symbolic: Arc<SymbolicCholesky<u32>>,
     values: Vec<f64>,
 }
 
 impl Cholesky {
     /// Factorises `matrix`; about 0.1 s for the Laplacian of a surface with 30 000 points.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseError> {
+        Self::in_order(&EliminationOrder::new(matrix)?, matrix)
+    }
+
+    /// Factorises `matrix`, which has the pattern that `order` was made for.
+    pub fn in_order(order: &EliminationOrder, matrix: &SparseSymmetric) -> Result<Self, SparseError> {
         let n = matrix.n;
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.column_start, None, &matrix.row);
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, SymmetricOrdering::Amd, params)
-            .map_err(|_| SparseError::TooLarge { n })?;
+        let (pattern, symbolic) = (matrix.pattern(), order.0.clone());
         let mut values = vec![0.0; symbolic.len_val()];
         // More threads never helped at our sizes and made solves tens of times slower.
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());

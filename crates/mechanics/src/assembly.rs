@@ -72,7 +72,17 @@ pub struct Station {
     pub length_mm: f64,
 }
 
-/// What a plan makes of one station.
+/// How a plan lets the two sides of one station move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// Unit normal of the walls' common face, perpendicular to the tangent, from side a into side b: a cannot go that way
+    /// without b.
+    pub wall: Vec3,
+    /// The connector, where there is one.
+    pub joint: Option<Joint>,
+}
+
+/// The connector that a plan makes at a station.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
     /// The side with the pin.
@@ -80,6 +90,8 @@ pub struct Joint {
     /// Unit vector perpendicular to the tangent along which the male may leave the female: ŝ. In the half space of the
     /// outward normal, or across it; never into the surface.
     pub leaves: Vec3,
+    /// Whether friction keeps the male from leaving, too: on the key, which nothing else holds back.
+    pub is_fast: bool,
     /// Unit vector along which side a is pulled by the separation force; side b is pulled the other way.
     pub pull_on_a: Vec3,
     /// Weight w of Eq. 4, > 0.
@@ -98,12 +110,12 @@ pub struct Opening {
 }
 
 impl Opening {
-    /// Rates the distances `opening_mm` at stations joined by `joints`.
-    pub fn rated(joints: &[Option<Joint>], opening_mm: Vec<f64>) -> Self {
-        let rated = joints.iter().zip(&opening_mm).map(|(j, d)| j.map_or(0.0, |j| j.weight * d));
+    /// Rates the distances `opening_mm` at the stations.
+    pub fn rated(meetings: &[Meeting], opening_mm: Vec<f64>) -> Self {
+        let rated = meetings.iter().zip(&opening_mm).map(|(m, d)| m.joint.map(|j| j.weight * d));
         let mut worst: Option<(u32, f64)> = None;
         for (i, value) in (0..).zip(rated) {
-            if joints[i as usize].is_some() && worst.is_none_or(|w| value > w.1) {
+            if let Some(value) = value.filter(|v| worst.is_none_or(|w| *v > w.1)) {
                 worst = Some((i, value));
             }
         }

@@ -1,6 +1,6 @@
 //! Static mechanics of thin-walled parts that are joined along seams.
 //!
-//! [`ShellAssembly`] says what there is: parts, and the stations of the seams between them. [`Joint`] says what a plan makes
+//! [`ShellAssembly`] says what there is: parts, and the stations of the seams between them. [`Meeting`] says what a plan makes
 //! of each station. From both, the solvers compute how far the seams open under a uniform separation force. This crate
 //! knows parts and stations, but neither patches nor plans.
 
@@ -9,6 +9,6 @@ pub mod material;
 pub mod neighbourhood;
 pub mod surface;
 
-pub use assembly::{Joint, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
+pub use assembly::{Joint, Meeting, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
 pub use surface::{SurfaceModel, SurfaceParams, SurfaceSolution};

@@ -11,6 +11,7 @@ pub mod direction;
 pub mod feedback;
 pub mod figure;
 pub mod ids;
+pub mod metric;
 pub mod params;
 pub mod piece;
 pub mod pipeline;

@@ -15,6 +15,7 @@ pub mod key;
 pub mod occlusion;
 mod params;
 mod piece_set;
+mod sample;
 pub mod score;
 mod search;
 #[cfg(test)]
@@ -27,6 +28,7 @@ pub mod types;
 
 pub use params::PlanParams;
 pub use piece_set::PieceSet;
+pub use sample::random_plans;
 pub use score::{PlanScore, score};
 pub use search::search;
 pub use survey::{PlanSurvey, survey};

@@ -1,14 +1,11 @@
-//! Preconditioned conjugate directions for many plans at once.
+//! One plan's equilibrium: Newton's method with an exact line search on a convex, piecewise quadratic energy.
 
 use shellock_geom::Vec3;
+use shellock_geom::sparse::{Cholesky, SparseError, SparseSymmetric};
 
-use super::terms::Term;
+use super::parts::{N_MOTIONS, first_row};
 use super::{SurfaceModel, SurfaceSolution};
-use crate::assembly::{Joint, Resistance};
-
-/// Stiffness, in `E H`, that ties every point to its place in the preconditioner and in the energy: enough for a factor to
-/// exist, 10⁵ times less than what the weakest joint of a plan that holds resists.
-pub(super) const GROUND_SHARE: f64 = 1e-8;
+use crate::assembly::{Meeting, Opening, Resistance, Side, Station};
 
 /// A gap this large, in connector sizes, has let the pins out: the plan does not hold.
 const LOST_SIZES: f64 = 0.6;
@@ -16,170 +13,222 @@ const LOST_SIZES: f64 = 0.6;
 /// Newton steps of a line search; the slope is piecewise linear and most searches end after two or three.
 const LINE_STEPS: usize = 30;
 
-/// One plan on its way to equilibrium.
-struct State<'a> {
-    joints: &'a [Option<Joint>],
-    two_sided: Vec<Term>,
-    one_sided: Vec<Term>,
-    moved: Vec<f64>,
-    /// What is left of the force.
-    residual: Vec<f64>,
-    direction: Vec<f64>,
-    /// `r · A⁻¹ r` of the last iteration and of the first.
-    norm: f64,
-    first_norm: f64,
-    /// `r · A⁻¹ f` parts for the conjugacy factor.
-    last_residual: Vec<f64>,
-    n_iterations: usize,
-    is_done: bool,
+/// Stiffness of what is held, in that of a contact a mm long.
+const HELD_SHARE: f64 = 1e4;
+
+/// Motions of both sides of a station.
+type Motions = [f64; 2 * N_MOTIONS];
+
+/// One contact: `k/2 (g · q)²` in the motions q of a station, where one-sided only for a negative sum.
+#[derive(Clone, Copy, Debug)]
+struct Contact {
+    station: usize,
+    gradient: Motions,
+    stiffness: f64,
+    is_one_sided: bool,
 }
 
-/// Solves the plans in step with each other; each solve of the preconditioner serves all that are not done.
-pub(super) fn solve(model: &SurfaceModel, plans: &[(&[Option<Joint>], Vec<Vec3>)]) -> Vec<SurfaceSolution> {
-    let mut states: Vec<State<'_>> = plans.iter().map(|(joints, pulls)| State::new(model, joints, pulls)).collect();
-    let n = model.n_rows;
-    let mut sides: Vec<f64> = Vec::with_capacity(n * states.len());
-    for _ in 0..model.params.max_iterations {
-        sides.clear();
-        states.iter().filter(|s| !s.is_done).for_each(|s| sides.extend_from_slice(&s.residual));
-        if sides.is_empty() {
+impl Contact {
+    fn value(&self, moved: &[f64]) -> f64 {
+        let start = first_row(self.station, 0);
+        self.gradient.iter().zip(&moved[start..]).map(|(g, q)| g * q).sum()
+    }
+
+    fn push(&self, size: f64, forces: &mut [f64]) {
+        let start = first_row(self.station, 0);
+        forces[start..].iter_mut().zip(self.gradient).for_each(|(f, g)| *f += size * g);
+    }
+}
+
+/// How side `from` moves from the other one along `g`, both perpendicular to the tangent, at `offset` from the seam point.
+fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motions {
+    let mut gradient = [0.0; 2 * N_MOTIONS];
+    let motion =
+        [g.dot(station.tangent), g.dot(station.normal), g.dot(station.across), station.tangent.cross(offset).dot(g)];
+    for (i, m) in motion.into_iter().enumerate() {
+        gradient[N_MOTIONS * from.index() + i] = m;
+        gradient[N_MOTIONS * from.other().index() + i] = -m;
+    }
+    gradient
+}
+
+/// The contacts of a plan. Where there is a connector, neither the tips nor the seam points may part across the channel,
+/// and the male's tip may not go deeper; the walls may not enter each other anywhere.
+fn contacts(model: &SurfaceModel, plan: &[Meeting]) -> Vec<Contact> {
+    let mut contacts = Vec::with_capacity(4 * plan.len());
+    for (i, (station, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {
+        let stiffness = model.params.contact_n_mm(station.length_mm);
+        let contact = |gradient, is_one_sided| Contact { station: i, gradient, stiffness, is_one_sided };
+        contacts.push(contact(gap(station, Side::B, Vec3::ZERO, meeting.wall), true));
+        if let Some(joint) = meeting.joint {
+            let n = station.tangent.cross(joint.leaves).normalize_or_zero();
+            let tip = -model.params.strip_mm() * joint.leaves;
+            contacts.push(contact(gap(station, joint.male, tip, n), false));
+            contacts.push(contact(gap(station, joint.male, Vec3::ZERO, n), false));
+            contacts.push(contact(gap(station, joint.male, tip, joint.leaves), !joint.is_fast));
+        }
+    }
+    contacts
+}
+
+/// The answer to `pulls`, N, on the tips of side a and, the other way, of side b.
+pub(super) fn solve(
+    model: &SurfaceModel,
+    plan: &[Meeting],
+    held: Option<u32>,
+    pulls: &[Vec3],
+) -> Result<SurfaceSolution, SparseError> {
+    let (contacts, force) = (contacts(model, plan), forces(model, plan, pulls));
+    let rigid = stiffness_of_parts(model, held);
+    let (moved, n_iterations, error) = minimise(model, &rigid, &contacts, &force)?;
+    let opening = rated(model, plan, &moved);
+    let lost = lost_parts(model, held, &opening);
+    let resistance = if lost.is_empty() { Resistance::Holds(opening) } else { Resistance::Separable(lost) };
+    Ok(SurfaceSolution { resistance, n_iterations, error })
+}
+
+/// The motions that `solve` finds.
+#[cfg(test)]
+pub(super) fn moved(
+    model: &SurfaceModel,
+    plan: &[Meeting],
+    held: Option<u32>,
+    pulls: &[Vec3],
+) -> Result<Vec<f64>, SparseError> {
+    let (contacts, force) = (contacts(model, plan), forces(model, plan, pulls));
+    Ok(minimise(model, &stiffness_of_parts(model, held), &contacts, &force)?.0)
+}
+
+/// Energy of motions with nothing but held points fixed, N mm.
+#[cfg(test)]
+pub(super) fn energy(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3], moved: &[f64]) -> f64 {
+    let parts = 0.5 * dot(&stiffness_of_parts(model, None).times(moved), moved);
+    let of_contact = |c: &Contact| {
+        let value = if c.is_one_sided { c.value(moved).min(0.0) } else { c.value(moved) };
+        0.5 * c.stiffness * value * value
+    };
+    parts + contacts(model, plan).iter().map(of_contact).sum::<f64>() - dot(&forces(model, plan, pulls), moved)
+}
+
+/// The pulls as forces on the motions.
+fn forces(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3]) -> Vec<f64> {
+    let mut force = vec![0.0; model.n_rows];
+    for (i, (station, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {
+        if let Some(joint) = meeting.joint {
+            let gradient = gap(station, Side::A, -model.params.strip_mm() * joint.leaves, pulls[i]);
+            force[first_row(i, 0)..].iter_mut().zip(gradient).for_each(|(f, g)| *f += g);
+        }
+    }
+    force
+}
+
+/// The parts' own stiffness; the held part's motions are tied to their place.
+fn stiffness_of_parts(model: &SurfaceModel, held: Option<u32>) -> SparseSymmetric {
+    let mut matrix = model.pattern.clone();
+    let values = matrix.values_mut();
+    for (i, (part, places)) in (0..).zip(model.parts.iter().zip(&model.places)) {
+        let m = part.rows.len();
+        if Some(i) == held {
+            let tie = HELD_SHARE * model.params.contact_n_mm(1.0);
+            (0..m).for_each(|j| values[places[j * (j + 3) / 2] as usize] += tie);
+        } else {
+            let upper = (0..m).flat_map(|column| (0..=column).map(move |row| (row, column)));
+            upper.zip(places).for_each(|((r, c), &place)| values[place as usize] += part.stiffness[(r, c)]);
+        }
+    }
+    matrix
+}
+
+/// Motions with the least energy, steps taken, and what is left of the force as a share of it.
+fn minimise(
+    model: &SurfaceModel,
+    rigid: &SparseSymmetric,
+    contacts: &[Contact],
+    force: &[f64],
+) -> Result<(Vec<f64>, usize, f64), SparseError> {
+    let mut moved = vec![0.0; force.len()];
+    let mut residual = force.to_vec();
+    let size = dot(force, force).sqrt();
+    let mut n_iterations = 0;
+    let mut error = if size > 0.0 { 1.0 } else { 0.0 };
+    while error > model.params.tolerance && n_iterations < model.params.max_iterations {
+        let mut tangent = rigid.clone();
+        for c in contacts.iter().filter(|c| !c.is_one_sided || c.value(&moved) <= 0.0) {
+            add_contact(model, &mut tangent, c);
+        }
+        let mut step = residual.clone();
+        Cholesky::in_order(&model.order, &tangent)?.solve_in_place(&mut step);
+        go_along(rigid, contacts, &step, &mut moved, &mut residual);
+        error = dot(&residual, &residual).sqrt() / size;
+        n_iterations += 1;
+    }
+    Ok((moved, n_iterations, error))
+}
+
+fn add_contact(model: &SurfaceModel, matrix: &mut SparseSymmetric, contact: &Contact) {
+    let mut places = model.station_places[contact.station].iter();
+    let values = matrix.values_mut();
+    for (column, gc) in contact.gradient.into_iter().enumerate() {
+        for gr in &contact.gradient[..=column] {
+            let place = *places.next().expect("a place for each pair of motions") as usize;
+            values[place] += contact.stiffness * gc * gr;
+        }
+    }
+}
+
+/// Goes along `step` to the least energy and updates what is left of the force.
+fn go_along(rigid: &SparseSymmetric, contacts: &[Contact], step: &[f64], moved: &mut [f64], residual: &mut [f64]) {
+    let stiff = rigid.times(step);
+    let lines: Vec<[f64; 2]> = contacts.iter().map(|c| [c.value(moved), c.value(step)]).collect();
+    let push = |c: &Contact, [a, b]: [f64; 2], length: f64| {
+        let x = a + length * b;
+        c.stiffness * if c.is_one_sided { x.min(0.0) } else { x }
+    };
+    let (linear, curved) = (-dot(residual, step), dot(&stiff, step));
+    let mut length = 0.0;
+    for _ in 0..LINE_STEPS {
+        let (mut slope, mut curve) = (linear + curved * length, curved);
+        for (c, &line) in contacts.iter().zip(&lines) {
+            slope += line[1] * (push(c, line, length) - push(c, line, 0.0));
+            let touches = !c.is_one_sided || line[0] + length * line[1] < 0.0;
+            curve += if touches { c.stiffness * line[1] * line[1] } else { 0.0 };
+        }
+        if slope.abs() <= 1e-12 * linear.abs() || curve <= 0.0 {
             break;
         }
-        model.factor.solve_in_place(&mut sides);
-        for (state, step) in states.iter_mut().filter(|s| !s.is_done).zip(sides.chunks_exact(n.max(1))) {
-            state.advance(model, step);
-        }
+        length -= slope / curve;
     }
-    states.into_iter().map(|s| s.into_solution(model)).collect()
-}
-
-impl<'a> State<'a> {
-    fn new(model: &SurfaceModel, joints: &'a [Option<Joint>], pulls: &[Vec3]) -> Self {
-        let (one_sided, two_sided) = model.terms_of(joints).into_iter().partition(|t| t.is_one_sided);
-        let n = model.n_rows;
-        let mut residual = vec![0.0; n];
-        for (i, &pull) in pulls.iter().enumerate() {
-            for (side, force) in [pull, -pull].into_iter().enumerate() {
-                add(&mut residual, model.row[model.tip(i, side)], force);
-            }
-        }
-        let is_done = residual.iter().all(|r| *r == 0.0);
-        Self {
-            joints,
-            two_sided,
-            one_sided,
-            moved: vec![0.0; n],
-            last_residual: vec![0.0; n],
-            residual,
-            direction: vec![0.0; n],
-            norm: 0.0,
-            first_norm: 0.0,
-            n_iterations: 0,
-            is_done,
-        }
-    }
-
-    /// One step along the direction conjugate to the last one; `step` is the preconditioned residual.
-    fn advance(&mut self, model: &SurfaceModel, step: &[f64]) {
-        let norm = dot(&self.residual, step);
-        if self.n_iterations == 0 {
-            self.first_norm = norm;
-        }
-        // Polak and Ribière's factor: it restarts by itself where contacts switched.
-        let conjugate = norm - dot(&self.last_residual, step);
-        let beta = if self.norm > 0.0 { (conjugate / self.norm).max(0.0) } else { 0.0 };
-        self.norm = norm;
-        if !(norm > model.params.tolerance.powi(2) * self.first_norm) {
-            self.is_done = true;
-            return;
-        }
-        self.n_iterations += 1;
-        self.direction.iter_mut().zip(step).for_each(|(p, z)| *p = z + beta * *p);
-        self.last_residual.copy_from_slice(&self.residual);
-        self.search_along(model);
-    }
-
-    /// Goes along the direction to the least energy.
-    fn search_along(&mut self, model: &SurfaceModel) {
-        let mut stiff = model.patches.times(&self.direction);
-        let ground = GROUND_SHARE * model.params.material.youngs_modulus_mpa * model.params.wall_mm;
-        stiff.iter_mut().zip(&self.direction).for_each(|(f, p)| *f += ground * p);
-        for term in &self.two_sided {
-            let pull = term.stiffness * value(model, term, &self.direction);
-            push(model, term, pull, &mut stiff);
-        }
-        let contacts: Vec<[f64; 3]> = self
-            .one_sided
-            .iter()
-            .map(|t| [value(model, t, &self.moved), value(model, t, &self.direction), t.stiffness])
-            .collect();
-        // The residual has the contacts as they are at length 0; the slope asks for them at every length.
-        let push_at = |[a, b, k]: [f64; 3], length: f64| k * (a + length * b).min(0.0);
-        let linear = -dot(&self.residual, &self.direction);
-        let curved = dot(&stiff, &self.direction);
-        let mut length = 0.0;
-        for _ in 0..LINE_STEPS {
-            let (mut slope, mut curve) = (linear + curved * length, curved);
-            for &c in &contacts {
-                slope += c[1] * (push_at(c, length) - push_at(c, 0.0));
-                curve += if c[0] + length * c[1] < 0.0 { c[2] * c[1] * c[1] } else { 0.0 };
-            }
-            if slope.abs() <= 1e-10 * linear.abs() || curve <= 0.0 {
-                break;
-            }
-            length -= slope / curve;
-        }
-        self.moved.iter_mut().zip(&self.direction).for_each(|(u, p)| *u += length * p);
-        self.residual.iter_mut().zip(&stiff).for_each(|(r, f)| *r -= length * f);
-        for (term, &c) in self.one_sided.iter().zip(&contacts) {
-            let change = push_at(c, length) - push_at(c, 0.0);
-            if change != 0.0 {
-                push(model, term, -change, &mut self.residual);
-            }
-        }
-    }
-
-    fn into_solution(self, model: &SurfaceModel) -> SurfaceSolution {
-        let opening = model.rated(self.joints, &self.moved);
-        let lost_mm = LOST_SIZES * model.params.connector_mm;
-        let lost = |(i, d): (usize, &f64)| (!(*d < lost_mm)).then_some(i);
-        let mut parts: Vec<u32> = opening
-            .opening_mm
-            .iter()
-            .enumerate()
-            .filter_map(lost)
-            .flat_map(|i| model.assembly.stations[i].points)
-            .filter(|&p| model.row[p as usize].is_some())
-            .map(|p| model.assembly.part_of_point[p as usize])
-            .collect();
-        parts.sort_unstable();
-        parts.dedup();
-        let is_lost = !parts.is_empty() || !self.is_done;
-        let resistance = if is_lost { Resistance::Separable(parts) } else { Resistance::Holds(opening) };
-        let error = if self.first_norm > 0.0 { (self.norm.max(0.0) / self.first_norm).sqrt() } else { 0.0 };
-        SurfaceSolution { resistance, n_iterations: self.n_iterations, error }
+    moved.iter_mut().zip(step).for_each(|(q, p)| *q += length * p);
+    residual.iter_mut().zip(&stiff).for_each(|(r, f)| *r -= length * f);
+    for (c, &line) in contacts.iter().zip(&lines) {
+        c.push(push(c, line, 0.0) - push(c, line, length), residual);
     }
 }
 
-/// `Σ gᵢ · uᵢ` of a term.
-fn value(model: &SurfaceModel, term: &Term, moved: &[f64]) -> f64 {
-    let at = |(p, g): (usize, Vec3)| model.row[p].map_or(0.0, |r| g.dot(Vec3::from_slice(&moved[r as usize..])));
-    term.corners().map(at).sum()
+/// The distances between the tips of both sides.
+fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[f64]) -> Opening {
+    let opening = |(i, (station, m)): (usize, (&Station, &Meeting))| {
+        let Some(joint) = m.joint else { return 0.0 };
+        let q = &moved[first_row(i, 0)..];
+        let along = |g| {
+            let gradient = gap(station, Side::A, -model.params.strip_mm() * joint.leaves, g);
+            gradient.iter().zip(q).map(|(g, q)| g * q).sum::<f64>()
+        };
+        Vec3::from_array([station.tangent, station.normal, station.across].map(along)).length()
+    };
+    Opening::rated(plan, model.assembly.stations.iter().zip(plan).enumerate().map(opening).collect())
 }
 
-/// Adds `size · gᵢ` at every point of a term.
-fn push(model: &SurfaceModel, term: &Term, size: f64, forces: &mut [f64]) {
-    for (p, g) in term.corners() {
-        add(forces, model.row[p], size * g);
-    }
-}
-
-fn add(forces: &mut [f64], row: Option<u32>, force: Vec3) {
-    if let Some(row) = row {
-        for (x, f) in (row as usize..).zip(force.to_array()) {
-            forces[x] += f;
-        }
-    }
+/// The parts at stations that opened too far, the held one left out, ascending.
+fn lost_parts(model: &SurfaceModel, held: Option<u32>, opening: &Opening) -> Vec<u32> {
+    let lost_mm = LOST_SIZES * model.params.connector_mm;
+    let lost = |(station, d): (&Station, &f64)| (!(*d < lost_mm)).then_some(station.points);
+    let points = model.assembly.stations.iter().zip(&opening.opening_mm).filter_map(lost).flatten();
+    let mut parts: Vec<u32> = points.map(|p| model.assembly.part_of_point[p as usize]).collect();
+    parts.retain(|p| Some(*p) != held);
+    parts.sort_unstable();
+    parts.dedup();
+    parts
 }
 
 fn dot(x: &[f64], y: &[f64]) -> f64 {

@@ -3,36 +3,20 @@
 use shellock_geom::Vec3;
 
 use super::SurfaceParams;
-use crate::assembly::{Joint, ShellAssembly, Side, Station};
-
-/// Contact stiffness per mm of seam, in Young's moduli: what a block as high as it is wide resists.
-pub(super) const POSITION_SHARE: f64 = 1.0;
+use crate::assembly::ShellAssembly;
 
 /// One constraint, to first order in the displacements.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Term {
-    points: [u32; 4],
-    gradients: [Vec3; 4],
-    n: u8,
+    /// The points it depends on, each once, with the gradient there.
+    pub corners: Vec<(u32, Vec3)>,
     /// N/mm for lengths, N mm for angles.
     pub stiffness: f64,
-    /// Whether it only resists where the sum is negative.
-    pub is_one_sided: bool,
 }
 
 impl Term {
-    fn new<const N: usize>(corners: [(usize, Vec3); N], stiffness: f64) -> Self {
-        let (mut points, mut gradients) = ([0; 4], [Vec3::ZERO; 4]);
-        for (i, (p, g)) in corners.into_iter().enumerate() {
-            (points[i], gradients[i]) = (p as u32, g);
-        }
-        Self { points, gradients, n: N as u8, stiffness, is_one_sided: false }
-    }
-
-    /// The points it depends on, each with the gradient there.
-    pub fn corners(&self) -> impl Iterator<Item = (usize, Vec3)> {
-        let n = usize::from(self.n);
-        self.points.into_iter().map(|p| p as usize).zip(self.gradients).take(n)
+    fn new(corners: impl IntoIterator<Item = (u32, Vec3)>, stiffness: f64) -> Self {
+        Self { corners: corners.into_iter().collect(), stiffness }
     }
 }
 
@@ -48,7 +32,7 @@ fn edge(params: &SurfaceParams, points: &[Vec3], [i, j]: [usize; 2], thickness_m
     let unit = along.try_normalize()?;
     let modulus = params.stiffness_ratios[0] * params.material.youngs_modulus_mpa;
     let stiffness = modulus * thickness_mm * area_mm2 / along.length_squared();
-    Some(Term::new([(i, -unit), (j, unit)], stiffness))
+    Some(Term::new([(i as u32, -unit), (j as u32, unit)], stiffness))
 }
 
 /// The dihedral angle at the edge `i j` between triangles `i j k` and `j i l`, with the given stiffness, N mm a radian.
@@ -67,10 +51,10 @@ pub(super) fn hinge(points: &[Vec3], [i, j, k, l]: [usize; 4], stiffness: f64) -
     let (k_to, l_to) =
         (|from: usize| (points[k] - points[from]).dot(unit), |from: usize| (points[l] - points[from]).dot(unit));
     let corners = [
-        (i, k_to(j) * n1 + l_to(j) * n2),
-        (j, -k_to(i) * n1 - l_to(i) * n2),
-        (k, edge.length() * n1),
-        (l, edge.length() * n2),
+        (i as u32, k_to(j) * n1 + l_to(j) * n2),
+        (j as u32, -k_to(i) * n1 - l_to(i) * n2),
+        (k as u32, edge.length() * n1),
+        (l as u32, edge.length() * n2),
     ];
     Some(Term::new(corners, stiffness))
 }
@@ -100,38 +84,45 @@ pub(super) fn patch_terms(params: &SurfaceParams, assembly: &ShellAssembly, poin
     terms
 }
 
-/// One side's strip between two stations: corners are the seam points, then the tips; `beside` is the patch's point
-/// across the seam edge.
-pub(super) fn strip_terms(
-    params: &SurfaceParams,
-    points: &[Vec3],
-    [b0, b1, t0, t1]: [usize; 4],
-    beside: Option<usize>,
-) -> impl Iterator<Item = Term> {
-    let thickness = params.pin_mm();
-    let area = |i: usize, j: usize, k: usize| 0.5 * (points[j] - points[i]).cross(points[k] - points[i]).length();
-    let areas = 0.5 * (area(b0, b1, t0) + area(b1, t1, t0));
-    // Both diagonals, each as the edge of both triangles' area, so that neither shear is stiffer.
-    let edges =
-        [[b0, t0], [b1, t1], [t0, t1], [b0, t1], [b1, t0]].map(|ends| edge(params, points, ends, thickness, areas));
-    // Bends at its root as a cantilever of its depth would.
-    let length = points[b0].distance(points[b1]);
-    let plate = params.stiffness_ratios[1] * bending(params, thickness);
-    let root = beside.and_then(|k| hinge(points, [b0, b1, k, t0], 3.0 * plate * length / params.strip_mm()));
-    let across = points[b1].distance_squared(points[t0]) / (2.0 * areas).max(f64::MIN_POSITIVE);
-    let flat = hinge(points, [b1, t0, b0, t1], plate * across);
-    edges.into_iter().chain([root, flat]).flatten()
+/// How a point of a rigid strip moves with the patch at its seam point: with the point, and about it as the mean of the
+/// triangles there turns.
+#[derive(Clone, Debug)]
+pub(super) struct Root {
+    point: u32,
+    /// `r` and `n` of each corner: the rotation is `Σ −r (n · u) + n (r · u) / 2`, the latter within the surface.
+    turns: Vec<(u32, [Vec3; 2])>,
 }
 
-/// The contact of a station: neither the tips nor the seam points may part across the channel, and the male's tip may not
-/// go deeper.
-pub(super) fn contacts(params: &SurfaceParams, station: &Station, joint: &Joint, tips: [usize; 2]) -> [Term; 3] {
-    let modulus = params.stiffness_ratios[2] * params.material.youngs_modulus_mpa;
-    let stiffness = POSITION_SHARE * modulus * station.length_mm;
-    let (male, female) = (joint.male.index(), joint.male.other().index());
-    let across = station.tangent.cross(joint.leaves).normalize_or_zero();
-    let pair = |points: [usize; 2], n: Vec3| Term::new([(points[male], n), (points[female], -n)], stiffness);
-    let roots = station.points.map(|p| p as usize);
-    debug_assert!(male != female && Side::A.index() == 0);
-    [pair(tips, across), pair(roots, across), Term { is_one_sided: true, ..pair(tips, joint.leaves) }]
+impl Root {
+    /// Of seam point `point`, at which these triangles meet.
+    pub fn new(points: &[Vec3], point: u32, triangles: impl Iterator<Item = [u32; 3]> + Clone) -> Self {
+        let doubled = |t: [u32; 3]| {
+            let [a, b, c] = t.map(|v| points[v as usize]);
+            (b - a).cross(c - a)
+        };
+        let total: f64 = triangles.clone().map(|t| doubled(t).length()).sum();
+        let mut turns = Vec::new();
+        for t in triangles {
+            let (area_vector, share) = (doubled(t), doubled(t).length() / total);
+            let Some(n) = area_vector.try_normalize() else { continue };
+            for i in 0..3 {
+                // The gradient of a corner's hat function is n × opposite edge / doubled area; r = n × gradient.
+                let opposite = points[t[(i + 2) % 3] as usize] - points[t[(i + 1) % 3] as usize];
+                let r = n.cross(n.cross(opposite)) / area_vector.length();
+                turns.push((t[i], [share * r, n]));
+            }
+        }
+        Self { point, turns }
+    }
+
+    /// Gradients of the seam point's motion along `g`.
+    pub fn shift(&self, g: Vec3) -> Vec<(u32, Vec3)> {
+        vec![(self.point, g)]
+    }
+
+    /// Gradients of the strip's rotation about `axis`, rad.
+    pub fn turn(&self, axis: Vec3) -> Vec<(u32, Vec3)> {
+        let turn = |&(p, [r, n]): &(u32, [Vec3; 2])| (p, -n * r.dot(axis) + 0.5 * r * n.dot(axis));
+        self.turns.iter().map(turn).collect()
+    }
 }

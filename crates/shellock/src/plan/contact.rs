@@ -95,6 +95,38 @@ struct Sample {
     barred: Barred,
 }
 
+/// The frame of a seam as its later piece sees it: three unit vectors perpendicular to each other.
+#[derive(Clone, Copy, Debug)]
+pub struct SeamFrame {
+    /// Along the seam.
+    pub tangent: Vec3,
+    /// Out of the surface.
+    pub normal: Vec3,
+    /// From the later piece to the earlier one.
+    pub across: Vec3,
+}
+
+impl SeamFrame {
+    /// Whether a connector can be made where the later piece leaves along the unit vector `s`.
+    pub fn carries(&self, s: Vec3) -> bool {
+        // s' is s without its part along the seam; where q is the male piece both s and v turn, so their product stays.
+        let (outwards, towards_female) = (s.dot(self.normal).abs(), s.dot(self.across));
+        s.dot(self.tangent).abs() <= MAX_ALONG_SEAM && towards_female.atan2(outwards) <= MAX_BACKWARD_RAD
+    }
+
+    /// Weight `w` of Eq. 4, in [β, 1 + β]: large where `s` runs along the seam or towards the earlier piece.
+    pub fn weight(&self, s: Vec3, beta: f64) -> f64 {
+        s.dot(self.tangent).abs().max(s.dot(self.across).max(0.0)) + beta
+    }
+}
+
+impl Sample {
+    /// The frame with the piece of the lower id as the later one where `side` is 1, else the other.
+    fn frame(&self, side: f64) -> SeamFrame {
+        SeamFrame { tangent: self.tangent, normal: self.normal, across: side * self.across }
+    }
+}
+
 impl Contact {
     /// What joins the two where `later` is installed after the other and leaves along `s`.
     pub fn joint(&self, later: PatchId, s: LatticeDirection) -> &Joint {
@@ -169,9 +201,7 @@ fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: Lattice
     let (mut weight, mut usable, mut length_mm, mut run_mm) = (0.0, 0.0, 0.0, 0.0_f64);
     for &(samples, is_loop) in lines {
         for x in samples {
-            let along = s.unit();
-            let w = along.dot(x.tangent).abs().max((side * along.dot(x.across)).max(0.0)) + params.beta;
-            weight += w * x.length_mm;
+            weight += x.frame(side).weight(s.unit(), params.beta) * x.length_mm;
             length_mm += x.length_mm;
             if carries(x, side, s) {
                 usable += x.length_mm;
@@ -185,13 +215,7 @@ fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: Lattice
 
 /// Whether a connector can be made at `x`.
 fn carries(x: &Sample, side: f64, s: LatticeDirection) -> bool {
-    if x.barred.has(usize::from(side < 0.0), s) {
-        return false;
-    }
-    let s = s.unit();
-    // s' is s without its part along the seam; where q is the male piece both s and v turn, so their product stays.
-    let (outwards, towards_female) = (s.dot(x.normal).abs(), side * s.dot(x.across));
-    x.has_room && s.dot(x.tangent).abs() <= MAX_ALONG_SEAM && towards_female.atan2(outwards) <= MAX_BACKWARD_RAD
+    !x.barred.has(usize::from(side < 0.0), s) && x.has_room && x.frame(side).carries(s.unit())
 }
 
 /// Length of the longest row of samples that carry connectors with the same male piece.

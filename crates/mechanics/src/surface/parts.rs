@@ -1,0 +1,135 @@
+//! Each part's stiffness as its seams feel it: the mesh condensed onto four motions of every station.
+//!
+//! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q K⁻¹ Qᵀ` and the
+//! stiffness `S = C⁻¹`: exact, whatever happens at the seams, and the same for all plans.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use shellock_geom::Vec3;
+use shellock_geom::sparse::{Cholesky, SparseError, SparseSymmetric};
+
+use super::SurfaceParams;
+use super::terms::{Root, Term, patch_terms};
+use crate::assembly::{SIDES, ShellAssembly};
+
+/// Motions of a side of a station: along the tangent, along the normal, across, and the turn about the tangent.
+pub(super) const N_MOTIONS: usize = 4;
+
+/// Stiffness, in `E H`, that ties every point to its place and keeps `K` definite where the part floats: 10⁵ times less
+/// than what the weakest joint of a plan that holds resists.
+const GROUND_SHARE: f64 = 1e-8;
+
+/// Compliance that every motion has besides the mesh's, in those of a contact a mm long. Parts of a few triangles have
+/// fewer motions than their stations ask for.
+const LEAST_COMPLIANCE: f64 = 1e-3;
+
+/// A part as its seams feel it.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    /// Rows of the system that are this part's motions, ascending.
+    pub rows: Vec<u32>,
+    /// Stiffness between them, N/mm (N for a turn, N mm for two).
+    pub stiffness: DMatrix<f64>,
+}
+
+/// The row of the first motion of a side of a station.
+pub(super) fn first_row(station: usize, side: usize) -> usize {
+    N_MOTIONS * (2 * station + side)
+}
+
+/// All parts; points with `is_held` do not move.
+pub(super) fn parts(
+    params: &SurfaceParams,
+    assembly: &ShellAssembly,
+    is_held: &[bool],
+) -> Result<Vec<Part>, SparseError> {
+    let mid_wall = assembly.points.iter().zip(&assembly.normals).map(|(p, n)| *p - 0.5 * params.wall_mm * *n);
+    let points: Vec<Vec3> = mid_wall.collect();
+    let mut terms: Vec<Vec<Term>> = vec![Vec::new(); assembly.n_parts];
+    for term in patch_terms(params, assembly, &points) {
+        terms[assembly.part_of_point[term.corners[0].0 as usize] as usize].push(term);
+    }
+    let mut triangles_at = vec![Vec::new(); points.len()];
+    assembly.triangles.iter().for_each(|t| t.iter().for_each(|&v| triangles_at[v as usize].push(*t)));
+    let mut motions: Vec<Vec<(u32, Vec<(u32, Vec3)>)>> = vec![Vec::new(); assembly.n_parts];
+    for (i, station) in assembly.stations.iter().enumerate() {
+        for side in SIDES {
+            let point = station.points[side.index()];
+            let root = Root::new(&points, point, triangles_at[point as usize].iter().copied());
+            let shifts = [station.tangent, station.normal, station.across].map(|g| root.shift(g));
+            let all = shifts.into_iter().chain([root.turn(station.tangent)]);
+            let rows = (first_row(i, side.index()) as u32..).zip(all);
+            motions[assembly.part_of_point[point as usize] as usize].extend(rows);
+        }
+    }
+    let row = rows_by_part(assembly, is_held);
+    terms.par_iter().zip(motions).map(|(terms, motions)| part(params, &row, terms, motions)).collect()
+}
+
+/// The row of each point's x within its part; `None` where it is held.
+fn rows_by_part(assembly: &ShellAssembly, is_held: &[bool]) -> Vec<Option<u32>> {
+    let mut n_rows = vec![0; assembly.n_parts];
+    let row = |(&part, &is_held): (&u32, &bool)| {
+        (!is_held).then(|| {
+            n_rows[part as usize] += 3;
+            n_rows[part as usize] - 3
+        })
+    };
+    assembly.part_of_point.iter().zip(is_held).map(row).collect()
+}
+
+fn part(
+    params: &SurfaceParams,
+    row: &[Option<u32>],
+    terms: &[Term],
+    motions: Vec<(u32, Vec<(u32, Vec3)>)>,
+) -> Result<Part, SparseError> {
+    let corners = terms.iter().flat_map(|t| &t.corners).chain(motions.iter().flat_map(|m| &m.1));
+    let n = corners.filter_map(|c| row[c.0 as usize]).max().map_or(0, |r| r as usize + 3);
+    let factor = Cholesky::new(&mesh_stiffness(params, n, row, terms))?;
+    let m = motions.len();
+    let mut sides = vec![0.0; n * m];
+    for (side, (_, gradient)) in sides.chunks_exact_mut(n.max(1)).zip(&motions) {
+        for &(p, g) in gradient {
+            add(side, row[p as usize], g);
+        }
+    }
+    let forces = DMatrix::from_column_slice(n, m, &sides);
+    factor.solve_in_place(&mut sides);
+    let mut compliance = forces.transpose() * DMatrix::from_column_slice(n, m, &sides);
+    for i in 0..m {
+        compliance[(i, i)] += LEAST_COMPLIANCE / params.contact_n_mm(1.0);
+    }
+    let symmetric = 0.5 * (&compliance + compliance.transpose());
+    let inverse = symmetric.cholesky().ok_or(SparseError::NotPositiveDefinite { n: m })?.inverse();
+    Ok(Part { rows: motions.into_iter().map(|m| m.0).collect(), stiffness: inverse })
+}
+
+fn mesh_stiffness(params: &SurfaceParams, n: usize, row: &[Option<u32>], terms: &[Term]) -> SparseSymmetric {
+    let ground = GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm;
+    let mut entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|r| (r, r, ground)).collect();
+    for term in terms {
+        let free = |&(p, g): &(u32, Vec3)| row[p as usize].map(|r| (r, g));
+        let corners: Vec<(u32, Vec3)> = term.corners.iter().filter_map(free).collect();
+        for (i, &(r, g)) in corners.iter().enumerate() {
+            for &(q, h) in &corners[i..] {
+                for (x, gx) in (0..).zip(g.to_array()) {
+                    for (y, hy) in (0..).zip(h.to_array()) {
+                        if r != q || y >= x {
+                            entries.push((r + x, q + y, term.stiffness * gx * hy));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    SparseSymmetric::from_entries(n, entries)
+}
+
+fn add(forces: &mut [f64], row: Option<u32>, force: Vec3) {
+    if let Some(row) = row {
+        for (x, f) in (row as usize..).zip(force.to_array()) {
+            forces[x] += f;
+        }
+    }
+}

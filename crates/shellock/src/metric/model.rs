@@ -1,0 +1,212 @@
+//! The segmented surface as parts and stations, and what a plan makes of them.
+
+use shellock_geom::remesh::{RemeshParams, remesh};
+use shellock_geom::sparse::SparseError;
+use shellock_geom::topology::ends;
+use shellock_geom::{Topology, TriMesh, Vec3};
+use shellock_mechanics::{Joint, Material, Meeting, ShellAssembly, Side, Station, SurfaceModel, SurfaceParams};
+
+use crate::plan::contact::{SeamFrame, end_gap_mm};
+use crate::plan::{InstallationPlan, PlanParams};
+use crate::seams::{seam_half_edges, stretches};
+use crate::{PatchId, SegmentedSurface};
+
+/// How the model is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MetricParams {
+    /// Wall thickness, mm. (0, 10]; 2.
+    pub wall_mm: f64,
+    /// Connector size D, mm. [1, 10]; 2.5.
+    pub connector_mm: f64,
+    /// Floor β of the connector weight (Eq. 4). [0, 1]; 0.1.
+    pub beta: f64,
+    /// Length of triangle edges, in square roots of the area per thousand points. [0.2, 5]; 1.
+    ///
+    /// 1 gives about 1000 points, on which a plan takes some milliseconds; see the study for what finer meshes change.
+    pub edge_share: f64,
+    /// What the pieces are printed of.
+    pub material: Material,
+}
+
+impl Default for MetricParams {
+    fn default() -> Self {
+        Self { wall_mm: 2.0, connector_mm: 2.5, beta: 0.1, edge_share: 1.0, material: Material::default() }
+    }
+}
+
+impl MetricParams {
+    /// The same wall, connectors and floor as the plan's.
+    pub fn of_plan(params: &PlanParams) -> Self {
+        let defaults = Self::default();
+        let wall_mm = if params.wall_mm > 0.0 { params.wall_mm } else { defaults.wall_mm };
+        Self { wall_mm, connector_mm: params.connector_size_mm, beta: params.beta, ..defaults }
+    }
+
+    /// The surface metric's parameters with these sizes.
+    pub fn surface(&self) -> SurfaceParams {
+        let (wall_mm, connector_mm, material) = (self.wall_mm, self.connector_mm, self.material);
+        SurfaceParams { wall_mm, connector_mm, material, ..SurfaceParams::default() }
+    }
+}
+
+/// What the metrics know of a segmented surface; the same for all plans.
+#[derive(Clone, Debug)]
+pub struct PlanModel {
+    /// Parts are pieces, by the same numbers.
+    pub assembly: ShellAssembly,
+    /// What it was made with.
+    pub params: MetricParams,
+    seams: Vec<StationSeam>,
+}
+
+/// Where a station is.
+#[derive(Clone, Copy, Debug)]
+struct StationSeam {
+    a: PatchId,
+    b: PatchId,
+    /// Whether it is far enough from the ends of an open seam for a connector.
+    has_room: bool,
+}
+
+impl PlanModel {
+    /// Remeshes `surface` evenly and finds the stations: all points inside seams.
+    pub fn new(params: &MetricParams, surface: &SegmentedSurface) -> Self {
+        /// Points of a mesh of equilateral triangles: one each √3/2 l².
+        const POINTS_AT_ONE: f64 = 1000.0;
+        let area_mm2 = surface.mesh.area();
+        let target_edge_mm = params.edge_share * (area_mm2 / (POINTS_AT_ONE * 0.75f64.sqrt())).sqrt();
+        let labels: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
+        let coarse = remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, &surface.mesh, &labels);
+        Self::of_mesh(params, &coarse.mesh, &coarse.labels, surface.n_patches)
+    }
+
+    /// The model of a closed mesh with these labels as it is.
+    fn of_mesh(params: &MetricParams, mesh: &TriMesh, labels: &[u32], n_parts: usize) -> Self {
+        let mut model = Self { assembly: parts(mesh, labels, n_parts), params: *params, seams: Vec::new() };
+        let topology = Topology::of_mesh(mesh).expect("a remeshed surface is closed");
+        let normals = point_normals(mesh);
+        // The copy of a mesh point in a part: parts() numbers points by part, then by point.
+        let copies = copies(mesh, labels);
+        let copy = |part: u32, v: u32| copies.binary_search(&(part, v)).expect("a seam point is of both parts") as u32;
+        for s in stretches(mesh, &topology, labels, &seam_half_edges(&topology, labels, 0..labels.len() as u32)) {
+            let mut chain: Vec<u32> = vec![ends(mesh, s.half_edges[0]).0];
+            chain.extend(s.half_edges.iter().map(|&h| ends(mesh, h).1));
+            let points: Vec<(Vec3, Vec3, [u32; 2])> = chain
+                .iter()
+                .map(|&v| (mesh.points[v as usize], normals[v as usize], [copy(s.a, v), copy(s.b, v)]))
+                .collect();
+            model.add_seam([PatchId(s.a), PatchId(s.b)], &points);
+        }
+        model
+    }
+
+    /// Adds the stations of a seam, patch a on its left: all points but the ends; of a loop all points once.
+    fn add_seam(&mut self, [a, b]: [PatchId; 2], points: &[(Vec3, Vec3, [u32; 2])]) {
+        let n = points.len() - 1;
+        let is_loop = points[0].2 == points[n].2;
+        let inner = |i: usize| points[i].0 - self.params.wall_mm * points[i].1;
+        let mut arc_mm = vec![0.0; n + 1];
+        (0..n).for_each(|i| arc_mm[i + 1] = arc_mm[i] + inner(i).distance(inner(i + 1)));
+        let margin = if is_loop { 0.0 } else { end_gap_mm(self.params.connector_mm, arc_mm[n]) };
+        let first = self.assembly.stations.len() as u32;
+        for i in usize::from(!is_loop)..n {
+            let (before, after) = (points[if i > 0 { i - 1 } else { n - 1 }], points[i + 1]);
+            let (place, normal, copies) = points[i];
+            let tangent =
+                (after.0 - before.0).reject_from_normalized(normal).normalize_or(normal.any_orthonormal_vector());
+            let length_mm = 0.5 * (place.distance(before.0) + after.0.distance(place));
+            let across = tangent.cross(normal);
+            self.assembly.stations.push(Station { points: copies, tangent, normal, across, length_mm });
+            let has_room = arc_mm[i] >= margin && arc_mm[i] <= arc_mm[n] - margin;
+            self.seams.push(StationSeam { a, b, has_room });
+        }
+        let last = self.assembly.stations.len() as u32;
+        self.assembly.steps.extend((first + 1..last).map(|i| [i - 1, i]));
+        if is_loop && last > first + 1 {
+            self.assembly.steps.push([last - 1, first]);
+        }
+    }
+
+    /// What `plan` makes of each station.
+    pub fn meetings(&self, plan: &InstallationPlan) -> Vec<Meeting> {
+        let mut position = vec![0; self.assembly.n_parts];
+        plan.steps.iter().enumerate().for_each(|(i, s)| position[usize::from(s.piece)] = i);
+        let meet = |(seam, station): (&StationSeam, &Station)| {
+            let a_is_later = position[usize::from(seam.a)] > position[usize::from(seam.b)];
+            let later = if a_is_later { seam.a } else { seam.b };
+            let s = plan.steps[position[usize::from(later)]].separation.unit();
+            let mut meeting = meeting(station, a_is_later, s, self.params.beta);
+            meeting.joint = meeting.joint.filter(|_| seam.has_room);
+            if let Some(joint) = &mut meeting.joint {
+                joint.is_fast = later == plan.key();
+            }
+            meeting
+        };
+        self.seams.iter().zip(&self.assembly.stations).map(meet).collect()
+    }
+
+    /// The two pieces at a station.
+    pub fn pieces_at(&self, station: usize) -> [PatchId; 2] {
+        [self.seams[station].a, self.seams[station].b]
+    }
+
+    /// The place of a station on the outer surface, mm.
+    pub fn place_of(&self, station: usize) -> Vec3 {
+        self.assembly.points[self.assembly.stations[station].points[0] as usize]
+    }
+
+    /// The surface metric's solver.
+    pub fn surface_model(&self) -> Result<SurfaceModel, SparseError> {
+        SurfaceModel::new(&self.params.surface(), &self.assembly)
+    }
+}
+
+/// How two pieces meet at a station where the later one leaves along `s`; no connector where there can be none.
+pub(crate) fn meeting(station: &Station, a_is_later: bool, s: Vec3, beta: f64) -> Meeting {
+    let across = if a_is_later { station.across } else { -station.across };
+    let frame = SeamFrame { tangent: station.tangent, normal: station.normal, across };
+    // Where s leads towards the earlier piece the face between the walls leans, so that it does not bar the way.
+    let in_section = s.reject_from_normalized(station.tangent).normalize_or_zero();
+    let lean = in_section.dot(across).max(0.0);
+    let face = (across - lean * in_section).normalize_or(across);
+    let wall = if a_is_later { face } else { -face };
+    let (later, earlier) = if a_is_later { (Side::A, Side::B) } else { (Side::B, Side::A) };
+    let later_is_male = s.dot(station.normal) >= 0.0;
+    let (male, leaves) = if later_is_male { (later, in_section) } else { (earlier, -in_section) };
+    let pull_on_a = if a_is_later { s } else { -s };
+    let joint = Joint { male, leaves, is_fast: false, pull_on_a, weight: frame.weight(s, beta) };
+    Meeting { wall, joint: frame.carries(s).then_some(joint) }
+}
+
+/// The parts' own points in order: by part, then by point of `mesh`.
+fn copies(mesh: &TriMesh, labels: &[u32]) -> Vec<(u32, u32)> {
+    let mut copies: Vec<(u32, u32)> =
+        mesh.triangles.iter().zip(labels).flat_map(|(t, &part)| t.map(|v| (part, v))).collect();
+    copies.sort_unstable();
+    copies.dedup();
+    copies
+}
+
+fn parts(mesh: &TriMesh, labels: &[u32], n_parts: usize) -> ShellAssembly {
+    let copies = copies(mesh, labels);
+    let normals = point_normals(mesh);
+    let copy = |part: u32, v: u32| copies.binary_search(&(part, v)).expect("all corners are copied") as u32;
+    ShellAssembly {
+        points: copies.iter().map(|c| mesh.points[c.1 as usize]).collect(),
+        normals: copies.iter().map(|c| normals[c.1 as usize]).collect(),
+        part_of_point: copies.iter().map(|c| c.0).collect(),
+        triangles: mesh.triangles.iter().zip(labels).map(|(t, &part)| t.map(|v| copy(part, v))).collect(),
+        n_parts,
+        ..ShellAssembly::default()
+    }
+}
+
+/// Outward unit normals, mean of the triangles by area.
+fn point_normals(mesh: &TriMesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; mesh.points.len()];
+    for (face, t) in mesh.triangles.iter().enumerate() {
+        let area_vector = mesh.area_vector_doubled(face);
+        t.iter().for_each(|&v| normals[v as usize] += area_vector);
+    }
+    normals.into_iter().map(|n| n.normalize_or(Vec3::Z)).collect()
+}

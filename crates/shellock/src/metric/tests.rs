@@ -1,0 +1,62 @@
+use shellock_geom::Vec3;
+use shellock_mechanics::{Resistance, Side};
+
+use super::*;
+use crate::plan::testing::{label, sphere};
+use crate::plan::{InstallationPlan, InstallationStep};
+use crate::{LatticeDirection, PatchId};
+
+fn octants() -> PlanModel {
+    let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
+    PlanModel::new(&MetricParams::default(), &label(sphere(5, Vec3::splat(40.0)), 8, octant))
+}
+
+fn plan(directions: impl Fn(u32) -> Vec3) -> InstallationPlan {
+    let step = |i: u32| InstallationStep { piece: PatchId(i), separation: LatticeDirection::nearest(directions(i)) };
+    InstallationPlan { steps: (0..8).map(step).collect() }
+}
+
+fn outwards(i: u32) -> Vec3 {
+    Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0))
+}
+
+#[test]
+fn stations_lie_on_both_pieces_in_right_handed_frames() {
+    let model = octants();
+    assert!(model.assembly.stations.len() > 50);
+    for (i, s) in model.assembly.stations.iter().enumerate() {
+        let [a, b] = s.points.map(|p| p as usize);
+        assert_eq!(model.assembly.points[a], model.assembly.points[b]);
+        assert_eq!([a, b].map(|p| PatchId(model.assembly.part_of_point[p])), model.pieces_at(i));
+        assert!((s.tangent.cross(s.normal) - s.across).length() < 1e-9);
+        // `across` leads from a to b: towards the middle of b's octant.
+        let toward_b = outwards(model.pieces_at(i)[1].0) - outwards(model.pieces_at(i)[0].0);
+        assert!(s.across.dot(toward_b) > 0.5);
+    }
+}
+
+#[test]
+fn the_male_is_the_piece_that_moves_outwards_and_both_are_pulled_apart() {
+    let model = octants();
+    let joints: Vec<_> = model.meetings(&plan(outwards)).into_iter().map(|m| m.joint).collect();
+    assert!(joints.iter().flatten().count() > 40);
+    for (i, joint) in joints.iter().enumerate().filter_map(|(i, j)| Some((i, j.as_ref()?))) {
+        // Here the later piece has the higher id: side b, and it leaves outwards.
+        assert_eq!(joint.male, Side::B);
+        assert!(joint.leaves.dot(model.assembly.stations[i].tangent).abs() < 1e-9);
+        assert!(joint.leaves.dot(joint.pull_on_a) < 0.0);
+    }
+    let inwards = model.meetings(&plan(|i| -outwards(i)));
+    assert!(inwards.iter().filter_map(|m| m.joint).all(|j| j.male == Side::A));
+}
+
+#[test]
+fn a_ball_whose_octants_all_leave_outwards_holds_and_one_whose_pieces_slide_off_together_does_not() {
+    let model = octants();
+    let solver = model.surface_model().unwrap();
+    let held = solver.resist(&model.meetings(&plan(outwards)), 7).unwrap();
+    let Resistance::Holds(opening) = &held.resistance else { panic!("{held:?}") };
+    assert!(opening.quality_mm < 0.0 && opening.quality_mm > -1.0, "{}", opening.quality_mm);
+    let up = solver.resist(&model.meetings(&plan(|_| Vec3::Z)), 7).unwrap();
+    assert!(matches!(up.resistance, Resistance::Separable(_)), "all along one direction: {up:?}");
+}

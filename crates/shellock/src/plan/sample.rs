@@ -1,0 +1,47 @@
+//! Random plans that keep every condition, for studies of metrics (Sect. 5.4).
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::contact::SHORTEST_RUN_SIZES;
+use super::draw::draw;
+use super::key::choices;
+use super::space::Space;
+use super::{InstallationPlan, PlanConstraints, PlanParams, PlanSurvey};
+
+/// Draws with the widest spread, which hardly look at costs, have this index among the spreads.
+const WIDEST: usize = 3;
+/// Draws per plan wanted after which a key is given up.
+const DRAWS_PER_PLAN: usize = 4;
+const TRIES_PER_PIECE: usize = 20;
+
+/// Up to `n` different plans with one and the same key: of the key that has most within the allowed draws.
+pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<InstallationPlan> {
+    let constraints = PlanConstraints::default();
+    let mut most = Vec::new();
+    for sizes in SHORTEST_RUN_SIZES {
+        let mut counted = survey.clone();
+        counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes * params.connector_size_mm));
+        let space = Space::new(&counted, &constraints, params.relaxed_tolerance);
+        for key in choices(params, &counted) {
+            let mut plans: Vec<InstallationPlan> = Vec::new();
+            for i in 0..DRAWS_PER_PLAN * n {
+                let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
+                rng.set_stream(i as u64);
+                let drawn = draw(&space, &key, rng, WIDEST, TRIES_PER_PIECE * space.n);
+                plans.extend(drawn.plan.filter(|p| !plans.contains(p)));
+                let is_hopeless = plans.is_empty() && i >= n;
+                if plans.len() >= n {
+                    return plans;
+                }
+                if is_hopeless {
+                    break;
+                }
+            }
+            if plans.len() > most.len() {
+                most = plans;
+            }
+        }
+    }
+    most
+}
