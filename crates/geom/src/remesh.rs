@@ -229,6 +229,7 @@ impl Remesher {
                 break;
             }
             self.turn_edges();
+            self.smooth();
         }
     }
 
@@ -254,12 +255,13 @@ impl Remesher {
             self.surface.split(h, seam.point(at_mm), Place::Seam { at_mm });
             return;
         }
-        let is_bridge = self.surface.is_bridge(h);
         let m = self.surface.split(h, middle, Place::Inside);
-        // A bridge may run close by a seam, so that its middle makes needles.
-        let at = if is_bridge { self.relaxed_inside(m, 1.0) } else { self.on_input(middle).0 };
-        if self.may_move(m, at, None, |h, t| self.may_face(h, t)) {
-            self.surface.points[m as usize] = at;
+        self.try_move(m, self.on_input(middle).0);
+    }
+
+    fn try_move(&mut self, v: u32, at: Vec3) {
+        if self.may_move(v, at, None, |h, t| self.may_face(h, t)) {
+            self.surface.points[v as usize] = at;
         }
     }
 
@@ -310,6 +312,9 @@ impl Remesher {
         for h in self.surface.edges() {
             if self.surface.is_bridge(h) {
                 self.split(h);
+                // A bridge may run close by a seam, so that its middle makes needles.
+                let m = self.surface.points.len() as u32 - 1;
+                self.try_move(m, self.relaxed_inside(m, 1.0));
             }
         }
         for face in 0..self.surface.is_dead.len() as u32 {

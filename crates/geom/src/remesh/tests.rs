@@ -263,3 +263,14 @@ fn what_is_no_task_comes_back_unchanged() {
     assert_eq!(remesh(&params(4.0), &open, &labels[1..]).mesh, open);
     assert_eq!(remesh(&params(4.0), &TriMesh::default(), &[]).mesh, TriMesh::default());
 }
+#[test]
+fn coarse_input_is_refined() {
+    let octahedron = ellipsoid(0, Vec3::splat(30.0));
+    let labels: Vec<u32> = (0..8).collect();
+    let out = remesh(&RemeshParams { target_edge_mm: 4.0, n_rounds: ROUNDS }, &octahedron, &labels);
+    assert_same_map(&octahedron, &labels, &out);
+    assert_near(out.mesh.signed_volume(), octahedron.signed_volume(), 1e-9);
+    assert_near(out.mesh.area(), octahedron.area(), 1e-9);
+    // Less than on larger regions: the 24 region corners of 60° cannot have even triangles.
+    assert!(even_share(&out.mesh, 4.0) > 0.9, "{}", even_share(&out.mesh, 4.0));
+}
