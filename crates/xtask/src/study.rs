@@ -23,8 +23,8 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum Study {
-    /// How well metrics agree: CSV with a column of scores for each metric and a row for each plan; the first column is
-    /// the metric that the others are compared with
+    /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a row for each
+    /// plan; the first column is the metric that the others are compared with
     Scores {
         /// The CSV file
         file: PathBuf,
@@ -53,21 +53,32 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     }
 }
 
-/// A file to be written: what comes after the study's name, and the text.
+/// Name and unit of a column, from "name" or "name [unit]".
+fn parts(column: &str) -> (&str, Option<&str>) {
+    let split = column.strip_suffix(']').and_then(|c| c.split_once(" ["));
+    split.map_or((column, None), |(name, unit)| (name, Some(unit)))
+}
+
+fn axis(column: &str) -> String {
+    let (name, unit) = parts(column);
+    unit.map_or_else(|| format!("score by {name}"), |unit| format!("score by {name}, {unit}"))
+}
+
+/// A file to be written: its name in the study's folder, and the text.
 type Sheet = (String, String);
 
 /// Curves of all metrics over the plans, a scatter of each against the first, and the table of rank correlations.
 pub fn agreement(scores: &Table) -> Result<Vec<Sheet>, Failure> {
     let columns: Vec<(&str, &[f64])> = scores.columns.iter().map(|(n, v)| (n.as_str(), v.as_slice())).collect();
     let Some(((first, reference), others)) = columns.split_first() else { return Ok(Vec::new()) };
-    let x = format!("plans, sorted by the score of \"{first}\"");
+    let x = format!("plan number, sorted by {}", parts(first).0);
     let labels = Labels { title: "Scores of the same plans", x: &x, y: "score, scaled to 0 … 1" };
     let mut sheets = vec![("scores.svg".to_owned(), sorted_scores(&labels, &columns)?)];
     let mut rows = Vec::new();
     for (name, values) in others {
-        let (title, x, y) = (format!("{name} and {first}"), format!("score of {first}"), format!("score of {name}"));
+        let (title, x, y) = (format!("{} and {}", parts(name).0, parts(first).0), axis(first), axis(name));
         let labels = Labels { title: &title, x: &x, y: &y };
-        sheets.push((format!("{}.svg", file_name(name)), scatter(&labels, reference, values)?));
+        sheets.push((format!("{}.svg", file_name(parts(name).0)), scatter(&labels, reference, values)?));
         let say = |r: Option<f64>| r.map_or("undefined".to_owned(), |r| format!("{r:.3}"));
         rows.push(vec![(*name).to_owned(), say(spearman(reference, values)), say(kendall(reference, values))]);
     }
@@ -144,10 +155,11 @@ mod tests {
 
     #[test]
     fn agreement_compares_every_metric_with_the_first() {
-        let table = Table::from_csv("volume,surface,data-driven\n1,2,3\n2,4,2\n3,8,1\n").unwrap();
+        let table = Table::from_csv("volume [mm],surface,data-driven\n1,2,3\n2,4,2\n3,8,1\n").unwrap();
         let sheets = agreement(&table).unwrap();
         let names: Vec<&str> = sheets.iter().map(|s| s.0.as_str()).collect();
         assert_eq!(names, ["scores.svg", "surface.svg", "data-driven.svg", "correlations.md", "scores.csv"]);
+        assert!(sheets[1].1.contains("score by volume, mm"));
         assert!(sheets[3].1.contains("| surface | 1.000 | 1.000 |"));
         assert!(sheets[3].1.contains("| data-driven | -1.000 | -1.000 |"));
     }
