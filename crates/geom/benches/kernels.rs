@@ -1,10 +1,11 @@
-//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans.
+//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing.
 
 use divan::{Bencher, black_box};
 use shellock_geom::band::Band;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::contour::contour as dense;
 use shellock_geom::marching_cubes::{OffBand, contour};
+use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
@@ -67,4 +68,13 @@ fn subtract_ball(bencher: Bencher) {
     let a = Volume::from_solid(&ball()).expect("a solid");
     let b = a.translate(Vec3::new(13.1, 7.3, 3.7));
     bencher.bench(|| black_box(&a).subtract(&b));
+}
+
+#[divan::bench]
+fn remesh_octants(bencher: Bencher) {
+    let ball = ball();
+    let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
+    let labels: Vec<u32> = (0..ball.mesh().triangles.len()).map(|f| octant(ball.mesh().face_center(f))).collect();
+    let params = RemeshParams { target_edge_mm: 6.0, n_rounds: 6 };
+    bencher.bench(|| remesh(&params, black_box(ball.mesh()), &labels));
 }

@@ -14,6 +14,7 @@ pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;
 pub mod mesh;
+pub mod remesh;
 pub mod rounding;
 pub mod signed_distance;
 pub mod solid;

@@ -1,0 +1,32 @@
+//! Why a study ended without its charts.
+
+use std::path::PathBuf;
+
+/// One line for a person.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// A file could not be read or written.
+    #[error("{path}: {source}", path = path.display())]
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A table does not have what the study needs.
+    #[error("{path}: {problem}", path = path.display())]
+    Table {
+        /// Which file.
+        path: PathBuf,
+        /// What is missing, and where.
+        problem: String,
+    },
+    /// The drawing library refused.
+    #[error("cannot draw the chart \"{title}\": {problem}")]
+    Chart {
+        /// The chart's title.
+        title: String,
+        /// What it says.
+        problem: String,
+    },
+}
