@@ -12,6 +12,7 @@ mod diagnose;
 mod draw;
 mod improve;
 pub mod key;
+pub mod local_tests;
 pub mod occlusion;
 mod params;
 mod piece_set;

@@ -4,9 +4,9 @@ use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::topology::ends;
 use shellock_geom::{Topology, TriMesh, Vec3};
-use shellock_mechanics::{Joint, Material, Meeting, ShellAssembly, Side, Station, SurfaceModel, SurfaceParams};
+use shellock_mechanics::{Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams};
 
-use crate::plan::contact::{SeamFrame, end_gap_mm};
+use crate::plan::contact::{end_gap_mm, meeting};
 use crate::plan::{InstallationPlan, PlanParams};
 use crate::seams::{seam_half_edges, stretches};
 use crate::{PatchId, SegmentedSurface};
@@ -135,7 +135,7 @@ impl PlanModel {
             let a_is_later = position[usize::from(seam.a)] > position[usize::from(seam.b)];
             let later = if a_is_later { seam.a } else { seam.b };
             let s = plan.steps[position[usize::from(later)]].separation.unit();
-            let mut meeting = meeting(station, a_is_later, s, self.params.beta);
+            let mut meeting = meeting(station, a_is_later, s, self.params.beta, false);
             meeting.joint = meeting.joint.filter(|_| seam.has_room);
             if let Some(joint) = &mut meeting.joint {
                 joint.is_fast = later == plan.key();
@@ -159,23 +159,6 @@ impl PlanModel {
     pub fn surface_model(&self) -> Result<SurfaceModel, SparseError> {
         SurfaceModel::new(&self.params.surface(), &self.assembly)
     }
-}
-
-/// How two pieces meet at a station where the later one leaves along `s`; no connector where there can be none.
-pub(crate) fn meeting(station: &Station, a_is_later: bool, s: Vec3, beta: f64) -> Meeting {
-    let across = if a_is_later { station.across } else { -station.across };
-    let frame = SeamFrame { tangent: station.tangent, normal: station.normal, across };
-    // Where s leads towards the earlier piece the face between the walls leans, so that it does not bar the way.
-    let in_section = s.reject_from_normalized(station.tangent).normalize_or_zero();
-    let lean = in_section.dot(across).max(0.0);
-    let face = (across - lean * in_section).normalize_or(across);
-    let wall = if a_is_later { face } else { -face };
-    let (later, earlier) = if a_is_later { (Side::A, Side::B) } else { (Side::B, Side::A) };
-    let later_is_male = s.dot(station.normal) >= 0.0;
-    let (male, leaves) = if later_is_male { (later, in_section) } else { (earlier, -in_section) };
-    let pull_on_a = if a_is_later { s } else { -s };
-    let joint = Joint { male, leaves, is_fast: false, pull_on_a, weight: frame.weight(s, beta) };
-    Meeting { wall, joint: frame.carries(s).then_some(joint) }
 }
 
 /// The parts' own points in order: by part, then by point of `mesh`.

@@ -18,6 +18,7 @@ mod hold;
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
+use shellock_mechanics::{Joint as MechanicalJoint, Meeting, Side, Station};
 
 use bars::{Barred, Bars};
 pub use hold::{HoldTable, Pushes};
@@ -118,6 +119,24 @@ impl SeamFrame {
     pub fn weight(&self, s: Vec3, beta: f64) -> f64 {
         s.dot(self.tangent).abs().max(s.dot(self.across).max(0.0)) + beta
     }
+}
+
+/// How two pieces meet at a station where the later one leaves along `s`; no connector where none can be made, unless
+/// `is_any_angle`.
+pub(crate) fn meeting(station: &Station, a_is_later: bool, s: Vec3, beta: f64, is_any_angle: bool) -> Meeting {
+    let across = if a_is_later { station.across } else { -station.across };
+    let frame = SeamFrame { tangent: station.tangent, normal: station.normal, across };
+    // Where s leads towards the earlier piece the face between the walls leans, so that it does not bar the way.
+    let in_section = s.reject_from_normalized(station.tangent).normalize_or_zero();
+    let lean = in_section.dot(across).max(0.0);
+    let face = (across - lean * in_section).normalize_or(across);
+    let wall = if a_is_later { face } else { -face };
+    let (later, earlier) = if a_is_later { (Side::A, Side::B) } else { (Side::B, Side::A) };
+    let later_is_male = s.dot(station.normal) >= 0.0;
+    let (male, leaves) = if later_is_male { (later, in_section) } else { (earlier, -in_section) };
+    let pull_on_a = if a_is_later { s } else { -s };
+    let joint = MechanicalJoint { male, leaves, is_fast: false, pull_on_a, weight: frame.weight(s, beta) };
+    Meeting { wall, joint: (is_any_angle || frame.carries(s)).then_some(joint) }
 }
 
 impl Sample {
