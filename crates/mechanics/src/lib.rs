@@ -6,6 +6,9 @@
 
 pub mod assembly;
 pub mod material;
+pub mod sample;
+pub mod volume;
 
 pub use assembly::{Joint, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
+pub use volume::{VolumeError, VolumeModel, VolumeParams};
