@@ -16,6 +16,9 @@ const MAX_ROUNDS: usize = 50;
 /// The motions that keep all gaps along n are a linear space, found from its Gram matrix. In it, the pushes leave a cone, which
 /// holds more than rest if and only if one of the vectors ± eᵢ has a nearest point in it that is not rest.
 pub(super) fn loose_parts(parts: &[Response], laws: &[Law], n_motions: usize) -> Vec<u32> {
+    if n_motions == 0 {
+        return Vec::new();
+    }
     let seen = seen_motions(parts, laws.len());
     let space = free_space(&seen, laws, n_motions);
     let pushes: Vec<DVector<f64>> = (0..laws.len())
