@@ -3,7 +3,8 @@
 //! `cargo run --release -p shellock-mechanics --example coupon`
 //!
 //! The reference has the same geometry as one solid a side (plate, bars and foot united by gmsh), quadratic tetrahedra of its own,
-//! the pairs of all nodes of the common face tied along n, one-sided along ŝ at root and tip. Needs `gmsh` and `ccx`.
+//! the pairs of all nodes of the common face tied along n, one-sided along ŝ at root and tip. Needs `gmsh` and `ccx`; a case that CalculiX
+//! does not settle within 120 s is given up, and said so.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,7 +17,11 @@ const LENGTH: f64 = 40.0;
 const WIDTH: f64 = 20.0;
 const CELLS: [u32; 2] = [20, 10];
 /// Sizes of the reference's elements, mm: at the seam, and at the clamps.
-const SIZE: [f64; 2] = [0.75, 2.5];
+const SIZE: [f64; 2] = [0.9, 3.0];
+/// Separation force, N/mm: so small that the reference, which has one-sided springs only with large displacements, is linear.
+const FORCE: f64 = 1e-3;
+/// What is printed: µm at 0.1 N/mm.
+const PRINTED: f64 = 1e3 * 0.1 / FORCE;
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -24,17 +29,18 @@ type Any<T> = Result<T, Box<dyn std::error::Error>>;
 type Moved = [[Vec3; 2]; 2];
 
 fn main() -> Any<()> {
-    let params = VolumeParams { force_n_per_mm: 0.1, ..VolumeParams::default() };
+    let params = VolumeParams { force_n_per_mm: FORCE, ..VolumeParams::default() };
     let folder = tempfile::tempdir()?;
-    std::fs::create_dir_all("/tmp/cc/x")?;
     println!("| T | load on a | opening µm | CalculiX | tip of a µm | CalculiX | tip of b µm | CalculiX | worst |");
     println!("| --: | :-- | --: | --: | --: | --: | --: | --: | --: |");
     for degrees in [0.0_f64, -45.0, -90.0, 45.0] {
         let frame = Frame::new(degrees);
-        for (name, pull) in [("+ŝ", frame.s), ("−ŝ", -frame.s), ("+n", frame.n), ("along", Vec3::Y)] {
+        let n_loads = if degrees == 0.0 { 4 } else { 2 };
+        for (name, pull) in
+            [("+ŝ", frame.s), ("−ŝ", -frame.s), ("+n", frame.n), ("along", Vec3::Y)].into_iter().take(n_loads)
+        {
             let own = ours(&params, &frame, pull)?;
-            let reference =
-                calculix(&params, &frame, pull, if true { std::path::Path::new("/tmp/cc/x") } else { folder.path() });
+            let reference = calculix(&params, &frame, pull, folder.path());
             print_row(&format!("{degrees}°"), name, &own, reference);
         }
     }
@@ -56,8 +62,8 @@ impl Frame {
 }
 
 fn print_row(angle: &str, name: &str, own: &Moved, reference: Any<Moved>) {
-    let widest = |m: &Moved| m[0][0].distance(m[1][0]).max(m[0][1].distance(m[1][1])) * 1e3;
-    let figures = |m: &Moved| [widest(m), m[0][1].length() * 1e3, m[1][1].length() * 1e3];
+    let widest = |m: &Moved| m[0][0].distance(m[1][0]).max(m[0][1].distance(m[1][1])) * PRINTED;
+    let figures = |m: &Moved| [widest(m), m[0][1].length() * PRINTED, m[1][1].length() * PRINTED];
     let own = figures(own);
     match reference.map(|m| figures(&m)) {
         Ok(theirs) => {
@@ -98,7 +104,7 @@ fn calculix(params: &VolumeParams, frame: &Frame, pull: Vec3, folder: &Path) -> 
     let mesh = Mesh::read(&std::fs::read_to_string(folder.join("mesh.inp"))?)?;
     let (deck, probes) = mesh.deck(params, frame, pull);
     std::fs::write(folder.join("coupon.inp"), deck)?;
-    run(Command::new("ccx").arg("coupon").env("OMP_NUM_THREADS", "2").current_dir(folder))?;
+    run(Command::new("timeout").args(["120", "ccx", "coupon"]).env("OMP_NUM_THREADS", "2").current_dir(folder))?;
     let results = std::fs::read_to_string(folder.join("coupon.dat"))?;
     let at = |node: usize| {
         let lines = results.lines().rev().map(|l| l.split_whitespace().collect::<Vec<_>>());
@@ -245,7 +251,7 @@ impl Mesh {
                 let _ = writeln!(deck, "{id}, 1, 3");
             }
         }
-        deck.push_str("*STEP\n*STATIC\n1., 1.\n*CLOAD\n");
+        deck.push_str("*STEP, NLGEOM\n*STATIC\n1., 1.\n*CLOAD\n");
         let n_stations = f64::from(CELLS[0] - 1);
         let total = params.force_n_per_mm * LENGTH / f64::from(CELLS[0]) * n_stations;
         let mut force = vec![Vec3::ZERO; self.nodes.len()];
@@ -304,5 +310,5 @@ fn write_contact(deck: &mut String, pairs: &[([usize; 2], Vec3)], d: f64, n_tets
     for (id, ([a, b], _)) in (n_tets + 1..).zip(on_floor) {
         let _ = writeln!(deck, "{id}, {a}, {b}");
     }
-    deck.push_str("*SPRING, ELSET=FLOOR, NONLINEAR\n3, 3\n-1000000., -1.\n0., 0.\n1e-3, 1.\n");
+    deck.push_str("*SPRING, ELSET=FLOOR, NONLINEAR\n3, 3\n-10000., -1.\n0., 0.\n1e-3, 1.\n");
 }

@@ -402,7 +402,8 @@ pub(super) fn sections(model: &VolumeModel, joints: &[Option<Joint>]) -> Vec<[Op
 
 /// Adds up the fronts of a part's bars, in order along the seams, and eliminates all their own unknowns.
 ///
-/// `spans` tells the first and the last bar that an unknown belongs to, or nothing if there is one only. Halves are condensed first, then joined: what remains of each is short, however long the seam.
+/// `spans` tells the first and the last bar that an unknown belongs to, or nothing if there is one only. Halves are
+/// condensed first, then joined: what remains of each is short, however long the seam.
 pub(super) fn condensed(
     fronts: &[Front],
     labels: Labels,
