@@ -310,5 +310,5 @@ fn write_contact(deck: &mut String, pairs: &[([usize; 2], Vec3)], d: f64, n_tets
     for (id, ([a, b], _)) in (n_tets + 1..).zip(on_floor) {
         let _ = writeln!(deck, "{id}, {a}, {b}");
     }
-    deck.push_str("*SPRING, ELSET=FLOOR, NONLINEAR\n3, 3\n-10000., -1.\n0., 0.\n1e-3, 1.\n");
+    deck.push_str("*SPRING, ELSET=FLOOR, NONLINEAR\n3, 3\n-1000000., -1.\n0., 0.\n1e-3, 1.\n");
 }
