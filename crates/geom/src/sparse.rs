@@ -6,13 +6,18 @@
 use std::sync::Arc;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use faer::{Accum, Conj, Mat, MatMut, Par, Side};
 use rayon::prelude::*;
 
 /// A symmetric matrix by its upper triangle, in compressed columns.
@@ -99,6 +104,49 @@ impl SparseSymmetric {
         }
         y
     }
+
+    /// What remains of the last `n_kept` rows and columns when all others have been eliminated: the Schur complement, dense,
+    /// lower triangle by columns with zeros above.
+    ///
+    /// Costs one factorisation. The matrix need only be positive definite in the rows eliminated, and positive semidefinite
+    /// as a whole.
+    pub fn schur_complement(mut self, n_kept: usize) -> Result<Vec<f64>, SparseError> {
+        let (n, first_kept) = (self.n, self.n - n_kept.min(self.n));
+        // The kept rows are eliminated as well, last, and multiplied back together: springs on their diagonal make them
+        // definite, and are taken away at the end.
+        let mut spring = 0.0_f64;
+        for column in first_kept..n {
+            let last = self.column_start[column + 1] as usize - 1;
+            spring = spring.max(self.value[last].abs());
+        }
+        for column in first_kept..n {
+            self.value[self.column_start[column + 1] as usize - 1] += spring;
+        }
+        let leading = SymbolicSparseColMatRef::new_checked(
+            first_kept,
+            first_kept,
+            &self.column_start[..=first_kept],
+            None,
+            &self.row[..self.column_start[first_kept] as usize],
+        );
+        let ordered = symbolic(leading, SymmetricOrdering::Amd)?;
+        let (order, place) = ordered.perm().ok_or(SparseError::TooLarge { n })?.arrays();
+        let kept = first_kept as u32..n as u32;
+        let order: Vec<u32> = order.iter().copied().chain(kept.clone()).collect();
+        let place: Vec<u32> = place.iter().copied().chain(kept).collect();
+        let factor = Cholesky::ordered(&self, SymmetricOrdering::Custom(PermRef::new_checked(&order, &place, n)))?;
+
+        let l = factor.trailing(first_kept)?;
+        let mut schur = Mat::<f64>::zeros(n_kept, n_kept);
+        let (lower, upper) = (BlockStructure::TriangularLower, BlockStructure::TriangularUpper);
+        matmul(schur.as_mut(), lower, Accum::Replace, l.as_ref(), lower, l.transpose(), upper, 1.0, Par::Seq);
+        Ok((0..n_kept * n_kept)
+            .map(|at| {
+                let (row, column) = (at % n_kept, at / n_kept);
+                schur[(row, column)] - if row == column { spring } else { 0.0 }
+            })
+            .collect())
+    }
 }
 
 /// The order of elimination of a pattern, for all matrices that have it.
@@ -108,15 +156,47 @@ pub struct EliminationOrder(Arc<SymbolicCholesky<u32>>);
 impl EliminationOrder {
     /// Looks at the places of `matrix` alone, not at its values.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseError> {
-        let n = matrix.n;
-        let params = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        factorize_symbolic_cholesky(matrix.pattern(), Side::Upper, SymmetricOrdering::Amd, params)
-            .map(|symbolic| Self(Arc::new(symbolic)))
-            .map_err(|_| SparseError::TooLarge { n })
+        symbolic(matrix.pattern(), SymmetricOrdering::Amd).map(|s| Self(Arc::new(s)))
     }
+}
+
+/// Eliminates the first `n_eliminated` rows and columns of the dense symmetric `n × n` matrix whose lower triangle `values`
+/// holds by columns, and leaves, in that triangle, the factor L of what is eliminated, `B L⁻ᵀ` below it, and the Schur complement.
+///
+/// Only the eliminated block must be positive definite. The strict upper triangle of `values` is neither read nor of use
+/// afterwards.
+///
+/// # Panics
+/// Where `values` has not `n²` entries or `n_eliminated` exceeds `n`.
+pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> Result<(), SparseError> {
+    let matrix = MatMut::from_column_major_slice_mut(values, n, n);
+    let (mut pivot, _, mut below, mut rest) = matrix.split_at_mut(n_eliminated, n_eliminated);
+    let mut memory = MemBuffer::try_new(cholesky_in_place_scratch::<f64>(n_eliminated, Par::Seq, Default::default()))
+        .map_err(|_| SparseError::TooLarge { n })?;
+    cholesky_in_place(
+        pivot.as_mut(),
+        LltRegularization::default(),
+        Par::Seq,
+        MemStack::new(&mut memory),
+        Default::default(),
+    )
+    .map_err(|_| SparseError::NotPositiveDefinite { n })?;
+    solve_lower_triangular_in_place(pivot.as_ref(), below.as_mut().transpose_mut(), Par::Seq);
+    let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    matmul(rest.as_mut(), lower, Accum::Add, below.as_ref(), full, below.as_ref().transpose(), full, -1.0, Par::Seq);
+    Ok(())
+}
+
+fn symbolic(
+    pattern: SymbolicSparseColMatRef<'_, u32>,
+    order: SymmetricOrdering<'_, u32>,
+) -> Result<SymbolicCholesky<u32>, SparseError> {
+    let params = CholeskySymbolicParams {
+        supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+        ..Default::default()
+    };
+    factorize_symbolic_cholesky(pattern, Side::Upper, order, params)
+        .map_err(|_| SparseError::TooLarge { n: pattern.nrows() })
 }
 
 /// The Cholesky factor of a matrix, kept for many right-hand sides.
@@ -130,6 +210,10 @@ impl Cholesky {
     /// Factorises `matrix`; about 0.1 s for the Laplacian of a surface with 30 000 points.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseError> {
         Self::in_order(&EliminationOrder::new(matrix)?, matrix)
+    }
+
+    fn ordered(matrix: &SparseSymmetric, order: SymmetricOrdering<'_, u32>) -> Result<Self, SparseError> {
+        Self::in_order(&EliminationOrder(Arc::new(symbolic(matrix.pattern(), order)?)), matrix)
     }
 
     /// Factorises `matrix`, which has the pattern that `order` was made for.
@@ -152,6 +236,33 @@ impl Cholesky {
             )
             .map_err(|_| SparseError::NotPositiveDefinite { n })?;
         Ok(Self { symbolic, values })
+    }
+
+    /// The rows and columns of the factor from `first` on, in the order of elimination.
+    fn trailing(&self, first: usize) -> Result<Mat<f64>, SparseError> {
+        let n = self.symbolic.nrows();
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
+            return Err(SparseError::TooLarge { n });
+        };
+        let factor = SupernodalLltRef::new(symbolic, &self.values);
+        let mut trailing = Mat::zeros(n - first, n - first);
+        for s in 0..symbolic.n_supernodes() {
+            let node = factor.supernode(s);
+            let (value, width) = (node.val(), node.val().ncols());
+            for j in 0..width {
+                let column = node.start() + j;
+                if column < first {
+                    continue;
+                }
+                for i in j..width {
+                    trailing[(node.start() + i - first, column - first)] = value[(i, j)];
+                }
+                for (i, row) in (width..).zip(node.pattern()) {
+                    trailing[(*row as usize - first, column - first)] = value[(i, j)];
+                }
+            }
+        }
+        Ok(trailing)
     }
 
     /// Replaces the right-hand sides, `n` numbers each and one after the other, by their solutions.
@@ -189,6 +300,40 @@ mod tests {
         for i in 0..n as usize {
             let expected = 0.5 * (i + 1) as f64 * (n as usize - i) as f64;
             assert!((x[i] - expected).abs() < 1e-9 && x[i] == x[i + n as usize]);
+        }
+    }
+
+    /// A chain of springs between fixed ends, its ends kept.
+    fn chain() -> (Vec<(u32, u32, f64)>, Vec<f64>) {
+        let n = 12_u32;
+        // Nodes 10 and 11 are the two free ends; the chain is 10 – 0 – 1 … 9 – 11 with springs of stiffness 2.
+        let line: Vec<u32> = [10].into_iter().chain(0..10).chain([11]).collect();
+        let mut entries: Vec<(u32, u32, f64)> = (0..n).map(|i| (i, i, 0.0)).collect();
+        for pair in line.windows(2) {
+            entries.extend([(pair[0], pair[0], 2.0), (pair[1], pair[1], 2.0), (pair[0], pair[1], -2.0)]);
+        }
+        let mut dense = vec![0.0; 144];
+        for &(i, j, v) in &entries {
+            dense[(i.max(j) + 12 * i.min(j)) as usize] += v;
+        }
+        (entries, dense)
+    }
+
+    #[test]
+    fn springs_in_a_row_condense_to_one_spring() {
+        // 11 springs of stiffness 2 in a row are one of 2/11, and the whole is singular.
+        let schur = SparseSymmetric::from_entries(12, chain().0).schur_complement(2).unwrap();
+        for (have, want) in schur.iter().zip([2.0 / 11.0, -2.0 / 11.0, 0.0, 2.0 / 11.0]) {
+            assert!((have - want).abs() < 1e-14, "{schur:?}");
+        }
+    }
+
+    #[test]
+    fn dense_and_sparse_elimination_agree() {
+        let (_, mut dense) = chain();
+        eliminate_leading(&mut dense, 12, 10).unwrap();
+        for (at, want) in [(10 + 120, 2.0 / 11.0), (11 + 120, -2.0 / 11.0), (11 + 132, 2.0 / 11.0)] {
+            assert!((dense[at] - want).abs() < 1e-14);
         }
     }
 

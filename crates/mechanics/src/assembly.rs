@@ -90,7 +90,7 @@ pub struct Joint {
     /// Unit vector perpendicular to the tangent along which the male may leave the female: ŝ. In the half space of the
     /// outward normal, or across it; never into the surface.
     pub leaves: Vec3,
-    /// Whether friction keeps the male from leaving, too: on the key, which nothing else holds back.
+    /// Whether friction keeps the male from leaving and from sliding, too: on the key, which nothing else holds back.
     pub is_fast: bool,
     /// Unit vector along which side a is pulled by the separation force; side b is pulled the other way.
     pub pull_on_a: Vec3,

@@ -7,8 +7,11 @@
 pub mod assembly;
 pub mod material;
 pub mod neighbourhood;
+pub mod sample;
 pub mod surface;
+pub mod volume;
 
 pub use assembly::{Joint, Meeting, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
 pub use surface::{SurfaceModel, SurfaceParams, SurfaceSolution};
+pub use volume::{VolumeError, VolumeModel, VolumeParams};

@@ -66,6 +66,9 @@ fn contacts(model: &SurfaceModel, plan: &[Meeting]) -> Vec<Contact> {
             contacts.push(contact(gap(station, joint.male, tip, n), false));
             contacts.push(contact(gap(station, joint.male, Vec3::ZERO, n), false));
             contacts.push(contact(gap(station, joint.male, tip, joint.leaves), !joint.is_fast));
+            if joint.is_fast {
+                contacts.push(contact(gap(station, joint.male, tip, station.tangent), false));
+            }
         }
     }
     contacts

@@ -1,0 +1,448 @@
+//! The volume-based metric (Sect. 5.1): walls and connectors as tetrahedra, linear elasticity, contact without friction.
+//!
+//! What no plan changes is done once, by [`VolumeModel::new`]: the wall of every part, its stiffness, and the condensation of that
+//! onto the points near the part's seams. What a plan adds, [`VolumeModel::resist`] hangs on those points: pins and channels
+//! ([`connector`]). A part's bars and wall condense to what contact sees of it, and contact is solved between these few
+//! unknowns ([`contact`]); rigid motions are kept apart, so that parts that come off are found exactly ([`mechanism`]).
+//!
+//! Deviations from the paper: contact is exact instead of by penalty, between pairs of nodes that start at one place;
+//! displacements are small. Limits: no friction, no gap, no contact between walls; where a thin model's walls overlap, each
+//! is whole. The floor of the channel is one-sided; its other faces hold in both directions.
+
+mod connector;
+mod contact;
+mod element;
+mod front;
+mod mechanism;
+mod part;
+#[cfg(test)]
+mod tests;
+mod wall;
+
+use rayon::prelude::*;
+use shellock_geom::Vec3;
+use shellock_geom::sparse::SparseError;
+
+pub use element::Order;
+pub use wall::{MIN_VOLUME_SHARE, Wall};
+
+use crate::assembly::SIDES;
+use crate::{Joint, Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
+use connector::{Bar, Labels, Owner, ROWS, Section};
+use contact::{Law, Response, direction_of};
+use front::Front;
+use part::Part;
+
+/// How the metric models walls and connectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumeParams {
+    /// Thickness of the wall, mm. (0, 20]; 2.0, as the printed parts.
+    pub wall_mm: f64,
+    /// Connector size D, mm: the pin is 0.6 D deep and 0.5 D thick. (0, 20]; 3.0, the middle of the paper's 2 to 4.
+    pub connector_mm: f64,
+    /// Layers of prisms across the wall. [1, 8]; 1, which is enough for quadratic elements.
+    pub n_layers: usize,
+    /// Degree of the elements of walls. Quadratic: a plan costs the same, and linear ones are several times too stiff.
+    pub order: Order,
+    /// What parts are made of. The paper's resin.
+    pub material: Material,
+    /// Separation force on each seam, N/mm. (0, 1000]; 0.01, the paper's 10 N/m. Openings are proportional to it.
+    pub force_n_per_mm: f64,
+    /// Pull or overlap at a contact that counts as none, relative to the largest. [10⁻¹², 10⁻²]; 10⁻⁶.
+    pub tolerance: f64,
+}
+
+impl Default for VolumeParams {
+    fn default() -> Self {
+        Self {
+            wall_mm: 2.0,
+            connector_mm: 3.0,
+            n_layers: 1,
+            order: Order::Quadratic,
+            material: Material::SLA_RESIN,
+            force_n_per_mm: 0.01,
+            tolerance: 1e-6,
+        }
+    }
+}
+
+impl VolumeParams {
+    /// Every problem at once.
+    pub fn problems(&self) -> Vec<String> {
+        let m = &self.material;
+        let checks = [
+            ("wall_mm", self.wall_mm, 0.0 < self.wall_mm && self.wall_mm <= 20.0, "(0, 20]"),
+            ("connector_mm", self.connector_mm, 0.0 < self.connector_mm && self.connector_mm <= 20.0, "(0, 20]"),
+            ("n_layers", self.n_layers as f64, (1..=8).contains(&self.n_layers), "[1, 8]"),
+            (
+                "force_n_per_mm",
+                self.force_n_per_mm,
+                0.0 < self.force_n_per_mm && self.force_n_per_mm <= 1e3,
+                "(0, 1000]",
+            ),
+            ("tolerance", self.tolerance, (1e-12..=1e-2).contains(&self.tolerance), "[1e-12, 0.01]"),
+            (
+                "youngs_modulus_mpa",
+                m.youngs_modulus_mpa,
+                0.0 < m.youngs_modulus_mpa && m.youngs_modulus_mpa <= 1e6,
+                "(0, 1e6]",
+            ),
+            ("poissons_ratio", m.poissons_ratio, (0.0..=0.45).contains(&m.poissons_ratio), "[0, 0.45]"),
+        ];
+        let wrong = checks.into_iter().filter(|(_, _, is_right, _)| !is_right);
+        wrong.map(|(name, value, _, range)| format!("{name} is {value}: must be in {range}")).collect()
+    }
+}
+
+/// Why the metric could not be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum VolumeError {
+    /// Parameters out of range.
+    #[error("{}", .0.join("; "))]
+    Params(Vec<String>),
+    /// The assembly names a point, part or station that it does not have, or a number that is none.
+    #[error("the assembly is inconsistent: {0}")]
+    Assembly(&'static str),
+    /// No wall fits below a triangle, however thin.
+    #[error("triangle {0} has no area, or its normals point along it: remesh the surface")]
+    FlatTriangle(u32),
+    /// There must be one joint, or none, for each station.
+    #[error("{joints} joints for {stations} stations")]
+    Joints {
+        /// How many were given.
+        joints: usize,
+        /// How many there must be.
+        stations: usize,
+    },
+    /// The fixed part does not exist.
+    #[error("part {0} is to be fixed, but there is none of that number")]
+    NoSuchPart(u32),
+    /// A stiffness matrix could not be factorised.
+    #[error(transparent)]
+    Factorisation(#[from] SparseError),
+    /// No set of contacts was found that neither pulls nor overlaps.
+    #[error("the contact problem does not converge")]
+    Contact,
+}
+
+/// Displacements at the joints in static equilibrium, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deflection {
+    /// At each station, of side a and side b, at the root and at the tip of the pin; zero where there is no joint.
+    pub displacement_mm: Vec<[[Vec3; 2]; 2]>,
+}
+
+/// What no plan changes: the walls and what connectors see of them.
+#[derive(Debug)]
+pub struct VolumeModel {
+    params: VolumeParams,
+    stations: Vec<Station>,
+    steps: Vec<[u32; 2]>,
+    /// The parts of each station's sides.
+    station_parts: Vec<[u32; 2]>,
+    /// Below each station's sides, on the inner surface.
+    inner_edge: Vec<[Vec3; 2]>,
+    wall: Wall,
+    /// Tetrahedra about each station's sides.
+    near: Vec<[Vec<u32>; 2]>,
+    parts: Vec<Part>,
+    /// Place of each wall node among its part's kept ones.
+    place_kept: Vec<Option<u32>>,
+}
+
+impl VolumeModel {
+    /// Builds and condenses the walls; about a second for 18 000 tetrahedra.
+    pub fn new(params: &VolumeParams, assembly: &ShellAssembly) -> Result<Self, VolumeError> {
+        Self::clamped(params, assembly, &[])
+    }
+
+    /// The same with the wall below the points `clamped` held in place.
+    pub fn clamped(params: &VolumeParams, assembly: &ShellAssembly, clamped: &[u32]) -> Result<Self, VolumeError> {
+        let problems = params.problems();
+        if !problems.is_empty() {
+            return Err(VolumeError::Params(problems));
+        }
+        check(assembly, clamped)?;
+        let wall =
+            Wall::new(assembly, params.wall_mm, params.n_layers).map_err(|flat| VolumeError::FlatTriangle(flat.0))?;
+
+        let n_points = assembly.points.len();
+        let mut is_clamped = vec![false; n_points];
+        for &point in clamped {
+            is_clamped[point as usize] = true;
+        }
+        let near = near_stations(assembly, params.n_layers);
+        let mut is_kept = vec![false; wall.nodes.len()];
+        for &tet in near.iter().flatten().flatten() {
+            for node in wall.tets[tet as usize] {
+                is_kept[node as usize] = !is_clamped[node as usize % n_points];
+            }
+        }
+        let part_of = |node: u32| assembly.part_of_point[node as usize % n_points];
+        let parts: Vec<Part> = (0..assembly.n_parts as u32)
+            .into_par_iter()
+            .map(|part| {
+                let tets: Vec<[u32; 4]> = wall.tets.iter().copied().filter(|t| part_of(t[0]) == part).collect();
+                let kept = (0..wall.nodes.len() as u32).filter(|v| is_kept[*v as usize] && part_of(*v) == part);
+                let clamp = |node: u32| is_clamped[node as usize % n_points];
+                Part::new(params.order, &params.material, &wall, &tets, kept.collect(), clamp)
+            })
+            .collect::<Result<_, _>>()?;
+        let mut place_kept = vec![None; wall.nodes.len()];
+        for part in &parts {
+            for (place, &node) in (0..).zip(&part.kept) {
+                place_kept[node as usize] = Some(place);
+            }
+        }
+        let below = |p: u32| assembly.points[p as usize] - assembly.normals[p as usize] * wall.depth_mm[p as usize];
+        Ok(Self {
+            params: *params,
+            stations: assembly.stations.clone(),
+            steps: assembly.steps.clone(),
+            station_parts: assembly.stations.iter().map(|s| s.points.map(&part_of)).collect(),
+            inner_edge: assembly.stations.iter().map(|s| s.points.map(below)).collect(),
+            near,
+            parts,
+            place_kept,
+            wall,
+        })
+    }
+
+    /// Tetrahedra of all walls.
+    pub fn n_tets(&self) -> usize {
+        self.wall.tets.len()
+    }
+
+    /// The walls.
+    pub fn wall(&self) -> &Wall {
+        &self.wall
+    }
+
+    /// How far the seams open when the stations are joined by `joints` and `fixed_part` is held in place, or which parts come
+    /// off. Opening is the larger of the distances between male and female at the root and at the tip of the pin.
+    ///
+    /// Connectors reach from station to station: one that is joined but none of whose neighbours along a step is, with the same
+    /// male side, has none. May be called from several threads at once.
+    pub fn resist(&self, plan: &[Meeting], fixed_part: u32) -> Result<Resistance, VolumeError> {
+        if fixed_part as usize >= self.parts.len() {
+            return Err(VolumeError::NoSuchPart(fixed_part));
+        }
+        Ok(match self.equilibrium(plan, Some(fixed_part))? {
+            Ok(deflection) => {
+                let widest = |[a, b]: &[[Vec3; 2]; 2]| a[0].distance(b[0]).max(a[1].distance(b[1]));
+                let openings = deflection.displacement_mm.iter().map(widest).collect();
+                Resistance::Holds(Opening::rated(plan, openings))
+            }
+            Err(parts) => Resistance::Separable(parts),
+        })
+    }
+
+    /// How parts move, with `fixed_part` held in place, or nothing but what is clamped; or the parts that come off.
+    pub fn equilibrium(
+        &self,
+        plan: &[Meeting],
+        fixed_part: Option<u32>,
+    ) -> Result<Result<Deflection, Vec<u32>>, VolumeError> {
+        let joints: Vec<Option<Joint>> = plan.iter().map(|m| m.joint).collect();
+        if joints.len() != self.stations.len() {
+            return Err(VolumeError::Joints { joints: joints.len(), stations: self.stations.len() });
+        }
+        let sections = connector::sections(self, &joints);
+        let bars = self.bars(&joints, &sections);
+        let is_free = |i: usize| self.parts[i].rigid.is_some() && Some(i as u32) != fixed_part;
+        let n_motions = 6 * (0..self.parts.len()).filter(|i| is_free(*i)).count();
+        let mut responses = (0..self.parts.len())
+            .into_par_iter()
+            .map(|i| self.response(i as u32, Some(i as u32) == fixed_part, &sections, &bars))
+            .collect::<Result<Vec<_>, _>>()?;
+        let free = (0..self.parts.len()).filter(|i| is_free(*i));
+        for (i, first) in free.zip((0..).step_by(6)) {
+            responses[i].first_motion = Some(first);
+        }
+
+        let laws = self.laws(&responses, &joints);
+        let loose = mechanism::loose_parts(&responses, &laws, n_motions);
+        if !loose.is_empty() {
+            return Ok(Err(loose));
+        }
+        let equilibrium =
+            contact::solve(&responses, &laws, n_motions, self.params.tolerance)?.ok_or(VolumeError::Contact)?;
+
+        let mut displacement_mm = vec![[[Vec3::ZERO; 2]; 2]; joints.len()];
+        for (part, response) in (0..).zip(&responses) {
+            for (&row, moved) in response.rows.iter().zip(response.displacement_mm(&equilibrium)) {
+                let station = row / ROWS;
+                let side = if self.station_parts[station][0] == part { Side::A } else { Side::B };
+                let Some(section) = &sections[station][side.index()] else { continue };
+                for (own, direction, _) in section.rows() {
+                    if own == row % ROWS {
+                        displacement_mm[station][side.index()][own / 3] += direction * moved;
+                    }
+                }
+            }
+        }
+        Ok(Ok(Deflection { displacement_mm }))
+    }
+
+    /// The bars of both sides along all steps between stations that are joined alike.
+    fn bars(&self, joints: &[Option<Joint>], sections: &[[Option<Section>; 2]]) -> Vec<[Bar; 2]> {
+        let along = |(step, ends): (usize, &[u32; 2])| {
+            let ends = ends.map(|s| s as usize);
+            let [Some(first), Some(second)] = ends.map(|s| joints[s]) else { return None };
+            let bar = |side: Side| {
+                let [Some(i), Some(j)] = ends.map(|s| sections[s][side.index()].as_ref()) else { return None };
+                Bar::new(step, side, ends, [i, j])
+            };
+            if first.male == second.male { Some([bar(Side::A)?, bar(Side::B)?]) } else { None }
+        };
+        self.steps.iter().enumerate().filter_map(along).collect()
+    }
+
+    fn response(
+        &self,
+        part: u32,
+        is_fixed: bool,
+        sections: &[[Option<Section>; 2]],
+        bars: &[[Bar; 2]],
+    ) -> Result<Response, SparseError> {
+        let n_stations = self.stations.len();
+        let n_wall = 3 * self.parts[part as usize].kept.len();
+        let labels = Labels::new(n_wall, n_stations);
+        let own: Vec<&Bar> =
+            bars.iter().flatten().filter(|bar| self.station_parts[bar.stations[0]][bar.side.index()] == part).collect();
+        // First and last bar at each section; the first carries what belongs to the station.
+        let mut spans: Vec<[Option<[usize; 2]>; 2]> = vec![[None; 2]; n_stations];
+        for (i, bar) in own.iter().enumerate() {
+            for station in bar.stations {
+                let span = &mut spans[station][bar.side.index()];
+                *span = Some([span.map_or(i, |s| s[0]), i]);
+            }
+        }
+        let span = |station: usize, side: Side| spans[station][side.index()].unwrap_or([0, usize::MAX]);
+        let fronts: Vec<Front> = (own.iter().enumerate())
+            .filter_map(|(i, bar)| {
+                let [Some(first), Some(second)] = bar.stations.map(|s| sections[s][bar.side.index()].as_ref()) else {
+                    return None;
+                };
+                let carries = bar.stations.map(|s| span(s, bar.side)[0] == i);
+                let mut front = bar.front(self, [first, second], carries, labels);
+                if is_fixed {
+                    front = front.without(|id| labels.is_wall(id));
+                }
+                Some(front)
+            })
+            .collect();
+        let spans = |id: u32| match labels.owner(id) {
+            Owner::Section(station, side) => Some(span(station, side)),
+            Owner::Step => None,
+        };
+        let top = connector::condensed(&fronts, labels, &spans)?;
+        let wall = if is_fixed { &Front::default() } else { &self.parts[part as usize].stiffness };
+        Ok(self.read(part, &Front::condensed(&[wall, &top], |id| labels.is_wall(id))?, labels, sections))
+    }
+
+    /// Compliance and drift from what is left of a part: its contact rows, and its load.
+    fn read(&self, part: u32, left: &Front, labels: Labels, sections: &[[Option<Section>; 2]]) -> Response {
+        let n = left.ids.len();
+        if n == 0 {
+            return Response::default();
+        }
+        let n_rows = n - 1;
+        debug_assert_eq!(left.ids[n_rows], labels.load(), "the load comes last");
+        let rows: Vec<usize> = left.ids[..n_rows].iter().map(|id| labels.row_of(*id)).collect();
+        let mut response = Response {
+            compliance: (0..n_rows * n_rows).map(|at| -left.values[at % n_rows + n * (at / n_rows)]).collect(),
+            drift_mm: (0..n_rows).map(|j| -left.values[n_rows + n * j]).collect(),
+            rigid: vec![[0.0; 6]; n_rows],
+            rows,
+            ..Response::default()
+        };
+        let Some(rigid) = self.parts[part as usize].rigid else { return response };
+        for first in (0..n_rows).step_by(ROWS) {
+            let station = response.rows[first] / ROWS;
+            for side in SIDES {
+                let Some(section) = &sections[station][side.index()] else { continue };
+                if self.station_parts[station][side.index()] != part {
+                    continue;
+                }
+                for (row, direction, place) in section.rows() {
+                    let moved = rigid.at(place).map(|v| v.dot(direction));
+                    (0..6).for_each(|m| response.rigid[first + row][m] += moved[m]);
+                }
+                let (force, places) = section.load();
+                for place in places {
+                    let work = rigid.at(place).map(|v| v.dot(force) / 4.0);
+                    (0..6).for_each(|m| response.rigid_load_n[m] += work[m]);
+                }
+            }
+        }
+        response
+    }
+
+    /// The law of each contact row.
+    fn laws(&self, responses: &[Response], joints: &[Option<Joint>]) -> Vec<Law> {
+        let mut laws = vec![Law::Free; self.stations.len() * ROWS];
+        for &row in responses.iter().flat_map(|r| &r.rows) {
+            let is_fast = joints[row / ROWS].is_some_and(|j| j.is_fast);
+            laws[row] = match direction_of(row) {
+                0 => Law::Both,
+                _ if is_fast => Law::Both,
+                1 => Law::Push,
+                _ => Law::Free,
+            };
+        }
+        laws
+    }
+
+    /// How a point of a connector moves with the wall of its side.
+    fn hold(&self, station: usize, side: Side, x: Vec3) -> Vec<(u32, f64)> {
+        let tets = self.near[station][side.index()].iter().map(|&t| {
+            let t = t as usize;
+            (self.wall.tets[t], self.wall.corners(t))
+        });
+        let weights = connector::interpolation(tets, x).into_iter();
+        weights.filter_map(|(node, w)| Some((self.place_kept[node as usize]?, w))).collect()
+    }
+}
+
+fn check(assembly: &ShellAssembly, clamped: &[u32]) -> Result<(), VolumeError> {
+    let n = assembly.points.len();
+    let has = |p: &u32| (*p as usize) < n;
+    let problem = if assembly.normals.len() != n || assembly.part_of_point.len() != n {
+        "points, normals and parts of points differ in number"
+    } else if !assembly.points.iter().chain(&assembly.normals).all(|p| p.is_finite()) {
+        "a point or normal is not finite"
+    } else if !assembly.part_of_point.iter().all(|p| (*p as usize) < assembly.n_parts) {
+        "a point has a part that there is not"
+    } else if !(assembly.triangles.iter().flatten().chain(clamped)).all(has) {
+        "a triangle or clamp names a point that there is not"
+    } else if !assembly.triangles.iter().all(|t| {
+        let part = |i: usize| assembly.part_of_point[t[i] as usize];
+        part(0) == part(1) && part(0) == part(2)
+    }) {
+        "a triangle has points of several parts"
+    } else if !assembly.stations.iter().flat_map(|s| &s.points).all(has) {
+        "a station names a point that there is not"
+    } else if !assembly.steps.iter().flatten().all(|s| (*s as usize) < assembly.stations.len()) {
+        "a step names a station that there is not"
+    } else {
+        return Ok(());
+    };
+    Err(VolumeError::Assembly(problem))
+}
+
+/// The tetrahedra below the triangles about each station's points.
+fn near_stations(assembly: &ShellAssembly, n_layers: usize) -> Vec<[Vec<u32>; 2]> {
+    let mut about: Vec<Vec<u32>> = vec![Vec::new(); assembly.points.len()];
+    for (i, t) in (0..).zip(&assembly.triangles) {
+        for point in t {
+            about[*point as usize].push(i);
+        }
+    }
+    let per_triangle = 3 * n_layers as u32;
+    let below = |point: u32| {
+        let tets = about[point as usize].iter().flat_map(|t| t * per_triangle..(t + 1) * per_triangle);
+        tets.collect()
+    };
+    assembly.stations.iter().map(|s| s.points.map(below)).collect()
+}

@@ -1,0 +1,456 @@
+//! Pins and channels: short bars of quadratic tetrahedra along the seams, hung on the walls.
+//!
+//! ```text
+//!      n ▲      male's wall         female's wall        in the plane of ŝ and n, at the inner edge o
+//!        │    ······o──────▶ ŝ      o······
+//!        │   front  │ foot                               front: −0.6 D ≤ s ≤ 0, 0.5 D thick; the male's on the side n < 0,
+//!            ┌──────o──────┐                                    the female's on n > 0; both touch along n = 0
+//!            │ pin  │      │                             foot:  0 ≤ s ≤ 0.5 D, where the front alone would hang on the
+//!            └──────┴──────┘                                    edge only, because ŝ lies across the wall
+//! ```
+//! A corner that lies in the wall of its own side, or in the face s = 0 where there is no foot, moves with the wall: by linear
+//! interpolation in the nearest tetrahedron, continued beyond it, which is exact for rigid motions. So no angle of ŝ needs
+//! another mesh, and bars may overlap the wall they belong to.
+
+use shellock_geom::Vec3;
+use shellock_geom::sparse::SparseError;
+
+use super::VolumeModel;
+use super::element::{EDGES, Order, gradients, lame, stiffness, volume_6};
+use super::front::Front;
+use crate::{Joint, SIDES, Side};
+
+/// How far the pin reaches, as a share of the connector size D.
+const DEPTH: f64 = 0.6;
+/// Thickness of pin, channel side and foot, as a share of D.
+const THICKNESS: f64 = 0.5;
+/// Corners this far outside the wall still count as inside, as a share of D: places on the inner surface are inside.
+const SLACK: f64 = 0.05;
+/// Least volume of a tetrahedron of a bar, as a share of a straight one's; below, frames twist too far for a connector.
+const MIN_VOLUME_SHARE: f64 = 0.1;
+
+/// Places along s in a cross-section, and across it. Even ones are corners, odd ones lie halfway.
+const N_ALONG_S: usize = 5;
+const N_ACROSS: usize = 3;
+const N_SECTION: usize = N_ALONG_S * N_ACROSS;
+/// Nodes of the bar between two stations: cross-sections at both and halfway.
+const N_BAR: usize = 3 * N_SECTION;
+
+/// Unknowns of contact at a station: at the root of the pin (s = 0) and at its tip, along n, ŝ and u.
+pub(super) const ROWS: usize = 6;
+
+/// Motion of a node as a weighted sum of those of kept wall nodes.
+type Hold = Vec<(u32, f64)>;
+
+/// One side's cross-section at a station.
+#[derive(Debug)]
+pub(super) struct Section {
+    /// Corners along s (tip, root, foot), and from the common face across.
+    at: [[Vec3; 2]; 3],
+    hold: [[Option<Hold>; 2]; 3],
+    has_foot: bool,
+    /// Directions n, ŝ, u: the same on both sides.
+    frame: [Vec3; 3],
+    /// 1 for the male, −1 for the female.
+    sign: f64,
+    /// Separation force on the side, N.
+    force_n: Vec3,
+}
+
+impl Section {
+    /// Where the pairs are: at the root and at the tip, on the common face.
+    const PAIRS: [usize; 2] = [1, 0];
+
+    /// The cross-section of `side` at a station joined by `joint`.
+    pub fn new(model: &VolumeModel, station: usize, side: Side, joint: &Joint) -> Self {
+        let (place, size) = (&model.stations[station], model.params.connector_mm);
+        let inland = if side == Side::A { -place.across } else { place.across };
+        let male_to_female = if joint.male == Side::A { place.across } else { -place.across };
+        // n = −u × ŝ with u = v × N, v from male to female.
+        let s = joint.leaves;
+        let n = male_to_female * s.dot(place.normal) - place.normal * s.dot(male_to_female);
+        let thick = n * (if joint.male == side { -THICKNESS } else { THICKNESS } * size);
+        let edge = model.inner_edge[station][side.index()];
+        let at = [-DEPTH, 0.0, THICKNESS].map(|s_share| [0.0, 1.0].map(|k| edge + s * (s_share * size) + thick * k));
+
+        let is_inside = |x: Vec3| {
+            let least = -SLACK * size;
+            (x - edge).dot(place.normal) >= least && (x - edge).dot(inland) >= least
+        };
+        let foot = (at[1][0] + at[1][1] + at[2][0] + at[2][1]) / 4.0 - edge;
+        let has_foot = foot.dot(place.normal) < SLACK * size && foot.dot(inland) > 0.0;
+        let hold = [0, 1, 2].map(|is| {
+            [0, 1].map(|k| {
+                let is_root = (is == 1) && (k == 0 || !has_foot);
+                (is_root || is_inside(at[is][k])).then(|| model.hold(station, side, at[is][k]))
+            })
+        });
+        let pull = joint.pull_on_a * (model.params.force_n_per_mm * place.length_mm);
+        Self {
+            at,
+            hold,
+            has_foot,
+            frame: [n, s, place.tangent],
+            sign: if joint.male == side { 1.0 } else { -1.0 },
+            force_n: if side == Side::A { pull } else { -pull },
+        }
+    }
+
+    /// Directions in which contact acts on this side: row, direction, place.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, Vec3, Vec3)> {
+        Self::PAIRS
+            .into_iter()
+            .enumerate()
+            .flat_map(move |(pair, is)| (0..3).map(move |c| (3 * pair + c, self.frame[c] * self.sign, self.at[is][0])))
+    }
+
+    /// The separation force and the places on which it acts, a quarter each.
+    pub fn load(&self) -> (Vec3, [Vec3; 4]) {
+        (self.force_n, [self.at[0][0], self.at[0][1], self.at[1][0], self.at[1][1]])
+    }
+}
+
+/// Labels of a part's unknowns: wall, contact rows, load, nodes of the sections, nodes halfway.
+#[derive(Clone, Copy)]
+pub(super) struct Labels {
+    n_wall: u32,
+    n_stations: u32,
+}
+
+impl Labels {
+    pub fn new(n_wall: usize, n_stations: usize) -> Self {
+        Self { n_wall: n_wall as u32, n_stations: n_stations as u32 }
+    }
+    pub fn is_wall(self, id: u32) -> bool {
+        id < self.n_wall
+    }
+    fn row(self, station: usize, row: usize) -> u32 {
+        self.n_wall + (station * ROWS + row) as u32
+    }
+    /// The contact row that `id` means.
+    pub fn row_of(self, id: u32) -> usize {
+        (id - self.n_wall) as usize
+    }
+    pub fn load(self) -> u32 {
+        self.n_wall + self.n_stations * ROWS as u32
+    }
+    fn section(self, station: usize, side: Side) -> u32 {
+        self.load() + 1 + ((2 * station + side.index()) * 3 * N_SECTION) as u32
+    }
+    fn halfway(self, step: usize, side: Side) -> u32 {
+        self.section(self.n_stations as usize, Side::A) + ((2 * step + side.index()) * 3 * N_SECTION) as u32
+    }
+}
+
+/// One side's bar along one step.
+#[derive(Debug)]
+pub(super) struct Bar {
+    pub step: usize,
+    pub side: Side,
+    pub stations: [usize; 2],
+    /// Corners of its tetrahedra, as nodes of the bar's lattice.
+    tets: Vec<[usize; 4]>,
+}
+
+/// The lattice node at `is` along s, `k` across and `it` along the seam.
+fn lattice(is: usize, k: usize, it: usize) -> usize {
+    (it * N_ALONG_S + is) * N_ACROSS + k
+}
+
+/// Corners of the six tetrahedra of the cell from tip to root (0) or root to foot (1).
+fn cell_tets(cell: usize) -> [[usize; 4]; 6] {
+    [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]].map(|axes| {
+        let mut at = [2 * cell, 0, 0];
+        let mut corners = [lattice(at[0], at[1], at[2]); 4];
+        for (corner, axis) in corners[1..].iter_mut().zip(axes) {
+            at[axis] += 2;
+            *corner = lattice(at[0], at[1], at[2]);
+        }
+        corners
+    })
+}
+
+/// Where the corner `node` of the lattice is.
+fn corner(sections: [&Section; 2], node: usize) -> Vec3 {
+    let (it, is, k) = (node / N_SECTION, node % N_SECTION / N_ACROSS, node % N_ACROSS);
+    sections[it / 2].at[is / 2][k / 2]
+}
+
+/// How a node moves with the wall, if it does: a node halfway where both ends do.
+fn hold(sections: [&Section; 2], node: usize) -> Option<Hold> {
+    let (it, is, k) = (node / N_SECTION, node % N_SECTION / N_ACROSS, node % N_ACROSS);
+    let end = |up: bool| {
+        let shifted = |x: usize| {
+            if x % 2 == 0 {
+                x
+            } else if up {
+                x + 1
+            } else {
+                x - 1
+            }
+        };
+        sections[shifted(it) / 2].hold[shifted(is) / 2][shifted(k) / 2].as_ref()
+    };
+    if it % 2 + is % 2 + k % 2 == 0 {
+        return end(true).cloned();
+    }
+    Some([end(false)?, end(true)?].into_iter().flatten().map(|(node, w)| (*node, 0.5 * w)).collect())
+}
+
+impl Bar {
+    /// The bar, or nothing where frames twist so far that it would turn inside out.
+    pub fn new(step: usize, side: Side, stations: [usize; 2], sections: [&Section; 2]) -> Option<Self> {
+        let has_foot = sections[0].has_foot && sections[1].has_foot;
+        let mut tets = Vec::new();
+        for cell in 0..1 + usize::from(has_foot) {
+            let mut cell_tets = cell_tets(cell);
+            let along = corner(sections, lattice(2 * cell, 0, 0)).distance(corner(sections, lattice(2 * cell, 0, 2)));
+            let section = sections[0].at[cell][0].distance(sections[0].at[cell + 1][0])
+                * sections[0].at[cell][0].distance(sections[0].at[cell][1]);
+            // Kuhn's tetrahedra: even permutations of the axes have one sign, odd ones the other.
+            let volumes: Vec<f64> = (cell_tets.iter().enumerate())
+                .map(|(i, t)| volume_6(t.map(|node| corner(sections, node))) * if i < 3 { 1.0 } else { -1.0 })
+                .collect();
+            let sign = volumes[0].signum();
+            if volumes.iter().any(|v| v * sign < MIN_VOLUME_SHARE * along * section) {
+                return None;
+            }
+            for (i, tet) in cell_tets.iter_mut().enumerate() {
+                if (i < 3) != (sign > 0.0) {
+                    tet.swap(2, 3);
+                }
+            }
+            let nodes: Vec<usize> = cell_tets.concat();
+            if nodes.into_iter().any(|node| hold(sections, node).is_none()) {
+                tets.extend(cell_tets);
+            }
+        }
+        Some(Self { step, side, stations, tets })
+    }
+
+    /// Stiffness, contact rows and load of the bar; of its stations only those in `carries`, so that each counts once.
+    pub fn front(&self, model: &VolumeModel, sections: [&Section; 2], carries: [bool; 2], labels: Labels) -> Front {
+        let holds: Vec<Option<Hold>> = (0..N_BAR).map(|node| hold(sections, node)).collect();
+        let base = [
+            labels.section(self.stations[0], self.side),
+            labels.halfway(self.step, self.side),
+            labels.section(self.stations[1], self.side),
+        ];
+        // What moves a node: its own unknown or the wall's.
+        let movers: Vec<Hold> = (holds.into_iter().enumerate())
+            .map(|(node, hold)| match hold {
+                Some(hold) => hold.into_iter().map(|(kept, w)| (3 * kept, w)).collect(),
+                None => vec![(base[node / N_SECTION] + 3 * (node % N_SECTION) as u32, 1.0)],
+            })
+            .collect();
+        let mut sum = Accumulator::new(self.used_nodes(), &movers, labels, self.stations, carries);
+        sum.add_stiffness(&self.lattice_stiffness(model, sections), &movers);
+        for i in 0..2 {
+            if carries[i] {
+                sum.add_contact(sections[i], &movers, 2 * i, |row| labels.row(self.stations[i], row));
+                sum.add_load(sections[i], &movers, 2 * i, labels.load());
+            }
+        }
+        sum.front
+    }
+
+    fn used_nodes(&self) -> Vec<usize> {
+        let mut nodes: Vec<usize> = self.tets.iter().flat_map(|t| with_middles(*t)).collect();
+        // Pairs and loads act on front corners, in elements or not.
+        nodes.extend([0, 2].into_iter().flat_map(|it| [0, 2].map(|is| [0, 2].map(|k| lattice(is, k, it)))).flatten());
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    fn lattice_stiffness(&self, model: &VolumeModel, sections: [&Section; 2]) -> Vec<f64> {
+        const N: usize = 3 * N_BAR;
+        let mut k_bar = vec![0.0; N * N];
+        let lame = lame(&model.params.material);
+        for tet in &self.tets {
+            let nodes = with_middles(*tet);
+            stiffness(Order::Quadratic, tet.map(|c| corner(sections, c)), lame, |a, b, k| {
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let (row, column) = (3 * nodes[a] + i, 3 * nodes[b] + j);
+                        k_bar[row + N * column] += k[i][j];
+                        if a != b {
+                            k_bar[column + N * row] += k[i][j];
+                        }
+                    }
+                }
+            });
+        }
+        k_bar
+    }
+}
+
+/// The ten nodes of a tetrahedron of the lattice.
+fn with_middles(corners: [usize; 4]) -> [usize; 10] {
+    let mut nodes = [0; 10];
+    nodes[..4].copy_from_slice(&corners);
+    for (node, [i, j]) in nodes[4..].iter_mut().zip(EDGES) {
+        *node = usize::midpoint(corners[i], corners[j]);
+    }
+    nodes
+}
+
+/// The nearest of `tets` to `x` (largest least barycentric coordinate): its corners with their weights at `x`.
+pub(super) fn interpolation(tets: impl Iterator<Item = ([u32; 4], [Vec3; 4])>, x: Vec3) -> [(u32, f64); 4] {
+    let mut best = ([(0, 0.0); 4], f64::NEG_INFINITY);
+    for (nodes, corners) in tets {
+        let g = gradients(corners);
+        let l: [f64; 4] = std::array::from_fn(|i| f64::from(u8::from(i == 0)) + g[i].dot(x - corners[0]));
+        let least = l.into_iter().fold(f64::INFINITY, f64::min);
+        if least > best.1 {
+            best = (std::array::from_fn(|i| (nodes[i], l[i])), least);
+        }
+    }
+    best.0
+}
+
+/// Adds up a bar's front.
+struct Accumulator {
+    front: Front,
+    used: Vec<usize>,
+}
+
+impl Accumulator {
+    fn new(used: Vec<usize>, movers: &[Hold], labels: Labels, stations: [usize; 2], carries: [bool; 2]) -> Self {
+        let mut ids: Vec<u32> =
+            used.iter().flat_map(|&node| &movers[node]).flat_map(|(first, _)| *first..*first + 3).collect();
+        for (station, carries) in stations.into_iter().zip(carries) {
+            if carries {
+                ids.extend((0..ROWS).map(|row| labels.row(station, row)));
+                ids.push(labels.load());
+            }
+        }
+        ids.sort_unstable();
+        ids.dedup();
+        let n = ids.len();
+        Self { front: Front { ids, values: vec![0.0; n * n] }, used }
+    }
+
+    fn place(&self, id: u32) -> usize {
+        self.front.ids.partition_point(|&other| other < id)
+    }
+
+    /// Pᵀ K P, where P takes the unknowns to the nodes.
+    fn add_stiffness(&mut self, k_bar: &[f64], movers: &[Hold]) {
+        const N: usize = 3 * N_BAR;
+        let n = self.front.ids.len();
+        let placed: Vec<Vec<(usize, f64)>> = (self.used.iter())
+            .map(|&node| movers[node].iter().map(|(first, w)| (self.place(*first), *w)).collect())
+            .collect();
+        let mut half = vec![0.0; n * N];
+        for (&node, movers) in self.used.iter().zip(&placed) {
+            for &(at, weight) in movers {
+                for i in 0..3 {
+                    let source = &k_bar[N * (3 * node + i)..][..N];
+                    for (sum, k) in half[N * (at + i)..][..N].iter_mut().zip(source) {
+                        *sum += weight * k;
+                    }
+                }
+            }
+        }
+        for column in 0..n {
+            for (&node, movers) in self.used.iter().zip(&placed) {
+                for &(at, weight) in movers {
+                    for i in 0..3 {
+                        self.front.values[at + i + n * column] += weight * half[N * column + 3 * node + i];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds `value`, a vector, between unknown `id` and the node's motion; `id` comes after the wall, and before the nodes.
+    fn couple(&mut self, id: u32, movers: &Hold, value: Vec3) {
+        let (n, at) = (self.front.ids.len(), self.place(id));
+        for (first, weight) in movers {
+            let first = self.place(*first);
+            for (i, v) in value.to_array().into_iter().enumerate() {
+                let (row, column) = (at.max(first + i), at.min(first + i));
+                self.front.values[row + n * column] += weight * v;
+            }
+        }
+    }
+
+    fn add_contact(&mut self, section: &Section, movers: &[Hold], it: usize, label: impl Fn(usize) -> u32) {
+        for (row, direction, _) in section.rows() {
+            let node = lattice(2 * Section::PAIRS[row / 3], 0, it);
+            self.couple(label(row), &movers[node], direction);
+        }
+    }
+
+    fn add_load(&mut self, section: &Section, movers: &[Hold], it: usize, load: u32) {
+        for is in [0, 2] {
+            for k in [0, 2] {
+                self.couple(load, &movers[lattice(is, k, it)], section.force_n / 4.0);
+            }
+        }
+    }
+}
+
+/// Both sides' cross-sections at all stations that are joined.
+pub(super) fn sections(model: &VolumeModel, joints: &[Option<Joint>]) -> Vec<[Option<Section>; 2]> {
+    use rayon::prelude::*;
+    (joints.par_iter().enumerate())
+        .map(|(i, joint)| SIDES.map(|side| joint.as_ref().map(|joint| Section::new(model, i, side, joint))))
+        .collect()
+}
+
+/// Adds up the fronts of a part's bars, in order along the seams, and eliminates all their own unknowns.
+///
+/// `spans` tells the first and the last bar that an unknown belongs to, or nothing if there is one only. Halves are
+/// condensed first, then joined: what remains of each is short, however long the seam.
+pub(super) fn condensed(
+    fronts: &[Front],
+    labels: Labels,
+    spans: &dyn Fn(u32) -> Option<[usize; 2]>,
+) -> Result<Front, SparseError> {
+    fn reduce(
+        fronts: &[Front],
+        from: usize,
+        is_inside: &dyn Fn(u32, usize, usize) -> bool,
+    ) -> Result<Front, SparseError> {
+        let to = from + fronts.len();
+        if let [front] = fronts {
+            return Front::condensed(&[front], |id| is_inside(id, from, to));
+        }
+        let (left, right) = fronts.split_at(fronts.len() / 2);
+        let halves = [reduce(left, from, is_inside)?, reduce(right, from + left.len(), is_inside)?];
+        Front::condensed(&[&halves[0], &halves[1]], |id| is_inside(id, from, to))
+    }
+    if fronts.is_empty() {
+        return Ok(Front::default());
+    }
+    reduce(fronts, 0, &|id, from, to| {
+        id > labels.load() && spans(id).is_none_or(|[first, last]| from <= first && last < to)
+    })
+}
+
+impl Labels {
+    /// Whether `id` belongs to a section (station and side) or halfway along a step (step and side).
+    pub fn owner(self, id: u32) -> Owner {
+        let of = |start: u32| {
+            let at = (id - start) as usize / (3 * N_SECTION);
+            (at / 2, SIDES[at % 2])
+        };
+        let halfway = self.halfway(0, Side::A);
+        if id >= halfway {
+            Owner::Step
+        } else {
+            let (station, side) = of(self.section(0, Side::A));
+            Owner::Section(station, side)
+        }
+    }
+}
+
+/// To what an unknown of a bar belongs.
+pub(super) enum Owner {
+    /// A cross-section at a station.
+    Section(usize, Side),
+    /// The nodes halfway along one step.
+    Step,
+}

@@ -1,0 +1,190 @@
+use super::*;
+use crate::sample;
+
+/// Every station joined; friction holds part `fast`.
+fn joined(assembly: &ShellAssembly, degrees: f64, fast: Option<u32>) -> Vec<Meeting> {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let joint = |s: &Station| {
+        let leaves = s.normal * cos + s.across * sin;
+        let is_fast = s.points.iter().any(|p| Some(assembly.part_of_point[*p as usize]) == fast);
+        let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0 };
+        Meeting { wall: s.across, joint: Some(joint) }
+    };
+    assembly.stations.iter().map(joint).collect()
+}
+
+#[test]
+fn plates_on_a_straight_seam_come_apart() {
+    let plates = sample::plates(30.0, 15.0, [10, 5]);
+    let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
+    for degrees in [-90.0, -45.0, 0.0, 45.0] {
+        assert_eq!(model.resist(&joined(&plates, degrees, None), 0).unwrap(), Resistance::Separable(vec![1]));
+    }
+}
+
+/// Along a great circle, half of the ball may turn against the other half: each of the three circles frees one rotation.
+#[test]
+fn octants_turn_about_great_circles_unless_friction_holds_one_of_them() {
+    let ball = sample::ball(20.0, 8);
+    let sliding = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    assert_eq!(sliding.resist(&joined(&ball, 0.0, None), 7).unwrap(), Resistance::Separable((0..7).collect()));
+    let sticking = sliding.resist(&joined(&ball, 0.0, Some(7)), 7).unwrap();
+    let Resistance::Holds(opening) = sticking else { panic!("it comes apart") };
+    assert!(opening.quality_mm < -1e-6 && opening.quality_mm > -0.1, "{opening:?}");
+}
+
+/// One plate alone, `[length, width]` mm, clamped at its far edge or not at all; its wall's stiffness on all points near the seam.
+fn strip(order: Order, clamp: bool) -> (VolumeModel, ShellAssembly) {
+    let plates = sample::plates(5.0, 40.0, [4, 20]);
+    let is_far = |p: &shellock_geom::Vec3| p.x.abs() > 40.0 - 1e-9;
+    let clamped: Vec<u32> = (0..).zip(&plates.points).filter(|(_, p)| clamp && is_far(p)).map(|(i, _)| i).collect();
+    // Without lateral contraction the clamp does not stiffen the strip, and beam theory is right.
+    let material = Material { poissons_ratio: 0.0, ..Material::SLA_RESIN };
+    let params = VolumeParams { order, material, ..VolumeParams::default() };
+    (VolumeModel::clamped(&params, &plates, &clamped).unwrap(), plates)
+}
+
+/// Deflection of a strip's tip, mm, under 1 N spread over its end face; and what beam theory says.
+fn tip_deflection(order: Order) -> (f64, f64) {
+    let (model, _) = strip(order, true);
+    let part = &model.parts[0];
+    let n = part.stiffness.ids.len();
+    // The load is one more row: what is left of its diagonal is minus the work it does.
+    let mut loaded = Front { ids: (0..=n as u32).collect(), values: vec![0.0; (n + 1) * (n + 1)] };
+    let end: Vec<usize> = (0..part.kept.len()).filter(|i| model.wall.nodes[part.kept[*i] as usize].x > -1e-9).collect();
+    for &i in &end {
+        loaded.values[n + (n + 1) * (3 * i + 2)] = 1.0 / end.len() as f64;
+    }
+    let left = Front::condensed(&[&part.stiffness, &loaded], |id| id < n as u32).unwrap();
+    let (force, length, width, depth, e) = (1.0, 40.0_f64, 5.0, 2.0_f64, 2000.0);
+    (-left.values[0], force * length.powi(3) / (3.0 * e * width * depth.powi(3) / 12.0))
+}
+
+#[test]
+fn a_cantilever_bends_as_a_beam_with_quadratic_elements_and_locks_with_linear_ones() {
+    let (quadratic, beam) = tip_deflection(Order::Quadratic);
+    assert!((quadratic / beam - 1.0).abs() < 0.02, "{quadratic} mm, beam {beam} mm");
+    let (linear, _) = tip_deflection(Order::Linear);
+    assert!(linear < 0.8 * beam, "{linear} mm, beam {beam} mm");
+}
+
+/// Under uniform strain, internal forces vanish away from the surface and balance as a whole: tested with the work, which is
+/// the strain energy density times the volume.
+#[test]
+fn uniform_strain_has_its_exact_energy() {
+    let corners = [[0.1, 0.0, 0.2], [2.0, 0.3, 0.0], [0.4, 1.7, 0.1], [0.3, 0.2, 1.1]].map(shellock_geom::Vec3::from);
+    let material = Material::SLA_RESIN;
+    let (lambda, mu) = element::lame(&material);
+    let gradient = [[0.3, 0.1, -0.2], [0.0, -0.4, 0.5], [0.2, 0.6, 0.7]];
+    let moved = |x: shellock_geom::Vec3| gradient.map(|row| shellock_geom::Vec3::from(row).dot(x));
+    let strain = |i: usize, j: usize| 0.5 * (gradient[i][j] + gradient[j][i]);
+    let trace: f64 = (0..3).map(|i| strain(i, i)).sum();
+    let square: f64 = (0..9).map(|at| strain(at / 3, at % 3).powi(2)).sum();
+    let expected = (lambda * trace * trace + 2.0 * mu * square) * element::volume_6(corners) / 6.0;
+    for order in [Order::Linear, Order::Quadratic] {
+        let mut places = corners.to_vec();
+        places.extend(element::EDGES.map(|[i, j]| (corners[i] + corners[j]) / 2.0));
+        let u: Vec<[f64; 3]> = places.into_iter().map(moved).collect();
+        let mut energy = 0.0;
+        element::stiffness(order, corners, (lambda, mu), |a, b, k| {
+            let work: f64 = (0..9).map(|at| u[a][at / 3] * k[at / 3][at % 3] * u[b][at % 3]).sum();
+            energy += work * if a == b { 1.0 } else { 2.0 };
+        });
+        assert!((energy / expected - 1.0).abs() < 1e-9, "{order:?}: {energy} for {expected}");
+    }
+}
+
+/// Patch test: a free wall whose near nodes move uniformly bears on them with forces that balance, and rigid motions cost nothing.
+#[test]
+fn rigid_motions_of_a_free_wall_are_held_by_its_springs_alone() {
+    let (model, _) = strip(Order::Quadratic, false);
+    let part = &model.parts[0];
+    let (n, k) = (part.stiffness.ids.len(), &part.stiffness.values);
+    let rigid = part.rigid.unwrap();
+    let spring = {
+        let one: f64 = 3.0_f64.recip() * n as f64;
+        let moved: f64 = (0..n / 3)
+            .flat_map(|i| (0..n / 3).map(move |j| (3 * i, 3 * j)))
+            .map(|(i, j)| k[i.max(j) + n * i.min(j)])
+            .sum();
+        moved / one
+    };
+    let at = |node: usize| rigid.at(model.wall.nodes[part.kept[node] as usize]);
+    for m in 0..6 {
+        let u: Vec<f64> = (0..n / 3).flat_map(|i| at(i)[m].to_array()).collect();
+        for row in 0..n {
+            let force: f64 = (0..n).map(|j| k[row.max(j) + n * row.min(j)] * u[j]).sum();
+            assert!((force - spring * u[row]).abs() < 1e-7 * spring, "motion {m}, row {row}: {force}");
+        }
+    }
+}
+
+#[test]
+fn every_tetrahedron_of_a_ball_is_sound() {
+    let model = VolumeModel::new(&VolumeParams::default(), &sample::ball(20.0, 8)).unwrap();
+    assert_eq!((model.n_tets(), model.wall().n_thinned), (8 * 64 * 3, 0));
+    for tet in 0..model.n_tets() {
+        let corners = model.wall().corners(tet);
+        assert!(element::volume_6(corners) > 0.0);
+        let normals = element::gradients(corners);
+        for [i, j] in element::EDGES {
+            let dihedral = (-normals[i].normalize().dot(normals[j].normalize())).acos().to_degrees();
+            assert!((15.0..165.0).contains(&dihedral), "{dihedral}° in {tet}");
+        }
+    }
+}
+
+/// A ball thinner than its wall: at the depth asked for, prisms would turn over at the centre.
+#[test]
+fn where_no_wall_fits_it_is_thinner_and_sound() {
+    let params = VolumeParams { wall_mm: 6.0, ..VolumeParams::default() };
+    let model = VolumeModel::new(&params, &sample::ball(5.0, 4)).unwrap();
+    assert!(model.wall().n_thinned > 0);
+    assert!((0..model.n_tets()).all(|t| element::volume_6(model.wall().corners(t)) > 0.0));
+    assert!(model.wall().depth_mm.iter().all(|d| *d < 5.0));
+}
+
+fn quality(params: &VolumeParams, degrees: f64) -> f64 {
+    let ball = sample::ball(15.0, 6);
+    let model = VolumeModel::new(params, &ball).unwrap();
+    match model.resist(&joined(&ball, degrees, Some(7)), 7).unwrap() {
+        Resistance::Holds(opening) => opening.quality_mm,
+        Resistance::Separable(parts) => panic!("{parts:?} come off"),
+    }
+}
+
+#[test]
+fn half_the_tolerance_does_not_change_the_quality() {
+    let params = VolumeParams::default();
+    let halved = VolumeParams { tolerance: params.tolerance / 2.0, ..params };
+    let (q, q_halved) = (quality(&params, -30.0), quality(&halved, -30.0));
+    assert!((q - q_halved).abs() < 0.01 * q.abs(), "{q} {q_halved}");
+}
+
+#[test]
+fn openings_are_proportional_to_force_over_stiffness() {
+    let params = VolumeParams::default();
+    let q = quality(&params, 0.0);
+    let twice = VolumeParams { force_n_per_mm: 2.0 * params.force_n_per_mm, ..params };
+    assert!((quality(&twice, 0.0) / q - 2.0).abs() < 1e-6);
+    let stiff = Material { youngs_modulus_mpa: 8000.0, ..params.material };
+    assert!((quality(&VolumeParams { material: stiff, ..params }, 0.0) / q - 0.25).abs() < 1e-6);
+}
+
+#[test]
+fn odd_input_is_refused() {
+    let plates = sample::plates(10.0, 5.0, [4, 2]);
+    let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
+    assert_eq!(
+        model.resist(&[Meeting { wall: Vec3::X, joint: None }], 0),
+        Err(VolumeError::Joints { joints: 1, stations: 3 })
+    );
+    assert_eq!(model.resist(&[Meeting { wall: Vec3::X, joint: None }; 3], 2), Err(VolumeError::NoSuchPart(2)));
+    assert_eq!(model.resist(&[Meeting { wall: Vec3::X, joint: None }; 3], 0), Ok(Resistance::Separable(vec![1])));
+    let thick = VolumeParams { wall_mm: f64::NAN, n_layers: 0, ..VolumeParams::default() };
+    assert_eq!(thick.problems().len(), 2);
+    assert!(VolumeModel::new(&thick, &plates).is_err());
+    let mut flat = plates;
+    flat.normals.fill(shellock_geom::Vec3::X);
+    assert_eq!(VolumeModel::new(&VolumeParams::default(), &flat).unwrap_err(), VolumeError::FlatTriangle(0));
+}

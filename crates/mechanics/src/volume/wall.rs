@@ -1,0 +1,116 @@
+//! The wall of all parts as tetrahedra: triangles of the outer surface, extruded inwards.
+//!
+//! A prism is cut into three tetrahedra along the diagonals that start at the lower-numbered point of each side, so that
+//! neighbours meet. Where a prism would fold over or become a sliver (tight concave places), the wall is made thinner there.
+
+use shellock_geom::Vec3;
+
+use super::element::volume_6;
+use crate::ShellAssembly;
+
+/// Least volume of a tetrahedron, as a share of that in a straight prism on the same triangle.
+///
+/// With it, an inner triangle has at least about a tenth of the outer one's area. Elements that are worse make the stiffness
+/// matrix ill-conditioned, and stiff beyond what the little material is worth.
+pub const MIN_VOLUME_SHARE: f64 = 0.1;
+
+/// Factor on the depth of a point whose prism is too bad.
+const THINNER: f64 = 0.8;
+
+/// Times that a depth may be reduced: to 3 % of the wall. What is bad then has a bad triangle outside.
+const MAX_REDUCTIONS: usize = 16;
+
+/// Tetrahedra of all parts.
+#[derive(Clone, Debug)]
+pub struct Wall {
+    /// Layer by layer from the outside; node `layer · n_points + point`.
+    pub nodes: Vec<Vec3>,
+    /// Four nodes of positive volume each; three times `n_layers` for each triangle, in its order.
+    pub tets: Vec<[u32; 4]>,
+    /// Depth of the wall at each point, mm.
+    pub depth_mm: Vec<f64>,
+    /// How many points have a thinner wall than asked for.
+    pub n_thinned: usize,
+}
+
+/// A triangle on which no prism stands, however thin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FlatTriangle(pub u32);
+
+impl Wall {
+    pub(super) fn new(assembly: &ShellAssembly, wall_mm: f64, n_layers: usize) -> Result<Self, FlatTriangle> {
+        let mut depth_mm = vec![wall_mm; assembly.points.len()];
+        for round in 0..=MAX_REDUCTIONS {
+            let bad = bad_triangles(assembly, &depth_mm, n_layers);
+            let Some(&first) = bad.first() else { break };
+            if round == MAX_REDUCTIONS {
+                return Err(FlatTriangle(first));
+            }
+            thin(assembly, &bad, &mut depth_mm);
+        }
+        let nodes = (0..=n_layers).flat_map(|layer| {
+            let share = layer as f64 / n_layers as f64;
+            (0..assembly.points.len()).map({
+                let depth_mm = &depth_mm;
+                move |i| assembly.points[i] - assembly.normals[i] * (depth_mm[i] * share)
+            })
+        });
+        Ok(Self {
+            nodes: nodes.collect(),
+            tets: (assembly.triangles.iter())
+                .flat_map(|&t| (0..n_layers).flat_map(move |layer| prism(t, layer, assembly.points.len() as u32)))
+                .collect(),
+            n_thinned: depth_mm.iter().filter(|d| **d < wall_mm).count(),
+            depth_mm,
+        })
+    }
+
+    /// Corners of tetrahedron `tet`.
+    pub fn corners(&self, tet: usize) -> [Vec3; 4] {
+        self.tets[tet].map(|node| self.nodes[node as usize])
+    }
+}
+
+/// The three tetrahedra below triangle `t` in `layer`, of positive volume if the prism is sound.
+fn prism(t: [u32; 3], layer: usize, n_points: u32) -> [[u32; 4]; 3] {
+    let lowest = (0..3).min_by_key(|i| t[*i]).unwrap_or(0);
+    let [a, b, c] = [t[lowest], t[(lowest + 1) % 3], t[(lowest + 2) % 3]].map(|p| p + layer as u32 * n_points);
+    let [d, e, f] = [a, b, c].map(|p| p + n_points);
+    // Diagonals start at a, the lowest; the one of side bc at the lower of b and c.
+    if b < c { [[a, e, d, f], [a, b, e, f], [a, b, f, c]] } else { [[a, e, d, f], [a, b, e, c], [a, c, e, f]] }
+}
+
+fn bad_triangles(assembly: &ShellAssembly, depth_mm: &[f64], n_layers: usize) -> Vec<u32> {
+    let n_points = assembly.points.len() as u32;
+    let node = |id: u32| {
+        let (layer, point) = (id / n_points, (id % n_points) as usize);
+        assembly.points[point] - assembly.normals[point] * (depth_mm[point] * f64::from(layer) / n_layers as f64)
+    };
+    let is_bad = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| assembly.points[i as usize]);
+        let depth = t.map(|i| depth_mm[i as usize]).iter().sum::<f64>() / 3.0;
+        let straight_6 = (b - a).cross(c - a).length() * depth / n_layers as f64;
+        let mut tets = (0..n_layers).flat_map(|layer| prism(*t, layer, n_points));
+        // Negated, so that a triangle of no area or of points that are no numbers is bad as well.
+        tets.any(|tet| !(volume_6(tet.map(node)) > MIN_VOLUME_SHARE * straight_6) || straight_6 <= 0.0)
+    };
+    (0..).zip(&assembly.triangles).filter(|(_, t)| is_bad(t)).map(|(i, _)| i).collect()
+}
+
+/// Makes the wall thinner below bad triangles, alike on both sides of a seam.
+fn thin(assembly: &ShellAssembly, bad: &[u32], depth_mm: &mut [f64]) {
+    let mut is_hit = vec![false; depth_mm.len()];
+    for &triangle in bad {
+        for point in assembly.triangles[triangle as usize] {
+            is_hit[point as usize] = true;
+        }
+    }
+    for (depth, is_hit) in depth_mm.iter_mut().zip(is_hit) {
+        *depth *= if is_hit { THINNER } else { 1.0 };
+    }
+    for station in &assembly.stations {
+        let [a, b] = station.points.map(|p| p as usize);
+        let least = depth_mm[a].min(depth_mm[b]);
+        (depth_mm[a], depth_mm[b]) = (least, least);
+    }
+}
