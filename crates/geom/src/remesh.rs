@@ -32,7 +32,7 @@ const COARSE: f64 = 0.6;
 /// No coarsening merge makes an edge of more target lengths.
 const COARSE_LONGEST: f64 = 1.1;
 /// Cosine between a triangle's normal and the input's at the nearest point (and, while coarsening, at its corners): at
-/// least this. Triangles across a sharp edge or a thin limb's tip have about 0.5.
+/// least this.
 const LEAST_COS: f64 = 0.2;
 /// No step makes a triangle whose height is a smaller share of its longest edge, unless it was worse before.
 const LEAST_HEIGHT: f64 = 0.05;
@@ -53,7 +53,7 @@ pub struct RemeshParams {
     /// Edge length wanted, mm, > 0. Most edges come out between 0.6 and 1.5 of it; raised where it would need more than
     /// a million triangles.
     pub target_edge_mm: f64,
-    /// Rounds of splitting, merging, turning and smoothing. After 5 the edge lengths hardly change.
+    /// Rounds of splitting, merging, turning and smoothing. The tests and the figures in these docs use 6.
     pub n_rounds: u32,
 }
 
