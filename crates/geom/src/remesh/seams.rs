@@ -3,8 +3,8 @@
 use super::surface::{NO_SEAM, Place, Surface, prev};
 use crate::{HalfEdge, Topology, Vec3};
 
-/// A line of the input along which the same two labels meet, from corner to corner or closed in itself. A place on it is
-/// its distance from the start along the line, mm.
+/// A line of the input along which the same two labels meet, from corner to corner or closed in itself. A place on it
+/// is its distance from the start along the line, mm.
 pub(super) struct Seam {
     /// The label on the left of someone who walks along the line, outside up: the lower of both.
     pub left: u32,
@@ -107,8 +107,8 @@ impl Surface {
         }
     }
 
-    /// The seam through a point of kind [`Place::Seam`] and the place on it this share of the way to the middle between the
-    /// neighbours there.
+    /// The seam through a point of kind [`Place::Seam`] and the place on it this share of the way to the middle between
+    /// the neighbours there.
     pub fn relaxed_along(&self, v: u32, share: f64, seams: &[Seam]) -> Option<(u32, f64)> {
         let onwards = self.around(v).find(|&h| {
             let seam = self.seam[h as usize];

@@ -234,7 +234,8 @@ impl Surface {
         self.out[v as usize] = HalfEdge::MAX;
     }
 
-    /// Whether merging the end of `h` into its start keeps the surface a manifold, the regions, the seams and the corners.
+    /// Whether merging the end of `h` into its start keeps the surface a manifold, the regions, the seams and the
+    /// corners.
     pub fn may_merge(&self, h: HalfEdge) -> bool {
         let g = self.opposite[h as usize];
         let [u, v] = self.ends(h);
