@@ -10,11 +10,14 @@ pub mod cluster;
 pub mod contact;
 mod diagnose;
 mod draw;
+mod exact;
 mod improve;
 pub mod key;
+pub mod local_cost;
 pub mod occlusion;
 mod params;
 mod piece_set;
+mod pool;
 pub mod score;
 mod search;
 #[cfg(test)]
@@ -25,9 +28,12 @@ mod survey;
 pub(crate) mod testing;
 pub mod types;
 
+pub use local_cost::{PieceCosts, SeamCosts};
 pub use params::PlanParams;
 pub use piece_set::PieceSet;
 pub use score::{PlanScore, score};
-pub use search::search;
+pub use search::{MakeCosts, search, search_with};
 pub use survey::{PlanSurvey, survey};
-pub use types::{Blocker, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome};
+pub use types::{
+    Blocker, FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanProof, RankedPlan,
+};
