@@ -23,6 +23,7 @@ mod search;
 #[cfg(test)]
 mod search_tests;
 mod space;
+pub mod study;
 mod survey;
 #[cfg(test)]
 pub(crate) mod testing;

@@ -2,10 +2,11 @@
 //! may lower the mean where the worst piece cannot be helped.
 
 use super::key::KeyChoice;
+use super::local_cost::{Role, Surroundings, mask_of};
 use super::score::PlanScore;
 use super::space::Space;
 use super::{InstallationPlan, PieceSet};
-use crate::{LatticeDirection, PatchId};
+use crate::{IdVec, LatticeDirection, PatchId};
 
 /// Improvements after which a plan is left as it is: a bound on time, since each one lowers the cost anyway.
 const MAX_IMPROVEMENTS: usize = 100;
@@ -48,19 +49,53 @@ fn turn(space: &Space<'_>, key: &KeyChoice, best: &mut Improved, piece: PatchId)
         return false;
     }
     let from = best.plan.clone();
+    let costs = best.score.pieces.clone();
+    let mut around = space.surroundings(&from);
     let mut is_improved = false;
     for s in LatticeDirection::all() {
         if s == from.steps[at].separation || (piece == from.key() && !key.directions.contains(&s)) {
             continue;
         }
-        let mut other = from.clone();
-        other.steps[at].separation = s;
-        let score = space.score(&other);
         best.n_evaluations += 1;
-        if score.is_better_than(&best.score) && space.allows(&other) {
-            (best.score, best.plan) = (score, other);
-            is_improved = true;
+        let score = turned(space, &mut around, &costs, piece, s);
+        if score.is_better_than(&best.score) {
+            let mut other = from.clone();
+            other.steps[at].separation = s;
+            if space.allows(&other) {
+                (best.score, best.plan) = (score, other);
+                is_improved = true;
+            }
         }
     }
     is_improved
+}
+
+/// The score where `piece` leaves along `s`: only its own cost and those of its earlier neighbours change from `costs`.
+fn turned(
+    space: &Space<'_>,
+    around: &mut [(Role, Surroundings)],
+    costs: &IdVec<PatchId, f64>,
+    piece: PatchId,
+    s: LatticeDirection,
+) -> PlanScore {
+    let at = usize::from(piece);
+    let mut costs = costs.clone();
+    for (k, &contact) in space.contacts_of[at].iter().enumerate() {
+        let is_later = around[at].1.seams[k].own != 0;
+        if !is_later {
+            continue;
+        }
+        around[at].1.seams[k].own = mask_of(s);
+        let q = space.survey.contacts[contact].other(piece);
+        let of_other = &space.contacts_of[usize::from(q)];
+        let (role, near) = &mut around[usize::from(q)];
+        if let Some(k) = of_other.iter().position(|&c| c == contact) {
+            near.seams[k].others = mask_of(s);
+        }
+        costs[q] = space.costs.bound(q, *role, near);
+    }
+    let (role, near) = &mut around[at];
+    *role = if let Role::Key(_) = role { Role::Key(s) } else { Role::Between(s) };
+    costs[piece] = space.costs.bound(piece, *role, near);
+    PlanScore::of(costs)
 }

@@ -24,7 +24,12 @@ pub const ALL_DIRECTIONS: DirectionMask = (1 << LatticeDirection::COUNT) - 1;
 
 /// The directions of a mask in order of their index.
 pub fn directions_in(mask: DirectionMask) -> impl Iterator<Item = LatticeDirection> {
-    LatticeDirection::all().filter(move |s| mask >> s.index() & 1 == 1)
+    let mut left = mask & ALL_DIRECTIONS;
+    std::iter::from_fn(move || {
+        let lowest = (left != 0).then(|| left.trailing_zeros())?;
+        left &= left - 1;
+        LatticeDirection::from_index(lowest as usize)
+    })
 }
 
 /// The mask of `s` alone.
@@ -213,7 +218,10 @@ impl SeamCosts {
         }
         let mut sum = [0.0; N_PUSHES];
         for (seam, states) in self.pieces[usize::from(piece)].seams.iter().zip(&around.seams) {
-            add(&mut sum, &seam.most_held(role, *states));
+            match seam.only_held(role, *states) {
+                Some(held) => add(&mut sum, held),
+                None => add(&mut sum, &seam.most_held(role, *states)),
+            }
         }
         f64::from(least(&sum))
     }
@@ -257,6 +265,16 @@ impl SeamTable {
         match role.separation().filter(|&s| states.own & mask_of(s) != 0) {
             Some(s) => of_others.min(self.cost_mm[0][s.index()]),
             None => of_others,
+        }
+    }
+
+    /// What is held where one state is left: nothing needs to be compared.
+    fn only_held(&self, role: Role, states: SeamStates) -> Option<&Hold> {
+        let own = role.separation().filter(|&s| states.own & mask_of(s) != 0);
+        match (own, states.others) {
+            (Some(s), 0) => Some(&self.hold[0][s.index()]),
+            (None, others) if others.is_power_of_two() => Some(&self.hold[1][others.trailing_zeros() as usize]),
+            _ => None,
         }
     }
 
@@ -312,21 +330,27 @@ impl PieceCosts for SeamCosts {
             seams().map(|(t, x)| (t.least_of_others(x.others), t.most_of_others(x.others))).collect();
         let mut left = vec![SeamStates::default(); around.seams.len()];
         for role in roles.iter() {
-            let mut choice = Choice { cost_mm: 0.0, hold: [0.0; N_PUSHES], seams: Vec::with_capacity(left.len()) };
-            for ((seam, &states), (least_mm, most)) in seams().zip(&of_others) {
-                choice.add(seam, role, states, *least_mm, most);
-            }
             let path = table.path_cost(role, around.remaining);
-            let base = choice.cost_mm / table.length_mm + path;
-            let is_held = matches!(role, Role::Key(_));
-            let loose = if is_held { 0.0 } else { loose_cost(f64::from(least(&choice.hold))) };
-            if base + loose > limit || !base.is_finite() {
+            let with_own = |((t, &x), others): ((&SeamTable, &SeamStates), &(f64, Hold))| t.with_own(role, x, others.0);
+            let least_mm: Vec<f64> = seams().zip(&of_others).map(with_own).collect();
+            let cost_mm: f64 = least_mm.iter().sum();
+            let base = cost_mm / table.length_mm + path;
+            if base > limit || !base.is_finite() {
                 *roles = roles.without(role);
                 continue;
             }
+            let is_held = matches!(role, Role::Key(_));
+            let mut choice = Choice { cost_mm, least_mm, hold: [0.0; N_PUSHES], most: Vec::with_capacity(left.len()) };
+            if !is_held {
+                seams().zip(&of_others).for_each(|((seam, &states), (_, most))| choice.hold(seam, role, states, most));
+                if base + loose_cost(f64::from(least(&choice.hold))) > limit {
+                    *roles = roles.without(role);
+                    continue;
+                }
+            }
             let most_mm = (limit - path + COST_SLACK) * table.length_mm;
             let held_mm3 = HELD_MM3 * (1.0 - (limit - base) / LOOSE_COST);
-            let needed = if is_held { f32::NEG_INFINITY } else { held_mm3 as f32 - HOLD_SLACK_MM3 };
+            let needed = (!is_held).then_some(held_mm3 as f32 - HOLD_SLACK_MM3);
             for (i, (seam, states)) in seams().enumerate() {
                 choice.support(i, seam, role, *states, &mut left[i], most_mm, needed);
             }
@@ -338,23 +362,25 @@ impl PieceCosts for SeamCosts {
 /// The best that each seam can give a piece in one role.
 struct Choice {
     cost_mm: f64,
+    /// By seam.
+    least_mm: Vec<f64>,
     hold: Hold,
-    seams: Vec<(f64, Hold)>,
+    /// By seam; empty for the key, which needs no hold.
+    most: Vec<Hold>,
 }
 
 impl Choice {
-    fn add(&mut self, seam: &SeamTable, role: Role, states: SeamStates, least_mm: f64, most: &Hold) {
-        let mut most = *most;
+    /// Adds what the next seam can hold.
+    fn hold(&mut self, seam: &SeamTable, role: Role, states: SeamStates, most_of_others: &Hold) {
+        let mut most = *most_of_others;
         if let Some(s) = role.separation().filter(|&s| states.own & mask_of(s) != 0) {
             raise(&mut most, &seam.hold[0][s.index()]);
         }
-        let least_mm = seam.with_own(role, states, least_mm);
-        self.cost_mm += least_mm;
         add(&mut self.hold, &most);
-        self.seams.push((least_mm, most));
+        self.most.push(most);
     }
 
-    /// Keeps the states of seam `i` that go with the best of all other seams.
+    /// Keeps the states of seam `i` that go with the best of all other seams; `needed` hold, mm³, where any is.
     #[expect(clippy::too_many_arguments, reason = "one innermost step, with what its loops have at hand")]
     fn support(
         &self,
@@ -364,20 +390,29 @@ impl Choice {
         states: SeamStates,
         left: &mut SeamStates,
         most_mm: f64,
-        needed: f32,
+        needed: Option<f32>,
     ) {
-        let (least_mm, most) = &self.seams[i];
-        let room_mm = most_mm - (self.cost_mm - least_mm);
-        let without: Hold = std::array::from_fn(|k| self.hold[k] - most[k]);
-        let fits = |order: usize, s: LatticeDirection| {
-            let held = &seam.hold[order][s.index()];
-            let sum: Hold = std::array::from_fn(|k| without[k] + held[k]);
-            seam.cost_mm[order][s.index()] <= room_mm && least(&sum) >= needed
+        let own = role.separation().filter(|&s| states.own & mask_of(s) != 0);
+        let others = states.others & !left.others;
+        if own.is_none() && others == 0 {
+            return;
+        }
+        let room_mm = most_mm - (self.cost_mm - self.least_mm[i]);
+        let without: Option<Hold> = needed.map(|_| std::array::from_fn(|k| self.hold[k] - self.most[i][k]));
+        let is_held = |held: &Hold| match (&without, needed) {
+            (Some(without), Some(needed)) => {
+                let sum: Hold = std::array::from_fn(|k| without[k] + held[k]);
+                least(&sum) >= needed
+            }
+            _ => true,
         };
-        for s in directions_in(states.others & !left.others) {
+        let fits = |order: usize, s: LatticeDirection| {
+            seam.cost_mm[order][s.index()] <= room_mm && is_held(&seam.hold[order][s.index()])
+        };
+        for s in directions_in(others) {
             left.others |= if fits(1, s) { mask_of(s) } else { 0 };
         }
-        if let Some(s) = role.separation().filter(|&s| states.own & mask_of(s) != 0) {
+        if let Some(s) = own {
             left.own |= if fits(0, s) { mask_of(s) } else { 0 };
         }
     }

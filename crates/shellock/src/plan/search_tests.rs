@@ -9,6 +9,7 @@ use shellock_geom::Vec3;
 use super::contact::{Contact, HoldTable, Joint};
 use super::exact::{Budget, prove};
 use super::key::{Flatness, KeyChoice, choices};
+use super::local_cost::{ALL_DIRECTIONS, Role, RoleSet, SeamStates, Surroundings, directions_in, mask_of};
 use super::occlusion::Occlusion;
 use super::pool::Pool;
 use super::space::Space;
@@ -281,13 +282,13 @@ fn the_exact_search_agrees_with_brute_force_and_no_budget_makes_its_bound_wrong(
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let constraints = PlanConstraints::default();
     let (mut n_plans, mut n_none) = (0, 0);
-    for round in 0..120 {
+    for round in 0..60 {
         let n = 3 + round % 3;
         let all: Vec<(u32, u32)> = (0..n as u32).flat_map(|a| (a + 1..n as u32).map(move |b| (a, b))).collect();
         let edges: Vec<(u32, u32)> = all.into_iter().filter(|_| rng.random_range(0.0..1.0) < 0.85).collect();
         let survey = made_up(n, &edges, if n == 5 { 0.55 } else { 0.6 }, &mut rng);
         let space = Space::new(&survey, &constraints, 0.03);
-        for key in choices(&PlanParams::default(), &survey).iter().filter(|k| !k.directions.is_empty()).take(3) {
+        for key in choices(&PlanParams::default(), &survey).iter().filter(|k| !k.directions.is_empty()).take(2) {
             let best = brute_force(&space, std::slice::from_ref(key));
             for n_revisions in [1, 30, 1_000_000] {
                 let (mut pool, mut budget) = (Pool::default(), Budget::new(n_revisions));
@@ -302,7 +303,7 @@ fn the_exact_search_agrees_with_brute_force_and_no_budget_makes_its_bound_wrong(
             *(if best.is_some() { &mut n_plans } else { &mut n_none }) += 1;
         }
     }
-    assert!(n_plans >= 30 && n_none >= 30, "{n_plans} with a plan, {n_none} without: the cases must be of both kinds");
+    assert!(n_plans >= 20 && n_none >= 20, "{n_plans} with a plan, {n_none} without: the cases must be of both kinds");
 }
 
 #[test]
@@ -321,5 +322,56 @@ fn a_spent_budget_leaves_a_plan_and_a_bound_below_the_optimum() {
     for less in [without, little] {
         assert!(Space::new(&survey, &constraints, 0.03).allows(&less.plan));
         assert!(less.lower_bound <= much.score.worst && much.score.worst <= less.score.worst);
+    }
+}
+
+/// The default costs as a metric would give them that knows bounds alone.
+struct BoundsAlone(SeamCosts);
+
+impl PieceCosts for BoundsAlone {
+    fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64 {
+        self.0.bound(piece, role, around)
+    }
+}
+
+#[test]
+fn a_metric_that_gives_bounds_alone_finds_the_same_optimum() {
+    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 6, 2));
+    let params = PlanParams { n_plans: 20, ..PlanParams::default() };
+    let constraints = PlanConstraints::default();
+    let make: MakeCosts<'_> = &|s, c| Box::new(BoundsAlone(SeamCosts::new(s, c)));
+    let plain = searched(&params, &survey, &constraints);
+    let other = on_ctx(|ctx| search_with(ctx, &params, &survey, &constraints, make)).unwrap();
+    let (PlanOutcome::Found(plain), PlanOutcome::Found(other)) = (plain, other) else { panic!("a ball has a plan") };
+    assert!(plain.is_optimal && other.is_optimal && plain.score.worst == other.score.worst);
+}
+
+#[test]
+fn a_bound_is_at_most_the_cost_of_every_state_it_leaves_open_and_narrowing_keeps_what_costs_little() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let survey = made_up(4, &[(0, 1), (0, 2), (1, 2), (2, 3), (0, 3)], 0.9, &mut rng);
+    let costs = SeamCosts::new(&survey, &PlanConstraints::default());
+    let (piece, n_seams) = (PatchId(0), 3);
+    for _ in 0..300 {
+        let mut mask = || rng.random_range(1..=ALL_DIRECTIONS) & rng.random_range(1..=ALL_DIRECTIONS);
+        let s = LatticeDirection::all().nth(mask() as usize % LatticeDirection::COUNT).unwrap();
+        let seams: Vec<SeamStates> =
+            (0..n_seams).map(|_| SeamStates { own: mask() | mask_of(s), others: mask() }).collect();
+        let open = Surroundings { seams, remaining: PieceSet::EMPTY };
+        let choose = |(i, x): (usize, &SeamStates)| match directions_in(x.others).nth(i + 1) {
+            Some(t) => SeamStates { own: 0, others: mask_of(t) },
+            None => SeamStates { own: mask_of(s), others: 0 },
+        };
+        let seams = open.seams.iter().enumerate().map(choose).collect();
+        let chosen = Surroundings { seams, remaining: PieceSet::first(4) };
+        let cost = costs.bound(piece, Role::Between(s), &chosen);
+        assert!(costs.bound(piece, Role::Between(s), &open) <= cost);
+        let mut roles = RoleSet { separations: ALL_DIRECTIONS, may_be_first: true, is_key: false };
+        let mut left = open.clone();
+        costs.narrow(piece, &mut roles, &mut left, cost);
+        assert!(roles.separations & mask_of(s) != 0);
+        for (left, chosen) in left.seams.iter().zip(&chosen.seams) {
+            assert!(left.own & chosen.own == chosen.own && left.others & chosen.others == chosen.others);
+        }
     }
 }

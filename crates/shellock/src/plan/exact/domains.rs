@@ -44,9 +44,12 @@ pub(super) struct Propagator<'a> {
     key: &'a KeyChoice,
     /// By contact: directions with a joint that holds, with `a` later and with `b` later.
     holding: Vec<[DirectionMask; 2]>,
-    /// Pieces revised: the measure of work.
+    /// Pieces whose cost was asked for: the measure of work.
     pub n_revisions: usize,
+    /// Pieces to revise.
     dirty: PieceSet,
+    /// Pieces whose cost is to be asked for again. A longer list of who remains alone is no reason: it changes little.
+    is_cost_open: PieceSet,
 }
 
 impl<'a> Propagator<'a> {
@@ -58,7 +61,7 @@ impl<'a> Propagator<'a> {
             })
         });
         let holding = holding.collect();
-        Self { space, key, holding, n_revisions: 0, dirty: PieceSet::EMPTY }
+        Self { space, key, holding, n_revisions: 0, dirty: PieceSet::EMPTY, is_cost_open: PieceSet::EMPTY }
     }
 
     /// All that can be with this key.
@@ -81,10 +84,10 @@ impl<'a> Propagator<'a> {
     /// Strikes out what cannot be, beginning with `changed`.
     pub fn propagate(&mut self, d: &mut Domains, changed: PieceSet, limit: f64) -> Result<(), Conflict> {
         self.dirty = changed;
+        self.is_cost_open = changed;
         loop {
             while let Some(p) = self.dirty.iter().next() {
                 self.dirty = self.dirty.minus(PieceSet::one(p));
-                self.n_revisions += 1;
                 self.revise(d, p, limit)?;
             }
             self.one_first(d)?;
@@ -100,7 +103,13 @@ impl<'a> Propagator<'a> {
         self.orient(d, p)?;
         self.leave_freely(d, p)?;
         self.join(d, p)?;
-        self.cost(d, p, limit)
+        if !self.is_cost_open.contains(p) {
+            return Ok(());
+        }
+        self.n_revisions += 1;
+        self.cost(d, p, limit)?;
+        self.is_cost_open = self.is_cost_open.minus(PieceSet::one(p));
+        Ok(())
     }
 
     /// Sides of contact `i` in `Domains::seams`: that with `p` later, that with the other later, and the other.
@@ -114,7 +123,9 @@ impl<'a> Propagator<'a> {
         if d.seams[i] != states {
             d.seams[i] = states;
             let c = &self.space.survey.contacts[i];
-            self.dirty = self.dirty.union(PieceSet::one(c.a)).union(PieceSet::one(c.b));
+            let pair = PieceSet::one(c.a).union(PieceSet::one(c.b));
+            self.dirty = self.dirty.union(pair);
+            self.is_cost_open = self.is_cost_open.union(pair);
         }
         if states == [0; 2] { Err(Conflict(by)) } else { Ok(()) }
     }
@@ -123,6 +134,7 @@ impl<'a> Propagator<'a> {
         if d.roles[usize::from(p)] != roles {
             d.roles[usize::from(p)] = roles;
             self.dirty = self.dirty.union(PieceSet::one(p));
+            self.is_cost_open = self.is_cost_open.union(PieceSet::one(p));
         }
         if roles.is_empty() { Err(Conflict(p)) } else { Ok(()) }
     }
