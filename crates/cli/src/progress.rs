@@ -61,9 +61,10 @@ pub struct PlanClock {
 }
 
 impl PlanClock {
-    /// A clock for searches that were allowed work of `plan_time_s`; they get twice the time.
+    /// A clock for searches that were allowed work of `plan_time_s`; they get twice the time, and some to find any plan.
     pub fn new(plan_time_s: f64) -> Self {
-        let limit = Duration::try_from_secs_f64(2.0 * plan_time_s).unwrap_or(Duration::MAX);
+        const GRACE_S: f64 = 10.0;
+        let limit = Duration::try_from_secs_f64(2.0 * plan_time_s + GRACE_S).unwrap_or(Duration::MAX);
         Self { since: Mutex::new(Instant::now()), limit }
     }
 

@@ -16,6 +16,10 @@
 mod domains;
 mod sequence;
 
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
 use super::improve::improve;
 use super::key::KeyChoice;
 use super::local_cost::{Role, RoleSet};
@@ -100,6 +104,41 @@ pub(super) fn prove(
     Ok(lower)
 }
 
+/// Limits of further plans, as shares of the least cost: some as good in the worst piece, some nearly.
+const FURTHER_LIMITS: [f64; 4] = [1.0, 1.0, 1.01, 1.03];
+
+/// How many further plans are asked for, and the revisions for each, per piece.
+const N_FURTHER: usize = 16;
+const FURTHER_BUDGET_PER_PIECE: usize = 60;
+
+/// Adds plans nearly as good as the best of `pool`, found by deciding in random order: with a lower mean, or only different.
+pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut Pool, rng: &mut ChaCha8Rng) {
+    let least = pool.least_cost();
+    let tries: Vec<(f64, Vec<f64>)> = (0..N_FURTHER)
+        .map(|i| {
+            let limit = FURTHER_LIMITS[i % FURTHER_LIMITS.len()] * least + COST_TIE;
+            (limit, (0..space.n).map(|_| rng.random_range(1.0..100.0)).collect())
+        })
+        .collect();
+    let further = |(limit, mut weights): (f64, Vec<f64>)| {
+        let n_revisions = FURTHER_BUDGET_PER_PIECE * space.n;
+        let weights = &mut weights;
+        let propagator = Propagator::new(space, key);
+        let mut probe =
+            Probe { ctx, propagator, limit, n_revisions, n_decisions: 0, run: 0, weights, is_time_up: false };
+        // Plans are many at such limits: striking out roles one by one would only cost time.
+        let mut d = probe.propagator.all();
+        let is_none = probe.narrows_to_nothing(&mut d, space.all());
+        let answer = if is_none { Answer::None } else { probe.with_restarts(&d) };
+        if let Answer::Plan(plan) = answer { Some((improve(space, key, plan.clone()), plan)) } else { None }
+    };
+    let found: Vec<_> = tries.into_par_iter().map(further).collect();
+    for (improved, plan) in found.into_iter().flatten() {
+        pool.add(space, space.score(&plan), plan);
+        pool.add(space, improved.score, improved.plan);
+    }
+}
+
 fn add(space: &Space<'_>, key: &KeyChoice, pool: &mut Pool, plan: InstallationPlan) {
     let score = space.score(&plan);
     let improved = improve(space, key, plan.clone());
@@ -120,7 +159,7 @@ fn ask(
     let propagator = Propagator::new(space, key);
     let n_revisions = n_revisions.min(budget.n_left);
     let mut probe = Probe { ctx, propagator, limit, n_revisions, n_decisions: 0, run: 0, weights, is_time_up: false };
-    let answer = probe.answer();
+    let answer = probe.proof();
     budget.n_left = budget.n_left.saturating_sub(probe.propagator.n_revisions.max(1));
     if probe.is_time_up {
         budget.n_left = 0;
@@ -151,7 +190,8 @@ enum Question {
 }
 
 impl Probe<'_> {
-    fn answer(&mut self) -> Answer {
+    /// The answer, after all that propagation alone can tell.
+    fn proof(&mut self) -> Answer {
         let mut d = self.propagator.all();
         let all = self.propagator.space.all();
         if self.narrows_to_nothing(&mut d, all) {
@@ -160,11 +200,16 @@ impl Probe<'_> {
         if let Some(answer) = self.shave(&mut d) {
             return answer;
         }
+        self.with_restarts(&d)
+    }
+
+    /// Decides what is open in `d`, from the start again each time that a run led nowhere.
+    fn with_restarts(&mut self, d: &Domains) -> Answer {
         let mut run = FIRST_RUN as f64;
         loop {
             self.n_decisions = 0;
             self.run = run as usize;
-            match self.decide(&d) {
+            match self.decide(d) {
                 Answer::Unknown if !self.is_over() => run *= RUN_GROWTH,
                 answer => return answer,
             }

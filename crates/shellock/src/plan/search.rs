@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::contact::SHORTEST_RUN_SIZES;
 use super::draw::{DrawLimits, Drawn, draw};
-use super::exact::{Budget, prove};
+use super::exact::{Budget, prove, vary};
 use super::improve::{Improved, improve};
 use super::key::{KeyChoice, choices};
 use super::local_cost::{PieceCosts, SeamCosts};
@@ -31,6 +31,13 @@ const BATCH: usize = 32;
 
 /// Batches without any plan after which a key is given up.
 const MAX_EMPTY_BATCHES: usize = 2;
+
+/// Batches in a row that found nothing better, after which a full pool is left to the exact search: so many, and one more
+/// for each ten pieces.
+///
+/// That search proves the optimum of a figure in 12 pieces in less time than eight batches take.
+const LEAST_STALE_BATCHES: usize = 2;
+const PIECES_PER_STALE_BATCH: usize = 10;
 
 /// Tries of one draw, per piece: enough to undo some wrong turns near the end; wrong beginnings need a new draw.
 const TRIES_PER_PIECE: usize = 20;
@@ -200,6 +207,10 @@ fn with_key(
     }
     let mut budget = Budget::new(params.proof_budget);
     let lower_bound = prove(ctx, space, key, &mut pool, &mut budget)?;
+    if params.proof_budget > 0 {
+        vary(ctx, space, key, &mut pool, &mut stream(params.seed, usize::MAX >> 1));
+        ctx.check()?;
+    }
     let ranked = |(score, plan): &(_, InstallationPlan)| RankedPlan::new(plan.clone(), score);
     let (score, plan) = pool.best().expect("a plan was drawn").clone();
     Ok(Ok(FoundPlan {
@@ -221,9 +232,10 @@ fn draw_plans(
     pool: &mut Pool,
 ) -> Result<Option<PieceSet>, Cancelled> {
     let mut stuck = space.all();
-    let mut n_drawn = 0;
+    let (mut n_drawn, mut n_stale) = (0, 0);
     for batch in 0..params.n_plans.div_ceil(BATCH) * 2 {
         ctx.check()?;
+        let best_before = pool.least_cost();
         let limits = DrawLimits { bound: bound_of(pool), max_tries: TRIES_PER_PIECE * space.n };
         let drawn: Vec<Drawn> = (batch * BATCH..(batch + 1) * BATCH)
             .into_par_iter()
@@ -246,8 +258,10 @@ fn draw_plans(
         let improved: Vec<Improved> = cheapest.into_par_iter().map(|plan| improve(space, key, plan.clone())).collect();
         improved.into_iter().for_each(|x| pool.add(space, x.score, x.plan));
         plans.into_iter().for_each(|(score, plan)| pool.add(space, score, plan));
+        n_stale = if pool.least_cost() < best_before { 0 } else { n_stale + 1 };
         let gives_up = pool.len() == 0 && batch + 1 >= MAX_EMPTY_BATCHES;
-        if is_exhausted || gives_up || n_drawn >= params.n_plans || *tries_left == 0 || ctx.is_time_up() {
+        let is_stale = pool.len() == MOST_PLANS && n_stale >= LEAST_STALE_BATCHES + space.n / PIECES_PER_STALE_BATCH;
+        if is_exhausted || gives_up || is_stale || n_drawn >= params.n_plans || *tries_left == 0 || ctx.is_time_up() {
             break;
         }
     }
@@ -262,6 +276,6 @@ fn bound_of(pool: &Pool) -> f64 {
 /// The random stream of draw number `i`.
 pub(super) fn stream(seed: u64, i: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(FIRST_STREAM + i as u64);
+    rng.set_stream(FIRST_STREAM.wrapping_add(i as u64));
     rng
 }
