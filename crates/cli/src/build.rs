@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use serde_json::json;
 use shellock::context::Progress;
 use shellock::pipeline::{Design, DesignOutcome, Params, design};
+use shellock::plan::PlanProof;
 use shellock::verify::Verification;
 use shellock::{Ctx, Warning};
 
@@ -14,7 +15,7 @@ use crate::args::{Options, Out};
 use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::output::{Destination, Summary, files};
-use crate::progress::Display;
+use crate::progress::{Display, PlanClock};
 
 /// `shellock build`.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
@@ -47,8 +48,13 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
         model.notes.iter().for_each(|n| println!("note: {n}"));
     }
     let display = Display::new(session.is_json);
-    let report = |p: Progress<'_>| display.show(p);
-    let ctx = Ctx::new(&report, &session.stop);
+    let clock = PlanClock::new(options.plan_time);
+    let report = |p: Progress<'_>| {
+        clock.see(&p);
+        display.show(p);
+    };
+    let is_time_up = || clock.is_up();
+    let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
     let outcome = design(&ctx, params, &model.solid, model.labels.as_deref()).inspect_err(|_| display.finish())?;
     let made = match outcome {
         DesignOutcome::Made(made) => made,
@@ -108,6 +114,9 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
         params.body.thickness_mm,
         100.0 * summary.volume_ratio
     );
+    if let Some(proof) = &made.proof {
+        println!("{}", quality(proof));
+    }
     println!("connectors on {:.0} % of the seam length that fits any", 100.0 * summary.connector_share);
     print_verdict(&made.verification);
     for w in warnings {
@@ -119,6 +128,18 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
         println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", params.connector.min_wall_mm);
     }
     println!("written to {}: open report.html in a browser, print pieces/*.stl", to.folder().display());
+}
+
+/// How good a plan is, in words.
+pub fn quality(proof: &PlanProof) -> String {
+    let PlanProof { cost, lower_bound, gap, optimal } = proof;
+    if *optimal {
+        return format!("plan: its worst piece costs {cost:.3}, proven to be the least for this key");
+    }
+    let percent = 100.0 * gap;
+    format!(
+        "plan: its worst piece costs {cost:.3}; none with this key costs less than {lower_bound:.3} ({percent:.1} % below)"
+    )
 }
 
 /// Each check on a line, and loudly what failed and where.

@@ -190,6 +190,7 @@ fn plan_json(
         "min_wall": params.connector.min_wall_mm,
         "key_piece": plan.key(),
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
+        "plan": design.proof,
         "volume_ratio": summary.volume_ratio,
         "connector_share": summary.connector_share,
         "pieces": pieces, "joints": joints, "contacts": contacts,

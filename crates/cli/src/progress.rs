@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use shellock::context::Progress;
@@ -51,6 +51,33 @@ impl Display {
         if let Some(bar) = self.bar.lock().expect("no holder of this lock panics").take() {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// How long the current search for a plan has been going on.
+pub struct PlanClock {
+    since: Mutex<Instant>,
+    limit: Duration,
+}
+
+impl PlanClock {
+    /// A clock for searches that were allowed work of `plan_time_s`; they get twice the time, and some to find any plan.
+    pub fn new(plan_time_s: f64) -> Self {
+        const GRACE_S: f64 = 10.0;
+        let limit = Duration::try_from_secs_f64(2.0 * plan_time_s + GRACE_S).unwrap_or(Duration::MAX);
+        Self { since: Mutex::new(Instant::now()), limit }
+    }
+
+    /// Every stage starts the clock anew, so each search has its own time.
+    pub fn see(&self, progress: &Progress<'_>) {
+        if let Progress::Stage { .. } = progress {
+            *self.since.lock().expect("no holder of this lock panics") = Instant::now();
+        }
+    }
+
+    /// Whether the stage has gone on for longer than planning may.
+    pub fn is_up(&self) -> bool {
+        self.since.lock().expect("no holder of this lock panics").elapsed() > self.limit
     }
 }
 

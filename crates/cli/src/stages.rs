@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use shellock::plan::{InstallationPlan, InstallationStep, PlanOutcome, score, search, survey};
+use shellock::plan::{InstallationPlan, InstallationStep, PlanOutcome, search, survey};
 use shellock::verify::VerifyParams;
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, segmentation};
 use shellock_geom::check::{inspect as inspection, into_solid};
@@ -14,10 +14,10 @@ use shellock_geom::{Solid, TriMesh, Vec3};
 
 use crate::Session;
 use crate::args::Options;
-use crate::build::{checked, print_verdict};
+use crate::build::{checked, print_verdict, quality};
 use crate::failure::Failure;
 use crate::input::{self, load, read};
-use crate::progress::Display;
+use crate::progress::{Display, PlanClock};
 
 /// Writes one file: whole or not at all.
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
@@ -93,8 +93,13 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     let params = checked(options)?;
     let model = input::model(file, options)?;
     let display = Display::new(session.is_json);
-    let report = |p: shellock::context::Progress<'_>| display.show(p);
-    let ctx = Ctx::new(&report, &session.stop);
+    let clock = PlanClock::new(options.plan_time);
+    let report = |p: shellock::context::Progress<'_>| {
+        clock.see(&p);
+        display.show(p);
+    };
+    let is_time_up = || clock.is_up();
+    let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
     let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
         .map_err(shellock::pipeline::DesignError::from)?;
     let tables = survey(&ctx, &params.plan, &surface, &surface.seams())?;
@@ -104,24 +109,25 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     match outcome {
         PlanOutcome::Infeasible { reason, .. } => Err(Failure::NoPlan(format!("no plan was found: {reason}"))),
         PlanOutcome::Found(found) => {
-            let score = score(&tables, &constraints, &found);
+            let proof = found.proof();
+            let found_steps = &found.plan.steps;
             if session.is_json {
-                let order: Vec<PatchId> = found.steps.iter().map(|s| s.piece).collect();
-                let steps: Vec<Value> = found
-                    .steps
+                let order: Vec<PatchId> = found_steps.iter().map(|s| s.piece).collect();
+                let steps: Vec<Value> = found_steps
                     .iter()
                     .map(|s| json!({ "piece": s.piece, "separation": s.separation.step() }))
                     .collect();
                 println!(
                     "{}",
-                    json!({ "status": "found", "installation_order": order, "steps": steps, "score": score.value })
+                    json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof,
+                            "mean_cost": found.score.mean, "piece_costs": found.score.pieces, "n_plans": found.pool.len() })
                 );
             } else {
-                for (i, s) in found.steps.iter().enumerate() {
+                for (i, s) in found_steps.iter().enumerate() {
                     let d = -s.separation.unit() + 0.0;
                     println!("{:3}. piece {:3} moves in along ({:+.2}, {:+.2}, {:+.2})", i + 1, s.piece, d.x, d.y, d.z);
                 }
-                println!("score {:.3} (lower is better)", score.value);
+                println!("{}", quality(&proof));
                 ctx.take_warnings().iter().for_each(|w| println!("warning: {}", w.message));
             }
             Ok(0)

@@ -45,13 +45,26 @@ pub enum Progress<'a> {
 pub struct Ctx<'a> {
     report: &'a (dyn Fn(Progress<'_>) + Sync),
     stop: &'a AtomicBool,
+    is_time_up: Option<&'a (dyn Fn() -> bool + Sync)>,
     warnings: Mutex<Vec<Warning>>,
 }
 
 impl<'a> Ctx<'a> {
     /// A context that tells `report` how far it is and ends soon after `stop` becomes true.
     pub fn new(report: &'a (dyn Fn(Progress<'_>) + Sync), stop: &'a AtomicBool) -> Self {
-        Self { report, stop, warnings: Mutex::new(Vec::new()) }
+        Self { report, stop, is_time_up: None, warnings: Mutex::new(Vec::new()) }
+    }
+
+    /// The same with a clock, which libraries do not read: searches that get better with time end soon after it says true.
+    ///
+    /// What they return then depends on how fast the machine is, so limits of work should end them before.
+    pub fn with_time_limit(self, is_time_up: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { is_time_up: Some(is_time_up), ..self }
+    }
+
+    /// Whether to be content with what was found.
+    pub fn is_time_up(&self) -> bool {
+        self.is_time_up.is_some_and(|is_up| is_up())
     }
 
     /// A stage of `n_steps` steps begins (0: unknown); fails where the user asked to stop.

@@ -22,6 +22,11 @@ impl LatticeDirection {
         self.0 as usize
     }
 
+    /// The direction at this position in [`Self::all`].
+    pub fn from_index(index: usize) -> Option<Self> {
+        u8::try_from(index).ok().filter(|&i| usize::from(i) < Self::COUNT).map(Self)
+    }
+
     /// The step to the neighbouring cell: components in {−1, 0, 1}, not all 0.
     pub fn step(self) -> [i32; 3] {
         // Cell 13 of the 3 × 3 × 3 block is the middle, which is no direction.
@@ -63,6 +68,7 @@ mod tests {
         for d in LatticeDirection::all() {
             assert_eq!(d.opposite().step(), d.step().map(|x| -x));
             assert_eq!(LatticeDirection::nearest(d.unit()), d);
+            assert_eq!(LatticeDirection::from_index(d.index()), Some(d));
         }
     }
 }

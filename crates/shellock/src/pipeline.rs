@@ -9,7 +9,7 @@ use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, has_no_bar};
 use crate::feedback::{Lesson, lessons};
 use crate::piece::{Joint, PieceError};
-use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey};
+use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanProof, PlanSurvey};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
@@ -84,6 +84,8 @@ pub struct Design {
     pub surface: SegmentedSurface,
     /// Order and directions.
     pub plan: InstallationPlan,
+    /// How good the plan is; `None` where it was given and not searched.
+    pub proof: Option<PlanProof>,
     /// One printable mesh a piece, in assembled position, mm.
     pub pieces: IdVec<PatchId, TriMesh>,
     /// Connector runs and how they came out.
@@ -250,8 +252,8 @@ fn with_segmentation(
     let (mut kit, mut n_blocked) = (0, 0);
     while kit < most_kits && n_blocked < MOST_BLOCKED {
         ctx.take_warnings();
-        let plan = match plan::search(ctx, &params.plan, &survey, &constraints)? {
-            PlanOutcome::Found(plan) => plan,
+        let found = match plan::search(ctx, &params.plan, &survey, &constraints)? {
+            PlanOutcome::Found(found) => found,
             PlanOutcome::Infeasible { reason, blockers, articulations } => {
                 blamed.splice(0..0, articulations.into_iter().chain(blockers.iter().map(|b| b.piece)));
                 return Ok(Attempt::Failed { reason, blockers, blamed, loose });
@@ -259,7 +261,8 @@ fn with_segmentation(
         };
         ctx.stage("distances to the patches", 0)?;
         let distances = distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
-        let design = match make(ctx, params, model, grid, distances, surface, plan) {
+        let proof = Some(found.proof());
+        let design = match make(ctx, params, model, grid, distances, surface, found.plan) {
             Err(DesignError::Body(BodyError::Blocked { piece, separation, kept })) => {
                 let lesson = Lesson::Blocked { piece, separation, kept };
                 ctx.note(&format!("another plan: {lesson}"));
@@ -268,7 +271,7 @@ fn with_segmentation(
                 n_blocked += 1;
                 continue;
             }
-            made => made?,
+            made => Design { proof, ..made? },
         };
         kit += 1;
         let learned: Vec<Lesson> = lessons(&design, params);
@@ -312,6 +315,7 @@ pub fn make(
     Ok(Design {
         surface: surface.clone(),
         plan,
+        proof: None,
         pieces: finished.meshes,
         joints: finished.joints,
         contacts,

@@ -1,7 +1,8 @@
 //! Which piece goes in when and along which direction (Sect. 6).
 //!
 //! [`survey`] measures the segmented surface once: who occludes whom along the 26 directions, how good a connector each
-//! seam could carry, how flat each piece is. [`search`] then finds the plan, again and again where later stages object.
+//! seam could carry, how flat each piece is. [`search`] then finds the plan and proves how good any other could be, again and
+//! again where later stages object. What a piece costs is one trait, [`PieceCosts`].
 //!
 //! Where we leave the paper: a plan must also pass the cluster test ([`cluster`]), which the paper leaves to simulation;
 //! seams too short for a connector join nothing; and the key is never cut anew here, only chosen.
@@ -10,27 +11,34 @@ pub mod cluster;
 pub mod contact;
 mod diagnose;
 mod draw;
+mod exact;
 mod improve;
 pub mod key;
+pub mod local_cost;
 pub mod local_tests;
 pub mod occlusion;
 mod params;
 mod piece_set;
+mod pool;
 mod sample;
 pub mod score;
 mod search;
 #[cfg(test)]
 mod search_tests;
 mod space;
+pub mod study;
 mod survey;
 #[cfg(test)]
 pub(crate) mod testing;
 pub mod types;
 
+pub use local_cost::{PieceCosts, SeamCosts};
 pub use params::PlanParams;
 pub use piece_set::PieceSet;
 pub use sample::random_plans;
 pub use score::{PlanScore, score};
-pub use search::search;
+pub use search::{MakeCosts, search, search_with};
 pub use survey::{PlanSurvey, survey};
-pub use types::{Blocker, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome};
+pub use types::{
+    Blocker, FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanProof, RankedPlan,
+};

@@ -4,7 +4,9 @@ use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::topology::ends;
 use shellock_geom::{Topology, TriMesh, Vec3};
-use shellock_mechanics::{Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams};
+use shellock_mechanics::{
+    Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams, VolumeError, VolumeModel, VolumeParams,
+};
 
 use crate::plan::contact::{end_gap_mm, meeting};
 use crate::plan::{InstallationPlan, PlanParams};
@@ -153,6 +155,13 @@ impl PlanModel {
     /// The place of a station on the outer surface, mm.
     pub fn place_of(&self, station: usize) -> Vec3 {
         self.assembly.points[self.assembly.stations[station].points[0] as usize]
+    }
+
+    /// The volume metric's solver.
+    pub fn volume_model(&self) -> Result<VolumeModel, VolumeError> {
+        let (wall_mm, connector_mm, material) = (self.params.wall_mm, self.params.connector_mm, self.params.material);
+        let params = VolumeParams { wall_mm, connector_mm, material, ..VolumeParams::default() };
+        VolumeModel::new(&params, &self.assembly)
     }
 
     /// The surface metric's solver.

@@ -177,9 +177,14 @@ impl Contact {
 
     /// A contact whose joints come from a function of the later piece and the direction; for made-up cases.
     #[cfg(test)]
-    pub fn made_up(a: PatchId, b: PatchId, joint: impl Fn(PatchId, LatticeDirection) -> Joint) -> Self {
+    pub fn made_up(
+        a: PatchId,
+        b: PatchId,
+        joint: impl Fn(PatchId, LatticeDirection) -> Joint,
+        hold: HoldTable,
+    ) -> Self {
         let joints = [a, b].map(|p| std::array::from_fn(|i| joint(p, LatticeDirection::all().nth(i).unwrap())));
-        Self { a, b, length_mm: 20.0, joints, hold: HoldTable::default() }
+        Self { a, b, length_mm: 20.0, joints, hold }
     }
 }
 

@@ -1,11 +1,15 @@
-//! One random plan, taken apart from the key on, with pruning and backtracking (Sect. 6.3).
+//! One random plan, taken apart from the key on, with pruning and backtracking (Sect. 6.2).
+//!
+//! Prunings come in the order of their cost: what is left hangs together, the path is free, the piece costs no more than the
+//! bound, and what was taken off does not come loose from the rest (the cluster test, which the paper does not have).
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::cluster::{DirectedJoint, loose_part_fused};
 use super::key::KeyChoice;
-use super::score::{contact_cost, inward_cost, occluded_cost};
+use super::local_cost::directions_in;
+use super::score::COST_TIE;
 use super::space::Space;
 use super::{InstallationPlan, InstallationStep, PieceSet};
 use crate::{LatticeDirection, PatchId};
@@ -20,10 +24,21 @@ pub(super) struct Drawn {
     pub plan: Option<InstallationPlan>,
     /// Pieces taken off, put back ones included.
     pub n_tries: usize,
-    /// Whether nothing was left to try: then no plan exists for this key.
+    /// Costs of pieces asked for.
+    pub n_evaluations: usize,
+    /// Whether nothing was left to try: then no plan within the bound exists for this key.
     pub is_exhausted: bool,
     /// The fewest pieces that were left where the search got stuck.
     pub stuck: PieceSet,
+}
+
+/// What a draw may do.
+#[derive(Clone, Copy)]
+pub(super) struct DrawLimits {
+    /// Costs above this are pruned; infinite for none. It must not depend on what other threads find.
+    pub bound: f64,
+    /// Pieces taken off before the draw is given up.
+    pub max_tries: usize,
 }
 
 struct Draw<'a> {
@@ -31,30 +46,50 @@ struct Draw<'a> {
     key: &'a KeyChoice,
     rng: ChaCha8Rng,
     spread: f64,
+    limits: DrawLimits,
     tries_left: usize,
+    n_evaluations: usize,
     removed: Vec<InstallationStep>,
+    /// Directions of the pieces taken off.
+    separations: Vec<Option<LatticeDirection>>,
     joints: Vec<DirectedJoint>,
     stuck: PieceSet,
 }
 
-/// Draws plan number `index` with the given key, taking off at most `max_tries` pieces.
-pub(super) fn draw(space: &Space<'_>, key: &KeyChoice, rng: ChaCha8Rng, index: usize, max_tries: usize) -> Drawn {
-    let spread = SPREADS[index % SPREADS.len()];
-    let (removed, joints, stuck) = (Vec::new(), Vec::new(), space.all());
-    let mut draw = Draw { space, key, rng, spread, tries_left: max_tries, removed, joints, stuck };
+/// Draws plan number `index` with the given key.
+pub(super) fn draw(space: &Space<'_>, key: &KeyChoice, rng: ChaCha8Rng, index: usize, limits: DrawLimits) -> Drawn {
+    let mut draw = Draw {
+        space,
+        key,
+        rng,
+        spread: SPREADS[index % SPREADS.len()],
+        limits,
+        tries_left: limits.max_tries,
+        n_evaluations: 0,
+        removed: Vec::new(),
+        separations: vec![None; space.n],
+        joints: Vec::new(),
+        stuck: space.all(),
+    };
     let found = draw.descend(space.all(), PieceSet::one(key.piece));
     let plan = found.then(|| {
         draw.removed.reverse();
         InstallationPlan { steps: std::mem::take(&mut draw.removed) }
     });
-    Drawn { plan, n_tries: max_tries - draw.tries_left, is_exhausted: draw.tries_left > 0, stuck: draw.stuck }
+    Drawn {
+        plan,
+        n_tries: limits.max_tries - draw.tries_left,
+        n_evaluations: draw.n_evaluations,
+        is_exhausted: draw.tries_left > 0,
+        stuck: draw.stuck,
+    }
 }
 
 impl Draw<'_> {
     /// Takes off all of `left`; `attached` holds the pieces that a later one joins. False with everything put back.
     fn descend(&mut self, left: PieceSet, attached: PieceSet) -> bool {
         if left.len() == 1 {
-            return self.finish(left);
+            return self.finish(left, attached);
         }
         for (piece, separation) in self.candidates(left, attached) {
             if self.tries_left == 0 {
@@ -65,6 +100,7 @@ impl Draw<'_> {
             let n_joints = self.joints.len();
             self.joints.extend(self.space.joints(piece, separation, rest));
             self.removed.push(InstallationStep { piece, separation });
+            self.separations[usize::from(piece)] = Some(separation);
             // What comes loose already, with the rest as one block, cannot lock any more.
             let holds = loose_part_fused(self.space.n, &self.joints, self.key.piece, rest).is_none();
             let attached = attached.union(self.space.joined(piece, separation, rest));
@@ -73,6 +109,7 @@ impl Draw<'_> {
             }
             self.joints.truncate(n_joints);
             self.removed.pop();
+            self.separations[usize::from(piece)] = None;
         }
         if left.len() < self.stuck.len() {
             self.stuck = left;
@@ -81,10 +118,15 @@ impl Draw<'_> {
     }
 
     /// The first-installed piece: nothing is left that it could leave.
-    fn finish(&mut self, left: PieceSet) -> bool {
+    fn finish(&mut self, left: PieceSet, attached: PieceSet) -> bool {
         let piece = left.iter().next().expect("one piece is left");
-        let outwards = LatticeDirection::nearest(self.space.survey.mean_normal[piece]);
-        self.removed.push(InstallationStep { piece, separation: outwards });
+        let separation = LatticeDirection::nearest(self.space.survey.mean_normal[piece]);
+        let step = InstallationStep { piece, separation };
+        let cost = self.cost(step, PieceSet::EMPTY);
+        if !attached.contains(piece) || !self.is_cheap(cost) {
+            return false;
+        }
+        self.removed.push(step);
         let mut steps = self.removed.clone();
         steps.reverse();
         if self.space.is_rejected(&InstallationPlan { steps }) {
@@ -92,6 +134,17 @@ impl Draw<'_> {
             return false;
         }
         true
+    }
+
+    /// What the piece of `step` costs when it leaves `rest`.
+    fn cost(&mut self, step: InstallationStep, rest: PieceSet) -> f64 {
+        self.n_evaluations += 1;
+        let (role, around) = self.space.leaving(step, rest, &self.separations);
+        self.space.costs.bound(step.piece, role, &around)
+    }
+
+    fn is_cheap(&self, cost: f64) -> bool {
+        cost <= self.limits.bound + COST_TIE
     }
 
     /// Who may leave `left` next and along which direction, in random order, good ones likely first.
@@ -103,34 +156,26 @@ impl Draw<'_> {
             if !rest.is_connected(&self.space.neighbours) {
                 continue;
             }
-            for s in LatticeDirection::all() {
-                let is_allowed = !is_first || self.key.directions.contains(&s);
-                if is_allowed && self.space.is_free(piece, s, rest) && !self.space.joined(piece, s, rest).is_empty() {
+            for separation in directions_in(self.space.allowed(piece)) {
+                let step = InstallationStep { piece, separation };
+                let is_allowed = !is_first || self.key.directions.contains(&separation);
+                if !is_allowed
+                    || !self.space.is_free(piece, separation, rest)
+                    || self.space.joined(piece, separation, rest).is_empty()
+                {
+                    continue;
+                }
+                let cost = self.cost(step, rest);
+                if self.is_cheap(cost) {
                     // Gumbel noise: the order is that of drawing without putting back, by weight exp(−cost / spread).
                     let u: f64 = self.rng.random_range(1e-12..1.0);
                     let noise = -(-u.ln()).ln();
-                    candidates.push((self.local_cost(piece, s, rest) - self.spread * noise, piece, s));
+                    candidates.push((cost - self.spread * noise, step));
                 }
             }
         }
-        candidates.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
-        candidates.into_iter().map(|(_, piece, s)| (piece, s)).collect()
-    }
-
-    /// Mean cost, by length, of the seams that `piece` decides by leaving `rest` along `s`.
-    fn local_cost(&self, piece: PatchId, s: LatticeDirection, rest: PieceSet) -> f64 {
-        let (mut cost, mut length_mm) = (0.0, 0.0);
-        for &i in &self.space.contacts_of[usize::from(piece)] {
-            let contact = &self.space.survey.contacts[i];
-            if rest.contains(contact.other(piece)) {
-                let is_weak = self.space.constraints.is_weak(piece, contact.other(piece), s);
-                cost += contact_cost(self.space.survey, contact, piece, s, is_weak) * contact.length_mm;
-                length_mm += contact.length_mm;
-            }
-        }
-        let survey = self.space.survey;
-        cost / f64::max(length_mm, f64::MIN_POSITIVE)
-            + inward_cost(survey, piece, s)
-            + occluded_cost(survey, piece, s, rest.iter())
+        let name = |step: InstallationStep| (step.piece, step.separation);
+        candidates.sort_by(|x, y| x.0.total_cmp(&y.0).then_with(|| name(x.1).cmp(&name(y.1))));
+        candidates.into_iter().map(|(_, step)| name(step)).collect()
     }
 }

@@ -1,80 +1,101 @@
-//! Local optimisation: other directions for the worst piece, then for its neighbours (Sect. 6.3); before them for the
-//! piece that is held least and for its neighbours, while there is one that might come loose.
+//! Local optimisation: other directions for the worst piece, then for its neighbours (Sect. 6.2), then for all others, which
+//! may lower the mean where the worst piece cannot be helped.
 
 use super::key::KeyChoice;
-use super::score::HELD_MM3;
+use super::local_cost::{Role, Surroundings, mask_of};
+use super::score::PlanScore;
 use super::space::Space;
-use super::{InstallationPlan, PieceSet, score};
-use crate::{LatticeDirection, PatchId};
+use super::{InstallationPlan, PieceSet};
+use crate::{IdVec, LatticeDirection, PatchId};
 
 /// Improvements after which a plan is left as it is: a bound on time, since each one lowers the cost anyway.
 const MAX_IMPROVEMENTS: usize = 100;
 
-/// Cost gain that counts; below, rounding decides.
-const LEAST_GAIN: f64 = 1e-9;
+/// A plan, what it costs, and how many others were looked at for it.
+pub(super) struct Improved {
+    pub score: PlanScore,
+    pub plan: InstallationPlan,
+    pub n_evaluations: usize,
+}
 
-/// A plan of the same order that is at least as good as `plan`, and its cost.
+/// A plan of the same order that is at least as good as `plan`, which keeps all conditions.
 ///
-/// Stops where no single change of direction of the worst or least held piece or of a piece that touches it helps.
-pub(super) fn improve(space: &Space<'_>, key: &KeyChoice, mut plan: InstallationPlan) -> (f64, InstallationPlan) {
-    let mut cost = space.cost(&plan);
+/// Stops where no single change of direction helps.
+pub(super) fn improve(space: &Space<'_>, key: &KeyChoice, plan: InstallationPlan) -> Improved {
+    let mut best = Improved { score: space.score(&plan), plan, n_evaluations: 1 };
     for _ in 0..MAX_IMPROVEMENTS {
-        let better = worst_first(space, &plan).into_iter().find_map(|p| better_direction(space, key, &plan, cost, p));
-        match better {
-            Some(found) => (cost, plan) = found,
-            None => break,
-        }
-    }
-    (cost, plan)
-}
-
-/// The least held piece and its neighbours where it may be loose, then the worst piece and its neighbours, by cost.
-fn worst_first(space: &Space<'_>, plan: &InstallationPlan) -> Vec<PatchId> {
-    let score = score(space.survey, space.constraints, plan);
-    let mut by_cost: Vec<PatchId> = score.pieces.ids().collect();
-    by_cost.sort_by(|&x, &y| score.pieces[y].total_cmp(&score.pieces[x]).then(x.cmp(&y)));
-    let worst = by_cost[0];
-    let loosest = score.hold_mm3.ids().min_by(|&x, &y| score.hold_mm3[x].total_cmp(&score.hold_mm3[y]));
-    let loosest = loosest.filter(|&p| score.hold_mm3[p] < HELD_MM3);
-    let near = |to: PatchId| by_cost.iter().copied().filter(move |&p| space.neighbours[usize::from(to)].contains(p));
-    let mut order: Vec<PatchId> = Vec::with_capacity(2 * by_cost.len());
-    for piece in loosest.into_iter().chain([worst]) {
-        order.extend([piece].into_iter().chain(near(piece)));
-    }
-    // A piece named twice is tried where it comes first.
-    let mut seen = PieceSet::EMPTY;
-    order.retain(|&p| {
-        let is_new = !seen.contains(p);
-        seen = seen.union(PieceSet::one(p));
-        is_new
-    });
-    order
-}
-
-/// The best other direction of `piece`, where one is better than `cost`.
-fn better_direction(
-    space: &Space<'_>,
-    key: &KeyChoice,
-    plan: &InstallationPlan,
-    cost: f64,
-    piece: PatchId,
-) -> Option<(f64, InstallationPlan)> {
-    let at = plan.position(piece);
-    if at == 0 {
-        return None;
-    }
-    let mut best: Option<(f64, InstallationPlan)> = None;
-    for s in LatticeDirection::all() {
-        if piece == plan.key() && !key.directions.contains(&s) {
-            continue;
-        }
-        let mut other = plan.clone();
-        other.steps[at].separation = s;
-        let other_cost = space.cost(&other);
-        let to_beat = best.as_ref().map_or(cost, |b| b.0);
-        if other_cost < to_beat - LEAST_GAIN && space.allows(&other) {
-            best = Some((other_cost, other));
+        let is_improved = worst_first(space, &best.score).into_iter().any(|p| turn(space, key, &mut best, p));
+        if !is_improved {
+            break;
         }
     }
     best
+}
+
+/// The worst piece, its neighbours by cost, then all others by cost.
+fn worst_first(space: &Space<'_>, score: &PlanScore) -> Vec<PatchId> {
+    let mut by_cost: Vec<PatchId> = score.pieces.ids().collect();
+    by_cost.sort_by(|&x, &y| score.pieces[y].total_cmp(&score.pieces[x]).then(x.cmp(&y)));
+    let near: PieceSet = space.neighbours[usize::from(by_cost[0])].union(PieceSet::one(by_cost[0]));
+    let (mut first, others): (Vec<PatchId>, Vec<PatchId>) = by_cost.into_iter().partition(|&p| near.contains(p));
+    first.extend(others);
+    first
+}
+
+/// Turns `piece` to the best other direction, where one is better.
+fn turn(space: &Space<'_>, key: &KeyChoice, best: &mut Improved, piece: PatchId) -> bool {
+    let at = best.plan.position(piece);
+    if at == 0 {
+        return false;
+    }
+    let from = best.plan.clone();
+    let costs = best.score.pieces.clone();
+    let mut around = space.surroundings(&from);
+    let mut is_improved = false;
+    for s in LatticeDirection::all() {
+        if s == from.steps[at].separation || (piece == from.key() && !key.directions.contains(&s)) {
+            continue;
+        }
+        best.n_evaluations += 1;
+        let score = turned(space, &mut around, &costs, piece, s);
+        if score.is_better_than(&best.score) {
+            let mut other = from.clone();
+            other.steps[at].separation = s;
+            if space.allows(&other) {
+                (best.score, best.plan) = (score, other);
+                is_improved = true;
+            }
+        }
+    }
+    is_improved
+}
+
+/// The score where `piece` leaves along `s`: only its own cost and those of its earlier neighbours change from `costs`.
+fn turned(
+    space: &Space<'_>,
+    around: &mut [(Role, Surroundings)],
+    costs: &IdVec<PatchId, f64>,
+    piece: PatchId,
+    s: LatticeDirection,
+) -> PlanScore {
+    let at = usize::from(piece);
+    let mut costs = costs.clone();
+    for (k, &contact) in space.contacts_of[at].iter().enumerate() {
+        let is_later = around[at].1.seams[k].own != 0;
+        if !is_later {
+            continue;
+        }
+        around[at].1.seams[k].own = mask_of(s);
+        let q = space.survey.contacts[contact].other(piece);
+        let of_other = &space.contacts_of[usize::from(q)];
+        let (role, near) = &mut around[usize::from(q)];
+        if let Some(k) = of_other.iter().position(|&c| c == contact) {
+            near.seams[k].others = mask_of(s);
+        }
+        costs[q] = space.costs.bound(q, *role, near);
+    }
+    let (role, near) = &mut around[at];
+    *role = if let Role::Key(_) = role { Role::Key(s) } else { Role::Between(s) };
+    costs[piece] = space.costs.bound(piece, *role, near);
+    PlanScore::of(costs)
 }

@@ -37,6 +37,8 @@ pub struct PlanParams {
     ///
     /// A bound on hopeless cases, for each of the two tolerances; where plans exist the search ends long before.
     pub max_tries: usize,
+    /// Work that the exact search may do: pieces revised. [0, 10⁹]; 100 000. Without any only the trivial bound 0 is proven.
+    pub proof_budget: usize,
 }
 
 impl Default for PlanParams {
@@ -53,6 +55,7 @@ impl Default for PlanParams {
             up: [0.0, 0.0, 1.0],
             n_plans: 300,
             max_tries: 200_000,
+            proof_budget: 100_000,
         }
     }
 }
@@ -73,6 +76,7 @@ impl PlanParams {
         range("occlusion_tolerance", self.occlusion_tolerance, 0.0, 0.2);
         range("relaxed_tolerance", self.relaxed_tolerance, self.occlusion_tolerance, 0.2);
         range("n_plans", self.n_plans as f64, 1.0, 1e5);
+        range("proof_budget", self.proof_budget as f64, 0.0, 1e9);
         range("max_tries", self.max_tries as f64, 1.0, 1e8);
         if Vec3::from(self.up).try_normalize().is_none() {
             problems.push("`up` has no direction; give a vector such as (0, 0, 1)".into());

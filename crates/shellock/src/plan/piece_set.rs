@@ -80,17 +80,22 @@ impl PieceSet {
 
     /// Whether the pieces of the set hang together by `neighbours`, symmetric; true for the empty set.
     pub fn is_connected(self, neighbours: &[Self]) -> bool {
+        self.is_joined_within(self, neighbours)
+    }
+
+    /// Whether the pieces of the set hang together by themselves and the other pieces of `bridges`; true for the empty set.
+    pub fn is_joined_within(self, bridges: Self, neighbours: &[Self]) -> bool {
         let Some(start) = self.iter().next() else { return true };
         let mut seen = Self::one(start);
         let mut front = seen;
         while front.0 != 0 {
             let x = front.0.trailing_zeros();
             front.0 &= front.0 - 1;
-            let new = neighbours[x as usize].and(self).minus(seen);
+            let new = neighbours[x as usize].and(bridges.union(self)).minus(seen);
             seen = seen.union(new);
             front = front.union(new);
         }
-        seen == self
+        self.minus(seen).is_empty()
     }
 }
 

@@ -1,11 +1,9 @@
 //! Random plans that keep every condition, for studies of metrics (Sect. 5.4).
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-
 use super::contact::SHORTEST_RUN_SIZES;
-use super::draw::draw;
+use super::draw::{DrawLimits, draw};
 use super::key::choices;
+use super::search::stream;
 use super::space::Space;
 use super::{InstallationPlan, PlanConstraints, PlanParams, PlanSurvey};
 
@@ -26,9 +24,8 @@ pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<I
         for key in choices(params, &counted) {
             let mut plans: Vec<InstallationPlan> = Vec::new();
             for i in 0..DRAWS_PER_PLAN * n {
-                let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
-                rng.set_stream(i as u64);
-                let drawn = draw(&space, &key, rng, WIDEST, TRIES_PER_PIECE * space.n);
+                let limits = DrawLimits { bound: f64::INFINITY, max_tries: TRIES_PER_PIECE * space.n };
+                let drawn = draw(&space, &key, stream(params.seed, i), WIDEST, limits);
                 plans.extend(drawn.plan.filter(|p| !plans.contains(p)));
                 let is_hopeless = plans.is_empty() && i >= n;
                 if plans.len() >= n {

@@ -1,23 +1,29 @@
-//! The randomised search for the best plan (Sect. 6.3).
+//! The search for the best plan (Sect. 6.2): drawn at random, improved, then proven.
 //!
-//! Keys are tried in order of preference. For each, plans are drawn from the last piece to the first; every draw has its
-//! own random stream, batches are of fixed size, and no clock is read, so the answer does not depend on the threads. The
-//! cluster test prunes every step: what comes loose with the remaining pieces as one block can never lock. The best plans
-//! are then improved one direction at a time.
+//! Keys are tried in order of preference; the first with any plan is kept. For it plans are drawn from the last piece to the
+//! first. Every draw has its own random stream, batches are of fixed size, and no clock is read, so the answer does not
+//! depend on the threads. The cluster test prunes every step: what comes loose with the remaining pieces as one block can
+//! never lock. The cheapest plans of a batch are improved one direction at a time. At last [`exact`](super::exact) looks for
+//! better ones and proves how good any can be.
 //!
-//! Deviation: the paper prunes by the best score so far, which would let threads influence each other; draws prefer cheap
-//! steps instead.
+//! Deviation: the paper prunes by the best score so far, which would let threads influence each other; here the bound is
+//! that of the batches before.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::contact::SHORTEST_RUN_SIZES;
-use super::draw::{Drawn, draw};
-use super::improve::improve;
+use super::draw::{DrawLimits, Drawn, draw};
+use super::exact::{Budget, prove, vary};
+use super::improve::{Improved, improve};
 use super::key::{KeyChoice, choices};
+use super::local_cost::{PieceCosts, SeamCosts};
+use super::pool::{MOST_PLANS, Pool};
 use super::space::Space;
-use super::{InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey, diagnose};
+use super::{
+    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey, RankedPlan, diagnose,
+};
 use crate::{Cancelled, Ctx, Warning};
 
 /// Draws that run side by side before anybody looks at the results.
@@ -26,25 +32,46 @@ const BATCH: usize = 32;
 /// Batches without any plan after which a key is given up.
 const MAX_EMPTY_BATCHES: usize = 2;
 
+/// Batches in a row that found nothing better, after which a full pool is left to the exact search: so many, and one more
+/// for each ten pieces.
+///
+/// That search proves the optimum of a figure in 12 pieces in less time than eight batches take.
+const LEAST_STALE_BATCHES: usize = 2;
+const PIECES_PER_STALE_BATCH: usize = 10;
+
 /// Tries of one draw, per piece: enough to undo some wrong turns near the end; wrong beginnings need a new draw.
 const TRIES_PER_PIECE: usize = 20;
 
-/// Plans that are improved: the cheapest ones drawn.
-const N_IMPROVED: usize = 24;
+/// Plans of a batch that are improved: the cheapest ones drawn.
+const N_IMPROVED: usize = 4;
 
 /// Keeps the streams of this stage's draws apart from those of the key planes, one a piece.
 const FIRST_STREAM: u64 = 1 << 32;
 
-/// The best plan found for `survey` under `constraints`, or why there is none.
+/// Makes the costs of pieces for what a survey and constraints say.
+pub type MakeCosts<'a> = &'a dyn Fn(&PlanSurvey, &PlanConstraints) -> Box<dyn PieceCosts>;
+
+/// The best plan found for `survey` under `constraints` by the default costs, or why there is none.
 ///
 /// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised`, `short-joints` and
-/// `key-not-flat`. Not promised: that the plan is the best there is, or that none exists where none was found (but where the reason is
-/// the contacts', none does).
+/// `key-not-flat`. Not promised: that none exists where none was found (but where the reason is the contacts', none does).
+/// How good the plan is among those with its key is proven, see [`FoundPlan::lower_bound`].
 pub fn search(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     survey: &PlanSurvey,
     constraints: &PlanConstraints,
+) -> Result<PlanOutcome, Cancelled> {
+    search_with(ctx, params, survey, constraints, &|s, c| Box::new(SeamCosts::new(s, c)))
+}
+
+/// As [`search`], with other costs.
+pub fn search_with(
+    ctx: &Ctx<'_>,
+    params: &PlanParams,
+    survey: &PlanSurvey,
+    constraints: &PlanConstraints,
+    costs: MakeCosts<'_>,
 ) -> Result<PlanOutcome, Cancelled> {
     ctx.stage("search for a plan", 0)?;
     if let Some(reason) = out_of_range(survey.n_pieces) {
@@ -55,12 +82,12 @@ pub fn search(
     for (i, sizes) in SHORTEST_RUN_SIZES.into_iter().enumerate() {
         let mut counted = survey.clone();
         counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes * params.connector_size_mm));
-        let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys)?;
-        if let PlanOutcome::Found(plan) = outcome {
+        let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys, costs)?;
+        if let PlanOutcome::Found(_) = outcome {
             if i > 0 {
                 warn_of_short_joints(ctx, sizes * params.connector_size_mm);
             }
-            return Ok(PlanOutcome::Found(plan));
+            return Ok(outcome);
         }
         // What is wrong with all joints that hold well says best what to change.
         first_answer.get_or_insert(outcome);
@@ -74,20 +101,22 @@ fn with_any_tolerance(
     survey: &PlanSurvey,
     constraints: &PlanConstraints,
     keys: &[KeyChoice],
+    costs: MakeCosts<'_>,
 ) -> Result<PlanOutcome, Cancelled> {
-    let strict = Space::new(survey, constraints, params.occlusion_tolerance);
+    let space = |tolerance| Space::with_costs(survey, constraints, tolerance, costs(survey, constraints));
+    let strict = space(params.occlusion_tolerance);
     if let Some(outcome) = diagnose::structural(&strict) {
         return Ok(outcome);
     }
-    if let Ok((plan, key)) = with_any_key(ctx, params, &strict, keys)? {
-        warn_of(ctx, &plan, key, None);
-        return Ok(PlanOutcome::Found(plan));
+    if let Ok((found, key)) = with_any_key(ctx, params, &strict, keys)? {
+        warn_of(ctx, &found.plan, key, None);
+        return Ok(PlanOutcome::Found(Box::new(found)));
     }
-    let relaxed = Space::new(survey, constraints, params.relaxed_tolerance);
+    let relaxed = space(params.relaxed_tolerance);
     match with_any_key(ctx, params, &relaxed, keys)? {
-        Ok((plan, key)) => {
-            warn_of(ctx, &plan, key, Some(params.relaxed_tolerance));
-            Ok(PlanOutcome::Found(plan))
+        Ok((found, key)) => {
+            warn_of(ctx, &found.plan, key, Some(params.relaxed_tolerance));
+            Ok(PlanOutcome::Found(Box::new(found)))
         }
         Err(stuck) => Ok(diagnose::stuck(&relaxed, stuck)),
     }
@@ -145,7 +174,7 @@ fn with_any_key<'k>(
     params: &PlanParams,
     space: &Space<'_>,
     keys: &'k [KeyChoice],
-) -> Result<Result<(InstallationPlan, &'k KeyChoice), PieceSet>, Cancelled> {
+) -> Result<Result<(FoundPlan, &'k KeyChoice), PieceSet>, Cancelled> {
     let mut tries_left = params.max_tries;
     let mut stuck = space.all();
     for key in keys {
@@ -156,7 +185,7 @@ fn with_any_key<'k>(
             continue;
         }
         match with_key(ctx, params, space, key, &mut tries_left)? {
-            Ok((_, plan)) => return Ok(Ok((plan, key))),
+            Ok(found) => return Ok(Ok((found, key))),
             Err(left) if left.len() < stuck.len() => stuck = left,
             Err(_) => {}
         }
@@ -164,44 +193,89 @@ fn with_any_key<'k>(
     Ok(Err(stuck))
 }
 
-/// The best plan with `key` and its cost; else the least that was left.
+/// The best plan with `key`; else the least that was left.
 fn with_key(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     space: &Space<'_>,
     key: &KeyChoice,
     tries_left: &mut usize,
-) -> Result<Result<(f64, InstallationPlan), PieceSet>, Cancelled> {
-    let mut stuck = space.all();
-    let mut plans: Vec<(f64, InstallationPlan)> = Vec::new();
-    for batch in 0..params.n_plans.div_ceil(BATCH) * 4 {
+) -> Result<Result<FoundPlan, PieceSet>, Cancelled> {
+    let mut pool = Pool::default();
+    if let Some(stuck) = draw_plans(ctx, params, space, key, tries_left, &mut pool)? {
+        return Ok(Err(stuck));
+    }
+    let mut budget = Budget::new(params.proof_budget);
+    let lower_bound = prove(ctx, space, key, &mut pool, &mut budget)?;
+    if params.proof_budget > 0 {
+        vary(ctx, space, key, &mut pool, &mut stream(params.seed, usize::MAX >> 1));
         ctx.check()?;
+    }
+    let ranked = |(score, plan): &(_, InstallationPlan)| RankedPlan::new(plan.clone(), score);
+    let (score, plan) = pool.best().expect("a plan was drawn").clone();
+    Ok(Ok(FoundPlan {
+        is_optimal: lower_bound >= score.worst,
+        lower_bound: lower_bound.min(score.worst),
+        plan,
+        score,
+        pool: pool.plans().iter().map(ranked).collect(),
+    }))
+}
+
+/// Fills `pool` with plans drawn at random and improved; the least that was left where there is none.
+fn draw_plans(
+    ctx: &Ctx<'_>,
+    params: &PlanParams,
+    space: &Space<'_>,
+    key: &KeyChoice,
+    tries_left: &mut usize,
+    pool: &mut Pool,
+) -> Result<Option<PieceSet>, Cancelled> {
+    let mut stuck = space.all();
+    let (mut n_drawn, mut n_stale) = (0, 0);
+    for batch in 0..params.n_plans.div_ceil(BATCH) * 2 {
+        ctx.check()?;
+        let best_before = pool.least_cost();
+        let limits = DrawLimits { bound: bound_of(pool), max_tries: TRIES_PER_PIECE * space.n };
         let drawn: Vec<Drawn> = (batch * BATCH..(batch + 1) * BATCH)
             .into_par_iter()
-            .map(|i| {
-                let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
-                rng.set_stream(FIRST_STREAM + i as u64);
-                draw(space, key, rng, i, TRIES_PER_PIECE * space.n)
-            })
+            .map(|i| draw(space, key, stream(params.seed, i), i, limits))
             .collect();
         let is_exhausted = drawn.iter().any(|d| d.plan.is_none() && d.is_exhausted);
+        let mut plans = Vec::new();
         for d in drawn {
             *tries_left = tries_left.saturating_sub(d.n_tries);
             if d.stuck.len() < stuck.len() {
                 stuck = d.stuck;
             }
-            plans.extend(d.plan.map(|plan| (space.cost(&plan), plan)));
+            plans.extend(d.plan.map(|plan| (space.score(&plan), plan)));
         }
-        let gives_up = plans.is_empty() && batch + 1 >= MAX_EMPTY_BATCHES;
-        if is_exhausted || gives_up || plans.len() >= params.n_plans || *tries_left == 0 {
+        n_drawn += plans.len();
+        // The sort is stable: of equal plans the one drawn first wins.
+        plans.sort_by(|x, y| x.0.worst.total_cmp(&y.0.worst));
+        plans.dedup_by(|x, y| x.1 == y.1);
+        let cheapest: Vec<&InstallationPlan> = plans.iter().take(N_IMPROVED).map(|x| &x.1).collect();
+        let improved: Vec<Improved> = cheapest.into_par_iter().map(|plan| improve(space, key, plan.clone())).collect();
+        improved.into_iter().for_each(|x| pool.add(space, x.score, x.plan));
+        plans.into_iter().for_each(|(score, plan)| pool.add(space, score, plan));
+        n_stale = if pool.least_cost() < best_before { 0 } else { n_stale + 1 };
+        let gives_up = pool.len() == 0 && batch + 1 >= MAX_EMPTY_BATCHES;
+        let is_stale = pool.len() == MOST_PLANS && n_stale >= LEAST_STALE_BATCHES + space.n / PIECES_PER_STALE_BATCH;
+        if is_exhausted || gives_up || is_stale || n_drawn >= params.n_plans || *tries_left == 0 || ctx.is_time_up() {
             break;
         }
     }
-    // The sort is stable: of equal plans the one drawn first wins.
-    plans.sort_by(|x, y| x.0.total_cmp(&y.0));
-    plans.dedup_by(|x, y| x.1 == y.1);
-    plans.truncate(N_IMPROVED);
-    let improved: Vec<(f64, InstallationPlan)> =
-        plans.into_par_iter().map(|(_, plan)| improve(space, key, plan)).collect();
-    Ok(improved.into_iter().min_by(|x, y| x.0.total_cmp(&y.0)).ok_or(stuck))
+    Ok((pool.len() == 0).then_some(stuck))
+}
+
+/// What plans may cost beyond those in the pool: nothing more than the best one, once there are enough.
+fn bound_of(pool: &Pool) -> f64 {
+    if pool.len() < MOST_PLANS { f64::INFINITY } else { pool.least_cost() }
+}
+
+/// The random stream of draw number `i`.
+pub(super) fn stream(seed: u64, i: usize) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(FIRST_STREAM.wrapping_add(i as u64));
+    rng
 }

@@ -6,9 +6,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shellock_geom::Vec3;
 
-use super::contact::{Contact, Joint};
+use super::contact::{Contact, HoldTable, Joint};
+use super::exact::{Budget, prove};
 use super::key::{Flatness, KeyChoice, choices};
+use super::local_cost::{ALL_DIRECTIONS, Role, RoleSet, SeamStates, Surroundings, directions_in, mask_of};
 use super::occlusion::Occlusion;
+use super::pool::Pool;
 use super::space::Space;
 use super::testing::{label, seams, sphere, voronoi};
 use super::*;
@@ -21,6 +24,14 @@ fn on_ctx<T>(run: impl FnOnce(&Ctx<'_>) -> T) -> T {
 
 fn searched(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> PlanOutcome {
     on_ctx(|ctx| search(ctx, params, survey, constraints)).unwrap()
+}
+
+/// The plan found, `None` where there is none.
+fn plan_of(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> Option<InstallationPlan> {
+    match searched(params, survey, constraints) {
+        PlanOutcome::Found(found) => Some(found.plan),
+        PlanOutcome::Infeasible { .. } => None,
+    }
 }
 
 fn surveyed(surface: &crate::SegmentedSurface) -> PlanSurvey {
@@ -45,7 +56,8 @@ fn made_up(n: usize, edges: &[(u32, u32)], share_free: f64, rng: &mut ChaCha8Rng
         .map(|&(a, b)| {
             let mut tables = [(); 2].map(|()| [(); LatticeDirection::COUNT].map(|()| random_joint(rng)));
             tables[0].reverse();
-            Contact::made_up(PatchId(a), PatchId(b), move |p, s| tables[usize::from(p.0 != a)][s.index()])
+            let hold = HoldTable::made_up(|| rng.random_range(0.0..1.5));
+            Contact::made_up(PatchId(a), PatchId(b), move |p, s| tables[usize::from(p.0 != a)][s.index()], hold)
         })
         .collect();
     PlanSurvey {
@@ -76,7 +88,7 @@ fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
         if left.is_empty() {
             let plan = InstallationPlan { steps: removal.iter().rev().copied().collect() };
             if space.allows(&plan) {
-                let cost = space.cost(&plan);
+                let cost = space.score(&plan).worst;
                 *best = Some(best.map_or(cost, |b: f64| b.min(cost)));
             }
             return;
@@ -104,6 +116,12 @@ fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
     best
 }
 
+/// The choice of key that `plan` was made with.
+fn key_of<'k>(keys: &'k [KeyChoice], plan: &InstallationPlan) -> &'k KeyChoice {
+    let is_choice = |k: &&KeyChoice| k.piece == plan.key() && k.directions.contains(&plan.separation(plan.key()));
+    keys.iter().find(is_choice).unwrap()
+}
+
 #[test]
 fn small_cases_are_found_iff_they_exist_and_with_the_best_cost_of_their_key() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -122,14 +140,12 @@ fn small_cases_are_found_iff_they_exist_and_with_the_best_cost_of_their_key() {
                 assert_eq!(brute_force(&space, &keys), None, "round {round}");
                 n_none += 1;
             }
-            PlanOutcome::Found(plan) => {
-                assert!(space.allows(&plan));
-                let key = keys
-                    .iter()
-                    .find(|k| k.piece == plan.key() && k.directions.contains(&plan.separation(plan.key())))
-                    .unwrap();
+            PlanOutcome::Found(found) => {
+                assert!(space.allows(&found.plan));
+                let key = key_of(&keys, &found.plan);
                 let best = brute_force(&space, std::slice::from_ref(key)).unwrap();
-                assert!(space.cost(&plan) <= best + 1e-9, "round {round}: {} > {best}", space.cost(&plan));
+                let cost = found.score.worst;
+                assert!(found.is_optimal && (cost - best).abs() <= 1e-9, "round {round}: {cost} is not {best}");
                 n_found += 1;
             }
         }
@@ -162,10 +178,19 @@ fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| searched(&PlanParams::default(), &survey, &PlanConstraints::default()))
     };
-    let PlanOutcome::Found(plan) = on(1) else { panic!("ten cells of a ball have a plan") };
-    assert_eq!(on(2), PlanOutcome::Found(plan.clone()));
+    let PlanOutcome::Found(found) = on(1) else { panic!("ten cells of a ball have a plan") };
+    assert_eq!(on(2), PlanOutcome::Found(found.clone()));
     let constraints = PlanConstraints::default();
-    assert!(Space::new(&survey, &constraints, 0.03).allows(&plan));
+    let space = Space::new(&survey, &constraints, 0.03);
+    // The pool: different plans, all allowed, best first, told with their costs.
+    let relations: std::collections::BTreeSet<_> = found.pool.iter().map(|r| space.relations(&r.plan)).collect();
+    assert_eq!(relations.len(), found.pool.len());
+    assert!(found.pool.len() > 50 && found.pool[0].plan == found.plan);
+    assert!(found.pool.is_sorted_by(|x, y| x.cost <= y.cost + 1e-8));
+    for ranked in &found.pool {
+        assert!(space.allows(&ranked.plan));
+        assert_eq!(ranked.cost, space.score(&ranked.plan).worst);
+    }
 }
 
 #[test]
@@ -174,7 +199,7 @@ fn what_earlier_rounds_forbid_is_kept_to() {
     let params = PlanParams { n_plans: 40, ..PlanParams::default() };
     let mut constraints = PlanConstraints::default();
     for _ in 0..4 {
-        let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("enough is left") };
+        let plan = plan_of(&params, &survey, &constraints).expect("enough is left");
         assert!(!constraints.rejected.contains(&plan));
         assert!(plan.steps[1..].iter().all(|s| !constraints.forbidden.contains(&(s.piece, s.separation))));
         constraints.forbidden.insert((plan.steps[3].piece, plan.steps[3].separation));
@@ -191,12 +216,12 @@ fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let params = PlanParams { n_plans: 40, ..PlanParams::default() };
     let mut constraints = PlanConstraints::default();
-    let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("a ball has a plan") };
+    let plan = plan_of(&params, &survey, &constraints).expect("a ball has a plan");
     let (earlier, later) = (plan.steps[2].piece, plan.steps[5].piece);
     constraints.rubbed.insert((later, earlier), 1);
-    assert_eq!(searched(&params, &survey, &constraints), PlanOutcome::Found(plan));
+    assert_eq!(plan_of(&params, &survey, &constraints), Some(plan));
     constraints.rubbed.insert((later, earlier), 2);
-    let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("enough is left") };
+    let plan = plan_of(&params, &survey, &constraints).expect("enough is left");
     assert!(plan.position(later) < plan.position(earlier));
 }
 
@@ -205,9 +230,9 @@ fn a_key_that_held_nothing_is_not_chosen_again_and_a_short_joint_only_in_another
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let params = PlanParams { n_plans: 40, ..PlanParams::default() };
     let mut constraints = PlanConstraints::default();
-    let PlanOutcome::Found(plan) = searched(&params, &survey, &constraints) else { panic!("a ball has a plan") };
+    let plan = plan_of(&params, &survey, &constraints).expect("a ball has a plan");
     constraints.bad_keys.insert(plan.key());
-    let PlanOutcome::Found(other) = searched(&params, &survey, &constraints) else { panic!("enough is left") };
+    let other = plan_of(&params, &survey, &constraints).expect("enough is left");
     assert_ne!(plan.key(), other.key());
     let (later, earlier) = (plan.steps[3], plan.steps[0].piece);
     constraints.weak_joints.insert((later.piece, earlier, later.separation));
@@ -247,9 +272,106 @@ fn one_piece_and_too_many_are_refused_in_words() {
 fn two_hemispheres_have_a_plan() {
     let survey = surveyed(&label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
     let constraints = PlanConstraints::default();
-    let PlanOutcome::Found(plan) = searched(&PlanParams::default(), &survey, &constraints) else {
-        panic!("either leaves along the axis")
-    };
+    let plan = plan_of(&PlanParams::default(), &survey, &constraints).expect("either leaves along the axis");
     let up = plan.separation(plan.key()).step()[2];
     assert_eq!(up, if plan.key() == PatchId(1) { 1 } else { -1 });
+}
+
+#[test]
+fn the_exact_search_agrees_with_brute_force_and_no_budget_makes_its_bound_wrong() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let constraints = PlanConstraints::default();
+    let (mut n_plans, mut n_none) = (0, 0);
+    for round in 0..60 {
+        let n = 3 + round % 3;
+        let all: Vec<(u32, u32)> = (0..n as u32).flat_map(|a| (a + 1..n as u32).map(move |b| (a, b))).collect();
+        let edges: Vec<(u32, u32)> = all.into_iter().filter(|_| rng.random_range(0.0..1.0) < 0.85).collect();
+        let survey = made_up(n, &edges, if n == 5 { 0.55 } else { 0.6 }, &mut rng);
+        let space = Space::new(&survey, &constraints, 0.03);
+        for key in choices(&PlanParams::default(), &survey).iter().filter(|k| !k.directions.is_empty()).take(2) {
+            let best = brute_force(&space, std::slice::from_ref(key));
+            for n_revisions in [1, 30, 1_000_000] {
+                let (mut pool, mut budget) = (Pool::default(), Budget::new(n_revisions));
+                let bound = on_ctx(|ctx| prove(ctx, &space, key, &mut pool, &mut budget)).unwrap();
+                assert!(bound <= best.unwrap_or(f64::INFINITY) + 1e-8, "round {round}: {bound} > {best:?}");
+                assert!(pool.plans().iter().all(|(_, plan)| space.allows(plan)));
+                if n_revisions == 1_000_000 {
+                    assert!(bound == pool.least_cost());
+                    assert!(pool.best().map(|b| b.0.worst) == best || (bound - best.unwrap()).abs() <= 1e-8);
+                }
+            }
+            *(if best.is_some() { &mut n_plans } else { &mut n_none }) += 1;
+        }
+    }
+    assert!(n_plans >= 20 && n_none >= 20, "{n_plans} with a plan, {n_none} without: the cases must be of both kinds");
+}
+
+#[test]
+fn a_spent_budget_leaves_a_plan_and_a_bound_below_the_optimum() {
+    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    let constraints = PlanConstraints::default();
+    let found = |proof_budget| {
+        let params = PlanParams { n_plans: 40, proof_budget, ..PlanParams::default() };
+        match searched(&params, &survey, &constraints) {
+            PlanOutcome::Found(found) => found,
+            PlanOutcome::Infeasible { reason, .. } => panic!("{reason}"),
+        }
+    };
+    let [without, little, much] = [0, 200, 1_000_000].map(found);
+    assert!(much.is_optimal && much.gap() == 0.0);
+    for less in [without, little] {
+        assert!(Space::new(&survey, &constraints, 0.03).allows(&less.plan));
+        assert!(less.lower_bound <= much.score.worst && much.score.worst <= less.score.worst);
+    }
+}
+
+/// The default costs as a metric would give them that knows bounds alone.
+struct BoundsAlone(SeamCosts);
+
+impl PieceCosts for BoundsAlone {
+    fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64 {
+        self.0.bound(piece, role, around)
+    }
+}
+
+#[test]
+fn a_metric_that_gives_bounds_alone_finds_the_same_optimum() {
+    let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 6, 2));
+    let params = PlanParams { n_plans: 20, ..PlanParams::default() };
+    let constraints = PlanConstraints::default();
+    let make: MakeCosts<'_> = &|s, c| Box::new(BoundsAlone(SeamCosts::new(s, c)));
+    let plain = searched(&params, &survey, &constraints);
+    let other = on_ctx(|ctx| search_with(ctx, &params, &survey, &constraints, make)).unwrap();
+    let (PlanOutcome::Found(plain), PlanOutcome::Found(other)) = (plain, other) else { panic!("a ball has a plan") };
+    assert!(plain.is_optimal && other.is_optimal && plain.score.worst == other.score.worst);
+}
+
+#[test]
+fn a_bound_is_at_most_the_cost_of_every_state_it_leaves_open_and_narrowing_keeps_what_costs_little() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let survey = made_up(4, &[(0, 1), (0, 2), (1, 2), (2, 3), (0, 3)], 0.9, &mut rng);
+    let costs = SeamCosts::new(&survey, &PlanConstraints::default());
+    let (piece, n_seams) = (PatchId(0), 3);
+    for _ in 0..300 {
+        let mut mask = || rng.random_range(1..=ALL_DIRECTIONS) & rng.random_range(1..=ALL_DIRECTIONS);
+        let s = LatticeDirection::all().nth(mask() as usize % LatticeDirection::COUNT).unwrap();
+        let seams: Vec<SeamStates> =
+            (0..n_seams).map(|_| SeamStates { own: mask() | mask_of(s), others: mask() }).collect();
+        let open = Surroundings { seams, remaining: PieceSet::EMPTY };
+        let choose = |(i, x): (usize, &SeamStates)| match directions_in(x.others).nth(i + 1) {
+            Some(t) => SeamStates { own: 0, others: mask_of(t) },
+            None => SeamStates { own: mask_of(s), others: 0 },
+        };
+        let seams = open.seams.iter().enumerate().map(choose).collect();
+        let chosen = Surroundings { seams, remaining: PieceSet::first(4) };
+        let cost = costs.bound(piece, Role::Between(s), &chosen);
+        assert!(costs.bound(piece, Role::Between(s), &open) <= cost);
+        let mut roles = RoleSet { separations: ALL_DIRECTIONS, may_be_first: true, is_key: false };
+        let mut left = open.clone();
+        costs.narrow(piece, &mut roles, &mut left, cost);
+        assert!(roles.separations & mask_of(s) != 0);
+        for (left, chosen) in left.seams.iter().zip(&chosen.seams) {
+            assert!(left.own & chosen.own == chosen.own && left.others & chosen.others == chosen.others);
+        }
+    }
 }

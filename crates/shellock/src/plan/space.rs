@@ -1,7 +1,9 @@
 //! The plans that may be: a survey, seen with a tolerance and with what earlier rounds forbid, as bit sets.
 
 use super::cluster::{DirectedJoint, loose_part};
-use super::{InstallationPlan, PieceSet, PlanConstraints, PlanSurvey, score};
+use super::local_cost::{PieceCosts, Role, SeamCosts, SeamStates, Surroundings, mask_of};
+use super::score::PlanScore;
+use super::{InstallationPlan, InstallationStep, PieceSet, PlanConstraints, PlanSurvey};
 use crate::{LatticeDirection, PatchId};
 
 /// Per piece and direction.
@@ -24,10 +26,31 @@ pub(super) struct Space<'a> {
     pub neighbours: Vec<PieceSet>,
     /// Contacts of each piece, as positions in the survey's list.
     pub contacts_of: Vec<Vec<usize>>,
+    /// What pieces cost.
+    pub costs: Box<dyn PieceCosts>,
+}
+
+/// What tells plans apart: directions of all pieces but the first, and which piece of each contact is later.
+///
+/// Plans that agree in both make the same joints, whatever the order of pieces that do not touch.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Relations {
+    separations: Vec<Option<LatticeDirection>>,
+    is_a_later: Vec<bool>,
 }
 
 impl<'a> Space<'a> {
+    /// The space with the default costs.
     pub fn new(survey: &'a PlanSurvey, constraints: &'a PlanConstraints, tolerance: f64) -> Self {
+        Self::with_costs(survey, constraints, tolerance, Box::new(SeamCosts::new(survey, constraints)))
+    }
+
+    pub fn with_costs(
+        survey: &'a PlanSurvey,
+        constraints: &'a PlanConstraints,
+        tolerance: f64,
+        costs: Box<dyn PieceCosts>,
+    ) -> Self {
         let n = survey.n_pieces;
         let ids = || (0..n).map(PatchId::from);
         let blocks = ids()
@@ -54,7 +77,7 @@ impl<'a> Space<'a> {
                 }
             }
         }
-        Self { survey, constraints, n, blocks, joins, neighbours, contacts_of }
+        Self { survey, constraints, n, blocks, joins, neighbours, contacts_of, costs }
     }
 
     pub fn all(&self) -> PieceSet {
@@ -100,18 +123,78 @@ impl<'a> Space<'a> {
         loose_part(self.n, &joints, plan.key()).is_none() && !self.is_rejected(plan)
     }
 
-    /// Whether an earlier round turned `plan` down; the first piece's direction has no meaning and is not compared.
+    /// Whether an earlier round turned down a plan with the same relations.
     pub fn is_rejected(&self, plan: &InstallationPlan) -> bool {
-        self.constraints.rejected.iter().any(|r| {
-            r.steps.len() == plan.steps.len()
-                && r.steps[1..] == plan.steps[1..]
-                && r.steps[0].piece == plan.steps[0].piece
-        })
+        let is_same = |r: &InstallationPlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
+        self.constraints.rejected.iter().any(is_same)
     }
 
-    /// Cost of `plan`; lower is better.
-    pub fn cost(&self, plan: &InstallationPlan) -> f64 {
-        score(self.survey, self.constraints, plan).value
+    /// What tells `plan` from others.
+    pub fn relations(&self, plan: &InstallationPlan) -> Relations {
+        let mut position = vec![0; self.n];
+        let mut separations = vec![None; self.n];
+        for (i, step) in plan.steps.iter().enumerate() {
+            position[usize::from(step.piece)] = i;
+            separations[usize::from(step.piece)] = (i > 0).then_some(step.separation);
+        }
+        let is_a_later =
+            self.survey.contacts.iter().map(|c| position[usize::from(c.a)] > position[usize::from(c.b)]).collect();
+        Relations { separations, is_a_later }
+    }
+
+    /// Costs of `plan`; lower is better.
+    pub fn score(&self, plan: &InstallationPlan) -> PlanScore {
+        let around = self.surroundings(plan);
+        let cost = |(p, (role, around)): (usize, &(Role, Surroundings))| self.costs.bound(p.into(), *role, around);
+        PlanScore::of(around.iter().enumerate().map(cost).collect())
+    }
+
+    /// Role and surroundings of each piece in `plan`.
+    pub fn surroundings(&self, plan: &InstallationPlan) -> Vec<(Role, Surroundings)> {
+        let mut separations = vec![None; self.n];
+        let mut rest = self.all();
+        let mut found = vec![(Role::First, Surroundings::default()); self.n];
+        for step in plan.removal() {
+            rest = rest.minus(PieceSet::one(step.piece));
+            found[usize::from(step.piece)] = self.leaving(step, rest, &separations);
+            separations[usize::from(step.piece)] = Some(step.separation);
+        }
+        found
+    }
+
+    /// Role and surroundings of the piece of `step` that leaves `rest`; `separations` of those that left before.
+    pub fn leaving(
+        &self,
+        step: InstallationStep,
+        rest: PieceSet,
+        separations: &[Option<LatticeDirection>],
+    ) -> (Role, Surroundings) {
+        let p = step.piece;
+        let role = match rest.len() {
+            0 => Role::First,
+            left if left + 1 == self.n => Role::Key(step.separation),
+            _ => Role::Between(step.separation),
+        };
+        let seam = |&i: &usize| {
+            let q = self.survey.contacts[i].other(p);
+            match separations[usize::from(q)] {
+                Some(s) => SeamStates { own: 0, others: mask_of(s) },
+                None => SeamStates { own: mask_of(step.separation), others: 0 },
+            }
+        };
+        let seams = self.contacts_of[usize::from(p)].iter().map(seam).collect();
+        (role, Surroundings { seams, remaining: rest })
+    }
+
+    /// Directions that `p` may ever take, as bits.
+    pub fn allowed(&self, p: PatchId) -> u32 {
+        let is_allowed = |s: &LatticeDirection| !self.constraints.forbidden.contains(&(p, *s));
+        LatticeDirection::all().filter(is_allowed).fold(0, |mask, s| mask | mask_of(s))
+    }
+
+    /// Who keeps `p` from leaving along `s` by staying.
+    pub fn blockers(&self, p: PatchId, s: LatticeDirection) -> PieceSet {
+        self.blocks[usize::from(p)][s.index()]
     }
 
     /// Pieces whose removal would part the others; all plans fail where there is one.

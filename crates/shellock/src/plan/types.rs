@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use super::PlanScore;
 use crate::{LatticeDirection, PatchId};
 
 /// One piece of a plan and the direction along which it leaves everything installed before it.
@@ -82,11 +83,72 @@ pub struct Blocker {
     pub occluded: f64,
 }
 
+/// A plan and what it costs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RankedPlan {
+    /// The plan.
+    pub plan: InstallationPlan,
+    /// Cost of its worst piece.
+    pub cost: f64,
+    /// Mean cost of its pieces.
+    pub mean_cost: f64,
+}
+
+impl RankedPlan {
+    /// `plan` with the two figures of its score.
+    pub fn new(plan: InstallationPlan, score: &PlanScore) -> Self {
+        Self { plan, cost: score.worst, mean_cost: score.mean }
+    }
+}
+
+/// The best plan found, and how good any other with the same choice of key can be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundPlan {
+    /// The best plan.
+    pub plan: InstallationPlan,
+    /// Its cost, which is that of its worst piece, and the cost of every piece.
+    pub score: PlanScore,
+    /// Proven: no allowed plan whose key is this piece, sliding along one of the directions of its choice, costs less.
+    ///
+    /// The choice is either the directions within the key's plane or all others.
+    pub lower_bound: f64,
+    /// Whether the plan's own cost was proven to be the least.
+    pub is_optimal: bool,
+    /// Up to 100 plans with different relations between pieces, best first; the first is `plan`.
+    pub pool: Vec<RankedPlan>,
+}
+
+/// What is known of how good a plan is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanProof {
+    /// Cost of the plan's worst piece.
+    pub cost: f64,
+    /// See [`FoundPlan::lower_bound`].
+    pub lower_bound: f64,
+    /// How much cheaper another plan may be, as share of the cost, in [0, 1].
+    pub gap: f64,
+    /// Whether the cost was proven to be the least.
+    pub optimal: bool,
+}
+
+impl FoundPlan {
+    /// The figures alone.
+    pub fn proof(&self) -> PlanProof {
+        let (cost, lower_bound) = (self.score.worst, self.lower_bound);
+        PlanProof { cost, lower_bound, gap: self.gap(), optimal: self.is_optimal }
+    }
+
+    /// How much cheaper another plan may be, as share of this one's cost, in [0, 1].
+    pub fn gap(&self) -> f64 {
+        if self.score.worst > 0.0 { 1.0 - self.lower_bound / self.score.worst } else { 0.0 }
+    }
+}
+
 /// The answer of the search. Both are results, not errors.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlanOutcome {
     /// A plan that keeps every condition.
-    Found(InstallationPlan),
+    Found(Box<FoundPlan>),
     /// None was found.
     Infeasible {
         /// Why, for people.

@@ -63,6 +63,12 @@ impl HoldTable {
         Self(table.collect())
     }
 
+    /// A table out of nothing; `held` gives mm³.
+    #[cfg(test)]
+    pub fn made_up(mut held: impl FnMut() -> f32) -> Self {
+        Self((0..2 * LatticeDirection::COUNT).map(|_| [[(); N_PUSHES]; 2].map(|x| x.map(|()| held()))).collect())
+    }
+
     /// What the contact holds; `order` is 0 where the piece with the lower id is later. `None` where nothing was measured.
     pub fn pushes(&self, order: usize, s: LatticeDirection) -> Option<&Pushes> {
         self.0.get(order * LatticeDirection::COUNT + s.index())

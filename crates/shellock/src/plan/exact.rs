@@ -1,0 +1,335 @@
+//! The best plan with a given key, and the proof: bisection on the cost of the worst piece.
+//!
+//! Whether a plan exists whose pieces all cost at most T is a search of its own: [`domains`] strikes out what cannot be, the
+//! most disputed piece or seam that is still open is decided either way, and so on until all is decided, which [`sequence`]
+//! turns into an order. No answer within its budget leaves the question open; "none" is a proof, so T bounds all plans.
+//!
+//! Deviation: a depth-first search from the key backwards meets a contradiction between two far pieces only after every way
+//! to take off the others. Deciding disputed pieces first, in any place, meets it at once. The order is only kept as far as
+//! it must be, so orders that differ in pieces that do not touch are one.
+//!
+//! Nothing here depends on threads or time but for the stop that [`Ctx::is_time_up`] asks for.
+//!
+//! Sources: the weights of conflicts are those of Boussemart et al. 2004, *Boosting systematic search by weighting
+//! constraints*.
+
+mod domains;
+mod sequence;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::improve::improve;
+use super::key::KeyChoice;
+use super::local_cost::{Role, RoleSet};
+use super::pool::Pool;
+use super::score::COST_TIE;
+use super::space::Space;
+use super::{InstallationPlan, PieceSet};
+use crate::{Cancelled, Ctx, PatchId};
+use domains::{Conflict, Domains, Propagator};
+use sequence::{Sequence, sequence};
+
+/// Share of the cost between two thresholds below which bisection stops and more work is spent on one question.
+const FINEST_STEP: f64 = 0.002;
+
+/// Pieces revised for one question at first, per piece; four times as many each time that all questions were left open.
+const FIRST_BUDGET_PER_PIECE: usize = 60;
+
+/// Decisions before the first restart, and by how much they grow: weights learned in one run steer the next.
+const FIRST_RUN: usize = 50;
+const RUN_GROWTH: f64 = 1.4;
+
+/// Work that may still be done.
+pub(super) struct Budget {
+    /// Pieces that may still be revised.
+    pub n_left: usize,
+}
+
+impl Budget {
+    /// At most `n` revisions.
+    pub fn new(n: usize) -> Self {
+        Self { n_left: n }
+    }
+}
+
+/// The answer to "is there a plan whose pieces all cost at most this?".
+enum Answer {
+    Plan(InstallationPlan),
+    None,
+    Unknown,
+}
+
+/// Proves a lower bound on the cost of all plans with `key` and adds better plans to `pool`.
+///
+/// The bound is the least cost in the pool where that was proven optimal, less elsewhere; infinite where no plan exists.
+pub(super) fn prove(
+    ctx: &Ctx<'_>,
+    space: &Space<'_>,
+    key: &KeyChoice,
+    pool: &mut Pool,
+    budget: &mut Budget,
+) -> Result<f64, Cancelled> {
+    let mut lower = 0.0;
+    let mut weights = vec![1.0; space.n];
+    let mut per_question = FIRST_BUDGET_PER_PIECE * space.n;
+    while budget.n_left > 0 {
+        // First the whole question: is there any better plan?
+        let upper = pool.least_cost();
+        let limit = if upper.is_finite() { upper - COST_TIE } else { f64::MAX };
+        match ask(ctx, space, key, limit, per_question, budget, &mut weights)? {
+            Answer::None => return Ok(upper),
+            Answer::Plan(plan) => {
+                add(space, key, pool, plan);
+                continue;
+            }
+            Answer::Unknown => {}
+        }
+        // Then easier ones below it; while no plan is known there is no scale for them.
+        let mut high = if upper.is_finite() { limit } else { lower };
+        while high - lower > FINEST_STEP * high && budget.n_left > 0 {
+            let middle = 0.5 * (lower + high);
+            match ask(ctx, space, key, middle, per_question, budget, &mut weights)? {
+                Answer::None => lower = middle,
+                Answer::Unknown => high = middle,
+                Answer::Plan(plan) => {
+                    add(space, key, pool, plan);
+                    high = high.min(pool.least_cost() - COST_TIE);
+                }
+            }
+        }
+        per_question *= 4;
+    }
+    Ok(lower)
+}
+
+/// Limits of further plans, as shares of the least cost: some as good in the worst piece, some nearly.
+const FURTHER_LIMITS: [f64; 4] = [1.0, 1.0, 1.01, 1.03];
+
+/// How many further plans are asked for, and the revisions for each, per piece.
+const N_FURTHER: usize = 16;
+const FURTHER_BUDGET_PER_PIECE: usize = 60;
+
+/// Adds plans nearly as good as the best of `pool`, found by deciding in random order: with a lower mean, or only different.
+pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut Pool, rng: &mut ChaCha8Rng) {
+    let least = pool.least_cost();
+    let tries: Vec<(f64, Vec<f64>)> = (0..N_FURTHER)
+        .map(|i| {
+            let limit = FURTHER_LIMITS[i % FURTHER_LIMITS.len()] * least + COST_TIE;
+            (limit, (0..space.n).map(|_| rng.random_range(1.0..100.0)).collect())
+        })
+        .collect();
+    let further = |(limit, mut weights): (f64, Vec<f64>)| {
+        let n_revisions = FURTHER_BUDGET_PER_PIECE * space.n;
+        let weights = &mut weights;
+        let propagator = Propagator::new(space, key);
+        let mut probe =
+            Probe { ctx, propagator, limit, n_revisions, n_decisions: 0, run: 0, weights, is_time_up: false };
+        // Plans are many at such limits: striking out roles one by one would only cost time.
+        let mut d = probe.propagator.all();
+        let is_none = probe.narrows_to_nothing(&mut d, space.all());
+        let answer = if is_none { Answer::None } else { probe.with_restarts(&d) };
+        if let Answer::Plan(plan) = answer { Some((improve(space, key, plan.clone()), plan)) } else { None }
+    };
+    let found: Vec<_> = tries.into_par_iter().map(further).collect();
+    for (improved, plan) in found.into_iter().flatten() {
+        pool.add(space, space.score(&plan), plan);
+        pool.add(space, improved.score, improved.plan);
+    }
+}
+
+fn add(space: &Space<'_>, key: &KeyChoice, pool: &mut Pool, plan: InstallationPlan) {
+    let score = space.score(&plan);
+    let improved = improve(space, key, plan.clone());
+    pool.add(space, score, plan);
+    pool.add(space, improved.score, improved.plan);
+}
+
+/// One question, with at most `n_revisions` revisions of a piece.
+fn ask(
+    ctx: &Ctx<'_>,
+    space: &Space<'_>,
+    key: &KeyChoice,
+    limit: f64,
+    n_revisions: usize,
+    budget: &mut Budget,
+    weights: &mut Vec<f64>,
+) -> Result<Answer, Cancelled> {
+    let propagator = Propagator::new(space, key);
+    let n_revisions = n_revisions.min(budget.n_left);
+    let mut probe = Probe { ctx, propagator, limit, n_revisions, n_decisions: 0, run: 0, weights, is_time_up: false };
+    let answer = probe.proof();
+    budget.n_left = budget.n_left.saturating_sub(probe.propagator.n_revisions.max(1));
+    if probe.is_time_up {
+        budget.n_left = 0;
+    }
+    ctx.check()?;
+    Ok(answer)
+}
+
+struct Probe<'a> {
+    ctx: &'a Ctx<'a>,
+    propagator: Propagator<'a>,
+    limit: f64,
+    /// Revisions after which the question is left open.
+    n_revisions: usize,
+    n_decisions: usize,
+    /// Decisions of this run.
+    run: usize,
+    /// How often each piece was at fault.
+    weights: &'a mut Vec<f64>,
+    is_time_up: bool,
+}
+
+/// Something that is still open.
+enum Question {
+    Role(PatchId),
+    /// Which piece of a contact is later.
+    Later(usize),
+}
+
+impl Probe<'_> {
+    /// The answer, after all that propagation alone can tell.
+    fn proof(&mut self) -> Answer {
+        let mut d = self.propagator.all();
+        let all = self.propagator.space.all();
+        if self.narrows_to_nothing(&mut d, all) {
+            return Answer::None;
+        }
+        if let Some(answer) = self.shave(&mut d) {
+            return answer;
+        }
+        self.with_restarts(&d)
+    }
+
+    /// Decides what is open in `d`, from the start again each time that a run led nowhere.
+    fn with_restarts(&mut self, d: &Domains) -> Answer {
+        let mut run = FIRST_RUN as f64;
+        loop {
+            self.n_decisions = 0;
+            self.run = run as usize;
+            match self.decide(d) {
+                Answer::Unknown if !self.is_over() => run *= RUN_GROWTH,
+                answer => return answer,
+            }
+        }
+    }
+
+    fn is_over(&mut self) -> bool {
+        self.is_time_up |= self.ctx.is_time_up() || self.ctx.check().is_err();
+        self.is_time_up || self.propagator.n_revisions >= self.n_revisions
+    }
+
+    fn narrows_to_nothing(&mut self, d: &mut Domains, changed: PieceSet) -> bool {
+        match self.propagator.propagate(d, changed, self.limit) {
+            Ok(()) => false,
+            Err(Conflict(p)) => {
+                self.weights[usize::from(p)] += 1.0;
+                true
+            }
+        }
+    }
+
+    /// Strikes out every role that leads to nothing by propagation alone.
+    fn shave(&mut self, d: &mut Domains) -> Option<Answer> {
+        let n = self.propagator.space.n;
+        let (mut since_change, mut p) = (0, 0);
+        while since_change < n {
+            for role in d.roles[p].iter() {
+                if d.roles[p].len() < 2 || self.is_over() {
+                    break;
+                }
+                let mut trial = d.clone();
+                trial.roles[p] = trial.roles[p].only(role);
+                if self.narrows_to_nothing(&mut trial, PieceSet::one(p.into())) {
+                    d.roles[p] = d.roles[p].without(role);
+                    since_change = 0;
+                    if self.narrows_to_nothing(d, PieceSet::one(p.into())) {
+                        return Some(Answer::None);
+                    }
+                }
+            }
+            since_change += 1;
+            p = (p + 1) % n;
+        }
+        None
+    }
+
+    /// Decides what is open in `d`, one way after the other.
+    fn decide(&mut self, d: &Domains) -> Answer {
+        let Some(question) = self.question(d) else {
+            return match sequence(self.propagator.space, d, self.limit) {
+                Sequence::Plan(plan) => Answer::Plan(plan),
+                Sequence::None => Answer::None,
+                Sequence::Unknown => Answer::Unknown,
+            };
+        };
+        let mut is_open = false;
+        for (mut child, changed) in self.children(d, &question) {
+            self.n_decisions += 1;
+            if self.n_decisions > self.run || self.is_over() {
+                return Answer::Unknown;
+            }
+            if self.narrows_to_nothing(&mut child, changed) {
+                continue;
+            }
+            match self.decide(&child) {
+                Answer::Plan(plan) => return Answer::Plan(plan),
+                Answer::None => {}
+                Answer::Unknown => is_open = true,
+            }
+        }
+        if is_open { Answer::Unknown } else { Answer::None }
+    }
+
+    /// What to decide next: few ways, and often at fault.
+    fn question(&self, d: &Domains) -> Option<Question> {
+        let mut best: Option<(f64, Question)> = None;
+        let mut offer = |dispute: f64, question| {
+            if best.as_ref().is_none_or(|b| dispute > b.0) {
+                best = Some((dispute, question));
+            }
+        };
+        for (p, roles) in d.roles.iter().enumerate().filter(|(_, roles)| roles.len() > 1) {
+            offer(self.weights[p] / roles.len() as f64, Question::Role(p.into()));
+        }
+        for (i, seam) in d.seams.iter().enumerate() {
+            if seam.contains(&0) {
+                continue;
+            }
+            let c = &self.propagator.space.survey.contacts[i];
+            let weight = self.weights[usize::from(c.a)] + self.weights[usize::from(c.b)];
+            offer(0.25 * weight, Question::Later(i));
+        }
+        best.map(|b| b.1)
+    }
+
+    /// The ways to decide, cheapest first, and the pieces they change.
+    fn children(&self, d: &Domains, question: &Question) -> Vec<(Domains, PieceSet)> {
+        match *question {
+            Question::Role(p) => {
+                let around = self.propagator.surroundings(d, p);
+                let roles: RoleSet = d.roles[usize::from(p)];
+                let cost = |role| self.propagator.space.costs.bound(p, role, &around);
+                let mut by_cost: Vec<(f64, Role)> = roles.iter().map(|role| (cost(role), role)).collect();
+                by_cost.sort_by(|x, y| x.0.total_cmp(&y.0));
+                let child = |(_, role)| {
+                    let mut child = d.clone();
+                    child.roles[usize::from(p)] = roles.only(role);
+                    (child, PieceSet::one(p))
+                };
+                by_cost.into_iter().map(child).collect()
+            }
+            Question::Later(i) => {
+                let c = &self.propagator.space.survey.contacts[i];
+                let child = |side: usize| {
+                    let mut child = d.clone();
+                    child.seams[i][1 - side] = 0;
+                    (child, PieceSet::one(c.a).union(PieceSet::one(c.b)))
+                };
+                [0, 1].map(child).into_iter().collect()
+            }
+        }
+    }
+}

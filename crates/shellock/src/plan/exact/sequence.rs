@@ -1,0 +1,85 @@
+//! From decided directions and seams to an order in which every condition holds.
+
+use std::collections::HashSet;
+
+use super::super::space::Space;
+use super::domains::Domains;
+use crate::plan::{InstallationPlan, InstallationStep, PieceSet};
+use crate::{LatticeDirection, PatchId};
+
+/// Sets of remaining pieces looked at before the question is left open.
+const MOST_SETS: usize = 4000;
+
+/// What came of it.
+pub(super) enum Sequence {
+    Plan(InstallationPlan),
+    /// There is no such order.
+    None,
+    /// Too many to try.
+    Unknown,
+}
+
+struct Sequencer<'a> {
+    space: &'a Space<'a>,
+    d: &'a Domains,
+    limit: f64,
+    separations: Vec<LatticeDirection>,
+    removed: Vec<InstallationStep>,
+    /// What was left where no order was found; only asked for membership.
+    dead: HashSet<PieceSet>,
+}
+
+/// An order that `d`, with one role a piece and one state a seam, leaves open.
+pub(super) fn sequence(space: &Space<'_>, d: &Domains, limit: f64) -> Sequence {
+    let separation = |p: usize| {
+        let outwards = LatticeDirection::nearest(space.survey.mean_normal[PatchId::from(p)]);
+        d.roles[p].iter().next().and_then(|role| role.separation()).unwrap_or(outwards)
+    };
+    let separations = (0..space.n).map(separation).collect();
+    let mut s = Sequencer { space, d, limit, separations, removed: Vec::new(), dead: HashSet::new() };
+    if !s.descend(space.all()) {
+        return if s.dead.len() < MOST_SETS { Sequence::None } else { Sequence::Unknown };
+    }
+    s.removed.reverse();
+    let plan = InstallationPlan { steps: s.removed };
+    // Relations are the same for all orders, so one that is turned down speaks for all.
+    if space.allows(&plan) { Sequence::Plan(plan) } else { Sequence::None }
+}
+
+impl Sequencer<'_> {
+    fn descend(&mut self, left: PieceSet) -> bool {
+        if left.is_empty() {
+            return true;
+        }
+        if self.dead.len() >= MOST_SETS || self.dead.contains(&left) {
+            return false;
+        }
+        for p in left.iter() {
+            let rest = left.minus(PieceSet::one(p));
+            if self.may_leave(p, rest) {
+                self.removed.push(InstallationStep { piece: p, separation: self.separations[usize::from(p)] });
+                if self.descend(rest) {
+                    return true;
+                }
+                self.removed.pop();
+            }
+        }
+        self.dead.insert(left);
+        false
+    }
+
+    fn may_leave(&self, p: PatchId, rest: PieceSet) -> bool {
+        let step = InstallationStep { piece: p, separation: self.separations[usize::from(p)] };
+        if !self.d.before[usize::from(p)].and(rest).is_empty()
+            || !rest.is_connected(&self.space.neighbours)
+            || (!rest.is_empty() && !self.space.is_free(p, step.separation, rest))
+        {
+            return false;
+        }
+        let gone: Vec<Option<LatticeDirection>> = (0..self.space.n)
+            .map(|q| (!rest.contains(q.into()) && q != usize::from(p)).then(|| self.separations[q]))
+            .collect();
+        let (role, around) = self.space.leaving(step, rest, &gone);
+        self.space.costs.bound(p, role, &around) <= self.limit
+    }
+}
