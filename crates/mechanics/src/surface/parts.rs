@@ -15,9 +15,15 @@ use crate::assembly::{SIDES, ShellAssembly};
 /// Motions of a side of a station: along the tangent, along the normal, across, and the turn about the tangent.
 pub(super) const N_MOTIONS: usize = 4;
 
-/// Stiffness, in `E H`, that ties every point to its place and keeps `K` definite where the part floats: 10⁵ times less
-/// than what the weakest joint of a plan that holds resists.
+/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what the weakest joint
+/// of a plan that holds resists.
 const GROUND_SHARE: f64 = 1e-8;
+
+/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate and taken out again.
+const SUPPORT_SHARE: f64 = 0.1;
+
+/// Length by which rotations are made comparable with shifts, mm: about a piece's radius.
+const RADIUS_MM: f64 = 30.0;
 
 /// Compliance that every motion has besides the mesh's, in those of a contact a mm long. Parts of a few triangles have
 /// fewer motions than their stations ask for.
@@ -63,7 +69,39 @@ pub(super) fn parts(
         }
     }
     let row = rows_by_part(assembly, is_held);
-    terms.par_iter().zip(motions).map(|(terms, motions)| part(params, &row, terms, motions)).collect()
+    let mut floats: Vec<Vec<u32>> = vec![Vec::new(); assembly.n_parts];
+    (0..).zip(&assembly.part_of_point).for_each(|(v, &part)| floats[part as usize].push(v));
+    floats.iter_mut().filter(|f| f.iter().any(|&v| is_held[v as usize])).for_each(Vec::clear);
+    let all = terms.par_iter().zip(motions).zip(floats);
+    all.map(|((terms, motions), floats)| part(params, &row, &points, terms, motions, &floats)).collect()
+}
+
+/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one beside the two.
+fn supports(params: &SurfaceParams, points: &[Vec3], body: &[u32]) -> Vec<Term> {
+    let at = |v: u32| points[v as usize];
+    let farthest = |distance: &dyn Fn(u32) -> f64| {
+        body.iter().copied().max_by(|&x, &y| distance(x).total_cmp(&distance(y)).then(y.cmp(&x)))
+    };
+    let Some(&a) = body.first() else { return Vec::new() };
+    let b = farthest(&|v| at(v).distance_squared(at(a))).unwrap_or(a);
+    let along = (at(b) - at(a)).normalize_or(Vec3::X);
+    let c = farthest(&|v| (at(v) - at(a)).reject_from_normalized(along).length_squared()).unwrap_or(a);
+    let aside = (at(c) - at(a)).reject_from_normalized(along).normalize_or(along.any_orthonormal_vector());
+    let up = along.cross(aside);
+    let held = [(a, along), (a, aside), (a, up), (b, aside), (b, up), (c, up)];
+    let stiffness = SUPPORT_SHARE * params.material.youngs_modulus_mpa * params.wall_mm;
+    held.map(|corner| Term { corners: vec![corner], stiffness }).to_vec()
+}
+
+/// What a stiffness between motions becomes when the body floats on soft springs instead of its supports: with the body's
+/// rigid motions `R` and the springs `G`, `S − S R (G + Rᵀ S R)⁻¹ Rᵀ S`.
+fn floating(stiffness: &DMatrix<f64>, rigid: &DMatrix<f64>, ground_n_mm: f64) -> Option<DMatrix<f64>> {
+    let carried = stiffness * rigid;
+    let mut small = rigid.transpose() * &carried;
+    (0..6).for_each(|i| small[(i, i)] += ground_n_mm);
+    let solved = small.cholesky()?.solve(&carried.transpose());
+    let free = stiffness - carried * solved;
+    Some(0.5 * (&free + free.transpose()))
 }
 
 /// The row of each point's x within its part; `None` where it is held.
@@ -81,12 +119,15 @@ fn rows_by_part(assembly: &ShellAssembly, is_held: &[bool]) -> Vec<Option<u32>> 
 fn part(
     params: &SurfaceParams,
     row: &[Option<u32>],
+    points: &[Vec3],
     terms: &[Term],
     motions: Vec<(u32, Vec<(u32, Vec3)>)>,
+    floats: &[u32],
 ) -> Result<Part, SparseError> {
-    let corners = terms.iter().flat_map(|t| &t.corners).chain(motions.iter().flat_map(|m| &m.1));
+    let supports = supports(params, points, floats);
+    let corners = terms.iter().chain(&supports).flat_map(|t| &t.corners).chain(motions.iter().flat_map(|m| &m.1));
     let n = corners.filter_map(|c| row[c.0 as usize]).max().map_or(0, |r| r as usize + 3);
-    let factor = Cholesky::new(&mesh_stiffness(params, n, row, terms))?;
+    let factor = Cholesky::new(&mesh_stiffness(n, row, terms.iter().chain(&supports)))?;
     let m = motions.len();
     let mut sides = vec![0.0; n * m];
     for (side, (_, gradient)) in sides.chunks_exact_mut(n.max(1)).zip(&motions) {
@@ -101,13 +142,26 @@ fn part(
         compliance[(i, i)] += LEAST_COMPLIANCE / params.contact_n_mm(1.0);
     }
     let symmetric = 0.5 * (&compliance + compliance.transpose());
-    let inverse = symmetric.cholesky().ok_or(SparseError::NotPositiveDefinite { n: m })?.inverse();
-    Ok(Part { rows: motions.into_iter().map(|m| m.0).collect(), stiffness: inverse })
+    let indefinite = || SparseError::NotPositiveDefinite { n: m };
+    let mut stiffness = symmetric.cholesky().ok_or_else(indefinite)?.inverse();
+    if !floats.is_empty() {
+        let ground = GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm * floats.len() as f64;
+        let rigid = DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &motions[i].1, j));
+        stiffness = floating(&stiffness, &rigid, ground).ok_or_else(indefinite)?;
+    }
+    Ok(Part { rows: motions.into_iter().map(|m| m.0).collect(), stiffness })
 }
 
-fn mesh_stiffness(params: &SurfaceParams, n: usize, row: &[Option<u32>], terms: &[Term]) -> SparseSymmetric {
-    let ground = GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm;
-    let mut entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|r| (r, r, ground)).collect();
+/// What a motion's gradient sees of rigid motion `j`: a shift, or a turn about an axis through the origin.
+fn rigid_motion(points: &[Vec3], gradient: &[(u32, Vec3)], j: usize) -> f64 {
+    let axis = Vec3::AXES[j % 3];
+    let moved = |v: u32| if j < 3 { axis } else { axis.cross(points[v as usize]) / RADIUS_MM };
+    gradient.iter().map(|&(v, g)| g.dot(moved(v))).sum()
+}
+
+fn mesh_stiffness<'a>(n: usize, row: &[Option<u32>], terms: impl Iterator<Item = &'a Term>) -> SparseSymmetric {
+    // A point of no triangle, if there is one, has no stiffness of its own.
+    let mut entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|r| (r, r, f64::MIN_POSITIVE)).collect();
     for term in terms {
         let free = |&(p, g): &(u32, Vec3)| row[p as usize].map(|r| (r, g));
         let corners: Vec<(u32, Vec3)> = term.corners.iter().filter_map(free).collect();
