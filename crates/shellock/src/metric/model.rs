@@ -1,6 +1,6 @@
 //! The segmented surface as parts and stations, and what a plan makes of them.
 
-use shellock_geom::remesh::{RemeshParams, remesh};
+use shellock_geom::remesh::{RemeshParams, Remeshed, remesh};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::topology::ends;
 use shellock_geom::{Topology, TriMesh, Vec3};
@@ -78,7 +78,8 @@ impl PlanModel {
         let area_mm2 = surface.mesh.area();
         let target_edge_mm = params.edge_share * (area_mm2 / (POINTS_AT_ONE * 0.75f64.sqrt())).sqrt();
         let labels: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
-        let coarse = remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, &surface.mesh, &labels);
+        let mut coarse = remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, &surface.mesh, &labels);
+        split_short_seams(&mut coarse);
         Self::of_mesh(params, &coarse.mesh, &coarse.labels, surface.n_patches)
     }
 
@@ -103,23 +104,33 @@ impl PlanModel {
     }
 
     /// Adds the stations of a seam, patch a on its left: all points but the ends; of a loop all points once.
+    ///
+    /// Lengths are those on the inner side of the wall, where connectors are.
     fn add_seam(&mut self, [a, b]: [PatchId; 2], points: &[(Vec3, Vec3, [u32; 2])]) {
+        /// Share of a station's stretch that must be far enough from the ends for a connector, against rounding.
+        const LEAST_SHARE: f64 = 1e-6;
         let n = points.len() - 1;
         let is_loop = points[0].2 == points[n].2;
         let inner = |i: usize| points[i].0 - self.params.wall_mm * points[i].1;
         let mut arc_mm = vec![0.0; n + 1];
         (0..n).for_each(|i| arc_mm[i + 1] = arc_mm[i] + inner(i).distance(inner(i + 1)));
         let margin = if is_loop { 0.0 } else { end_gap_mm(self.params.connector_mm, arc_mm[n]) };
+        let before_mm = |i: usize| if i > 0 { arc_mm[i - 1] } else { arc_mm[n - 1] - arc_mm[n] };
         let first = self.assembly.stations.len() as u32;
         for i in usize::from(!is_loop)..n {
             let (before, after) = (points[if i > 0 { i - 1 } else { n - 1 }], points[i + 1]);
             let (place, normal, copies) = points[i];
             let tangent =
                 (after.0 - before.0).reject_from_normalized(normal).normalize_or(normal.any_orthonormal_vector());
-            let length_mm = 0.5 * (place.distance(before.0) + after.0.distance(place));
             let across = tangent.cross(normal);
+            // A station stands for the seam up to halfway to the next ones, at the ends of open seams for all that is left.
+            let half = |from: f64, to: f64| 0.5 * (from + to);
+            let start = if is_loop || i > 1 { half(arc_mm[i], before_mm(i)) } else { 0.0 };
+            let end = if is_loop || i + 1 < n { half(arc_mm[i], arc_mm[i + 1]) } else { arc_mm[n] };
+            let joined_mm = end.min(arc_mm[n] - margin) - start.max(margin);
+            let has_room = is_loop || joined_mm > LEAST_SHARE * (end - start);
+            let length_mm = if has_room && !is_loop { joined_mm } else { end - start };
             self.assembly.stations.push(Station { points: copies, tangent, normal, across, length_mm });
-            let has_room = arc_mm[i] >= margin && arc_mm[i] <= arc_mm[n] - margin;
             self.seams.push(StationSeam { a, b, has_room });
         }
         let last = self.assembly.stations.len() as u32;
@@ -167,6 +178,44 @@ impl PlanModel {
     /// The surface metric's solver.
     pub fn surface_model(&self) -> Result<SurfaceModel, SparseError> {
         SurfaceModel::new(&self.params.surface(), &self.assembly)
+    }
+}
+
+/// Splits edges of seams that have fewer than three, the longest first: two stations are the least that hold a turn.
+fn split_short_seams(coarse: &mut Remeshed) {
+    const LEAST_EDGES: usize = 3;
+    let topology = Topology::of_mesh(&coarse.mesh).expect("a remeshed surface is closed");
+    let seam = seam_half_edges(&topology, &coarse.labels, 0..coarse.labels.len() as u32);
+    let mut edges: Vec<(u32, u32, usize)> = Vec::new();
+    for s in stretches(&coarse.mesh, &topology, &coarse.labels, &seam) {
+        if s.half_edges.len() < LEAST_EDGES {
+            let n_parts = LEAST_EDGES.div_ceil(s.half_edges.len());
+            edges.extend(s.half_edges.iter().map(|&h| ends(&coarse.mesh, h)).map(|(u, v)| (u, v, n_parts)));
+        }
+    }
+    for (u, v, n_parts) in edges {
+        let [from, to] = [u, v].map(|x| coarse.mesh.points[x as usize]);
+        let mut last = u;
+        for k in 1..n_parts {
+            let middle = coarse.mesh.points.len() as u32;
+            coarse.mesh.points.push(from.lerp(to, k as f64 / n_parts as f64));
+            split_edge(coarse, last, v, middle);
+            last = middle;
+        }
+    }
+}
+
+/// Puts point `middle` on the edge between `u` and `v`: each triangle at it becomes two.
+fn split_edge(coarse: &mut Remeshed, u: u32, v: u32, middle: u32) {
+    for i in 0..coarse.mesh.triangles.len() {
+        let triangle = coarse.mesh.triangles[i];
+        let Some(at) = (0..3).find(|&k| [(u, v), (v, u)].contains(&(triangle[k], triangle[(k + 1) % 3]))) else {
+            continue;
+        };
+        let [x, y, z] = [0, 1, 2].map(|k| triangle[(at + k) % 3]);
+        coarse.mesh.triangles[i] = [x, middle, z];
+        coarse.mesh.triangles.push([middle, y, z]);
+        coarse.labels.push(coarse.labels[i]);
     }
 }
 
