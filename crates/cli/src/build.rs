@@ -117,6 +117,13 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
     if let Some(proof) = &made.proof {
         println!("{}", quality(proof));
     }
+    if let Some(weakest) = made.holding.as_ref().and_then(|h| h.seams.first()) {
+        let [x, y, z] = weakest.at;
+        println!(
+            "weakest seam: pieces {} and {} open by {:.2} mm at 10 N/m at ({x:.1}, {y:.1}, {z:.1}) mm: {}",
+            weakest.later, weakest.earlier, weakest.opening_mm, weakest.reason
+        );
+    }
     println!("connectors on {:.0} % of the seam length that fits any", 100.0 * summary.connector_share);
     print_verdict(&made.verification);
     for w in warnings {

@@ -191,6 +191,7 @@ fn plan_json(
         "key_piece": plan.key(),
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
         "plan": design.proof,
+        "holding": design.holding,
         "volume_ratio": summary.volume_ratio,
         "connector_share": summary.connector_share,
         "pieces": pieces, "joints": joints, "contacts": contacts,
@@ -236,11 +237,11 @@ fn report(
             installation_direction: stand(-plan.separation(p).unit()).to_array(),
             order: plan.position(p),
             is_key: plan.key() == p,
-            facts: vec![("volume".into(), format!("{:.1} cm³", standing[p.0 as usize].signed_volume() / 1000.0))],
+            facts: piece_facts(design, p, standing[p.0 as usize].signed_volume() / 1000.0),
         })
         .collect();
     let size = model.solid.mesh().bounds().size();
-    let facts = vec![
+    let mut facts: Vec<(String, String)> = vec![
         ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
         ("pieces".into(), design.pieces.len().to_string()),
         ("wall".into(), format!("{} mm", params.body.thickness_mm)),
@@ -249,6 +250,7 @@ fn report(
         ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
         ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
     ];
+    facts.extend(plan_facts(design));
     let checks = design
         .verification
         .checks
@@ -257,4 +259,28 @@ fn report(
         .collect();
     let data = ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings };
     rayon::join(|| html(&data).into_bytes(), || pieces_picture(&data.pieces).png())
+}
+
+/// What a person wants to know of the plan: how good it is, and where it is weakest.
+fn plan_facts(design: &Design) -> Vec<(String, String)> {
+    let proof = design.proof.map(|p| {
+        let how = if p.optimal { "proven best for this key".into() } else { format!("within {:.0} %", 100.0 * p.gap) };
+        ("plan's cost".into(), format!("{:.2}, {how}", p.cost))
+    });
+    let weakest = design.holding.as_ref().and_then(|h| h.seams.first()).map(|s| {
+        let figure = format!("{} and {}: opens {:.2} mm at 10 N/m; {}", s.later, s.earlier, s.opening_mm, s.reason);
+        ("weakest seam".into(), figure)
+    });
+    proof.into_iter().chain(weakest).collect()
+}
+
+/// A piece's volume, and how each of its seams holds.
+fn piece_facts(design: &Design, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
+    let mut facts = vec![("volume".to_owned(), format!("{volume_cm3:.1} cm³"))];
+    let seams = design.holding.iter().flat_map(|h| &h.seams);
+    for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
+        let other = if s.later == piece { s.earlier } else { s.later };
+        facts.push((format!("seam with {other}"), format!("opens {:.2} mm at 10 N/m", s.opening_mm)));
+    }
+    facts
 }

@@ -4,8 +4,10 @@
 //! A plan makes a joint of each station that can carry a connector; the solvers of `shellock-mechanics` then say how far
 //! the seams open. The quality `Q = −max w d` is in mm at the separation force of 10 N/m; higher is better.
 
+mod choice;
 mod model;
 #[cfg(test)]
 mod tests;
 
+pub use choice::{ChoiceError, Holding, SeamHolding, choose};
 pub use model::{MetricParams, PlanModel};

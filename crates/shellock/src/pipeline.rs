@@ -8,12 +8,14 @@ use shellock_geom::{Aabb, Solid, TriMesh};
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, has_no_bar};
 use crate::feedback::{Lesson, lessons};
+use crate::metric::{ChoiceError, Holding};
 use crate::piece::{Joint, PieceError};
 use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanProof, PlanSurvey};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
-    Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece, plan, segmentation, verify,
+    Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, metric, piece, plan, segmentation,
+    verify,
 };
 
 /// Everything that may be set. Each stage's parameters are declared beside it.
@@ -86,6 +88,8 @@ pub struct Design {
     pub plan: InstallationPlan,
     /// How good the plan is; `None` where it was given and not searched.
     pub proof: Option<PlanProof>,
+    /// How it holds by simulation, and where it is weak; `None` where its plan was given.
+    pub holding: Option<Holding>,
     /// One printable mesh a piece, in assembled position, mm.
     pub pieces: IdVec<PatchId, TriMesh>,
     /// Connector runs and how they came out.
@@ -123,12 +127,24 @@ pub enum DesignError {
     /// The wall cannot be split.
     #[error(transparent)]
     Body(#[from] BodyError),
+    /// Plans cannot be compared.
+    #[error(transparent)]
+    Choice(ChoiceError),
     /// A piece cannot be finished.
     #[error(transparent)]
     Piece(#[from] PieceError),
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<ChoiceError> for DesignError {
+    fn from(e: ChoiceError) -> Self {
+        match e {
+            ChoiceError::Cancelled(c) => c.into(),
+            other => Self::Choice(other),
+        }
+    }
 }
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds
@@ -259,6 +275,7 @@ fn with_segmentation(
                 return Ok(Attempt::Failed { reason, blockers, blamed, loose });
             }
         };
+        let (found, holding) = metric::choose(ctx, &params.plan, surface, *found)?;
         ctx.stage("distances to the patches", 0)?;
         let distances = distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
         let proof = Some(found.proof());
@@ -271,7 +288,7 @@ fn with_segmentation(
                 n_blocked += 1;
                 continue;
             }
-            made => Design { proof, ..made? },
+            made => Design { proof, holding: Some(holding), ..made? },
         };
         kit += 1;
         let learned: Vec<Lesson> = lessons(&design, params);
@@ -316,6 +333,7 @@ pub fn make(
         surface: surface.clone(),
         plan,
         proof: None,
+        holding: None,
         pieces: finished.meshes,
         joints: finished.joints,
         contacts,

@@ -119,7 +119,7 @@ impl PlanModel {
         let first = self.assembly.stations.len() as u32;
         for i in usize::from(!is_loop)..n {
             let (before, after) = (points[if i > 0 { i - 1 } else { n - 1 }], points[i + 1]);
-            let (place, normal, copies) = points[i];
+            let (_, normal, copies) = points[i];
             let tangent =
                 (after.0 - before.0).reject_from_normalized(normal).normalize_or(normal.any_orthonormal_vector());
             let across = tangent.cross(normal);

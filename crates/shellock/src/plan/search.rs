@@ -22,7 +22,8 @@ use super::local_cost::{PieceCosts, SeamCosts};
 use super::pool::{MOST_PLANS, Pool};
 use super::space::Space;
 use super::{
-    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanSurvey, RankedPlan, diagnose,
+    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey, RankedPlan,
+    diagnose,
 };
 use crate::{Cancelled, Ctx, Warning};
 
@@ -211,7 +212,8 @@ fn with_key(
         vary(ctx, space, key, &mut pool, &mut stream(params.seed, usize::MAX >> 1));
         ctx.check()?;
     }
-    let ranked = |(score, plan): &(_, InstallationPlan)| RankedPlan::new(plan.clone(), score);
+    let ranked =
+        |(score, plan): &(PlanScore, InstallationPlan)| RankedPlan { plan: plan.clone(), score: score.clone() };
     let (score, plan) = pool.best().expect("a plan was drawn").clone();
     Ok(Ok(FoundPlan {
         is_optimal: lower_bound >= score.worst,

@@ -88,17 +88,8 @@ pub struct Blocker {
 pub struct RankedPlan {
     /// The plan.
     pub plan: InstallationPlan,
-    /// Cost of its worst piece.
-    pub cost: f64,
-    /// Mean cost of its pieces.
-    pub mean_cost: f64,
-}
-
-impl RankedPlan {
-    /// `plan` with the two figures of its score.
-    pub fn new(plan: InstallationPlan, score: &PlanScore) -> Self {
-        Self { plan, cost: score.worst, mean_cost: score.mean }
-    }
+    /// Its cost, which is that of its worst piece, and the cost of every piece.
+    pub score: PlanScore,
 }
 
 /// The best plan found, and how good any other with the same choice of key can be.

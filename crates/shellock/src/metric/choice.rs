@@ -1,0 +1,167 @@
+//! The plan that holds best among those that the search cannot tell apart, and what is weak about it (Sect. 6.2).
+
+use serde::{Deserialize, Serialize};
+use shellock_geom::sparse::SparseError;
+use shellock_mechanics::{Meeting, Opening, Resistance};
+
+use super::{MetricParams, PlanModel};
+use crate::plan::{FoundPlan, InstallationPlan, PlanParams, RankedPlan};
+use crate::{Cancelled, Ctx, PatchId, SegmentedSurface, Warning};
+
+/// Plans whose cost is within this share of the best one's are compared by simulation.
+///
+/// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins hold), so it
+/// decides among plans of about the same cost only.
+const COST_SLACK: f64 = 0.05;
+
+/// Share of `s` along the seam, or towards the earlier piece, from which that is named as the reason why a seam is weak.
+const ALONG_SHARE: f64 = 0.7;
+const BACKWARD_SHARE: f64 = 0.5;
+
+/// How a plan resists the separation force of 10 N/m, by the surface metric.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Holding {
+    /// `Q = −max w d`, mm; higher is better. `None` where pieces come apart in the simulation.
+    pub quality_mm: Option<f64>,
+    /// Pieces that come apart in the simulation, which knows no friction but the key's; empty where all hold.
+    pub loose: Vec<PatchId>,
+    /// The seams, weakest first; those without a connector are left out.
+    pub seams: Vec<SeamHolding>,
+    /// Plans that were compared.
+    pub n_compared: usize,
+}
+
+/// How one pair of pieces resists.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeamHolding {
+    /// The piece installed later.
+    pub later: PatchId,
+    /// The other one.
+    pub earlier: PatchId,
+    /// `max w d` along the seam, mm.
+    pub score_mm: f64,
+    /// How far it opens there, mm.
+    pub opening_mm: f64,
+    /// Weight `w` of Eq. 4 there.
+    pub weight: f64,
+    /// The place, mm in assembly space.
+    pub at: [f64; 3],
+    /// Why it is weak there, for people.
+    pub reason: String,
+}
+
+/// Simulates the plans of the pool that cost about as little as the best one; the chosen plan takes the place of `found`'s.
+///
+/// Warns with `comes-apart` where none of them holds without friction.
+pub fn choose(
+    ctx: &Ctx<'_>,
+    params: &PlanParams,
+    surface: &SegmentedSurface,
+    found: FoundPlan,
+) -> Result<(FoundPlan, Holding), ChoiceError> {
+    ctx.stage("which plan holds best", 0)?;
+    let model = PlanModel::new(&MetricParams::of_plan(params), surface);
+    let limit = found.score.worst * (1.0 + COST_SLACK);
+    let plans: Vec<&RankedPlan> = found.pool.iter().filter(|p| p.score.worst <= limit).collect();
+    let meetings: Vec<Vec<Meeting>> = plans.iter().map(|p| model.meetings(&p.plan)).collect();
+    let key = found.plan.key();
+    ctx.check()?;
+    let solved = model.surface_model()?.resist_all(&meetings, key.0)?;
+    let quality = |i: usize| match &solved[i].resistance {
+        Resistance::Holds(opening) => opening.quality_mm,
+        Resistance::Separable(parts) => -1e3 * parts.len() as f64,
+    };
+    // The earlier of equals, which costs less.
+    let best = (0..plans.len()).reduce(|best, i| if quality(i) > quality(best) { i } else { best });
+    let Some(best) = best else { return Err(ChoiceError::NoPlan) };
+    let holding = holding(&model, &plans[best].plan, &meetings[best], &solved[best].resistance, plans.len());
+    if !holding.loose.is_empty() {
+        warn_of_loose(ctx, &holding.loose);
+    }
+    let chosen = plans[best].clone();
+    let is_optimal = found.is_optimal && best == 0;
+    Ok((FoundPlan { plan: chosen.plan, score: chosen.score, is_optimal, ..found }, holding))
+}
+
+fn warn_of_loose(ctx: &Ctx<'_>, loose: &[PatchId]) {
+    let names: Vec<String> = loose.iter().map(ToString::to_string).collect();
+    ctx.warn(Warning {
+        code: "comes-apart".into(),
+        message: format!("in the simulation without friction these pieces can be pulled apart: {}", names.join(", ")),
+        pieces: loose.to_vec(),
+        at: None,
+    });
+}
+
+/// Puts the stations' openings together by pairs of pieces.
+fn holding(
+    model: &PlanModel,
+    plan: &InstallationPlan,
+    meetings: &[Meeting],
+    resistance: &Resistance,
+    n_compared: usize,
+) -> Holding {
+    let (opening, loose) = match resistance {
+        Resistance::Holds(opening) => (opening, Vec::new()),
+        Resistance::Separable(parts) => {
+            let loose = parts.iter().map(|&p| PatchId(p)).collect();
+            return Holding { quality_mm: None, loose, seams: Vec::new(), n_compared };
+        }
+    };
+    let mut seams = weakest_places(model, plan, meetings, opening);
+    seams.sort_by(|x, y| y.score_mm.total_cmp(&x.score_mm).then((x.later, x.earlier).cmp(&(y.later, y.earlier))));
+    Holding { quality_mm: Some(opening.quality_mm), loose, seams, n_compared }
+}
+
+/// The weakest place of every pair of pieces that has a connector.
+fn weakest_places(
+    model: &PlanModel,
+    plan: &InstallationPlan,
+    meetings: &[Meeting],
+    opening: &Opening,
+) -> Vec<SeamHolding> {
+    let mut worst: std::collections::BTreeMap<[PatchId; 2], (usize, f64)> = std::collections::BTreeMap::new();
+    for (i, (meeting, d)) in meetings.iter().zip(&opening.opening_mm).enumerate() {
+        if let Some(joint) = meeting.joint {
+            let entry = worst.entry(model.pieces_at(i)).or_insert((i, joint.weight * d));
+            if joint.weight * d > entry.1 {
+                *entry = (i, joint.weight * d);
+            }
+        }
+    }
+    let seam = |([a, b], (station, score_mm)): ([PatchId; 2], (usize, f64))| {
+        let (later, earlier) = if plan.position(a) > plan.position(b) { (a, b) } else { (b, a) };
+        let weight = meetings[station].joint.map_or(0.0, |j| j.weight);
+        let at = model.place_of(station).to_array();
+        let reason = reason(model, plan, station, [later, earlier]);
+        SeamHolding { later, earlier, score_mm, opening_mm: opening.opening_mm[station], weight, at, reason }
+    };
+    worst.into_iter().map(seam).collect()
+}
+
+fn reason(model: &PlanModel, plan: &InstallationPlan, station: usize, [later, earlier]: [PatchId; 2]) -> String {
+    let s = plan.separation(later).unit();
+    let frame = &model.assembly.stations[station];
+    let across = if later == model.pieces_at(station)[0] { frame.across } else { -frame.across };
+    if s.dot(frame.tangent).abs() >= ALONG_SHARE {
+        format!("the direction of piece {later} runs along the seam, so the connector is shallow")
+    } else if s.dot(across) >= BACKWARD_SHARE {
+        format!("piece {later} leaves towards piece {earlier}, so the connector leans backward")
+    } else {
+        format!("piece {later} bends away from piece {earlier} here, far from what holds it back")
+    }
+}
+
+/// Why no plan was chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ChoiceError {
+    /// The search's pool is empty.
+    #[error("there is no plan to choose from")]
+    NoPlan,
+    /// The simulation's system could not be solved.
+    #[error("the simulation of the seams cannot be solved: {0}")]
+    Solve(#[from] SparseError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
