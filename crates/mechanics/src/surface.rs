@@ -150,7 +150,14 @@ impl SurfaceModel {
 
     /// How well one plan resists.
     pub fn resist(&self, plan: &[Meeting], held: u32) -> Result<SurfaceSolution, SparseError> {
-        solve::solve(self, plan, Some(held), &self.pulls(plan))
+        let is_held: Vec<bool> = (0..self.parts.len()).map(|p| p == held as usize).collect();
+        solve::solve(self, plan, &is_held, &self.pulls(plan))
+    }
+
+    /// How well part `free` resists alone, all others fixed.
+    pub fn resist_alone(&self, plan: &[Meeting], free: u32) -> Result<SurfaceSolution, SparseError> {
+        let is_held: Vec<bool> = (0..self.parts.len()).map(|p| p != free as usize).collect();
+        solve::solve(self, plan, &is_held, &self.pulls(plan))
     }
 
     /// The separation force on side a of each station, N.
@@ -164,7 +171,7 @@ impl SurfaceModel {
     /// The answer to given forces, N, on the tips of side a at each station and, the other way, of side b; with no part
     /// fixed but the held points.
     pub fn respond(&self, plan: &[Meeting], pulls: &[Vec3]) -> Result<SurfaceSolution, SparseError> {
-        solve::solve(self, plan, None, pulls)
+        solve::solve(self, plan, &[], pulls)
     }
 }
 

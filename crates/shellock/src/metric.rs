@@ -5,9 +5,11 @@
 //! the seams open. The quality `Q = −max w d` is in mm at the separation force of 10 N/m; higher is better.
 
 mod choice;
+mod data_driven;
 mod model;
 #[cfg(test)]
 mod tests;
 
 pub use choice::{ChoiceError, Holding, SeamHolding, choose};
+pub use data_driven::{data_driven, pieces_alone};
 pub use model::{MetricParams, PlanModel};

@@ -78,14 +78,14 @@ fn contacts(model: &SurfaceModel, plan: &[Meeting]) -> Vec<Contact> {
 pub(super) fn solve(
     model: &SurfaceModel,
     plan: &[Meeting],
-    held: Option<u32>,
+    is_held: &[bool],
     pulls: &[Vec3],
 ) -> Result<SurfaceSolution, SparseError> {
     let (contacts, force) = (contacts(model, plan), forces(model, plan, pulls));
-    let rigid = stiffness_of_parts(model, held);
+    let rigid = stiffness_of_parts(model, is_held);
     let (moved, n_iterations, error) = minimise(model, &rigid, &contacts, &force)?;
     let opening = rated(model, plan, &moved);
-    let lost = lost_parts(model, held, &opening);
+    let lost = lost_parts(model, is_held, &opening);
     let resistance = if lost.is_empty() { Resistance::Holds(opening) } else { Resistance::Separable(lost) };
     Ok(SurfaceSolution { resistance, n_iterations, error })
 }
@@ -95,17 +95,17 @@ pub(super) fn solve(
 pub(super) fn moved(
     model: &SurfaceModel,
     plan: &[Meeting],
-    held: Option<u32>,
+    is_held: &[bool],
     pulls: &[Vec3],
 ) -> Result<Vec<f64>, SparseError> {
     let (contacts, force) = (contacts(model, plan), forces(model, plan, pulls));
-    Ok(minimise(model, &stiffness_of_parts(model, held), &contacts, &force)?.0)
+    Ok(minimise(model, &stiffness_of_parts(model, is_held), &contacts, &force)?.0)
 }
 
 /// Energy of motions with nothing but held points fixed, N mm.
 #[cfg(test)]
 pub(super) fn energy(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3], moved: &[f64]) -> f64 {
-    let parts = 0.5 * dot(&stiffness_of_parts(model, None).times(moved), moved);
+    let parts = 0.5 * dot(&stiffness_of_parts(model, &[]).times(moved), moved);
     let of_contact = |c: &Contact| {
         let value = if c.is_one_sided { c.value(moved).min(0.0) } else { c.value(moved) };
         0.5 * c.stiffness * value * value
@@ -125,13 +125,13 @@ fn forces(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3]) -> Vec<f64> {
     force
 }
 
-/// The parts' own stiffness; the held part's motions are tied to their place.
-fn stiffness_of_parts(model: &SurfaceModel, held: Option<u32>) -> SparseSymmetric {
+/// The parts' own stiffness; those of parts that are held tie their motions to their place.
+fn stiffness_of_parts(model: &SurfaceModel, is_held: &[bool]) -> SparseSymmetric {
     let mut matrix = model.pattern.clone();
     let values = matrix.values_mut();
-    for (i, (part, places)) in (0..).zip(model.parts.iter().zip(&model.places)) {
+    for (i, (part, places)) in model.parts.iter().zip(&model.places).enumerate() {
         let m = part.rows.len();
-        if Some(i) == held {
+        if is_held.get(i).is_some_and(|h| *h) {
             let tie = HELD_SHARE * model.params.contact_n_mm(1.0);
             (0..m).for_each(|j| values[places[j * (j + 3) / 2] as usize] += tie);
         } else {
@@ -222,13 +222,13 @@ fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[f64]) -> Opening {
     Opening::rated(plan, model.assembly.stations.iter().zip(plan).enumerate().map(opening).collect())
 }
 
-/// The parts at stations that opened too far, the held one left out, ascending.
-fn lost_parts(model: &SurfaceModel, held: Option<u32>, opening: &Opening) -> Vec<u32> {
+/// The parts at stations that opened too far, held ones left out, ascending.
+fn lost_parts(model: &SurfaceModel, is_held: &[bool], opening: &Opening) -> Vec<u32> {
     let lost_mm = LOST_SIZES * model.params.connector_mm;
     let lost = |(station, d): (&Station, &f64)| (!(*d < lost_mm)).then_some(station.points);
     let points = model.assembly.stations.iter().zip(&opening.opening_mm).filter_map(lost).flatten();
     let mut parts: Vec<u32> = points.map(|p| model.assembly.part_of_point[p as usize]).collect();
-    parts.retain(|p| Some(*p) != held);
+    parts.retain(|p| !is_held.get(*p as usize).is_some_and(|h| *h));
     parts.sort_unstable();
     parts.dedup();
     parts

@@ -68,6 +68,8 @@ struct StationSeam {
     b: PatchId,
     /// Whether it is far enough from the ends of an open seam for a connector.
     has_room: bool,
+    /// First and last point of the seam.
+    ends: [Vec3; 2],
 }
 
 impl PlanModel {
@@ -131,7 +133,7 @@ impl PlanModel {
             let has_room = is_loop || joined_mm > LEAST_SHARE * (end - start);
             let length_mm = if has_room && !is_loop { joined_mm } else { end - start };
             self.assembly.stations.push(Station { points: copies, tangent, normal, across, length_mm });
-            self.seams.push(StationSeam { a, b, has_room });
+            self.seams.push(StationSeam { a, b, has_room, ends: [points[0].0, points[n].0] });
         }
         let last = self.assembly.stations.len() as u32;
         self.assembly.steps.extend((first + 1..last).map(|i| [i - 1, i]));
@@ -161,6 +163,11 @@ impl PlanModel {
     /// The two pieces at a station.
     pub fn pieces_at(&self, station: usize) -> [PatchId; 2] {
         [self.seams[station].a, self.seams[station].b]
+    }
+
+    /// The ends of the station's seam, mm; the same point twice where it is a loop.
+    pub fn seam_ends(&self, station: usize) -> [Vec3; 2] {
+        self.seams[station].ends
     }
 
     /// The place of a station on the outer surface, mm.

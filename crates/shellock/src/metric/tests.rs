@@ -60,3 +60,29 @@ fn a_ball_whose_octants_all_leave_outwards_holds_and_one_whose_pieces_slide_off_
     let up = solver.resist(&model.meetings(&plan(|_| Vec3::Z)), 7).unwrap();
     assert!(matches!(up.resistance, Resistance::Separable(_)), "all along one direction: {up:?}");
 }
+
+#[test]
+fn a_piece_opens_no_farther_with_its_neighbours_held_than_free() {
+    let model = octants();
+    let solver = model.surface_model().unwrap();
+    let meetings = model.meetings(&plan(outwards));
+    let Resistance::Holds(all) = solver.resist(&meetings, 7).unwrap().resistance else { panic!("it holds") };
+    let alone = pieces_alone(&model, &solver, &meetings, PatchId(7)).unwrap().unwrap();
+    assert!(alone < 0.0 && alone >= all.quality_mm, "{alone} {}", all.quality_mm);
+}
+
+#[test]
+fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction() {
+    // Whatever holds a piece elsewhere: this is what the maximum of Eq. 6 hides.
+    let model = octants();
+    let tests = crate::plan::local_tests::LocalTests::simulate(&model.params.surface()).unwrap();
+    let meetings = model.meetings(&plan(outwards));
+    let quality = data_driven(&model, &tests, &meetings);
+    for (station, meeting) in model.assembly.stations.iter().zip(&meetings) {
+        let Some(joint) = meeting.joint else { continue };
+        let (tangent, normal, across) = (station.tangent, station.normal, station.across);
+        let frame = crate::plan::contact::SeamFrame { tangent, normal, across };
+        let own = tests.opening_mm(&frame, joint.pull_on_a, joint.pull_on_a);
+        assert!(-quality >= joint.weight * own - 1e-12 && own > 0.0);
+    }
+}

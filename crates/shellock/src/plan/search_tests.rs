@@ -186,10 +186,10 @@ fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
     let relations: std::collections::BTreeSet<_> = found.pool.iter().map(|r| space.relations(&r.plan)).collect();
     assert_eq!(relations.len(), found.pool.len());
     assert!(found.pool.len() > 50 && found.pool[0].plan == found.plan);
-    assert!(found.pool.is_sorted_by(|x, y| x.cost <= y.cost + 1e-8));
+    assert!(found.pool.is_sorted_by(|x, y| x.score.worst <= y.score.worst + 1e-8));
     for ranked in &found.pool {
         assert!(space.allows(&ranked.plan));
-        assert_eq!(ranked.cost, space.score(&ranked.plan).worst);
+        assert_eq!(ranked.score.worst, space.score(&ranked.plan).worst);
     }
 }
 
