@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -139,7 +140,17 @@ impl SparseSymmetric {
         let l = factor.trailing(first_kept)?;
         let mut schur = Mat::<f64>::zeros(n_kept, n_kept);
         let (lower, upper) = (BlockStructure::TriangularLower, BlockStructure::TriangularUpper);
-        matmul(schur.as_mut(), lower, Accum::Replace, l.as_ref(), lower, l.transpose(), upper, 1.0, Par::Seq);
+        triangular::matmul(
+            schur.as_mut(),
+            lower,
+            Accum::Replace,
+            l.as_ref(),
+            lower,
+            l.transpose(),
+            upper,
+            1.0,
+            Par::Seq,
+        );
         Ok((0..n_kept * n_kept)
             .map(|at| {
                 let (row, column) = (at % n_kept, at / n_kept);
@@ -160,6 +171,9 @@ impl EliminationOrder {
     }
 }
 
+/// Columns that one thread works on: enough for dense products at full speed, and several panels in a front of a part.
+const PANEL: usize = 192;
+
 /// Eliminates the first `n_eliminated` rows and columns of the dense symmetric `n × n` matrix whose lower triangle `values`
 /// holds by columns, and leaves, in that triangle, the factor L of what is eliminated, `B L⁻ᵀ` below it, and the Schur complement.
 ///
@@ -170,7 +184,7 @@ impl EliminationOrder {
 /// Where `values` has not `n²` entries or `n_eliminated` exceeds `n`.
 pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> Result<(), SparseError> {
     let matrix = MatMut::from_column_major_slice_mut(values, n, n);
-    let (mut pivot, _, mut below, mut rest) = matrix.split_at_mut(n_eliminated, n_eliminated);
+    let (mut pivot, _, mut below, rest) = matrix.split_at_mut(n_eliminated, n_eliminated);
     let mut memory = MemBuffer::try_new(cholesky_in_place_scratch::<f64>(n_eliminated, Par::Seq, Default::default()))
         .map_err(|_| SparseError::TooLarge { n })?;
     cholesky_in_place(
@@ -181,10 +195,27 @@ pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> R
         Default::default(),
     )
     .map_err(|_| SparseError::NotPositiveDefinite { n })?;
-    solve_lower_triangular_in_place(pivot.as_ref(), below.as_mut().transpose_mut(), Par::Seq);
-    let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    matmul(rest.as_mut(), lower, Accum::Add, below.as_ref(), full, below.as_ref().transpose(), full, -1.0, Par::Seq);
+    for_panels(below.as_mut().transpose_mut(), 0, &|_, panel| {
+        solve_lower_triangular_in_place(pivot.as_ref(), panel, Par::Seq);
+    });
+    let below = below.as_ref();
+    for_panels(rest, 0, &|first, panel| {
+        let n_rows = panel.nrows() - first;
+        let (left, right) = (below.subrows(first, n_rows), below.subrows(first, panel.ncols()));
+        matmul(panel.subrows_mut(first, n_rows), Accum::Add, left, right.transpose(), -1.0, Par::Seq);
+    });
     Ok(())
+}
+
+/// Calls `f` for panels of [`PANEL`] columns with the place of the first, several at once; the same panels on any number of threads.
+fn for_panels(columns: MatMut<'_, f64>, first: usize, f: &(impl Fn(usize, MatMut<'_, f64>) + Sync)) {
+    let n_panels = columns.ncols().div_ceil(PANEL);
+    if n_panels <= 1 {
+        return f(first, columns);
+    }
+    let half = n_panels / 2 * PANEL;
+    let (left, right) = columns.split_at_col_mut(half);
+    rayon::join(|| for_panels(left, first, f), || for_panels(right, first + half, f));
 }
 
 fn symbolic(
