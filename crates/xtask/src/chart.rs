@@ -86,7 +86,12 @@ pub fn scatter(labels: &Labels<'_>, x: &[f64], y: &[f64]) -> Result<String, Fail
 }
 
 /// A line through the medians of each curve in a band from least to greatest; `optimum`, where known, as a dashed line.
-pub fn bands(labels: &Labels<'_>, curves: &[Curve<'_>], optimum: Option<f64>, legend: Corner) -> Result<String, Failure> {
+pub fn bands(
+    labels: &Labels<'_>,
+    curves: &[Curve<'_>],
+    optimum: Option<f64>,
+    legend: Corner,
+) -> Result<String, Failure> {
     let points = || curves.iter().flat_map(|c| &c.points);
     let x = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.x), h.max(p.x)));
     let y = padded(points().flat_map(|p| [p.low, p.high]).chain(optimum));
@@ -116,21 +121,15 @@ pub fn sorted_scores(labels: &Labels<'_>, columns: &[(&str, &[f64])]) -> Result<
         order.sort_by(|&i, &j| first[i].total_cmp(&first[j]));
         order
     });
-    svg(
-        labels,
-        widened(1.0, order.len() as f64),
-        -PADDING..1.0 + PADDING,
-        Some(Corner::LowerRight.into()),
-        |plane| {
-            // The first, which all others are to follow, is drawn last and so on top.
-            for (i, (name, values)) in columns.iter().enumerate().rev() {
-                let values = normalised(values);
-                let line = order.iter().enumerate().filter_map(|(k, &row)| Some((k as f64 + 1.0, *values.get(row)?)));
-                draw_line(plane, name, line.collect(), COLOURS[i % COLOURS.len()])?;
-            }
-            Ok(())
-        },
-    )
+    svg(labels, widened(1.0, order.len() as f64), -PADDING..1.0 + PADDING, Some(Corner::LowerRight.into()), |plane| {
+        // The first, which all others are to follow, is drawn last and so on top.
+        for (i, (name, values)) in columns.iter().enumerate().rev() {
+            let values = normalised(values);
+            let line = order.iter().enumerate().filter_map(|(k, &row)| Some((k as f64 + 1.0, *values.get(row)?)));
+            draw_line(plane, name, line.collect(), COLOURS[i % COLOURS.len()])?;
+        }
+        Ok(())
+    })
 }
 
 /// One line an interval, in their order from above, with a dot where the value was reached.

@@ -107,8 +107,8 @@ pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
 /// Divides the model and surveys the pieces.
 pub fn divide(ctx: &Ctx<'_>, params: &Params, model: &Model, path: &Path) -> Result<Divided, Failure> {
     let fault = |problem: String| Failure::Model { path: path.to_owned(), problem };
-    let surface = segment(ctx, &params.segmentation, &model.solid, model.labels.as_deref())
-        .map_err(|e| fault(e.to_string()))?;
+    let surface =
+        segment(ctx, &params.segmentation, &model.solid, model.labels.as_deref()).map_err(|e| fault(e.to_string()))?;
     let survey =
         survey(ctx, &params.plan, &surface, &surface.seams()).map_err(|_| fault("the study was stopped".into()))?;
     Ok(Divided { surface, survey })

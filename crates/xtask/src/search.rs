@@ -131,12 +131,7 @@ fn of_sizes(ctx: &Ctx<'_>, options: &SearchOptions, model: &str, subjects: &[Sub
 }
 
 /// Fig. 16: the best plan of each segmentation.
-fn of_segmentations(
-    ctx: &Ctx<'_>,
-    options: &SearchOptions,
-    name: &str,
-    model: &Model,
-) -> Result<Vec<Sheet>, Failure> {
+fn of_segmentations(ctx: &Ctx<'_>, options: &SearchOptions, name: &str, model: &Model) -> Result<Vec<Sheet>, Failure> {
     let (mut found, mut rows) = (Vec::new(), Vec::new());
     let mut table = Table { columns: ["seed", "pieces", "cost", "lower bound"].map(|n| (n.into(), vec![])).into() };
     for seed in (options.model.seed..).take(options.segmentations as usize) {
@@ -156,7 +151,8 @@ fn of_segmentations(
     }
     found.sort_by(|x, y| x.high.total_cmp(&y.high));
     let title = format!("Best plans of {} segmentations of {name}", found.len());
-    let labels = Labels { title: &title, x: "cost of the worst piece; the line reaches down to the proven bound", y: "" };
+    let labels =
+        Labels { title: &title, x: "cost of the worst piece; the line reaches down to the proven bound", y: "" };
     let head = ["segmentation seed", "pieces", "cost of the best plan", "proven lower bound"];
     Ok(vec![
         ("segmentations.svg".to_owned(), intervals(&labels, &found)?),
@@ -165,12 +161,7 @@ fn of_segmentations(
     ])
 }
 
-fn runs_of(
-    ctx: &Ctx<'_>,
-    options: &SearchOptions,
-    subject: &Subject,
-    technique: Technique,
-) -> Result<Runs, Failure> {
+fn runs_of(ctx: &Ctx<'_>, options: &SearchOptions, subject: &Subject, technique: Technique) -> Result<Runs, Failure> {
     eprintln!("{}, {}", subject.name, name_of(technique));
     let run = |seed: u64| {
         let params = PlanParams { seed, ..subject.params.clone() };
@@ -202,7 +193,8 @@ fn convergence_sheets(
         }
         curves.push(Curve { name, points });
     }
-    let labels = Labels { title, x: "plans looked at and costs of pieces asked for", y: "cost of the best plan's worst piece" };
+    let labels =
+        Labels { title, x: "plans looked at and costs of pieces asked for", y: "cost of the best plan's worst piece" };
     Ok(vec![
         (format!("{file}.svg"), bands(&labels, &curves, optimum, Corner::UpperRight)?),
         (format!("{file}.csv"), table.to_csv()),

@@ -22,7 +22,8 @@ impl Table {
                 return Err(format!("line {} has {} fields, but there are {n} columns", i + 1, fields.len()));
             }
             for (field, (name, values)) in fields.iter().zip(&mut columns) {
-                let value = if field.is_empty() { Some(f64::NAN) } else { field.parse().ok().filter(|v: &f64| v.is_finite()) };
+                let value =
+                    if field.is_empty() { Some(f64::NAN) } else { field.parse().ok().filter(|v: &f64| v.is_finite()) };
                 values.push(value.ok_or(format!("line {}: \"{field}\" in column \"{name}\" is no number", i + 1))?);
             }
         }
@@ -37,14 +38,17 @@ impl Table {
     /// What [`Self::from_csv`] reads; shortest decimal forms that give the same numbers.
     pub fn to_csv(&self) -> String {
         let names: Vec<&str> = self.columns.iter().map(|c| c.0.as_str()).collect();
-        let rows = self.rows().map(|row| row.map(|v| if v.is_nan() { String::new() } else { v.to_string() }).collect::<Vec<_>>().join(","));
+        let rows = self.rows().map(|row| {
+            row.map(|v| if v.is_nan() { String::new() } else { v.to_string() }).collect::<Vec<_>>().join(",")
+        });
         std::iter::once(names.join(",")).chain(rows).map(|line| line + "\n").collect()
     }
 
     /// The rows in which nothing is missing.
     pub fn complete(&self) -> Self {
         let is_whole: Vec<bool> = self.rows().map(|mut row| row.all(f64::is_finite)).collect();
-        let kept = |values: &[f64]| values.iter().zip(&is_whole).filter(|(_, whole)| **whole).map(|(v, _)| *v).collect();
+        let kept =
+            |values: &[f64]| values.iter().zip(&is_whole).filter(|(_, whole)| **whole).map(|(v, _)| *v).collect();
         Self { columns: self.columns.iter().map(|(name, values)| (name.clone(), kept(values))).collect() }
     }
 

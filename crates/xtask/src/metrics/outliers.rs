@@ -50,7 +50,8 @@ pub fn outliers(subject: &Subject, first: &Column, second: &Column) -> Vec<Outli
 /// Weight, frame and openings at every joint of the plans that hold by both metrics.
 pub fn stations(subject: &Subject, first: &Column, second: &Column) -> Table {
     let mut table = Table::default();
-    let names = ["plan", "station", "a", "b", "length", "weight", "male", "fast", "leaves N", "leaves v", "first", "second"];
+    let names =
+        ["plan", "station", "a", "b", "length", "weight", "male", "fast", "leaves N", "leaves v", "first", "second"];
     table.columns.extend(names.map(|n| (n.to_owned(), Vec::new())));
     for (plan, (a, b)) in first.scores.iter().zip(&second.scores).enumerate() {
         let (Some(a), Some(b)) = (a.opening(), b.opening()) else { continue };
@@ -60,8 +61,18 @@ pub fn stations(subject: &Subject, first: &Column, second: &Column) -> Table {
             let (male, fast) = (f64::from(u8::from(joint.male == Side::B)), f64::from(u8::from(joint.is_fast)));
             let leaves = [station.normal, station.across].map(|v| joint.leaves.dot(v));
             let row = [
-                plan as f64, i as f64, pieces[0], pieces[1], station.length_mm, joint.weight, male, fast, leaves[0],
-                leaves[1], a.opening_mm[i], b.opening_mm[i],
+                plan as f64,
+                i as f64,
+                pieces[0],
+                pieces[1],
+                station.length_mm,
+                joint.weight,
+                male,
+                fast,
+                leaves[0],
+                leaves[1],
+                a.opening_mm[i],
+                b.opening_mm[i],
             ];
             table.columns.iter_mut().zip(row).for_each(|(c, v)| c.1.push(v));
         }
