@@ -6,8 +6,8 @@
 //! unknowns ([`contact`]); rigid motions are kept apart, so that parts that come off are found exactly ([`mechanism`]).
 //!
 //! Deviations from the paper: contact is exact instead of by penalty, between pairs of nodes that start at one place;
-//! displacements are small. Limits: no friction, no gap, no contact between walls; where a thin model's walls overlap, each
-//! is whole. The floor of the channel is one-sided; its other faces hold in both directions.
+//! displacements are small. Limits: no friction, no gap; where a thin model's walls overlap, each is whole. The floor of the
+//! channel is one-sided, and so are the walls' faces, which touch at mid-wall; the channel's other faces hold in both directions.
 
 mod connector;
 mod contact;
@@ -15,6 +15,7 @@ mod element;
 mod front;
 mod mechanism;
 mod part;
+mod rows;
 #[cfg(test)]
 mod tests;
 mod wall;
@@ -26,12 +27,12 @@ use shellock_geom::sparse::SparseError;
 pub use element::Order;
 pub use wall::{MIN_VOLUME_SHARE, Wall};
 
-use crate::assembly::SIDES;
 use crate::{Joint, Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
-use connector::{Bar, Labels, Owner, ROWS, Section};
-use contact::{Law, Response, direction_of};
+use connector::{Bar, Labels, Section};
+use contact::Response;
 use front::Front;
 use part::Part;
+use rows::{ROWS, WALL};
 
 /// How the metric models walls and connectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -253,14 +254,14 @@ impl VolumeModel {
         let n_motions = 6 * (0..self.parts.len()).filter(|i| is_free(*i)).count();
         let mut responses = (0..self.parts.len())
             .into_par_iter()
-            .map(|i| self.response(i as u32, Some(i as u32) == fixed_part, &sections, &bars))
+            .map(|i| self.response(i as u32, Some(i as u32) == fixed_part, plan, &sections, &bars))
             .collect::<Result<Vec<_>, _>>()?;
         let free = (0..self.parts.len()).filter(|i| is_free(*i));
         for (i, first) in free.zip((0..).step_by(6)) {
             responses[i].first_motion = Some(first);
         }
 
-        let laws = self.laws(&responses, &joints);
+        let laws = rows::laws(plan);
         let loose = mechanism::loose_parts(&responses, &laws, n_motions);
         if !loose.is_empty() {
             return Ok(Err(loose));
@@ -271,11 +272,11 @@ impl VolumeModel {
         let mut displacement_mm = vec![[[Vec3::ZERO; 2]; 2]; joints.len()];
         for (part, response) in (0..).zip(&responses) {
             for (&row, moved) in response.rows.iter().zip(response.displacement_mm(&equilibrium)) {
-                let station = row / ROWS;
+                let (station, row) = (row / ROWS, row % ROWS);
                 let side = if self.station_parts[station][0] == part { Side::A } else { Side::B };
                 let Some(section) = &sections[station][side.index()] else { continue };
                 for (own, direction, _) in section.rows() {
-                    if own == row % ROWS {
+                    if own == row {
                         displacement_mm[station][side.index()][own / 3] += direction * moved;
                     }
                 }
@@ -302,6 +303,7 @@ impl VolumeModel {
         &self,
         part: u32,
         is_fixed: bool,
+        plan: &[Meeting],
         sections: &[[Option<Section>; 2]],
         bars: &[[Bar; 2]],
     ) -> Result<Response, SparseError> {
@@ -310,65 +312,61 @@ impl VolumeModel {
         let labels = Labels::new(n_wall, n_stations);
         let own: Vec<&Bar> =
             bars.iter().flatten().filter(|bar| self.station_parts[bar.stations[0]][bar.side.index()] == part).collect();
-        // First and last bar at each section; the first carries what belongs to the station.
-        let mut spans: Vec<[Option<[usize; 2]>; 2]> = vec![[None; 2]; n_stations];
-        for (i, bar) in own.iter().enumerate() {
-            for station in bar.stations {
-                let span = &mut spans[station][bar.side.index()];
-                *span = Some([span.map_or(i, |s| s[0]), i]);
-            }
-        }
-        let span = |station: usize, side: Side| spans[station][side.index()].unwrap_or([0, usize::MAX]);
+        let spans = connector::spans(&own, n_stations);
         let fronts: Vec<Front> = (own.iter().enumerate())
-            .filter_map(|(i, bar)| {
+            .map(|(i, bar)| {
                 let [Some(first), Some(second)] = bar.stations.map(|s| sections[s][bar.side.index()].as_ref()) else {
-                    return None;
+                    return Front::default();
                 };
-                let carries = bar.stations.map(|s| span(s, bar.side)[0] == i);
-                let mut front = bar.front(self, [first, second], carries, labels);
-                if is_fixed {
-                    front = front.without(|id| labels.is_wall(id));
-                }
-                Some(front)
+                let carries = bar.stations.map(|s| spans[s][bar.side.index()].is_some_and(|span| span[0] == i));
+                let front = bar.front(self, [first, second], carries, labels);
+                if is_fixed { front.without(|id| labels.is_wall(id)) } else { front }
             })
             .collect();
-        let spans = |id: u32| match labels.owner(id) {
-            Owner::Section(station, side) => Some(span(station, side)),
-            Owner::Step => None,
-        };
-        let top = connector::condensed(&fronts, labels, &spans)?;
-        let wall = if is_fixed { &Front::default() } else { &self.parts[part as usize].stiffness };
-        Ok(self.read(part, &Front::condensed(&[wall, &top], |id| labels.is_wall(id))?, labels, sections))
+        let mut fronts = connector::condensed(&fronts, &own, labels, &spans)?;
+        if !is_fixed {
+            fronts.extend(self.wall_fronts(part, plan, labels));
+        }
+        let wall = (!is_fixed).then_some(&self.parts[part as usize].stiffness);
+        let all: Vec<&Front> = wall.into_iter().chain(&fronts).collect();
+        Ok(self.read(part, &Front::condensed(&all, |id| labels.is_inner(id))?, labels, plan, sections))
     }
 
-    /// Compliance and drift from what is left of a part: its contact rows, and its load.
-    fn read(&self, part: u32, left: &Front, labels: Labels, sections: &[[Option<Section>; 2]]) -> Response {
+    /// Compliance and drift from what is left of a part: its contact rows, and its load, if it has one.
+    fn read(
+        &self,
+        part: u32,
+        left: &Front,
+        labels: Labels,
+        plan: &[Meeting],
+        sections: &[[Option<Section>; 2]],
+    ) -> Response {
         let n = left.ids.len();
-        if n == 0 {
-            return Response::default();
-        }
-        let n_rows = n - 1;
-        debug_assert_eq!(left.ids[n_rows], labels.load(), "the load comes last");
+        let n_rows = left.ids.partition_point(|id| *id < labels.load());
         let rows: Vec<usize> = left.ids[..n_rows].iter().map(|id| labels.row_of(*id)).collect();
         let mut response = Response {
-            compliance: (0..n_rows * n_rows).map(|at| -left.values[at % n_rows + n * (at / n_rows)]).collect(),
-            drift_mm: (0..n_rows).map(|j| -left.values[n_rows + n * j]).collect(),
+            compliance: (0..n_rows).flat_map(|j| left.values[n * j..n * j + n_rows].iter().map(|v| -v)).collect(),
+            drift_mm: (0..n_rows).map(|j| if n_rows < n { -left.values[n_rows + n * j] } else { 0.0 }).collect(),
             rigid: vec![[0.0; 6]; n_rows],
             rows,
             ..Response::default()
         };
         let Some(rigid) = self.parts[part as usize].rigid else { return response };
-        for first in (0..n_rows).step_by(ROWS) {
-            let station = response.rows[first] / ROWS;
-            for side in SIDES {
-                let Some(section) = &sections[station][side.index()] else { continue };
-                if self.station_parts[station][side.index()] != part {
-                    continue;
-                }
-                for (row, direction, place) in section.rows() {
-                    let moved = rigid.at(place).map(|v| v.dot(direction));
-                    (0..6).for_each(|m| response.rigid[first + row][m] += moved[m]);
-                }
+        let mut see = |station: usize, row: usize, direction: Vec3, place: Vec3| {
+            let Ok(at) = response.rows.binary_search(&(station * ROWS + row)) else { return };
+            let moved = rigid.at(place).map(|v| v.dot(direction));
+            (0..6).for_each(|m| response.rigid[at][m] += moved[m]);
+        };
+        for (station, side) in self.sides_of_part(part) {
+            see(station, WALL, rows::off_the_wall(&plan[station], side), self.mid_wall(station, side));
+            for (row, direction, place) in sections[station][side.index()].iter().flat_map(Section::rows) {
+                see(station, row, direction, place);
+            }
+        }
+        for (station, side) in self.sides_of_part(part) {
+            let Some(section) = &sections[station][side.index()] else { continue };
+            // Without its rows the station is in no bar, and has no connector.
+            if response.rows.binary_search(&(station * ROWS)).is_ok() {
                 let (force, places) = section.load();
                 for place in places {
                     let work = rigid.at(place).map(|v| v.dot(force) / 4.0);
@@ -377,21 +375,6 @@ impl VolumeModel {
             }
         }
         response
-    }
-
-    /// The law of each contact row.
-    fn laws(&self, responses: &[Response], joints: &[Option<Joint>]) -> Vec<Law> {
-        let mut laws = vec![Law::Free; self.stations.len() * ROWS];
-        for &row in responses.iter().flat_map(|r| &r.rows) {
-            let is_fast = joints[row / ROWS].is_some_and(|j| j.is_fast);
-            laws[row] = match direction_of(row) {
-                0 => Law::Both,
-                _ if is_fast => Law::Both,
-                1 => Law::Push,
-                _ => Law::Free,
-            };
-        }
-        laws
     }
 
     /// How a point of a connector moves with the wall of its side.

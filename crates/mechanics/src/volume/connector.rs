@@ -18,6 +18,7 @@ use shellock_geom::sparse::SparseError;
 use super::VolumeModel;
 use super::element::{EDGES, Order, gradients, lame, stiffness, volume_6};
 use super::front::Front;
+use super::rows::ROWS;
 use crate::{Joint, SIDES, Side};
 
 /// How far the pin reaches, as a share of the connector size D.
@@ -35,9 +36,6 @@ const N_ACROSS: usize = 3;
 const N_SECTION: usize = N_ALONG_S * N_ACROSS;
 /// Nodes of the bar between two stations: cross-sections at both and halfway.
 const N_BAR: usize = 3 * N_SECTION;
-
-/// Unknowns of contact at a station: at the root of the pin (s = 0) and at its tip, along n, ŝ and u.
-pub(super) const ROWS: usize = 6;
 
 /// Motion of a node as a weighted sum of those of kept wall nodes.
 type Hold = Vec<(u32, f64)>;
@@ -124,8 +122,12 @@ impl Labels {
     pub fn is_wall(self, id: u32) -> bool {
         id < self.n_wall
     }
-    fn row(self, station: usize, row: usize) -> u32 {
+    pub fn row(self, station: usize, row: usize) -> u32 {
         self.n_wall + (station * ROWS + row) as u32
+    }
+    /// Whether `id` is neither a contact row nor the load.
+    pub fn is_inner(self, id: u32) -> bool {
+        self.is_wall(id) || id > self.load()
     }
     /// The contact row that `id` means.
     pub fn row_of(self, id: u32) -> usize {
@@ -400,15 +402,31 @@ pub(super) fn sections(model: &VolumeModel, joints: &[Option<Joint>]) -> Vec<[Op
         .collect()
 }
 
-/// Adds up the fronts of a part's bars, in order along the seams, and eliminates all their own unknowns.
+/// First and last of a part's bars at each section, station by station and side by side; the first carries what belongs to
+/// the station.
+pub(super) type Spans = Vec<[Option<[usize; 2]>; 2]>;
+
+pub(super) fn spans(bars: &[&Bar], n_stations: usize) -> Spans {
+    let mut spans = vec![[None; 2]; n_stations];
+    for (i, bar) in bars.iter().enumerate() {
+        for station in bar.stations {
+            let span: &mut Option<[usize; 2]> = &mut spans[station][bar.side.index()];
+            *span = Some([span.map_or(i, |s| s[0]), i]);
+        }
+    }
+    spans
+}
+
+/// Adds up the fronts of a part's `bars` and eliminates their own unknowns; one front is left for each chain of bars that
+/// follow each other.
 ///
-/// `spans` tells the first and the last bar that an unknown belongs to, or nothing if there is one only. Halves are
-/// condensed first, then joined: what remains of each is short, however long the seam.
+/// Halves are condensed first, then joined: what remains of each is short, however long the seam.
 pub(super) fn condensed(
     fronts: &[Front],
+    bars: &[&Bar],
     labels: Labels,
-    spans: &dyn Fn(u32) -> Option<[usize; 2]>,
-) -> Result<Front, SparseError> {
+    spans: &Spans,
+) -> Result<Vec<Front>, SparseError> {
     fn reduce(
         fronts: &[Front],
         from: usize,
@@ -422,33 +440,36 @@ pub(super) fn condensed(
         let halves = [reduce(left, from, is_inside)?, reduce(right, from + left.len(), is_inside)?];
         Front::condensed(&[&halves[0], &halves[1]], |id| is_inside(id, from, to))
     }
-    if fronts.is_empty() {
-        return Ok(Front::default());
-    }
-    reduce(fronts, 0, &|id, from, to| {
-        id > labels.load() && spans(id).is_none_or(|[first, last]| from <= first && last < to)
-    })
+    let is_inside = |id: u32, from: usize, to: usize| match labels.owner(id) {
+        Owner::Part => false,
+        Owner::Section(station, side) => {
+            spans[station][side.index()].is_none_or(|[first, last]| from <= first && last < to)
+        }
+        Owner::Step => true,
+    };
+    let follows = |i: usize| bars[i - 1].stations.iter().any(|s| bars[i].stations.contains(s));
+    let starts: Vec<usize> = (0..bars.len()).filter(|i| *i == 0 || !follows(*i)).chain([bars.len()]).collect();
+    starts.windows(2).map(|ends| reduce(&fronts[ends[0]..ends[1]], ends[0], &is_inside)).collect()
 }
 
 impl Labels {
-    /// Whether `id` belongs to a section (station and side) or halfway along a step (step and side).
-    pub fn owner(self, id: u32) -> Owner {
-        let of = |start: u32| {
-            let at = (id - start) as usize / (3 * N_SECTION);
-            (at / 2, SIDES[at % 2])
-        };
-        let halfway = self.halfway(0, Side::A);
-        if id >= halfway {
-            Owner::Step
+    fn owner(self, id: u32) -> Owner {
+        let first = self.section(0, Side::A);
+        if id < first {
+            Owner::Part
+        } else if id < self.halfway(0, Side::A) {
+            let at = (id - first) as usize / (3 * N_SECTION);
+            Owner::Section(at / 2, SIDES[at % 2])
         } else {
-            let (station, side) = of(self.section(0, Side::A));
-            Owner::Section(station, side)
+            Owner::Step
         }
     }
 }
 
-/// To what an unknown of a bar belongs.
-pub(super) enum Owner {
+/// To what an unknown belongs.
+enum Owner {
+    /// The wall, contact or the load.
+    Part,
     /// A cross-section at a station.
     Section(usize, Side),
     /// The nodes halfway along one step.

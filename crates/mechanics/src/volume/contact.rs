@@ -3,14 +3,14 @@
 //! Unknowns are the forces λ at the contact rows and the rigid motions α of the free parts; F is the sum of the parts'
 //! compliances, B their rigid motions seen at the rows, d the displacement by the load alone, g the load's work on rigid motions:
 //! ```text
-//!     δ = F λ + B α + d      gap at the rows, male minus female
+//!     δ = F λ + B α + d      gap at the rows, male minus female; at walls, b minus a
 //!     0 = Bᵀ λ + g           equilibrium of every free part
-//!     along n: δ = 0         along ŝ: δ ≥ 0, λ ≥ 0, δ λ = 0         along u: λ = 0
+//!     along n: δ = 0         along ŝ and across walls: δ ≥ 0, λ ≥ 0, δ λ = 0         along u: λ = 0
 //! ```
 
 use shellock_geom::sparse::{SparseError, eliminate_leading};
 
-use super::connector::ROWS;
+use super::rows::Law;
 
 /// Compliance that every contact has of its own, as a share of the mean: keeps the system definite where two rows say the same.
 const CONTACT_COMPLIANCE: f64 = 1e-10;
@@ -46,17 +46,6 @@ pub(super) struct Equilibrium {
     pub force_n: Vec<f64>,
     /// Rigid motions of the free parts.
     pub motion: Vec<f64>,
-}
-
-/// How a row takes part.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Law {
-    /// δ = 0.
-    Both,
-    /// δ ≥ 0.
-    Push,
-    /// No force.
-    Free,
 }
 
 impl Response {
@@ -186,7 +175,7 @@ fn active_set(
     n_motions: usize,
     tolerance: f64,
 ) -> Result<Option<(Vec<f64>, Vec<f64>)>, SparseError> {
-    let mut is_active = vec![true; n_pushes];
+    let mut is_active = vec![false; n_pushes];
     let (mut fewest_wrong, mut stalled) = (usize::MAX, 0);
     for _round in 0..MAX_ROUNDS {
         let active: Vec<usize> = (0..n_pushes).filter(|i| is_active[*i]).collect();
@@ -234,7 +223,10 @@ fn with_active(
     // What is left for the motions is negative definite: contact resists them.
     let n = n_motions + 1;
     let mut coarse: Vec<f64> = gather(&(0..n).collect::<Vec<_>>(), &forces);
-    let stiffest = (0..n_motions).fold(0.0_f64, |m, i| m.max(-coarse[i * (n + 1)]));
+    // Where nothing is active yet, a single contact is the measure.
+    let compliance: f64 = (0..n_pushes).map(|i| whole.at(i, i)).sum();
+    let contact_n_mm = if compliance > 0.0 { n_pushes as f64 / compliance } else { 0.0 };
+    let stiffest = (0..n_motions).fold(contact_n_mm, |m, i| m.max(-coarse[i * (n + 1)]));
     for column in 0..n_motions {
         for row in column..n_motions {
             coarse[row + n * column] = -coarse[row + n * column];
@@ -244,9 +236,4 @@ fn with_active(
     }
     let motion = Eliminated::new(coarse, n, n_motions)?.eliminated(&[]);
     Ok((forces.eliminated(&motion), motion))
-}
-
-/// The directions of a row: along n, ŝ or u.
-pub(super) fn direction_of(row: usize) -> usize {
-    row % ROWS % 3
 }

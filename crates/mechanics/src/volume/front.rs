@@ -22,9 +22,16 @@ impl Front {
         for front in fronts {
             let place: Vec<usize> =
                 front.ids.iter().map(|&id| ids.partition_point(|&other| key(other) < key(id))).collect();
+            let is_sorted = place.is_sorted();
             for (j, &column) in place.iter().enumerate() {
-                for (i, &row) in place.iter().enumerate().skip(j) {
-                    values[row.max(column) + n * row.min(column)] += front.values[i + place.len() * j];
+                let source = &front.values[place.len() * j + j..place.len() * (j + 1)];
+                if is_sorted && place[place.len() - 1] - column == source.len() - 1 {
+                    // One run of unknowns, as the wall's are.
+                    values[n * column + column..][..source.len()].iter_mut().zip(source).for_each(|(v, s)| *v += s);
+                    continue;
+                }
+                for (&row, s) in place[j..].iter().zip(source) {
+                    values[row.max(column) + n * row.min(column)] += s;
                 }
             }
         }
@@ -35,6 +42,16 @@ impl Front {
             rest.extend_from_slice(&values[n * column + n_eliminated..n * (column + 1)]);
         }
         Ok(Self { ids: ids.split_off(n_eliminated), values: rest })
+    }
+
+    /// Unknown `id` coupled to `others`, which are ascending and all before it.
+    pub fn coupling(id: u32, others: &[(u32, f64)]) -> Self {
+        let n = others.len() + 1;
+        let mut values = vec![0.0; n * n];
+        for (column, (_, value)) in others.iter().enumerate() {
+            values[n - 1 + n * column] = *value;
+        }
+        Self { ids: others.iter().map(|o| o.0).chain([id]).collect(), values }
     }
 
     /// The front with some unknowns held at zero.

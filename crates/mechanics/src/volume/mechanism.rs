@@ -2,16 +2,19 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::contact::{Law, Response};
+use super::contact::Response;
+use super::rows::Law;
 
 /// Mean displacement along blocked directions, as a share of the motion, below which the motion is free. Frames are exact to
 /// rounding; a motion that is this nearly free would open seams ten thousand times further than the parts deform.
 const FREE: f64 = 1e-4;
+/// Depth, as a share of the probe, that is none whatever the motion.
+const ROUNDING: f64 = 1e-9;
 /// Rounds of a projection onto the cone of free motions, for each of its dimensions.
 const MAX_ROUNDS: usize = 50;
 
 /// The parts (ascending, by place in `parts`) that some rigid motion takes off: along n nothing moves, along ŝ nothing moves
-/// into the floor.
+/// into the floor, and no wall into another.
 ///
 /// The motions that keep all gaps along n are a linear space, found from its Gram matrix. In it, the pushes leave a cone, which
 /// holds more than rest if and only if one of the vectors ± eᵢ has a nearest point in it that is not rest.
@@ -98,7 +101,7 @@ fn nearest_in_cone(pushes: &[DVector<f64>], probe: DVector<f64>) -> DVector<f64>
     for _round in 0..MAX_ROUNDS * probe.len() {
         let deepest = (0..pushes.len()).map(|i| (i, pushes[i].dot(&nearest))).min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((entering, depth)) = deepest else { break };
-        if depth > -1e-9 || held.contains(&entering) {
+        if depth > -(FREE * nearest.norm()).max(ROUNDING) || held.contains(&entering) {
             break;
         }
         held.push(entering);

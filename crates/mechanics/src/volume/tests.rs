@@ -22,6 +22,54 @@ fn plates_on_a_straight_seam_come_apart() {
     }
 }
 
+/// Pins straight below a straight seam leave a plate two translations and a rotation. Walls across these hold it, each in its one
+/// direction, so that none of them may be missing or turned round.
+#[test]
+fn walls_block_what_pins_leave_free_each_in_one_direction() {
+    let plates = sample::plates(30.0, 15.0, [6, 3]);
+    let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
+    let with_walls = |walls: [Vec3; 5]| {
+        let mut plan = joined(&plates, 0.0, None);
+        plan.iter_mut().zip(walls).for_each(|(meeting, wall)| meeting.wall = wall);
+        model.resist(&plan, 0).unwrap()
+    };
+    // Both ends keep b from going down; in between, one station each keeps it from sliding to either side.
+    let walls = [Vec3::Z, Vec3::Y, -Vec3::Y, Vec3::X, Vec3::Z];
+    assert!(matches!(with_walls(walls), Resistance::Holds(_)));
+    for i in [0, 1, 2, 4] {
+        let mut turned = walls;
+        turned[i] = -turned[i];
+        assert_eq!(with_walls(turned), Resistance::Separable(vec![1]));
+        turned[i] = Vec3::X;
+        assert_eq!(with_walls(turned), Resistance::Separable(vec![1]));
+    }
+}
+
+#[test]
+fn walls_alone_hold_no_octant() {
+    let ball = sample::ball(20.0, 4);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    let plan: Vec<Meeting> = ball.stations.iter().map(|s| Meeting { wall: s.across, joint: None }).collect();
+    assert_eq!(model.resist(&plan, 7).unwrap(), Resistance::Separable((0..7).collect()));
+}
+
+/// Two clamped plates, the pins pulled straight out: a wall across their way is the only thing in it.
+#[test]
+fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
+    let plates = sample::plates(20.0, 20.0, [8, 8]);
+    let clamped: Vec<u32> = (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > 19.9).map(|(i, _)| i).collect();
+    let model = VolumeModel::clamped(&VolumeParams::default(), &plates, &clamped).unwrap();
+    let opening = |wall: Vec3| {
+        let mut plan = joined(&plates, 0.0, None);
+        plan.iter_mut().for_each(|meeting| meeting.wall = wall);
+        let moved = model.equilibrium(&plan, None).unwrap().unwrap().displacement_mm;
+        moved.iter().map(|[a, b]| (a[0] - b[0]).z).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let open = opening(-Vec3::Z);
+    assert!(open > 1e-3, "{open} mm");
+    assert!(opening(Vec3::Z).abs() < 0.02 * open, "{} mm of {open} mm", opening(Vec3::Z));
+}
+
 /// Along a great circle, half of the ball may turn against the other half: each of the three circles frees one rotation.
 #[test]
 fn octants_turn_about_great_circles_unless_friction_holds_one_of_them() {

@@ -1,0 +1,89 @@
+//! Contact rows of a station: who may not move where against whom.
+//!
+//! | row  | where            | along | law                                     |
+//! | :--- | :--------------- | :---- | :-------------------------------------- |
+//! | 0, 3 | root, tip of pin | n     | closed                                  |
+//! | 1, 4 | root, tip of pin | ŝ     | pushes only; closed where friction holds |
+//! | 2, 5 | root, tip of pin | u     | free; closed where friction holds       |
+//! | 6    | mid-wall         | wall  | pushes only                             |
+
+use shellock_geom::Vec3;
+
+use super::VolumeModel;
+use super::connector::Labels;
+use super::front::Front;
+use crate::{Meeting, Side};
+
+/// Contact rows of a station.
+pub(super) const ROWS: usize = 7;
+
+/// The row of the walls' faces; those before belong to the connector.
+pub(super) const WALL: usize = 6;
+
+/// How a row takes part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Law {
+    /// δ = 0.
+    Both,
+    /// δ ≥ 0.
+    Push,
+    /// No force.
+    Free,
+}
+
+/// The law of each contact row; of use where the row has a side at all.
+pub(super) fn laws(plan: &[Meeting]) -> Vec<Law> {
+    let of_station = |meeting: &Meeting| {
+        let [along_n, along_s, along_u] = match meeting.joint {
+            None => [Law::Free; 3],
+            Some(joint) if joint.is_fast => [Law::Both; 3],
+            Some(_) => [Law::Both, Law::Push, Law::Free],
+        };
+        [along_n, along_s, along_u, along_n, along_s, along_u, Law::Push]
+    };
+    plan.iter().flat_map(of_station).collect()
+}
+
+/// Direction in which contact of the walls' faces acts on `side`: they part when b goes along `wall`, or a against it.
+pub(super) fn off_the_wall(meeting: &Meeting, side: Side) -> Vec3 {
+    if side == Side::A { -meeting.wall } else { meeting.wall }
+}
+
+impl VolumeModel {
+    /// Where `side` of a station is at mid-wall.
+    pub(super) fn mid_wall(&self, station: usize, side: Side) -> Vec3 {
+        let [outer, inner] = self.faces(station, side).map(|node| self.wall.nodes[node]);
+        outer.midpoint(inner)
+    }
+
+    /// The wall nodes of a station's point on the outer and on the inner surface.
+    fn faces(&self, station: usize, side: Side) -> [usize; 2] {
+        let point = self.stations[station].points[side.index()] as usize;
+        [point, point + self.params.n_layers * self.wall.depth_mm.len()]
+    }
+
+    /// One small front for each station of `part`: its wall's motion at mid-wall, the mean of outer and inner surface,
+    /// coupled to the row.
+    pub(super) fn wall_fronts(&self, part: u32, plan: &[Meeting], labels: Labels) -> Vec<Front> {
+        let sides = self.sides_of_part(part);
+        let front = |(station, side): (usize, Side)| {
+            let kept = self.faces(station, side).map(|node| self.place_kept[node]);
+            let row = labels.row(station, WALL);
+            let half = off_the_wall(&plan[station], side).to_array().map(|x| 0.5 * x);
+            let mut couplings: Vec<(u32, f64)> =
+                (kept.into_iter().flatten()).flat_map(|place| (3 * place..).zip(half)).collect();
+            couplings.sort_unstable_by_key(|c| c.0);
+            (!couplings.is_empty()).then(|| Front::coupling(row, &couplings))
+        };
+        sides.filter_map(front).collect()
+    }
+
+    /// The stations that `part` takes part in, and on which side.
+    pub(super) fn sides_of_part(&self, part: u32) -> impl Iterator<Item = (usize, Side)> {
+        let of_station = move |(station, parts): (usize, &[u32; 2])| {
+            let parts = *parts;
+            crate::SIDES.into_iter().filter(move |side| parts[side.index()] == part).map(move |side| (station, side))
+        };
+        self.station_parts.iter().enumerate().flat_map(of_station)
+    }
+}
