@@ -11,8 +11,9 @@ use clap::Args;
 use rayon::prelude::*;
 use shellock::metric::{MetricParams, PlanModel};
 use shellock::plan::{InstallationPlan, random_plans};
+use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{
-    Meeting, Opening, Resistance, SurfaceModel, SurfaceParams, VolumeError, VolumeModel, VolumeParams,
+    Meeting, Opening, Resistance, SurfaceModel, SurfaceParams, SurfaceSolution, VolumeError, VolumeModel, VolumeParams,
 };
 
 use crate::failure::Failure;
@@ -123,11 +124,23 @@ impl Column {
         let params = SurfaceParams { stiffness_ratios, ..subject.model.params.surface() };
         let surface = || SurfaceModel::new(&params, &subject.model.assembly).map_err(|e| failed(name, &e));
         Self::new(name, subject.plans.len(), surface, |surface, i| {
-            match surface.resist(&subject.meetings[i], subject.key) {
-                Ok(solution) if solution.error <= params.tolerance => Score::of(solution.resistance),
-                Ok(solution) => Score::Unsolved(format!("{:.1e} of the force is left", solution.error)),
-                Err(e) => Score::Unsolved(e.to_string()),
+            Score::of_surface(surface.resist(&subject.meetings[i], subject.key), subject)
+        })
+    }
+
+    /// The surface metric without the joints for which the volume metric finds no room: lone ones, and where frames twist.
+    fn by_surface_with_bars(name: &str, subject: &Subject) -> Result<Self, Failure> {
+        let prepare = || {
+            let volume = volume_model(subject, &subject.model.params).map_err(|e| failed(name, &e))?;
+            let surface = subject.model.surface_model().map_err(|e| failed(name, &e))?;
+            Ok((volume, surface))
+        };
+        Self::new(name, subject.plans.len(), prepare, |(volume, surface), i| {
+            let mut meetings = subject.meetings[i].clone();
+            for (meeting, has) in meetings.iter_mut().zip(volume.has_connector(&subject.meetings[i])) {
+                meeting.joint = meeting.joint.filter(|_| has);
             }
+            Score::of_surface(surface.resist(&meetings, subject.key), subject)
         })
     }
 
@@ -145,6 +158,14 @@ impl Score {
         }
     }
 
+    fn of_surface(solution: Result<SurfaceSolution, SparseError>, subject: &Subject) -> Self {
+        match solution {
+            Ok(solution) if solution.error <= subject.model.params.surface().tolerance => Self::of(solution.resistance),
+            Ok(solution) => Self::Unsolved(format!("{:.1e} of the force is left", solution.error)),
+            Err(e) => Self::Unsolved(e.to_string()),
+        }
+    }
+
     fn opening(&self) -> Option<&Opening> {
         if let Self::Holds(opening) = self { Some(opening) } else { None }
     }
@@ -156,6 +177,7 @@ fn columns(subject: &Subject) -> Result<Vec<Column>, Failure> {
     Ok(vec![
         Column::by_volume("volume [mm]", subject, e_mpa, subject.plans.len())?,
         Column::by_surface("surface [mm]", subject, [1.0; 3])?,
+        Column::by_surface_with_bars("surface with the volume's connectors [mm]", subject)?,
     ])
 }
 
