@@ -238,6 +238,19 @@ impl VolumeModel {
         })
     }
 
+    /// Which stations have a connector: a joint with a bar to a neighbour, see [`resist`](Self::resist).
+    pub fn has_connector(&self, plan: &[Meeting]) -> Vec<bool> {
+        let joints: Vec<Option<Joint>> = plan.iter().map(|m| m.joint).collect();
+        let mut has = vec![false; self.stations.len()];
+        if joints.len() == self.stations.len() {
+            let sections = connector::sections(self, &joints);
+            for bar in self.bars(&joints, &sections) {
+                bar[0].stations.iter().for_each(|&station| has[station] = true);
+            }
+        }
+        has
+    }
+
     /// How parts move, with `fixed_part` held in place, or nothing but what is clamped; or the parts that come off.
     pub fn equilibrium(
         &self,

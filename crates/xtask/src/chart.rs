@@ -45,6 +45,25 @@ pub struct Curve<'a> {
     pub points: Vec<BandPoint>,
 }
 
+/// Where the legend stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Corner {
+    /// For curves that rise.
+    LowerRight,
+    /// For curves that fall.
+    UpperRight,
+}
+
+/// A named value known to lie between two bounds.
+pub struct Interval {
+    /// On the left of its line.
+    pub name: String,
+    /// No more is proven.
+    pub low: f64,
+    /// Reached.
+    pub high: f64,
+}
+
 type Plane<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 type Drawn = Result<(), Box<dyn Error>>;
 
@@ -67,11 +86,16 @@ pub fn scatter(labels: &Labels<'_>, x: &[f64], y: &[f64]) -> Result<String, Fail
 }
 
 /// A line through the medians of each curve in a band from least to greatest; `optimum`, where known, as a dashed line.
-pub fn bands(labels: &Labels<'_>, curves: &[Curve<'_>], optimum: Option<f64>) -> Result<String, Failure> {
+pub fn bands(
+    labels: &Labels<'_>,
+    curves: &[Curve<'_>],
+    optimum: Option<f64>,
+    legend: Corner,
+) -> Result<String, Failure> {
     let points = || curves.iter().flat_map(|c| &c.points);
     let x = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.x), h.max(p.x)));
     let y = padded(points().flat_map(|p| [p.low, p.high]).chain(optimum));
-    svg(labels, widened(x.0, x.1), y, Some(SeriesLabelPosition::LowerRight), |plane| {
+    svg(labels, widened(x.0, x.1), y, Some(legend.into()), |plane| {
         for (curve, colour) in curves.iter().zip(COLOURS.iter().cycle()) {
             let steps = as_steps(&curve.points);
             let below = steps.iter().map(|p| (p.x, p.low));
@@ -97,21 +121,44 @@ pub fn sorted_scores(labels: &Labels<'_>, columns: &[(&str, &[f64])]) -> Result<
         order.sort_by(|&i, &j| first[i].total_cmp(&first[j]));
         order
     });
-    svg(
-        labels,
-        widened(1.0, order.len() as f64),
-        -PADDING..1.0 + PADDING,
-        Some(SeriesLabelPosition::LowerRight),
-        |plane| {
-            // The first, which all others are to follow, is drawn last and so on top.
-            for (i, (name, values)) in columns.iter().enumerate().rev() {
-                let values = normalised(values);
-                let line = order.iter().enumerate().filter_map(|(k, &row)| Some((k as f64 + 1.0, *values.get(row)?)));
-                draw_line(plane, name, line.collect(), COLOURS[i % COLOURS.len()])?;
-            }
-            Ok(())
-        },
-    )
+    svg(labels, widened(1.0, order.len() as f64), -PADDING..1.0 + PADDING, Some(Corner::LowerRight.into()), |plane| {
+        // The first, which all others are to follow, is drawn last and so on top.
+        for (i, (name, values)) in columns.iter().enumerate().rev() {
+            let values = normalised(values);
+            let line = order.iter().enumerate().filter_map(|(k, &row)| Some((k as f64 + 1.0, *values.get(row)?)));
+            draw_line(plane, name, line.collect(), COLOURS[i % COLOURS.len()])?;
+        }
+        Ok(())
+    })
+}
+
+/// One line an interval, in their order from above, with a dot where the value was reached.
+pub fn intervals(labels: &Labels<'_>, intervals: &[Interval]) -> Result<String, Failure> {
+    let n = intervals.len() as f64;
+    let most = intervals.iter().map(|i| i.high).fold(0.0, f64::max);
+    svg(labels, widened(0.0, (1.0 + PADDING) * most), 0.0..n.max(1.0), None, |plane| {
+        for (i, interval) in intervals.iter().enumerate() {
+            let y = n - i as f64 - 0.5;
+            let colour = COLOURS[0];
+            plane.draw_series([PathElement::new(
+                vec![(interval.low, y), (interval.high, y)],
+                colour.mix(0.4).stroke_width(3 * LINE_PX),
+            )])?;
+            plane.draw_series([Circle::new((interval.high, y), 6, colour.filled())])?;
+            let style = ("sans-serif", TEXT_PX - 1).into_font().color(&BLACK);
+            plane.draw_series([Text::new(interval.name.clone(), (0.0, y), style)])?;
+        }
+        Ok(())
+    })
+}
+
+impl From<Corner> for SeriesLabelPosition {
+    fn from(corner: Corner) -> Self {
+        match corner {
+            Corner::LowerRight => Self::LowerRight,
+            Corner::UpperRight => Self::UpperRight,
+        }
+    }
 }
 
 /// What holds from one point to the next, as corners of a staircase.
@@ -230,10 +277,10 @@ mod tests {
             BandPoint { x: 1.0, low: 2.0, middle: 2.5, high: 3.0 },
         ];
         let curves = ["full", "no pruning"].map(|name| Curve { name, points: points.clone() });
-        let text = bands(&LABELS, &curves, Some(4.0)).unwrap();
+        let text = bands(&LABELS, &curves, Some(4.0), Corner::LowerRight).unwrap();
         assert!(["full", "no pruning", "proven optimum"].iter().all(|name| text.contains(name)));
         assert_eq!(text.matches("<polygon").count(), 2);
-        assert!(!bands(&LABELS, &curves, None).unwrap().contains("proven optimum"));
+        assert!(!bands(&LABELS, &curves, None, Corner::UpperRight).unwrap().contains("proven optimum"));
     }
 
     #[test]
@@ -242,7 +289,7 @@ mod tests {
         assert!(scatter(&LABELS, &[1.0], &[0.0]).is_ok());
         assert!(sorted_scores(&LABELS, &[]).is_ok());
         assert!(sorted_scores(&LABELS, &[("volume", &[1.0])]).is_ok());
-        assert!(bands(&LABELS, &[], None).is_ok());
+        assert!(bands(&LABELS, &[], None, Corner::LowerRight).is_ok());
     }
 
     #[test]

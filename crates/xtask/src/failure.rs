@@ -21,6 +21,22 @@ pub enum Failure {
         /// What is missing, and where.
         problem: String,
     },
+    /// A model cannot be studied.
+    #[error("{path}: {problem}", path = path.display())]
+    Model {
+        /// Its file, or that of its labels.
+        path: PathBuf,
+        /// Why not.
+        problem: String,
+    },
+    /// What a metric computes once for all plans could not be computed.
+    #[error("{metric}: {problem}")]
+    Metric {
+        /// Its name.
+        metric: String,
+        /// What it says.
+        problem: String,
+    },
     /// The drawing library refused.
     #[error("cannot draw the chart \"{title}\": {problem}")]
     Chart {

@@ -4,6 +4,9 @@
 
 mod chart;
 mod failure;
+mod metrics;
+mod model;
+mod search;
 mod statistics;
 mod study;
 mod table;

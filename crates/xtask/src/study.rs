@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 
-use crate::chart::{Curve, Labels, bands, scatter, sorted_scores};
+use crate::chart::{Corner, Curve, Labels, bands, scatter, sorted_scores};
 use crate::failure::Failure;
+use crate::metrics::{self, MetricsOptions};
+use crate::search::{self, SearchOptions};
 use crate::statistics::{band, kendall, spearman};
 use crate::table::{Table, markdown};
 
@@ -23,6 +25,10 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum Study {
+    /// How well the metrics agree on random plans of a model
+    Metrics(MetricsOptions),
+    /// How fast plans of a model are found, and what its segmentations allow
+    Search(SearchOptions),
     /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a row for each
     /// plan; the first column is the metric that the others are compared with
     Scores {
@@ -45,6 +51,8 @@ enum Study {
 /// Runs the study; returns the files written.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     match &options.study {
+        Study::Metrics(metrics) => metrics::run(metrics, &options.out),
+        Study::Search(search) => search::run(search, &options.out),
         Study::Scores { file } => write_all(&options.out, &stem(file), &agreement(&read(file)?)?),
         Study::Convergence { file, optimum, names } => {
             let runs = runs(&read(file)?).map_err(|problem| Failure::Table { path: file.clone(), problem })?;
@@ -65,7 +73,7 @@ fn axis(column: &str) -> String {
 }
 
 /// A file to be written: its name in the study's folder, and the text.
-type Sheet = (String, String);
+pub type Sheet = (String, String);
 
 /// Curves of all metrics over the plans, a scatter of each against the first, and the table of rank correlations.
 pub fn agreement(scores: &Table) -> Result<Vec<Sheet>, Failure> {
@@ -121,7 +129,7 @@ pub fn convergence(runs: &Runs, names: &[String], optimum: Option<f64>) -> Resul
     let n_seeds = runs.values().map(Vec::len).max().unwrap_or(0);
     let title = format!("Best score so far: median and range of {n_seeds} seeds");
     let labels = Labels { title: &title, x: "time, s", y: "score" };
-    Ok(("convergence.svg".to_owned(), bands(&labels, &curves, optimum)?))
+    Ok(("convergence.svg".to_owned(), bands(&labels, &curves, optimum, Corner::LowerRight)?))
 }
 
 fn read(path: &Path) -> Result<Table, Failure> {
@@ -129,7 +137,8 @@ fn read(path: &Path) -> Result<Table, Failure> {
     Table::from_csv(&text).map_err(|problem| Failure::Table { path: path.to_owned(), problem })
 }
 
-fn write_all(out: &Path, study: &str, sheets: &[Sheet]) -> Result<Vec<PathBuf>, Failure> {
+/// Writes the sheets into a folder of `out`; returns the files.
+pub fn write_all(out: &Path, study: &str, sheets: &[Sheet]) -> Result<Vec<PathBuf>, Failure> {
     let folder = out.join(study);
     fs::create_dir_all(&folder).map_err(|source| Failure::File { path: folder.clone(), source })?;
     let write = |(name, text): &Sheet| {

@@ -3,12 +3,13 @@
 /// Columns of equal length, by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// In order; each with its values.
+    /// In order; each with its values, not a number where there is none.
     pub columns: Vec<(String, Vec<f64>)>,
 }
 
 impl Table {
-    /// Reads comma-separated numbers under one line of names; blank lines are passed over.
+    /// Reads comma-separated numbers under one line of names; blank lines are passed over, an empty field is a value that
+    /// is missing.
     pub fn from_csv(text: &str) -> Result<Self, String> {
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
         let (_, names) = lines.next().ok_or("the table is empty; the first line must name the columns")?;
@@ -21,7 +22,8 @@ impl Table {
                 return Err(format!("line {} has {} fields, but there are {n} columns", i + 1, fields.len()));
             }
             for (field, (name, values)) in fields.iter().zip(&mut columns) {
-                let value = field.parse().ok().filter(|v: &f64| v.is_finite());
+                let value =
+                    if field.is_empty() { Some(f64::NAN) } else { field.parse().ok().filter(|v: &f64| v.is_finite()) };
                 values.push(value.ok_or(format!("line {}: \"{field}\" in column \"{name}\" is no number", i + 1))?);
             }
         }
@@ -36,8 +38,18 @@ impl Table {
     /// What [`Self::from_csv`] reads; shortest decimal forms that give the same numbers.
     pub fn to_csv(&self) -> String {
         let names: Vec<&str> = self.columns.iter().map(|c| c.0.as_str()).collect();
-        let rows = self.rows().map(|row| row.map(|v| v.to_string()).collect::<Vec<_>>().join(","));
+        let rows = self.rows().map(|row| {
+            row.map(|v| if v.is_nan() { String::new() } else { v.to_string() }).collect::<Vec<_>>().join(",")
+        });
         std::iter::once(names.join(",")).chain(rows).map(|line| line + "\n").collect()
+    }
+
+    /// The rows in which nothing is missing.
+    pub fn complete(&self) -> Self {
+        let is_whole: Vec<bool> = self.rows().map(|mut row| row.all(f64::is_finite)).collect();
+        let kept =
+            |values: &[f64]| values.iter().zip(&is_whole).filter(|(_, whole)| **whole).map(|(v, _)| *v).collect();
+        Self { columns: self.columns.iter().map(|(name, values)| (name.clone(), kept(values))).collect() }
     }
 
     fn rows(&self) -> impl Iterator<Item = impl Iterator<Item = f64>> {
@@ -65,6 +77,14 @@ mod tests {
         assert_eq!(Table::from_csv(&table.to_csv()), Ok(table.clone()));
         assert_eq!(table.column("surface"), Some(&[1.0 / 3.0, 2.0][..]));
         assert_eq!(table.column("depth"), None);
+    }
+
+    #[test]
+    fn a_missing_value_is_an_empty_field() {
+        let table = Table::from_csv("a,b\n1,\n,2\n").unwrap();
+        assert!(table.columns[0].1[1].is_nan() && table.columns[1].1[0].is_nan());
+        assert_eq!(table.to_csv(), "a,b\n1,\n,2\n");
+        assert_eq!(table.complete(), Table::from_csv("a,b\n").unwrap());
     }
 
     #[test]

@@ -17,8 +17,12 @@ pub const MIN_VOLUME_SHARE: f64 = 0.1;
 /// Factor on the depth of a point whose prism is too bad.
 const THINNER: f64 = 0.8;
 
-/// Times that a depth may be reduced: to 3 % of the wall. What is bad then has a bad triangle outside.
-const MAX_REDUCTIONS: usize = 16;
+/// Least depth, as a share of the wall's. What is bad with it at all three corners has a bad triangle outside.
+const LEAST_DEPTH_SHARE: f64 = 0.03;
+
+/// Rounds of thinning: enough for the depths to fall from the wall's to the least, and then for the neighbours', which must
+/// not be many times deeper.
+const MAX_ROUNDS: usize = 64;
 
 /// Tetrahedra of all parts.
 #[derive(Clone, Debug)]
@@ -40,13 +44,19 @@ pub(super) struct FlatTriangle(pub u32);
 impl Wall {
     pub(super) fn new(assembly: &ShellAssembly, wall_mm: f64, n_layers: usize) -> Result<Self, FlatTriangle> {
         let mut depth_mm = vec![wall_mm; assembly.points.len()];
-        for round in 0..=MAX_REDUCTIONS {
+        let least_mm = LEAST_DEPTH_SHARE * wall_mm;
+        for round in 0..=MAX_ROUNDS {
             let bad = bad_triangles(assembly, &depth_mm, n_layers);
-            let Some(&first) = bad.first() else { break };
-            if round == MAX_REDUCTIONS {
-                return Err(FlatTriangle(first));
-            }
-            thin(assembly, &bad, &mut depth_mm);
+            let is_hopeless =
+                |t: &&u32| assembly.triangles[**t as usize].iter().all(|&p| depth_mm[p as usize] <= least_mm);
+            let Some(&first) = bad.iter().find(is_hopeless).or(bad.first().filter(|_| round == MAX_ROUNDS)) else {
+                if bad.is_empty() {
+                    break;
+                }
+                thin(assembly, &bad, &mut depth_mm, least_mm);
+                continue;
+            };
+            return Err(FlatTriangle(first));
         }
         let nodes = (0..=n_layers).flat_map(|layer| {
             let share = layer as f64 / n_layers as f64;
@@ -98,7 +108,7 @@ fn bad_triangles(assembly: &ShellAssembly, depth_mm: &[f64], n_layers: usize) ->
 }
 
 /// Makes the wall thinner below bad triangles, alike on both sides of a seam.
-fn thin(assembly: &ShellAssembly, bad: &[u32], depth_mm: &mut [f64]) {
+fn thin(assembly: &ShellAssembly, bad: &[u32], depth_mm: &mut [f64], least_mm: f64) {
     let mut is_hit = vec![false; depth_mm.len()];
     for &triangle in bad {
         for point in assembly.triangles[triangle as usize] {
@@ -106,7 +116,9 @@ fn thin(assembly: &ShellAssembly, bad: &[u32], depth_mm: &mut [f64]) {
         }
     }
     for (depth, is_hit) in depth_mm.iter_mut().zip(is_hit) {
-        *depth *= if is_hit { THINNER } else { 1.0 };
+        if is_hit {
+            *depth = (*depth * THINNER).max(least_mm);
+        }
     }
     for station in &assembly.stations {
         let [a, b] = station.points.map(|p| p as usize);

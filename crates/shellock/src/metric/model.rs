@@ -82,7 +82,7 @@ impl PlanModel {
         let labels: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
         let mut coarse = remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, &surface.mesh, &labels);
         split_short_seams(&mut coarse);
-        Self::of_mesh(params, &coarse.mesh, &coarse.labels, surface.n_patches)
+        Self::of_mesh(params, &relaxed(coarse.mesh), &coarse.labels, surface.n_patches)
     }
 
     /// The model of a closed mesh with these labels as it is.
@@ -249,12 +249,67 @@ fn parts(mesh: &TriMesh, labels: &[u32], n_parts: usize) -> ShellAssembly {
     }
 }
 
-/// Outward unit normals, mean of the triangles by area.
+/// Least cosine between a point's normal and those of its triangles, so that a wall stands on each.
+const LEAST_COSINE: f64 = 0.2;
+
+/// The mesh with points moved towards their neighbours where triangles fold so sharply that no wall stands on them.
+///
+/// At ears and in ditches narrower than an edge a coarse mesh has a few such points in two thousand.
+fn relaxed(mut mesh: TriMesh) -> TriMesh {
+    /// Most folds are gone after two rounds.
+    const MOST_ROUNDS: usize = 50;
+    for _ in 0..MOST_ROUNDS {
+        let normals = point_normals(&mesh);
+        let is_folded = |face: &usize| {
+            let across = mesh.area_vector_doubled(*face).normalize_or_zero();
+            mesh.triangles[*face].iter().any(|&v| normals[v as usize].dot(across) < LEAST_COSINE)
+        };
+        let folded: Vec<usize> = (0..mesh.triangles.len()).filter(is_folded).collect();
+        if folded.is_empty() {
+            break;
+        }
+        let mut is_moved = vec![false; mesh.points.len()];
+        folded.iter().flat_map(|&f| mesh.triangles[f]).for_each(|v| is_moved[v as usize] = true);
+        // Of each point the sum of itself and its neighbours, which the triangles around name twice, and their number.
+        let mut sums: Vec<(Vec3, f64)> = mesh.points.iter().map(|p| (2.0 * *p, 2.0)).collect();
+        for t in &mesh.triangles {
+            for (v, w) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                for (at, from) in [(v, w), (w, v)] {
+                    let sum = &mut sums[at as usize];
+                    *sum = (sum.0 + mesh.points[from as usize], sum.1 + 1.0);
+                }
+            }
+        }
+        let places = mesh.points.iter_mut().zip(sums).zip(is_moved).filter(|(_, is_moved)| *is_moved);
+        places.for_each(|((p, sum), _)| *p = sum.0 / sum.1);
+    }
+    mesh
+}
+
+/// Outward unit normals: the mean of the triangles by area, turned until every triangle at the point is seen from outside.
+///
+/// At ears and folds the mean may lie along a triangle, and no wall would stand on it. Where no direction sees all of a
+/// point's triangles, the last one tried is kept.
 fn point_normals(mesh: &TriMesh) -> Vec<Vec3> {
+    /// A turn adds the worst triangle's normal (the perceptron's rule, which ends where there is an answer).
+    const MOST_TURNS: usize = 100;
     let mut normals = vec![Vec3::ZERO; mesh.points.len()];
+    let mut around: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.points.len()];
     for (face, t) in mesh.triangles.iter().enumerate() {
         let area_vector = mesh.area_vector_doubled(face);
-        t.iter().for_each(|&v| normals[v as usize] += area_vector);
+        for &v in t {
+            normals[v as usize] += area_vector;
+            around[v as usize].extend(area_vector.try_normalize());
+        }
     }
-    normals.into_iter().map(|n| n.normalize_or(Vec3::Z)).collect()
+    let turned = |(mean, around): (Vec3, Vec<Vec3>)| {
+        let mut normal = mean.normalize_or(Vec3::Z);
+        for _ in 0..MOST_TURNS {
+            let worst = around.iter().min_by(|a, b| a.dot(normal).total_cmp(&b.dot(normal)));
+            let Some(worst) = worst.filter(|w| w.dot(normal) < 1.5 * LEAST_COSINE) else { break };
+            normal = (normal + 0.2 * *worst).normalize_or(normal);
+        }
+        normal
+    };
+    normals.into_iter().zip(around).map(turned).collect()
 }

@@ -1,0 +1,130 @@
+//! From a file to what is studied: a segmented surface and the survey of it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use clap::{Args, ValueEnum};
+use shellock::context::Progress;
+use shellock::pipeline::Params;
+use shellock::plan::{PlanSurvey, survey};
+use shellock::segmentation::segment;
+use shellock::{Ctx, SegmentedSurface};
+use shellock_geom::Solid;
+use shellock_geom::check::into_solid;
+use shellock_geom::io::{read_labels, read_mesh};
+
+use crate::failure::Failure;
+
+/// Which model, and how it is divided.
+#[derive(Args, Clone)]
+pub struct ModelOptions {
+    /// A closed mesh: OBJ, PLY, OFF, STL or 3MF
+    pub model: PathBuf,
+    /// Longest side, mm
+    #[arg(long, default_value_t = 150.0)]
+    pub size: f64,
+    /// Which axis of the file points up
+    #[arg(long, value_enum, default_value = "y")]
+    pub up: Axis,
+    /// One label a face, one integer a line; a label is a piece
+    #[arg(long, value_name = "FILE")]
+    pub labels: Option<PathBuf>,
+    /// Seed of all random choices
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// An axis of the file.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Axis {
+    /// The first coordinate.
+    X,
+    /// The second.
+    Y,
+    /// The third.
+    Z,
+}
+
+impl ModelOptions {
+    /// The product's own parameters, but for the seeds and the axis that points up.
+    pub fn params(&self) -> Params {
+        let mut params = Params::default().agreed();
+        params.segmentation.seed = self.seed;
+        params.plan.seed = self.seed;
+        params.plan.up = std::array::from_fn(|axis| if axis == self.up as usize { 1.0 } else { 0.0 });
+        params
+    }
+
+    /// The model's name in titles and folders.
+    pub fn name(&self) -> String {
+        self.model.file_stem().map_or_else(|| "model".to_owned(), |s| s.to_string_lossy().into_owned())
+    }
+}
+
+/// A model in mm, with the user's labels.
+pub struct Model {
+    /// The file's mesh, scaled.
+    pub solid: Solid,
+    /// One a face of `solid`, where there are any.
+    pub labels: Option<Vec<i64>>,
+}
+
+/// A model in pieces.
+pub struct Divided {
+    /// The pieces.
+    pub surface: SegmentedSurface,
+    /// What planning knows of them.
+    pub survey: PlanSurvey,
+}
+
+/// Reads the model and its labels.
+pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
+    let path = &options.model;
+    let fault = |problem: String| Failure::Model { path: path.clone(), problem };
+    let extension = path.extension().and_then(|e| e.to_str());
+    let loaded = read_mesh(&read(path)?, extension).map_err(|e| fault(e.to_string()))?;
+    let (solid, kept) = into_solid(&loaded.mesh).map_err(|e| fault(e.to_string()))?;
+    let labels = options.labels.as_ref().map(|file| {
+        let fault = |problem: String| Failure::Model { path: file.clone(), problem };
+        let labels = read_labels(&read(file)?).map_err(|e| fault(e.to_string()))?;
+        let (n_labels, n_faces) = (labels.len(), loaded.n_file_faces());
+        if n_labels != n_faces {
+            return Err(fault(format!("{n_labels} labels for a model of {n_faces} faces")));
+        }
+        Ok(kept.iter().map(|&k| labels[loaded.file_face[k as usize] as usize]).collect())
+    });
+    let mut mesh = solid.into_mesh();
+    let scale = options.size / mesh.bounds().size().max_element();
+    if !(scale.is_finite() && scale > 0.0) {
+        return Err(fault(format!("it cannot be made {} mm long", options.size)));
+    }
+    mesh.points.iter_mut().for_each(|p| *p *= scale);
+    let solid = Solid::new(mesh).map_err(|e| fault(e.to_string()))?;
+    Ok(Model { solid, labels: labels.transpose()? })
+}
+
+/// Divides the model and surveys the pieces.
+pub fn divide(ctx: &Ctx<'_>, params: &Params, model: &Model, path: &Path) -> Result<Divided, Failure> {
+    let fault = |problem: String| Failure::Model { path: path.to_owned(), problem };
+    let surface =
+        segment(ctx, &params.segmentation, &model.solid, model.labels.as_deref()).map_err(|e| fault(e.to_string()))?;
+    let survey =
+        survey(ctx, &params.plan, &surface, &surface.seams()).map_err(|_| fault("the study was stopped".into()))?;
+    Ok(Divided { surface, survey })
+}
+
+/// Calls `work` with a context that tells stages on stderr and never stops.
+pub fn with_ctx<T>(work: impl FnOnce(&Ctx<'_>) -> T) -> T {
+    let stop = AtomicBool::new(false);
+    let report = |progress: Progress<'_>| {
+        if let Progress::Stage { name, .. } = progress {
+            eprintln!("{name}");
+        }
+    };
+    work(&Ctx::new(&report, &stop))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path).map_err(|source| Failure::File { path: path.to_owned(), source })
+}
