@@ -8,6 +8,7 @@ use manifold_rust::linalg::Vec3 as V;
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{Error, MeshGL64, OpType};
 
+use crate::topology::{Topology, components};
 use crate::{Aabb, Solid, TriMesh, Vec3};
 
 /// A region bounded by a manifold mesh; may be empty, may have several bodies, may have cavities.
@@ -193,6 +194,27 @@ impl Volume {
 
     /// The region bounded by those connected boundary surfaces whose points `keep` accepts.
     pub fn retain(&self, keep: impl Fn(&mut dyn Iterator<Item = Vec3>) -> bool) -> Self {
+        let mesh = self.to_mesh();
+        // The library's own decomposition copies all points for every part: gigabytes where a cut leaves many crumbs. It is
+        // asked only where parts share an edge, which a topology of half-edges cannot tell apart.
+        let Some(topology) = Topology::of_mesh(&mesh) else { return self.retain_decomposed(keep) };
+        let (component, n) = components(&topology, |_, _| true);
+        let mut points: Vec<Vec<u32>> = vec![Vec::new(); n];
+        let mut is_told = vec![false; mesh.points.len()];
+        for (triangle, &c) in mesh.triangles.iter().zip(&component) {
+            let new = triangle.iter().filter(|v| !std::mem::replace(&mut is_told[**v as usize], true));
+            points[c as usize].extend(new);
+        }
+        let is_kept: Vec<bool> = points.iter().map(|p| keep(&mut p.iter().map(|&v| mesh.points[v as usize]))).collect();
+        if is_kept.iter().all(|k| *k) {
+            return self.clone();
+        }
+        let kept = mesh.triangles.iter().zip(&component).filter(|(_, c)| is_kept[**c as usize]).map(|(t, _)| *t);
+        let part = TriMesh { triangles: kept.collect(), points: mesh.points }.without_unused_points();
+        Self::from_closed_mesh(&part).expect("a closed part of a manifold is a manifold")
+    }
+
+    fn retain_decomposed(&self, keep: impl Fn(&mut dyn Iterator<Item = Vec3>) -> bool) -> Self {
         let parts = self.0.decompose();
         let n_parts = parts.len();
         let is_kept = |part: &Manifold| {

@@ -56,6 +56,18 @@ impl TriMesh {
         sixfold / 6.0
     }
 
+    /// The same triangles with the points they use alone, in the order of the points.
+    #[must_use]
+    pub fn without_unused_points(mut self) -> Self {
+        let mut name = vec![u32::MAX; self.points.len()];
+        self.triangles.iter().flatten().for_each(|&v| name[v as usize] = 0);
+        name.iter_mut().filter(|x| **x == 0).zip(0..).for_each(|(slot, n)| *slot = n);
+        let mut place = name.iter();
+        self.points.retain(|_| place.next() != Some(&u32::MAX));
+        self.triangles.iter_mut().flatten().for_each(|v| *v = name[*v as usize]);
+        self
+    }
+
     /// The smallest box around all points; empty where there are none.
     pub fn bounds(&self) -> Aabb {
         Aabb::around(self.points.iter().copied())

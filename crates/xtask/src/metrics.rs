@@ -54,7 +54,13 @@ enum Score {
     Holds(Opening),
     Separable,
     /// The solver failed.
-    Unsolved(String),
+    Unsolved,
+}
+
+/// Says why a plan has no score.
+fn unsolved(why: &str) -> Score {
+    eprintln!("warning: a plan was not solved: {why}");
+    Score::Unsolved
 }
 
 /// One metric over all plans.
@@ -116,7 +122,7 @@ impl Column {
         let volume = || volume_model(subject, &params).map_err(|e| failed(name, &e));
         Self::new(name, n, volume, |volume, i| match volume.resist(&subject.meetings[i], subject.key) {
             Ok(resistance) => Score::of(resistance),
-            Err(e) => Score::Unsolved(e.to_string()),
+            Err(e) => unsolved(&e.to_string()),
         })
     }
 
@@ -161,8 +167,8 @@ impl Score {
     fn of_surface(solution: Result<SurfaceSolution, SparseError>, subject: &Subject) -> Self {
         match solution {
             Ok(solution) if solution.error <= subject.model.params.surface().tolerance => Self::of(solution.resistance),
-            Ok(solution) => Self::Unsolved(format!("{:.1e} of the force is left", solution.error)),
-            Err(e) => Self::Unsolved(e.to_string()),
+            Ok(solution) => unsolved(&format!("{:.1e} of the force is left", solution.error)),
+            Err(e) => unsolved(&e.to_string()),
         }
     }
 

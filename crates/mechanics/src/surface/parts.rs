@@ -29,6 +29,9 @@ const RADIUS_MM: f64 = 30.0;
 /// fewer motions than their stations ask for.
 const LEAST_COMPLIANCE: f64 = 1e-3;
 
+/// A row of the system and the gradient of its motion at the part's points.
+type Motion = (u32, Vec<(u32, Vec3)>);
+
 /// A part as its seams feel it.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
@@ -57,7 +60,7 @@ pub(super) fn parts(
     }
     let mut triangles_at = vec![Vec::new(); points.len()];
     assembly.triangles.iter().for_each(|t| t.iter().for_each(|&v| triangles_at[v as usize].push(*t)));
-    let mut motions: Vec<Vec<(u32, Vec<(u32, Vec3)>)>> = vec![Vec::new(); assembly.n_parts];
+    let mut motions: Vec<Vec<Motion>> = vec![Vec::new(); assembly.n_parts];
     for (i, station) in assembly.stations.iter().enumerate() {
         for side in SIDES {
             let point = station.points[side.index()];
@@ -121,7 +124,7 @@ fn part(
     row: &[Option<u32>],
     points: &[Vec3],
     terms: &[Term],
-    motions: Vec<(u32, Vec<(u32, Vec3)>)>,
+    motions: Vec<Motion>,
     floats: &[u32],
 ) -> Result<Part, SparseError> {
     let supports = supports(params, points, floats);

@@ -225,7 +225,7 @@ fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[f64]) -> Opening {
 /// The parts at stations that opened too far, held ones left out, ascending.
 fn lost_parts(model: &SurfaceModel, is_held: &[bool], opening: &Opening) -> Vec<u32> {
     let lost_mm = LOST_SIZES * model.params.connector_mm;
-    let lost = |(station, d): (&Station, &f64)| (!(*d < lost_mm)).then_some(station.points);
+    let lost = |(station, d): (&Station, &f64)| (d.is_nan() || *d >= lost_mm).then_some(station.points);
     let points = model.assembly.stations.iter().zip(&opening.opening_mm).filter_map(lost).flatten();
     let mut parts: Vec<u32> = points.map(|p| model.assembly.part_of_point[p as usize]).collect();
     parts.retain(|p| !is_held.get(*p as usize).is_some_and(|h| *h));

@@ -183,7 +183,7 @@ fn hold(sections: [&Section; 2], node: usize) -> Option<Hold> {
     let (it, is, k) = (node / N_SECTION, node % N_SECTION / N_ACROSS, node % N_ACROSS);
     let end = |up: bool| {
         let shifted = |x: usize| {
-            if x % 2 == 0 {
+            if x.is_multiple_of(2) {
                 x
             } else if up {
                 x + 1
@@ -272,12 +272,12 @@ impl Bar {
         for tet in &self.tets {
             let nodes = with_middles(*tet);
             stiffness(Order::Quadratic, tet.map(|c| corner(sections, c)), lame, |a, b, k| {
-                for i in 0..3 {
-                    for j in 0..3 {
+                for (i, k) in k.iter().enumerate() {
+                    for (j, k) in k.iter().enumerate() {
                         let (row, column) = (3 * nodes[a] + i, 3 * nodes[b] + j);
-                        k_bar[row + N * column] += k[i][j];
+                        k_bar[row + N * column] += k;
                         if a != b {
-                            k_bar[column + N * row] += k[i][j];
+                            k_bar[column + N * row] += k;
                         }
                     }
                 }

@@ -63,8 +63,8 @@ impl Response {
         let mut moved = self.drift_mm.clone();
         for (j, &row) in self.rows.iter().enumerate() {
             let force = equilibrium.force_n[row];
-            for i in 0..n {
-                moved[i] += force * self.compliance[i.max(j) + n * i.min(j)];
+            for (i, moved) in moved.iter_mut().enumerate() {
+                *moved += force * self.compliance[i.max(j) + n * i.min(j)];
             }
         }
         if let Some(first) = self.first_motion {
@@ -166,6 +166,9 @@ fn system(parts: &[Response], order: &[usize], n_rows: usize, n_motions: usize) 
     values
 }
 
+/// Forces along rows, N, and rigid motions.
+type ForcesAndMotions = (Vec<f64>, Vec<f64>);
+
 /// Block principal pivoting: the forces along the unilateral rows, and the rigid motions.
 ///
 /// All rows that are wrong change sides at once, until that no longer helps; then the last wrong one alone.
@@ -174,7 +177,7 @@ fn active_set(
     n_pushes: usize,
     n_motions: usize,
     tolerance: f64,
-) -> Result<Option<(Vec<f64>, Vec<f64>)>, SparseError> {
+) -> Result<Option<ForcesAndMotions>, SparseError> {
     let mut is_active = vec![false; n_pushes];
     let (mut fewest_wrong, mut stalled) = (usize::MAX, 0);
     for _round in 0..MAX_ROUNDS {

@@ -137,9 +137,9 @@ fn assemble(
         let dofs = numbering.of_tet(order, tet);
         stiffness(order, tet.map(|v| wall.nodes[v as usize]), lame, |a, b, k| {
             let (Some(p), Some(q)) = (dofs[a], dofs[b]) else { return };
-            for i in 0..3 {
+            for (i, k) in (0..).zip(k) {
                 for j in if a == b { i..3 } else { 0..3 } {
-                    entries.push((p + i as u32, q + j as u32, k[i][j]));
+                    entries.push((p + i as u32, q + j as u32, k[j]));
                 }
             }
         });

@@ -101,8 +101,9 @@ fn bad_triangles(assembly: &ShellAssembly, depth_mm: &[f64], n_layers: usize) ->
         let depth = t.map(|i| depth_mm[i as usize]).iter().sum::<f64>() / 3.0;
         let straight_6 = (b - a).cross(c - a).length() * depth / n_layers as f64;
         let mut tets = (0..n_layers).flat_map(|layer| prism(*t, layer, n_points));
-        // Negated, so that a triangle of no area or of points that are no numbers is bad as well.
-        tets.any(|tet| !(volume_6(tet.map(node)) > MIN_VOLUME_SHARE * straight_6) || straight_6 <= 0.0)
+        // A triangle of no area or of points that are no numbers is bad as well.
+        let is_sound = |tet: [u32; 4]| straight_6 > 0.0 && volume_6(tet.map(node)) > MIN_VOLUME_SHARE * straight_6;
+        tets.any(|tet| !is_sound(tet))
     };
     (0..).zip(&assembly.triangles).filter(|(_, t)| is_bad(t)).map(|(i, _)| i).collect()
 }

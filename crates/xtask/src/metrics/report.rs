@@ -62,7 +62,7 @@ fn verdicts(reference: &Column, other: &Column) -> Vec<Vec<String>> {
     let verdict = |s: &Score| match s {
         Score::Holds(_) => 0,
         Score::Separable => 1,
-        Score::Unsolved(_) => 2,
+        Score::Unsolved => 2,
     };
     let mut n = [[0usize; 3]; 3];
     for (a, b) in reference.scores.iter().zip(&other.scores) {
