@@ -14,6 +14,9 @@ use crate::{Cancelled, Ctx, PatchId, SegmentedSurface, Warning};
 /// decides among plans of about the same cost only.
 const COST_SLACK: f64 = 0.05;
 
+/// Costs that differ by less than this share are the same but for rounding.
+const COST_TIE: f64 = 1e-9;
+
 /// Share of `s` along the seam, or towards the earlier piece, from which that is named as the reason why a seam is weak.
 const ALONG_SHARE: f64 = 0.7;
 const BACKWARD_SHARE: f64 = 0.5;
@@ -79,7 +82,7 @@ pub fn choose(
         warn_of_loose(ctx, &holding.loose);
     }
     let chosen = plans[best].clone();
-    let is_optimal = found.is_optimal && best == 0;
+    let is_optimal = found.is_optimal && chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
     Ok((FoundPlan { plan: chosen.plan, score: chosen.score, is_optimal, ..found }, holding))
 }
 
