@@ -222,8 +222,8 @@ impl VolumeModel {
     /// How far the seams open when the stations are joined by `joints` and `fixed_part` is held in place, or which parts come
     /// off. Opening is the larger of the distances between male and female at the root and at the tip of the pin.
     ///
-    /// Connectors reach from station to station: one that is joined but none of whose neighbours along a step is, with the same
-    /// male side, has none. May be called from several threads at once.
+    /// Connectors reach from station to station. One that stands alone reaches to a station without; where all its neighbours
+    /// have the other male side it has none. May be called from several threads at once.
     pub fn resist(&self, plan: &[Meeting], fixed_part: u32) -> Result<Resistance, VolumeError> {
         if fixed_part as usize >= self.parts.len() {
             return Err(VolumeError::NoSuchPart(fixed_part));
@@ -240,15 +240,38 @@ impl VolumeModel {
 
     /// Which stations have a connector: a joint with a bar to a neighbour, see [`resist`](Self::resist).
     pub fn has_connector(&self, plan: &[Meeting]) -> Vec<bool> {
-        let joints: Vec<Option<Joint>> = plan.iter().map(|m| m.joint).collect();
+        let joints = self.with_overhangs(plan);
         let mut has = vec![false; self.stations.len()];
         if joints.len() == self.stations.len() {
             let sections = connector::sections(self, &joints);
             for bar in self.bars(&joints, &sections) {
-                bar[0].stations.iter().for_each(|&station| has[station] = true);
+                bar[0].stations.iter().for_each(|&station| has[station] = plan[station].joint.is_some());
             }
         }
         has
+    }
+
+    /// The joints, and for each that stands alone a shape to hang its bars on at the next station: nothing touches or pulls there.
+    fn with_overhangs(&self, plan: &[Meeting]) -> Vec<Option<Joint>> {
+        let mut joints: Vec<Option<Joint>> = plan.iter().map(|m| m.joint).collect();
+        if joints.len() != self.stations.len() {
+            return joints;
+        }
+        let mut next: Vec<Vec<usize>> = vec![Vec::new(); joints.len()];
+        for [i, j] in self.steps.iter().map(|s| s.map(|s| s as usize)) {
+            next[i].push(j);
+            next[j].push(i);
+        }
+        for i in 0..joints.len() {
+            let Some(joint) = plan[i].joint else { continue };
+            if next[i].iter().any(|&j| joints[j].is_some_and(|other| other.male == joint.male)) {
+                continue;
+            }
+            let Some(&free) = next[i].iter().find(|&&j| joints[j].is_none()) else { continue };
+            let leaves = joint.leaves.reject_from_normalized(self.stations[free].tangent).try_normalize();
+            joints[free] = leaves.map(|leaves| Joint { leaves, pull_on_a: Vec3::ZERO, ..joint });
+        }
+        joints
     }
 
     /// How parts move, with `fixed_part` held in place, or nothing but what is clamped; or the parts that come off.
@@ -257,10 +280,10 @@ impl VolumeModel {
         plan: &[Meeting],
         fixed_part: Option<u32>,
     ) -> Result<Result<Deflection, Vec<u32>>, VolumeError> {
-        let joints: Vec<Option<Joint>> = plan.iter().map(|m| m.joint).collect();
-        if joints.len() != self.stations.len() {
-            return Err(VolumeError::Joints { joints: joints.len(), stations: self.stations.len() });
+        if plan.len() != self.stations.len() {
+            return Err(VolumeError::Joints { joints: plan.len(), stations: self.stations.len() });
         }
+        let joints = self.with_overhangs(plan);
         let sections = connector::sections(self, &joints);
         let bars = self.bars(&joints, &sections);
         let is_free = |i: usize| self.parts[i].rigid.is_some() && Some(i as u32) != fixed_part;

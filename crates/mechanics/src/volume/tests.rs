@@ -236,3 +236,16 @@ fn odd_input_is_refused() {
     flat.normals.fill(shellock_geom::Vec3::X);
     assert_eq!(VolumeModel::new(&VolumeParams::default(), &flat).unwrap_err(), VolumeError::FlatTriangle(0));
 }
+
+#[test]
+fn a_joint_that_stands_alone_has_a_connector_and_its_neighbour_without_joint_bears_nothing() {
+    let ball = sample::ball(20.0, 8);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    let mut plan = joined(&ball, 0.0, None);
+    let alone = ball.steps[0][0] as usize;
+    plan.iter_mut().enumerate().filter(|(i, _)| *i != alone).for_each(|(_, m)| m.joint = None);
+    let has: Vec<usize> = (0..).zip(model.has_connector(&plan)).filter(|(_, has)| *has).map(|(i, _)| i).collect();
+    assert_eq!(has, [alone]);
+    // One joint holds no octant.
+    assert!(matches!(model.resist(&plan, 7), Ok(Resistance::Separable(_))));
+}
