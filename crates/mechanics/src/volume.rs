@@ -2,8 +2,8 @@
 //!
 //! What no plan changes is done once, by [`VolumeModel::new`]: the wall of every part, its stiffness, and the condensation of that
 //! onto the points near the part's seams. What a plan adds, [`VolumeModel::resist`] hangs on those points: pins and channels
-//! ([`connector`]). A part's bars and wall condense to what contact sees of it, and contact is solved between these few
-//! unknowns ([`contact`]); rigid motions are kept apart, so that parts that come off are found exactly ([`mechanism`]).
+//! (`connector`). A part's bars and wall condense to what contact sees of it, and contact is solved between these few
+//! unknowns (`contact`); rigid motions are kept apart, so that parts that come off are found exactly (`mechanism`).
 //!
 //! Deviations from the paper: contact is exact instead of by penalty, between pairs of nodes that start at one place;
 //! displacements are small. Limits: no friction, no gap; where a thin model's walls overlap, each is whole. The floor of the
