@@ -98,6 +98,9 @@ pub struct Joint {
     pub weight: f64,
 }
 
+/// An opening this wide, in connector sizes, has let the pin out of its channel: the joint does not hold.
+pub(crate) const LOST_SIZES: f64 = 0.6;
+
 /// What a solver found for one plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opening {
@@ -120,6 +123,20 @@ impl Opening {
             }
         }
         Self { opening_mm, quality_mm: -worst.map_or(0.0, |w| w.1), worst: worst.map(|w| w.0) }
+    }
+
+    /// Whether that holds: unless a station opens by `lost_mm` or more. `parts` names those of a station that are free.
+    pub(crate) fn resistance<I: IntoIterator<Item = u32>>(
+        self,
+        lost_mm: f64,
+        parts: impl Fn(usize) -> I,
+    ) -> Resistance {
+        let is_lost = |d: f64| d.is_nan() || d >= lost_mm;
+        let lost = (0..self.opening_mm.len()).filter(|station| is_lost(self.opening_mm[*station]));
+        let mut lost: Vec<u32> = lost.flat_map(parts).collect();
+        lost.sort_unstable();
+        lost.dedup();
+        if lost.is_empty() { Resistance::Holds(self) } else { Resistance::Separable(lost) }
     }
 }
 

@@ -27,8 +27,9 @@ use shellock_geom::sparse::SparseError;
 pub use element::Order;
 pub use wall::{MIN_VOLUME_SHARE, Wall};
 
-use crate::{Joint, Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
-use connector::{Bar, Labels, Section};
+use crate::assembly::LOST_SIZES;
+use crate::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
+use connector::{Bar, Labels, Section, Sections};
 use contact::Response;
 use front::Front;
 use part::Part;
@@ -222,8 +223,7 @@ impl VolumeModel {
     /// How far the seams open when the stations are joined by `joints` and `fixed_part` is held in place, or which parts come
     /// off. Opening is the larger of the distances between male and female at the root and at the tip of the pin.
     ///
-    /// Connectors reach from station to station. One that stands alone reaches to a station without; where all its neighbours
-    /// have the other male side it has none. May be called from several threads at once.
+    /// May be called from several threads at once.
     pub fn resist(&self, plan: &[Meeting], fixed_part: u32) -> Result<Resistance, VolumeError> {
         if fixed_part as usize >= self.parts.len() {
             return Err(VolumeError::NoSuchPart(fixed_part));
@@ -232,46 +232,13 @@ impl VolumeModel {
             Ok(deflection) => {
                 let widest = |[a, b]: &[[Vec3; 2]; 2]| a[0].distance(b[0]).max(a[1].distance(b[1]));
                 let openings = deflection.displacement_mm.iter().map(widest).collect();
-                Resistance::Holds(Opening::rated(plan, openings))
+                let lost_mm = LOST_SIZES * self.params.connector_mm;
+                Opening::rated(plan, openings).resistance(lost_mm, |station| {
+                    self.station_parts[station].into_iter().filter(|part| *part != fixed_part)
+                })
             }
             Err(parts) => Resistance::Separable(parts),
         })
-    }
-
-    /// Which stations have a connector: a joint with a bar to a neighbour, see [`resist`](Self::resist).
-    pub fn has_connector(&self, plan: &[Meeting]) -> Vec<bool> {
-        let joints = self.with_overhangs(plan);
-        let mut has = vec![false; self.stations.len()];
-        if joints.len() == self.stations.len() {
-            let sections = connector::sections(self, &joints);
-            for bar in self.bars(&joints, &sections) {
-                bar[0].stations.iter().for_each(|&station| has[station] = plan[station].joint.is_some());
-            }
-        }
-        has
-    }
-
-    /// The joints, and for each that stands alone a shape to hang its bars on at the next station: nothing touches or pulls there.
-    fn with_overhangs(&self, plan: &[Meeting]) -> Vec<Option<Joint>> {
-        let mut joints: Vec<Option<Joint>> = plan.iter().map(|m| m.joint).collect();
-        if joints.len() != self.stations.len() {
-            return joints;
-        }
-        let mut next: Vec<Vec<usize>> = vec![Vec::new(); joints.len()];
-        for [i, j] in self.steps.iter().map(|s| s.map(|s| s as usize)) {
-            next[i].push(j);
-            next[j].push(i);
-        }
-        for i in 0..joints.len() {
-            let Some(joint) = plan[i].joint else { continue };
-            if next[i].iter().any(|&j| joints[j].is_some_and(|other| other.male == joint.male)) {
-                continue;
-            }
-            let Some(&free) = next[i].iter().find(|&&j| joints[j].is_none()) else { continue };
-            let leaves = joint.leaves.reject_from_normalized(self.stations[free].tangent).try_normalize();
-            joints[free] = leaves.map(|leaves| Joint { leaves, pull_on_a: Vec3::ZERO, ..joint });
-        }
-        joints
     }
 
     /// How parts move, with `fixed_part` held in place, or nothing but what is clamped; or the parts that come off.
@@ -283,9 +250,8 @@ impl VolumeModel {
         if plan.len() != self.stations.len() {
             return Err(VolumeError::Joints { joints: plan.len(), stations: self.stations.len() });
         }
-        let joints = self.with_overhangs(plan);
-        let sections = connector::sections(self, &joints);
-        let bars = self.bars(&joints, &sections);
+        let sections = connector::sections(self, plan);
+        let bars = connector::bars(self, plan, &sections);
         let is_free = |i: usize| self.parts[i].rigid.is_some() && Some(i as u32) != fixed_part;
         let n_motions = 6 * (0..self.parts.len()).filter(|i| is_free(*i)).count();
         let mut responses = (0..self.parts.len())
@@ -305,7 +271,7 @@ impl VolumeModel {
         let equilibrium =
             contact::solve(&responses, &laws, n_motions, self.params.tolerance)?.ok_or(VolumeError::Contact)?;
 
-        let mut displacement_mm = vec![[[Vec3::ZERO; 2]; 2]; joints.len()];
+        let mut displacement_mm = vec![[[Vec3::ZERO; 2]; 2]; plan.len()];
         for (part, response) in (0..).zip(&responses) {
             for (&row, moved) in response.rows.iter().zip(response.displacement_mm(&equilibrium)) {
                 let (station, row) = (row / ROWS, row % ROWS);
@@ -321,44 +287,26 @@ impl VolumeModel {
         Ok(Ok(Deflection { displacement_mm }))
     }
 
-    /// The bars of both sides along all steps between stations that are joined alike.
-    fn bars(&self, joints: &[Option<Joint>], sections: &[[Option<Section>; 2]]) -> Vec<[Bar; 2]> {
-        let along = |(step, ends): (usize, &[u32; 2])| {
-            let ends = ends.map(|s| s as usize);
-            let [Some(first), Some(second)] = ends.map(|s| joints[s]) else { return None };
-            let bar = |side: Side| {
-                let [Some(i), Some(j)] = ends.map(|s| sections[s][side.index()].as_ref()) else { return None };
-                Bar::new(step, side, ends, [i, j])
-            };
-            if first.male == second.male { Some([bar(Side::A)?, bar(Side::B)?]) } else { None }
-        };
-        self.steps.iter().enumerate().filter_map(along).collect()
-    }
-
     fn response(
         &self,
         part: u32,
         is_fixed: bool,
         plan: &[Meeting],
-        sections: &[[Option<Section>; 2]],
-        bars: &[[Bar; 2]],
+        sections: &Sections,
+        bars: &[Bar],
     ) -> Result<Response, SparseError> {
         let n_stations = self.stations.len();
         let n_wall = 3 * self.parts[part as usize].kept.len();
         let labels = Labels::new(n_wall, n_stations);
-        let own: Vec<&Bar> =
-            bars.iter().flatten().filter(|bar| self.station_parts[bar.stations[0]][bar.side.index()] == part).collect();
+        let is_own = |bar: &&Bar| self.station_parts[bar.from][bar.side.index()] == part;
+        let own: Vec<&Bar> = bars.iter().filter(is_own).collect();
         let spans = connector::spans(&own, n_stations);
-        let fronts: Vec<Front> = (own.iter().enumerate())
-            .map(|(i, bar)| {
-                let [Some(first), Some(second)] = bar.stations.map(|s| sections[s][bar.side.index()].as_ref()) else {
-                    return Front::default();
-                };
-                let carries = bar.stations.map(|s| spans[s][bar.side.index()].is_some_and(|span| span[0] == i));
-                let front = bar.front(self, [first, second], carries, labels);
-                if is_fixed { front.without(|id| labels.is_wall(id)) } else { front }
-            })
-            .collect();
+        let front = |(i, bar): (usize, &&Bar)| {
+            let carries = |station: usize| spans[station][bar.side.index()].is_some_and(|span| span[0] == i);
+            let front = bar.front(self, sections, carries, labels);
+            if is_fixed { front.without(|id| labels.is_wall(id)) } else { front }
+        };
+        let fronts: Vec<Front> = own.iter().enumerate().map(front).collect();
         let mut fronts = connector::condensed(&fronts, &own, labels, &spans)?;
         if !is_fixed {
             fronts.extend(self.wall_fronts(part, plan, labels));
@@ -369,14 +317,7 @@ impl VolumeModel {
     }
 
     /// Compliance and drift from what is left of a part: its contact rows, and its load, if it has one.
-    fn read(
-        &self,
-        part: u32,
-        left: &Front,
-        labels: Labels,
-        plan: &[Meeting],
-        sections: &[[Option<Section>; 2]],
-    ) -> Response {
+    fn read(&self, part: u32, left: &Front, labels: Labels, plan: &[Meeting], sections: &Sections) -> Response {
         let n = left.ids.len();
         let n_rows = left.ids.partition_point(|id| *id < labels.load());
         let rows: Vec<usize> = left.ids[..n_rows].iter().map(|id| labels.row_of(*id)).collect();

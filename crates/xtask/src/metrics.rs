@@ -134,22 +134,6 @@ impl Column {
         })
     }
 
-    /// The surface metric without the joints for which the volume metric finds no room: lone ones, and where frames twist.
-    fn by_surface_with_bars(name: &str, subject: &Subject) -> Result<Self, Failure> {
-        let prepare = || {
-            let volume = volume_model(subject, &subject.model.params).map_err(|e| failed(name, &e))?;
-            let surface = subject.model.surface_model().map_err(|e| failed(name, &e))?;
-            Ok((volume, surface))
-        };
-        Self::new(name, subject.plans.len(), prepare, |(volume, surface), i| {
-            let mut meetings = subject.meetings[i].clone();
-            for (meeting, has) in meetings.iter_mut().zip(volume.has_connector(&subject.meetings[i])) {
-                meeting.joint = meeting.joint.filter(|_| has);
-            }
-            Score::of_surface(surface.resist(&meetings, subject.key), subject)
-        })
-    }
-
     /// The qualities, mm; not a number where there is none.
     fn qualities_mm(&self) -> Vec<f64> {
         self.scores.iter().map(|s| s.opening().map_or(f64::NAN, |o| o.quality_mm)).collect()
@@ -183,7 +167,6 @@ fn columns(subject: &Subject) -> Result<Vec<Column>, Failure> {
     Ok(vec![
         Column::by_volume("volume [mm]", subject, e_mpa, subject.plans.len())?,
         Column::by_surface("surface [mm]", subject, [1.0; 3])?,
-        Column::by_surface_with_bars("surface with the volume's connectors [mm]", subject)?,
     ])
 }
 

@@ -19,7 +19,7 @@ use super::VolumeModel;
 use super::element::{EDGES, Order, gradients, lame, stiffness, volume_6};
 use super::front::Front;
 use super::rows::ROWS;
-use crate::{Joint, SIDES, Side};
+use crate::{Joint, Meeting, SIDES, Side};
 
 /// How far the pin reaches, as a share of the connector size D.
 const DEPTH: f64 = 0.6;
@@ -59,8 +59,8 @@ impl Section {
     /// Where the pairs are: at the root and at the tip, on the common face.
     const PAIRS: [usize; 2] = [1, 0];
 
-    /// The cross-section of `side` at a station joined by `joint`.
-    pub fn new(model: &VolumeModel, station: usize, side: Side, joint: &Joint) -> Self {
+    /// The cross-section of `side` at a station joined by `joint`, or that far along from it: a section further on carries no force.
+    pub fn new(model: &VolumeModel, station: usize, side: Side, joint: &Joint, along_mm: f64) -> Self {
         let (place, size) = (&model.stations[station], model.params.connector_mm);
         let inland = if side == Side::A { -place.across } else { place.across };
         let male_to_female = if joint.male == Side::A { place.across } else { -place.across };
@@ -68,7 +68,7 @@ impl Section {
         let s = joint.leaves;
         let n = male_to_female * s.dot(place.normal) - place.normal * s.dot(male_to_female);
         let thick = n * (if joint.male == side { -THICKNESS } else { THICKNESS } * size);
-        let edge = model.inner_edge[station][side.index()];
+        let edge = model.inner_edge[station][side.index()] + along_mm * place.tangent;
         let at = [-DEPTH, 0.0, THICKNESS].map(|s_share| [0.0, 1.0].map(|k| edge + s * (s_share * size) + thick * k));
 
         let is_inside = |x: Vec3| {
@@ -139,17 +139,21 @@ impl Labels {
     fn section(self, station: usize, side: Side) -> u32 {
         self.load() + 1 + ((2 * station + side.index()) * 3 * N_SECTION) as u32
     }
-    fn halfway(self, step: usize, side: Side) -> u32 {
-        self.section(self.n_stations as usize, Side::A) + ((2 * step + side.index()) * 3 * N_SECTION) as u32
+    /// The bar's cross-section halfway, and the one at its free end.
+    fn within(self, bar: usize) -> [u32; 2] {
+        let first = self.section(self.n_stations as usize, Side::A) + (2 * bar * 3 * N_SECTION) as u32;
+        [first, first + 3 * N_SECTION as u32]
     }
 }
 
-/// One side's bar along one step.
+/// One side's bar along the seam, from a station to the next, or halfway there with an end of its own.
 #[derive(Debug)]
 pub(super) struct Bar {
-    pub step: usize,
+    /// Number among the bars of all parts.
+    index: usize,
     pub side: Side,
-    pub stations: [usize; 2],
+    pub from: usize,
+    pub to: Result<usize, Section>,
     /// Corners of its tetrahedra, as nodes of the bar's lattice.
     tets: Vec<[usize; 4]>,
 }
@@ -199,45 +203,66 @@ fn hold(sections: [&Section; 2], node: usize) -> Option<Hold> {
     Some([end(false)?, end(true)?].into_iter().flatten().map(|(node, w)| (*node, 0.5 * w)).collect())
 }
 
-impl Bar {
-    /// The bar, or nothing where frames twist so far that it would turn inside out.
-    pub fn new(step: usize, side: Side, stations: [usize; 2], sections: [&Section; 2]) -> Option<Self> {
-        let has_foot = sections[0].has_foot && sections[1].has_foot;
-        let mut tets = Vec::new();
-        for cell in 0..1 + usize::from(has_foot) {
-            let mut cell_tets = cell_tets(cell);
-            let along = corner(sections, lattice(2 * cell, 0, 0)).distance(corner(sections, lattice(2 * cell, 0, 2)));
-            let section = sections[0].at[cell][0].distance(sections[0].at[cell + 1][0])
-                * sections[0].at[cell][0].distance(sections[0].at[cell][1]);
-            // Kuhn's tetrahedra: even permutations of the axes have one sign, odd ones the other.
-            let volumes: Vec<f64> = (cell_tets.iter().enumerate())
-                .map(|(i, t)| volume_6(t.map(|node| corner(sections, node))) * if i < 3 { 1.0 } else { -1.0 })
-                .collect();
-            let sign = volumes[0].signum();
-            if volumes.iter().any(|v| v * sign < MIN_VOLUME_SHARE * along * section) {
-                return None;
-            }
-            for (i, tet) in cell_tets.iter_mut().enumerate() {
-                if (i < 3) != (sign > 0.0) {
-                    tet.swap(2, 3);
-                }
-            }
-            let nodes: Vec<usize> = cell_tets.concat();
-            if nodes.into_iter().any(|node| hold(sections, node).is_none()) {
-                tets.extend(cell_tets);
+/// Tetrahedra of the bar between two cross-sections that are not rigidly part of the wall, as nodes of its lattice; nothing
+/// where the sections are so far twisted that it would turn inside out.
+fn tets_between(sections: [&Section; 2]) -> Option<Vec<[usize; 4]>> {
+    let has_foot = sections[0].has_foot && sections[1].has_foot;
+    let mut tets = Vec::new();
+    for cell in 0..1 + usize::from(has_foot) {
+        let mut cell_tets = cell_tets(cell);
+        let along = corner(sections, lattice(2 * cell, 0, 0)).distance(corner(sections, lattice(2 * cell, 0, 2)));
+        let section = sections[0].at[cell][0].distance(sections[0].at[cell + 1][0])
+            * sections[0].at[cell][0].distance(sections[0].at[cell][1]);
+        // Kuhn's tetrahedra: even permutations of the axes have one sign, odd ones the other.
+        let volumes: Vec<f64> = (cell_tets.iter().enumerate())
+            .map(|(i, t)| volume_6(t.map(|node| corner(sections, node))) * if i < 3 { 1.0 } else { -1.0 })
+            .collect();
+        let sign = volumes[0].signum();
+        if volumes.iter().any(|v| v * sign < MIN_VOLUME_SHARE * along * section) {
+            return None;
+        }
+        for (i, tet) in cell_tets.iter_mut().enumerate() {
+            if (i < 3) != (sign > 0.0) {
+                tet.swap(2, 3);
             }
         }
-        Some(Self { step, side, stations, tets })
+        let nodes: Vec<usize> = cell_tets.concat();
+        if nodes.into_iter().any(|node| hold(sections, node).is_none()) {
+            tets.extend(cell_tets);
+        }
+    }
+    Some(tets)
+}
+
+impl Bar {
+    /// Its stations: one or two.
+    pub fn stations(&self) -> impl Iterator<Item = usize> {
+        std::iter::once(self.from).chain(self.to.as_ref().ok().copied())
     }
 
-    /// Stiffness, contact rows and load of the bar; of its stations only those in `carries`, so that each counts once.
-    pub fn front(&self, model: &VolumeModel, sections: [&Section; 2], carries: [bool; 2], labels: Labels) -> Front {
-        let holds: Vec<Option<Hold>> = (0..N_BAR).map(|node| hold(sections, node)).collect();
-        let base = [
-            labels.section(self.stations[0], self.side),
-            labels.halfway(self.step, self.side),
-            labels.section(self.stations[1], self.side),
-        ];
+    /// The cross-sections at its ends.
+    fn ends<'a>(&'a self, sections: &'a Sections) -> Option<[&'a Section; 2]> {
+        let of = |station: usize| sections[station][self.side.index()].as_ref();
+        let to = match &self.to {
+            Ok(station) => of(*station)?,
+            Err(end) => end,
+        };
+        Some([of(self.from)?, to])
+    }
+
+    /// Stiffness, contact rows and load of the bar; `carries` says of which of its stations, so that each counts once.
+    pub fn front(
+        &self,
+        model: &VolumeModel,
+        sections: &Sections,
+        carries: impl Fn(usize) -> bool,
+        labels: Labels,
+    ) -> Front {
+        let Some(ends) = self.ends(sections) else { return Front::default() };
+        let holds: Vec<Option<Hold>> = (0..N_BAR).map(|node| hold(ends, node)).collect();
+        let [halfway, end] = labels.within(self.index);
+        let to = self.to.as_ref().map_or(end, |station| labels.section(*station, self.side));
+        let base = [labels.section(self.from, self.side), halfway, to];
         // What moves a node: its own unknown or the wall's.
         let movers: Vec<Hold> = (holds.into_iter().enumerate())
             .map(|(node, hold)| match hold {
@@ -245,13 +270,13 @@ impl Bar {
                 None => vec![(base[node / N_SECTION] + 3 * (node % N_SECTION) as u32, 1.0)],
             })
             .collect();
-        let mut sum = Accumulator::new(self.used_nodes(), &movers, labels, self.stations, carries);
-        sum.add_stiffness(&self.lattice_stiffness(model, sections), &movers);
-        for i in 0..2 {
-            if carries[i] {
-                sum.add_contact(sections[i], &movers, 2 * i, |row| labels.row(self.stations[i], row));
-                sum.add_load(sections[i], &movers, 2 * i, labels.load());
-            }
+        let carried: Vec<(usize, usize)> =
+            self.stations().enumerate().filter(|(_, station)| carries(*station)).collect();
+        let mut sum = Accumulator::new(self.used_nodes(), &movers, labels, &carried);
+        sum.add_stiffness(&self.lattice_stiffness(model, ends), &movers);
+        for (i, station) in carried {
+            sum.add_contact(ends[i], &movers, 2 * i, |row| labels.row(station, row));
+            sum.add_load(ends[i], &movers, 2 * i, labels.load());
         }
         sum.front
     }
@@ -318,14 +343,12 @@ struct Accumulator {
 }
 
 impl Accumulator {
-    fn new(used: Vec<usize>, movers: &[Hold], labels: Labels, stations: [usize; 2], carries: [bool; 2]) -> Self {
+    fn new(used: Vec<usize>, movers: &[Hold], labels: Labels, carried: &[(usize, usize)]) -> Self {
         let mut ids: Vec<u32> =
             used.iter().flat_map(|&node| &movers[node]).flat_map(|(first, _)| *first..*first + 3).collect();
-        for (station, carries) in stations.into_iter().zip(carries) {
-            if carries {
-                ids.extend((0..ROWS).map(|row| labels.row(station, row)));
-                ids.push(labels.load());
-            }
+        for (_, station) in carried {
+            ids.extend((0..ROWS).map(|row| labels.row(*station, row)));
+            ids.push(labels.load());
         }
         ids.sort_unstable();
         ids.dedup();
@@ -394,12 +417,103 @@ impl Accumulator {
     }
 }
 
-/// Both sides' cross-sections at all stations that are joined.
-pub(super) fn sections(model: &VolumeModel, joints: &[Option<Joint>]) -> Vec<[Option<Section>; 2]> {
+/// Both sides' cross-sections at each station, where it is joined.
+pub(super) type Sections = Vec<[Option<Section>; 2]>;
+
+/// All of them for a plan.
+pub(super) fn sections(model: &VolumeModel, plan: &[Meeting]) -> Sections {
     use rayon::prelude::*;
-    (joints.par_iter().enumerate())
-        .map(|(i, joint)| SIDES.map(|side| joint.as_ref().map(|joint| Section::new(model, i, side, joint))))
+    (plan.par_iter().enumerate())
+        .map(|(i, m)| SIDES.map(|side| m.joint.as_ref().map(|joint| Section::new(model, i, side, joint, 0.0))))
         .collect()
+}
+
+/// The bars of both sides. Every joint has two on either side: towards a neighbour that is joined alike the two share one;
+/// towards any other, and where the seam ends, it has its own, which ends halfway.
+pub(super) fn bars(model: &VolumeModel, plan: &[Meeting], sections: &Sections) -> Vec<Bar> {
+    let mut bars = Bars { model, plan, sections, all: Vec::new() };
+    let ways: Vec<[Way; 2]> = model.steps.iter().map(|step| ways(model, step.map(|s| s as usize))).collect();
+    let mut has_way = vec![[false; 2]; plan.len()];
+    ways.iter().flatten().for_each(|way| has_way[way.station][usize::from(way.is_forward)] = true);
+    for [from, to] in ways {
+        let to_ends = [from, to].map(|way| Way { is_forward: !way.is_forward, ..way });
+        let ends = |way: &Way| !std::mem::replace(&mut has_way[way.station][usize::from(way.is_forward)], true);
+        let is_end = to_ends.each_ref().map(ends);
+        if is_end[0] {
+            bars.push_own(&to_ends[0]);
+        }
+        if !bars.push_shared([from.station, to.station]) {
+            bars.push_own(&from);
+            bars.push_own(&to);
+        }
+        if is_end[1] {
+            bars.push_own(&to_ends[1]);
+        }
+    }
+    for (station, has_way) in has_way.into_iter().enumerate() {
+        let half_mm = 0.5 * model.stations[station].length_mm;
+        for is_forward in [false, true].into_iter().filter(|is_forward| !has_way[usize::from(*is_forward)]) {
+            bars.push_own(&Way { station, is_forward, half_mm });
+        }
+    }
+    bars.all
+}
+
+/// From a station along its tangent or against it, half as far as the next station.
+#[derive(Clone, Copy)]
+struct Way {
+    station: usize,
+    is_forward: bool,
+    half_mm: f64,
+}
+
+/// The ways from both ends of a step towards each other.
+fn ways(model: &VolumeModel, [from, to]: [usize; 2]) -> [Way; 2] {
+    let step = model.inner_edge[to][0] - model.inner_edge[from][0];
+    let way = |station: usize, step: Vec3| Way {
+        station,
+        is_forward: step.dot(model.stations[station].tangent) >= 0.0,
+        half_mm: 0.5 * step.length(),
+    };
+    [way(from, step), way(to, -step)]
+}
+
+/// Bars being listed.
+struct Bars<'a> {
+    model: &'a VolumeModel,
+    plan: &'a [Meeting],
+    sections: &'a Sections,
+    all: Vec<Bar>,
+}
+
+impl Bars<'_> {
+    /// The two bars between two stations, if both are joined and alike.
+    fn push_shared(&mut self, [from, to]: [usize; 2]) -> bool {
+        let males = [from, to].map(|s| self.plan[s].joint.map(|joint| joint.male));
+        let tets = SIDES.map(|side| {
+            let [first, second] = [from, to].map(|s| self.sections[s][side.index()].as_ref());
+            tets_between([first?, second?])
+        });
+        let ([Some(a), Some(b)], true) = (tets, males[0] == males[1]) else { return false };
+        for (side, tets) in SIDES.into_iter().zip([a, b]) {
+            self.all.push(Bar { index: self.all.len(), side, from, to: Ok(to), tets });
+        }
+        true
+    }
+
+    /// The two bars of one station alone, if it is joined.
+    fn push_own(&mut self, way: &Way) {
+        let from = way.station;
+        let Some(joint) = &self.plan[from].joint else { return };
+        let along_mm = if way.is_forward { way.half_mm } else { -way.half_mm };
+        for side in SIDES {
+            let end = Section::new(self.model, from, side, joint, along_mm);
+            let tets = self.sections[from][side.index()].as_ref().and_then(|section| tets_between([section, &end]));
+            if let Some(tets) = tets {
+                self.all.push(Bar { index: self.all.len(), side, from, to: Err(end), tets });
+            }
+        }
+    }
 }
 
 /// First and last of a part's bars at each section, station by station and side by side; the first carries what belongs to
@@ -409,7 +523,7 @@ pub(super) type Spans = Vec<[Option<[usize; 2]>; 2]>;
 pub(super) fn spans(bars: &[&Bar], n_stations: usize) -> Spans {
     let mut spans = vec![[None; 2]; n_stations];
     for (i, bar) in bars.iter().enumerate() {
-        for station in bar.stations {
+        for station in bar.stations() {
             let span: &mut Option<[usize; 2]> = &mut spans[station][bar.side.index()];
             *span = Some([span.map_or(i, |s| s[0]), i]);
         }
@@ -445,9 +559,9 @@ pub(super) fn condensed(
         Owner::Section(station, side) => {
             spans[station][side.index()].is_none_or(|[first, last]| from <= first && last < to)
         }
-        Owner::Step => true,
+        Owner::Bar => true,
     };
-    let follows = |i: usize| bars[i - 1].stations.iter().any(|s| bars[i].stations.contains(s));
+    let follows = |i: usize| bars[i - 1].stations().any(|s| bars[i].stations().any(|other| s == other));
     let starts: Vec<usize> = (0..bars.len()).filter(|i| *i == 0 || !follows(*i)).chain([bars.len()]).collect();
     starts.windows(2).map(|ends| reduce(&fronts[ends[0]..ends[1]], ends[0], &is_inside)).collect()
 }
@@ -457,11 +571,11 @@ impl Labels {
         let first = self.section(0, Side::A);
         if id < first {
             Owner::Part
-        } else if id < self.halfway(0, Side::A) {
+        } else if id < self.within(0)[0] {
             let at = (id - first) as usize / (3 * N_SECTION);
             Owner::Section(at / 2, SIDES[at % 2])
         } else {
-            Owner::Step
+            Owner::Bar
         }
     }
 }
@@ -472,6 +586,6 @@ enum Owner {
     Part,
     /// A cross-section at a station.
     Section(usize, Side),
-    /// The nodes halfway along one step.
-    Step,
+    /// The nodes halfway along a bar or at its free end.
+    Bar,
 }

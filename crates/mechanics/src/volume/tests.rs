@@ -1,4 +1,5 @@
 use super::*;
+use crate::Joint;
 use crate::sample;
 
 /// Every station joined; friction holds part `fast`.
@@ -238,14 +239,46 @@ fn odd_input_is_refused() {
 }
 
 #[test]
-fn a_joint_that_stands_alone_has_a_connector_and_its_neighbour_without_joint_bears_nothing() {
+fn every_joint_has_connectors_of_its_seams_length_whatever_its_neighbours_are() {
+    let ball = sample::ball(20.0, 8);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    let mut plan = joined(&ball, 0.0, None);
+    for (i, meeting) in plan.iter_mut().enumerate() {
+        meeting.joint = meeting.joint.filter(|_| i % 5 != 0);
+        if let Some(joint) = meeting.joint.as_mut().filter(|_| i % 3 == 0) {
+            joint.male = joint.male.other();
+        }
+    }
+    let sections = super::connector::sections(&model, &plan);
+    let bars = super::connector::bars(&model, &plan, &sections);
+    assert!(bars.iter().any(|bar| bar.to.is_ok()) && bars.iter().any(|bar| bar.to.is_err()));
+    for (i, meeting) in plan.iter().enumerate() {
+        for side in crate::SIDES {
+            let n_bars = bars.iter().filter(|bar| bar.side == side && bar.stations().any(|s| s == i)).count();
+            assert_eq!(n_bars, if meeting.joint.is_some() { 2 } else { 0 }, "station {i}");
+        }
+    }
+}
+
+#[test]
+fn a_joint_that_stands_alone_holds_no_octant() {
     let ball = sample::ball(20.0, 8);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let mut plan = joined(&ball, 0.0, None);
     let alone = ball.steps[0][0] as usize;
     plan.iter_mut().enumerate().filter(|(i, _)| *i != alone).for_each(|(_, m)| m.joint = None);
-    let has: Vec<usize> = (0..).zip(model.has_connector(&plan)).filter(|(_, has)| *has).map(|(i, _)| i).collect();
-    assert_eq!(has, [alone]);
-    // One joint holds no octant.
     assert!(matches!(model.resist(&plan, 7), Ok(Resistance::Separable(_))));
+}
+
+#[test]
+fn pins_that_slide_out_of_their_channels_do_not_hold() {
+    let ball = sample::ball(20.0, 8);
+    let plan = joined(&ball, -0.7, Some(7));
+    let at = |force_n_per_mm| VolumeModel::new(&VolumeParams { force_n_per_mm, ..VolumeParams::default() }, &ball);
+    let Resistance::Holds(opening) = at(0.01).unwrap().resist(&plan, 7).unwrap() else { panic!("does not hold") };
+    let widest_mm = opening.opening_mm.iter().copied().fold(0.0, f64::max);
+    let lost_mm = 0.6 * VolumeParams::default().connector_mm;
+    let force = |share: f64| 0.01 * share * lost_mm / widest_mm;
+    assert!(matches!(at(force(0.99)).unwrap().resist(&plan, 7).unwrap(), Resistance::Holds(_)));
+    assert!(matches!(at(force(1.01)).unwrap().resist(&plan, 7).unwrap(), Resistance::Separable(_)));
 }
