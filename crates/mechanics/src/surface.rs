@@ -6,8 +6,6 @@
 //!   ───a────b   b────b───         b: seam points, two at one place; t: tips of the strips, ℓ below along −ŝ
 //!            \ /                  the male's tip is projected onto the female's strip: it may leave along ŝ and
 //!             t   (both strips)   slide along the seam, and nothing else; walls may part but not enter each other
-//!
-//! Strips are short and thick: each turns with the triangles at its seam point, and its own bending is the contact's.
 //! ```
 //!
 //! Strips are short and thick: each turns with the triangles at its seam point, and its own bending is the contact's.
@@ -18,9 +16,9 @@
 //!
 //! The static state is computed, not approached. One factorisation of the meshes serves all plans: it condenses each part
 //! onto the motions of its stations. What a plan adds, contacts between stations, is a small system in the forces of those that
-//! are closed. Newton's method solves it exactly in about six steps, each of which joins the parts two at a time: 5 ms in all
-//! for a plan with 170 stations. (With the motions as unknowns, four on either side of each station, each step took four times
-//! as long. Local and global steps with one matrix, the paper's way, took 240 to 1000 iterations for three digits, even with
+//! are closed. Newton's method solves it exactly in about six steps, each of which joins the parts two at a time: 5 to 8 ms
+//! in all for a plan with 170 stations. (With the motions as unknowns, four on either side of each station, ten steps took ten
+//! times as long. Local and global steps with one matrix, the paper's way, took 240 to 1000 iterations for three digits, even with
 //! conjugate directions and the parts' rigid motions projected out, since plans that barely hold are soft where the matrix is
 //! stiff.)
 //!

@@ -45,15 +45,8 @@ pub(super) fn minimise(
     is_held: &[bool],
     pulls: &[Vec3],
 ) -> Result<(Vec<Motions>, usize, f64), SparseError> {
-    let (contacts, force) = (contacts(model, plan), forces(model, plan, pulls));
-    let (touched, n_stations) = (touched(model, is_held), model.assembly.stations.len());
-    let of_station = ranges(&contacts, n_stations);
-    let of_touched =
-        |t: &Touched| t.stations.iter().flat_map(|s| of_station[*s as usize].clone()).map(|c| c as u32).collect();
-    let (mut joinings, order) = Joinings::new(touched.iter().map(of_touched).collect(), contacts.len());
-    let contacts: Vec<Contact> = order.iter().map(|c| contacts[*c as usize]).collect();
-    let (of_station, given) = (ranges(&contacts, n_stations), given(model, is_held));
-    let bodies: Vec<Body> = touched.iter().map(|t| body(t, &contacts, &of_station, &given)).collect();
+    let force = forces(model, plan, pulls);
+    let (contacts, bodies, mut joinings) = system(model, plan, is_held);
     // The first step leaves all one-sided contacts open, which takes three steps fewer than all closed.
     let mut is_closed: Vec<bool> = contacts.iter().map(|c| !c.is_one_sided).collect();
     let (mut borne, mut gaps) = (vec![0.0; contacts.len()], gaps(&contacts, &answer(model, is_held, &force)));
@@ -71,6 +64,21 @@ pub(super) fn minimise(
         n_iterations += 1;
     }
     Ok((less(&contacts, force, &borne), n_iterations, error))
+}
+
+/// The contacts of a plan in the order in which they are eliminated, and the bodies that are joined by them.
+fn system(model: &SurfaceModel, plan: &[Meeting], is_held: &[bool]) -> (Vec<Contact>, Vec<Body>, Joinings) {
+    let (touched, n_stations) = (touched(model, is_held), model.assembly.stations.len());
+    let contacts = contacts(model, plan);
+    let of_station = ranges(&contacts, n_stations);
+    let of_body =
+        |t: &Touched| t.stations.iter().flat_map(|s| of_station[*s as usize].clone()).map(|c| c as u32).collect();
+    let (joinings, order) = Joinings::new(touched.iter().map(of_body).collect(), contacts.len());
+
+    let contacts: Vec<Contact> = order.iter().map(|c| contacts[*c as usize]).collect();
+    let (of_station, given) = (ranges(&contacts, n_stations), given(model, is_held));
+    let bodies = touched.iter().map(|t| body(t, &contacts, &of_station, &given)).collect();
+    (contacts, bodies, joinings)
 }
 
 /// What contacts must bear more for the balance of the closed ones. Only differences from it are solved for, since rounding is
