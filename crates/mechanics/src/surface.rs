@@ -14,13 +14,13 @@
 //! (position), each `p` the nearest configuration in which the constraint has no energy. Loads move things by far less than
 //! a triangle, so projections are taken at the rest shape: an edge keeps its length, a hinge its angle, to first order.
 //!
-//! The static state is computed, not approached. One factorisation of the meshes serves all plans: it condenses each part
-//! onto the motions of its stations. What a plan adds, contacts between stations, is a small system in the forces of those that
-//! are closed. Newton's method solves it exactly in about six steps, each of which joins the parts two at a time: 5 to 8 ms
-//! in all for a plan with 170 stations. (With the motions as unknowns, four on either side of each station, ten steps took ten
-//! times as long. Local and global steps with one matrix, the paper's way, took 240 to 1000 iterations for three digits, even with
-//! conjugate directions and the parts' rigid motions projected out, since plans that barely hold are soft where the matrix is
-//! stiff.)
+//! The static state is computed, not approached. One factorisation of the meshes serves all plans: it condenses each
+//! part onto the motions of its stations. What a plan adds, contacts between stations, is a small system in the forces
+//! of those that are closed. Newton's method solves it exactly in about six steps, each of which joins the parts two at
+//! a time: 5 to 8 ms in all for a plan with 170 stations. (With the motions as unknowns, four on either side of each
+//! station, ten steps took ten times as long. Local and global steps with one matrix, the paper's way, took 240 to 1000
+//! iterations for three digits, even with conjugate directions and the parts' rigid motions projected out, since plans
+//! that barely hold are soft where the matrix is stiff.)
 //!
 //! Weights follow the material: `k = E h A/l²` for edges (a regular mesh then has Young's modulus E and Poisson's ratio
 //! 1/3), `k = B l²/A` for hinges with `B = E h³/12(1 − ν²)`, A the area of the triangles at the edge.

@@ -6,7 +6,8 @@ use super::SurfaceModel;
 use super::parts::{Motions, N_MOTIONS};
 use crate::assembly::{Meeting, Side, Station};
 
-/// One contact: its energy is `(g · r)²/2` in the motions r of side a from side b, where one-sided only for a negative sum.
+/// One contact: its energy is `(g · r)²/2` in the motions r of side a from side b, where one-sided only for a negative
+/// sum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
     pub station: usize,
@@ -22,15 +23,16 @@ impl Contact {
     }
 }
 
-/// How side `from` moves from the other one along `g`, both perpendicular to the tangent, at `offset` from the seam point.
+/// How side `from` moves from the other one along `g`, both perpendicular to the tangent, at `offset` from the seam
+/// point.
 pub(super) fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motions {
     let turned = station.tangent.cross(offset).dot(g);
     let motions = [g.dot(station.tangent), g.dot(station.normal), g.dot(station.across), turned];
     motions.map(|m| if from == Side::A { m } else { -m })
 }
 
-/// The contacts of a plan, station by station. Where there is a connector, neither the tips nor the seam points may part
-/// across the channel, and the male's tip may not go deeper; the walls may not enter each other anywhere.
+/// The contacts of a plan, station by station. Where there is a connector, neither the tips nor the seam points may
+/// part across the channel, and the male's tip may not go deeper; the walls may not enter each other anywhere.
 pub(super) fn contacts(model: &SurfaceModel, plan: &[Meeting]) -> Vec<Contact> {
     let mut contacts = Vec::with_capacity(4 * plan.len());
     for (i, (station, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {

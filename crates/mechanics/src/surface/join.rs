@@ -33,8 +33,8 @@ struct Joining {
     kept: Vec<u32>,
 }
 
-/// The closed contacts of a joining, ascending, and their matrix: the lower triangle by columns, with the right-hand side as
-/// the last row.
+/// The closed contacts of a joining, ascending, and their matrix: the lower triangle by columns, with the right-hand
+/// side as the last row.
 #[derive(Clone, Debug, Default)]
 struct Front {
     contacts: Vec<u32>,
@@ -52,8 +52,8 @@ pub(super) struct Joinings {
 }
 
 impl Joinings {
-    /// How bodies with these contacts (ascending) are joined, always the two that take the least work next; and the order in which
-    /// the contacts are eliminated. Joinings number them in that order.
+    /// How bodies with these contacts (ascending) are joined, always the two that take the least work next; and the
+    /// order in which the contacts are eliminated. Joinings number them in that order.
     pub fn new(bodies: Vec<Vec<u32>>, n_contacts: usize) -> (Self, Vec<u32>) {
         let mut n_touching = vec![0; n_contacts];
         bodies.iter().flatten().for_each(|&c| n_touching[c as usize] += 1);
@@ -153,8 +153,8 @@ impl Joining {
 }
 
 impl Front {
-    /// Empties the front and takes the closed contacts of `joining`, with the 1 and the right-hand side of those that it
-    /// eliminates.
+    /// Empties the front and takes the closed contacts of `joining`, with the 1 and the right-hand side of those that
+    /// it eliminates.
     fn gather(&mut self, joining: &Joining, is_closed: &[bool], side: &[f64]) {
         let closed = |of: &[u32]| of.iter().copied().filter(|&c| is_closed[c as usize]).collect::<Vec<u32>>();
         self.contacts = closed(&joining.eliminated);

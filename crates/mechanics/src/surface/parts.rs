@@ -1,8 +1,8 @@
 //! Each part as its seams feel it: the mesh condensed onto four motions of every station.
 //!
-//! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q K⁻¹ Qᵀ`: exact,
-//! whatever happens at the seams, and the same for all plans. A part that floats on springs `G` has its rigid motions `R`
-//! besides, and with them the compliance `C + R G⁻¹ Rᵀ`.
+//! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q K⁻¹ Qᵀ`:
+//! exact, whatever happens at the seams, and the same for all plans. A part that floats on springs `G` has its rigid
+//! motions `R` besides, and with them the compliance `C + R G⁻¹ Rᵀ`.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -19,12 +19,12 @@ pub(super) const N_MOTIONS: usize = 4;
 /// How side a of a station moves from side b, or what pulls them apart.
 pub(super) type Motions = [f64; N_MOTIONS];
 
-/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what the weakest joint
-/// of a plan that holds resists.
+/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what the weakest
+/// joint of a plan that holds resists.
 const GROUND_SHARE: f64 = 1e-8;
 
-/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate, so that they add nothing
-/// but rigid motions, and those next to nothing beside the ground's.
+/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate, so that they add
+/// nothing but rigid motions, and those next to nothing beside the ground's.
 const SUPPORT_SHARE: f64 = 0.1;
 
 /// Length by which rotations are made comparable with shifts, mm: about a piece's radius.
@@ -42,8 +42,8 @@ type Gradient = Vec<(u32, Vec3)>;
 pub(super) struct Part {
     /// The stations at which it is a side, ascending.
     pub stations: Vec<u32>,
-    /// How side a moves from side b at each of them, in [`N_MOTIONS`], under forces that pull them apart: mm/N (1/N for a turn,
-    /// 1/N mm for two). What the other sides' parts add is not in it.
+    /// How side a moves from side b at each of them, in [`N_MOTIONS`], under forces that pull them apart: mm/N (1/N for
+    /// a turn, 1/N mm for two). What the other sides' parts add is not in it.
     pub compliance: DMatrix<f64>,
 }
 
@@ -84,7 +84,8 @@ pub(super) fn parts(
     all.map(|((terms, motions), floats)| part(params, &row, &points, terms, motions, &floats)).collect()
 }
 
-/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one beside the two.
+/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one beside
+/// the two.
 fn supports(params: &SurfaceParams, points: &[Vec3], body: &[u32]) -> Vec<Term> {
     let at = |v: u32| points[v as usize];
     let farthest = |distance: &dyn Fn(u32) -> f64| {

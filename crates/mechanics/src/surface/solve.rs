@@ -1,7 +1,8 @@
 //! One plan's equilibrium: Newton's method with an exact line search on a convex, piecewise quadratic energy.
 //!
-//! The unknowns are the forces in the contacts. With `r = D s` the motions that forces s at the stations cause, the parts are
-//! in balance whatever the contacts bear, `s = f − Gᵀ μ`; what is sought are μ that are those of the gaps, `μ = (G r)⁻`.
+//! The unknowns are the forces in the contacts. With `r = D s` the motions that forces s at the stations cause, the
+//! parts are in balance whatever the contacts bear, `s = f − Gᵀ μ`; what is sought are μ that are those of the gaps,
+//! `μ = (G r)⁻`.
 
 use std::ops::Range;
 
@@ -37,8 +38,8 @@ pub(super) fn solve(
     Ok(SurfaceSolution { resistance, n_iterations, error })
 }
 
-/// What the pulls and the contacts send through the stations at the least energy, steps taken, and what is left of the force as
-/// a share of it.
+/// What the pulls and the contacts send through the stations at the least energy, steps taken, and what is left of the
+/// force as a share of it.
 pub(super) fn minimise(
     model: &SurfaceModel,
     plan: &[Meeting],
@@ -81,8 +82,8 @@ fn system(model: &SurfaceModel, plan: &[Meeting], is_held: &[bool]) -> (Vec<Cont
     (contacts, bodies, joinings)
 }
 
-/// What contacts must bear more for the balance of the closed ones. Only differences from it are solved for, since rounding is
-/// in proportion to what the ground bears, and that is soft.
+/// What contacts must bear more for the balance of the closed ones. Only differences from it are solved for, since
+/// rounding is in proportion to what the ground bears, and that is soft.
 fn step(
     joinings: &mut Joinings,
     bodies: &[Body],
