@@ -1,7 +1,8 @@
-//! Each part's stiffness as its seams feel it: the mesh condensed onto four motions of every station.
+//! Each part as its seams feel it: the mesh condensed onto four motions of every station.
 //!
-//! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q K⁻¹ Qᵀ` and the
-//! stiffness `S = C⁻¹`: exact, whatever happens at the seams, and the same for all plans.
+//! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q K⁻¹ Qᵀ`:
+//! exact, whatever happens at the seams, and the same for all plans. A part that floats on springs `G` has its rigid
+//! motions `R` besides, and with them the compliance `C + R G⁻¹ Rᵀ`.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -12,14 +13,18 @@ use super::SurfaceParams;
 use super::terms::{Root, Term, patch_terms};
 use crate::assembly::{SIDES, ShellAssembly};
 
-/// Motions of a side of a station: along the tangent, along the normal, across, and the turn about the tangent.
+/// Motions of a station: along the tangent, along the normal, across, and the turn about the tangent.
 pub(super) const N_MOTIONS: usize = 4;
 
-/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what the weakest joint
-/// of a plan that holds resists.
+/// How side a of a station moves from side b, or what pulls them apart.
+pub(super) type Motions = [f64; N_MOTIONS];
+
+/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what the weakest
+/// joint of a plan that holds resists.
 const GROUND_SHARE: f64 = 1e-8;
 
-/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate and taken out again.
+/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate, so that they add
+/// nothing but rigid motions, and those next to nothing beside the ground's.
 const SUPPORT_SHARE: f64 = 0.1;
 
 /// Length by which rotations are made comparable with shifts, mm: about a piece's radius.
@@ -29,21 +34,17 @@ const RADIUS_MM: f64 = 30.0;
 /// fewer motions than their stations ask for.
 const LEAST_COMPLIANCE: f64 = 1e-3;
 
-/// A row of the system and the gradient of its motion at the part's points.
-type Motion = (u32, Vec<(u32, Vec3)>);
+/// The gradient of a motion at the part's points.
+type Gradient = Vec<(u32, Vec3)>;
 
 /// A part as its seams feel it.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
-    /// Rows of the system that are this part's motions, ascending.
-    pub rows: Vec<u32>,
-    /// Stiffness between them, N/mm (N for a turn, N mm for two).
-    pub stiffness: DMatrix<f64>,
-}
-
-/// The row of the first motion of a side of a station.
-pub(super) fn first_row(station: usize, side: usize) -> usize {
-    N_MOTIONS * (2 * station + side)
+    /// The stations at which it is a side, ascending.
+    pub stations: Vec<u32>,
+    /// How side a moves from side b at each of them, in [`N_MOTIONS`], under forces that pull them apart: mm/N (1/N for
+    /// a turn, 1/N mm for two). What the other sides' parts add is not in it.
+    pub compliance: DMatrix<f64>,
 }
 
 /// All parts; points with `is_held` do not move.
@@ -60,15 +61,19 @@ pub(super) fn parts(
     }
     let mut triangles_at = vec![Vec::new(); points.len()];
     assembly.triangles.iter().for_each(|t| t.iter().for_each(|&v| triangles_at[v as usize].push(*t)));
-    let mut motions: Vec<Vec<Motion>> = vec![Vec::new(); assembly.n_parts];
-    for (i, station) in assembly.stations.iter().enumerate() {
-        for side in SIDES {
+    let mut motions: Vec<Vec<(u32, [Gradient; N_MOTIONS])>> = vec![Vec::new(); assembly.n_parts];
+    for (i, station) in (0..).zip(&assembly.stations) {
+        for (side, sign) in SIDES.into_iter().zip([1.0, -1.0]) {
             let point = station.points[side.index()];
             let root = Root::new(&points, point, triangles_at[point as usize].iter().copied());
-            let shifts = [station.tangent, station.normal, station.across].map(|g| root.shift(g));
-            let all = shifts.into_iter().chain([root.turn(station.tangent)]);
-            let rows = (first_row(i, side.index()) as u32..).zip(all);
-            motions[assembly.part_of_point[point as usize] as usize].extend(rows);
+            let [t, n, across] = [station.tangent, station.normal, station.across].map(|g| root.shift(sign * g));
+            let own = [t, n, across, root.turn(sign * station.tangent)];
+            let of_part = &mut motions[assembly.part_of_point[point as usize] as usize];
+            match of_part.last_mut() {
+                // A seam of a part with itself.
+                Some((last, all)) if *last == i => all.iter_mut().zip(own).for_each(|(a, o)| a.extend(o)),
+                _ => of_part.push((i, own)),
+            }
         }
     }
     let row = rows_by_part(assembly, is_held);
@@ -79,7 +84,8 @@ pub(super) fn parts(
     all.map(|((terms, motions), floats)| part(params, &row, &points, terms, motions, &floats)).collect()
 }
 
-/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one beside the two.
+/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one beside
+/// the two.
 fn supports(params: &SurfaceParams, points: &[Vec3], body: &[u32]) -> Vec<Term> {
     let at = |v: u32| points[v as usize];
     let farthest = |distance: &dyn Fn(u32) -> f64| {
@@ -94,17 +100,6 @@ fn supports(params: &SurfaceParams, points: &[Vec3], body: &[u32]) -> Vec<Term> 
     let held = [(a, along), (a, aside), (a, up), (b, aside), (b, up), (c, up)];
     let stiffness = SUPPORT_SHARE * params.material.youngs_modulus_mpa * params.wall_mm;
     held.map(|corner| Term { corners: vec![corner], stiffness }).to_vec()
-}
-
-/// What a stiffness between motions becomes when the body floats on soft springs instead of its supports: with the body's
-/// rigid motions `R` and the springs `G`, `S − S R (G + Rᵀ S R)⁻¹ Rᵀ S`.
-fn floating(stiffness: &DMatrix<f64>, rigid: &DMatrix<f64>, ground_n_mm: f64) -> Option<DMatrix<f64>> {
-    let carried = stiffness * rigid;
-    let mut small = rigid.transpose() * &carried;
-    (0..6).for_each(|i| small[(i, i)] += ground_n_mm);
-    let solved = small.cholesky()?.solve(&carried.transpose());
-    let free = stiffness - carried * solved;
-    Some(0.5 * (&free + free.transpose()))
 }
 
 /// The row of each point's x within its part; `None` where it is held.
@@ -124,16 +119,18 @@ fn part(
     row: &[Option<u32>],
     points: &[Vec3],
     terms: &[Term],
-    motions: Vec<Motion>,
+    motions: Vec<(u32, [Gradient; N_MOTIONS])>,
     floats: &[u32],
 ) -> Result<Part, SparseError> {
+    let (stations, gradients): (Vec<u32>, Vec<_>) = motions.into_iter().unzip();
+    let gradients: Vec<Gradient> = gradients.into_iter().flatten().collect();
     let supports = supports(params, points, floats);
-    let corners = terms.iter().chain(&supports).flat_map(|t| &t.corners).chain(motions.iter().flat_map(|m| &m.1));
+    let corners = terms.iter().chain(&supports).flat_map(|t| &t.corners).chain(gradients.iter().flatten());
     let n = corners.filter_map(|c| row[c.0 as usize]).max().map_or(0, |r| r as usize + 3);
     let factor = Cholesky::new(&mesh_stiffness(n, row, terms.iter().chain(&supports)))?;
-    let m = motions.len();
+    let m = gradients.len();
     let mut sides = vec![0.0; n * m];
-    for (side, (_, gradient)) in sides.chunks_exact_mut(n.max(1)).zip(&motions) {
+    for (side, gradient) in sides.chunks_exact_mut(n.max(1)).zip(&gradients) {
         for &(p, g) in gradient {
             add(side, row[p as usize], g);
         }
@@ -144,15 +141,12 @@ fn part(
     for i in 0..m {
         compliance[(i, i)] += LEAST_COMPLIANCE / params.contact_n_mm(1.0);
     }
-    let symmetric = 0.5 * (&compliance + compliance.transpose());
-    let indefinite = || SparseError::NotPositiveDefinite { n: m };
-    let mut stiffness = symmetric.cholesky().ok_or_else(indefinite)?.inverse();
     if !floats.is_empty() {
         let ground = GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm * floats.len() as f64;
-        let rigid = DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &motions[i].1, j));
-        stiffness = floating(&stiffness, &rigid, ground).ok_or_else(indefinite)?;
+        let rigid = DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &gradients[i], j));
+        compliance += &rigid * rigid.transpose() / ground;
     }
-    Ok(Part { rows: motions.into_iter().map(|m| m.0).collect(), stiffness })
+    Ok(Part { stations, compliance: 0.5 * (&compliance + compliance.transpose()) })
 }
 
 /// What a motion's gradient sees of rigid motion `j`: a shift, or a turn about an axis through the origin.

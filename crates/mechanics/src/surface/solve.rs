@@ -1,9 +1,17 @@
 //! One plan's equilibrium: Newton's method with an exact line search on a convex, piecewise quadratic energy.
+//!
+//! The unknowns are the forces in the contacts. With `r = D s` the motions that forces s at the stations cause, the
+//! parts are in balance whatever the contacts bear, `s = f − Gᵀ μ`; what is sought are μ that are those of the gaps,
+//! `μ = (G r)⁻`.
+
+use std::ops::Range;
 
 use shellock_geom::Vec3;
-use shellock_geom::sparse::{Cholesky, SparseError, SparseSymmetric};
+use shellock_geom::sparse::SparseError;
 
-use super::parts::{N_MOTIONS, first_row};
+use super::contact::{Contact, contacts, forces, gap};
+use super::join::{Body, Joinings};
+use super::parts::{Motions, N_MOTIONS, Part};
 use super::{SurfaceModel, SurfaceSolution};
 use crate::assembly::{Meeting, Opening, Resistance, Side, Station};
 
@@ -16,64 +24,6 @@ const LINE_STEPS: usize = 30;
 /// Stiffness of what is held, in that of a contact a mm long.
 const HELD_SHARE: f64 = 1e4;
 
-/// Motions of both sides of a station.
-type Motions = [f64; 2 * N_MOTIONS];
-
-/// One contact: `k/2 (g · q)²` in the motions q of a station, where one-sided only for a negative sum.
-#[derive(Clone, Copy, Debug)]
-struct Contact {
-    station: usize,
-    gradient: Motions,
-    stiffness: f64,
-    is_one_sided: bool,
-}
-
-impl Contact {
-    fn value(&self, moved: &[f64]) -> f64 {
-        let start = first_row(self.station, 0);
-        self.gradient.iter().zip(&moved[start..]).map(|(g, q)| g * q).sum()
-    }
-
-    fn push(&self, size: f64, forces: &mut [f64]) {
-        let start = first_row(self.station, 0);
-        forces[start..].iter_mut().zip(self.gradient).for_each(|(f, g)| *f += size * g);
-    }
-}
-
-/// How side `from` moves from the other one along `g`, both perpendicular to the tangent, at `offset` from the seam point.
-fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motions {
-    let mut gradient = [0.0; 2 * N_MOTIONS];
-    let motion =
-        [g.dot(station.tangent), g.dot(station.normal), g.dot(station.across), station.tangent.cross(offset).dot(g)];
-    for (i, m) in motion.into_iter().enumerate() {
-        gradient[N_MOTIONS * from.index() + i] = m;
-        gradient[N_MOTIONS * from.other().index() + i] = -m;
-    }
-    gradient
-}
-
-/// The contacts of a plan. Where there is a connector, neither the tips nor the seam points may part across the channel,
-/// and the male's tip may not go deeper; the walls may not enter each other anywhere.
-fn contacts(model: &SurfaceModel, plan: &[Meeting]) -> Vec<Contact> {
-    let mut contacts = Vec::with_capacity(4 * plan.len());
-    for (i, (station, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {
-        let stiffness = model.params.contact_n_mm(station.length_mm);
-        let contact = |gradient, is_one_sided| Contact { station: i, gradient, stiffness, is_one_sided };
-        contacts.push(contact(gap(station, Side::B, Vec3::ZERO, meeting.wall), true));
-        if let Some(joint) = meeting.joint {
-            let n = station.tangent.cross(joint.leaves).normalize_or_zero();
-            let tip = -model.params.strip_mm() * joint.leaves;
-            contacts.push(contact(gap(station, joint.male, tip, n), false));
-            contacts.push(contact(gap(station, joint.male, Vec3::ZERO, n), false));
-            contacts.push(contact(gap(station, joint.male, tip, joint.leaves), !joint.is_fast));
-            if joint.is_fast {
-                contacts.push(contact(gap(station, joint.male, tip, station.tangent), false));
-            }
-        }
-    }
-    contacts
-}
-
 /// The answer to `pulls`, N, on the tips of side a and, the other way, of side b.
 pub(super) fn solve(
     model: &SurfaceModel,
@@ -81,145 +31,218 @@ pub(super) fn solve(
     is_held: &[bool],
     pulls: &[Vec3],
 ) -> Result<SurfaceSolution, SparseError> {
-    let (contacts, force) = (contacts(model, plan), forces(model, plan, pulls));
-    let rigid = stiffness_of_parts(model, is_held);
-    let (moved, n_iterations, error) = minimise(model, &rigid, &contacts, &force)?;
-    let opening = rated(model, plan, &moved);
+    let (sent, n_iterations, error) = minimise(model, plan, is_held, pulls)?;
+    let opening = rated(model, plan, &answer(model, is_held, &sent));
     let lost = lost_parts(model, is_held, &opening);
     let resistance = if lost.is_empty() { Resistance::Holds(opening) } else { Resistance::Separable(lost) };
     Ok(SurfaceSolution { resistance, n_iterations, error })
 }
 
-/// The motions that `solve` finds.
-#[cfg(test)]
-pub(super) fn moved(
+/// What the pulls and the contacts send through the stations at the least energy, steps taken, and what is left of the
+/// force as a share of it.
+pub(super) fn minimise(
     model: &SurfaceModel,
     plan: &[Meeting],
     is_held: &[bool],
     pulls: &[Vec3],
-) -> Result<Vec<f64>, SparseError> {
-    let (contacts, force) = (contacts(model, plan), forces(model, plan, pulls));
-    Ok(minimise(model, &stiffness_of_parts(model, is_held), &contacts, &force)?.0)
-}
-
-/// Energy of motions with nothing but held points fixed, N mm.
-#[cfg(test)]
-pub(super) fn energy(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3], moved: &[f64]) -> f64 {
-    let parts = 0.5 * dot(&stiffness_of_parts(model, &[]).times(moved), moved);
-    let of_contact = |c: &Contact| {
-        let value = if c.is_one_sided { c.value(moved).min(0.0) } else { c.value(moved) };
-        0.5 * c.stiffness * value * value
-    };
-    parts + contacts(model, plan).iter().map(of_contact).sum::<f64>() - dot(&forces(model, plan, pulls), moved)
-}
-
-/// The pulls as forces on the motions.
-fn forces(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3]) -> Vec<f64> {
-    let mut force = vec![0.0; model.n_rows];
-    for (i, (station, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {
-        if let Some(joint) = meeting.joint {
-            let gradient = gap(station, Side::A, -model.params.strip_mm() * joint.leaves, pulls[i]);
-            force[first_row(i, 0)..].iter_mut().zip(gradient).for_each(|(f, g)| *f += g);
-        }
-    }
-    force
-}
-
-/// The parts' own stiffness; those of parts that are held tie their motions to their place.
-fn stiffness_of_parts(model: &SurfaceModel, is_held: &[bool]) -> SparseSymmetric {
-    let mut matrix = model.pattern.clone();
-    let values = matrix.values_mut();
-    for (i, (part, places)) in model.parts.iter().zip(&model.places).enumerate() {
-        let m = part.rows.len();
-        if is_held.get(i).is_some_and(|h| *h) {
-            let tie = HELD_SHARE * model.params.contact_n_mm(1.0);
-            (0..m).for_each(|j| values[places[j * (j + 3) / 2] as usize] += tie);
-        } else {
-            let upper = (0..m).flat_map(|column| (0..=column).map(move |row| (row, column)));
-            upper.zip(places).for_each(|((r, c), &place)| values[place as usize] += part.stiffness[(r, c)]);
-        }
-    }
-    matrix
-}
-
-/// Motions with the least energy, steps taken, and what is left of the force as a share of it.
-fn minimise(
-    model: &SurfaceModel,
-    rigid: &SparseSymmetric,
-    contacts: &[Contact],
-    force: &[f64],
-) -> Result<(Vec<f64>, usize, f64), SparseError> {
-    let mut moved = vec![0.0; force.len()];
-    let mut residual = force.to_vec();
-    let size = dot(force, force).sqrt();
-    let mut n_iterations = 0;
-    let mut error = if size > 0.0 { 1.0 } else { 0.0 };
+) -> Result<(Vec<Motions>, usize, f64), SparseError> {
+    let force = forces(model, plan, pulls);
+    let (contacts, bodies, mut joinings) = system(model, plan, is_held);
+    // The first step leaves all one-sided contacts open, which takes three steps fewer than all closed.
+    let mut is_closed: Vec<bool> = contacts.iter().map(|c| !c.is_one_sided).collect();
+    let (mut borne, mut gaps) = (vec![0.0; contacts.len()], gaps(&contacts, &answer(model, is_held, &force)));
+    let (mut n_iterations, mut error) = (0, if norm(&force) > 0.0 { 1.0 } else { 0.0 });
     while error > model.params.tolerance && n_iterations < model.params.max_iterations {
-        let mut tangent = rigid.clone();
-        for c in contacts.iter().filter(|c| !c.is_one_sided || c.value(&moved) <= 0.0) {
-            add_contact(model, &mut tangent, c);
-        }
-        let mut step = residual.clone();
-        Cholesky::in_order(&model.order, &tangent)?.solve_in_place(&mut step);
-        go_along(rigid, contacts, &step, &mut moved, &mut residual);
-        error = dot(&residual, &residual).sqrt() / size;
+        let step = step(&mut joinings, &bodies, &is_closed, &borne, &gaps)?;
+        let opened = opened(&bodies, &step);
+        let length = if n_iterations == 0 { 1.0 } else { length(&contacts, [&borne, &step], [&gaps, &opened]) };
+        borne.iter_mut().zip(&step).for_each(|(b, s)| *b += length * s);
+        gaps.iter_mut().zip(&opened).for_each(|(g, o)| *g += length * o);
+        let pressed = contacts.iter().zip(&gaps).map(|(c, g)| c.pressed(*g));
+        let left: Vec<f64> = borne.iter().zip(pressed).map(|(b, p)| b - p).collect();
+        error = norm(&less(&contacts, vec![[0.0; N_MOTIONS]; force.len()], &left)) / norm(&force);
+        is_closed = contacts.iter().zip(&gaps).map(|(c, g)| !c.is_one_sided || *g <= 0.0).collect();
         n_iterations += 1;
     }
-    Ok((moved, n_iterations, error))
+    Ok((less(&contacts, force, &borne), n_iterations, error))
 }
 
-fn add_contact(model: &SurfaceModel, matrix: &mut SparseSymmetric, contact: &Contact) {
-    let mut places = model.station_places[contact.station].iter();
-    let values = matrix.values_mut();
-    for (column, gc) in contact.gradient.into_iter().enumerate() {
-        for gr in &contact.gradient[..=column] {
-            let place = *places.next().expect("a place for each pair of motions") as usize;
-            values[place] += contact.stiffness * gc * gr;
-        }
-    }
+/// The contacts of a plan in the order in which they are eliminated, and the bodies that are joined by them.
+fn system(model: &SurfaceModel, plan: &[Meeting], is_held: &[bool]) -> (Vec<Contact>, Vec<Body>, Joinings) {
+    let (touched, n_stations) = (touched(model, is_held), model.assembly.stations.len());
+    let contacts = contacts(model, plan);
+    let of_station = ranges(&contacts, n_stations);
+    let of_body =
+        |t: &Touched| t.stations.iter().flat_map(|s| of_station[*s as usize].clone()).map(|c| c as u32).collect();
+    let (joinings, order) = Joinings::new(touched.iter().map(of_body).collect(), contacts.len());
+
+    let contacts: Vec<Contact> = order.iter().map(|c| contacts[*c as usize]).collect();
+    let (of_station, given) = (ranges(&contacts, n_stations), given(model, is_held));
+    let bodies = touched.iter().map(|t| body(t, &contacts, &of_station, &given)).collect();
+    (contacts, bodies, joinings)
 }
 
-/// Goes along `step` to the least energy and updates what is left of the force.
-fn go_along(rigid: &SparseSymmetric, contacts: &[Contact], step: &[f64], moved: &mut [f64], residual: &mut [f64]) {
-    let stiff = rigid.times(step);
-    let lines: Vec<[f64; 2]> = contacts.iter().map(|c| [c.value(moved), c.value(step)]).collect();
-    let push = |c: &Contact, [a, b]: [f64; 2], length: f64| {
-        let x = a + length * b;
-        c.stiffness * if c.is_one_sided { x.min(0.0) } else { x }
-    };
-    let (linear, curved) = (-dot(residual, step), dot(&stiff, step));
-    let mut length = 0.0;
+/// What contacts must bear more for the balance of the closed ones. Only differences from it are solved for, since
+/// rounding is in proportion to what the ground bears, and that is soft.
+fn step(
+    joinings: &mut Joinings,
+    bodies: &[Body],
+    is_closed: &[bool],
+    borne: &[f64],
+    gaps: &[f64],
+) -> Result<Vec<f64>, SparseError> {
+    let mut step: Vec<f64> = borne.iter().zip(is_closed).map(|(b, closed)| if *closed { 0.0 } else { -b }).collect();
+    let mut side = opened(bodies, &step);
+    side.iter_mut().zip(gaps).zip(borne).for_each(|((s, g), b)| *s += g - b);
+    let closed = joinings.solve(bodies, is_closed, &side)?;
+    step.iter_mut().zip(closed).for_each(|(s, c)| *s += c);
+    Ok(step)
+}
+
+/// The length of step with the least energy, from what contacts bear and their gaps, and what the step changes in both.
+fn length(contacts: &[Contact], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f64]; 2]) -> f64 {
+    let (mut length, mut first) = (0.0, None);
     for _ in 0..LINE_STEPS {
-        let (mut slope, mut curve) = (linear + curved * length, curved);
-        for (c, &line) in contacts.iter().zip(&lines) {
-            slope += line[1] * (push(c, line, length) - push(c, line, 0.0));
-            let touches = !c.is_one_sided || line[0] + length * line[1] < 0.0;
-            curve += if touches { c.stiffness * line[1] * line[1] } else { 0.0 };
+        let (mut slope, mut curve) = (0.0, 0.0);
+        for (i, contact) in contacts.iter().enumerate() {
+            let gap = gaps[i] + length * opened[i];
+            let pressed = contact.pressed(gap);
+            slope += (pressed - borne[i] - length * step[i]) * opened[i];
+            let stiffness = if !contact.is_one_sided || gap < 0.0 { opened[i] } else { 0.0 };
+            curve += (stiffness - step[i]) * opened[i];
         }
-        if slope.abs() <= 1e-12 * linear.abs() || curve <= 0.0 {
+        if slope.abs() <= 1e-12 * first.get_or_insert(slope).abs() || curve <= 0.0 {
             break;
         }
         length -= slope / curve;
     }
-    moved.iter_mut().zip(step).for_each(|(q, p)| *q += length * p);
-    residual.iter_mut().zip(&stiff).for_each(|(r, f)| *r -= length * f);
-    for (c, &line) in contacts.iter().zip(&lines) {
-        c.push(push(c, line, 0.0) - push(c, line, length), residual);
+    length
+}
+
+/// Compliance of what is held, mm/N.
+fn held_compliance(model: &SurfaceModel) -> f64 {
+    1.0 / (HELD_SHARE * model.params.contact_n_mm(1.0))
+}
+
+/// How side a moves from side b at each station under forces that pull them apart.
+pub(super) fn answer(model: &SurfaceModel, is_held: &[bool], forces: &[Motions]) -> Vec<Motions> {
+    let mut moved = vec![[0.0; N_MOTIONS]; forces.len()];
+    for (i, part) in model.parts.iter().enumerate() {
+        if is_held.get(i).is_some_and(|h| *h) {
+            for &s in &part.stations {
+                add(&mut moved[s as usize], held_compliance(model), &forces[s as usize]);
+            }
+            continue;
+        }
+        let mut own = vec![0.0; N_MOTIONS * part.stations.len()];
+        let sent = part.stations.iter().flat_map(|s| forces[*s as usize]);
+        for (column, force) in part.compliance.as_slice().chunks_exact(own.len().max(1)).zip(sent) {
+            add(&mut own, force, column);
+        }
+        for (&s, own) in part.stations.iter().zip(own.chunks_exact(N_MOTIONS)) {
+            add(&mut moved[s as usize], 1.0, own);
+        }
     }
+    moved
+}
+
+/// What a plan's contacts touch: a free part, or a station between held parts alone.
+struct Touched<'a> {
+    stations: Vec<u32>,
+    part: Option<&'a Part>,
+}
+
+fn touched<'a>(model: &'a SurfaceModel, is_held: &[bool]) -> Vec<Touched<'a>> {
+    let is_held = |part: usize| is_held.get(part).is_some_and(|h| *h);
+    let free = model.parts.iter().enumerate().filter(|(i, _)| !is_held(*i)).map(|(_, part)| part);
+    let mut touched: Vec<_> = free.map(|p| Touched { stations: p.stations.clone(), part: Some(p) }).collect();
+    let mut is_free = vec![false; model.assembly.stations.len()];
+    touched.iter().flat_map(|t| &t.stations).for_each(|s| is_free[*s as usize] = true);
+    let between_held = (0..).zip(is_free).filter(|(_, is_free)| !is_free);
+    touched.extend(between_held.map(|(s, _)| Touched { stations: vec![s], part: None }));
+    touched
+}
+
+/// Compliance that held parts add at each station, mm/N.
+fn given(model: &SurfaceModel, is_held: &[bool]) -> Vec<f64> {
+    let mut given = vec![0.0; model.assembly.stations.len()];
+    for (part, _) in model.parts.iter().zip(is_held).filter(|(_, is_held)| **is_held) {
+        part.stations.iter().for_each(|s| given[*s as usize] += held_compliance(model));
+    }
+    given
+}
+
+/// The contacts of each station, which follow each other.
+fn ranges(contacts: &[Contact], n_stations: usize) -> Vec<Range<usize>> {
+    let mut ranges = vec![0..0; n_stations];
+    let mut first = 0;
+    for same in contacts.chunk_by(|a, b| a.station == b.station) {
+        ranges[same[0].station] = first..first + same.len();
+        first += same.len();
+    }
+    ranges
+}
+
+/// How the contacts feel a body, with what held parts add.
+fn body(touched: &Touched, contacts: &[Contact], ranges: &[Range<usize>], given: &[f64]) -> Body {
+    let n = N_MOTIONS * touched.stations.len();
+    // In the order of the contacts, with the place of each station in the part.
+    let mut stations: Vec<(Range<usize>, usize)> =
+        touched.stations.iter().map(|s| ranges[*s as usize].clone()).zip((0..).step_by(N_MOTIONS)).collect();
+    stations.sort_unstable_by_key(|(range, _)| range.start);
+    let ids: Vec<u32> = stations.iter().flat_map(|(range, _)| range.start as u32..range.end as u32).collect();
+    let mut compliance = Vec::with_capacity(ids.len() * ids.len());
+    let mut moved = vec![0.0; n];
+    for (range, place) in &stations {
+        for contact in &contacts[range.clone()] {
+            moved.fill(0.0);
+            let columns = touched.part.map_or(&[][..], |p| &p.compliance.as_slice()[n * place..]);
+            columns.chunks_exact(n).zip(&contact.gradient).for_each(|(column, g)| add(&mut moved, *g, column));
+            add(&mut moved[*place..], given[contact.station], &contact.gradient);
+            for (range, place) in &stations {
+                let moved = &moved[*place..*place + N_MOTIONS];
+                compliance.extend(contacts[range.clone()].iter().map(|c| dot(&c.gradient, moved)));
+            }
+        }
+    }
+    Body { contacts: ids, compliance }
+}
+
+/// How gaps change when contacts bear `borne` more.
+fn opened(bodies: &[Body], borne: &[f64]) -> Vec<f64> {
+    let mut opened = vec![0.0; borne.len()];
+    let mut own = Vec::new();
+    for body in bodies {
+        own.clear();
+        own.resize(body.contacts.len(), 0.0);
+        for (column, &c) in body.compliance.chunks_exact(own.len().max(1)).zip(&body.contacts) {
+            if borne[c as usize] != 0.0 {
+                add(&mut own, -borne[c as usize], column);
+            }
+        }
+        own.iter().zip(&body.contacts).for_each(|(o, &c)| opened[c as usize] += o);
+    }
+    opened
+}
+
+fn gaps(contacts: &[Contact], moved: &[Motions]) -> Vec<f64> {
+    contacts.iter().map(|c| dot(&c.gradient, &moved[c.station])).collect()
+}
+
+/// `force` without what the contacts bear.
+fn less(contacts: &[Contact], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Motions> {
+    contacts.iter().zip(borne).for_each(|(c, b)| add(&mut force[c.station], -b, &c.gradient));
+    force
 }
 
 /// The distances between the tips of both sides.
-fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[f64]) -> Opening {
-    let opening = |(i, (station, m)): (usize, (&Station, &Meeting))| {
+fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Opening {
+    let opening = |((station, m), moved): ((&Station, &Meeting), &Motions)| {
         let Some(joint) = m.joint else { return 0.0 };
-        let q = &moved[first_row(i, 0)..];
-        let along = |g| {
-            let gradient = gap(station, Side::A, -model.params.strip_mm() * joint.leaves, g);
-            gradient.iter().zip(q).map(|(g, q)| g * q).sum::<f64>()
-        };
+        let along = |g| dot(&gap(station, Side::A, -model.params.strip_mm() * joint.leaves, g), moved);
         Vec3::from_array([station.tangent, station.normal, station.across].map(along)).length()
     };
-    Opening::rated(plan, model.assembly.stations.iter().zip(plan).enumerate().map(opening).collect())
+    Opening::rated(plan, model.assembly.stations.iter().zip(plan).zip(moved).map(opening).collect())
 }
 
 /// The parts at stations that opened too far, held ones left out, ascending.
@@ -234,6 +257,14 @@ fn lost_parts(model: &SurfaceModel, is_held: &[bool], opening: &Opening) -> Vec<
     parts
 }
 
+fn add(to: &mut [f64], factor: f64, x: &[f64]) {
+    to.iter_mut().zip(x).for_each(|(t, x)| *t += factor * x);
+}
+
 fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+fn norm(forces: &[Motions]) -> f64 {
+    forces.iter().map(|f| dot(f, f)).sum::<f64>().sqrt()
 }

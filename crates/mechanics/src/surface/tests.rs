@@ -1,8 +1,12 @@
+use nalgebra::{DMatrix, DVector};
 use shellock_geom::Vec3;
 
+use super::contact::{Contact, contacts, forces};
+use super::parts::Motions;
 use super::terms::{Term, patch_terms};
 use super::*;
 use crate::neighbourhood::{outer_ring, two_plates};
+use crate::sample::ball;
 use crate::{Joint, Side};
 
 const N: usize = 8;
@@ -77,22 +81,65 @@ fn forces_are_in_balance_and_a_finer_tolerance_changes_nothing() {
     assert!((opening(&coarse) / opening(&fine) - 1.0).abs() < 1e-3);
 }
 
-/// The smallest energy that cyclic descent along single motions reaches from the solver's answer is that answer's.
+/// Stiffness of all parts together against how side a moves from side b, station by station.
+fn stiffness(model: &SurfaceModel) -> DMatrix<f64> {
+    let n_stations = model.assembly.stations.len();
+    let columns: Vec<DVector<f64>> = (0..N_MOTIONS * n_stations)
+        .map(|j| {
+            let mut unit = vec![[0.0; N_MOTIONS]; n_stations];
+            unit[j / N_MOTIONS][j % N_MOTIONS] = 1.0;
+            DVector::from_vec(solve::answer(model, &[], &unit).concat())
+        })
+        .collect();
+    DMatrix::from_columns(&columns).cholesky().unwrap().inverse()
+}
+
+/// Energy of the stations' motions, N mm.
+fn energy(model: &SurfaceModel, plan: &[Meeting], stiffness: &DMatrix<f64>, moved: &[Motions]) -> f64 {
+    let [all, force] = [moved, &forces(model, plan, &model.pulls(plan))].map(|m| DVector::from_vec(m.concat()));
+    let of_contact = |c: &Contact| {
+        let gap = c.gradient.iter().zip(moved[c.station]).map(|(g, r)| g * r).sum();
+        0.5 * c.pressed(gap).powi(2)
+    };
+    0.5 * all.dot(&(stiffness * &all)) - all.dot(&force) + contacts(model, plan).iter().map(of_contact).sum::<f64>()
+}
+
 #[test]
 fn no_motion_of_a_single_station_lowers_the_energy() {
     let model = plates(&SurfaceParams::default());
     let plan = joints(Vec3::new(0.0, -0.6, 0.8), Vec3::new(0.3, 0.5, 0.8));
-    let pulls = model.pulls(&plan);
-    let moved = solve::moved(&model, &plan, &[], &pulls).unwrap();
-    let least = solve::energy(&model, &plan, &pulls, &moved);
+    let (sent, ..) = solve::minimise(&model, &plan, &[], &model.pulls(&plan)).unwrap();
+    let moved = solve::answer(&model, &[], &sent);
+    let stiffness = stiffness(&model);
+    let least = energy(&model, &plan, &stiffness, &moved);
     assert!(least < 0.0);
-    for i in 0..moved.len() {
+    for i in 0..N_MOTIONS * moved.len() {
         for by in [1e-4, -1e-4, 1e-6, -1e-6] {
             let mut other = moved.clone();
-            other[i] += by;
-            assert!(solve::energy(&model, &plan, &pulls, &other) >= least - 1e-12 * least.abs());
+            other[i / N_MOTIONS][i % N_MOTIONS] += by;
+            assert!(energy(&model, &plan, &stiffness, &other) >= least - 1e-12 * least.abs());
         }
     }
+}
+
+#[test]
+fn a_part_that_is_free_alone_opens_its_own_seams_alone() {
+    let ball = ball(40.0, 4);
+    let model = SurfaceModel::new(&SurfaceParams::default(), &ball).unwrap();
+    let plan: Vec<Meeting> = (ball.stations.iter())
+        .map(|s| {
+            let leaves = (s.normal - s.across * 0.5).normalize();
+            let joint = Joint { male: Side::A, leaves, is_fast: true, pull_on_a: leaves, weight: 1.0 };
+            Meeting { wall: s.across, joint: Some(joint) }
+        })
+        .collect();
+    let solution = model.resist_alone(&plan, 3).unwrap();
+    assert!(solution.error <= 1e-6);
+    let Resistance::Holds(opening) = &solution.resistance else { panic!("{solution:?}") };
+    let is_own = |s: &Station| s.points.iter().any(|p| ball.part_of_point[*p as usize] == 3);
+    let (own, others): (Vec<_>, Vec<_>) = ball.stations.iter().zip(&opening.opening_mm).partition(|(s, _)| is_own(s));
+    let [own, others] = [own, others].map(|all| all.iter().map(|(_, d)| **d).fold(0.0, f64::max));
+    assert!(others > 0.0 && others < 1e-2 * own, "{others} {own}");
 }
 
 #[test]
