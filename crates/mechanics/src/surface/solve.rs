@@ -13,10 +13,7 @@ use super::contact::{Contact, contacts, forces, gap};
 use super::join::{Body, Joinings};
 use super::parts::{Motions, N_MOTIONS, Part};
 use super::{SurfaceModel, SurfaceSolution};
-use crate::assembly::{Meeting, Opening, Resistance, Side, Station};
-
-/// A gap this large, in connector sizes, has let the pins out: the plan does not hold.
-const LOST_SIZES: f64 = 0.6;
+use crate::assembly::{LOST_SIZES, Meeting, Opening, Side, Station};
 
 /// Newton steps of a line search; the slope is piecewise linear and most searches end after two or three.
 const LINE_STEPS: usize = 30;
@@ -33,8 +30,11 @@ pub(super) fn solve(
 ) -> Result<SurfaceSolution, SparseError> {
     let (sent, n_iterations, error) = minimise(model, plan, is_held, pulls)?;
     let opening = rated(model, plan, &answer(model, is_held, &sent));
-    let lost = lost_parts(model, is_held, &opening);
-    let resistance = if lost.is_empty() { Resistance::Holds(opening) } else { Resistance::Separable(lost) };
+    let part_of = |p: u32| model.assembly.part_of_point[p as usize];
+    let is_free = |part: &u32| !is_held.get(*part as usize).is_some_and(|h| *h);
+    let resistance = opening.resistance(LOST_SIZES * model.params.connector_mm, |station| {
+        model.assembly.stations[station].points.map(part_of).into_iter().filter(is_free)
+    });
     Ok(SurfaceSolution { resistance, n_iterations, error })
 }
 
@@ -243,18 +243,6 @@ fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Opening {
         Vec3::from_array([station.tangent, station.normal, station.across].map(along)).length()
     };
     Opening::rated(plan, model.assembly.stations.iter().zip(plan).zip(moved).map(opening).collect())
-}
-
-/// The parts at stations that opened too far, held ones left out, ascending.
-fn lost_parts(model: &SurfaceModel, is_held: &[bool], opening: &Opening) -> Vec<u32> {
-    let lost_mm = LOST_SIZES * model.params.connector_mm;
-    let lost = |(station, d): (&Station, &f64)| (d.is_nan() || *d >= lost_mm).then_some(station.points);
-    let points = model.assembly.stations.iter().zip(&opening.opening_mm).filter_map(lost).flatten();
-    let mut parts: Vec<u32> = points.map(|p| model.assembly.part_of_point[p as usize]).collect();
-    parts.retain(|p| !is_held.get(*p as usize).is_some_and(|h| *h));
-    parts.sort_unstable();
-    parts.dedup();
-    parts
 }
 
 fn add(to: &mut [f64], factor: f64, x: &[f64]) {
