@@ -25,6 +25,8 @@ mod element;
 mod region;
 mod solver;
 mod stress;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -199,6 +201,16 @@ impl ShellModel {
     /// A third of the area of the triangles around each point, mm²: what turns pressures into forces, areas into masses.
     pub fn areas_mm2(&self) -> &[f64] {
         &self.areas_mm2
+    }
+
+    /// The points of each connected part, in ascending order.
+    fn parts(&self) -> Vec<Vec<u32>> {
+        let mut parts = vec![Vec::new(); self.points.len()];
+        for (v, &part) in (0..).zip(&self.part_of_point) {
+            parts[part as usize].push(v);
+        }
+        parts.retain(|part| !part.is_empty());
+        parts
     }
 
     /// Factorises the stiffness of the shell with thickness `thickness_mm`, in [0.001, 1000], which each load case holds by nodes

@@ -1,7 +1,7 @@
 //! Nodes that hold in the mean: the reaction that balances a load, and the rigid motion left in a displacement.
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
-use shellock_geom::Vec3;
+use shellock_geom::{Aabb, Vec3};
 
 use super::DOFS;
 
@@ -87,6 +87,25 @@ impl Region {
         let (shift, turn) = (Vec3::new(motion[0], motion[1], motion[2]), Vec3::new(motion[3], motion[4], motion[5]));
         shift + turn.cross(self.arm(point))
     }
+}
+
+/// Whether the held degrees of freedom stop all rigid motions of `nodes`; nothing else moves without strain.
+pub(super) fn holds(nodes: &[u32], points: &[Vec3], is_held: &[bool]) -> bool {
+    let bounds = Aabb::around(nodes.iter().map(|&v| points[v as usize]));
+    let mut stopped = Matrix6::zeros();
+    for &v in nodes {
+        let arm = (points[v as usize] - bounds.center()) / bounds.diagonal();
+        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+        let of_moves = axes.map(|axis| wrench(axis, arm));
+        let of_turns = axes.map(|axis| Vector6::new(0.0, 0.0, 0.0, axis.x, axis.y, axis.z));
+        for (form, is_held) in of_moves.into_iter().chain(of_turns).zip(&is_held[v as usize * DOFS..]) {
+            if *is_held {
+                stopped += form * form.transpose();
+            }
+        }
+    }
+    let eigenvalues = stopped.symmetric_eigenvalues();
+    eigenvalues.min() > MIN_INERTIA * eigenvalues.max()
 }
 
 fn wrench(force: Vec3, arm: Vec3) -> Vector6<f64> {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use shellock_geom::Vec3;
 use shellock_geom::sparse::Cholesky;
 
-use super::region::Region;
+use super::region::{self, Region};
 use super::{DOFS, ShellError, ShellModel, THICKNESS_MM};
 
 /// Cases solved together: enough to read the factor once for several, few enough for two threads to share twelve.
@@ -55,11 +55,7 @@ pub struct ShellSolver<'a> {
 
 impl<'a> ShellSolver<'a> {
     pub(super) fn free(model: &'a ShellModel, thickness_mm: f64) -> Result<Self, ShellError> {
-        let mut free_parts = vec![Vec::new(); model.points.len()];
-        for (v, &part) in (0..).zip(&model.part_of_point) {
-            free_parts[part as usize].push(v);
-        }
-        free_parts.retain(|part| !part.is_empty());
+        let free_parts = model.parts();
         // One node of each part, held in all six, is a support that is statically determinate.
         let supports: Vec<Support> = free_parts.iter().map(|p| Support { point: p[0], held: [true; DOFS] }).collect();
         Ok(Self { free_parts, ..Self::held(model, thickness_mm, &supports)? })
@@ -74,6 +70,11 @@ impl<'a> ShellSolver<'a> {
             let dofs = is_held.get_mut(support.point as usize * DOFS..).and_then(|d| d.get_mut(..DOFS));
             let dofs = dofs.ok_or(ShellError::MissingSupport(support.point))?;
             dofs.iter_mut().zip(support.held).for_each(|(d, held)| *d |= held);
+        }
+        for part in model.parts() {
+            if !region::holds(&part, &model.points, &is_held) {
+                return Err(ShellError::Loose(part[0]));
+            }
         }
         let mut stiffness = model.pattern.clone();
         let (of_membrane, of_bending) = (thickness_mm, thickness_mm.powi(3));
@@ -127,14 +128,12 @@ impl<'a> ShellSolver<'a> {
             .collect())
     }
 
-    /// Forces and moments of a case; 0 where supports hold.
+    /// Forces and moments of a case.
     fn loads(&self, at: usize, case: &LoadCase) -> Result<Vec<f64>, ShellError> {
         let want = self.model.points.len();
-        for have in [case.forces_n.len(), case.moments_n_mm.len()] {
-            let may_be_empty = have == case.moments_n_mm.len();
-            if have != want && !(have == 0 && may_be_empty) {
-                return Err(ShellError::LoadLength { case: at, have, want });
-            }
+        let n_moments = if case.moments_n_mm.is_empty() { want } else { case.moments_n_mm.len() };
+        if let Some(have) = [case.forces_n.len(), n_moments].into_iter().find(|have| *have != want) {
+            return Err(ShellError::LoadLength { case: at, have, want });
         }
         let mut loads = Vec::with_capacity(want * DOFS);
         for (v, force) in case.forces_n.iter().enumerate() {
@@ -154,11 +153,8 @@ impl<'a> ShellSolver<'a> {
         for &v in &case.held {
             *holds.get_mut(v as usize).ok_or(ShellError::MissingSupport(v))? = true;
         }
-        if self.free_parts.is_empty() {
-            if !case.held.is_empty() {
-                return Err(ShellError::HeldTwice { case: at });
-            }
-            loads.iter_mut().zip(&self.is_held).filter(|(_, held)| **held).for_each(|(load, _)| *load = 0.0);
+        if self.free_parts.is_empty() && !case.held.is_empty() {
+            return Err(ShellError::HeldTwice { case: at });
         }
         let mut regions = Vec::new();
         for nodes in &self.free_parts {
@@ -175,6 +171,8 @@ impl<'a> ShellSolver<'a> {
             region.balance(nodes, &model.points, loads);
             regions.push(region);
         }
+        // What pushes where a support holds goes straight into the support.
+        loads.iter_mut().zip(&self.is_held).filter(|(_, held)| **held).for_each(|(load, _)| *load = 0.0);
         Ok(regions)
     }
 }
