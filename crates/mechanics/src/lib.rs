@@ -8,10 +8,12 @@ pub mod assembly;
 pub mod material;
 pub mod neighbourhood;
 pub mod sample;
+pub mod shell;
 pub mod surface;
 pub mod volume;
 
 pub use assembly::{Joint, Meeting, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
+pub use shell::{Displacements, FaceStress, LoadCase, ShellError, ShellModel, ShellSolver, ShellStress, Support};
 pub use surface::{SurfaceModel, SurfaceParams, SurfaceSolution};
 pub use volume::{VolumeError, VolumeModel, VolumeParams};
