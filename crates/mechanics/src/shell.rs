@@ -1,5 +1,5 @@
-//! Thin shells as flat triangles with six degrees of freedom a node: displacements and stresses under several loads, for many
-//! thicknesses.
+//! Thin shells as flat triangles with six degrees of freedom a node: displacements and stresses under several loads,
+//! for many thicknesses.
 //!
 //! ```text
 //!   ShellModel::new(mesh, material)      elements and pattern, once a mesh:   K = H·K_m + H³·K_b
@@ -9,21 +9,24 @@
 //!             .stresses(displacements)   both faces of every triangle
 //! ```
 //!
-//! **What holds.** It differs from case to case. Two ways, which answer different questions (figures in docs/shell.md):
+//! **What holds.** It differs from case to case. Two ways, which answer different questions (figures in
+//! docs/shell.md):
 //!
-//! - *In the mean*, for all cases one factorisation: over the area of the case's region, the mean displacement and the mean
-//!   rotation of its nodes vanish. The reaction to that is a traction that varies linearly over the region, and equilibrium
-//!   alone says which: six numbers from six equations. So each case's loads are brought into equilibrium first, the free
-//!   shell is solved with the six supports of one node, which then carry nothing, and the rigid motion is taken away last.
-//!   The region itself bends under the traction: the 99th percentile of stress was 1.5 to 2.1 times that of a clamped
-//!   region. With all nodes held so, it is inertia relief: a free body that its loads accelerate.
-//! - *Clamped*, for each set of supports a factorisation (0.2 s for 5 000 points), but no assembly and no order of elimination. The
-//!   stress at the edge of what is clamped grows with every refinement.
+//! - *In the mean*, for all cases one factorisation: over the area of the case's region, the mean displacement and the
+//!   mean rotation of its nodes vanish. The reaction to that is a traction that varies linearly over the region, and
+//!   equilibrium alone says which: six numbers from six equations. So each case's loads are brought into equilibrium
+//!   first, the free shell is solved with the six supports of one node, which then carry nothing, and the rigid motion
+//!   is taken away last. The region itself bends under the traction: the 99th percentile of stress was 1.5 to 2.1
+//!   times that of a clamped region. With all nodes held so, it is inertia relief: a free body that its loads
+//!   accelerate.
+//! - *Clamped*, for each set of supports a factorisation (0.2 s for 5 000 points), but no assembly and no order of
+//!   elimination. The stress at the edge of what is clamped grows with every refinement.
 //!
-//! Each connected part of the mesh is held by its own nodes. The element is described in `element`; docs/shell.md has benchmarks.
+//! Each connected part of the mesh is held by its own nodes. The element is described in `element`; docs/shell.md has
+//! benchmarks.
 //!
-//! Source: Sect. 4.3 of the paper, which does not say what element it uses. Limits: small displacements, a thickness that is the
-//! same everywhere and small beside the radii of curvature, no shear across the wall.
+//! Source: Sect. 4.3 of the paper, which does not say what element it uses. Limits: small displacements, a thickness
+//! that is the same everywhere and small beside the radii of curvature, no shear across the wall.
 
 mod element;
 mod region;
@@ -48,7 +51,7 @@ pub(crate) const DOFS: usize = 6;
 
 /// Height of a triangle over its longest edge below which it is refused as having no area.
 ///
-/// The entries of a stiffness grow as the inverse of this; three digits are left at this one after a factorisation.
+/// The entries of a stiffness grow as the inverse of this. Remeshed surfaces stay far above it.
 const MIN_HEIGHT: f64 = 1e-5;
 
 /// Thickness that can be solved for, mm.
@@ -158,8 +161,8 @@ pub struct ShellModel {
 impl ShellModel {
     /// Computes the elements, adds them up and orders the elimination; 0.2 s for 5 000 points.
     ///
-    /// The mesh is the middle surface; it may be open, branch, or have several parts. Corners go counter-clockwise seen from
-    /// the outer face.
+    /// The mesh is the middle surface; it may be open, branch, or have several parts. Corners go counter-clockwise
+    /// seen from the outer face.
     pub fn new(mesh: &TriMesh, material: &Material) -> Result<Self, ShellError> {
         check(mesh, material)?;
         let n_nodes = mesh.points.len();
@@ -188,7 +191,8 @@ impl ShellModel {
         })
     }
 
-    /// A third of the area of the triangles around each point, mm²: what turns pressures into forces, areas into masses.
+    /// A third of the area of the triangles around each point, mm²: what turns pressures into forces, areas into
+    /// masses.
     pub fn areas_mm2(&self) -> &[f64] {
         &self.areas_mm2
     }
@@ -203,8 +207,8 @@ impl ShellModel {
         parts
     }
 
-    /// Factorises the stiffness of the shell with thickness `thickness_mm`, in [0.001, 1000], which each load case holds in the mean
-    /// of nodes of its own.
+    /// Factorises the stiffness of the shell with thickness `thickness_mm`, in [0.001, 1000], which each load case
+    /// holds in the mean of nodes of its own.
     pub fn at_thickness(&self, thickness_mm: f64) -> Result<ShellSolver<'_>, ShellError> {
         ShellSolver::free(self, thickness_mm)
     }

@@ -5,7 +5,8 @@ use shellock_geom::{Aabb, Vec3};
 
 use super::DOFS;
 
-/// Least eigenvalue of a region's inertia over the greatest, with lengths in units of its size, below which it is a line.
+/// Least eigenvalue of a region's inertia over the greatest, with lengths in units of its size, below which it is a
+/// line.
 const MIN_INERTIA: f64 = 1e-10;
 
 /// Weighted nodes with the inertia of their rigid motions.
