@@ -32,9 +32,10 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 /// Share of the stiffness in bending in the plane, β_0, which is what holds the drilling rotations.
 ///
-/// (1 − 4ν²) / 2, Felippa's, makes rectangles exact in the plane, but stops curved shells from bending without stretching:
-/// a hemisphere with 8 elements a quarter edge reaches 0.49 of its displacement, with this value 0.92. What it costs is
-/// 2 % too much in a beam two elements wide, 10 % in one a single element wide. At 0.001 the hemisphere reaches 0.96.
+/// (1 − 4ν²) / 2, Felippa's, makes rectangles exact in the plane, but stops curved shells from bending without
+/// stretching: a hemisphere with 8 elements a quarter edge reaches 0.49 of its displacement, with this value 0.92.
+/// What it costs is 2 % too much in a beam two elements wide, 10 % in one a single element wide. At 0.001 the
+/// hemisphere reaches 0.96.
 const IN_PLANE_BENDING_SHARE: f64 = 0.02;
 
 /// How a triangle's stresses follow from displacements.
