@@ -435,6 +435,33 @@ mod tests {
     }
 
     #[test]
+    fn blocks_of_a_mesh_are_solved_as_their_entries_are() {
+        // A strip of four triangles with two rows a node: one spring matrix in each cell, and one more on each row.
+        let cells = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]];
+        let mut matrix = SparseSymmetric::of_cells(6, 2, &cells);
+        let mut entries = Vec::new();
+        for cell in cells {
+            for i in 0..6_u32 {
+                for j in 0..=i {
+                    let [row, column] = [i, j].map(|at| cell[at as usize / 2] * 2 + at % 2);
+                    entries.push((row, column, if i == j { 5.0 } else { -1.0 / f64::from(1 + i + j) }));
+                }
+            }
+        }
+        for &(row, column, value) in &entries {
+            let place = matrix.position(row, column).unwrap();
+            matrix.values_mut()[place] += value;
+        }
+        // Nodes 0 and 3 share no cell, so that their rows have no place in common.
+        assert!(matrix.position(0, 6).is_none() && matrix.n_places() == matrix.places().count());
+        let (mut x, mut y) = (vec![1.0; 12], vec![1.0; 12]);
+        let order = EliminationOrder::of_blocks(&matrix, 2).unwrap();
+        Cholesky::in_order(&order, &matrix).unwrap().solve_in_place(&mut x);
+        Cholesky::new(&SparseSymmetric::from_entries(12, entries)).unwrap().solve_in_place(&mut y);
+        assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-12), "{x:?} {y:?}");
+    }
+
+    #[test]
     fn an_indefinite_matrix_is_refused() {
         let matrix = SparseSymmetric::from_entries(2, vec![(0, 0, 1.0), (1, 1, 1.0), (0, 1, 2.0)]);
         assert_eq!(Cholesky::new(&matrix).unwrap_err(), SparseError::NotPositiveDefinite { n: 2 });

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p shellock-mechanics --example shell_free_form -- MODEL SIZE_MM EDGE_MM WALL_MM > case.json`
 //!
-//! MODEL is a mesh file, scaled to SIZE_MM along its longest side and remeshed to EDGE_MM. `scripts/shell_kratos.py case.json`
-//! solves the same with Kratos and compares.
+//! MODEL is a mesh file, scaled to SIZE_MM along its longest side and remeshed to EDGE_MM. `scripts/shell_kratos.py
+//! case.json` solves the same with Kratos and compares.
 
 use std::fmt::{Debug, Write as _};
 use std::io::Write as _;

@@ -1,7 +1,7 @@
 //! Published benchmarks of shell elements: ours against their references.
 //!
-//! `cargo test --release -p shellock-mechanics --test shell_benchmarks -- --nocapture` prints the table of docs/shell.md.
-//! Quantities have the units of the sources, which are consistent.
+//! `cargo test --release -p shellock-mechanics --test shell_benchmarks -- --nocapture` prints the table of
+//! docs/shell.md. Quantities have the units of the sources, which are consistent.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -21,7 +21,8 @@ fn grid(cells: [usize; 2], place: impl Fn(f64, f64) -> Vec3) -> TriMesh {
     TriMesh { points, triangles: triangles.collect() }
 }
 
-/// The degrees of freedom named in `dofs` (`xyz` displacements, `XYZ` rotations) are held at the points where `at` says so.
+/// The degrees of freedom named in `dofs` (`xyz` displacements, `XYZ` rotations) are held at the points where `at`
+/// says so.
 fn hold(mesh: &TriMesh, dofs: &str, at: impl Fn(Vec3) -> bool) -> Vec<Support> {
     let held = ['x', 'y', 'z', 'X', 'Y', 'Z'].map(|dof| dofs.contains(dof));
     let points = (0..).zip(&mesh.points).filter(|(_, p)| at(**p));

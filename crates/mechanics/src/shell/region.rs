@@ -5,7 +5,8 @@ use shellock_geom::{Aabb, Vec3};
 
 use super::DOFS;
 
-/// Least eigenvalue of a region's inertia over the greatest, with lengths in units of its size, below which it is a line.
+/// Least eigenvalue of a region's inertia over the greatest, with lengths in units of its size, below which it is a
+/// line.
 const MIN_INERTIA: f64 = 1e-10;
 
 /// Weighted nodes with the inertia of their rigid motions.
@@ -28,7 +29,7 @@ impl Region {
         let mean_sq =
             nodes.iter().zip(&weights).map(|(v, w)| (at(v) - center).length_squared() * (w / total)).sum::<f64>();
         let size = mean_sq.sqrt();
-        if !(size > 0.0) {
+        if size == 0.0 {
             return None;
         }
         let mut inertia = Matrix6::zeros();
@@ -42,7 +43,8 @@ impl Region {
         let eigenvalues = inertia.symmetric_eigenvalues();
         let is_solid = eigenvalues.min() > MIN_INERTIA * eigenvalues.max();
         let weights = weights.into_iter().map(|w| w / total).collect();
-        is_solid.then(|| inertia.cholesky().map(|inertia| Self { nodes, weights, center, size, inertia }))?
+        let inertia = inertia.cholesky().filter(|_| is_solid)?;
+        Some(Self { nodes, weights, center, size, inertia })
     }
 
     fn arm(&self, point: Vec3) -> Vec3 {
