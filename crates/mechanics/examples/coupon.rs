@@ -2,12 +2,12 @@
 //!
 //! `cargo run --release -p shellock-mechanics --example coupon`
 //!
-//! The reference has the same geometry as one solid a side. `gmsh` meshes the cross-section (walls, fronts and feet cut at each
-//! other's outlines, six-node triangles), which is swept along the seam into fifteen-node wedges; where the sides touch, each
-//! has its own nodes at the same places. Contact acts where ours does, on the lines that our stations stand for: along n and ŝ
-//! at the root and at the tip of the pin, across the walls at mid-wall. A closed contact is an `*EQUATION` between two nodes and
-//! a third that is held: the reaction there is the contact's force. Analyses are linear; contacts that pull are opened and those
-//! that overlap closed, until CalculiX's own results show none of either. Needs `gmsh` and `ccx`.
+//! The reference has the same geometry as one solid a side. `gmsh` meshes the cross-section (walls, fronts and feet cut at
+//! each other's outlines, six-node triangles), which is swept along the seam into fifteen-node wedges; where the sides touch,
+//! each has its own nodes at the same places. A closed contact is an `*EQUATION` between two nodes; its force is what
+//! CalculiX gives as RF there, less the node's share of the load. Analyses are linear: contacts that pull are opened and those
+//! that overlap closed, until CalculiX's own results show none of either. Loads along n and ŝ are symmetric about the
+//! middle of the seam, and half of the coupon is enough. Needs `gmsh` and `ccx`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -24,31 +24,16 @@ const CELLS: [u32; 2] = [20, 10];
 /// Separation force, N/mm.
 const FORCE: f64 = 0.1;
 /// Pull or overlap that counts as none, as a share of the largest.
-const NONE: f64 = 1e-4;
+const NONE: f64 = 1e-3;
 /// Runs of the reference after which its contacts are called unsettled.
-const MAX_RUNS: usize = 20;
+const MAX_RUNS: usize = 12;
 /// Places closer than this are the same, mm.
 const SAME: f64 = 1e-6;
-/// What is printed: µm.
-const PRINTED: f64 = 1e3;
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// Displacements at the middle of the seam: side a and b, at the root and at the tip.
 type Moved = [[Vec3; 2]; 2];
-
-/// How finely the reference is meshed.
-#[derive(Clone, Copy)]
-struct Fineness {
-    /// Sides of triangles at the seam and at the clamps, mm.
-    near_mm: f64,
-    far_mm: f64,
-    /// Layers of wedges from station to station.
-    n_layers: usize,
-}
-
-const COARSE: Fineness = Fineness { near_mm: 0.5, far_mm: 2.0, n_layers: 1 };
-const USED: Fineness = Fineness { near_mm: 0.25, far_mm: 1.0, n_layers: 2 };
 
 /// Where the reference's sides touch.
 #[derive(Clone, Copy, PartialEq)]
@@ -59,29 +44,91 @@ enum Touch {
     Faces,
 }
 
+/// Sides of its triangles at the clamps, mm; wedges are as long as stations are apart.
+const FAR_MM: f64 = 2.0;
+/// Sides of the reference's triangles at the seam, mm: for the comparison, and to see what the mesh does.
+const SIZES_MM: [f64; 2] = [0.7, 1.4];
+
+/// A load case: T, the normal of the walls' common face, and the force on a.
+struct Case {
+    frame: Frame,
+    wall: Vec3,
+    pull: Vec3,
+    name: String,
+}
+
 fn main() -> Any<()> {
     let params = VolumeParams { force_n_per_mm: FORCE, ..VolumeParams::default() };
-    let folder = tempfile::Builder::new().disable_cleanup(true).prefix("coupon").tempdir()?;
-    let only = std::env::args().nth(1);
-    for degrees in [0.0_f64, -45.0, -90.0, 45.0] {
+    let folder = tempfile::tempdir()?;
+    println!(
+        "| T | load on a | opening | lines | faces | tip of a | lines | faces | tip of b | lines | faces | off lines | \
+         off faces |"
+    );
+    println!("| --: | :-- |{}", " --: |".repeat(11));
+    let mut meshes = String::new();
+    for case in cases() {
+        let own = figures(&ours(&params, &case)?);
+        let references = [Touch::Lines, Touch::Faces].map(|touch| {
+            SIZES_MM.map(|near_mm| {
+                let reference = Reference { params: &params, case: &case, near_mm, touch };
+                reference.equilibrium(folder.path()).map(|(moved, n_runs)| (figures(&moved), n_runs))
+            })
+        });
+        let finest = [0, 1].map(|touch| &references[touch][0]);
+        let text = |r: &Any<([f64; 3], usize)>, i: usize| {
+            r.as_ref().map_or_else(ToString::to_string, |r| format!("{:.3}", r.0[i]))
+        };
+        let columns: Vec<String> =
+            (0..3).map(|i| format!("{:.3} | {} | {}", own[i], text(finest[0], i), text(finest[1], i))).collect();
+        let off = finest.map(|r| r.as_ref().map_or(String::new(), |r| format!("{:+.1} %", worst(own, r.0))));
+        println!("| {} | {} | {} |", case.name, columns.join(" | "), off.join(" | "));
+        let tips: Vec<String> = references.iter().flatten().map(|r| text(r, 1)).collect();
+        let runs: Vec<String> =
+            references.iter().flatten().map(|r| r.as_ref().map_or(String::new(), |r| r.1.to_string())).collect();
+        let _ = writeln!(meshes, "| {} | {} | {} |", case.name, tips.join(" | "), runs.join(", "));
+    }
+    let sizes: Vec<String> = ["lines", "faces"].iter().flat_map(|t| SIZES_MM.map(|h| format!("{t}, {h} mm"))).collect();
+    println!(
+        "\n| T | load on a | tip of a: {} | runs |\n| --: | :-- |{}\n{meshes}",
+        sizes.join(" | "),
+        " --: |".repeat(5)
+    );
+    Ok(())
+}
+
+/// Walls stand upright but where a plan would lean them, so that they do not bar the way: along ŝ.
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (degrees, leans) in [(0.0, false), (-45.0, false), (-90.0, false), (45.0, true), (45.0, false)] {
         let frame = Frame::new(degrees);
-        let n_loads = if degrees == 0.0 { 4 } else { 2 };
-        for (name, pull) in
-            [("+ŝ", frame.s), ("−ŝ", -frame.s), ("+n", frame.n), ("along", Vec3::Y)].into_iter().take(n_loads)
-        {
-            if only.as_ref().is_some_and(|o| *o != format!("{degrees}{name}")) { continue }
-            let own = ours(&params, &frame, pull)?;
-            for (f, t) in [(COARSE, Touch::Lines)] {
-            let reference = Reference { params: &params, frame: &frame, pull, fineness: f, touch: t };
-            let clock = std::time::Instant::now();
-            let result = reference.equilibrium(folder.path());
-            eprintln!("{:.1} s", clock.elapsed().as_secs_f64());
-            if let Ok((m, _)) = &result { eprintln!("ours {own:?}\nccx  {m:?}"); }
-            print_row(&format!("{degrees}°"), name, &own, result);
-            }
+        let loads = [("+ŝ", frame.s), ("−ŝ", -frame.s), ("+n", frame.n), ("along", Vec3::Y)];
+        let n_loads = if degrees == 0.0 {
+            4
+        } else if degrees == 45.0 && !leans {
+            1
+        } else {
+            2
+        };
+        for (load, pull) in loads.into_iter().take(n_loads) {
+            let wall = if leans { frame.n } else { Vec3::X };
+            let name = format!("{degrees}°{} | {load}", if degrees == 45.0 && !leans { ", upright" } else { "" });
+            cases.push(Case { frame: Frame::new(degrees), wall, pull, name });
         }
     }
-    Ok(())
+    cases
+}
+
+/// Opening, and how far the tips of a and b move, µm.
+fn figures(m: &Moved) -> [f64; 3] {
+    let widest = m[0][0].distance(m[1][0]).max(m[0][1].distance(m[1][1]));
+    [widest, m[0][1].length(), m[1][1].length()].map(|mm| mm * 1e3)
+}
+
+/// The largest deviation, %. What stays closed is compared on the scale of what moves.
+fn worst(own: [f64; 3], theirs: [f64; 3]) -> f64 {
+    let largest = theirs.iter().fold(0.0_f64, |m, v| m.max(*v));
+    let off = |i: usize| (own[i] - theirs[i]) / if theirs[i] < 0.05 * largest { largest } else { theirs[i] };
+    100.0 * (0..3).map(off).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }
 
 /// The cross-section's axes: x across from a to b, z outwards.
@@ -103,32 +150,16 @@ impl Frame {
     }
 }
 
-fn print_row(angle: &str, name: &str, own: &Moved, reference: Any<(Moved, usize)>) {
-    let widest = |m: &Moved| m[0][0].distance(m[1][0]).max(m[0][1].distance(m[1][1])) * PRINTED;
-    let figures = |m: &Moved| [widest(m), m[0][1].length() * PRINTED, m[1][1].length() * PRINTED];
-    let own = figures(own);
-    match reference.map(|(m, _)| figures(&m)) {
-        Ok(theirs) => {
-            let largest = theirs.iter().fold(0.0_f64, |m, v| m.max(*v));
-            // What stays closed is compared on the scale of what moves.
-            let off = |i: usize| (own[i] - theirs[i]) / if theirs[i] < 0.05 * largest { largest } else { theirs[i] };
-            let worst = (0..3).map(off).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0) * 100.0;
-            let columns: Vec<String> = own.iter().zip(theirs).map(|(o, t)| format!("{o:.3} | {t:.3}")).collect();
-            println!("| {angle} | {name} | {} | {worst:+.1} % |", columns.join(" | "));
-        }
-        Err(error) => println!("| {angle} | {name} | {:.3} | | {:.3} | | {:.3} | | {error} |", own[0], own[1], own[2]),
-    }
-}
-
-fn ours(params: &VolumeParams, frame: &Frame, pull: Vec3) -> Any<Moved> {
+fn ours(params: &VolumeParams, case: &Case) -> Any<Moved> {
     let plates = sample::plates(LENGTH, WIDTH, CELLS);
     let clamped: Vec<u32> =
         (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > WIDTH - 1e-9).map(|(i, _)| i).collect();
     let model = VolumeModel::clamped(params, &plates, &clamped)?;
-    let joint = Joint { male: Side::A, leaves: frame.s, is_fast: false, pull_on_a: pull, weight: 1.0 };
-    let joints: Vec<Meeting> = plates.stations.iter().map(|s| Meeting { wall: s.across, joint: Some(joint) }).collect();
+    let joint = Joint { male: Side::A, leaves: case.frame.s, is_fast: false, pull_on_a: case.pull, weight: 1.0 };
+    let joints: Vec<Meeting> =
+        plates.stations.iter().map(|_| Meeting { wall: case.wall, joint: Some(joint) }).collect();
     let held = model.equilibrium(&joints, None)?.map_err(|_| "the coupon comes apart")?;
-    Ok(held.displacement_mm[plates.stations.len() / 2].map(|side| side.map(|x| frame.local(x))))
+    Ok(held.displacement_mm[plates.stations.len() / 2].map(|side| side.map(|x| case.frame.local(x))))
 }
 
 fn run(command: &mut Command) -> Any<()> {
@@ -141,9 +172,8 @@ fn run(command: &mut Command) -> Any<()> {
 /// One load case of the reference.
 struct Reference<'a> {
     params: &'a VolumeParams,
-    frame: &'a Frame,
-    pull: Vec3,
-    fineness: Fineness,
+    case: &'a Case,
+    near_mm: f64,
     touch: Touch,
 }
 
@@ -154,23 +184,25 @@ impl Reference<'_> {
         run(Command::new("timeout")
             .args(["60", "gmsh", "-2", "-order", "2", "-format", "inp", "-o", "section.inp", "section.geo"])
             .current_dir(folder))?;
-        let section = Section::read(&std::fs::read_to_string(folder.join("section.inp"))?, self.frame)?;
+        let section = Section::read(&std::fs::read_to_string(folder.join("section.inp"))?, &self.case.frame)?;
         let solid = Solid::swept(&section, self);
         let (contacts, probes) = (solid.contacts(&section, self), solid.probes(&section, self)?);
         let (model, load) = (solid.model(self), self.load_n_mm3());
         let mut is_closed = vec![true; contacts.len()];
+        let mut fewest_wrong = usize::MAX;
         for n_runs in 1..=MAX_RUNS {
             std::fs::write(folder.join("coupon.inp"), model.clone() + &self.step(&contacts, &is_closed))?;
             run(Command::new("timeout").args(["60", "ccx", "coupon"]).env("OMP_NUM_THREADS", "1").current_dir(folder))?;
             let results = Results::read(&std::fs::read_to_string(folder.join("coupon.dat"))?)?;
             let wrong = results.wrong(&contacts, &is_closed, |node| load[solid.side[node]] * solid.front_mm3[node])?;
-            let n_closed = is_closed.iter().filter(|c| **c).count();
-            eprintln!("run {n_runs}: {n_closed} of {} contacts closed, {} of them wrong, {} nodes, {} wedges", contacts.len(), wrong.len(), solid.nodes.len(), solid.wedges.len());
             if wrong.is_empty() {
                 let at = |node: usize| results.displacement(node);
                 return Ok(([[at(probes[0][0])?, at(probes[0][1])?], [at(probes[1][0])?, at(probes[1][1])?]], n_runs));
             }
-            wrong.into_iter().for_each(|i| is_closed[i] = !is_closed[i]);
+            // All that are wrong at once, until that no longer helps; then the first half.
+            let n_changed = if wrong.len() < fewest_wrong { wrong.len() } else { wrong.len().div_ceil(2) };
+            fewest_wrong = fewest_wrong.min(wrong.len());
+            wrong.into_iter().take(n_changed).for_each(|i| is_closed[i] = !is_closed[i]);
         }
         Err("not settled".into())
     }
@@ -183,16 +215,16 @@ impl Reference<'_> {
 
     /// Whether what is symmetric about the middle of the seam may stand for the whole.
     fn is_half(&self) -> bool {
-        self.pull.y == 0.0
+        self.case.pull.y == 0.0
     }
 
-    /// The cross-section for gmsh, with n along x, ŝ along y and the inner edge at the origin. Walls are two layers, so that
-    /// there are nodes at mid-wall.
+    /// The cross-section for gmsh, with n along x, ŝ along y and the inner edge at the origin. Walls are two layers, so
+    /// that there are nodes at mid-wall.
     fn geometry(&self) -> String {
         let (d, half_wall) = (self.params.connector_mm, self.params.wall_mm / 2.0);
         let (h, pin) = (d / 2.0, 0.6 * d);
         let foot = |id: u32, k: f64| {
-            let centre = self.frame.n * (k * h / 2.0) + self.frame.s * (h / 2.0);
+            let centre = self.case.frame.n * (k * h / 2.0) + self.case.frame.s * (h / 2.0);
             let x = if k < 0.0 { -h } else { 0.0 };
             let has_foot = centre.z < 0.05 * d && centre.x * k > 0.0;
             if has_foot { format!("Rectangle({id}) = {{{x}, 0, 0, {h}, {h}}};\n") } else { String::new() }
@@ -205,17 +237,17 @@ Rotate {{{{0, 0, 1}}, {{0, 0, 0}}, {angle}}} {{ Surface{{1:4}}; }}
 Rectangle(5) = {{{mh}, {mp}, 0, {h}, {pin}}};\nRectangle(6) = {{0, {mp}, 0, {h}, {pin}}};\n{feet}
 BooleanFragments{{ Surface{{:}}; Delete; }}{{}}
 Physical Surface(\"ALL\") = {{Surface{{:}}}};
-Field[1] = MathEval;\nField[1].F = \"{near} + {slope} * Max(Sqrt(x*x+y*y) - 3, 0)\";\nBackground Field = 1;
+Field[1] = MathEval;\nField[1].F = \"Min({far}, {near} + 0.25 * Max(Sqrt(x*x+y*y) - 2, 0))\";\nBackground Field = 1;
 Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGroupsOfNodes = 0;\n",
             mw = -WIDTH,
             w = WIDTH,
             t = half_wall,
             mh = -h,
             mp = -pin,
-            angle = self.frame.degrees.to_radians(),
+            angle = self.case.frame.degrees.to_radians(),
             feet = foot(7, -1.0) + &foot(8, 1.0),
-            near = self.fineness.near_mm,
-            slope = (self.fineness.far_mm - self.fineness.near_mm) / (WIDTH - 3.0),
+            near = self.near_mm,
+            far = FAR_MM,
         )
     }
 
@@ -223,7 +255,8 @@ Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGro
     fn load_n_mm3(&self) -> [Vec3; 2] {
         let (d, [y0, y1]) = (self.params.connector_mm, self.ends());
         let joined_mm = LENGTH * f64::from(CELLS[0] - 1) / f64::from(CELLS[0]);
-        let pull = self.frame.local(self.pull) * (self.params.force_n_per_mm * joined_mm / (0.3 * d * d * (y1 - y0)));
+        let pull = self.case.frame.local(self.case.pull)
+            * (self.params.force_n_per_mm * joined_mm / (0.3 * d * d * (y1 - y0)));
         [pull, -pull]
     }
 
@@ -290,10 +323,15 @@ impl Section {
                 found.push(ids.as_slice().try_into()?);
             }
         }
-        if found.is_empty() { Err("gmsh made no quadratic triangles".into()) } else { Ok(Self::split(&at, &found, frame)) }
+        if found.is_empty() {
+            Err("gmsh made no quadratic triangles".into())
+        } else {
+            Ok(Self::split(&at, &found, frame))
+        }
     }
 
-    /// Gives each side its own nodes. Above the inner face the sides are told apart by the seam's plane, below by the common face.
+    /// Gives each side its own nodes: above the inner face they are told apart by the seam's plane, below by the common
+    /// face.
     fn split(at: &BTreeMap<usize, Vec3>, found: &[[usize; 6]], frame: &Frame) -> Self {
         let mut own = BTreeMap::new();
         let mut section = Self { nodes: Vec::new(), triangles: Vec::new(), pairs: Vec::new(), is_corner: Vec::new() };
@@ -317,7 +355,6 @@ impl Section {
             .collect();
         section
     }
-
 }
 
 /// Fifteen-node wedges: the cross-section swept along y.
@@ -342,41 +379,51 @@ struct Contact {
 
 impl Solid {
     fn swept(section: &Section, reference: &Reference) -> Self {
-        let n_cells = CELLS[0] as usize / if reference.is_half() { 2 } else { 1 };
-        let n_layers = n_cells * reference.fineness.n_layers;
-        let layer = LENGTH / f64::from(CELLS[0]) / reference.fineness.n_layers as f64;
-        let y_of: Vec<f64> = (0..=2 * n_layers).map(|half| half as f64 * layer / 2.0).collect();
-        let mut solid = Self { nodes: Vec::new(), wedges: Vec::new(), side: Vec::new(), front_mm3: Vec::new(), place: vec![BTreeMap::new(); y_of.len()], y_of };
+        let n_layers = CELLS[0] as usize / if reference.is_half() { 2 } else { 1 };
+        let layer_mm = LENGTH / f64::from(CELLS[0]);
+        let mut solid = Self {
+            nodes: Vec::new(),
+            wedges: Vec::new(),
+            side: Vec::new(),
+            front_mm3: Vec::new(),
+            place: vec![BTreeMap::new(); 2 * n_layers + 1],
+            y_of: (0..=2 * n_layers).map(|half| half as f64 * layer_mm / 2.0).collect(),
+        };
         let (pin, h) = (0.6 * reference.params.connector_mm, 0.5 * reference.params.connector_mm);
         let [y0, y1] = reference.ends();
         for below in (0..2 * n_layers).step_by(2) {
-            let y = solid.y_of[below + 1];
-            for t in section.triangles.iter().filter(|t| t.is_wall || (y0..y1).contains(&y)) {
-                let is_front = (-pin..0.0).contains(&t.centre.z) && t.centre.x.abs() < h
-                    && (t.centre.x > 0.0) == (t.side == 1) && (y0..y1).contains(&y);
-                // Turned round, so that the sweep goes up: n × ŝ points down the seam.
-                let [a, b, c, ab, bc, ca] = t.nodes;
-                let mut node = |half: usize, at: usize| solid.node(section, half, at);
-                let [low, mid, high] = [below, below + 1, below + 2];
-                let wedge = [
-                    [a, c, b].map(|at| node(low, at)), [a, c, b].map(|at| node(high, at)),
-                    [ca, bc, ab].map(|at| node(low, at)), [ca, bc, ab].map(|at| node(high, at)),
-                    [a, c, b].map(|at| node(mid, at)),
-                ];
-                let mut nodes = [0; 15];
-                nodes.copy_from_slice(&wedge.concat());
-                solid.wedges.push((nodes, is_front.then_some(t.side)));
-                for &node in &nodes { solid.side[node] = t.side; }
-                if is_front {
-                    let [p, q, r] = [a, b, c].map(|at| section.nodes[at]);
-                    let volume = (q - p).cross(r - p).length() / 2.0 * layer;
-                    for (i, &node) in nodes.iter().enumerate() {
-                        solid.front_mm3[node] += volume * if i < 6 { -1.0 / 9.0 } else if i < 12 { 1.0 / 6.0 } else { 2.0 / 9.0 };
-                    }
-                }
+            let has_connector = (y0..y1).contains(&solid.y_of[below + 1]);
+            for triangle in section.triangles.iter().filter(|t| t.is_wall || has_connector) {
+                let Vec3 { x, z, .. } = triangle.centre;
+                let is_front =
+                    has_connector && (-pin..0.0).contains(&z) && x.abs() < h && (x > 0.0) == (triangle.side == 1);
+                solid.sweep(section, triangle, below, is_front.then_some(layer_mm));
             }
         }
         solid
+    }
+
+    /// The wedge on `triangle` in one layer, whose height is given where it bears the load.
+    fn sweep(&mut self, section: &Section, triangle: &Triangle, below: usize, loaded_mm: Option<f64>) {
+        // Turned round, so that the sweep goes up: n × ŝ points down the seam.
+        let [a, c, b, ac, cb, ba] = triangle.nodes;
+        let (corners, middles) = ([a, b, c], [ba, cb, ac]);
+        let mut nodes = [0; 15];
+        for (i, (corner, middle)) in corners.into_iter().zip(middles).enumerate() {
+            nodes[i] = self.node(section, below, corner);
+            nodes[3 + i] = self.node(section, below + 2, corner);
+            nodes[6 + i] = self.node(section, below, middle);
+            nodes[9 + i] = self.node(section, below + 2, middle);
+            nodes[12 + i] = self.node(section, below + 1, corner);
+        }
+        let [p, q, r] = corners.map(|at| section.nodes[at]);
+        let volume = loaded_mm.unwrap_or(0.0) * (q - p).cross(r - p).length() / 2.0;
+        for (i, node) in nodes.into_iter().enumerate() {
+            self.side[node] = triangle.side;
+            // Integrals of the shape functions over the wedge: corners, middles of the triangles' sides, middles in between.
+            self.front_mm3[node] += volume * [-1.0 / 9.0, -1.0 / 9.0, 1.0 / 6.0, 1.0 / 6.0, 2.0 / 9.0][i / 3];
+        }
+        self.wedges.push((nodes, loaded_mm.map(|_| triangle.side)));
     }
 
     fn node(&mut self, section: &Section, half: usize, at: usize) -> usize {
@@ -390,27 +437,35 @@ impl Solid {
     }
 
     fn contacts(&self, section: &Section, reference: &Reference) -> Vec<Contact> {
-        let (pin, frame) = (0.6 * reference.params.connector_mm, reference.frame);
+        let (pin, frame) = (0.6 * reference.params.connector_mm, &reference.case.frame);
         let [y0, y1] = reference.ends();
         let middle = frame.local(Vec3::Z * (reference.params.wall_mm / 2.0));
-        let off_wall = -frame.local(Vec3::X);
+        let off_wall = -frame.local(reference.case.wall);
         let mut contacts = Vec::new();
         for (half, nodes) in self.place.iter().enumerate() {
-            if !(y0 - SAME..=y1 + SAME).contains(&self.y_of[half]) { continue; }
+            if !(y0 - SAME..=y1 + SAME).contains(&self.y_of[half]) {
+                continue;
+            }
             for pair in &section.pairs {
                 let [Some(&a), Some(&b)] = pair.map(|p| nodes.get(&p)) else { continue };
                 let mut add = |opens, is_tie| contacts.push(Contact { nodes: [a, b], opens, is_tie });
                 let x = section.nodes[pair[0]];
                 let is_common = x.x.abs() < SAME && (-pin - SAME..SAME).contains(&x.z);
                 let is_end = is_common && (x.z.abs() < SAME || x.z < SAME - pin);
-                let is_middle = x.distance(middle) < SAME;
+                // Of a face's nodes, those at corners of elements bear nothing under even pressure.
                 let is_between = section.is_corner[pair[0]] != (half % 2 == 0);
-                match reference.touch {
-                    Touch::Lines if is_end => { add(Vec3::X, true); add(Vec3::Z, false); }
-                    Touch::Lines if is_middle => add(off_wall, false),
-                    Touch::Faces if is_common => { add(Vec3::X, true); if is_end { add(Vec3::Z, false); } }
-                    Touch::Faces if !is_common && is_between => add(off_wall, false),
-                    _ => {}
+                let (is_tied, is_wall) = match reference.touch {
+                    Touch::Lines => (is_end, x.distance(middle) < SAME),
+                    Touch::Faces => (is_common, !is_common && is_between),
+                };
+                if is_tied {
+                    add(Vec3::X, true);
+                }
+                if is_end {
+                    add(Vec3::Z, false);
+                }
+                if is_wall {
+                    add(off_wall, false);
                 }
             }
         }
@@ -442,9 +497,13 @@ impl Solid {
             }
         }
         let (e, nu) = (reference.params.material.youngs_modulus_mpa, reference.params.material.poissons_ratio);
-        let _ = writeln!(deck, "*ELSET, ELSET=EALL\nFRONT0, FRONT1, REST\n*MATERIAL, NAME=M\n*ELASTIC\n{e}, {nu}\n*DENSITY\n1.\n*SOLID SECTION, ELSET=EALL, MATERIAL=M\n*BOUNDARY");
+        let _ = writeln!(
+            deck,
+            "*ELSET, ELSET=EALL\nFRONT0, FRONT1, REST\n*MATERIAL, NAME=M\n*ELASTIC\n{e}, {nu}\n*DENSITY\n1.
+*SOLID SECTION, ELSET=EALL, MATERIAL=M\n*BOUNDARY"
+        );
         for (id, p) in (1..).zip(&self.nodes) {
-            if (reference.frame.n.x * p.x + reference.frame.s.x * p.z).abs() > WIDTH - SAME {
+            if (reference.case.frame.n.x * p.x + reference.case.frame.s.x * p.z).abs() > WIDTH - SAME {
                 let _ = writeln!(deck, "{id}, 1, 3");
             } else if reference.is_half() && p.y > LENGTH / 2.0 - SAME {
                 let _ = writeln!(deck, "{id}, 2, 2");
