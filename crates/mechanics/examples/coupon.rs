@@ -6,9 +6,8 @@
 //! each other's outlines, six-node triangles), which is swept along the seam into fifteen-node wedges; where the sides touch,
 //! each has its own nodes at the same places. A closed contact is an `*EQUATION` between two nodes; its force is what
 //! CalculiX gives as RF there, less the node's share of the load. Analyses are linear: contacts that pull are opened and those
-//! that overlap closed, until CalculiX's own results show none of either, or
-//! displacements no longer change. Loads along n and ŝ are symmetric about the
-//! middle of the seam, and half of the coupon is enough. Needs `gmsh` and `ccx`.
+//! that overlap closed, until CalculiX's own results show none of either, or displacements no longer change. Loads along n
+//! and ŝ are symmetric about the middle of the seam, and half of the coupon is enough. Needs `gmsh` and `ccx`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
