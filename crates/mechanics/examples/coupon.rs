@@ -1,6 +1,6 @@
 //! The volume metric against CalculiX: two plates clamped at their far edges, joined along a straight seam, pulled apart.
 //!
-//! `cargo run --release -p shellock-mechanics --example coupon`
+//! `cargo run --release -p shellock-mechanics --example coupon [ANGLE]`: all rows, or those whose T is ANGLE (`-45`).
 //!
 //! The reference has the same geometry as one solid a side. `gmsh` meshes the cross-section (walls, fronts and feet cut at
 //! each other's outlines, six-node triangles), which is swept along the seam into fifteen-node wedges; where the sides touch,
@@ -66,7 +66,8 @@ fn main() -> Any<()> {
     );
     println!("| --: | :-- |{}", " --: |".repeat(11));
     let mut meshes = String::new();
-    for case in cases() {
+    let only: Option<f64> = std::env::args().nth(1).map(|word| word.parse()).transpose()?;
+    for case in cases().into_iter().filter(|c| only.is_none_or(|degrees| degrees == c.frame.degrees)) {
         let own = figures(&ours(&params, &case)?);
         let references = [Touch::Lines, Touch::Faces].map(|touch| {
             SIZES_MM.map(|near_mm| {
