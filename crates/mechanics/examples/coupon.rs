@@ -97,23 +97,15 @@ fn main() -> Any<()> {
     Ok(())
 }
 
-/// Walls stand upright but where a plan would lean them, so that they do not bar the way: along ŝ.
+/// Walls stand upright but where these would bar the way: there a plan leans them, along ŝ.
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (degrees, leans) in [(0.0, false), (-45.0, false), (-90.0, false), (45.0, true), (45.0, false)] {
+    for degrees in [0.0_f64, -45.0, -90.0, 45.0] {
         let frame = Frame::new(degrees);
+        let wall = if degrees > 0.0 { frame.n } else { Vec3::X };
         let loads = [("+ŝ", frame.s), ("−ŝ", -frame.s), ("+n", frame.n), ("along", Vec3::Y)];
-        let n_loads = if degrees == 0.0 {
-            4
-        } else if degrees == 45.0 && !leans {
-            1
-        } else {
-            2
-        };
-        for (load, pull) in loads.into_iter().take(n_loads) {
-            let wall = if leans { frame.n } else { Vec3::X };
-            let name = format!("{degrees}°{} | {load}", if degrees == 45.0 && !leans { ", upright" } else { "" });
-            cases.push(Case { frame: Frame::new(degrees), wall, pull, name });
+        for (load, pull) in loads.into_iter().take(if degrees == 0.0 { 4 } else { 2 }) {
+            cases.push(Case { frame: Frame::new(degrees), wall, pull, name: format!("{degrees}° | {load}") });
         }
     }
     cases
