@@ -1,9 +1,11 @@
 //! What can be said on the command line.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use shellock::pipeline::Params;
+use shellock::pipeline::{Params, ThicknessChoice};
+use shellock::strength::Material;
 
 /// Exit codes, shown in the help.
 const EXIT_CODES: &str = "Exit codes: 0 made and verified · 1 made, but a check failed · 2 the input or an argument is wrong · \
@@ -112,6 +114,44 @@ impl Axis {
     }
 }
 
+/// Where the wall's thickness comes from.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Thickness {
+    Auto,
+    Mm(f64),
+}
+
+impl FromStr for Thickness {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.eq_ignore_ascii_case("auto") {
+            return Ok(Self::Auto);
+        }
+        text.parse().map(Self::Mm).map_err(|_| "give millimetres, such as 2.4, or auto".to_owned())
+    }
+}
+
+/// A material preset.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MaterialName {
+    SlaResin,
+    Pla,
+    Petg,
+    Pa12,
+}
+
+impl MaterialName {
+    fn material(self) -> Material {
+        match self {
+            Self::SlaResin => Material::SLA_RESIN,
+            Self::Pla => Material::PLA,
+            Self::Petg => Material::PETG,
+            Self::Pa12 => Material::PA12,
+        }
+    }
+}
+
 #[derive(Args)]
 pub struct Options {
     /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
@@ -138,9 +178,15 @@ pub struct Options {
     /// Work spent on proving that no plan is better, in seconds of an ordinary computer; a slower one ends after twice that
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, help_heading = "Pieces")]
     pub plan_time: f64,
-    /// Wall thickness, mm, 0.8 to 10
-    #[arg(long, value_name = "MM", default_value_t = Params::default().body.thickness_mm, help_heading = "Make")]
-    pub thickness: f64,
+    /// Wall thickness, mm, 0.8 to 10, or auto: the least that bears a fall
+    #[arg(long, value_name = "MM|auto", default_value = "2", help_heading = "Make")]
+    pub thickness: Thickness,
+    /// What it is printed of: what it bears decides how thick walls must be
+    #[arg(long, value_enum, default_value = "sla-resin", help_heading = "Make")]
+    pub material: MaterialName,
+    /// Height of the fall that walls must bear, m, 0.01 to 20
+    #[arg(long, value_name = "M", default_value_t = Params::default().strength.drop_m, help_heading = "Make")]
+    pub drop: f64,
     /// Connector size, mm, 1.5 to 6
     #[arg(long, value_name = "MM", default_value_t = Params::default().connector.size_mm, help_heading = "Make")]
     pub connector: f64,
@@ -176,7 +222,13 @@ impl Options {
         p.plan.key = self.key.map(shellock::PatchId);
         p.plan.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
         p.plan.up = std::array::from_fn(|axis| f64::from(u8::from(axis == self.up.index())));
-        p.body.thickness_mm = self.thickness;
+        match self.thickness {
+            Thickness::Auto => p.thickness = ThicknessChoice::Auto,
+            Thickness::Mm(mm) => p.body.thickness_mm = mm,
+        }
+        p.strength.material = self.material.material();
+        p.strength.drop_m = self.drop;
+        p.strength.seed = self.seed;
         p.body.wall_gap_mm = self.wall_gap;
         p.body.cell_mm = self.grid;
         p.connector.size_mm = self.connector;

@@ -7,6 +7,7 @@ use serde_json::json;
 use shellock::context::Progress;
 use shellock::pipeline::{Design, DesignOutcome, Params, design};
 use shellock::plan::PlanProof;
+use shellock::strength::{Strength, StrengthParams};
 use shellock::verify::Verification;
 use shellock::{Ctx, Warning};
 
@@ -99,7 +100,7 @@ fn print_json(to: &Destination, model: &Model, made: &Design, summary: &Summary,
         "out": to.folder(), "notes": model.notes,
         "pieces": made.pieces.len(), "key_piece": made.plan.key(),
         "volume_ratio": summary.volume_ratio, "connector_share": summary.connector_share,
-        "thin_share": summary.thin_share,
+        "thin_share": summary.thin_share, "thickness_mm": made.thickness_mm,
         "checks": made.verification.checks, "findings": made.verification.findings,
         "warnings": warnings, "exit_code": code,
     });
@@ -108,12 +109,15 @@ fn print_json(to: &Destination, model: &Model, made: &Design, summary: &Summary,
 
 fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summary, warnings: &[Warning]) {
     println!(
-        "{} pieces, the last is piece {}; walls {} mm; material {:.0} % of the solid model",
+        "{} pieces, the last is piece {}; walls {:.2} mm; material {:.0} % of the solid model",
         made.pieces.len(),
         made.plan.key(),
-        params.body.thickness_mm,
+        made.thickness_mm,
         100.0 * summary.volume_ratio
     );
+    if let Some(strength) = &made.strength {
+        println!("{}", bearing(strength, params));
+    }
     if let Some(proof) = &made.proof {
         println!("{}", quality(proof));
     }
@@ -135,6 +139,17 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
         println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", params.connector.min_wall_mm);
     }
     println!("written to {}: open report.html in a browser, print pieces/*.stl", to.folder().display());
+}
+
+/// What the wall bears, in words.
+pub fn bearing(strength: &Strength, params: &Params) -> String {
+    let [x, y, z] = strength.at.to_array();
+    let StrengthParams { drop_m, material, .. } = &params.strength;
+    format!(
+        "in a fall from {drop_m:.2} m the wall's stress reaches {:.0} MPa of the {:.0} that the material bears, \
+         at ({x:.1}, {y:.1}, {z:.1}) mm",
+        strength.stress_mpa, material.strength_mpa
+    )
 }
 
 /// How good a plan is, in words.

@@ -8,12 +8,14 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{ReportCheck, ReportData, ReportPiece, html, palette, pieces_picture};
+use shellock::strength::{Strength, StrengthParams};
 use shellock::verify::thin_share;
 use shellock::{PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::args::{Axis, Options};
+use crate::build::bearing;
 use crate::failure::Failure;
 use crate::input::Model;
 
@@ -183,7 +185,8 @@ fn plan_json(
         "format": "shellock-plan", "version": 1, "units": "mm", "program": env!("CARGO_PKG_VERSION"),
         "input": { "file": model.name, "sha256": model.sha256, "transform": model.transform },
         "seed": params.plan.seed,
-        "shell_thickness": params.body.thickness_mm,
+        "shell_thickness": design.thickness_mm,
+        "strength": design.strength.as_ref().map(|s| strength_json(s, params)),
         "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
         "connector_size": params.connector.size_mm,
         "wall_gap": params.body.wall_gap_mm,
@@ -198,6 +201,16 @@ fn plan_json(
         "verification": { "passed": design.verification.passed(), "checks": design.verification.checks,
                           "findings": design.verification.findings },
         "warnings": warnings,
+    })
+}
+
+fn strength_json(strength: &Strength, params: &Params) -> Value {
+    let StrengthParams { material, drop_m, n_cases, .. } = &params.strength;
+    json!({
+        "material": material, "drop_m": drop_m, "n_falls": n_cases,
+        "stress_mpa": strength.stress_mpa, "is_too_weak": strength.is_too_weak, "at": strength.at.to_array(),
+        "deciding_fall": strength.deciding.0, "down": strength.deciding.1.to_array(),
+        "tried": strength.tried, "solid": strength.solid,
     })
 }
 
@@ -244,12 +257,13 @@ fn report(
     let mut facts: Vec<(String, String)> = vec![
         ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
         ("pieces".into(), design.pieces.len().to_string()),
-        ("wall".into(), format!("{} mm", params.body.thickness_mm)),
+        ("wall".into(), format!("{:.2} mm", design.thickness_mm)),
         ("connectors".into(), format!("{} mm", params.connector.size_mm)),
         ("clearance".into(), format!("{} mm", params.connector.clearance_mm)),
         ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
         ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
     ];
+    facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, params))));
     facts.extend(plan_facts(design));
     let checks = design
         .verification

@@ -12,10 +12,11 @@ use crate::metric::{ChoiceError, Holding};
 use crate::piece::{Joint, PieceError};
 use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanProof, PlanSurvey};
 use crate::segmentation::{SegmentationError, SegmentationParams};
+use crate::strength::{Strength, StrengthError, StrengthParams};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
     Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, metric, piece, plan, segmentation,
-    verify,
+    strength, verify,
 };
 
 /// Everything that may be set. Each stage's parameters are declared beside it.
@@ -23,6 +24,10 @@ use crate::{
 pub struct Params {
     /// How the surface is divided.
     pub segmentation: SegmentationParams,
+    /// Where the wall's thickness comes from.
+    pub thickness: ThicknessChoice,
+    /// What the wall must bear.
+    pub strength: StrengthParams,
     /// How plans are judged and searched.
     pub plan: PlanParams,
     /// How the wall is made and cut.
@@ -33,6 +38,16 @@ pub struct Params {
     pub verify: VerifyParams,
     /// How often a kit that failed its verification is planned and made again.
     pub rounds: Rounds,
+}
+
+/// Where the wall's thickness comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ThicknessChoice {
+    /// From [`BodyParams::thickness_mm`]; its stress is told.
+    #[default]
+    Given,
+    /// The least that bears a fall.
+    Auto,
 }
 
 /// Bounds of the feedback loop.
@@ -56,7 +71,8 @@ impl Params {
     /// Every problem of every stage, in words.
     pub fn problems(&self) -> Vec<String> {
         let words = |p: Vec<crate::params::ParamProblem>| p.into_iter().map(|p| p.to_string());
-        let mut problems: Vec<String> = words(self.body.problems()).chain(words(self.connector.problems())).collect();
+        let stages = [self.body.problems(), self.connector.problems(), self.strength.problems()];
+        let mut problems: Vec<String> = stages.into_iter().flat_map(words).collect();
         problems.extend(self.segmentation.problems());
         problems.extend(self.plan.problems());
         problems
@@ -68,7 +84,12 @@ impl Params {
         const CONTACT_SIZES: f64 = 5.6;
         /// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides; below this nothing was left.
         const LEAST_CONTACT_SIZES: f64 = 4.2;
+        /// Two lines on either side of a seam's pin.
+        const LEAST_WALLS: f64 = 4.0;
         let mut p = self.clone();
+        let least_mm = (LEAST_WALLS * p.connector.min_wall_mm).max(0.8).max(2.0 * p.body.cell_mm.unwrap_or(0.0));
+        p.strength.least_mm = least_mm.min(5.0);
+        p.strength.most_mm = p.strength.most_mm.max(p.strength.least_mm);
         p.segmentation.min_contact_mm = CONTACT_SIZES * p.connector.size_mm;
         p.segmentation.least_contact_mm = LEAST_CONTACT_SIZES * p.connector.size_mm;
         p.segmentation.wall_mm = p.body.thickness_mm;
@@ -86,6 +107,10 @@ pub struct Design {
     pub surface: SegmentedSurface,
     /// Order and directions.
     pub plan: InstallationPlan,
+    /// Thickness of its walls, mm.
+    pub thickness_mm: f64,
+    /// What the wall bears; `None` where the stress could not be computed, which is warned of.
+    pub strength: Option<Strength>,
     /// How good the plan is; `None` where it was given and not searched.
     pub proof: Option<PlanProof>,
     /// How it holds by simulation, and where it is weak; `None` where its plan was given.
@@ -118,6 +143,9 @@ pub enum DesignOutcome {
 /// Why the job could not be done.
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
+    /// No thickness can be found.
+    #[error(transparent)]
+    Strength(StrengthError),
     /// The surface cannot be divided.
     #[error(transparent)]
     Segmentation(#[from] SegmentationError),
@@ -138,6 +166,15 @@ pub enum DesignError {
     Cancelled(#[from] Cancelled),
 }
 
+impl From<StrengthError> for DesignError {
+    fn from(e: StrengthError) -> Self {
+        match e {
+            StrengthError::Cancelled(c) => c.into(),
+            other => Self::Strength(other),
+        }
+    }
+}
+
 impl From<ChoiceError> for DesignError {
     fn from(e: ChoiceError) -> Self {
         match e {
@@ -150,7 +187,8 @@ impl From<ChoiceError> for DesignError {
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds
 /// are used up; then the best of them is returned, its failures told.
 pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
-    let params = &params.agreed();
+    let (params, bearing) = with_thickness(ctx, params, model)?;
+    let params = &params;
     let mut surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
     ctx.stage("grid", 0)?;
     let grid = ShellGrid::new(&params.body, model, params.connector.room_mm())?;
@@ -171,7 +209,39 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
     };
     // Warnings of segmentations and plans that were given up go with them.
     ctx.take_warnings();
+    if let Some(best) = &mut kits.best {
+        best.warnings.extend(bearing.warnings);
+        best.strength = bearing.strength;
+    }
     finish(ctx, params, model, labels, kits.best, attempt)
+}
+
+/// The parameters with the thickness of the wall, what it bears, and what to tell of it.
+fn with_thickness(ctx: &Ctx, params: &Params, model: &Solid) -> Result<(Params, Bearing), DesignError> {
+    let mut params = params.agreed();
+    let found = match params.thickness {
+        ThicknessChoice::Given => strength::stress(ctx, &params.strength, model, params.body.thickness_mm),
+        ThicknessChoice::Auto => strength::thickness(ctx, &params.strength, model),
+    };
+    match found {
+        Ok(strength) => {
+            params.body.thickness_mm = strength.thickness_mm;
+            let warnings = strength.warnings(&params.strength);
+            Ok((params.agreed(), Bearing { strength: Some(strength), warnings }))
+        }
+        Err(StrengthError::Shell(e)) if params.thickness == ThicknessChoice::Given => {
+            let message = format!("what the wall bears could not be computed: {e}");
+            let warning = Warning { code: "strength-unknown".into(), message, pieces: Vec::new(), at: None };
+            Ok((params, Bearing { strength: None, warnings: vec![warning] }))
+        }
+        Err(e) => Err(e.into()),
+    }
+}
+
+/// What the wall bears, and what to tell of it.
+struct Bearing {
+    strength: Option<Strength>,
+    warnings: Vec<Warning>,
 }
 
 /// The surface with other pieces, which may do better.
@@ -332,6 +402,8 @@ pub fn make(
     Ok(Design {
         surface: surface.clone(),
         plan,
+        thickness_mm: params.body.thickness_mm,
+        strength: None,
         proof: None,
         holding: None,
         pieces: finished.meshes,

@@ -1,0 +1,426 @@
+//! How thick the wall must be so that a fall does not break it (Sect. 4.3, Eq. 2).
+//!
+//! The model falls in a few random orientations. In each, the region that meets the ground stops the model within Δt, while
+//! the region on top is held:
+//!
+//! ```text
+//!     ▒▒▒▒▒▒▒    top: holds in the mean (see `mechanics::shell`)
+//!    ╱       ╲
+//!   │  shell  │  │ v = √(2 g h)
+//!    ╲       ╱   ▼
+//!     ░░░░░░░    bottom: f = m v / Δt upwards, spread by mass
+//! ```
+//!
+//! m is the mass of the whole shell, so the load grows with the thickness H, and σ falls like 1/H where the wall bends. The
+//! least H whose stress stays below the material's strength is found on a bracket that shrinks by interpolating log σ over log H.
+//!
+//! Two rules. Where the model is too thin to be hollow with that H it is solid, and no shell: these places do not count
+//! ([`thin`]). And the stress that counts in a case is the one that all but a small share of the other area stays below: the few
+//! worst triangles, in creases and at tips, tell more of the mesh than of the model, and their stress grows with every
+//! refinement. docs/strength.md has what the share and the mesh change.
+
+mod thin;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::remesh::{RemeshParams, remesh};
+use shellock_geom::{Solid, TriMesh, Vec3};
+pub use shellock_mechanics::Material;
+use shellock_mechanics::{LoadCase, ShellError, ShellModel};
+
+use crate::params::ParamProblem;
+use crate::{Cancelled, Ctx, Warning};
+
+pub use thin::SolidRegion;
+
+/// Free fall, mm/s².
+const GRAVITY_MM_S2: f64 = 9806.65;
+/// Duration of the impact (Sect. 4.3), s.
+const IMPACT_S: f64 = 1.0 / 300.0;
+/// Height of the regions that hold and that meet the ground, as a share of the model's height in that orientation.
+const ZONE_SHARE: f64 = 0.1;
+/// Least area of such a region, as a share of the surface: a tip's zone grows until it has as much.
+const LEAST_ZONE_AREA: f64 = 0.01;
+/// Least area of a solid place that is told, mm².
+const TOLD_SOLID_MM2: f64 = 50.0;
+/// Width of the bracket at which the search ends, mm.
+const RESOLUTION_MM: f64 = 0.05;
+/// Thicknesses looked at in search of one that bears its stress, at most.
+const MOST_WITHOUT_BRACKET: usize = 6;
+/// Thicknesses after which the search bisects.
+const MOST_INTERPOLATED: usize = 6;
+/// Stress over the least there is that no thicker wall is worth avoiding.
+const WORTH_MORE_WALL: f64 = 1.05;
+/// Points of the mesh that shows how the stress depends on the thickness.
+const COARSE_POINTS: f64 = 2000.0;
+/// Points of the mesh whose stress counts; docs/strength.md has what more of them change.
+const FINE_POINTS: f64 = 8000.0;
+/// Change of the two meshes' ratio, in its logarithm, at which the search ends.
+const RATIO_TOLERANCE: f64 = 0.01;
+/// Thicknesses after which the search ends at all events.
+const MOST_TRIED: usize = 30;
+
+/// What a wall must bear. Lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StrengthParams {
+    /// What pieces are printed of.
+    pub material: Material,
+    /// Height that the model falls from, m. [0.01, 20]; 1.275, which gives the paper's 5 m/s.
+    pub drop_m: f64,
+    /// Orientations. [1, 200]; 12, the paper's.
+    pub n_cases: usize,
+    /// Seed of the orientations.
+    pub seed: u64,
+    /// Thinnest wall to look at. [0.4, 5]; 1.6, four lines of an ordinary nozzle: a seam's two sides need two each.
+    pub least_mm: f64,
+    /// Thickest wall to look at. [`least_mm`, 20]; 4. The paper looks up to 10 mm, but that leaves no cavity in a figure of 150 mm.
+    pub most_mm: f64,
+    /// Share of the hollow area whose stress may be above the one that counts. [0, 0.2]; 0.005.
+    pub peak_share: f64,
+    /// Factor on the points of the analysis mesh. [0.1, 20]; 1.
+    pub refinement: f64,
+}
+
+impl Default for StrengthParams {
+    fn default() -> Self {
+        let (material, seed) = (Material::default(), 1);
+        Self {
+            material,
+            drop_m: 1.275,
+            n_cases: 12,
+            seed,
+            least_mm: 1.6,
+            most_mm: 4.0,
+            peak_share: 0.005,
+            refinement: 1.0,
+        }
+    }
+}
+
+impl StrengthParams {
+    /// Every value out of range.
+    pub fn problems(&self) -> Vec<ParamProblem> {
+        [
+            ParamProblem::unless_within("drop height", "m", self.drop_m, 0.01, 20.0),
+            ParamProblem::unless_within("number of falls", "", self.n_cases as f64, 1.0, 200.0),
+            ParamProblem::unless_within("thinnest wall", "mm", self.least_mm, 0.4, 5.0),
+            ParamProblem::unless_within("thickest wall", "mm", self.most_mm, self.least_mm, 20.0),
+            ParamProblem::unless_within("share of peaks", "", self.peak_share, 0.0, 0.2),
+            ParamProblem::unless_within("refinement", "", self.refinement, 0.1, 20.0),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// Speed at the ground, mm/s.
+    pub fn speed_mm_s(&self) -> f64 {
+        (2.0 * GRAVITY_MM_S2 * 1e3 * self.drop_m).sqrt()
+    }
+}
+
+/// Why there is no stress to speak of.
+#[derive(Debug, thiserror::Error)]
+pub enum StrengthError {
+    /// The shell could not be solved.
+    #[error("the wall's stress could not be computed ({0}); give the thickness with --thickness")]
+    Shell(#[from] ShellError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// The stress of one thickness.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Tried {
+    /// Thickness H, mm.
+    pub thickness_mm: f64,
+    /// The stress that counts, in the worst case, MPa.
+    pub stress_mpa: f64,
+}
+
+/// The thickness and what it bears.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strength {
+    /// The least thickness in the limits whose stress stays below the strength, mm.
+    pub thickness_mm: f64,
+    /// The stress that counts with it, MPa.
+    pub stress_mpa: f64,
+    /// Whether no wall in the limits bears its stress; the thickness is then the least that hardly any thicker one betters.
+    pub is_too_weak: bool,
+    /// All thicknesses that were looked at, ascending, with the fine mesh's stress as the coarse one lets expect it.
+    pub tried: Vec<Tried>,
+    /// The orientation that decides: number of the fall and the direction that is down then.
+    pub deciding: (usize, Vec3),
+    /// Where the stress that counts is, mm.
+    pub at: Vec3,
+    /// The analysis mesh.
+    pub mesh: TriMesh,
+    /// Von Mises' stress of each of its triangles in the fall that decides, MPa.
+    pub deciding_mpa: Vec<f64>,
+    /// The largest of each triangle over all falls, MPa.
+    pub largest_mpa: Vec<f64>,
+    /// Where the model is too thin to be hollow, the largest first.
+    pub solid: Vec<SolidRegion>,
+}
+
+impl Strength {
+    /// What the user should know: a wall that is too weak, and where the model is solid.
+    pub fn warnings(&self, params: &StrengthParams) -> Vec<Warning> {
+        let weak = self.is_too_weak.then(|| Warning {
+            code: "wall-too-weak".into(),
+            message: format!(
+                "a wall of {:.2} mm does not bear a fall from {:.2} m: {:.0} MPa, and the material bears {:.0}; \
+                 a wall up to {:.1} mm helps little",
+                self.thickness_mm, params.drop_m, self.stress_mpa, params.material.strength_mpa, params.most_mm
+            ),
+            pieces: Vec::new(),
+            at: Some(self.at.to_array()),
+        });
+        let total_mm2: f64 = self.solid.iter().map(|r| r.area_mm2).sum();
+        let percent = 100.0 * total_mm2 / self.mesh.area();
+        let large = self.solid.first().filter(|r| r.area_mm2 >= TOLD_SOLID_MM2);
+        let solid = large.map(|largest| Warning {
+            code: "too-thin-to-hollow".into(),
+            message: format!(
+                "{} places ({percent:.1} % of the surface) are thinner than two walls of {:.2} mm: they are solid and \
+                 have no connectors; the largest has {:.0} mm²",
+                self.solid.len(),
+                self.thickness_mm,
+                largest.area_mm2
+            ),
+            pieces: Vec::new(),
+            at: Some(largest.at),
+        });
+        weak.into_iter().chain(solid).collect()
+    }
+}
+
+/// Finds the thickness of the wall of `model` (mm).
+///
+/// A coarse mesh shows how the stress depends on the thickness, a fine one by how much the coarse one is wrong: their ratio
+/// hardly depends on the thickness.
+pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Result<Strength, StrengthError> {
+    ctx.stage("thickness", 0)?;
+    let falls = |points: f64| Falls::new(params, model, points);
+    let (coarse, fine) = rayon::join(|| falls(COARSE_POINTS), || falls(FINE_POINTS));
+    let (coarse, fine) = (coarse?, fine?);
+    let strength_mpa = params.material.strength_mpa;
+    let middle_mm = (params.least_mm * params.most_mm).sqrt();
+    let mut tried = vec![coarse.worst(middle_mm)?.tried];
+    let mut ratio = fine.worst(middle_mm)?.tried.stress_mpa / tried[0].stress_mpa;
+    let (found, is_too_weak) = loop {
+        let limit_mpa = strength_mpa / ratio;
+        while let Some(next_mm) = next(&tried, params, limit_mpa) {
+            ctx.check()?;
+            tried.push(coarse.worst(next_mm)?.tried);
+            tried.sort_by(|a, b| a.thickness_mm.total_cmp(&b.thickness_mm));
+        }
+        let estimate = choice(&tried, limit_mpa);
+        let exact = fine.worst(estimate.thickness_mm)?;
+        let before = std::mem::replace(&mut ratio, exact.tried.stress_mpa / estimate.stress_mpa);
+        if (ratio / before).ln().abs() <= RATIO_TOLERANCE || tried.len() >= MOST_TRIED {
+            break (exact, estimate.stress_mpa > limit_mpa);
+        }
+    };
+    let corrected = |t: &Tried| Tried { stress_mpa: ratio * t.stress_mpa, ..*t };
+    Ok(fine.strength(found, is_too_weak, tried.iter().map(corrected).collect()))
+}
+
+/// The thinnest wall that bears its stress; where none does, the thinnest one that hardly any thicker one betters.
+fn choice(tried: &[Tried], limit_mpa: f64) -> Tried {
+    let least_mpa = tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
+    let bearable_mpa = limit_mpa.max(WORTH_MORE_WALL * least_mpa);
+    tried.iter().find(|t| t.stress_mpa <= bearable_mpa).copied().unwrap_or(tried[0])
+}
+
+/// The stress of a given thickness, mm.
+pub fn stress(
+    ctx: &Ctx<'_>,
+    params: &StrengthParams,
+    model: &Solid,
+    thickness_mm: f64,
+) -> Result<Strength, StrengthError> {
+    ctx.stage("stress", 0)?;
+    let shell = Falls::new(params, model, FINE_POINTS)?;
+    let found = shell.worst(thickness_mm)?;
+    let tried = found.tried;
+    Ok(shell.strength(found, tried.stress_mpa > params.material.strength_mpa, vec![tried]))
+}
+
+/// The thickness to look at next, if any: both ends of the range; where even the thickest wall is too weak a few between, since
+/// what is solid does not count; and in the bracket about the first that bears its stress, until that is narrow enough.
+fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64> {
+    let (thinnest, thickest) = (tried.first()?, tried.last()?);
+    let Some(first) = tried.iter().position(|t| t.stress_mpa <= limit_mpa) else {
+        let gaps = tried.windows(2).map(|pair| [pair[0].thickness_mm, pair[1].thickness_mm]);
+        let widest = gaps.max_by(|a, b| (a[1] / a[0]).total_cmp(&(b[1] / b[0])));
+        let between = widest.filter(|_| tried.len() < MOST_WITHOUT_BRACKET).map(|[a, b]| (a * b).sqrt());
+        return if thickest.thickness_mm < params.most_mm { Some(params.most_mm) } else { between };
+    };
+    let Some(below) = first.checked_sub(1) else {
+        return (thinnest.thickness_mm > params.least_mm).then_some(params.least_mm);
+    };
+    let (low, high) = (tried[below], tried[first]);
+    let width_mm = high.thickness_mm - low.thickness_mm;
+    if width_mm <= RESOLUTION_MM {
+        return None;
+    }
+    // Interpolated, and moved a little into the wider side, so that the bracket closes from both.
+    let share = (low.stress_mpa / limit_mpa).ln() / (low.stress_mpa / high.stress_mpa).ln();
+    let guess_mm = low.thickness_mm * (high.thickness_mm / low.thickness_mm).powf(share.clamp(0.0, 1.0));
+    let is_nearer_low = guess_mm - low.thickness_mm < 0.5 * width_mm;
+    let moved_mm = guess_mm + RESOLUTION_MM / 3.0 * if is_nearer_low { 1.0 } else { -1.0 };
+    // Where stresses do not follow a power of the thickness, interpolation alone would creep.
+    let margin_mm = if tried.len() < MOST_INTERPOLATED { RESOLUTION_MM / 3.0 } else { 0.3 * width_mm };
+    let margin_mm = margin_mm.min(0.5 * width_mm);
+    Some(moved_mm.clamp(low.thickness_mm + margin_mm, high.thickness_mm - margin_mm))
+}
+
+/// A shell and its falls.
+struct Falls {
+    mesh: TriMesh,
+    shell: ShellModel,
+    /// The load of each where a mm³ of material falls, N.
+    cases: Vec<LoadCase>,
+    down: Vec<Vec3>,
+    bvh: TriangleBvh,
+    peak_share: f64,
+    /// Of the model, mm³.
+    volume_mm3: f64,
+}
+
+impl Falls {
+    fn new(params: &StrengthParams, model: &Solid, n_points: f64) -> Result<Self, ShellError> {
+        let mesh = analysis_mesh(model.mesh(), params.refinement * n_points);
+        let shell = ShellModel::new(&mesh, &params.material)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
+        let down: Vec<Vec3> = (0..params.n_cases).map(|_| on_sphere(&mut rng)).collect();
+        let density_t_mm3 = 1e-9 * params.material.density_g_cm3;
+        let force_n_mm3 = density_t_mm3 * params.speed_mm_s() / IMPACT_S;
+        let cases = down.iter().map(|down| fall(&mesh, shell.areas_mm2(), *down, force_n_mm3)).collect();
+        let (bvh, volume_mm3) = (TriangleBvh::new(&mesh), mesh.signed_volume());
+        Ok(Self { bvh, volume_mm3, mesh, shell, cases, down, peak_share: params.peak_share })
+    }
+
+    /// Stresses of all triangles in all falls, MPa.
+    fn stresses(&self, thickness_mm: f64) -> Result<Vec<Vec<f64>>, ShellError> {
+        let solver = self.shell.at_thickness(thickness_mm)?;
+        let material_mm3 = (thickness_mm * self.mesh.area()).min(self.volume_mm3);
+        let scaled = |case: &LoadCase| LoadCase {
+            forces_n: case.forces_n.iter().map(|f| material_mm3 * *f).collect(),
+            ..case.clone()
+        };
+        let moved = solver.solve(&self.cases.iter().map(scaled).collect::<Vec<_>>())?;
+        Ok(moved.iter().map(|u| solver.stresses(u).iter().map(|s| s.von_mises_mpa()).collect()).collect())
+    }
+
+    fn worst(&self, thickness_mm: f64) -> Result<Fallen, ShellError> {
+        let hollow_mm2 = self.hollow_areas(thickness_mm);
+        let stresses_mpa = self.stresses(thickness_mm)?;
+        let counts: Vec<(usize, f64)> =
+            stresses_mpa.par_iter().map(|of_case| counting(of_case, &hollow_mm2, self.peak_share)).collect();
+        let case = (0..counts.len()).max_by(|&i, &j| counts[i].1.total_cmp(&counts[j].1)).unwrap_or(0);
+        let (triangle, stress_mpa) = counts[case];
+        Ok(Fallen { tried: Tried { thickness_mm, stress_mpa }, case, triangle, hollow_mm2, stresses_mpa })
+    }
+
+    /// What there is to say of `worst`.
+    fn strength(self, worst: Fallen, is_too_weak: bool, tried: Vec<Tried>) -> Strength {
+        let Fallen { case, hollow_mm2, mut stresses_mpa, .. } = worst;
+        let largest = |t: usize| stresses_mpa.iter().map(|of_case| of_case[t]).fold(0.0, f64::max);
+        Strength {
+            largest_mpa: (0..self.mesh.triangles.len()).map(largest).collect(),
+            thickness_mm: worst.tried.thickness_mm,
+            stress_mpa: worst.tried.stress_mpa,
+            is_too_weak,
+            tried,
+            deciding: (case, self.down[case]),
+            at: self.mesh.face_center(worst.triangle),
+            deciding_mpa: stresses_mpa.swap_remove(case),
+            solid: thin::regions(&self.mesh, &hollow_mm2),
+            mesh: self.mesh,
+        }
+    }
+
+    /// The area of each triangle below which there is a cavity, and 0 of those where the model is solid, mm².
+    fn hollow_areas(&self, thickness_mm: f64) -> Vec<f64> {
+        let area = |t: usize| {
+            let is_solid = thin::is_solid(&self.mesh, &self.bvh, t, thickness_mm);
+            if is_solid { 0.0 } else { self.mesh.face_area(t) }
+        };
+        (0..self.mesh.triangles.len()).into_par_iter().map(area).collect()
+    }
+}
+
+/// All falls with one thickness.
+struct Fallen {
+    tried: Tried,
+    /// The fall that decides.
+    case: usize,
+    /// The triangle that has the stress that counts.
+    triangle: usize,
+    hollow_mm2: Vec<f64>,
+    /// Of each fall and triangle.
+    stresses_mpa: Vec<Vec<f64>>,
+}
+
+/// The triangle and the stress that all but `peak_share` of the area stays below or at; 0 where there is no area.
+fn counting(stress_mpa: &[f64], areas: &[f64], peak_share: f64) -> (usize, f64) {
+    let mut order: Vec<usize> = (0..areas.len()).filter(|&t| areas[t] > 0.0).collect();
+    order.sort_by(|&i, &j| stress_mpa[j].total_cmp(&stress_mpa[i]));
+    let mut left = peak_share * areas.iter().sum::<f64>();
+    let found = order.iter().find(|&&t| {
+        left -= areas[t];
+        left < 0.0
+    });
+    found.map_or((0, 0.0), |&t| (t, stress_mpa[t]))
+}
+
+/// Even triangles on about `n_points` points.
+fn analysis_mesh(mesh: &TriMesh, n_points: f64) -> TriMesh {
+    // One point for each √3/2 l² of a mesh of equilateral triangles.
+    let target_edge_mm = (mesh.area() / (n_points * 0.75f64.sqrt())).sqrt();
+    remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, mesh, &vec![0; mesh.triangles.len()]).mesh
+}
+
+/// A random direction, all alike.
+fn on_sphere(rng: &mut ChaCha8Rng) -> Vec3 {
+    loop {
+        let p = Vec3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
+        let length = p.length();
+        if (0.1..=1.0).contains(&length) {
+            return p / length;
+        }
+    }
+}
+
+/// The load of a fall along `down`: `total_n` on the bottom, spread by area, which is by mass.
+fn fall(mesh: &TriMesh, areas_mm2: &[f64], down: Vec3, total_n: f64) -> LoadCase {
+    let bottom = zone(mesh, areas_mm2, down);
+    let zone_mm2: f64 = bottom.iter().map(|&v| areas_mm2[v as usize]).sum();
+    let mut forces_n = vec![Vec3::ZERO; mesh.points.len()];
+    bottom.iter().for_each(|&v| forces_n[v as usize] = -down * (total_n * areas_mm2[v as usize] / zone_mm2));
+    LoadCase { forces_n, moments_n_mm: Vec::new(), held: zone(mesh, areas_mm2, -down) }
+}
+
+/// The points furthest along `way`: a [`ZONE_SHARE`] of the height, and no less than [`LEAST_ZONE_AREA`] of the surface.
+fn zone(mesh: &TriMesh, areas_mm2: &[f64], way: Vec3) -> Vec<u32> {
+    let mut order: Vec<(f64, u32)> = mesh.points.iter().map(|p| p.dot(way)).zip(0..).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let (Some(first), Some(last)) = (order.first(), order.last()) else { return Vec::new() };
+    let least_height = first.0 - ZONE_SHARE * (first.0 - last.0);
+    let mut missing_mm2 = LEAST_ZONE_AREA * areas_mm2.iter().sum::<f64>();
+    let belongs = |(height, v): &&(f64, u32)| {
+        let belongs = *height >= least_height || missing_mm2 > 0.0;
+        missing_mm2 -= areas_mm2[*v as usize];
+        belongs
+    };
+    order.iter().take_while(belongs).map(|(_, v)| *v).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,89 @@
+use std::sync::atomic::AtomicBool;
+
+use super::*;
+use crate::figure::Figure;
+use crate::plan::testing::sphere;
+
+fn ball(radius_mm: f64) -> Solid {
+    Solid::new(sphere(4, Vec3::splat(radius_mm))).unwrap()
+}
+
+fn quick(drop_m: f64) -> StrengthParams {
+    StrengthParams { drop_m, n_cases: 3, refinement: 0.1, least_mm: 0.5, ..StrengthParams::default() }
+}
+
+fn found(params: &StrengthParams, model: &Solid) -> Strength {
+    let stop = AtomicBool::new(false);
+    thickness(&Ctx::new(&|_| {}, &stop), params, model).unwrap()
+}
+
+#[test]
+fn the_wall_that_just_bears_the_stress_of_a_wall_is_that_wall() {
+    let (mut params, model) = (quick(1.275), ball(60.0));
+    params.refinement = 0.3;
+    let stop = AtomicBool::new(false);
+    for wall_mm in [0.9, 1.7, 3.1] {
+        params.material.strength_mpa =
+            stress(&Ctx::new(&|_| {}, &stop), &params, &model, wall_mm).unwrap().stress_mpa;
+        let strength = found(&params, &model);
+        assert!((strength.thickness_mm - wall_mm).abs() <= 2.0 * RESOLUTION_MM, "{wall_mm}: {:?}", strength.tried);
+        assert!(!strength.is_too_weak && strength.stress_mpa <= 1.01 * params.material.strength_mpa);
+        let thinner = strength.tried.iter().rfind(|t| t.thickness_mm < strength.thickness_mm).unwrap();
+        assert!(thinner.stress_mpa > params.material.strength_mpa);
+        assert!(strength.thickness_mm - thinner.thickness_mm <= RESOLUTION_MM);
+    }
+}
+
+#[test]
+fn stress_is_proportional_to_the_speed() {
+    let stop = AtomicBool::new(false);
+    let at = |drop_m| stress(&Ctx::new(&|_| {}, &stop), &quick(drop_m), &ball(60.0), 2.0).unwrap().stress_mpa;
+    assert!((at(4.0) / at(1.0) - 2.0).abs() < 1e-9);
+}
+
+#[test]
+fn the_force_of_a_fall_stops_all_of_the_shell_and_acts_at_the_bottom_alone() {
+    let params = quick(1.275);
+    let falls = Falls::new(&params, &ball(60.0), 2000.0).unwrap();
+    let force_n_mm3 = 1e-9 * params.material.density_g_cm3 * params.speed_mm_s() / IMPACT_S;
+    for (case, down) in falls.cases.iter().zip(&falls.down) {
+        let total: Vec3 = case.forces_n.iter().copied().sum();
+        assert!((total + *down * force_n_mm3).length() < 1e-12 * force_n_mm3.max(1.0));
+        let height = |v: usize| falls.mesh.points[v].dot(*down);
+        let pushed = (0..case.forces_n.len()).filter(|v| case.forces_n[*v] != Vec3::ZERO);
+        let held = case.held.iter().map(|v| height(*v as usize));
+        assert!(pushed.map(height).fold(f64::INFINITY, f64::min) > held.fold(f64::NEG_INFINITY, f64::max));
+    }
+}
+
+#[test]
+fn what_no_wall_bears_is_told_and_gets_no_wall_that_does_not_help() {
+    let mut params = quick(1.275);
+    params.material.strength_mpa = 0.01;
+    let strength = found(&params, &ball(60.0));
+    let least = strength.tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
+    assert!(strength.is_too_weak && strength.stress_mpa <= WORTH_MORE_WALL * least * 1.01);
+    assert_eq!(strength.warnings(&params)[0].code, "wall-too-weak");
+}
+
+#[test]
+fn arms_thinner_than_two_walls_are_solid_and_a_ball_is_nowhere() {
+    let mut params = quick(1.0);
+    params.refinement = 1.0;
+    let stop = AtomicBool::new(false);
+    let solid = |model: &Solid, mm| stress(&Ctx::new(&|_| {}, &stop), &params, model, mm).unwrap().solid;
+    assert_eq!(solid(&ball(60.0), 4.0), []);
+    let flat = Solid::new(sphere(4, Vec3::new(60.0, 60.0, 3.0))).unwrap();
+    let area_mm2: f64 = solid(&flat, 4.0).iter().map(|r| r.area_mm2).sum();
+    assert!(area_mm2 > 0.95 * flat.mesh().area(), "{area_mm2}");
+}
+
+#[test]
+fn thicknesses_are_the_same_bits_on_any_number_of_threads() {
+    let model = ball(60.0);
+    let on = |n| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+        pool.install(|| found(&quick(6.0), &model))
+    };
+    assert_eq!(on(1), on(3));
+}
