@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use shellock::pipeline::Params;
+use shellock::sizes::SizeChoice;
 
 /// Exit codes, shown in the help.
 const EXIT_CODES: &str = "Exit codes: 0 made and verified · 1 made, but a check failed · 2 the input or an argument is wrong · \
@@ -141,9 +142,9 @@ pub struct Options {
     /// Wall thickness, mm, 0.8 to 10
     #[arg(long, value_name = "MM", default_value_t = Params::default().body.thickness_mm, help_heading = "Make")]
     pub thickness: f64,
-    /// Connector size, mm, 1.5 to 6
-    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.size_mm, help_heading = "Make")]
-    pub connector: f64,
+    /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by what fits
+    #[arg(long, value_name = "auto|MM", default_value_t = SizeChoice::default(), help_heading = "Make")]
+    pub connector: SizeChoice,
     /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament
     #[arg(long, value_name = "MM", default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]
     pub clearance: f64,
@@ -179,7 +180,7 @@ impl Options {
         p.body.thickness_mm = self.thickness;
         p.body.wall_gap_mm = self.wall_gap;
         p.body.cell_mm = self.grid;
-        p.connector.size_mm = self.connector;
+        p.connector.size = self.connector;
         p.connector.clearance_mm = self.clearance;
         p.connector.min_wall_mm = self.min_wall;
         p.verify.seed = self.seed;

@@ -18,6 +18,8 @@ const WIDTH: f64 = 20.0;
 const CELLS: [u32; 2] = [20, 10];
 /// Sizes of the reference's elements, mm: at the seam, and at the clamps.
 const SIZE: [f64; 2] = [0.9, 3.0];
+/// Connector size D, mm.
+const SIZE_MM: f64 = 3.0;
 /// Separation force, N/mm: so small that the reference, which has one-sided springs only with large displacements, is linear.
 const FORCE: f64 = 1e-3;
 /// What is printed: µm at 0.1 N/mm.
@@ -83,7 +85,8 @@ fn ours(params: &VolumeParams, frame: &Frame, pull: Vec3) -> Any<Moved> {
     let clamped: Vec<u32> =
         (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > WIDTH - 1e-9).map(|(i, _)| i).collect();
     let model = VolumeModel::clamped(params, &plates, &clamped)?;
-    let joint = Joint { male: Side::A, leaves: frame.s, is_fast: false, pull_on_a: pull, weight: 1.0 };
+    let joint =
+        Joint { male: Side::A, leaves: frame.s, is_fast: false, pull_on_a: pull, weight: 1.0, size_mm: SIZE_MM };
     let joints: Vec<Meeting> = plates.stations.iter().map(|s| Meeting { wall: s.across, joint: Some(joint) }).collect();
     let held = model.equilibrium(&joints, None)?.map_err(|_| "the coupon comes apart")?;
     Ok(held.displacement_mm[plates.stations.len() / 2])
@@ -123,7 +126,7 @@ fn ends() -> [f64; 2] {
 
 /// Plates and bars for gmsh, with n along x, ŝ along z and the inner edge at the origin: what each side has, less the other side's wall; touching faces are shared.
 fn geometry(params: &VolumeParams, frame: &Frame) -> String {
-    let (d, t, [y0, y1]) = (params.connector_mm, params.wall_mm, ends());
+    let (d, t, [y0, y1]) = (SIZE_MM, params.wall_mm, ends());
     let (long, h, pin) = (y1 - y0, d / 2.0, 0.6 * d);
     let has_foot = |k: f64| {
         let centre = frame.n * (k * h / 2.0) + frame.s * (h / 2.0);
@@ -225,7 +228,7 @@ impl Mesh {
     /// The input of CalculiX, and the nodes to look at.
     fn deck(mut self, params: &VolumeParams, frame: &Frame, pull: Vec3) -> (String, [[usize; 2]; 2]) {
         let (pairs, is_b) = self.split();
-        let d = params.connector_mm;
+        let d = SIZE_MM;
         let [y0, y1] = ends();
         let pairs: Vec<([usize; 2], Vec3)> = (pairs.into_iter())
             .map(|p| (p, self.at(p[0])))
