@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use shellock::pipeline::{Params, ThicknessChoice};
+use shellock::sizes::SizeChoice;
 use shellock::strength::Material;
 
 /// Exit codes, shown in the help.
@@ -187,9 +188,9 @@ pub struct Options {
     /// Height of the fall that walls must bear, m, 0.01 to 20
     #[arg(long, value_name = "M", default_value_t = Params::default().strength.drop_m, help_heading = "Make")]
     pub drop: f64,
-    /// Connector size, mm, 1.5 to 6
-    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.size_mm, help_heading = "Make")]
-    pub connector: f64,
+    /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by what fits
+    #[arg(long, value_name = "auto|MM", default_value_t = SizeChoice::default(), help_heading = "Make")]
+    pub connector: SizeChoice,
     /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament
     #[arg(long, value_name = "MM", default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]
     pub clearance: f64,
@@ -231,7 +232,7 @@ impl Options {
         p.strength.seed = self.seed;
         p.body.wall_gap_mm = self.wall_gap;
         p.body.cell_mm = self.grid;
-        p.connector.size_mm = self.connector;
+        p.connector.size = self.connector;
         p.connector.clearance_mm = self.clearance;
         p.connector.min_wall_mm = self.min_wall;
         p.verify.seed = self.seed;

@@ -181,14 +181,14 @@ fn plan_json(
                     "at": c.at.to_array() })
         })
         .collect();
-    json!({
+    let mut value = json!({
         "format": "shellock-plan", "version": 1, "units": "mm", "program": env!("CARGO_PKG_VERSION"),
         "input": { "file": model.name, "sha256": model.sha256, "transform": model.transform },
         "seed": params.plan.seed,
         "shell_thickness": design.thickness_mm,
         "strength": design.strength.as_ref().map(|s| strength_json(s, params)),
         "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
-        "connector_size": params.connector.size_mm,
+        "connector_size": design.sizes.largest_mm(),
         "wall_gap": params.body.wall_gap_mm,
         "min_wall": params.connector.min_wall_mm,
         "key_piece": plan.key(),
@@ -201,7 +201,25 @@ fn plan_json(
         "verification": { "passed": design.verification.passed(), "checks": design.verification.checks,
                           "findings": design.verification.findings },
         "warnings": warnings,
-    })
+    });
+    // Only where pairs have sizes of their own; `connector_size` is then the largest.
+    let sizes: Vec<Value> =
+        design.sizes.pairs().map(|(pair, size_mm)| json!({ "pieces": pair, "size_mm": size_mm })).collect();
+    if !sizes.is_empty() {
+        value["connector_sizes"] = sizes.into();
+    }
+    value
+}
+
+/// The sizes of the connectors that were made, mm, as in "2.5" or "2.0–3.4".
+fn connector_sizes(design: &Design) -> String {
+    if design.sizes.pairs().next().is_none() {
+        return design.sizes.default_mm().to_string();
+    }
+    let made = design.joints.iter().filter(|j| j.length_mm > 0.0).map(|j| [design.sizes.of(j.male, j.female); 2]);
+    let ends = made.reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])]).unwrap_or([design.sizes.default_mm(); 2]);
+    let [least, most] = ends.map(|d| format!("{d:.1}"));
+    if least == most { most } else { format!("{least}–{most}") }
 }
 
 fn strength_json(strength: &Strength, params: &Params) -> Value {
@@ -258,7 +276,7 @@ fn report(
         ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
         ("pieces".into(), design.pieces.len().to_string()),
         ("wall".into(), format!("{:.2} mm", design.thickness_mm)),
-        ("connectors".into(), format!("{} mm", params.connector.size_mm)),
+        ("connectors".into(), format!("{} mm", connector_sizes(design))),
         ("clearance".into(), format!("{} mm", params.connector.clearance_mm)),
         ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
         ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),

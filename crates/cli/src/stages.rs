@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use shellock::plan::{InstallationPlan, InstallationStep, PlanOutcome, search, survey};
+use shellock::sizes::choose;
 use shellock::verify::VerifyParams;
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, segmentation};
 use shellock_geom::check::{inspect as inspection, into_solid};
@@ -102,7 +103,8 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
     let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
         .map_err(shellock::pipeline::DesignError::from)?;
-    let tables = survey(&ctx, &params.plan, &surface, &surface.seams())?;
+    let sizes = choose(&ctx, &params.sizes(), &surface, None)?.sizes;
+    let tables = survey(&ctx, &params.plan, &surface, &surface.seams(), &sizes)?;
     let constraints = shellock::plan::PlanConstraints::default();
     let outcome = search(&ctx, &params.plan, &tables, &constraints)?;
     display.finish();

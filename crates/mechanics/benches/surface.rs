@@ -41,7 +41,7 @@ fn plan(number: u32) -> Vec<Meeting> {
         let angle = f64::from(1 + i / (FREQUENCY - 1)) * f64::from(7 + number);
         let leaves = (s.normal + s.across * angle.sin()).normalize();
         let is_fast = s.points.iter().any(|p| ball.part_of_point[*p as usize] == 0);
-        let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0 };
+        let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0, size_mm: 2.5 };
         Meeting { wall: s.across, joint: Some(joint) }
     };
     (0..).zip(&ball.stations).map(joint).collect()

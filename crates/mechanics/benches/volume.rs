@@ -23,7 +23,7 @@ fn resist(bencher: Bencher, order: &str) {
         .map(|s| {
             let leaves = (s.normal - s.across * 0.5).normalize();
             let is_fast = s.points.iter().any(|p| ball.part_of_point[*p as usize] == 0);
-            let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0 };
+            let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0, size_mm: 3.0 };
             Meeting { wall: s.across, joint: Some(joint) }
         })
         .collect();

@@ -19,6 +19,8 @@ use shellock_mechanics::{Joint, Meeting, Side, VolumeModel, VolumeParams, sample
 
 const LENGTH: f64 = 40.0;
 const WIDTH: f64 = 20.0;
+/// Connector size D, mm.
+const SIZE_MM: f64 = 3.0;
 /// Squares of our plates along and across the seam; stations are where the lines across meet it.
 const CELLS: [u32; 2] = [20, 10];
 /// Separation force, N/mm.
@@ -148,7 +150,14 @@ fn ours(params: &VolumeParams, case: &Case) -> Any<Moved> {
     let clamped: Vec<u32> =
         (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > WIDTH - 1e-9).map(|(i, _)| i).collect();
     let model = VolumeModel::clamped(params, &plates, &clamped)?;
-    let joint = Joint { male: Side::A, leaves: case.frame.s, is_fast: false, pull_on_a: case.pull, weight: 1.0 };
+    let joint = Joint {
+        male: Side::A,
+        leaves: case.frame.s,
+        is_fast: false,
+        pull_on_a: case.pull,
+        weight: 1.0,
+        size_mm: SIZE_MM,
+    };
     let joints: Vec<Meeting> =
         plates.stations.iter().map(|_| Meeting { wall: case.wall, joint: Some(joint) }).collect();
     let held = model.equilibrium(&joints, None)?.map_err(|_| "the coupon comes apart")?;
@@ -179,7 +188,7 @@ impl Reference<'_> {
             .current_dir(folder))?;
         let section = Section::read(&std::fs::read_to_string(folder.join("section.inp"))?, &self.case.frame)?;
         let solid = Solid::swept(&section, self);
-        let (contacts, probes) = (solid.contacts(&section, self), solid.probes(&section, self)?);
+        let (contacts, probes) = (solid.contacts(&section, self), solid.probes(&section)?);
         let (model, load) = (solid.model(self), self.load_n_mm3());
         // From open: what is closed too much opens only little by little.
         let mut is_closed: Vec<bool> = contacts.iter().map(|c| c.is_tie).collect();
@@ -215,7 +224,7 @@ impl Reference<'_> {
     /// The cross-section for gmsh, with n along x, ŝ along y and the inner edge at the origin. Walls are two layers, so
     /// that there are nodes at mid-wall.
     fn geometry(&self) -> String {
-        let (d, half_wall) = (self.params.connector_mm, self.params.wall_mm / 2.0);
+        let (d, half_wall) = (SIZE_MM, self.params.wall_mm / 2.0);
         let (h, pin) = (d / 2.0, 0.6 * d);
         let foot = |id: u32, k: f64| {
             let centre = self.case.frame.n * (k * h / 2.0) + self.case.frame.s * (h / 2.0);
@@ -247,7 +256,7 @@ Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGro
 
     /// Separation force on the fronts of a and b, spread over their volume, N/mm³, in the reference's axes.
     fn load_n_mm3(&self) -> [Vec3; 2] {
-        let (d, [y0, y1]) = (self.params.connector_mm, self.ends());
+        let (d, [y0, y1]) = (SIZE_MM, self.ends());
         let joined_mm = LENGTH * f64::from(CELLS[0] - 1) / f64::from(CELLS[0]);
         let pull = self.case.frame.local(self.case.pull)
             * (self.params.force_n_per_mm * joined_mm / (0.3 * d * d * (y1 - y0)));
@@ -383,7 +392,7 @@ impl Solid {
             place: vec![BTreeMap::new(); 2 * n_layers + 1],
             y_of: (0..=2 * n_layers).map(|half| half as f64 * layer_mm / 2.0).collect(),
         };
-        let (pin, h) = (0.6 * reference.params.connector_mm, 0.5 * reference.params.connector_mm);
+        let (pin, h) = (0.6 * SIZE_MM, 0.5 * SIZE_MM);
         let [y0, y1] = reference.ends();
         for below in (0..2 * n_layers).step_by(2) {
             let has_connector = (y0..y1).contains(&solid.y_of[below + 1]);
@@ -431,7 +440,7 @@ impl Solid {
     }
 
     fn contacts(&self, section: &Section, reference: &Reference) -> Vec<Contact> {
-        let (pin, frame) = (0.6 * reference.params.connector_mm, &reference.case.frame);
+        let (pin, frame) = (0.6 * SIZE_MM, &reference.case.frame);
         let [y0, y1] = reference.ends();
         let middle = frame.local(Vec3::Z * (reference.params.wall_mm / 2.0));
         let off_wall = -frame.local(reference.case.wall);
@@ -466,14 +475,14 @@ impl Solid {
         contacts
     }
 
-    fn probes(&self, section: &Section, reference: &Reference) -> Any<[[usize; 2]; 2]> {
+    fn probes(&self, section: &Section) -> Any<[[usize; 2]; 2]> {
         let half = self.y_of.iter().position(|y| (y - LENGTH / 2.0).abs() < SAME).ok_or("no middle")?;
         let at = |z: f64| {
             let is_there = |p: &&[usize; 2]| section.nodes[p[0]].distance(Vec3::Z * z) < SAME;
             let pair = section.pairs.iter().find(is_there).ok_or("no node to look at")?;
             Ok::<_, &'static str>(pair.map(|p| self.place[half][&p]))
         };
-        let (root, tip) = (at(0.0)?, at(-0.6 * reference.params.connector_mm)?);
+        let (root, tip) = (at(0.0)?, at(-0.6 * SIZE_MM)?);
         Ok([[root[0], tip[0]], [root[1], tip[1]]])
     }
 

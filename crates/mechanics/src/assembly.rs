@@ -96,10 +96,12 @@ pub struct Joint {
     pub pull_on_a: Vec3,
     /// Weight w of Eq. 4, > 0.
     pub weight: f64,
+    /// Connector size D, mm, > 0: the pin is 0.6 D deep and half as thick as D.
+    pub size_mm: f64,
 }
 
 /// An opening this wide, in connector sizes, has let the pin out of its channel: the joint does not hold.
-pub(crate) const LOST_SIZES: f64 = 0.6;
+const LOST_SIZES: f64 = 0.6;
 
 /// What a solver found for one plan.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,15 +127,18 @@ impl Opening {
         Self { opening_mm, quality_mm: -worst.map_or(0.0, |w| w.1), worst: worst.map(|w| w.0) }
     }
 
-    /// Whether that holds: unless a station opens by `lost_mm` or more. `parts` names those of a station that are free.
+    /// Whether that holds: unless a station has let its connector go. `parts` names those of a station that are free.
     pub(crate) fn resistance<I: IntoIterator<Item = u32>>(
         self,
-        lost_mm: f64,
+        meetings: &[Meeting],
         parts: impl Fn(usize) -> I,
     ) -> Resistance {
-        let is_lost = |d: f64| d.is_nan() || d >= lost_mm;
-        let lost = (0..self.opening_mm.len()).filter(|station| is_lost(self.opening_mm[*station]));
-        let mut lost: Vec<u32> = lost.flat_map(parts).collect();
+        let is_lost = |station: &usize| {
+            let lost_mm = meetings[*station].joint.map_or(f64::INFINITY, |joint| LOST_SIZES * joint.size_mm);
+            let d = self.opening_mm[*station];
+            d.is_nan() || d >= lost_mm
+        };
+        let mut lost: Vec<u32> = (0..self.opening_mm.len()).filter(is_lost).flat_map(parts).collect();
         lost.sort_unstable();
         lost.dedup();
         if lost.is_empty() { Resistance::Holds(self) } else { Resistance::Separable(lost) }

@@ -36,7 +36,7 @@ use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 
 use crate::Material;
-use crate::assembly::{Meeting, Resistance, ShellAssembly, Station};
+use crate::assembly::{Joint, Meeting, Resistance, ShellAssembly, Station};
 use parts::{N_MOTIONS, Part, parts};
 
 /// How the shell resists. Lengths in mm.
@@ -44,7 +44,7 @@ use parts::{N_MOTIONS, Part, parts};
 pub struct SurfaceParams {
     /// Wall thickness H. (0, 10]; 2.
     pub wall_mm: f64,
-    /// Connector size D: pins are 0.6 D deep below the wall and half as thick as D. [1, 10]; 2.5.
+    /// Connector size D where walls meet without a connector, which has its own: their contact is as stiff. [1, 10]; 2.5.
     pub connector_mm: f64,
     /// What parts are made of.
     pub material: Material,
@@ -73,14 +73,14 @@ impl Default for SurfaceParams {
 }
 
 impl SurfaceParams {
-    /// Depth of the strips below mid-wall, mm.
-    fn strip_mm(&self) -> f64 {
-        0.5 * self.wall_mm + 0.6 * self.connector_mm
+    /// Depth of a joint's strips below mid-wall, mm.
+    fn strip_mm(&self, joint: &Joint) -> f64 {
+        0.5 * self.wall_mm + 0.6 * joint.size_mm
     }
 
-    /// Stiffness of a contact along that much seam, N/mm: that of the pin, as deep as wide, bent like a cantilever.
-    fn contact_n_mm(&self, length_mm: f64) -> f64 {
-        let (thickness, depth) = (0.5 * self.connector_mm, 0.6 * self.connector_mm);
+    /// Stiffness of a contact along that much seam, N/mm: that of a pin of size D, as deep as wide, bent like a cantilever.
+    fn contact_n_mm(&self, size_mm: f64, length_mm: f64) -> f64 {
+        let (thickness, depth) = (0.5 * size_mm, 0.6 * size_mm);
         3.0 * self.stiffness_ratios[2] * terms::bending(self, thickness) * length_mm / depth.powi(3)
     }
 }

@@ -27,7 +27,6 @@ use shellock_geom::sparse::SparseError;
 pub use element::Order;
 pub use wall::{MIN_VOLUME_SHARE, Wall};
 
-use crate::assembly::LOST_SIZES;
 use crate::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
 use connector::{Bar, Labels, Section, Sections};
 use contact::Response;
@@ -40,8 +39,6 @@ use rows::{ROWS, WALL};
 pub struct VolumeParams {
     /// Thickness of the wall, mm. (0, 20]; 2.0, as the printed parts.
     pub wall_mm: f64,
-    /// Connector size D, mm: the pin is 0.6 D deep and 0.5 D thick. (0, 20]; 3.0, the middle of the paper's 2 to 4.
-    pub connector_mm: f64,
     /// Layers of prisms across the wall. [1, 8]; 1, which is enough for quadratic elements.
     pub n_layers: usize,
     /// Degree of the elements of walls. Quadratic: a plan costs the same, and linear ones are several times too stiff.
@@ -58,7 +55,6 @@ impl Default for VolumeParams {
     fn default() -> Self {
         Self {
             wall_mm: 2.0,
-            connector_mm: 3.0,
             n_layers: 1,
             order: Order::Quadratic,
             material: Material::SLA_RESIN,
@@ -74,7 +70,6 @@ impl VolumeParams {
         let m = &self.material;
         let checks = [
             ("wall_mm", self.wall_mm, 0.0 < self.wall_mm && self.wall_mm <= 20.0, "(0, 20]"),
-            ("connector_mm", self.connector_mm, 0.0 < self.connector_mm && self.connector_mm <= 20.0, "(0, 20]"),
             ("n_layers", self.n_layers as f64, (1..=8).contains(&self.n_layers), "[1, 8]"),
             (
                 "force_n_per_mm",
@@ -232,8 +227,7 @@ impl VolumeModel {
             Ok(deflection) => {
                 let widest = |[a, b]: &[[Vec3; 2]; 2]| a[0].distance(b[0]).max(a[1].distance(b[1]));
                 let openings = deflection.displacement_mm.iter().map(widest).collect();
-                let lost_mm = LOST_SIZES * self.params.connector_mm;
-                Opening::rated(plan, openings).resistance(lost_mm, |station| {
+                Opening::rated(plan, openings).resistance(plan, |station| {
                     self.station_parts[station].into_iter().filter(|part| *part != fixed_part)
                 })
             }

@@ -9,7 +9,7 @@ use shellock::figure::{Figure, make};
 use shellock::pipeline::{Params, design};
 use shellock::plan::{PlanConstraints, PlanParams, search, survey};
 use shellock::segmentation::{SegmentationParams, segment};
-use shellock::{Ctx, SegmentedSurface};
+use shellock::{ConnectorSizes, Ctx, SegmentedSurface};
 use shellock_geom::Solid;
 
 fn main() {
@@ -40,7 +40,8 @@ fn plan(bencher: Bencher) {
     let params = PlanParams::default();
     bencher.bench(|| {
         let ctx = Ctx::new(&|_| {}, &STOP);
-        let tables = survey(&ctx, &params, &surface, &surface.seams()).expect("not stopped");
+        let tables =
+            survey(&ctx, &params, &surface, &surface.seams(), &ConnectorSizes::default()).expect("not stopped");
         search(&ctx, &params, &tables, &PlanConstraints::default())
     });
 }

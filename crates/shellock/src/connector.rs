@@ -28,14 +28,15 @@ pub use profile::{Part, Section};
 pub use run::{Contact, Run, Station, runs};
 
 use crate::params::ParamProblem;
+use crate::sizes::SizeChoice;
 
 /// How connectors are made. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConnectorParams {
-    /// Connector size D: depth and width of the channel. [1.5, 6]; 2.5.
+    /// Connector size D, depth and width of the channel: one for all pairs of pieces, or one for each. 2.5 for all.
     ///
-    /// The published range is 2–4 mm (Eq. 3); walls of channel and pin come out at about 0.45 D.
-    pub size_mm: f64,
+    /// Walls of channel and pin come out at about 0.45 D.
+    pub size: SizeChoice,
     /// Gap between mating faces. [0.03, 0.6]; 0.12.
     ///
     /// Resin printers hold 0.05–0.15 mm a side, filament printers want 0.15–0.3.
@@ -46,25 +47,22 @@ pub struct ConnectorParams {
 
 impl Default for ConnectorParams {
     fn default() -> Self {
-        Self { size_mm: 2.5, clearance_mm: 0.12, min_wall_mm: 0.4 }
+        Self { size: SizeChoice::default(), clearance_mm: 0.12, min_wall_mm: 0.4 }
     }
 }
 
 impl ConnectorParams {
-    /// Room below the wall that connectors may take, mm: a channel under the steepest backward seam is as deep.
-    pub fn room_mm(&self) -> f64 {
-        2.1 * self.size_mm + self.clearance_mm
+    /// Room below the wall that connectors up to `size_mm` may take, mm: a channel under the steepest backward seam is as deep.
+    pub fn room_mm(&self, size_mm: f64) -> f64 {
+        2.1 * size_mm + self.clearance_mm
     }
 
     /// Every value out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
-        [
-            ParamProblem::unless_within("connector size", "mm", self.size_mm, 1.5, 6.0),
+        let others = [
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
             ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        ];
+        self.size.problems().into_iter().chain(others.into_iter().flatten()).collect()
     }
 }

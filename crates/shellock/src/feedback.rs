@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::pipeline::{Design, Params};
+use crate::pipeline::Design;
 use crate::plan::{InstallationPlan, PlanConstraints};
 use crate::verify::Finding;
 use crate::{LatticeDirection, PatchId};
@@ -140,7 +140,7 @@ impl std::fmt::Display for Lesson {
 }
 
 /// The lessons of a kit; none where it passed. The last one always rules this plan out.
-pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
+pub fn lessons(design: &Design) -> Vec<Lesson> {
     if design.verification.passed() {
         return Vec::new();
     }
@@ -163,13 +163,13 @@ pub fn lessons(design: &Design, params: &Params) -> Vec<Lesson> {
     }
     loose.sort_unstable();
     loose.dedup();
-    learned.extend(weak_joints(design, params).filter(|_| !loose.is_empty()));
+    learned.extend(weak_joints(design).filter(|_| !loose.is_empty()));
     learned.push(Lesson::FailedPlan { plan: design.plan.clone(), loose });
     learned
 }
 
 /// Pairs whose connectors are too short: they must not be counted on again in this way.
-fn weak_joints(design: &Design, params: &Params) -> Option<Lesson> {
+fn weak_joints(design: &Design) -> Option<Lesson> {
     let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
     let by_order = |a: PatchId, b: PatchId| {
         if design.plan.position(a) > design.plan.position(b) { (a, b) } else { (b, a) }
@@ -180,8 +180,8 @@ fn weak_joints(design: &Design, params: &Params) -> Option<Lesson> {
     for joint in &design.joints {
         lengths.entry(by_order(joint.male, joint.female)).or_default()[0] += joint.length_mm;
     }
-    let is_weak = |length_mm: f64| length_mm < LEAST_JOINT * params.connector.size_mm;
-    let weak = lengths.into_iter().filter(|(_, [length_mm, _])| is_weak(*length_mm));
+    let is_weak = |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < LEAST_JOINT * design.sizes.of(a, b);
+    let weak = lengths.into_iter().filter(|(pair, [length_mm, _])| is_weak(*pair, *length_mm));
     let joints: Vec<WeakJoint> = weak
         .map(|((later, earlier), [length_mm, seam_mm])| {
             let separation = design.plan.separation(later);

@@ -1,7 +1,7 @@
 //! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that they hold.
 //!
 //! After Yao, Chen, Xu, Wang, "Interlocking-shell pieces", 2017. The stages, in the only direction that data flows:
-//! segmentation → plan → body → connector → piece → verify → report.
+//! segmentation → sizes → plan → body → connector → piece → verify → report.
 
 pub mod body;
 pub mod connector;
@@ -20,6 +20,7 @@ pub mod push;
 pub mod report;
 mod seams;
 pub mod segmentation;
+pub mod sizes;
 pub mod strength;
 pub mod surface;
 pub mod verify;
@@ -28,4 +29,5 @@ pub use contact_graph::{Contact, ContactGraph};
 pub use context::{Cancelled, Ctx, Warning};
 pub use direction::LatticeDirection;
 pub use ids::{IdVec, PatchId};
+pub use sizes::ConnectorSizes;
 pub use surface::{Seam, SegmentedSurface};

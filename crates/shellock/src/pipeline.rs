@@ -12,11 +12,12 @@ use crate::metric::{ChoiceError, Holding};
 use crate::piece::{Joint, PieceError};
 use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanProof, PlanSurvey};
 use crate::segmentation::{SegmentationError, SegmentationParams};
-use crate::strength::{Strength, StrengthError, StrengthParams};
+use crate::sizes::{CONTACT_SIZES, ChosenSizes, LEAST_CONTACT_SIZES, SizeParams, StressField};
+use crate::strength::{Strength, StrengthError, StrengthParams, StressMap};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
-    Cancelled, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, metric, piece, plan, segmentation,
-    strength, verify,
+    Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, metric, piece, plan,
+    segmentation, sizes, strength, verify,
 };
 
 /// Everything that may be set. Each stage's parameters are declared beside it.
@@ -80,24 +81,30 @@ impl Params {
 
     /// The parameters with what one stage owns and others need set alike everywhere.
     pub fn agreed(&self) -> Self {
-        /// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
-        const CONTACT_SIZES: f64 = 5.6;
-        /// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides; below this nothing was left.
-        const LEAST_CONTACT_SIZES: f64 = 4.2;
         /// Two lines on either side of a seam's pin.
         const LEAST_WALLS: f64 = 4.0;
         let mut p = self.clone();
         let least_mm = (LEAST_WALLS * p.connector.min_wall_mm).max(0.8).max(2.0 * p.body.cell_mm.unwrap_or(0.0));
         p.strength.least_mm = least_mm.min(5.0);
         p.strength.most_mm = p.strength.most_mm.max(p.strength.least_mm);
-        p.segmentation.min_contact_mm = CONTACT_SIZES * p.connector.size_mm;
-        p.segmentation.least_contact_mm = LEAST_CONTACT_SIZES * p.connector.size_mm;
+        let smallest_mm = p.connector.size.smallest_mm();
+        p.segmentation.min_contact_mm = CONTACT_SIZES * smallest_mm;
+        p.segmentation.least_contact_mm = LEAST_CONTACT_SIZES * smallest_mm;
         p.segmentation.wall_mm = p.body.thickness_mm;
         p.plan.wall_mm = p.body.thickness_mm;
-        p.plan.connector_size_mm = p.connector.size_mm;
         p.plan.clearance_mm = p.connector.clearance_mm;
         p.verify.clearance_mm = p.connector.clearance_mm.max(2.0 * p.body.wall_gap_mm);
         p
+    }
+
+    /// What decides on connector sizes.
+    pub fn sizes(&self) -> SizeParams {
+        SizeParams {
+            choice: self.connector.size,
+            wall_mm: self.body.thickness_mm,
+            clearance_mm: self.connector.clearance_mm,
+            strength_mpa: self.strength.material.strength_mpa,
+        }
     }
 }
 
@@ -105,6 +112,8 @@ impl Params {
 pub struct Design {
     /// The segmented surface it was made from.
     pub surface: SegmentedSurface,
+    /// Connector sizes of its pairs of pieces.
+    pub sizes: ConnectorSizes,
     /// Order and directions.
     pub plan: InstallationPlan,
     /// Thickness of its walls, mm.
@@ -189,13 +198,18 @@ impl From<ChoiceError> for DesignError {
 pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
     let (params, bearing) = with_thickness(ctx, params, model)?;
     let params = &params;
+    let stress = bearing.strength.as_ref().map(StressMap::new);
+    let stress_at = stress.as_ref().map(|map| |place| map.at(place));
+    let stress_mpa = stress_at.as_ref().map(|at| at as StressField);
     let mut surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
+    let mut sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
+    let mut room_mm = params.connector.room_mm(sizes.sizes.largest_mm());
     ctx.stage("grid", 0)?;
-    let grid = ShellGrid::new(&params.body, model, params.connector.room_mm())?;
+    let mut grid = ShellGrid::new(&params.body, model, room_mm)?;
     let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all };
     let mut mending = 0;
     let attempt = loop {
-        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &mut kits)?;
+        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &sizes, &mut kits)?;
         let Attempt::Failed { blamed, loose, .. } = &attempt else { break attempt };
         if mending == params.rounds.mendings || kits.n_left == 0 {
             break attempt;
@@ -206,6 +220,12 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
         ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
         surface = mended;
         mending += 1;
+        sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
+        let least_mm = params.connector.room_mm(sizes.sizes.largest_mm());
+        if least_mm > room_mm {
+            room_mm = least_mm;
+            grid = ShellGrid::new(&params.body, model, room_mm)?;
+        }
     };
     // Warnings of segmentations and plans that were given up go with them.
     ctx.take_warnings();
@@ -230,7 +250,9 @@ fn with_thickness(ctx: &Ctx, params: &Params, model: &Solid) -> Result<(Params, 
             Ok((params.agreed(), Bearing { strength: Some(strength), warnings }))
         }
         Err(StrengthError::Shell(e)) if params.thickness == ThicknessChoice::Given => {
-            let message = format!("what the wall bears could not be computed: {e}");
+            let message = format!(
+                "what the wall bears could not be computed ({e}); connectors are sized as if nothing pressed on them"
+            );
             let warning = Warning { code: "strength-unknown".into(), message, pieces: Vec::new(), at: None };
             Ok((params, Bearing { strength: None, warnings: vec![warning] }))
         }
@@ -328,9 +350,11 @@ fn with_segmentation(
     model: &Solid,
     grid: &ShellGrid,
     surface: &SegmentedSurface,
+    chosen: &ChosenSizes,
     kits: &mut Kits,
 ) -> Result<Attempt, DesignError> {
-    let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams())?;
+    let sizes = &chosen.sizes;
+    let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams(), sizes)?;
     let mut distances: Option<PatchDistances> = None;
     let mut constraints = PlanConstraints::default();
     let (mut blamed, mut loose) = (Vec::new(), Vec::new());
@@ -338,6 +362,7 @@ fn with_segmentation(
     let (mut kit, mut n_blocked) = (0, 0);
     while kit < most_kits && n_blocked < MOST_BLOCKED {
         ctx.take_warnings();
+        chosen.tell(ctx);
         let found = match plan::search(ctx, &params.plan, &survey, &constraints)? {
             PlanOutcome::Found(found) => found,
             PlanOutcome::Infeasible { reason, blockers, articulations } => {
@@ -345,11 +370,11 @@ fn with_segmentation(
                 return Ok(Attempt::Failed { reason, blockers, blamed, loose });
             }
         };
-        let (found, holding) = metric::choose(ctx, &params.plan, surface, *found)?;
+        let (found, holding) = metric::choose(ctx, &params.plan, surface, sizes, *found)?;
         ctx.stage("distances to the patches", 0)?;
         let distances = distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
         let proof = Some(found.proof());
-        let design = match make(ctx, params, model, grid, distances, surface, found.plan) {
+        let design = match make(ctx, params, model, grid, distances, surface, sizes, found.plan) {
             Err(DesignError::Body(BodyError::Blocked { piece, separation, kept })) => {
                 let lesson = Lesson::Blocked { piece, separation, kept };
                 ctx.note(&format!("another plan: {lesson}"));
@@ -361,7 +386,7 @@ fn with_segmentation(
             made => Design { proof, holding: Some(holding), ..made? },
         };
         kit += 1;
-        let learned: Vec<Lesson> = lessons(&design, params);
+        let learned: Vec<Lesson> = lessons(&design);
         kits.add(design);
         if learned.is_empty() {
             return Ok(Attempt::Passed);
@@ -381,7 +406,8 @@ fn failures(design: &Design) -> usize {
     design.verification.checks.iter().filter(|c| !c.ok).count()
 }
 
-/// Makes and verifies the kit of one plan.
+/// Makes and verifies the kit of one plan. The grid must have room for connectors of the largest of `sizes`.
+#[expect(clippy::too_many_arguments, reason = "the data of all earlier stages, each once")]
 pub fn make(
     ctx: &Ctx,
     params: &Params,
@@ -389,18 +415,20 @@ pub fn make(
     grid: &ShellGrid,
     distances: &PatchDistances,
     surface: &SegmentedSurface,
+    sizes: &ConnectorSizes,
     plan: InstallationPlan,
 ) -> Result<Design, DesignError> {
-    let rooms = rooms(params, surface);
+    let rooms = rooms(params, surface, sizes);
     let shell = body::build(ctx, &params.body, grid, distances, &plan, &rooms)?;
     let curves = shell.inner.as_ref().map_or(Vec::new(), |inner| connector::curves(grid, inner, &plan));
     let is_free = has_no_bar(&params.connector, grid, &shell);
-    let (runs, contacts) = connector::runs(&params.connector, &plan, &curves, &is_free);
+    let (runs, contacts) = connector::runs(&params.connector, sizes, &plan, &curves, &is_free);
     let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms)?;
     let verification = verify::verify(ctx, &params.verify, model, &finished.meshes, &plan)?;
-    warn_of_bare_seams(ctx, params, &contacts, &finished.joints);
+    warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
         surface: surface.clone(),
+        sizes: sizes.clone(),
         plan,
         thickness_mm: params.body.thickness_mm,
         strength: None,
@@ -415,8 +443,9 @@ pub fn make(
 }
 
 /// Says which long seams came out without any connector.
-fn warn_of_bare_seams(ctx: &Ctx, params: &Params, contacts: &[Contact], joints: &[Joint]) {
-    for contact in contacts.iter().filter(|c| c.length_mm >= params.segmentation.min_contact_mm) {
+fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[Contact], joints: &[Joint]) {
+    let has_room = |c: &&Contact| c.length_mm >= CONTACT_SIZES * sizes.of(c.later, c.earlier);
+    for contact in contacts.iter().filter(has_room) {
         let pair = [contact.later, contact.earlier];
         let joins = |j: &&Joint| pair.contains(&j.male) && pair.contains(&j.female);
         if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
@@ -434,13 +463,13 @@ fn warn_of_bare_seams(ctx: &Ctx, params: &Params, contacts: &[Contact], joints: 
 }
 
 /// The box around each patch and all connectors its piece can have.
-fn rooms(params: &Params, surface: &SegmentedSurface) -> IdVec<PatchId, Aabb> {
+fn rooms(params: &Params, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> IdVec<PatchId, Aabb> {
     /// Carving shifts seams by less than this, mm.
     const SHIFT_MM: f64 = 2.0;
     let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
     for (face, &p) in surface.patch_of_face.iter().enumerate() {
         rooms[p] = rooms[p].union(Aabb::around(surface.mesh.corners(face)));
     }
-    let reach = params.body.thickness_mm + params.connector.room_mm() + SHIFT_MM;
+    let reach = params.body.thickness_mm + params.connector.room_mm(sizes.largest_mm()) + SHIFT_MM;
     rooms.as_slice().iter().map(|r| r.grown(reach)).collect()
 }

@@ -199,6 +199,24 @@ impl Strength {
     }
 }
 
+/// The largest stress of all falls, by place.
+pub struct StressMap<'a> {
+    bvh: TriangleBvh,
+    largest_mpa: &'a [f64],
+}
+
+impl<'a> StressMap<'a> {
+    /// Of the analysis mesh's triangles.
+    pub fn new(strength: &'a Strength) -> Self {
+        Self { bvh: TriangleBvh::new(&strength.mesh), largest_mpa: &strength.largest_mpa }
+    }
+
+    /// Of the triangle nearest to `place`, MPa.
+    pub fn at(&self, place: Vec3) -> f64 {
+        self.bvh.nearest(place, f64::INFINITY).map_or(0.0, |nearest| self.largest_mpa[nearest.face as usize])
+    }
+}
+
 /// Finds the thickness of the wall of `model` (mm).
 ///
 /// A coarse mesh shows how the stress depends on the thickness, a fine one by how much the coarse one is wrong: their ratio

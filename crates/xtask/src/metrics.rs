@@ -205,20 +205,19 @@ fn subject(options: &MetricsOptions) -> Result<Subject, Failure> {
     let path = &options.model.model;
     let params = options.model.params();
     let solid = load(&options.model)?;
-    let Divided { surface, survey } = with_ctx(|ctx| divide(ctx, &params, &solid, path))?;
+    let Divided { surface, sizes, survey } = with_ctx(|ctx| divide(ctx, &params, &solid, path))?;
     let plans = random_plans(&params.plan, &survey, options.plans);
     let Some(key) = plans.first().map(|p| p.key().0) else {
         return Err(Failure::Model { path: path.clone(), problem: "no plan was found".to_owned() });
     };
-    let metric = MetricParams { edge_share: options.edge_share, ..MetricParams::of_plan(&params.plan) };
-    let model = PlanModel::new(&metric, &surface);
+    let metric = MetricParams { edge_share: options.edge_share, ..MetricParams::of_plan(&params.plan, &sizes) };
+    let model = PlanModel::new(&metric, &surface, &sizes);
     let meetings = plans.iter().map(|p| model.meetings(p)).collect();
     Ok(Subject { model, plans, meetings, key })
 }
 
 fn volume_model(subject: &Subject, params: &MetricParams) -> Result<VolumeModel, VolumeError> {
-    let (wall_mm, connector_mm, material) = (params.wall_mm, params.connector_mm, params.material);
-    let params = VolumeParams { wall_mm, connector_mm, material, ..VolumeParams::default() };
+    let params = VolumeParams { wall_mm: params.wall_mm, material: params.material, ..VolumeParams::default() };
     VolumeModel::new(&params, &subject.model.assembly)
 }
 

@@ -9,7 +9,8 @@ use shellock::context::Progress;
 use shellock::pipeline::Params;
 use shellock::plan::{PlanSurvey, survey};
 use shellock::segmentation::segment;
-use shellock::{Ctx, SegmentedSurface};
+use shellock::sizes;
+use shellock::{ConnectorSizes, Ctx, SegmentedSurface};
 use shellock_geom::Solid;
 use shellock_geom::check::into_solid;
 use shellock_geom::io::{read_labels, read_mesh};
@@ -74,6 +75,8 @@ pub struct Model {
 pub struct Divided {
     /// The pieces.
     pub surface: SegmentedSurface,
+    /// Connector sizes of the pairs.
+    pub sizes: ConnectorSizes,
     /// What planning knows of them.
     pub survey: PlanSurvey,
 }
@@ -109,9 +112,10 @@ pub fn divide(ctx: &Ctx<'_>, params: &Params, model: &Model, path: &Path) -> Res
     let fault = |problem: String| Failure::Model { path: path.to_owned(), problem };
     let surface =
         segment(ctx, &params.segmentation, &model.solid, model.labels.as_deref()).map_err(|e| fault(e.to_string()))?;
-    let survey =
-        survey(ctx, &params.plan, &surface, &surface.seams()).map_err(|_| fault("the study was stopped".into()))?;
-    Ok(Divided { surface, survey })
+    let stopped = |_| fault("the study was stopped".into());
+    let sizes = sizes::choose(ctx, &params.sizes(), &surface, None).map_err(stopped)?.sizes;
+    let survey = survey(ctx, &params.plan, &surface, &surface.seams(), &sizes).map_err(stopped)?;
+    Ok(Divided { surface, sizes, survey })
 }
 
 /// Calls `work` with a context that tells stages on stderr and never stops.

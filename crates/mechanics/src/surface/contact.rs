@@ -36,13 +36,14 @@ pub(super) fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motio
 pub(super) fn contacts(model: &SurfaceModel, plan: &[Meeting]) -> Vec<Contact> {
     let mut contacts = Vec::with_capacity(4 * plan.len());
     for (i, (station, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {
-        let root = model.params.contact_n_mm(station.length_mm).sqrt();
+        let size_mm = meeting.joint.map_or(model.params.connector_mm, |joint| joint.size_mm);
+        let root = model.params.contact_n_mm(size_mm, station.length_mm).sqrt();
         let contact =
             |gap: Motions, is_one_sided| Contact { station: i, gradient: gap.map(|g| root * g), is_one_sided };
         contacts.push(contact(gap(station, Side::B, Vec3::ZERO, meeting.wall), true));
         if let Some(joint) = meeting.joint {
             let n = station.tangent.cross(joint.leaves).normalize_or_zero();
-            let tip = -model.params.strip_mm() * joint.leaves;
+            let tip = -model.params.strip_mm(&joint) * joint.leaves;
             contacts.push(contact(gap(station, joint.male, tip, n), false));
             contacts.push(contact(gap(station, joint.male, Vec3::ZERO, n), false));
             contacts.push(contact(gap(station, joint.male, tip, joint.leaves), !joint.is_fast));
@@ -59,7 +60,7 @@ pub(super) fn forces(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3]) -> 
     let mut forces = vec![[0.0; N_MOTIONS]; model.assembly.stations.len()];
     for (((force, station), meeting), pull) in forces.iter_mut().zip(&model.assembly.stations).zip(plan).zip(pulls) {
         if let Some(joint) = meeting.joint {
-            *force = gap(station, Side::A, -model.params.strip_mm() * joint.leaves, *pull);
+            *force = gap(station, Side::A, -model.params.strip_mm(&joint) * joint.leaves, *pull);
         }
     }
     forces

@@ -139,7 +139,7 @@ fn part(
     factor.solve_in_place(&mut sides);
     let mut compliance = forces.transpose() * DMatrix::from_column_slice(n, m, &sides);
     for i in 0..m {
-        compliance[(i, i)] += LEAST_COMPLIANCE / params.contact_n_mm(1.0);
+        compliance[(i, i)] += LEAST_COMPLIANCE / params.contact_n_mm(params.connector_mm, 1.0);
     }
     if !floats.is_empty() {
         let ground = GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm * floats.len() as f64;

@@ -13,7 +13,7 @@ use super::contact::{Contact, contacts, forces, gap};
 use super::join::{Body, Joinings};
 use super::parts::{Motions, N_MOTIONS, Part};
 use super::{SurfaceModel, SurfaceSolution};
-use crate::assembly::{LOST_SIZES, Meeting, Opening, Side, Station};
+use crate::assembly::{Meeting, Opening, Side, Station};
 
 /// Newton steps of a line search; the slope is piecewise linear and most searches end after two or three.
 const LINE_STEPS: usize = 30;
@@ -32,9 +32,8 @@ pub(super) fn solve(
     let opening = rated(model, plan, &answer(model, is_held, &sent));
     let part_of = |p: u32| model.assembly.part_of_point[p as usize];
     let is_free = |part: &u32| !is_held.get(*part as usize).is_some_and(|h| *h);
-    let resistance = opening.resistance(LOST_SIZES * model.params.connector_mm, |station| {
-        model.assembly.stations[station].points.map(part_of).into_iter().filter(is_free)
-    });
+    let resistance = opening
+        .resistance(plan, |station| model.assembly.stations[station].points.map(part_of).into_iter().filter(is_free));
     Ok(SurfaceSolution { resistance, n_iterations, error })
 }
 
@@ -121,7 +120,7 @@ fn length(contacts: &[Contact], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f
 
 /// Compliance of what is held, mm/N.
 fn held_compliance(model: &SurfaceModel) -> f64 {
-    1.0 / (HELD_SHARE * model.params.contact_n_mm(1.0))
+    1.0 / (HELD_SHARE * model.params.contact_n_mm(model.params.connector_mm, 1.0))
 }
 
 /// How side a moves from side b at each station under forces that pull them apart.
@@ -239,7 +238,7 @@ fn less(contacts: &[Contact], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Mot
 fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Opening {
     let opening = |((station, m), moved): ((&Station, &Meeting), &Motions)| {
         let Some(joint) = m.joint else { return 0.0 };
-        let along = |g| dot(&gap(station, Side::A, -model.params.strip_mm() * joint.leaves, g), moved);
+        let along = |g| dot(&gap(station, Side::A, -model.params.strip_mm(&joint) * joint.leaves, g), moved);
         Vec3::from_array([station.tangent, station.normal, station.across].map(along)).length()
     };
     Opening::rated(plan, model.assembly.stations.iter().zip(plan).zip(moved).map(opening).collect())

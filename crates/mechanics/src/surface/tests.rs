@@ -18,7 +18,7 @@ fn plates(params: &SurfaceParams) -> SurfaceModel {
 
 /// Joints of side a as the male, leaving along `leaves`, pulled along `pull`.
 fn joints(leaves: Vec3, pull: Vec3) -> Vec<Meeting> {
-    let joint = Joint { male: Side::A, leaves, is_fast: false, pull_on_a: pull, weight: 1.0 };
+    let joint = Joint { male: Side::A, leaves, is_fast: false, pull_on_a: pull, weight: 1.0, size_mm: 2.5 };
     vec![Meeting { wall: Vec3::Y, joint: Some(joint) }; N - 1]
 }
 
@@ -129,7 +129,7 @@ fn a_part_that_is_free_alone_opens_its_own_seams_alone() {
     let plan: Vec<Meeting> = (ball.stations.iter())
         .map(|s| {
             let leaves = (s.normal - s.across * 0.5).normalize();
-            let joint = Joint { male: Side::A, leaves, is_fast: true, pull_on_a: leaves, weight: 1.0 };
+            let joint = Joint { male: Side::A, leaves, is_fast: true, pull_on_a: leaves, weight: 1.0, size_mm: 2.5 };
             Meeting { wall: s.across, joint: Some(joint) }
         })
         .collect();

@@ -61,7 +61,7 @@ impl Section {
 
     /// The cross-section of `side` at a station joined by `joint`, or that far along from it: a section further on carries no force.
     pub fn new(model: &VolumeModel, station: usize, side: Side, joint: &Joint, along_mm: f64) -> Self {
-        let (place, size) = (&model.stations[station], model.params.connector_mm);
+        let (place, size) = (&model.stations[station], joint.size_mm);
         let inland = if side == Side::A { -place.across } else { place.across };
         let male_to_female = if joint.male == Side::A { place.across } else { -place.across };
         // n = −u × ŝ with u = v × N, v from male to female.

@@ -2,13 +2,16 @@ use super::*;
 use crate::Joint;
 use crate::sample;
 
+/// Connector size D: the middle of the paper's 2 to 4.
+const SIZE_MM: f64 = 3.0;
+
 /// Every station joined; friction holds part `fast`.
 fn joined(assembly: &ShellAssembly, degrees: f64, fast: Option<u32>) -> Vec<Meeting> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let joint = |s: &Station| {
         let leaves = s.normal * cos + s.across * sin;
         let is_fast = s.points.iter().any(|p| Some(assembly.part_of_point[*p as usize]) == fast);
-        let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0 };
+        let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0, size_mm: SIZE_MM };
         Meeting { wall: s.across, joint: Some(joint) }
     };
     assembly.stations.iter().map(joint).collect()
@@ -277,7 +280,7 @@ fn pins_that_slide_out_of_their_channels_do_not_hold() {
     let at = |force_n_per_mm| VolumeModel::new(&VolumeParams { force_n_per_mm, ..VolumeParams::default() }, &ball);
     let Resistance::Holds(opening) = at(0.01).unwrap().resist(&plan, 7).unwrap() else { panic!("does not hold") };
     let widest_mm = opening.opening_mm.iter().copied().fold(0.0, f64::max);
-    let lost_mm = 0.6 * VolumeParams::default().connector_mm;
+    let lost_mm = 0.6 * SIZE_MM;
     let force = |share: f64| 0.01 * share * lost_mm / widest_mm;
     assert!(matches!(at(force(0.99)).unwrap().resist(&plan, 7).unwrap(), Resistance::Holds(_)));
     assert!(matches!(at(force(1.01)).unwrap().resist(&plan, 7).unwrap(), Resistance::Separable(_)));

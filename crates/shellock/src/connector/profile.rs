@@ -50,7 +50,7 @@ impl Section {
     ///
     /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across the seam.
     pub fn at(params: &ConnectorParams, station: &Station) -> Self {
-        let (d, c) = (params.size_mm, params.clearance_mm);
+        let (d, c) = (station.size_mm, params.clearance_mm);
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
         // Stretch along ŝ; ŝ leans against the seam by the angle whose cosine is `depth`.
         let k = 1.0 / station.depth.max(0.4);
@@ -81,7 +81,7 @@ impl Section {
 mod tests {
     use super::*;
 
-    fn station(theta_degrees: f64) -> Station {
+    fn station(theta_degrees: f64, size_mm: f64) -> Station {
         Station {
             point: Vec3::ZERO,
             tangent: Vec3::X,
@@ -90,14 +90,27 @@ mod tests {
             theta: theta_degrees.to_radians(),
             depth: 1.0,
             arc_mm: 0.0,
+            size_mm,
         }
+    }
+
+    fn angles_and_sizes() -> impl Iterator<Item = (f64, f64)> {
+        [2.0, 2.5, 4.0].into_iter().flat_map(|d| (-90..=60).step_by(5).map(move |t| (f64::from(t), d)))
+    }
+
+    #[test]
+    fn a_straight_channel_is_as_deep_as_sizes_are_chosen_for() {
+        let params = ConnectorParams::default();
+        let section = Section::at(&params, &station(0.0, 3.0));
+        let floor = section.female.iter().flatten().map(|part| part.s0).fold(f64::INFINITY, f64::min);
+        assert!((-floor - crate::sizes::depth_mm(3.0, params.clearance_mm)).abs() < 1e-12, "{floor}");
     }
 
     #[test]
     fn pin_and_channel_keep_the_clearance_at_every_angle() {
         let params = ConnectorParams::default();
-        for degrees in (-90..=60).step_by(5) {
-            let section = Section::at(&params, &station(f64::from(degrees)));
+        for (degrees, size_mm) in angles_and_sizes() {
+            let section = Section::at(&params, &station(degrees, size_mm));
             let pin = section.male[0].unwrap();
             for wall in section.female.iter().flatten() {
                 let gap_n = (wall.n0 - pin.n1).max(pin.n0 - wall.n1);
@@ -110,8 +123,8 @@ mod tests {
     #[test]
     fn no_wall_is_thinner_than_the_least() {
         let params = ConnectorParams::default();
-        for degrees in (-90..=60).step_by(5) {
-            let section = Section::at(&params, &station(f64::from(degrees)));
+        for (degrees, size_mm) in angles_and_sizes() {
+            let section = Section::at(&params, &station(degrees, size_mm));
             for part in section.male.iter().chain(&section.female).flatten() {
                 assert!((part.n1 - part.n0).min(part.s1 - part.s0) >= params.min_wall_mm, "at {degrees}°: {part:?}");
             }

@@ -4,9 +4,9 @@ use shellock_geom::Vec3;
 
 use super::frame::Curve;
 use super::{ConnectorParams, Section};
-use crate::PatchId;
 use crate::plan::InstallationPlan;
 use crate::plan::contact::end_gap_mm;
+use crate::{ConnectorSizes, PatchId};
 
 /// Steepest backward angle T that gives a sound pin, rad: 60°.
 const STEEPEST: f64 = 1.047;
@@ -42,6 +42,8 @@ pub struct Station {
     pub depth: f64,
     /// Distance along the curve, mm.
     pub arc_mm: f64,
+    /// Connector size D, mm.
+    pub size_mm: f64,
 }
 
 /// One stretch of connector: a pin of `male` in a channel of `female`.
@@ -86,6 +88,7 @@ pub struct Contact {
 /// at a point below the wall; `None` where the point lies in or above the wall and does not count.
 pub fn runs(
     params: &ConnectorParams,
+    sizes: &ConnectorSizes,
     plan: &InstallationPlan,
     curves: &[Curve],
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
@@ -94,9 +97,10 @@ pub fn runs(
     for curve in curves {
         let separation = plan.separation(curve.later).unit();
         let later_is_male = roles(curve, separation);
+        let size_mm = sizes.of(curve.later, curve.earlier);
         let stations: Vec<Station> =
-            (0..curve.points.len()).map(|i| station(curve, i, separation, later_is_male[i])).collect();
-        let mut allowed = allowed(params, curve, &stations, &later_is_male);
+            (0..curve.points.len()).map(|i| station(curve, i, separation, later_is_male[i], size_mm)).collect();
+        let mut allowed = allowed(size_mm, curve, &stations, &later_is_male);
         let step = |i: usize| stations[i].point.distance(stations[i + 1].point);
         contacts.push(Contact {
             later: curve.later,
@@ -112,7 +116,7 @@ pub fn runs(
         for (from, to) in stretches(&allowed, &later_is_male) {
             let run = thinned(&stations[from..=to]);
             let (male, female) = sides(curve, later_is_male[from]);
-            if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN * params.size_mm {
+            if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN * size_mm {
                 runs.push(Run { male, female, stations: run });
             }
         }
@@ -139,7 +143,7 @@ fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
         .collect()
 }
 
-fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool) -> Station {
+fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_mm: f64) -> Station {
     let (u, normal) = (curve.tangents[i], curve.normals[i]);
     let (s, to_female) = if later_is_male { (separation, curve.across[i]) } else { (-separation, -curve.across[i]) };
     let across = s - s.dot(u) * u;
@@ -148,14 +152,14 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool) -> St
     let theta = flat.dot(to_female).atan2(flat.dot(normal));
     let n = (theta.cos() * to_female - theta.sin() * normal).normalize_or_zero();
     let arc_mm = curve.points[..=i].windows(2).map(|w| w[0].distance(w[1])).sum();
-    Station { point: curve.points[i], tangent: u, n, s, theta, depth, arc_mm }
+    Station { point: curve.points[i], tangent: u, n, s, theta, depth, arc_mm, size_mm }
 }
 
 /// Where ends, roles, angles and turns allow a connector.
-fn allowed(params: &ConnectorParams, curve: &Curve, stations: &[Station], later_is_male: &[bool]) -> Vec<bool> {
+fn allowed(size_mm: f64, curve: &Curve, stations: &[Station], later_is_male: &[bool]) -> Vec<bool> {
     let n = stations.len();
     let length = stations[n - 1].arc_mm;
-    let end = end_gap_mm(params.size_mm, length);
+    let end = end_gap_mm(size_mm, length);
     let turns = |i: usize, j: usize| stations[i].n.dot(stations[j].n) < SHARPEST_TURN.cos();
     (0..n)
         .map(|i| {

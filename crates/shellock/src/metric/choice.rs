@@ -6,7 +6,7 @@ use shellock_mechanics::{Meeting, Opening, Resistance};
 
 use super::{MetricParams, PlanModel};
 use crate::plan::{FoundPlan, InstallationPlan, PlanParams, RankedPlan};
-use crate::{Cancelled, Ctx, PatchId, SegmentedSurface, Warning};
+use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
 /// Plans whose cost is within this share of the best one's are compared by simulation.
 ///
@@ -60,10 +60,11 @@ pub fn choose(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     surface: &SegmentedSurface,
+    sizes: &ConnectorSizes,
     found: FoundPlan,
 ) -> Result<(FoundPlan, Holding), ChoiceError> {
     ctx.stage("which plan holds best", 0)?;
-    let model = PlanModel::new(&MetricParams::of_plan(params), surface);
+    let model = PlanModel::new(&MetricParams::of_plan(params, sizes), surface, sizes);
     let limit = found.score.worst * (1.0 + COST_SLACK);
     let plans: Vec<&RankedPlan> = found.pool.iter().filter(|p| p.score.worst <= limit).collect();
     let meetings: Vec<Vec<Meeting>> = plans.iter().map(|p| model.meetings(&p.plan)).collect();

@@ -11,14 +11,14 @@ use shellock_mechanics::{
 use crate::plan::contact::{end_gap_mm, meeting};
 use crate::plan::{InstallationPlan, PlanParams};
 use crate::seams::{seam_half_edges, stretches};
-use crate::{PatchId, SegmentedSurface};
+use crate::{ConnectorSizes, PatchId, SegmentedSurface};
 
 /// How the model is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetricParams {
     /// Wall thickness, mm. (0, 10]; 2.
     pub wall_mm: f64,
-    /// Connector size D, mm. [1, 10]; 2.5.
+    /// Connector size D of local tests, and where walls meet without a connector, mm. [1, 10]; 2.5.
     pub connector_mm: f64,
     /// Floor β of the connector weight (Eq. 4). [0, 1]; 0.1.
     pub beta: f64,
@@ -37,11 +37,11 @@ impl Default for MetricParams {
 }
 
 impl MetricParams {
-    /// The same wall, connectors and floor as the plan's.
-    pub fn of_plan(params: &PlanParams) -> Self {
+    /// The same wall and floor as the plan's.
+    pub fn of_plan(params: &PlanParams, sizes: &ConnectorSizes) -> Self {
         let defaults = Self::default();
         let wall_mm = if params.wall_mm > 0.0 { params.wall_mm } else { defaults.wall_mm };
-        Self { wall_mm, connector_mm: params.connector_size_mm, beta: params.beta, ..defaults }
+        Self { wall_mm, connector_mm: sizes.default_mm(), beta: params.beta, ..defaults }
     }
 
     /// The surface metric's parameters with these sizes.
@@ -66,6 +66,8 @@ pub struct PlanModel {
 struct StationSeam {
     a: PatchId,
     b: PatchId,
+    /// Connector size D, mm.
+    size_mm: f64,
     /// Whether it is far enough from the ends of an open seam for a connector.
     has_room: bool,
     /// First and last point of the seam.
@@ -74,7 +76,7 @@ struct StationSeam {
 
 impl PlanModel {
     /// Remeshes `surface` evenly and finds the stations: all points inside seams.
-    pub fn new(params: &MetricParams, surface: &SegmentedSurface) -> Self {
+    pub fn new(params: &MetricParams, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> Self {
         /// Points of a mesh of equilateral triangles: one each √3/2 l².
         const POINTS_AT_ONE: f64 = 1000.0;
         let area_mm2 = surface.mesh.area();
@@ -82,11 +84,11 @@ impl PlanModel {
         let labels: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
         let mut coarse = remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, &surface.mesh, &labels);
         split_short_seams(&mut coarse);
-        Self::of_mesh(params, &relaxed(coarse.mesh), &coarse.labels, surface.n_patches)
+        Self::of_mesh(params, &relaxed(coarse.mesh), &coarse.labels, surface.n_patches, sizes)
     }
 
     /// The model of a closed mesh with these labels as it is.
-    fn of_mesh(params: &MetricParams, mesh: &TriMesh, labels: &[u32], n_parts: usize) -> Self {
+    fn of_mesh(params: &MetricParams, mesh: &TriMesh, labels: &[u32], n_parts: usize, sizes: &ConnectorSizes) -> Self {
         let mut model = Self { assembly: parts(mesh, labels, n_parts), params: *params, seams: Vec::new() };
         let topology = Topology::of_mesh(mesh).expect("a remeshed surface is closed");
         let normals = point_normals(mesh);
@@ -100,7 +102,8 @@ impl PlanModel {
                 .iter()
                 .map(|&v| (mesh.points[v as usize], normals[v as usize], [copy(s.a, v), copy(s.b, v)]))
                 .collect();
-            model.add_seam([PatchId(s.a), PatchId(s.b)], &points);
+            let [a, b] = [PatchId(s.a), PatchId(s.b)];
+            model.add_seam([a, b], sizes.of(a, b), &points);
         }
         model
     }
@@ -108,7 +111,7 @@ impl PlanModel {
     /// Adds the stations of a seam, patch a on its left: all points but the ends; of a loop all points once.
     ///
     /// Lengths are those on the inner side of the wall, where connectors are.
-    fn add_seam(&mut self, [a, b]: [PatchId; 2], points: &[(Vec3, Vec3, [u32; 2])]) {
+    fn add_seam(&mut self, [a, b]: [PatchId; 2], size_mm: f64, points: &[(Vec3, Vec3, [u32; 2])]) {
         /// Share of a station's stretch that must be far enough from the ends for a connector, against rounding.
         const LEAST_SHARE: f64 = 1e-6;
         let n = points.len() - 1;
@@ -116,7 +119,7 @@ impl PlanModel {
         let inner = |i: usize| points[i].0 - self.params.wall_mm * points[i].1;
         let mut arc_mm = vec![0.0; n + 1];
         (0..n).for_each(|i| arc_mm[i + 1] = arc_mm[i] + inner(i).distance(inner(i + 1)));
-        let margin = if is_loop { 0.0 } else { end_gap_mm(self.params.connector_mm, arc_mm[n]) };
+        let margin = if is_loop { 0.0 } else { end_gap_mm(size_mm, arc_mm[n]) };
         let before_mm = |i: usize| if i > 0 { arc_mm[i - 1] } else { arc_mm[n - 1] - arc_mm[n] };
         let first = self.assembly.stations.len() as u32;
         for i in usize::from(!is_loop)..n {
@@ -133,7 +136,7 @@ impl PlanModel {
             let has_room = is_loop || joined_mm > LEAST_SHARE * (end - start);
             let length_mm = if has_room && !is_loop { joined_mm } else { end - start };
             self.assembly.stations.push(Station { points: copies, tangent, normal, across, length_mm });
-            self.seams.push(StationSeam { a, b, has_room, ends: [points[0].0, points[n].0] });
+            self.seams.push(StationSeam { a, b, size_mm, has_room, ends: [points[0].0, points[n].0] });
         }
         let last = self.assembly.stations.len() as u32;
         self.assembly.steps.extend((first + 1..last).map(|i| [i - 1, i]));
@@ -150,7 +153,7 @@ impl PlanModel {
             let a_is_later = position[usize::from(seam.a)] > position[usize::from(seam.b)];
             let later = if a_is_later { seam.a } else { seam.b };
             let s = plan.steps[position[usize::from(later)]].separation.unit();
-            let mut meeting = meeting(station, a_is_later, s, self.params.beta, false);
+            let mut meeting = meeting(station, seam.size_mm, a_is_later, s, self.params.beta, false);
             meeting.joint = meeting.joint.filter(|_| seam.has_room);
             if let Some(joint) = &mut meeting.joint {
                 joint.is_fast = later == plan.key();
@@ -177,8 +180,8 @@ impl PlanModel {
 
     /// The volume metric's solver.
     pub fn volume_model(&self) -> Result<VolumeModel, VolumeError> {
-        let (wall_mm, connector_mm, material) = (self.params.wall_mm, self.params.connector_mm, self.params.material);
-        let params = VolumeParams { wall_mm, connector_mm, material, ..VolumeParams::default() };
+        let MetricParams { wall_mm, material, .. } = self.params;
+        let params = VolumeParams { wall_mm, material, ..VolumeParams::default() };
         VolumeModel::new(&params, &self.assembly)
     }
 

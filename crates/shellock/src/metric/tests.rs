@@ -4,11 +4,12 @@ use shellock_mechanics::{Resistance, Side};
 use super::*;
 use crate::plan::testing::{label, sphere};
 use crate::plan::{InstallationPlan, InstallationStep};
-use crate::{LatticeDirection, PatchId};
+use crate::{ConnectorSizes, LatticeDirection, PatchId};
 
 fn octants() -> PlanModel {
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
-    PlanModel::new(&MetricParams::default(), &label(sphere(5, Vec3::splat(40.0)), 8, octant))
+    let surface = label(sphere(5, Vec3::splat(40.0)), 8, octant);
+    PlanModel::new(&MetricParams::default(), &surface, &ConnectorSizes::default())
 }
 
 fn plan(directions: impl Fn(u32) -> Vec3) -> InstallationPlan {

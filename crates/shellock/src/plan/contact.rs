@@ -24,7 +24,7 @@ use bars::{Barred, Bars};
 pub use hold::{HoldTable, Pushes};
 
 use super::PlanParams;
-use crate::{LatticeDirection, PatchId, Seam, SegmentedSurface};
+use crate::{ConnectorSizes, LatticeDirection, PatchId, Seam, SegmentedSurface};
 
 /// Distance between samples of a seam, mm: below the size of any connector.
 const SAMPLE_STEP_MM: f64 = 1.0;
@@ -78,6 +78,8 @@ pub struct Contact {
     pub b: PatchId,
     /// Length of all seams between the two, mm.
     pub length_mm: f64,
+    /// Size D of their connectors, mm.
+    pub size_mm: f64,
     /// By who is later (a, then b) and by direction.
     joints: [[Joint; LatticeDirection::COUNT]; 2],
     hold: HoldTable,
@@ -121,9 +123,16 @@ impl SeamFrame {
     }
 }
 
-/// How two pieces meet at a station where the later one leaves along `s`; no connector where none can be made, unless
-/// `is_any_angle`.
-pub(crate) fn meeting(station: &Station, a_is_later: bool, s: Vec3, beta: f64, is_any_angle: bool) -> Meeting {
+/// How two pieces with connectors of `size_mm` meet at a station where the later one leaves along `s`; no connector where
+/// none can be made, unless `is_any_angle`.
+pub(crate) fn meeting(
+    station: &Station,
+    size_mm: f64,
+    a_is_later: bool,
+    s: Vec3,
+    beta: f64,
+    is_any_angle: bool,
+) -> Meeting {
     let across = if a_is_later { station.across } else { -station.across };
     let frame = SeamFrame { tangent: station.tangent, normal: station.normal, across };
     // Where s leads towards the earlier piece the face between the walls leans, so that it does not bar the way.
@@ -135,7 +144,7 @@ pub(crate) fn meeting(station: &Station, a_is_later: bool, s: Vec3, beta: f64, i
     let later_is_male = s.dot(station.normal) >= 0.0;
     let (male, leaves) = if later_is_male { (later, in_section) } else { (earlier, -in_section) };
     let pull_on_a = if a_is_later { s } else { -s };
-    let joint = MechanicalJoint { male, leaves, is_fast: false, pull_on_a, weight: frame.weight(s, beta) };
+    let joint = MechanicalJoint { male, leaves, is_fast: false, pull_on_a, weight: frame.weight(s, beta), size_mm };
     Meeting { wall, joint: (is_any_angle || frame.carries(s)).then_some(joint) }
 }
 
@@ -165,8 +174,9 @@ impl Contact {
         if piece == self.a { self.b } else { self.a }
     }
 
-    /// Lets exactly the joints hold whose run is at least `shortest_mm` long; not shorter than the survey's shortest of all.
-    pub fn count_runs_from(&mut self, shortest_mm: f64) {
+    /// Lets exactly the joints hold whose run is at least so many connector sizes long; not shorter than the survey's shortest of all.
+    pub fn count_runs_from(&mut self, shortest_sizes: f64) {
+        let shortest_mm = shortest_sizes * self.size_mm;
         self.joints.iter_mut().flatten().for_each(|j| j.holds = j.run_mm >= shortest_mm);
     }
 
@@ -184,24 +194,33 @@ impl Contact {
         hold: HoldTable,
     ) -> Self {
         let joints = [a, b].map(|p| std::array::from_fn(|i| joint(p, LatticeDirection::all().nth(i).unwrap())));
-        Self { a, b, length_mm: 20.0, joints, hold }
+        Self { a, b, length_mm: 20.0, size_mm: 2.5, joints, hold }
     }
 }
 
 /// The contacts of all pairs that share a seam, sorted by pair.
-pub fn contacts(params: &PlanParams, surface: &SegmentedSurface, seams: &[Seam]) -> Vec<Contact> {
+pub fn contacts(
+    params: &PlanParams,
+    surface: &SegmentedSurface,
+    seams: &[Seam],
+    sizes: &ConnectorSizes,
+) -> Vec<Contact> {
     let edges = patch_border(surface);
     let bars = Bars::new(params, surface);
     let sampled = |seam: &Seam| {
-        let found = samples(params, seam, a_is_left(seam, &edges), bars.as_ref());
+        let found = samples(params, sizes.of(seam.a, seam.b), seam, a_is_left(seam, &edges), bars.as_ref());
         (seam.a, seam.b, found, seam.is_loop())
     };
     let mut sampled: Vec<(PatchId, PatchId, Vec<Sample>, bool)> = seams.par_iter().map(sampled).collect();
     sampled.sort_by_key(|s| (s.0, s.1));
-    sampled.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).filter_map(|group| contact(params, group)).collect()
+    let of_pair = |group: &[(PatchId, PatchId, Vec<Sample>, bool)]| {
+        let (a, b, ..) = group.first()?;
+        contact(params, sizes.of(*a, *b), group)
+    };
+    sampled.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).filter_map(of_pair).collect()
 }
 
-fn contact(params: &PlanParams, seams: &[(PatchId, PatchId, Vec<Sample>, bool)]) -> Option<Contact> {
+fn contact(params: &PlanParams, size_mm: f64, seams: &[(PatchId, PatchId, Vec<Sample>, bool)]) -> Option<Contact> {
     let (a, b, ..) = seams.first()?;
     let length_mm = seams.iter().flat_map(|s| &s.2).map(|s| s.length_mm).sum();
     if length_mm <= 0.0 {
@@ -212,16 +231,16 @@ fn contact(params: &PlanParams, seams: &[(PatchId, PatchId, Vec<Sample>, bool)])
         std::array::from_fn(|i| {
             // The frame of b later than a is that of a later with v turned round.
             let s = LatticeDirection::all().nth(i).expect("26 directions");
-            joint(params, &lines, side, s)
+            joint(params, size_mm, &lines, side, s)
         })
     });
-    let least_mm = SHORTEST_RUN_SIZES[SHORTEST_RUN_SIZES.len() - 1] * params.connector_size_mm;
-    let hold = HoldTable::new(params, &lines, |order, s| joints[order][s.index()].run_mm >= least_mm);
-    Some(Contact { a: *a, b: *b, length_mm, joints, hold })
+    let least_mm = SHORTEST_RUN_SIZES[SHORTEST_RUN_SIZES.len() - 1] * size_mm;
+    let hold = HoldTable::new(params, size_mm, &lines, |order, s| joints[order][s.index()].run_mm >= least_mm);
+    Some(Contact { a: *a, b: *b, length_mm, size_mm, joints, hold })
 }
 
 /// What `lines` offer along `s`; `side` = 1 where the piece with the lower id is later, else −1.
-fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: LatticeDirection) -> Joint {
+fn joint(params: &PlanParams, size_mm: f64, lines: &[(&[Sample], bool)], side: f64, s: LatticeDirection) -> Joint {
     let (mut weight, mut usable, mut length_mm, mut run_mm) = (0.0, 0.0, 0.0, 0.0_f64);
     for &(samples, is_loop) in lines {
         for x in samples {
@@ -233,7 +252,7 @@ fn joint(params: &PlanParams, lines: &[(&[Sample], bool)], side: f64, s: Lattice
         }
         run_mm = run_mm.max(longest_run_mm(samples, is_loop, side, s));
     }
-    let holds = run_mm >= SHORTEST_RUN_SIZES[0] * params.connector_size_mm;
+    let holds = run_mm >= SHORTEST_RUN_SIZES[0] * size_mm;
     Joint { weight: weight / length_mm, usable: usable / length_mm, run_mm, holds }
 }
 
@@ -267,13 +286,13 @@ fn longest_run_mm(samples: &[Sample], is_loop: bool, side: f64, s: LatticeDirect
 }
 
 /// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame; lengths are those on the inner side of the wall.
-fn samples(params: &PlanParams, seam: &Seam, a_is_left: bool, bars: Option<&Bars<'_>>) -> Vec<Sample> {
+fn samples(params: &PlanParams, size_mm: f64, seam: &Seam, a_is_left: bool, bars: Option<&Bars<'_>>) -> Vec<Sample> {
     let n = (seam.length() / SAMPLE_STEP_MM).ceil().max(1.0);
     let stations: Vec<(Vec3, Vec3)> = seam.resampled(n as usize);
     let inner = seam.below(params.wall_mm, seam.length() / n);
     let lengths: Vec<f64> = inner.windows(2).map(|w| w[0].distance(w[1])).collect();
     let total: f64 = lengths.iter().sum();
-    let margin = if seam.is_loop() { 0.0 } else { end_gap_mm(params.connector_size_mm, total) };
+    let margin = if seam.is_loop() { 0.0 } else { end_gap_mm(size_mm, total) };
     let mut out = Vec::with_capacity(lengths.len());
     let mut before = 0.0;
     for (w, length_mm) in stations.windows(2).zip(lengths) {
@@ -284,7 +303,7 @@ fn samples(params: &PlanParams, seam: &Seam, a_is_left: bool, bars: Option<&Bars
         let has_room = middle >= margin && middle <= total - margin;
         // N × u points to the left, where the surface is seen from outside.
         let across = if a_is_left { -normal.cross(tangent) } else { normal.cross(tangent) };
-        let barred = |bars: &Bars<'_>| bars.at([seam.a, seam.b], 0.5 * (w[0].0 + w[1].0), normal, across);
+        let barred = |bars: &Bars<'_>| bars.at([seam.a, seam.b], size_mm, 0.5 * (w[0].0 + w[1].0), normal, across);
         let barred = bars.filter(|_| has_room).map(barred).unwrap_or_default();
         out.push(Sample { tangent, normal, across, length_mm, has_room, barred });
     }
@@ -361,7 +380,7 @@ mod tests {
 
     fn cap_contact(height: f64) -> Contact {
         let surface = label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > height));
-        let mut found = contacts(&PlanParams::default(), &surface, &seams(&surface));
+        let mut found = contacts(&PlanParams::default(), &surface, &seams(&surface), &ConnectorSizes::default());
         assert_eq!(found.len(), 1);
         found.remove(0)
     }
@@ -389,7 +408,7 @@ mod tests {
         let surface = label(sphere(5, Vec3::new(7.0, 7.0, 60.0)), 2, |p| u32::from(p.z > 0.0));
         let share = |wall_mm: f64, s: Vec3| {
             let params = PlanParams { wall_mm, ..PlanParams::default() };
-            let contact = contacts(&params, &surface, &seams(&surface)).remove(0);
+            let contact = contacts(&params, &surface, &seams(&surface), &ConnectorSizes::default()).remove(0);
             contact.joint(contact.b, LatticeDirection::nearest(s)).usable
         };
         assert!(share(0.0, Vec3::X) > 0.6 && share(2.0, Vec3::X) < 0.2);
@@ -414,11 +433,13 @@ mod tests {
             normals: vec![Vec3::Z; 21],
         };
         let params = PlanParams::default();
-        let up = |length_mm: f64| {
-            let samples = samples(&params, &line(length_mm), true, None);
-            joint(&params, &[(&samples, false)], 1.0, LatticeDirection::nearest(Vec3::Z))
+        let up = |length_mm: f64, size_mm: f64| {
+            let samples = samples(&params, size_mm, &line(length_mm), true, None);
+            joint(&params, size_mm, &[(&samples, false)], 1.0, LatticeDirection::nearest(Vec3::Z))
         };
-        assert!((up(40.0).run_mm - 32.5).abs() <= SAMPLE_STEP_MM);
-        assert!(up(40.0).holds && !up(12.0).holds);
+        assert!((up(40.0, 2.5).run_mm - 32.5).abs() <= SAMPLE_STEP_MM);
+        assert!(up(40.0, 2.5).holds && !up(12.0, 2.5).holds);
+        // What holds depends on the size alone: half the size, half the length.
+        assert!(up(12.0, 1.25).holds && !up(20.0, 5.0).holds);
     }
 }

@@ -11,8 +11,6 @@ use crate::PatchId;
 pub struct PlanParams {
     /// Seed of all random streams of the stage; the same seed gives the same plan on any number of threads.
     pub seed: u64,
-    /// Connector size D that seams must have room for. [1, 10]; 2.5.
-    pub connector_size_mm: f64,
     /// Wall thickness: seams are as long as on the inner side of the wall, where connectors are. [0, 10]; 0, the outer surface.
     pub wall_mm: f64,
     /// Gap between mating faces. [0.03, 0.6]; 0.12. What a push must cross before it is resisted.
@@ -45,7 +43,6 @@ impl Default for PlanParams {
     fn default() -> Self {
         Self {
             seed: 0,
-            connector_size_mm: 2.5,
             wall_mm: 0.0,
             clearance_mm: 0.12,
             beta: 0.1,
@@ -69,7 +66,6 @@ impl PlanParams {
                 problems.push(format!("`{name}` is {value}; choose a value in [{low}, {high}]"));
             }
         };
-        range("connector_size_mm", self.connector_size_mm, 1.0, 10.0);
         range("wall_mm", self.wall_mm, 0.0, 10.0);
         range("clearance_mm", self.clearance_mm, 0.03, 0.6);
         range("beta", self.beta, 0.0, 1.0);

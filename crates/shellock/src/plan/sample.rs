@@ -19,7 +19,7 @@ pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<I
     let mut most = Vec::new();
     for sizes in SHORTEST_RUN_SIZES {
         let mut counted = survey.clone();
-        counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes * params.connector_size_mm));
+        counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes));
         let space = Space::new(&counted, &constraints, params.relaxed_tolerance);
         for key in choices(params, &counted) {
             let mut plans: Vec<InstallationPlan> = Vec::new();

@@ -107,7 +107,9 @@ mod tests {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0));
         let stop = std::sync::atomic::AtomicBool::new(false);
         let ctx = crate::Ctx::new(&|_| {}, &stop);
-        let survey = survey(&ctx, &PlanParams::default(), &surface, &seams(&surface)).unwrap();
+        let survey =
+            survey(&ctx, &PlanParams::default(), &surface, &seams(&surface), &crate::ConnectorSizes::default())
+                .unwrap();
         let up = LatticeDirection::nearest(Vec3::Z);
         let value = |separation| {
             let steps = [0, 1].map(|p| InstallationStep { piece: PatchId(p), separation }).to_vec();
@@ -123,7 +125,9 @@ mod tests {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z < 0.0));
         let stop = std::sync::atomic::AtomicBool::new(false);
         let ctx = crate::Ctx::new(&|_| {}, &stop);
-        let survey = survey(&ctx, &PlanParams::default(), &surface, &seams(&surface)).unwrap();
+        let survey =
+            survey(&ctx, &PlanParams::default(), &surface, &seams(&surface), &crate::ConnectorSizes::default())
+                .unwrap();
         let separation = LatticeDirection::nearest(s);
         let steps = [0, 1].map(|p| InstallationStep { piece: PatchId(p), separation }).to_vec();
         let mut constraints = PlanConstraints::default();

@@ -82,11 +82,12 @@ pub fn search_with(
     let mut first_answer = None;
     for (i, sizes) in SHORTEST_RUN_SIZES.into_iter().enumerate() {
         let mut counted = survey.clone();
-        counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes * params.connector_size_mm));
+        counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes));
         let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys, costs)?;
         if let PlanOutcome::Found(_) = outcome {
             if i > 0 {
-                warn_of_short_joints(ctx, sizes * params.connector_size_mm);
+                let least_mm = survey.contacts.iter().map(|c| sizes * c.size_mm).fold(f64::INFINITY, f64::min);
+                warn_of_short_joints(ctx, least_mm);
             }
             return Ok(outcome);
         }

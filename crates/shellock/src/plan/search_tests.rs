@@ -35,7 +35,8 @@ fn plan_of(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstrain
 }
 
 fn surveyed(surface: &crate::SegmentedSurface) -> PlanSurvey {
-    on_ctx(|ctx| survey(ctx, &PlanParams::default(), surface, &seams(surface))).unwrap()
+    on_ctx(|ctx| survey(ctx, &PlanParams::default(), surface, &seams(surface), &crate::ConnectorSizes::default()))
+        .unwrap()
 }
 
 /// A survey out of nothing: random contacts, joints, and few free directions.

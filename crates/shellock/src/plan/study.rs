@@ -137,7 +137,7 @@ mod tests {
         let ctx = Ctx::new(&|_| {}, &stop);
         let params = PlanParams { n_plans: 40, ..PlanParams::default() };
         let surface = voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1);
-        let survey = survey(&ctx, &params, &surface, &seams(&surface)).unwrap();
+        let survey = survey(&ctx, &params, &surface, &seams(&surface), &crate::ConnectorSizes::default()).unwrap();
         let PlanOutcome::Found(found) = search(&ctx, &params, &survey, &PlanConstraints::default()).unwrap() else {
             panic!("a ball has a plan")
         };

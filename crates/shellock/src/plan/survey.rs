@@ -6,7 +6,7 @@ use super::contact::{Contact, contacts};
 use super::key::{Flatness, flatness};
 use super::occlusion::Occlusion;
 use super::{PieceSet, PlanParams};
-use crate::{Cancelled, Ctx, IdVec, PatchId, Seam, SegmentedSurface};
+use crate::{Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, Seam, SegmentedSurface};
 
 /// Everything that [`search`](super::search) reads of the surface.
 #[derive(Clone, Debug)]
@@ -27,12 +27,13 @@ pub struct PlanSurvey {
     pub beta: f64,
 }
 
-/// Measures `surface`. With more than [`PieceSet::MAX_PIECES`] pieces only their number, which the search refuses.
+/// Measures `surface`, to be joined by connectors of `sizes`. With more than [`PieceSet::MAX_PIECES`] pieces only their number, which the search refuses.
 pub fn survey(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     surface: &SegmentedSurface,
     seams: &[Seam],
+    sizes: &ConnectorSizes,
 ) -> Result<PlanSurvey, Cancelled> {
     ctx.stage("who is in whose way", 3)?;
     let n_pieces = surface.n_patches;
@@ -42,7 +43,7 @@ pub fn survey(
     }
     survey.occlusion = Occlusion::measure(surface);
     ctx.step()?;
-    survey.contacts = contacts(params, surface, seams);
+    survey.contacts = contacts(params, surface, seams, sizes);
     ctx.step()?;
     survey.area_mm2 = surface.areas();
     survey.mean_normal = mean_normals(surface, &survey.area_mm2);

@@ -1,7 +1,6 @@
 use std::sync::atomic::AtomicBool;
 
 use super::*;
-use crate::figure::Figure;
 use crate::plan::testing::sphere;
 
 fn ball(radius_mm: f64) -> Solid {
@@ -23,8 +22,7 @@ fn the_wall_that_just_bears_the_stress_of_a_wall_is_that_wall() {
     params.refinement = 0.3;
     let stop = AtomicBool::new(false);
     for wall_mm in [0.9, 1.7, 3.1] {
-        params.material.strength_mpa =
-            stress(&Ctx::new(&|_| {}, &stop), &params, &model, wall_mm).unwrap().stress_mpa;
+        params.material.strength_mpa = stress(&Ctx::new(&|_| {}, &stop), &params, &model, wall_mm).unwrap().stress_mpa;
         let strength = found(&params, &model);
         assert!((strength.thickness_mm - wall_mm).abs() <= 2.0 * RESOLUTION_MM, "{wall_mm}: {:?}", strength.tried);
         assert!(!strength.is_too_weak && strength.stress_mpa <= 1.01 * params.material.strength_mpa);

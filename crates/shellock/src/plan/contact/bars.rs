@@ -35,7 +35,6 @@ pub(super) struct Bars<'a> {
     surface: &'a SegmentedSurface,
     bvh: TriangleBvh,
     wall_mm: f64,
-    size_mm: f64,
     far_mm: f64,
 }
 
@@ -57,17 +56,18 @@ impl<'a> Bars<'a> {
             surface,
             bvh: TriangleBvh::new(&surface.mesh),
             wall_mm: params.wall_mm,
-            size_mm: params.connector_size_mm,
             far_mm: surface.mesh.bounds().diagonal(),
         })
     }
 
-    /// What bars a connector between `a` and `b` below `point` of the outer surface; `across` leads from a to b.
-    pub fn at(&self, [a, b]: [PatchId; 2], point: Vec3, normal: Vec3, across: Vec3) -> Barred {
-        let below = point - (self.wall_mm + DEPTH_SIZES * self.size_mm) * normal;
-        let beside = BESIDE_SIZES * self.size_mm * across;
+    /// What bars a connector of `size_mm` between `a` and `b` below `point` of the outer surface; `across` leads from a to b.
+    pub fn at(&self, [a, b]: [PatchId; 2], size_mm: f64, point: Vec3, normal: Vec3, across: Vec3) -> Barred {
+        let height_mm = self.wall_mm + DEPTH_SIZES * size_mm;
+        let below = point - height_mm * normal;
+        let beside = BESIDE_SIZES * size_mm * across;
         let (in_a, in_b) = (below - beside, below + beside);
-        let seen = |origin: Vec3| LatticeDirection::all().map(|s| self.met(origin, normal, s, [a, b])).collect();
+        let seen =
+            |origin: Vec3| LatticeDirection::all().map(|s| self.met(origin, normal, height_mm, s, [a, b])).collect();
         let (from_a, from_b): (Vec<[bool; 2]>, Vec<[bool; 2]>) = (seen(in_a), seen(in_b));
         let mut barred = 0;
         for s in LatticeDirection::all() {
@@ -87,11 +87,10 @@ impl<'a> Bars<'a> {
         Barred(barred)
     }
 
-    /// Which of two patches the ray from `origin` along `s` meets, the wall right above not counted.
-    fn met(&self, origin: Vec3, normal: Vec3, s: LatticeDirection, patches: [PatchId; 2]) -> [bool; 2] {
+    /// Which of two patches the ray from `origin`, so far below the surface, along `s` meets, the wall right above not counted.
+    fn met(&self, origin: Vec3, normal: Vec3, height_mm: f64, s: LatticeDirection, patches: [PatchId; 2]) -> [bool; 2] {
         let along = s.unit();
         let up = along.dot(normal);
-        let height_mm = self.wall_mm + DEPTH_SIZES * self.size_mm;
         let mut travel_mm = if up > LEAVES_ABOVE { LOCAL_WALL * height_mm / up } else { 0.0 };
         let mut met = [false; 2];
         for _ in 0..MOST_WALLS {

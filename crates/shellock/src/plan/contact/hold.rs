@@ -41,9 +41,10 @@ pub type Pushes = [[f32; N_PUSHES]; 2];
 pub struct HoldTable(Vec<Pushes>);
 
 impl HoldTable {
-    /// The table of a contact with these seams; `holds(order, s)` is whether its runs are long enough there.
+    /// The table of a contact with these seams and connectors of `size_mm`; `holds(order, s)` is whether its runs are long enough there.
     pub(super) fn new(
         params: &PlanParams,
+        size_mm: f64,
         lines: &[(&[Sample], bool)],
         holds: impl Fn(usize, LatticeDirection) -> bool + Sync,
     ) -> Self {
@@ -55,7 +56,7 @@ impl HoldTable {
             let side = if order == 0 { 1.0 } else { -1.0 };
             if holds(order, s) {
                 for x in lines.iter().flat_map(|l| l.0).filter(|x| carries(x, side, s)) {
-                    add(params, x, side, s.unit(), &pushes, &mut held);
+                    add(params, size_mm, x, side, s.unit(), &pushes, &mut held);
                 }
             }
             held.map(|pushes| pushes.map(|mm3| mm3 as f32))
@@ -78,19 +79,20 @@ impl HoldTable {
 /// Adds what the connector at `x` holds, mm³.
 fn add(
     params: &PlanParams,
+    size_mm: f64,
     x: &Sample,
     side: f64,
     s: Vec3,
     pushes: &[Vec3; N_PUSHES],
     held: &mut [[f64; N_PUSHES]; 2],
 ) {
-    let (size, gap, step) = (params.connector_size_mm, params.clearance_mm, push::length_mm(params.clearance_mm));
+    let (gap, step) = (params.clearance_mm, push::length_mm(params.clearance_mm));
     // The male leaves along +s if it is the later piece, else along −s; so does the sign of its motion.
     let role = if s.dot(x.normal) >= 0.0 { 1.0 } else { -1.0 };
     let leaves = (role * s).reject_from_normalized(x.tangent).normalize_or_zero();
     let n = leaves.cross(x.tangent);
     let across = side * x.across;
-    let (depth, width) = (PIN_DEPTH_SIZES * size, PIN_WIDTH_SIZES * size - gap);
+    let (depth, width) = (PIN_DEPTH_SIZES * size_mm, PIN_WIDTH_SIZES * size_mm - gap);
     let is_forward = s.dot(across) <= 0.0;
     for (held, sign) in held.iter_mut().zip([1.0, -1.0]) {
         for (held, &push) in held.iter_mut().zip(pushes) {

@@ -1,0 +1,369 @@
+//! How large connectors are, pair by pair of pieces (Sect. 4.3): by the stress at their boundary, and by what fits.
+//!
+//! ```text
+//!   D = D_min + min(α max σ, 1) (D_max − D_min)                                      (Eq. 3)
+//! ```
+//!
+//! with σ the largest von Mises stress of any load case at a point of the boundary. The paper leaves α open. Here it is 1 over
+//! the material's strength: a boundary that is stressed to the limit gets D_max. A larger α saturates boundaries that are far
+//! from failing; a smaller one never reaches D_max, since walls are made so thick that no stress exceeds the strength.
+//!
+//! What fits comes first. A short seam gets no larger connectors than leave it a contact; and between the wall of a narrow limb
+//! and the one opposite must be room for a channel:
+//!
+//! ```text
+//!   ═══════╤═══════  wall H       t: thickness of the model, along the normal
+//!      F│M│ │F                    a channel that leaves straight out is 1.05 D + c deep, and c away from the wall opposite:
+//!      F│ ┘ │F       cavity         1.05 D + 2 c ≤ t − 2 H
+//!      F└───┘F
+//!   ═══════════════  wall H
+//! ```
+//!
+//! Limits: the plan is not known yet, so neither is the angle of a connector, and a channel that leans may be twice as deep;
+//! connectors on the wall opposite are not looked at. What does not fit after all is left out or carved, as with any size.
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use shellock_geom::Vec3;
+use shellock_geom::bvh::TriangleBvh;
+
+use crate::params::ParamProblem;
+use crate::{Cancelled, Ctx, PatchId, Seam, SegmentedSurface, Warning};
+
+/// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
+pub(crate) const CONTACT_SIZES: f64 = 5.6;
+/// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides; below this nothing was left.
+pub(crate) const LEAST_CONTACT_SIZES: f64 = 4.2;
+/// A closed seam has no ends that need gaps: only the run.
+const LOOP_SIZES: f64 = 2.5;
+
+/// Depth of a straight channel without its clearance, in connector sizes: pin and floor.
+const DEPTH_SIZES: f64 = 1.05;
+/// Share of a pair's seams on which the cavity must have room for the size; the rest is left out or carved.
+const ROOM_SHARE: f64 = 0.8;
+/// Distance between the places where the cavity is measured, mm: below the smallest connector.
+const STEP_MM: f64 = 1.5;
+/// Rays begin this far below the surface, mm, so that they do not meet where they start.
+const BELOW_MM: f64 = 0.01;
+/// A size that is smaller by no more than this, mm, is none that a user would care about.
+const TOLD_FROM_MM: f64 = 0.25;
+
+/// The greatest von Mises stress of all load cases at a place of the outer surface, MPa.
+pub type StressField<'a> = &'a (dyn Fn(Vec3) -> f64 + Sync);
+
+/// Depth of a channel below the wall where the piece leaves straight out, mm; `clearance_mm` between the pin and the floor.
+pub fn depth_mm(size_mm: f64, clearance_mm: f64) -> f64 {
+    DEPTH_SIZES * size_mm + clearance_mm
+}
+
+/// Connector size D of every pair of pieces, mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConnectorSizes {
+    default_mm: f64,
+    /// The lower id first.
+    by_pair: BTreeMap<[PatchId; 2], f64>,
+}
+
+impl Default for ConnectorSizes {
+    fn default() -> Self {
+        Self::uniform(SizeChoice::DEFAULT_MM)
+    }
+}
+
+impl ConnectorSizes {
+    /// The same size for all pairs.
+    pub fn uniform(size_mm: f64) -> Self {
+        Self { default_mm: size_mm, by_pair: BTreeMap::new() }
+    }
+
+    /// Sizes of their own for some pairs, named in either order; the last counts where one is named twice.
+    pub fn with_pairs(default_mm: f64, sizes_mm: impl IntoIterator<Item = ([PatchId; 2], f64)>) -> Self {
+        let sorted = |([a, b], size_mm): ([PatchId; 2], f64)| ([a.min(b), a.max(b)], size_mm);
+        Self { default_mm, by_pair: sizes_mm.into_iter().map(sorted).collect() }
+    }
+
+    /// The size between two pieces, in either order.
+    pub fn of(&self, a: PatchId, b: PatchId) -> f64 {
+        self.by_pair.get(&[a.min(b), a.max(b)]).copied().unwrap_or(self.default_mm)
+    }
+
+    /// The size of pairs without one of their own, such as those that meet on the inner surface only.
+    pub fn default_mm(&self) -> f64 {
+        self.default_mm
+    }
+
+    /// The pairs with a size of their own, the lower id first; sorted.
+    pub fn pairs(&self) -> impl Iterator<Item = ([PatchId; 2], f64)> {
+        self.by_pair.iter().map(|(pair, size_mm)| (*pair, *size_mm))
+    }
+
+    /// The largest size that any pair may have: what the cavity must have room for.
+    pub fn largest_mm(&self) -> f64 {
+        self.by_pair.values().copied().fold(self.default_mm, f64::max)
+    }
+}
+
+/// Where connector sizes come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SizeChoice {
+    /// One size for all, mm. [1.5, 6].
+    Fixed(f64),
+    /// By stress and by what fits.
+    Auto(SizeRange),
+}
+
+/// What Eq. 3 chooses from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SizeRange {
+    /// D_min, mm: for boundaries without stress. [1.5, 6]; 2, as published.
+    pub min_mm: f64,
+    /// D_max, mm. [D_min, 6]; 4, as published.
+    pub max_mm: f64,
+    /// α, 1/MPa. [0, 10]; 1 over the material's strength where `None`.
+    pub alpha_per_mpa: Option<f64>,
+}
+
+impl Default for SizeRange {
+    fn default() -> Self {
+        Self { min_mm: 2.0, max_mm: 4.0, alpha_per_mpa: None }
+    }
+}
+
+impl Default for SizeChoice {
+    fn default() -> Self {
+        Self::Fixed(Self::DEFAULT_MM)
+    }
+}
+
+impl SizeChoice {
+    /// The size for all pairs where nothing else is said, mm: its walls come out at 1.1 mm.
+    pub const DEFAULT_MM: f64 = 2.5;
+
+    /// The least size that a pair may get, mm.
+    ///
+    /// Segmentation, which comes before any size, counts a seam as a contact that has room for this one: longer seams get
+    /// larger connectors, but a seam is a contact if there is any size with which it can be one.
+    pub fn smallest_mm(&self) -> f64 {
+        match self {
+            Self::Fixed(size_mm) => *size_mm,
+            Self::Auto(range) => range.min_mm,
+        }
+    }
+
+    /// Every value out of range.
+    pub fn problems(&self) -> Vec<ParamProblem> {
+        const MM: [f64; 2] = [1.5, 6.0];
+        let size = |name, value, least| ParamProblem::unless_within(name, "mm", value, least, MM[1]);
+        let problems = match *self {
+            Self::Fixed(size_mm) => vec![size("connector size", size_mm, MM[0])],
+            Self::Auto(SizeRange { min_mm, max_mm, alpha_per_mpa }) => vec![
+                size("smallest connector size", min_mm, MM[0]),
+                size("largest connector size", max_mm, MM[0].max(min_mm)),
+                alpha_per_mpa.and_then(|a| ParamProblem::unless_within("α of connector sizes", "1/MPa", a, 0.0, 10.0)),
+            ],
+        };
+        problems.into_iter().flatten().collect()
+    }
+}
+
+impl std::fmt::Display for SizeChoice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Fixed(size_mm) => size_mm.fmt(f),
+            Self::Auto(_) => f.write_str("auto"),
+        }
+    }
+}
+
+impl FromStr for SizeChoice {
+    type Err = NoSize;
+
+    /// `auto`, or a size in mm.
+    fn from_str(text: &str) -> Result<Self, NoSize> {
+        if text == "auto" {
+            return Ok(Self::Auto(SizeRange::default()));
+        }
+        text.parse().map(Self::Fixed).map_err(|_| NoSize)
+    }
+}
+
+/// A text that says no size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("neither \"auto\" nor a number of mm")]
+pub struct NoSize;
+
+/// How sizes are chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SizeParams {
+    /// Where they come from.
+    pub choice: SizeChoice,
+    /// Wall thickness H, mm. (0, 10].
+    pub wall_mm: f64,
+    /// Gap between mating faces, mm. [0.03, 0.6].
+    pub clearance_mm: f64,
+    /// Stress that the material bears, MPa. > 0; 42 for the paper's resin.
+    pub strength_mpa: f64,
+}
+
+/// Sizes, and where they are smaller than the stress asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChosenSizes {
+    /// The sizes.
+    pub sizes: ConnectorSizes,
+    /// The pairs whose size was limited by more than a user would overlook, sorted.
+    pub limited: Vec<LimitedSize>,
+}
+
+/// A pair whose connectors are smaller than Eq. 3 has them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LimitedSize {
+    /// The pair, the lower id first.
+    pub pair: [PatchId; 2],
+    /// The middle of its longest seam, mm.
+    pub at: Vec3,
+    /// By Eq. 3, mm.
+    pub wanted_mm: f64,
+    /// What it got, mm.
+    pub given_mm: f64,
+    /// What there is no room in.
+    pub limit: SizeLimit,
+}
+
+/// What keeps connectors small.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SizeLimit {
+    /// The seam is too short.
+    Seam,
+    /// The cavity is too narrow.
+    Cavity,
+}
+
+/// Eq. 3: the size for a greatest stress of `stress_mpa`, mm in [D_min, D_max]. No number counts as no stress.
+pub fn size_for_stress_mm(range: &SizeRange, strength_mpa: f64, stress_mpa: f64) -> f64 {
+    let alpha = range.alpha_per_mpa.unwrap_or(1.0 / strength_mpa);
+    // In this order NaN becomes 0.
+    let share = (alpha * stress_mpa).max(0.0).min(1.0);
+    range.min_mm + share * (range.max_mm - range.min_mm)
+}
+
+/// A size for each pair that shares a seam of `surface`; without a stress field as if there were no stress.
+///
+/// Limited sizes are told by [`ChosenSizes::tell`], so that a kit tells those of its own segmentation only.
+pub fn choose(
+    ctx: &Ctx<'_>,
+    params: &SizeParams,
+    surface: &SegmentedSurface,
+    stress_mpa: Option<StressField<'_>>,
+) -> Result<ChosenSizes, Cancelled> {
+    let range = match &params.choice {
+        SizeChoice::Fixed(size_mm) => {
+            return Ok(ChosenSizes { sizes: ConnectorSizes::uniform(*size_mm), limited: Vec::new() });
+        }
+        SizeChoice::Auto(range) => range,
+    };
+    ctx.stage("connector sizes", 0)?;
+    let mut seams_of: BTreeMap<[PatchId; 2], Vec<Seam>> = BTreeMap::new();
+    for seam in surface.seams() {
+        seams_of.entry([seam.a, seam.b]).or_default().push(seam);
+    }
+    let cavity = Cavity { bvh: TriangleBvh::new(&surface.mesh), far_mm: surface.mesh.bounds().diagonal() };
+    let chosen: Vec<LimitedSize> = seams_of
+        .into_par_iter()
+        .map(|(pair, seams)| {
+            let stress =
+                |field: StressField<'_>| seams.iter().flat_map(|s| &s.points).map(|p| field(*p)).fold(0.0, f64::max);
+            let wanted_mm = size_for_stress_mm(range, params.strength_mpa, stress_mpa.map_or(0.0, stress));
+            let (seam_mm, at) = longest(&seams, params.wall_mm);
+            let cavity_mm = cavity.size_that_fits_mm(params, &seams);
+            let limit = if seam_mm <= cavity_mm { SizeLimit::Seam } else { SizeLimit::Cavity };
+            let given_mm = wanted_mm.min(seam_mm).min(cavity_mm).max(range.min_mm);
+            LimitedSize { pair, at, wanted_mm, given_mm, limit }
+        })
+        .collect();
+    ctx.check()?;
+    let sizes = ConnectorSizes::with_pairs(range.min_mm, chosen.iter().map(|c| (c.pair, c.given_mm)));
+    let limited = chosen.into_iter().filter(|c| c.wanted_mm - c.given_mm > TOLD_FROM_MM).collect();
+    Ok(ChosenSizes { sizes, limited })
+}
+
+/// The largest size with which the longest of `seams` is a contact, mm, and the middle of that seam.
+fn longest(seams: &[Seam], wall_mm: f64) -> (f64, Vec3) {
+    let size_mm = |s: &Seam| s.length_below(wall_mm) / if s.is_loop() { LOOP_SIZES } else { CONTACT_SIZES };
+    let sized = seams.iter().map(|s| (size_mm(s), s));
+    let longest = sized.reduce(|x, y| if y.0 > x.0 { y } else { x });
+    longest.map_or((0.0, Vec3::ZERO), |(size_mm, s)| (size_mm, s.points[s.points.len() / 2]))
+}
+
+/// The inside of the model, as rays see it.
+struct Cavity {
+    bvh: TriangleBvh,
+    far_mm: f64,
+}
+
+impl Cavity {
+    /// The largest size for which there is room below [`ROOM_SHARE`] of `seams`, mm; ≤ 0 where there is no cavity, ∞ where nothing
+    /// can be measured.
+    fn size_that_fits_mm(&self, params: &SizeParams, seams: &[Seam]) -> f64 {
+        let mut fits: Vec<f64> = seams
+            .iter()
+            .flat_map(|seam| seam.resampled((seam.length() / STEP_MM).ceil().max(1.0) as usize))
+            .filter_map(|(point, normal)| {
+                let inwards = -normal.try_normalize()?;
+                let (_, on_mm) = self.bvh.first_hit(point + BELOW_MM * inwards, inwards, self.far_mm)?;
+                Some(size_within_mm(params, BELOW_MM + on_mm))
+            })
+            .collect();
+        fits.sort_unstable_by(|x, y| y.total_cmp(x));
+        let n = (ROOM_SHARE * fits.len() as f64).ceil() as usize;
+        fits.get(n.saturating_sub(1)).copied().unwrap_or(f64::INFINITY)
+    }
+}
+
+/// The largest size whose channel fits where the model is so thick, the clearance away from the wall opposite, mm; may be < 0.
+fn size_within_mm(params: &SizeParams, thickness_mm: f64) -> f64 {
+    (thickness_mm - 2.0 * (params.wall_mm + params.clearance_mm)) / DEPTH_SIZES
+}
+
+impl ChosenSizes {
+    /// Warns with `connector-limited`: once for all seams that are too short, once for all cavities that are too narrow.
+    pub fn tell(&self, ctx: &Ctx<'_>) {
+        for limit in [SizeLimit::Seam, SizeLimit::Cavity] {
+            let limited: Vec<&LimitedSize> = self.limited.iter().filter(|l| l.limit == limit).collect();
+            let lost_mm = |l: &LimitedSize| l.wanted_mm - l.given_mm;
+            // Of equals the pair with the lower ids.
+            let worst = limited.iter().copied().reduce(|x, y| if lost_mm(y) > lost_mm(x) { y } else { x });
+            let Some(worst) = worst else { continue };
+            let mut pieces: Vec<PatchId> = limited.iter().flat_map(|l| l.pair).collect();
+            pieces.sort_unstable();
+            pieces.dedup();
+            let message = worst.message(limited.len() - 1);
+            ctx.warn(Warning { code: "connector-limited".into(), message, pieces, at: Some(worst.at.to_array()) });
+        }
+    }
+}
+
+impl LimitedSize {
+    fn message(&self, n_others: usize) -> String {
+        let Self { pair: [a, b], wanted_mm, given_mm, .. } = self;
+        let (why, remedy) = match self.limit {
+            SizeLimit::Seam => ("their seam is too short for larger ones", "fewer pieces have longer seams"),
+            SizeLimit::Cavity => {
+                ("the cavity is too narrow for larger ones", "thinner walls or a larger model make room")
+            }
+        };
+        let others = match n_others {
+            0 => String::new(),
+            1 => ", and so for one other pair".to_owned(),
+            n => format!(", and so for {n} other pairs"),
+        };
+        format!(
+            "connectors between pieces {a} and {b} are {given_mm:.1} mm where the stress asks for {wanted_mm:.1} mm, because {why}{others}; {remedy}"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;
