@@ -4,9 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use shellock::pipeline::Params;
+use shellock_mechanics::Material;
+
+use crate::stress;
 
 /// Exit codes, shown in the help.
-const EXIT_CODES: &str = "Exit codes: 0 made and verified · 1 made, but a check failed · 2 the input or an argument is wrong · \
+const EXIT_CODES: &str = "Exit codes: 0 made and verified · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
 3 no plan could be found · 4 a file could not be written · 130 stopped with Ctrl-C (nothing is left behind)";
 
 /// Turns a closed 3D model into hollow pieces that lock each other without glue.
@@ -68,6 +71,13 @@ pub enum Command {
         /// The model it was made from [default: the file named in its plan.json]
         model: Option<PathBuf>,
     },
+    /// Punch a finished kit and let it fall, in simulation; compare it with half connectors and with a plan of half the score
+    Test {
+        /// Folder of the kit; stress.json and stress.svg go there
+        kit: PathBuf,
+        #[command(flatten)]
+        blows: Blows,
+    },
     /// Say what a file holds and whether it can be made
     Inspect {
         /// STL, OBJ, PLY or OFF file
@@ -84,6 +94,23 @@ pub enum Command {
         #[arg(long, default_value_t = 150.0, value_name = "MM")]
         size: f64,
     },
+}
+
+/// What is done to a kit.
+#[derive(Args)]
+pub struct Blows {
+    /// Force on the top
+    #[arg(long, value_name = "FORCE", default_value = "70N", value_parser = stress::newtons)]
+    pub punch: f64,
+    /// Height of the fall: m, cm or mm
+    #[arg(long, value_name = "HEIGHT", default_value = "2m", value_parser = stress::length_mm)]
+    pub drop: f64,
+    /// What the pieces are printed of: sla-resin, pla, petg or pa12
+    #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material)]
+    pub material: Material,
+    /// Which axis points up [default: as the kit was built]
+    #[arg(long, value_enum)]
+    pub up: Option<Axis>,
 }
 
 /// Where a kit goes.
@@ -106,9 +133,14 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Its index and unit vector.
+    /// Its index.
     pub fn index(self) -> usize {
         self as usize
+    }
+
+    /// Along it.
+    pub fn unit(self) -> [f64; 3] {
+        std::array::from_fn(|axis| f64::from(u8::from(axis == self.index())))
     }
 }
 
@@ -175,7 +207,7 @@ impl Options {
         p.plan.seed = self.seed;
         p.plan.key = self.key.map(shellock::PatchId);
         p.plan.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
-        p.plan.up = std::array::from_fn(|axis| f64::from(u8::from(axis == self.up.index())));
+        p.plan.up = self.up.unit();
         p.body.thickness_mm = self.thickness;
         p.body.wall_gap_mm = self.wall_gap;
         p.body.cell_mm = self.grid;

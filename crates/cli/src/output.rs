@@ -187,6 +187,7 @@ fn plan_json(
         "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
         "connector_size": params.connector.size_mm,
         "wall_gap": params.body.wall_gap_mm,
+        "up": params.plan.up,
         "min_wall": params.connector.min_wall_mm,
         "key_piece": plan.key(),
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),

@@ -20,6 +20,7 @@ pub mod push;
 pub mod report;
 mod seams;
 pub mod segmentation;
+pub mod stress_test;
 pub mod surface;
 pub mod verify;
 

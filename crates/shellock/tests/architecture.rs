@@ -4,8 +4,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module may name those before it. `plan` stands before `body` because bodies are split along a plan.
-const ORDER: [&str; 10] =
-    ["segmentation", "plan", "metric", "body", "connector", "piece", "verify", "report", "feedback", "pipeline"];
+const ORDER: [&str; 11] = [
+    "segmentation",
+    "plan",
+    "metric",
+    "stress_test",
+    "body",
+    "connector",
+    "piece",
+    "verify",
+    "report",
+    "feedback",
+    "pipeline",
+];
 
 fn rust_files(src: &Path, module: &str) -> Vec<PathBuf> {
     let mut files = vec![src.join(format!("{module}.rs"))];
