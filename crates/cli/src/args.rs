@@ -96,18 +96,31 @@ pub enum Command {
     },
 }
 
+/// Where a punch lands.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Place {
+    Top,
+    Middle,
+}
+
 /// What is done to a kit.
 #[derive(Args)]
 pub struct Blows {
     /// Force on the top
     #[arg(long, value_name = "FORCE", default_value = "70N", value_parser = stress::newtons)]
     pub punch: f64,
+    /// Where it presses: on the highest point, or on the highest place above the middle
+    #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
+    pub at: Place,
     /// Height of the fall: m, cm or mm
     #[arg(long, value_name = "HEIGHT", default_value = "2m", value_parser = stress::length_mm)]
     pub drop: f64,
     /// What the pieces are printed of: sla-resin, pla, petg or pa12
     #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material)]
     pub material: Material,
+    /// Length of the simulation's triangle edges, as a share of the usual one, 0.2 to 5; half takes some ten times as long
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
+    pub edges: f64,
     /// Which axis points up [default: as the kit was built]
     #[arg(long, value_enum)]
     pub up: Option<Axis>,

@@ -5,13 +5,13 @@ use std::path::Path;
 use serde_json::{Value, json};
 use shellock::metric::MetricParams;
 use shellock::pipeline::Params;
-use shellock::stress_test::{Outcome, Pair, StressParams, StressReport, Verdict, chart, stress_test};
+use shellock::stress_test::{Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test};
 use shellock::{Ctx, PatchId, SegmentedSurface};
 use shellock_geom::check::into_solid;
 use shellock_mechanics::Material;
 
 use crate::Session;
-use crate::args::{Axis, Blows};
+use crate::args::{Axis, Blows, Place};
 use crate::failure::Failure;
 use crate::input::{load, read};
 use crate::progress::Display;
@@ -63,7 +63,8 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
 
     let code = u8::from(!tested.passed());
     let value = json!({
-        "format": "shellock-stress", "version": 1, "punch_n": params.punch_n, "drop_mm": params.drop_mm,
+        "format": "shellock-stress", "version": 1, "punch_n": params.punch_n,
+        "punch_at": params.punch_at, "drop_mm": params.drop_mm,
         "material": params.metric.material, "connector_size": params.metric.connector_mm, "up": params.plan.up,
         "passed": tested.passed(), "report": tested,
     });
@@ -112,8 +113,12 @@ fn params_of(plan: &Value, blows: &Blows) -> StressParams {
         _ => Axis::Z.unit(),
     };
     let plan = params.agreed().plan;
-    let metric = MetricParams { material: blows.material, ..MetricParams::of_plan(&plan) };
-    StressParams { punch_n: blows.punch, drop_mm: blows.drop, metric, plan }
+    let metric = MetricParams { material: blows.material, edge_share: blows.edges, ..MetricParams::of_plan(&plan) };
+    let punch_at = match blows.at {
+        Place::Top => PunchAt::Top,
+        Place::Middle => PunchAt::Middle,
+    };
+    StressParams { punch_n: blows.punch, punch_at, drop_mm: blows.drop, metric, plan }
 }
 
 fn print_table(params: &StressParams, tested: &StressReport) {

@@ -196,7 +196,7 @@ fn imbalance(responses: &[Response], equilibrium: &Equilibrium, forces_n: &[Vec3
 }
 
 /// One part with its connectors.
-struct Body<'a> {
+pub(super) struct Body<'a> {
     /// Tetrahedra of its wall.
     tets: Vec<u32>,
     numbering: Numbering,
@@ -220,7 +220,8 @@ struct Body<'a> {
 type Entries = Vec<(u32, u32, f64)>;
 
 impl<'a> Body<'a> {
-    fn new(
+    /// The part, and what contact sees of it; `loads_n` are the forces at the wall nodes.
+    pub fn new(
         model: &'a VolumeModel,
         part: u32,
         plan: &[Meeting],
@@ -252,8 +253,7 @@ impl<'a> Body<'a> {
         let rows = BTreeMap::new();
         let (is_pinned, moved_mm) = (vec![false; n], Vec::new());
         let stiffness = Cholesky::new(&SparseSymmetric::from_entries(0, Vec::new()))?;
-        let mut body =
-            Self { tets, numbering, bars, labels, own, kept, stiffness, is_pinned, rows, load_n, moved_mm };
+        let mut body = Self { tets, numbering, bars, labels, own, kept, stiffness, is_pinned, rows, load_n, moved_mm };
         body.add_fronts(&fronts, &mut entries);
         if model.parts[part as usize].rigid.is_some() {
             body.pin(model);

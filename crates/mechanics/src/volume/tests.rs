@@ -346,7 +346,11 @@ fn a_balls_mass_is_its_walls_volume_times_density() {
 #[test]
 fn a_plate_pulled_at_its_outer_face_has_the_stress_of_a_bar() {
     let (model, plates) = strip(Order::Quadratic, true);
-    let end: Vec<u32> = (0..).zip(&plates.points).filter(|(i, p)| p.x == 0.0 && plates.part_of_point[*i as usize] == 0).map(|(i, _)| i).collect();
+    let end: Vec<u32> = (0..)
+        .zip(&plates.points)
+        .filter(|(i, p)| p.x == 0.0 && plates.part_of_point[*i as usize] == 0)
+        .map(|(i, _)| i)
+        .collect();
     let mut forces_n = vec![Vec3::ZERO; plates.points.len()];
     end.iter().for_each(|&p| forces_n[p as usize] = Vec3::X * 10.0 / end.len() as f64);
     let plan: Vec<Meeting> = plates.stations.iter().map(|s| Meeting { wall: -s.across, joint: None }).collect();
@@ -354,10 +358,34 @@ fn a_plate_pulled_at_its_outer_face_has_the_stress_of_a_bar() {
     // Pulled at the outer face of 2 mm: N/A + M/W = (1 + 3) F / (b h), of which von Mises sees all.
     let expected_mpa = 4.0 * 10.0 / (5.0 * 2.0);
     let middle = plates.triangles.iter().zip(&loaded.triangle_mpa).filter(|(t, _)| {
-        t.iter().all(|&p| (p as usize) < plates.points.len() / 2 && (-30.0..-10.0).contains(&plates.points[p as usize].x))
+        t.iter()
+            .all(|&p| (p as usize) < plates.points.len() / 2 && (-30.0..-10.0).contains(&plates.points[p as usize].x))
     });
     let largest_mpa = middle.map(|(_, mpa)| *mpa).fold(0.0, f64::max);
     assert!((largest_mpa / expected_mpa - 1.0).abs() < 0.1, "{largest_mpa} MPa, a bar has {expected_mpa} MPa");
+}
+
+/// Condensed onto the seams, and as one sparse system: two ways to the same compliance.
+#[test]
+fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
+    let plates = sample::plates(20.0, 10.0, [5, 3]);
+    let clamped: Vec<u32> = (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > 9.9).map(|(i, _)| i).collect();
+    let model = VolumeModel::clamped(&VolumeParams::default(), &plates, &clamped).unwrap();
+    let plan = joined(&plates, 20.0, None);
+    let sections = super::connector::sections(&model, &plan);
+    let bars = super::connector::bars(&model, &plan, &sections);
+    let loads_n = vec![Vec3::ZERO; model.wall.nodes.len()];
+    for part in 0..2 {
+        let condensed = model.response(part, false, &plan, &sections, &bars).unwrap();
+        let (_, sparse) = super::load::Body::new(&model, part, &plan, &sections, &bars, &loads_n).unwrap();
+        assert_eq!(condensed.rows, sparse.rows);
+        let n = condensed.rows.len();
+        let largest = condensed.compliance.iter().copied().fold(0.0, f64::max);
+        for at in (0..n * n).filter(|at| at % n >= at / n) {
+            let difference = condensed.compliance[at] - sparse.compliance[at];
+            assert!(difference.abs() < 1e-7 * largest, "{difference} of {largest} at {at}");
+        }
+    }
 }
 
 #[test]

@@ -33,29 +33,52 @@ pub fn lowest(assembly: &ShellAssembly, up: Vec3) -> Vec<u32> {
     (0..assembly.points.len() as u32).collect()
 }
 
-/// The points (ascending) around the highest one, no farther from it sideways or below than `radius_mm`, that face upwards.
-pub fn top(assembly: &ShellAssembly, up: Vec3, radius_mm: f64) -> Vec<u32> {
-    let highest = (0..assembly.points.len()).reduce(|best, i| {
-        if assembly.points[i].dot(up) > assembly.points[best].dot(up) { i } else { best }
-    });
-    let Some(highest) = highest else { return Vec::new() };
+/// The highest point.
+pub fn highest(assembly: &ShellAssembly, up: Vec3) -> Option<usize> {
+    highest_of(assembly, up, 0..assembly.points.len())
+}
+
+/// The highest point that faces upwards within `radius_mm` of the vertical line through the middle of the surface; the highest of
+/// all where there is none, as on a ring.
+pub fn highest_in_the_middle(assembly: &ShellAssembly, up: Vec3, radius_mm: f64) -> Option<usize> {
+    let areas_mm2 = point_areas_mm2(assembly);
+    let weighted: Vec3 = assembly.points.iter().zip(&areas_mm2).map(|(p, area)| *p * *area).sum();
+    let middle = weighted / areas_mm2.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let is_near = |i: &usize| (assembly.points[*i] - middle).reject_from_normalized(up).length() <= radius_mm;
+    let near = (0..assembly.points.len()).filter(|i| is_near(i) && assembly.normals[*i].dot(up) > 0.0);
+    highest_of(assembly, up, near).or_else(|| highest(assembly, up))
+}
+
+fn highest_of(assembly: &ShellAssembly, up: Vec3, points: impl Iterator<Item = usize>) -> Option<usize> {
+    let height = |i: usize| assembly.points[i].dot(up);
+    points.reduce(|best, i| if height(i) > height(best) { i } else { best })
+}
+
+/// The points (ascending) that face upwards around point `hit`, no farther from it sideways or below than `radius_mm`.
+pub fn around(assembly: &ShellAssembly, up: Vec3, hit: usize, radius_mm: f64) -> Vec<u32> {
     let is_hit = |i: &usize| {
-        let from = assembly.points[*i] - assembly.points[highest];
+        let from = assembly.points[*i] - assembly.points[hit];
         let below_mm = -from.dot(up);
-        let is_near = below_mm <= radius_mm && (from + below_mm * up).length() <= radius_mm;
-        *i == highest || (is_near && assembly.normals[*i].dot(up) > 0.0)
+        let is_near = (0.0..=radius_mm).contains(&below_mm) && (from + below_mm * up).length() <= radius_mm;
+        *i == hit || (is_near && assembly.normals[*i].dot(up) > 0.0)
     };
     (0..assembly.points.len()).filter(is_hit).map(|i| i as u32).collect()
 }
 
-/// `force_n` over `points`, each by its share of their area; evenly where they have none.
-pub fn spread(assembly: &ShellAssembly, points: &[u32], force_n: Vec3) -> Vec<Vec3> {
-    let mut area_mm2 = vec![0.0; assembly.points.len()];
+/// A third of its triangles' area for each point.
+fn point_areas_mm2(assembly: &ShellAssembly) -> Vec<f64> {
+    let mut areas_mm2 = vec![0.0; assembly.points.len()];
     for t in &assembly.triangles {
         let [a, b, c] = t.map(|p| assembly.points[p as usize]);
         let third = (b - a).cross(c - a).length() / 6.0;
-        t.iter().for_each(|&p| area_mm2[p as usize] += third);
+        t.iter().for_each(|&p| areas_mm2[p as usize] += third);
     }
+    areas_mm2
+}
+
+/// `force_n` over `points`, each by its share of their area; evenly where they have none.
+pub fn spread(assembly: &ShellAssembly, points: &[u32], force_n: Vec3) -> Vec<Vec3> {
+    let area_mm2 = point_areas_mm2(assembly);
     let total: f64 = points.iter().map(|&p| area_mm2[p as usize]).sum();
     let mut forces_n = vec![Vec3::ZERO; assembly.points.len()];
     for &p in points {

@@ -37,9 +37,12 @@ fn forces_are_spread_over_what_they_hit_and_add_up() {
     let model = PlanModel::new(&coarse().metric, &octants());
     let a = &model.assembly;
     let height = |p: &u32| a.points[*p as usize].z;
-    let (hit, foot) = (top(a, Vec3::Z, PUNCH_RADIUS_MM), lowest(a, Vec3::Z));
+    let top = highest(a, Vec3::Z).unwrap();
+    let (hit, foot) = (around(a, Vec3::Z, top, PUNCH_RADIUS_MM), lowest(a, Vec3::Z));
     assert!(!hit.is_empty() && hit.iter().all(|p| height(p) > 30.0));
     assert!(foot.len() >= 3 && foot.iter().all(|p| height(p) < 0.0));
+    // A ball's top is in its middle.
+    assert_eq!(highest_in_the_middle(a, Vec3::Z, PUNCH_RADIUS_MM), Some(top));
     let forces_n = spread(a, &hit, -70.0 * Vec3::Z);
     assert!((forces_n.iter().sum::<Vec3>() + 70.0 * Vec3::Z).length() < 1e-9);
     assert!((0..).zip(&forces_n).all(|(i, f)| hit.contains(&i) || *f == Vec3::ZERO));
