@@ -9,7 +9,7 @@ use shellock_mechanics::Material;
 use crate::stress;
 
 /// Exit codes, shown in the help.
-const EXIT_CODES: &str = "Exit codes: 0 made and verified · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
+const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
 3 no plan could be found · 4 a file could not be written · 130 stopped with Ctrl-C (nothing is left behind)";
 
 /// Turns a closed 3D model into hollow pieces that lock each other without glue.
@@ -73,7 +73,7 @@ pub enum Command {
     },
     /// Punch a finished kit and let it fall, in simulation; compare it with half connectors and with a plan of half the score
     Test {
-        /// Folder of the kit; stress.json and stress.svg go there
+        /// Folder of the kit; stress.json and stress.svg go there. Exit code 0: it holds; 1: it opens, yields or comes apart
         kit: PathBuf,
         #[command(flatten)]
         blows: Blows,
@@ -106,14 +106,15 @@ pub enum Place {
 /// What is done to a kit.
 #[derive(Args)]
 pub struct Blows {
-    /// Force on the top
-    #[arg(long, value_name = "FORCE", default_value = "70N", value_parser = stress::newtons)]
+    /// Force of the punch
+    #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true, value_parser = stress::newtons)]
     pub punch: f64,
     /// Where it presses: on the highest point, or on the highest place above the middle
     #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
     pub at: Place,
     /// Height of the fall: m, cm or mm
-    #[arg(long, value_name = "HEIGHT", default_value = "2m", value_parser = stress::length_mm)]
+    #[arg(long, value_name = "HEIGHT", default_value = "2m", allow_hyphen_values = true,
+          value_parser = stress::length_mm)]
     pub drop: f64,
     /// What the pieces are printed of: sla-resin, pla, petg or pa12
     #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material)]

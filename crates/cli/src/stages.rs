@@ -22,8 +22,12 @@ use crate::progress::{Display, PlanClock};
 /// Writes one file: whole or not at all.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let temporary = tempfile::Builder::new().prefix(".shellock-").tempfile_in(parent);
-    let temporary = temporary.map_err(Failure::unwritable(path))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".shellock-");
+    // Temporary files are for their owner alone; this one stays, for whom the user lets read files.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let temporary = builder.tempfile_in(parent).map_err(Failure::unwritable(path))?;
     fs::write(temporary.path(), bytes).map_err(Failure::unwritable(path))?;
     temporary.persist(path).map(|_| ()).map_err(|e| Failure::Unwritable { path: path.to_owned(), source: e.error })
 }

@@ -20,7 +20,7 @@ use crate::stages::{order_of, write};
 /// A force in N: "70N", "70 N" or "70".
 pub fn newtons(text: &str) -> Result<f64, String> {
     let number = text.trim().strip_suffix('N').unwrap_or(text).trim();
-    positive(number).ok_or_else(|| format!("\"{text}\" is no force; write for example 70N"))
+    positive(number).ok_or_else(|| format!("\"{text}\" is no force above 0 N; write for example 70N"))
 }
 
 /// A length in mm: "2m", "200cm" or "2000 mm".
@@ -29,7 +29,7 @@ pub fn length_mm(text: &str) -> Result<f64, String> {
     let units = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0)];
     let split = units.into_iter().find_map(|(unit, mm)| Some((text.strip_suffix(unit)?.trim(), mm)));
     let value = split.and_then(|(number, mm)| Some(positive(number)? * mm));
-    value.ok_or_else(|| format!("\"{text}\" is no height; write for example 2m, 150cm or 500mm"))
+    value.ok_or_else(|| format!("\"{text}\" is no height above 0; write for example 2m, 150cm or 500mm"))
 }
 
 fn positive(text: &str) -> Option<f64> {
@@ -46,6 +46,12 @@ pub fn material(name: &str) -> Result<Material, String> {
 /// `shellock test`.
 pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure> {
     let path = kit.join("plan.json");
+    if !path.exists() {
+        return Err(Failure::Wrong(format!(
+            "{}: there is no kit here, for it has no plan.json; `shellock build` makes one",
+            kit.display()
+        )));
+    }
     let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
     let plan: Value = serde_json::from_slice(&read(&path)?).map_err(|e| broken(&format!("not a plan: {e}")))?;
     let order = order_of(&plan).map_err(|f| match f {
@@ -53,7 +59,7 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
         other => other,
     })?;
     let surface = surface_of(&kit.join("segmentation.ply"), order.steps.len())?;
-    let params = params_of(&plan, blows);
+    let params = params_of(&plan, blows).map_err(|what| broken(&what))?;
 
     let display = Display::new(session.is_json);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
@@ -99,8 +105,8 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
     Ok(SegmentedSurface { mesh: solid.into_mesh(), patch_of_face, source_face: kept, n_patches: n_pieces })
 }
 
-/// The kit's sizes, with defaults where its plan does not tell them.
-fn params_of(plan: &Value, blows: &Blows) -> StressParams {
+/// The kit's sizes, with defaults where its plan does not tell them; or what is wrong with them.
+fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
     let mut params = Params::default();
     let number = |name: &str, default: f64| plan[name].as_f64().unwrap_or(default);
     params.body.thickness_mm = number("shell_thickness", params.body.thickness_mm);
@@ -112,13 +118,17 @@ fn params_of(plan: &Value, blows: &Blows) -> StressParams {
         (None, [x, y, z]) => [*x, *y, *z],
         _ => Axis::Z.unit(),
     };
+    let problems = params.problems();
+    if !problems.is_empty() {
+        return Err(problems.join("; "));
+    }
     let plan = params.agreed().plan;
     let metric = MetricParams { material: blows.material, edge_share: blows.edges, ..MetricParams::of_plan(&plan) };
     let punch_at = match blows.at {
         Place::Top => PunchAt::Top,
         Place::Middle => PunchAt::Middle,
     };
-    StressParams { punch_n: blows.punch, punch_at, drop_mm: blows.drop, metric, plan }
+    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: blows.drop, metric, plan })
 }
 
 fn print_table(params: &StressParams, tested: &StressReport) {
@@ -130,7 +140,7 @@ fn print_table(params: &StressParams, tested: &StressReport) {
         tested.strength_mpa
     );
     println!("design           test   force N  opening mm  between   walls MPa  connectors MPa  of strength  verdict");
-    for (name, Pair { punch, drop, score_mm }) in tested.designs() {
+    for (name, Pair { punch, drop, score_mm, .. }) in tested.designs() {
         for (test, o) in [("punch", punch), ("fall", drop)] {
             let Outcome { force_n, opening_mm, wall_mpa, connector_mpa, .. } = o;
             let between = o.between.map_or_else(String::new, |[a, b]| format!("{a} and {b}"));
@@ -145,7 +155,9 @@ fn print_table(params: &StressParams, tested: &StressReport) {
             println!("{name:16} score by the surface metric {score_mm:.4} mm");
         }
     }
-    if tested.half_score.is_none() {
+    if tested.kit.score_mm.is_none() {
+        println!("by the surface metric this plan comes apart, so there is none of half its score");
+    } else if tested.half_score.is_none() {
         println!("no other plan that holds was found, so none of half the score was tested");
     }
 }

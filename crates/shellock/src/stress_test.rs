@@ -40,6 +40,11 @@ const N_DRAWN: usize = 100;
 /// An opening of this many connector sizes shows, and is half of what lets a pin out.
 const OPEN_SIZES: f64 = 0.3;
 
+/// How far a seam may open and still hold, mm.
+fn open_mm(connector_mm: f64) -> f64 {
+    OPEN_SIZES * connector_mm
+}
+
 /// Where the punch lands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -145,8 +150,10 @@ pub struct Pair {
     pub punch: Outcome,
     /// Fallen.
     pub drop: Outcome,
-    /// The plan's score, by the surface metric, mm (higher is better); `None` where pieces come apart in it.
+    /// The plan's score with whole connectors, by the surface metric, mm (higher is better); `None` where pieces come apart in it.
     pub score_mm: Option<f64>,
+    /// Size of the connectors, mm.
+    pub connector_mm: f64,
 }
 
 /// The tests of a kit and of two that ought to be worse.
@@ -234,7 +241,7 @@ pub fn stress_test(
     let half_score = worse.map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm))).transpose()?;
     ctx.stage("stress test: half connectors", 0)?;
     let half_mm = params.metric.connector_mm / 2.0;
-    let half_connectors = Bench::new(params, &model, half_mm)?.test(&meetings, None)?;
+    let half_connectors = Bench::new(params, &model, half_mm)?.test(&meetings, score_mm)?;
     Ok(StressReport {
         kit,
         half_connectors,
@@ -329,7 +336,12 @@ impl<'a> Bench<'a> {
         let impact = spread(assembly, &lowest(assembly, up), up * impact_n);
         let punched = self.standing.under_load(meetings, &punch)?;
         let fallen = self.free.under_load(meetings, &impact)?;
-        Ok(Pair { punch: self.outcome(punched, self.params.punch_n), drop: self.outcome(fallen, impact_n), score_mm })
+        Ok(Pair {
+            punch: self.outcome(punched, self.params.punch_n),
+            drop: self.outcome(fallen, impact_n),
+            score_mm,
+            connector_mm: self.connector_mm,
+        })
     }
 
     fn outcome(&self, loaded: Result<Loaded, Vec<u32>>, force_n: f64) -> Outcome {
@@ -350,7 +362,7 @@ impl<'a> Bench<'a> {
             Verdict::ComesApart
         } else if strength_share > 1.0 {
             Verdict::Yields
-        } else if opening_mm >= OPEN_SIZES * self.connector_mm {
+        } else if opening_mm >= open_mm(self.connector_mm) {
             Verdict::Opens
         } else {
             Verdict::Holds

@@ -2,53 +2,103 @@
 
 use std::fmt::Write;
 
-use super::{Outcome, StressReport, Verdict};
+use super::{Outcome, Pair, StressReport, Verdict, open_mm};
 
-const BAR_PX: f64 = 26.0;
-const LEFT_PX: f64 = 210.0;
-const LONGEST_PX: f64 = 360.0;
-const PANEL_PX: f64 = LEFT_PX + LONGEST_PX + 190.0;
+const ROW_PX: f64 = 26.0;
+const NAME_PX: f64 = 130.0;
+const LONGEST_PX: f64 = 300.0;
+/// Figure and verdict.
+const LABEL_PX: f64 = 150.0;
+const PANEL_PX: f64 = NAME_PX + LONGEST_PX + LABEL_PX + 20.0;
 
-/// Two panels side by side: the widest opening in mm, and the stress as a share of the strength, each bar in the colour of its
-/// verdict.
+/// One bar.
+struct Row {
+    design: &'static str,
+    verdict: Verdict,
+    value: f64,
+    /// It holds below this.
+    limit: f64,
+}
+
+/// A name and its bars for each of the two tests.
+type Groups = [(String, Vec<Row>); 2];
+
+/// Two panels side by side: the widest opening, and the stress as a share of the strength; in each the designs under the punch,
+/// then in the fall. Bars have the colour of the test's verdict; a line across each marks its limit.
 pub fn chart(report: &StressReport) -> String {
-    let rows: Vec<(String, &Outcome)> = (report.designs().into_iter())
-        .flat_map(|(name, pair)| [(format!("{name}, punch"), &pair.punch), (format!("{name}, fall"), &pair.drop)])
-        .collect();
-    let height = BAR_PX * (rows.len() as f64 + 3.0);
-    let width = 2.0 * PANEL_PX;
+    let (width, height) = (2.0 * PANEL_PX, ROW_PX * (2.0 * report.designs().len() as f64 + 6.0));
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
          font-size=\"14\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
     );
-    let openings = rows.iter().map(|(name, o)| (name.as_str(), *o, o.opening_mm, "mm"));
-    panel(&mut svg, 0.0, "widest opening between pieces", &openings.collect::<Vec<_>>());
-    let shares = rows.iter().map(|(name, o)| (name.as_str(), *o, 100.0 * o.strength_share, "%"));
-    panel(&mut svg, PANEL_PX, "stress, share of the strength", &shares.collect::<Vec<_>>());
+    let openings = groups(report, |pair, outcome| (outcome.opening_mm, open_mm(pair.connector_mm)));
+    panel(&mut svg, 0.0, "widest opening, mm", 2, &openings);
+    let shares = groups(report, |_, outcome| (100.0 * outcome.strength_share, 100.0));
+    panel(&mut svg, PANEL_PX, "stress, % of the strength", 0, &shares);
+    let note = "Black line: below it the kit holds. Connectors of half the size may open half as far.";
+    text(&mut svg, [NAME_PX, height - 0.6 * ROW_PX], "fill=\"#555\"", note);
     svg.push_str("</svg>\n");
     svg
 }
 
-/// One panel: a title, and name, bar and figure of each row. What is not finite gets the longest bar.
-fn panel(svg: &mut String, x: f64, title: &str, rows: &[(&str, &Outcome, f64, &str)]) {
-    let largest = rows.iter().map(|r| r.2).filter(|v| v.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
-    // Writing to a string cannot fail.
-    let _ = writeln!(svg, "<text x=\"{}\" y=\"{BAR_PX}\" font-weight=\"bold\">{title}</text>", x + LEFT_PX);
-    for (i, (name, outcome, value, unit)) in rows.iter().enumerate() {
-        let y = BAR_PX * (i as f64 + 1.7);
-        let length = if value.is_finite() { LONGEST_PX * value / largest } else { LONGEST_PX };
-        let figure = if value.is_finite() { format!("{value:.3} {unit}") } else { "without end".to_owned() };
-        let (color, word) = style(outcome.verdict);
-        let (end, baseline) = (x + LEFT_PX - 8.0, y + 0.65 * BAR_PX);
-        let _ = writeln!(svg, "<text x=\"{end}\" y=\"{baseline:.1}\" text-anchor=\"end\">{name}</text>");
-        let (left, thick) = (x + LEFT_PX, 0.8 * BAR_PX);
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{left}\" y=\"{y:.1}\" width=\"{length:.1}\" height=\"{thick:.1}\" fill=\"{color}\"/>"
-        );
-        let after = left + length + 6.0;
-        let _ = writeln!(svg, "<text x=\"{after:.1}\" y=\"{baseline:.1}\">{figure} · {word}</text>");
+/// The bars with the value and the limit that `measure` tells.
+fn groups(report: &StressReport, measure: fn(&Pair, &Outcome) -> (f64, f64)) -> Groups {
+    let rows = |of: fn(&Pair) -> &Outcome| -> Vec<Row> {
+        let row = |(design, pair): (&'static str, &Pair)| {
+            let (value, limit) = measure(pair, of(pair));
+            Row { design, verdict: of(pair).verdict, value, limit }
+        };
+        report.designs().into_iter().map(row).collect()
+    };
+    let (punch_n, impact_n) = (report.kit.punch.force_n, report.kit.drop.force_n);
+    [
+        (format!("punched with {punch_n:.0} N"), rows(|pair| &pair.punch)),
+        (format!("fallen, stopped with {impact_n:.0} N"), rows(|pair| &pair.drop)),
+    ]
+}
+
+/// A title, and for each test its name and its bars.
+fn panel(svg: &mut String, x: f64, title: &str, digits: usize, groups: &Groups) {
+    let values = groups.iter().flat_map(|(_, rows)| rows).flat_map(|row| [row.value, row.limit]);
+    let largest = values.filter(|v| v.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
+    let left = x + NAME_PX;
+    text(svg, [left, ROW_PX], "font-weight=\"bold\" font-size=\"16\"", title);
+    let mut y = 1.3 * ROW_PX;
+    for (test, rows) in groups {
+        text(svg, [left, y + 0.7 * ROW_PX], "fill=\"#555\"", test);
+        y += ROW_PX;
+        for row in rows {
+            bar(svg, [left, y], LONGEST_PX / largest, digits, row);
+            y += ROW_PX;
+        }
+        y += 0.4 * ROW_PX;
     }
+}
+
+/// Name, bar, limit and figure. What is not finite gets the longest bar.
+fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, digits: usize, row: &Row) {
+    let (length, figure) = if row.value.is_finite() {
+        (row.value * px_per_unit, format!("{:.digits$}", row.value))
+    } else {
+        (LONGEST_PX, "without end".to_owned())
+    };
+    let (color, word) = style(row.verdict);
+    let (limit, thick) = (row.limit * px_per_unit, 0.8 * ROW_PX);
+    let (at, bottom, baseline) = (left + limit, y + thick, y + 0.6 * ROW_PX);
+    text(svg, [left - 8.0, baseline], "text-anchor=\"end\"", row.design);
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        svg,
+        "<rect x=\"{left}\" y=\"{y:.1}\" width=\"{length:.1}\" height=\"{thick:.1}\" fill=\"{color}\"/>\n\
+         <line x1=\"{at:.1}\" y1=\"{y:.1}\" x2=\"{at:.1}\" y2=\"{bottom:.1}\" stroke=\"black\" stroke-width=\"2\"/>"
+    );
+    // The figure stands behind the bar, and behind the limit where that would cross it.
+    let after = if (0.0..LABEL_PX).contains(&(limit - length)) { limit } else { length };
+    text(svg, [left + after + 8.0, baseline], "", &format!("{figure} · {word}"));
+}
+
+fn text(svg: &mut String, [x, y]: [f64; 2], style: &str, words: &str) {
+    let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" {style}>{words}</text>");
 }
 
 fn style(verdict: Verdict) -> (&'static str, &'static str) {

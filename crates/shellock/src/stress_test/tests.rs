@@ -60,6 +60,7 @@ fn half_connectors_fare_worse_than_whole_ones_and_the_report_says_so() {
     }
     let drawing = chart(&tested);
     assert_eq!(drawing.matches("<rect").count(), 1 + 4 * tested.designs().len());
+    assert_eq!(drawing.matches("<line").count(), 4 * tested.designs().len());
     assert!(drawing.ends_with("</svg>\n"));
 }
 
