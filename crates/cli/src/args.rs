@@ -73,7 +73,7 @@ pub enum Command {
     },
     /// Punch a finished kit and let it fall, in simulation; compare it with half connectors and with a plan of half the score
     Test {
-        /// Folder of the kit; stress.json and stress.svg go there. Exit code 0: it holds; 1: it opens, yields or comes apart
+        /// Folder of the kit; stress.json and stress.svg go there. Exit code 0: it holds, 1: it does not
         kit: PathBuf,
         #[command(flatten)]
         blows: Blows,

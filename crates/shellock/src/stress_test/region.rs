@@ -9,7 +9,8 @@ const FOOT_SHARE: f64 = 0.02;
 /// Points of a part that hold it: with fewer it could turn.
 const LEAST_POINTS: usize = 3;
 
-/// The points (ascending) that touch the floor: the lowest 2 % of the height, or as much more as one part needs to stand firmly.
+/// The points (ascending) that touch the floor: the lowest 2 % of the height, or as much more as one part needs to
+/// stand firmly.
 ///
 /// Parts that touch it with fewer than three points are left out.
 pub fn lowest(assembly: &ShellAssembly, up: Vec3) -> Vec<u32> {
@@ -38,8 +39,8 @@ pub fn highest(assembly: &ShellAssembly, up: Vec3) -> Option<usize> {
     highest_of(assembly, up, 0..assembly.points.len())
 }
 
-/// The highest point that faces upwards within `radius_mm` of the vertical line through the middle of the surface; the highest of
-/// all where there is none, as on a ring.
+/// The highest point that faces upwards within `radius_mm` of the vertical line through the middle of the surface; the
+/// highest of all where there is none, as on a ring.
 pub fn highest_in_the_middle(assembly: &ShellAssembly, up: Vec3, radius_mm: f64) -> Option<usize> {
     let areas_mm2 = point_areas_mm2(assembly);
     let weighted: Vec3 = assembly.points.iter().zip(&areas_mm2).map(|(p, area)| *p * *area).sum();
