@@ -6,10 +6,12 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use shellock::pipeline::{Params, ThicknessChoice};
 use shellock::sizes::SizeChoice;
-use shellock::strength::Material;
+use shellock_mechanics::Material;
+
+use crate::stress;
 
 /// Exit codes, shown in the help.
-const EXIT_CODES: &str = "Exit codes: 0 made and verified · 1 made, but a check failed · 2 the input or an argument is wrong · \
+const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
 3 no plan could be found · 4 a file could not be written · 130 stopped with Ctrl-C (nothing is left behind)";
 
 /// Turns a closed 3D model into hollow pieces that lock each other without glue.
@@ -71,6 +73,13 @@ pub enum Command {
         /// The model it was made from [default: the file named in its plan.json]
         model: Option<PathBuf>,
     },
+    /// Punch a finished kit and let it fall, in simulation; compare it with half connectors and with a plan of half the score
+    Test {
+        /// Folder of the kit; stress.json and stress.svg go there. Exit code 0: it holds, 1: it does not
+        kit: PathBuf,
+        #[command(flatten)]
+        blows: Blows,
+    },
     /// Say what a file holds and whether it can be made
     Inspect {
         /// STL, OBJ, PLY or OFF file
@@ -87,6 +96,37 @@ pub enum Command {
         #[arg(long, default_value_t = 150.0, value_name = "MM")]
         size: f64,
     },
+}
+
+/// Where a punch lands.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Place {
+    Top,
+    Middle,
+}
+
+/// What is done to a kit.
+#[derive(Args)]
+pub struct Blows {
+    /// Force of the punch
+    #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true, value_parser = stress::newtons)]
+    pub punch: f64,
+    /// Where it presses: on the highest point, or on the highest place above the middle
+    #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
+    pub at: Place,
+    /// Height of the fall: m, cm or mm
+    #[arg(long, value_name = "HEIGHT", default_value = "2m", allow_hyphen_values = true,
+          value_parser = stress::length_mm)]
+    pub drop: f64,
+    /// What the pieces are printed of: sla-resin, pla, petg or pa12
+    #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material)]
+    pub material: Material,
+    /// Length of the simulation's triangle edges, as a share of the usual one, 0.2 to 5; half takes some ten times as long
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
+    pub edges: f64,
+    /// Which axis points up [default: as the kit was built]
+    #[arg(long, value_enum)]
+    pub up: Option<Axis>,
 }
 
 /// Where a kit goes.
@@ -109,9 +149,14 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Its index and unit vector.
+    /// Its index.
     pub fn index(self) -> usize {
         self as usize
+    }
+
+    /// Along it.
+    pub fn unit(self) -> [f64; 3] {
+        std::array::from_fn(|axis| f64::from(u8::from(axis == self.index())))
     }
 }
 
@@ -130,26 +175,6 @@ impl FromStr for Thickness {
             return Ok(Self::Auto);
         }
         text.parse().map(Self::Mm).map_err(|_| "give millimetres, such as 2.4, or auto".to_owned())
-    }
-}
-
-/// A material preset.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MaterialName {
-    SlaResin,
-    Pla,
-    Petg,
-    Pa12,
-}
-
-impl MaterialName {
-    fn material(self) -> Material {
-        match self {
-            Self::SlaResin => Material::SLA_RESIN,
-            Self::Pla => Material::PLA,
-            Self::Petg => Material::PETG,
-            Self::Pa12 => Material::PA12,
-        }
     }
 }
 
@@ -183,8 +208,8 @@ pub struct Options {
     #[arg(long, value_name = "MM|auto", default_value = "2", help_heading = "Make")]
     pub thickness: Thickness,
     /// What it is printed of: what it bears decides how thick walls must be
-    #[arg(long, value_enum, default_value = "sla-resin", help_heading = "Make")]
-    pub material: MaterialName,
+    #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material, help_heading = "Make")]
+    pub material: Material,
     /// Height of the fall that walls must bear, m, 0.01 to 20
     #[arg(long, value_name = "M", default_value_t = Params::default().strength.drop_m, help_heading = "Make")]
     pub drop: f64,
@@ -222,12 +247,12 @@ impl Options {
         p.plan.seed = self.seed;
         p.plan.key = self.key.map(shellock::PatchId);
         p.plan.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
-        p.plan.up = std::array::from_fn(|axis| f64::from(u8::from(axis == self.up.index())));
+        p.plan.up = self.up.unit();
         match self.thickness {
             Thickness::Auto => p.thickness = ThicknessChoice::Auto,
             Thickness::Mm(mm) => p.body.thickness_mm = mm,
         }
-        p.strength.material = self.material.material();
+        p.strength.material = self.material;
         p.strength.drop_m = self.drop;
         p.strength.seed = self.seed;
         p.body.wall_gap_mm = self.wall_gap;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use shellock::pipeline::DesignError;
+use shellock::stress_test::StressError;
 use shellock_geom::check::InputError;
 use shellock_geom::io::ReadError;
 
@@ -23,6 +24,8 @@ pub enum Failure {
     Unwritable { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
     Design(#[from] DesignError),
+    #[error(transparent)]
+    Stress(#[from] StressError),
     #[error("stopped; nothing was written")]
     Stopped,
 }
@@ -41,6 +44,7 @@ impl Failure {
         use shellock::segmentation::SegmentationError;
         match self {
             Self::Stopped
+            | Self::Stress(StressError::Cancelled(_))
             | Self::Design(
                 DesignError::Cancelled(_)
                 | DesignError::Body(BodyError::Cancelled(_))

@@ -7,6 +7,7 @@ mod input;
 mod output;
 mod progress;
 mod stages;
+mod stress;
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -65,6 +66,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Segment { model, options, out } => stages::segment(session, &model, &options, &out),
         Command::Plan { model, options } => stages::plan(session, &model, &options),
         Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
+        Command::Test { kit, blows } => stress::test(session, &kit, &blows),
         Command::Inspect { model } => stages::inspect(session, &model),
         Command::Figure { name, out, size } => stages::figure(&name, &out, size),
     }

@@ -190,6 +190,7 @@ fn plan_json(
         "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
         "connector_size": design.sizes.largest_mm(),
         "wall_gap": params.body.wall_gap_mm,
+        "up": params.plan.up,
         "min_wall": params.connector.min_wall_mm,
         "key_piece": plan.key(),
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),

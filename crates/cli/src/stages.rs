@@ -21,10 +21,14 @@ use crate::input::{self, load, read};
 use crate::progress::{Display, PlanClock};
 
 /// Writes one file: whole or not at all.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let temporary = tempfile::Builder::new().prefix(".shellock-").tempfile_in(parent);
-    let temporary = temporary.map_err(Failure::unwritable(path))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".shellock-");
+    // Temporary files are for their owner alone; this one stays, for whom the user lets read files.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let temporary = builder.tempfile_in(parent).map_err(Failure::unwritable(path))?;
     fs::write(temporary.path(), bytes).map_err(Failure::unwritable(path))?;
     temporary.persist(path).map(|_| ()).map_err(|e| Failure::Unwritable { path: path.to_owned(), source: e.error })
 }
@@ -185,32 +189,47 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
 
 /// The meshes and the order that a plan file names.
 fn pieces_of(kit: &Path, plan: &Value) -> Result<(IdVec<PatchId, TriMesh>, InstallationPlan), Failure> {
+    let order = order_of(plan)?;
+    let mut meshes = Vec::new();
+    for (i, piece) in plan["pieces"].as_array().into_iter().flatten().enumerate() {
+        let file = piece["file"].as_str().ok_or_else(|| Failure::Wrong(format!("piece {i} names no file")))?;
+        let (loaded, _) = load(&kit.join(file))?;
+        meshes.push(weld(&loaded.mesh).mesh);
+    }
+    Ok((meshes.into_iter().collect(), order))
+}
+
+/// The order and the directions that a plan file names.
+pub fn order_of(plan: &Value) -> Result<InstallationPlan, Failure> {
     let wrong = |what: String| Failure::Wrong(what);
     let list = plan["pieces"].as_array().ok_or_else(|| wrong("there is no list of pieces".into()))?;
-    let mut meshes = Vec::new();
     let mut directions = Vec::new();
     for (i, piece) in list.iter().enumerate() {
         if piece["id"].as_u64() != Some(i as u64) {
             return Err(wrong(format!("piece number {i} does not have the id {i}")));
         }
-        let file = piece["file"].as_str().ok_or_else(|| wrong(format!("piece {i} names no file")))?;
-        let (loaded, _) = load(&kit.join(file))?;
-        meshes.push(weld(&loaded.mesh).mesh);
         let d: Vec<f64> =
             piece["installation_direction"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
         let [x, y, z] = d[..] else { return Err(wrong(format!("piece {i} has no installation direction"))) };
         directions.push(LatticeDirection::nearest(-Vec3::new(x, y, z)));
     }
     let order = plan["installation_order"].as_array().ok_or_else(|| wrong("there is no installation order".into()))?;
+    let mut is_named = vec![false; directions.len()];
     let steps = order
         .iter()
         .map(|id| {
-            let piece = id.as_u64().filter(|&i| i < meshes.len() as u64);
+            let piece = id.as_u64().filter(|&i| i < directions.len() as u64);
             let piece = piece.ok_or_else(|| wrong(format!("the installation order names {id}, which is no piece")))?;
+            if std::mem::replace(&mut is_named[piece as usize], true) {
+                return Err(wrong(format!("the installation order names piece {id} twice")));
+            }
             Ok(InstallationStep { piece: PatchId(piece as u32), separation: directions[piece as usize] })
         })
-        .collect::<Result<_, Failure>>()?;
-    Ok((meshes.into_iter().collect(), InstallationPlan { steps }))
+        .collect::<Result<Vec<_>, Failure>>()?;
+    match is_named.iter().position(|is_named| !is_named) {
+        Some(piece) => Err(wrong(format!("the installation order leaves out piece {piece}"))),
+        None => Ok(InstallationPlan { steps }),
+    }
 }
 
 /// `shellock inspect`.

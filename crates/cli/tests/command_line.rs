@@ -112,3 +112,100 @@ fn what_is_not_there_is_named() {
     assert_eq!(code(&o), 2);
     assert!(errors(&o).contains("squirrel"));
 }
+
+/// The figure cube of the tests: closed, one body; its faces have the labels `label`.
+fn labelled_cube(label: [i32; 12]) -> String {
+    let mut ply = String::from(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 12\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n",
+    );
+    for i in 0..8 {
+        ply += &format!("{} {} {}\n", 80 * (i & 1), 80 * (i >> 1 & 1), 80 * (i >> 2));
+    }
+    let sides = ["0 2 3 1", "4 5 7 6", "0 1 5 4", "2 6 7 3", "0 4 6 2", "1 3 7 5"];
+    for (i, side) in sides.iter().enumerate() {
+        let [a, b, c, d] = side.split(' ').collect::<Vec<_>>()[..] else { unreachable!("sides have four corners") };
+        ply += &format!("3 {a} {b} {c} {}\n3 {a} {c} {d} {}\n", label[2 * i], label[2 * i + 1]);
+    }
+    ply
+}
+
+/// What `test` reads of a plan of two pieces.
+const TWO_PIECES: &str = r#"{ "pieces": [ { "id": 0, "installation_direction": [0, 0, 1] },
+    { "id": 1, "installation_direction": [0, 0, -1] } ], "installation_order": [0, 1], "up": [0, 0, 1] }"#;
+
+#[test]
+fn a_folder_that_is_no_kit_is_not_tested() {
+    let dir = tempfile::tempdir().unwrap();
+    let kit = dir.path().join("kit");
+    let refused = |words: &[&str]| {
+        let o = shellock(dir.path(), &["test", "kit"]);
+        assert_eq!(code(&o), 2, "{}", errors(&o));
+        for word in words {
+            assert!(errors(&o).contains(word), "{word}: {}", errors(&o));
+        }
+        assert!(!kit.join("stress.json").exists() && !kit.join("stress.svg").exists());
+    };
+    refused(&["kit", "shellock build"]);
+    fs::create_dir(&kit).unwrap();
+    refused(&["kit", "shellock build"]);
+    let plan = kit.join("plan.json");
+    let twice = TWO_PIECES.replace("[0, 1], \"up\"", "[1, 1], \"up\"");
+    let thick = TWO_PIECES.replace("\"up\"", "\"shell_thickness\": -3, \"up\"");
+    fs::write(&plan, "{ \"pieces\": [").unwrap();
+    refused(&["plan.json", "not a plan"]);
+    fs::write(&plan, "{}").unwrap();
+    refused(&["plan.json", "no list of pieces"]);
+    fs::write(&plan, twice).unwrap();
+    refused(&["plan.json", "names piece 1 twice"]);
+    fs::write(&plan, TWO_PIECES).unwrap();
+    refused(&["segmentation.ply"]);
+    fs::write(kit.join("segmentation.ply"), labelled_cube([0; 12])).unwrap();
+    refused(&["segmentation.ply", "no face"]);
+    fs::write(kit.join("segmentation.ply"), labelled_cube([0, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0])).unwrap();
+    refused(&["segmentation.ply", "label"]);
+    fs::write(kit.join("segmentation.ply"), labelled_cube([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0])).unwrap();
+    fs::write(&plan, thick).unwrap();
+    refused(&["plan.json", "thickness"]);
+}
+
+#[test]
+fn blows_that_are_none_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    for (option, value) in [
+        ("--punch", "0N"),
+        ("--punch", "-70N"),
+        ("--punch", "70kg"),
+        ("--drop", "-2m"),
+        ("--drop", "0m"),
+        ("--drop", "2"),
+        ("--material", "wood"),
+    ] {
+        let o = shellock(dir.path(), &["test", "kit", option, value]);
+        assert_eq!(code(&o), 2, "{option} {value}");
+        assert!(errors(&o).contains(option) && errors(&o).contains(value), "{}", errors(&o));
+    }
+}
+
+/// A lid on a box comes off: nothing stops it, whatever the walls are made of.
+#[test]
+fn a_test_says_how_it_ended_by_its_exit_code_and_leaves_figures_and_a_picture() {
+    let dir = tempfile::tempdir().unwrap();
+    let kit = dir.path().join("kit");
+    fs::create_dir(&kit).unwrap();
+    fs::write(kit.join("plan.json"), TWO_PIECES).unwrap();
+    let lid = labelled_cube([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0]);
+    fs::write(kit.join("segmentation.ply"), lid).unwrap();
+    let o = shellock(dir.path(), &["test", "kit", "--edges", "3", "--json"]);
+    let told: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
+    let written: serde_json::Value = serde_json::from_slice(&fs::read(kit.join("stress.json")).unwrap()).unwrap();
+    assert_eq!(told, written);
+    let verdicts = ["punch", "drop"].map(|test| written["report"]["kit"][test]["verdict"].clone());
+    assert_eq!(written["passed"], verdicts.iter().all(|v| v == "holds"), "{verdicts:?}");
+    assert_eq!(code(&o), i32::from(written["passed"] == false), "{}", errors(&o));
+    let svg = fs::read_to_string(kit.join("stress.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
+    let mut names: Vec<_> = fs::read_dir(&kit).unwrap().flatten().map(|f| f.file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["plan.json", "segmentation.ply", "stress.json", "stress.svg"]);
+}

@@ -1,8 +1,8 @@
 //! Static mechanics of thin-walled parts that are joined along seams.
 //!
 //! [`ShellAssembly`] says what there is: parts, and the stations of the seams between them. [`Meeting`] says what a plan makes
-//! of each station. From both, the solvers compute how far the seams open under a uniform separation force. This crate
-//! knows parts and stations, but neither patches nor plans.
+//! of each station. From both, the solvers compute how far the seams open under a uniform separation force or under forces
+//! from outside. This crate knows parts and stations, but neither patches nor plans.
 
 pub mod assembly;
 pub mod material;
@@ -16,4 +16,4 @@ pub use assembly::{Joint, Meeting, Opening, Resistance, SIDES, ShellAssembly, Si
 pub use material::Material;
 pub use shell::{Displacements, FaceStress, LoadCase, ShellError, ShellModel, ShellSolver, ShellStress, Support};
 pub use surface::{SurfaceModel, SurfaceParams, SurfaceSolution};
-pub use volume::{VolumeError, VolumeModel, VolumeParams};
+pub use volume::{Loaded, StressLevel, VolumeError, VolumeModel, VolumeParams};

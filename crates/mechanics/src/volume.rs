@@ -13,9 +13,11 @@ mod connector;
 mod contact;
 mod element;
 mod front;
+mod load;
 mod mechanism;
 mod part;
 mod rows;
+mod stress;
 #[cfg(test)]
 mod tests;
 mod wall;
@@ -25,11 +27,13 @@ use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 
 pub use element::Order;
+pub use load::Loaded;
+pub use stress::StressLevel;
 pub use wall::{MIN_VOLUME_SHARE, Wall};
 
 use crate::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
-use connector::{Bar, Labels, Section, Sections};
-use contact::Response;
+use connector::{Bar, Labels, Section, Sections, Spans};
+use contact::{Equilibrium, Response};
 use front::Front;
 use part::Part;
 use rows::{ROWS, WALL};
@@ -117,6 +121,14 @@ pub enum VolumeError {
     /// A stiffness matrix could not be factorised.
     #[error(transparent)]
     Factorisation(#[from] SparseError),
+    /// There must be one force for each point of the assembly, all of them numbers.
+    #[error("{forces} forces for {points} points, or one of them is not finite")]
+    Forces {
+        /// How many were given.
+        forces: usize,
+        /// How many there must be.
+        points: usize,
+    },
     /// No set of contacts was found that neither pulls nor overlaps.
     #[error("the contact problem does not converge")]
     Contact,
@@ -135,6 +147,9 @@ pub struct VolumeModel {
     params: VolumeParams,
     stations: Vec<Station>,
     steps: Vec<[u32; 2]>,
+    part_of_point: Vec<u32>,
+    /// Whether the wall below each point is held.
+    is_clamped: Vec<bool>,
     /// The parts of each station's sides.
     station_parts: Vec<[u32; 2]>,
     /// Below each station's sides, on the inner surface.
@@ -198,6 +213,8 @@ impl VolumeModel {
             steps: assembly.steps.clone(),
             station_parts: assembly.stations.iter().map(|s| s.points.map(&part_of)).collect(),
             inner_edge: assembly.stations.iter().map(|s| s.points.map(below)).collect(),
+            part_of_point: assembly.part_of_point.clone(),
+            is_clamped,
             near,
             parts,
             place_kept,
@@ -265,9 +282,14 @@ impl VolumeModel {
         let equilibrium =
             contact::solve(&responses, &laws, n_motions, self.params.tolerance)?.ok_or(VolumeError::Contact)?;
 
-        let mut displacement_mm = vec![[[Vec3::ZERO; 2]; 2]; plan.len()];
-        for (part, response) in (0..).zip(&responses) {
-            for (&row, moved) in response.rows.iter().zip(response.displacement_mm(&equilibrium)) {
+        Ok(Ok(self.deflection(&responses, &equilibrium, &sections)))
+    }
+
+    /// Displacements at the joints, from those along the rows.
+    fn deflection(&self, responses: &[Response], equilibrium: &Equilibrium, sections: &Sections) -> Deflection {
+        let mut displacement_mm = vec![[[Vec3::ZERO; 2]; 2]; sections.len()];
+        for (part, response) in (0..).zip(responses) {
+            for (&row, moved) in response.rows.iter().zip(response.displacement_mm(equilibrium)) {
                 let (station, row) = (row / ROWS, row % ROWS);
                 let side = if self.station_parts[station][0] == part { Side::A } else { Side::B };
                 let Some(section) = &sections[station][side.index()] else { continue };
@@ -278,7 +300,7 @@ impl VolumeModel {
                 }
             }
         }
-        Ok(Ok(Deflection { displacement_mm }))
+        Deflection { displacement_mm }
     }
 
     fn response(
@@ -289,18 +311,11 @@ impl VolumeModel {
         sections: &Sections,
         bars: &[Bar],
     ) -> Result<Response, SparseError> {
-        let n_stations = self.stations.len();
-        let n_wall = 3 * self.parts[part as usize].kept.len();
-        let labels = Labels::new(n_wall, n_stations);
-        let is_own = |bar: &&Bar| self.station_parts[bar.from][bar.side.index()] == part;
-        let own: Vec<&Bar> = bars.iter().filter(is_own).collect();
-        let spans = connector::spans(&own, n_stations);
-        let front = |(i, bar): (usize, &&Bar)| {
-            let carries = |station: usize| spans[station][bar.side.index()].is_some_and(|span| span[0] == i);
-            let front = bar.front(self, sections, carries, labels);
-            if is_fixed { front.without(|id| labels.is_wall(id)) } else { front }
-        };
-        let fronts: Vec<Front> = own.iter().enumerate().map(front).collect();
+        let labels = self.labels(part);
+        let (own, spans, mut fronts) = self.bar_fronts(part, sections, bars, labels);
+        if is_fixed {
+            fronts = fronts.iter().map(|front| front.without(|id| labels.is_wall(id))).collect();
+        }
         let mut fronts = connector::condensed(&fronts, &own, labels, &spans)?;
         if !is_fixed {
             fronts.extend(self.wall_fronts(part, plan, labels));
@@ -308,6 +323,29 @@ impl VolumeModel {
         let wall = (!is_fixed).then_some(&self.parts[part as usize].stiffness);
         let all: Vec<&Front> = wall.into_iter().chain(&fronts).collect();
         Ok(self.read(part, &Front::condensed(&all, |id| labels.is_inner(id))?, labels, plan, sections))
+    }
+
+    fn labels(&self, part: u32) -> Labels {
+        Labels::new(3 * self.parts[part as usize].kept.len(), self.stations.len())
+    }
+
+    /// The bars of `part`, which of them meet at each section, and the front of each.
+    fn bar_fronts<'a>(
+        &self,
+        part: u32,
+        sections: &Sections,
+        bars: &'a [Bar],
+        labels: Labels,
+    ) -> (Vec<&'a Bar>, Spans, Vec<Front>) {
+        let is_own = |bar: &&Bar| self.station_parts[bar.from][bar.side.index()] == part;
+        let own: Vec<&Bar> = bars.iter().filter(is_own).collect();
+        let spans = connector::spans(&own, self.stations.len());
+        let front = |(i, bar): (usize, &&Bar)| {
+            let carries = |station: usize| spans[station][bar.side.index()].is_some_and(|span| span[0] == i);
+            bar.front(self, sections, carries, labels)
+        };
+        let fronts = own.iter().enumerate().map(front).collect();
+        (own, spans, fronts)
     }
 
     /// Compliance and drift from what is left of a part: its contact rows, and its load, if it has one.

@@ -22,6 +22,7 @@ mod seams;
 pub mod segmentation;
 pub mod sizes;
 pub mod strength;
+pub mod stress_test;
 pub mod surface;
 pub mod verify;
 

@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module may name those before it. `plan` stands before `body` because bodies are split along a plan.
-const ORDER: [&str; 12] = [
+const ORDER: [&str; 13] = [
     "strength",
     "segmentation",
     "sizes",
     "plan",
     "metric",
+    "stress_test",
     "body",
     "connector",
     "piece",

@@ -38,7 +38,7 @@ const N_SECTION: usize = N_ALONG_S * N_ACROSS;
 const N_BAR: usize = 3 * N_SECTION;
 
 /// Motion of a node as a weighted sum of those of kept wall nodes.
-type Hold = Vec<(u32, f64)>;
+pub(super) type Hold = Vec<(u32, f64)>;
 
 /// One side's cross-section at a station.
 #[derive(Debug)]
@@ -155,7 +155,7 @@ pub(super) struct Bar {
     pub from: usize,
     pub to: Result<usize, Section>,
     /// Corners of its tetrahedra, as nodes of the bar's lattice.
-    tets: Vec<[usize; 4]>,
+    pub tets: Vec<[usize; 4]>,
 }
 
 /// The lattice node at `is` along s, `k` across and `it` along the seam.
@@ -177,7 +177,7 @@ fn cell_tets(cell: usize) -> [[usize; 4]; 6] {
 }
 
 /// Where the corner `node` of the lattice is.
-fn corner(sections: [&Section; 2], node: usize) -> Vec3 {
+pub(super) fn corner(sections: [&Section; 2], node: usize) -> Vec3 {
     let (it, is, k) = (node / N_SECTION, node % N_SECTION / N_ACROSS, node % N_ACROSS);
     sections[it / 2].at[is / 2][k / 2]
 }
@@ -250,6 +250,19 @@ impl Bar {
         Some([of(self.from)?, to])
     }
 
+    /// The cross-sections at its ends, and what moves each node: its own unknown or the wall's, by the first of three.
+    pub fn movers<'a>(&'a self, sections: &'a Sections, labels: Labels) -> Option<([&'a Section; 2], Vec<Hold>)> {
+        let ends = self.ends(sections)?;
+        let [halfway, end] = labels.within(self.index);
+        let to = self.to.as_ref().map_or(end, |station| labels.section(*station, self.side));
+        let base = [labels.section(self.from, self.side), halfway, to];
+        let mover = |node: usize| match hold(ends, node) {
+            Some(hold) => hold.into_iter().map(|(kept, w)| (3 * kept, w)).collect(),
+            None => vec![(base[node / N_SECTION] + 3 * (node % N_SECTION) as u32, 1.0)],
+        };
+        Some((ends, (0..N_BAR).map(mover).collect()))
+    }
+
     /// Stiffness, contact rows and load of the bar; `carries` says of which of its stations, so that each counts once.
     pub fn front(
         &self,
@@ -258,18 +271,7 @@ impl Bar {
         carries: impl Fn(usize) -> bool,
         labels: Labels,
     ) -> Front {
-        let Some(ends) = self.ends(sections) else { return Front::default() };
-        let holds: Vec<Option<Hold>> = (0..N_BAR).map(|node| hold(ends, node)).collect();
-        let [halfway, end] = labels.within(self.index);
-        let to = self.to.as_ref().map_or(end, |station| labels.section(*station, self.side));
-        let base = [labels.section(self.from, self.side), halfway, to];
-        // What moves a node: its own unknown or the wall's.
-        let movers: Vec<Hold> = (holds.into_iter().enumerate())
-            .map(|(node, hold)| match hold {
-                Some(hold) => hold.into_iter().map(|(kept, w)| (3 * kept, w)).collect(),
-                None => vec![(base[node / N_SECTION] + 3 * (node % N_SECTION) as u32, 1.0)],
-            })
-            .collect();
+        let Some((ends, movers)) = self.movers(sections, labels) else { return Front::default() };
         let carried: Vec<(usize, usize)> =
             self.stations().enumerate().filter(|(_, station)| carries(*station)).collect();
         let mut sum = Accumulator::new(self.used_nodes(), &movers, labels, &carried);
@@ -313,7 +315,7 @@ impl Bar {
 }
 
 /// The ten nodes of a tetrahedron of the lattice.
-fn with_middles(corners: [usize; 4]) -> [usize; 10] {
+pub(super) fn with_middles(corners: [usize; 4]) -> [usize; 10] {
     let mut nodes = [0; 10];
     nodes[..4].copy_from_slice(&corners);
     for (node, [i, j]) in nodes[4..].iter_mut().zip(EDGES) {

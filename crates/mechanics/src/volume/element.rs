@@ -96,3 +96,29 @@ pub(super) fn stiffness(
         }
     }
 }
+
+/// Von Mises stress at barycentric coordinates `l`, MPa; the first `order.n_nodes()` of `displacement_mm` are of use.
+pub(super) fn von_mises_mpa(
+    order: Order,
+    corners: [Vec3; 4],
+    (lambda, mu): (f64, f64),
+    displacement_mm: &[Vec3; 10],
+    l: [f64; 4],
+) -> f64 {
+    let shape = shape_gradients(order, &gradients(corners), l);
+    let mut gradient = [[0.0; 3]; 3];
+    for (u, g) in displacement_mm.iter().zip(&shape).take(order.n_nodes()) {
+        let (u, g) = (u.to_array(), g.to_array());
+        for i in 0..3 {
+            for j in 0..3 {
+                gradient[i][j] += u[i] * g[j];
+            }
+        }
+    }
+    let trace = gradient[0][0] + gradient[1][1] + gradient[2][2];
+    let stress =
+        |i: usize, j: usize| mu * (gradient[i][j] + gradient[j][i]) + if i == j { lambda * trace } else { 0.0 };
+    let [x, y, z] = [0, 1, 2].map(|i| stress(i, i));
+    let shear_sq = stress(0, 1).powi(2) + stress(1, 2).powi(2) + stress(2, 0).powi(2);
+    (0.5 * ((x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2)) + 3.0 * shear_sq).sqrt()
+}

@@ -28,7 +28,7 @@ pub(super) struct RigidModes {
 }
 
 impl RigidModes {
-    fn new(points: &[Vec3]) -> Self {
+    pub fn new(points: &[Vec3]) -> Self {
         let center = points.iter().sum::<Vec3>() / points.len().max(1) as f64;
         let radius_sq = points.iter().map(|p| p.distance_squared(center)).sum::<f64>() / points.len().max(1) as f64;
         Self { center, radius_mm: radius_sq.sqrt().max(f64::MIN_POSITIVE) }
@@ -42,16 +42,16 @@ impl RigidModes {
 }
 
 /// Unknowns of a part: interior nodes first, then the kept ones; none for clamped nodes.
-struct Numbering {
-    vertices: Vec<u32>,
+pub(super) struct Numbering {
+    pub vertices: Vec<u32>,
     edges: Vec<[u32; 2]>,
     /// First of three unknowns of each vertex, then of each edge's middle.
-    first: Vec<Option<u32>>,
-    n: usize,
+    pub first: Vec<Option<u32>>,
+    pub n: usize,
 }
 
 impl Numbering {
-    fn new(order: Order, tets: &[[u32; 4]], kept: &[u32], is_clamped: &impl Fn(u32) -> bool) -> Self {
+    pub fn new(order: Order, tets: &[[u32; 4]], kept: &[u32], is_clamped: &impl Fn(u32) -> bool) -> Self {
         let mut vertices = tets.concat();
         vertices.sort_unstable();
         vertices.dedup();
@@ -78,7 +78,7 @@ impl Numbering {
         Self { vertices, edges, first, n: n as usize }
     }
 
-    fn of_tet(&self, order: Order, tet: &[u32; 4]) -> [Option<u32>; 10] {
+    pub fn of_tet(&self, order: Order, tet: &[u32; 4]) -> [Option<u32>; 10] {
         let mut dofs = [None; 10];
         for i in 0..4 {
             dofs[i] = self.vertices.binary_search(&tet[i]).ok().and_then(|at| self.first[at]);
@@ -124,7 +124,8 @@ impl Part {
     }
 }
 
-fn assemble(
+/// Stiffness of the wall made of `tets`: row, column, N/mm.
+pub(super) fn assemble(
     order: Order,
     material: &Material,
     wall: &Wall,

@@ -285,3 +285,119 @@ fn pins_that_slide_out_of_their_channels_do_not_hold() {
     assert!(matches!(at(force(0.99)).unwrap().resist(&plan, 7).unwrap(), Resistance::Holds(_)));
     assert!(matches!(at(force(1.01)).unwrap().resist(&plan, 7).unwrap(), Resistance::Separable(_)));
 }
+
+/// Points of `assembly` whose height lies beyond `z`, upwards or downwards.
+fn beyond(assembly: &ShellAssembly, z: f64) -> Vec<u32> {
+    let is_beyond = |p: &Vec3| if z > 0.0 { p.z > z } else { p.z < z };
+    (0..).zip(&assembly.points).filter(|(_, p)| is_beyond(p)).map(|(i, _)| i).collect()
+}
+
+/// A ball pressed on its top with `force_n`, its bottom held if `is_held`.
+fn pressed(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
+    let ball = sample::ball(20.0, 6);
+    let params = VolumeParams { connector_mm, ..VolumeParams::default() };
+    let held = if is_held { beyond(&ball, -17.0) } else { Vec::new() };
+    let model = VolumeModel::clamped(&params, &ball, &held).unwrap();
+    let top = beyond(&ball, 17.0);
+    let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
+    top.iter().for_each(|&p| forces_n[p as usize] = -Vec3::Z * force_n / top.len() as f64);
+    model.under_load(&joined(&ball, -30.0, Some(7)), &forces_n).unwrap().unwrap()
+}
+
+#[test]
+fn forces_on_every_part_of_a_pressed_ball_balance_and_all_grows_with_the_force() {
+    let (once, twice) = (pressed(10.0, 3.0, true), pressed(20.0, 3.0, true));
+    assert!(once.imbalance < 1e-6 && once.lost.is_empty(), "{once:?}");
+    let widest = |l: &Loaded| l.opening_mm.iter().copied().fold(0.0, f64::max);
+    assert!((widest(&twice) / widest(&once) - 2.0).abs() < 1e-5);
+    assert!((twice.walls.largest_mpa / once.walls.largest_mpa - 2.0).abs() < 1e-5);
+    assert!((twice.connectors.robust_mpa / once.connectors.robust_mpa - 2.0).abs() < 1e-5);
+    assert!(once.walls.robust_mpa > 0.0 && once.walls.robust_mpa <= once.walls.largest_mpa);
+}
+
+#[test]
+fn smaller_connectors_open_wider_and_are_stressed_more() {
+    let (whole, half) = (pressed(10.0, 3.0, true), pressed(10.0, 1.5, true));
+    let widest = |l: &Loaded| l.opening_mm.iter().copied().fold(0.0, f64::max);
+    assert!(widest(&half) > widest(&whole), "{} {}", widest(&half), widest(&whole));
+    assert!(half.connectors.robust_mpa > whole.connectors.robust_mpa);
+}
+
+#[test]
+fn a_struck_ball_that_nothing_holds_is_balanced_by_its_inertia() {
+    let struck = pressed(10.0, 3.0, false);
+    assert!(struck.imbalance < 1e-6 && struck.lost.is_empty(), "{}", struck.imbalance);
+    // The reference part's forces are in no equation: they balance because inertia balances the whole.
+    let ball = sample::ball(20.0, 6);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
+    forces_n[5] = Vec3::new(1.0, -2.0, 3.0);
+    let loads_n = model.balanced(&forces_n).unwrap();
+    let torque: Vec3 = loads_n.iter().zip(&model.wall().nodes).map(|(f, x)| x.cross(*f)).sum();
+    assert!(loads_n.iter().sum::<Vec3>().length() < 1e-9 && torque.length() < 1e-8, "{torque}");
+}
+
+#[test]
+fn a_balls_mass_is_its_walls_volume_times_density() {
+    let ball = sample::ball(20.0, 12);
+    let mass_t = VolumeModel::new(&VolumeParams::default(), &ball).unwrap().mass_t();
+    let wall_mm3 = 4.0 / 3.0 * std::f64::consts::PI * (20.0_f64.powi(3) - 18.0_f64.powi(3));
+    assert!((mass_t / (wall_mm3 * 1.15e-9) - 1.0).abs() < 0.05, "{mass_t} t");
+}
+
+/// Away from where it is held and pulled.
+#[test]
+fn a_plate_pulled_at_its_outer_face_has_the_stress_of_a_bar() {
+    let (model, plates) = strip(Order::Quadratic, true);
+    let end: Vec<u32> = (0..)
+        .zip(&plates.points)
+        .filter(|(i, p)| p.x == 0.0 && plates.part_of_point[*i as usize] == 0)
+        .map(|(i, _)| i)
+        .collect();
+    let mut forces_n = vec![Vec3::ZERO; plates.points.len()];
+    end.iter().for_each(|&p| forces_n[p as usize] = Vec3::X * 10.0 / end.len() as f64);
+    let plan: Vec<Meeting> = plates.stations.iter().map(|s| Meeting { wall: -s.across, joint: None }).collect();
+    let loaded = model.under_load(&plan, &forces_n).unwrap().unwrap();
+    // Pulled at the outer face of 2 mm: N/A + M/W = (1 + 3) F / (b h), of which von Mises sees all.
+    let expected_mpa = 4.0 * 10.0 / (5.0 * 2.0);
+    let middle = plates.triangles.iter().zip(&loaded.triangle_mpa).filter(|(t, _)| {
+        t.iter()
+            .all(|&p| (p as usize) < plates.points.len() / 2 && (-30.0..-10.0).contains(&plates.points[p as usize].x))
+    });
+    let largest_mpa = middle.map(|(_, mpa)| *mpa).fold(0.0, f64::max);
+    assert!((largest_mpa / expected_mpa - 1.0).abs() < 0.1, "{largest_mpa} MPa, a bar has {expected_mpa} MPa");
+}
+
+/// Condensed onto the seams, and as one sparse system: two ways to the same compliance.
+#[test]
+fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
+    let plates = sample::plates(20.0, 10.0, [5, 3]);
+    let clamped: Vec<u32> = (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > 9.9).map(|(i, _)| i).collect();
+    let model = VolumeModel::clamped(&VolumeParams::default(), &plates, &clamped).unwrap();
+    let plan = joined(&plates, 20.0, None);
+    let sections = super::connector::sections(&model, &plan);
+    let bars = super::connector::bars(&model, &plan, &sections);
+    let loads_n = vec![Vec3::ZERO; model.wall.nodes.len()];
+    for part in 0..2 {
+        let condensed = model.response(part, false, &plan, &sections, &bars).unwrap();
+        let (_, sparse) = super::load::Body::new(&model, part, &plan, &sections, &bars, &loads_n).unwrap();
+        assert_eq!(condensed.rows, sparse.rows);
+        let n = condensed.rows.len();
+        let largest = condensed.compliance.iter().copied().fold(0.0, f64::max);
+        for at in (0..n * n).filter(|at| at % n >= at / n) {
+            let difference = condensed.compliance[at] - sparse.compliance[at];
+            assert!(difference.abs() < 1e-7 * largest, "{difference} of {largest} at {at}");
+        }
+    }
+}
+
+#[test]
+fn forces_that_are_none_are_refused() {
+    let plates = sample::plates(10.0, 5.0, [4, 2]);
+    let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
+    let plan = joined(&plates, 0.0, None);
+    let n = plates.points.len();
+    assert_eq!(model.under_load(&plan, &[]), Err(VolumeError::Forces { forces: 0, points: n }));
+    assert!(model.under_load(&plan, &vec![Vec3::splat(f64::NAN); n]).is_err());
+    assert!(model.under_load(&[], &vec![Vec3::ZERO; n]).is_err());
+}

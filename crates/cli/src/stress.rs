@@ -1,0 +1,190 @@
+//! `test`: what a punch and a fall do to a finished kit.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use shellock::metric::MetricParams;
+use shellock::pipeline::Params;
+use shellock::stress_test::{Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test};
+use shellock::{Ctx, PatchId, SegmentedSurface};
+use shellock_geom::check::into_solid;
+use shellock_mechanics::Material;
+
+use crate::Session;
+use crate::args::{Axis, Blows, Place};
+use crate::failure::Failure;
+use crate::input::{load, read};
+use crate::progress::Display;
+use crate::stages::{order_of, write};
+
+/// A force in N: "70N", "70 N" or "70".
+pub fn newtons(text: &str) -> Result<f64, String> {
+    let number = text.trim().strip_suffix('N').unwrap_or(text).trim();
+    positive(number).ok_or_else(|| format!("\"{text}\" is no force above 0 N; write for example 70N"))
+}
+
+/// A length in mm: "2m", "200cm" or "2000 mm".
+pub fn length_mm(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let units = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0)];
+    let split = units.into_iter().find_map(|(unit, mm)| Some((text.strip_suffix(unit)?.trim(), mm)));
+    let value = split.and_then(|(number, mm)| Some(positive(number)? * mm));
+    value.ok_or_else(|| format!("\"{text}\" is no height above 0; write for example 2m, 150cm or 500mm"))
+}
+
+fn positive(text: &str) -> Option<f64> {
+    text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0)
+}
+
+/// The material of that name.
+pub fn material(name: &str) -> Result<Material, String> {
+    let found = Material::PRESETS.into_iter().find(|(preset, _)| *preset == name).map(|(_, material)| material);
+    let names = || Material::PRESETS.map(|(preset, _)| preset).join(", ");
+    found.ok_or_else(|| format!("there is no material \"{name}\"; choose one of {}", names()))
+}
+
+/// `shellock test`.
+pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure> {
+    let path = kit.join("plan.json");
+    if !path.exists() {
+        return Err(Failure::Wrong(format!(
+            "{}: there is no kit here, for it has no plan.json; `shellock build` makes one",
+            kit.display()
+        )));
+    }
+    let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
+    let plan: Value = serde_json::from_slice(&read(&path)?).map_err(|e| broken(&format!("not a plan: {e}")))?;
+    let order = order_of(&plan).map_err(|f| match f {
+        Failure::Wrong(what) => broken(&what),
+        other => other,
+    })?;
+    let surface = surface_of(&kit.join("segmentation.ply"), order.steps.len())?;
+    let params = params_of(&plan, blows).map_err(|what| broken(&what))?;
+
+    let display = Display::new(session.is_json);
+    let report = |p: shellock::context::Progress<'_>| display.show(p);
+    let ctx = Ctx::new(&report, &session.stop);
+    let tested = stress_test(&ctx, &params, &surface, &order).inspect_err(|_| display.finish())?;
+    display.finish();
+
+    let code = u8::from(!tested.passed());
+    let value = json!({
+        "format": "shellock-stress", "version": 1, "punch_n": params.punch_n,
+        "punch_at": params.punch_at, "drop_mm": params.drop_mm,
+        "material": params.metric.material, "connector_size": params.metric.connector_mm, "up": params.plan.up,
+        "passed": tested.passed(), "report": tested,
+    });
+    let mut text = serde_json::to_string_pretty(&value).map_err(|e| broken(&e.to_string()))?;
+    text.push('\n');
+    write(&kit.join("stress.json"), text.as_bytes())?;
+    write(&kit.join("stress.svg"), chart(&tested).as_bytes())?;
+    if session.is_json {
+        println!("{value}");
+    } else {
+        print_table(&params, &tested);
+        println!("written to {}: stress.json, stress.svg", kit.display());
+    }
+    Ok(code)
+}
+
+/// The surface with its patches that `build` wrote.
+fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure> {
+    let wrong = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
+    let (loaded, _) = load(path)?;
+    let labels = loaded.face_labels.as_ref().ok_or_else(|| wrong("its faces have no labels"))?;
+    let (solid, kept) =
+        into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody { path: path.to_owned(), source })?;
+    let patch = |&face: &u32| {
+        let label = u32::try_from(labels[face as usize]).ok().filter(|&label| (label as usize) < n_pieces);
+        label.map(PatchId).ok_or_else(|| wrong("a face has a label that is no piece of plan.json"))
+    };
+    let patch_of_face: Vec<PatchId> = kept.iter().map(patch).collect::<Result<_, _>>()?;
+    if (0..n_pieces as u32).any(|piece| !patch_of_face.contains(&PatchId(piece))) {
+        return Err(wrong("a piece of plan.json has no face"));
+    }
+    Ok(SegmentedSurface { mesh: solid.into_mesh(), patch_of_face, source_face: kept, n_patches: n_pieces })
+}
+
+/// The kit's sizes, with defaults where its plan does not tell them; or what is wrong with them.
+fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
+    let mut params = Params::default();
+    let number = |name: &str, default: f64| plan[name].as_f64().unwrap_or(default);
+    params.body.thickness_mm = number("shell_thickness", params.body.thickness_mm);
+    params.connector.size_mm = number("connector_size", params.connector.size_mm);
+    params.plan.seed = plan["seed"].as_u64().unwrap_or_default();
+    let told: Vec<f64> = plan["up"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+    params.plan.up = match (blows.up, &told[..]) {
+        (Some(axis), _) => axis.unit(),
+        (None, [x, y, z]) => [*x, *y, *z],
+        _ => Axis::Z.unit(),
+    };
+    let problems = params.problems();
+    if !problems.is_empty() {
+        return Err(problems.join("; "));
+    }
+    let plan = params.agreed().plan;
+    let metric = MetricParams { material: blows.material, edge_share: blows.edges, ..MetricParams::of_plan(&plan) };
+    let punch_at = match blows.at {
+        Place::Top => PunchAt::Top,
+        Place::Middle => PunchAt::Middle,
+    };
+    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: blows.drop, metric, plan })
+}
+
+fn print_table(params: &StressParams, tested: &StressReport) {
+    println!(
+        "walls weigh {:.0} g; punch {:.0} N, fall from {:.2} m; material bears {} MPa",
+        tested.mass_g,
+        params.punch_n,
+        params.drop_mm / 1000.0,
+        tested.strength_mpa
+    );
+    println!("design           test   force N  opening mm  between   walls MPa  connectors MPa  of strength  verdict");
+    for (name, Pair { punch, drop, score_mm, .. }) in tested.designs() {
+        for (test, o) in [("punch", punch), ("fall", drop)] {
+            let Outcome { force_n, opening_mm, wall_mpa, connector_mpa, .. } = o;
+            let between = o.between.map_or_else(String::new, |[a, b]| format!("{a} and {b}"));
+            let percent = 100.0 * o.strength_share;
+            let verdict = words(o.verdict);
+            println!(
+                "{name:16} {test:6} {force_n:7.0}  {opening_mm:10.3}  {between:9} {wall_mpa:9.1}  {connector_mpa:14.1}  \
+                 {percent:9.0} %  {verdict}"
+            );
+        }
+        if let Some(score_mm) = score_mm {
+            println!("{name:16} score by the surface metric {score_mm:.4} mm");
+        }
+    }
+    if tested.kit.score_mm.is_none() {
+        println!("by the surface metric this plan comes apart, so there is none of half its score");
+    } else if tested.half_score.is_none() {
+        println!("no other plan that holds was found, so none of half the score was tested");
+    }
+}
+
+fn words(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Holds => "holds",
+        Verdict::Opens => "OPENS",
+        Verdict::Yields => "YIELDS",
+        Verdict::ComesApart => "COMES APART",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantities_have_units() {
+        assert_eq!((newtons("70N"), newtons("7.5 N"), newtons("70")), (Ok(70.0), Ok(7.5), Ok(70.0)));
+        assert_eq!((length_mm("2m"), length_mm("150 cm"), length_mm("30mm")), (Ok(2000.0), Ok(1500.0), Ok(30.0)));
+        for wrong in ["", "N", "-3N", "infN", "3kg"] {
+            assert!(newtons(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["", "2", "m", "-2m", "nanm", "2 km"] {
+            assert!(length_mm(wrong).is_err(), "{wrong}");
+        }
+        assert!(material("pla").is_ok() && material("wood").is_err());
+    }
+}

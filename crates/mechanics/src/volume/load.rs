@@ -1,0 +1,397 @@
+//! Forces from outside: how far the seams open, and how much walls and connectors are stressed.
+//!
+//! Each part with its connectors is one sparse system `K u = f + Jᵀ λ`, J its contact rows. A part that is free to move is held
+//! at six unknowns that suffice and bear nothing, since all forces on it balance in the end. Solved for each row and for the load,
+//! it gives the compliance and the drift that contact (`contact`) asks for; with the contact's forces, the stresses.
+//!
+//! What is clamped bears the load. Where nothing is clamped, as in a fall, the forces accelerate the whole as a rigid body,
+//! and the inertia of the walls balances them (inertia relief). Connectors have no mass.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use shellock_geom::Vec3;
+use shellock_geom::sparse::{Cholesky, SparseError, SparseSymmetric};
+
+use super::connector::{self, Bar, Labels, Sections};
+use super::contact::{self, Equilibrium, Response};
+use super::element::volume_6;
+use super::front::Front;
+use super::part::{Numbering, RigidModes, assemble};
+use super::rows::{self, ROWS, WALL};
+use super::stress::{Sample, StressLevel, samples};
+use super::{VolumeError, VolumeModel, mechanism};
+use crate::Meeting;
+use crate::assembly::LOST_SIZES;
+
+/// g/cm³ in t/mm³, so that t · mm/s² = N.
+const T_MM3_PER_G_CM3: f64 = 1e-9;
+
+/// What forces from outside do to an assembly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// How far each station opens, mm: the larger distance between male and female at the root and at the tip of the pin; where
+    /// there is no joint, how far the walls' faces part.
+    pub opening_mm: Vec<f64>,
+    /// The joints (ascending) whose pins have left their channels.
+    pub lost: Vec<u32>,
+    /// Stress in the walls.
+    pub walls: StressLevel,
+    /// Stress in pins and channels.
+    pub connectors: StressLevel,
+    /// The largest stress in the wall below each triangle, MPa.
+    pub triangle_mpa: Vec<f64>,
+    /// Forces and torques on each part's six rigid motions that nothing balances, N, relative to the largest force: rounding.
+    pub imbalance: f64,
+}
+
+impl VolumeModel {
+    /// Mass of all walls, t.
+    pub fn mass_t(&self) -> f64 {
+        self.node_masses_t().iter().sum()
+    }
+
+    /// A quarter of each tetrahedron's mass at each of its corners.
+    fn node_masses_t(&self) -> Vec<f64> {
+        let mut mass_t = vec![0.0; self.wall.nodes.len()];
+        let density_t_mm3 = self.params.material.density_g_cm3 * T_MM3_PER_G_CM3;
+        for (i, tet) in self.wall.tets.iter().enumerate() {
+            let share = density_t_mm3 * volume_6(self.wall.corners(i)) / 24.0;
+            tet.iter().for_each(|&node| mass_t[node as usize] += share);
+        }
+        mass_t
+    }
+
+    /// What `forces_n`, one at each point of the outer surface, do to the parts joined by `plan`; or the parts that come off.
+    ///
+    /// What is clamped bears them; where nothing is, the walls' inertia does. The separation force does not act.
+    pub fn under_load(&self, plan: &[Meeting], forces_n: &[Vec3]) -> Result<Result<Loaded, Vec<u32>>, VolumeError> {
+        if plan.len() != self.stations.len() {
+            return Err(VolumeError::Joints { joints: plan.len(), stations: self.stations.len() });
+        }
+        if forces_n.len() != self.part_of_point.len() || !forces_n.iter().all(|f| f.is_finite()) {
+            return Err(VolumeError::Forces { forces: forces_n.len(), points: self.part_of_point.len() });
+        }
+        let sections = connector::sections(self, plan);
+        let bars = connector::bars(self, plan, &sections);
+        let loads_n = self.balanced(forces_n)?;
+        let (mut bodies, mut responses): (Vec<Body>, Vec<Response>) = (0..self.parts.len() as u32)
+            .into_par_iter()
+            .map(|part| Body::new(self, part, plan, &sections, &bars, &loads_n))
+            .collect::<Result<Vec<_>, _>>()?
+            .into_iter()
+            .unzip();
+        // Where all parts float, the first is where the others are seen from; its forces balance with the whole's.
+        let n_motions = number_motions(&mut responses, |i| self.parts[i].rigid.is_some() && (i > 0 || self.is_held()));
+        let laws = rows::laws(plan);
+        let Some(equilibrium) = contact::solve(&responses, &laws, n_motions, self.params.tolerance)? else {
+            let loose = mechanism::loose_parts(&responses, &laws, n_motions);
+            return if loose.is_empty() { Err(VolumeError::Contact) } else { Ok(Err(loose)) };
+        };
+        bodies.par_iter_mut().for_each(|body| body.move_by(&equilibrium));
+        let opening_mm = self.openings(plan, &responses, &equilibrium, &sections);
+        let is_lost = |i: &u32| {
+            let d = opening_mm[*i as usize];
+            plan[*i as usize].joint.is_some() && (d.is_nan() || d >= LOST_SIZES * self.params.connector_mm)
+        };
+        let (triangle_mpa, walls) = self.wall_stress(&bodies);
+        let connectors: Vec<Sample> = bodies.par_iter().flat_map_iter(|b| b.bar_samples(self, &sections)).collect();
+        Ok(Ok(Loaded {
+            lost: (0..opening_mm.len() as u32).filter(is_lost).collect(),
+            walls,
+            connectors: StressLevel::of(connectors),
+            triangle_mpa,
+            imbalance: imbalance(&responses, &equilibrium, forces_n),
+            opening_mm,
+        }))
+    }
+
+    fn is_held(&self) -> bool {
+        self.is_clamped.iter().any(|is| *is)
+    }
+
+    /// Forces at the wall nodes, the inertia of a whole that nothing holds among them.
+    pub(super) fn balanced(&self, forces_n: &[Vec3]) -> Result<Vec<Vec3>, SparseError> {
+        let nodes = &self.wall.nodes;
+        let mut loads_n = forces_n.to_vec();
+        loads_n.resize(nodes.len(), Vec3::ZERO);
+        if self.is_held() {
+            return Ok(loads_n);
+        }
+        let rigid = RigidModes::new(nodes);
+        let mass_t = self.node_masses_t();
+        let mut inertia = nalgebra::SMatrix::<f64, 6, 6>::zeros();
+        let mut work = nalgebra::SVector::<f64, 6>::zeros();
+        for ((x, m), f) in nodes.iter().zip(&mass_t).zip(&loads_n) {
+            let modes = rigid.at(*x);
+            for a in 0..6 {
+                work[a] += modes[a].dot(*f);
+                (0..6).for_each(|b| inertia[(a, b)] += m * modes[a].dot(modes[b]));
+            }
+        }
+        let inverse = inertia.try_inverse().ok_or(SparseError::NotPositiveDefinite { n: 6 })?;
+        let acceleration = inverse * work;
+        for ((x, m), f) in nodes.iter().zip(&mass_t).zip(&mut loads_n) {
+            rigid.at(*x).iter().zip(acceleration.iter()).for_each(|(mode, a)| *f -= *mode * (m * a));
+        }
+        Ok(loads_n)
+    }
+
+    fn openings(
+        &self,
+        plan: &[Meeting],
+        responses: &[Response],
+        equilibrium: &Equilibrium,
+        sections: &Sections,
+    ) -> Vec<f64> {
+        let mut gap_mm = vec![0.0; plan.len()];
+        for response in responses {
+            for (&row, moved) in response.rows.iter().zip(response.displacement_mm(equilibrium)) {
+                if row % ROWS == WALL {
+                    gap_mm[row / ROWS] += moved;
+                }
+            }
+        }
+        let moved = self.deflection(responses, equilibrium, sections).displacement_mm;
+        let opening = |((meeting, [a, b]), gap): ((&Meeting, [[Vec3; 2]; 2]), f64)| match meeting.joint {
+            Some(_) => a[0].distance(b[0]).max(a[1].distance(b[1])),
+            None => gap.max(0.0),
+        };
+        plan.iter().zip(moved).zip(gap_mm).map(opening).collect()
+    }
+
+    /// The largest stress below each triangle, and that of all walls.
+    fn wall_stress(&self, bodies: &[Body]) -> (Vec<f64>, StressLevel) {
+        let samples: Vec<(u32, [Sample; 4])> = bodies.par_iter().flat_map_iter(|b| b.wall_samples(self)).collect();
+        let mut largest = vec![0.0_f64; self.wall.tets.len() / (3 * self.params.n_layers)];
+        for (tet, corners) in &samples {
+            let triangle = &mut largest[*tet as usize / (3 * self.params.n_layers)];
+            *triangle = corners.iter().map(|s| s.stress_mpa).fold(*triangle, f64::max);
+        }
+        (largest, StressLevel::of(samples.into_iter().flat_map(|s| s.1).collect()))
+    }
+}
+
+/// Numbers the motions of the parts that may move: how many there are.
+fn number_motions(responses: &mut [Response], is_free: impl Fn(usize) -> bool) -> usize {
+    let mut n_motions = 0;
+    for (_, response) in responses.iter_mut().enumerate().filter(|(i, _)| is_free(*i)) {
+        response.first_motion = Some(n_motions);
+        n_motions += 6;
+    }
+    n_motions
+}
+
+/// What contact and load leave of force on the rigid motions of the free parts, relative to the largest force.
+fn imbalance(responses: &[Response], equilibrium: &Equilibrium, forces_n: &[Vec3]) -> f64 {
+    let largest_n = forces_n.iter().map(|f| f.length()).fold(f64::MIN_POSITIVE, f64::max);
+    let mut worst = 0.0_f64;
+    for response in responses.iter().filter(|r| r.first_motion.is_some()) {
+        for m in 0..6 {
+            let by_contact = response.rows.iter().zip(&response.rigid).map(|(row, r)| equilibrium.force_n[*row] * r[m]);
+            worst = worst.max((by_contact.sum::<f64>() + response.rigid_load_n[m]).abs());
+        }
+    }
+    worst / largest_n
+}
+
+/// One part with its connectors.
+pub(super) struct Body<'a> {
+    /// Tetrahedra of its wall.
+    tets: Vec<u32>,
+    numbering: Numbering,
+    bars: Vec<&'a Bar>,
+    labels: Labels,
+    /// Labels of the bars' own unknowns, ascending; they come after the wall's.
+    own: Vec<u32>,
+    /// Wall nodes that labels count.
+    kept: &'a [u32],
+    stiffness: Cholesky,
+    is_pinned: Vec<bool>,
+    /// For each contact row, the unknowns that it acts on.
+    rows: BTreeMap<u32, Vec<(u32, f64)>>,
+    /// Force on each unknown, N.
+    load_n: Vec<f64>,
+    /// Displacement of each unknown, but for a rigid motion where the part is free, mm.
+    moved_mm: Vec<f64>,
+}
+
+/// A stiffness matrix in parts: row, column, N/mm.
+type Entries = Vec<(u32, u32, f64)>;
+
+impl<'a> Body<'a> {
+    /// The part, and what contact sees of it; `loads_n` are the forces at the wall nodes.
+    pub fn new(
+        model: &'a VolumeModel,
+        part: u32,
+        plan: &[Meeting],
+        sections: &Sections,
+        bars: &'a [Bar],
+        loads_n: &[Vec3],
+    ) -> Result<(Self, Response), SparseError> {
+        let (order, material) = (model.params.order, &model.params.material);
+        let n_points = model.part_of_point.len();
+        let is_own = |tet: &u32| model.part_of_point[model.wall.tets[*tet as usize][0] as usize % n_points] == part;
+        let tets: Vec<u32> = (0..model.wall.tets.len() as u32).filter(is_own).collect();
+        let corners: Vec<[u32; 4]> = tets.iter().map(|tet| model.wall.tets[*tet as usize]).collect();
+        let numbering = Numbering::new(order, &corners, &[], &|node| model.is_clamped[node as usize % n_points]);
+        let mut entries = assemble(order, material, &model.wall, &corners, &numbering);
+
+        let labels = model.labels(part);
+        let (bars, _, mut fronts) = model.bar_fronts(part, sections, bars, labels);
+        let mut own: Vec<u32> = fronts.iter().flat_map(|f| &f.ids).copied().filter(|id| *id > labels.load()).collect();
+        own.sort_unstable();
+        own.dedup();
+        fronts.extend(model.wall_fronts(part, plan, labels));
+        let n = numbering.n + own.len();
+        let mut load_n = vec![0.0; n];
+        for (node, first) in numbering.vertices.iter().zip(&numbering.first) {
+            let Some(first) = first else { continue };
+            load_n[*first as usize..][..3].copy_from_slice(&loads_n[*node as usize].to_array());
+        }
+        let kept = &model.parts[part as usize].kept;
+        let rows = BTreeMap::new();
+        let (is_pinned, moved_mm) = (vec![false; n], Vec::new());
+        let stiffness = Cholesky::new(&SparseSymmetric::from_entries(0, Vec::new()))?;
+        let mut body = Self { tets, numbering, bars, labels, own, kept, stiffness, is_pinned, rows, load_n, moved_mm };
+        body.add_fronts(&fronts, &mut entries);
+        if model.parts[part as usize].rigid.is_some() {
+            body.pin(model);
+        }
+        let is_pinned = &body.is_pinned;
+        entries.retain(|(p, q, _)| p == q || !(is_pinned[*p as usize] || is_pinned[*q as usize]));
+        body.stiffness = Cholesky::new(&SparseSymmetric::from_entries(n, entries))?;
+        let mut response = model.read(part, &body.front(), labels, plan, sections);
+        response.rigid_load_n = [0.0; 6];
+        if let Some(rigid) = model.parts[part as usize].rigid {
+            for node in &body.numbering.vertices {
+                let modes = rigid.at(model.wall.nodes[*node as usize]);
+                (0..6).for_each(|m| response.rigid_load_n[m] += modes[m].dot(loads_n[*node as usize]));
+            }
+        }
+        Ok((body, response))
+    }
+
+    /// The unknown that a label means; none for contact rows and the load.
+    fn unknown(&self, id: u32) -> Option<u32> {
+        if self.labels.is_wall(id) {
+            let at = self.numbering.vertices.binary_search(&self.kept[id as usize / 3]).ok()?;
+            return self.numbering.first[at].map(|first| first + id % 3);
+        }
+        self.own.binary_search(&id).ok().map(|at| (self.numbering.n + at) as u32)
+    }
+
+    /// Adds stiffness to `entries`, and takes note of the rows.
+    fn add_fronts(&mut self, fronts: &[Front], entries: &mut Entries) {
+        for front in fronts {
+            let n = front.ids.len();
+            let unknowns: Vec<Option<u32>> = front.ids.iter().map(|id| self.unknown(*id)).collect();
+            for j in 0..n {
+                for i in j..n {
+                    let value = front.values[i + n * j];
+                    let (row, of) = match (unknowns[i], unknowns[j]) {
+                        (Some(p), Some(q)) => {
+                            entries.push((p, q, value));
+                            continue;
+                        }
+                        (None, Some(of)) => (front.ids[i], of),
+                        (Some(of), None) => (front.ids[j], of),
+                        (None, None) => continue,
+                    };
+                    // Most of a row's places are empty, and the separation force does not act.
+                    if value != 0.0 && row != self.labels.load() {
+                        self.rows.entry(row).or_default().push((of, value));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Holds six unknowns of the wall that leave it no rigid motion: one after the other the one that moves farthest.
+    fn pin(&mut self, model: &VolumeModel) {
+        let points: Vec<Vec3> = self.numbering.vertices.iter().map(|v| model.wall.nodes[*v as usize]).collect();
+        let rigid = RigidModes::new(&points);
+        let mut left: Vec<(u32, nalgebra::SVector<f64, 6>)> = Vec::new();
+        for (point, first) in points.iter().zip(&self.numbering.first) {
+            let modes = rigid.at(*point);
+            let Some(first) = first else { continue };
+            left.extend((0..3).map(|c| (first + c as u32, modes.map(|m| m[c]).into())));
+        }
+        for _ in 0..6 {
+            let farthest = left.iter().max_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared()));
+            let Some(&(unknown, motion)) = farthest else { return };
+            self.is_pinned[unknown as usize] = true;
+            let along = motion.normalize();
+            left.iter_mut().for_each(|(_, motion)| *motion -= along * along.dot(motion));
+        }
+    }
+
+    /// Minus the displacement along each row by each row's force and by the load, mm/N and mm.
+    fn front(&self) -> Front {
+        let n = self.load_n.len();
+        let m = self.rows.len() + 1;
+        let mut sides = vec![0.0; n * m];
+        for (side, row) in sides.chunks_exact_mut(n.max(1)).zip(self.rows.values()) {
+            row.iter().for_each(|(of, value)| side[*of as usize] += value);
+        }
+        if let Some(last) = sides.chunks_exact_mut(n.max(1)).last() {
+            last.copy_from_slice(&self.load_n);
+        }
+        sides.chunks_exact_mut(n.max(1)).for_each(|side| self.release_pins(side));
+        self.stiffness.solve_in_place(&mut sides);
+        let mut values = vec![0.0; m * m];
+        for (j, side) in sides.chunks_exact(n.max(1)).enumerate() {
+            for (i, row) in self.rows.values().enumerate() {
+                let along: f64 = row.iter().map(|(of, value)| side[*of as usize] * value).sum();
+                values[i.max(j) + m * i.min(j)] = -along;
+            }
+        }
+        Front { ids: self.rows.keys().copied().chain([self.labels.load()]).collect(), values }
+    }
+
+    fn release_pins(&self, side: &mut [f64]) {
+        side.iter_mut().zip(&self.is_pinned).filter(|(_, is_pinned)| **is_pinned).for_each(|(f, _)| *f = 0.0);
+    }
+
+    /// Displaces it by the load and by what contact presses.
+    fn move_by(&mut self, equilibrium: &Equilibrium) {
+        let mut side = self.load_n.clone();
+        for (id, row) in &self.rows {
+            let force_n = equilibrium.force_n[self.labels.row_of(*id)];
+            row.iter().for_each(|(of, value)| side[*of as usize] += force_n * value);
+        }
+        self.release_pins(&mut side);
+        self.stiffness.solve_in_place(&mut side);
+        self.moved_mm = side;
+    }
+
+    fn displacement_mm(&self, first: Option<u32>) -> Vec3 {
+        let at = |first: u32| Vec3::from_slice(&self.moved_mm[first as usize..first as usize + 3]);
+        first.map_or(Vec3::ZERO, at)
+    }
+
+    fn wall_samples<'b>(&'b self, model: &'b VolumeModel) -> impl Iterator<Item = (u32, [Sample; 4])> + 'b {
+        let order = model.params.order;
+        self.tets.iter().map(move |&tet| {
+            let unknowns = self.numbering.of_tet(order, &model.wall.tets[tet as usize]);
+            let moved = unknowns.map(|first| self.displacement_mm(first));
+            (tet, samples(order, model.wall.corners(tet as usize), &model.params.material, &moved))
+        })
+    }
+
+    fn bar_samples(&self, model: &VolumeModel, sections: &Sections) -> Vec<Sample> {
+        let mut all = Vec::new();
+        for bar in &self.bars {
+            let Some((ends, movers)) = bar.movers(sections, self.labels) else { continue };
+            for tet in &bar.tets {
+                let moved = connector::with_middles(*tet).map(|node| {
+                    let by = |(first, weight): &(u32, f64)| self.displacement_mm(self.unknown(*first)) * *weight;
+                    movers[node].iter().map(by).sum()
+                });
+                let corners = tet.map(|node| connector::corner(ends, node));
+                all.extend(samples(super::Order::Quadratic, corners, &model.params.material, &moved));
+            }
+        }
+        all
+    }
+}

@@ -1,0 +1,64 @@
+//! Stresses in walls and connectors, and what of them to believe.
+//!
+//! Von Mises stress is sampled at the corners of the tetrahedra, where bending has its largest, each with a quarter of the
+//! volume. At re-entrant corners and under point forces elasticity has no largest stress: the finer the mesh, the higher. So the
+//! figure to hold against a material's strength is the one that all but [`PEAK_SHARE`] of the volume stay under.
+
+use shellock_geom::Vec3;
+
+use super::element::{Order, lame, volume_6, von_mises_mpa};
+use crate::Material;
+
+/// Share of the volume whose stress is taken for a peak that the model makes, and that a ductile print evens out.
+pub const PEAK_SHARE: f64 = 0.005;
+
+/// How much some of the material is stressed, MPa (von Mises).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StressLevel {
+    /// The largest sample.
+    pub largest_mpa: f64,
+    /// What all but [`PEAK_SHARE`] of the volume stay under.
+    pub robust_mpa: f64,
+    /// Where the smallest sample is that is not below `robust_mpa`.
+    pub at: Vec3,
+}
+
+/// Stress at one place, with the volume that it stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    pub stress_mpa: f64,
+    pub volume_mm3: f64,
+    pub at: Vec3,
+}
+
+/// At the four corners of a tetrahedron.
+pub(super) fn samples(
+    order: Order,
+    corners: [Vec3; 4],
+    material: &Material,
+    displacement_mm: &[Vec3; 10],
+) -> [Sample; 4] {
+    let volume_mm3 = volume_6(corners).abs() / 24.0;
+    std::array::from_fn(|i| {
+        let mut l = [0.0; 4];
+        l[i] = 1.0;
+        let stress_mpa = von_mises_mpa(order, corners, lame(material), displacement_mm, l);
+        Sample { stress_mpa, volume_mm3, at: corners[i] }
+    })
+}
+
+impl StressLevel {
+    /// Of all samples; zero where there are none.
+    pub(super) fn of(mut samples: Vec<Sample>) -> Self {
+        samples.sort_by(|a, b| b.stress_mpa.total_cmp(&a.stress_mpa));
+        let Some(largest) = samples.first() else { return Self::default() };
+        let peak_mm3 = PEAK_SHARE * samples.iter().map(|s| s.volume_mm3).sum::<f64>();
+        let mut above_mm3 = 0.0;
+        let robust = samples.iter().find(|s| {
+            above_mm3 += s.volume_mm3;
+            above_mm3 >= peak_mm3
+        });
+        let robust = robust.unwrap_or(largest);
+        Self { largest_mpa: largest.stress_mpa, robust_mpa: robust.stress_mpa, at: robust.at }
+    }
+}

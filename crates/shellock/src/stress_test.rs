@@ -1,0 +1,390 @@
+//! What a punch on top and a fall do to the assembled pieces (Sect. 7, Fig. 15), and what they would do to worse ones.
+//!
+//! The pieces are walls and connectors of tetrahedra with contact, as in the volume metric. Punch: the force presses on
+//! what faces upwards within [`PUNCH_RADIUS_MM`] of the top, or of the highest place in the middle; what stands on the
+//! table is held. Fall: the model lands on its feet and is stopped within 1/300 s (Sect. 4.3); the floor pushes with
+//! `M v / Δt` on what touches it, and inertia balances it.
+//!
+//! Limits: static and linear; no friction but at the key, no clearance; the fall is upright; connectors are everywhere
+//! where the plan has room for them, carved or not.
+
+mod chart;
+mod region;
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+use shellock_geom::Vec3;
+use shellock_geom::sparse::SparseError;
+use shellock_mechanics::{Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams};
+
+use crate::metric::{MetricParams, PlanModel};
+use crate::plan::{InstallationPlan, PlanParams, random_plans, survey};
+use crate::{Cancelled, Ctx, PatchId, SegmentedSurface};
+
+pub use chart::chart;
+use region::{around, highest, highest_in_the_middle, lowest, spread};
+
+/// Radius of the fist, mm.
+pub const PUNCH_RADIUS_MM: f64 = 10.0;
+
+/// How long an impact takes, s (Sect. 4.3).
+const IMPACT_S: f64 = 1.0 / 300.0;
+
+/// Standard gravity, mm/s².
+const GRAVITY_MM_S2: f64 = 9806.65;
+
+/// Plans drawn at random, among which one of half the score is looked for.
+const N_DRAWN: usize = 100;
+
+/// An opening of this many connector sizes shows, and is half of what lets a pin out.
+const OPEN_SIZES: f64 = 0.3;
+
+/// How far a seam may open and still hold, mm.
+fn open_mm(connector_mm: f64) -> f64 {
+    OPEN_SIZES * connector_mm
+}
+
+/// Where the punch lands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PunchAt {
+    /// On the highest point, be it the tip of an ear.
+    #[default]
+    Top,
+    /// On the highest place above the middle of the surface.
+    Middle,
+}
+
+/// What is done to the pieces, and what they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StressParams {
+    /// Force on the top, N. (0, 10⁵]; 70, as in the paper.
+    pub punch_n: f64,
+    /// Where it presses. The highest point.
+    pub punch_at: PunchAt,
+    /// Height of the fall, mm. (0, 10⁵]; 2000, as in the paper.
+    pub drop_mm: f64,
+    /// Walls, connectors and material.
+    pub metric: MetricParams,
+    /// How plans are drawn; `up` says where the top is.
+    pub plan: PlanParams,
+}
+
+impl Default for StressParams {
+    fn default() -> Self {
+        Self {
+            punch_n: 70.0,
+            punch_at: PunchAt::default(),
+            drop_mm: 2000.0,
+            metric: MetricParams::default(),
+            plan: PlanParams::default(),
+        }
+    }
+}
+
+impl StressParams {
+    /// Every problem at once.
+    pub fn problems(&self) -> Vec<String> {
+        let mut problems = self.plan.problems();
+        if !(0.2..=5.0).contains(&self.metric.edge_share) {
+            problems.push(format!("edges are {} of their usual length; choose 0.2 to 5", self.metric.edge_share));
+        }
+        for (name, value) in [("the punch", self.punch_n), ("the height of the fall", self.drop_mm)] {
+            if !(value > 0.0 && value <= 1e5) {
+                problems.push(format!("{name} is {value}; it must be more than 0 and at most 100 000 N or mm"));
+            }
+        }
+        problems
+    }
+
+    /// Force of the floor that stops a mass, N, given in t: `M v / Δt` with `v = √(2 g h)`.
+    pub fn impact_n(&self, mass_t: f64) -> f64 {
+        mass_t * (2.0 * GRAVITY_MM_S2 * self.drop_mm).sqrt() / IMPACT_S
+    }
+}
+
+/// How a test ends, from best to worst.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Seams stay closed, and the material bears it.
+    Holds,
+    /// A seam opens by [0.3, 0.6) connector sizes.
+    Opens,
+    /// The stress in walls or connectors is more than the material bears.
+    Yields,
+    /// A pin leaves its channel, or nothing stops some piece.
+    ComesApart,
+}
+
+/// What one test did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// How it ends.
+    pub verdict: Verdict,
+    /// Force on the model, N.
+    pub force_n: f64,
+    /// The widest opening, mm; infinite (`null`) where nothing stops some piece.
+    pub opening_mm: f64,
+    /// The pieces that part there.
+    pub between: Option<[PatchId; 2]>,
+    /// The place, mm in assembly space.
+    pub at: Option<[f64; 3]>,
+    /// Joints whose pins have left their channels.
+    pub n_lost: usize,
+    /// Stress that all but 0.5 % of the walls' volume stays under, MPa (von Mises).
+    pub wall_mpa: f64,
+    /// The same of pins and channels.
+    pub connector_mpa: f64,
+    /// The largest stress anywhere, which grows with the fineness of the mesh, MPa.
+    pub peak_mpa: f64,
+    /// The larger of the first two over the strength.
+    pub strength_share: f64,
+}
+
+/// Both tests of one design.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pair {
+    /// Punched on the top.
+    pub punch: Outcome,
+    /// Fallen.
+    pub drop: Outcome,
+    /// The plan's score, by the surface metric, mm (higher is better); `None` where pieces come apart in it, and for
+    /// half connectors, whose plan is the kit's.
+    pub score_mm: Option<f64>,
+    /// Size of the connectors, mm.
+    pub connector_mm: f64,
+}
+
+/// The tests of a kit and of two that ought to be worse.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StressReport {
+    /// As it is.
+    pub kit: Pair,
+    /// With connectors of half the size.
+    pub half_connectors: Pair,
+    /// With the plan of those drawn whose score is nearest to twice as bad; none if none holds at all.
+    pub half_score: Option<Pair>,
+    /// Mass of the walls, g.
+    pub mass_g: f64,
+    /// What the material bears, MPa.
+    pub strength_mpa: f64,
+}
+
+impl StressReport {
+    /// The designs with their names, the kit first.
+    pub fn designs(&self) -> Vec<(&'static str, &Pair)> {
+        let mut all = vec![("kit", &self.kit), ("half connectors", &self.half_connectors)];
+        all.extend(self.half_score.iter().map(|pair| ("half score", pair)));
+        all
+    }
+
+    /// Whether the kit holds in both tests.
+    pub fn passed(&self) -> bool {
+        [&self.kit.punch, &self.kit.drop].iter().all(|o| o.verdict == Verdict::Holds)
+    }
+}
+
+/// Why the tests could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StressError {
+    /// Parameters out of range.
+    #[error("{}", .0.join("; "))]
+    Params(Vec<String>),
+    /// The plan is not one of this surface.
+    #[error("the plan has {steps} pieces, the surface {patches}: they do not belong together")]
+    Plan {
+        /// Steps of the plan.
+        steps: usize,
+        /// Patches of the surface.
+        patches: usize,
+    },
+    /// The simulation failed.
+    #[error("the simulation failed: {0}")]
+    Volume(#[from] VolumeError),
+    /// The surface metric failed.
+    #[error("the surface metric failed: {0}")]
+    Surface(#[from] SparseError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Tests the pieces of `surface` under `plan`, with connectors of half the size, and under a plan of half the score.
+pub fn stress_test(
+    ctx: &Ctx<'_>,
+    params: &StressParams,
+    surface: &SegmentedSurface,
+    plan: &InstallationPlan,
+) -> Result<StressReport, StressError> {
+    let problems = params.problems();
+    if !problems.is_empty() {
+        return Err(StressError::Params(problems));
+    }
+    if plan.steps.len() != surface.n_patches {
+        return Err(StressError::Plan { steps: plan.steps.len(), patches: surface.n_patches });
+    }
+    ctx.stage("a plan of half the score", 0)?;
+    let model = sound_model(&params.metric, surface)?;
+    let scored = |plan: &InstallationPlan| score(&model, plan);
+    let score_mm = scored(plan)?;
+    let worse = match score_mm {
+        Some(score_mm) => half_as_good(ctx, params, surface, &model, score_mm)?,
+        None => None,
+    };
+
+    let meetings = model.meetings(plan);
+    ctx.stage("stress test: the kit", 0)?;
+    let bench = Bench::new(params, &model, params.metric.connector_mm)?;
+    let kit = bench.test(&meetings, score_mm)?;
+    ctx.stage("stress test: half the score", 0)?;
+    let half_score = worse.map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm))).transpose()?;
+    ctx.stage("stress test: half connectors", 0)?;
+    let half_mm = params.metric.connector_mm / 2.0;
+    let half_connectors = Bench::new(params, &model, half_mm)?.test(&meetings, None)?;
+    Ok(StressReport {
+        kit,
+        half_connectors,
+        half_score,
+        mass_g: bench.free.mass_t() * 1e6,
+        strength_mpa: params.metric.material.strength_mpa,
+    })
+}
+
+/// Lengths of the edges to try, as shares of what is asked for: where a coarse mesh folds so that no wall stands on it,
+/// a somewhat finer or coarser one mostly does not.
+const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
+
+/// The model on the first mesh on which walls stand.
+fn sound_model(params: &MetricParams, surface: &SegmentedSurface) -> Result<PlanModel, StressError> {
+    let mut failure = None;
+    for share in EDGE_SHARES {
+        let model = PlanModel::new(&MetricParams { edge_share: share * params.edge_share, ..*params }, surface);
+        match model.volume_model() {
+            Err(e @ VolumeError::FlatTriangle(_)) => failure = failure.or(Some(e)),
+            Err(e) => return Err(e.into()),
+            Ok(_) => return Ok(model),
+        }
+    }
+    Err(failure.map_or(VolumeError::Contact, |e| e).into())
+}
+
+/// Quality by the surface metric, mm; `None` where pieces come apart.
+fn score(model: &PlanModel, plan: &InstallationPlan) -> Result<Option<f64>, SparseError> {
+    let solved = model.surface_model()?.resist(&model.meetings(plan), plan.key().0)?;
+    Ok(match solved.resistance {
+        Resistance::Holds(opening) => Some(opening.quality_mm),
+        Resistance::Separable(_) => None,
+    })
+}
+
+/// The plan of those drawn whose score is nearest, by ratio, to twice `score_mm` (scores are negative).
+fn half_as_good(
+    ctx: &Ctx<'_>,
+    params: &StressParams,
+    surface: &SegmentedSurface,
+    model: &PlanModel,
+    score_mm: f64,
+) -> Result<Option<(InstallationPlan, f64)>, StressError> {
+    let survey = survey(ctx, &params.plan, surface, &surface.seams())?;
+    let plans = random_plans(&params.plan, &survey, N_DRAWN);
+    let solver = model.surface_model()?;
+    let mut best: Option<(f64, InstallationPlan, f64)> = None;
+    for plan in plans {
+        ctx.check()?;
+        let solved = solver.resist(&model.meetings(&plan), plan.key().0)?;
+        let Resistance::Holds(opening) = solved.resistance else { continue };
+        let distance = (opening.quality_mm / (2.0 * score_mm)).ln().abs();
+        if best.as_ref().is_none_or(|b| distance < b.0) {
+            best = Some((distance, plan, opening.quality_mm));
+        }
+    }
+    Ok(best.map(|(_, plan, score_mm)| (plan, score_mm)))
+}
+
+/// The pieces of one design, standing and falling.
+struct Bench<'a> {
+    params: &'a StressParams,
+    model: &'a PlanModel,
+    connector_mm: f64,
+    /// Held where it stands.
+    standing: VolumeModel,
+    /// Held nowhere.
+    free: VolumeModel,
+}
+
+impl<'a> Bench<'a> {
+    fn new(params: &'a StressParams, model: &'a PlanModel, connector_mm: f64) -> Result<Self, VolumeError> {
+        let (wall_mm, material) = (params.metric.wall_mm, params.metric.material);
+        let volume = VolumeParams { wall_mm, connector_mm, material, ..VolumeParams::default() };
+        let held = lowest(&model.assembly, Vec3::from_array(params.plan.up));
+        let standing = VolumeModel::clamped(&volume, &model.assembly, &held)?;
+        let free = VolumeModel::new(&volume, &model.assembly)?;
+        Ok(Self { params, model, connector_mm, standing, free })
+    }
+
+    fn test(&self, meetings: &[Meeting], score_mm: Option<f64>) -> Result<Pair, VolumeError> {
+        let up = Vec3::from_array(self.params.plan.up).normalize_or(Vec3::Z);
+        let assembly = &self.model.assembly;
+        let hit = match self.params.punch_at {
+            PunchAt::Top => highest(assembly, up),
+            PunchAt::Middle => highest_in_the_middle(assembly, up, PUNCH_RADIUS_MM),
+        };
+        let fist = hit.map_or_else(Vec::new, |hit| around(assembly, up, hit, PUNCH_RADIUS_MM));
+        let punch = spread(assembly, &fist, -up * self.params.punch_n);
+        let impact_n = self.params.impact_n(self.free.mass_t());
+        let impact = spread(assembly, &lowest(assembly, up), up * impact_n);
+        let punched = self.standing.under_load(meetings, &punch)?;
+        let fallen = self.free.under_load(meetings, &impact)?;
+        Ok(Pair {
+            punch: self.outcome(punched, self.params.punch_n),
+            drop: self.outcome(fallen, impact_n),
+            score_mm,
+            connector_mm: self.connector_mm,
+        })
+    }
+
+    fn outcome(&self, loaded: Result<Loaded, Vec<u32>>, force_n: f64) -> Outcome {
+        let strength_mpa = self.params.metric.material.strength_mpa;
+        let loaded = loaded.unwrap_or_else(|parts| Loaded {
+            opening_mm: self.openings_of(&parts),
+            lost: Vec::new(),
+            walls: StressLevel::default(),
+            connectors: StressLevel::default(),
+            triangle_mpa: Vec::new(),
+            imbalance: 0.0,
+        });
+        let widest =
+            (0..loaded.opening_mm.len()).max_by(|a, b| loaded.opening_mm[*a].total_cmp(&loaded.opening_mm[*b]));
+        let opening_mm = widest.map_or(0.0, |i| loaded.opening_mm[i]);
+        let strength_share = loaded.walls.robust_mpa.max(loaded.connectors.robust_mpa) / strength_mpa;
+        let verdict = if !loaded.lost.is_empty() || opening_mm.is_infinite() {
+            Verdict::ComesApart
+        } else if strength_share > 1.0 {
+            Verdict::Yields
+        } else if opening_mm >= open_mm(self.connector_mm) {
+            Verdict::Opens
+        } else {
+            Verdict::Holds
+        };
+        Outcome {
+            verdict,
+            force_n,
+            opening_mm,
+            between: widest.map(|i| self.model.pieces_at(i)),
+            at: widest.map(|i| self.model.place_of(i).to_array()),
+            n_lost: loaded.lost.len(),
+            wall_mpa: loaded.walls.robust_mpa,
+            connector_mpa: loaded.connectors.robust_mpa,
+            peak_mpa: loaded.walls.largest_mpa.max(loaded.connectors.largest_mpa),
+            strength_share,
+        }
+    }
+
+    /// Infinite at the stations of `parts`, which come off, and nothing elsewhere.
+    fn openings_of(&self, parts: &[u32]) -> Vec<f64> {
+        let is_loose = |i: usize| self.model.pieces_at(i).iter().any(|piece| parts.contains(&piece.0));
+        (0..self.model.assembly.stations.len()).map(|i| if is_loose(i) { f64::INFINITY } else { 0.0 }).collect()
+    }
+}

@@ -1,0 +1,94 @@
+use std::sync::atomic::AtomicBool;
+
+use super::*;
+use crate::LatticeDirection;
+use crate::plan::InstallationStep;
+use crate::plan::testing::{label, sphere};
+
+fn octants() -> SegmentedSurface {
+    let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
+    label(sphere(4, Vec3::splat(40.0)), 8, octant)
+}
+
+/// Every octant leaves outwards.
+fn outwards() -> InstallationPlan {
+    let direction = |i: u32| Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0));
+    let step = |i: u32| InstallationStep { piece: PatchId(i), separation: LatticeDirection::nearest(direction(i)) };
+    InstallationPlan { steps: (0..8).map(step).collect() }
+}
+
+/// A coarse mesh: what is tested here holds on any.
+fn coarse() -> StressParams {
+    StressParams { metric: MetricParams { edge_share: 2.5, ..MetricParams::default() }, ..StressParams::default() }
+}
+
+#[test]
+fn an_impact_takes_the_momentum_of_the_fall() {
+    let params = StressParams::default();
+    let mass_t = 1e-4;
+    let speed_mm_s = (2.0 * 9806.65 * 2000.0_f64).sqrt();
+    assert!((params.impact_n(mass_t) / 300.0 - mass_t * speed_mm_s).abs() < 1e-12);
+    // 100 g from 2 m: 6.26 m/s in 1/300 s.
+    assert!((params.impact_n(mass_t) - 187.9).abs() < 0.1);
+}
+
+#[test]
+fn forces_are_spread_over_what_they_hit_and_add_up() {
+    let model = PlanModel::new(&coarse().metric, &octants());
+    let a = &model.assembly;
+    let height = |p: &u32| a.points[*p as usize].z;
+    let top = highest(a, Vec3::Z).unwrap();
+    let (hit, foot) = (around(a, Vec3::Z, top, PUNCH_RADIUS_MM), lowest(a, Vec3::Z));
+    assert!(!hit.is_empty() && hit.iter().all(|p| height(p) > 30.0));
+    assert!(foot.len() >= 3 && foot.iter().all(|p| height(p) < 0.0));
+    // A ball's top is in its middle.
+    assert_eq!(highest_in_the_middle(a, Vec3::Z, PUNCH_RADIUS_MM), Some(top));
+    let forces_n = spread(a, &hit, -70.0 * Vec3::Z);
+    assert!((forces_n.iter().sum::<Vec3>() + 70.0 * Vec3::Z).length() < 1e-9);
+    assert!((0..).zip(&forces_n).all(|(i, f)| hit.contains(&i) || *f == Vec3::ZERO));
+}
+
+#[test]
+fn half_connectors_fare_worse_than_whole_ones_and_the_report_says_so() {
+    let stop = AtomicBool::new(false);
+    let ctx = Ctx::new(&|_| {}, &stop);
+    let tested = stress_test(&ctx, &coarse(), &octants(), &outwards()).unwrap();
+    let (kit, half) = (&tested.kit, &tested.half_connectors);
+    for (whole, half) in [(&kit.punch, &half.punch), (&kit.drop, &half.drop)] {
+        assert!(half.opening_mm > whole.opening_mm, "{half:?} {whole:?}");
+        assert!(half.connector_mpa > whole.connector_mpa && half.verdict >= whole.verdict);
+    }
+    let drawing = chart(&tested);
+    assert_eq!(drawing.matches("<rect").count(), 1 + 4 * tested.designs().len());
+    assert_eq!(drawing.matches("<line").count(), 4 * tested.designs().len());
+    assert!(drawing.ends_with("</svg>\n"));
+}
+
+#[test]
+fn a_stronger_material_bears_what_a_weaker_one_does_not() {
+    // So light a touch opens nothing; the verdict is the material's alone.
+    let with_strength = |strength_mpa: f64| {
+        let mut params = StressParams { punch_n: 1.0, ..coarse() };
+        params.metric.material.strength_mpa = strength_mpa;
+        let model = PlanModel::new(&params.metric, &octants());
+        let bench = Bench::new(&params, &model, params.metric.connector_mm).unwrap();
+        bench.test(&model.meetings(&outwards()), None).unwrap().punch
+    };
+    let measured = with_strength(42.0);
+    assert_eq!(measured.verdict, Verdict::Holds);
+    let mpa = measured.wall_mpa.max(measured.connector_mpa);
+    assert_eq!(with_strength(0.9 * mpa).verdict, Verdict::Yields);
+    assert_eq!(with_strength(1.1 * mpa).verdict, Verdict::Holds);
+}
+
+#[test]
+fn what_does_not_belong_together_is_refused() {
+    let stop = AtomicBool::new(false);
+    let ctx = Ctx::new(&|_| {}, &stop);
+    let mut plan = outwards();
+    plan.steps.pop();
+    let refused = stress_test(&ctx, &coarse(), &octants(), &plan);
+    assert_eq!(refused, Err(StressError::Plan { steps: 7, patches: 8 }));
+    let params = StressParams { punch_n: f64::NAN, drop_mm: -1.0, ..coarse() };
+    assert_eq!(params.problems().len(), 2);
+}
