@@ -148,3 +148,20 @@ pub enum Resistance {
     /// These parts (ascending) can be pulled off without any resistance, the fixed part held.
     Separable(Vec<u32>),
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_station_is_that_of_the_largest_weighted_opening_and_only_joints_count() {
+        let meeting = |weight: Option<f64>| {
+            let joint = |weight| Joint { male: Side::A, leaves: Vec3::Z, is_fast: false, pull_on_a: Vec3::Z, weight };
+            Meeting { wall: Vec3::X, joint: weight.map(joint) }
+        };
+        let rated = Opening::rated(&[Some(1.0), Some(0.1), None, Some(0.5)].map(meeting), vec![2.0, 9.0, 50.0, 5.0]);
+        assert_eq!((rated.quality_mm, rated.worst), (-2.5, Some(3)));
+        let none = Opening::rated(&[meeting(None)], vec![1.0]);
+        assert_eq!((none.quality_mm, none.worst), (0.0, None));
+    }
+}
