@@ -205,7 +205,7 @@ pub struct Options {
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, help_heading = "Pieces")]
     pub plan_time: f64,
     /// Wall thickness, mm, 0.8 to 10, or auto: the least that bears a fall
-    #[arg(long, value_name = "MM|auto", default_value = "2", help_heading = "Make")]
+    #[arg(long, value_name = "auto|MM", default_value = "auto", help_heading = "Make")]
     pub thickness: Thickness,
     /// What it is printed of: what it bears decides how thick walls must be
     #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material, help_heading = "Make")]

@@ -38,7 +38,11 @@ pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Res
 /// The parameters, or all that is wrong with them.
 pub fn checked(options: &Options) -> Result<Params, Failure> {
     let params = options.params();
-    let problems = params.problems();
+    let mut problems = params.problems();
+    // An infinite time is one: until the proof is closed.
+    if options.plan_time.is_nan() || options.plan_time < 0.0 {
+        problems.push(format!("plan time is {} s; it must be 0 or more", options.plan_time));
+    }
     if problems.is_empty() { Ok(params.agreed()) } else { Err(Failure::Wrong(problems.join("\nerror: "))) }
 }
 

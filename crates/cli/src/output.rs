@@ -283,7 +283,7 @@ fn report(
         ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
     ];
     facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, params))));
-    facts.extend(plan_facts(design));
+    facts.extend(plan_facts(design, stand));
     let checks = design
         .verification
         .checks
@@ -294,14 +294,18 @@ fn report(
     rayon::join(|| html(&data).into_bytes(), || pieces_picture(&data.pieces).png())
 }
 
-/// What a person wants to know of the plan: how good it is, and where it is weakest.
-fn plan_facts(design: &Design) -> Vec<(String, String)> {
+/// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is made to `stand`.
+fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, String)> {
     let proof = design.proof.map(|p| {
         let how = if p.optimal { "proven best for this key".into() } else { format!("within {:.0} %", 100.0 * p.gap) };
         ("plan's cost".into(), format!("{:.2}, {how}", p.cost))
     });
     let weakest = design.holding.as_ref().and_then(|h| h.seams.first()).map(|s| {
-        let figure = format!("{} and {}: opens {:.2} mm at 10 N/m; {}", s.later, s.earlier, s.opening_mm, s.reason);
+        let [x, y, z] = stand(Vec3::from_array(s.at)).to_array();
+        let figure = format!(
+            "{} and {}: opens {:.2} mm at 10 N/m at ({x:.1}, {y:.1}, {z:.1}) mm; {}",
+            s.later, s.earlier, s.opening_mm, s.reason
+        );
         ("weakest seam".into(), figure)
     });
     proof.into_iter().chain(weakest).collect()

@@ -5,8 +5,9 @@ use std::path::Path;
 use serde_json::{Value, json};
 use shellock::metric::MetricParams;
 use shellock::pipeline::Params;
+use shellock::sizes::SizeChoice;
 use shellock::stress_test::{Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test};
-use shellock::{Ctx, PatchId, SegmentedSurface};
+use shellock::{ConnectorSizes, Ctx, PatchId, SegmentedSurface};
 use shellock_geom::check::into_solid;
 use shellock_mechanics::Material;
 
@@ -71,7 +72,7 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
     let value = json!({
         "format": "shellock-stress", "version": 1, "punch_n": params.punch_n,
         "punch_at": params.punch_at, "drop_mm": params.drop_mm,
-        "material": params.metric.material, "connector_size": params.metric.connector_mm, "up": params.plan.up,
+        "material": params.metric.material, "connector_size": params.sizes.largest_mm(), "up": params.plan.up,
         "passed": tested.passed(), "report": tested,
     });
     let mut text = serde_json::to_string_pretty(&value).map_err(|e| broken(&e.to_string()))?;
@@ -110,7 +111,8 @@ fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
     let mut params = Params::default();
     let number = |name: &str, default: f64| plan[name].as_f64().unwrap_or(default);
     params.body.thickness_mm = number("shell_thickness", params.body.thickness_mm);
-    params.connector.size_mm = number("connector_size", params.connector.size_mm);
+    let sizes = sizes_of(plan)?;
+    params.connector.size = SizeChoice::Fixed(sizes.largest_mm());
     params.plan.seed = plan["seed"].as_u64().unwrap_or_default();
     let told: Vec<f64> = plan["up"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
     params.plan.up = match (blows.up, &told[..]) {
@@ -123,12 +125,25 @@ fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
         return Err(problems.join("; "));
     }
     let plan = params.agreed().plan;
-    let metric = MetricParams { material: blows.material, edge_share: blows.edges, ..MetricParams::of_plan(&plan) };
+    let (material, edge_share) = (blows.material, blows.edges);
+    let metric = MetricParams { material, edge_share, ..MetricParams::of_plan(&plan, &sizes) };
     let punch_at = match blows.at {
         Place::Top => PunchAt::Top,
         Place::Middle => PunchAt::Middle,
     };
-    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: blows.drop, metric, plan })
+    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: blows.drop, metric, sizes, plan })
+}
+
+/// The connectors' sizes: one for all, or those of each pair.
+fn sizes_of(plan: &Value) -> Result<ConnectorSizes, String> {
+    let default_mm = plan["connector_size"].as_f64().unwrap_or(SizeChoice::DEFAULT_MM);
+    let pair = |entry: &Value| -> Option<([PatchId; 2], f64)> {
+        let piece = |i: usize| u32::try_from(entry["pieces"][i].as_u64()?).ok().map(PatchId);
+        Some(([piece(0)?, piece(1)?], entry["size_mm"].as_f64().filter(|mm| (0.1..=20.0).contains(mm))?))
+    };
+    let pairs = plan["connector_sizes"].as_array().into_iter().flatten().map(pair).collect::<Option<Vec<_>>>();
+    let pairs = pairs.ok_or("\"connector_sizes\" must list \"pieces\", two numbers, and \"size_mm\", 0.1 to 20")?;
+    Ok(ConnectorSizes::with_pairs(default_mm, pairs))
 }
 
 fn print_table(params: &StressParams, tested: &StressReport) {

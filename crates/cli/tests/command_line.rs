@@ -90,6 +90,12 @@ fn all_bad_parameters_are_told_at_once() {
     for word in ["thickness", "clearance", "connector size"] {
         assert!(errors(&o).contains(word), "{}", errors(&o));
     }
+    for seconds in ["NaN", "-1", "-inf"] {
+        let o = shellock(dir.path(), &["demo", &format!("--plan-time={seconds}")]);
+        assert_eq!(code(&o), 2, "{seconds}");
+        assert!(errors(&o).contains("plan time"), "{}", errors(&o));
+    }
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
 #[test]

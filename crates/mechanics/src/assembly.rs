@@ -103,6 +103,12 @@ pub struct Joint {
 /// An opening this wide, in connector sizes, has let the pin out of its channel: the joint does not hold.
 const LOST_SIZES: f64 = 0.6;
 
+/// Whether `opening_mm` lets the connector go that `meeting` has.
+pub(crate) fn is_lost(meeting: &Meeting, opening_mm: f64) -> bool {
+    let lost_mm = meeting.joint.map_or(f64::INFINITY, |joint| LOST_SIZES * joint.size_mm);
+    opening_mm.is_nan() || opening_mm >= lost_mm
+}
+
 /// What a solver found for one plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opening {
@@ -133,12 +139,8 @@ impl Opening {
         meetings: &[Meeting],
         parts: impl Fn(usize) -> I,
     ) -> Resistance {
-        let is_lost = |station: &usize| {
-            let lost_mm = meetings[*station].joint.map_or(f64::INFINITY, |joint| LOST_SIZES * joint.size_mm);
-            let d = self.opening_mm[*station];
-            d.is_nan() || d >= lost_mm
-        };
-        let mut lost: Vec<u32> = (0..self.opening_mm.len()).filter(is_lost).flat_map(parts).collect();
+        let lost = (0..self.opening_mm.len()).filter(|i| is_lost(&meetings[*i], self.opening_mm[*i]));
+        let mut lost: Vec<u32> = lost.flat_map(parts).collect();
         lost.sort_unstable();
         lost.dedup();
         if lost.is_empty() { Resistance::Holds(self) } else { Resistance::Separable(lost) }
@@ -152,4 +154,28 @@ pub enum Resistance {
     Holds(Opening),
     /// These parts (ascending) can be pulled off without any resistance, the fixed part held.
     Separable(Vec<u32>),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_station_is_that_of_the_largest_weighted_opening_and_only_joints_count() {
+        let meeting = |weight: Option<f64>| {
+            let joint = |weight| Joint {
+                male: Side::A,
+                leaves: Vec3::Z,
+                is_fast: false,
+                pull_on_a: Vec3::Z,
+                weight,
+                size_mm: 3.0,
+            };
+            Meeting { wall: Vec3::X, joint: weight.map(joint) }
+        };
+        let rated = Opening::rated(&[Some(1.0), Some(0.1), None, Some(0.5)].map(meeting), vec![2.0, 9.0, 50.0, 5.0]);
+        assert_eq!((rated.quality_mm, rated.worst), (-2.5, Some(3)));
+        let none = Opening::rated(&[meeting(None)], vec![1.0]);
+        assert_eq!((none.quality_mm, none.worst), (0.0, None));
+    }
 }

@@ -29,11 +29,15 @@ use changes::Changes;
 
 use crate::{Cancelled, Ctx, PatchId, SegmentedSurface};
 
+/// As many pieces as can be planned.
+pub const MOST_PIECES: usize = 128;
+
 /// How the surface is divided. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationParams {
-    /// Patches that automatic segmentation begins with; mending adds some. [2, 200]; `None`: from the area, 10 for a 150 mm figure.
+    /// Patches that automatic segmentation begins with; mending adds some. [2, [`MOST_PIECES`]]; `None`: from the area, 10 for a 150 mm
+    /// figure.
     pub n_pieces: Option<usize>,
     /// Seed of all random choices; 0.
     pub seed: u64,
@@ -75,8 +79,11 @@ impl SegmentationParams {
     /// Every problem at once, for people; empty where there is none.
     pub fn problems(&self) -> Vec<String> {
         let mut found = Vec::new();
-        if self.n_pieces.is_some_and(|n| !(2..=200).contains(&n)) {
-            found.push(format!("n_pieces is {}, but must be from 2 to 200", self.n_pieces.unwrap_or_default()));
+        if self.n_pieces.is_some_and(|n| !(2..=MOST_PIECES).contains(&n)) {
+            found.push(format!(
+                "n_pieces is {}, but must be from 2 to {MOST_PIECES}",
+                self.n_pieces.unwrap_or_default()
+            ));
         }
         for (name, value, low, high) in [
             ("smoothing_mm2", self.smoothing_mm2, 0.0, 100.0),

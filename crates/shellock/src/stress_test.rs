@@ -16,11 +16,11 @@ mod tests;
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
-use shellock_mechanics::{Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams};
+use shellock_mechanics::{Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams};
 
 use crate::metric::{MetricParams, PlanModel};
 use crate::plan::{InstallationPlan, PlanParams, random_plans, survey};
-use crate::{Cancelled, Ctx, PatchId, SegmentedSurface};
+use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface};
 
 pub use chart::chart;
 use region::{around, highest, highest_in_the_middle, lowest, spread};
@@ -40,9 +40,25 @@ const N_DRAWN: usize = 100;
 /// An opening of this many connector sizes shows, and is half of what lets a pin out.
 const OPEN_SIZES: f64 = 0.3;
 
-/// How far a seam may open and still hold, mm.
-fn open_mm(connector_mm: f64) -> f64 {
+/// How far a seam with connectors of that size may open and still hold, mm.
+fn limit_mm(connector_mm: f64) -> f64 {
     OPEN_SIZES * connector_mm
+}
+
+/// Size of the largest connectors, mm.
+fn largest_mm(meetings: &[Meeting]) -> f64 {
+    meetings.iter().filter_map(|m| m.joint).map(|joint| joint.size_mm).fold(0.0, f64::max)
+}
+
+/// Whether some connector has come out too far.
+fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
+    meetings.iter().zip(opening_mm).any(|(m, d)| m.joint.is_some_and(|joint| *d >= limit_mm(joint.size_mm)))
+}
+
+/// The same with a connector half as large.
+fn with_half_the_size(meeting: &Meeting) -> Meeting {
+    let half = |joint: Joint| Joint { size_mm: joint.size_mm / 2.0, ..joint };
+    Meeting { joint: meeting.joint.map(half), ..*meeting }
 }
 
 /// Where the punch lands.
@@ -67,6 +83,8 @@ pub struct StressParams {
     pub drop_mm: f64,
     /// Walls, connectors and material.
     pub metric: MetricParams,
+    /// Connectors of each pair of pieces.
+    pub sizes: ConnectorSizes,
     /// How plans are drawn; `up` says where the top is.
     pub plan: PlanParams,
 }
@@ -78,6 +96,7 @@ impl Default for StressParams {
             punch_at: PunchAt::default(),
             drop_mm: 2000.0,
             metric: MetricParams::default(),
+            sizes: ConnectorSizes::default(),
             plan: PlanParams::default(),
         }
     }
@@ -127,6 +146,8 @@ pub struct Outcome {
     pub force_n: f64,
     /// The widest opening, mm; infinite (`null`) where nothing stops some piece.
     pub opening_mm: f64,
+    /// How far the connectors there may come out and still hold, mm.
+    pub limit_mm: f64,
     /// The pieces that part there.
     pub between: Option<[PatchId; 2]>,
     /// The place, mm in assembly space.
@@ -153,7 +174,7 @@ pub struct Pair {
     /// The plan's score, by the surface metric, mm (higher is better); `None` where pieces come apart in it, and for
     /// half connectors, whose plan is the kit's.
     pub score_mm: Option<f64>,
-    /// Size of the connectors, mm.
+    /// Size of the largest connectors, mm.
     pub connector_mm: f64,
 }
 
@@ -226,7 +247,7 @@ pub fn stress_test(
         return Err(StressError::Plan { steps: plan.steps.len(), patches: surface.n_patches });
     }
     ctx.stage("a plan of half the score", 0)?;
-    let model = sound_model(&params.metric, surface)?;
+    let model = sound_model(params, surface)?;
     let scored = |plan: &InstallationPlan| score(&model, plan);
     let score_mm = scored(plan)?;
     let worse = match score_mm {
@@ -236,13 +257,12 @@ pub fn stress_test(
 
     let meetings = model.meetings(plan);
     ctx.stage("stress test: the kit", 0)?;
-    let bench = Bench::new(params, &model, params.metric.connector_mm)?;
+    let bench = Bench::new(params, &model)?;
     let kit = bench.test(&meetings, score_mm)?;
     ctx.stage("stress test: half the score", 0)?;
     let half_score = worse.map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm))).transpose()?;
     ctx.stage("stress test: half connectors", 0)?;
-    let half_mm = params.metric.connector_mm / 2.0;
-    let half_connectors = Bench::new(params, &model, half_mm)?.test(&meetings, None)?;
+    let half_connectors = bench.test(&meetings.iter().map(with_half_the_size).collect::<Vec<_>>(), None)?;
     Ok(StressReport {
         kit,
         half_connectors,
@@ -257,10 +277,14 @@ pub fn stress_test(
 const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
 
 /// The model on the first mesh on which walls stand.
-fn sound_model(params: &MetricParams, surface: &SegmentedSurface) -> Result<PlanModel, StressError> {
+fn sound_model(params: &StressParams, surface: &SegmentedSurface) -> Result<PlanModel, StressError> {
     let mut failure = None;
     for share in EDGE_SHARES {
-        let model = PlanModel::new(&MetricParams { edge_share: share * params.edge_share, ..*params }, surface);
+        let model = PlanModel::new(
+            &MetricParams { edge_share: share * params.metric.edge_share, ..params.metric },
+            surface,
+            &params.sizes,
+        );
         match model.volume_model() {
             Err(e @ VolumeError::FlatTriangle(_)) => failure = failure.or(Some(e)),
             Err(e) => return Err(e.into()),
@@ -287,7 +311,7 @@ fn half_as_good(
     model: &PlanModel,
     score_mm: f64,
 ) -> Result<Option<(InstallationPlan, f64)>, StressError> {
-    let survey = survey(ctx, &params.plan, surface, &surface.seams())?;
+    let survey = survey(ctx, &params.plan, surface, &surface.seams(), &params.sizes)?;
     let plans = random_plans(&params.plan, &survey, N_DRAWN);
     let solver = model.surface_model()?;
     let mut best: Option<(f64, InstallationPlan, f64)> = None;
@@ -307,7 +331,6 @@ fn half_as_good(
 struct Bench<'a> {
     params: &'a StressParams,
     model: &'a PlanModel,
-    connector_mm: f64,
     /// Held where it stands.
     standing: VolumeModel,
     /// Held nowhere.
@@ -315,13 +338,13 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(params: &'a StressParams, model: &'a PlanModel, connector_mm: f64) -> Result<Self, VolumeError> {
+    fn new(params: &'a StressParams, model: &'a PlanModel) -> Result<Self, VolumeError> {
         let (wall_mm, material) = (params.metric.wall_mm, params.metric.material);
-        let volume = VolumeParams { wall_mm, connector_mm, material, ..VolumeParams::default() };
+        let volume = VolumeParams { wall_mm, material, ..VolumeParams::default() };
         let held = lowest(&model.assembly, Vec3::from_array(params.plan.up));
         let standing = VolumeModel::clamped(&volume, &model.assembly, &held)?;
         let free = VolumeModel::new(&volume, &model.assembly)?;
-        Ok(Self { params, model, connector_mm, standing, free })
+        Ok(Self { params, model, standing, free })
     }
 
     fn test(&self, meetings: &[Meeting], score_mm: Option<f64>) -> Result<Pair, VolumeError> {
@@ -338,14 +361,14 @@ impl<'a> Bench<'a> {
         let punched = self.standing.under_load(meetings, &punch)?;
         let fallen = self.free.under_load(meetings, &impact)?;
         Ok(Pair {
-            punch: self.outcome(punched, self.params.punch_n),
-            drop: self.outcome(fallen, impact_n),
+            punch: self.outcome(punched, meetings, self.params.punch_n),
+            drop: self.outcome(fallen, meetings, impact_n),
             score_mm,
-            connector_mm: self.connector_mm,
+            connector_mm: largest_mm(meetings),
         })
     }
 
-    fn outcome(&self, loaded: Result<Loaded, Vec<u32>>, force_n: f64) -> Outcome {
+    fn outcome(&self, loaded: Result<Loaded, Vec<u32>>, meetings: &[Meeting], force_n: f64) -> Outcome {
         let strength_mpa = self.params.metric.material.strength_mpa;
         let loaded = loaded.unwrap_or_else(|parts| Loaded {
             opening_mm: self.openings_of(&parts),
@@ -363,7 +386,7 @@ impl<'a> Bench<'a> {
             Verdict::ComesApart
         } else if strength_share > 1.0 {
             Verdict::Yields
-        } else if opening_mm >= open_mm(self.connector_mm) {
+        } else if is_open(&loaded.opening_mm, meetings) {
             Verdict::Opens
         } else {
             Verdict::Holds
@@ -372,6 +395,7 @@ impl<'a> Bench<'a> {
             verdict,
             force_n,
             opening_mm,
+            limit_mm: limit_mm(widest.and_then(|i| meetings[i].joint).map_or(largest_mm(meetings), |j| j.size_mm)),
             between: widest.map(|i| self.model.pieces_at(i)),
             at: widest.map(|i| self.model.place_of(i).to_array()),
             n_lost: loaded.lost.len(),

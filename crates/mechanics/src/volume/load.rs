@@ -22,7 +22,7 @@ use super::rows::{self, ROWS, WALL};
 use super::stress::{Sample, StressLevel, samples};
 use super::{VolumeError, VolumeModel, mechanism};
 use crate::Meeting;
-use crate::assembly::LOST_SIZES;
+use crate::assembly::is_lost;
 
 /// g/cm³ in t/mm³, so that t · mm/s² = N.
 const T_MM3_PER_G_CM3: f64 = 1e-9;
@@ -90,14 +90,10 @@ impl VolumeModel {
         };
         bodies.par_iter_mut().for_each(|body| body.move_by(&equilibrium));
         let opening_mm = self.openings(plan, &responses, &equilibrium, &sections);
-        let is_lost = |i: &u32| {
-            let d = opening_mm[*i as usize];
-            plan[*i as usize].joint.is_some() && (d.is_nan() || d >= LOST_SIZES * self.params.connector_mm)
-        };
         let (triangle_mpa, walls) = self.wall_stress(&bodies);
         let connectors: Vec<Sample> = bodies.par_iter().flat_map_iter(|b| b.bar_samples(self, &sections)).collect();
         Ok(Ok(Loaded {
-            lost: (0..opening_mm.len() as u32).filter(is_lost).collect(),
+            lost: (0..).zip(plan).filter(|(i, m)| is_lost(m, opening_mm[*i as usize])).map(|(i, _)| i).collect(),
             walls,
             connectors: StressLevel::of(connectors),
             triangle_mpa,

@@ -146,6 +146,48 @@ fn uniform_strain_has_its_exact_energy() {
     }
 }
 
+/// A bar that is pulled along one axis and free across it.
+#[test]
+fn uniaxial_strain_with_lateral_contraction_has_the_stress_of_a_bar() {
+    for (_, material) in Material::PRESETS {
+        let (e_mpa, nu) = (material.youngs_modulus_mpa, material.poissons_ratio);
+        let (lambda, mu) = element::lame(&material);
+        let strain = [1.0, -nu, -nu];
+        let stress = strain.map(|x| lambda * strain.iter().sum::<f64>() + 2.0 * mu * x);
+        assert!((stress[0] / e_mpa - 1.0).abs() < 1e-12 && stress[1].abs() < 1e-9 * e_mpa, "{stress:?}");
+    }
+}
+
+/// In a channel whatever way it leans: n, ŝ and u are perpendicular to each other, and both sides see them the other way round.
+#[test]
+fn contact_acts_along_three_perpendicular_directions_and_each_side_bears_its_share_of_the_force() {
+    let ball = sample::ball(20.0, 8);
+    let params = VolumeParams::default();
+    let model = VolumeModel::new(&params, &ball).unwrap();
+    for degrees in [-90.0, -30.0, 0.0, 45.0] {
+        for [a, b] in super::connector::sections(&model, &joined(&ball, degrees, None)).iter().zip(&ball.stations).map(
+            |(sides, station)| {
+                let sides = sides.each_ref().map(|s| s.as_ref().expect("every station is joined"));
+                let force_n = params.force_n_per_mm * station.length_mm;
+                assert!((sides[0].load().0.length() - force_n).abs() < 1e-12);
+                assert!((sides[0].load().0 + sides[1].load().0).length() < 1e-12);
+                sides
+            },
+        ) {
+            for pair in [0, 3] {
+                let along = |side: &super::connector::Section| -> Vec<Vec3> {
+                    side.rows().filter(|r| (pair..pair + 3).contains(&r.0)).map(|r| r.1).collect()
+                };
+                let (of_a, of_b) = (along(a), along(b));
+                for i in 0..3 {
+                    assert!((of_a[i].length() - 1.0).abs() < 1e-9 && (of_a[i] + of_b[i]).length() < 1e-9);
+                    assert!(of_a[i].dot(of_a[(i + 1) % 3]).abs() < 1e-9, "{degrees}°: {of_a:?}");
+                }
+            }
+        }
+    }
+}
+
 /// Patch test: a free wall whose near nodes move uniformly bears on them with forces that balance, and rigid motions cost nothing.
 #[test]
 fn rigid_motions_of_a_free_wall_are_held_by_its_springs_alone() {
@@ -295,13 +337,15 @@ fn beyond(assembly: &ShellAssembly, z: f64) -> Vec<u32> {
 /// A ball pressed on its top with `force_n`, its bottom held if `is_held`.
 fn pressed(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
     let ball = sample::ball(20.0, 6);
-    let params = VolumeParams { connector_mm, ..VolumeParams::default() };
+    let params = VolumeParams::default();
     let held = if is_held { beyond(&ball, -17.0) } else { Vec::new() };
     let model = VolumeModel::clamped(&params, &ball, &held).unwrap();
     let top = beyond(&ball, 17.0);
     let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
     top.iter().for_each(|&p| forces_n[p as usize] = -Vec3::Z * force_n / top.len() as f64);
-    model.under_load(&joined(&ball, -30.0, Some(7)), &forces_n).unwrap().unwrap()
+    let mut plan = joined(&ball, -30.0, Some(7));
+    plan.iter_mut().filter_map(|m| m.joint.as_mut()).for_each(|joint| joint.size_mm = connector_mm);
+    model.under_load(&plan, &forces_n).unwrap().unwrap()
 }
 
 #[test]

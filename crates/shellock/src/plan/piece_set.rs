@@ -118,6 +118,13 @@ mod tests {
     }
 
     #[test]
+    fn as_many_pieces_may_be_asked_for_as_can_be_planned() {
+        assert_eq!(crate::segmentation::MOST_PIECES, PieceSet::MAX_PIECES);
+        let asked = |n| crate::segmentation::SegmentationParams { n_pieces: Some(n), ..Default::default() }.problems();
+        assert_eq!((asked(PieceSet::MAX_PIECES).len(), asked(PieceSet::MAX_PIECES + 1).len()), (0, 1));
+    }
+
+    #[test]
     fn a_path_without_its_middle_is_not_connected() {
         let arcs = [[1].as_slice(), &[0, 2], &[1]].map(|a| a.iter().map(|&i| PatchId(i)).collect::<PieceSet>());
         assert!(PieceSet::first(3).is_connected(&arcs));

@@ -25,7 +25,7 @@ use super::{
     FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey, RankedPlan,
     diagnose,
 };
-use crate::{Cancelled, Ctx, Warning};
+use crate::{Cancelled, Ctx, PatchId, Warning};
 
 /// Draws that run side by side before anybody looks at the results.
 const BATCH: usize = 32;
@@ -75,7 +75,7 @@ pub fn search_with(
     costs: MakeCosts<'_>,
 ) -> Result<PlanOutcome, Cancelled> {
     ctx.stage("search for a plan", 0)?;
-    if let Some(reason) = out_of_range(survey.n_pieces) {
+    if let Some(reason) = out_of_range(survey.n_pieces, params.key) {
         return Ok(PlanOutcome::Infeasible { reason, blockers: Vec::new(), articulations: Vec::new() });
     }
     let keys = choices(params, survey);
@@ -135,13 +135,15 @@ fn warn_of_short_joints(ctx: &Ctx<'_>, shortest_mm: f64) {
     });
 }
 
-fn out_of_range(n_pieces: usize) -> Option<String> {
+fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
     match n_pieces {
         0 | 1 => Some("one piece has nothing to interlock with; segment into at least two".into()),
         n if n > PieceSet::MAX_PIECES => {
             Some(format!("{n} pieces are more than the {} that can be planned; segment coarser", PieceSet::MAX_PIECES))
         }
-        _ => None,
+        n => key.filter(|&k| usize::from(k) >= n).map(|k| {
+            format!("piece {k} is to be the key, but there are only pieces 0 to {}; choose one of them", n - 1)
+        }),
     }
 }
 

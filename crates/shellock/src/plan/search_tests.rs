@@ -270,6 +270,17 @@ fn one_piece_and_too_many_are_refused_in_words() {
 }
 
 #[test]
+fn a_key_that_is_no_piece_is_named_and_not_blamed_on_the_pieces() {
+    let survey = surveyed(&label(sphere(2, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
+    for key in [2, u32::MAX] {
+        let params = PlanParams { key: Some(PatchId(key)), ..PlanParams::default() };
+        let outcome = searched(&params, &survey, &PlanConstraints::default());
+        let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else { panic!("there is no piece {key}") };
+        assert!(reason.contains(&format!("piece {key} ")) && blockers.is_empty(), "{reason}");
+    }
+}
+
+#[test]
 fn two_hemispheres_have_a_plan() {
     let survey = surveyed(&label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
     let constraints = PlanConstraints::default();

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Outcome, Pair, StressReport, Verdict, open_mm};
+use super::{Outcome, Pair, StressReport, Verdict};
 
 const ROW_PX: f64 = 26.0;
 const NAME_PX: f64 = 130.0;
@@ -40,23 +40,23 @@ pub fn chart(report: &StressReport) -> String {
     svg
 }
 
-fn opening(design: &'static str, pair: &Pair, outcome: &Outcome) -> Row {
-    let (value, limit) = (outcome.opening_mm, open_mm(pair.connector_mm));
+fn opening(design: &'static str, outcome: &Outcome) -> Row {
+    let Outcome { opening_mm: value, limit_mm: limit, .. } = *outcome;
     let figure = if value.is_finite() { format!("{value:.2}") } else { "without end".to_owned() };
     let (color, word) = style(outcome.verdict);
     Row { design, value, limit, label: format!("{figure} · {word}"), color }
 }
 
-fn stress(design: &'static str, _: &Pair, outcome: &Outcome) -> Row {
+fn stress(design: &'static str, outcome: &Outcome) -> Row {
     let (value, limit) = (100.0 * outcome.strength_share, 100.0);
     let (color, _) = style(if value > limit { Verdict::Yields } else { Verdict::Holds });
     Row { design, value, limit, label: format!("{value:.0}"), color }
 }
 
 /// The bars of both tests.
-fn groups(report: &StressReport, row: fn(&'static str, &Pair, &Outcome) -> Row) -> Groups {
+fn groups(report: &StressReport, row: fn(&'static str, &Outcome) -> Row) -> Groups {
     let rows = |of: fn(&Pair) -> &Outcome| -> Vec<Row> {
-        report.designs().into_iter().map(|(design, pair)| row(design, pair, of(pair))).collect()
+        report.designs().into_iter().map(|(design, pair)| row(design, of(pair))).collect()
     };
     let (punch_n, impact_n) = (report.kit.punch.force_n, report.kit.drop.force_n);
     [

@@ -34,7 +34,7 @@ fn an_impact_takes_the_momentum_of_the_fall() {
 
 #[test]
 fn forces_are_spread_over_what_they_hit_and_add_up() {
-    let model = PlanModel::new(&coarse().metric, &octants());
+    let model = PlanModel::new(&coarse().metric, &octants(), &ConnectorSizes::default());
     let a = &model.assembly;
     let height = |p: &u32| a.points[*p as usize].z;
     let top = highest(a, Vec3::Z).unwrap();
@@ -70,8 +70,8 @@ fn a_stronger_material_bears_what_a_weaker_one_does_not() {
     let with_strength = |strength_mpa: f64| {
         let mut params = StressParams { punch_n: 1.0, ..coarse() };
         params.metric.material.strength_mpa = strength_mpa;
-        let model = PlanModel::new(&params.metric, &octants());
-        let bench = Bench::new(&params, &model, params.metric.connector_mm).unwrap();
+        let model = PlanModel::new(&params.metric, &octants(), &params.sizes);
+        let bench = Bench::new(&params, &model).unwrap();
         bench.test(&model.meetings(&outwards()), None).unwrap().punch
     };
     let measured = with_strength(42.0);
