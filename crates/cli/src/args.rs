@@ -214,7 +214,7 @@ pub struct Options {
     #[arg(long, value_name = "M", default_value_t = Params::default().strength.drop_m, help_heading = "Make")]
     pub drop: f64,
     /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by what fits
-    #[arg(long, value_name = "auto|MM", default_value_t = SizeChoice::default(), help_heading = "Make")]
+    #[arg(long, value_name = "auto|MM", default_value = "auto", help_heading = "Make")]
     pub connector: SizeChoice,
     /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament
     #[arg(long, value_name = "MM", default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]

@@ -21,6 +21,8 @@
 
 mod thin;
 
+use std::f64::consts::{PI, TAU};
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -316,7 +318,7 @@ impl Falls {
         let mesh = analysis_mesh(model.mesh(), params.refinement * n_points);
         let shell = ShellModel::new(&mesh, &params.material)?;
         let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
-        let down: Vec<Vec3> = (0..params.n_cases).map(|_| on_sphere(&mut rng)).collect();
+        let down = even_directions(&mut rng, params.n_cases);
         let density_t_mm3 = 1e-9 * params.material.density_g_cm3;
         let force_n_mm3 = density_t_mm3 * params.speed_mm_s() / IMPACT_S;
         let cases = down.iter().map(|down| fall(&mesh, shell.areas_mm2(), *down, force_n_mm3)).collect();
@@ -403,6 +405,22 @@ fn analysis_mesh(mesh: &TriMesh, n_points: f64) -> TriMesh {
     // One point for each √3/2 l² of a mesh of equilateral triangles.
     let target_edge_mm = (mesh.area() / (n_points * 0.75f64.sqrt())).sqrt();
     remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, mesh, &vec![0; mesh.triangles.len()]).mesh
+}
+
+/// Directions that are as even as few directions can be, turned at random: a spiral of equal areas.
+///
+/// Directions drawn one by one leave gaps and clusters, and the thickness depends on them: docs/strength.md.
+fn even_directions(rng: &mut ChaCha8Rng, n: usize) -> Vec<Vec3> {
+    let pole = on_sphere(rng);
+    let (x, y) = pole.any_orthonormal_pair();
+    let start: f64 = rng.random_range(0.0..TAU);
+    let on_spiral = |i: usize| {
+        let height = 1.0 - (2.0 * i as f64 + 1.0) / n as f64;
+        let angle = start + i as f64 * PI * (3.0 - 5.0f64.sqrt());
+        let radius = (1.0 - height * height).max(0.0).sqrt();
+        pole * height + x * (radius * angle.cos()) + y * (radius * angle.sin())
+    };
+    (0..n).map(on_spiral).collect()
 }
 
 /// A random direction, all alike.
