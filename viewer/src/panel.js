@@ -43,6 +43,7 @@ export function buildPanel(header, meshes, order, on) {
   if (header.notes.length) panel.append(noteList(header, on));
   if (header.facts.length) panel.append(section("Facts", table(header.facts)));
   if (header.checks.length) panel.append(section("Checks", checkTable(header.checks)));
+  for (const figure of header.figures ?? []) panel.append(section(figure.title, picture(figure)));
   return {
     update(state, flying) {
       MODES.forEach(([mode], i) => modeButtons[i].setAttribute("aria-pressed", state.mode === mode));
@@ -69,6 +70,25 @@ function section(title, ...content) {
   const s = element("section");
   s.append(element("h2", "", title), ...content);
   return s;
+}
+
+// Small in the panel; a click shows it as large as the window.
+function picture({ title, source }) {
+  const image = element("img");
+  image.src = source;
+  image.alt = title;
+  const large = element("dialog");
+  const whole = element("img");
+  whole.src = source;
+  whole.alt = title;
+  large.append(whole);
+  large.addEventListener("click", () => large.close());
+  const open = button("", `Enlarge ${title}`, () => large.showModal());
+  open.className = "figure";
+  open.append(image);
+  const holder = element("div");
+  holder.append(open, large);
+  return holder;
 }
 
 function table(rows) {

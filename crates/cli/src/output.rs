@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::pipeline::{Design, Params};
-use shellock::report::{ReportCheck, ReportData, ReportPiece, html, palette, pieces_picture};
-use shellock::strength::{Strength, StrengthParams};
+use shellock::report::{
+    ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
+};
+use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::thin_share;
 use shellock::{PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
@@ -115,8 +117,11 @@ pub fn files(
         files.push((piece_file(p), write_stl_binary(mesh)));
     }
     let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
+    let chart = design.strength.as_ref().map(|strength| stress_chart(options, params, design, strength));
+    let figures = chart.iter().map(|svg| ("Stress in a fall".to_owned(), svg.clone())).collect();
     let (archive, (page, picture)) =
-        rayon::join(|| assembly(design), || report(model, options, params, design, warnings, &summary));
+        rayon::join(|| assembly(design), || report(model, options, params, design, warnings, &summary, figures));
+    files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
     files.push(("assembly.3mf".into(), archive));
     files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
     files.push(("report.html".into(), page));
@@ -233,6 +238,31 @@ fn strength_json(strength: &Strength, params: &Params) -> Value {
     })
 }
 
+/// The model's stress, and that along its seams.
+fn stress_chart(options: &Options, params: &Params, design: &Design, strength: &Strength) -> String {
+    let map = StressMap::new(strength);
+    let seams: Vec<SeamStress> = design
+        .surface
+        .seams()
+        .into_iter()
+        .map(|seam| SeamStress {
+            stress_mpa: seam.points.par_iter().map(|p| map.at(*p)).collect(),
+            size_mm: design.sizes.of(seam.a, seam.b),
+            points: seam.points,
+        })
+        .collect();
+    strength_chart(strength, params.strength.material.strength_mpa, &seams, |v| standing(options.up, v))
+}
+
+/// Turned so that `up` becomes z.
+fn standing(up: Axis, v: Vec3) -> Vec3 {
+    match up {
+        Axis::X => Vec3::new(-v.z, v.y, v.x),
+        Axis::Y => Vec3::new(v.x, -v.z, v.y),
+        Axis::Z => v,
+    }
+}
+
 /// The page and the picture. Both show the model standing on its feet: `up` becomes z.
 fn report(
     model: &Model,
@@ -241,13 +271,10 @@ fn report(
     design: &Design,
     warnings: &[Warning],
     summary: &Summary,
+    figures: Vec<(String, String)>,
 ) -> (Vec<u8>, Vec<u8>) {
-    let stand = |v: Vec3| match options.up {
-        Axis::X => Vec3::new(-v.z, v.y, v.x),
-        Axis::Y => Vec3::new(v.x, -v.z, v.y),
-        Axis::Z => v,
-    };
-    let standing: Vec<TriMesh> = design
+    let stand = |v: Vec3| standing(options.up, v);
+    let turned: Vec<TriMesh> = design
         .pieces
         .as_slice()
         .iter()
@@ -265,11 +292,11 @@ fn report(
             id: p.0,
             name: format!("piece {p}"),
             color: palette::color(plan.position(p)),
-            mesh: &standing[p.0 as usize],
+            mesh: &turned[p.0 as usize],
             installation_direction: stand(-plan.separation(p).unit()).to_array(),
             order: plan.position(p),
             is_key: plan.key() == p,
-            facts: piece_facts(design, p, standing[p.0 as usize].signed_volume() / 1000.0),
+            facts: piece_facts(design, p, turned[p.0 as usize].signed_volume() / 1000.0),
         })
         .collect();
     let size = model.solid.mesh().bounds().size();
@@ -290,7 +317,7 @@ fn report(
         .iter()
         .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
         .collect();
-    let data = ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings };
+    let data = ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures };
     rayon::join(|| html(&data).into_bytes(), || pieces_picture(&data.pieces).png())
 }
 

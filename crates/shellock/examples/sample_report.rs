@@ -39,6 +39,7 @@ fn main() -> std::io::Result<()> {
             check("Locked while the key is held", false, "1 piece moves"),
         ],
         warnings: &[warning],
+        figures: Vec::new(),
     };
     std::fs::write(folder.join("report.html"), html(&data))
 }

@@ -7,6 +7,7 @@ mod page;
 pub mod palette;
 mod pictures;
 pub mod stills;
+mod strength;
 
 use serde::Serialize;
 use shellock_geom::{Aabb, TriMesh, Vec3};
@@ -15,6 +16,7 @@ use crate::Warning;
 
 pub use page::html;
 pub use pictures::pieces_picture;
+pub use strength::{SeamStress, strength_chart};
 
 /// Everything the report says, filled by the pipeline.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +31,8 @@ pub struct ReportData<'a> {
     pub checks: Vec<ReportCheck>,
     /// What the user should know.
     pub warnings: &'a [Warning],
+    /// Title and SVG text of what goes below the lists.
+    pub figures: Vec<(String, String)>,
 }
 
 /// One piece in assembled position.

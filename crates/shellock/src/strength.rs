@@ -165,6 +165,8 @@ pub struct Strength {
     pub deciding_mpa: Vec<f64>,
     /// The largest of each triangle over all falls, MPa.
     pub largest_mpa: Vec<f64>,
+    /// Which triangles have no cavity below.
+    pub is_solid: Vec<bool>,
     /// Where the model is too thin to be hollow, the largest first.
     pub solid: Vec<SolidRegion>,
 }
@@ -361,6 +363,7 @@ impl Falls {
             deciding: (case, self.down[case]),
             at: self.mesh.face_center(worst.triangle),
             deciding_mpa: stresses_mpa.swap_remove(case),
+            is_solid: hollow_mm2.iter().map(|a| *a == 0.0).collect(),
             solid: thin::regions(&self.mesh, &hollow_mm2),
             mesh: self.mesh,
         }

@@ -8,6 +8,7 @@ mod metrics;
 mod model;
 mod search;
 mod statistics;
+mod strength;
 mod study;
 mod table;
 

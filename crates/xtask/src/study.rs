@@ -11,6 +11,7 @@ use crate::failure::Failure;
 use crate::metrics::{self, MetricsOptions};
 use crate::search::{self, SearchOptions};
 use crate::statistics::{band, kendall, spearman};
+use crate::strength::{self, StrengthOptions};
 use crate::table::{Table, markdown};
 
 /// What to study and where the charts go.
@@ -29,6 +30,8 @@ enum Study {
     Metrics(MetricsOptions),
     /// How fast plans of a model are found, and what its segmentations allow
     Search(SearchOptions),
+    /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
+    Strength(StrengthOptions),
     /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a row for each
     /// plan; the first column is the metric that the others are compared with
     Scores {
@@ -53,6 +56,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     match &options.study {
         Study::Metrics(metrics) => metrics::run(metrics, &options.out),
         Study::Search(search) => search::run(search, &options.out),
+        Study::Strength(strength) => strength::run(strength, &options.out),
         Study::Scores { file } => write_all(&options.out, &stem(file), &agreement(&read(file)?)?),
         Study::Convergence { file, optimum, names } => {
             let runs = runs(&read(file)?).map_err(|problem| Failure::Table { path: file.clone(), problem })?;

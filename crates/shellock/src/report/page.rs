@@ -24,6 +24,7 @@ pub fn html(data: &ReportData<'_>) -> String {
         facts: &data.facts,
         checks: &data.checks,
         notes: data.warnings.iter().map(|w| note(w, &data.pieces)).collect(),
+        figures: data.figures.iter().map(Figure::new).collect(),
     };
     let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
     // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
@@ -49,6 +50,21 @@ struct Header<'a> {
     facts: &'a [(String, String)],
     checks: &'a [ReportCheck],
     notes: Vec<Note<'a>>,
+    figures: Vec<Figure<'a>>,
+}
+
+/// A picture with a title.
+#[derive(Serialize)]
+struct Figure<'a> {
+    title: &'a str,
+    /// A `data:` address.
+    source: String,
+}
+
+impl<'a> Figure<'a> {
+    fn new((title, svg): &'a (String, String)) -> Self {
+        Self { title, source: format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg)) }
+    }
 }
 
 #[derive(Serialize)]
@@ -193,6 +209,7 @@ mod tests {
             pieces: vec![piece],
             checks: vec![ReportCheck { name: HOSTILE.into(), ok: true, figure: HOSTILE.into() }],
             warnings: &[warning],
+            figures: vec![hostile()],
         })
     }
 

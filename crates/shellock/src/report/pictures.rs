@@ -18,7 +18,9 @@ pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
     let shifts = exploded_shifts(pieces);
     let painted = |share: f64| -> Vec<Painted<'_>> {
         let scene = pieces.iter().zip(&shifts);
-        scene.map(|(p, &shift)| Painted { mesh: p.mesh, color: p.color, shift: share * shift }).collect()
+        scene
+            .map(|(p, &shift)| Painted { mesh: p.mesh, color: p.color, shift: share * shift, face_colors: None })
+            .collect()
     };
     let (together, apart) = (painted(0.0), painted(1.0));
     let views = [
@@ -40,7 +42,7 @@ fn from_inside(piece: &ReportPiece<'_>, middle: Vec3) -> Image {
     let outwards = (piece.mesh.bounds().center() - middle).normalize_or(Vec3::Y);
     // Straight up or down, "up" has no meaning in the picture.
     let up = if outwards.z.abs() > 0.9 { Vec3::Y } else { Vec3::Z };
-    let scene = [Painted { mesh: piece.mesh, color: piece.color, shift: Vec3::ZERO }];
+    let scene = [Painted { mesh: piece.mesh, color: piece.color, shift: Vec3::ZERO, face_colors: None }];
     render(&scene, &Camera::along(outwards, up), SMALL, SMALL)
 }
 

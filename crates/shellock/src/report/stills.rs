@@ -26,6 +26,8 @@ pub struct Painted<'a> {
     pub mesh: &'a TriMesh,
     /// sRGB.
     pub color: [u8; 3],
+    /// A colour for each triangle instead.
+    pub face_colors: Option<&'a [[u8; 3]]>,
     /// Added to every point, mm.
     pub shift: Vec3,
 }
@@ -103,6 +105,8 @@ struct Facet {
     normals: [[f32; 3]; 3],
     /// Position of the mesh in the scene, plus 1.
     mesh: u16,
+    /// Linear light.
+    color: [f32; 3],
 }
 
 /// The scene on a transparent ground, `width` × `height` pixels. An empty scene gives an empty picture.
@@ -113,7 +117,6 @@ pub fn render(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usiz
     let facets: Vec<Facet> = scene.iter().enumerate().flat_map(|(i, painted)| facets(painted, i, &view)).collect();
     let n_bands = height.div_ceil(BAND_ROWS);
     let bins = bins(&facets, n_bands);
-    let colors: Vec<[f32; 3]> = scene.iter().map(|painted| painted.color.map(canvas::linear_from_srgb)).collect();
     let rows: Vec<Vec<u8>> = (0..n_bands)
         .into_par_iter()
         .map(|band| {
@@ -122,7 +125,7 @@ pub fn render(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usiz
             for &facet in &bins[band] {
                 draw(&mut samples, &facets[facet as usize]);
             }
-            samples.resolve(&colors)
+            samples.resolve()
         })
         .collect();
     Image { width, height, rgba: rows.concat() }
@@ -136,7 +139,11 @@ fn facets<'a>(painted: &'a Painted<'_>, mesh: usize, view: &'a View) -> Vec<Face
     let triangles = &painted.mesh.triangles;
     (triangles, &normals)
         .into_par_iter()
-        .map(|(t, n)| Facet { corners: t.map(|v| points[v as usize]), normals: n.map(in_view), mesh })
+        .enumerate()
+        .map(|(face, (t, n))| {
+            let color = painted.face_colors.map_or(painted.color, |colors| colors[face]).map(canvas::linear_from_srgb);
+            Facet { corners: t.map(|v| points[v as usize]), normals: n.map(in_view), mesh, color }
+        })
         .collect()
 }
 
@@ -187,7 +194,7 @@ fn draw(band: &mut Band, facet: &Facet) {
             let mix = |k: usize, v: &[[f32; 3]; 3]| wa * v[0][k] + wb * v[1][k] + wc * v[2][k];
             let depth = mix(2, &facet.corners);
             let normal = || [0, 1, 2].map(|k| mix(k, &facet.normals));
-            band.put(x as usize, y, depth, || Sample { depth, normal: normal(), mesh: facet.mesh });
+            band.put(x as usize, y, depth, || Sample { depth, normal: normal(), mesh: facet.mesh, color: facet.color });
         }
     }
 }
@@ -209,7 +216,8 @@ mod tests {
     #[test]
     fn a_ball_covers_its_disc() {
         let mesh = ball();
-        let scene = [Painted { mesh: &mesh, color: [200, 120, 40], shift: Vec3::new(3.0, 4.0, 5.0) }];
+        let scene =
+            [Painted { mesh: &mesh, color: [200, 120, 40], shift: Vec3::new(3.0, 4.0, 5.0), face_colors: None }];
         let image = render(&scene, &Camera::front(), 300, 200);
         let covered: f64 = image.rgba.chunks_exact(4).map(|p| f64::from(p[3]) / 255.0).sum();
         // The ball fits the height but for the margin of 4 % on both sides; a line surrounds it by one sample and a bit.
@@ -222,7 +230,7 @@ mod tests {
     #[test]
     fn png_decodes_to_the_same_pixels() {
         let mesh = ball();
-        let scene = [Painted { mesh: &mesh, color: [30, 120, 240], shift: Vec3::ZERO }];
+        let scene = [Painted { mesh: &mesh, color: [30, 120, 240], shift: Vec3::ZERO, face_colors: None }];
         let image = render(&scene, &Camera::back(), 64, 48);
         let mut reader = png::Decoder::new(std::io::Cursor::new(image.png())).read_info().unwrap();
         let mut rgba = vec![0; reader.output_buffer_size().unwrap()];
@@ -233,8 +241,8 @@ mod tests {
     #[test]
     fn the_nearer_mesh_hides_the_other_and_nothing_gives_nothing() {
         let mesh = ball();
-        let far = Painted { mesh: &mesh, color: [255, 0, 0], shift: Vec3::ZERO };
-        let near = Painted { mesh: &mesh, color: [0, 0, 255], shift: Vec3::new(0.0, -30.0, 0.0) };
+        let far = Painted { mesh: &mesh, color: [255, 0, 0], shift: Vec3::ZERO, face_colors: None };
+        let near = Painted { mesh: &mesh, color: [0, 0, 255], shift: Vec3::new(0.0, -30.0, 0.0), face_colors: None };
         let image = render(&[near, far], &Camera::along(Vec3::Y, Vec3::Z), 60, 60);
         let middle = &image.rgba[4 * (30 * 60 + 30)..][..4];
         assert!(middle[2] > middle[0] && middle[3] == 255);

@@ -73,9 +73,11 @@ pub(super) struct Sample {
     pub normal: [f32; 3],
     /// 0 for nothing.
     pub mesh: u16,
+    /// Linear light, unlit.
+    pub color: [f32; 3],
 }
 
-const NOTHING: Sample = Sample { depth: f32::NEG_INFINITY, normal: [0.0; 3], mesh: 0 };
+const NOTHING: Sample = Sample { depth: f32::NEG_INFINITY, normal: [0.0; 3], mesh: 0, color: [0.0; 3] };
 
 /// Some rows of samples, with [`LINE_REACH`] more on both sides so that lines at the border come out the same.
 pub(super) struct Band {
@@ -114,7 +116,7 @@ impl Band {
     }
 
     /// The pixels, four bytes each.
-    pub fn resolve(&self, colors: &[[f32; 3]]) -> Vec<u8> {
+    pub fn resolve(&self) -> Vec<u8> {
         const N: f32 = (SAMPLES * SAMPLES) as f32;
         let mut rgba = Vec::with_capacity(4 * self.width * self.n_rows / (SAMPLES * SAMPLES));
         for row in (0..self.n_rows).step_by(SAMPLES) {
@@ -123,7 +125,7 @@ impl Band {
                 let mut covered = 0.0;
                 for at in 0..SAMPLES * SAMPLES {
                     let (x, y) = (column + at % SAMPLES, row + at / SAMPLES + LINE_REACH);
-                    if let Some(light) = self.light_at(x, y, colors) {
+                    if let Some(light) = self.light_at(x, y) {
                         (0..3).for_each(|k| sum[k] += light[k]);
                         covered += 1.0;
                     }
@@ -136,13 +138,12 @@ impl Band {
     }
 
     /// Linear light of one sample: a line, the lit surface, or nothing.
-    fn light_at(&self, x: usize, y: usize, colors: &[[f32; 3]]) -> Option<[f32; 3]> {
+    fn light_at(&self, x: usize, y: usize) -> Option<[f32; 3]> {
         let here = self.samples[y * self.width + x];
         if here.mesh == 0 {
             return None;
         }
-        let color = colors[here.mesh as usize - 1];
-        let light = shade::lit(color, here.normal);
+        let light = shade::lit(here.color, here.normal);
         let strength = self.line_at(x, y, here);
         Some(std::array::from_fn(|k| light[k] * (1.0 - strength) + 0.012 * strength))
     }
