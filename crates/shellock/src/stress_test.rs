@@ -106,9 +106,7 @@ impl StressParams {
     /// Every problem at once.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = self.plan.problems();
-        if !(0.2..=5.0).contains(&self.metric.edge_share) {
-            problems.push(format!("edges are {} of their usual length; choose 0.2 to 5", self.metric.edge_share));
-        }
+        problems.extend(self.metric.problems().iter().map(ToString::to_string));
         for (name, value) in [("the punch", self.punch_n), ("the height of the fall", self.drop_mm)] {
             if !(value > 0.0 && value <= 1e5) {
                 problems.push(format!("{name} is {value}; it must be more than 0 and at most 100 000 N or mm"));

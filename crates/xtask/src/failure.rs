@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use shellock::params::ParamProblem;
+
 /// One line for a person.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
@@ -21,6 +23,9 @@ pub enum Failure {
         /// What is missing, and where.
         problem: String,
     },
+    /// Options out of their ranges.
+    #[error("{}", .0.join("; "))]
+    Options(Vec<String>),
     /// A model cannot be studied.
     #[error("{path}: {problem}", path = path.display())]
     Model {
@@ -45,4 +50,12 @@ pub enum Failure {
         /// What it says.
         problem: String,
     },
+}
+
+impl Failure {
+    /// Refuses options that have `problems`.
+    pub fn unless_right(problems: impl IntoIterator<Item = ParamProblem>) -> Result<(), Self> {
+        let problems: Vec<String> = problems.into_iter().map(|p| p.to_string()).collect();
+        if problems.is_empty() { Ok(()) } else { Err(Self::Options(problems)) }
+    }
 }

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 use shellock::context::Progress;
+use shellock::params::ParamProblem;
 use shellock::pipeline::Params;
 use shellock::plan::{PlanSurvey, survey};
 use shellock::segmentation::segment;
@@ -22,8 +23,8 @@ use crate::failure::Failure;
 pub struct ModelOptions {
     /// A closed mesh: OBJ, PLY, OFF, STL or 3MF
     pub model: PathBuf,
-    /// Longest side, mm
-    #[arg(long, default_value_t = 150.0)]
+    /// Longest side, mm: 10 to 2000
+    #[arg(long, default_value_t = 150.0, allow_negative_numbers = true)]
     pub size: f64,
     /// Which axis of the file points up
     #[arg(long, value_enum, default_value = "y")]
@@ -81,8 +82,18 @@ pub struct Divided {
     pub survey: PlanSurvey,
 }
 
+/// A number of things that there must be at least one of.
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("there must be at least one".to_owned()),
+        Ok(n) => Ok(n),
+        Err(_) => Err("this is no whole number from 1 on".to_owned()),
+    }
+}
+
 /// Reads the model and its labels.
 pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
+    Failure::unless_right(ParamProblem::unless_within("size", "mm", options.size, 10.0, 2000.0))?;
     let path = &options.model;
     let fault = |problem: String| Failure::Model { path: path.clone(), problem };
     let extension = path.extension().and_then(|e| e.to_str());
@@ -109,6 +120,10 @@ pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
 
 /// Divides the model and surveys the pieces.
 pub fn divide(ctx: &Ctx<'_>, params: &Params, model: &Model, path: &Path) -> Result<Divided, Failure> {
+    let problems = params.problems();
+    if !problems.is_empty() {
+        return Err(Failure::Options(problems));
+    }
     let fault = |problem: String| Failure::Model { path: path.to_owned(), problem };
     let surface =
         segment(ctx, &params.segmentation, &model.solid, model.labels.as_deref()).map_err(|e| fault(e.to_string()))?;

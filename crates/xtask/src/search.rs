@@ -10,7 +10,7 @@ use shellock::plan::{FoundPlan, PlanConstraints, PlanOutcome, PlanParams, search
 
 use crate::chart::{Corner, Curve, Interval, Labels, bands, intervals};
 use crate::failure::Failure;
-use crate::model::{Divided, Model, ModelOptions, divide, load, with_ctx};
+use crate::model::{Divided, Model, ModelOptions, at_least_one, divide, load, with_ctx};
 use crate::statistics::band;
 use crate::study::{Sheet, write_all};
 use crate::table::{Table, markdown};
@@ -24,14 +24,14 @@ pub struct SearchOptions {
     #[arg(long, value_delimiter = ',', default_value = "10,20,40")]
     pieces: Vec<usize>,
     /// Runs of each search, with different seeds
-    #[arg(long, default_value_t = 5)]
-    seeds: u64,
+    #[arg(long, default_value_t = 5, value_parser = at_least_one)]
+    seeds: usize,
     /// Work of each run: costs of pieces asked for, and plans looked at
-    #[arg(long, default_value_t = 100_000)]
+    #[arg(long, default_value_t = 100_000, value_parser = at_least_one)]
     evaluations: usize,
     /// Segmentations compared, each with another seed
-    #[arg(long, default_value_t = 8)]
-    segmentations: u64,
+    #[arg(long, default_value_t = 8, value_parser = at_least_one)]
+    segmentations: usize,
 }
 
 /// A divided model, and the best plan that is known.
@@ -134,7 +134,7 @@ fn of_sizes(ctx: &Ctx<'_>, options: &SearchOptions, model: &str, subjects: &[Sub
 fn of_segmentations(ctx: &Ctx<'_>, options: &SearchOptions, name: &str, model: &Model) -> Result<Vec<Sheet>, Failure> {
     let (mut found, mut rows) = (Vec::new(), Vec::new());
     let mut table = Table { columns: ["seed", "pieces", "cost", "lower bound"].map(|n| (n.into(), vec![])).into() };
-    for seed in (options.model.seed..).take(options.segmentations as usize) {
+    for seed in (options.model.seed..).take(options.segmentations) {
         let subject = match subject(ctx, options, model, options.pieces.first().copied(), seed) {
             Ok(subject) => subject,
             Err(failure) => {
@@ -170,7 +170,7 @@ fn runs_of(ctx: &Ctx<'_>, options: &SearchOptions, subject: &Subject, technique:
         let samples = samples.map_err(|_| Failure::Model { path: options.model.model.clone(), problem })?;
         Ok(samples.iter().map(|s| (s.n_evaluations as f64, s.best_cost)).collect())
     };
-    (options.model.seed..).take(options.seeds as usize).map(run).collect()
+    (options.model.seed..).take(options.seeds).map(run).collect()
 }
 
 fn convergence_sheets(

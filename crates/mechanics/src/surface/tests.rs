@@ -61,6 +61,96 @@ fn a_joint_opens_along_its_direction_and_hardly_across_it() {
     assert!(free > 5.0 * sideways, "{free} {sideways}");
 }
 
+/// The bending stiffness `D = E h³/12(1 − ν²)` of a plate, N mm.
+fn plate_stiffness(params: &SurfaceParams) -> f64 {
+    let m = params.material;
+    m.youngs_modulus_mpa * params.wall_mm.powi(3) / (12.0 * (1.0 - m.poissons_ratio.powi(2)))
+}
+
+/// `D κ²/2` per area, without the half cells at both ends, beyond whose last edges nothing bends.
+#[test]
+fn a_plate_bent_to_a_cylinder_costs_its_bending_stiffness() {
+    let params = SurfaceParams::default();
+    let assembly = two_plates(N, ROWS, 5.0);
+    let curvature = 1e-3;
+    let bent = |term: &Term| {
+        let height = |v: u32| 0.5 * curvature * assembly.points[v as usize].x.powi(2);
+        term.corners.iter().map(|&(v, g)| g.z * height(v)).sum::<f64>()
+    };
+    let terms = patch_terms(&params, &assembly, &assembly.points);
+    let found: f64 = terms.iter().map(|t| 0.5 * t.stiffness * bent(t).powi(2)).sum();
+    let area_mm2 = 2.0 * (5.0 * (N - 1) as f64) * (5.0 * ROWS as f64);
+    let expected = 0.5 * plate_stiffness(&params) * curvature.powi(2) * area_mm2;
+    assert!((found / expected - 1.0).abs() < 1e-9, "{found} N mm for {expected} N mm");
+}
+
+/// A plate of 95 × 20 mm beyond its clamp, pushed at its end: `F L³/3 D b`, by two theorems of minimum energy. It yields at
+/// least as a cylinder would, which bends at the edges across alone; and at most 5/4 of that, as separate rows of squares,
+/// whose diagonals then have half of the moment² at twice the stiffness.
+#[test]
+fn a_cantilever_bends_as_a_plate_strip_does_or_up_to_a_quarter_more() {
+    const N_CELLS: usize = 20;
+    let (force_n, length_mm, width_mm) = (1.0, 95.0_f64, 20.0);
+    let params = SurfaceParams::default();
+    let strip = two_plates(N_CELLS, ROWS, 5.0);
+    let n = (N_CELLS + 1) * (ROWS + 1);
+    let is_held = |v: usize| strip.points[v].x < -0.5 * 100.0 + 5.1;
+    let mut stiffness = DMatrix::zeros(3 * n, 3 * n);
+    for term in patch_terms(&params, &strip, &strip.points).iter().filter(|t| (t.corners[0].0 as usize) < n) {
+        let mut gradient = DVector::zeros(3 * n);
+        for &(v, g) in term.corners.iter().filter(|c| !is_held(c.0 as usize)) {
+            (0..3).for_each(|x| gradient[3 * v as usize + x] += g[x]);
+        }
+        stiffness.ger(term.stiffness, &gradient, &gradient, 1.0);
+    }
+    (0..3 * n).filter(|row| is_held(row / 3)).for_each(|row| stiffness[(row, row)] = 1.0);
+    let end: Vec<usize> = (0..n).filter(|v| strip.points[*v].x > 49.9).collect();
+    // The outer rows' ends bear half.
+    let mut force = DVector::zeros(3 * n);
+    for &v in &end {
+        let share = if [0.0, width_mm].contains(&strip.points[v].y.abs()) { 0.5 } else { 1.0 };
+        force[3 * v + 2] = force_n * share / ROWS as f64;
+    }
+    let deflection_mm = stiffness.cholesky().unwrap().solve(&force).dot(&force) / force_n;
+    // Σ M² over hinges at the near ends of the cells, for the integral.
+    let n = (N_CELLS - 1) as f64;
+    let of_hinges = (n + 1.0) * (2.0 * n + 1.0) / (2.0 * n * n);
+    let cylinder_mm = of_hinges * force_n * length_mm.powi(3) / (3.0 * plate_stiffness(&params) * width_mm);
+    let ratio = deflection_mm / cylinder_mm;
+    assert!((1.0..1.25).contains(&ratio), "{ratio} of {cylinder_mm} mm");
+}
+
+/// Pins pulled straight out: a wall across their way is the only thing in it, and only where it is on that side.
+#[test]
+fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
+    let model = plates(&SurfaceParams::default());
+    let opened = |wall: Vec3| {
+        let plan: Vec<Meeting> = joints(Vec3::Z, Vec3::Z).into_iter().map(|m| Meeting { wall, ..m }).collect();
+        opening(&pulled(&model, &plan))
+    };
+    let (open, blocked) = (opened(-Vec3::Z), opened(Vec3::Z));
+    assert!(open > 1e-3 && blocked < 0.1 * open, "{blocked} mm of {open} mm");
+    // What nothing presses on bears nothing: as if the wall stood across another way.
+    assert!((opened(Vec3::Y) / open - 1.0).abs() < 1e-2, "{} mm, {open} mm", opened(Vec3::Y));
+}
+
+/// Without friction a pin may leave and slide; with friction, as on the key, it does neither, and resists both ways alike.
+#[test]
+fn friction_holds_a_pin_out_of_its_channel_and_along_it() {
+    let model = plates(&SurfaceParams::default());
+    let opened = |pull: Vec3, is_fast: bool| {
+        let mut plan = joints(Vec3::Z, pull);
+        plan.iter_mut().filter_map(|m| m.joint.as_mut()).for_each(|joint| joint.is_fast = is_fast);
+        opening(&pulled(&model, &plan))
+    };
+    for along in [Vec3::Z, Vec3::X] {
+        let [free, held] = [false, true].map(|is_fast| opened(along, is_fast));
+        assert!(held < 0.2 * free, "{held} mm of {free} mm along {along}");
+        assert!((opened(-along, true) / held - 1.0).abs() < 0.01, "{} {held}", opened(-along, true));
+    }
+    assert!(opened(Vec3::Z, false) > 5.0 * opened(-Vec3::Z, false));
+}
+
 #[test]
 fn openings_grow_with_the_force_and_fall_with_the_modulus() {
     let params = SurfaceParams::default();

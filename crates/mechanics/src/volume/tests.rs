@@ -77,12 +77,80 @@ fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
 /// Along a great circle, half of the ball may turn against the other half: each of the three circles frees one rotation.
 #[test]
 fn octants_turn_about_great_circles_unless_friction_holds_one_of_them() {
-    let ball = sample::ball(20.0, 8);
+    let ball = sample::ball(20.0, 4);
     let sliding = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     assert_eq!(sliding.resist(&joined(&ball, 0.0, None), 7).unwrap(), Resistance::Separable((0..7).collect()));
     let sticking = sliding.resist(&joined(&ball, 0.0, Some(7)), 7).unwrap();
     let Resistance::Holds(opening) = sticking else { panic!("it comes apart") };
     assert!(opening.quality_mm < -1e-6 && opening.quality_mm > -0.1, "{opening:?}");
+}
+
+/// Contact is exact: whoever touches may not enter the other, by as little as a millionth of what opens.
+#[test]
+fn connectors_enter_each_other_nowhere_and_where_friction_holds_they_do_not_move_at_all() {
+    let ball = sample::ball(20.0, 4);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    let plan = joined(&ball, -30.0, Some(7));
+    let moved = model.equilibrium(&plan, Some(7)).unwrap().unwrap().displacement_mm;
+    let gaps_mm: Vec<[Vec3; 2]> = moved.iter().map(|[a, b]| [0, 1].map(|pair| a[pair] - b[pair])).collect();
+    let widest_mm = gaps_mm.iter().flatten().map(|gap| gap.length()).fold(0.0, f64::max);
+    for ((station, meeting), gaps) in ball.stations.iter().zip(&plan).zip(gaps_mm) {
+        let joint = meeting.joint.unwrap();
+        let n = station.tangent.cross(joint.leaves);
+        for gap in gaps {
+            assert!(gap.dot(n).abs() < 1e-6 * widest_mm, "{gap} across the channel of {widest_mm} mm");
+            assert!(gap.dot(joint.leaves) > -1e-6 * widest_mm, "{gap} into the channel of {widest_mm} mm");
+            assert!(!joint.is_fast || gap.length() < 1e-6 * widest_mm, "{gap} in spite of friction of {widest_mm} mm");
+        }
+    }
+}
+
+/// Root and tip lie along ŝ, so a connector that turns about n moves its tip along the seam by the depth of the pin more than
+/// its root: reading the root alone would miss it.
+#[test]
+fn the_opening_is_that_of_the_tip_where_a_connector_turns() {
+    let ball = sample::ball(20.0, 4);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    let plan = joined(&ball, -30.0, Some(7));
+    let moved = model.equilibrium(&plan, Some(7)).unwrap().unwrap().displacement_mm;
+    let Resistance::Holds(opening) = model.resist(&plan, 7).unwrap() else { panic!("it comes apart") };
+    let [mut n_by_root, mut n_by_tip] = [0; 2];
+    for ([a, b], opening_mm) in moved.iter().zip(&opening.opening_mm) {
+        let [root_mm, tip_mm] = [0, 1].map(|pair| a[pair].distance(b[pair]));
+        assert!((opening_mm - root_mm.max(tip_mm)).abs() < 1e-12);
+        n_by_root += usize::from(root_mm > 1.01 * tip_mm);
+        n_by_tip += usize::from(tip_mm > 1.01 * root_mm);
+    }
+    assert!(n_by_root > 0 && n_by_tip > 0, "{n_by_root} {n_by_tip}");
+}
+
+/// The row of the walls' faces is read off the nodes, rigid motions off the place: both must mean the point at mid-wall.
+#[test]
+fn the_row_of_a_wall_sees_rigid_motions_as_its_point_at_mid_wall_does() {
+    let ball = sample::ball(20.0, 4);
+    let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
+    let plan = joined(&ball, 20.0, None);
+    let (labels, part) = (model.labels(3), &model.parts[3]);
+    let (fronts, sides) = (model.wall_fronts(3, &plan, labels), model.sides_of_part(3));
+    let rigid = part.rigid.unwrap();
+    let mut n_seen = 0;
+    for (front, (station, side)) in fronts.iter().zip(sides) {
+        let n = front.ids.len();
+        assert_eq!(front.ids[n - 1], labels.row(station, super::WALL));
+        let place = model.mid_wall(station, side);
+        assert!((place.length() - 19.0).abs() < 1e-9, "{place}");
+        let along = super::rows::off_the_wall(&plan[station], side);
+        for motion in 0..6 {
+            let at_node = |id: u32| {
+                let node = part.kept[id as usize / 3] as usize;
+                rigid.at(model.wall.nodes[node])[motion].to_array()[id as usize % 3]
+            };
+            let seen: f64 = (0..n - 1).map(|i| front.values[n - 1 + n * i] * at_node(front.ids[i])).sum();
+            assert!((seen - rigid.at(place)[motion].dot(along)).abs() < 1e-9, "motion {motion} at station {station}");
+        }
+        n_seen += 1;
+    }
+    assert_eq!(n_seen, 9);
 }
 
 /// One plate alone, `[length, width]` mm, clamped at its far edge or not at all; its wall's stiffness on all points near the seam.
@@ -161,7 +229,7 @@ fn uniaxial_strain_with_lateral_contraction_has_the_stress_of_a_bar() {
 /// In a channel whatever way it leans: n, ŝ and u are perpendicular to each other, and both sides see them the other way round.
 #[test]
 fn contact_acts_along_three_perpendicular_directions_and_each_side_bears_its_share_of_the_force() {
-    let ball = sample::ball(20.0, 8);
+    let ball = sample::ball(20.0, 4);
     let params = VolumeParams::default();
     let model = VolumeModel::new(&params, &ball).unwrap();
     for degrees in [-90.0, -30.0, 0.0, 45.0] {
@@ -215,8 +283,8 @@ fn rigid_motions_of_a_free_wall_are_held_by_its_springs_alone() {
 
 #[test]
 fn every_tetrahedron_of_a_ball_is_sound() {
-    let model = VolumeModel::new(&VolumeParams::default(), &sample::ball(20.0, 8)).unwrap();
-    assert_eq!((model.n_tets(), model.wall().n_thinned), (8 * 64 * 3, 0));
+    let model = VolumeModel::new(&VolumeParams::default(), &sample::ball(20.0, 6)).unwrap();
+    assert_eq!((model.n_tets(), model.wall().n_thinned), (8 * 36 * 3, 0));
     for tet in 0..model.n_tets() {
         let corners = model.wall().corners(tet);
         assert!(element::volume_6(corners) > 0.0);
@@ -239,7 +307,7 @@ fn where_no_wall_fits_it_is_thinner_and_sound() {
 }
 
 fn quality(params: &VolumeParams, degrees: f64) -> f64 {
-    let ball = sample::ball(15.0, 6);
+    let ball = sample::ball(15.0, 4);
     let model = VolumeModel::new(params, &ball).unwrap();
     match model.resist(&joined(&ball, degrees, Some(7)), 7).unwrap() {
         Resistance::Holds(opening) => opening.quality_mm,
@@ -248,11 +316,10 @@ fn quality(params: &VolumeParams, degrees: f64) -> f64 {
 }
 
 #[test]
-fn half_the_tolerance_does_not_change_the_quality() {
-    let params = VolumeParams::default();
-    let halved = VolumeParams { tolerance: params.tolerance / 2.0, ..params };
-    let (q, q_halved) = (quality(&params, -30.0), quality(&halved, -30.0));
-    assert!((q - q_halved).abs() < 0.01 * q.abs(), "{q} {q_halved}");
+fn the_coarsest_and_the_finest_tolerance_agree_on_the_quality() {
+    let with = |tolerance| quality(&VolumeParams { tolerance, ..VolumeParams::default() }, -30.0);
+    let (coarse, fine) = (with(1e-2), with(1e-12));
+    assert!((coarse / fine - 1.0).abs() < 0.01, "{coarse} {fine}");
 }
 
 #[test]
@@ -285,7 +352,7 @@ fn odd_input_is_refused() {
 
 #[test]
 fn every_joint_has_connectors_of_its_seams_length_whatever_its_neighbours_are() {
-    let ball = sample::ball(20.0, 8);
+    let ball = sample::ball(20.0, 6);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let mut plan = joined(&ball, 0.0, None);
     for (i, meeting) in plan.iter_mut().enumerate() {
@@ -307,7 +374,7 @@ fn every_joint_has_connectors_of_its_seams_length_whatever_its_neighbours_are() 
 
 #[test]
 fn a_joint_that_stands_alone_holds_no_octant() {
-    let ball = sample::ball(20.0, 8);
+    let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let mut plan = joined(&ball, 0.0, None);
     let alone = ball.steps[0][0] as usize;
@@ -317,7 +384,7 @@ fn a_joint_that_stands_alone_holds_no_octant() {
 
 #[test]
 fn pins_that_slide_out_of_their_channels_do_not_hold() {
-    let ball = sample::ball(20.0, 8);
+    let ball = sample::ball(20.0, 4);
     let plan = joined(&ball, -0.7, Some(7));
     let at = |force_n_per_mm| VolumeModel::new(&VolumeParams { force_n_per_mm, ..VolumeParams::default() }, &ball);
     let Resistance::Holds(opening) = at(0.01).unwrap().resist(&plan, 7).unwrap() else { panic!("does not hold") };
@@ -336,7 +403,7 @@ fn beyond(assembly: &ShellAssembly, z: f64) -> Vec<u32> {
 
 /// A ball pressed on its top with `force_n`, its bottom held if `is_held`.
 fn pressed(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
-    let ball = sample::ball(20.0, 6);
+    let ball = sample::ball(20.0, 4);
     let params = VolumeParams::default();
     let held = if is_held { beyond(&ball, -17.0) } else { Vec::new() };
     let model = VolumeModel::clamped(&params, &ball, &held).unwrap();
@@ -372,7 +439,7 @@ fn a_struck_ball_that_nothing_holds_is_balanced_by_its_inertia() {
     let struck = pressed(10.0, 3.0, false);
     assert!(struck.imbalance < 1e-6 && struck.lost.is_empty(), "{}", struck.imbalance);
     // The reference part's forces are in no equation: they balance because inertia balances the whole.
-    let ball = sample::ball(20.0, 6);
+    let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
     forces_n[5] = Vec3::new(1.0, -2.0, 3.0);
@@ -383,7 +450,7 @@ fn a_struck_ball_that_nothing_holds_is_balanced_by_its_inertia() {
 
 #[test]
 fn a_balls_mass_is_its_walls_volume_times_density() {
-    let ball = sample::ball(20.0, 12);
+    let ball = sample::ball(20.0, 8);
     let mass_t = VolumeModel::new(&VolumeParams::default(), &ball).unwrap().mass_t();
     let wall_mm3 = 4.0 / 3.0 * std::f64::consts::PI * (20.0_f64.powi(3) - 18.0_f64.powi(3));
     assert!((mass_t / (wall_mm3 * 1.15e-9) - 1.0).abs() < 0.05, "{mass_t} t");

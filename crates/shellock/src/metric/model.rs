@@ -8,6 +8,7 @@ use shellock_mechanics::{
     Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams, VolumeError, VolumeModel, VolumeParams,
 };
 
+use crate::params::ParamProblem;
 use crate::plan::contact::{end_gap_mm, meeting};
 use crate::plan::{InstallationPlan, PlanParams};
 use crate::seams::{seam_half_edges, stretches};
@@ -16,7 +17,7 @@ use crate::{ConnectorSizes, PatchId, SegmentedSurface};
 /// How the model is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetricParams {
-    /// Wall thickness, mm. (0, 10]; 2.
+    /// Wall thickness, mm. [0.1, 10]; 2.
     pub wall_mm: f64,
     /// Connector size D of local tests, and where walls meet without a connector, mm. [1, 10]; 2.5.
     pub connector_mm: f64,
@@ -26,7 +27,7 @@ pub struct MetricParams {
     ///
     /// 1 gives about 1000 points, on which a plan takes some milliseconds; see the study for what finer meshes change.
     pub edge_share: f64,
-    /// What the pieces are printed of.
+    /// What the pieces are printed of. E in [1, 10⁶] MPa, ν in [0, 0.45].
     pub material: Material,
 }
 
@@ -42,6 +43,20 @@ impl MetricParams {
         let defaults = Self::default();
         let wall_mm = if params.wall_mm > 0.0 { params.wall_mm } else { defaults.wall_mm };
         Self { wall_mm, connector_mm: sizes.default_mm(), beta: params.beta, ..defaults }
+    }
+
+    /// Every value out of range: no model can be made of such.
+    pub fn problems(&self) -> Vec<ParamProblem> {
+        let Material { youngs_modulus_mpa, poissons_ratio, .. } = self.material;
+        let checks = [
+            ParamProblem::unless_within("wall thickness", "mm", self.wall_mm, 0.1, 10.0),
+            ParamProblem::unless_within("connector size", "mm", self.connector_mm, 1.0, 10.0),
+            ParamProblem::unless_within("floor of the connector weight", "", self.beta, 0.0, 1.0),
+            ParamProblem::unless_within("edge share", "", self.edge_share, 0.2, 5.0),
+            ParamProblem::unless_within("Young's modulus", "MPa", youngs_modulus_mpa, 1.0, 1e6),
+            ParamProblem::unless_within("Poisson's ratio", "", poissons_ratio, 0.0, 0.45),
+        ];
+        checks.into_iter().flatten().collect()
     }
 
     /// The surface metric's parameters with these sizes.
@@ -75,7 +90,8 @@ struct StationSeam {
 }
 
 impl PlanModel {
-    /// Remeshes `surface` evenly and finds the stations: all points inside seams.
+    /// Remeshes `surface` evenly and finds the stations: all points inside seams. `params` must have no
+    /// [`problems`](MetricParams::problems).
     pub fn new(params: &MetricParams, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> Self {
         /// Points of a mesh of equilateral triangles: one each √3/2 l².
         const POINTS_AT_ONE: f64 = 1000.0;

@@ -22,6 +22,18 @@ fn outwards(i: u32) -> Vec3 {
 }
 
 #[test]
+fn every_parameter_out_of_its_range_is_named_and_the_defaults_are_within() {
+    let right = MetricParams::default();
+    assert_eq!(right.problems(), []);
+    let edges = |edge_share| MetricParams { edge_share, ..right };
+    let wrong = [f64::NAN, f64::INFINITY, 0.0, -1.0, 0.19, 5.1].map(edges);
+    assert!(wrong.iter().all(|w| w.problems().iter().map(|p| p.name).eq(["edge share"])));
+    let mut all = MetricParams { wall_mm: 0.0, connector_mm: 0.9, beta: -0.1, ..edges(0.0) };
+    (all.material.youngs_modulus_mpa, all.material.poissons_ratio) = (f64::NAN, 0.5);
+    assert_eq!(all.problems().len(), 6);
+}
+
+#[test]
 fn stations_lie_on_both_pieces_in_right_handed_frames() {
     let model = octants();
     assert!(model.assembly.stations.len() > 50);

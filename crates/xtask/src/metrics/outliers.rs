@@ -2,7 +2,8 @@
 
 use shellock_mechanics::{Opening, Side};
 
-use super::{Column, Subject};
+use super::Subject;
+use super::column::Column;
 use crate::statistics::mean_ranks;
 use crate::table::Table;
 

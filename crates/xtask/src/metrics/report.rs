@@ -1,7 +1,8 @@
 //! The study's figures for people.
 
+use super::Subject;
+use super::column::{Column, Score};
 use super::outliers::{Outlier, outliers};
-use super::{Column, Score, Subject};
 use crate::statistics::{kendall, spearman};
 use crate::table::markdown;
 
@@ -29,12 +30,16 @@ pub fn markdown_of(
     let (reference, others) = columns.split_first().expect("there is a first metric");
     text += &format!("## Rank correlations with {}\n\n{}\n", reference.name, correlations(reference, others));
     if let Some(surface) = columns.get(1) {
-        text += &format!("## Rank correlations with {}\n\n{}\n", surface.name, correlations(surface, stiffness));
+        text += &format!(
+            "## Rank correlations with {}\n\n{}\n",
+            surface.name,
+            correlations(surface, columns[2..].iter().chain(stiffness))
+        );
     }
     if let Some(deviation) = linearity {
         text += &format!("Volume openings with 0.5 E and 2 E follow 1/E to within {deviation:.1e}.\n\n");
     }
-    for other in others {
+    for other in others.iter().filter(|c| c.knows_separable()) {
         let head = ["", &format!("{} holds", other.name), "separable", "unsolved"];
         text += &format!("## Who is separable\n\n{}\n", markdown(&head, &verdicts(reference, other)));
     }
@@ -46,21 +51,21 @@ pub fn markdown_of(
     text
 }
 
-fn correlations(reference: &Column, others: &[Column]) -> String {
+fn correlations<'a>(reference: &Column, others: impl IntoIterator<Item = &'a Column>) -> String {
     let say = |r: Option<f64>| r.map_or("undefined".to_owned(), |r| format!("{r:.3}"));
     let row = |other: &Column| {
-        let pairs = reference.qualities_mm().into_iter().zip(other.qualities_mm());
+        let pairs = reference.qualities().into_iter().zip(other.qualities());
         let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
         vec![other.name.clone(), a.len().to_string(), say(spearman(&a, &b)), say(kendall(&a, &b))]
     };
-    let rows: Vec<Vec<String>> = others.iter().map(row).collect();
+    let rows: Vec<Vec<String>> = others.into_iter().map(row).collect();
     markdown(&["metric", "plans that hold by both", "Spearman ρ", "Kendall τ-b"], &rows)
 }
 
 /// How often each pair of verdicts was given: rows by the reference, columns by the other.
 fn verdicts(reference: &Column, other: &Column) -> Vec<Vec<String>> {
     let verdict = |s: &Score| match s {
-        Score::Holds(_) => 0,
+        Score::Holds(_) | Score::Rated(_) => 0,
         Score::Separable => 1,
         Score::Unsolved => 2,
     };

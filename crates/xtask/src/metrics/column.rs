@@ -1,0 +1,193 @@
+//! One metric over all plans, and how long it takes.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use rayon::prelude::*;
+use shellock::PatchId;
+use shellock::metric::{data_driven, pieces_alone};
+use shellock::plan::local_tests::LocalTests;
+use shellock::plan::{PlanConstraints, PlanScore, score};
+use shellock_geom::sparse::SparseError;
+use shellock_mechanics::{
+    Opening, Resistance, SurfaceModel, SurfaceParams, SurfaceSolution, VolumeError, VolumeModel, VolumeParams,
+};
+
+use super::Subject;
+use crate::failure::Failure;
+
+/// Plans that are timed one by one, before all are evaluated on all cores.
+const N_TIMED: usize = 5;
+
+/// What a metric says of a plan.
+#[derive(Clone, Debug)]
+pub enum Score {
+    /// Simulated as a whole.
+    Holds(Opening),
+    /// A number alone; higher is better.
+    Rated(f64),
+    Separable,
+    /// The solver failed.
+    Unsolved,
+}
+
+impl Score {
+    fn of(resistance: Resistance) -> Self {
+        match resistance {
+            Resistance::Holds(opening) => Self::Holds(opening),
+            Resistance::Separable(_) => Self::Separable,
+        }
+    }
+
+    fn of_surface(solution: Result<SurfaceSolution, SparseError>, subject: &Subject) -> Self {
+        match solution {
+            Ok(solution) if solution.error <= subject.model.params.surface().tolerance => Self::of(solution.resistance),
+            Ok(solution) => Self::unsolved(&format!("{:.1e} of the force is left", solution.error)),
+            Err(e) => Self::unsolved(&e.to_string()),
+        }
+    }
+
+    /// Says why a plan has no score.
+    fn unsolved(why: &str) -> Self {
+        eprintln!("warning: a plan was not solved: {why}");
+        Self::Unsolved
+    }
+
+    /// What opens, where the plan was simulated as a whole and holds.
+    pub fn opening(&self) -> Option<&Opening> {
+        if let Self::Holds(opening) = self { Some(opening) } else { None }
+    }
+
+    /// Not a number where there is none; higher is better.
+    fn quality(&self) -> f64 {
+        match self {
+            Self::Holds(opening) => opening.quality_mm,
+            Self::Rated(quality) => *quality,
+            Self::Separable | Self::Unsolved => f64::NAN,
+        }
+    }
+}
+
+/// One metric over all plans.
+pub struct Column {
+    /// With the unit in brackets, if it has one.
+    pub name: String,
+    /// Of each plan.
+    pub scores: Vec<Score>,
+    pub times: Times,
+}
+
+/// Wall time, s.
+pub struct Times {
+    /// Making what all plans share.
+    pub setup: f64,
+    /// A plan, alone on the machine: median of the first ones.
+    pub alone: f64,
+    /// A plan, where all are evaluated side by side.
+    pub together: f64,
+}
+
+impl Column {
+    /// `scores` of plans 0 to `n` − 1 by what `prepare` makes.
+    fn new<T: Sync>(
+        name: &str,
+        n: usize,
+        prepare: impl FnOnce() -> Result<T, Failure>,
+        score: impl Fn(&T, usize) -> Score + Sync,
+    ) -> Result<Self, Failure> {
+        eprintln!("{name}: {n} plans");
+        let start = Instant::now();
+        let metric = prepare()?;
+        let setup = start.elapsed().as_secs_f64();
+        let timed = |i: usize| {
+            let start = Instant::now();
+            let _ = score(&metric, i);
+            start.elapsed().as_secs_f64()
+        };
+        let mut alone: Vec<f64> = (0..n.min(N_TIMED)).map(timed).collect();
+        alone.sort_by(f64::total_cmp);
+        let start = Instant::now();
+        let n_done = AtomicUsize::new(0);
+        let told = |i: usize| {
+            let found = score(&metric, i);
+            let done = n_done.fetch_add(1, Ordering::Relaxed) + 1;
+            if done.is_multiple_of(10) {
+                eprintln!("  {done} of {n} after {:.1} s", start.elapsed().as_secs_f64());
+            }
+            found
+        };
+        let scores: Vec<Score> = (0..n).into_par_iter().map(told).collect();
+        let together = start.elapsed().as_secs_f64() / n.max(1) as f64;
+        let alone = alone.get(alone.len() / 2).copied().unwrap_or(0.0);
+        Ok(Self { name: name.to_owned(), scores, times: Times { setup, alone, together } })
+    }
+
+    /// The volume metric on the first `n` plans.
+    pub fn by_volume(name: &str, subject: &Subject, youngs_modulus_mpa: f64, n: usize) -> Result<Self, Failure> {
+        let volume = || volume_model(subject, youngs_modulus_mpa).map_err(|e| failed(name, &e));
+        Self::new(name, n, volume, |volume, i| match volume.resist(&subject.meetings[i], subject.key) {
+            Ok(resistance) => Score::of(resistance),
+            Err(e) => Score::unsolved(&e.to_string()),
+        })
+    }
+
+    /// The surface metric with these factors on stretch, bending and position.
+    pub fn by_surface(name: &str, subject: &Subject, stiffness_ratios: [f64; 3]) -> Result<Self, Failure> {
+        let params = SurfaceParams { stiffness_ratios, ..subject.model.params.surface() };
+        let surface = || SurfaceModel::new(&params, &subject.model.assembly).map_err(|e| failed(name, &e));
+        Self::new(name, subject.plans.len(), surface, |surface, i| {
+            Score::of_surface(surface.resist(&subject.meetings[i], subject.key), subject)
+        })
+    }
+
+    /// Each piece alone, its neighbours held.
+    pub fn by_pieces_alone(name: &str, subject: &Subject) -> Result<Self, Failure> {
+        let surface = || subject.model.surface_model().map_err(|e| failed(name, &e));
+        Self::new(name, subject.plans.len(), surface, |surface, i| {
+            match pieces_alone(&subject.model, surface, &subject.meetings[i], PatchId(subject.key)) {
+                Ok(quality_mm) => quality_mm.map_or(Score::Separable, Score::Rated),
+                Err(e) => Score::unsolved(&e.to_string()),
+            }
+        })
+    }
+
+    /// Eq. 6 as published.
+    pub fn by_eq_6(name: &str, subject: &Subject) -> Result<Self, Failure> {
+        let tests = || LocalTests::simulate(&subject.model.params.surface()).map_err(|e| failed(name, &e));
+        Self::new(name, subject.plans.len(), tests, |tests, i| {
+            Score::Rated(data_driven(&subject.model, tests, &subject.meetings[i]))
+        })
+    }
+
+    /// What the search minimises, with its sign turned: `of` takes it from the costs of a plan.
+    pub fn by_cost(name: &str, subject: &Subject, of: fn(&PlanScore) -> f64) -> Result<Self, Failure> {
+        let nothing_shared = || Ok(PlanConstraints::default());
+        Self::new(name, subject.plans.len(), nothing_shared, |constraints, i| {
+            Score::Rated(-of(&score(&subject.survey, constraints, &subject.plans[i])))
+        })
+    }
+
+    /// Whether it can tell that a plan comes apart.
+    pub fn knows_separable(&self) -> bool {
+        self.scores.iter().any(|s| !matches!(s, Score::Rated(_)))
+    }
+
+    /// The qualities, higher is better; not a number where there is none.
+    pub fn qualities(&self) -> Vec<f64> {
+        self.scores.iter().map(Score::quality).collect()
+    }
+}
+
+fn volume_model(subject: &Subject, youngs_modulus_mpa: f64) -> Result<VolumeModel, VolumeError> {
+    let mut params = VolumeParams {
+        wall_mm: subject.model.params.wall_mm,
+        material: subject.model.params.material,
+        ..VolumeParams::default()
+    };
+    params.material.youngs_modulus_mpa = youngs_modulus_mpa;
+    VolumeModel::new(&params, &subject.model.assembly)
+}
+
+fn failed(metric: &str, problem: &dyn std::fmt::Display) -> Failure {
+    Failure::Metric { metric: metric.to_owned(), problem: problem.to_string() }
+}
