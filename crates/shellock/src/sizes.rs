@@ -244,8 +244,9 @@ pub enum SizeLimit {
 /// Eq. 3: the size for a greatest stress of `stress_mpa`, mm in [D_min, D_max]. No number counts as no stress.
 pub fn size_for_stress_mm(range: &SizeRange, strength_mpa: f64, stress_mpa: f64) -> f64 {
     let alpha = range.alpha_per_mpa.unwrap_or(1.0 / strength_mpa);
-    // In this order NaN becomes 0.
-    let share = (alpha * stress_mpa).max(0.0).min(1.0);
+    // `max` takes the number of a number and NaN.
+    let share = (alpha * stress_mpa).max(0.0);
+    let share = share.min(1.0);
     range.min_mm + share * (range.max_mm - range.min_mm)
 }
 

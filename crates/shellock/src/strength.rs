@@ -51,7 +51,7 @@ const TOLD_SOLID_MM2: f64 = 50.0;
 /// Width of the bracket at which the search ends, mm.
 const RESOLUTION_MM: f64 = 0.05;
 /// Thicknesses looked at in search of one that bears its stress, at most.
-const MOST_WITHOUT_BRACKET: usize = 6;
+const MOST_WITHOUT_BRACKET: usize = 4;
 /// Thicknesses after which the search bisects.
 const MOST_INTERPOLATED: usize = 6;
 /// Stress over the least there is that no thicker wall is worth avoiding.
@@ -256,9 +256,14 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
 
 /// The thinnest wall that bears its stress; where none does, the thinnest one that hardly any thicker one betters.
 fn choice(tried: &[Tried], limit_mpa: f64) -> Tried {
-    let least_mpa = tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
-    let bearable_mpa = limit_mpa.max(WORTH_MORE_WALL * least_mpa);
+    let bearable_mpa = bearable_mpa(tried, limit_mpa);
     tried.iter().find(|t| t.stress_mpa <= bearable_mpa).copied().unwrap_or(tried[0])
+}
+
+/// The limit, or where no wall stays below it a little more than the least stress.
+fn bearable_mpa(tried: &[Tried], limit_mpa: f64) -> f64 {
+    let least_mpa = tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
+    if least_mpa <= limit_mpa { limit_mpa } else { WORTH_MORE_WALL * least_mpa }
 }
 
 /// The stress of a given thickness, mm.
@@ -276,15 +281,19 @@ pub fn stress(
 }
 
 /// The thickness to look at next, if any: both ends of the range; where even the thickest wall is too weak a few between, since
-/// what is solid does not count; and in the bracket about the first that bears its stress, until that is narrow enough.
+/// what is solid does not count; and in the bracket about the first that [`bearable_mpa`] allows, until that is narrow enough.
 fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64> {
     let (thinnest, thickest) = (tried.first()?, tried.last()?);
-    let Some(first) = tried.iter().position(|t| t.stress_mpa <= limit_mpa) else {
+    let is_bearable = tried.iter().any(|t| t.stress_mpa <= limit_mpa);
+    if !is_bearable && thickest.thickness_mm < params.most_mm {
+        return Some(params.most_mm);
+    }
+    if !is_bearable && tried.len() < MOST_WITHOUT_BRACKET {
         let gaps = tried.windows(2).map(|pair| [pair[0].thickness_mm, pair[1].thickness_mm]);
-        let widest = gaps.max_by(|a, b| (a[1] / a[0]).total_cmp(&(b[1] / b[0])));
-        let between = widest.filter(|_| tried.len() < MOST_WITHOUT_BRACKET).map(|[a, b]| (a * b).sqrt());
-        return if thickest.thickness_mm < params.most_mm { Some(params.most_mm) } else { between };
-    };
+        return gaps.max_by(|a, b| (a[1] / a[0]).total_cmp(&(b[1] / b[0]))).map(|[a, b]| (a * b).sqrt());
+    }
+    let limit_mpa = bearable_mpa(tried, limit_mpa);
+    let first = tried.iter().position(|t| t.stress_mpa <= limit_mpa)?;
     let Some(below) = first.checked_sub(1) else {
         return (thinnest.thickness_mm > params.least_mm).then_some(params.least_mm);
     };
