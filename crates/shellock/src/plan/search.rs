@@ -192,7 +192,7 @@ fn with_any_key<'k>(
         match draw_plans(ctx, params, space, key, &mut tries_left, &mut pool)? {
             None => {
                 let equals = keys.iter().filter(|k| k.is_as_good_as(key));
-                let candidate = |k: &&'k KeyChoice| Candidate::new(*k, space.n);
+                let candidate = |k: &&'k KeyChoice| Candidate::new(k, space.n);
                 let mut candidates: Vec<Candidate<'k>> = equals.map(candidate).collect();
                 candidates.iter_mut().filter(|c| c.key == key).for_each(|c| c.pool = std::mem::take(&mut pool));
                 return proven(ctx, params, space, candidates, tries_left).map(Ok);
