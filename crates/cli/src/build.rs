@@ -5,8 +5,10 @@ use std::sync::atomic::Ordering;
 
 use serde_json::json;
 use shellock::context::Progress;
+use shellock::metric::Holding;
 use shellock::pipeline::{Design, DesignOutcome, Params, design};
-use shellock::plan::PlanProof;
+use shellock::plan::key::KeyDirections;
+use shellock::plan::{PlanProof, ProofScope};
 use shellock::strength::{Strength, StrengthParams};
 use shellock::verify::Verification;
 use shellock::{Ctx, Warning};
@@ -125,19 +127,10 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
     if let Some(proof) = &made.proof {
         println!("{}", quality(proof));
     }
-    if let Some(weakest) = made.holding.as_ref().and_then(|h| h.seams.first()) {
-        let [x, y, z] = weakest.at;
-        println!(
-            "weakest seam: pieces {} and {} open by {:.2} mm at 10 N/m at ({x:.1}, {y:.1}, {z:.1}) mm: {}",
-            weakest.later, weakest.earlier, weakest.opening_mm, weakest.reason
-        );
-    }
+    made.holding.iter().flat_map(weakest).for_each(|line| println!("{line}"));
     println!("connectors on {:.0} % of the seam length that fits any", 100.0 * summary.connector_share);
     print_verdict(&made.verification);
-    for w in warnings {
-        let place = w.at.map_or_else(String::new, |[x, y, z]| format!(" at ({x:.1}, {y:.1}, {z:.1}) mm"));
-        println!("warning: {}{place}", w.message);
-    }
+    print_warnings(warnings);
     if summary.thin_share > 0.002 {
         let percent = 100.0 * summary.thin_share;
         println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", params.connector.min_wall_mm);
@@ -158,14 +151,66 @@ pub fn bearing(strength: &Strength, params: &Params) -> String {
 
 /// How good a plan is, in words.
 pub fn quality(proof: &PlanProof) -> String {
-    let PlanProof { cost, lower_bound, gap, optimal } = proof;
-    if *optimal {
-        return format!("plan: its worst piece costs {cost:.3}, proven to be the least for this key");
+    let PlanProof { cost, lower_bound, gap, least_cost, key_lower_bound, .. } = proof;
+    let scope = scope(proof);
+    // Bounds that meet the least known cost are proofs; what is left is rounding.
+    let is_met = |bound: &f64| *bound >= least_cost * (1.0 - 1e-9);
+    let chosen = match least_cost < cost {
+        true => format!("{cost:.3}, chosen since it holds better than those from {least_cost:.3} on; that is"),
+        false => format!("{cost:.3},"),
+    };
+    if is_met(lower_bound) {
+        return format!("plan: its worst piece costs {chosen} proven to be the least with {scope}");
     }
+    let of_key = if is_met(key_lower_bound) { " the least with its key;" } else { " not proven to be the least;" };
     let percent = 100.0 * gap;
     format!(
-        "plan: its worst piece costs {cost:.3}; none with this key costs less than {lower_bound:.3} ({percent:.1} % below)"
+        "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} ({percent:.1} % below)"
     )
+}
+
+/// For which plans a proof holds, in words.
+pub fn scope(proof: &PlanProof) -> String {
+    let ProofScope { keys, slides, n_lessons } = &proof.proven_for;
+    let who = match &keys[..] {
+        [key] => format!("piece {key} as the key"),
+        all if all.len() == proof.piece_costs.len() => "any piece as the key".into(),
+        some => {
+            let mut names: Vec<String> = some.iter().map(ToString::to_string).collect();
+            let last = names.pop().unwrap_or_default();
+            format!("piece {} or {last} as the key", names.join(", "))
+        }
+    };
+    let how = match slides {
+        KeyDirections::WithinPlane => "within its plane",
+        KeyDirections::OutOfPlane => "out of its plane",
+    };
+    let lessons = match n_lessons {
+        0 => String::new(),
+        1 => ", and what one lesson of failed kits leaves".into(),
+        n => format!(", and what {n} lessons of failed kits leave"),
+    };
+    format!("{who}, sliding {how}{lessons}")
+}
+
+/// Where a plan is weakest: a seam, or each piece that comes apart.
+pub fn weakest(holding: &Holding) -> Vec<String> {
+    let place = |[x, y, z]: [f64; 3]| format!("at ({x:.1}, {y:.1}, {z:.1}) mm");
+    let seam = holding.seams.first().map(|s| {
+        let (later, earlier, opening_mm) = (s.later, s.earlier, s.opening_mm);
+        let at = place(s.at);
+        format!("weakest seam: pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m {at}: {}", s.reason)
+    });
+    let loose = holding.loose.iter().map(|l| format!("comes apart at 10 N/m: piece {}, {}", l.piece, place(l.at)));
+    seam.into_iter().chain(loose).collect()
+}
+
+/// Each on a line, with its place.
+pub fn print_warnings(warnings: &[Warning]) {
+    for w in warnings {
+        let place = w.at.map_or_else(String::new, |[x, y, z]| format!(" at ({x:.1}, {y:.1}, {z:.1}) mm"));
+        println!("warning: {}{place}", w.message);
+    }
 }
 
 /// Each check on a line, and loudly what failed and where.

@@ -17,7 +17,7 @@ use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::args::{Axis, Options};
-use crate::build::bearing;
+use crate::build::{bearing, scope};
 use crate::failure::Failure;
 use crate::input::Model;
 
@@ -323,9 +323,13 @@ fn report(
 
 /// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is made to `stand`.
 fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, String)> {
-    let proof = design.proof.map(|p| {
-        let how = if p.optimal { "proven best for this key".into() } else { format!("within {:.0} %", 100.0 * p.gap) };
-        ("plan's cost".into(), format!("{:.2}, {how}", p.cost))
+    let proof = design.proof.as_ref().map(|p| {
+        let how = if p.optimal {
+            "proven to be the least with".into()
+        } else {
+            format!("at least {:.2} with", p.lower_bound)
+        };
+        ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)))
     });
     let weakest = design.holding.as_ref().and_then(|h| h.seams.first()).map(|s| {
         let [x, y, z] = stand(Vec3::from_array(s.at)).to_array();
@@ -335,12 +339,17 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
         );
         ("weakest seam".into(), figure)
     });
-    proof.into_iter().chain(weakest).collect()
+    let loose = design.holding.iter().flat_map(|h| &h.loose).map(|part| {
+        let [x, y, z] = stand(Vec3::from_array(part.at)).to_array();
+        ("comes apart".into(), format!("piece {} at ({x:.1}, {y:.1}, {z:.1}) mm, at 10 N/m", part.piece))
+    });
+    proof.into_iter().chain(weakest).chain(loose).collect()
 }
 
 /// A piece's volume, and how each of its seams holds.
 fn piece_facts(design: &Design, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
     let mut facts = vec![("volume".to_owned(), format!("{volume_cm3:.1} cm³"))];
+    facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
     let seams = design.holding.iter().flat_map(|h| &h.seams);
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };

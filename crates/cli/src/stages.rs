@@ -4,10 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use shellock::plan::{InstallationPlan, InstallationStep, PlanOutcome, search, survey};
-use shellock::sizes::choose;
+use shellock::pipeline::DesignError;
+use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
 use shellock::verify::VerifyParams;
-use shellock::{Ctx, IdVec, LatticeDirection, PatchId, segmentation};
+use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, segmentation, sizes};
 use shellock_geom::check::{inspect as inspection, into_solid};
 use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
@@ -15,7 +15,7 @@ use shellock_geom::{Solid, TriMesh, Vec3};
 
 use crate::Session;
 use crate::args::Options;
-use crate::build::{checked, print_verdict, quality};
+use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
 use crate::input::{self, load, read};
 use crate::progress::{Display, PlanClock};
@@ -49,7 +49,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
     let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
-        .map_err(shellock::pipeline::DesignError::from)?;
+        .map_err(DesignError::from)?;
     display.finish();
     let bytes = if kind == "ply" {
         let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
@@ -106,39 +106,41 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     let is_time_up = || clock.is_up();
     let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
     let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
-        .map_err(shellock::pipeline::DesignError::from)?;
-    let sizes = choose(&ctx, &params.sizes(), &surface, None)?.sizes;
+        .map_err(DesignError::from)?;
+    let sizes = sizes::choose(&ctx, &params.sizes(), &surface, None)?.sizes;
     let tables = survey(&ctx, &params.plan, &surface, &surface.seams(), &sizes)?;
-    let constraints = shellock::plan::PlanConstraints::default();
-    let outcome = search(&ctx, &params.plan, &tables, &constraints)?;
-    display.finish();
-    match outcome {
-        PlanOutcome::Infeasible { reason, .. } => Err(Failure::NoPlan(format!("no plan was found: {reason}"))),
-        PlanOutcome::Found(found) => {
-            let proof = found.proof();
-            let found_steps = &found.plan.steps;
-            if session.is_json {
-                let order: Vec<PatchId> = found_steps.iter().map(|s| s.piece).collect();
-                let steps: Vec<Value> = found_steps
-                    .iter()
-                    .map(|s| json!({ "piece": s.piece, "separation": s.separation.step() }))
-                    .collect();
-                println!(
-                    "{}",
-                    json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof,
-                            "mean_cost": found.score.mean, "piece_costs": found.score.pieces, "n_plans": found.pool.len() })
-                );
-            } else {
-                for (i, s) in found_steps.iter().enumerate() {
-                    let d = -s.separation.unit() + 0.0;
-                    println!("{:3}. piece {:3} moves in along ({:+.2}, {:+.2}, {:+.2})", i + 1, s.piece, d.x, d.y, d.z);
-                }
-                println!("{}", quality(&proof));
-                ctx.take_warnings().iter().for_each(|w| println!("warning: {}", w.message));
-            }
-            Ok(0)
+    let found = match search(&ctx, &params.plan, &tables, &PlanConstraints::default())? {
+        PlanOutcome::Found(found) => *found,
+        PlanOutcome::Infeasible { reason, .. } => {
+            display.finish();
+            return Err(Failure::NoPlan(format!("no plan was found: {reason}")));
         }
+    };
+    // The same choice as when a kit is made.
+    let (found, holding) = metric::choose(&ctx, &params.plan, &surface, &sizes, found).map_err(DesignError::from)?;
+    display.finish();
+    let warnings = ctx.take_warnings();
+    let (proof, steps) = (found.proof(), &found.plan.steps);
+    if session.is_json {
+        let order: Vec<PatchId> = steps.iter().map(|s| s.piece).collect();
+        let steps: Vec<Value> =
+            steps.iter().map(|s| json!({ "piece": s.piece, "separation": s.separation.step() })).collect();
+        println!(
+            "{}",
+            json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof, "holding": holding,
+                    "mean_cost": found.score.mean, "n_plans": found.pool.len(), "warnings": warnings })
+        );
+        return Ok(0);
     }
+    for (i, s) in steps.iter().enumerate() {
+        let (cost, d) = (found.score.pieces[s.piece], -s.separation.unit() + 0.0);
+        let [x, y, z] = d.to_array();
+        println!("{:3}. piece {:3} moves in along ({x:+.2}, {y:+.2}, {z:+.2}), cost {cost:.2}", i + 1, s.piece);
+    }
+    println!("{}", quality(&proof));
+    weakest(&holding).iter().for_each(|line| println!("{line}"));
+    print_warnings(&warnings);
+    Ok(0)
 }
 
 /// `shellock verify`.

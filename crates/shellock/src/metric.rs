@@ -10,6 +10,6 @@ mod model;
 #[cfg(test)]
 mod tests;
 
-pub use choice::{ChoiceError, Holding, SeamHolding, choose};
+pub use choice::{ChoiceError, Holding, LoosePart, SeamHolding, choose};
 pub use data_driven::{data_driven, pieces_alone};
 pub use model::{MetricParams, PlanModel};

@@ -7,6 +7,8 @@
 //! Where we leave the paper: a plan must also pass the cluster test ([`cluster`]), which the paper leaves to simulation;
 //! seams too short for a connector join nothing; and the key is never cut anew here, only chosen.
 
+#[cfg(test)]
+mod bound_tests;
 pub mod cluster;
 pub mod contact;
 mod diagnose;
@@ -40,5 +42,6 @@ pub use score::{PlanScore, score};
 pub use search::{MakeCosts, search, search_with};
 pub use survey::{PlanSurvey, survey};
 pub use types::{
-    Blocker, FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanProof, RankedPlan,
+    Blocker, FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanProof, ProofScope,
+    RankedPlan,
 };

@@ -27,7 +27,7 @@ pub struct ModelOptions {
     #[arg(long, default_value_t = 150.0, allow_negative_numbers = true)]
     pub size: f64,
     /// Which axis of the file points up
-    #[arg(long, value_enum, default_value = "y")]
+    #[arg(long, value_enum, default_value = "z")]
     pub up: Axis,
     /// One label a face, one integer a line; a label is a piece
     #[arg(long, value_name = "FILE")]

@@ -1,11 +1,12 @@
 //! The plan that holds best among those that the search cannot tell apart, and what is weak about it (Sect. 6.2).
 
 use serde::{Deserialize, Serialize};
+use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
 use super::{MetricParams, PlanModel};
-use crate::plan::{FoundPlan, InstallationPlan, PlanParams, RankedPlan};
+use crate::plan::{FoundPlan, InstallationPlan, PlanParams};
 use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
 /// Plans whose cost is within this share of the best one's are compared by simulation.
@@ -27,11 +28,20 @@ pub struct Holding {
     /// `Q = −max w d`, mm; higher is better. `None` where pieces come apart in the simulation.
     pub quality_mm: Option<f64>,
     /// Pieces that come apart in the simulation, which knows no friction but the key's; empty where all hold.
-    pub loose: Vec<PatchId>,
-    /// The seams, weakest first; those without a connector are left out.
+    pub loose: Vec<LoosePart>,
+    /// The seams, weakest first; those without a connector are left out. Empty where pieces come apart.
     pub seams: Vec<SeamHolding>,
     /// Plans that were compared.
     pub n_compared: usize,
+}
+
+/// A piece that comes apart.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoosePart {
+    /// The piece.
+    pub piece: PatchId,
+    /// A place in its middle, mm in assembly space.
+    pub at: [f64; 3],
 }
 
 /// How one pair of pieces resists.
@@ -55,19 +65,20 @@ pub struct SeamHolding {
 
 /// Simulates the plans of the pool that cost about as little as the best one; the chosen plan takes the place of `found`'s.
 ///
-/// Warns with `comes-apart` where none of them holds without friction.
+/// Warns with `comes-apart` where none of them holds without friction, and with `piece-loose` of each piece that hardly
+/// anything holds by the estimate of the costs.
 pub fn choose(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     surface: &SegmentedSurface,
     sizes: &ConnectorSizes,
-    found: FoundPlan,
+    mut found: FoundPlan,
 ) -> Result<(FoundPlan, Holding), ChoiceError> {
     ctx.stage("which plan holds best", 0)?;
     let model = PlanModel::new(&MetricParams::of_plan(params, sizes), surface, sizes);
     let limit = found.score.worst * (1.0 + COST_SLACK);
-    let plans: Vec<&RankedPlan> = found.pool.iter().filter(|p| p.score.worst <= limit).collect();
-    let meetings: Vec<Vec<Meeting>> = plans.iter().map(|p| model.meetings(&p.plan)).collect();
+    let plans: Vec<usize> = (0..found.pool.len()).filter(|&i| found.pool[i].score.worst <= limit).collect();
+    let meetings: Vec<Vec<Meeting>> = plans.iter().map(|&i| model.meetings(&found.pool[i].plan)).collect();
     let key = found.plan.key();
     ctx.check()?;
     let solved = model.surface_model()?.resist_all(&meetings, key.0)?;
@@ -78,23 +89,46 @@ pub fn choose(
     // The earlier of equals, which costs less.
     let best = (0..plans.len()).reduce(|best, i| if quality(i) > quality(best) { i } else { best });
     let Some(best) = best else { return Err(ChoiceError::NoPlan) };
-    let holding = holding(&model, &plans[best].plan, &meetings[best], &solved[best].resistance, plans.len());
+    let chosen = found.pool.remove(plans[best]);
+    let holding = holding(&model, &chosen.plan, &meetings[best], &solved[best].resistance, plans.len());
     if !holding.loose.is_empty() {
-        warn_of_loose(ctx, &holding.loose);
+        warn_of_parting(ctx, &holding.loose);
     }
-    let chosen = plans[best].clone();
-    let is_optimal = found.is_optimal && chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
-    Ok((FoundPlan { plan: chosen.plan, score: chosen.score, is_optimal, ..found }, holding))
+    chosen.loose.iter().for_each(|&piece| warn_of_loose(ctx, &model, piece));
+    found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
+    (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
+    found.pool.insert(0, chosen);
+    Ok((found, holding))
 }
 
-fn warn_of_loose(ctx: &Ctx<'_>, loose: &[PatchId]) {
-    let names: Vec<String> = loose.iter().map(ToString::to_string).collect();
+fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePart]) {
+    let names: Vec<String> = loose.iter().map(|part| part.piece.to_string()).collect();
     ctx.warn(Warning {
         code: "comes-apart".into(),
         message: format!("in the simulation without friction these pieces can be pulled apart: {}", names.join(", ")),
-        pieces: loose.to_vec(),
-        at: None,
+        pieces: loose.iter().map(|part| part.piece).collect(),
+        at: loose.first().map(|part| part.at),
     });
+}
+
+fn warn_of_loose(ctx: &Ctx<'_>, model: &PlanModel, piece: PatchId) {
+    ctx.warn(Warning {
+        code: "piece-loose".into(),
+        message: format!(
+            "some push moves piece {piece} and hardly any connector stops it; make more pieces, or divide the model otherwise"
+        ),
+        pieces: vec![piece],
+        at: Some(middle_of(model, piece).to_array()),
+    });
+}
+
+/// The point of `piece` that is nearest to the mean of its points, mm.
+fn middle_of(model: &PlanModel, piece: PatchId) -> Vec3 {
+    let assembly = &model.assembly;
+    let own =
+        || assembly.points.iter().zip(&assembly.part_of_point).filter(|(_, part)| **part == piece.0).map(|x| *x.0);
+    let mean = own().sum::<Vec3>() / own().count().max(1) as f64;
+    own().min_by(|x, y| x.distance_squared(mean).total_cmp(&y.distance_squared(mean))).unwrap_or(mean)
 }
 
 /// Puts the stations' openings together by pairs of pieces.
@@ -108,7 +142,8 @@ fn holding(
     let (opening, loose) = match resistance {
         Resistance::Holds(opening) => (opening, Vec::new()),
         Resistance::Separable(parts) => {
-            let loose = parts.iter().map(|&p| PatchId(p)).collect();
+            let part = |&p: &u32| LoosePart { piece: PatchId(p), at: middle_of(model, PatchId(p)).to_array() };
+            let loose = parts.iter().map(part).collect();
             return Holding { quality_mm: None, loose, seams: Vec::new(), n_compared };
         }
     };

@@ -2,9 +2,11 @@ use shellock_geom::Vec3;
 use shellock_mechanics::{Resistance, Side};
 
 use super::*;
-use crate::plan::testing::{label, sphere};
-use crate::plan::{InstallationPlan, InstallationStep};
-use crate::{ConnectorSizes, LatticeDirection, PatchId};
+use crate::plan::testing::{label, seams, sphere, voronoi};
+use crate::plan::{
+    FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanParams, search, survey,
+};
+use crate::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning};
 
 fn octants() -> PlanModel {
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
@@ -98,4 +100,38 @@ fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction
         let own = tests.opening_mm(&frame, joint.pull_on_a, joint.pull_on_a);
         assert!(-quality >= joint.weight * own - 1e-12 && own > 0.0);
     }
+}
+
+/// The plan that is chosen for `surface`, how it holds, and what is warned of at that.
+fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let ctx = Ctx::new(&|_| {}, &stop);
+    let (params, sizes) = (PlanParams { n_plans: 40, ..PlanParams::default() }, ConnectorSizes::default());
+    let survey = survey(&ctx, &params, surface, &seams(surface), &sizes).unwrap();
+    let outcome = search(&ctx, &params, &survey, &PlanConstraints::default()).unwrap();
+    let PlanOutcome::Found(found) = outcome else { panic!("{outcome:?}") };
+    ctx.take_warnings();
+    let (found, holding) = choose(&ctx, &params, surface, &sizes, *found).unwrap();
+    (found, holding, ctx.take_warnings())
+}
+
+#[test]
+fn the_chosen_plan_leads_the_pool_and_the_others_follow_by_cost() {
+    let (found, holding, _) = chosen(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
+    assert!(holding.n_compared > 1, "{holding:?}");
+    let (first, others) = found.pool.split_first().unwrap();
+    assert!(first.plan == found.plan && first.score == found.score);
+    assert!(others.is_sorted_by(|x, y| x.score.worst <= y.score.worst * (1.0 + 1e-8)));
+    assert!(found.pool.iter().all(|p| p.plan.key() == found.plan.key()));
+    let least = found.pool.iter().map(|p| p.score.worst).fold(f64::INFINITY, f64::min);
+    assert!(found.lower_bound <= least && found.score.worst <= 1.05 * least);
+}
+
+#[test]
+fn a_half_that_nothing_holds_is_told_with_its_place() {
+    let (found, _, warnings) = chosen(&label(sphere(5, Vec3::splat(40.0)), 2, |p| u32::from(p.z > 0.0)));
+    let loose = warnings.iter().find(|w| w.code == "piece-loose").unwrap_or_else(|| panic!("{warnings:?}"));
+    let first = found.plan.steps[0].piece;
+    assert_eq!(loose.pieces, [first]);
+    assert_eq!(loose.at.unwrap()[2] > 0.0, first == PatchId(1));
 }

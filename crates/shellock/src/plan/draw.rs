@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::cluster::{DirectedJoint, loose_part_fused};
 use super::key::KeyChoice;
 use super::local_cost::directions_in;
-use super::score::COST_TIE;
+use super::score::just_above;
 use super::space::Space;
 use super::{InstallationPlan, InstallationStep, PieceSet};
 use crate::{LatticeDirection, PatchId};
@@ -144,7 +144,7 @@ impl Draw<'_> {
     }
 
     fn is_cheap(&self, cost: f64) -> bool {
-        cost <= self.limits.bound + COST_TIE
+        cost <= just_above(self.limits.bound)
     }
 
     /// Who may leave `left` next and along which direction, in random order, good ones likely first.

@@ -1,8 +1,10 @@
-//! The best plan with a given key, and the proof: bisection on the cost of the worst piece.
+//! The best plan with any of the given keys, and the proof: bisection on the cost of the worst piece.
 //!
 //! Whether a plan exists whose pieces all cost at most T is a search of its own: [`domains`] strikes out what cannot be, the
 //! most disputed piece or seam that is still open is decided either way, and so on until all is decided, which [`sequence`]
-//! turns into an order. No answer within its budget leaves the question open; "none" is a proof, so T bounds all plans.
+//! turns into an order. No answer within its budget leaves the question open; "none" is a proof, so T bounds all plans. Each
+//! key is asked on its own, with the best plan of all keys as the limit, and small questions before large ones, so that a key
+//! that is hard to prove keeps no other from being tried.
 //!
 //! Deviation: a depth-first search from the key backwards meets a contradiction between two far pieces only after every way
 //! to take off the others. Deciding disputed pieces first, in any place, meets it at once. The order is only kept as far as
@@ -24,7 +26,7 @@ use super::improve::improve;
 use super::key::KeyChoice;
 use super::local_cost::{Role, RoleSet};
 use super::pool::Pool;
-use super::score::COST_TIE;
+use super::score::{just_above, just_below};
 use super::space::Space;
 use super::{InstallationPlan, PieceSet};
 use crate::{Cancelled, Ctx, PatchId};
@@ -45,12 +47,14 @@ const RUN_GROWTH: f64 = 1.4;
 pub(super) struct Budget {
     /// Pieces that may still be revised.
     pub n_left: usize,
+    /// Revisions for one question at first, per piece.
+    pub first_per_piece: usize,
 }
 
 impl Budget {
     /// At most `n` revisions.
     pub fn new(n: usize) -> Self {
-        Self { n_left: n }
+        Self { n_left: n, first_per_piece: FIRST_BUDGET_PER_PIECE }
     }
 }
 
@@ -61,47 +65,98 @@ enum Answer {
     Unknown,
 }
 
-/// Proves a lower bound on the cost of all plans with `key` and adds better plans to `pool`.
+/// One way to choose the key, and what is known of the plans with it.
+pub(super) struct Candidate<'k> {
+    pub key: &'k KeyChoice,
+    /// The best that were found.
+    pub pool: Pool,
+    /// None costs less; infinite where there is none.
+    pub lower_bound: f64,
+    /// How often each piece was at fault: what one question teaches steers the next.
+    weights: Vec<f64>,
+}
+
+impl<'k> Candidate<'k> {
+    /// Nothing is known of the plans with `key`, for `n` pieces.
+    pub fn new(key: &'k KeyChoice, n: usize) -> Self {
+        Self { key, pool: Pool::default(), lower_bound: 0.0, weights: vec![1.0; n] }
+    }
+
+    fn add(&mut self, space: &Space<'_>, plan: InstallationPlan) {
+        let score = space.score(&plan);
+        let improved = improve(space, self.key, plan.clone());
+        self.pool.add(space, score, plan);
+        self.pool.add(space, improved.score, improved.plan);
+    }
+}
+
+/// Cost of the best plan of all; infinite where none was found.
+pub(super) fn least_cost(candidates: &[Candidate<'_>]) -> f64 {
+    candidates.iter().map(|c| c.pool.least_cost()).fold(f64::INFINITY, f64::min)
+}
+
+/// No plan of any candidate costs less.
+pub(super) fn lower_bound(candidates: &[Candidate<'_>]) -> f64 {
+    candidates.iter().map(|c| c.lower_bound).fold(f64::INFINITY, f64::min)
+}
+
+/// Proves a lower bound for each of `candidates` and adds better plans to their pools.
 ///
-/// The bound is the least cost in the pool where that was proven optimal, less elsewhere; infinite where no plan exists.
+/// A bound at or above the least cost of all closes a candidate: nothing with that key is better than what is known.
 pub(super) fn prove(
     ctx: &Ctx<'_>,
     space: &Space<'_>,
-    key: &KeyChoice,
-    pool: &mut Pool,
+    candidates: &mut [Candidate<'_>],
     budget: &mut Budget,
-) -> Result<f64, Cancelled> {
-    let mut lower = 0.0;
-    let mut weights = vec![1.0; space.n];
-    let mut per_question = FIRST_BUDGET_PER_PIECE * space.n;
-    while budget.n_left > 0 {
-        // First the whole question: is there any better plan?
-        let upper = pool.least_cost();
-        let limit = if upper.is_finite() { upper - COST_TIE } else { f64::MAX };
-        match ask(ctx, space, key, limit, per_question, budget, &mut weights)? {
-            Answer::None => return Ok(upper),
-            Answer::Plan(plan) => {
-                add(space, key, pool, plan);
-                continue;
-            }
-            Answer::Unknown => {}
-        }
-        // Then easier ones below it; while no plan is known there is no scale for them.
-        let mut high = if upper.is_finite() { limit } else { lower };
-        while high - lower > FINEST_STEP * high && budget.n_left > 0 {
-            let middle = 0.5 * (lower + high);
-            match ask(ctx, space, key, middle, per_question, budget, &mut weights)? {
-                Answer::None => lower = middle,
-                Answer::Unknown => high = middle,
-                Answer::Plan(plan) => {
-                    add(space, key, pool, plan);
-                    high = high.min(pool.least_cost() - COST_TIE);
+) -> Result<(), Cancelled> {
+    let mut per_question = budget.first_per_piece * space.n;
+    while budget.n_left > 0 && lower_bound(candidates) < least_cost(candidates) {
+        // First the whole question of each key: is there any better plan?
+        for i in 0..candidates.len() {
+            let mut is_answered = true;
+            while is_answered && budget.n_left > 0 && candidates[i].lower_bound < least_cost(candidates) {
+                let upper = least_cost(candidates);
+                let limit = if upper.is_finite() { just_below(upper) } else { f64::MAX };
+                match ask(ctx, space, &mut candidates[i], limit, per_question, budget)? {
+                    Answer::None => candidates[i].lower_bound = upper,
+                    Answer::Plan(plan) => candidates[i].add(space, plan),
+                    Answer::Unknown => is_answered = false,
                 }
             }
         }
-        per_question *= 4;
+        bisect(ctx, space, candidates, per_question, budget)?;
+        per_question = per_question.saturating_mul(4);
     }
-    Ok(lower)
+    Ok(())
+}
+
+/// Easier questions: raises the least of the bounds as far as questions of this size can.
+fn bisect(
+    ctx: &Ctx<'_>,
+    space: &Space<'_>,
+    candidates: &mut [Candidate<'_>],
+    per_question: usize,
+    budget: &mut Budget,
+) -> Result<(), Cancelled> {
+    let mut high = just_below(least_cost(candidates));
+    if !high.is_finite() {
+        // While no plan is known there is no scale for them.
+        return Ok(());
+    }
+    while high - lower_bound(candidates) > FINEST_STEP * high && budget.n_left > 0 {
+        let middle = 0.5 * (lower_bound(candidates) + high);
+        // One key that leaves the question open leaves it open for all.
+        let Some(i) = candidates.iter().position(|c| c.lower_bound < middle) else { break };
+        match ask(ctx, space, &mut candidates[i], middle, per_question, budget)? {
+            Answer::None => candidates[i].lower_bound = middle,
+            Answer::Unknown => high = middle,
+            Answer::Plan(plan) => {
+                candidates[i].add(space, plan);
+                high = high.min(just_below(least_cost(candidates)));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Limits of further plans, as shares of the least cost: some as good in the worst piece, some nearly.
@@ -116,7 +171,7 @@ pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut
     let least = pool.least_cost();
     let tries: Vec<(f64, Vec<f64>)> = (0..N_FURTHER)
         .map(|i| {
-            let limit = FURTHER_LIMITS[i % FURTHER_LIMITS.len()] * least + COST_TIE;
+            let limit = just_above(FURTHER_LIMITS[i % FURTHER_LIMITS.len()] * least);
             (limit, (0..space.n).map(|_| rng.random_range(1.0..100.0)).collect())
         })
         .collect();
@@ -139,24 +194,16 @@ pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut
     }
 }
 
-fn add(space: &Space<'_>, key: &KeyChoice, pool: &mut Pool, plan: InstallationPlan) {
-    let score = space.score(&plan);
-    let improved = improve(space, key, plan.clone());
-    pool.add(space, score, plan);
-    pool.add(space, improved.score, improved.plan);
-}
-
 /// One question, with at most `n_revisions` revisions of a piece.
 fn ask(
     ctx: &Ctx<'_>,
     space: &Space<'_>,
-    key: &KeyChoice,
+    candidate: &mut Candidate<'_>,
     limit: f64,
     n_revisions: usize,
     budget: &mut Budget,
-    weights: &mut Vec<f64>,
 ) -> Result<Answer, Cancelled> {
-    let propagator = Propagator::new(space, key);
+    let (propagator, weights) = (Propagator::new(space, candidate.key), &mut candidate.weights);
     let n_revisions = n_revisions.min(budget.n_left);
     let mut probe = Probe { ctx, propagator, limit, n_revisions, n_decisions: 0, run: 0, weights, is_time_up: false };
     let answer = probe.proof();

@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
 use super::{PlanParams, PlanSurvey};
@@ -151,8 +152,28 @@ pub struct KeyChoice {
     pub piece: PatchId,
     /// The directions to try, all of one kind.
     pub directions: Vec<LatticeDirection>,
+    /// Which kind.
+    pub slides: KeyDirections,
     /// Whether the piece is flat enough for straight connectors.
     pub is_flat: bool,
+}
+
+impl KeyChoice {
+    /// Whether nothing but the cost of plans makes one of them the better key.
+    pub fn is_as_good_as(&self, other: &Self) -> bool {
+        self.is_flat == other.is_flat && self.slides == other.slides
+    }
+}
+
+/// Which way a key slides out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum KeyDirections {
+    /// Along one of the lattice directions nearest to its plane's own.
+    #[serde(rename = "within its plane")]
+    WithinPlane,
+    /// Along one of all others.
+    #[serde(rename = "out of its plane")]
+    OutOfPlane,
 }
 
 /// All choices, best first: flat pieces within their plane, then along other directions, then pieces that are not flat.
@@ -169,16 +190,15 @@ pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
     let (flat, other): (Vec<PatchId>, Vec<PatchId>) = pieces.into_iter().partition(|&p| survey.flatness[p].is_flat());
     let mut choices = Vec::new();
     for pieces in [flat, other] {
-        for within_plane in [true, false] {
+        for slides in [KeyDirections::WithinPlane, KeyDirections::OutOfPlane] {
             for &piece in &pieces {
                 let plane = survey.flatness[piece];
                 let in_plane = plane.in_plane();
-                let directions = if within_plane {
-                    in_plane
-                } else {
-                    LatticeDirection::all().filter(|s| !in_plane.contains(s)).collect()
+                let directions = match slides {
+                    KeyDirections::WithinPlane => in_plane,
+                    KeyDirections::OutOfPlane => LatticeDirection::all().filter(|s| !in_plane.contains(s)).collect(),
                 };
-                choices.push(KeyChoice { piece, directions, is_flat: plane.is_flat() });
+                choices.push(KeyChoice { piece, directions, slides, is_flat: plane.is_flat() });
             }
         }
     }

@@ -11,7 +11,7 @@
 //! So the cost of p depends on one [`SeamStates`] a seam, on its [`Role`], and on who remains in its way. The search asks for
 //! bounds while several states are still possible; where one is left, the bound is the cost.
 
-use super::score::{HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
+use super::score::{ASKED_MM3, HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
 use super::{PieceSet, PlanConstraints, PlanSurvey};
 use crate::push::N_PUSHES;
 use crate::{LatticeDirection, PatchId};
@@ -125,6 +125,11 @@ pub trait PieceCosts: Send + Sync {
     ///
     /// It is the cost where each seam has one state left. Infinite where a seam has none that goes with `role`.
     fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64;
+
+    /// Whether the piece is held by less than the verification asks for, by estimate; never where the costs know no hold.
+    fn is_loose(&self, _piece: PatchId, _role: Role, _around: &Surroundings) -> bool {
+        false
+    }
 
     /// Strikes out roles and states that any choice with costs up to `limit` cannot use; may leave some in.
     fn narrow(&self, piece: PatchId, roles: &mut RoleSet, around: &mut Surroundings, limit: f64) {
@@ -321,6 +326,10 @@ impl PieceCosts for SeamCosts {
         let cost_mm: f64 = seams.map(|(seam, &states)| seam.least_cost_mm(role, states)).sum();
         let path = table.path_cost(role, around.remaining);
         cost_mm / table.length_mm + path + loose_cost(self.hold_mm3(piece, role, around))
+    }
+
+    fn is_loose(&self, piece: PatchId, role: Role, around: &Surroundings) -> bool {
+        self.hold_mm3(piece, role, around) < ASKED_MM3
     }
 
     fn narrow(&self, piece: PatchId, roles: &mut RoleSet, around: &mut Surroundings, limit: f64) {

@@ -90,6 +90,13 @@ impl Occlusion {
         Self { n, tables: vec![table; LatticeDirection::COUNT] }
     }
 
+    /// Says that q hides this share of p along s.
+    #[cfg(test)]
+    pub fn occlude(&mut self, p: PatchId, q: PatchId, s: LatticeDirection, share: f64) {
+        let at = self.at(p, q);
+        self.tables[s.index()].occluded_mm2[at] = share * self.total_mm2(p, s);
+    }
+
     /// Says that q hides all of p along s.
     #[cfg(test)]
     pub fn block(&mut self, p: PatchId, q: PatchId, s: LatticeDirection) {

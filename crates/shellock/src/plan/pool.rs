@@ -1,9 +1,9 @@
 //! The best plans found so far that differ in what they join (Sect. 6.2).
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use super::InstallationPlan;
-use super::score::{COST_TIE, PlanScore};
+use super::score::{PlanScore, rounded};
 use super::space::{Relations, Space};
 
 /// Plans kept.
@@ -13,17 +13,24 @@ pub(super) const MOST_PLANS: usize = 100;
 #[derive(Default)]
 pub(super) struct Pool {
     plans: Vec<(PlanScore, InstallationPlan)>,
-    seen: BTreeSet<Relations>,
+    /// The least cost of each that was met, kept or not.
+    seen: BTreeMap<Relations, f64>,
 }
 
 impl Pool {
-    /// Takes in a plan that keeps all conditions, unless one with the same relations was met before.
+    /// Takes in a plan that keeps all conditions, unless one with the same relations was met before that costs no more.
+    ///
+    /// Where pieces that do not touch are in each other's way, their order changes the cost, but not what is joined.
     pub fn add(&mut self, space: &Space<'_>, score: PlanScore, plan: InstallationPlan) {
-        if !self.seen.insert(space.relations(&plan)) {
-            return;
+        let relations = space.relations(&plan);
+        match self.seen.get(&relations) {
+            Some(&least) if rounded(least) <= rounded(score.worst) => return,
+            Some(_) => self.plans.retain(|(_, other)| space.relations(other) != relations),
+            None => {}
         }
+        self.seen.insert(relations, score.worst);
         // Of equal plans the one met first stays in front. Keys are rounded so that ties are an equivalence.
-        let key = |s: &PlanScore| ((s.worst / COST_TIE).round(), s.mean);
+        let key = |s: &PlanScore| (rounded(s.worst), s.mean);
         let rank = key(&score);
         let at = self.plans.partition_point(|(s, _)| {
             let other = key(s);

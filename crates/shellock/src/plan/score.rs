@@ -23,8 +23,11 @@ const INWARD_COST: f64 = 0.25;
 /// Carving must absorb it: three of four paths that rubbed in finished kits of four models had some, most free paths have none.
 const OCCLUDED_COST: f64 = 0.3;
 
+/// Hold that the verification asks for, mm³.
+pub(super) const ASKED_MM3: f64 = 0.5;
+
 /// Estimated hold from which a piece counts as held, mm³: three times what the verification asks for.
-pub(super) const HELD_MM3: f64 = 1.5;
+pub(super) const HELD_MM3: f64 = 3.0 * ASKED_MM3;
 
 /// What a piece that is not held at all costs, in units of Eq. 4's weight.
 ///
@@ -42,8 +45,25 @@ pub struct PlanScore {
     pub pieces: IdVec<PatchId, f64>,
 }
 
-/// Difference of costs below which rounding decides.
-pub(super) const COST_TIE: f64 = 1e-9;
+/// Difference of costs, as share of them, below which rounding decides. A share, since metrics may have any unit.
+const COST_TIE: f64 = 1e-9;
+
+/// The greatest cost that is less than `cost` by more than rounding.
+pub(super) fn just_below(cost: f64) -> f64 {
+    cost * (1.0 - COST_TIE)
+}
+
+/// The greatest cost that may be `cost` but for rounding.
+pub(super) fn just_above(cost: f64) -> f64 {
+    cost * (1.0 + COST_TIE)
+}
+
+/// `cost` to 30 binary digits, a step just finer than what rounding decides: being equal to them is an equivalence.
+pub(super) fn rounded(cost: f64) -> f64 {
+    const DROPPED: u32 = 52 - 30;
+    let half = 1 << (DROPPED - 1);
+    f64::from_bits(cost.to_bits().wrapping_add(half) >> DROPPED << DROPPED)
+}
 
 impl PlanScore {
     /// The score of pieces that cost so much.
@@ -55,8 +75,8 @@ impl PlanScore {
 
     /// Whether the worst piece is cheaper than `other`'s, or as cheap and the mean is lower.
     pub fn is_better_than(&self, other: &Self) -> bool {
-        let gain = other.worst - self.worst;
-        gain > COST_TIE || (gain >= -COST_TIE && self.mean < other.mean - COST_TIE)
+        self.worst < just_below(other.worst)
+            || (self.worst <= just_above(other.worst) && self.mean < just_below(other.mean))
     }
 }
 

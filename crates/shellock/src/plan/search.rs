@@ -1,10 +1,10 @@
 //! The search for the best plan (Sect. 6.2): drawn at random, improved, then proven.
 //!
-//! Keys are tried in order of preference; the first with any plan is kept. For it plans are drawn from the last piece to the
-//! first. Every draw has its own random stream, batches are of fixed size, and no clock is read, so the answer does not
+//! Keys are tried in order of preference, until one has any plan. For it plans are drawn from the last piece to the first;
+//! all keys as good as it (equally flat, sliding the same way) are left to the exact search. Every draw has its own random stream, batches are of fixed size, and no clock is read, so the answer does not
 //! depend on the threads. The cluster test prunes every step: what comes loose with the remaining pieces as one block can
 //! never lock. The cheapest plans of a batch are improved one direction at a time. At last [`exact`](super::exact) looks for
-//! better ones and proves how good any can be.
+//! better ones with any of the keys and proves how good any can be.
 //!
 //! Deviation: the paper prunes by the best score so far, which would let threads influence each other; here the bound is
 //! that of the batches before.
@@ -15,15 +15,16 @@ use rayon::prelude::*;
 
 use super::contact::SHORTEST_RUN_SIZES;
 use super::draw::{DrawLimits, Drawn, draw};
-use super::exact::{Budget, prove, vary};
+use super::exact::{Budget, Candidate, least_cost, lower_bound, prove, vary};
 use super::improve::{Improved, improve};
 use super::key::{KeyChoice, choices};
 use super::local_cost::{PieceCosts, SeamCosts};
 use super::pool::{MOST_PLANS, Pool};
+use super::score::just_below;
 use super::space::Space;
 use super::{
-    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey, RankedPlan,
-    diagnose,
+    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey, ProofScope,
+    RankedPlan, diagnose,
 };
 use crate::{Cancelled, Ctx, PatchId, Warning};
 
@@ -56,7 +57,7 @@ pub type MakeCosts<'a> = &'a dyn Fn(&PlanSurvey, &PlanConstraints) -> Box<dyn Pi
 ///
 /// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised`, `short-joints` and
 /// `key-not-flat`. Not promised: that none exists where none was found (but where the reason is the contacts', none does).
-/// How good the plan is among those with its key is proven, see [`FoundPlan::lower_bound`].
+/// How good the plan is among those with keys as good as its own is proven, see [`FoundPlan::lower_bound`].
 pub fn search(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -172,7 +173,7 @@ fn warn_of(ctx: &Ctx<'_>, plan: &InstallationPlan, key: &KeyChoice, tolerance: O
     }
 }
 
-/// The best plan with the first key that has any; else the least that was left where the search got stuck.
+/// The best plan with a key as good as the first that has any; else the least that was left where the search got stuck.
 fn with_any_key<'k>(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -181,50 +182,68 @@ fn with_any_key<'k>(
 ) -> Result<Result<(FoundPlan, &'k KeyChoice), PieceSet>, Cancelled> {
     let mut tries_left = params.max_tries;
     let mut stuck = space.all();
-    for key in keys {
+    let is_bad = |key: &KeyChoice| params.key.is_none() && space.constraints.bad_keys.contains(&key.piece);
+    let keys: Vec<&KeyChoice> = keys.iter().filter(|k| !k.directions.is_empty() && !is_bad(k)).collect();
+    for &key in &keys {
         if tries_left == 0 {
             break;
         }
-        if params.key.is_none() && space.constraints.bad_keys.contains(&key.piece) {
-            continue;
-        }
-        match with_key(ctx, params, space, key, &mut tries_left)? {
-            Ok(found) => return Ok(Ok((found, key))),
-            Err(left) if left.len() < stuck.len() => stuck = left,
-            Err(_) => {}
+        let mut pool = Pool::default();
+        match draw_plans(ctx, params, space, key, &mut tries_left, &mut pool)? {
+            None => {
+                let equals = keys.iter().filter(|k| k.is_as_good_as(key));
+                let candidate = |k: &&'k KeyChoice| Candidate::new(k, space.n);
+                let mut candidates: Vec<Candidate<'k>> = equals.map(candidate).collect();
+                candidates.iter_mut().filter(|c| c.key == key).for_each(|c| c.pool = std::mem::take(&mut pool));
+                return proven(ctx, params, space, candidates, tries_left).map(Ok);
+            }
+            Some(left) if left.len() < stuck.len() => stuck = left,
+            Some(_) => {}
         }
     }
     Ok(Err(stuck))
 }
 
-/// The best plan with `key`; else the least that was left.
-fn with_key(
+/// The best plan with any of `candidates`, one of which has a plan already, and how good any can be.
+fn proven<'k>(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     space: &Space<'_>,
-    key: &KeyChoice,
-    tries_left: &mut usize,
-) -> Result<Result<FoundPlan, PieceSet>, Cancelled> {
-    let mut pool = Pool::default();
-    if let Some(stuck) = draw_plans(ctx, params, space, key, tries_left, &mut pool)? {
-        return Ok(Err(stuck));
+    mut candidates: Vec<Candidate<'k>>,
+    mut tries_left: usize,
+) -> Result<(FoundPlan, &'k KeyChoice), Cancelled> {
+    prove(ctx, space, &mut candidates, &mut Budget::new(params.proof_budget))?;
+    let (least_cost, lower_bound) = (least_cost(&candidates), lower_bound(&candidates));
+    let keys: Vec<PatchId> = candidates.iter().map(|c| c.key.piece).collect();
+    // Of equals the key that is liked best.
+    let best = candidates.iter().position(|c| c.pool.least_cost() == least_cost).expect("a plan was drawn");
+    let Candidate { key, mut pool, lower_bound: key_bound, .. } = candidates.swap_remove(best);
+    if pool.len() < MOST_PLANS {
+        // The exact search gave this key its best plan, but not the others that metrics choose from.
+        draw_plans(ctx, params, space, key, &mut tries_left, &mut pool)?;
     }
-    let mut budget = Budget::new(params.proof_budget);
-    let lower_bound = prove(ctx, space, key, &mut pool, &mut budget)?;
     if params.proof_budget > 0 {
         vary(ctx, space, key, &mut pool, &mut stream(params.seed, usize::MAX >> 1));
         ctx.check()?;
     }
-    let ranked =
-        |(score, plan): &(PlanScore, InstallationPlan)| RankedPlan { plan: plan.clone(), score: score.clone() };
+    let ranked = |(score, plan): &(PlanScore, InstallationPlan)| RankedPlan {
+        plan: plan.clone(),
+        score: score.clone(),
+        loose: space.loose(plan),
+    };
     let (score, plan) = pool.best().expect("a plan was drawn").clone();
-    Ok(Ok(FoundPlan {
-        is_optimal: lower_bound >= score.worst,
-        lower_bound: lower_bound.min(score.worst),
+    // Of plans that cost the same but for rounding the pool prefers the lower mean.
+    let is_optimal = lower_bound >= just_below(score.worst);
+    let found = FoundPlan {
+        is_optimal,
+        lower_bound: if is_optimal { score.worst } else { lower_bound },
+        key_lower_bound: key_bound.min(score.worst),
+        scope: ProofScope { keys, slides: key.slides, n_lessons: space.constraints.n_lessons() },
         plan,
         score,
         pool: pool.plans().iter().map(ranked).collect(),
-    }))
+    };
+    Ok((found, key))
 }
 
 /// Fills `pool` with plans drawn at random and improved; the least that was left where there is none.

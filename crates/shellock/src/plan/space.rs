@@ -11,7 +11,7 @@ type ByDirection<T> = Vec<[T; LatticeDirection::COUNT]>;
 
 /// How often a piece may rub against an earlier one before another order is asked for: the seam between the two is then at fault, not
 /// the direction.
-const MOST_RUBS: usize = 2;
+pub(super) const MOST_RUBS: usize = 2;
 
 /// What the search asks, in bits. Holds at most [`PieceSet::MAX_PIECES`] pieces.
 pub(super) struct Space<'a> {
@@ -147,6 +147,16 @@ impl<'a> Space<'a> {
         let around = self.surroundings(plan);
         let cost = |(p, (role, around)): (usize, &(Role, Surroundings))| self.costs.bound(p.into(), *role, around);
         PlanScore::of(around.iter().enumerate().map(cost).collect())
+    }
+
+    /// Pieces of `plan` that hardly anything holds.
+    pub fn loose(&self, plan: &InstallationPlan) -> Vec<PatchId> {
+        let around = self.surroundings(plan);
+        let is_loose = |p: &PatchId| {
+            let (role, around) = &around[usize::from(*p)];
+            self.costs.is_loose(*p, *role, around)
+        };
+        (0..self.n).map(PatchId::from).filter(is_loose).collect()
     }
 
     /// Role and surroundings of each piece in `plan`.

@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::PlanScore;
-use crate::{LatticeDirection, PatchId};
+use super::key::KeyDirections;
+use super::space::MOST_RUBS;
+use crate::{IdVec, LatticeDirection, PatchId};
 
 /// One piece of a plan and the direction along which it leaves everything installed before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,6 +65,13 @@ pub struct PlanConstraints {
 }
 
 impl PlanConstraints {
+    /// How many things there are that restrict plans.
+    pub fn n_lessons(&self) -> usize {
+        let Self { weak_contacts, weak_joints, forbidden, bad_keys, rubbed, rejected } = self;
+        let n_orders = rubbed.values().filter(|&&n| n >= MOST_RUBS).count();
+        weak_contacts.len() + weak_joints.len() + forbidden.len() + bad_keys.len() + n_orders + rejected.len()
+    }
+
     /// Whether nothing joins the two where `later` leaves along `s`.
     pub fn is_weak(&self, later: PatchId, earlier: PatchId, s: LatticeDirection) -> bool {
         let pair = (later.min(earlier), later.max(earlier));
@@ -90,27 +99,44 @@ pub struct RankedPlan {
     pub plan: InstallationPlan,
     /// Its cost, which is that of its worst piece, and the cost of every piece.
     pub score: PlanScore,
+    /// Pieces that are held by less than the verification asks for, by estimate.
+    pub loose: Vec<PatchId>,
 }
 
-/// The best plan found, and how good any other with the same choice of key can be.
+/// The best plan found, and how good any other with a key as good as its own can be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundPlan {
     /// The best plan.
     pub plan: InstallationPlan,
     /// Its cost, which is that of its worst piece, and the cost of every piece.
     pub score: PlanScore,
-    /// Proven: no allowed plan whose key is this piece, sliding along one of the directions of its choice, costs less.
-    ///
-    /// The choice is either the directions within the key's plane or all others.
+    /// Proven: no allowed plan within `scope` costs less.
     pub lower_bound: f64,
-    /// Whether the plan's own cost was proven to be the least.
+    /// The same for plans within `scope` that have this plan's key: at least as much, since one key is less to search.
+    pub key_lower_bound: f64,
+    /// Whether the plan's own cost was proven to be the least within `scope`.
     pub is_optimal: bool,
-    /// Up to 100 plans with different relations between pieces, best first; the first is `plan`.
+    /// For which plans that holds.
+    pub scope: ProofScope,
+    /// Up to 100 plans with the same key and different relations between pieces: `plan`, then the others, cheapest first.
     pub pool: Vec<RankedPlan>,
 }
 
+/// The plans for which a lower bound holds; about all others it says nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProofScope {
+    /// Pieces that may be the key: as flat as the plan's own, or as curved; the one that is liked best first.
+    pub keys: Vec<PatchId>,
+    /// How the key slides out.
+    #[serde(rename = "key_slides")]
+    pub slides: KeyDirections,
+    /// Lessons of failed kits that plans must respect; 0 where nothing but the model restricts them.
+    #[serde(rename = "lessons")]
+    pub n_lessons: usize,
+}
+
 /// What is known of how good a plan is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanProof {
     /// Cost of the plan's worst piece.
     pub cost: f64,
@@ -120,13 +146,32 @@ pub struct PlanProof {
     pub gap: f64,
     /// Whether the cost was proven to be the least.
     pub optimal: bool,
+    /// Cost of the cheapest plan that is known; less than `cost` where a plan that costs a little more was chosen.
+    pub least_cost: f64,
+    /// See [`FoundPlan::key_lower_bound`].
+    pub key_lower_bound: f64,
+    /// For which plans the bound holds.
+    pub proven_for: ProofScope,
+    /// Cost of each piece.
+    pub piece_costs: IdVec<PatchId, f64>,
 }
 
 impl FoundPlan {
     /// The figures alone.
     pub fn proof(&self) -> PlanProof {
         let (cost, lower_bound) = (self.score.worst, self.lower_bound);
-        PlanProof { cost, lower_bound, gap: self.gap(), optimal: self.is_optimal }
+        let (proven_for, piece_costs) = (self.scope.clone(), self.score.pieces.clone());
+        let least_cost = self.pool.iter().map(|p| p.score.worst).fold(cost, f64::min);
+        PlanProof {
+            cost,
+            lower_bound,
+            gap: self.gap(),
+            optimal: self.is_optimal,
+            least_cost,
+            key_lower_bound: self.key_lower_bound,
+            proven_for,
+            piece_costs,
+        }
     }
 
     /// How much cheaper another plan may be, as share of this one's cost, in [0, 1].

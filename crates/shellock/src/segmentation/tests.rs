@@ -205,8 +205,9 @@ fn islands_join_what_surrounds_them_and_far_parts_become_pieces() {
     let solid = limbed();
     let mut labels = arm_labels(&solid);
     labels.iter_mut().filter(|l| **l == 100).for_each(|l| *l = -3);
-    let lone = labels.iter().position(|&l| l == 7).unwrap();
-    labels[lone] = 12;
+    let is_lone = |l: &i64| *l == 7;
+    let lone = [labels.iter().position(is_lone), labels.iter().rposition(is_lone)];
+    lone.into_iter().flatten().for_each(|face| labels[face] = 12);
     let (patches, warnings) = with_ctx(|ctx| {
         let patches = user_labels(ctx, &SegmentationParams::default(), &solid, &labels).unwrap();
         (patches, ctx.take_warnings())
@@ -214,6 +215,7 @@ fn islands_join_what_surrounds_them_and_far_parts_become_pieces() {
     assert_eq!(patches.n_patches(), 5);
     let codes: Vec<&str> = warnings.iter().map(|w| w.code.as_str()).collect();
     assert_eq!(codes, ["label-split", "label-island"]);
+    assert!(warnings[1].message.starts_with("2 islands") && warnings[1].at.is_some(), "{warnings:?}");
 }
 
 #[test]

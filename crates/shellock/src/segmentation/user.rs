@@ -16,8 +16,8 @@ const ISLAND_SHARE: f64 = 0.1;
 
 /// Patches from one label a triangle: numbered without gaps in order of the labels, each connected and large enough.
 ///
-/// Parts of a label far apart become pieces of their own (`label-split`), islands (`label-island`) and patches that are too small
-/// (`label-merged`) join the neighbour with the longest common seam.
+/// Parts of a label far apart become pieces of their own (`label-split`), islands (`label-island`, one warning for all) and
+/// patches that are too small (`label-merged`) join the neighbour with the longest common seam.
 pub fn user_labels(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -74,6 +74,7 @@ impl<'a> Parts<'a> {
     }
 
     fn merge_islands(&mut self, ctx: &Ctx, params: &SegmentationParams, names: &[i64]) {
+        let (mut n_islands, mut islands_mm2, mut largest) = (0, 0.0, None);
         for label in 0..names.len() as u32 {
             let mut same: Vec<usize> = (0..self.label.len()).filter(|&p| self.label[p] == label).collect();
             same.sort_by(|&p, &q| self.area[q].total_cmp(&self.area[p]));
@@ -83,8 +84,10 @@ impl<'a> Parts<'a> {
                 let area = self.area[part];
                 let name = names[label as usize];
                 if area < island_mm2 {
-                    let message = format!("{area:.1} mm² of label {name} lie apart and join the patch around them");
-                    self.warn(ctx, "label-island", part, message);
+                    (n_islands, islands_mm2) = (n_islands + 1, islands_mm2 + area);
+                    if largest.is_none_or(|(most_mm2, _, _)| area > most_mm2) {
+                        largest = Some((area, name, self.place_of(part)));
+                    }
                     self.merge(part);
                 } else {
                     let message =
@@ -92,6 +95,16 @@ impl<'a> Parts<'a> {
                     self.warn(ctx, "label-split", part, message);
                 }
             }
+        }
+        if let Some((area, name, at)) = largest {
+            let message = match n_islands {
+                1 => format!("{area:.1} mm² of label {name} lie apart and join the patch around them"),
+                n => format!(
+                    "{n} islands of labels, {islands_mm2:.1} mm² in all, lie apart and join the patches around them; \
+                     the largest has {area:.1} mm² of label {name}"
+                ),
+            };
+            ctx.warn(Warning { code: "label-island".into(), message, pieces: Vec::new(), at });
         }
     }
 
@@ -139,12 +152,12 @@ impl<'a> Parts<'a> {
     }
 
     fn warn(&self, ctx: &Ctx, code: &str, part: usize, message: String) {
+        let at = self.place_of(part);
+        ctx.warn(Warning { code: code.into(), message, pieces: Vec::<PatchId>::new(), at });
+    }
+
+    fn place_of(&self, part: usize) -> Option<[f64; 3]> {
         let face = self.part_of_face.iter().position(|&p| p as usize == part);
-        ctx.warn(Warning {
-            code: code.into(),
-            message,
-            pieces: Vec::<PatchId>::new(),
-            at: face.map(|f| self.mesh.face_center(f).to_array()),
-        });
+        face.map(|f| self.mesh.face_center(f).to_array())
     }
 }
