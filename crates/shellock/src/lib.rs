@@ -24,6 +24,8 @@ pub mod sizes;
 pub mod strength;
 pub mod stress_test;
 pub mod surface;
+#[cfg(test)]
+mod testing;
 pub mod verify;
 
 pub use contact_graph::{Contact, ContactGraph};

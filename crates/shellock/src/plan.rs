@@ -30,8 +30,6 @@ mod search_tests;
 mod space;
 pub mod study;
 mod survey;
-#[cfg(test)]
-pub(crate) mod testing;
 pub mod types;
 
 pub use local_cost::{PieceCosts, SeamCosts};

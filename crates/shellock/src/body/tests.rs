@@ -3,8 +3,8 @@ use std::sync::atomic::AtomicBool;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 
 use super::*;
-use crate::plan::testing::{label, sphere};
 use crate::plan::{InstallationPlan, InstallationStep};
+use crate::testing::{label, sphere};
 use crate::{Ctx, IdVec, LatticeDirection, SegmentedSurface};
 
 const RADIUS_MM: f64 = 16.0;

@@ -2,10 +2,10 @@ use shellock_geom::Vec3;
 use shellock_mechanics::{Resistance, Side};
 
 use super::*;
-use crate::plan::testing::{label, seams, sphere, voronoi};
 use crate::plan::{
     FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanParams, search, survey,
 };
+use crate::testing::{label, seams, sphere, voronoi};
 use crate::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning};
 
 fn octants() -> PlanModel {

@@ -376,13 +376,21 @@ fn patch_border(surface: &SegmentedSurface) -> Vec<BorderEdge> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::testing::{label, seams, sphere};
+    use crate::testing::{label, seams, sphere};
 
     fn cap_contact(height: f64) -> Contact {
         let surface = label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > height));
         let mut found = contacts(&PlanParams::default(), &surface, &seams(&surface), &ConnectorSizes::default());
         assert_eq!(found.len(), 1);
         found.remove(0)
+    }
+
+    #[test]
+    fn a_seam_as_long_as_its_size_asks_for_has_room_for_a_run_that_holds() {
+        for size_mm in [2.0, 2.5, 4.0] {
+            let length_mm = crate::sizes::CONTACT_SIZES * size_mm;
+            assert!(length_mm - 2.0 * end_gap_mm(size_mm, length_mm) >= 2.5 * size_mm);
+        }
     }
 
     #[test]

@@ -208,7 +208,7 @@ pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::testing::{label, sphere};
+    use crate::testing::{label, sphere};
 
     #[test]
     fn the_flat_face_of_a_clipped_ball_is_the_flattest_piece_and_slides_level() {

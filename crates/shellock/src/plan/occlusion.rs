@@ -280,7 +280,7 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::testing::{sphere, voronoi};
+    use crate::testing::{sphere, voronoi};
 
     fn direction(x: f64, y: f64, z: f64) -> LatticeDirection {
         LatticeDirection::nearest(Vec3::new(x, y, z))
@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn hemispheres_leave_along_their_axis_and_shade_each_other_fully_the_other_way() {
         let mesh = sphere(5, Vec3::splat(50.0));
-        let surface = crate::plan::testing::label(mesh, 2, |p| u32::from(p.z > 0.0));
+        let surface = crate::testing::label(mesh, 2, |p| u32::from(p.z > 0.0));
         let occlusion = Occlusion::measure(&surface);
         let (low, high) = (PatchId(0), PatchId(1));
         assert_eq!(occlusion.share(high, low, direction(0.0, 0.0, 1.0)), 0.0);
@@ -319,7 +319,7 @@ mod tests {
 
     #[test]
     fn a_cap_leaves_along_its_axis_and_hits_the_rest_on_its_rim_first() {
-        let surface = crate::plan::testing::label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 30.0));
+        let surface = crate::testing::label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 30.0));
         let occlusion = Occlusion::measure(&surface);
         let (rest, cap) = (PatchId(0), PatchId(1));
         assert_eq!(occlusion.share(cap, rest, direction(0.0, 0.0, 1.0)), 0.0);

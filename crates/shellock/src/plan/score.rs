@@ -119,8 +119,8 @@ mod tests {
 
     use super::*;
     use crate::LatticeDirection;
-    use crate::plan::testing::{label, seams, sphere};
     use crate::plan::{InstallationStep, PlanParams, survey};
+    use crate::testing::{label, seams, sphere};
 
     #[test]
     fn a_hemisphere_that_leaves_along_its_axis_beats_every_other_direction() {

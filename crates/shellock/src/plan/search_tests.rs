@@ -13,8 +13,8 @@ use super::local_cost::{ALL_DIRECTIONS, Role, RoleSet, SeamStates, Surroundings,
 use super::occlusion::Occlusion;
 use super::pool::Pool;
 use super::space::Space;
-use super::testing::{label, seams, sphere, voronoi};
 use super::*;
+use crate::testing::{label, seams, sphere, voronoi};
 use crate::{Ctx, IdVec, LatticeDirection, PatchId};
 
 pub fn on_ctx<T>(run: impl FnOnce(&Ctx<'_>) -> T) -> T {

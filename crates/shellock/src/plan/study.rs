@@ -128,8 +128,8 @@ mod tests {
     use shellock_geom::Vec3;
 
     use super::*;
-    use crate::plan::testing::{seams, sphere, voronoi};
     use crate::plan::{PlanOutcome, search, survey};
+    use crate::testing::{seams, sphere, voronoi};
 
     #[test]
     fn every_technique_gets_better_with_work_and_none_beats_the_proven_bound() {

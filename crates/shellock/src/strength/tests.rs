@@ -1,7 +1,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::*;
-use crate::plan::testing::sphere;
+use crate::testing::sphere;
 
 fn ball(radius_mm: f64) -> Solid {
     Solid::new(sphere(4, Vec3::splat(radius_mm))).unwrap()

@@ -3,7 +3,7 @@ use std::sync::atomic::AtomicBool;
 use super::*;
 use crate::LatticeDirection;
 use crate::plan::InstallationStep;
-use crate::plan::testing::{label, sphere};
+use crate::testing::{label, sphere};
 
 fn octants() -> SegmentedSurface {
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);

@@ -1,4 +1,4 @@
-//! Made-up surfaces for the tests of the plan stage: icospheres, labels by face centre, seams along triangle edges.
+//! Made-up surfaces for tests: icospheres, labels by face centre, seams along triangle edges.
 
 use std::collections::{BTreeMap, BTreeSet};
 
