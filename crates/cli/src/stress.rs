@@ -109,8 +109,7 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
 /// The kit's sizes, with defaults where its plan does not tell them; or what is wrong with them.
 fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
     let mut params = Params::default();
-    let number = |name: &str, default: f64| plan[name].as_f64().unwrap_or(default);
-    params.body.thickness_mm = number("shell_thickness", params.body.thickness_mm);
+    params.body.thickness_mm = plan["shell_thickness"].as_f64().unwrap_or(params.body.thickness_mm);
     let sizes = sizes_of(plan)?;
     params.connector.size = SizeChoice::Fixed(sizes.largest_mm());
     params.plan.seed = plan["seed"].as_u64().unwrap_or_default();

@@ -15,7 +15,7 @@
 //! least H whose stress stays below the material's strength is found on a bracket that shrinks by interpolating log σ over log H.
 //!
 //! Two rules. Where the model is too thin to be hollow with that H it is solid, and no shell: these places do not count
-//! ([`thin`]). And the stress that counts in a case is the one that all but a small share of the other area stays below: the few
+//! (`SolidRegion`). And the stress that counts in a case is the one that all but a small share of the other area stays below: the few
 //! worst triangles, in creases and at tips, tell more of the mesh than of the model, and their stress grows with every
 //! refinement. docs/strength.md has what the share and the mesh change.
 
@@ -249,8 +249,11 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
         }
         let mut estimate = choice(&tried, limit_mpa);
         if estimate.stress_mpa > limit_mpa && estimate.thickness_mm < usual_mm {
-            estimate = coarse.worst(usual_mm)?.tried;
-            insert(&mut tried, estimate);
+            let known = tried.iter().find(|t| t.thickness_mm == usual_mm).copied();
+            estimate = known.map_or_else(|| Ok(coarse.worst(usual_mm)?.tried), Ok::<_, ShellError>)?;
+            if known.is_none() {
+                insert(&mut tried, estimate);
+            }
         }
         let exact = fine.worst(estimate.thickness_mm)?;
         let before = std::mem::replace(&mut ratio, exact.tried.stress_mpa / estimate.stress_mpa);

@@ -17,7 +17,7 @@ pub const PEAK_SHARE: f64 = 0.005;
 pub struct StressLevel {
     /// The largest sample.
     pub largest_mpa: f64,
-    /// What all but [`PEAK_SHARE`] of the volume stay under.
+    /// What all but 0.5 % of the volume stay under.
     pub robust_mpa: f64,
     /// Where the smallest sample is that is not below `robust_mpa`.
     pub at: Vec3,
