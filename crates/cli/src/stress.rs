@@ -106,10 +106,10 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
     Ok(SegmentedSurface { mesh: solid.into_mesh(), patch_of_face, source_face: kept, n_patches: n_pieces })
 }
 
-/// The kit's sizes, with defaults where its plan does not tell them; or what is wrong with them.
+/// The kit's sizes, or what is wrong with them.
 fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
     let mut params = Params::default();
-    params.body.thickness_mm = plan["shell_thickness"].as_f64().unwrap_or(params.body.thickness_mm);
+    params.body.thickness_mm = plan["shell_thickness"].as_f64().ok_or("\"shell_thickness\" is no number of mm")?;
     let sizes = sizes_of(plan)?;
     params.connector.size = SizeChoice::Fixed(sizes.largest_mm());
     params.plan.seed = plan["seed"].as_u64().unwrap_or_default();
@@ -135,7 +135,7 @@ fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
 
 /// The connectors' sizes: one for all, or those of each pair.
 fn sizes_of(plan: &Value) -> Result<ConnectorSizes, String> {
-    let default_mm = plan["connector_size"].as_f64().unwrap_or(SizeChoice::DEFAULT_MM);
+    let default_mm = plan["connector_size"].as_f64().ok_or("\"connector_size\" is no number of mm")?;
     let pair = |entry: &Value| -> Option<([PatchId; 2], f64)> {
         let piece = |i: usize| u32::try_from(entry["pieces"][i].as_u64()?).ok().map(PatchId);
         Some(([piece(0)?, piece(1)?], entry["size_mm"].as_f64().filter(|mm| (0.1..=20.0).contains(mm))?))

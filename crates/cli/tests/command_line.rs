@@ -138,7 +138,8 @@ fn labelled_cube(label: [i32; 12]) -> String {
 
 /// What `test` reads of a plan of two pieces.
 const TWO_PIECES: &str = r#"{ "pieces": [ { "id": 0, "installation_direction": [0, 0, 1] },
-    { "id": 1, "installation_direction": [0, 0, -1] } ], "installation_order": [0, 1], "up": [0, 0, 1] }"#;
+    { "id": 1, "installation_direction": [0, 0, -1] } ], "installation_order": [0, 1], "up": [0, 0, 1],
+    "shell_thickness": 2, "connector_size": 2.5 }"#;
 
 #[test]
 fn a_folder_that_is_no_kit_is_not_tested() {
@@ -157,7 +158,8 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     refused(&["kit", "shellock build"]);
     let plan = kit.join("plan.json");
     let twice = TWO_PIECES.replace("[0, 1], \"up\"", "[1, 1], \"up\"");
-    let thick = TWO_PIECES.replace("\"up\"", "\"shell_thickness\": -3, \"up\"");
+    let thick = TWO_PIECES.replace("\"shell_thickness\": 2", "\"shell_thickness\": -3");
+    let unsaid = TWO_PIECES.replace("\"shell_thickness\": 2,", "");
     fs::write(&plan, "{ \"pieces\": [").unwrap();
     refused(&["plan.json", "not a plan"]);
     fs::write(&plan, "{}").unwrap();
@@ -171,6 +173,8 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     fs::write(kit.join("segmentation.ply"), labelled_cube([0, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0])).unwrap();
     refused(&["segmentation.ply", "label"]);
     fs::write(kit.join("segmentation.ply"), labelled_cube([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0])).unwrap();
+    fs::write(&plan, unsaid).unwrap();
+    refused(&["plan.json", "shell_thickness"]);
     fs::write(&plan, thick).unwrap();
     refused(&["plan.json", "thickness"]);
 }

@@ -9,6 +9,7 @@ use shellock::figure::{Figure, make};
 use shellock::pipeline::{Params, design};
 use shellock::plan::{PlanConstraints, PlanParams, search, survey};
 use shellock::segmentation::{SegmentationParams, segment};
+use shellock::strength::{self, StrengthParams};
 use shellock::{ConnectorSizes, Ctx, SegmentedSurface};
 use shellock_geom::Solid;
 
@@ -26,6 +27,15 @@ fn squirrel() -> &'static Solid {
 fn surface() -> SegmentedSurface {
     let ctx = Ctx::new(&|_| {}, &STOP);
     segment(&ctx, &SegmentationParams::default(), squirrel(), None).expect("the squirrel can be divided")
+}
+
+#[divan::bench(sample_count = 5)]
+fn thickness(bencher: Bencher) {
+    squirrel();
+    bencher.bench(|| {
+        let ctx = Ctx::new(&|_| {}, &STOP);
+        strength::thickness(&ctx, &StrengthParams::default(), squirrel()).expect("the squirrel has a wall")
+    });
 }
 
 #[divan::bench(sample_count = 5)]

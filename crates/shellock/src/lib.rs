@@ -11,6 +11,7 @@ pub mod direction;
 pub mod feedback;
 pub mod figure;
 pub mod ids;
+mod impact;
 pub mod metric;
 pub mod params;
 pub mod piece;
@@ -24,6 +25,7 @@ pub mod sizes;
 pub mod strength;
 pub mod stress_test;
 pub mod surface;
+mod svg;
 #[cfg(test)]
 mod testing;
 pub mod verify;

@@ -33,15 +33,12 @@ use shellock_geom::{Solid, TriMesh, Vec3};
 pub use shellock_mechanics::Material;
 use shellock_mechanics::{LoadCase, ShellError, ShellModel};
 
+use crate::impact::impact_n;
 use crate::params::ParamProblem;
 use crate::{Cancelled, Ctx, Warning};
 
 pub use thin::SolidRegion;
 
-/// Free fall, mm/s².
-const GRAVITY_MM_S2: f64 = 9806.65;
-/// Duration of the impact (Sect. 4.3), s.
-const IMPACT_S: f64 = 1.0 / 300.0;
 /// Height of the regions that hold and that meet the ground, as a share of the model's height in that orientation.
 const ZONE_SHARE: f64 = 0.1;
 /// Least area of such a region, as a share of the surface: a tip's zone grows until it has as much.
@@ -121,11 +118,6 @@ impl StrengthParams {
         .into_iter()
         .flatten()
         .collect()
-    }
-
-    /// Speed at the ground, mm/s.
-    pub fn speed_mm_s(&self) -> f64 {
-        (2.0 * GRAVITY_MM_S2 * 1e3 * self.drop_m).sqrt()
     }
 }
 
@@ -351,7 +343,7 @@ impl Falls {
         let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
         let down = even_directions(&mut rng, params.n_cases);
         let density_t_mm3 = 1e-9 * params.material.density_g_cm3;
-        let force_n_mm3 = density_t_mm3 * params.speed_mm_s() / IMPACT_S;
+        let force_n_mm3 = impact_n(density_t_mm3, 1e3 * params.drop_m);
         let cases = down.iter().map(|down| fall(&mesh, shell.areas_mm2(), *down, force_n_mm3)).collect();
         let (bvh, volume_mm3) = (TriangleBvh::new(&mesh), mesh.signed_volume());
         Ok(Self { bvh, volume_mm3, mesh, shell, cases, down, peak_share: params.peak_share })

@@ -18,6 +18,7 @@ use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams};
 
+use crate::impact::impact_n;
 use crate::metric::{MetricParams, PlanModel};
 use crate::plan::{InstallationPlan, PlanParams, random_plans, survey};
 use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface};
@@ -27,12 +28,6 @@ use region::{around, highest, highest_in_the_middle, lowest, spread};
 
 /// Radius of the fist, mm.
 pub const PUNCH_RADIUS_MM: f64 = 10.0;
-
-/// How long an impact takes, s (Sect. 4.3).
-const IMPACT_S: f64 = 1.0 / 300.0;
-
-/// Standard gravity, mm/s².
-const GRAVITY_MM_S2: f64 = 9806.65;
 
 /// Plans drawn at random, among which one of half the score is looked for.
 const N_DRAWN: usize = 100;
@@ -113,11 +108,6 @@ impl StressParams {
             }
         }
         problems
-    }
-
-    /// Force of the floor that stops a mass, N, given in t: `M v / Δt` with `v = √(2 g h)`.
-    pub fn impact_n(&self, mass_t: f64) -> f64 {
-        mass_t * (2.0 * GRAVITY_MM_S2 * self.drop_mm).sqrt() / IMPACT_S
     }
 }
 
@@ -245,7 +235,7 @@ pub fn stress_test(
         return Err(StressError::Plan { steps: plan.steps.len(), patches: surface.n_patches });
     }
     ctx.stage("a plan of half the score", 0)?;
-    let model = sound_model(params, surface)?;
+    let model = sound_model(ctx, params, surface)?;
     let scored = |plan: &InstallationPlan| score(&model, plan);
     let score_mm = scored(plan)?;
     let worse = match score_mm {
@@ -275,7 +265,7 @@ pub fn stress_test(
 const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
 
 /// The model on the first mesh on which walls stand.
-fn sound_model(params: &StressParams, surface: &SegmentedSurface) -> Result<PlanModel, StressError> {
+fn sound_model(ctx: &Ctx<'_>, params: &StressParams, surface: &SegmentedSurface) -> Result<PlanModel, StressError> {
     let mut failure = None;
     for share in EDGE_SHARES {
         let model = PlanModel::new(
@@ -286,7 +276,12 @@ fn sound_model(params: &StressParams, surface: &SegmentedSurface) -> Result<Plan
         match model.volume_model() {
             Err(e @ VolumeError::FlatTriangle(_)) => failure = failure.or(Some(e)),
             Err(e) => return Err(e.into()),
-            Ok(_) => return Ok(model),
+            Ok(_) => {
+                if share != 1.0 {
+                    ctx.note(&format!("the mesh folds; its edges are made {share} times as long as asked for"));
+                }
+                return Ok(model);
+            }
         }
     }
     Err(failure.map_or(VolumeError::Contact, |e| e).into())
@@ -354,7 +349,7 @@ impl<'a> Bench<'a> {
         };
         let fist = hit.map_or_else(Vec::new, |hit| around(assembly, up, hit, PUNCH_RADIUS_MM));
         let punch = spread(assembly, &fist, -up * self.params.punch_n);
-        let impact_n = self.params.impact_n(self.free.mass_t());
+        let impact_n = impact_n(self.free.mass_t(), self.params.drop_mm);
         let impact = spread(assembly, &lowest(assembly, up), up * impact_n);
         let punched = self.standing.under_load(meetings, &punch)?;
         let fallen = self.free.under_load(meetings, &impact)?;

@@ -10,6 +10,7 @@ use shellock_geom::{TriMesh, Vec3};
 
 use super::stills::{Camera, Painted, render};
 use crate::strength::Strength;
+use crate::svg::{begin, end, text};
 
 /// Pixels of a view along each side.
 const VIEW_PX: usize = 420;
@@ -106,10 +107,7 @@ fn tubes(seams: &[SeamStress], strength_mpa: f64) -> (TriMesh, Vec<[u8; 3]>) {
 fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: &[Vec<u8>]) -> String {
     let view = VIEW_PX as f64;
     let (width, height) = (2.0 * view + CHART_PX, 2.0 * ROW_PX);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-         font-family=\"sans-serif\" font-size=\"14\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
-    );
+    let mut svg = begin(width, height);
     let sizes = seams.iter().map(|s| s.size_mm);
     let (least, most) = (sizes.clone().fold(f64::INFINITY, f64::min), sizes.fold(0.0, f64::max));
     let rows = [
@@ -131,8 +129,7 @@ fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: 
     }
     legend(&mut svg, [2.0 * view + 40.0, 60.0], strength_mpa);
     curve(&mut svg, [2.0 * view + 70.0, ROW_PX + 60.0], strength, strength_mpa);
-    svg.push_str("</svg>\n");
-    svg
+    end(svg)
 }
 
 /// What the colours mean.
@@ -201,10 +198,6 @@ fn swatch(svg: &mut String, [x, y]: [f64; 2], [width, height]: [f64; 2], [r, g, 
         svg,
         "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width}\" height=\"{height}\" fill=\"rgb({r},{g},{b})\"/>"
     );
-}
-
-fn text(svg: &mut String, [x, y]: [f64; 2], style: &str, words: &str) {
-    let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" {style}>{words}</text>");
 }
 
 #[cfg(test)]

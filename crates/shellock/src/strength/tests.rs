@@ -44,7 +44,7 @@ fn stress_is_proportional_to_the_speed() {
 fn the_force_of_a_fall_stops_all_of_the_shell_and_acts_at_the_bottom_alone() {
     let params = quick(1.275);
     let falls = Falls::new(&params, &ball(60.0), 2000.0).unwrap();
-    let force_n_mm3 = 1e-9 * params.material.density_g_cm3 * params.speed_mm_s() / IMPACT_S;
+    let force_n_mm3 = impact_n(1e-9 * params.material.density_g_cm3, 1e3 * params.drop_m);
     for (case, down) in falls.cases.iter().zip(&falls.down) {
         let total: Vec3 = case.forces_n.iter().copied().sum();
         assert!((total + *down * force_n_mm3).length() < 1e-12 * force_n_mm3.max(1.0));

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::svg::{begin, end, text};
+
 use super::{Outcome, Pair, StressReport, Verdict};
 
 const ROW_PX: f64 = 26.0;
@@ -28,16 +30,12 @@ type Groups = [(String, Vec<Row>); 2];
 /// the punch, then in the fall. A line marks the limit of each bar. The verdict of the test stands at its opening.
 pub fn chart(report: &StressReport) -> String {
     let (width, height) = (2.0 * PANEL_PX, ROW_PX * (2.0 * report.designs().len() as f64 + 6.0));
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
-         font-size=\"14\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
-    );
+    let mut svg = begin(width, height);
     panel(&mut svg, 0.0, "widest opening, mm", &groups(report, opening));
     panel(&mut svg, PANEL_PX, "stress, % of the strength", &groups(report, stress));
     let note = "Black line: below it the kit holds. Connectors of half the size may open half as far.";
     text(&mut svg, [NAME_PX, height - 0.6 * ROW_PX], "fill=\"#555\"", note);
-    svg.push_str("</svg>\n");
-    svg
+    end(svg)
 }
 
 fn opening(design: &'static str, outcome: &Outcome) -> Row {
@@ -99,10 +97,6 @@ fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, row: &Row) {
     // The figure stands behind the bar, and behind the limit where that would cross it.
     let after = if (0.0..LABEL_PX).contains(&(limit - length)) { limit } else { length };
     text(svg, [left + after + 8.0, baseline], "", &row.label);
-}
-
-fn text(svg: &mut String, [x, y]: [f64; 2], style: &str, words: &str) {
-    let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" {style}>{words}</text>");
 }
 
 fn style(verdict: Verdict) -> (&'static str, &'static str) {
