@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use shellock::pipeline::{Params, ThicknessChoice};
+use shellock::pipeline::{KeySource, Params, ThicknessChoice};
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
 
@@ -178,6 +178,28 @@ impl FromStr for Thickness {
     }
 }
 
+/// Where the key comes from.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Key {
+    Auto,
+    Flattest,
+    Piece(u32),
+}
+
+impl FromStr for Key {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.to_ascii_lowercase().as_str() {
+            "auto" => Ok(Self::Auto),
+            "piece" => Ok(Self::Flattest),
+            number => {
+                number.parse().map(Self::Piece).map_err(|_| "give auto, piece, or the number of a piece".to_owned())
+            }
+        }
+    }
+}
+
 #[derive(Args)]
 pub struct Options {
     /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
@@ -198,9 +220,10 @@ pub struct Options {
     /// About how many pieces to make where there are no labels [default: from the size, 10 for a 150 mm figure]
     #[arg(long, value_name = "N", help_heading = "Pieces")]
     pub pieces: Option<usize>,
-    /// The piece that goes in last and can be taken out again [default: the flattest that works]
-    #[arg(long, value_name = "PIECE", help_heading = "Pieces")]
-    pub key: Option<u32>,
+    /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best; piece, the flattest
+    /// piece that works, as it is; or the number of a piece
+    #[arg(long, value_name = "auto|piece|N", default_value = "auto", help_heading = "Pieces")]
+    pub key: Key,
     /// Work spent on proving that no plan is better, in seconds of an ordinary computer; a slower one ends after twice that
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, help_heading = "Pieces")]
     pub plan_time: f64,
@@ -219,6 +242,9 @@ pub struct Options {
     /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament
     #[arg(long, value_name = "MM", default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]
     pub clearance: f64,
+    /// The same on the rails of the key, mm, 0.03 to 0.8
+    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.key_clearance_mm, help_heading = "Make")]
+    pub key_clearance: f64,
     /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
     #[arg(long, value_name = "MM", default_value_t = Params::default().body.wall_gap_mm, help_heading = "Make")]
     pub wall_gap: f64,
@@ -245,7 +271,11 @@ impl Options {
         p.segmentation.n_pieces = self.pieces;
         p.segmentation.seed = self.seed;
         p.plan.seed = self.seed;
-        p.plan.key = self.key.map(shellock::PatchId);
+        (p.key, p.plan.key) = match self.key {
+            Key::Auto => (KeySource::Cut, None),
+            Key::Flattest => (KeySource::Piece, None),
+            Key::Piece(id) => (KeySource::Piece, Some(shellock::PatchId(id))),
+        };
         p.plan.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
         p.plan.up = self.up.unit();
         match self.thickness {
@@ -259,6 +289,7 @@ impl Options {
         p.body.cell_mm = self.grid;
         p.connector.size = self.connector;
         p.connector.clearance_mm = self.clearance;
+        p.connector.key_clearance_mm = self.key_clearance;
         p.connector.min_wall_mm = self.min_wall;
         p.verify.seed = self.seed;
         p

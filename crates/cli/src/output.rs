@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use shellock::key::KeySite;
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
     ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
@@ -188,16 +189,17 @@ fn plan_json(
         .collect();
     let mut value = json!({
         "format": "shellock-plan", "version": 1, "units": "mm", "program": env!("CARGO_PKG_VERSION"),
-        "input": { "file": model.name, "sha256": model.sha256, "transform": model.transform },
+        "input": { "file": model.name, "sha256": model.sha256, "transform": transform(model, design) },
         "seed": params.plan.seed,
         "shell_thickness": design.thickness_mm,
         "strength": design.strength.as_ref().map(|s| strength_json(s, params)),
         "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
         "connector_size": design.sizes.largest_mm(),
         "wall_gap": params.body.wall_gap_mm,
-        "up": params.plan.up,
+        "up": design.turn.apply(Vec3::from(params.plan.up)).to_array(),
         "min_wall": params.connector.min_wall_mm,
         "key_piece": plan.key(),
+        "key": design.key.as_ref().map(|k| key_json(design, k)),
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
         "plan": design.proof,
         "holding": design.holding,
@@ -215,6 +217,27 @@ fn plan_json(
         value["connector_sizes"] = sizes.into();
     }
     value
+}
+
+/// Assembly from file coordinates, 4 × 4, row-major: the model's own, then turned for the key.
+fn transform(model: &Model, design: &Design) -> [f64; 16] {
+    let column = |c: usize| Vec3::new(model.transform[c], model.transform[4 + c], model.transform[8 + c]);
+    let turned = [0, 1, 2, 3].map(|c| design.turn.apply(column(c)) + 0.0);
+    let mut all = [0.0; 16];
+    for (c, v) in turned.iter().enumerate() {
+        (all[c], all[4 + c], all[8 + c]) = (v.x, v.y, v.z);
+    }
+    all[15] = 1.0;
+    all
+}
+
+/// How the key was cut.
+fn key_json(design: &Design, key: &KeySite) -> Value {
+    json!({
+        "rails": design.rails_mm(), "area_mm2": key.area_mm2, "flat_share": key.flat_share, "side_share": key.side_share,
+        "slide": key.prism.slide.to_array(), "plane_normal": key.prism.normal.to_array(),
+        "turned_degrees": design.turn.angle().to_degrees(),
+    })
 }
 
 /// The sizes of the connectors that were made, mm, as in "2.5" or "2.0–3.4".
@@ -251,11 +274,12 @@ fn stress_chart(options: &Options, params: &Params, design: &Design, strength: &
             points: seam.points,
         })
         .collect();
-    strength_chart(strength, params.strength.material.strength_mpa, &seams, |v| standing(options.up, v))
+    strength_chart(strength, params.strength.material.strength_mpa, &seams, |v| standing(options.up, design, v))
 }
 
-/// Turned so that `up` becomes z.
-fn standing(up: Axis, v: Vec3) -> Vec3 {
+/// From assembly space to the model as it was given, then so that `up` becomes z.
+fn standing(up: Axis, design: &Design, v: Vec3) -> Vec3 {
+    let v = design.turn.inverse().apply(v);
     match up {
         Axis::X => Vec3::new(-v.z, v.y, v.x),
         Axis::Y => Vec3::new(v.x, -v.z, v.y),
@@ -273,7 +297,7 @@ fn report(
     summary: &Summary,
     figures: Vec<(String, String)>,
 ) -> (Vec<u8>, Vec<u8>) {
-    let stand = |v: Vec3| standing(options.up, v);
+    let stand = |v: Vec3| standing(options.up, design, v);
     let turned: Vec<TriMesh> = design
         .pieces
         .as_slice()

@@ -7,7 +7,7 @@ use shellock::metric::MetricParams;
 use shellock::pipeline::Params;
 use shellock::sizes::SizeChoice;
 use shellock::stress_test::{Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test};
-use shellock::{ConnectorSizes, Ctx, PatchId, SegmentedSurface};
+use shellock::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface};
 use shellock_geom::check::into_solid;
 use shellock_mechanics::Material;
 
@@ -119,6 +119,12 @@ fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
         (None, [x, y, z]) => [*x, *y, *z],
         _ => Axis::Z.unit(),
     };
+    if let [x, y, z] =
+        plan["key"]["slide"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect::<Vec<_>>()[..]
+    {
+        params.plan.key = plan["key_piece"].as_u64().and_then(|key| u32::try_from(key).ok()).map(PatchId);
+        params.plan.key_slide = Some(LatticeDirection::nearest(shellock_geom::Vec3::new(x, y, z)));
+    }
     let problems = params.problems();
     if !problems.is_empty() {
         return Err(problems.join("; "));

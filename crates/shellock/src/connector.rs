@@ -16,16 +16,20 @@
 //! A run of connectors is one profile swept along the seam; its shape changes smoothly with the angle between the
 //! separation direction and the surface. The socket is the swept pin grown by the clearance, so the pin can leave along
 //! the separation direction and along no other.
+//!
+//! Where a key slides along its seam no such profile holds. There its neighbour carries a straight tongue under the key's wall, and
+//! the key a groove around it, see [`rail`].
 
 mod frame;
 mod free;
 mod profile;
+mod rail;
 mod run;
 
 pub use frame::{Curve, curves};
 pub use free::has_no_bar;
 pub use profile::{Part, Section};
-pub use run::{Contact, Run, Station, runs};
+pub use run::{Contact, Run, Shape, Station, runs};
 
 use crate::params::ParamProblem;
 use crate::sizes::SizeChoice;
@@ -41,13 +45,15 @@ pub struct ConnectorParams {
     ///
     /// Resin printers hold 0.05–0.15 mm a side, filament printers want 0.15–0.3.
     pub clearance_mm: f64,
+    /// The same between the rails of a key and their grooves, so that it can be taken out by hand. [0.03, 0.8]; 0.15.
+    pub key_clearance_mm: f64,
     /// Thinnest wall left standing. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
     pub min_wall_mm: f64,
 }
 
 impl Default for ConnectorParams {
     fn default() -> Self {
-        Self { size: SizeChoice::default(), clearance_mm: 0.12, min_wall_mm: 0.4 }
+        Self { size: SizeChoice::default(), clearance_mm: 0.12, key_clearance_mm: 0.15, min_wall_mm: 0.4 }
     }
 }
 
@@ -61,6 +67,7 @@ impl ConnectorParams {
     pub fn problems(&self) -> Vec<ParamProblem> {
         let others = [
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
+            ParamProblem::unless_within("key clearance", "mm", self.key_clearance_mm, 0.03, 0.8),
             ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
         ];
         self.size.problems().into_iter().chain(others.into_iter().flatten()).collect()

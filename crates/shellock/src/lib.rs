@@ -12,6 +12,7 @@ pub mod feedback;
 pub mod figure;
 pub mod ids;
 mod impact;
+pub mod key;
 pub mod metric;
 pub mod params;
 pub mod piece;

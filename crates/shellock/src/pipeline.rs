@@ -3,11 +3,16 @@
 //! Feedback goes one way: what a finished kit teaches becomes a constraint for the next round of planning; when plans run
 //! out, the segmentation is mended at the piece to blame, and planning starts afresh.
 
-use shellock_geom::{Aabb, Solid, TriMesh};
+mod cut_key;
+
+use std::borrow::Cow;
+
+use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
 
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, has_no_bar};
 use crate::feedback::{Lesson, lessons};
+use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
 use crate::piece::{Joint, PieceError};
 use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanProof, PlanSurvey};
@@ -16,9 +21,10 @@ use crate::sizes::{CONTACT_SIZES, ChosenSizes, LEAST_CONTACT_SIZES, SizeParams, 
 use crate::strength::{Strength, StrengthError, StrengthParams, StressMap};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
-    Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, metric, piece, plan,
-    segmentation, sizes, strength, verify,
+    Cancelled, ConnectorSizes, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning, body, connector,
+    metric, piece, plan, segmentation, sizes, strength, verify,
 };
+use cut_key::CutKey;
 
 /// Everything that may be set. Each stage's parameters are declared beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,6 +35,8 @@ pub struct Params {
     pub thickness: ThicknessChoice,
     /// What the wall must bear.
     pub strength: StrengthParams,
+    /// Where the key comes from.
+    pub key: KeySource,
     /// How plans are judged and searched.
     pub plan: PlanParams,
     /// How the wall is made and cut.
@@ -49,6 +57,16 @@ pub enum ThicknessChoice {
     Given,
     /// The least that bears a fall.
     Auto,
+}
+
+/// Where the key comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KeySource {
+    /// It is cut out of the surface where it slides best, see [`crate::key`]; where no such kit passes, as with `Piece`.
+    #[default]
+    Cut,
+    /// It is one of the pieces: that of [`PlanParams::key`], or the flattest that works.
+    Piece,
 }
 
 /// Bounds of the feedback loop.
@@ -108,8 +126,12 @@ impl Params {
     }
 }
 
-/// A finished kit.
+/// A finished kit. All places are in assembly space: the model as it was given, turned by `turn`.
 pub struct Design {
+    /// How the model was turned to make it.
+    pub turn: Turn,
+    /// How its key was cut; `None` where the key is one of the pieces.
+    pub key: Option<KeySite>,
     /// The segmented surface it was made from.
     pub surface: SegmentedSurface,
     /// Connector sizes of its pairs of pieces.
@@ -134,6 +156,13 @@ pub struct Design {
     pub verification: Verification,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
+}
+
+impl Design {
+    /// Length of the rails that the key slides on, mm; 0 where it has none.
+    pub fn rails_mm(&self) -> f64 {
+        self.joints.iter().filter(|j| j.is_rail).map(|j| j.length_mm).sum()
+    }
 }
 
 /// How the job ended.
@@ -198,42 +227,99 @@ impl From<ChoiceError> for DesignError {
 pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
     let (params, bearing) = with_thickness(ctx, params, model)?;
     let params = &params;
-    let stress = bearing.strength.as_ref().map(StressMap::new);
-    let stress_at = stress.as_ref().map(|map| |place| map.at(place));
-    let stress_mpa = stress_at.as_ref().map(|at| at as StressField);
-    let mut surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
-    let mut sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
-    let mut room_mm = params.connector.room_mm(sizes.sizes.largest_mm());
-    ctx.stage("grid", 0)?;
-    let mut grid = ShellGrid::new(&params.body, model, room_mm)?;
-    let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all };
-    let mut mending = 0;
-    let attempt = loop {
-        let attempt = with_segmentation(ctx, params, model, &grid, &surface, &sizes, &mut kits)?;
-        let Attempt::Failed { blamed, loose, .. } = &attempt else { break attempt };
-        if mending == params.rounds.mendings || kits.n_left == 0 {
-            break attempt;
-        }
-        let is_hopeless = kits.best.is_none() && 2 * mending >= params.rounds.mendings;
-        let mended = mended(ctx, params, &surface, blamed, loose, is_hopeless);
-        let Some(mended) = mended else { break attempt };
-        ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
-        surface = mended;
-        mending += 1;
-        sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
-        let least_mm = params.connector.room_mm(sizes.sizes.largest_mm());
-        if least_mm > room_mm {
-            room_mm = least_mm;
-            grid = ShellGrid::new(&params.body, model, room_mm)?;
-        }
-    };
-    // Warnings of segmentations and plans that were given up go with them.
-    ctx.take_warnings();
-    if let Some(best) = &mut kits.best {
-        best.warnings.extend(bearing.warnings);
-        best.strength = bearing.strength;
+    let surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
+    let job = Job { params, model, labels, bearing: &bearing, surface: &surface };
+    let cut = if params.key == KeySource::Cut { cut_key::design(ctx, &job)? } else { cut_key::Cut::default() };
+    if cut.best.as_ref().is_some_and(|d| d.verification.passed()) {
+        return Ok(DesignOutcome::Made(Box::new(cut.best.expect("it was looked at"))));
     }
-    finish(ctx, params, model, labels, kits.best, attempt)
+    let outcome = job.kit(ctx, params, &Laid::of(&job), None)?;
+    Ok(cut.compared_with(outcome))
+}
+
+/// What all kits of a job have in common, as it was given.
+struct Job<'a> {
+    params: &'a Params,
+    model: &'a Solid,
+    labels: Option<&'a [i64]>,
+    bearing: &'a Bearing,
+    surface: &'a SegmentedSurface,
+}
+
+/// The model and its pieces, turned.
+struct Laid<'a> {
+    turn: Turn,
+    model: Cow<'a, Solid>,
+    surface: SegmentedSurface,
+}
+
+impl<'a> Laid<'a> {
+    /// As it was given.
+    fn of(job: &Job<'a>) -> Self {
+        Self { turn: Turn::default(), model: Cow::Borrowed(job.model), surface: job.surface.clone() }
+    }
+}
+
+impl Job<'_> {
+    /// Kits of `laid` until one passes or the rounds are used up; then the best of them. With `key`, its piece is cut again after every
+    /// change of the pieces.
+    fn kit(
+        &self,
+        ctx: &Ctx,
+        params: &Params,
+        laid: &Laid<'_>,
+        key: Option<&CutKey>,
+    ) -> Result<DesignOutcome, DesignError> {
+        let (turn, back) = (laid.turn, laid.turn.inverse());
+        let stress = self.bearing.strength.as_ref().map(StressMap::new);
+        let stress_at = stress.as_ref().map(|map| |place| map.at(back.apply(place)));
+        let stress_mpa = stress_at.as_ref().map(|at| at as StressField);
+        let mut params = params.clone();
+        let mut surface = laid.surface.clone();
+        let cut_again = |params: &mut Params, surface: SegmentedSurface| match key {
+            Some(key) => key.cut(ctx, params, surface),
+            None => Some(surface),
+        };
+        let no_key = || DesignOutcome::NoPlan { reason: "the key falls apart".into(), blockers: Vec::new() };
+        let Some(cut) = cut_again(&mut params, surface) else { return Ok(no_key()) };
+        surface = cut;
+        let mut sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
+        let mut room_mm = params.connector.room_mm(sizes.sizes.largest_mm());
+        ctx.stage("grid", 0)?;
+        let mut grid = ShellGrid::new(&params.body, &laid.model, room_mm)?;
+        let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all };
+        let mut mending = 0;
+        let attempt = loop {
+            let attempt = with_segmentation(ctx, &params, &laid.model, &grid, &surface, &sizes, &mut kits)?;
+            let Attempt::Failed { blamed, loose, .. } = &attempt else { break attempt };
+            if mending == params.rounds.mendings || kits.n_left == 0 {
+                break attempt;
+            }
+            let is_hopeless = kits.best.is_none() && 2 * mending >= params.rounds.mendings;
+            let mended = mended(ctx, &params, &surface, blamed, loose, is_hopeless);
+            let Some(mended) = mended.and_then(|m| cut_again(&mut params, m)) else { break attempt };
+            ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
+            surface = mended;
+            mending += 1;
+            sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
+            let least_mm = params.connector.room_mm(sizes.sizes.largest_mm());
+            if least_mm > room_mm {
+                room_mm = least_mm;
+                grid = ShellGrid::new(&params.body, &laid.model, room_mm)?;
+            }
+        };
+        // Warnings of segmentations and plans that were given up go with them.
+        ctx.take_warnings();
+        if let Some(best) = &mut kits.best {
+            let place = |at: [f64; 3]| turn.apply(Vec3::from(at)).to_array();
+            let turned = |w: &Warning| Warning { at: w.at.map(place), ..w.clone() };
+            best.warnings.extend(self.bearing.warnings.iter().map(turned));
+            best.strength = self.bearing.strength.clone().map(|s| s.turned(|v| turn.apply(v)));
+            best.turn = turn;
+            best.key = key.map(|k| k.site);
+        }
+        finish(ctx, &params, &laid.model, self.labels, kits.best, attempt)
+    }
 }
 
 /// The parameters with the thickness of the wall, what it bears, and what to tell of it.
@@ -422,11 +508,14 @@ pub fn make(
     let shell = body::build(ctx, &params.body, grid, distances, &plan, &rooms)?;
     let curves = shell.inner.as_ref().map_or(Vec::new(), |inner| connector::curves(grid, inner, &plan));
     let is_free = has_no_bar(&params.connector, grid, &shell);
-    let (runs, contacts) = connector::runs(&params.connector, sizes, &plan, &curves, &is_free);
+    let slide = params.plan.key.and(params.plan.key_slide).map(LatticeDirection::unit);
+    let (runs, contacts) = connector::runs(&params.connector, sizes, &plan, &curves, slide, &is_free);
     let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms)?;
     let verification = verify::verify(ctx, &params.verify, model, &finished.meshes, &plan)?;
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
+        turn: Turn::default(),
+        key: None,
         surface: surface.clone(),
         sizes: sizes.clone(),
         plan,

@@ -373,6 +373,11 @@ pub fn divide(
     changed(ctx, params, surface, |solid, labels| split_piece(solid, labels, patch))
 }
 
+/// The same surface mended and smoothed again, as its patches are; patches may be renumbered.
+pub fn mended_again(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface) -> Option<SegmentedSurface> {
+    changed(ctx, params, surface, |_, labels| Some(labels.clone()))
+}
+
 /// The same surface with each of `patches` joined to the neighbour it has the longest seam with, mended and smoothed again; `None` where
 /// there would be one piece left, or nothing is joined.
 ///

@@ -153,6 +153,14 @@ impl SizeChoice {
         }
     }
 
+    /// The size that a pair gets where nothing presses on it and there is room.
+    pub fn usual_mm(&self) -> f64 {
+        match self {
+            Self::Fixed(size_mm) => *size_mm,
+            Self::Auto(range) => Self::DEFAULT_MM.max(range.min_mm).min(range.max_mm),
+        }
+    }
+
     /// Every value out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         const MM: [f64; 2] = [1.5, 6.0];

@@ -170,6 +170,15 @@ pub struct Strength {
 }
 
 impl Strength {
+    /// The same where the model, and all directions with it, are turned by `turn`.
+    pub fn turned(mut self, turn: impl Fn(Vec3) -> Vec3) -> Self {
+        self.deciding.1 = turn(self.deciding.1);
+        self.at = turn(self.at);
+        self.mesh.points.iter_mut().for_each(|p| *p = turn(*p));
+        self.solid.iter_mut().for_each(|r| r.at = turn(r.at.into()).to_array());
+        self
+    }
+
     /// What the user should know: a wall that is too weak, and where the model is solid.
     pub fn warnings(&self, params: &StrengthParams) -> Vec<Warning> {
         let weak = self.is_too_weak.then(|| Warning {

@@ -2,7 +2,8 @@
 
 use shellock_geom::Vec3;
 
-use super::{ConnectorParams, Station};
+use super::run::RailPart;
+use super::{ConnectorParams, Shape, Station};
 
 /// A rectangle of the cross-section: from `n0` to `n1` along the frame's `n`, from `s0` to `s1` along ŝ, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,12 +45,58 @@ const TONGUE_ANGLE: f64 = -0.698;
 /// How far parts reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.6;
 
+/// How far the lip of a key's groove stays from the seam, mm.
+const LIP_GAP_MM: f64 = 0.1;
+/// How much smaller the tip of a rail's tongue is, mm: so that the groove finds it.
+const LEAD_IN_MM: f64 = 0.3;
+/// How far a rail reaches up into walls that are not quite as flat as it, mm.
+const RAIL_ROOT_MM: f64 = 1.2;
+
 impl Section {
+    /// The cross-section at a station.
+    pub fn at(params: &ConnectorParams, station: &Station) -> Self {
+        match station.shape {
+            Shape::Seam => Self::seam(params, station),
+            Shape::Rail(part) => Self::rail(params, station.size_mm, part),
+        }
+    }
+
+    /// A tongue of the male under the female's wall, and the female's groove around it; ŝ points out of the surface.
+    ///
+    /// ```text
+    ///      M M M M│F F F F F F
+    ///      ───┐M M│  ┌──┐F F ──      ─── inner side of the wall
+    ///         │M M└────┐│F│
+    ///         └────────┘│F│          tongue
+    ///              ┌────┘F│
+    ///              └──────┘          lip
+    /// ```
+    fn rail(params: &ConnectorParams, d: f64, part: RailPart) -> Self {
+        let c = params.key_clearance_mm;
+        let (reach, thick, wall) = (0.5 * d, 0.45 * d, (0.5 * d - c).max(params.min_wall_mm));
+        let floor = -2.0 * c - 2.0 * thick;
+        let lead = if part == RailPart::LeadIn { LEAD_IN_MM.min(0.3 * thick) } else { 0.0 };
+        let has_tongue = part != RailPart::Stop;
+        let outer = reach + c + wall;
+        let tongue = Part { n0: -reach, n1: reach - lead, s0: -c - thick + lead, s1: -c - lead };
+        Self {
+            male: [
+                has_tongue.then_some(tongue),
+                has_tongue.then_some(Part { n0: -reach, n1: -c, s0: tongue.s0, s1: RAIL_ROOT_MM }),
+            ],
+            female: [
+                Some(Part { n0: LIP_GAP_MM, n1: outer, s0: floor, s1: -2.0 * c - thick }),
+                Some(Part { n0: reach + c, n1: outer, s0: floor, s1: RAIL_ROOT_MM }),
+                (!has_tongue).then_some(Part { n0: LIP_GAP_MM, n1: outer, s0: floor, s1: RAIL_ROOT_MM }),
+            ],
+        }
+    }
+
     /// The cross-section for the angle `T` of a station: −90° a tongue under the female (forward connector), 0 a pin that
     /// pulls straight out, up to 60° backward.
     ///
     /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across the seam.
-    pub fn at(params: &ConnectorParams, station: &Station) -> Self {
+    fn seam(params: &ConnectorParams, station: &Station) -> Self {
         let (d, c) = (station.size_mm, params.clearance_mm);
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
         // Stretch along ŝ; ŝ leans against the seam by the angle whose cosine is `depth`.
@@ -91,6 +138,7 @@ mod tests {
             depth: 1.0,
             arc_mm: 0.0,
             size_mm,
+            shape: Shape::Seam,
         }
     }
 
@@ -117,6 +165,29 @@ mod tests {
                 let gap_s = (wall.s0 - pin.s1).max(pin.s0 - wall.s1);
                 assert!(gap_n.max(gap_s) >= params.clearance_mm - 1e-12, "at {degrees}°: {wall:?}");
             }
+        }
+    }
+
+    #[test]
+    fn tongue_and_groove_of_a_rail_keep_the_keys_clearance_and_overlap_both_ways() {
+        for (size_mm, key_clearance_mm) in [(2.0, 0.1), (2.5, 0.15), (4.0, 0.3)] {
+            let params = ConnectorParams { key_clearance_mm, ..ConnectorParams::default() };
+            for part in [RailPart::Full, RailPart::LeadIn] {
+                let section = Section::rail(&params, size_mm, part);
+                let [tongue, root] = section.male.map(Option::unwrap);
+                for wall in section.female.iter().flatten() {
+                    for male in [tongue, root] {
+                        let gap_n = (wall.n0 - male.n1).max(male.n0 - wall.n1);
+                        let gap_s = (wall.s0 - male.s1).max(male.s0 - wall.s1);
+                        assert!(gap_n.max(gap_s) >= key_clearance_mm - 1e-12, "{wall:?}");
+                    }
+                    assert!((wall.n1 - wall.n0).min(wall.s1 - wall.s0) >= params.min_wall_mm);
+                }
+                let lip = section.female[0].unwrap();
+                // The key's wall lies above the tongue, its lip below: neither lets it out across.
+                assert!(tongue.s1 < 0.0 && tongue.n1 > 0.5 && lip.s1 < tongue.s0 && lip.n0 < 0.3 * tongue.n1);
+            }
+            assert!(Section::rail(&params, size_mm, RailPart::Stop).male.iter().all(Option::is_none));
         }
     }
 

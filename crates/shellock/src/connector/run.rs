@@ -3,6 +3,7 @@
 use shellock_geom::Vec3;
 
 use super::frame::Curve;
+use super::rail::rails;
 use super::{ConnectorParams, Section};
 use crate::plan::InstallationPlan;
 use crate::plan::contact::end_gap_mm;
@@ -11,7 +12,7 @@ use crate::{ConnectorSizes, PatchId};
 /// Steepest backward angle T that gives a sound pin, rad: 60°.
 const STEEPEST: f64 = 1.047;
 /// Where the separation direction runs along the seam by more than this (|ŝ·u|), a connector is too shallow to hold.
-const SHALLOWEST: f64 = 0.9;
+pub(super) const SHALLOWEST: f64 = 0.9;
 /// The male role changes sides only where |ŝ·N| exceeds this, so that it does not flicker along a run.
 const ROLE_HYSTERESIS: f64 = 0.1;
 /// Frames that turn by more than this between neighbouring points, rad, cannot be swept.
@@ -44,6 +45,28 @@ pub struct Station {
     pub arc_mm: f64,
     /// Connector size D, mm.
     pub size_mm: f64,
+    /// What the section looks like.
+    pub shape: Shape,
+}
+
+/// The kinds of sections.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// Pin and channel of a seam that is left across.
+    Seam,
+    /// Tongue and groove of a seam that a key slides along; `n` leads to the key, ŝ out of the surface.
+    Rail(RailPart),
+}
+
+/// Where on a rail a section is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RailPart {
+    /// The tongue is whole.
+    Full,
+    /// The tip of the tongue, narrower so that the groove finds it.
+    LeadIn,
+    /// Beyond the tongue: the end of the groove, which stops the key.
+    Stop,
 }
 
 /// One stretch of connector: a pin of `male` in a channel of `female`.
@@ -61,6 +84,11 @@ impl Run {
     /// Length along the seam, mm.
     pub fn length(&self) -> f64 {
         self.stations.windows(2).map(|w| w[0].point.distance(w[1].point)).sum()
+    }
+
+    /// Whether it is a rail of the key.
+    pub fn is_rail(&self) -> bool {
+        self.stations[0].shape != Shape::Seam
     }
 
     /// The middle station's place.
@@ -85,12 +113,15 @@ pub struct Contact {
 }
 
 /// The runs along all curves, and what each curve offered. `is_free(piece, point)` says whether `piece` may have material
-/// at a point below the wall; `None` where the point lies in or above the wall and does not count.
+/// at a point below the wall; `None` where the point lies in or above the wall and does not count. `slide` is the key's direction where
+/// it slides on rails.
+#[expect(clippy::too_many_arguments, reason = "what all earlier stages know of seams")]
 pub fn runs(
     params: &ConnectorParams,
     sizes: &ConnectorSizes,
     plan: &InstallationPlan,
     curves: &[Curve],
+    slide: Option<Vec3>,
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
 ) -> (Vec<Run>, Vec<Contact>) {
     let (mut runs, mut contacts) = (Vec::new(), Vec::new());
@@ -109,6 +140,11 @@ pub fn runs(
             usable_mm: (0..stations.len() - 1).filter(|&i| allowed[i] && allowed[i + 1]).map(step).sum(),
             at: curve.points[curve.points.len() / 2],
         });
+        if let Some(slide) = slide.filter(|_| curve.later == plan.key()) {
+            let (rails, usable_mm) = rails(params, curve, slide, size_mm, is_free);
+            runs.extend(rails);
+            contacts.iter_mut().last().into_iter().for_each(|c| c.usable_mm += usable_mm);
+        }
         for i in 0..stations.len() {
             let (male, female) = sides(curve, later_is_male[i]);
             allowed[i] = allowed[i] && has_room(params, &stations[i], male, female, is_free);
@@ -152,7 +188,7 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_
     let theta = flat.dot(to_female).atan2(flat.dot(normal));
     let n = (theta.cos() * to_female - theta.sin() * normal).normalize_or_zero();
     let arc_mm = curve.points[..=i].windows(2).map(|w| w[0].distance(w[1])).sum();
-    Station { point: curve.points[i], tangent: u, n, s, theta, depth, arc_mm, size_mm }
+    Station { point: curve.points[i], tangent: u, n, s, theta, depth, arc_mm, size_mm, shape: Shape::Seam }
 }
 
 /// Where ends, roles, angles and turns allow a connector.
@@ -176,7 +212,7 @@ fn allowed(size_mm: f64, curve: &Curve, stations: &[Station], later_is_male: &[b
 }
 
 /// Whether both halves keep most of their section.
-fn has_room(
+pub(super) fn has_room(
     params: &ConnectorParams,
     station: &Station,
     male: PatchId,

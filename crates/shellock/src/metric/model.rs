@@ -12,7 +12,7 @@ use crate::params::ParamProblem;
 use crate::plan::contact::{end_gap_mm, meeting};
 use crate::plan::{InstallationPlan, PlanParams};
 use crate::seams::{seam_half_edges, stretches};
-use crate::{ConnectorSizes, PatchId, SegmentedSurface};
+use crate::{ConnectorSizes, LatticeDirection, PatchId, SegmentedSurface};
 
 /// How the model is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,11 +29,13 @@ pub struct MetricParams {
     pub edge_share: f64,
     /// What the pieces are printed of. E in [1, 10⁶] MPa, ν in [0, 0.45].
     pub material: Material,
+    /// The key that slides on rails, and along what; none by default.
+    pub rails: Option<(PatchId, LatticeDirection)>,
 }
 
 impl Default for MetricParams {
     fn default() -> Self {
-        Self { wall_mm: 2.0, connector_mm: 2.5, beta: 0.1, edge_share: 1.0, material: Material::default() }
+        Self { wall_mm: 2.0, connector_mm: 2.5, beta: 0.1, edge_share: 1.0, material: Material::default(), rails: None }
     }
 }
 
@@ -42,7 +44,8 @@ impl MetricParams {
     pub fn of_plan(params: &PlanParams, sizes: &ConnectorSizes) -> Self {
         let defaults = Self::default();
         let wall_mm = if params.wall_mm > 0.0 { params.wall_mm } else { defaults.wall_mm };
-        Self { wall_mm, connector_mm: sizes.default_mm(), beta: params.beta, ..defaults }
+        let rails = params.key.zip(params.key_slide);
+        Self { wall_mm, connector_mm: sizes.default_mm(), beta: params.beta, rails, ..defaults }
     }
 
     /// Every value out of range: no model can be made of such.
@@ -168,8 +171,9 @@ impl PlanModel {
         let meet = |(seam, station): (&StationSeam, &Station)| {
             let a_is_later = position[usize::from(seam.a)] > position[usize::from(seam.b)];
             let later = if a_is_later { seam.a } else { seam.b };
-            let s = plan.steps[position[usize::from(later)]].separation.unit();
-            let mut meeting = meeting(station, seam.size_mm, a_is_later, s, self.params.beta, false);
+            let s = plan.steps[position[usize::from(later)]].separation;
+            let on_rails = self.params.rails == Some((later, s));
+            let mut meeting = meeting(station, seam.size_mm, a_is_later, s.unit(), self.params.beta, false, on_rails);
             meeting.joint = meeting.joint.filter(|_| seam.has_room);
             if let Some(joint) = &mut meeting.joint {
                 joint.is_fast = later == plan.key();

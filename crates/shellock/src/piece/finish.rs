@@ -31,6 +31,8 @@ pub struct Joint {
     pub kept: [f64; 2],
     /// Its middle.
     pub at: Vec3,
+    /// Whether it is a rail of the key.
+    pub is_rail: bool,
 }
 
 /// The finished pieces.
@@ -128,7 +130,7 @@ fn joint(run: &Run, halves: &Halves) -> Joint {
     let kept = std::array::from_fn(|h| if halves.raw[h] > 0.0 { volume_mm3[h] / halves.raw[h] } else { 0.0 });
     let holds = kept.iter().all(|k| *k >= LEAST_KEPT);
     let length_mm = if holds { run.length() } else { 0.0 };
-    Joint { male: run.male, female: run.female, length_mm, volume_mm3, kept, at: run.middle() }
+    Joint { male: run.male, female: run.female, length_mm, volume_mm3, kept, at: run.middle(), is_rail: run.is_rail() }
 }
 
 fn join_to_bodies(

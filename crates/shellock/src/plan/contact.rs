@@ -35,6 +35,9 @@ const MAX_ALONG_SEAM: f64 = 0.9;
 /// Most backward angle T that a connector bears, rad (60°); beyond, it is ill-shaped.
 const MAX_BACKWARD_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
+/// Most `|s · N|` at which a rail can run under the seam.
+const MAX_OUT_OF_RAIL: f64 = 0.25;
+
 /// How clearly, as `|s · N|`, a sample must ask for the other male piece before a run of connectors ends there.
 const ROLE_HYSTERESIS: f64 = 0.1;
 
@@ -117,6 +120,11 @@ impl SeamFrame {
         s.dot(self.tangent).abs() <= MAX_ALONG_SEAM && towards_female.atan2(outwards) <= MAX_BACKWARD_RAD
     }
 
+    /// Whether the seam runs along `s`, so that the key can slide on a rail under it.
+    pub fn carries_rail(&self, s: Vec3) -> bool {
+        s.dot(self.tangent).abs() > MAX_ALONG_SEAM && s.dot(self.normal).abs() < MAX_OUT_OF_RAIL
+    }
+
     /// Weight `w` of Eq. 4, in [β, 1 + β]: large where `s` runs along the seam or towards the earlier piece.
     pub fn weight(&self, s: Vec3, beta: f64) -> f64 {
         s.dot(self.tangent).abs().max(s.dot(self.across).max(0.0)) + beta
@@ -124,7 +132,7 @@ impl SeamFrame {
 }
 
 /// How two pieces with connectors of `size_mm` meet at a station where the later one leaves along `s`; no connector where
-/// none can be made, unless `is_any_angle`.
+/// none can be made, unless `is_any_angle`; `is_on_rails` where the later one is the key and slides on rails.
 pub(crate) fn meeting(
     station: &Station,
     size_mm: f64,
@@ -132,6 +140,7 @@ pub(crate) fn meeting(
     s: Vec3,
     beta: f64,
     is_any_angle: bool,
+    is_on_rails: bool,
 ) -> Meeting {
     let across = if a_is_later { station.across } else { -station.across };
     let frame = SeamFrame { tangent: station.tangent, normal: station.normal, across };
@@ -144,8 +153,12 @@ pub(crate) fn meeting(
     let later_is_male = s.dot(station.normal) >= 0.0;
     let (male, leaves) = if later_is_male { (later, in_section) } else { (earlier, -in_section) };
     let pull_on_a = if a_is_later { s } else { -s };
-    let joint = MechanicalJoint { male, leaves, is_fast: false, pull_on_a, weight: frame.weight(s, beta), size_mm };
-    Meeting { wall, joint: (is_any_angle || frame.carries(s)).then_some(joint) }
+    let is_rail = is_on_rails && frame.carries_rail(s);
+    // A rail holds across the seam; what leaves along it does so beside it.
+    let (male, leaves) = if is_rail { (earlier, station.normal) } else { (male, leaves) };
+    let weight = if is_rail { beta } else { frame.weight(s, beta) };
+    let joint = MechanicalJoint { male, leaves, is_fast: false, pull_on_a, weight, size_mm };
+    Meeting { wall, joint: (is_any_angle || is_rail || frame.carries(s)).then_some(joint) }
 }
 
 impl Sample {
@@ -231,53 +244,82 @@ fn contact(params: &PlanParams, size_mm: f64, seams: &[(PatchId, PatchId, Vec<Sa
         std::array::from_fn(|i| {
             // The frame of b later than a is that of a later with v turned round.
             let s = LatticeDirection::all().nth(i).expect("26 directions");
-            joint(params, size_mm, &lines, side, s)
+            joint(params, size_mm, &lines, Way::new(params, [*a, *b], side, s))
         })
     });
     let least_mm = SHORTEST_RUN_SIZES[SHORTEST_RUN_SIZES.len() - 1] * size_mm;
-    let hold = HoldTable::new(params, size_mm, &lines, |order, s| joints[order][s.index()].run_mm >= least_mm);
+    let holds = |order: usize, s: LatticeDirection| joints[order][s.index()].run_mm >= least_mm;
+    let hold = HoldTable::new(params, size_mm, [*a, *b], &lines, holds);
     Some(Contact { a: *a, b: *b, length_mm, size_mm, joints, hold })
 }
 
-/// What `lines` offer along `s`; `side` = 1 where the piece with the lower id is later, else −1.
-fn joint(params: &PlanParams, size_mm: f64, lines: &[(&[Sample], bool)], side: f64, s: LatticeDirection) -> Joint {
+/// Which piece of a pair is later, and how it leaves.
+#[derive(Clone, Copy)]
+struct Way {
+    /// 1 where the piece with the lower id is later, else −1.
+    side: f64,
+    s: LatticeDirection,
+    /// Whether it is the key and slides on rails.
+    is_on_rails: bool,
+}
+
+impl Way {
+    fn new(params: &PlanParams, pair: [PatchId; 2], side: f64, s: LatticeDirection) -> Self {
+        let later = pair[usize::from(side < 0.0)];
+        Self { side, s, is_on_rails: params.slides_on_rails(later, s) }
+    }
+
+    /// Whether there is a rail at `x`. What would bar it has been looked at where the key was cut.
+    fn has_rail(&self, x: &Sample) -> bool {
+        self.is_on_rails && x.has_room && x.frame(self.side).carries_rail(self.s.unit())
+    }
+
+    /// Whether a connector can be made at `x`.
+    fn carries(&self, x: &Sample) -> bool {
+        let is_barred = || x.barred.has(usize::from(self.side < 0.0), self.s);
+        self.has_rail(x) || x.has_room && !is_barred() && x.frame(self.side).carries(self.s.unit())
+    }
+
+    /// Weight of Eq. 4 at `x`; a rail is as good as a connector can be.
+    fn weight(&self, x: &Sample, beta: f64) -> f64 {
+        if self.has_rail(x) { beta } else { x.frame(self.side).weight(self.s.unit(), beta) }
+    }
+}
+
+/// What `lines` offer.
+fn joint(params: &PlanParams, size_mm: f64, lines: &[(&[Sample], bool)], way: Way) -> Joint {
     let (mut weight, mut usable, mut length_mm, mut run_mm) = (0.0, 0.0, 0.0, 0.0_f64);
     for &(samples, is_loop) in lines {
         for x in samples {
-            weight += x.frame(side).weight(s.unit(), params.beta) * x.length_mm;
+            weight += way.weight(x, params.beta) * x.length_mm;
             length_mm += x.length_mm;
-            if carries(x, side, s) {
+            if way.carries(x) {
                 usable += x.length_mm;
             }
         }
-        run_mm = run_mm.max(longest_run_mm(samples, is_loop, side, s));
+        run_mm = run_mm.max(longest_run_mm(samples, is_loop, way));
     }
     let holds = run_mm >= SHORTEST_RUN_SIZES[0] * size_mm;
     Joint { weight: weight / length_mm, usable: usable / length_mm, run_mm, holds }
 }
 
-/// Whether a connector can be made at `x`.
-fn carries(x: &Sample, side: f64, s: LatticeDirection) -> bool {
-    !x.barred.has(usize::from(side < 0.0), s) && x.has_room && x.frame(side).carries(s.unit())
-}
-
 /// Length of the longest row of samples that carry connectors with the same male piece.
-fn longest_run_mm(samples: &[Sample], is_loop: bool, side: f64, s: LatticeDirection) -> f64 {
+fn longest_run_mm(samples: &[Sample], is_loop: bool, way: Way) -> f64 {
     // A loop is walked twice, so that a run across its first point is seen whole; no run is longer than the loop.
     let whole: f64 = samples.iter().map(|x| x.length_mm).sum();
     let rounds = if is_loop { 2 } else { 1 };
     let (mut longest, mut run) = (0.0_f64, 0.0_f64);
     let mut role = 0.0;
     for x in samples.iter().cycle().take(rounds * samples.len()) {
-        let outwards = s.unit().dot(x.normal);
+        let outwards = way.s.unit().dot(x.normal);
         let flips = role * outwards < 0.0 && outwards.abs() > ROLE_HYSTERESIS;
         if flips || role == 0.0 {
             role = outwards.signum();
         }
-        if flips || !carries(x, side, s) {
+        if flips || !way.carries(x) {
             run = 0.0;
         }
-        if carries(x, side, s) {
+        if way.carries(x) {
             run += x.length_mm;
         }
         longest = longest.max(run);
@@ -443,7 +485,13 @@ mod tests {
         let params = PlanParams::default();
         let up = |length_mm: f64, size_mm: f64| {
             let samples = samples(&params, size_mm, &line(length_mm), true, None);
-            joint(&params, size_mm, &[(&samples, false)], 1.0, LatticeDirection::nearest(Vec3::Z))
+            let pair = [PatchId(0), PatchId(1)];
+            joint(
+                &params,
+                size_mm,
+                &[(&samples, false)],
+                Way::new(&params, pair, 1.0, LatticeDirection::nearest(Vec3::Z)),
+            )
         };
         assert!((up(40.0, 2.5).run_mm - 32.5).abs() <= SAMPLE_STEP_MM);
         assert!(up(40.0, 2.5).holds && !up(12.0, 2.5).holds);

@@ -1,6 +1,5 @@
 //! Which piece can be the key: the flattest, sliding out within its plane (Sect. 6.1).
 
-use nalgebra::Matrix3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -8,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
 use super::{PlanParams, PlanSurvey};
+use crate::key::plane::{Plane, Spot};
 use crate::{IdVec, LatticeDirection, PatchId, SegmentedSurface};
 
 /// Planes tried per piece.
@@ -15,12 +15,6 @@ const N_PLANES: usize = 64;
 
 /// Faces looked at per piece, so that a fine mesh costs no more than a coarse one.
 const MAX_FACES: usize = 3000;
-
-/// Farthest from the plane, as share of the model's longest edge, that a face lies on it: 1.2 mm at 150 mm.
-const INLIER_SHARE: f64 = 0.008;
-
-/// Least cosine between a face and the plane it lies on (26°).
-const INLIER_COSINE: f64 = 0.9;
 
 /// Directions tried within the plane (Sect. 6.1).
 const N_IN_PLANE: usize = 8;
@@ -67,33 +61,21 @@ impl Flatness {
     }
 }
 
-/// A face as RANSAC sees it.
-#[derive(Clone, Copy)]
-struct Spot {
-    center: Vec3,
-    normal: Vec3,
-    area: f64,
-}
-
 /// The nearest plane of every piece by RANSAC over its faces, refined by least squares; a random stream per piece.
 pub fn flatness(params: &PlanParams, surface: &SegmentedSurface) -> IdVec<PatchId, Flatness> {
     let mut faces = vec![Vec::new(); surface.n_patches];
     for (face, &patch) in surface.patch_of_face.iter().enumerate() {
         faces[usize::from(patch)].push(face);
     }
-    let tolerance_mm = INLIER_SHARE * surface.mesh.bounds().size().max_element();
+    let tolerance_mm = Plane::tolerance_mm(surface.mesh.bounds().size().max_element());
     let flats: Vec<Flatness> = faces
         .par_iter()
         .enumerate()
         .map(|(patch, faces)| {
             let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
             rng.set_stream(patch as u64);
-            let spot = |&f: &usize| Spot {
-                center: surface.mesh.face_center(f),
-                normal: surface.mesh.face_normal(f),
-                area: surface.mesh.face_area(f),
-            };
-            let spots: Vec<Spot> = faces.iter().step_by(faces.len().div_ceil(MAX_FACES).max(1)).map(spot).collect();
+            let step = faces.len().div_ceil(MAX_FACES).max(1);
+            let spots = Spot::sample(&surface.mesh, faces.iter().copied(), step);
             nearest_plane(&spots, tolerance_mm, &mut rng)
         })
         .collect();
@@ -105,44 +87,19 @@ fn nearest_plane(spots: &[Spot], tolerance_mm: f64, rng: &mut ChaCha8Rng) -> Fla
     if total <= 0.0 || !total.is_finite() {
         return Flatness::NONE;
     }
-    let lies_on =
-        |s: &Spot, at: Vec3, n: Vec3| (s.center - at).dot(n).abs() < tolerance_mm && s.normal.dot(n) > INLIER_COSINE;
-    let share = |at: Vec3, n: Vec3| spots.iter().filter(|s| lies_on(s, at, n)).map(|s| s.area).sum::<f64>() / total;
-    let mut best = (Flatness::NONE, Vec3::ZERO);
+    let mut best = (0.0, None);
     for _ in 0..N_PLANES {
-        let Spot { center, normal, .. } = spots[rng.random_range(0..spots.len())];
-        let found = share(center, normal);
-        if found > best.0.share {
-            best = (Flatness { normal, share: found }, center);
+        let Spot { center: at, normal, .. } = spots[rng.random_range(0..spots.len())];
+        let plane = Plane { at, normal, tolerance_mm };
+        let found = plane.area_mm2(spots);
+        if found > best.0 {
+            best = (found, Some(plane));
         }
     }
-    let inliers: Vec<Spot> = spots.iter().copied().filter(|s| lies_on(s, best.1, best.0.normal)).collect();
-    if let Some((at, normal)) = least_squares_plane(&inliers, best.0.normal) {
-        let found = share(at, normal);
-        if found > best.0.share {
-            best.0 = Flatness { normal, share: found };
-        }
-    }
-    best.0
-}
-
-/// Centre and unit normal of the plane with least squared distance, by area, turned towards `towards`.
-fn least_squares_plane(spots: &[Spot], towards: Vec3) -> Option<(Vec3, Vec3)> {
-    let area: f64 = spots.iter().map(|s| s.area).sum();
-    if area <= 0.0 {
-        return None;
-    }
-    let center = spots.iter().map(|s| s.center * s.area).sum::<Vec3>() / area;
-    let mut spread = Matrix3::<f64>::zeros();
-    for s in spots {
-        let d = s.center - center;
-        let d = nalgebra::Vector3::new(d.x, d.y, d.z);
-        spread += s.area * d * d.transpose();
-    }
-    let eigen = spread.symmetric_eigen();
-    let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-    let normal = Vec3::new(least[0], least[1], least[2]).try_normalize()?;
-    Some((center, if normal.dot(towards) < 0.0 { -normal } else { normal }))
+    best.1.map_or(Flatness::NONE, |plane| {
+        let plane = plane.refined(spots);
+        Flatness { normal: plane.normal, share: plane.area_mm2(spots) / total }
+    })
 }
 
 /// One way to choose the key: a piece and the directions it may take.
@@ -187,6 +144,11 @@ pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
     };
     let mut pieces: Vec<PatchId> = survey.area_mm2.ids().filter(|&p| params.key.is_none_or(|k| k == p)).collect();
     pieces.sort_by(|&x, &y| rank(y).total_cmp(&rank(x)).then(x.cmp(&y)));
+    if let (Some(piece), Some(slide)) = (params.key, params.key_slide) {
+        // A key that was cut as such: its rails are straight whatever else it is.
+        let slides = KeyDirections::WithinPlane;
+        return vec![KeyChoice { piece, directions: vec![slide], slides, is_flat: true }];
+    }
     let (flat, other): (Vec<PatchId>, Vec<PatchId>) = pieces.into_iter().partition(|&p| survey.flatness[p].is_flat());
     let mut choices = Vec::new();
     for pieces in [flat, other] {

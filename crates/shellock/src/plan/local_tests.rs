@@ -38,7 +38,8 @@ impl LocalTests {
         for (k, openings) in opening_mm.iter_mut().enumerate() {
             let (sin, cos) = angle_of(k).sin_cos();
             // Side a is the later piece; a connector is made at any angle, good or bad: the weight w is for that.
-            let at = |s: &Station| meeting(s, params.connector_mm, true, cos * s.normal + sin * s.across, 0.0, true);
+            let at =
+                |s: &Station| meeting(s, params.connector_mm, true, cos * s.normal + sin * s.across, 0.0, true, false);
             let plan: Vec<_> = assembly.stations.iter().map(at).collect();
             for (f, opening) in LatticeDirection::all().zip(openings) {
                 let force = |s: &Station| params.force_n_per_mm * s.length_mm * in_world(s, f.unit());

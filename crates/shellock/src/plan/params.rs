@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
-use crate::PatchId;
+use crate::{LatticeDirection, PatchId};
 
 /// How plans are judged and searched. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +27,8 @@ pub struct PlanParams {
     pub relaxed_tolerance: f64,
     /// The piece to be the key; the flattest that works where `None`.
     pub key: Option<PatchId>,
+    /// The only direction `key` may leave along, with rails under its sides; any of the 26, without rails, where `None`.
+    pub key_slide: Option<LatticeDirection>,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
     /// Plans that the random search compares. [1, 100 000]; 300.
@@ -49,6 +51,7 @@ impl Default for PlanParams {
             occlusion_tolerance: 0.01,
             relaxed_tolerance: 0.03,
             key: None,
+            key_slide: None,
             up: [0.0, 0.0, 1.0],
             n_plans: 300,
             max_tries: 200_000,
@@ -58,6 +61,11 @@ impl Default for PlanParams {
 }
 
 impl PlanParams {
+    /// Whether the later piece of a pair is the key that slides on rails along `s`.
+    pub(crate) fn slides_on_rails(&self, later: PatchId, s: LatticeDirection) -> bool {
+        self.key == Some(later) && self.key_slide == Some(s)
+    }
+
     /// Every problem at once, in words that say what to do; empty where all is well.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = Vec::new();

@@ -10,17 +10,17 @@
 //!   along +ŝ:  nothing
 //! ```
 //!
-//! and the walls where the later piece is pushed at the earlier one across a seam that does not lean.
+//! (a rail under a seam along s holds along ±N alone), and the walls where the later piece is pushed at the earlier one across a seam that does not lean.
 //!
 //! Limits: carving and bars shorten runs, which one factor stands for; ends of runs resist nothing here.
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
 
-use super::{Sample, carries};
-use crate::LatticeDirection;
+use super::{Sample, Way};
 use crate::plan::PlanParams;
 use crate::push::{self, N_PUSHES};
+use crate::{LatticeDirection, PatchId};
 
 /// Depth and width of a pin, in connector sizes.
 const PIN_DEPTH_SIZES: f64 = 0.6;
@@ -41,10 +41,11 @@ pub type Pushes = [[f32; N_PUSHES]; 2];
 pub struct HoldTable(Vec<Pushes>);
 
 impl HoldTable {
-    /// The table of a contact with these seams and connectors of `size_mm`; `holds(order, s)` is whether its runs are long enough there.
+    /// The table of a contact between `pair` with these seams and connectors of `size_mm`; `holds(order, s)` is whether its runs are long enough there.
     pub(super) fn new(
         params: &PlanParams,
         size_mm: f64,
+        pair: [PatchId; 2],
         lines: &[(&[Sample], bool)],
         holds: impl Fn(usize, LatticeDirection) -> bool + Sync,
     ) -> Self {
@@ -54,9 +55,10 @@ impl HoldTable {
         let table = cases.into_par_iter().map(|(order, s)| {
             let mut held = [[0.0; N_PUSHES]; 2];
             let side = if order == 0 { 1.0 } else { -1.0 };
+            let way = Way::new(params, pair, side, s);
             if holds(order, s) {
-                for x in lines.iter().flat_map(|l| l.0).filter(|x| carries(x, side, s)) {
-                    add(params, size_mm, x, side, s.unit(), &pushes, &mut held);
+                for x in lines.iter().flat_map(|l| l.0).filter(|x| way.carries(x)) {
+                    add(params, size_mm, x, way, &pushes, &mut held);
                 }
             }
             held.map(|pushes| pushes.map(|mm3| mm3 as f32))
@@ -81,11 +83,11 @@ fn add(
     params: &PlanParams,
     size_mm: f64,
     x: &Sample,
-    side: f64,
-    s: Vec3,
+    way: Way,
     pushes: &[Vec3; N_PUSHES],
     held: &mut [[f64; N_PUSHES]; 2],
 ) {
+    let (side, s) = (way.side, way.s.unit());
     let (gap, step) = (params.clearance_mm, push::length_mm(params.clearance_mm));
     // The male leaves along +s if it is the later piece, else along −s; so does the sign of its motion.
     let role = if s.dot(x.normal) >= 0.0 { 1.0 } else { -1.0 };
@@ -100,8 +102,10 @@ fn add(
             let male = role * later;
             let sides = (male.dot(n).abs() - gap).max(0.0) * depth;
             let floor = (-male.dot(leaves) - gap).max(0.0) * width;
+            let on_rail = || (later.dot(x.normal).abs() - gap).max(0.0) * width;
+            let sides = if way.has_rail(x) { on_rail() } else { sides + floor };
             let walls = if is_forward { (later.dot(across) - WALL_GAP_MM).max(0.0) * WALL_HEIGHT_MM } else { 0.0 };
-            *held += LEFT_SHARE * (sides + floor + walls) * x.length_mm;
+            *held += LEFT_SHARE * (sides + walls) * x.length_mm;
         }
     }
 }

@@ -1,0 +1,65 @@
+//! Where a key can be, and cutting it (Sect. 6.1): no hand of the user is needed.
+//!
+//! A key is what a half-infinite prism takes from the surface. The prism lies on a plane that the surface follows and is open towards
+//! the slide `s`, so it takes the rim along, and whatever is in it can leave along `s`: the way out is free by construction.
+//!
+//! ```text
+//!        side               plane, seen from outside          section along s
+//!    ┌──────────┐                                             ____________________
+//!    │          │ \ flare                                  b |████████████████████\
+//!  b │   key    │  ) 3°            s ──►                   a |                  ███|  rim
+//!    │          │ /                                        c |                  ███|──── depth
+//!    └──────────┘                                          k                     ▒▒ ┘
+//! ```
+//!
+//! [`sites`] finds such prisms: planes by random sampling, 16 slides in each, places along the rim, three sizes. [`imprint`] gives what
+//! is inside to a patch of its own, with straight seams. Stages after that know 26 directions; [`Turn`] lays the model so that the
+//! slide is one of them.
+//!
+//! Where we leave the paper: there the user draws the key.
+
+mod imprint;
+pub(crate) mod plane;
+mod prism;
+mod site;
+mod turn;
+
+use serde::{Deserialize, Serialize};
+
+pub use imprint::{imprint, patch_in};
+pub use prism::KeyPrism;
+pub use site::{KeySite, sites};
+pub use turn::Turn;
+
+/// What a key needs. Lengths in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeyParams {
+    /// Seed of the planes that are tried; any number.
+    pub seed: u64,
+    /// Thickness of the wall. [0.8, 10]; 2.
+    pub wall_mm: f64,
+    /// Size D of the connectors the key is made for. [1.5, 6]; 2.5.
+    pub size_mm: f64,
+    /// Area of an ordinary piece, mm². > 0; 4000. A key takes a third of that or less.
+    pub piece_mm2: f64,
+    /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
+    pub up: [f64; 3],
+}
+
+impl Default for KeyParams {
+    fn default() -> Self {
+        Self { seed: 0, wall_mm: 2.0, size_mm: 2.5, piece_mm2: 4000.0, up: [0.0, 0.0, 1.0] }
+    }
+}
+
+impl KeyParams {
+    /// How deep below the plane the key's rim reaches, mm: past its grooves, with room for the connectors of the seam there.
+    pub fn depth_mm(&self) -> f64 {
+        self.wall_mm + 2.2 * self.size_mm + 1.0
+    }
+
+    /// The narrowest key, mm: two grooves, and a connector at the back between the gaps at its corners.
+    pub fn least_width_mm(&self) -> f64 {
+        5.5 * self.size_mm
+    }
+}

@@ -1,0 +1,55 @@
+//! The half-infinite prism that a key is cut by.
+
+use shellock_geom::Vec3;
+
+/// How far each side leans away from the slide, as a tangent: 3°, so that the key is loose as soon as it moves.
+const FLARE: f64 = 0.0524;
+
+/// A convex region, open towards `slide`: everything in it can leave along `slide` without meeting anything outside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyPrism {
+    /// A point of the plane, in the middle of the back edge.
+    pub origin: Vec3,
+    /// Unit vector along which the key leaves; perpendicular to `normal`.
+    pub slide: Vec3,
+    /// Outward unit normal of the plane.
+    pub normal: Vec3,
+    /// Half the width at the back, mm.
+    pub half_width_mm: f64,
+    /// How far it reaches below the plane, mm.
+    pub depth_mm: f64,
+    /// Radius of the edges where two sides meet, mm.
+    pub corner_mm: f64,
+}
+
+impl KeyPrism {
+    /// Unit vector across the slide, within the plane.
+    pub fn across(&self) -> Vec3 {
+        self.normal.cross(self.slide)
+    }
+
+    /// Coordinates along the slide from the back edge, across it from the middle, and below the plane, mm.
+    pub fn coordinates(&self, p: Vec3) -> [f64; 3] {
+        let d = p - self.origin;
+        [d.dot(self.slide), d.dot(self.across()), -d.dot(self.normal)]
+    }
+
+    /// Half the width so far along the slide, mm.
+    pub fn half_width_at(&self, along_mm: f64) -> f64 {
+        self.half_width_mm + FLARE * along_mm
+    }
+
+    /// How far inside `p` lies, mm: positive inside, no farther than the corner radius, exact there; negative outside, exact but for the
+    /// cosine of the flare.
+    pub fn inside_mm(&self, p: Vec3) -> f64 {
+        let [along, across, below] = self.coordinates(p);
+        let inside = [along, self.half_width_at(along) - across.abs(), self.depth_mm - below];
+        let lacks = inside.map(|mm| (self.corner_mm - mm).max(0.0));
+        self.corner_mm - Vec3::from(lacks).length()
+    }
+
+    /// Whether `p` is inside.
+    pub fn contains(&self, p: Vec3) -> bool {
+        self.inside_mm(p) > 0.0
+    }
+}

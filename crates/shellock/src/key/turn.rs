@@ -1,0 +1,90 @@
+//! Laying the model so that a key's slide is one of the 26 directions.
+
+use glam::{DMat3, DQuat};
+use shellock_geom::{NotSolid, Solid, TriMesh, Vec3};
+
+use super::{KeyPrism, KeySite};
+use crate::LatticeDirection;
+
+/// A smaller turn, rad, is none: over 300 mm it moves nothing by more than a thousandth of a millimetre.
+const LEAST_TURN: f64 = 3e-6;
+
+/// A rotation about the origin, from the model as it was given to the model as its pieces are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn(DMat3);
+
+impl Default for Turn {
+    fn default() -> Self {
+        Self(DMat3::IDENTITY)
+    }
+}
+
+impl Turn {
+    /// The smallest turn that takes `normal` to an axis and `slide`, perpendicular to it, to a lattice direction within that axis' plane;
+    /// and that direction.
+    pub fn laying(normal: Vec3, slide: Vec3) -> (Self, LatticeDirection) {
+        let axis = [Vec3::X, Vec3::Y, Vec3::Z]
+            .into_iter()
+            .flat_map(|a| [a, -a])
+            .max_by(|a, b| a.dot(normal).total_cmp(&b.dot(normal)))
+            .expect("there are six axes");
+        let tip = DMat3::from_quat(DQuat::from_rotation_arc(normal, axis));
+        let tipped = tip * slide;
+        let flat = LatticeDirection::all().filter(|s| s.unit().dot(axis).abs() < 0.5);
+        let direction =
+            flat.max_by(|a, b| a.unit().dot(tipped).total_cmp(&b.unit().dot(tipped))).expect("eight lie in the plane");
+        let to = direction.unit();
+        let angle = tipped.cross(to).dot(axis).atan2(tipped.dot(to));
+        let whole = DMat3::from_axis_angle(axis, angle) * tip;
+        let is_none = DQuat::from_mat3(&whole).to_axis_angle().1.abs() < LEAST_TURN;
+        (if is_none { Self::default() } else { Self(whole) }, direction)
+    }
+
+    /// Whether nothing turns.
+    pub fn is_none(&self) -> bool {
+        self.0 == DMat3::IDENTITY
+    }
+
+    /// The angle, rad, in [0, π].
+    pub fn angle(&self) -> f64 {
+        DQuat::from_mat3(&self.0).to_axis_angle().1.abs()
+    }
+
+    /// The other way.
+    pub fn inverse(&self) -> Self {
+        Self(self.0.transpose())
+    }
+
+    /// A point or a direction, turned.
+    pub fn apply(&self, v: Vec3) -> Vec3 {
+        if self.is_none() { v } else { self.0 * v }
+    }
+
+    /// A mesh, turned.
+    pub fn mesh(&self, mesh: &TriMesh) -> TriMesh {
+        TriMesh { points: mesh.points.iter().map(|&p| self.apply(p)).collect(), triangles: mesh.triangles.clone() }
+    }
+
+    /// A solid, turned; fails where rounding leaves no volume.
+    pub fn solid(&self, solid: &Solid) -> Result<Solid, NotSolid> {
+        Solid::new(self.mesh(solid.mesh()))
+    }
+
+    /// A prism, turned.
+    pub fn prism(&self, prism: &KeyPrism) -> KeyPrism {
+        let KeyPrism { origin, slide, normal, .. } = *prism;
+        KeyPrism { origin: self.apply(origin), slide: self.apply(slide), normal: self.apply(normal), ..*prism }
+    }
+
+    /// A site, turned; its slide then is exactly `along`.
+    pub fn site(&self, site: &KeySite, along: LatticeDirection) -> KeySite {
+        let prism = KeyPrism { slide: along.unit(), ..self.prism(&site.prism) };
+        let normal = prism.normal.reject_from_normalized(prism.slide).normalize();
+        KeySite { prism: KeyPrism { normal, ..prism }, ..*site }
+    }
+
+    /// The 3 × 3 matrix, row by row.
+    pub fn rows(&self) -> [[f64; 3]; 3] {
+        self.0.transpose().to_cols_array_2d()
+    }
+}

@@ -1,0 +1,146 @@
+//! Kits whose key is cut out of the surface.
+
+use std::borrow::Cow;
+
+use super::{Design, DesignError, DesignOutcome, Job, Laid, Params};
+use crate::key::{self, KeyParams, KeySite};
+use crate::{Ctx, LatticeDirection, SegmentedSurface, Warning, segmentation};
+
+/// Places for a key of which kits are made, before one of the pieces becomes the key.
+const MOST_TRIED: usize = 2;
+/// Kits made for one of them, mendings of its segmentation, and kits in all.
+const MOST_KITS: usize = 2;
+const MOST_MENDINGS: usize = 2;
+const MOST_KITS_IN_ALL: usize = 4;
+
+/// A place for a key in assembly space.
+pub(super) struct CutKey {
+    pub site: KeySite,
+    along: LatticeDirection,
+}
+
+impl CutKey {
+    /// The surface with the key as a patch, which `params` then name; `None` where it does not come out as one piece.
+    ///
+    /// Where the key leaves a piece hanging on another, the pieces are mended first.
+    pub(super) fn cut(&self, ctx: &Ctx, params: &mut Params, surface: SegmentedSurface) -> Option<SegmentedSurface> {
+        let faults = |s: &SegmentedSurface| {
+            let p = &params.segmentation;
+            s.contact_graph_below(p.wall_mm, p.least_contact_mm).n_faults()
+        };
+        let mut best = key::imprint(&surface, &self.site.prism)?;
+        if faults(&best.0) > 0
+            && let Some(mended) = segmentation::mended_again(ctx, &params.segmentation, &best.0)
+            && let Some(again) = key::imprint(&mended, &self.site.prism)
+            && faults(&again.0) < faults(&best.0)
+        {
+            best = again;
+        }
+        params.plan.key = Some(best.1);
+        params.plan.key_slide = Some(self.along);
+        Some(best.0)
+    }
+}
+
+/// The best kit whose key was cut, and why none passed.
+#[derive(Default)]
+pub(super) struct Cut {
+    pub best: Option<Design>,
+    /// What failed, for people; empty where nothing was tried.
+    reasons: Vec<String>,
+}
+
+impl Cut {
+    /// The better of this kit and that of `outcome`, whose key is one of the pieces; it is told that no key was cut.
+    pub(super) fn compared_with(self, mut outcome: DesignOutcome) -> DesignOutcome {
+        let failures = |d: &Design| d.verification.checks.iter().filter(|c| !c.ok).count();
+        match (self.best, &mut outcome) {
+            (Some(best), DesignOutcome::Made(other)) if failures(&best) < failures(other) => {
+                DesignOutcome::Made(Box::new(best))
+            }
+            (Some(best), DesignOutcome::NoPlan { .. }) => DesignOutcome::Made(Box::new(best)),
+            (_, DesignOutcome::Made(design)) if !self.reasons.is_empty() => {
+                let key = design.plan.key();
+                design.warnings.push(Warning {
+                    code: "key-not-cut".into(),
+                    message: format!("piece {key} is the key as it is, without rails: {}", self.reasons.join("; ")),
+                    pieces: vec![key],
+                    at: None,
+                });
+                outcome
+            }
+            _ => outcome,
+        }
+    }
+}
+
+/// Makes kits with keys cut at the best places, until one passes.
+pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
+    let mut cut = Cut::default();
+    let mut params = job.params.clone();
+    params.rounds.kits = params.rounds.kits.min(MOST_KITS);
+    params.rounds.mendings = params.rounds.mendings.min(MOST_MENDINGS);
+    params.rounds.kits_in_all = params.rounds.kits_in_all.min(MOST_KITS_IN_ALL);
+    let sites = key::sites(ctx, &key_params(job), job.surface)?;
+    if sites.is_empty() {
+        cut.reasons.push("nowhere is the surface flat, free and thick enough to cut one".into());
+    }
+    for site in sites.iter().take(MOST_TRIED) {
+        ctx.note(&told(site));
+        let Some((laid, key)) = laid(job, site) else { continue };
+        let reason = match job.kit(ctx, &params, &laid, Some(&key))? {
+            DesignOutcome::Made(made) => {
+                let failed: Vec<&str> =
+                    made.verification.checks.iter().filter(|c| !c.ok).map(|c| c.name.as_str()).collect();
+                if failed.is_empty() {
+                    return Ok(Cut { best: Some(*made), reasons: Vec::new() });
+                }
+                let reason = format!("with {} it fails: {}", told(site), failed.join(", "));
+                cut.best.get_or_insert(*made);
+                reason
+            }
+            DesignOutcome::NoPlan { reason, .. } => format!("with {} there is no plan: {reason}", told(site)),
+        };
+        ctx.note(&reason);
+        cut.reasons.push(reason);
+    }
+    Ok(cut)
+}
+
+/// A site in words.
+fn told(site: &KeySite) -> String {
+    let (s, [x, y, z]) = (site.prism.slide, site.prism.origin.to_array());
+    format!(
+        "a key of {:.0} mm² cut at ({x:.0}, {y:.0}, {z:.0}) mm, sliding along ({:.2}, {:.2}, {:.2}), {:.0} % flat, {:.0} % at its sides",
+        site.area_mm2,
+        s.x,
+        s.y,
+        s.z,
+        100.0 * site.flat_share,
+        100.0 * site.side_share
+    )
+}
+
+fn key_params(job: &Job<'_>) -> KeyParams {
+    let params = job.params;
+    KeyParams {
+        seed: params.segmentation.seed,
+        wall_mm: params.body.thickness_mm,
+        size_mm: params.connector.size.usual_mm(),
+        piece_mm2: job.surface.mesh.area() / job.surface.n_patches as f64,
+        up: params.plan.up,
+    }
+}
+
+/// The model turned so that the key's slide is a lattice direction; `None` where rounding leaves no solid.
+fn laid<'a>(job: &Job<'a>, site: &KeySite) -> Option<(Laid<'a>, CutKey)> {
+    let (turn, along) = key::Turn::laying(site.prism.normal, site.prism.slide);
+    let site = turn.site(site, along);
+    let mut laid = Laid::of(job);
+    if !turn.is_none() {
+        laid.model = Cow::Owned(turn.solid(job.model).ok()?);
+        laid.surface.mesh = turn.mesh(&laid.surface.mesh);
+        laid.turn = turn;
+    }
+    Some((laid, CutKey { site, along }))
+}
