@@ -245,6 +245,12 @@ pub struct Options {
     /// The same on the rails of the key, mm, 0.03 to 0.8
     #[arg(long, value_name = "MM", default_value_t = Params::default().connector.key_clearance_mm, help_heading = "Make")]
     pub key_clearance: f64,
+    /// Height of a bump on each rail that the key clicks past, mm, 0 to 0.4; 0 makes none
+    #[arg(long, value_name = "MM", default_value_t = 0.0, help_heading = "Make")]
+    pub detent: f64,
+    /// Cut a notch for a fingernail into the key, 0.45 mm deep
+    #[arg(long, help_heading = "Make")]
+    pub key_grip: bool,
     /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
     #[arg(long, value_name = "MM", default_value_t = Params::default().body.wall_gap_mm, help_heading = "Make")]
     pub wall_gap: f64,
@@ -290,6 +296,8 @@ impl Options {
         p.connector.size = self.connector;
         p.connector.clearance_mm = self.clearance;
         p.connector.key_clearance_mm = self.key_clearance;
+        p.connector.detent_mm = self.detent;
+        p.has_grip = self.key_grip;
         p.connector.min_wall_mm = self.min_wall;
         p.verify.seed = self.seed;
         p

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::key::KeySite;
+use shellock::piece::Detent;
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
     ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
@@ -233,10 +234,12 @@ fn transform(model: &Model, design: &Design) -> [f64; 16] {
 
 /// How the key was cut.
 fn key_json(design: &Design, key: &KeySite) -> Value {
+    let detent = |d: &Detent| json!({ "piece": d.piece, "at": d.at.to_array(), "interference_mm": d.interference_mm, "travel_mm": d.travel_mm });
+    let detents: Vec<Value> = design.detents.iter().map(detent).collect();
     json!({
         "rails": design.rails_mm(), "area_mm2": key.area_mm2, "flat_share": key.flat_share, "side_share": key.side_share,
         "slide": key.prism.slide.to_array(), "plane_normal": key.prism.normal.to_array(),
-        "turned_degrees": design.turn.angle().to_degrees(),
+        "turned_degrees": design.turn.angle().to_degrees(), "detents": detents,
     })
 }
 

@@ -29,7 +29,7 @@ mod run;
 pub use frame::{Curve, curves};
 pub use free::has_no_bar;
 pub use profile::{Part, Section};
-pub use run::{Contact, Run, Shape, Station, runs};
+pub use run::{Contact, RailPart, Run, Shape, Station, runs};
 
 use crate::params::ParamProblem;
 use crate::sizes::SizeChoice;
@@ -47,13 +47,23 @@ pub struct ConnectorParams {
     pub clearance_mm: f64,
     /// The same between the rails of a key and their grooves, so that it can be taken out by hand. [0.03, 0.8]; 0.15.
     pub key_clearance_mm: f64,
+    /// How far a bump on each rail presses into the key's groove before it snaps into its dimple. [0, 0.4]; 0, none.
+    ///
+    /// It keeps the key from creeping out, and must bend the groove's wall on the way: a tenth of its thickness for 0.1 mm.
+    pub detent_mm: f64,
     /// Thinnest wall left standing. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
     pub min_wall_mm: f64,
 }
 
 impl Default for ConnectorParams {
     fn default() -> Self {
-        Self { size: SizeChoice::default(), clearance_mm: 0.12, key_clearance_mm: 0.15, min_wall_mm: 0.4 }
+        Self {
+            size: SizeChoice::default(),
+            clearance_mm: 0.12,
+            key_clearance_mm: 0.15,
+            detent_mm: 0.0,
+            min_wall_mm: 0.4,
+        }
     }
 }
 
@@ -68,6 +78,7 @@ impl ConnectorParams {
         let others = [
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
             ParamProblem::unless_within("key clearance", "mm", self.key_clearance_mm, 0.03, 0.8),
+            ParamProblem::unless_within("detent", "mm", self.detent_mm, 0.0, 0.4),
             ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
         ];
         self.size.problems().into_iter().chain(others.into_iter().flatten()).collect()

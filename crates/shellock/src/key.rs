@@ -22,6 +22,8 @@ mod imprint;
 pub(crate) mod plane;
 mod prism;
 mod site;
+#[cfg(test)]
+mod tests;
 mod turn;
 
 use serde::{Deserialize, Serialize};

@@ -5,5 +5,7 @@
 
 mod carve;
 mod finish;
+mod key_parts;
 
 pub use finish::{Finished, Joint, PieceError, make};
+pub use key_parts::{Detent, Grip};

@@ -14,7 +14,7 @@ use crate::connector::{ConnectorParams, Contact, has_no_bar};
 use crate::feedback::{Lesson, lessons};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
-use crate::piece::{Joint, PieceError};
+use crate::piece::{Detent, Grip, Joint, PieceError};
 use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanProof, PlanSurvey};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::sizes::{CONTACT_SIZES, ChosenSizes, LEAST_CONTACT_SIZES, SizeParams, StressField};
@@ -37,6 +37,10 @@ pub struct Params {
     pub strength: StrengthParams,
     /// Where the key comes from.
     pub key: KeySource,
+    /// Whether a key that is cut gets a notch for a fingernail.
+    pub has_grip: bool,
+    /// Where that notch is; the key's place decides.
+    grip: Option<Grip>,
     /// How plans are judged and searched.
     pub plan: PlanParams,
     /// How the wall is made and cut.
@@ -150,6 +154,8 @@ pub struct Design {
     pub pieces: IdVec<PatchId, TriMesh>,
     /// Connector runs and how they came out.
     pub joints: Vec<Joint>,
+    /// What clicks on the key's way in.
+    pub detents: Vec<Detent>,
     /// What the seams offered.
     pub contacts: Vec<Contact>,
     /// The verdict on the finished meshes.
@@ -510,7 +516,9 @@ pub fn make(
     let is_free = has_no_bar(&params.connector, grid, &shell);
     let slide = params.plan.key.and(params.plan.key_slide).map(LatticeDirection::unit);
     let (runs, contacts) = connector::runs(&params.connector, sizes, &plan, &curves, slide, &is_free);
-    let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms)?;
+    let grip = params.grip.map(|grip| Grip { key: plan.key(), ..grip });
+    let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms, grip.as_ref())?;
+    warn_of_detents(ctx, &finished.detents);
     let verification = verify::verify(ctx, &params.verify, model, &finished.meshes, &plan)?;
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
@@ -525,10 +533,27 @@ pub fn make(
         holding: None,
         pieces: finished.meshes,
         joints: finished.joints,
+        detents: finished.detents,
         contacts,
         verification,
         warnings: ctx.take_warnings(),
     })
+}
+
+/// Says what the key must be pressed past.
+fn warn_of_detents(ctx: &Ctx, detents: &[Detent]) {
+    for d in detents {
+        ctx.warn(Warning {
+            code: "detent".into(),
+            message: format!(
+                "on the last {:.1} mm of its way the key is pressed past a bump of piece {} that is {:.2} mm too high for its \
+                 groove, on purpose: it clicks; the proofs of free paths are without it",
+                d.travel_mm, d.piece, d.interference_mm
+            ),
+            pieces: vec![d.piece],
+            at: Some(d.at.to_array()),
+        });
+    }
 }
 
 /// Says which long seams came out without any connector.

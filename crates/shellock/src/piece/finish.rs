@@ -6,10 +6,11 @@ use shellock_geom::rounding::{NotPrintable, printable};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use super::carve::{Half, Wake, carved, whole_half};
+use super::key_parts::{Change, Detent, Grip, detents, notch};
 use crate::body::{ShellBodies, ShellGrid};
 use crate::connector::{ConnectorParams, Run};
 use crate::plan::InstallationPlan;
-use crate::{Cancelled, Ctx, IdVec, PatchId};
+use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 
 /// How far connectors reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.4;
@@ -41,6 +42,8 @@ pub struct Finished {
     pub meshes: IdVec<PatchId, TriMesh>,
     /// One joint a run.
     pub joints: Vec<Joint>,
+    /// What clicks on the key's way in.
+    pub detents: Vec<Detent>,
 }
 
 /// Why a piece could not be finished.
@@ -66,7 +69,8 @@ struct Halves {
     carved: [Volume; 2],
 }
 
-/// Carves every half connector in the order of taking apart and joins it to its body.
+/// Carves every half connector in the order of taking apart and joins it to its body; a key gets its detents and, with `grip`, a notch.
+#[expect(clippy::too_many_arguments, reason = "what all earlier stages made")]
 pub fn make(
     ctx: &Ctx,
     params: &ConnectorParams,
@@ -75,6 +79,7 @@ pub fn make(
     plan: &InstallationPlan,
     runs: &[Run],
     rooms: &IdVec<PatchId, Aabb>,
+    grip: Option<&Grip>,
 ) -> Result<Finished, PieceError> {
     ctx.stage("connectors", plan.steps.len())?;
     let far_mm = rooms.as_slice().iter().fold(Aabb::EMPTY, |b, r| b.union(*r)).diagonal();
@@ -102,8 +107,21 @@ pub fn make(
         ctx.step()?;
     }
     let joints: Vec<Joint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
-    let meshes = join_to_bodies(ctx, shell, plan, &joints, &halves)?;
-    Ok(Finished { meshes, joints })
+    let kept: Vec<Run> = runs.iter().zip(&joints).filter(|(_, j)| j.length_mm > 0.0).map(|(r, _)| r.clone()).collect();
+    let (detents, mut changes) = detents(params, &kept);
+    if let Some(grip) = grip {
+        match notch(grip, &shell.bodies[grip.key].to_mesh()) {
+            Some(cut) => changes.push(cut),
+            None => ctx.warn(Warning {
+                code: "key-without-grip".into(),
+                message: format!("piece {}: its surface is too uneven for a notch to pull the key at", grip.key),
+                pieces: vec![grip.key],
+                at: Some(grip.at.to_array()),
+            }),
+        }
+    }
+    let meshes = join_to_bodies(ctx, shell, plan, &joints, &halves, &changes)?;
+    Ok(Finished { meshes, joints, detents })
 }
 
 /// Where the half connectors of `q` may be, within `boxes`: below the wall, a root's depth into it, and the clearance away
@@ -139,6 +157,7 @@ fn join_to_bodies(
     plan: &InstallationPlan,
     joints: &[Joint],
     halves: &[Halves],
+    changes: &[Change],
 ) -> Result<IdVec<PatchId, TriMesh>, PieceError> {
     ctx.stage("pieces", plan.steps.len())?;
     let ids: Vec<PatchId> = shell.bodies.ids().collect();
@@ -154,7 +173,11 @@ fn join_to_bodies(
                     parts.push(half.carved[1].clone());
                 }
             }
-            let united = shell.bodies[q].union(&Volume::union_all(parts));
+            parts.extend(changes.iter().filter(|c| c.piece == q && c.is_added).map(|c| c.volume.clone()));
+            let mut united = shell.bodies[q].union(&Volume::union_all(parts));
+            for cut in changes.iter().filter(|c| c.piece == q && !c.is_added) {
+                united = united.subtract(&cut.volume);
+            }
             // What hangs on nothing is a chip that carving cut loose.
             let piece = united.components().into_iter().next().unwrap_or_else(Volume::empty);
             let mesh = printable(&piece).map_err(|reason| PieceError::NotPrintable { piece: q, reason });

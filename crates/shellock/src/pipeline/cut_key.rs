@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 
 use super::{Design, DesignError, DesignOutcome, Job, Laid, Params};
-use crate::key::{self, KeyParams, KeySite};
-use crate::{Ctx, LatticeDirection, SegmentedSurface, Warning, segmentation};
+use crate::key::{self, KeyParams, KeyPrism, KeySite};
+use crate::piece::Grip;
+use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning, segmentation};
 
 /// Places for a key of which kits are made, before one of the pieces becomes the key.
 const MOST_TRIED: usize = 2;
@@ -20,6 +21,15 @@ pub(super) struct CutKey {
 }
 
 impl CutKey {
+    /// A notch across the key, nearer to its front.
+    fn grip(&self) -> Grip {
+        /// Of its length, which is its width.
+        const FROM_BACK: f64 = 0.65;
+        let KeyPrism { origin, slide, normal, half_width_mm, .. } = self.site.prism;
+        // Which piece the key is the plan says.
+        Grip { key: PatchId(0), at: origin + FROM_BACK * 2.0 * half_width_mm * slide, slide, normal }
+    }
+
     /// The surface with the key as a patch, which `params` then name; `None` where it does not come out as one piece.
     ///
     /// Where the key leaves a piece hanging on another, the pieces are mended first.
@@ -38,6 +48,7 @@ impl CutKey {
         }
         params.plan.key = Some(best.1);
         params.plan.key_slide = Some(self.along);
+        params.grip = params.has_grip.then(|| self.grip());
         Some(best.0)
     }
 }

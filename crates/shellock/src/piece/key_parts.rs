@@ -1,0 +1,167 @@
+//! What only keys have: detents that click, and a notch to pull at.
+
+use shellock_geom::{TriMesh, Vec3, Volume};
+
+use crate::PatchId;
+use crate::connector::{ConnectorParams, Run, Section, Station};
+
+/// Where on a rail the detent sits, mm from its back end, so that it presses on the last millimetres of the way alone; half its length
+/// at its foot and at its top.
+const AT_MM: f64 = 1.3;
+const FOOT_MM: f64 = 0.9;
+const TOP_MM: f64 = 0.3;
+/// How far its foot stands in the tongue, and how much larger the dimple is, mm.
+const ROOT_MM: f64 = 0.2;
+const PLAY_MM: f64 = 0.08;
+/// A notch is so deep, mm: less than what the verification takes for a hole. Half its length along the slide, and its width.
+const NOTCH_MM: f64 = 0.45;
+const NOTCH_HALF_MM: f64 = 1.6;
+const NOTCH_WIDTH_MM: f64 = 12.0;
+/// The surface below a notch is uneven by less than this, mm.
+const NOTCH_UNEVEN_MM: f64 = 0.4;
+
+/// A bump on a rail's tongue that snaps into a dimple in the key's groove.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detent {
+    /// The piece with the bump.
+    pub piece: PatchId,
+    /// Its place.
+    pub at: Vec3,
+    /// By how much it presses the groove apart on the way in, mm.
+    pub interference_mm: f64,
+    /// On how much of the way, mm: the last of it.
+    pub travel_mm: f64,
+}
+
+/// A notch for a fingernail across the key's outer surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// The key.
+    pub key: PatchId,
+    /// Middle of the notch, near the surface.
+    pub at: Vec3,
+    /// Unit vector along which the key is pulled.
+    pub slide: Vec3,
+    /// Outward unit normal of its plane.
+    pub normal: Vec3,
+}
+
+/// Something added to a piece or cut from it.
+pub(super) struct Change {
+    pub piece: PatchId,
+    pub volume: Volume,
+    pub is_added: bool,
+}
+
+/// Bumps and dimples of the rails among `runs`, where the parameters want any.
+pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<Detent>, Vec<Change>) {
+    let (mut made, mut changes) = (Vec::new(), Vec::new());
+    for run in runs.iter().filter(|r| params.detent_mm > 0.0 && r.is_rail()) {
+        let station = &run.stations[0];
+        let Some(tongue) = Section::at(params, station).male[0] else { continue };
+        let top = tongue.n1 + params.key_clearance_mm + params.detent_mm;
+        let inset = 0.15 * (tongue.s1 - tongue.s0);
+        let (s0, s1) = (tongue.s0 + inset, tongue.s1 - inset);
+        let bump = wedge(station, [tongue.n1 - ROOT_MM, top], [s0, s1], 0.0);
+        let dimple = wedge(station, [tongue.n1 - ROOT_MM, top], [s0, s1], PLAY_MM);
+        changes.push(Change { piece: run.male, volume: bump, is_added: true });
+        changes.push(Change { piece: run.female, volume: dimple, is_added: false });
+        made.push(Detent {
+            piece: run.male,
+            at: station.point + AT_MM * station.tangent + tongue.n1 * station.n,
+            interference_mm: params.detent_mm,
+            travel_mm: AT_MM + FOOT_MM,
+        });
+    }
+    (made, changes)
+}
+
+/// A roof across the rail, long at its foot and short at its top, grown by `play_mm`.
+fn wedge(station: &Station, [foot, top]: [f64; 2], [s0, s1]: [f64; 2], play_mm: f64) -> Volume {
+    let mut points = Vec::new();
+    for (n, half_mm) in [(foot, FOOT_MM), (top + play_mm, TOP_MM)] {
+        for s in [s0 - play_mm, s1 + play_mm] {
+            for along in [AT_MM - half_mm - play_mm, AT_MM + half_mm + play_mm] {
+                points.push(station.point + along * station.tangent + n * station.n + s * station.s);
+            }
+        }
+    }
+    Volume::hull(&points)
+}
+
+/// The notch, to be cut from the key whose body is `body`; `None` where the surface is too uneven for one.
+pub(super) fn notch(grip: &Grip, body: &TriMesh) -> Option<Change> {
+    let across = grip.normal.cross(grip.slide);
+    let local = |p: &Vec3| {
+        let d = *p - grip.at;
+        [d.dot(grip.slide), d.dot(across), d.dot(grip.normal)]
+    };
+    let is_below = |[along, aside, height]: &[f64; 3]| {
+        along.abs() < NOTCH_HALF_MM && aside.abs() < 0.5 * NOTCH_WIDTH_MM && height.abs() < 2.0
+    };
+    // The outer side: within the wall's half next to the plane.
+    let heights: Vec<f64> = body.points.iter().map(local).filter(is_below).map(|[_, _, height]| height).collect();
+    let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let outer: Vec<f64> = heights.into_iter().filter(|h| highest - h < 1.0).collect();
+    let lowest = outer.iter().copied().fold(f64::INFINITY, f64::min);
+    if outer.len() < 3 || highest - lowest > NOTCH_UNEVEN_MM {
+        return None;
+    }
+    // Deepest in front, where the nail pushes; running out towards the back.
+    let mut points = Vec::new();
+    for (along, height) in
+        [(NOTCH_HALF_MM, lowest - NOTCH_MM), (NOTCH_HALF_MM, highest + 1.0), (-NOTCH_HALF_MM, highest + 0.1)]
+    {
+        for aside in [-0.5, 0.5] {
+            points.push(grip.at + along * grip.slide + aside * NOTCH_WIDTH_MM * across + height * grip.normal);
+        }
+    }
+    Some(Change { piece: grip.key, volume: Volume::hull(&points), is_added: false })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::connector::{RailPart, Shape};
+
+    #[test]
+    fn a_bump_interferes_by_what_was_asked_for_and_not_in_its_dimple() {
+        let params = ConnectorParams { detent_mm: 0.25, ..ConnectorParams::default() };
+        let station = |arc_mm: f64| Station {
+            point: arc_mm * Vec3::X,
+            tangent: Vec3::X,
+            n: Vec3::Y,
+            s: Vec3::Z,
+            theta: 0.0,
+            depth: 1.0,
+            arc_mm,
+            size_mm: 2.5,
+            shape: Shape::Rail(RailPart::Full),
+        };
+        let run = Run { male: PatchId(1), female: PatchId(0), stations: vec![station(0.0), station(20.0)] };
+        let (made, changes) = detents(&params, &[run]);
+        assert_eq!((made.len(), changes.len()), (1, 2));
+        let hanger = Section::at(&params, &station(0.0)).female[1].unwrap();
+        let (bump, dimple) = (&changes[0].volume, &changes[1].volume);
+        assert!((bump.bounds().max.y - hanger.n0 - 0.25).abs() < 1e-9);
+        assert!(bump.subtract(dimple).volume() < 1e-6 && dimple.bounds().max.y < hanger.n1 - params.min_wall_mm);
+    }
+
+    #[test]
+    fn a_notch_is_cut_into_a_flat_key_and_left_out_of_a_bent_one() {
+        let plate = |bend: f64| {
+            let mut mesh = TriMesh::default();
+            for x in -20..20 {
+                for y in -20..20 {
+                    let (x, y) = (0.5 * f64::from(x), 0.5 * f64::from(y));
+                    mesh.points.push(Vec3::new(x, y, bend * x * x));
+                }
+            }
+            mesh
+        };
+        let grip = Grip { key: PatchId(3), at: Vec3::new(0.1, 0.1, 0.3), slide: Vec3::X, normal: Vec3::Z };
+        let cut = notch(&grip, &plate(0.0)).unwrap();
+        assert!((cut.volume.bounds().min.z + NOTCH_MM).abs() < 1e-9 && !cut.is_added);
+        assert!(notch(&grip, &plate(0.3)).is_none());
+    }
+}
