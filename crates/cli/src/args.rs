@@ -116,11 +116,11 @@ pub struct Blows {
     pub at: Place,
     /// Height of the fall: m, cm or mm
     #[arg(long, value_name = "HEIGHT", default_value = "2m", allow_hyphen_values = true,
-          value_parser = stress::length_mm)]
+          value_parser = stress::metres)]
     pub drop: f64,
-    /// What the pieces are printed of: sla-resin, pla, petg or pa12
-    #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material)]
-    pub material: Material,
+    /// What the pieces are printed of: sla-resin, pla, petg or pa12 [default: as the kit was built]
+    #[arg(long, value_name = "NAME", value_parser = stress::material)]
+    pub material: Option<Material>,
     /// Length of the simulation's triangle edges, as a share of the usual one, 0.2 to 5; half takes some ten times as long
     #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
     pub edges: f64,
@@ -203,13 +203,13 @@ impl FromStr for Key {
 #[derive(Args)]
 pub struct Options {
     /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
-    #[arg(long, value_name = "MM", help_heading = "Size", conflicts_with_all = ["height", "scale"])]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Size", conflicts_with_all = ["height", "scale"])]
     pub size: Option<f64>,
     /// Height of the made thing along --up, mm
-    #[arg(long, value_name = "MM", help_heading = "Size", conflicts_with = "scale")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Size", conflicts_with = "scale")]
     pub height: Option<f64>,
     /// Millimetres a file unit
-    #[arg(long, value_name = "F", help_heading = "Size")]
+    #[arg(long, value_name = "F", allow_hyphen_values = true, help_heading = "Size")]
     pub scale: Option<f64>,
     /// Which axis of the file points up
     #[arg(long, value_enum, default_value = "z", help_heading = "Size")]
@@ -225,40 +225,41 @@ pub struct Options {
     #[arg(long, value_name = "auto|piece|N", default_value = "auto", help_heading = "Pieces")]
     pub key: Key,
     /// Work spent on proving that no plan is better, in seconds of an ordinary computer; a slower one ends after twice that
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, help_heading = "Pieces")]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, default_value_t = 10.0, help_heading = "Pieces")]
     pub plan_time: f64,
-    /// Wall thickness, mm, 0.8 to 10, or auto: the least that bears a fall
-    #[arg(long, value_name = "auto|MM", default_value = "auto", help_heading = "Make")]
+    /// Wall thickness, mm, 0.8 to 10, or auto: the least from 1.6 (or four times --min-wall, if that is more) to 3 mm that bears a fall
+    #[arg(long, value_name = "auto|MM", allow_hyphen_values = true, default_value = "auto", help_heading = "Make")]
     pub thickness: Thickness,
     /// What it is printed of: what it bears decides how thick walls must be
     #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material, help_heading = "Make")]
     pub material: Material,
-    /// Height of the fall that walls must bear, m, 0.01 to 20
-    #[arg(long, value_name = "M", default_value_t = Params::default().strength.drop_m, help_heading = "Make")]
+    /// Height of the fall that walls must bear, 0.01 to 20 m
+    #[arg(long, value_name = "HEIGHT", default_value_t = Params::default().strength.drop_m, allow_hyphen_values = true,
+          value_parser = stress::metres, help_heading = "Make")]
     pub drop: f64,
     /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by what fits
-    #[arg(long, value_name = "auto|MM", default_value = "auto", help_heading = "Make")]
+    #[arg(long, value_name = "auto|MM", allow_hyphen_values = true, default_value = "auto", help_heading = "Make")]
     pub connector: SizeChoice,
     /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament
-    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]
     pub clearance: f64,
     /// The same on the rails of the key, mm, 0.03 to 0.8
-    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.key_clearance_mm, help_heading = "Make")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.key_clearance_mm, help_heading = "Make")]
     pub key_clearance: f64,
     /// Height of a bump on each rail that the key clicks past, mm, 0 to 0.4; 0 makes none
-    #[arg(long, value_name = "MM", default_value_t = 0.0, help_heading = "Make")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = 0.0, help_heading = "Make")]
     pub detent: f64,
     /// Cut a notch for a fingernail into the key, 0.45 mm deep
     #[arg(long, help_heading = "Make")]
     pub key_grip: bool,
     /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
-    #[arg(long, value_name = "MM", default_value_t = Params::default().body.wall_gap_mm, help_heading = "Make")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().body.wall_gap_mm, help_heading = "Make")]
     pub wall_gap: f64,
     /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported
-    #[arg(long, value_name = "MM", default_value_t = Params::default().connector.min_wall_mm, help_heading = "Make")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.min_wall_mm, help_heading = "Make")]
     pub min_wall: f64,
     /// Spacing of the grid behind the walls, mm [default: thickness / 2.5]
-    #[arg(long, value_name = "MM", help_heading = "Make")]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
     pub grid: Option<f64>,
     /// Seed of all random choices: the same seed gives the same kit
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Make")]

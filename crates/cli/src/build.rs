@@ -107,6 +107,9 @@ fn print_json(to: &Destination, model: &Model, made: &Design, summary: &Summary,
         "pieces": made.pieces.len(), "key_piece": made.plan.key(),
         "volume_ratio": summary.volume_ratio, "connector_share": summary.connector_share,
         "thin_share": summary.thin_share, "thickness_mm": made.thickness_mm,
+        "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
+        "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.sizes.largest_mm(),
+        "key_slides_on_rails_mm": made.rails_mm(),
         "checks": made.verification.checks, "findings": made.verification.findings,
         "warnings": warnings, "exit_code": code,
     });
@@ -142,8 +145,15 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
 pub fn bearing(strength: &Strength, params: &Params) -> String {
     let [x, y, z] = strength.at.to_array();
     let StrengthParams { drop_m, material, .. } = &params.strength;
+    let hollow = 100.0 * (1.0 - strength.solid_share());
+    // Hardly anything was judged where hardly anything is hollow.
+    let judged = if hollow < 80.0 {
+        format!(" (judged on the {hollow:.0} % of the surface that are hollow)")
+    } else {
+        String::new()
+    };
     format!(
-        "in a fall from {drop_m:.2} m the wall's stress reaches {:.0} MPa of the {:.0} that the material bears, \
+        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the material bears, \
          at ({x:.1}, {y:.1}, {z:.1}) mm",
         strength.stress_mpa, material.strength_mpa
     )
@@ -221,8 +231,7 @@ pub fn print_verdict(verdict: &Verification) {
     if !verdict.passed() {
         eprintln!("FAILED: this kit does not hold together as it should; do not print it. What failed, and where:");
         for finding in &verdict.findings {
-            let text = serde_json::to_string(finding).unwrap_or_else(|_| format!("{finding:?}"));
-            eprintln!("  {text}");
+            eprintln!("  {finding}");
         }
     }
 }

@@ -28,6 +28,9 @@ pub struct Session {
     pub stop: Arc<AtomicBool>,
 }
 
+/// More threads than this are not made: each has a stack, and no computer has as many cores.
+const MOST_THREADS: usize = 256;
+
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
@@ -42,7 +45,7 @@ fn main() -> ExitCode {
     // Without a handler Ctrl-C would still end the program, only less tidily.
     let _ = ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed));
     if let Some(n) = cli.threads
-        && let Err(e) = rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build_global()
+        && let Err(e) = rayon::ThreadPoolBuilder::new().num_threads(n.clamp(1, MOST_THREADS)).build_global()
     {
         eprintln!("warning: --threads {n} was not taken: {e}");
     }

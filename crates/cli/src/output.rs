@@ -54,7 +54,24 @@ impl Destination {
         if has_content && !force {
             return refuse("holds a kit already; choose another folder with -o, or --force to replace it");
         }
-        Ok(Self { folder, may_replace: force })
+        let made = Self { folder, may_replace: force };
+        // Now, not after a minute's work.
+        made.temporary()?;
+        Ok(made)
+    }
+
+    /// A folder beside the kit's that vanishes when it is dropped.
+    fn temporary(&self) -> Result<tempfile::TempDir, Failure> {
+        let parent = match self.folder.parent() {
+            Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let unwritable = |source: std::io::Error| Failure::Unwritable {
+            path: parent.clone(),
+            source: std::io::Error::new(source.kind(), source.kind().to_string()),
+        };
+        fs::create_dir_all(&parent).map_err(unwritable)?;
+        tempfile::Builder::new().prefix(".shellock-").tempdir_in(&parent).map_err(unwritable)
     }
 
     /// The folder.
@@ -64,13 +81,7 @@ impl Destination {
 
     /// Writes all files; the folder appears whole or not at all.
     pub fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
-        let parent = match self.folder.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        fs::create_dir_all(&parent).map_err(Failure::unwritable(&parent))?;
-        let temporary =
-            tempfile::Builder::new().prefix(".shellock-").tempdir_in(&parent).map_err(Failure::unwritable(&parent))?;
+        let temporary = self.temporary()?;
         let made = temporary.path().join("kit");
         for (name, bytes) in files {
             let path = made.join(name);
@@ -195,6 +206,7 @@ fn plan_json(
         "shell_thickness": design.thickness_mm,
         "strength": design.strength.as_ref().map(|s| strength_json(s, params)),
         "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
+        // The largest, where pairs have sizes of their own.
         "connector_size": design.sizes.largest_mm(),
         "wall_gap": params.body.wall_gap_mm,
         "up": design.turn.apply(Vec3::from(params.plan.up)).to_array(),
@@ -259,7 +271,7 @@ fn strength_json(strength: &Strength, params: &Params) -> Value {
     json!({
         "material": material, "drop_m": drop_m, "n_falls": n_cases,
         "stress_mpa": strength.stress_mpa, "is_too_weak": strength.is_too_weak, "at": strength.at.to_array(),
-        "deciding_fall": strength.deciding.0, "down": strength.deciding.1.to_array(),
+        "deciding_fall": strength.deciding.0 + 1, "down": strength.deciding.1.to_array(),
         "tried": strength.tried, "solid": strength.solid,
     })
 }

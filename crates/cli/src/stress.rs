@@ -18,19 +18,23 @@ use crate::input::{load, read};
 use crate::progress::Display;
 use crate::stages::{order_of, write};
 
-/// A force in N: "70N", "70 N" or "70".
+/// A force in N: "70N", "0.07 kN" or "70".
 pub fn newtons(text: &str) -> Result<f64, String> {
-    let number = text.trim().strip_suffix('N').unwrap_or(text).trim();
-    positive(number).ok_or_else(|| format!("\"{text}\" is no force above 0 N; write for example 70N"))
+    let said = || format!("\"{text}\" is no force above 0 N; write for example 70N");
+    with_unit(text, &[("kn", 1000.0), ("n", 1.0), ("", 1.0)]).ok_or_else(said)
 }
 
-/// A length in mm: "2m", "200cm" or "2000 mm".
-pub fn length_mm(text: &str) -> Result<f64, String> {
-    let text = text.trim();
-    let units = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0)];
-    let split = units.into_iter().find_map(|(unit, mm)| Some((text.strip_suffix(unit)?.trim(), mm)));
-    let value = split.and_then(|(number, mm)| Some(positive(number)? * mm));
-    value.ok_or_else(|| format!("\"{text}\" is no height above 0; write for example 2m, 150cm or 500mm"))
+/// A height in m: "2m", "200cm", "2000 mm" or "2".
+pub fn metres(text: &str) -> Result<f64, String> {
+    let said = || format!("\"{text}\" is no height above 0; write for example 2m, 150cm or 500mm");
+    with_unit(text, &[("mm", 0.001), ("cm", 0.01), ("m", 1.0), ("", 1.0)]).ok_or_else(said)
+}
+
+/// A number above 0 times that of the first unit it ends in.
+fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
+    let text = text.trim().to_ascii_lowercase();
+    let (number, factor) = units.iter().find_map(|(unit, factor)| Some((text.strip_suffix(unit)?.trim(), factor)))?;
+    Some(positive(number)? * factor)
 }
 
 fn positive(text: &str) -> Option<f64> {
@@ -39,7 +43,10 @@ fn positive(text: &str) -> Option<f64> {
 
 /// The material of that name.
 pub fn material(name: &str) -> Result<Material, String> {
-    let found = Material::PRESETS.into_iter().find(|(preset, _)| *preset == name).map(|(_, material)| material);
+    let found = Material::PRESETS
+        .into_iter()
+        .find(|(preset, _)| preset.eq_ignore_ascii_case(name))
+        .map(|(_, material)| material);
     let names = || Material::PRESETS.map(|(preset, _)| preset).join(", ");
     found.ok_or_else(|| format!("there is no material \"{name}\"; choose one of {}", names()))
 }
@@ -59,6 +66,7 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
         Failure::Wrong(what) => broken(&what),
         other => other,
     })?;
+    check_kit(kit, &plan).map_err(|what| broken(&what))?;
     let surface = surface_of(&kit.join("segmentation.ply"), order.steps.len())?;
     let params = params_of(&plan, blows).map_err(|what| broken(&what))?;
 
@@ -88,6 +96,24 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
     Ok(code)
 }
 
+/// What makes a plan no plan of this program's, or its kit incomplete.
+fn check_kit(kit: &Path, plan: &Value) -> Result<(), String> {
+    if plan.get("format").is_some_and(|f| f != "shellock-plan") || plan.get("version").is_some_and(|v| v != 1) {
+        return Err("\"format\" and \"version\" are not \"shellock-plan\" and 1; build the kit again".into());
+    }
+    for piece in plan["pieces"].as_array().into_iter().flatten() {
+        let direction: Vec<f64> =
+            piece["installation_direction"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+        if direction.len() != 3 || (direction.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() > 0.01 {
+            return Err(format!("the installation_direction of piece {} is no unit vector", piece["id"]));
+        }
+        if let Some(file) = piece["file"].as_str().filter(|file| !kit.join(file).is_file()) {
+            return Err(format!("names {file}, which is not there; the kit is not complete"));
+        }
+    }
+    Ok(())
+}
+
 /// The surface with its patches that `build` wrote.
 fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure> {
     let wrong = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
@@ -107,7 +133,8 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
 }
 
 /// The kit's sizes, or what is wrong with them.
-fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
+fn params_of(plan_value: &Value, blows: &Blows) -> Result<StressParams, String> {
+    let plan = plan_value;
     let mut params = Params::default();
     params.body.thickness_mm = plan["shell_thickness"].as_f64().ok_or("\"shell_thickness\" is no number of mm")?;
     let sizes = sizes_of(plan)?;
@@ -130,13 +157,14 @@ fn params_of(plan: &Value, blows: &Blows) -> Result<StressParams, String> {
         return Err(problems.join("; "));
     }
     let plan = params.agreed().plan;
-    let (material, edge_share) = (blows.material, blows.edges);
+    let built = || serde_json::from_value::<Material>(plan_value["strength"]["material"].clone()).ok();
+    let (material, edge_share) = (blows.material.or_else(built).unwrap_or_default(), blows.edges);
     let metric = MetricParams { material, edge_share, ..MetricParams::of_plan(&plan, &sizes) };
     let punch_at = match blows.at {
         Place::Top => PunchAt::Top,
         Place::Middle => PunchAt::Middle,
     };
-    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: blows.drop, metric, sizes, plan })
+    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: 1000.0 * blows.drop, metric, sizes, plan })
 }
 
 /// The connectors' sizes: one for all, or those of each pair.
@@ -148,6 +176,13 @@ fn sizes_of(plan: &Value) -> Result<ConnectorSizes, String> {
     };
     let pairs = plan["connector_sizes"].as_array().into_iter().flatten().map(pair).collect::<Option<Vec<_>>>();
     let pairs = pairs.ok_or("\"connector_sizes\" must list \"pieces\", two numbers, and \"size_mm\", 0.1 to 20")?;
+    let n_pieces = plan["pieces"].as_array().map_or(0, Vec::len);
+    if let Some(([a, b], _)) = pairs.iter().find(|(pair, _)| pair.iter().any(|p| usize::from(*p) >= n_pieces)) {
+        return Err(format!("\"connector_sizes\" names pieces {a} and {b}, which are not both there"));
+    }
+    if plan["connector_sizes"].as_array().is_some_and(Vec::is_empty) {
+        return Err("\"connector_sizes\" is empty; a kit whose seams all have the same size has none".into());
+    }
     Ok(ConnectorSizes::with_pairs(default_mm, pairs))
 }
 
@@ -197,13 +232,16 @@ mod tests {
 
     #[test]
     fn quantities_have_units() {
-        assert_eq!((newtons("70N"), newtons("7.5 N"), newtons("70")), (Ok(70.0), Ok(7.5), Ok(70.0)));
-        assert_eq!((length_mm("2m"), length_mm("150 cm"), length_mm("30mm")), (Ok(2000.0), Ok(1500.0), Ok(30.0)));
+        assert_eq!(
+            (newtons("70N"), newtons("7.5 n"), newtons("0.07kN"), newtons("70")),
+            (Ok(70.0), Ok(7.5), Ok(0.07 * 1000.0), Ok(70.0))
+        );
+        assert_eq!((metres("2m"), metres("150 cm"), metres("2")), (Ok(2.0), Ok(1.5), Ok(2.0)));
         for wrong in ["", "N", "-3N", "infN", "3kg"] {
             assert!(newtons(wrong).is_err(), "{wrong}");
         }
-        for wrong in ["", "2", "m", "-2m", "nanm", "2 km"] {
-            assert!(length_mm(wrong).is_err(), "{wrong}");
+        for wrong in ["", "m", "-2m", "nanm", "2 km", "0"] {
+            assert!(metres(wrong).is_err(), "{wrong}");
         }
         assert!(material("pla").is_ok() && material("wood").is_err());
     }

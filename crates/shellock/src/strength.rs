@@ -63,8 +63,11 @@ const FINE_POINTS: f64 = 6000.0;
 const USUAL_RATIO: f64 = 1.025;
 /// Change of the two meshes' ratio, in its logarithm, at which the search ends.
 const RATIO_TOLERANCE: f64 = 0.01;
-/// Thicknesses after which the search ends at all events.
+/// Thicknesses looked at on the coarse mesh, and on the fine one, at most.
 const MOST_TRIED: usize = 30;
+const MOST_FINE: usize = 5;
+/// Least share of the surface with a cavity below: a model with less is as good as solid, and no wall to be computed.
+const LEAST_HOLLOW: f64 = 0.1;
 
 /// What a wall must bear. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,6 +108,25 @@ impl Default for StrengthParams {
 }
 
 impl StrengthParams {
+    /// The same with no wall so thick that it leaves hardly any cavity; `None` where the thinnest is.
+    fn leaving_cavity(&self, falls: &Falls) -> Option<Self> {
+        /// Rounds of bisection: to a hundredth of a millimetre.
+        const ROUNDS: usize = 8;
+        let is_hollow = |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>() >= LEAST_HOLLOW * falls.mesh.area();
+        if is_hollow(self.most_mm) {
+            return Some(self.clone());
+        }
+        let (mut low, mut high) = (self.least_mm, self.most_mm);
+        if !is_hollow(low) {
+            return None;
+        }
+        for _ in 0..ROUNDS {
+            let middle = 0.5 * (low + high);
+            if is_hollow(middle) { low = middle } else { high = middle }
+        }
+        Some(Self { most_mm: low, ..self.clone() })
+    }
+
     /// Every value out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         [
@@ -127,6 +149,15 @@ pub enum StrengthError {
     /// The shell could not be solved.
     #[error("the wall's stress could not be computed ({0}); give the thickness with --thickness")]
     Shell(#[from] ShellError),
+    /// Hardly anywhere is there a cavity between two walls.
+    #[error(
+        "the model is hardly anywhere thicker than two walls of {wall_mm} mm, the thinnest that is made, so there is nothing to hollow \
+         out; print it solid, make it larger, or give a thinner wall with --thickness"
+    )]
+    NothingHollow {
+        /// Thickness of the thinnest wall, mm.
+        wall_mm: f64,
+    },
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -179,12 +210,18 @@ impl Strength {
         self
     }
 
+    /// Share of the surface with no cavity below, in [0, 1].
+    pub fn solid_share(&self) -> f64 {
+        let solid = |t: &usize| self.is_solid[*t];
+        (0..self.is_solid.len()).filter(solid).map(|t| self.mesh.face_area(t)).sum::<f64>() / self.mesh.area()
+    }
+
     /// What the user should know: a wall that is too weak, and where the model is solid.
     pub fn warnings(&self, params: &StrengthParams) -> Vec<Warning> {
         let weak = self.is_too_weak.then(|| Warning {
             code: "wall-too-weak".into(),
             message: format!(
-                "a wall of {:.2} mm does not bear a fall from {:.2} m: {:.0} MPa, and the material bears {:.0}; \
+                "a wall of {:.2} mm does not bear a fall from {} m: {:.0} MPa, and the material bears {:.0}; \
                  a wall up to {:.1} mm helps little",
                 self.thickness_mm, params.drop_m, self.stress_mpa, params.material.strength_mpa, params.most_mm
             ),
@@ -197,8 +234,8 @@ impl Strength {
         let solid = large.map(|largest| Warning {
             code: "too-thin-to-hollow".into(),
             message: format!(
-                "{} places ({percent:.1} % of the surface) are thinner than two walls of {:.2} mm: they are solid and \
-                 have no connectors; the largest has {:.0} mm²",
+                "{} place(s) ({percent:.1} % of the surface) have no cavity between two walls of {:.2} mm, as they are thin or at \
+                 a sharp edge: they are solid and have no connectors; the largest has {:.0} mm²",
                 self.solid.len(),
                 self.thickness_mm,
                 largest.area_mm2
@@ -237,34 +274,68 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
     let falls = |points: f64| Falls::new(params, model, points);
     let (coarse, fine) = rayon::join(|| falls(COARSE_POINTS), || falls(FINE_POINTS));
     let (coarse, fine) = (coarse?, fine?);
+    let params = &params.leaving_cavity(&coarse).ok_or(StrengthError::NothingHollow { wall_mm: params.least_mm })?;
     let strength_mpa = params.material.strength_mpa;
-    let usual_mm = USUAL_MM.clamp(params.least_mm, params.most_mm);
     let middle_mm = (params.least_mm * params.most_mm).sqrt();
     let mut tried = vec![coarse.worst(middle_mm)?.tried];
     let mut ratio = USUAL_RATIO;
-    let found = loop {
-        let limit_mpa = strength_mpa / ratio;
-        while let Some(next_mm) = next(&tried, params, limit_mpa) {
-            ctx.check()?;
-            insert(&mut tried, coarse.worst(next_mm)?.tried);
-        }
-        let mut estimate = choice(&tried, limit_mpa);
-        if estimate.stress_mpa > limit_mpa && estimate.thickness_mm < usual_mm {
-            let known = tried.iter().find(|t| t.thickness_mm == usual_mm).copied();
-            estimate = known.map_or_else(|| Ok(coarse.worst(usual_mm)?.tried), Ok::<_, ShellError>)?;
-            if known.is_none() {
-                insert(&mut tried, estimate);
-            }
+    let mut exacts: Vec<Fallen> = Vec::new();
+    for _ in 0..MOST_FINE {
+        let estimate = estimate(ctx, params, &coarse, &mut tried, strength_mpa / ratio)?;
+        if exacts.iter().any(|e| e.tried.thickness_mm == estimate.thickness_mm) {
+            break;
         }
         let exact = fine.worst(estimate.thickness_mm)?;
-        let before = std::mem::replace(&mut ratio, exact.tried.stress_mpa / estimate.stress_mpa);
-        if (ratio / before).ln().abs() <= RATIO_TOLERANCE || tried.len() >= MOST_TRIED {
-            break exact;
+        let before = ratio;
+        // Of a wall without any load nothing can be learned.
+        if exact.tried.stress_mpa > 0.0 && estimate.stress_mpa > 0.0 {
+            ratio = exact.tried.stress_mpa / estimate.stress_mpa;
         }
+        exacts.push(exact);
+        if (ratio / before).ln().abs() <= RATIO_TOLERANCE {
+            break;
+        }
+    }
+    // Where the two meshes disagree from thickness to thickness, the thinnest that bears its stress counts, or the last.
+    let bears = |e: &Fallen| e.tried.stress_mpa <= (1.0 + RATIO_TOLERANCE) * strength_mpa;
+    let last = exacts.len() - 1;
+    let thinnest = |i: &usize, j: &usize| exacts[*i].tried.thickness_mm.total_cmp(&exacts[*j].tried.thickness_mm);
+    let at = if bears(&exacts[last]) {
+        last
+    } else {
+        (0..last).filter(|&i| bears(&exacts[i])).min_by(thinnest).unwrap_or(last)
     };
+    let found = exacts.swap_remove(at);
+    let is_too_weak = !bears(&found);
     let corrected = |t: &Tried| Tried { stress_mpa: ratio * t.stress_mpa, ..*t };
-    let is_too_weak = found.tried.stress_mpa > (1.0 + RATIO_TOLERANCE) * strength_mpa;
     Ok(fine.strength(found, is_too_weak, tried.iter().map(corrected).collect()))
+}
+
+/// The thickness that the coarse mesh asks for where stresses above `limit_mpa` are too much, with its stress there; what was looked at on
+/// the way is added to `tried`.
+fn estimate(
+    ctx: &Ctx<'_>,
+    params: &StrengthParams,
+    coarse: &Falls,
+    tried: &mut Vec<Tried>,
+    limit_mpa: f64,
+) -> Result<Tried, StrengthError> {
+    while let Some(next_mm) = next(tried, params, limit_mpa).filter(|_| tried.len() < MOST_TRIED) {
+        ctx.check()?;
+        insert(tried, coarse.worst(next_mm)?.tried);
+    }
+    ctx.check()?;
+    let found = choice(tried, limit_mpa);
+    let usual_mm = USUAL_MM.clamp(params.least_mm, params.most_mm);
+    if found.stress_mpa <= limit_mpa || found.thickness_mm >= usual_mm {
+        return Ok(found);
+    }
+    if let Some(known) = tried.iter().find(|t| t.thickness_mm == usual_mm) {
+        return Ok(*known);
+    }
+    let usual = coarse.worst(usual_mm)?.tried;
+    insert(tried, usual);
+    Ok(usual)
 }
 
 /// Keeps thicknesses ascending.

@@ -20,6 +20,7 @@ mod probe;
 #[cfg(test)]
 mod tests;
 mod thin;
+mod words;
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Solid, TriMesh};

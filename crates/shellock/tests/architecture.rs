@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module may name those before it. `plan` stands before `body` because bodies are split along a plan.
-const ORDER: [&str; 13] = [
+const ORDER: [&str; 14] = [
     "strength",
     "segmentation",
+    "key",
     "sizes",
     "plan",
     "metric",

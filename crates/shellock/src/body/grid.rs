@@ -53,7 +53,7 @@ pub enum GridError {
     NoInside,
     /// Nothing of the model is deeper than the wall is thick.
     #[error(
-        "the model is nowhere thicker than two walls of {thickness_mm} mm, so there is nothing to hollow out; print it solid, make it larger or choose a thinner wall"
+        "the model has no cavity between two walls of {thickness_mm:.2} mm that the grid could resolve, so there is nothing to hollow out; print it solid, make it larger or choose a thinner wall"
     )]
     NoCavity {
         /// Wall thickness asked for, mm.

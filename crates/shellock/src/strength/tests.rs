@@ -87,3 +87,23 @@ fn thicknesses_are_the_same_bits_on_any_number_of_threads() {
     };
     assert_eq!(on(1), on(3));
 }
+
+#[test]
+fn a_plate_ends_with_a_wall_that_leaves_a_cavity_or_with_a_sentence() {
+    let plate = |half_mm: f64| Solid::new(sphere(5, Vec3::new(50.0, 40.0, half_mm))).unwrap();
+    let params = quick(1.275);
+    for half_mm in [3.0, 4.0, 5.0] {
+        let strength = found(&params, &plate(half_mm));
+        assert!(strength.thickness_mm < half_mm && strength.solid_share() < 1.0 - LEAST_HOLLOW + 0.05, "{half_mm}");
+    }
+    let stop = AtomicBool::new(false);
+    let refused = thickness(&Ctx::new(&|_| {}, &stop), &params, &plate(1.2));
+    assert!(matches!(refused, Err(StrengthError::NothingHollow { .. })));
+}
+
+#[test]
+fn a_stop_is_heard_while_the_thickness_is_sought() {
+    let stop = AtomicBool::new(true);
+    let stopped = thickness(&Ctx::new(&|_| {}, &stop), &quick(1.275), &ball(30.0));
+    assert!(matches!(stopped, Err(StrengthError::Cancelled(_))));
+}
