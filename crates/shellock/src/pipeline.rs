@@ -4,6 +4,7 @@
 //! out, the segmentation is mended at the piece to blame, and planning starts afresh.
 
 mod cut_key;
+mod rounds;
 
 use std::borrow::Cow;
 
@@ -11,20 +12,20 @@ use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
 
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, has_no_bar};
-use crate::feedback::{Lesson, lessons};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
 use crate::piece::{Detent, Grip, Joint, PieceError};
-use crate::plan::{Blocker, InstallationPlan, PlanConstraints, PlanOutcome, PlanParams, PlanProof, PlanSurvey};
+use crate::plan::{Blocker, InstallationPlan, PlanParams, PlanProof};
 use crate::segmentation::{SegmentationError, SegmentationParams};
-use crate::sizes::{CONTACT_SIZES, ChosenSizes, LEAST_CONTACT_SIZES, SizeParams, StressField};
+use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams, StressField};
 use crate::strength::{Strength, StrengthError, StrengthParams, StressMap};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
     Cancelled, ConnectorSizes, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning, body, connector,
-    metric, piece, plan, segmentation, sizes, strength, verify,
+    piece, segmentation, sizes, strength, verify,
 };
 use cut_key::CutKey;
+use rounds::{Attempt, Kits, WallGrid, mended, with_segmentation};
 
 /// Everything that may be set. Each stage's parameters are declared beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -290,13 +291,13 @@ impl Job<'_> {
         let Some(cut) = cut_again(&mut params, surface) else { return Ok(no_key()) };
         surface = cut;
         let mut sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
-        let mut room_mm = params.connector.room_mm(sizes.sizes.largest_mm());
-        ctx.stage("grid", 0)?;
-        let mut grid = ShellGrid::new(&params.body, &laid.model, room_mm)?;
+        let body = params.body.clone();
+        let mut grid = WallGrid { params: &body, model: &laid.model, room_mm: 0.0, made: None };
         let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all };
         let mut mending = 0;
         let attempt = loop {
-            let attempt = with_segmentation(ctx, &params, &laid.model, &grid, &surface, &sizes, &mut kits)?;
+            grid.make_room(params.connector.room_mm(sizes.sizes.largest_mm()));
+            let attempt = with_segmentation(ctx, &params, &mut grid, &surface, &sizes, &mut kits)?;
             let Attempt::Failed { blamed, loose, .. } = &attempt else { break attempt };
             if mending == params.rounds.mendings || kits.n_left == 0 {
                 break attempt;
@@ -308,11 +309,6 @@ impl Job<'_> {
             surface = mended;
             mending += 1;
             sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
-            let least_mm = params.connector.room_mm(sizes.sizes.largest_mm());
-            if least_mm > room_mm {
-                room_mm = least_mm;
-                grid = ShellGrid::new(&params.body, &laid.model, room_mm)?;
-            }
         };
         // Warnings of segmentations and plans that were given up go with them.
         ctx.take_warnings();
@@ -358,61 +354,6 @@ struct Bearing {
     warnings: Vec<Warning>,
 }
 
-/// The surface with other pieces, which may do better.
-///
-/// Dividing comes first, as it keeps the user's labels. What came loose where seams are short would only get shorter ones: it is joined
-/// to a neighbour; so is what stood in the way of every plan until half of the rounds were gone.
-fn mended(
-    ctx: &Ctx,
-    params: &Params,
-    surface: &SegmentedSurface,
-    blamed: &[PatchId],
-    loose: &[PatchId],
-    is_hopeless: bool,
-) -> Option<SegmentedSurface> {
-    /// Pieces joined at once; more would change what holds.
-    const MOST_JOINED: usize = 2;
-    let params = &params.segmentation;
-    let divided = || blamed.iter().find_map(|&p| segmentation::divide(ctx, params, surface, p));
-    let united = |pieces: &[PatchId]| segmentation::unite(ctx, params, surface, pieces);
-    if is_hopeless {
-        return blamed.iter().find_map(|&p| united(&[p]));
-    }
-    let is_thin = !loose.is_empty() && segmentation::has_short_contacts(params, surface);
-    let joined = is_thin.then(|| united(&loose[..loose.len().min(MOST_JOINED)])).flatten();
-    joined.or_else(divided)
-}
-
-/// The kits made so far.
-struct Kits {
-    /// The one with the fewest failures, the earliest of several.
-    best: Option<Design>,
-    n_left: usize,
-}
-
-impl Kits {
-    /// Counts a kit and keeps it where it is the best so far.
-    fn add(&mut self, design: Design) {
-        self.n_left -= 1;
-        if self.best.as_ref().is_none_or(|b| failures(&design) < failures(b)) {
-            self.best = Some(design);
-        }
-    }
-}
-
-/// How one segmentation went.
-enum Attempt {
-    Passed,
-    Failed {
-        reason: String,
-        blockers: Vec<Blocker>,
-        /// Pieces whose division may help, most promising first.
-        blamed: Vec<PatchId>,
-        /// Pieces that came out loose in the last kit.
-        loose: Vec<PatchId>,
-    },
-}
-
 fn finish(
     ctx: &Ctx,
     params: &Params,
@@ -430,72 +371,6 @@ fn finish(
         (None, Attempt::Failed { reason, blockers, .. }) => DesignOutcome::NoPlan { reason, blockers },
         (None, Attempt::Passed) => unreachable!("what passed was kept"),
     })
-}
-
-/// Plans of one segmentation that may be given up because a piece could not take its wall along; they cost seconds.
-const MOST_BLOCKED: usize = 8;
-
-/// Plans and makes kits of one segmentation until one passes or nothing new can be tried.
-fn with_segmentation(
-    ctx: &Ctx,
-    params: &Params,
-    model: &Solid,
-    grid: &ShellGrid,
-    surface: &SegmentedSurface,
-    chosen: &ChosenSizes,
-    kits: &mut Kits,
-) -> Result<Attempt, DesignError> {
-    let sizes = &chosen.sizes;
-    let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams(), sizes)?;
-    let mut distances: Option<PatchDistances> = None;
-    let mut constraints = PlanConstraints::default();
-    let (mut blamed, mut loose) = (Vec::new(), Vec::new());
-    let most_kits = params.rounds.kits.min(kits.n_left);
-    let (mut kit, mut n_blocked) = (0, 0);
-    while kit < most_kits && n_blocked < MOST_BLOCKED {
-        ctx.take_warnings();
-        chosen.tell(ctx);
-        let found = match plan::search(ctx, &params.plan, &survey, &constraints)? {
-            PlanOutcome::Found(found) => found,
-            PlanOutcome::Infeasible { reason, blockers, articulations } => {
-                blamed.splice(0..0, articulations.into_iter().chain(blockers.iter().map(|b| b.piece)));
-                return Ok(Attempt::Failed { reason, blockers, blamed, loose });
-            }
-        };
-        let (found, holding) = metric::choose(ctx, &params.plan, surface, sizes, *found)?;
-        ctx.stage("distances to the patches", 0)?;
-        let distances = distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
-        let proof = Some(found.proof());
-        let design = match make(ctx, params, model, grid, distances, surface, sizes, found.plan) {
-            Err(DesignError::Body(BodyError::Blocked { piece, separation, kept })) => {
-                let lesson = Lesson::Blocked { piece, separation, kept };
-                ctx.note(&format!("another plan: {lesson}"));
-                blamed.extend(lesson.blamed());
-                lesson.teach(&mut constraints);
-                n_blocked += 1;
-                continue;
-            }
-            made => Design { proof, holding: Some(holding), ..made? },
-        };
-        kit += 1;
-        let learned: Vec<Lesson> = lessons(&design);
-        kits.add(design);
-        if learned.is_empty() {
-            return Ok(Attempt::Passed);
-        }
-        blamed.extend(learned.iter().flat_map(Lesson::blamed));
-        loose = learned.iter().flat_map(Lesson::loose).collect();
-        if kit < params.rounds.kits {
-            learned.iter().for_each(|lesson| ctx.note(&format!("another plan: {lesson}")));
-        }
-        learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
-    }
-    let reason = "no kit passed its verification within the allowed rounds".into();
-    Ok(Attempt::Failed { reason, blockers: Vec::new(), blamed, loose })
-}
-
-fn failures(design: &Design) -> usize {
-    design.verification.checks.iter().filter(|c| !c.ok).count()
 }
 
 /// Makes and verifies the kit of one plan. The grid must have room for connectors of the largest of `sizes`.

@@ -1,0 +1,190 @@
+//! Rounds of plans and kits for one segmentation, and what is changed after them.
+
+use shellock_geom::Solid;
+
+use super::{Design, DesignError, Params, make};
+use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
+use crate::feedback::{Lesson, lessons};
+use crate::metric::Holding;
+use crate::plan::{Blocker, FoundPlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::sizes::ChosenSizes;
+use crate::{ConnectorSizes, Ctx, PatchId, SegmentedSurface, metric, plan, segmentation};
+
+/// The surface with other pieces, which may do better.
+///
+/// Dividing comes first, as it keeps the user's labels. What came loose where seams are short would only get shorter ones: it is joined
+/// to a neighbour; so is what stood in the way of every plan until half of the rounds were gone.
+pub(super) fn mended(
+    ctx: &Ctx,
+    params: &Params,
+    surface: &SegmentedSurface,
+    blamed: &[PatchId],
+    loose: &[PatchId],
+    is_hopeless: bool,
+) -> Option<SegmentedSurface> {
+    /// Pieces joined at once; more would change what holds.
+    const MOST_JOINED: usize = 2;
+    let params = &params.segmentation;
+    let divided = || blamed.iter().find_map(|&p| segmentation::divide(ctx, params, surface, p));
+    let united = |pieces: &[PatchId]| segmentation::unite(ctx, params, surface, pieces);
+    if is_hopeless {
+        return blamed.iter().find_map(|&p| united(&[p]));
+    }
+    let is_thin = !loose.is_empty() && segmentation::has_short_contacts(params, surface);
+    let joined = is_thin.then(|| united(&loose[..loose.len().min(MOST_JOINED)])).flatten();
+    joined.or_else(divided)
+}
+
+/// The kits made so far.
+pub(super) struct Kits {
+    /// The one with the fewest failures, the earliest of several.
+    pub best: Option<Design>,
+    pub n_left: usize,
+}
+
+impl Kits {
+    /// Counts a kit and keeps it where it is the best so far.
+    fn add(&mut self, design: Design) {
+        self.n_left -= 1;
+        if self.best.as_ref().is_none_or(|b| failures(&design) < failures(b)) {
+            self.best = Some(design);
+        }
+    }
+}
+
+/// How one segmentation went.
+pub(super) enum Attempt {
+    Passed,
+    Failed {
+        reason: String,
+        blockers: Vec<Blocker>,
+        /// Pieces whose division may help, most promising first.
+        blamed: Vec<PatchId>,
+        /// Pieces that came out loose in the last kit.
+        loose: Vec<PatchId>,
+    },
+}
+
+/// The grid of a model's wall, made when it is first asked for.
+pub(super) struct WallGrid<'a> {
+    pub params: &'a BodyParams,
+    pub model: &'a Solid,
+    /// Room for connectors below the wall.
+    pub room_mm: f64,
+    pub made: Option<ShellGrid>,
+}
+
+impl WallGrid<'_> {
+    /// Makes sure that there will be so much room.
+    pub(super) fn make_room(&mut self, room_mm: f64) {
+        if room_mm > self.room_mm {
+            (self.room_mm, self.made) = (room_mm, None);
+        }
+    }
+
+    fn get(&mut self) -> Result<&ShellGrid, GridError> {
+        if self.made.is_none() {
+            self.made = Some(ShellGrid::new(self.params, self.model, self.room_mm)?);
+        }
+        Ok(self.made.as_ref().expect("it was made just now"))
+    }
+}
+
+/// Plans of one segmentation that may be given up because a piece could not take its wall along; they cost seconds.
+const MOST_BLOCKED: usize = 8;
+
+/// Plans and makes kits of one segmentation until one passes or nothing new can be tried.
+pub(super) fn with_segmentation(
+    ctx: &Ctx,
+    params: &Params,
+    wall: &mut WallGrid<'_>,
+    surface: &SegmentedSurface,
+    chosen: &ChosenSizes,
+    kits: &mut Kits,
+) -> Result<Attempt, DesignError> {
+    let sizes = &chosen.sizes;
+    let survey: PlanSurvey = plan::survey(ctx, &params.plan, surface, &surface.seams(), sizes)?;
+    let mut distances: Option<PatchDistances> = None;
+    let mut constraints = PlanConstraints::default();
+    let (mut blamed, mut loose) = (Vec::new(), Vec::new());
+    let most_kits = params.rounds.kits.min(kits.n_left);
+    let (mut kit, mut n_blocked) = (0, 0);
+    while kit < most_kits && n_blocked < MOST_BLOCKED {
+        ctx.take_warnings();
+        chosen.tell(ctx);
+        // The proof of a plan runs on one thread; the grid and distances in it are made beside it.
+        let (measured, outcome) = rayon::join(
+            || {
+                let grid = wall.get()?;
+                distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
+                Ok::<(), GridError>(())
+            },
+            || planned(ctx, params, surface, &survey, sizes, &constraints),
+        );
+        measured?;
+        let (found, holding) = match outcome? {
+            Planned::Found(found, holding) => (found, holding),
+            Planned::Infeasible { reason, blockers, articulations } => {
+                blamed.splice(0..0, articulations.into_iter().chain(blockers.iter().map(|b| b.piece)));
+                return Ok(Attempt::Failed { reason, blockers, blamed, loose });
+            }
+        };
+        let (model, grid) = (wall.model, wall.get()?);
+        let distances = distances.as_ref().expect("they were measured beside the plan");
+        let proof = Some(found.proof());
+        let design = match make(ctx, params, model, grid, distances, surface, sizes, found.plan) {
+            Err(DesignError::Body(BodyError::Blocked { piece, separation, kept })) => {
+                let lesson = Lesson::Blocked { piece, separation, kept };
+                ctx.note(&format!("another plan: {lesson}"));
+                blamed.extend(lesson.blamed());
+                lesson.teach(&mut constraints);
+                n_blocked += 1;
+                continue;
+            }
+            made => Design { proof, holding: Some(holding), ..made? },
+        };
+        kit += 1;
+        let learned: Vec<Lesson> = lessons(&design);
+        kits.add(design);
+        if learned.is_empty() {
+            return Ok(Attempt::Passed);
+        }
+        blamed.extend(learned.iter().flat_map(Lesson::blamed));
+        loose = learned.iter().flat_map(Lesson::loose).collect();
+        if kit < params.rounds.kits {
+            learned.iter().for_each(|lesson| ctx.note(&format!("another plan: {lesson}")));
+        }
+        learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
+    }
+    let reason = "no kit passed its verification within the allowed rounds".into();
+    Ok(Attempt::Failed { reason, blockers: Vec::new(), blamed, loose })
+}
+
+/// A plan that holds best of those that cost about the least, or why there is none.
+enum Planned {
+    Found(Box<FoundPlan>, Holding),
+    Infeasible { reason: String, blockers: Vec<Blocker>, articulations: Vec<PatchId> },
+}
+
+fn planned(
+    ctx: &Ctx,
+    params: &Params,
+    surface: &SegmentedSurface,
+    survey: &PlanSurvey,
+    sizes: &ConnectorSizes,
+    constraints: &PlanConstraints,
+) -> Result<Planned, DesignError> {
+    Ok(match plan::search(ctx, &params.plan, survey, constraints)? {
+        PlanOutcome::Found(found) => {
+            let (found, holding) = metric::choose(ctx, &params.plan, surface, sizes, *found)?;
+            Planned::Found(Box::new(found), holding)
+        }
+        PlanOutcome::Infeasible { reason, blockers, articulations } => {
+            Planned::Infeasible { reason, blockers, articulations }
+        }
+    })
+}
+
+pub(super) fn failures(design: &Design) -> usize {
+    design.verification.checks.iter().filter(|c| !c.ok).count()
+}
