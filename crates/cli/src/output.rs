@@ -142,14 +142,15 @@ pub fn files(
     (files, summary)
 }
 
-/// All pieces in place, named and coloured.
+/// All pieces in place, named and coloured; on the plate they stand as the model was given.
 fn assembly(design: &Design) -> Vec<u8> {
+    let turned = (!design.turn.is_none()).then(|| design.turn.rows());
     let names: Vec<String> = design.pieces.ids().map(|p| format!("piece {p}")).collect();
     let objects: Vec<NamedObject> = design
         .pieces
         .iter()
         .zip(&names)
-        .map(|((p, mesh), name)| NamedObject { name, color: palette::color(design.plan.position(p)), mesh })
+        .map(|((p, mesh), name)| NamedObject { name, color: palette::color(design.plan.position(p)), mesh, turned })
         .collect();
     write_3mf(&objects)
 }

@@ -15,8 +15,10 @@ pub struct NamedObject<'a> {
     pub name: &'a str,
     /// sRGB.
     pub color: [u8; 3],
-    /// Where it stands on the plate, mm.
+    /// mm.
     pub mesh: &'a TriMesh,
+    /// How it is turned on the plate: where the x, y and z axes go; as it is where `None`.
+    pub turned: Option<[[f64; 3]; 3]>,
 }
 
 const TITLE: &str = "Shellock pieces";
@@ -78,8 +80,12 @@ fn model_xml(objects: &[NamedObject]) -> String {
         xml.push_str("</object>\n");
     }
     xml.push_str("</resources>\n<build>\n");
-    for i in 0..objects.len() {
-        add(&mut xml, format_args!("<item objectid=\"{}\"/>\n", object_id(i)));
+    for (i, object) in objects.iter().enumerate() {
+        add(&mut xml, format_args!("<item objectid=\"{}\"", object_id(i)));
+        if let Some([[a, b, c], [d, e, f], [g, h, i]]) = object.turned {
+            add(&mut xml, format_args!(" transform=\"{a} {b} {c} {d} {e} {f} {g} {h} {i} 0 0 0\""));
+        }
+        xml.push_str("/>\n");
     }
     xml.push_str("</build>\n</model>\n");
     xml
