@@ -97,6 +97,7 @@ fn a_plate_ends_with_a_wall_that_leaves_a_cavity_or_with_a_sentence() {
         assert!(strength.thickness_mm < half_mm && strength.solid_share() < 1.0 - LEAST_HOLLOW + 0.05, "{half_mm}");
     }
     let stop = AtomicBool::new(false);
+    let params = StrengthParams { least_mm: 1.6, ..params };
     let refused = thickness(&Ctx::new(&|_| {}, &stop), &params, &plate(1.2));
     assert!(matches!(refused, Err(StrengthError::NothingHollow { .. })));
 }
