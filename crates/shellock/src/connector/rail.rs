@@ -34,9 +34,16 @@ struct Axes {
     outwards: Vec3,
 }
 
-/// The rails under `curve`, along which the key leaves on `slide`, and the length of seam that would do for one, mm.
+impl Axes {
+    fn place(&self, p: &Vec3) -> Place {
+        [p.dot(self.slide), p.dot(self.to_key), p.dot(self.outwards)]
+    }
+}
+
+/// The rails under `curve`, one of `curves`, along which the key leaves on `slide`, and the length of seam that would do for one, mm.
 pub(super) fn rails(
     params: &ConnectorParams,
+    curves: &[Curve],
     curve: &Curve,
     slide: Vec3,
     size_mm: f64,
@@ -51,7 +58,10 @@ pub(super) fn rails(
         let across = slide.cross(outwards);
         let to_key = if across.dot(mean(&curve.across)) < 0.0 { across } else { -across };
         let axes = Axes { slide, to_key, outwards };
-        let rail = straight(points, &axes, size_mm).and_then(|line| rail(params, curve, &axes, line, size_mm, is_free));
+        let all = curves.iter().filter(|c| c.later == curve.later).flat_map(|c| &c.points);
+        let outline: Vec<Place> = all.map(|p| axes.place(p)).collect();
+        let rail = straight(points, &outline, &axes, size_mm)
+            .and_then(|line| rail(params, curve, &axes, line, size_mm, is_free));
         rails.extend(rail);
     }
     (rails, usable_mm)
@@ -81,10 +91,10 @@ fn along_slide(curve: &Curve, slide: Vec3, size_mm: f64) -> Vec<(usize, usize)> 
     found
 }
 
-/// Both ends of the longest straight line that the points follow, lying under the lowest of them: back, then front.
-fn straight(points: &[Vec3], axes: &Axes, size_mm: f64) -> Option<[Place; 2]> {
-    let mut places: Vec<Place> =
-        points.iter().map(|p| [p.dot(axes.slide), p.dot(axes.to_key), p.dot(axes.outwards)]).collect();
+/// Both ends of the longest straight line that the points follow: back, then front. It lies under the lowest of them and under whatever
+/// of the key's `outline` is behind its front, since all of that passes over it.
+fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Option<[Place; 2]> {
+    let mut places: Vec<Place> = points.iter().map(|p| axes.place(p)).collect();
     places.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut rest = &places[..];
     loop {
@@ -94,7 +104,10 @@ fn straight(points: &[Vec3], axes: &Axes, size_mm: f64) -> Option<[Place; 2]> {
         }
         let (middle, slope) = fitted(rest);
         let aside = |p: &Place| (p[1] - middle[1] - slope * (p[0] - middle[0])).abs();
-        let (low, high) = rest.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[2]), h.max(p[2])));
+        let front = rest[rest.len() - 1][0];
+        let passing = outline.iter().filter(|p| p[0] <= front).map(|p| p[2]);
+        let low = passing.fold(rest.iter().map(|p| p[2]).fold(f64::INFINITY, f64::min), f64::min);
+        let high = rest.iter().map(|p| p[2]).fold(f64::NEG_INFINITY, f64::max);
         let uneven = |p: &Place| (p[2] - middle[2]).abs();
         let excess = |p: &Place| aside(p) / MOST_ASIDE_SIZES + uneven(p) / MOST_UNEVEN_SIZES;
         if rest.iter().all(|p| aside(p) <= MOST_ASIDE_SIZES * size_mm) && high - low <= MOST_UNEVEN_SIZES * size_mm {
@@ -190,11 +203,16 @@ mod tests {
             .map(|i| f64::from(i))
             .map(|x| Vec3::new(x, 0.05 * x + (x - 30.0).max(0.0).powi(2), 0.1 * (x * 0.4).sin()))
             .collect();
-        let [back, front] = straight(&points, &axes, 2.5).unwrap();
+        let [back, front] = straight(&points, &[], &axes, 2.5).unwrap();
         assert!(back[0] < 3.0 && front[0] > 27.0 && front[0] < 33.0, "{back:?} {front:?}");
         assert!((back[2] + 0.1).abs() < 0.02 && back[2] == front[2]);
         let slope = (front[1] - back[1]) / (front[0] - back[0]);
         assert!((slope - 0.05).abs() < 0.03, "{slope}");
+        // What is behind passes over the rail; what is in front of it does not.
+        let [behind, ahead] = [[-4.0, 8.0, -0.5], [39.0, 8.0, -3.0]];
+        let lower = straight(&points, &[behind, ahead], &axes, 2.5).unwrap();
+        assert_eq!(lower[0][2], -0.5);
+        assert_eq!(straight(&points, &[[-4.0, 8.0, -2.0]], &axes, 2.5), None);
     }
 
     #[test]

@@ -141,7 +141,7 @@ pub fn runs(
             at: curve.points[curve.points.len() / 2],
         });
         if let Some(slide) = slide.filter(|_| curve.later == plan.key()) {
-            let (rails, usable_mm) = rails(params, curve, slide, size_mm, is_free);
+            let (rails, usable_mm) = rails(params, curves, curve, slide, size_mm, is_free);
             runs.extend(rails);
             contacts.iter_mut().last().into_iter().for_each(|c| c.usable_mm += usable_mm);
         }

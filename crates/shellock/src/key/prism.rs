@@ -34,6 +34,11 @@ impl KeyPrism {
         [d.dot(self.slide), d.dot(self.across()), -d.dot(self.normal)]
     }
 
+    /// Length of the key along the slide, on the plane, mm: as much as its width at the back.
+    pub fn length_mm(&self) -> f64 {
+        2.0 * self.half_width_mm
+    }
+
     /// Half the width so far along the slide, mm.
     pub fn half_width_at(&self, along_mm: f64) -> f64 {
         self.half_width_mm + FLARE * along_mm

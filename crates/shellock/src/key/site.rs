@@ -31,7 +31,8 @@ const SIDE_BAND_MM: f64 = 2.0;
 /// How much less a key on top is liked than one underneath, and one for which the model must be turned.
 const VISIBLE_COST: f64 = 0.4;
 const TURN_COST: f64 = 0.1;
-/// Candidates that are looked at closely, and sites that are returned.
+/// Candidates whose rails are looked for, those that are looked at closely, and sites that are returned.
+const MOST_PROBED: usize = 400;
 const MOST_CANDIDATES: usize = 60;
 const MOST_SITES: usize = 6;
 /// A key or the rest counts as one component where all others have less than this share of its area.
@@ -48,6 +49,8 @@ pub struct KeySite {
     pub flat_share: f64,
     /// The same along the worse of its two sides, where the rails are.
     pub side_share: f64,
+    /// Length of straight rails that fit under the worse of its sides, by estimate, mm.
+    pub rail_mm: f64,
     /// Its surface, mm².
     pub area_mm2: f64,
     /// How well it is liked; larger is better.
@@ -65,9 +68,17 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
     let mut candidates: Vec<KeySite> =
         planes.par_iter().flat_map_iter(|plane| on_plane(params, &spots, *plane)).collect();
     ctx.check()?;
-    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
-    candidates.truncate(MOST_CANDIDATES);
+    let by_score = |a: &KeySite, b: &KeySite| b.score.total_cmp(&a.score);
+    candidates.sort_by(by_score);
+    candidates.truncate(MOST_PROBED);
     let bvh = TriangleBvh::new(mesh);
+    candidates.par_iter_mut().for_each(|site| {
+        site.rail_mm = rail_mm(params, mesh, &bvh, &site.prism);
+        site.score *= (site.rail_mm / site.prism.length_mm()).sqrt();
+    });
+    ctx.check()?;
+    candidates.sort_by(by_score);
+    candidates.truncate(MOST_CANDIDATES);
     let is_sound: Vec<bool> = candidates
         .par_iter()
         .map(|site| has_room(params, mesh, &bvh, site) && parts_in_two(mesh, &topology, &site.prism))
@@ -236,7 +247,48 @@ fn scored(params: &KeyParams, spots: &[Spot], plane: Plane, prism: KeyPrism, len
     let shown = 0.5 * (1.0 + (facing / area).dot(up));
     let turned = if Turn::laying(prism.normal, prism.slide).0.is_none() { 0.0 } else { TURN_COST };
     let score = flat_share * side_share.sqrt() * flat.sqrt() * (1.0 - VISIBLE_COST * shown) * (1.0 - turned);
-    Some(KeySite { prism, flat_share, side_share, area_mm2: area, score })
+    Some(KeySite { prism, flat_share, side_share, rail_mm: 0.0, area_mm2: area, score })
+}
+
+/// Length of the longest straight rail under the worse side: all of the key behind its front passes over it, so it must lie below that,
+/// and yet reach up to the wall at the side.
+fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPrism) -> f64 {
+    const N_ALONG: usize = 24;
+    const N_ACROSS: usize = 9;
+    /// How far a tongue reaches up to an uneven wall, in connector sizes.
+    const UNEVEN_SIZES: f64 = 0.3;
+    /// Rays begin so far outside the plane, mm.
+    const ABOVE_MM: f64 = 8.0;
+    let length_mm = prism.length_mm();
+    let below = |along: f64, share: f64| {
+        let at = prism.origin + along * prism.slide + share * prism.half_width_at(along) * prism.across();
+        let hit = bvh.first_hit(at + ABOVE_MM * prism.normal, -prism.normal, 2.0 * ABOVE_MM);
+        let outer = hit.filter(|(face, _)| mesh.face_normal(*face as usize).dot(prism.normal) > 0.0);
+        outer.map_or(f64::INFINITY, |(_, mm)| mm - ABOVE_MM)
+    };
+    let step_mm = length_mm / N_ALONG as f64;
+    let rows: Vec<[f64; N_ACROSS]> = (0..N_ALONG)
+        .map(|i| {
+            let along = (i as f64 + 0.5) * step_mm;
+            std::array::from_fn(|j| below(along, 2.0 * j as f64 / (N_ACROSS - 1) as f64 - 1.0))
+        })
+        .collect();
+    let longest = |side: usize| {
+        let mut best = 0;
+        for from in 0..N_ALONG {
+            let mut least = f64::INFINITY;
+            for to in from..N_ALONG {
+                least = least.min(rows[to][side]);
+                let passing = rows[..=to].iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+                if !passing.is_finite() || passing - least > UNEVEN_SIZES * params.size_mm {
+                    break;
+                }
+                best = best.max(to + 1 - from);
+            }
+        }
+        best as f64 * step_mm
+    };
+    longest(0).min(longest(N_ACROSS - 1))
 }
 
 /// Whether the model is thick enough below the key's sides for its wall, its grooves and the wall across.
@@ -246,7 +298,7 @@ fn has_room(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, site: &KeySit
     const N_ALONG: usize = 6;
     let prism = &site.prism;
     let needed_mm = 2.0 * params.wall_mm + 2.0 * params.size_mm - START_MM;
-    let length_mm = 2.0 * prism.half_width_mm;
+    let length_mm = prism.length_mm();
     let (mut n_free, mut n_all) = (0usize, 0u32);
     for i in 0..N_ALONG {
         let along = length_mm * (i as f64 + 0.5) / N_ALONG as f64;

@@ -23,11 +23,12 @@ pub(super) struct CutKey {
 impl CutKey {
     /// A notch across the key, nearer to its front.
     fn grip(&self) -> Grip {
-        /// Of its length, which is its width.
+        /// Of its length.
         const FROM_BACK: f64 = 0.65;
-        let KeyPrism { origin, slide, normal, half_width_mm, .. } = self.site.prism;
+        let prism = self.site.prism;
+        let KeyPrism { origin, slide, normal, .. } = prism;
         // Which piece the key is the plan says.
-        Grip { key: PatchId(0), at: origin + FROM_BACK * 2.0 * half_width_mm * slide, slide, normal }
+        Grip { key: PatchId(0), at: origin + FROM_BACK * prism.length_mm() * slide, slide, normal }
     }
 
     /// The surface with the key as a patch, which `params` then name; `None` where it does not come out as one piece.
@@ -100,9 +101,12 @@ pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
         ctx.note(&told(site));
         let Some((laid, key)) = laid(job, site) else { continue };
         let reason = match job.kit(ctx, &params, &laid, Some(&key))? {
-            DesignOutcome::Made(made) => {
-                let failed: Vec<&str> =
-                    made.verification.checks.iter().filter(|c| !c.ok).map(|c| c.name.as_str()).collect();
+            DesignOutcome::Made(mut made) => {
+                let failed: Vec<String> =
+                    made.verification.checks.iter().filter(|c| !c.ok).map(|c| c.name.clone()).collect();
+                if made.rails_mm() <= 0.0 {
+                    made.warnings.push(without_rails(&made, site));
+                }
                 if failed.is_empty() {
                     return Ok(Cut { best: Some(*made), reasons: Vec::new() });
                 }
@@ -118,17 +122,31 @@ pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
     Ok(cut)
 }
 
+/// Says that a key slides on nothing.
+fn without_rails(made: &Design, site: &KeySite) -> Warning {
+    let key = made.plan.key();
+    Warning {
+        code: "key-without-rails".into(),
+        message: format!(
+            "piece {key} is the key, but nothing straight runs under its sides: it slides along its plane without rails and is held by \
+             its other connectors"
+        ),
+        pieces: vec![key],
+        at: Some(made.turn.apply(site.prism.origin).to_array()),
+    }
+}
+
 /// A site in words.
 fn told(site: &KeySite) -> String {
     let (s, [x, y, z]) = (site.prism.slide, site.prism.origin.to_array());
     format!(
-        "a key of {:.0} mm² cut at ({x:.0}, {y:.0}, {z:.0}) mm, sliding along ({:.2}, {:.2}, {:.2}), {:.0} % flat, {:.0} % at its sides",
+        "a key of {:.0} mm² cut at ({x:.0}, {y:.0}, {z:.0}) mm, sliding along ({:.2}, {:.2}, {:.2}), {:.0} % flat, with room for rails of {:.0} mm",
         site.area_mm2,
         s.x,
         s.y,
         s.z,
         100.0 * site.flat_share,
-        100.0 * site.side_share
+        site.rail_mm
     )
 }
 
