@@ -22,8 +22,9 @@
 //! cross at a large angle can be deeper inside by their middle than by their edges, and edges alone that cross on the way
 //! touch with a depth of 0. How far apart the solids would have to be moved is not asked.
 //!
-//! Parts of a surface can be left out of account ([`Shape::counting`]): neither distances to them nor depths of their points
-//! are asked, but depths are measured to the other's whole surface.
+//! Parts of a surface can be left out of account ([`Scope::WhatCounts`]): then distances are those of the parts that count, and
+//! points that count are looked at for their depth where parts that count cross; depths are measured to the other's whole
+//! surface.
 
 mod depth;
 mod pair;
@@ -32,7 +33,7 @@ mod tests;
 mod traverse;
 
 use depth::{Deepest, Passage};
-use pair::{Approach, raised, swept, swept_box};
+use pair::{Approach, raised, swept};
 use traverse::for_near_pairs;
 
 use crate::bvh::TriangleBvh;
@@ -85,6 +86,15 @@ pub struct Translation {
     pub far_mm: f64,
 }
 
+/// Which parts of two surfaces a question is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// All of them.
+    Everything,
+    /// The triangles that count, of either shape.
+    WhatCounts,
+}
+
 impl Shape {
     /// Prepares `solid`; O(n log n).
     pub fn new(solid: &Solid) -> Self {
@@ -96,7 +106,7 @@ impl Shape {
         }
     }
 
-    /// The same solid with only those triangles taken into account for whose index `counts` holds.
+    /// The same solid, where only those triangles count for whose index `counts` holds: [`Scope::WhatCounts`].
     #[must_use]
     pub fn counting(mut self, counts: impl Fn(usize) -> bool) -> Self {
         (0..self.counts.len()).for_each(|f| self.counts[f] = counts(f));
@@ -105,16 +115,22 @@ impl Shape {
 }
 
 /// Where `a` and `b` come nearest, if that is within `within_mm`. Distances are exact but for rounding, depths to 0.1 µm.
-pub fn least_gap(a: &Shape, b: &Shape, within_mm: f64) -> Option<Gap> {
-    Some(Encounter::new(a, b, Vec3::ZERO, [0.0; 2], within_mm).nearest()?.0)
+pub fn least_gap(a: &Shape, b: &Shape, scope: Scope, within_mm: f64) -> Option<Gap> {
+    Some(Encounter::new([a, b], Vec3::ZERO, [0.0; 2], scope, within_mm).nearest()?.0)
 }
 
 /// Where `moving` comes nearest to `fixed` over all travels of `motion`, if that is within `within_mm`. Distances are exact
 /// but for rounding, depths to 0.1 µm. With only one travel, 0, the answer is that of [`least_gap`].
-pub fn swept_gap(moving: &Shape, fixed: &Shape, motion: &Translation, within_mm: f64) -> Option<SweptGap> {
+pub fn swept_gap(
+    moving: &Shape,
+    fixed: &Shape,
+    motion: &Translation,
+    scope: Scope,
+    within_mm: f64,
+) -> Option<SweptGap> {
     let along = motion.along.normalize_or_zero();
     let travels = if along == Vec3::ZERO { [0.0; 2] } else { [motion.from_mm, motion.far_mm] };
-    let (gap, travel_mm) = Encounter::new(moving, fixed, along, travels, within_mm).nearest()?;
+    let (gap, travel_mm) = Encounter::new([moving, fixed], along, travels, scope, within_mm).nearest()?;
     Some(SweptGap { gap_mm: gap.gap_mm, travel_mm, at: gap.at })
 }
 
@@ -135,7 +151,7 @@ struct Tree {
 }
 
 impl<'a> Encounter<'a> {
-    fn new(moving: &'a Shape, fixed: &'a Shape, along: Vec3, travels: [f64; 2], limit_mm: f64) -> Self {
+    fn new(shapes: [&'a Shape; 2], along: Vec3, travels: [f64; 2], scope: Scope, limit_mm: f64) -> Self {
         let axes = if along == Vec3::ZERO {
             Vec3::AXES
         } else {
@@ -143,17 +159,17 @@ impl<'a> Encounter<'a> {
             [x, y, along]
         };
         let seen = |p: Vec3| Vec3::from(axes.map(|axis| axis.dot(p)));
-        let meshes = [moving, fixed].map(|shape| {
+        let meshes = shapes.map(|shape| {
             let mesh = shape.solid.mesh();
             TriMesh { points: mesh.points.iter().map(|&p| seen(p)).collect(), triangles: mesh.triangles.clone() }
         });
         let bounds = meshes.each_ref().map(TriMesh::bounds);
         let travels = if along == Vec3::ZERO { travels } else { travels_that_matter(bounds, travels) };
-        let [a, b] = &meshes;
-        let trees = [
-            Tree::of(a, moving, raised(bounds[1], [-travels[1], -travels[0]]).grown(limit_mm)),
-            Tree::of(b, fixed, raised(bounds[0], travels).grown(limit_mm)),
-        ];
+        let ([moving, fixed], [a, b]) = (shapes, &meshes);
+        let in_scope = |shape: &Shape, f: usize| scope == Scope::Everything || shape.counts[f];
+        let room_of_a = raised(bounds[1], [-travels[1], -travels[0]]).grown(limit_mm);
+        let room_of_b = raised(bounds[0], travels).grown(limit_mm);
+        let trees = [Tree::of(a, room_of_a, |f| in_scope(moving, f)), Tree::of(b, room_of_b, |f| in_scope(fixed, f))];
         Self { passage: Passage { moving, fixed, along, travels }, axes, limit_mm, trees }
     }
 
@@ -230,10 +246,9 @@ impl<'a> Encounter<'a> {
 }
 
 impl Tree {
-    /// The triangles of `mesh` that count for `shape` and meet `room`.
-    fn of(mesh: &TriMesh, shape: &Shape, room: Aabb) -> Self {
-        let is_near =
-            |&f: &u32| shape.counts[f as usize] && swept_box(mesh.corners(f as usize), [0.0; 2]).intersects(room);
+    /// The triangles of `mesh` that are in scope and meet `room`.
+    fn of(mesh: &TriMesh, room: Aabb, in_scope: impl Fn(usize) -> bool) -> Self {
+        let is_near = |&f: &u32| in_scope(f as usize) && Aabb::around(mesh.corners(f as usize)).intersects(room);
         let faces: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_near).collect();
         let triangles = faces.iter().map(|&f| mesh.triangles[f as usize]).collect();
         Self { bvh: TriangleBvh::new(&TriMesh { points: mesh.points.clone(), triangles }), faces }
