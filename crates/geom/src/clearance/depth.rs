@@ -2,7 +2,7 @@
 
 use super::pair::{nearest_on, pierced_at};
 use super::{Shape, TOUCH_MM};
-use crate::Vec3;
+use crate::{TriMesh, Vec3};
 
 /// A depth is found to within this, mm: a tenth of what a measuring gauge of a workshop tells apart.
 pub(super) const DEPTH_TOLERANCE_MM: f64 = 1e-4;
@@ -141,16 +141,19 @@ impl Passage<'_> {
     }
 
     /// Depth of a single point, negative outside, and the nearest triangle. Deepens `best`.
+    ///
+    /// Sheets that lie within rounding of each other may cross, and then the normals there tell the wrong side. So what would
+    /// deepen `best`, which happens rarely, is asked of the whole surface.
     fn probe(&self, point: Track, best: &mut Deepest) -> Option<(f64, u32)> {
-        let near = self.fixed.distance.at(point.ends[0], f64::INFINITY)?;
-        if near.signed_mm > best.depth_mm {
-            *best = Deepest {
-                depth_mm: near.signed_mm,
-                travel_mm: point.travels[0],
-                point: point.ends[0],
-                surface: near.point,
-            };
+        let x = point.ends[0];
+        let near = self.fixed.distance.at(x, f64::INFINITY)?;
+        if near.signed_mm <= best.depth_mm {
+            return Some((near.signed_mm, near.face));
         }
+        if near.signed_mm > TOUCH_MM && winding_number(self.fixed.solid.mesh(), x) < 0.5 {
+            return Some((-near.signed_mm, near.face));
+        }
+        *best = Deepest { depth_mm: near.signed_mm, travel_mm: point.travels[0], point: x, surface: near.point };
         Some((near.signed_mm, near.face))
     }
 
@@ -187,10 +190,43 @@ fn led_by(leader: &mut [u32], mut v: u32) -> u32 {
     v
 }
 
+/// How often a closed surface winds around `q`: 1 inside, 0 outside. [Jacobson2013, eq. 5], after [VanOosterom1983].
+fn winding_number(mesh: &TriMesh, q: Vec3) -> f64 {
+    let half_angles = (0..mesh.triangles.len()).map(|f| {
+        let [a, b, c] = mesh.corners(f).map(|p| p - q);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        a.dot(b.cross(c)).atan2(denominator)
+    });
+    half_angles.sum::<f64>() / std::f64::consts::TAU
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{Aabb, Solid, Volume};
+
+    #[test]
+    fn a_surface_winds_once_around_what_is_inside() {
+        let cube = Volume::cuboid(Aabb { min: Vec3::ZERO, max: Vec3::ONE }).to_mesh();
+        assert!((winding_number(&cube, Vec3::new(0.1, 0.7, 0.9)) - 1.0).abs() < 1e-12);
+        assert!(winding_number(&cube, Vec3::new(1.1, 0.7, 0.9)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_flap_turned_inside_out_does_not_make_the_outside_deep() {
+        // The flap over the cube is as thin as rounding; what is above and below it is outside, whatever its normals say.
+        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let mut mesh = cuboid([0.0; 3], [4.0; 3]).to_mesh();
+        let flap = cuboid([1.0, 1.0, 4.5], [3.0, 3.0, 4.5 + 1e-7]).to_mesh();
+        let first = mesh.points.len() as u32;
+        mesh.points.extend(&flap.points);
+        mesh.triangles.extend(flap.triangles.iter().map(|t| [t[0] + first, t[2] + first, t[1] + first]));
+        let fixed = Shape::new(&Solid::new(mesh).unwrap());
+        let moving = Shape::new(&Solid::new(cuboid([1.5, 1.5, 4.2], [2.5, 2.5, 5.2]).to_mesh()).unwrap());
+        let found = super::super::least_gap(&moving, &fixed, super::super::Scope::Everything, 1.0).unwrap();
+        assert!(found.gap_mm.abs() < 1e-6, "{found:?}");
+    }
 
     #[test]
     fn depth_along_a_track_is_that_of_dense_samples() {

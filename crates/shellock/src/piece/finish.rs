@@ -89,11 +89,10 @@ pub fn make(
         let whole: Vec<Volume> =
             mine.par_iter().map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h])).collect();
         let boxes: Vec<Aabb> = whole.iter().map(Volume::bounds).collect();
-        let (space, (below, beside)) =
+        let (space, off_walls) =
             rayon::join(|| space(params, grid, shell, q, &boxes), || off_other_walls(params, grid, shell, q, &boxes));
         let made = |whole: &Volume| {
-            let free = whole.intersect(&space);
-            let free = free.intersect(&below).union(&free.intersect(&beside));
+            let free = whole.intersect(&space).intersect(&off_walls);
             (whole.volume(), carved(&free, &wakes, far_mm))
         };
         let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
@@ -117,7 +116,7 @@ fn space(params: &ConnectorParams, grid: &ShellGrid, shell: &ShellBodies, q: Pat
     region(grid, boxes, |n| (grid.depth[n] - ceiling).min(-barred[n] - clearance))
 }
 
-/// Two regions, the clearance off what other pieces have of the wall: below the wall, and on `q`'s own side of the cuts.
+/// The clearance off what other pieces have of the wall: below the wall, or on `q`'s own side of the cuts.
 ///
 /// A body's edge along the inner end of a seam is sharp. The one field of what bars `q` rounds it off by up to a third of a
 /// cell, more than the clearance; two smooth ones, united after they are contoured, keep it.
@@ -127,11 +126,13 @@ fn off_other_walls(
     shell: &ShellBodies,
     q: PatchId,
     boxes: &[Aabb],
-) -> (Volume, Volume) {
+) -> Volume {
     let side = shell.side[q].spread(&grid.band, -grid.cutoff_mm());
     let clearance = params.clearance_mm as f32;
     let floor = grid.thickness_mm as f32 + clearance;
-    rayon::join(|| region(grid, boxes, |n| grid.depth[n] - floor), || region(grid, boxes, |n| side[n] - clearance))
+    let (below, beside) =
+        rayon::join(|| region(grid, boxes, |n| grid.depth[n] - floor), || region(grid, boxes, |n| side[n] - clearance));
+    below.union(&beside)
 }
 
 /// Where `field` is positive, in and near `boxes`.
