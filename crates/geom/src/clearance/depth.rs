@@ -20,6 +20,9 @@ pub(super) struct Deepest {
     pub surface: Vec3,
 }
 
+/// A triangle of the moving shape and one of the fixed one; or the two ends of an edge, which name it.
+type Pair = (u32, u32);
+
 /// A motion of one shape past another that is at rest.
 pub(super) struct Passage<'a> {
     /// What moves.
@@ -54,7 +57,7 @@ impl Passage<'_> {
     /// `crossings` are the pairs (moving, fixed) of triangles that touch at any travel, sorted; `near` are the moving
     /// triangles that may be inside.
     pub fn deepen(&self, near: &[u32], crossings: &[(u32, u32)], best: &mut Deepest) {
-        let mut tracks: Vec<((u32, u32), Track, &[(u32, u32)])> = Vec::new();
+        let mut tracks: Vec<(Pair, Track, &[Pair])> = Vec::new();
         for of_face in crossings.chunk_by(|x, y| x.0 == y.0) {
             tracks.extend(self.tracks(of_face[0].0).map(|(name, track)| (name, track, of_face)));
         }
