@@ -226,9 +226,12 @@ mod tests {
         mesh.points.extend(&flap.points);
         mesh.triangles.extend(flap.triangles.iter().map(|t| [t[0] + first, t[2] + first, t[1] + first]));
         let fixed = Shape::new(&Solid::new(mesh).unwrap());
-        let moving = Shape::new(&Solid::new(cuboid([1.5, 1.5, 4.2], [2.5, 2.5, 5.2]).to_mesh()).unwrap());
-        let found = super::super::least_gap(&moving, &fixed, super::super::Scope::Everything, 1.0).unwrap();
-        assert!(found.gap_mm.abs() < 1e-6, "{found:?}");
+        let above = Vec3::new(2.0, 2.1, 4.9);
+        assert!(fixed.distance.at(above, 1.0).unwrap().signed_mm > 0.3, "normals alone are wrong here");
+        let passage = Passage { moving: &fixed, fixed: &fixed, along: Vec3::X, travels: [0.0, 1.0] };
+        let mut best = Deepest::default();
+        passage.dive(Track { ends: [above - 0.7 * Vec3::Z, above], travels: [0.0; 2] }, &mut best);
+        assert!(best.depth_mm < 1e-6, "{best:?}");
     }
 
     #[test]
