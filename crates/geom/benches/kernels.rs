@@ -1,8 +1,10 @@
-//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing.
+//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing; clearances of two half
+//! shells of 26 000 triangles.
 
 use divan::{Bencher, black_box};
 use shellock_geom::band::Band;
 use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::clearance::{Scope, Shape, Translation, least_gap, swept_gap};
 use shellock_geom::contour::contour as dense;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::remesh::{RemeshParams, remesh};
@@ -77,4 +79,25 @@ fn remesh_octants(bencher: Bencher) {
     let labels: Vec<u32> = (0..ball.mesh().triangles.len()).map(|f| octant(ball.mesh().face_center(f))).collect();
     let params = RemeshParams { target_edge_mm: 6.0, n_rounds: 6 };
     bencher.bench(|| remesh(&params, black_box(ball.mesh()), &labels));
+}
+
+/// Half of a shell 2 mm thick, 0.05 mm off a wavy seam.
+fn half_shell(side: f64) -> Shape {
+    let bounds = Aabb { min: Vec3::splat(-42.0), max: Vec3::splat(42.0) };
+    let seam = |p: Vec3| side * (p.z - 0.5 * (0.3 * p.x).sin()) - 0.05;
+    let field = |p: Vec3| (40.0 - p.length()).min(p.length() - 38.0).min(seam(p));
+    Shape::new(&Solid::new(dense(bounds, 1.07, field)).expect("half a shell is closed"))
+}
+
+#[divan::bench]
+fn gap_of_half_shells(bencher: Bencher) {
+    let (upper, lower) = (half_shell(1.0), half_shell(-1.0));
+    bencher.bench(|| least_gap(black_box(&upper), &lower, Scope::Everything, 1.0));
+}
+
+#[divan::bench]
+fn gap_of_half_shells_drawn_apart(bencher: Bencher) {
+    let (upper, lower) = (half_shell(1.0), half_shell(-1.0));
+    let motion = Translation { along: Vec3::new(1.0, 0.0, 1.0), from_mm: 0.0, far_mm: f64::INFINITY };
+    bencher.bench(|| swept_gap(black_box(&upper), &lower, &motion, Scope::Everything, 1.0));
 }

@@ -11,24 +11,31 @@ const N_BINS: usize = 16;
 const MAX_UNEVEN_DEPTH: u32 = 28;
 
 #[derive(Clone, Copy)]
-struct Node {
-    bounds: Aabb,
+pub(crate) struct Node {
+    pub(crate) bounds: Aabb,
     /// First triangle of a leaf (in `order`), or index of the left child; the right child follows it.
-    first: u32,
+    pub(crate) first: u32,
     /// Triangles of a leaf; 0 for an inner node.
-    count: u32,
+    pub(crate) count: u32,
     /// The group that all triangles below share, or [`MIXED`].
     group: u32,
+}
+
+impl Node {
+    /// The triangles of a leaf, as positions in leaf order.
+    pub(crate) fn triangles(&self) -> std::ops::Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
 }
 
 const MIXED: u32 = u32::MAX;
 
 /// Triangles sorted into nested boxes. Built in O(n log n); every answer is exact.
 pub struct TriangleBvh {
-    nodes: Vec<Node>,
+    pub(crate) nodes: Vec<Node>,
     /// Corners in leaf order, so that a leaf reads memory in sequence.
-    corners: Vec<[Vec3; 3]>,
-    faces: Vec<u32>,
+    pub(crate) corners: Vec<[Vec3; 3]>,
+    pub(crate) faces: Vec<u32>,
     groups: Vec<u32>,
 }
 
@@ -116,7 +123,7 @@ impl TriangleBvh {
             }
             let node = &self.nodes[at as usize];
             if node.count > 0 {
-                for i in node.first as usize..(node.first + node.count) as usize {
+                for i in node.triangles() {
                     let (point, feature) = nearest_on_triangle(self.corners[i], q);
                     let distance_sq = point.distance_squared(q);
                     if distance_sq < limit || (best.is_none() && distance_sq <= limit) {
@@ -153,7 +160,7 @@ impl TriangleBvh {
                 continue;
             }
             if node.count > 0 {
-                for i in node.first as usize..(node.first + node.count) as usize {
+                for i in node.triangles() {
                     let d = nearest_on_triangle(self.corners[i], q).0.distance_squared(q);
                     match found.iter_mut().find(|e| e.0 == self.groups[i]) {
                         Some(entry) => entry.1 = entry.1.min(d),
@@ -194,7 +201,7 @@ impl TriangleBvh {
                 top += 2;
                 continue;
             }
-            for i in node.first as usize..(node.first + node.count) as usize {
+            for i in node.triangles() {
                 if let Some(t) = ray_meets_triangle(self.corners[i], origin, direction)
                     && t <= limit
                 {

@@ -7,6 +7,7 @@ pub mod band;
 pub mod boolean;
 pub mod bvh;
 pub mod check;
+pub mod clearance;
 pub mod contour;
 pub mod decimate;
 pub mod io;

@@ -12,7 +12,7 @@
 //!
 //! so that along every line in direction s all remaining material comes before p: p leaves freely by construction.
 //! Fragments that a cut leaves on either side are given to the other one, which p then keeps out of the way of. Inside, the
-//! two sides of a cut keep a small gap that tapers to a tenth of it (some µm) at the outer rim.
+//! two sides of a cut keep a small gap that tapers to three tenths of it (15 µm a side) at the outer rim.
 //! Where outer patches hide each other a little, only the seam shifts. The first-installed piece is what is left.
 
 mod grid;
@@ -40,7 +40,7 @@ pub struct BodyParams {
     pub cell_mm: Option<f64>,
     /// Gap that each side of a seam leaves inside the wall. [0, 0.4]; 0.05.
     pub wall_gap_mm: f64,
-    /// Depth over which that gap grows from a tenth at the outer rim. [0.05, 5]; 1.
+    /// Depth over which that gap grows from three tenths at the outer rim. [0.05, 5]; 1.
     pub rim_mm: f64,
 }
 

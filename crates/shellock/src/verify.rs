@@ -7,6 +7,7 @@
 //! Limits: motions are infinitesimal (a piece that tilts through a gap is found only by its contacts), walls may bend
 //! in reality, and friction is ignored.
 
+pub mod clearance;
 pub mod contact;
 pub mod motion;
 pub mod sample;

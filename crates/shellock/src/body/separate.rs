@@ -19,8 +19,9 @@ use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, 
 const SKIN_CELLS: f64 = 1.5;
 /// What remains is grown by this many cells before it is swept, so that interpolation leaves no rub.
 const MARGIN_CELLS: f64 = 0.15;
-/// Share of the wall gap that is left at the rim: the two sides of a cut keep a few µm apart there.
-const RIM_LEAST: f64 = 0.1;
+/// Share of the wall gap that is left at the rim. With a tenth of it the two sides of most seams crossed somewhere, by up to
+/// 0.1 mm, and paths rubbed there; half of that is left. At 15 µm a side the surface still counts as covered everywhere.
+const RIM_LEAST: f64 = 0.3;
 /// Cutting tools are simplified by at most this share of the gap and this many mm where they cut, so that paths stay free,
 /// and by more where they end outside the wall, farther from it than so many cells.
 const GAP_SHARE: f64 = 0.2;
@@ -52,6 +53,8 @@ pub struct ShellBodies {
     /// Where a piece may have no connectors: positive where bodies lie in its way out, or where it would lie in a later
     /// piece's way. On the nodes around its patch.
     pub barred: IdVec<PatchId, LocalField>,
+    /// Positive on each piece's own side of all cuts; with the wall's limits it is the body. On the nodes around its patch.
+    pub side: IdVec<PatchId, LocalField>,
 }
 
 /// Splits the wall along the plan. The result is a partition of the wall but for the gap inside the seams.
@@ -68,10 +71,12 @@ pub fn build(
     let mut inner = InnerSurface::new(grid);
     let mut cuts: Vec<Cut> = Vec::new();
     let mut barred: Vec<Option<LocalField>> = vec![None; plan.steps.len()];
+    let mut side = barred.clone();
     for step in plan.removal() {
         let p = step.piece;
         let in_way = if fields.n_left() == 1 {
             inner.give_rest(p);
+            side[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &fields.rest, rooms[p]));
             cuts.push(Cut { piece: p, field: None });
             fields.in_later_ways.clone()
         } else {
@@ -82,6 +87,8 @@ pub fn build(
             }
             let local = || LocalField::cut_out(&grid.band, &g, rooms[p]);
             let ((), local) = rayon::join(|| inner.give(p, &g, &grid.band), local);
+            let own: Vec<f32> = g.par_iter().zip(&fields.rest).map(|(g, rest)| g.min(*rest)).collect();
+            side[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &own, rooms[p]));
             cuts.push(Cut { piece: p, field: Some(local) });
             fields.remove(p, step.separation, &g)
         };
@@ -94,8 +101,13 @@ pub fn build(
     Ok(ShellBodies {
         bodies: parts.into_iter().map(|(p, part)| whole_body(ctx, p, &part)).collect(),
         inner: inner.finish(plan.steps.len()),
-        barred: barred.into_iter().map(|b| b.expect("every piece of a plan is removed once")).collect(),
+        barred: of_every_piece(barred),
+        side: of_every_piece(side),
     })
+}
+
+fn of_every_piece(fields: Vec<Option<LocalField>>) -> IdVec<PatchId, LocalField> {
+    fields.into_iter().map(|f| f.expect("every piece of a plan is removed once")).collect()
 }
 
 /// A piece and the field of its cut, positive on its side; the first-installed piece has none.

@@ -96,9 +96,13 @@ pub fn make(
         let whole: Vec<Volume> =
             mine.par_iter().map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h])).collect();
         let boxes: Vec<Aabb> = whole.iter().map(Volume::bounds).collect();
-        let space = space(params, grid, shell, q, &boxes);
-        let made: Vec<(f64, Volume)> =
-            whole.par_iter().map(|whole| (whole.volume(), carved(&whole.intersect(&space), &wakes, far_mm))).collect();
+        let (space, off_walls) =
+            rayon::join(|| space(params, grid, shell, q, &boxes), || off_other_walls(params, grid, shell, q, &boxes));
+        let made = |whole: &Volume| {
+            let free = whole.intersect(&space).intersect(&off_walls);
+            (whole.volume(), carved(&free, &wakes, far_mm))
+        };
+        let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
             halves[r].carved[h] = volume;
@@ -129,14 +133,38 @@ pub fn make(
 fn space(params: &ConnectorParams, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
     let barred = shell.barred[q].spread(&grid.band, grid.cutoff_mm());
     let (clearance, ceiling) = (params.clearance_mm as f32, (grid.thickness_mm - ROOT_MM) as f32);
+    region(grid, boxes, |n| (grid.depth[n] - ceiling).min(-barred[n] - clearance))
+}
+
+/// The clearance off what other pieces have of the wall: below the wall, or on `q`'s own side of the cuts.
+///
+/// A body's edge along the inner end of a seam is sharp. The one field of what bars `q` rounds it off by up to a third of a
+/// cell, more than the clearance; two smooth ones, united after they are contoured, keep it.
+fn off_other_walls(
+    params: &ConnectorParams,
+    grid: &ShellGrid,
+    shell: &ShellBodies,
+    q: PatchId,
+    boxes: &[Aabb],
+) -> Volume {
+    let side = shell.side[q].spread(&grid.band, -grid.cutoff_mm());
+    let clearance = params.clearance_mm as f32;
+    let floor = grid.thickness_mm as f32 + clearance;
+    let (below, beside) =
+        rayon::join(|| region(grid, boxes, |n| grid.depth[n] - floor), || region(grid, boxes, |n| side[n] - clearance));
+    below.union(&beside)
+}
+
+/// Where `field` is positive, in and near `boxes`.
+fn region(grid: &ShellGrid, boxes: &[Aabb], field: impl Fn(usize) -> f32 + Sync) -> Volume {
     let boxes: Vec<Aabb> = boxes.iter().map(|b| b.grown(2.0 * grid.band.cell_mm())).collect();
     let outside = -(grid.band.cell_mm() as f32);
     let field: Vec<f32> = (0..grid.band.len())
         .into_par_iter()
         .map(|n| {
-            let free = (grid.depth[n] - ceiling).min(-barred[n] - clearance);
+            let value = field(n);
             let is_near = || boxes.iter().any(|b| b.contains(grid.band.position(n)));
-            if free > outside && is_near() { free } else { free.min(outside) }
+            if value > outside && is_near() { value } else { value.min(outside) }
         })
         .collect();
     let mesh = contour(&grid.band, &field, OffBand::Outside);

@@ -57,9 +57,7 @@ pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
 
 fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
     let mut defects = Vec::new();
-    let is_sound = mesh.points.iter().all(|p| p.is_finite())
-        && mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.points.len());
-    let mesh = if is_sound { merged(mesh) } else { TriMesh::default() };
+    let mesh = finite(mesh).map(merged).unwrap_or_default();
     let edges = edge_use(&mesh);
     if let Some((count, at)) = edges.shared {
         defects.push(Finding::SharedEdges { piece, count, at: at.to_array() });
@@ -78,8 +76,15 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
     Body { mesh, volume, defects }
 }
 
+/// `mesh`, unless it names points that are not there or are not numbers.
+pub fn finite(mesh: &TriMesh) -> Option<&TriMesh> {
+    let is_sound = mesh.points.iter().all(|p| p.is_finite())
+        && mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.points.len());
+    is_sound.then_some(mesh)
+}
+
 /// `mesh` with equal points made one and triangles that collapse by it left out. Points keep their first order.
-fn merged(mesh: &TriMesh) -> TriMesh {
+pub fn merged(mesh: &TriMesh) -> TriMesh {
     let cell = |p: Vec3| p.to_array().map(|x| (f64::from(x as f32) / MERGE_MM).round() as i64);
     let mut by_place: Vec<([i64; 3], u32)> = mesh.points.iter().map(|&p| cell(p)).zip(0..).collect();
     by_place.sort_unstable();

@@ -1,0 +1,269 @@
+//! Clearance: the least distance of two solids, at rest and over a whole translation, with its place and its sign.
+//!
+//! Nothing is sampled. Over a translation the distance of two triangles is a convex function of the travel, so the least one
+//! is that of their shadows along the motion, or that at an end of the travels; two trees of boxes, one drawn out along the
+//! motion, leave few pairs to look at.
+//!
+//! ```text
+//!            far ┌ ─ ─ ┐
+//!                  a + t·s        shadow of a      shadow of b
+//!              ↑ └ ─ ─ ┘           ├──────┤         ├─────┤
+//!            s │ ┌─────┐  ┌───┐            ←──────→
+//!              │ │  a  │  │ b │       the gap, where heights allow
+//!                └─────┘  └───┘
+//! ```
+//!
+//! Where surfaces cross, the gap is negative: minus the *depth*, which is the greatest distance to the other's surface
+//! of a point that is inside the other and is
+//! - a corner of either mesh, at any of the travels, or
+//! - a point on an edge of either mesh, at the first travel.
+//!
+//! Two faceted faces that overlap by a little and are about parallel overlap most at such a point. Limits: faces that
+//! cross at a large angle can be deeper inside by their middle than by their edges, and edges alone that cross on the way
+//! touch with a depth of 0. How far apart the solids would have to be moved is not asked.
+//!
+//! Parts of a surface can be left out of account ([`Scope::WhatCounts`]): then distances are those of the parts that count, and
+//! points that count are looked at for their depth where parts that count cross; depths are measured to the other's whole
+//! surface.
+
+mod depth;
+mod pair;
+#[cfg(test)]
+mod tests;
+mod traverse;
+
+use depth::{Deepest, Passage};
+use pair::{Approach, raised, swept};
+use traverse::for_near_pairs;
+
+use crate::bvh::TriangleBvh;
+use crate::signed_distance::SignedDistance;
+use crate::{Aabb, Solid, TriMesh, Vec3};
+
+/// Surfaces that come nearer than this touch, mm: a hundred times the rounding of coordinates of some 100 mm.
+const TOUCH_MM: f64 = 1e-9;
+
+/// A solid prepared for questions of clearance.
+pub struct Shape {
+    solid: Solid,
+    distance: SignedDistance,
+    bounds: Aabb,
+    counts: Vec<bool>,
+}
+
+/// Where two solids come nearest. All points are where they are when the gap is least.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// Least distance, mm; 0 where surfaces only touch; minus the depth where they cross.
+    pub gap_mm: f64,
+    /// Midway between the two surfaces.
+    pub at: Vec3,
+    /// The point of the first solid's surface.
+    pub on_a: Vec3,
+    /// The point of the second one's.
+    pub on_b: Vec3,
+}
+
+/// Where a moving solid comes nearest to one at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SweptGap {
+    /// Least distance over all travels, mm; 0 where surfaces only touch; minus the depth where they cross.
+    pub gap_mm: f64,
+    /// A travel at which it is that small, mm.
+    pub travel_mm: f64,
+    /// Midway between the two surfaces then.
+    pub at: Vec3,
+}
+
+/// A translation, and the travels that matter, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Translation {
+    /// Direction, of any length; zero is no motion.
+    pub along: Vec3,
+    /// First travel, mm; not finite is from ever.
+    pub from_mm: f64,
+    /// Last travel, mm; not finite is for ever.
+    pub far_mm: f64,
+}
+
+/// Which parts of two surfaces a question is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// All of them.
+    Everything,
+    /// The triangles that count, of either shape.
+    WhatCounts,
+}
+
+impl Shape {
+    /// Prepares `solid`; O(n log n).
+    pub fn new(solid: &Solid) -> Self {
+        Self {
+            distance: SignedDistance::new(solid),
+            bounds: solid.mesh().bounds(),
+            counts: vec![true; solid.mesh().triangles.len()],
+            solid: solid.clone(),
+        }
+    }
+
+    /// The same solid, where only those triangles count for whose index `counts` holds: [`Scope::WhatCounts`].
+    #[must_use]
+    pub fn counting(mut self, counts: impl Fn(usize) -> bool) -> Self {
+        (0..self.counts.len()).for_each(|f| self.counts[f] = counts(f));
+        self
+    }
+}
+
+/// Where `a` and `b` come nearest, if that is within `within_mm`. Distances are exact but for rounding, depths to 0.1 µm.
+pub fn least_gap(a: &Shape, b: &Shape, scope: Scope, within_mm: f64) -> Option<Gap> {
+    Some(Encounter::new([a, b], Vec3::ZERO, [0.0; 2], scope, within_mm).nearest()?.0)
+}
+
+/// Where `moving` comes nearest to `fixed` over all travels of `motion`, if that is within `within_mm`. Distances are exact
+/// but for rounding, depths to 0.1 µm. With only one travel, 0, the answer is that of [`least_gap`].
+pub fn swept_gap(
+    moving: &Shape,
+    fixed: &Shape,
+    motion: &Translation,
+    scope: Scope,
+    within_mm: f64,
+) -> Option<SweptGap> {
+    let along = motion.along.normalize_or_zero();
+    let travels = if along == Vec3::ZERO { [0.0; 2] } else { [motion.from_mm, motion.far_mm] };
+    let (gap, travel_mm) = Encounter::new([moving, fixed], along, travels, scope, within_mm).nearest()?;
+    Some(SweptGap { gap_mm: gap.gap_mm, travel_mm, at: gap.at })
+}
+
+/// Two shapes, one of which moves, as seen along its motion: z is the direction.
+struct Encounter<'a> {
+    passage: Passage<'a>,
+    axes: [Vec3; 3],
+    limit_mm: f64,
+    /// What may come within the limit of the moving shape and of the fixed one.
+    trees: [Tree; 2],
+}
+
+/// Some triangles of a shape, in the encounter's axes.
+struct Tree {
+    bvh: TriangleBvh,
+    /// The shape's triangle behind each of the tree's; ascending.
+    faces: Vec<u32>,
+}
+
+impl<'a> Encounter<'a> {
+    fn new(shapes: [&'a Shape; 2], along: Vec3, travels: [f64; 2], scope: Scope, limit_mm: f64) -> Self {
+        let axes = if along == Vec3::ZERO {
+            Vec3::AXES
+        } else {
+            let (x, y) = along.any_orthonormal_pair();
+            [x, y, along]
+        };
+        let seen = |p: Vec3| Vec3::from(axes.map(|axis| axis.dot(p)));
+        let meshes = shapes.map(|shape| {
+            let mesh = shape.solid.mesh();
+            TriMesh { points: mesh.points.iter().map(|&p| seen(p)).collect(), triangles: mesh.triangles.clone() }
+        });
+        let bounds = meshes.each_ref().map(TriMesh::bounds);
+        let travels = if along == Vec3::ZERO { travels } else { travels_that_matter(bounds, travels) };
+        let ([moving, fixed], [a, b]) = (shapes, &meshes);
+        let in_scope = |shape: &Shape, f: usize| scope == Scope::Everything || shape.counts[f];
+        let room_of_a = raised(bounds[1], [-travels[1], -travels[0]]).grown(limit_mm);
+        let room_of_b = raised(bounds[0], travels).grown(limit_mm);
+        let trees = [Tree::of(a, room_of_a, |f| in_scope(moving, f)), Tree::of(b, room_of_b, |f| in_scope(fixed, f))];
+        Self { passage: Passage { moving, fixed, along, travels }, axes, limit_mm, trees }
+    }
+
+    /// The least gap and the travel at which it is.
+    fn nearest(&self) -> Option<(Gap, f64)> {
+        let approach = self.approach();
+        let touches = approach.is_some_and(|a| a.distance_sq <= TOUCH_MM * TOUCH_MM);
+        let deepest = self.deepest(touches);
+        if deepest.depth_mm > TOUCH_MM {
+            return Some((gap_between(-deepest.depth_mm, deepest.point, deepest.surface), deepest.travel_mm));
+        }
+        let [x, y, z] = self.axes;
+        let approach = approach?;
+        let [on_a, on_b] = [approach.on_a, approach.on_b].map(|p| p.x * x + p.y * y + p.z * z);
+        let gap_mm = if touches { 0.0 } else { approach.distance_sq.sqrt() };
+        Some((gap_between(gap_mm, on_a, on_b), approach.travel_mm))
+    }
+
+    /// Where the surfaces come nearest within the limit; the first place found where they meet.
+    fn approach(&self) -> Option<Approach> {
+        let ([a, b], travels) = (&self.trees, self.passage.travels);
+        let mut best: Option<Approach> = None;
+        let mut limit_sq = self.limit_mm * self.limit_mm;
+        for_near_pairs(&a.bvh, &b.bvh, travels, &mut limit_sq, |i, j, limit_sq| {
+            if let Some(found) = swept(a.bvh.corners[i], b.bvh.corners[j], travels, *limit_sq)
+                && best.is_none_or(|b| found.distance_sq < b.distance_sq)
+            {
+                best = Some(found);
+                // Nothing is nearer than touching: no pair is looked at any more.
+                *limit_sq = if found.distance_sq <= TOUCH_MM * TOUCH_MM { -1.0 } else { found.distance_sq };
+            }
+        });
+        best
+    }
+
+    /// Pairs of triangles that touch at any travel.
+    fn crossings(&self) -> Vec<(u32, u32)> {
+        let ([a, b], travels) = (&self.trees, self.passage.travels);
+        let mut crossings = Vec::new();
+        let touch_sq = TOUCH_MM * TOUCH_MM;
+        for_near_pairs(&a.bvh, &b.bvh, travels, &mut { touch_sq }, |i, j, _| {
+            if swept(a.bvh.corners[i], b.bvh.corners[j], travels, touch_sq).is_some() {
+                crossings.push((a.faces[a.bvh.faces[i] as usize], b.faces[b.bvh.faces[j] as usize]));
+            }
+        });
+        crossings
+    }
+
+    /// The deepest point of either shape in the other.
+    fn deepest(&self, touches: bool) -> Deepest {
+        let Passage { moving, fixed, along, travels } = self.passage;
+        let start = travels[0] * along;
+        let mut best = Deepest::default();
+        let moved = Aabb { min: moving.bounds.min + start, max: moving.bounds.max + start };
+        if !touches && !moved.intersects(fixed.bounds) {
+            return best;
+        }
+        let mut crossings = if touches { self.crossings() } else { Vec::new() };
+        crossings.sort_unstable();
+        self.passage.deepen(&self.trees[0].faces, &crossings, &mut best);
+
+        // The other way round: what is at rest moves backwards past the moving shape.
+        let mut flipped: Vec<(u32, u32)> = crossings.into_iter().map(|(a, b)| (b, a)).collect();
+        flipped.sort_unstable();
+        let backwards = Passage { moving: fixed, fixed: moving, along: -along, travels };
+        let mut theirs = Deepest { depth_mm: best.depth_mm, ..Deepest::default() };
+        backwards.deepen(&self.trees[1].faces, &flipped, &mut theirs);
+        if theirs.depth_mm > best.depth_mm {
+            let shift = theirs.travel_mm * along;
+            best = Deepest { point: theirs.point + shift, surface: theirs.surface + shift, ..theirs };
+        }
+        best
+    }
+}
+
+impl Tree {
+    /// The triangles of `mesh` that are in scope and meet `room`.
+    fn of(mesh: &TriMesh, room: Aabb, in_scope: impl Fn(usize) -> bool) -> Self {
+        let is_near = |&f: &u32| in_scope(f as usize) && Aabb::around(mesh.corners(f as usize)).intersects(room);
+        let faces: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_near).collect();
+        let triangles = faces.iter().map(|&f| mesh.triangles[f as usize]).collect();
+        Self { bvh: TriangleBvh::new(&TriMesh { points: mesh.points.clone(), triangles }), faces }
+    }
+}
+
+/// The travels between which the least distance lies: before them and after them the boxes of both, seen along the motion,
+/// are past each other.
+fn travels_that_matter([moving, fixed]: [Aabb; 2], [from, far]: [f64; 2]) -> [f64; 2] {
+    let (reached, passed) = (fixed.min.z - moving.max.z, fixed.max.z - moving.min.z);
+    let far = if far.is_finite() { far } else { passed };
+    let from = if from.is_finite() { from.min(far) } else { reached.min(far) };
+    [from.max(reached).min(far), far.min(passed).max(from)]
+}
+
+fn gap_between(gap_mm: f64, on_a: Vec3, on_b: Vec3) -> Gap {
+    Gap { gap_mm, at: 0.5 * (on_a + on_b), on_a, on_b }
+}
