@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use shellock::certificate::{Certificate, PieceFile, certify};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
     ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
@@ -19,7 +20,10 @@ use shellock_geom::{TriMesh, Vec3};
 use crate::args::{Axis, Options};
 use crate::build::{bearing, scope};
 use crate::failure::Failure;
-use crate::input::Model;
+use crate::input::{Model, sha256};
+
+/// The certificate's name within a kit.
+pub const CERTIFICATE: &str = "certificate.json";
 
 /// Figures of a kit that people and machines ask for.
 pub struct Summary {
@@ -113,9 +117,11 @@ pub fn files(
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
     text.push('\n');
     let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
-    for (p, mesh) in design.pieces.iter() {
-        files.push((piece_file(p), write_stl_binary(mesh)));
-    }
+    let meshes = design.pieces.iter().map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
+    let pieces: Vec<(String, Vec<u8>)> = meshes.collect();
+    let claimed = certificate(&pieces, design, params.verify.clearance_mm);
+    files.extend(claimed.map(|bytes| (CERTIFICATE.to_owned(), bytes)));
+    files.extend(pieces);
     let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
     let chart = design.strength.as_ref().map(|strength| stress_chart(options, params, design, strength));
     let figures = chart.iter().map(|svg| ("Stress in a fall".to_owned(), svg.clone())).collect();
@@ -143,6 +149,20 @@ fn assembly(design: &Design) -> Vec<u8> {
 
 fn piece_file(p: PatchId) -> String {
     format!("pieces/piece-{:02}.stl", p.0)
+}
+
+/// What is claimed of the kit whose pieces are these files, in order of their ids.
+fn certificate(files: &[(String, Vec<u8>)], design: &Design, clearance_mm: f64) -> Option<Vec<u8>> {
+    let named = files.iter().zip(design.pieces.ids());
+    let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
+    certify(named, &design.pieces, &design.plan, &design.touching, clearance_mm).map(|c| certificate_bytes(&c))
+}
+
+/// As it is written to [`CERTIFICATE`].
+pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
+    let mut bytes = serde_json::to_vec_pretty(certificate).expect("numbers and strings can be written");
+    bytes.push(b'\n');
+    bytes
 }
 
 fn plan_json(

@@ -132,6 +132,8 @@ pub struct Design {
     pub contacts: Vec<Contact>,
     /// The verdict on the finished meshes.
     pub verification: Verification,
+    /// Where the finished pieces touch.
+    pub touching: Vec<verify::contact::Contact>,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
 }
@@ -424,7 +426,7 @@ pub fn make(
     let is_free = has_no_bar(&params.connector, grid, &shell);
     let (runs, contacts) = connector::runs(&params.connector, sizes, &plan, &curves, &is_free);
     let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms)?;
-    let verification = verify::verify(ctx, &params.verify, model, &finished.meshes, &plan)?;
+    let (verification, touching) = verify::examine(ctx, &params.verify, model, &finished.meshes, &plan)?;
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
         surface: surface.clone(),
@@ -438,6 +440,7 @@ pub fn make(
         joints: finished.joints,
         contacts,
         verification,
+        touching,
         warnings: ctx.take_warnings(),
     })
 }

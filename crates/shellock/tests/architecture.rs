@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module may name those before it. `plan` stands before `body` because bodies are split along a plan.
-const ORDER: [&str; 13] = [
+const ORDER: [&str; 14] = [
     "strength",
     "segmentation",
     "sizes",
@@ -15,6 +15,7 @@ const ORDER: [&str; 13] = [
     "connector",
     "piece",
     "verify",
+    "certificate",
     "report",
     "feedback",
     "pipeline",
