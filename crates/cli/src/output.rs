@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use shellock::certificate::{Certificate, PieceFile, certify};
+use shellock::certificate::{Certificate, PieceFile, Play, Rattle, certify, rattle};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
     ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
 };
 use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::thin_share;
-use shellock::{PatchId, Warning};
+use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 
@@ -33,6 +33,8 @@ pub struct Summary {
     pub connector_share: f64,
     /// Greatest share of a piece's volume that is thinner than the thinnest wall.
     pub thin_share: f64,
+    /// How far each piece moves within its gaps.
+    pub rattle: IdVec<PatchId, Rattle>,
 }
 
 /// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
@@ -112,6 +114,7 @@ pub fn files(
         volume_ratio: volume / model.solid.volume(),
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
+        rattle: rattle(&design.pieces, &design.plan, &design.touching),
     };
     let plan = plan_json(model, params, design, warnings, &summary, &thin);
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
@@ -186,7 +189,7 @@ fn plan_json(
             json!({
                 "id": p, "file": piece_file(p), "neighbors": neighbours, "volume_mm3": mesh.signed_volume(),
                 "installation_direction": (-plan.separation(p).unit() + 0.0).to_array(),
-                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize],
+                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize], "rattle": summary.rattle[p],
             })
         })
         .collect();
@@ -316,7 +319,7 @@ fn report(
             installation_direction: stand(-plan.separation(p).unit()).to_array(),
             order: plan.position(p),
             is_key: plan.key() == p,
-            facts: piece_facts(design, p, turned[p.0 as usize].signed_volume() / 1000.0),
+            facts: piece_facts(design, summary, p, turned[p.0 as usize].signed_volume() / 1000.0),
         })
         .collect();
     let size = model.solid.mesh().bounds().size();
@@ -367,9 +370,13 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
 }
 
 /// A piece's volume, and how each of its seams holds.
-fn piece_facts(design: &Design, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
+fn piece_facts(design: &Design, summary: &Summary, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
     let mut facts = vec![("volume".to_owned(), format!("{volume_cm3:.1} cm³"))];
     facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
+    let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
+    let Rattle { alone, together } = summary.rattle[piece];
+    facts.extend(alone.map(|p| ("play alone".to_owned(), play(p))));
+    facts.extend(together.map(|p| ("play with others".to_owned(), play(p))));
     let seams = design.holding.iter().flat_map(|h| &h.seams);
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };

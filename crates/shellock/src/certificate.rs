@@ -8,6 +8,7 @@
 //! Coordinates are mm in assembly space. Motions are twists about [`Certificate::center`].
 
 mod proof;
+mod rattle;
 #[cfg(test)]
 mod tests;
 
@@ -22,6 +23,7 @@ use crate::verify::contact::{Contact, REACH_MM};
 use crate::verify::motion::{Freedom, free_motion};
 use crate::{IdVec, PatchId};
 use proof::prove;
+pub use rattle::{Play, Rattle, rattle};
 
 /// What [`Certificate::format`] says.
 pub const FORMAT: &str = "shellock-certificate";
@@ -79,7 +81,7 @@ pub enum Claim {
         multipliers: Vec<(usize, f64)>,
         /// Length of the multipliers' sum of wrenches. Less than `hold`, which is the proof.
         residual: f64,
-        /// Least singular value of the contacts' wrenches, weighted by the multipliers.
+        /// Least singular value of the contacts' wrenches, weighted by their multipliers up to 1.
         hold: f64,
     },
     /// Nothing is claimed while these are held: the contacts allow this motion.
@@ -157,8 +159,7 @@ pub fn certify(
     if named.len() < 2 || !named.into_iter().eq(pieces.ids()) {
         return None;
     }
-    let bounds = pieces.as_slice().iter().fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()));
-    let (center, length_mm) = (bounds.center(), 0.5 * bounds.diagonal());
+    let (center, length_mm) = frame(pieces);
     let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - center, ..*c }).collect();
     let (key, first) = (plan.key(), plan.steps[0].piece);
     let mut claims: Vec<Claim> =
@@ -187,9 +188,15 @@ pub fn certify(
     })
 }
 
+/// The middle of all pieces and half their diagonal, mm: what twists are about, and at what distance spins count.
+fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
+    let bounds = pieces.as_slice().iter().fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()));
+    (bounds.center(), 0.5 * bounds.diagonal())
+}
+
 /// The lock with its proof, or the motion that there is instead.
 fn claim_lock(contacts: &[Contact], n_pieces: usize, held: Vec<PatchId>, length_mm: f64) -> Claim {
-    match prove(contacts, n_pieces, &held, length_mm) {
+    match prove(contacts, n_pieces, &held, length_mm, Freedom::Rigid) {
         Some(proof) => {
             Claim::Locked { held, multipliers: proof.multipliers, residual: proof.residual, hold: proof.hold }
         }

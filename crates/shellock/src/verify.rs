@@ -14,6 +14,8 @@ pub mod sample;
 mod body;
 mod columns;
 mod cover;
+#[cfg(test)]
+pub(crate) mod kits;
 mod overlap;
 mod path;
 mod probe;

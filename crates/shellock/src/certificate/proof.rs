@@ -1,22 +1,22 @@
 //! Proofs that contacts allow no motion, which need no solver to be checked.
 //!
 //! The contacts of some free pieces allow the motions `x` with `A x ≤ 0` ([`crate::verify::motion`]). A proof is a positive
-//! multiplier `μ` for some of them. With `D = diag(μ)`, let
+//! multiplier `μ` for some of them. With `D = diag(min(μ, 1))`, let
 //!
 //! ```text
 //!  residual ≥ |Aᵀμ|        how far the multipliers, as forces, are from equilibrium
 //!  hold     ≤ σ_min(D A)   by how much every unit motion closes or opens contacts, weighted
 //! ```
 //!
-//! *If `residual < hold`, then `x = 0` is the only solution of `A x ≤ 0`.* For such an `x`, all entries of `D A x` are ≤ 0,
-//! so their sum is `−‖D A x‖₁`, and
+//! *If `residual < hold`, then `x = 0` is the only solution of `A x ≤ 0`.* For such an `x`, all entries of `A x` are ≤ 0, so
+//! `−μᵀA x = Σ μᵢ |aᵢ x|`, and
 //!
 //! ```text
-//!  hold |x| ≤ ‖D A x‖₂ ≤ ‖D A x‖₁ = −μᵀA x ≤ |Aᵀμ| |x| ≤ residual |x|,
+//!  hold |x| ≤ ‖D A x‖₂ ≤ ‖D A x‖₁ ≤ −μᵀA x ≤ |Aᵀμ| |x| ≤ residual |x|,
 //! ```
 //!
-//! which leaves `|x| = 0`. The conclusion is exact although `μ` is not: rounding only has to stay under `hold`. Neither
-//! side changes its meaning with the scale of `μ`.
+//! which leaves `|x| = 0`. The conclusion is exact although `μ` is not: rounding only has to stay under `hold`. Weights end
+//! at 1 so that a few great forces do not drown the rest in the rounding of `(D A)ᵀ D A`.
 //!
 //! Multipliers are found by giving each contact of a well-conditioned spanning set `S` the force 1 (a Cholesky factor of
 //! `A Aᵀ` with pivoting chooses it) and balancing `Aᵀ1_S` by the least-squares forces of all contacts. They exist exactly
@@ -25,7 +25,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Cholesky, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::PatchId;
 use crate::verify::contact::Contact;
@@ -47,16 +47,25 @@ pub(super) struct Proof {
     pub multipliers: Vec<(usize, f64)>,
     /// `|Aᵀμ|`.
     pub residual: f64,
-    /// `σ_min(D A)`; greater than the residual.
+    /// `σ_min(D A)`; greater than the residual. 1 where no piece is free.
     pub hold: f64,
 }
 
 /// A proof that of `n_pieces` none moves while those of `held` do not; `None` where there is none.
 ///
 /// Twists are about the origin, and spins count as velocities at `length_mm` from it.
-pub(super) fn prove(contacts: &[Contact], n_pieces: usize, held: &[PatchId], length_mm: f64) -> Option<Proof> {
+pub(super) fn prove(
+    contacts: &[Contact],
+    n_pieces: usize,
+    held: &[PatchId],
+    length_mm: f64,
+    freedom: Freedom,
+) -> Option<Proof> {
     let free: Vec<PatchId> = (0..n_pieces).map(PatchId::from).filter(|id| !held.contains(id)).collect();
-    let system = System::new(contacts, &free, length_mm, Freedom::Rigid);
+    if free.is_empty() {
+        return Some(Proof { multipliers: Vec::new(), residual: 0.0, hold: 1.0 });
+    }
+    let system = System::new(contacts, &free, length_mm, freedom);
     let mut multipliers: BTreeMap<usize, f64> = spanning_rows(&system)?.into_iter().map(|row| (row, 1.0)).collect();
     let load = rest(&system, &multipliers);
     for (row, force) in system.balance(&load, BALANCED).forces {
@@ -68,7 +77,7 @@ pub(super) fn prove(contacts: &[Contact], n_pieces: usize, held: &[PatchId], len
         correct(&system, &mut multipliers)?;
     }
     let residual = rest(&system, &multipliers).norm();
-    let hold = SymmetricEigen::new(weighted_gram(&system, &multipliers)).eigenvalues.min().max(0.0).sqrt();
+    let hold = SymmetricEigen::new(weighted_gram(&system, &multipliers, 1.0)).eigenvalues.min().max(0.0).sqrt();
     let named = multipliers.into_iter().map(|(row, value)| (system.rows[row].contact, value));
     (residual < hold).then(|| Proof { multipliers: named.collect(), residual, hold })
 }
@@ -104,15 +113,15 @@ fn rest(system: &System, multipliers: &BTreeMap<usize, f64>) -> DVector<f64> {
     rest
 }
 
-/// `(D A)ᵀ D A`.
-fn weighted_gram(system: &System, multipliers: &BTreeMap<usize, f64>) -> nalgebra::DMatrix<f64> {
-    system.gram(multipliers.iter().map(|(&row, &value)| (&system.rows[row], value * value)))
+/// `(D A)ᵀ D A`, the weights being the multipliers up to `most`.
+fn weighted_gram(system: &System, multipliers: &BTreeMap<usize, f64>, most: f64) -> DMatrix<f64> {
+    system.gram(multipliers.iter().map(|(&row, value)| (&system.rows[row], value.min(most).powi(2))))
 }
 
 /// Takes what is left of equilibrium out of the multipliers, by the change `δ` with the least `Σ (δ/μ)²`: small
 /// multipliers change little, and stay positive. `None` where one would not.
 fn correct(system: &System, multipliers: &mut BTreeMap<usize, f64>) -> Option<()> {
-    let spread = Cholesky::new(weighted_gram(system, multipliers))?.solve(&rest(system, multipliers));
+    let spread = Cholesky::new(weighted_gram(system, multipliers, f64::INFINITY))?.solve(&rest(system, multipliers));
     for (&row, value) in multipliers.iter_mut() {
         *value *= 1.0 - *value * system.dot(&system.rows[row], &spread);
         if !(*value > 0.0 && value.is_finite()) {

@@ -10,12 +10,14 @@
 //! [LawsonHanson1974, ch. 23] on a Cholesky factor of the active contacts, never more of them than unknowns.
 
 mod forces;
+mod play;
 mod system;
 
 use shellock_geom::Vec3;
 
 use super::contact::Contact;
 use crate::PatchId;
+pub(crate) use play::Corner;
 pub(crate) use system::System;
 
 /// Which motions of a piece are considered.

@@ -61,8 +61,8 @@ impl System {
 
 /// The contacts that carry force, and the Cholesky factor of their products `A_P A_Pᵀ`.
 #[derive(Default)]
-struct Active {
-    rows: Vec<usize>,
+pub(super) struct Active {
+    pub(super) rows: Vec<usize>,
     forces: Vec<f64>,
     /// Row `i` has `i + 1` entries.
     lower: Vec<Vec<f64>>,
@@ -70,7 +70,7 @@ struct Active {
 
 impl Active {
     /// Adds a row with no force; `false`, and nothing is added, where it depends on the others.
-    fn push(&mut self, system: &System, entering: usize) -> bool {
+    pub(super) fn push(&mut self, system: &System, entering: usize) -> bool {
         let row = &system.rows[entering];
         let products: Vec<f64> = self.rows.iter().map(|&p| system.dot_rows(row, &system.rows[p])).collect();
         let mut line = self.forward(&products);
@@ -109,7 +109,8 @@ impl Active {
         entering_left
     }
 
-    fn forward(&self, right: &[f64]) -> Vec<f64> {
+    /// Solves with the factor.
+    pub(super) fn forward(&self, right: &[f64]) -> Vec<f64> {
         let mut y: Vec<f64> = Vec::with_capacity(right.len() + 1);
         for (line, b) in self.lower.iter().zip(right) {
             let known: f64 = line.iter().zip(&y).map(|(l, y)| l * y).sum();
@@ -118,7 +119,8 @@ impl Active {
         y
     }
 
-    fn backward(&self, right: &[f64]) -> Vec<f64> {
+    /// Solves with the transposed factor.
+    pub(super) fn backward(&self, right: &[f64]) -> Vec<f64> {
         let mut x = right.to_vec();
         for i in (0..x.len()).rev() {
             x[i] /= self.lower[i][i];
@@ -129,7 +131,7 @@ impl Active {
     }
 
     /// Takes row `at` out of the factor; Givens rotations make it triangular again.
-    fn remove(&mut self, at: usize) {
+    pub(super) fn remove(&mut self, at: usize) {
         self.rows.remove(at);
         self.forces.remove(at);
         self.lower.remove(at);

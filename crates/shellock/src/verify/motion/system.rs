@@ -50,6 +50,11 @@ impl System {
         Self { dof, n: free.len() * dof, rows }
     }
 
+    /// Where the unknowns of the free piece at `position` begin.
+    pub fn column(&self, position: usize) -> usize {
+        position * self.dof
+    }
+
     /// `a · x`.
     pub fn dot(&self, row: &Row, x: &DVector<f64>) -> f64 {
         let part = |at: Option<usize>| at.map_or(0.0, |at| (0..self.dof).map(|k| row.wrench[k] * x[at + k]).sum());
