@@ -14,7 +14,7 @@ const PIXEL_MM: f64 = 0.25;
 /// Stretches that reach less far past each other are rounding, mm.
 const ROUNDING_MM: f64 = 0.02;
 /// Share of a piece's shadow that single rays may find in the way.
-const SLIVERS: f64 = 2e-3;
+const SLIVERS: f64 = 1e-3;
 /// The same, mm², for small pieces.
 const SLIVERS_MM2: f64 = 1.0;
 /// Rays for overlaps: parallel to no face of a common model.

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
@@ -49,8 +50,21 @@ fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// The kit, its certificate and its plan; the files of the pieces lie in `folder`.
+/// A kit: the files of its pieces, its certificate and its plan.
+struct Made {
+    files: Vec<(String, Vec<u8>)>,
+    certificate: Value,
+    plan: Value,
+}
+
+/// The kit's certificate and plan; the files of the pieces lie in `folder` then.
 fn made_kit(folder: &Path) -> (Value, Value) {
+    static KIT: LazyLock<Made> = LazyLock::new(make);
+    KIT.files.iter().for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
+    (KIT.certificate.clone(), KIT.plan.clone())
+}
+
+fn make() -> Made {
     let pieces: IdVec<PatchId, TriMesh> = parts().iter().map(as_written).collect();
     let steps = [Vec3::X, Vec3::X, Vec3::Z].into_iter().enumerate();
     let steps = steps.map(|(i, d)| InstallationStep { piece: i.into(), separation: LatticeDirection::nearest(d) });
@@ -58,19 +72,18 @@ fn made_kit(folder: &Path) -> (Value, Value) {
     let (report, stop) = (|_: shellock::context::Progress<'_>| {}, AtomicBool::new(false));
     let model = Solid::new(cuboid(ALL, ALL, ALL).to_mesh()).unwrap();
     let params = VerifyParams { clearance_mm: CLEARANCE_MM, seed: 0 };
-    let (_, contacts) = examine(&Ctx::new(&report, &stop), &params, &model, &pieces, &plan).unwrap();
-    let files = pieces.iter().map(|(id, mesh)| {
-        let (file, bytes) = (format!("{id}.stl"), write_stl_binary(mesh));
-        fs::write(folder.join(&file), &bytes).unwrap();
-        PieceFile { id, file, sha256: sha256(&bytes) }
-    });
-    let certificate = certify(files.collect(), &pieces, &plan, &contacts, CLEARANCE_MM).unwrap();
+    let (verdict, contacts) = examine(&Ctx::new(&report, &stop), &params, &model, &pieces, &plan).unwrap();
+    let files: Vec<(String, Vec<u8>)> =
+        pieces.iter().map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh))).collect();
+    let named = pieces.ids().zip(&files);
+    let named = named.map(|(id, (file, bytes))| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
+    let certificate = certify(named, &pieces, &plan, &contacts, &verdict, CLEARANCE_MM).unwrap();
     let pieces = plan.steps.iter().map(|s| {
         json!({ "file": format!("{}.stl", s.piece), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
     });
     let plan = json!({ "key_piece": 2, "installation_order": [0, 1, 2], "clearance": CLEARANCE_MM,
                        "pieces": pieces.collect::<Vec<_>>() });
-    (serde_json::to_value(certificate).unwrap(), plan)
+    Made { files, certificate: serde_json::to_value(certificate).unwrap(), plan }
 }
 
 /// The claims that are refuted once `change` has been at the kit.

@@ -158,7 +158,8 @@ fn piece_file(p: PatchId) -> String {
 fn certificate(files: &[(String, Vec<u8>)], design: &Design, clearance_mm: f64) -> Option<Vec<u8>> {
     let named = files.iter().zip(design.pieces.ids());
     let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
-    certify(named, &design.pieces, &design.plan, &design.touching, clearance_mm).map(|c| certificate_bytes(&c))
+    certify(named, &design.pieces, &design.plan, &design.touching, &design.verification, clearance_mm)
+        .map(|c| certificate_bytes(&c))
 }
 
 /// As it is written to [`CERTIFICATE`].

@@ -178,7 +178,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
     let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &solid, &pieces, &order)?;
-    let claimed = certify(files, &pieces, &order, &contacts, params.clearance_mm);
+    let claimed = certify(files, &pieces, &order, &contacts, &verdict, params.clearance_mm);
     display.finish();
     if let Some(claimed) = claimed {
         write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed))?;

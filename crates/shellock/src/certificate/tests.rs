@@ -12,7 +12,8 @@ use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, PIN, cuboid, grown, pinned_kit,
 fn certified(kit: &Kit) -> Certificate {
     let file = |id: PatchId| PieceFile { id, file: format!("{id}.stl"), sha256: String::new() };
     let files = kit.pieces.ids().map(file).collect();
-    certify(files, &kit.pieces, &kit.plan, &kit.examined().1, 2.0 * HALF_GAP_MM).expect("the plan is whole")
+    let (verdict, contacts) = kit.examined();
+    certify(files, &kit.pieces, &kit.plan, &contacts, &verdict, 2.0 * HALF_GAP_MM).expect("the plan is whole")
 }
 
 /// Who can move while key and first piece are held; empty where a lock is claimed.
@@ -94,6 +95,19 @@ fn blocks_in_a_straight_groove_are_not_certified() {
     let pieces = [tube, block(0.0, 9.9), block(20.0, 30.0), block(10.0, 19.9)];
     let kit = Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::NEG_X, Vec3::X, Vec3::X]);
     assert!(!movers(&kit).is_empty());
+}
+
+#[test]
+fn a_path_that_rubs_is_not_claimed() {
+    let mut kit = pinned_kit(|_| {});
+    let installs = |kit: &Kit| {
+        let claims = certified(kit).claims.into_iter();
+        let piece = |claim| if let Claim::Installs { piece, .. } = claim { Some(piece.0) } else { None };
+        claims.filter_map(piece).collect::<Vec<u32>>()
+    };
+    assert_eq!(installs(&kit), [1, 2]);
+    kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X);
+    assert_eq!(installs(&kit), [2]);
 }
 
 #[test]
@@ -225,8 +239,9 @@ fn gaps_of_a_row_add_up_when_all_may_move() {
 fn a_plan_that_leaves_a_piece_out_is_not_certified() {
     let mut kit = pinned_kit(|_| {});
     kit.plan.steps.pop();
-    assert_eq!(certify(Vec::new(), &kit.pieces, &kit.plan, &[], 0.1), None);
+    let claimed = |kit: &Kit| certify(Vec::new(), &kit.pieces, &kit.plan, &[], &Verification::default(), 0.1);
+    assert_eq!(claimed(&kit), None);
     kit.pieces = [Volume::empty().to_mesh(), Volume::empty().to_mesh()].into_iter().collect();
-    let claims = certify(Vec::new(), &kit.pieces, &kit.plan, &[], 0.1).expect("two pieces, both named").claims;
+    let claims = claimed(&kit).expect("two pieces, both named").claims;
     assert!(matches!(&claims[1], Claim::Moves { motions, .. } if motions.len() == 1), "nothing holds an empty piece");
 }
