@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use shellock::certificate::{Certificate, PieceFile, Play, Rattle, certify, rattle};
+use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
     ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
@@ -33,8 +33,8 @@ pub struct Summary {
     pub connector_share: f64,
     /// Greatest share of a piece's volume that is thinner than the thinnest wall.
     pub thin_share: f64,
-    /// How far each piece moves within its gaps.
-    pub rattle: IdVec<PatchId, Rattle>,
+    /// How far each piece moves within its gaps; `None` for one that leaves.
+    pub rattle: IdVec<PatchId, Option<Play>>,
 }
 
 /// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
@@ -114,7 +114,7 @@ pub fn files(
         volume_ratio: volume / model.solid.volume(),
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
-        rattle: rattle(&design.pieces, &design.plan, &design.touching),
+        rattle: play_alone(&design.pieces, &design.plan, &design.touching),
     };
     let plan = plan_json(model, params, design, warnings, &summary, &thin);
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
@@ -375,9 +375,7 @@ fn piece_facts(design: &Design, summary: &Summary, piece: PatchId, volume_cm3: f
     let mut facts = vec![("volume".to_owned(), format!("{volume_cm3:.1} cm³"))];
     facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
     let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
-    let Rattle { alone, together } = summary.rattle[piece];
-    facts.extend(alone.map(|p| ("play alone".to_owned(), play(p))));
-    facts.extend(together.map(|p| ("play with others".to_owned(), play(p))));
+    facts.extend(summary.rattle[piece].map(|p| ("play".to_owned(), play(p))));
     let seams = design.holding.iter().flat_map(|h| &h.seams);
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };

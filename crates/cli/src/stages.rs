@@ -151,7 +151,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
     let text = read(&path)?;
     let plan: Value = serde_json::from_slice(&text).map_err(|e| broken(&format!("not a plan: {e}")))?;
-    let (files, pieces, order) = pieces_of(kit, &plan).map_err(|f| match f {
+    let Kit { files, pieces, order } = pieces_of(kit, &plan).map_err(|f| match f {
         Failure::Wrong(what) => broken(&what),
         other => other,
     })?;
@@ -195,8 +195,15 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     Ok(code)
 }
 
+/// What a plan file names.
+struct Kit {
+    files: Vec<PieceFile>,
+    pieces: IdVec<PatchId, TriMesh>,
+    order: InstallationPlan,
+}
+
 /// The files, their meshes and the order that a plan file names.
-fn pieces_of(kit: &Path, plan: &Value) -> Result<(Vec<PieceFile>, IdVec<PatchId, TriMesh>, InstallationPlan), Failure> {
+fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
     let order = order_of(plan)?;
     let (mut files, mut meshes) = (Vec::new(), Vec::new());
     for (i, piece) in plan["pieces"].as_array().into_iter().flatten().enumerate() {
@@ -205,7 +212,7 @@ fn pieces_of(kit: &Path, plan: &Value) -> Result<(Vec<PieceFile>, IdVec<PatchId,
         files.push(PieceFile { id: i.into(), file: file.to_owned(), sha256: sha256(&bytes) });
         meshes.push(weld(&loaded.mesh).mesh);
     }
-    Ok((files, meshes.into_iter().collect(), order))
+    Ok(Kit { files, pieces: meshes.into_iter().collect(), order })
 }
 
 /// The order and the directions that a plan file names.

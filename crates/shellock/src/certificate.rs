@@ -23,7 +23,7 @@ use crate::verify::motion::{Freedom, free_motion};
 use crate::verify::{Finding, Motion, Verification};
 use crate::{IdVec, PatchId};
 use proof::prove;
-pub use rattle::{Play, Rattle, rattle};
+pub use rattle::{Play, play_alone, play_together};
 
 /// What [`Certificate::format`] says.
 pub const FORMAT: &str = "shellock-certificate";

@@ -19,11 +19,6 @@ use crate::verify::contact::Contact;
 use crate::verify::motion::{Corner, Freedom, System};
 use crate::{IdVec, PatchId};
 
-/// Contacts of all pieces together that play is computed from; every k-th of a longer list.
-///
-/// On kits of 9 to 20 pieces three times as many change the greatest play by less than 0.02 mm.
-const MOST_CONTACTS: usize = 4_000;
-
 /// How far a piece moves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Play {
@@ -33,42 +28,61 @@ pub struct Play {
     pub rotation_deg: f64,
 }
 
-/// How far a piece moves within its gaps. `None`: as far as it likes, or it is held by definition.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rattle {
-    /// While no other piece moves.
-    pub alone: Option<Play>,
-    /// While the key and the first piece do not move, and all others do as they may: gaps add up.
-    pub together: Option<Play>,
-}
-
-/// The play of each piece. Takes about 0.5 s for 13 pieces on two cores, most of it for `together`.
-pub fn rattle(
+/// The play of each piece while no other moves; `None` where it has no end. About 0.1 s for 13 pieces.
+pub fn play_alone(
     pieces: &IdVec<PatchId, TriMesh>,
     plan: &InstallationPlan,
     contacts: &[Contact],
-) -> IdVec<PatchId, Rattle> {
-    let none = Rattle { alone: None, together: None };
-    let (Some(first), Some(key)) = (plan.steps.first(), plan.steps.last()) else {
-        return IdVec::from_fn(pieces.len(), |_| none);
-    };
+) -> IdVec<PatchId, Option<Play>> {
     let (center, length_mm) = frame(pieces);
-    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - center, ..*c }).collect();
-    let keep_every = centered.len().div_ceil(MOST_CONTACTS).max(1);
-    let kept: Vec<Contact> = centered.iter().copied().step_by(keep_every).collect();
-    let free: Vec<PatchId> = pieces.ids().filter(|&p| p != key.piece && p != first.piece).collect();
     let ids: Vec<PatchId> = pieces.ids().collect();
-    let play_of = |piece: PatchId, contacts: &[Contact], free: &[PatchId]| {
-        let step = plan.steps.iter().find(|s| s.piece == piece)?;
-        let moved = Moved { piece, centroid: centroid(&pieces[piece]) - center, separation: step.separation.unit() };
-        moved.play(contacts, free, length_mm)
+    let play = |&piece: &PatchId| {
+        let own = centered(contacts.iter().filter(|c| c.a == piece || c.b == piece), center);
+        Moved::new(pieces, plan, piece, center)?.play(&mut Room::new(&own, &[piece], length_mm))
     };
-    let rattles = ids.into_par_iter().map(|piece| {
-        let own: Vec<Contact> = centered.iter().copied().filter(|c| c.a == piece || c.b == piece).collect();
-        let together = free.contains(&piece).then(|| play_of(piece, &kept, &free)).flatten();
-        Rattle { alone: play_of(piece, &own, &[piece]), together }
-    });
-    rattles.collect::<Vec<Rattle>>().into_iter().collect()
+    ids.par_iter().map(play).collect::<Vec<Option<Play>>>().into_iter().collect()
+}
+
+/// The play of each piece while key and first piece do not move, and all others do as they may, so that gaps add up;
+/// `None` where it has no end, and for the two that are held.
+///
+/// Slow, and no part of a build: 3 s for 9 pieces with 12 000 contacts, and more than in proportion for more pieces.
+pub fn play_together(
+    pieces: &IdVec<PatchId, TriMesh>,
+    plan: &InstallationPlan,
+    contacts: &[Contact],
+) -> IdVec<PatchId, Option<Play>> {
+    let (center, length_mm) = frame(pieces);
+    let ends = [plan.steps.first(), plan.steps.last()].map(|step| step.map(|s| s.piece));
+    let free: Vec<PatchId> = pieces.ids().filter(|&p| !ends.contains(&Some(p))).collect();
+    let mut room = Room::new(&centered(contacts.iter(), center), &free, length_mm);
+    let play = |piece: PatchId| {
+        let moved = Moved::new(pieces, plan, piece, center).filter(|_| free.contains(&piece))?;
+        moved.play(&mut room)
+    };
+    pieces.ids().map(play).collect()
+}
+
+fn centered<'a>(contacts: impl Iterator<Item = &'a Contact>, center: Vec3) -> Vec<Contact> {
+    contacts.map(|c| Contact { point: c.point - center, ..*c }).collect()
+}
+
+/// What contacts leave free pieces.
+struct Room {
+    system: System,
+    free: Vec<PatchId>,
+    gaps_mm: Vec<f64>,
+    length_mm: f64,
+    corner: Corner,
+}
+
+impl Room {
+    fn new(contacts: &[Contact], free: &[PatchId], length_mm: f64) -> Self {
+        let system = System::new(contacts, free, length_mm, Freedom::Rigid);
+        let gaps_mm = system.rows.iter().map(|row| contacts[row.contact].gap_mm.max(0.0)).collect();
+        let corner = Corner::at_rest(&system);
+        Self { system, free: free.to_vec(), gaps_mm, length_mm, corner }
+    }
 }
 
 /// A piece whose play is asked for; places are about the center of the kit.
@@ -79,22 +93,26 @@ struct Moved {
 }
 
 impl Moved {
-    fn play(&self, contacts: &[Contact], free: &[PatchId], length_mm: f64) -> Option<Play> {
-        let system = System::new(contacts, free, length_mm, Freedom::Rigid);
-        let gaps_mm: Vec<f64> = system.rows.iter().map(|row| contacts[row.contact].gap_mm.max(0.0)).collect();
+    /// `None` where the plan does not name the piece.
+    fn new(pieces: &IdVec<PatchId, TriMesh>, plan: &InstallationPlan, piece: PatchId, center: Vec3) -> Option<Self> {
+        let step = plan.steps.iter().find(|s| s.piece == piece)?;
+        Some(Self { piece, centroid: centroid(&pieces[piece]) - center, separation: step.separation.unit() })
+    }
+
+    fn play(&self, room: &mut Room) -> Option<Play> {
+        let Room { system, free, gaps_mm, length_mm, corner } = room;
         let at = system.column(free.binary_search(&self.piece).ok()?);
-        let mut corner = Corner::at_rest(&system);
         let mut farthest = |velocity: Vec3, spin: Vec3| {
             let mut objective = DVector::zeros(system.n);
             for k in 0..3 {
                 (objective[at + k], objective[at + 3 + k]) = (velocity[k], spin[k]);
             }
-            system.farthest(&objective, &gaps_mm, &mut corner)
+            system.farthest(&objective, gaps_mm, corner)
         };
         let (mut translation_mm, mut rotation) = (0.0f64, 0.0f64);
         for axis in [Vec3::X, Vec3::Y, Vec3::Z, self.separation] {
             for d in [axis, -axis] {
-                translation_mm = translation_mm.max(farthest(d, self.centroid.cross(d) / length_mm)?);
+                translation_mm = translation_mm.max(farthest(d, self.centroid.cross(d) / *length_mm)?);
             }
         }
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
@@ -102,7 +120,7 @@ impl Moved {
                 rotation = rotation.max(farthest(Vec3::ZERO, d)?);
             }
         }
-        Some(Play { translation_mm, rotation_deg: (rotation / length_mm).to_degrees() })
+        Some(Play { translation_mm, rotation_deg: (rotation / *length_mm).to_degrees() })
     }
 }
 
