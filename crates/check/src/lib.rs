@@ -166,7 +166,8 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
 fn test_completeness(c: &Certificate) -> Tested {
     let count = |is_it: &dyn Fn(&Claim) -> bool| c.claims.iter().filter(|claim| is_it(claim)).count();
     let first = c.installation_order.first().copied();
-    let is_lock = |claim: &Claim| matches!(claim, Claim::Locked { held, .. } if Some(held.clone()) == first.map(|f| vec![c.key, f]));
+    let ends = first.map(|first| vec![c.key, first]);
+    let is_lock = |claim: &Claim| matches!(claim, Claim::Locked { held, .. } if Some(held) == ends.as_ref());
     if count(&is_lock) != 1 {
         return Err("it is not claimed that nothing moves while the key and the first piece are held".into());
     }
