@@ -49,6 +49,11 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).map_err(unreadable)
 }
 
+/// SHA-256 in lower-case hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
 /// The mesh in a file.
 pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
     let bytes = read(path)?;
@@ -77,7 +82,7 @@ pub fn model(path: &Path, options: &Options) -> Result<Model, Failure> {
     made.labels = labels;
     made.n_file_faces = loaded.n_file_faces();
     made.file_face = file_face;
-    made.sha256 = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+    made.sha256 = sha256(&bytes);
     made.notes = notes;
     Ok(made)
 }
@@ -112,7 +117,7 @@ pub fn figure(name: &str, options: &Options) -> Result<Model, Failure> {
     let solid = shellock_figure(name, options.size.or(options.height).unwrap_or(DEFAULT_SIZE_MM))?;
     let bytes = shellock_geom::io::write_stl_binary(solid.mesh());
     let mut model = made_of(solid, 1.0, &PathBuf::from(format!("{name}.stl")))?;
-    model.sha256 = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+    model.sha256 = sha256(&bytes);
     Ok(model)
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone};
 use shellock::key::KeySite;
 use shellock::piece::Detent;
 use shellock::pipeline::{Design, Params};
@@ -14,14 +15,17 @@ use shellock::report::{
 };
 use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::thin_share;
-use shellock::{PatchId, Warning};
+use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::args::{Axis, Options};
 use crate::build::{bearing, scope};
 use crate::failure::Failure;
-use crate::input::Model;
+use crate::input::{Model, sha256};
+
+/// The certificate's name within a kit.
+pub const CERTIFICATE: &str = "certificate.json";
 
 /// Figures of a kit that people and machines ask for.
 pub struct Summary {
@@ -31,6 +35,8 @@ pub struct Summary {
     pub connector_share: f64,
     /// Greatest share of a piece's volume that is thinner than the thinnest wall.
     pub thin_share: f64,
+    /// How far each piece moves within its gaps; `None` for one that leaves.
+    pub rattle: IdVec<PatchId, Option<Play>>,
 }
 
 /// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
@@ -121,14 +127,17 @@ pub fn files(
         volume_ratio: volume / model.solid.volume(),
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
+        rattle: play_alone(&design.pieces, &design.plan, &design.touching),
     };
     let plan = plan_json(model, params, design, warnings, &summary, &thin);
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
     text.push('\n');
     let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
-    for (p, mesh) in design.pieces.iter() {
-        files.push((piece_file(p), write_stl_binary(mesh)));
-    }
+    let meshes = design.pieces.iter().map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
+    let pieces: Vec<(String, Vec<u8>)> = meshes.collect();
+    let claimed = certificate(&pieces, design, params.verify.clearance_mm);
+    files.extend(claimed.map(|bytes| (CERTIFICATE.to_owned(), bytes)));
+    files.extend(pieces);
     let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
     let chart = design.strength.as_ref().map(|strength| stress_chart(options, params, design, strength));
     let figures = chart.iter().map(|svg| ("Stress in a fall".to_owned(), svg.clone())).collect();
@@ -159,6 +168,21 @@ fn piece_file(p: PatchId) -> String {
     format!("pieces/piece-{:02}.stl", p.0)
 }
 
+/// What is claimed of the kit whose pieces are these files, in order of their ids.
+fn certificate(files: &[(String, Vec<u8>)], design: &Design, clearance_mm: f64) -> Option<Vec<u8>> {
+    let named = files.iter().zip(design.pieces.ids());
+    let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
+    certify(named, &design.pieces, &design.plan, &design.touching, &design.verification, clearance_mm)
+        .map(|c| certificate_bytes(&c))
+}
+
+/// As it is written to [`CERTIFICATE`].
+pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
+    let mut bytes = serde_json::to_vec_pretty(certificate).expect("numbers and strings can be written");
+    bytes.push(b'\n');
+    bytes
+}
+
 fn plan_json(
     model: &Model,
     params: &Params,
@@ -180,7 +204,7 @@ fn plan_json(
             json!({
                 "id": p, "file": piece_file(p), "neighbors": neighbours, "volume_mm3": mesh.signed_volume(),
                 "installation_direction": (-plan.separation(p).unit() + 0.0).to_array(),
-                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize],
+                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize], "rattle": summary.rattle[p],
             })
         })
         .collect();
@@ -336,7 +360,7 @@ fn report(
             installation_direction: stand(-plan.separation(p).unit()).to_array(),
             order: plan.position(p),
             is_key: plan.key() == p,
-            facts: piece_facts(design, p, turned[p.0 as usize].signed_volume() / 1000.0),
+            facts: piece_facts(design, summary, p, turned[p.0 as usize].signed_volume() / 1000.0),
         })
         .collect();
     let size = model.solid.mesh().bounds().size();
@@ -387,9 +411,11 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
 }
 
 /// A piece's volume, and how each of its seams holds.
-fn piece_facts(design: &Design, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
+fn piece_facts(design: &Design, summary: &Summary, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
     let mut facts = vec![("volume".to_owned(), format!("{volume_cm3:.1} cm³"))];
     facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
+    let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
+    facts.extend(summary.rattle[piece].map(|p| ("play".to_owned(), play(p))));
     let seams = design.holding.iter().flat_map(|h| &h.seams);
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
+use shellock::certificate::{PieceFile, certify};
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
 use shellock::verify::VerifyParams;
@@ -17,7 +18,8 @@ use crate::Session;
 use crate::args::Options;
 use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
-use crate::input::{self, load, read};
+use crate::input::{self, load, read, sha256};
+use crate::output::{CERTIFICATE, certificate_bytes};
 use crate::progress::{Display, PlanClock};
 
 /// Writes one file: whole or not at all.
@@ -149,7 +151,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
     let text = read(&path)?;
     let plan: Value = serde_json::from_slice(&text).map_err(|e| broken(&format!("not a plan: {e}")))?;
-    let (pieces, order) = pieces_of(kit, &plan).map_err(|f| match f {
+    let Kit { files, pieces, order } = pieces_of(kit, &plan).map_err(|f| match f {
         Failure::Wrong(what) => broken(&what),
         other => other,
     })?;
@@ -175,8 +177,12 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let display = Display::new(session.is_json);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let verdict = shellock::verify::verify(&ctx, &params, &solid, &pieces, &order)?;
+    let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &solid, &pieces, &order)?;
+    let claimed = certify(files, &pieces, &order, &contacts, &verdict, params.clearance_mm);
     display.finish();
+    if let Some(claimed) = claimed {
+        write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed))?;
+    }
     let code = u8::from(!verdict.passed());
     if session.is_json {
         println!(
@@ -189,16 +195,24 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     Ok(code)
 }
 
-/// The meshes and the order that a plan file names.
-fn pieces_of(kit: &Path, plan: &Value) -> Result<(IdVec<PatchId, TriMesh>, InstallationPlan), Failure> {
+/// What a plan file names.
+struct Kit {
+    files: Vec<PieceFile>,
+    pieces: IdVec<PatchId, TriMesh>,
+    order: InstallationPlan,
+}
+
+/// The files, their meshes and the order that a plan file names.
+fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
     let order = order_of(plan)?;
-    let mut meshes = Vec::new();
+    let (mut files, mut meshes) = (Vec::new(), Vec::new());
     for (i, piece) in plan["pieces"].as_array().into_iter().flatten().enumerate() {
         let file = piece["file"].as_str().ok_or_else(|| Failure::Wrong(format!("piece {i} names no file")))?;
-        let (loaded, _) = load(&kit.join(file))?;
+        let (loaded, bytes) = load(&kit.join(file))?;
+        files.push(PieceFile { id: i.into(), file: file.to_owned(), sha256: sha256(&bytes) });
         meshes.push(weld(&loaded.mesh).mesh);
     }
-    Ok((meshes.into_iter().collect(), order))
+    Ok(Kit { files, pieces: meshes.into_iter().collect(), order })
 }
 
 /// The order and the directions that a plan file names.

@@ -59,7 +59,7 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     for piece in plan["pieces"].as_array().unwrap() {
         assert!(dir.path().join("one").join(piece["file"].as_str().unwrap()).is_file());
     }
-    for name in ["assembly.3mf", "report.html", "pieces.png", "segmentation.ply"] {
+    for name in ["assembly.3mf", "certificate.json", "report.html", "pieces.png", "segmentation.ply"] {
         assert!(dir.path().join("one").join(name).is_file(), "{name}");
     }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2, "something was left behind");

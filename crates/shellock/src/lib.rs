@@ -1,9 +1,10 @@
 //! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that they hold.
 //!
 //! After Yao, Chen, Xu, Wang, "Interlocking-shell pieces", 2017. The stages, in the only direction that data flows:
-//! segmentation → key → sizes → plan → body → connector → piece → verify → report.
+//! segmentation → key → sizes → plan → body → connector → piece → verify → certificate → report.
 
 pub mod body;
+pub mod certificate;
 pub mod connector;
 pub mod contact_graph;
 pub mod context;

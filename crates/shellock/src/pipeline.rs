@@ -161,6 +161,8 @@ pub struct Design {
     pub contacts: Vec<Contact>,
     /// The verdict on the finished meshes.
     pub verification: Verification,
+    /// Where the finished pieces touch.
+    pub touching: Vec<verify::contact::Contact>,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
 }
@@ -394,7 +396,7 @@ pub fn make(
     let grip = params.grip.map(|grip| Grip { key: plan.key(), ..grip });
     let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms, grip.as_ref())?;
     warn_of_detents(ctx, &finished.detents);
-    let verification = verify::verify(ctx, &params.verify, model, &finished.meshes, &plan)?;
+    let (verification, touching) = verify::examine(ctx, &params.verify, model, &finished.meshes, &plan)?;
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
         turn: Turn::default(),
@@ -411,6 +413,7 @@ pub fn make(
         detents: finished.detents,
         contacts,
         verification,
+        touching,
         warnings: ctx.take_warnings(),
     })
 }

@@ -15,6 +15,8 @@ pub mod sample;
 mod body;
 mod columns;
 mod cover;
+#[cfg(test)]
+pub(crate) mod kits;
 mod overlap;
 mod path;
 mod probe;
@@ -77,6 +79,12 @@ pub struct Motion {
     pub velocity: [f64; 3],
     /// Spin times half the diagonal of the model; components in [−1, 1].
     pub spin: [f64; 3],
+}
+
+impl From<&Twist> for Motion {
+    fn from(t: &Twist) -> Self {
+        Self { piece: t.piece, velocity: t.velocity.to_array(), spin: t.spin.to_array() }
+    }
 }
 
 /// What is wrong, where, and with whom. Places are mm in assembly space.
@@ -201,6 +209,17 @@ pub fn verify(
     pieces: &IdVec<PatchId, TriMesh>,
     plan: &InstallationPlan,
 ) -> Result<Verification, Cancelled> {
+    examine(ctx, params, model, pieces, plan).map(|(verdict, _)| verdict)
+}
+
+/// As [`verify`], and the contacts of the pieces, from which a certificate is made; none where the plan is broken.
+pub fn examine(
+    ctx: &Ctx,
+    params: &VerifyParams,
+    model: &Solid,
+    pieces: &IdVec<PatchId, TriMesh>,
+    plan: &InstallationPlan,
+) -> Result<(Verification, Vec<Contact>), Cancelled> {
     ctx.stage("verify", 0)?;
     let mut verdict = Verification::default();
     verdict.add(check_plan(pieces, plan));
@@ -214,7 +233,7 @@ pub fn verify(
     verdict.add(overlap::check_outside(model, &bodies));
     verdict.add(cover::check(model, &bodies, params.seed));
     if !is_plan {
-        return Ok(verdict);
+        return Ok((verdict, Vec::new()));
     }
     let length_mm = model.mesh().bounds().diagonal();
     verdict.add(path::check(ctx, &bodies, &plan.steps, length_mm)?);
@@ -229,7 +248,7 @@ pub fn verify(
         ctx.check()?;
         verdict.add(check_motion(name, &bodies, &contacts, held, 0.5 * length_mm, freedom));
     }
-    Ok(verdict)
+    Ok((verdict, contacts))
 }
 
 fn check_plan(pieces: &IdVec<PatchId, TriMesh>, plan: &InstallationPlan) -> (Check, Vec<Finding>) {
@@ -262,15 +281,14 @@ fn check_motion(
 ) -> (Check, Option<Finding>) {
     let moving = motion::free_motion(contacts, bodies.len(), held, scale_mm, freedom);
     let figure = format!("{} pieces move; {} contacts", moving.len(), contacts.len());
-    let named = |t: &Twist| Motion { piece: t.piece, velocity: t.velocity.to_array(), spin: t.spin.to_array() };
     let is_same = |s: &Twist, t: &Twist| s.velocity.distance(t.velocity) + s.spin.distance(t.spin) < SAME_MOTION;
     let finding = match moving.first() {
         None => None,
         Some(t) if held.len() == 1 && moving.len() + 1 == bodies.len() && moving.iter().all(|s| is_same(s, t)) => {
             let of_key = Twist { piece: held[0], velocity: -t.velocity, spin: -t.spin };
-            Some(Finding::KeyLeaves { motion: named(&of_key) })
+            Some(Finding::KeyLeaves { motion: Motion::from(&of_key) })
         }
-        Some(_) => Some(Finding::ClusterMoves { motions: moving.iter().map(named).collect() }),
+        Some(_) => Some(Finding::ClusterMoves { motions: moving.iter().map(Motion::from).collect() }),
     };
     (Check::new(name, moving.is_empty(), figure), finding)
 }

@@ -13,7 +13,7 @@ const SPACING_MM: f64 = 0.7;
 /// Least and most samples on one piece.
 const N_SAMPLES: (f64, f64) = (2_000.0, 60_000.0);
 /// What may come on top of the clearance between faces that still count as touching, mm: a printer's error.
-const REACH_MM: f64 = 0.15;
+pub const REACH_MM: f64 = 0.15;
 /// Faces whose normals have a greater dot product do not face each other (26° from opposite).
 const FACING: f64 = -0.9;
 /// Most contacts that are kept; every k-th of a longer list.

@@ -1,0 +1,270 @@
+//! Checks the certificate of a kit of shell pieces with none of the code that made it.
+//!
+//! Everything is recomputed from `certificate.json`, `plan.json` and the pieces' STL files; nothing is believed but the
+//! choice of contacts and multipliers, and those only as far as they stand the test. What each claim means and why its
+//! test is enough: docs/certificate.md.
+
+mod lock;
+mod mesh;
+mod rays;
+mod vector;
+
+use std::fmt;
+use std::fs;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use mesh::Mesh;
+use vector::{Vec3, scale};
+
+/// Most that a contact's faces may be apart beyond the clearance, mm.
+const MOST_REACH_MM: f64 = 0.15;
+/// Difference of two numbers written from one.
+const SAME: f64 = 1e-9;
+
+/// One claim and what became of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The claim, as a statement.
+    pub claim: String,
+    /// Whether it stood the test.
+    pub is_confirmed: bool,
+    /// The figure that decided.
+    pub figure: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = if self.is_confirmed { "confirmed" } else { "refuted" };
+        write!(f, "{verdict:9}  {:52}  {}", self.claim, self.figure)
+    }
+}
+
+/// What a test found: the figure, as good news or as bad.
+type Tested = Result<String, String>;
+
+#[derive(Deserialize)]
+struct Certificate {
+    format: String,
+    version: u32,
+    clearance_mm: f64,
+    reach_mm: f64,
+    center: Vec3,
+    length_mm: f64,
+    key: usize,
+    installation_order: Vec<usize>,
+    pieces: Vec<PieceFile>,
+    contacts: Vec<Contact>,
+    claims: Vec<Claim>,
+}
+
+#[derive(Deserialize)]
+struct PieceFile {
+    id: usize,
+    file: String,
+    sha256: String,
+}
+
+/// A point of piece `a`, its normal there, and the piece that it faces.
+#[derive(Clone, Deserialize)]
+struct Contact {
+    a: usize,
+    b: usize,
+    point: Vec3,
+    normal: Vec3,
+    gap_mm: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "claim", rename_all = "kebab-case")]
+enum Claim {
+    Locked { held: Vec<usize>, multipliers: Vec<(usize, f64)>, hold: f64 },
+    Moves { held: Vec<usize> },
+    KeyLeaves { piece: usize, direction: Vec3 },
+    Installs { piece: usize, direction: Vec3 },
+    Apart {},
+}
+
+/// Tests every claim of the kit in `folder`. An error means that there is no certificate to test.
+pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
+    let certificate: Certificate = read_json(&folder.join("certificate.json"))?;
+    if (certificate.format.as_str(), certificate.version) != ("shellock-certificate", 1) {
+        return Err(format!("format \"{}\" version {} is not known", certificate.format, certificate.version));
+    }
+    let plan: Value = read_json(&folder.join("plan.json"))?;
+    let mut findings = Vec::new();
+    let mut add = |claim: &str, tested: Tested| {
+        let is_confirmed = tested.is_ok();
+        findings.push(Finding { claim: claim.to_owned(), is_confirmed, figure: tested.unwrap_or_else(|bad| bad) });
+        is_confirmed
+    };
+    let is_whole = add("the certificate speaks of this plan", test_plan(&certificate, &plan))
+        & add("every claim that a kit needs is made", test_completeness(&certificate));
+    let (meshes, files) = read_pieces(folder, &certificate.pieces);
+    let is_read = add("the files are those that were certified", files);
+    if !is_whole || (!is_read && meshes.len() < certificate.pieces.len()) {
+        return Ok(findings);
+    }
+    add("each piece is a closed surface around a volume", test_closed(&meshes));
+    let contacts = located(&certificate, &meshes);
+    let names = match &contacts {
+        Ok(contacts) => Ok(format!("{} contacts, up to {:.3} mm apart", contacts.len(), largest_gap_mm(contacts))),
+        Err(why) => Err(why.clone()),
+    };
+    add("the contacts lie on both pieces' surfaces", names);
+    for claim in &certificate.claims {
+        let (name, tested) = test_claim(&certificate, &meshes, contacts.as_deref().ok(), claim);
+        add(&name, tested);
+    }
+    Ok(findings)
+}
+
+fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
+    let bytes = fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    serde_json::from_slice(&bytes).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Key, order, directions, files and clearance are those of the plan, and all ids name pieces.
+fn test_plan(c: &Certificate, plan: &Value) -> Tested {
+    let n = c.pieces.len();
+    let mut order = c.installation_order.clone();
+    order.sort_unstable();
+    if n < 2 || !order.into_iter().eq(0..n) || !c.pieces.iter().map(|p| p.id).eq(0..n) {
+        return Err(format!("{n} pieces, not each once in the order"));
+    }
+    if c.contacts.iter().any(|c| c.a.max(c.b) >= n || c.a == c.b) {
+        return Err("a contact is not one of two pieces".into());
+    }
+    let order: Vec<Value> = c.installation_order.iter().map(|&id| id.into()).collect();
+    let is_near = |value: &Value, x: f64| value.as_f64().is_some_and(|y| (x - y).abs() <= SAME);
+    if plan["installation_order"] != Value::Array(order) || plan["key_piece"] != c.key {
+        return Err("the plan has another order or key".into());
+    }
+    if c.installation_order.last() != Some(&c.key) || !is_near(&plan["clearance"], c.clearance_mm) {
+        return Err("the key is not the last piece, or the plan has another clearance".into());
+    }
+    if plan["pieces"].as_array().map(Vec::len) != Some(n) {
+        return Err("the plan has another number of pieces".into());
+    }
+    for claim in &c.claims {
+        let Claim::Installs { piece, direction } = claim else { continue };
+        let planned = &plan["pieces"][*piece]["installation_direction"];
+        if !(0..3).all(|k| is_near(&planned[k], direction[k])) {
+            return Err(format!("the plan installs piece {piece} along another direction"));
+        }
+    }
+    match c.pieces.iter().find(|p| plan["pieces"][p.id]["file"] != p.file.as_str()) {
+        Some(p) => Err(format!("the plan has another file for piece {}", p.id)),
+        None => Ok(format!("{n} pieces, key {}", c.key)),
+    }
+}
+
+/// A lock with key and first piece held, the key's way out, a way in for all others, and no overlap.
+fn test_completeness(c: &Certificate) -> Tested {
+    let count = |is_it: &dyn Fn(&Claim) -> bool| c.claims.iter().filter(|claim| is_it(claim)).count();
+    let first = c.installation_order.first().copied();
+    let ends = first.map(|first| vec![c.key, first]);
+    let is_lock = |claim: &Claim| matches!(claim, Claim::Locked { held, .. } if Some(held) == ends.as_ref());
+    if count(&is_lock) != 1 {
+        return Err("it is not claimed that nothing moves while the key and the first piece are held".into());
+    }
+    if count(&|claim| matches!(claim, Claim::KeyLeaves { piece, .. } if *piece == c.key)) != 1 {
+        return Err("it is not claimed that the key can leave".into());
+    }
+    if count(&|claim| matches!(claim, Claim::Apart {})) != 1 {
+        return Err("it is not claimed that pieces do not overlap".into());
+    }
+    for &id in c.installation_order.iter().skip(1) {
+        if count(&|claim| matches!(claim, Claim::Installs { piece, .. } if *piece == id)) != 1 {
+            return Err(format!("it is not claimed that piece {id} can be installed"));
+        }
+    }
+    Ok(format!("{} claims", c.claims.len()))
+}
+
+/// The pieces' meshes, as far as they can be read, and whether their bytes are those that were hashed.
+fn read_pieces(folder: &Path, pieces: &[PieceFile]) -> (Vec<Mesh>, Tested) {
+    let (mut meshes, mut tested) = (Vec::new(), Ok(format!("{} files", pieces.len())));
+    for piece in pieces {
+        let mesh = fs::read(folder.join(&piece.file)).map_err(|e| e.to_string()).and_then(|bytes| {
+            let hash: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+            if hash != piece.sha256 {
+                tested = Err(format!("{} has other bytes", piece.file));
+            }
+            Mesh::from_stl(&bytes)
+        });
+        match mesh {
+            Ok(mesh) => meshes.push(mesh),
+            Err(why) => tested = Err(format!("{}: {why}", piece.file)),
+        }
+    }
+    (meshes, tested)
+}
+
+fn test_closed(meshes: &[Mesh]) -> Tested {
+    for (id, mesh) in meshes.iter().enumerate() {
+        let (n_open, volume_mm3) = (mesh.n_open_edges(), mesh.volume_mm3());
+        if n_open > 0 || volume_mm3.is_nan() || volume_mm3 <= 0.0 {
+            return Err(format!("piece {id} has {n_open} open edges and a volume of {volume_mm3:.1} mm³"));
+        }
+    }
+    Ok(format!("{:.1} mm³ in all", meshes.iter().map(Mesh::volume_mm3).sum::<f64>()))
+}
+
+/// The contacts, with points and normals of the triangles that they really lie on.
+fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
+    if c.reach_mm > c.clearance_mm + MOST_REACH_MM + SAME {
+        return Err(format!("contacts {} mm apart hold nothing", c.reach_mm));
+    }
+    let locate = |(i, contact): (usize, &Contact)| {
+        let Contact { a, b, point, normal, gap_mm } = contact;
+        let on_a = meshes[*a].triangle_at(*point, *normal);
+        let (point, normal) = on_a.ok_or_else(|| format!("contact {i} is not on piece {a}"))?;
+        let is_near = *gap_mm <= c.reach_mm && meshes[*b].is_faced(point, normal, *gap_mm);
+        if !is_near {
+            return Err(format!("contact {i} does not face piece {b} at {gap_mm:.3} mm"));
+        }
+        Ok(Contact { point, normal, ..contact.clone() })
+    };
+    c.contacts.iter().enumerate().map(locate).collect()
+}
+
+fn largest_gap_mm(contacts: &[Contact]) -> f64 {
+    contacts.iter().map(|c| c.gap_mm).fold(0.0, f64::max)
+}
+
+fn test_claim(c: &Certificate, meshes: &[Mesh], contacts: Option<&[Contact]>, claim: &Claim) -> (String, Tested) {
+    let names = |held: &[usize]| held.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
+    match claim {
+        Claim::Locked { held, multipliers, hold } => {
+            let frame = lock::Frame { center: c.center, length_mm: c.length_mm, n_pieces: meshes.len() };
+            let tested = match contacts {
+                Some(contacts) => lock::test(&frame, contacts, held, multipliers, *hold),
+                None => Err("its contacts are not there".into()),
+            };
+            (format!("nothing moves while {} are held", names(held)).replace("are held", is_or_are(held)), tested)
+        }
+        Claim::Moves { held } => {
+            let claim = format!("no lock is claimed with {} alone held", names(held));
+            (claim, Ok("others can move".into()))
+        }
+        Claim::KeyLeaves { piece, direction } => {
+            let others: Vec<usize> = (0..meshes.len()).filter(|p| p != piece).collect();
+            let tested = rays::test_path(meshes, *piece, *direction, &others);
+            (format!("the key, piece {piece}, can leave"), tested)
+        }
+        Claim::Installs { piece, direction } => {
+            let earlier: Vec<usize> = c.installation_order.iter().copied().take_while(|p| p != piece).collect();
+            let tested = rays::test_path(meshes, *piece, scale(*direction, -1.0), &earlier);
+            (format!("piece {piece} can be installed"), tested)
+        }
+        Claim::Apart {} => ("the assembled pieces do not overlap".into(), rays::test_apart(meshes)),
+    }
+}
+
+fn is_or_are(held: &[usize]) -> &'static str {
+    if held.len() == 1 { "is held" } else { "are held" }
+}

@@ -1,0 +1,185 @@
+//! Paths and overlaps by parallel rays through the pieces.
+//!
+//! Along each ray a piece is a list of stretches inside it. A piece that leaves along the rays meets another one exactly
+//! where, on some ray, a stretch of the other does not lie behind its own. Rays are [`PIXEL_MM`] apart, so what is seen
+//! surely is an obstacle that covers a block of two by two rays; single rays hit the slivers that rounding leaves along
+//! walls parallel to the path, and count with their area alone.
+
+use crate::Tested;
+use crate::mesh::Mesh;
+use crate::vector::{Vec3, cross, dot, norm, scale};
+
+/// Distance of neighbouring rays, mm.
+const PIXEL_MM: f64 = 0.25;
+/// Stretches that reach less far past each other are rounding, mm.
+const ROUNDING_MM: f64 = 0.02;
+/// Share of a piece's shadow that single rays may find in the way.
+const SLIVERS: f64 = 1e-3;
+/// The same, mm², for small pieces.
+const SLIVERS_MM2: f64 = 1.0;
+/// Rays for overlaps: parallel to no face of a common model.
+const OBLIQUE: Vec3 = [0.3713, 0.5219, 0.7680];
+
+/// Whether piece `moving` can leave along `direction` past the `others`, which stay.
+pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usize]) -> Tested {
+    if (norm(direction) - 1.0).abs() > 1e-6 {
+        return Err("the direction is no unit vector".into());
+    }
+    let mesh = meshes.get(moving).ok_or("there is no such piece")?;
+    let grid = Grid::around(direction, [mesh]);
+    let own = grid.stretches(mesh);
+    let mut is_blocked = vec![false; grid.n[0] * grid.n[1]];
+    for &other in others {
+        let theirs = grid.stretches(&meshes[other]);
+        visit_pairs(&own, &theirs, |pixel, mine, other| {
+            let past_mm = (other[1] - mine[0]).min(other[1] - other[0]).min(mine[1] - mine[0]);
+            if past_mm > ROUNDING_MM {
+                is_blocked[pixel] = true;
+            }
+        });
+    }
+    let mut shadow = own.iter().map(|s| s.pixel).collect::<Vec<_>>();
+    shadow.dedup();
+    verdict(&grid, &is_blocked, shadow.len(), "in its way")
+}
+
+/// Whether no two pieces overlap as they are.
+pub fn test_apart(meshes: &[Mesh]) -> Tested {
+    let length = norm(OBLIQUE);
+    let grid = Grid::around(scale(OBLIQUE, 1.0 / length), meshes);
+    let mut all: Vec<Stretch> = meshes.iter().flat_map(|mesh| grid.stretches(mesh)).collect();
+    all.sort_by(|s, t| s.pixel.cmp(&t.pixel).then(s.inside[0].total_cmp(&t.inside[0])));
+    let mut is_shared = vec![false; grid.n[0] * grid.n[1]];
+    for stretches in all.chunk_by(|s, t| s.pixel == t.pixel) {
+        let mut end = f64::NEG_INFINITY;
+        for s in stretches {
+            if end.min(s.inside[1]) - s.inside[0] > ROUNDING_MM {
+                is_shared[s.pixel] = true;
+            }
+            end = end.max(s.inside[1]);
+        }
+    }
+    let n_rays = all.chunk_by(|s, t| s.pixel == t.pixel).count();
+    verdict(&grid, &is_shared, n_rays, "shared")
+}
+
+fn verdict(grid: &Grid, is_hit: &[bool], n_rays: usize, what: &str) -> Tested {
+    let n_hit = is_hit.iter().filter(|&&hit| hit).count();
+    let width = grid.n[0];
+    let is_block = |&i: &usize| [i, i + 1, i + width, i + width + 1].iter().all(|&k| is_hit.get(k) == Some(&true));
+    let n_blocks = (0..is_hit.len()).filter(is_block).count();
+    let cell_mm2 = PIXEL_MM * PIXEL_MM;
+    let (area_mm2, most_mm2) = (n_hit as f64 * cell_mm2, SLIVERS_MM2.max(SLIVERS * n_rays as f64 * cell_mm2));
+    let figure = format!("{n_hit} of {n_rays} rays find something {what}, {n_blocks} blocks of four");
+    if n_blocks > 0 || area_mm2 > most_mm2 { Err(figure) } else { Ok(figure) }
+}
+
+/// A stretch of a ray inside a body.
+struct Stretch {
+    pixel: usize,
+    /// Depths at which the ray goes in and out, mm.
+    inside: [f64; 2],
+}
+
+/// Calls `visit` with each two stretches on one ray. Both lists are in order of their pixels.
+fn visit_pairs(a: &[Stretch], b: &[Stretch], mut visit: impl FnMut(usize, [f64; 2], [f64; 2])) {
+    let mut from = 0;
+    for s in a {
+        while from < b.len() && b[from].pixel < s.pixel {
+            from += 1;
+        }
+        b[from..].iter().take_while(|t| t.pixel == s.pixel).for_each(|t| visit(s.pixel, s.inside, t.inside));
+    }
+}
+
+/// Parallel rays through the middles of square pixels.
+struct Grid {
+    axes: [Vec3; 3],
+    origin: [f64; 2],
+    n: [usize; 2],
+}
+
+impl Grid {
+    /// Covers the shadow of `meshes`; the rays run along `direction`.
+    fn around<'a>(direction: Vec3, meshes: impl IntoIterator<Item = &'a Mesh>) -> Self {
+        // Rows parallel to no wall of an axis-aligned model, so that walls along the path are not met all at once.
+        let slant = [0.4217, -0.2873, 0.8600];
+        let u = cross(direction, slant);
+        let u = scale(u, 1.0 / norm(u));
+        let mut grid = Self { axes: [u, cross(direction, u), direction], origin: [0.0; 2], n: [0; 2] };
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for corner in meshes.into_iter().flat_map(|m| m.triangles.iter().flatten()) {
+            let p = grid.project(*corner);
+            for k in 0..2 {
+                (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
+            }
+        }
+        // An empty shadow has no pixels.
+        let n = |k: usize| if low[k] <= high[k] { ((high[k] - low[k]) / PIXEL_MM).ceil() as usize + 1 } else { 0 };
+        (grid.n, grid.origin) = ([n(0), n(1)], low);
+        grid
+    }
+
+    /// Place across the rays, and depth.
+    fn project(&self, p: Vec3) -> Vec3 {
+        self.axes.map(|axis| dot(axis, p))
+    }
+
+    /// The stretches inside a closed mesh, in order of their pixels, then of depth.
+    fn stretches(&self, mesh: &Mesh) -> Vec<Stretch> {
+        let mut crossings: Vec<(usize, f64, i32)> = Vec::new();
+        mesh.triangles.iter().for_each(|t| self.cross_triangle(t.map(|p| self.project(p)), &mut crossings));
+        crossings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut stretches = Vec::new();
+        for ray in crossings.chunk_by(|a, b| a.0 == b.0) {
+            let (mut depth, mut start) = (0, 0.0);
+            for &(pixel, at, step) in ray {
+                if depth == 0 && step > 0 {
+                    start = at;
+                }
+                if depth == 1 && step < 0 {
+                    stretches.push(Stretch { pixel, inside: [start, at] });
+                }
+                depth += step;
+            }
+        }
+        stretches
+    }
+
+    /// The rays that cross a triangle: its rows are cut at half-open ends that neighbours share to the last bit.
+    fn cross_triangle(&self, t: [Vec3; 3], crossings: &mut Vec<(usize, f64, i32)>) {
+        let at = |p: Vec3| [(p[0] - self.origin[0]) / PIXEL_MM, (p[1] - self.origin[1]) / PIXEL_MM];
+        let corners = t.map(at);
+        let [[ax, ay], [bx, by], [cx, cy]] = corners;
+        let twice_area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
+        if twice_area == 0.0 {
+            return;
+        }
+        let [slope_x, slope_y] = [
+            ((t[1][2] - t[0][2]) * (cy - ay) - (t[2][2] - t[0][2]) * (by - ay)) / twice_area,
+            ((t[2][2] - t[0][2]) * (bx - ax) - (t[1][2] - t[0][2]) * (cx - ax)) / twice_area,
+        ];
+        // Outward normals against the rays are entries.
+        let step = if twice_area < 0.0 { 1 } else { -1 };
+        let rows = [ay.min(by).min(cy), ay.max(by).max(cy)].map(|y| y.ceil().clamp(0.0, self.n[1] as f64) as usize);
+        for row in rows[0]..rows[1] {
+            let y = row as f64;
+            let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+            for k in 0..3 {
+                let (mut p, mut q) = (corners[k], corners[(k + 1) % 3]);
+                if p[1] > q[1] {
+                    (p, q) = (q, p);
+                }
+                if p[1] <= y && y < q[1] {
+                    let x = p[0] + (q[0] - p[0]) * ((y - p[1]) / (q[1] - p[1]));
+                    ends = [ends[0].min(x), ends[1].max(x)];
+                }
+            }
+            let columns = ends.map(|x| x.ceil().clamp(0.0, self.n[0] as f64) as usize);
+            for column in columns[0]..columns[1] {
+                let depth = t[0][2] + slope_x * (column as f64 - ax) + slope_y * (y - ay);
+                crossings.push((row * self.n[0] + column, depth, step));
+            }
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! A kit as it was made is confirmed; whatever is changed in it is refuted.
+
+use std::fs;
+use std::path::Path;
+use std::sync::LazyLock;
+use std::sync::atomic::AtomicBool;
+
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use shellock::certificate::{PieceFile, certify};
+use shellock::plan::{InstallationPlan, InstallationStep};
+use shellock::verify::{VerifyParams, examine};
+use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
+use shellock_check::{Finding, check};
+use shellock_geom::io::write_stl_binary;
+use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
+
+const CLEARANCE_MM: f64 = 0.1;
+const ALL: [f64; 2] = [0.0, 30.0];
+
+fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
+    Volume::cuboid(Aabb { min: Vec3::new(x[0], y[0], z[0]), max: Vec3::new(x[1], y[1], z[1]) })
+}
+
+fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
+    let wide = |[low, high]: [f64; 2]| [low - CLEARANCE_MM, high + CLEARANCE_MM];
+    cuboid(wide(x), wide(y), wide(z))
+}
+
+/// A cube in three parts: a base with a T-shaped groove, a lid whose tongue slides in along −x, and a pin through both.
+fn parts() -> [Volume; 3] {
+    let (stem, foot) = (([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]), ([10.0, 30.0], [7.0, 23.0], [5.0, 9.0]));
+    let pin = ([17.0, 24.0], [13.0, 17.0]);
+    let hole = grown(pin.0, pin.1, [1.0, 40.0]);
+    let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([p.0[0], 40.0], p.1, p.2);
+    let base = cuboid(ALL, ALL, [0.0, 15.0 - CLEARANCE_MM]);
+    let tongue = [cuboid(stem.0, stem.1, stem.2), cuboid(foot.0, foot.1, foot.2)];
+    let lid = Volume::union_all([vec![cuboid(ALL, ALL, [15.0, 30.0])], tongue.into()].concat());
+    let base = base.subtract(&open(stem)).subtract(&open(foot)).subtract(&hole);
+    [base, lid.subtract(&hole), cuboid(pin.0, pin.1, [1.0, 30.0])]
+}
+
+fn as_written(v: &Volume) -> TriMesh {
+    let mut mesh = v.to_mesh();
+    mesh.points.iter_mut().for_each(|p| *p = p.as_vec3().as_dvec3());
+    mesh
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A kit: the files of its pieces, its certificate and its plan.
+struct Made {
+    files: Vec<(String, Vec<u8>)>,
+    certificate: Value,
+    plan: Value,
+}
+
+/// The kit's certificate and plan; the files of the pieces lie in `folder` then.
+fn made_kit(folder: &Path) -> (Value, Value) {
+    static KIT: LazyLock<Made> = LazyLock::new(make);
+    KIT.files.iter().for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
+    (KIT.certificate.clone(), KIT.plan.clone())
+}
+
+fn make() -> Made {
+    let pieces: IdVec<PatchId, TriMesh> = parts().iter().map(as_written).collect();
+    let steps = [Vec3::X, Vec3::X, Vec3::Z].into_iter().enumerate();
+    let steps = steps.map(|(i, d)| InstallationStep { piece: i.into(), separation: LatticeDirection::nearest(d) });
+    let plan = InstallationPlan { steps: steps.collect() };
+    let (report, stop) = (|_: shellock::context::Progress<'_>| {}, AtomicBool::new(false));
+    let model = Solid::new(cuboid(ALL, ALL, ALL).to_mesh()).unwrap();
+    let params = VerifyParams { clearance_mm: CLEARANCE_MM, seed: 0 };
+    let (verdict, contacts) = examine(&Ctx::new(&report, &stop), &params, &model, &pieces, &plan).unwrap();
+    let files: Vec<(String, Vec<u8>)> =
+        pieces.iter().map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh))).collect();
+    let named = pieces.ids().zip(&files);
+    let named = named.map(|(id, (file, bytes))| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
+    let certificate = certify(named, &pieces, &plan, &contacts, &verdict, CLEARANCE_MM).unwrap();
+    let pieces = plan.steps.iter().map(|s| {
+        json!({ "file": format!("{}.stl", s.piece), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
+    });
+    let plan = json!({ "key_piece": 2, "installation_order": [0, 1, 2], "clearance": CLEARANCE_MM,
+                       "pieces": pieces.collect::<Vec<_>>() });
+    Made { files, certificate: serde_json::to_value(certificate).unwrap(), plan }
+}
+
+/// The claims that are refuted once `change` has been at the kit.
+fn refuted(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut certificate, mut plan) = made_kit(folder.path());
+    change(folder.path(), &mut certificate, &mut plan);
+    for (name, value) in [("certificate.json", certificate), ("plan.json", plan)] {
+        fs::write(folder.path().join(name), serde_json::to_vec(&value).unwrap()).unwrap();
+    }
+    let findings: Vec<Finding> = check(folder.path()).unwrap();
+    findings.into_iter().filter(|f| !f.is_confirmed).map(|f| f.claim).collect()
+}
+
+/// Puts `mesh` in the place of a piece, with its hash.
+fn replace(folder: &Path, certificate: &mut Value, piece: usize, mesh: &Volume) {
+    let bytes = write_stl_binary(&as_written(mesh));
+    fs::write(folder.join(format!("{piece}.stl")), &bytes).unwrap();
+    certificate["pieces"][piece]["sha256"] = sha256(&bytes).into();
+}
+
+/// The multipliers of the lock with key and first piece held, and the place of the greatest.
+fn multipliers(certificate: &mut Value) -> (&mut Vec<Value>, usize) {
+    let list = certificate["claims"][0]["multipliers"].as_array_mut().unwrap();
+    let value = |i: &usize| list[*i][1].as_f64().unwrap();
+    let greatest = (0..list.len()).max_by(|i, k| value(i).total_cmp(&value(k))).unwrap();
+    (list, greatest)
+}
+
+const FILES: &str = "the files are those that were certified";
+const CONTACTS: &str = "the contacts lie on both pieces' surfaces";
+const LOCK: &str = "nothing moves while 2 and 0 are held";
+const PLAN: &str = "the certificate speaks of this plan";
+const COMPLETE: &str = "every claim that a kit needs is made";
+
+#[test]
+fn a_kit_as_it_was_made_is_confirmed() {
+    assert_eq!(refuted(|_, _, _| {}), [""; 0]);
+}
+
+#[test]
+fn a_changed_byte_of_a_piece_is_seen() {
+    let change = |folder: &Path, _: &mut Value, _: &mut Value| {
+        let path = folder.join("1.stl");
+        let mut bytes = fs::read(&path).unwrap();
+        // The last bit of a coordinate.
+        bytes[84 + 12] ^= 1;
+        fs::write(path, bytes).unwrap();
+    };
+    assert!(refuted(change).contains(&FILES.to_owned()));
+}
+
+#[test]
+fn a_piece_moved_by_less_than_a_clearance_or_two_is_off_its_contacts() {
+    for step in [Vec3::X, Vec3::Y, Vec3::Z] {
+        let lost = refuted(|folder, certificate, _| {
+            replace(folder, certificate, 1, &parts()[1].translate(step * 0.2));
+        });
+        assert!(lost.contains(&CONTACTS.to_owned()) && lost.contains(&LOCK.to_owned()), "{step}: {lost:?}");
+        assert!(!lost.contains(&FILES.to_owned()));
+    }
+}
+
+#[test]
+fn a_piece_without_its_connector_is_off_its_contacts() {
+    let lost = refuted(|folder, certificate, _| {
+        let bare = parts()[1].intersect(&cuboid([-1.0, 31.0], [-1.0, 31.0], [15.0, 31.0]));
+        replace(folder, certificate, 1, &bare);
+    });
+    assert!(lost.contains(&CONTACTS.to_owned()) && lost.contains(&LOCK.to_owned()), "{lost:?}");
+}
+
+#[test]
+fn a_changed_multiplier_or_a_dropped_contact_leaves_no_equilibrium() {
+    let changed = refuted(|_, certificate, _| {
+        let (list, greatest) = multipliers(certificate);
+        list[greatest][1] = (1.001 * list[greatest][1].as_f64().unwrap()).into();
+    });
+    assert_eq!(changed, [LOCK]);
+    let negative = refuted(|_, certificate, _| multipliers(certificate).0[0][1] = (-1.0).into());
+    assert_eq!(negative, [LOCK]);
+    let dropped = refuted(|_, certificate, _| {
+        let (list, greatest) = multipliers(certificate);
+        list.remove(greatest);
+    });
+    assert_eq!(dropped, [LOCK]);
+}
+
+#[test]
+fn forces_in_equilibrium_along_one_line_hold_nothing_else() {
+    // One pair of opposed contacts has multipliers without residual, but no rank.
+    let lost = refuted(|_, certificate, _| {
+        let of = |c: &Value, k: &str| c[k].clone();
+        let mut back = certificate["contacts"][0].clone();
+        (back["a"], back["b"]) = (of(&back, "b"), of(&back, "a"));
+        let n = certificate["contacts"].as_array().unwrap().len();
+        certificate["contacts"].as_array_mut().unwrap().push(back);
+        certificate["claims"][0]["multipliers"] = json!([[0, 1.0], [n, 1.0]]);
+    });
+    assert!(lost.contains(&LOCK.to_owned()), "{lost:?}");
+}
+
+#[test]
+fn a_turned_normal_is_not_that_of_the_piece() {
+    let lost = refuted(|_, certificate, _| certificate["contacts"][0]["normal"] = json!([0.6, 0.0, 0.8]));
+    assert_eq!(lost[0], CONTACTS);
+}
+
+#[test]
+fn a_changed_direction_is_not_the_plans_and_not_free() {
+    let turned = json!([0.0, 1.0, 0.0]);
+    let is_lid = |c: &&mut Value| c["claim"] == "installs" && c["piece"] == 1;
+    let turn = |certificate: &mut Value| {
+        let claim = certificate["claims"].as_array_mut().unwrap().iter_mut().find(is_lid).unwrap();
+        claim["direction"] = turned.clone();
+    };
+    assert_eq!(refuted(|_, certificate, _| turn(certificate)), [PLAN]);
+    let both = refuted(|_, certificate, plan| {
+        turn(certificate);
+        plan["pieces"][1]["installation_direction"] = turned.clone();
+    });
+    assert_eq!(both, ["piece 1 can be installed"]);
+}
+
+#[test]
+fn a_missing_piece_or_claim_is_missed() {
+    let lost = refuted(|folder, _, _| fs::remove_file(folder.join("1.stl")).unwrap());
+    assert_eq!(lost, [FILES]);
+    let unlisted = refuted(|_, certificate, _| {
+        certificate["pieces"].as_array_mut().unwrap().remove(1);
+    });
+    assert!(unlisted.contains(&PLAN.to_owned()));
+    for claim in 0..6 {
+        let silent = refuted(|_, certificate, _| {
+            certificate["claims"].as_array_mut().unwrap().remove(claim);
+        });
+        // The second one says what moves with the key alone held; nobody needs it.
+        assert_eq!(silent.contains(&COMPLETE.to_owned()), claim != 1, "{claim}: {silent:?}");
+    }
+}
+
+#[test]
+fn an_open_piece_and_overlapping_pieces_are_refuted() {
+    let open = refuted(|folder, certificate, _| {
+        let mut mesh = as_written(&parts()[2]);
+        mesh.triangles.pop();
+        let bytes = write_stl_binary(&mesh);
+        fs::write(folder.join("2.stl"), &bytes).unwrap();
+        certificate["pieces"][2]["sha256"] = sha256(&bytes).into();
+    });
+    assert!(open.contains(&"each piece is a closed surface around a volume".to_owned()));
+    let thick = refuted(|folder, certificate, _| {
+        replace(folder, certificate, 2, &cuboid([16.0, 25.0], [12.0, 18.0], [1.0, 30.0]));
+    });
+    assert!(thick.contains(&"the assembled pieces do not overlap".to_owned()), "{thick:?}");
+}
+
+#[test]
+fn what_is_no_certificate_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(check(folder.path()).is_err());
+    let (mut certificate, plan) = made_kit(folder.path());
+    fs::write(folder.path().join("plan.json"), plan.to_string()).unwrap();
+    certificate["version"] = 2.into();
+    fs::write(folder.path().join("certificate.json"), certificate.to_string()).unwrap();
+    assert!(check(folder.path()).is_err_and(|why| why.contains("version 2")));
+    fs::write(folder.path().join("certificate.json"), "{").unwrap();
+    assert!(check(folder.path()).is_err());
+}

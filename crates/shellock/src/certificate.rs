@@ -1,0 +1,249 @@
+//! What is claimed of a finished kit, each claim with what a stranger needs to check it.
+//!
+//! A verdict ([`crate::verify`]) asks for trust in the program that made it. A certificate does not: it names the files by
+//! their hashes, and what is hard to find (which contacts hold the pieces, and with what forces) is written down, so that
+//! checking takes arithmetic only. The package `shellock-check` does that without any of this code. The format, the
+//! derivation and what is *not* proven are told in docs/certificate.md.
+//!
+//! Coordinates are mm in assembly space. Motions are twists about [`Certificate::center`].
+
+mod proof;
+mod rattle;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+use shellock_geom::{Aabb, TriMesh, Vec3};
+
+use crate::plan::InstallationPlan;
+use crate::verify::contact::{Contact, REACH_MM};
+use crate::verify::motion::{Freedom, free_motion};
+use crate::verify::{Finding, Motion, Verification};
+use crate::{IdVec, PatchId};
+use proof::prove;
+pub use rattle::{Play, play_alone, play_together};
+
+/// What [`Certificate::format`] says.
+pub const FORMAT: &str = "shellock-certificate";
+/// What [`Certificate::version`] says: readers refuse what they do not know.
+pub const VERSION: u32 = 1;
+
+/// A file of a kit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PieceFile {
+    /// The piece.
+    pub id: PatchId,
+    /// Its path within the kit.
+    pub file: String,
+    /// SHA-256 of the file's bytes, in lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+/// A place where one piece keeps another from coming nearer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HoldingContact {
+    /// The piece the point lies on.
+    pub a: PatchId,
+    /// The piece it faces.
+    pub b: PatchId,
+    /// The point.
+    pub point: [f64; 3],
+    /// Outward unit normal of `a` there, towards `b`.
+    pub normal: [f64; 3],
+    /// Distance to `b`, mm.
+    pub gap_mm: f64,
+}
+
+/// How near two bodies come: the distance, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeastGap {
+    /// Distance, mm; negative where they overlap.
+    pub gap_mm: f64,
+    /// How far the moving one is from its place then, mm; 0 where nothing moves.
+    pub travel_mm: f64,
+    /// Where.
+    pub at: [f64; 3],
+    /// The other piece.
+    pub against: PatchId,
+}
+
+/// One statement about a kit, with its proof where it needs one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "claim", rename_all = "kebab-case")]
+pub enum Claim {
+    /// No piece moves, alone or with others, by however little, while the held ones do not.
+    Locked {
+        /// Pieces that do not move.
+        held: Vec<PatchId>,
+        /// Contacts, by their places in the certificate's list, with positive multipliers.
+        multipliers: Vec<(usize, f64)>,
+        /// Length of the multipliers' sum of wrenches. Less than `hold`, which is the proof.
+        residual: f64,
+        /// Least singular value of the contacts' wrenches, weighted by their multipliers up to 1.
+        hold: f64,
+    },
+    /// Nothing is claimed while these are held: the contacts allow this motion.
+    Moves {
+        /// Pieces that do not move.
+        held: Vec<PatchId>,
+        /// Who moves and how.
+        motions: Vec<Motion>,
+    },
+    /// The key can be taken out: it moves along `direction` and meets nothing.
+    KeyLeaves {
+        /// The key.
+        piece: PatchId,
+        /// Unit vector.
+        direction: [f64; 3],
+        /// Where it comes nearest to another piece; `None` where that was not computed.
+        least_gap: Option<LeastGap>,
+    },
+    /// The piece can be put in: along `direction` it comes to its place past all that are there already.
+    Installs {
+        /// The piece.
+        piece: PatchId,
+        /// Unit vector.
+        direction: [f64; 3],
+        /// Where it comes nearest to another piece; `None` where that was not computed.
+        least_gap: Option<LeastGap>,
+    },
+    /// The assembled pieces do not overlap.
+    Apart {
+        /// The least distance of all pairs; `None` where that was not computed.
+        least_gap: Option<LeastGap>,
+    },
+}
+
+/// What is claimed of a kit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// [`FORMAT`].
+    pub format: String,
+    /// [`VERSION`].
+    pub version: u32,
+    /// Gap left between mating faces, mm.
+    pub clearance_mm: f64,
+    /// Faces farther apart than this hold nothing, mm.
+    pub reach_mm: f64,
+    /// The point that twists are about.
+    pub center: [f64; 3],
+    /// Spins count as velocities at this distance, mm: half the diagonal of the kit.
+    pub length_mm: f64,
+    /// The piece installed last.
+    pub key: PatchId,
+    /// First to last.
+    pub installation_order: Vec<PatchId>,
+    /// All pieces, in order of their ids.
+    pub pieces: Vec<PieceFile>,
+    /// Contacts with a part in a proof.
+    pub contacts: Vec<HoldingContact>,
+    /// The claims.
+    pub claims: Vec<Claim>,
+}
+
+/// Claims what can be proven of finished `pieces`, written as `files`, that are installed as `plan` says and touch at
+/// `contacts`; [`crate::verify::examine`] gives these with its verdict, and what that speaks against is not claimed.
+///
+/// `None` where the plan does not name every piece once, of at least two. Takes 0.04 s for 9 pieces with 12 000 contacts.
+pub fn certify(
+    files: Vec<PieceFile>,
+    pieces: &IdVec<PatchId, TriMesh>,
+    plan: &InstallationPlan,
+    contacts: &[Contact],
+    verdict: &Verification,
+    clearance_mm: f64,
+) -> Option<Certificate> {
+    let mut named: Vec<PatchId> = plan.steps.iter().map(|s| s.piece).collect();
+    named.sort_unstable();
+    if named.len() < 2 || !named.into_iter().eq(pieces.ids()) {
+        return None;
+    }
+    let (center, length_mm) = frame(pieces);
+    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - center, ..*c }).collect();
+    let (key, first) = (plan.key(), plan.steps[0].piece);
+    let mut claims: Vec<Claim> =
+        [vec![key, first], vec![key]].map(|held| claim_lock(&centered, pieces.len(), held, length_mm)).into();
+    let contacts = keep_holding(contacts, &mut claims);
+    claims.extend(claim_paths(plan, verdict));
+    Some(Certificate {
+        format: FORMAT.into(),
+        version: VERSION,
+        clearance_mm,
+        reach_mm: clearance_mm + REACH_MM,
+        center: center.to_array(),
+        length_mm,
+        key,
+        installation_order: plan.steps.iter().map(|s| s.piece).collect(),
+        pieces: files,
+        contacts,
+        claims,
+    })
+}
+
+/// The middle of all pieces and half their diagonal, mm: what twists are about, and at what distance spins count.
+fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
+    let bounds = pieces.as_slice().iter().fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()));
+    (bounds.center(), 0.5 * bounds.diagonal())
+}
+
+/// The lock with its proof, or the motion that there is instead.
+fn claim_lock(contacts: &[Contact], n_pieces: usize, held: Vec<PatchId>, length_mm: f64) -> Claim {
+    match prove(contacts, n_pieces, &held, length_mm, Freedom::Rigid) {
+        Some(proof) => {
+            Claim::Locked { held, multipliers: proof.multipliers, residual: proof.residual, hold: proof.hold }
+        }
+        None => {
+            let twists = free_motion(contacts, n_pieces, &held, length_mm, Freedom::Rigid);
+            Claim::Moves { held, motions: twists.iter().map(Motion::from).collect() }
+        }
+    }
+}
+
+/// That the key leaves, that all but the first piece can be installed, and that nothing overlaps: as far as the verdict
+/// found nothing against it.
+fn claim_paths(plan: &InstallationPlan, verdict: &Verification) -> Vec<Claim> {
+    let is_free = |id: PatchId| {
+        let rubs = |f: &Finding| matches!(f, Finding::PathRubs { piece, .. } if *piece == id);
+        !verdict.findings.iter().any(rubs)
+    };
+    let mut claims = Vec::new();
+    let key = plan.key();
+    if is_free(key) {
+        let direction = plan.separation(key).unit().to_array();
+        claims.push(Claim::KeyLeaves { piece: key, direction, least_gap: None });
+    }
+    for step in plan.steps[1..].iter().filter(|step| is_free(step.piece)) {
+        let direction = (-step.separation.unit() + 0.0).to_array();
+        claims.push(Claim::Installs { piece: step.piece, direction, least_gap: None });
+    }
+    if !verdict.findings.iter().any(|f| matches!(f, Finding::Overlap { .. })) {
+        claims.push(Claim::Apart { least_gap: None });
+    }
+    claims
+}
+
+/// The contacts that proofs name; the proofs then name them by their new places.
+fn keep_holding(contacts: &[Contact], claims: &mut [Claim]) -> Vec<HoldingContact> {
+    let named = |claim: &Claim| match claim {
+        Claim::Locked { multipliers, .. } => multipliers.iter().map(|m| m.0).collect(),
+        _ => Vec::new(),
+    };
+    let used: BTreeSet<usize> = claims.iter().flat_map(named).collect();
+    let place: BTreeMap<usize, usize> = used.iter().copied().zip(0..).collect();
+    for claim in claims {
+        if let Claim::Locked { multipliers, .. } = claim {
+            multipliers.iter_mut().for_each(|m| m.0 = place[&m.0]);
+        }
+    }
+    let array = |v: Vec3| v.to_array();
+    let holding = |c: &Contact| HoldingContact {
+        a: c.a,
+        b: c.b,
+        point: array(c.point),
+        normal: array(c.normal),
+        gap_mm: c.gap_mm,
+    };
+    used.iter().map(|&i| holding(&contacts[i])).collect()
+}

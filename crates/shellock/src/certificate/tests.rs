@@ -1,0 +1,248 @@
+//! What is locked is certified, what moves is not, and play is what the gaps leave.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use shellock_geom::{Vec3, Volume};
+
+use super::*;
+use crate::LatticeDirection;
+use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, PIN, cuboid, grown, pinned_kit, pinned_lid};
+
+fn certified(kit: &Kit) -> Certificate {
+    let file = |id: PatchId| PieceFile { id, file: format!("{id}.stl"), sha256: String::new() };
+    let files = kit.pieces.ids().map(file).collect();
+    let (verdict, contacts) = kit.examined();
+    certify(files, &kit.pieces, &kit.plan, &contacts, &verdict, 2.0 * HALF_GAP_MM).expect("the plan is whole")
+}
+
+/// Who can move while key and first piece are held; empty where a lock is claimed.
+fn movers(kit: &Kit) -> Vec<u32> {
+    match &certified(kit).claims[0] {
+        Claim::Locked { .. } => Vec::new(),
+        Claim::Moves { motions, .. } => motions.iter().map(|m| m.piece.0).collect(),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn contact(a: u32, b: u32, point: Vec3, normal: Vec3) -> Contact {
+    Contact { a: PatchId(a), b: PatchId(b), point, normal, gap_mm: 0.1, area_mm2: 1.0 }
+}
+
+fn is_locked(contacts: &[Contact], n_pieces: usize, freedom: Freedom) -> bool {
+    prove(contacts, n_pieces, &[PatchId(0)], 1.0, freedom).is_some()
+}
+
+#[test]
+fn a_pinned_lid_is_certified_with_few_contacts_whose_proof_adds_up() {
+    let certificate = certified(&pinned_kit(|_| {}));
+    let Claim::Locked { held, multipliers, residual, hold } = &certificate.claims[0] else { panic!() };
+    assert_eq!(*held, [PatchId(2), PatchId(0)]);
+    assert!(multipliers.len() <= 12 && certificate.contacts.len() <= 12, "{multipliers:?}");
+    assert!(*residual < 1e-9 && *hold > 1e-3, "{residual} {hold}");
+    let wrench = |i: usize| {
+        let c = &certificate.contacts[i];
+        let arm = (Vec3::from(c.point) - Vec3::from(certificate.center)) / certificate.length_mm;
+        let sign = if c.a == PatchId(1) { 1.0 } else { -1.0 };
+        (sign * Vec3::from(c.normal), sign * arm.cross(c.normal.into()))
+    };
+    let sum = multipliers.iter().fold((Vec3::ZERO, Vec3::ZERO), |sum, &(i, value)| {
+        assert!(value > 0.0);
+        (sum.0 + value * wrench(i).0, sum.1 + value * wrench(i).1)
+    });
+    assert!(sum.0.length() + sum.1.length() < 1e-9, "{sum:?}");
+    // The key can leave, so nothing is claimed with the key alone held but the motion.
+    assert!(matches!(&certificate.claims[1], Claim::Moves { motions, .. } if motions.len() == 2));
+}
+
+#[test]
+fn walls_without_connectors_are_not_certified() {
+    let slice = |from: f64| cuboid(ALL, ALL, [from, from + 9.9]);
+    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[slice(0.0), slice(10.0), slice(20.0)], &[Vec3::Z; 3]);
+    assert_eq!(movers(&kit), [1]);
+}
+
+#[test]
+fn a_lid_without_its_tongue_is_not_certified() {
+    let [_, lid, pin] = pinned_lid(PIN);
+    let above = cuboid([-1.0, 31.0], [-1.0, 31.0], [15.0 + HALF_GAP_MM, 31.0]);
+    let bare = lid.intersect(&above);
+    assert_eq!(movers(&pinned_kit(|pieces| pieces[1] = bare)), [1]);
+    drop(pin);
+}
+
+#[test]
+fn a_piece_that_alone_joins_another_to_the_rest_does_not_lock_it() {
+    // A bar that ends in a turned wheel: the wheel, piece 1, touches the bar alone, along a round axle and two flanks.
+    let mut contacts = Vec::new();
+    for i in 0..24 {
+        let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
+        for x in [-0.3, 0.4] {
+            contacts.push(contact(1, 0, Vec3::new(x, cos, sin), Vec3::new(0.0, -cos, -sin)));
+            contacts.push(contact(1, 0, Vec3::new(x, cos, sin), Vec3::new(x.signum(), 0.0, 0.0)));
+        }
+    }
+    assert!(!is_locked(&contacts, 2, Freedom::Rigid));
+    let spin = free_motion(&contacts, 2, &[PatchId(0)], 1.0, Freedom::Rigid)[0];
+    assert!(spin.spin.x.abs() > 0.99 && spin.velocity.length() < 1e-6, "{spin:?}");
+}
+
+#[test]
+fn blocks_in_a_straight_groove_are_not_certified() {
+    let hole = grown([-5.0, 35.0], [10.0, 20.0], [10.0, 20.0]);
+    let tube = cuboid(ALL, ALL, ALL).subtract(&hole);
+    let block = |from: f64, to: f64| cuboid([from, to], [10.0, 20.0], [10.0, 20.0]);
+    let pieces = [tube, block(0.0, 9.9), block(20.0, 30.0), block(10.0, 19.9)];
+    let kit = Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::NEG_X, Vec3::X, Vec3::X]);
+    assert!(!movers(&kit).is_empty());
+}
+
+#[test]
+fn a_path_that_rubs_is_not_claimed() {
+    let mut kit = pinned_kit(|_| {});
+    let installs = |kit: &Kit| {
+        let claims = certified(kit).claims.into_iter();
+        let piece = |claim| if let Claim::Installs { piece, .. } = claim { Some(piece.0) } else { None };
+        claims.filter_map(piece).collect::<Vec<u32>>()
+    };
+    assert_eq!(installs(&kit), [1, 2]);
+    kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X);
+    assert_eq!(installs(&kit), [2]);
+}
+
+#[test]
+fn a_screw_is_not_certified_and_one_more_contact_locks_it() {
+    const PITCH: f64 = 0.2;
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut contacts = Vec::new();
+    for _ in 0..200 {
+        let (sin, cos) = (rng.random::<f64>() * std::f64::consts::TAU).sin_cos();
+        let point = Vec3::new(cos, sin, rng.random::<f64>() - 0.5);
+        // Any normal square to the screw's velocity z PITCH + z × p.
+        let velocity = (Vec3::Z * PITCH + Vec3::Z.cross(point)).normalize();
+        let random = Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
+        contacts.push(contact(1, 0, point, velocity.cross(random).normalize()));
+    }
+    assert!(!is_locked(&contacts, 2, Freedom::Rigid));
+    assert!(is_locked(&contacts, 2, Freedom::Translations), "a screw does not slide out");
+    for normal in [Vec3::Z, Vec3::NEG_Z] {
+        contacts.push(contact(1, 0, Vec3::new(0.0, 0.0, 0.5 * normal.z), normal));
+    }
+    assert!(is_locked(&contacts, 2, Freedom::Rigid));
+}
+
+/// Whether some subset of the pieces 1.. moves along one of `directions` past all others: brute force over the subsets of
+/// the directional blocking graphs.
+fn a_subset_slides(contacts: &[Contact], n_pieces: u32, directions: &[Vec3]) -> bool {
+    let subsets = 1u32..1 << (n_pieces - 1);
+    let moves = |subset: u32, piece: PatchId| piece.0 > 0 && subset >> (piece.0 - 1) & 1 == 1;
+    directions.iter().any(|d| {
+        subsets.clone().any(|subset| {
+            contacts.iter().all(|c| {
+                let relative = f64::from(moves(subset, c.a)) - f64::from(moves(subset, c.b));
+                relative * c.normal.dot(*d) <= 1e-12
+            })
+        })
+    })
+}
+
+#[test]
+fn no_subset_slides_out_of_what_is_certified() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let normals: Vec<Vec3> = LatticeDirection::all().map(LatticeDirection::unit).collect();
+    let crosses = normals.iter().flat_map(|a| normals.iter().map(|b| a.cross(*b).normalize_or_zero()));
+    let directions: Vec<Vec3> = normals.iter().copied().chain(crosses.filter(|d| *d != Vec3::ZERO)).collect();
+    let (mut n_locked, mut n_sliding) = (0, 0);
+    for round in 0..60u32 {
+        let n_pieces = 2 + round % 4;
+        let n_contacts = (3 + rng.random_range(0..9)) * n_pieces;
+        let contacts: Vec<Contact> = (0..n_contacts)
+            .map(|_| {
+                let a = rng.random_range(0..n_pieces);
+                let b = (a + rng.random_range(1..n_pieces)) % n_pieces;
+                contact(a, b, Vec3::ZERO, normals[rng.random_range(0..normals.len())])
+            })
+            .collect();
+        let slides = a_subset_slides(&contacts, n_pieces, &directions);
+        let locked = is_locked(&contacts, n_pieces as usize, Freedom::Translations);
+        assert!(!(slides && locked), "round {round}: {contacts:?}");
+        (n_locked, n_sliding) = (n_locked + u32::from(locked), n_sliding + u32::from(slides));
+    }
+    assert!(n_locked > 8 && n_sliding > 8, "{n_locked} locked, {n_sliding} sliding");
+}
+
+#[test]
+fn forty_pieces_are_proven_and_no_proof_names_more_contacts_than_twice_the_unknowns() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut contacts = Vec::new();
+    for piece in 1..40 {
+        let center = Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0;
+        for _ in 0..500 {
+            let axis = rng.random_range(0..3);
+            let mut offset = Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
+            offset[axis] = offset[axis].signum();
+            let normal = Vec3::AXES[axis] * offset[axis];
+            contacts.push(contact(piece, piece - 1, center + offset, normal));
+        }
+    }
+    let proof =
+        prove(&contacts, 40, &[PatchId(0)], 2.0, Freedom::Rigid).expect("every piece is caged by the one before");
+    assert!(proof.multipliers.len() <= 2 * 39 * 6 && proof.residual < 1e-9 * proof.hold, "{}", proof.residual);
+}
+
+#[test]
+fn a_block_in_a_wide_slot_rattles_by_its_gaps() {
+    // The pin has the gap of the kit on four sides and below, and leaves upwards.
+    let kit = pinned_kit(|_| {});
+    let contacts = kit.examined().1;
+    let [alone, together] = [play_alone, play_together].map(|play| play(&kit.pieces, &kit.plan, &contacts));
+    assert_eq!(alone[PatchId(2)], None, "the key leaves");
+    assert_eq!(together[PatchId(2)], None, "the key is held");
+    let (Some(alone), Some(together)) = (alone[PatchId(1)], together[PatchId(1)]) else { panic!("{alone:?}") };
+    // The lid stops after one gap along y and z, and turns a little at most.
+    let gap_mm = 2.0 * HALF_GAP_MM;
+    assert!(alone.translation_mm > 0.9 * gap_mm && alone.translation_mm < 2.0 * gap_mm, "{alone:?}");
+    assert!(alone.rotation_deg > 0.0 && alone.rotation_deg < 2.0, "{alone:?}");
+    assert!((alone.translation_mm - together.translation_mm).abs() < 1e-6, "all other pieces are held: {together:?}");
+}
+
+#[test]
+fn gaps_of_a_row_add_up_when_all_may_move() {
+    // Piece 0, 1, 2 caged one in the other along every axis with gap g: 2 moves g alone and 2 g with 1.
+    let mut contacts = Vec::new();
+    for (a, b) in [(1, 0), (2, 1)] {
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                for (p, q) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+                    let mut point = Vec3::splat(sign);
+                    (point[(axis + 1) % 3], point[(axis + 2) % 3]) = (p, q);
+                    contacts.push(contact(a, b, point, Vec3::AXES[axis] * sign));
+                }
+            }
+        }
+    }
+    let farthest = |free: &[PatchId], d: Vec3| {
+        let system = crate::verify::motion::System::new(&contacts, free, 1.0, Freedom::Rigid);
+        let mut objective = nalgebra::DVector::zeros(system.n);
+        let at = system.n - 6;
+        (0..3).for_each(|k| objective[at + k] = d[k]);
+        let gaps: Vec<f64> = system.rows.iter().map(|row| contacts[row.contact].gap_mm).collect();
+        let mut corner = crate::verify::motion::Corner::at_rest(&system);
+        system.farthest(&objective, &gaps, &mut corner).expect("it is caged")
+    };
+    for d in [Vec3::X, Vec3::NEG_Y, Vec3::Z] {
+        assert!((farthest(&[PatchId(2)], d) - 0.1).abs() < 1e-9);
+        assert!((farthest(&[PatchId(1), PatchId(2)], d) - 0.2).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_plan_that_leaves_a_piece_out_is_not_certified() {
+    let mut kit = pinned_kit(|_| {});
+    kit.plan.steps.pop();
+    let claimed = |kit: &Kit| certify(Vec::new(), &kit.pieces, &kit.plan, &[], &Verification::default(), 0.1);
+    assert_eq!(claimed(&kit), None);
+    kit.pieces = [Volume::empty().to_mesh(), Volume::empty().to_mesh()].into_iter().collect();
+    let claims = claimed(&kit).expect("two pieces, both named").claims;
+    assert!(matches!(&claims[1], Claim::Moves { motions, .. } if motions.len() == 1), "nothing holds an empty piece");
+}

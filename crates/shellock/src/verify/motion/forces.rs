@@ -1,0 +1,149 @@
+//! Forces of contacts that balance a load as far as pushing can: non-negative least squares.
+
+use nalgebra::DVector;
+
+use super::system::{Row, System};
+
+/// By how much a contact may be violated, relative to the motion, when the search for contacts to add ends.
+const VIOLATION: f64 = 1e-6;
+/// A contact whose part outside the span of the active ones is a smaller share of it adds nothing but rounding.
+const INDEPENDENT: f64 = 1e-9;
+/// Rounds for each unknown before the search ends undecided, which counts as a motion. A guard against endless rounds
+/// by rounding; how many real assemblies need has not been measured.
+const ROUNDS: usize = 30;
+
+/// Forces `μ ≥ 0` of contacts, and what of a load they leave.
+pub(crate) struct Balance {
+    /// Rows with their forces, all positive; the rows are independent.
+    pub forces: Vec<(usize, f64)>,
+    /// `load + Aᵀμ`, the least that contacts can make of it.
+    pub rest: DVector<f64>,
+}
+
+impl System {
+    /// The forces that leave least of `load`; ends as soon as the rest's components sum to no more than `enough`.
+    pub fn balance(&self, load: &DVector<f64>, enough: f64) -> Balance {
+        let mut active = Active::default();
+        let mut rest = load.clone();
+        let mut is_refused = vec![false; self.rows.len()];
+        for _ in 0..ROUNDS * self.n {
+            if rest.lp_norm(1) <= enough {
+                break;
+            }
+            let Some(entering) = self.most_violated(&rest, &is_refused) else { break };
+            if !active.push(self, entering) {
+                is_refused[entering] = true;
+                continue;
+            }
+            is_refused.fill(false);
+            let left_at_once = active.solve(self, load, entering);
+            if left_at_once {
+                // Rounding: the contact that should have gained a force lost it. The next one may do better.
+                is_refused[entering] = true;
+            }
+            rest.copy_from(load);
+            for (&row, &force) in active.rows.iter().zip(&active.forces) {
+                self.add(&self.rows[row], force, &mut rest);
+            }
+        }
+        Balance { forces: active.rows.into_iter().zip(active.forces).collect(), rest }
+    }
+
+    /// The row along which `−rest` violates its contact most, per length of the row.
+    fn most_violated(&self, rest: &DVector<f64>, is_refused: &[bool]) -> Option<usize> {
+        let limit = -VIOLATION * rest.norm();
+        let violation = |row: &Row| self.dot(row, rest) / self.dot_rows(row, row).sqrt();
+        let open = self.rows.iter().enumerate().filter(|(i, _)| !is_refused[*i]);
+        let worst = open.map(|(i, row)| (i, violation(row))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (worst.1 < limit).then_some(worst.0)
+    }
+}
+
+/// The contacts that carry force, and the Cholesky factor of their products `A_P A_Pᵀ`.
+#[derive(Default)]
+pub(super) struct Active {
+    pub(super) rows: Vec<usize>,
+    forces: Vec<f64>,
+    /// Row `i` has `i + 1` entries.
+    lower: Vec<Vec<f64>>,
+}
+
+impl Active {
+    /// Adds a row with no force; `false`, and nothing is added, where it depends on the others.
+    pub(super) fn push(&mut self, system: &System, entering: usize) -> bool {
+        let row = &system.rows[entering];
+        let products: Vec<f64> = self.rows.iter().map(|&p| system.dot_rows(row, &system.rows[p])).collect();
+        let mut line = self.forward(&products);
+        let whole = system.dot_rows(row, row);
+        let rest = whole - line.iter().map(|x| x * x).sum::<f64>();
+        if rest <= INDEPENDENT * whole {
+            return false;
+        }
+        line.push(rest.sqrt());
+        self.lower.push(line);
+        self.rows.push(entering);
+        self.forces.push(0.0);
+        true
+    }
+
+    /// Moves the forces to the least-squares solution, dropping rows whose force would become negative. Whether
+    /// `entering` was the first to go.
+    fn solve(&mut self, system: &System, base: &DVector<f64>, entering: usize) -> bool {
+        let mut entering_left = false;
+        let mut is_first = true;
+        while !self.rows.is_empty() {
+            let against: Vec<f64> = self.rows.iter().map(|&p| -system.dot(&system.rows[p], base)).collect();
+            let target = self.backward(&self.forward(&against));
+            let share = |i: usize| self.forces[i] / (self.forces[i] - target[i]);
+            let leaving = (0..target.len()).filter(|&i| target[i] <= 0.0).map(|i| (i, share(i)));
+            let Some((leaving, share)) = leaving.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+                self.forces = target;
+                break;
+            };
+            let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+            self.forces.iter_mut().zip(&target).for_each(|(force, to)| *force += share * (to - *force));
+            entering_left |= is_first && self.rows[leaving] == entering;
+            is_first = false;
+            self.remove(leaving);
+        }
+        entering_left
+    }
+
+    /// Solves with the factor.
+    pub(super) fn forward(&self, right: &[f64]) -> Vec<f64> {
+        let mut y: Vec<f64> = Vec::with_capacity(right.len() + 1);
+        for (line, b) in self.lower.iter().zip(right) {
+            let known: f64 = line.iter().zip(&y).map(|(l, y)| l * y).sum();
+            y.push((b - known) / line[line.len() - 1]);
+        }
+        y
+    }
+
+    /// Solves with the transposed factor.
+    pub(super) fn backward(&self, right: &[f64]) -> Vec<f64> {
+        let mut x = right.to_vec();
+        for i in (0..x.len()).rev() {
+            x[i] /= self.lower[i][i];
+            let known = x[i];
+            x[..i].iter_mut().zip(&self.lower[i]).for_each(|(x, l)| *x -= l * known);
+        }
+        x
+    }
+
+    /// Takes row `at` out of the factor; Givens rotations make it triangular again.
+    pub(super) fn remove(&mut self, at: usize) {
+        self.rows.remove(at);
+        self.forces.remove(at);
+        self.lower.remove(at);
+        for i in at..self.lower.len() {
+            let (p, q) = (self.lower[i][i], self.lower[i][i + 1]);
+            let length = p.hypot(q);
+            let (cos, sin) = (p / length, q / length);
+            for line in &mut self.lower[i..] {
+                let (x, y) = (line[i], line[i + 1]);
+                (line[i], line[i + 1]) = (cos * x + sin * y, cos * y - sin * x);
+            }
+            self.lower[i].pop();
+        }
+    }
+}
