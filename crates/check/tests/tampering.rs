@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use shellock::certificate::{PieceFile, certify};
 use shellock::plan::{InstallationPlan, InstallationStep};
+use shellock::verify::clearance::KitGaps;
 use shellock::verify::{VerifyParams, examine};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
 use shellock_check::{Finding, check};
@@ -77,7 +78,7 @@ fn make() -> Made {
         pieces.iter().map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh))).collect();
     let named = pieces.ids().zip(&files);
     let named = named.map(|(id, (file, bytes))| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
-    let certificate = certify(named, &pieces, &plan, &contacts, &verdict, CLEARANCE_MM).unwrap();
+    let certificate = certify(named, &pieces, &plan, &contacts, &verdict, &KitGaps::default(), CLEARANCE_MM).unwrap();
     let pieces = plan.steps.iter().map(|s| {
         json!({ "file": format!("{}.stl", s.piece), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
     });

@@ -14,6 +14,7 @@ use shellock::report::{
     ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
 };
 use shellock::strength::{Strength, StrengthParams, StressMap};
+use shellock::verify::clearance::PathGap;
 use shellock::verify::thin_share;
 use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
@@ -172,7 +173,7 @@ fn piece_file(p: PatchId) -> String {
 fn certificate(files: &[(String, Vec<u8>)], design: &Design, clearance_mm: f64) -> Option<Vec<u8>> {
     let named = files.iter().zip(design.pieces.ids());
     let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
-    certify(named, &design.pieces, &design.plan, &design.touching, &design.verification, clearance_mm)
+    certify(named, &design.pieces, &design.plan, &design.touching, &design.verification, &design.gaps, clearance_mm)
         .map(|c| certificate_bytes(&c))
 }
 
@@ -244,6 +245,7 @@ fn plan_json(
         "volume_ratio": summary.volume_ratio,
         "connector_share": summary.connector_share,
         "pieces": pieces, "joints": joints, "contacts": contacts,
+        "gaps": gaps_json(design),
         "verification": { "passed": design.verification.passed(), "checks": design.verification.checks,
                           "findings": design.verification.findings },
         "warnings": warnings,
@@ -267,6 +269,21 @@ fn transform(model: &Model, design: &Design) -> [f64; 16] {
     }
     all[15] = 1.0;
     all
+}
+
+/// How near pieces come, at rest and on their way, mm: the least of all and beneath the rim, which is meant to touch.
+fn gaps_json(design: &Design) -> Value {
+    let least = |gaps: &mut dyn Iterator<Item = f64>| gaps.min_by(f64::total_cmp);
+    let (pairs, paths) = (&design.gaps.pairs, &design.gaps.paths);
+    let key = design.plan.key();
+    let beneath = |p: &PathGap| p.beneath_rim.map(|place| place.gap_mm);
+    json!({
+        "at_rest_mm": least(&mut pairs.iter().map(|p| p.overall.gap_mm)),
+        "at_rest_beneath_rim_mm": least(&mut pairs.iter().filter_map(|p| p.beneath_rim.map(|place| place.gap_mm))),
+        "on_the_way_mm": least(&mut paths.iter().map(|p| p.overall.gap_mm)),
+        "on_the_way_beneath_rim_mm": least(&mut paths.iter().filter_map(beneath)),
+        "key_on_the_way_beneath_rim_mm": least(&mut paths.iter().filter(|p| p.piece == key).filter_map(beneath)),
+    })
 }
 
 /// How the key was cut.

@@ -4,10 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
+use shellock::body::BodyParams;
 use shellock::certificate::{PieceFile, certify};
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
 use shellock::verify::VerifyParams;
+use shellock::verify::clearance::kit_gaps;
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, segmentation, sizes};
 use shellock_geom::check::{inspect as inspection, into_solid};
 use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
@@ -178,7 +180,9 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
     let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &solid, &pieces, &order)?;
-    let claimed = certify(files, &pieces, &order, &contacts, &verdict, params.clearance_mm);
+    let rim_mm = BodyParams::default().rim_mm;
+    let gaps = kit_gaps(&ctx, &solid, &pieces, &order, rim_mm)?;
+    let claimed = certify(files, &pieces, &order, &contacts, &verdict, &gaps, params.clearance_mm);
     display.finish();
     if let Some(claimed) = claimed {
         write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed))?;

@@ -19,6 +19,7 @@ use crate::plan::{Blocker, InstallationPlan, PlanParams, PlanProof};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams, StressField};
 use crate::strength::{Strength, StrengthError, StrengthParams, StressMap};
+use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
     Cancelled, ConnectorSizes, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning, body, connector,
@@ -163,6 +164,8 @@ pub struct Design {
     pub verification: Verification,
     /// Where the finished pieces touch.
     pub touching: Vec<verify::contact::Contact>,
+    /// How near pieces come, at rest and on their way.
+    pub gaps: KitGaps,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
 }
@@ -292,7 +295,15 @@ impl Job<'_> {
         let no_key = || DesignOutcome::NoPlan { reason: "the key falls apart".into(), blockers: Vec::new() };
         let Some(cut) = cut_again(&mut params, surface) else { return Ok(no_key()) };
         surface = cut;
-        let mut sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
+        let choose = |params: &Params, surface: &SegmentedSurface| {
+            let mut chosen = sizes::choose(ctx, &params.sizes(), surface, stress_mpa)?;
+            if let Some(piece) = params.plan.key.filter(|_| key.is_some()) {
+                // Its rails have as much room as it was cut for.
+                chosen.sizes.cap(piece, params.connector.size.usual_mm());
+            }
+            Ok::<_, DesignError>(chosen)
+        };
+        let mut sizes = choose(&params, &surface)?;
         let body = params.body.clone();
         let mut grid = WallGrid { params: &body, model: &laid.model, room_mm: 0.0, made: None };
         let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all };
@@ -310,7 +321,7 @@ impl Job<'_> {
             ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
             surface = mended;
             mending += 1;
-            sizes = sizes::choose(ctx, &params.sizes(), &surface, stress_mpa)?;
+            sizes = choose(&params, &surface)?;
         };
         // Warnings of segmentations and plans that were given up go with them.
         ctx.take_warnings();
@@ -368,6 +379,7 @@ fn finish(
         (Some(mut design), _) => {
             segmentation::tell(ctx, &params.segmentation, model, labels, &design.surface)?;
             design.warnings.splice(0..0, ctx.take_warnings());
+            design.gaps = kit_gaps(ctx, model, &design.pieces, &design.plan, params.body.rim_mm)?;
             DesignOutcome::Made(Box::new(design))
         }
         (None, Attempt::Failed { reason, blockers, .. }) => DesignOutcome::NoPlan { reason, blockers },
@@ -414,6 +426,7 @@ pub fn make(
         contacts,
         verification,
         touching,
+        gaps: KitGaps::default(),
         warnings: ctx.take_warnings(),
     })
 }

@@ -85,6 +85,11 @@ impl ConnectorSizes {
         Self { default_mm, by_pair: sizes_mm.into_iter().map(sorted).collect() }
     }
 
+    /// Lets no pair with `piece` have a larger size than `most_mm`.
+    pub fn cap(&mut self, piece: PatchId, most_mm: f64) {
+        self.by_pair.iter_mut().filter(|(pair, _)| pair.contains(&piece)).for_each(|(_, mm)| *mm = mm.min(most_mm));
+    }
+
     /// The size between two pieces, in either order.
     pub fn of(&self, a: PatchId, b: PatchId) -> f64 {
         self.by_pair.get(&[a.min(b), a.max(b)]).copied().unwrap_or(self.default_mm)

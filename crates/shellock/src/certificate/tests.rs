@@ -13,7 +13,8 @@ fn certified(kit: &Kit) -> Certificate {
     let file = |id: PatchId| PieceFile { id, file: format!("{id}.stl"), sha256: String::new() };
     let files = kit.pieces.ids().map(file).collect();
     let (verdict, contacts) = kit.examined();
-    certify(files, &kit.pieces, &kit.plan, &contacts, &verdict, 2.0 * HALF_GAP_MM).expect("the plan is whole")
+    certify(files, &kit.pieces, &kit.plan, &contacts, &verdict, &KitGaps::default(), 2.0 * HALF_GAP_MM)
+        .expect("the plan is whole")
 }
 
 /// Who can move while key and first piece are held; empty where a lock is claimed.
@@ -240,7 +241,9 @@ fn gaps_of_a_row_add_up_when_all_may_move() {
 fn a_plan_that_leaves_a_piece_out_is_not_certified() {
     let mut kit = pinned_kit(|_| {});
     kit.plan.steps.pop();
-    let claimed = |kit: &Kit| certify(Vec::new(), &kit.pieces, &kit.plan, &[], &Verification::default(), 0.1);
+    let claimed = |kit: &Kit| {
+        certify(Vec::new(), &kit.pieces, &kit.plan, &[], &Verification::default(), &KitGaps::default(), 0.1)
+    };
     assert_eq!(claimed(&kit), None);
     kit.pieces = [Volume::empty().to_mesh(), Volume::empty().to_mesh()].into_iter().collect();
     let claims = claimed(&kit).expect("two pieces, both named").claims;

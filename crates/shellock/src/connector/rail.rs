@@ -16,6 +16,8 @@ const MOST_OUTWARDS: f64 = 0.25;
 /// The seam may leave a straight line by this much across, and the wall's inner side by this much up and down, in connector sizes.
 const MOST_ASIDE_SIZES: f64 = 0.16;
 const MOST_UNEVEN_SIZES: f64 = 0.3;
+/// What passes over a tongue is no farther across from the seam than this, in connector sizes.
+const REACH_SIZES: f64 = 1.2;
 /// Shortest rail, in connector sizes.
 const SHORTEST_SIZES: f64 = 2.0;
 /// Length of the narrow tip and of the stop, in connector sizes.
@@ -105,7 +107,8 @@ fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Op
         let (middle, slope) = fitted(rest);
         let aside = |p: &Place| (p[1] - middle[1] - slope * (p[0] - middle[0])).abs();
         let front = rest[rest.len() - 1][0];
-        let passing = outline.iter().filter(|p| p[0] <= front).map(|p| p[2]);
+        let near_seam = |p: &&Place| (p[1] - middle_of(rest)).abs() < REACH_SIZES * size_mm;
+        let passing = outline.iter().filter(|p| p[0] <= front).filter(near_seam).map(|p| p[2]);
         let low = passing.fold(rest.iter().map(|p| p[2]).fold(f64::INFINITY, f64::min), f64::min);
         let high = rest.iter().map(|p| p[2]).fold(f64::NEG_INFINITY, f64::max);
         let uneven = |p: &Place| (p[2] - middle[2]).abs();
@@ -117,6 +120,11 @@ fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Op
         // What bends away does so at an end.
         rest = if excess(&rest[0]) > excess(&rest[rest.len() - 1]) { &rest[1..] } else { &rest[..rest.len() - 1] };
     }
+}
+
+/// How far across the slide the middle of the places is.
+fn middle_of(places: &[Place]) -> f64 {
+    places.iter().map(|p| p[1]).sum::<f64>() / places.len() as f64
 }
 
 /// Centre of the places and slope of the line of least squares towards the key.

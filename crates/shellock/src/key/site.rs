@@ -254,31 +254,34 @@ fn scored(params: &KeyParams, spots: &[Spot], plane: Plane, prism: KeyPrism, len
 /// and yet reach up to the wall at the side.
 fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPrism) -> f64 {
     const N_ALONG: usize = 24;
-    const N_ACROSS: usize = 9;
+    /// Places beside the seam, up to so far inwards, in connector sizes.
+    const N_BESIDE: usize = 3;
+    const BESIDE_SIZES: f64 = 0.8;
     /// How far a tongue reaches up to an uneven wall, in connector sizes.
     const UNEVEN_SIZES: f64 = 0.3;
     /// Rays begin so far outside the plane, mm.
     const ABOVE_MM: f64 = 8.0;
     let length_mm = prism.length_mm();
-    let below = |along: f64, share: f64| {
-        let at = prism.origin + along * prism.slide + share * prism.half_width_at(along) * prism.across();
+    let below = |along: f64, across: f64| {
+        let at = prism.origin + along * prism.slide + across * prism.across();
         let hit = bvh.first_hit(at + ABOVE_MM * prism.normal, -prism.normal, 2.0 * ABOVE_MM);
         let outer = hit.filter(|(face, _)| mesh.face_normal(*face as usize).dot(prism.normal) > 0.0);
         outer.map_or(f64::INFINITY, |(_, mm)| mm - ABOVE_MM)
     };
     let step_mm = length_mm / N_ALONG as f64;
-    let rows: Vec<[f64; N_ACROSS]> = (0..N_ALONG)
-        .map(|i| {
-            let along = (i as f64 + 0.5) * step_mm;
-            std::array::from_fn(|j| below(along, 2.0 * j as f64 / (N_ACROSS - 1) as f64 - 1.0))
-        })
-        .collect();
-    let longest = |side: usize| {
+    // At the seam, then inwards.
+    let row = |i: usize, side: f64| -> [f64; N_BESIDE] {
+        let along = (i as f64 + 0.5) * step_mm;
+        let inwards = |j: usize| BESIDE_SIZES * params.size_mm * j as f64 / (N_BESIDE - 1) as f64;
+        std::array::from_fn(|j| below(along, side * (prism.half_width_at(along) - inwards(j))))
+    };
+    let longest = |side: f64| {
+        let rows: Vec<[f64; N_BESIDE]> = (0..N_ALONG).map(|i| row(i, side)).collect();
         let mut best = 0;
         for from in 0..N_ALONG {
             let mut least = f64::INFINITY;
             for to in from..N_ALONG {
-                least = least.min(rows[to][side]);
+                least = least.min(rows[to][0]);
                 let passing = rows[..=to].iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
                 if !passing.is_finite() || passing - least > UNEVEN_SIZES * params.size_mm {
                     break;
@@ -288,7 +291,7 @@ fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPri
         }
         best as f64 * step_mm
     };
-    longest(0).min(longest(N_ACROSS - 1))
+    longest(-1.0).min(longest(1.0))
 }
 
 /// Whether the model is thick enough below the key's sides for its wall, its grooves and the wall across.

@@ -58,6 +58,29 @@ pub struct PathGap {
     pub beneath_rim: Option<NearestPlace>,
 }
 
+/// All gaps of a kit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct KitGaps {
+    /// At rest, see [`pair_gaps`].
+    pub pairs: Vec<PairGap>,
+    /// On the way, see [`path_gaps`].
+    pub paths: Vec<PathGap>,
+}
+
+/// All gaps of the finished `pieces` of `model`, installed as `plan` says. What is within `rim_mm` of the model's surface is rim.
+pub fn kit_gaps(
+    ctx: &Ctx,
+    model: &Solid,
+    pieces: &IdVec<PatchId, TriMesh>,
+    plan: &InstallationPlan,
+    rim_mm: f64,
+) -> Result<KitGaps, Cancelled> {
+    ctx.stage("gaps", 0)?;
+    let shapes = prepare(ctx, model, pieces, rim_mm)?;
+    let (pairs, paths) = rayon::join(|| pair_gaps(ctx, &shapes), || path_gaps(ctx, &shapes, plan));
+    Ok(KitGaps { pairs: pairs?, paths: paths? })
+}
+
 /// Prepares `pieces` of `model`. What is within `rim_mm` of the model's surface is rim.
 pub fn prepare(
     ctx: &Ctx,
