@@ -40,13 +40,15 @@ pub struct BodyParams {
     pub cell_mm: Option<f64>,
     /// Gap that each side of a seam leaves inside the wall. [0, 0.4]; 0.05.
     pub wall_gap_mm: f64,
+    /// The same along the seams of a key that slides on rails; [0, 0.4], `None` where it does not. Such a key is to be taken out by hand.
+    pub key_gap_mm: Option<f64>,
     /// Depth over which that gap grows from three tenths at the outer rim. [0.05, 5]; 1.
     pub rim_mm: f64,
 }
 
 impl Default for BodyParams {
     fn default() -> Self {
-        Self { thickness_mm: 2.0, cell_mm: None, wall_gap_mm: 0.05, rim_mm: 1.0 }
+        Self { thickness_mm: 2.0, cell_mm: None, wall_gap_mm: 0.05, key_gap_mm: None, rim_mm: 1.0 }
     }
 }
 
@@ -63,6 +65,7 @@ impl BodyParams {
             ParamProblem::unless_within("thickness", "mm", self.thickness_mm, 0.8, 10.0),
             ParamProblem::unless_within("grid spacing", "mm", cell, 0.05, self.thickness_mm / 2.0),
             ParamProblem::unless_within("wall gap", "mm", self.wall_gap_mm, 0.0, 0.4),
+            self.key_gap_mm.and_then(|mm| ParamProblem::unless_within("gap of the key", "mm", mm, 0.0, 0.4)),
             ParamProblem::unless_within("rim", "mm", self.rim_mm, 0.05, 5.0),
         ]
         .into_iter()

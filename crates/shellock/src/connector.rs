@@ -18,7 +18,7 @@
 //! the separation direction and along no other.
 //!
 //! Where a key slides along its seam no such profile holds. There its neighbour carries a straight tongue under the key's wall, and
-//! the key a groove around it, see [`rail`].
+//! the key a groove around it (`connector::rail`).
 
 mod frame;
 mod free;
@@ -45,7 +45,7 @@ pub struct ConnectorParams {
     ///
     /// Resin printers hold 0.05–0.15 mm a side, filament printers want 0.15–0.3.
     pub clearance_mm: f64,
-    /// The same between the rails of a key and their grooves, so that it can be taken out by hand. [0.03, 0.8]; 0.15.
+    /// The same between a key that slides on rails and its neighbours, so that it can be taken out by hand; no less than the other. [0.03, 0.8]; 0.15.
     pub key_clearance_mm: f64,
     /// How far a bump on each rail presses into the key's groove before it snaps into its dimple. [0, 0.4]; 0, none.
     ///
@@ -68,6 +68,11 @@ impl Default for ConnectorParams {
 }
 
 impl ConnectorParams {
+    /// Gap of connectors, mm: of those of a key that slides on rails, or of all others.
+    pub fn clearance_of(&self, is_sliding_key: bool) -> f64 {
+        if is_sliding_key { self.key_clearance_mm.max(self.clearance_mm) } else { self.clearance_mm }
+    }
+
     /// Room below the wall that connectors up to `size_mm` may take, mm: a channel under the steepest backward seam is as deep.
     pub fn room_mm(&self, size_mm: f64) -> f64 {
         2.1 * size_mm + self.clearance_mm

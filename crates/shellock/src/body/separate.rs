@@ -22,6 +22,8 @@ const MARGIN_CELLS: f64 = 0.15;
 /// Share of the wall gap that is left at the rim. With a tenth of it the two sides of most seams crossed somewhere, by up to
 /// 0.1 mm, and paths rubbed there; half of that is left. At 15 µm a side the surface still counts as covered everywhere.
 const RIM_LEAST: f64 = 0.3;
+/// What is nearer than this to the key's cut is its seam, mm.
+const KEY_REACH_MM: f32 = 1.5;
 /// Cutting tools are simplified by at most this share of the gap and this many mm where they cut, so that paths stay free,
 /// and by more where they end outside the wall, farther from it than so many cells.
 const GAP_SHARE: f64 = 0.2;
@@ -96,7 +98,9 @@ pub fn build(
         ctx.step()?;
     }
     ctx.stage("bodies", plan.steps.len())?;
-    let mut parts = split(&Splitter { ctx, params, grid }, grid.wall.clone(), &cuts)?;
+    let key_cut = cuts[0].field.as_ref().filter(|_| params.key_gap_mm.is_some());
+    let key_side = key_cut.map(|field| field.spread(&grid.band, -grid.cutoff_mm()));
+    let mut parts = split(&Splitter { ctx, params, grid, key_side }, grid.wall.clone(), &cuts)?;
     parts.sort_by_key(|(p, _)| *p);
     Ok(ShellBodies {
         bodies: parts.into_iter().map(|(p, part)| whole_body(ctx, p, &part)).collect(),
@@ -120,6 +124,8 @@ struct Splitter<'a> {
     ctx: &'a Ctx<'a>,
     params: &'a BodyParams,
     grid: &'a ShellGrid,
+    /// Positive on the key's side of its cut, where its seams have a gap of their own.
+    key_side: Option<Vec<f32>>,
 }
 
 /// Divides `wall` among the pieces of `cuts`, which stand in the order of taking apart: first into the earlier and the later
@@ -185,18 +191,19 @@ impl Splitter<'_> {
 
     /// All of the wanted side, less the gap.
     fn whole_side(&self, g: &[f32], sign: f32) -> Volume {
-        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
-        let field: Vec<f32> = (0..g.len())
-            .into_par_iter()
-            .map(|n| {
-                let taper = (self.grid.depth[n] / rim).clamp(RIM_LEAST as f32, 1.0);
-                (sign * g[n] - gap * taper).min(self.limits(n))
-            })
-            .collect();
+        let field: Vec<f32> =
+            (0..g.len()).into_par_iter().map(|n| (sign * g[n] - self.gap_mm(n)).min(self.limits(n))).collect();
         // The same corners as the other side's collar cuts apart.
         let apart = if sign > 0.0 { Corners::Negative } else { Corners::Positive };
         let mesh = contour_cutting(&self.grid.band, &field, OffBand::Outside, apart);
         Volume::from_closed_mesh(&mesh).expect("contours are manifold")
+    }
+
+    /// How far each side of a cut stays away from it, mm: less towards the outer rim, more along the key's seams where it has its own gap.
+    fn gap_mm(&self, n: usize) -> f32 {
+        let is_at_key = self.key_side.as_ref().is_some_and(|key| key[n].abs() < KEY_REACH_MM);
+        let gap = self.params.key_gap_mm.filter(|_| is_at_key).unwrap_or(self.params.wall_gap_mm) as f32;
+        gap * (self.grid.depth[n] / self.params.rim_mm as f32).clamp(RIM_LEAST as f32, 1.0)
     }
 
     /// Positive where tools reach. Nothing is cut below the wall or far outside: cuts are unknown there. The limits are so
@@ -215,7 +222,6 @@ impl Splitter<'_> {
     /// Positive in the collar: from the gap's border on the side of `sign` to some cells on the other side of the cut.
     fn collar_field(&self, g: &[f32], sign: f32) -> Vec<f32> {
         let (cell, cutoff) = (self.grid.band.cell_mm() as f32, self.grid.cutoff_mm());
-        let (gap, rim) = (self.params.wall_gap_mm as f32, self.params.rim_mm as f32);
         let is_own = |n: u32| sign * g[n as usize] > 0.0;
         let mut field: Vec<f32> =
             (0..g.len() as u32).into_par_iter().map(|n| if is_own(n) { cutoff } else { -cell }).collect();
@@ -235,8 +241,7 @@ impl Splitter<'_> {
             }
         }
         field.par_iter_mut().enumerate().for_each(|(n, f)| {
-            let taper = (self.grid.depth[n] / rim).clamp(RIM_LEAST as f32, 1.0);
-            *f = f.min(gap * taper - sign * g[n]).min(self.limits(n));
+            *f = f.min(self.gap_mm(n) - sign * g[n]).min(self.limits(n));
         });
         field
     }

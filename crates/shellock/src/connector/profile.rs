@@ -56,8 +56,8 @@ impl Section {
     /// The cross-section at a station.
     pub fn at(params: &ConnectorParams, station: &Station) -> Self {
         match station.shape {
-            Shape::Seam => Self::seam(params, station),
-            Shape::Rail(part) => Self::rail(params, station.size_mm, part),
+            Shape::Seam => Self::seam(station),
+            Shape::Rail(part) => Self::rail(params, station, part),
         }
     }
 
@@ -71,8 +71,8 @@ impl Section {
     ///              ┌────┘F│
     ///              └──────┘          lip
     /// ```
-    fn rail(params: &ConnectorParams, d: f64, part: RailPart) -> Self {
-        let c = params.key_clearance_mm;
+    fn rail(params: &ConnectorParams, station: &Station, part: RailPart) -> Self {
+        let (d, c) = (station.size_mm, station.clearance_mm);
         let (reach, thick, wall) = (0.5 * d, 0.45 * d, (0.5 * d - c).max(params.min_wall_mm));
         let floor = -2.0 * c - 2.0 * thick;
         let lead = if part == RailPart::LeadIn { LEAD_IN_MM.min(0.3 * thick) } else { 0.0 };
@@ -96,8 +96,8 @@ impl Section {
     /// pulls straight out, up to 60° backward.
     ///
     /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across the seam.
-    fn seam(params: &ConnectorParams, station: &Station) -> Self {
-        let (d, c) = (station.size_mm, params.clearance_mm);
+    fn seam(station: &Station) -> Self {
+        let (d, c) = (station.size_mm, station.clearance_mm);
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
         // Stretch along ŝ; ŝ leans against the seam by the angle whose cosine is `depth`.
         let k = 1.0 / station.depth.max(0.4);
@@ -138,6 +138,7 @@ mod tests {
             depth: 1.0,
             arc_mm: 0.0,
             size_mm,
+            clearance_mm: ConnectorParams::default().clearance_mm,
             shape: Shape::Seam,
         }
     }
@@ -171,9 +172,10 @@ mod tests {
     #[test]
     fn tongue_and_groove_of_a_rail_keep_the_keys_clearance_and_overlap_both_ways() {
         for (size_mm, key_clearance_mm) in [(2.0, 0.1), (2.5, 0.15), (4.0, 0.3)] {
-            let params = ConnectorParams { key_clearance_mm, ..ConnectorParams::default() };
+            let params = ConnectorParams::default();
+            let station = Station { clearance_mm: key_clearance_mm, ..station(0.0, size_mm) };
             for part in [RailPart::Full, RailPart::LeadIn] {
-                let section = Section::rail(&params, size_mm, part);
+                let section = Section::rail(&params, &station, part);
                 let [tongue, root] = section.male.map(Option::unwrap);
                 for wall in section.female.iter().flatten() {
                     for male in [tongue, root] {
@@ -187,7 +189,7 @@ mod tests {
                 // The key's wall lies above the tongue, its lip below: neither lets it out across.
                 assert!(tongue.s1 < 0.0 && tongue.n1 > 0.5 && lip.s1 < tongue.s0 && lip.n0 < 0.3 * tongue.n1);
             }
-            assert!(Section::rail(&params, size_mm, RailPart::Stop).male.iter().all(Option::is_none));
+            assert!(Section::rail(&params, &station, RailPart::Stop).male.iter().all(Option::is_none));
         }
     }
 

@@ -149,6 +149,7 @@ fn rail(
     is_free: &dyn Fn(crate::PatchId, Vec3) -> Option<bool>,
 ) -> Option<Run> {
     let (male, female) = (curve.earlier, curve.later);
+    let clearance_mm = params.clearance_of(true);
     let point = |p: Place| p[0] * axes.slide + p[1] * axes.to_key + p[2] * axes.outwards;
     let tangent = (point(front) - point(back)).normalize();
     let n = axes.outwards.cross(tangent);
@@ -163,13 +164,14 @@ fn rail(
         depth: 1.0,
         arc_mm,
         size_mm,
+        clearance_mm,
         shape: Shape::Rail(part),
     };
     let arc = |i: usize| length_mm * i as f64 / N_PLACES as f64;
     let free: Vec<bool> =
         (0..=N_PLACES).map(|i| has_room(params, &station(arc(i), RailPart::Full), male, female, is_free)).collect();
     let (from, to) = longest(&free)?;
-    let stop_mm = params.key_clearance_mm + STOP_SIZES * size_mm;
+    let stop_mm = clearance_mm + STOP_SIZES * size_mm;
     let (start, end) = (arc(from), arc(to));
     if end - start < SHORTEST_SIZES * size_mm {
         return None;
@@ -178,7 +180,7 @@ fn rail(
     let mut stations =
         vec![station(start, RailPart::Full), station(tip, RailPart::Full), station(end, RailPart::LeadIn)];
     if has_room(params, &station(end + stop_mm, RailPart::Stop), male, female, is_free) {
-        let stop = [end + params.key_clearance_mm, end + stop_mm];
+        let stop = [end + clearance_mm, end + stop_mm];
         stations.extend(stop.map(|arc_mm| station(arc_mm, RailPart::Stop)));
     }
     Some(Run { male, female, stations })
@@ -208,7 +210,7 @@ mod tests {
     fn a_line_with_a_bent_end_gives_the_straight_part_under_its_lowest_point() {
         let axes = Axes { slide: Vec3::X, to_key: Vec3::Y, outwards: Vec3::Z };
         let points: Vec<Vec3> = (0..40)
-            .map(|i| f64::from(i))
+            .map(f64::from)
             .map(|x| Vec3::new(x, 0.05 * x + (x - 30.0).max(0.0).powi(2), 0.1 * (x * 0.4).sin()))
             .collect();
         let [back, front] = straight(&points, &[], &axes, 2.5).unwrap();

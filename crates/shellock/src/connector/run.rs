@@ -45,6 +45,8 @@ pub struct Station {
     pub arc_mm: f64,
     /// Connector size D, mm.
     pub size_mm: f64,
+    /// Gap between the two halves, mm.
+    pub clearance_mm: f64,
     /// What the section looks like.
     pub shape: Shape,
 }
@@ -91,6 +93,11 @@ impl Run {
         self.stations[0].shape != Shape::Seam
     }
 
+    /// Gap between its two halves, mm.
+    pub fn clearance_mm(&self) -> f64 {
+        self.stations[0].clearance_mm
+    }
+
     /// The middle station's place.
     pub fn middle(&self) -> Vec3 {
         self.stations[self.stations.len() / 2].point
@@ -115,7 +122,6 @@ pub struct Contact {
 /// The runs along all curves, and what each curve offered. `is_free(piece, point)` says whether `piece` may have material
 /// at a point below the wall; `None` where the point lies in or above the wall and does not count. `slide` is the key's direction where
 /// it slides on rails.
-#[expect(clippy::too_many_arguments, reason = "what all earlier stages know of seams")]
 pub fn runs(
     params: &ConnectorParams,
     sizes: &ConnectorSizes,
@@ -129,8 +135,9 @@ pub fn runs(
         let separation = plan.separation(curve.later).unit();
         let later_is_male = roles(curve, separation);
         let size_mm = sizes.of(curve.later, curve.earlier);
-        let stations: Vec<Station> =
-            (0..curve.points.len()).map(|i| station(curve, i, separation, later_is_male[i], size_mm)).collect();
+        let clearance_mm = params.clearance_of(slide.is_some() && curve.later == plan.key());
+        let at = |i: usize| Station { clearance_mm, ..station(curve, i, separation, later_is_male[i], size_mm) };
+        let stations: Vec<Station> = (0..curve.points.len()).map(at).collect();
         let mut allowed = allowed(size_mm, curve, &stations, &later_is_male);
         let step = |i: usize| stations[i].point.distance(stations[i + 1].point);
         contacts.push(Contact {
@@ -188,7 +195,18 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_
     let theta = flat.dot(to_female).atan2(flat.dot(normal));
     let n = (theta.cos() * to_female - theta.sin() * normal).normalize_or_zero();
     let arc_mm = curve.points[..=i].windows(2).map(|w| w[0].distance(w[1])).sum();
-    Station { point: curve.points[i], tangent: u, n, s, theta, depth, arc_mm, size_mm, shape: Shape::Seam }
+    Station {
+        point: curve.points[i],
+        tangent: u,
+        n,
+        s,
+        theta,
+        depth,
+        arc_mm,
+        size_mm,
+        clearance_mm: 0.0,
+        shape: Shape::Seam,
+    }
 }
 
 /// Where ends, roles, angles and turns allow a connector.

@@ -84,10 +84,10 @@ pub(super) struct Wake {
 impl Wake {
     /// The wake of all half connectors of `piece`.
     pub(super) fn of(params: &ConnectorParams, runs: &[Run], piece: PatchId, separation: LatticeDirection) -> Self {
-        let grown = params.clearance_mm - SOCKET_SLACK_MM.min(0.5 * params.clearance_mm);
         let cells = runs
             .iter()
             .flat_map(|run| {
+                let grown = run.clearance_mm() - SOCKET_SLACK_MM.min(0.5 * run.clearance_mm());
                 let male = (run.male == piece).then(|| cells(params, run, Half::Male, grown));
                 let female = (run.female == piece).then(|| cells(params, run, Half::Female, grown));
                 male.into_iter().chain(female).flatten()

@@ -96,7 +96,8 @@ pub fn make(
         let whole: Vec<Volume> =
             mine.par_iter().map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h])).collect();
         let boxes: Vec<Aabb> = whole.iter().map(Volume::bounds).collect();
-        let space = space(params, grid, shell, q, &boxes);
+        let clearance_mm = mine.iter().map(|&(r, _)| runs[r].clearance_mm()).fold(params.clearance_mm, f64::max);
+        let space = space(clearance_mm, grid, shell, q, &boxes);
         let made = |whole: &Volume| (whole.volume(), carved(&whole.intersect(&space), &wakes, far_mm));
         let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
@@ -124,12 +125,12 @@ pub fn make(
     Ok(Finished { meshes, joints, detents })
 }
 
-/// Where the half connectors of `q` may be, within `boxes`: below the wall, a root's depth into it, and the clearance away
+/// Where the half connectors of `q` may be, within `boxes`: below the wall, a root's depth into it, and `clearance_mm` away
 /// from whatever its way out or a later piece's takes, and from what other pieces have of the wall.
-fn space(params: &ConnectorParams, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
+fn space(clearance_mm: f64, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
     let barred = shell.barred[q].spread(&grid.band, grid.cutoff_mm());
     let side = shell.side[q].spread(&grid.band, -grid.cutoff_mm());
-    let (clearance, ceiling) = (params.clearance_mm as f32, (grid.thickness_mm - ROOT_MM) as f32);
+    let (clearance, ceiling) = (clearance_mm as f32, (grid.thickness_mm - ROOT_MM) as f32);
     let (floor, cell_mm) = (grid.thickness_mm as f32 + clearance, grid.band.cell_mm() as f32);
     region(grid, boxes, |n| {
         let depth = grid.depth[n];

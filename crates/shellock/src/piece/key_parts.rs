@@ -59,7 +59,7 @@ pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<Detent>, V
     for run in runs.iter().filter(|r| params.detent_mm > 0.0 && r.is_rail()) {
         let station = &run.stations[0];
         let Some(tongue) = Section::at(params, station).male[0] else { continue };
-        let top = tongue.n1 + params.key_clearance_mm + params.detent_mm;
+        let top = tongue.n1 + station.clearance_mm + params.detent_mm;
         let inset = 0.15 * (tongue.s1 - tongue.s0);
         let (s0, s1) = (tongue.s0 + inset, tongue.s1 - inset);
         let bump = wedge(station, [tongue.n1 - ROOT_MM, top], [s0, s1], 0.0);
@@ -136,6 +136,7 @@ mod tests {
             depth: 1.0,
             arc_mm,
             size_mm: 2.5,
+            clearance_mm: params.key_clearance_mm,
             shape: Shape::Rail(RailPart::Full),
         };
         let run = Run { male: PatchId(1), female: PatchId(0), stations: vec![station(0.0), station(20.0)] };

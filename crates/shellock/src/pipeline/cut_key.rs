@@ -49,6 +49,7 @@ impl CutKey {
         }
         params.plan.key = Some(best.1);
         params.plan.key_slide = Some(self.along);
+        params.body.key_gap_mm = Some(params.body.wall_gap_mm.max(0.5 * params.connector.key_clearance_mm));
         params.grip = params.has_grip.then(|| self.grip());
         Some(best.0)
     }
