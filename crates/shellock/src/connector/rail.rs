@@ -218,11 +218,11 @@ mod tests {
         assert!((back[2] + 0.1).abs() < 0.02 && back[2] == front[2]);
         let slope = (front[1] - back[1]) / (front[0] - back[0]);
         assert!((slope - 0.05).abs() < 0.03, "{slope}");
-        // What is behind passes over the rail; what is in front of it does not.
-        let [behind, ahead] = [[-4.0, 8.0, -0.5], [39.0, 8.0, -3.0]];
-        let lower = straight(&points, &[behind, ahead], &axes, 2.5).unwrap();
+        // What is behind passes over the rail; what is in front of it or far aside does not.
+        let [behind, ahead, aside] = [[-4.0, 1.0, -0.5], [39.0, 1.0, -3.0], [-4.0, 9.0, -3.0]];
+        let lower = straight(&points, &[behind, ahead, aside], &axes, 2.5).unwrap();
         assert_eq!(lower[0][2], -0.5);
-        assert_eq!(straight(&points, &[[-4.0, 8.0, -2.0]], &axes, 2.5), None);
+        assert_eq!(straight(&points, &[[-4.0, 1.0, -2.0]], &axes, 2.5), None);
     }
 
     #[test]
