@@ -41,7 +41,7 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
     let job = |threads: &str, out: &str| {
         let args =
-            ["demo", "--figure", "teddy", "--size", "80", "--pieces", "6", "--threads", threads, "-o", out, "--json"];
+            ["demo", "--figure", "vase", "--size", "80", "--pieces", "6", "--threads", threads, "-o", out, "--json"];
         shellock(dir.path(), &args)
     };
     let one = job("1", "one");
@@ -56,6 +56,7 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     assert_eq!(a.len(), b.len());
     let plan: serde_json::Value = serde_json::from_slice(&fs::read(dir.path().join("one/plan.json")).unwrap()).unwrap();
     assert_eq!(plan["installation_order"].as_array().unwrap().last(), Some(&plan["key_piece"]));
+    assert!(plan["key"]["rails"].as_f64().unwrap() > 5.0, "{}", plan["key"]);
     for piece in plan["pieces"].as_array().unwrap() {
         assert!(dir.path().join("one").join(piece["file"].as_str().unwrap()).is_file());
     }
@@ -65,10 +66,10 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2, "something was left behind");
 
     // The kit can be verified again from its files, and a missing piece is noticed.
-    assert_eq!(code(&shellock(dir.path(), &["figure", "teddy", "--size", "80", "-o", "teddy.stl"])), 0);
-    assert_eq!(code(&shellock(dir.path(), &["verify", "one", "teddy.stl"])), 0);
+    assert_eq!(code(&shellock(dir.path(), &["figure", "vase", "--size", "80", "-o", "vase.stl"])), 0);
+    assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 0);
     fs::copy(dir.path().join("one/pieces/piece-01.stl"), dir.path().join("one/pieces/piece-00.stl")).unwrap();
-    assert_eq!(code(&shellock(dir.path(), &["verify", "one", "teddy.stl"])), 1);
+    assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 1);
 }
 
 #[test]
@@ -188,7 +189,7 @@ fn blows_that_are_none_are_refused() {
         ("--punch", "70kg"),
         ("--drop", "-2m"),
         ("--drop", "0m"),
-        ("--drop", "2"),
+        ("--drop", "2km"),
         ("--material", "wood"),
     ] {
         let o = shellock(dir.path(), &["test", "kit", option, value]);

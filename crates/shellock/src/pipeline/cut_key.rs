@@ -7,12 +7,12 @@ use crate::key::{self, KeyParams, KeyPrism, KeySite};
 use crate::piece::Grip;
 use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning, segmentation};
 
-/// Places for a key of which kits are made, before one of the pieces becomes the key.
-const MOST_TRIED: usize = 2;
-/// Kits made for one of them, mendings of its segmentation, and kits in all.
-const MOST_KITS: usize = 2;
-const MOST_MENDINGS: usize = 2;
-const MOST_KITS_IN_ALL: usize = 4;
+/// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where the best one does not do,
+/// others seldom do.
+const MOST_KITS: [usize; 2] = [3, 1];
+/// Kits made for one segmentation, and mendings of it.
+const MOST_KITS_EACH: usize = 2;
+const MOST_MENDINGS: usize = 1;
 
 /// A place for a key in assembly space.
 pub(super) struct CutKey {
@@ -91,15 +91,15 @@ impl Cut {
 pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
     let mut cut = Cut::default();
     let mut params = job.params.clone();
-    params.rounds.kits = params.rounds.kits.min(MOST_KITS);
+    params.rounds.kits = params.rounds.kits.min(MOST_KITS_EACH);
     params.rounds.mendings = params.rounds.mendings.min(MOST_MENDINGS);
-    params.rounds.kits_in_all = params.rounds.kits_in_all.min(MOST_KITS_IN_ALL);
     let sites = key::sites(ctx, &key_params(job), job.surface)?;
     if sites.is_empty() {
         cut.reasons.push("nowhere is the surface flat, free and thick enough to cut one".into());
     }
-    for site in sites.iter().take(MOST_TRIED) {
+    for (site, most_kits) in sites.iter().zip(MOST_KITS) {
         ctx.note(&told(site));
+        params.rounds.kits_in_all = job.params.rounds.kits_in_all.min(most_kits);
         let Some((laid, key)) = laid(job, site) else { continue };
         let reason = match job.kit(ctx, &params, &laid, Some(&key))? {
             DesignOutcome::Made(mut made) => {
