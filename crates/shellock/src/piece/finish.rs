@@ -97,8 +97,14 @@ pub fn make(
             mine.par_iter().map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h])).collect();
         let boxes: Vec<Aabb> = whole.iter().map(Volume::bounds).collect();
         let clearance_mm = mine.iter().map(|&(r, _)| runs[r].clearance_mm()).fold(params.clearance_mm, f64::max);
-        let space = space(clearance_mm, grid, shell, q, &boxes);
-        let made = |whole: &Volume| (whole.volume(), carved(&whole.intersect(&space), &wakes, far_mm));
+        let (space, off_walls) = rayon::join(
+            || space(clearance_mm, grid, shell, q, &boxes),
+            || off_other_walls(clearance_mm, grid, shell, q, &boxes),
+        );
+        let made = |whole: &Volume| {
+            let free = whole.intersect(&space).intersect(&off_walls);
+            (whole.volume(), carved(&free, &wakes, far_mm))
+        };
         let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
@@ -126,28 +132,25 @@ pub fn make(
 }
 
 /// Where the half connectors of `q` may be, within `boxes`: below the wall, a root's depth into it, and `clearance_mm` away
-/// from whatever its way out or a later piece's takes, and from what other pieces have of the wall.
+/// from whatever its way out or a later piece's takes.
 fn space(clearance_mm: f64, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
     let barred = shell.barred[q].spread(&grid.band, grid.cutoff_mm());
-    let side = shell.side[q].spread(&grid.band, -grid.cutoff_mm());
     let (clearance, ceiling) = (clearance_mm as f32, (grid.thickness_mm - ROOT_MM) as f32);
-    let (floor, cell_mm) = (grid.thickness_mm as f32 + clearance, grid.band.cell_mm() as f32);
-    region(grid, boxes, |n| {
-        let depth = grid.depth[n];
-        let off_walls = off_other_walls(depth - floor, side[n] - clearance, cell_mm);
-        (depth - ceiling).min(-barred[n] - clearance).min(off_walls)
-    })
+    region(grid, boxes, |n| (grid.depth[n] - ceiling).min(-barred[n] - clearance))
 }
 
-/// Positive where connectors keep off what other pieces have of the wall: `below_mm` the wall, or `beside_mm` on their own side of the cuts.
+/// The clearance off what other pieces have of the wall: below the wall, or on `q`'s own side of the cuts.
 ///
-/// The edge of another body along the inner end of a seam is sharp, and contours round the angle between the two regions off by up to a
-/// third of a cell, more than the clearance. So the angle is filled by as much.
-fn off_other_walls(below_mm: f32, beside_mm: f32, cell_mm: f32) -> f32 {
-    /// In cells.
-    const FILLED: f32 = 0.35;
-    let nearness = (1.0 - (below_mm - beside_mm).abs() / cell_mm).max(0.0);
-    below_mm.max(beside_mm) - FILLED * cell_mm * nearness
+/// A body's edge along the inner end of a seam is sharp. The one field of what bars `q` rounds it off by up to a third of a
+/// cell, more than the clearance; two smooth ones, united after they are contoured, keep it. (Filling the angle in one field instead
+/// is faster, but takes the connectors of narrow cavities away.)
+fn off_other_walls(clearance_mm: f64, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
+    let side = shell.side[q].spread(&grid.band, -grid.cutoff_mm());
+    let clearance = clearance_mm as f32;
+    let floor = grid.thickness_mm as f32 + clearance;
+    let (below, beside) =
+        rayon::join(|| region(grid, boxes, |n| grid.depth[n] - floor), || region(grid, boxes, |n| side[n] - clearance));
+    below.union(&beside)
 }
 
 /// Where `field` is positive, in and near `boxes`.
