@@ -173,7 +173,7 @@ pub struct Design {
 impl Design {
     /// Length of the rails that the key slides on, mm; 0 where it has none.
     pub fn rails_mm(&self) -> f64 {
-        self.joints.iter().filter(|j| j.is_rail).map(|j| j.length_mm).sum()
+        self.joints.iter().filter(|j| j.is_rail).map(|j| j.length_mm).fold(0.0, |sum, mm| sum + mm)
     }
 }
 

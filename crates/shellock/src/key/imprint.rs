@@ -17,7 +17,8 @@ const LEAST_MM: f64 = 0.02;
 /// A fragment of a patch stays a patch where it has more than this share of an ordinary one; else it joins its longest neighbour.
 const FRAGMENT_SHARE: f64 = 0.08;
 
-/// The surface with what lies in `prism` as a patch of its own, and its id; `None` where that is nothing, or everything.
+/// The surface with what lies in `prism` as a patch of its own, and its id; `None` where that is nothing, or everything, or not
+/// nearly all of one patch.
 ///
 /// Patches that the key cuts in two become two, or lose a small part to a neighbour. Ids change.
 pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(SegmentedSurface, PatchId)> {
@@ -37,14 +38,13 @@ pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(Segmente
         .collect();
     let topology = Topology::of_mesh(&cut.mesh)?;
     let (label, n_patches) = without_fragments(&cut.mesh, &topology, label, key);
-    let key = label.iter().zip(&cut.side).find(|(_, side)| **side == Side::Positive).map(|(&k, _)| k);
     let surface = SegmentedSurface {
         patch_of_face: label.into_iter().map(PatchId).collect(),
         source_face: cut.source_face.iter().map(|&f| source_face[f as usize]).collect(),
         mesh: cut.mesh,
         n_patches,
     };
-    let key = patch_in(&surface, prism).or(key.map(PatchId))?;
+    let key = patch_in(&surface, prism)?;
     (n_patches > 2).then_some((surface, key))
 }
 

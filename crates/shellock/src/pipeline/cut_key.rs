@@ -101,8 +101,11 @@ pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
         ctx.note(&told(site));
         params.rounds.kits_in_all = job.params.rounds.kits_in_all.min(most_kits);
         let Some((laid, key)) = laid(job, site) else { continue };
-        let reason = match job.kit(ctx, &params, &laid, Some(&key))? {
-            DesignOutcome::Made(mut made) => {
+        let reason = match job.kit(ctx, &params, &laid, Some(&key)) {
+            Err(DesignError::Cancelled(stop)) => return Err(stop.into()),
+            // What goes wrong with this key need not with another.
+            Err(e) => format!("with {} it cannot be made: {e}", told(site)),
+            Ok(DesignOutcome::Made(mut made)) => {
                 let failed: Vec<String> =
                     made.verification.checks.iter().filter(|c| !c.ok).map(|c| c.name.clone()).collect();
                 if made.rails_mm() <= 0.0 {
@@ -115,7 +118,7 @@ pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
                 cut.best.get_or_insert(*made);
                 reason
             }
-            DesignOutcome::NoPlan { reason, .. } => format!("with {} there is no plan: {reason}", told(site)),
+            Ok(DesignOutcome::NoPlan { reason, .. }) => format!("with {} there is no plan: {reason}", told(site)),
         };
         ctx.note(&reason);
         cut.reasons.push(reason);

@@ -36,7 +36,7 @@ const MAX_ALONG_SEAM: f64 = 0.9;
 const MAX_BACKWARD_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Most `|s · N|` at which a rail can run under the seam.
-const MAX_OUT_OF_RAIL: f64 = 0.25;
+pub const MAX_OUT_OF_RAIL: f64 = 0.25;
 
 /// How clearly, as `|s · N|`, a sample must ask for the other male piece before a run of connectors ends there.
 const ROLE_HYSTERESIS: f64 = 0.1;
