@@ -208,6 +208,31 @@ impl Band {
         }))
     }
 
+    /// The part of the band in `room` as a band of its own, and which node of this one each of its nodes is.
+    pub fn part_in(&self, room: Aabb) -> (Self, Vec<u32>) {
+        let index = |p: Vec3| ((p - self.origin) / self.cell_mm).to_array();
+        let low = index(room.min).map(|x| x.ceil().max(0.0) as usize);
+        let high: [usize; 3] = std::array::from_fn(|a| {
+            let past = (index(room.max)[a].floor() + 1.0).max(0.0) as usize;
+            past.clamp(low[a].min(self.dims[a]), self.dims[a])
+        });
+        let dims: [usize; 3] = std::array::from_fn(|a| high[a].saturating_sub(low[a]));
+        let (mut nodes, mut keys) = (Vec::new(), Vec::new());
+        for (k, j) in (low[2]..high[2]).flat_map(|k| (low[1]..high[1]).map(move |j| (k, j))) {
+            let row = j + self.dims[1] * k;
+            for run in &self.runs[self.row_start[row] as usize..self.row_start[row + 1] as usize] {
+                let from = (run.i0 as usize).max(low[0]);
+                let to = (run.i0 as usize + run.len as usize).min(high[0]);
+                for i in from..to {
+                    nodes.push(run.first + (i - run.i0 as usize) as u32);
+                    keys.push(((i - low[0]) + dims[0] * ((j - low[1]) + dims[1] * (k - low[2]))) as u64);
+                }
+            }
+        }
+        let origin = self.origin + self.cell_mm * Vec3::from_array(low.map(|x| x as f64));
+        (Self::from_keys(origin, self.cell_mm, dims, &keys), nodes)
+    }
+
     /// The nodes in `b`, ascending.
     pub fn nodes_in(&self, b: Aabb) -> Vec<u32> {
         (0..self.len() as u32).into_par_iter().filter(|&n| b.contains(self.position(n as usize))).collect()

@@ -95,16 +95,9 @@ pub fn make(
             .collect();
         let whole: Vec<Volume> =
             mine.par_iter().map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h])).collect();
-        let boxes: Vec<Aabb> = whole.iter().map(Volume::bounds).collect();
         let clearance_mm = mine.iter().map(|&(r, _)| runs[r].clearance_mm()).fold(params.clearance_mm, f64::max);
-        let (space, off_walls) = rayon::join(
-            || space(clearance_mm, grid, shell, q, &boxes),
-            || off_other_walls(clearance_mm, grid, shell, q, &boxes),
-        );
-        let made = |whole: &Volume| {
-            let free = whole.intersect(&space).intersect(&off_walls);
-            (whole.volume(), carved(&free, &wakes, far_mm))
-        };
+        let room = Room::of(clearance_mm, grid, shell, q);
+        let made = |whole: &Volume| (whole.volume(), carved(&room.cut(whole), &wakes, far_mm));
         let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
@@ -131,42 +124,45 @@ pub fn make(
     Ok(Finished { meshes, joints, detents })
 }
 
-/// Where the half connectors of `q` may be, within `boxes`: below the wall, a root's depth into it, and `clearance_mm` away
-/// from whatever its way out or a later piece's takes.
-fn space(clearance_mm: f64, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
-    let barred = shell.barred[q].spread(&grid.band, grid.cutoff_mm());
-    let (clearance, ceiling) = (clearance_mm as f32, (grid.thickness_mm - ROOT_MM) as f32);
-    region(grid, boxes, |n| (grid.depth[n] - ceiling).min(-barred[n] - clearance))
+/// Where the half connectors of one piece may be.
+struct Room<'a> {
+    grid: &'a ShellGrid,
+    clearance_mm: f32,
+    /// Positive where the piece may not be: what its way out or a later piece's takes.
+    barred: Vec<f32>,
+    /// Positive on its own side of the cuts.
+    side: Vec<f32>,
 }
 
-/// The clearance off what other pieces have of the wall: below the wall, or on `q`'s own side of the cuts.
-///
-/// A body's edge along the inner end of a seam is sharp. The one field of what bars `q` rounds it off by up to a third of a
-/// cell, more than the clearance; two smooth ones, united after they are contoured, keep it. (Filling the angle in one field instead
-/// is faster, but takes the connectors of narrow cavities away.)
-fn off_other_walls(clearance_mm: f64, grid: &ShellGrid, shell: &ShellBodies, q: PatchId, boxes: &[Aabb]) -> Volume {
-    let side = shell.side[q].spread(&grid.band, -grid.cutoff_mm());
-    let clearance = clearance_mm as f32;
-    let floor = grid.thickness_mm as f32 + clearance;
-    let (below, beside) =
-        rayon::join(|| region(grid, boxes, |n| grid.depth[n] - floor), || region(grid, boxes, |n| side[n] - clearance));
-    below.union(&beside)
-}
+impl<'a> Room<'a> {
+    fn of(clearance_mm: f64, grid: &'a ShellGrid, shell: &ShellBodies, q: PatchId) -> Self {
+        let cutoff = grid.cutoff_mm();
+        let (barred, side) =
+            rayon::join(|| shell.barred[q].spread(&grid.band, cutoff), || shell.side[q].spread(&grid.band, -cutoff));
+        Self { grid, clearance_mm: clearance_mm as f32, barred, side }
+    }
 
-/// Where `field` is positive, in and near `boxes`.
-fn region(grid: &ShellGrid, boxes: &[Aabb], field: impl Fn(usize) -> f32 + Sync) -> Volume {
-    let boxes: Vec<Aabb> = boxes.iter().map(|b| b.grown(2.0 * grid.band.cell_mm())).collect();
-    let outside = -(grid.band.cell_mm() as f32);
-    let field: Vec<f32> = (0..grid.band.len())
-        .into_par_iter()
-        .map(|n| {
-            let value = field(n);
-            let is_near = || boxes.iter().any(|b| b.contains(grid.band.position(n)));
-            if value > outside && is_near() { value } else { value.min(outside) }
-        })
-        .collect();
-    let mesh = contour(&grid.band, &field, OffBand::Outside);
-    Volume::from_closed_mesh(&mesh).expect("contours are manifold")
+    /// What of `whole` has room: below the wall, a root's depth into it, `clearance_mm` away from what is barred, and as far
+    /// off what other pieces have of the wall: below the wall by that, or so far on the piece's own side of the cuts.
+    ///
+    /// A body's edge along the inner end of a seam is sharp. The one field of what bars the piece rounds it off by up to a third of a
+    /// cell, more than the clearance; two smooth ones, united after they are contoured, keep it. (Filling the angle in one field
+    /// instead takes the connectors of narrow cavities away.)
+    fn cut(&self, whole: &Volume) -> Volume {
+        let (part, nodes) = self.grid.band.part_in(whole.bounds().grown(2.0 * self.grid.band.cell_mm()));
+        let region = |field: &dyn Fn(usize) -> f32| {
+            let field: Vec<f32> = nodes.iter().map(|&n| field(n as usize)).collect();
+            Volume::from_closed_mesh(&contour(&part, &field, OffBand::Outside)).expect("contours are manifold")
+        };
+        let thickness = self.grid.thickness_mm as f32;
+        let (ceiling, floor) = (thickness - ROOT_MM as f32, thickness + self.clearance_mm);
+        let depth = &self.grid.depth;
+        let space = region(&|n| (depth[n] - ceiling).min(-self.barred[n] - self.clearance_mm));
+        let below = region(&|n| depth[n] - floor);
+        let beside = region(&|n| self.side[n] - self.clearance_mm);
+        let free = whole.intersect(&space);
+        free.intersect(&below.union(&beside))
+    }
 }
 
 fn joint(run: &Run, halves: &Halves) -> Joint {
