@@ -249,6 +249,9 @@ pub struct Options {
     /// Height of a bump on each rail that the key clicks past, mm, 0 to 0.4; 0 makes none
     #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = 0.0, help_heading = "Make")]
     pub detent: f64,
+    /// How far ribs on a key without rails press on the pieces around it, mm, 0 to 0.3; 0 makes none
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.key_rib_mm, help_heading = "Make")]
+    pub key_ribs: f64,
     /// Cut a notch for a fingernail into the key, 0.45 mm deep
     #[arg(long, help_heading = "Make")]
     pub key_grip: bool,
@@ -298,6 +301,7 @@ impl Options {
         p.connector.clearance_mm = self.clearance;
         p.connector.key_clearance_mm = self.key_clearance;
         p.connector.detent_mm = self.detent;
+        p.connector.key_rib_mm = self.key_ribs;
         p.has_grip = self.key_grip;
         p.connector.min_wall_mm = self.min_wall;
         p.verify.seed = self.seed;

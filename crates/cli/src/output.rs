@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone};
 use shellock::key::KeySite;
-use shellock::piece::Detent;
+use shellock::piece::{PressFit, PressFitKind};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
     ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
@@ -239,6 +239,7 @@ fn plan_json(
         "min_wall": params.connector.min_wall_mm,
         "key_piece": plan.key(),
         "key": design.key.as_ref().map(|k| key_json(design, k)),
+        "press_fits": design.press_fits.iter().map(press_fit_json).collect::<Vec<_>>(),
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
         "plan": design.proof,
         "holding": design.holding,
@@ -286,14 +287,24 @@ fn gaps_json(design: &Design) -> Value {
     })
 }
 
+/// What presses on purpose on the key's way in.
+fn press_fit_json(fit: &PressFit) -> Value {
+    let kind = match fit.kind {
+        PressFitKind::Detent => "detent",
+        PressFitKind::Rib => "rib",
+    };
+    json!({
+        "kind": kind, "piece": fit.piece, "at": fit.at.to_array(),
+        "interference_mm": fit.interference_mm, "travel_mm": fit.travel_mm,
+    })
+}
+
 /// How the key was cut.
 fn key_json(design: &Design, key: &KeySite) -> Value {
-    let detent = |d: &Detent| json!({ "piece": d.piece, "at": d.at.to_array(), "interference_mm": d.interference_mm, "travel_mm": d.travel_mm });
-    let detents: Vec<Value> = design.detents.iter().map(detent).collect();
     json!({
         "rails": design.rails_mm(), "area_mm2": key.area_mm2, "flat_share": key.flat_share, "side_share": key.side_share,
         "slide": key.prism.slide.to_array(), "plane_normal": key.prism.normal.to_array(),
-        "turned_degrees": design.turn.angle().to_degrees(), "detents": detents,
+        "turned_degrees": design.turn.angle().to_degrees(),
     })
 }
 

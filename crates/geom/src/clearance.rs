@@ -116,7 +116,8 @@ impl Shape {
 
 /// Where `a` and `b` come nearest, if that is within `within_mm`. Distances are exact but for rounding, depths to 0.1 µm.
 pub fn least_gap(a: &Shape, b: &Shape, scope: Scope, within_mm: f64) -> Option<Gap> {
-    Some(Encounter::new([a, b], Vec3::ZERO, [0.0; 2], scope, within_mm).nearest()?.0)
+    let rest = Translation { along: Vec3::ZERO, from_mm: 0.0, far_mm: 0.0 };
+    Some(Encounter::new([a, b], &rest, scope, within_mm).nearest()?.0)
 }
 
 /// Where `moving` comes nearest to `fixed` over all travels of `motion`, if that is within `within_mm`. Distances are exact
@@ -128,10 +129,38 @@ pub fn swept_gap(
     scope: Scope,
     within_mm: f64,
 ) -> Option<SweptGap> {
-    let along = motion.along.normalize_or_zero();
-    let travels = if along == Vec3::ZERO { [0.0; 2] } else { [motion.from_mm, motion.far_mm] };
-    let (gap, travel_mm) = Encounter::new([moving, fixed], along, travels, scope, within_mm).nearest()?;
+    let (gap, travel_mm) = Encounter::new([moving, fixed], motion, scope, within_mm).nearest()?;
     Some(SweptGap { gap_mm: gap.gap_mm, travel_mm, at: gap.at })
+}
+
+/// A triangle that something passes too near by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passed {
+    /// Which triangle.
+    pub face: u32,
+    /// The box around those triangles of the moving surface, at travel 0, that come too near to it.
+    pub by: Aabb,
+}
+
+/// The triangles of `fixed` that come within `within_mm` of one of `moving` over all travels of `motion`, ascending. The surfaces need
+/// not be closed; distances are exact but for rounding.
+pub fn faces_passed(moving: &TriMesh, fixed: &TriMesh, motion: &Translation, within_mm: f64) -> Vec<Passed> {
+    let along = motion.along.normalize_or_zero();
+    let axes = axes_along(along);
+    let meshes = [moving, fixed].map(|mesh| turned(mesh, axes));
+    let travels = travels_of(motion, along, meshes.each_ref().map(TriMesh::bounds));
+    let [a, b] = trees(&meshes, travels, within_mm, |_, _| true);
+    let mut by = vec![Aabb::EMPTY; b.faces.len()];
+    let limit_sq = within_mm * within_mm;
+    for_near_pairs(&a.bvh, &b.bvh, travels, &mut { limit_sq }, |i, j, _| {
+        if swept(a.bvh.corners[i], b.bvh.corners[j], travels, limit_sq).is_some() {
+            let mover = Aabb::around(moving.corners(a.faces[a.bvh.faces[i] as usize] as usize));
+            let of_face = &mut by[b.bvh.faces[j] as usize];
+            *of_face = of_face.union(mover);
+        }
+    });
+    let passed = b.faces.iter().zip(by).filter(|(_, by)| *by != Aabb::EMPTY);
+    passed.map(|(&face, by)| Passed { face, by }).collect()
 }
 
 /// Two shapes, one of which moves, as seen along its motion: z is the direction.
@@ -151,25 +180,14 @@ struct Tree {
 }
 
 impl<'a> Encounter<'a> {
-    fn new(shapes: [&'a Shape; 2], along: Vec3, travels: [f64; 2], scope: Scope, limit_mm: f64) -> Self {
-        let axes = if along == Vec3::ZERO {
-            Vec3::AXES
-        } else {
-            let (x, y) = along.any_orthonormal_pair();
-            [x, y, along]
-        };
-        let seen = |p: Vec3| Vec3::from(axes.map(|axis| axis.dot(p)));
-        let meshes = shapes.map(|shape| {
-            let mesh = shape.solid.mesh();
-            TriMesh { points: mesh.points.iter().map(|&p| seen(p)).collect(), triangles: mesh.triangles.clone() }
-        });
-        let bounds = meshes.each_ref().map(TriMesh::bounds);
-        let travels = if along == Vec3::ZERO { travels } else { travels_that_matter(bounds, travels) };
-        let ([moving, fixed], [a, b]) = (shapes, &meshes);
-        let in_scope = |shape: &Shape, f: usize| scope == Scope::Everything || shape.counts[f];
-        let room_of_a = raised(bounds[1], [-travels[1], -travels[0]]).grown(limit_mm);
-        let room_of_b = raised(bounds[0], travels).grown(limit_mm);
-        let trees = [Tree::of(a, room_of_a, |f| in_scope(moving, f)), Tree::of(b, room_of_b, |f| in_scope(fixed, f))];
+    fn new(shapes: [&'a Shape; 2], motion: &Translation, scope: Scope, limit_mm: f64) -> Self {
+        let along = motion.along.normalize_or_zero();
+        let axes = axes_along(along);
+        let meshes = shapes.map(|shape| turned(shape.solid.mesh(), axes));
+        let travels = travels_of(motion, along, meshes.each_ref().map(TriMesh::bounds));
+        let in_scope = |which: usize, f: usize| scope == Scope::Everything || shapes[which].counts[f];
+        let trees = trees(&meshes, travels, limit_mm, in_scope);
+        let [moving, fixed] = shapes;
         Self { passage: Passage { moving, fixed, along, travels }, axes, limit_mm, trees }
     }
 
@@ -253,6 +271,34 @@ impl Tree {
         let triangles = faces.iter().map(|&f| mesh.triangles[f as usize]).collect();
         Self { bvh: TriangleBvh::new(&TriMesh { points: mesh.points.clone(), triangles }), faces }
     }
+}
+
+/// The axes that a motion is seen in: z is its direction.
+fn axes_along(along: Vec3) -> [Vec3; 3] {
+    if along == Vec3::ZERO {
+        return Vec3::AXES;
+    }
+    let (x, y) = along.any_orthonormal_pair();
+    [x, y, along]
+}
+
+fn turned(mesh: &TriMesh, axes: [Vec3; 3]) -> TriMesh {
+    let seen = |p: Vec3| Vec3::from(axes.map(|axis| axis.dot(p)));
+    TriMesh { points: mesh.points.iter().map(|&p| seen(p)).collect(), triangles: mesh.triangles.clone() }
+}
+
+/// The triangles of a moving and a fixed mesh that `counts`, given which mesh and which triangle, and that can come within `limit_mm` of
+/// the other.
+fn trees(meshes: &[TriMesh; 2], travels: [f64; 2], limit_mm: f64, counts: impl Fn(usize, usize) -> bool) -> [Tree; 2] {
+    let [a, b] = meshes.each_ref().map(TriMesh::bounds);
+    let room_of_a = raised(b, [-travels[1], -travels[0]]).grown(limit_mm);
+    let room_of_b = raised(a, travels).grown(limit_mm);
+    [Tree::of(&meshes[0], room_of_a, |f| counts(0, f)), Tree::of(&meshes[1], room_of_b, |f| counts(1, f))]
+}
+
+/// The travels of `motion` that matter to two boxes, seen along it; 0 alone where it has no direction.
+fn travels_of(motion: &Translation, along: Vec3, bounds: [Aabb; 2]) -> [f64; 2] {
+    if along == Vec3::ZERO { [0.0; 2] } else { travels_that_matter(bounds, [motion.from_mm, motion.far_mm]) }
 }
 
 /// The travels between which the least distance lies: before them and after them the boxes of both, seen along the motion,

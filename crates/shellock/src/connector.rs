@@ -51,6 +51,8 @@ pub struct ConnectorParams {
     ///
     /// It keeps the key from creeping out, and must bend the groove's wall on the way: a tenth of its thickness for 0.1 mm.
     pub detent_mm: f64,
+    /// How far ribs of a key without rails press on the pieces around it: friction is all that holds such a key. [0, 0.3]; 0.08.
+    pub key_rib_mm: f64,
     /// Thinnest wall left standing. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
     pub min_wall_mm: f64,
 }
@@ -62,6 +64,7 @@ impl Default for ConnectorParams {
             clearance_mm: 0.12,
             key_clearance_mm: 0.15,
             detent_mm: 0.0,
+            key_rib_mm: 0.08,
             min_wall_mm: 0.4,
         }
     }
@@ -84,6 +87,7 @@ impl ConnectorParams {
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
             ParamProblem::unless_within("key clearance", "mm", self.key_clearance_mm, 0.03, 0.8),
             ParamProblem::unless_within("detent", "mm", self.detent_mm, 0.0, 0.4),
+            ParamProblem::unless_within("key rib", "mm", self.key_rib_mm, 0.0, 0.3),
             ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
         ];
         self.size.problems().into_iter().chain(others.into_iter().flatten()).collect()

@@ -1,11 +1,15 @@
 //! Finished pieces: bodies with their connectors, carved so that every path stays free, ready to print.
 //!
 //! Pieces are taken in the order of taking apart. From a piece's half connectors goes whatever lies in its own way out,
-//! and whatever a later piece, its bodies and its connectors, passes on its way out: the socket is what the pin sweeps.
+//! and whatever a later piece, its bodies and its connectors, passes on its way out: the socket is what the pin sweeps. Where a joined piece
+//! still comes too near to another, that is taken off too.
 
 mod carve;
 mod finish;
 mod key_parts;
+mod relief;
+mod ribs;
 
-pub use finish::{Finished, Joint, PieceError, make};
-pub use key_parts::{Detent, Grip};
+pub use finish::{FinishParams, Finished, Joint, PieceError, make};
+pub use key_parts::{Grip, PressFit, PressFitKind};
+pub use relief::Relief;

@@ -14,7 +14,7 @@ use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, has_no_bar};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
-use crate::piece::{Detent, Grip, Joint, PieceError};
+use crate::piece::{FinishParams, Finished, Grip, Joint, PieceError, PressFit, PressFitKind, Relief};
 use crate::plan::{Blocker, InstallationPlan, PlanParams, PlanProof};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams, StressField};
@@ -121,6 +121,13 @@ impl Params {
         p
     }
 
+    /// The least gaps that finished pieces keep beneath the rim: those of connectors and of walls, whichever is narrower.
+    fn relief(&self) -> Relief {
+        let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.wall_gap_mm);
+        let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
+        Relief { rim_mm: self.body.rim_mm, gap_mm, key_gap_mm: self.body.key_gap_mm.map_or(gap_mm, of_key) }
+    }
+
     /// What decides on connector sizes.
     pub fn sizes(&self) -> SizeParams {
         SizeParams {
@@ -157,7 +164,7 @@ pub struct Design {
     /// Connector runs and how they came out.
     pub joints: Vec<Joint>,
     /// What clicks on the key's way in.
-    pub detents: Vec<Detent>,
+    pub press_fits: Vec<PressFit>,
     /// What the seams offered.
     pub contacts: Vec<Contact>,
     /// The verdict on the finished meshes.
@@ -406,8 +413,9 @@ pub fn make(
     let slide = params.plan.key.and(params.plan.key_slide).map(LatticeDirection::unit);
     let (runs, contacts) = connector::runs(&params.connector, sizes, &plan, &curves, slide, &is_free);
     let grip = params.grip.map(|grip| Grip { key: plan.key(), ..grip });
-    let finished = piece::make(ctx, &params.connector, grid, &shell, &plan, &runs, &rooms, grip.as_ref())?;
-    warn_of_detents(ctx, &finished.detents);
+    let finish = FinishParams { connector: &params.connector, relief: params.relief(), grip };
+    let finished = piece::make(ctx, &finish, grid, &shell, &plan, &runs, &rooms)?;
+    warn_of_press_fits(ctx, &finished);
     let (verification, touching) = verify::examine(ctx, &params.verify, model, &finished.meshes, &plan)?;
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
@@ -422,7 +430,7 @@ pub fn make(
         holding: None,
         pieces: finished.meshes,
         joints: finished.joints,
-        detents: finished.detents,
+        press_fits: finished.press_fits,
         contacts,
         verification,
         touching,
@@ -431,9 +439,10 @@ pub fn make(
     })
 }
 
-/// Says what the key must be pressed past.
-fn warn_of_detents(ctx: &Ctx, detents: &[Detent]) {
-    for d in detents {
+/// Says what the key must be pressed past, and what holds a key without rails.
+fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
+    let of = |kind: PressFitKind| finished.press_fits.iter().filter(move |f| f.kind == kind);
+    for d in of(PressFitKind::Detent) {
         ctx.warn(Warning {
             code: "detent".into(),
             message: format!(
@@ -443,6 +452,18 @@ fn warn_of_detents(ctx: &Ctx, detents: &[Detent]) {
             ),
             pieces: vec![d.piece],
             at: Some(d.at.to_array()),
+        });
+    }
+    if let Some(rib) = of(PressFitKind::Rib).next() {
+        ctx.warn(Warning {
+            code: "key-ribs".into(),
+            message: format!(
+                "the key has no rails: {} ribs on its sides press by {:.2} mm on the last {:.1} mm of its way, on purpose, so that it \
+                 stays in; file them down if it is too tight; the proofs of free paths are without them",
+                of(PressFitKind::Rib).count(), rib.interference_mm, rib.travel_mm
+            ),
+            pieces: vec![rib.piece],
+            at: Some(rib.at.to_array()),
         });
     }
 }

@@ -8,7 +8,7 @@ use crate::{LatticeDirection, PatchId};
 
 /// The socket is grown by this much less than the clearance, mm: the channel's section already keeps the clearance, and
 /// faces that would coincide stay apart.
-const SOCKET_SLACK_MM: f64 = 0.02;
+const SOCKET_SLACK_MM: f64 = 0.01;
 
 /// Which half of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +112,7 @@ impl Wake {
 }
 
 /// The least and greatest t in [0, `far_mm`] for which `moving + t·along` meets `room`.
-fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm: f64) -> Option<(f64, f64)> {
+pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm: f64) -> Option<(f64, f64)> {
     let (mut from, mut to) = (0.0f64, far_mm);
     for axis in 0..3 {
         let (low, high) = (room.min[axis] - moving.max[axis], room.max[axis] - moving.min[axis]);

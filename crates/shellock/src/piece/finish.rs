@@ -1,12 +1,15 @@
 //! From bodies and runs to printable meshes.
 
 use rayon::prelude::*;
+use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::rounding::{NotPrintable, printable};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use super::carve::{Half, Wake, carved, whole_half};
-use super::key_parts::{Change, Detent, Grip, detents, notch};
+use super::key_parts::{Change, Grip, PressFit, detents, notch};
+use super::relief::{Relief, relieve};
+use super::ribs::{Seat, ribs};
 use crate::body::{ShellBodies, ShellGrid};
 use crate::connector::{ConnectorParams, Run};
 use crate::plan::InstallationPlan;
@@ -16,6 +19,9 @@ use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 const ROOT_MM: f64 = 0.4;
 /// A run of which less than this share of either half survives the carving is given up, both halves.
 const LEAST_KEPT: f64 = 0.25;
+
+/// The middle line of a rib stays so far off the rim and off the wall's inner side, mm.
+const RIB_MARGIN_MM: f64 = 0.1;
 
 /// How one run came out.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +48,8 @@ pub struct Finished {
     pub meshes: IdVec<PatchId, TriMesh>,
     /// One joint a run.
     pub joints: Vec<Joint>,
-    /// What clicks on the key's way in.
-    pub detents: Vec<Detent>,
+    /// What presses on the key's way in, on purpose.
+    pub press_fits: Vec<PressFit>,
 }
 
 /// Why a piece could not be finished.
@@ -62,6 +68,16 @@ pub enum PieceError {
     Cancelled(#[from] Cancelled),
 }
 
+/// How pieces are finished.
+pub struct FinishParams<'a> {
+    /// Profiles and clearances.
+    pub connector: &'a ConnectorParams,
+    /// Least gaps of the finished pieces.
+    pub relief: Relief,
+    /// The notch that the key is to have.
+    pub grip: Option<Grip>,
+}
+
 /// Both halves of a run while they are carved.
 #[derive(Clone)]
 struct Halves {
@@ -69,18 +85,18 @@ struct Halves {
     carved: [Volume; 2],
 }
 
-/// Carves every half connector in the order of taking apart and joins it to its body; a key gets its detents and, with `grip`, a notch.
-#[expect(clippy::too_many_arguments, reason = "what all earlier stages made")]
+/// Carves every half connector in the order of taking apart and joins it to its body; takes off what is too near to others;
+/// a key gets its detents and its notch.
 pub fn make(
     ctx: &Ctx,
-    params: &ConnectorParams,
+    finish: &FinishParams<'_>,
     grid: &ShellGrid,
     shell: &ShellBodies,
     plan: &InstallationPlan,
     runs: &[Run],
     rooms: &IdVec<PatchId, Aabb>,
-    grip: Option<&Grip>,
 ) -> Result<Finished, PieceError> {
+    let params = finish.connector;
     ctx.stage("connectors", plan.steps.len())?;
     let far_mm = rooms.as_slice().iter().fold(Aabb::EMPTY, |b, r| b.union(*r)).diagonal();
     let mut halves = vec![Halves { raw: [0.0; 2], carved: [Volume::empty(), Volume::empty()] }; runs.len()];
@@ -108,8 +124,8 @@ pub fn make(
     }
     let joints: Vec<Joint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
     let kept: Vec<Run> = runs.iter().zip(&joints).filter(|(_, j)| j.length_mm > 0.0).map(|(r, _)| r.clone()).collect();
-    let (detents, mut changes) = detents(params, &kept);
-    if let Some(grip) = grip {
+    let (mut press_fits, mut changes) = detents(params, &kept);
+    if let Some(grip) = &finish.grip {
         match notch(grip, &shell.bodies[grip.key].to_mesh()) {
             Some(cut) => changes.push(cut),
             None => ctx.warn(Warning {
@@ -120,8 +136,15 @@ pub fn make(
             }),
         }
     }
-    let meshes = join_to_bodies(ctx, shell, plan, &joints, &halves, &changes)?;
-    Ok(Finished { meshes, joints, detents })
+    ctx.stage("pieces", plan.steps.len())?;
+    let mut pieces = joined(shell, &joints, &halves);
+    relieve(ctx, &finish.relief, grid, plan, &mut pieces)?;
+    if params.key_rib_mm > 0.0 && !joints.iter().any(|j| j.is_rail && j.length_mm > 0.0) {
+        let (fits, added) = ribs_of_key(params.key_rib_mm, finish.relief.rim_mm, grid, plan, &pieces);
+        press_fits.extend(fits);
+        changes.extend(added);
+    }
+    Ok(Finished { meshes: printed(ctx, &pieces, &changes)?, joints, press_fits })
 }
 
 /// Where the half connectors of one piece may be.
@@ -173,17 +196,10 @@ fn joint(run: &Run, halves: &Halves) -> Joint {
     Joint { male: run.male, female: run.female, length_mm, volume_mm3, kept, at: run.middle(), is_rail: run.is_rail() }
 }
 
-fn join_to_bodies(
-    ctx: &Ctx,
-    shell: &ShellBodies,
-    plan: &InstallationPlan,
-    joints: &[Joint],
-    halves: &[Halves],
-    changes: &[Change],
-) -> Result<IdVec<PatchId, TriMesh>, PieceError> {
-    ctx.stage("pieces", plan.steps.len())?;
+/// The bodies with what hangs from them.
+fn joined(shell: &ShellBodies, joints: &[Joint], halves: &[Halves]) -> IdVec<PatchId, Volume> {
     let ids: Vec<PatchId> = shell.bodies.ids().collect();
-    let meshes: Vec<Result<TriMesh, PieceError>> = ids
+    let pieces: Vec<Volume> = ids
         .par_iter()
         .map(|&q| {
             let mut parts = Vec::new();
@@ -195,13 +211,51 @@ fn join_to_bodies(
                     parts.push(half.carved[1].clone());
                 }
             }
-            parts.extend(changes.iter().filter(|c| c.piece == q && c.is_added).map(|c| c.volume.clone()));
-            let mut united = shell.bodies[q].union(&Volume::union_all(parts));
-            for cut in changes.iter().filter(|c| c.piece == q && !c.is_added) {
-                united = united.subtract(&cut.volume);
+            shell.bodies[q].union(&Volume::union_all(parts))
+        })
+        .collect();
+    pieces.into_iter().collect()
+}
+
+/// Ribs around a key that slides on no rails.
+fn ribs_of_key(
+    interference_mm: f64,
+    rim_mm: f64,
+    grid: &ShellGrid,
+    plan: &InstallationPlan,
+    pieces: &IdVec<PatchId, Volume>,
+) -> (Vec<PressFit>, Vec<Change>) {
+    let key = plan.key();
+    let along = plan.removal().next().expect("a plan has a step for each piece").separation.unit();
+    let mut others = TriMesh::default();
+    for other in pieces.ids().filter(|&p| p != key) {
+        let mesh = pieces[other].to_mesh();
+        let first = others.points.len() as u32;
+        others.points.extend(mesh.points);
+        others.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    let depths_mm = [rim_mm + RIB_MARGIN_MM, grid.thickness_mm - RIB_MARGIN_MM];
+    let (mesh, others) = (pieces[key].to_mesh(), TriangleBvh::new(&others));
+    let seat = Seat { key, mesh: &mesh, others: &others, along, depths_mm };
+    ribs(interference_mm, &seat, |p| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY))
+}
+
+/// The pieces with all changes as meshes that can be written.
+fn printed(
+    ctx: &Ctx,
+    pieces: &IdVec<PatchId, Volume>,
+    changes: &[Change],
+) -> Result<IdVec<PatchId, TriMesh>, PieceError> {
+    let ids: Vec<PatchId> = pieces.ids().collect();
+    let meshes: Vec<Result<TriMesh, PieceError>> = ids
+        .par_iter()
+        .map(|&q| {
+            let mut piece = pieces[q].clone();
+            for change in changes.iter().filter(|c| c.piece == q) {
+                piece = if change.is_added { piece.union(&change.volume) } else { piece.subtract(&change.volume) };
             }
             // What hangs on nothing is a chip that carving cut loose.
-            let piece = united.components().into_iter().next().unwrap_or_else(Volume::empty);
+            let piece = piece.components().into_iter().next().unwrap_or_else(Volume::empty);
             let mesh = printable(&piece).map_err(|reason| PieceError::NotPrintable { piece: q, reason });
             ctx.step()?;
             mesh

@@ -20,14 +20,25 @@ const NOTCH_WIDTH_MM: f64 = 12.0;
 /// The surface below a notch is uneven by less than this, mm.
 const NOTCH_UNEVEN_MM: f64 = 0.4;
 
-/// A bump on a rail's tongue that snaps into a dimple in the key's groove.
+/// What presses on purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PressFitKind {
+    /// A bump on a rail's tongue that snaps into a dimple in the key's groove.
+    Detent,
+    /// A rib on the key's side of a seam that rubs on the other side.
+    Rib,
+}
+
+/// A place where the key is held by being pressed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Detent {
-    /// The piece with the bump.
+pub struct PressFit {
+    /// Which kind it is.
+    pub kind: PressFitKind,
+    /// The piece that it stands on.
     pub piece: PatchId,
     /// Its place.
     pub at: Vec3,
-    /// By how much it presses the groove apart on the way in, mm.
+    /// By how much it presses on the other piece on the way in, mm.
     pub interference_mm: f64,
     /// On how much of the way, mm: the last of it.
     pub travel_mm: f64,
@@ -54,7 +65,7 @@ pub(super) struct Change {
 }
 
 /// Bumps and dimples of the rails among `runs`, where the parameters want any.
-pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<Detent>, Vec<Change>) {
+pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<PressFit>, Vec<Change>) {
     let (mut made, mut changes) = (Vec::new(), Vec::new());
     for run in runs.iter().filter(|r| params.detent_mm > 0.0 && r.is_rail()) {
         let station = &run.stations[0];
@@ -66,7 +77,8 @@ pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<Detent>, V
         let dimple = wedge(station, [tongue.n1 - ROOT_MM, top], [s0, s1], PLAY_MM);
         changes.push(Change { piece: run.male, volume: bump, is_added: true });
         changes.push(Change { piece: run.female, volume: dimple, is_added: false });
-        made.push(Detent {
+        made.push(PressFit {
+            kind: PressFitKind::Detent,
             piece: run.male,
             at: station.point + AT_MM * station.tangent + tongue.n1 * station.n,
             interference_mm: params.detent_mm,

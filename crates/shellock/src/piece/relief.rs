@@ -1,0 +1,200 @@
+//! Relief: what of a piece comes too near to another one on its way out is taken off.
+//!
+//! Carving keeps the clearances wherever sampled fields are smooth. Where seams of three pieces meet, or a wall is crooked within a cell of
+//! the grid, they come out smaller in spots, and in the worst ones surfaces cross. So the exact gaps of the finished pieces
+//! beneath the rim are asked, and each triangle that a piece passes too near by is swollen by the clearance, drawn out against the
+//! piece's way, and cut from it. The rim stays: nobody shall see a difference.
+
+use rayon::prelude::*;
+use shellock_geom::clearance::{Passed, Translation, faces_passed};
+use shellock_geom::level_cut::{Side, cut_at_zero};
+use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
+
+use super::carve::distances_that_meet;
+use crate::body::ShellGrid;
+use crate::plan::InstallationPlan;
+use crate::{Cancelled, Ctx, IdVec, PatchId};
+
+/// Gaps smaller than wanted by up to this much stay, mm: sockets are half as much tighter by design, and what is cut must be worth it.
+const TOLERANCE_MM: f64 = 0.0195;
+/// What is cut keeps this much less than the gap wanted, mm: faces that would coincide with a socket's stay apart.
+const SHY_MM: f64 = 0.005;
+/// Rims nearer than the first are cut until they keep the second, mm: by design they are 0.03 mm apart.
+const RIM_LEAST_MM: f64 = 0.003;
+const RIM_GAP_MM: f64 = 0.008;
+/// Triangles within this of a plane, so parallel to it and together no larger are cut out as one.
+const FLAT_MM: f64 = 0.02;
+const FLAT_COS: f64 = 0.97;
+const FLAT_SIZE_MM: f64 = 4.0;
+
+/// Least gaps beneath the rim, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relief {
+    /// What lies within this depth of the model's surface is rim.
+    pub rim_mm: f64,
+    /// Between any two pieces.
+    pub gap_mm: f64,
+    /// Between the key and any other piece.
+    pub key_gap_mm: f64,
+}
+
+/// The surface of a piece: all of it, and what lies beneath the rim.
+struct Skin {
+    whole: TriMesh,
+    beneath: TriMesh,
+}
+
+/// Takes off each of `pieces` what comes too near to an earlier-installed one on its way out.
+pub(super) fn relieve(
+    ctx: &Ctx,
+    params: &Relief,
+    grid: &ShellGrid,
+    plan: &InstallationPlan,
+    pieces: &mut IdVec<PatchId, Volume>,
+) -> Result<(), Cancelled> {
+    let skins: Vec<Skin> = pieces.as_slice().par_iter().map(|piece| Skin::of(grid, piece, params.rim_mm)).collect();
+    let skins: IdVec<PatchId, Skin> = skins.into_iter().collect();
+    let order: Vec<_> = plan.removal().collect();
+    let relieved: Vec<Option<Volume>> = (0..order.len())
+        .into_par_iter()
+        .map(|at| {
+            ctx.check()?;
+            let (piece, along) = (order[at].piece, order[at].separation.unit());
+            let gap_mm = if at == 0 { params.key_gap_mm } else { params.gap_mm };
+            let cuts: Vec<Vec<Volume>> = order[at + 1..]
+                .par_iter()
+                .map(|earlier| cuts(&skins[piece], &skins[earlier.piece], along, gap_mm))
+                .collect();
+            let cuts = cuts.concat();
+            Ok((!cuts.is_empty()).then(|| pieces[piece].subtract(&Volume::union_all(cuts))))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    for (step, volume) in order.iter().zip(relieved) {
+        if let Some(volume) = volume {
+            pieces[step.piece] = volume;
+        }
+    }
+    Ok(())
+}
+
+/// What must go of a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`, and that their rims do not touch.
+fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
+    let way_out = Translation { along, from_mm: 0.0, far_mm: f64::INFINITY };
+    let of = |piece: &TriMesh, earlier: &TriMesh, least_mm: f64, gap_mm: f64| -> Vec<Volume> {
+        let passed = faces_passed(piece, earlier, &way_out, least_mm);
+        flats(earlier, &passed).iter().filter_map(|flat| flat.drawn_out(along, gap_mm)).collect()
+    };
+    let mut cuts = of(&piece.beneath, &earlier.beneath, gap_mm - TOLERANCE_MM, gap_mm - SHY_MM);
+    cuts.extend(of(&piece.whole, &earlier.whole, RIM_LEAST_MM, RIM_GAP_MM));
+    cuts
+}
+
+/// Triangles that lie about in a plane, and what passes them.
+struct Flat {
+    normal: Vec3,
+    corners: Vec<Vec3>,
+    around: Aabb,
+    passed_by: Aabb,
+}
+
+/// The passed triangles of `mesh`, those of about one plane together: carving leaves many slivers, and each alone would be cut out.
+fn flats(mesh: &TriMesh, passed: &[Passed]) -> Vec<Flat> {
+    let mut flats: Vec<Flat> = Vec::new();
+    for p in passed {
+        let corners = mesh.corners(p.face as usize);
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let around = Aabb::around(corners);
+        let takes = |flat: &&mut Flat| {
+            let is_in_plane = corners.iter().all(|q| (*q - flat.corners[0]).dot(flat.normal).abs() < FLAT_MM);
+            let is_parallel = normal == Vec3::ZERO || normal.dot(flat.normal) > FLAT_COS;
+            is_in_plane && is_parallel && flat.around.union(around).diagonal() < FLAT_SIZE_MM
+        };
+        match flats.iter_mut().find(takes) {
+            Some(flat) => {
+                flat.corners.extend(corners);
+                flat.around = flat.around.union(around);
+                flat.passed_by = flat.passed_by.union(p.by);
+            }
+            None => flats.push(Flat {
+                normal: if normal == Vec3::ZERO { Vec3::Z } else { normal },
+                corners: corners.to_vec(),
+                around,
+                passed_by: p.by,
+            }),
+        }
+    }
+    flats
+}
+
+impl Flat {
+    /// What it sweeps of that which passes it when it is swollen by `by_mm` and moves against `along`.
+    fn drawn_out(&self, along: Vec3, by_mm: f64) -> Option<Volume> {
+        let swollen = self.swollen(by_mm);
+        let bounds = Aabb::around(swollen.iter().copied());
+        let (from, to) = distances_that_meet(bounds, -along, self.passed_by, f64::INFINITY)?;
+        let ends = [from, to].into_iter().flat_map(|t| swollen.iter().map(move |p| *p - t * along));
+        Some(Volume::hull(&ends.collect::<Vec<_>>()))
+    }
+
+    /// Corners whose hull holds all points within `by_mm`: a cube around each corner, one axis along the normal.
+    fn swollen(&self, by_mm: f64) -> Vec<Vec3> {
+        let (u, v) = self.normal.any_orthonormal_pair();
+        let signs = (0..8u8).map(|bits| [0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { by_mm } else { -by_mm }));
+        let cube: Vec<Vec3> = signs.map(|[x, y, z]| x * u + y * v + z * self.normal).collect();
+        self.corners.iter().flat_map(|&p| cube.iter().map(move |&d| p + d)).collect()
+    }
+}
+
+impl Skin {
+    fn of(grid: &ShellGrid, piece: &Volume, rim_mm: f64) -> Self {
+        let whole = piece.to_mesh();
+        let depth = |p: &Vec3| grid.band.sample(&grid.depth, *p).unwrap_or(f64::INFINITY);
+        // What is off the band lies far beneath; lines are cut between finite values.
+        let values: Vec<f64> = whole.points.iter().map(|p| (depth(p) - rim_mm).min(10.0 * rim_mm)).collect();
+        let cut = cut_at_zero(&whole, &values, |_| true);
+        let sides = cut.mesh.triangles.iter().zip(&cut.side);
+        let triangles = sides.filter(|(_, side)| **side == Side::Positive).map(|(t, _)| *t).collect();
+        Self { whole, beneath: TriMesh { points: cut.mesh.points, triangles } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_swollen_flat_holds_what_is_near_it_and_is_no_thicker_along_its_normal() {
+        let corners = [[0.0, 0.0, 1.0], [2.0, 0.3, 1.0], [0.4, 1.0, 1.0], [2.2, 1.4, 1.0]].map(Vec3::from_array);
+        let mesh = TriMesh { points: corners.to_vec(), triangles: vec![[0, 1, 2], [2, 1, 3]] };
+        let passed = [0, 1].map(|face| Passed { face, by: mesh.bounds() });
+        let [flat] = &flats(&mesh, &passed)[..] else { panic!("both triangles lie in one plane") };
+        let solid = Volume::hull(&flat.swollen(0.1));
+        let bounds = solid.bounds();
+        assert!((bounds.min.z - 0.9).abs() < 1e-9 && (bounds.max.z - 1.1).abs() < 1e-9);
+        let hull = solid.to_mesh();
+        for t in 0..hull.triangles.len() {
+            let [a, b, c] = hull.corners(t);
+            let normal = (b - a).cross(c - a).normalize();
+            assert!(corners.iter().all(|p| normal.dot(a - *p) > 0.1 - 1e-9));
+        }
+    }
+
+    /// A block below an overhang that its way out touches by 0.03 mm: it leaves past it at the gap that was asked for.
+    #[test]
+    fn what_was_too_near_on_the_way_keeps_the_gap_afterwards_and_the_rest_stays() {
+        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let skin = |volume: &Volume| Skin { whole: volume.to_mesh(), beneath: volume.to_mesh() };
+        let block = cuboid([0.0; 3], [4.0, 4.0, 4.0]);
+        let wall = cuboid([-2.0, 0.0, 0.0], [-1.0, 4.0, 9.0]);
+        let overhang = cuboid([3.97, 1.0, 6.0], [6.0, 3.0, 7.0]);
+        assert!(cuts(&skin(&block), &skin(&wall), Vec3::Z, 0.1).is_empty());
+        let cut = cuts(&skin(&block), &skin(&overhang), Vec3::Z, 0.1);
+        let free = block.subtract(&Volume::union_all(cut));
+        assert!(cuts(&skin(&free), &skin(&overhang), Vec3::Z, 0.1).is_empty());
+        let way_out = Translation { along: Vec3::Z, from_mm: 0.0, far_mm: f64::INFINITY };
+        assert_eq!(faces_passed(&free.to_mesh(), &overhang.to_mesh(), &way_out, 0.1 - SHY_MM - 1e-6), []);
+        let lost = block.volume() - free.volume();
+        assert!((0.9..1.1).contains(&(lost / (4.0 * 2.19 * 0.125))), "{lost}");
+    }
+}

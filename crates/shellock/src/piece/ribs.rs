@@ -1,0 +1,179 @@
+//! Friction ribs: what holds a key that pulls out and has no rails to click on.
+//!
+//! A rib stands on the key's side of a seam, between the rim and the wall's inner side, along the way out, and reaches a little farther
+//! than the other piece's side. Pressed in, the ribs are flattened or bend the walls, and their friction keeps the key in its seat.
+
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::{TriMesh, Vec3, Volume};
+
+use super::key_parts::{Change, PressFit, PressFitKind};
+use crate::PatchId;
+
+/// Length along the way out, mm; half its width at the foot and at the top; how far the foot stands in the key.
+const LENGTH_MM: f64 = 2.4;
+const FOOT_MM: f64 = 0.5;
+const TOP_MM: f64 = 0.15;
+const ROOT_MM: f64 = 0.2;
+/// Both ends run out over this length, mm.
+const LEAD_MM: f64 = 0.7;
+/// At most so many, no two nearer than this, mm.
+const MOST: usize = 6;
+const APART_MM: f64 = 6.0;
+/// The side must be so much along the way out, as |n·s|, and the other side this near, mm, and as near at a rib's ends to this.
+const LEAST_ALONG: f64 = 0.12;
+const WIDEST_GAP_MM: f64 = 0.6;
+const UNEVEN_MM: f64 = 0.06;
+/// A side is looked at in places so far apart, mm.
+const STEP_MM: f64 = 0.8;
+
+/// What a rib needs to know of its surroundings.
+pub(super) struct Seat<'a> {
+    /// The key, and its finished mesh.
+    pub key: PatchId,
+    pub mesh: &'a TriMesh,
+    /// All other pieces.
+    pub others: &'a TriangleBvh,
+    /// Unit vector of the way out.
+    pub along: Vec3,
+    /// Least and greatest depth of a rib's middle line, mm.
+    pub depths_mm: [f64; 2],
+}
+
+/// Where a rib can stand.
+#[derive(Clone, Copy)]
+struct Place {
+    at: Vec3,
+    normal: Vec3,
+    gap_mm: f64,
+}
+
+/// Ribs that press by `interference_mm` on the pieces around the key, spread over its seams; none where no side lies along the way out.
+/// `depth` is that below the model's surface, mm.
+pub(super) fn ribs(interference_mm: f64, seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> (Vec<PressFit>, Vec<Change>) {
+    let places = spread(places(seat, depth));
+    let fit = |p: &Place| PressFit {
+        kind: PressFitKind::Rib,
+        piece: seat.key,
+        at: p.at,
+        interference_mm,
+        travel_mm: LENGTH_MM,
+    };
+    let change =
+        |p: &Place| Change { piece: seat.key, volume: rib(p, seat.along, p.gap_mm + interference_mm), is_added: true };
+    (places.iter().map(fit).collect(), places.iter().map(change).collect())
+}
+
+fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
+    let gap = |p: Vec3, normal: Vec3| Some(seat.others.first_hit(p, normal, WIDEST_GAP_MM)?.1);
+    let [least_mm, most_mm] = seat.depths_mm;
+    let mut found = Vec::new();
+    for face in 0..seat.mesh.triangles.len() {
+        let [a, b, c] = seat.mesh.corners(face);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        if normal == Vec3::ZERO || normal.dot(seat.along).abs() > LEAST_ALONG {
+            continue;
+        }
+        for at in grid_on([a, b, c]) {
+            if !(least_mm..=most_mm).contains(&depth(at)) {
+                continue;
+            }
+            let Some(gap_mm) = gap(at, normal) else { continue };
+            let goes_on = [-0.5, 0.5].into_iter().all(|share| {
+                let end = at + share * LENGTH_MM * seat.along;
+                let is_deep = (least_mm..=most_mm + 0.5).contains(&depth(end));
+                is_deep && gap(end - 0.1 * normal, normal).is_some_and(|mm| (mm - 0.1 - gap_mm).abs() < UNEVEN_MM)
+            });
+            if goes_on {
+                found.push(Place { at, normal, gap_mm });
+            }
+        }
+    }
+    found
+}
+
+/// Points about [`STEP_MM`] apart inside a triangle; its middle where it is small.
+fn grid_on([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let n = (longest / STEP_MM).ceil().clamp(1.0, 200.0) as usize;
+    let middle = move |i: usize, j: usize| [(i as f64 + 1.0 / 3.0) / n as f64, (j as f64 + 1.0 / 3.0) / n as f64];
+    let inside = move |[u, v]: &[f64; 2]| u + v < 1.0;
+    let pairs = (0..n).flat_map(move |i| (0..n - i).map(move |j| middle(i, j)));
+    pairs.filter(inside).map(move |[u, v]| a + u * (b - a) + v * (c - a))
+}
+
+/// Up to [`MOST`] of `places`, each as far from those before as can be, the first as far from the middle.
+fn spread(places: Vec<Place>) -> Vec<Place> {
+    let middle = places.iter().map(|p| p.at).sum::<Vec3>() / places.len().max(1) as f64;
+    let mut apart_mm: Vec<f64> = places.iter().map(|p| p.at.distance(middle)).collect();
+    let mut chosen: Vec<Place> = Vec::new();
+    while chosen.len() < MOST {
+        let Some(best) = (0..places.len()).max_by(|&i, &j| apart_mm[i].total_cmp(&apart_mm[j]).then(j.cmp(&i))) else {
+            break;
+        };
+        if !chosen.is_empty() && apart_mm[best] < APART_MM {
+            break;
+        }
+        let at = places[best].at;
+        if chosen.is_empty() {
+            apart_mm.fill(f64::INFINITY);
+        }
+        apart_mm.iter_mut().zip(&places).for_each(|(mm, p)| *mm = mm.min(p.at.distance(at)));
+        chosen.push(places[best]);
+    }
+    chosen
+}
+
+/// A roof along the way out whose ridge is `height_mm` above the key's side.
+fn rib(place: &Place, along: Vec3, height_mm: f64) -> Volume {
+    let across = along.cross(place.normal).normalize_or_zero();
+    let along = place.normal.cross(across);
+    let mut points = Vec::new();
+    for (height, half_width, half_length) in
+        [(-ROOT_MM, FOOT_MM, 0.5 * LENGTH_MM), (height_mm, TOP_MM, 0.5 * LENGTH_MM - LEAD_MM)]
+    {
+        for (s, t) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+            points.push(place.at + s * half_width * across + t * half_length * along + height * place.normal);
+        }
+    }
+    Volume::hull(&points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shellock_geom::Aabb;
+
+    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
+        Volume::cuboid(Aabb { min: min.into(), max: max.into() })
+    }
+
+    /// A block of 20 mm in the middle of a tray that is 0.1 mm wider on each side; it leaves upwards.
+    fn ribs_of_a_block(depths_mm: [f64; 2]) -> (Vec<PressFit>, Vec<Change>) {
+        let tray = cuboid([-5.0, -5.0, -5.0], [25.0, 25.0, 10.0]).subtract(&cuboid([-0.1; 3], [20.1, 20.1, 11.0]));
+        let others = TriangleBvh::new(&tray.to_mesh());
+        let mesh = cuboid([0.0; 3], [20.0, 20.0, 10.0]).to_mesh();
+        let seat = Seat { key: PatchId(4), mesh: &mesh, others: &others, along: Vec3::Z, depths_mm };
+        ribs(0.08, &seat, |p| 10.0 - p.z)
+    }
+
+    #[test]
+    fn ribs_press_by_what_was_asked_for_on_all_sides_along_the_way_and_not_on_the_floor() {
+        let (fits, changes) = ribs_of_a_block([1.5, 6.0]);
+        assert_eq!((fits.len(), changes.len()), (MOST, MOST));
+        for change in &changes {
+            let b = change.volume.bounds();
+            let beyond = [-b.min.x, -b.min.y, b.max.x - 20.0, b.max.y - 20.0].into_iter().fold(0.0, f64::max);
+            assert!((beyond - 0.18).abs() < 1e-9, "{b:?}");
+            assert!(b.min.z > 2.0 && b.max.z < 10.0);
+        }
+        let sides: Vec<bool> = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y]
+            .map(|side| changes.iter().any(|c| (c.volume.bounds().center() - Vec3::splat(10.0)).dot(side) > 9.0))
+            .to_vec();
+        assert!(sides.iter().filter(|s| **s).count() >= 3, "{sides:?}");
+    }
+
+    #[test]
+    fn there_are_none_where_the_sides_are_all_rim() {
+        assert!(ribs_of_a_block([20.0, 30.0]).0.is_empty());
+    }
+}
