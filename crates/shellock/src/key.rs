@@ -18,6 +18,7 @@
 //!
 //! Where we leave the paper: there the user draws the key.
 
+mod conditions;
 mod imprint;
 pub(crate) mod plane;
 mod prism;
@@ -28,6 +29,7 @@ mod turn;
 
 use serde::{Deserialize, Serialize};
 
+pub use conditions::{KeyConditions, conditions};
 pub use imprint::{imprint, patch_in};
 pub use prism::KeyPrism;
 pub use site::{KeySite, sites};

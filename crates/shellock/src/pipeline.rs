@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3};
 
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
-use crate::connector::{ConnectorParams, Contact, has_no_bar};
+use crate::connector::{ConnectorParams, Contact, Run, has_no_bar};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
 use crate::piece::{FinishParams, Finished, Grip, Joint, PieceError, PressFit, PressFitKind, Relief};
@@ -22,8 +22,8 @@ use crate::strength::{Strength, StrengthError, StrengthParams, StressMap};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
-    Cancelled, ConnectorSizes, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning, body, connector,
-    piece, segmentation, sizes, strength, verify,
+    Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece, segmentation,
+    sizes, strength, verify,
 };
 use cut_key::CutKey;
 use rounds::{Attempt, Kits, WallGrid, mended, with_segmentation};
@@ -410,8 +410,15 @@ pub fn make(
     let shell = body::build(ctx, &params.body, grid, distances, &plan, &rooms)?;
     let curves = shell.inner.as_ref().map_or(Vec::new(), |inner| connector::curves(grid, inner, &plan));
     let is_free = has_no_bar(&params.connector, grid, &shell);
-    let slide = params.plan.key.and(params.plan.key_slide).map(LatticeDirection::unit);
-    let (runs, contacts) = connector::runs(&params.connector, sizes, &plan, &curves, slide, &is_free);
+    let runs_for = |slide| connector::runs(&params.connector, sizes, &plan, &curves, slide, &is_free);
+    let (runs, contacts) = match params.plan.key.and(params.plan.key_slide) {
+        Some(cut) => runs_for(Some(cut.unit())),
+        // A piece that is the key has rails where its seams happen to allow them.
+        None => {
+            let own = runs_for(plan.steps.last().map(|step| step.separation.unit()));
+            if own.0.iter().any(Run::is_rail) { own } else { runs_for(None) }
+        }
+    };
     let grip = params.grip.map(|grip| Grip { key: plan.key(), ..grip });
     let finish = FinishParams { connector: &params.connector, relief: params.relief(), grip };
     let finished = piece::make(ctx, &finish, grid, &shell, &plan, &runs, &rooms)?;

@@ -6,9 +6,9 @@ use super::{Design, DesignError, Params, make};
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::feedback::{Lesson, lessons};
 use crate::metric::Holding;
-use crate::plan::{Blocker, FoundPlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::plan::{Blocker, FoundPlan, InstallationPlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::sizes::ChosenSizes;
-use crate::{ConnectorSizes, Ctx, PatchId, SegmentedSurface, metric, plan, segmentation};
+use crate::{ConnectorSizes, Ctx, PatchId, SegmentedSurface, key, metric, plan, segmentation};
 
 /// The surface with other pieces, which may do better.
 ///
@@ -177,12 +177,23 @@ fn planned(
     Ok(match plan::search(ctx, &params.plan, survey, constraints)? {
         PlanOutcome::Found(found) => {
             let (found, holding) = metric::choose(ctx, &params.plan, surface, sizes, *found)?;
+            if params.plan.key_slide.is_none() {
+                warn_of_key(ctx, surface, sizes, &found.plan);
+            }
             Planned::Found(Box::new(found), holding)
         }
         PlanOutcome::Infeasible { reason, blockers, articulations } => {
             Planned::Infeasible { reason, blockers, articulations }
         }
     })
+}
+
+/// Says which conditions a key breaks that was not cut to meet them.
+fn warn_of_key(ctx: &Ctx, surface: &SegmentedSurface, sizes: &ConnectorSizes, plan: &InstallationPlan) {
+    let Some(last) = plan.steps.last() else { return };
+    if let Some(found) = key::conditions(surface, last.piece, last.separation.unit()) {
+        found.problems(last.piece, sizes.largest_mm()).into_iter().for_each(|problem| ctx.warn(problem));
+    }
 }
 
 pub(super) fn failures(design: &Design) -> usize {

@@ -55,8 +55,8 @@ pub type MakeCosts<'a> = &'a dyn Fn(&PlanSurvey, &PlanConstraints) -> Box<dyn Pi
 
 /// The best plan found for `survey` under `constraints` by the default costs, or why there is none.
 ///
-/// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised`, `short-joints` and
-/// `key-not-flat`. Not promised: that none exists where none was found (but where the reason is the contacts', none does).
+/// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised` and `short-joints`.
+/// Not promised: that none exists where none was found (but where the reason is the contacts', none does).
 /// How good the plan is among those with keys as good as its own is proven, see [`FoundPlan::lower_bound`].
 pub fn search(
     ctx: &Ctx<'_>,
@@ -111,14 +111,13 @@ fn with_any_tolerance(
     if let Some(outcome) = diagnose::structural(&strict) {
         return Ok(outcome);
     }
-    if let Ok((found, key)) = with_any_key(ctx, params, &strict, keys)? {
-        warn_of(ctx, &found.plan, key, None);
+    if let Ok((found, _)) = with_any_key(ctx, params, &strict, keys)? {
         return Ok(PlanOutcome::Found(Box::new(found)));
     }
     let relaxed = space(params.relaxed_tolerance);
     match with_any_key(ctx, params, &relaxed, keys)? {
-        Ok((found, key)) => {
-            warn_of(ctx, &found.plan, key, Some(params.relaxed_tolerance));
+        Ok((found, _)) => {
+            warn_of_tolerance(ctx, params.relaxed_tolerance);
             Ok(PlanOutcome::Found(Box::new(found)))
         }
         Err(stuck) => Ok(diagnose::stuck(&relaxed, stuck)),
@@ -148,29 +147,16 @@ fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
     }
 }
 
-fn warn_of(ctx: &Ctx<'_>, plan: &InstallationPlan, key: &KeyChoice, tolerance: Option<f64>) {
-    if let Some(tolerance) = tolerance {
-        ctx.warn(Warning {
-            code: "occlusion-tolerance-raised".into(),
-            message: format!(
-                "no plan leaves all paths free; pieces may now overlap by {} % on their way, which carving must absorb",
-                tolerance * 100.0
-            ),
-            pieces: Vec::new(),
-            at: None,
-        });
-    }
-    if !key.is_flat {
-        ctx.warn(Warning {
-            code: "key-not-flat".into(),
-            message: format!(
-                "piece {} is the key though it is curved, so it may sit loosely; make a flat piece",
-                plan.key()
-            ),
-            pieces: vec![plan.key()],
-            at: None,
-        });
-    }
+fn warn_of_tolerance(ctx: &Ctx<'_>, tolerance: f64) {
+    ctx.warn(Warning {
+        code: "occlusion-tolerance-raised".into(),
+        message: format!(
+            "no plan leaves all paths free; pieces may now overlap by {} % on their way, which carving must absorb",
+            tolerance * 100.0
+        ),
+        pieces: Vec::new(),
+        at: None,
+    });
 }
 
 /// The best plan with a key as good as the first that has any; else the least that was left where the search got stuck.
