@@ -78,8 +78,8 @@ function creaseNormals(nPoints, indices, area, unit) {
   return normals;
 }
 
-// Dark violet to yellow, even in lightness (after viridis): the order shows without hue, too.
-const RAMP = [[72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121], [109, 205, 89], [180, 222, 44], [240, 229, 60]];
+// Violet to yellow, even in lightness, and light enough for a dark ground: the order shows without hue, too.
+const RAMP = [[96, 80, 160], [72, 106, 172], [54, 133, 172], [42, 157, 162], [52, 180, 140], [98, 201, 110], [150, 216, 80], [200, 226, 70], [244, 232, 84]];
 export const RAMP_CSS = `linear-gradient(to right, ${RAMP.map((c) => `rgb(${c.join(",")})`).join(",")})`;
 const NO_VALUE = [150, 147, 156];
 

@@ -441,8 +441,11 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
 
 /// What the report colours pieces by.
 fn quantities(design: &Design, summary: &Summary) -> Vec<ReportQuantity> {
+    // The key is there to leave: how far it gets before unevenness stops it would drown what the others differ by.
     let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
-        play.as_slice().iter().map(|p| p.map(|p| p.translation_mm)).collect::<Vec<Option<f64>>>()
+        let of_piece =
+            |(id, p): (PatchId, &Option<Play>)| p.filter(|_| id != design.plan.key()).map(|p| p.translation_mm);
+        play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
     };
     let order = design.pieces.ids().map(|p| Some(design.plan.position(p) as f64 + 1.0)).collect();
     [
