@@ -104,7 +104,7 @@ fn certificate(bencher: Bencher, n_pieces: usize) {
     bencher.bench(|| shell.certified());
 }
 
-#[divan::bench(args = [10, 13, 40], sample_count = 3)]
+#[divan::bench(args = [10, 13], sample_count = 3)]
 fn play(bencher: Bencher, n_pieces: usize) {
     let shell = Shell::new(n_pieces);
     bencher.bench(|| play_together(&shell.pieces, &shell.plan, &shell.contacts));
