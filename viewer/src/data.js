@@ -2,6 +2,7 @@
 //
 // header.meshes[i].points    = { offset, count, min, max }: 3 × uint16 a point, 0 … 65535 from min to max
 // header.meshes[i].triangles = { offset, count, bytes }: 3 × uint16 or uint32 a triangle
+// header.quantities[j]       = { name, unit, values }: one number or null a mesh, to colour meshes by
 // Offsets count bytes. Everything else in the header is text and numbers to show.
 
 export function readPage(document) {
@@ -75,4 +76,21 @@ function creaseNormals(nPoints, indices, area, unit) {
     normals.set([x / length, y / length, z / length], 3 * i);
   }
   return normals;
+}
+
+// Violet to yellow, even in lightness, and light enough for a dark ground: the order shows without hue, too.
+const RAMP = [[96, 80, 160], [72, 106, 172], [54, 133, 172], [42, 157, 162], [52, 180, 140], [98, 201, 110], [150, 216, 80], [200, 226, 70], [244, 232, 84]];
+export const RAMP_CSS = `linear-gradient(to right, ${RAMP.map((c) => `rgb(${c.join(",")})`).join(",")})`;
+const NO_VALUE = [150, 147, 156];
+
+/** The colour of each mesh by a quantity, sRGB; grey where it has no value. And the least and the greatest value. */
+export function shades({ values }) {
+  const known = values.filter((v) => v !== null);
+  const [low, high] = [Math.min(...known), Math.max(...known)];
+  const color = (value) => {
+    const at = ((value - low) / (high - low || 1)) * (RAMP.length - 1);
+    const i = Math.min(Math.floor(at), RAMP.length - 2);
+    return RAMP[i].map((c, k) => Math.round(c + (at - i) * (RAMP[i + 1][k] - c)));
+  };
+  return { low, high, hasGaps: known.length < values.length, colors: values.map((v) => (v === null ? NO_VALUE : color(v))) };
 }

@@ -1,5 +1,7 @@
 // The lists and controls beside the canvas. All text goes in as text, never as markup.
 
+import { RAMP_CSS } from "./data.js";
+
 export function element(tag, className, text) {
   const e = document.createElement(tag);
   if (className) e.className = className;
@@ -36,7 +38,8 @@ export function buildPanel(header, meshes, order, on) {
   const apart = slider("Spread", 0.8, on.apart);
   const steps = stepControls(meshes.length, on);
   const cut = cutControls(on);
-  tools.append(modes, apart.holder, steps.holder, cut.holder, button("Reset view", "Reset view", on.home));
+  const paint = paintControls(header, on);
+  tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, button("Reset view", "Reset view", on.home));
   panel.append(element("h1", "", header.title), summary(header));
   const list = meshList(header, meshes, order, on);
   panel.append(list.holder);
@@ -50,6 +53,7 @@ export function buildPanel(header, meshes, order, on) {
       apart.holder.hidden = state.mode !== "apart";
       apart.input.value = state.apart;
       cut.input.value = state.cut;
+      paint.update(state);
       steps.update(state, flying === undefined ? "" : meshes[flying].name);
       list.update(state, flying);
     },
@@ -140,6 +144,38 @@ function cutControls(on) {
   return { holder, input: cut.input };
 }
 
+// What meshes are coloured by, and a legend where that is a quantity.
+function paintControls(header, on) {
+  const quantities = header.quantities ?? [];
+  const holder = element("label", "paint", "Colour by");
+  holder.hidden = !quantities.length;
+  const select = element("select");
+  [header.meshes_title.toLowerCase(), ...quantities.map((q) => q.name)].forEach((name, i) => {
+    const option = element("option", "", name);
+    option.value = i - 1;
+    select.append(option);
+  });
+  select.addEventListener("change", () => on.paint(Number(select.value)));
+  const legend = element("span", "legend");
+  const [low, bar, high, none] = ["low", "ramp", "high", "none"].map((name) => element("span", name));
+  bar.style.background = RAMP_CSS;
+  legend.append(low, bar, high, none);
+  holder.append(select, legend);
+  return {
+    holder,
+    update({ paint, shades }) {
+      select.value = paint;
+      legend.hidden = !shades;
+      if (!shades) return;
+      const { unit } = quantities[paint];
+      const text = (value) => (unit ? value.toFixed(2) : String(value));
+      low.textContent = text(shades.low);
+      high.textContent = `${text(shades.high)} ${unit}`;
+      none.textContent = shades.hasGaps ? "grey: none" : "";
+    },
+  };
+}
+
 function meshList(header, meshes, order, on) {
   const list = element("ol", "meshes");
   const rows = new Map();
@@ -149,7 +185,6 @@ function meshList(header, meshes, order, on) {
     const pick = button("", `Select ${m.name}`, () => on.choose(row.classList.contains("chosen") ? -1 : i));
     pick.className = "pick";
     const dot = element("span", "dot");
-    dot.style.background = `rgb(${m.color.join(",")})`;
     pick.append(element("span", "number", String(m.step + 1)), dot, element("span", "name", m.name));
     if (m.badge) pick.append(element("span", "badge", m.badge));
     const eye = button("hide", `Hide or show ${m.name}`, () => on.toggle(i));
@@ -158,13 +193,14 @@ function meshList(header, meshes, order, on) {
     details.append(table(m.facts), button("Only this", `Show only ${m.name}`, on.alone));
     row.append(pick, eye, details);
     list.append(row);
-    rows.set(i, { row, eye });
+    rows.set(i, { row, eye, dot });
   }
   const holder = section(`${header.meshes_title} (${meshes.length})`, list, button("Show all", "Show all", on.showAll));
   return {
     holder,
     update(state, flying) {
-      for (const [i, { row, eye }] of rows) {
+      for (const [i, { row, eye, dot }] of rows) {
+        dot.style.background = `rgb(${(state.shades?.colors[i] ?? meshes[i].color).join(",")})`;
         const chosen = state.chosen === i;
         if (chosen && !row.classList.contains("chosen")) row.scrollIntoView?.({ block: "nearest" });
         row.classList.toggle("chosen", chosen);

@@ -123,6 +123,13 @@ export class Stage {
     this.items[i].group.position.copy(offset);
   }
 
+  /** Gives a mesh another colour, sRGB. */
+  paint(i, rgb) {
+    const { skin, cut } = this.items[i];
+    skin.color.setRGB(...rgb.map((c) => c / 255)).convertSRGBToLinear();
+    cut.color.copy(skin.color).multiplyScalar(0.55);
+  }
+
   /** How a mesh shows: hidden, faint (seen through), lit up. */
   show(i, { hidden = false, faint = false, lit = false }) {
     const { group, skin, cut } = this.items[i];

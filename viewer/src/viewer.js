@@ -1,7 +1,7 @@
 // A page with meshes to look at: together, apart, or arriving one after the other; with lists of facts, checks and notes.
 
 import { Vector3 } from "three";
-import { readPage } from "./data.js";
+import { readPage, shades } from "./data.js";
 import { buildPanel, element } from "./panel.js";
 import { Stage } from "./stage.js";
 
@@ -19,7 +19,7 @@ function start() {
   }
   const order = meshes.map((_, i) => i).sort((a, b) => meshes[a].step - meshes[b].step);
   // apart: 0 … 1 · step: how many have arrived, with the share of the one on its way
-  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0 };
+  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null };
   const panel = buildPanel(header, meshes, order, {
     mode: (mode) => { setMode(mode); },
     apart: (share) => { state.apart = share; update(); },
@@ -27,6 +27,7 @@ function start() {
     goTo,
     play: () => { state.playing ? stop() : play(); },
     cut: (axis, share) => { Object.assign(state, { cutAxis: axis, cut: share }); stage?.cutAt(axis, share); },
+    paint,
     choose,
     toggle: (i) => { state.hidden.has(i) ? state.hidden.delete(i) : state.hidden.add(i); update(); },
     alone: () => { state.alone = !state.alone && state.chosen >= 0; update(); },
@@ -50,6 +51,14 @@ function start() {
   function choose(i) {
     state.chosen = i;
     if (i < 0) state.alone = false;
+    update();
+  }
+
+  // By a quantity, or −1: each mesh in its own colour.
+  function paint(quantity) {
+    const chosen = header.quantities?.[quantity];
+    Object.assign(state, { paint: chosen ? quantity : -1, shades: chosen?.values.some((v) => v !== null) ? shades(chosen) : null });
+    meshes.forEach((m, i) => stage?.paint(i, state.shades?.colors[i] ?? m.color));
     update();
   }
 
@@ -143,7 +152,7 @@ function start() {
     clicks(holder.querySelector("canvas"), (x, y) => choose(stage.pick(x, y)));
   }
   keys({ next: () => goTo(Math.floor(state.step) + 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => (state.playing ? stop() : play()), escape: () => choose(-1) });
-  fromAddress(location.hash, { state, setMode, update, choose, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
+  fromAddress(location.hash, { state, setMode, update, choose, paint, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
   update();
   document.documentElement.dataset.ready = "true";
 }
@@ -169,8 +178,8 @@ function keys({ next, back, play, escape }) {
   });
 }
 
-// #apart, #apart=0.5, #step=3.4, #choose=2, #cut=0.5, #note=0 show that view at once: for links and for pictures.
-function fromAddress(hash, { state, setMode, update, choose, note, cut }) {
+// #apart, #apart=0.5, #step=3.4, #choose=2, #cut=0.5, #note=0, #paint=1 show that view at once: for links and for pictures.
+function fromAddress(hash, { state, setMode, update, choose, paint, note, cut }) {
   for (const [key, text] of new URLSearchParams(hash.slice(1))) {
     const value = Number(text);
     if (!Number.isFinite(value)) continue;
@@ -179,6 +188,7 @@ function fromAddress(hash, { state, setMode, update, choose, note, cut }) {
     if (key === "choose") choose(value);
     if (key === "cut") { state.cut = value; cut(value); }
     if (key === "note") note(value);
+    if (key === "paint") paint(value);
   }
   state.step = Math.min(state.step, document.querySelectorAll(".mesh").length);
   update();

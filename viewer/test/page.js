@@ -31,6 +31,7 @@ export async function samplePage() {
     title: "Two cubes </script>", meshes_title: "Meshes", meshes, facts: [["Count", "2"]],
     checks: [{ name: "closed", ok: true, figure: "2 of 2" }, { name: "apart", ok: false, figure: "2 mm" }],
     notes: [{ title: "corner", text: "look here", at: [11, 5, 10] }, { title: "general", text: "no place", at: null }],
+    quantities: [{ name: "size <i>", unit: "mm", values: [10, null] }, { name: "nothing", unit: "", values: [null, null] }],
   };
   const dist = (name) => readFile(new URL(`../dist/${name}`, import.meta.url), "utf8");
   return `<!doctype html><meta charset="utf-8"><title>t</title><style>${await dist("viewer.css")}</style>
@@ -53,6 +54,10 @@ setTimeout(() => {
   for (let i = 3; i < pixels.length; i += 4) covered += pixels[i] > 127;
   document.documentElement.dataset.covered = (covered / (pixels.length / 4)).toFixed(4);
   for (const b of document.querySelectorAll("button")) b.click();
+  const select = document.querySelector(".paint select");
+  const dots = () => [...document.querySelectorAll(".mesh .dot")].map((d) => d.style.background).join(" ");
+  const painted = ["1", "0", "-1"].map((value) => { select.value = value; select.dispatchEvent(new Event("change")); return dots() + " " + document.querySelector(".legend").textContent; });
+  document.documentElement.dataset.painted = painted.join("|");
   for (const key of ["ArrowRight", "ArrowLeft", " ", "Escape"]) dispatchEvent(new KeyboardEvent("keydown", { key }));
   document.documentElement.dataset.clicked = document.querySelectorAll("button").length;
 }, 1500);

@@ -5,7 +5,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import test from "node:test";
 import { bundle } from "../build.js";
-import { shadedCorners } from "../src/data.js";
+import { shadedCorners, shades } from "../src/data.js";
 import { samplePage } from "./page.js";
 
 /** SHELLOCK_CHROMIUM, or chromium on the path; undefined where neither runs. */
@@ -27,6 +27,15 @@ test("normals break at right angles and are smooth on a plane", () => {
   assert.deepEqual([...normals.subarray(18, 21)].map(Math.round), [0, 1, 0].map((x, i) => normals[18 + i] < 0 ? -x : x));
 });
 
+test("shades go from the least value to the greatest and leave out what has none", () => {
+  const { low, high, hasGaps, colors } = shades({ values: [2, null, 1, 3] });
+  assert.deepEqual([low, high, hasGaps], [1, 3, true]);
+  const light = colors.map(([r, g, b]) => 0.2126 * r + 0.7152 * g + 0.0722 * b);
+  assert.ok(light[2] < light[0] && light[0] < light[3], "lightness follows the value");
+  assert.ok(Math.max(...colors[1]) - Math.min(...colors[1]) < 16, "no value is grey");
+  assert.ok(shades({ values: [5, 5] }).colors.flat().every(Number.isFinite));
+});
+
 test("the page draws, answers every control and reports no error", { skip: withoutBrowser }, async () => {
   const folder = await mkdtemp(join(tmpdir(), "viewer-"));
   try {
@@ -40,6 +49,10 @@ test("the page draws, answers every control and reports no error", { skip: witho
     assert.equal(data("ready"), "true");
     assert.ok(Number(data("covered")) > 0.05, `the canvas is blank: ${data("covered")} of it is covered`);
     assert.ok(Number(data("clicked")) > 10);
+    const own = "rgb(60, 120, 200) rgb(180, 120, 80)";
+    const [nothing, size, back] = data("painted").split("|").map((text) => text.trim());
+    assert.ok(nothing.startsWith(own) && back.startsWith(own));
+    assert.match(size, /^rgb\(96, 80, 160\) rgb\(150, 147, 156\) 10\.0010\.00 mmgrey: none$/);
     assert.match(dom, /<h1>Two cubes &lt;\/script&gt;<\/h1>/);
   } finally {
     await rm(folder, { recursive: true, force: true, maxRetries: 5 });

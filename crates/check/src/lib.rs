@@ -4,6 +4,7 @@
 //! choice of contacts and multipliers, and those only as far as they stand the test. What each claim means and why its
 //! test is enough: docs/certificate.md.
 
+mod gap;
 mod lock;
 mod mesh;
 mod rays;
@@ -12,6 +13,7 @@ mod vector;
 use std::fmt;
 use std::fs;
 use std::path::Path;
+use std::thread;
 
 use serde::Deserialize;
 use serde_json::Value;
@@ -83,9 +85,25 @@ struct Contact {
 enum Claim {
     Locked { held: Vec<usize>, multipliers: Vec<(usize, f64)>, hold: f64 },
     Moves { held: Vec<usize> },
-    KeyLeaves { piece: usize, direction: Vec3 },
-    Installs { piece: usize, direction: Vec3 },
-    Apart {},
+    KeyLeaves { piece: usize, direction: Vec3, least: LeastGaps },
+    Installs { piece: usize, direction: Vec3, least: LeastGaps },
+    Apart { least: LeastGaps },
+}
+
+/// The least gaps of a claim, as far as they are told.
+#[derive(Deserialize)]
+struct LeastGaps {
+    overall: Option<Gap>,
+    beneath_rim: Option<Gap>,
+}
+
+/// Where two surfaces come nearest: midway between them, after the moving one has travelled. Negative is a depth.
+#[derive(Deserialize)]
+struct Gap {
+    gap_mm: f64,
+    travel_mm: f64,
+    at: Vec3,
+    against: usize,
 }
 
 /// Tests every claim of the kit in `folder`. An error means that there is no certificate to test.
@@ -115,10 +133,16 @@ pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
         Err(why) => Err(why.clone()),
     };
     add("the contacts lie on both pieces' surfaces", names);
-    for claim in &certificate.claims {
-        let (name, tested) = test_claim(&certificate, &meshes, contacts.as_deref().ok(), claim);
+    let (c, meshes, contacts) = (&certificate, &meshes[..], contacts.as_deref().ok());
+    let tested: Vec<(String, Tested)> = thread::scope(|scope| {
+        let tests: Vec<_> =
+            c.claims.iter().map(|claim| scope.spawn(|| test_claim(c, meshes, contacts, claim))).collect();
+        let died = |_| ("a claim".to_owned(), Err("its test came to no end".to_owned()));
+        tests.into_iter().map(|test| test.join().unwrap_or_else(died)).collect()
+    });
+    tested.into_iter().for_each(|(name, tested)| {
         add(&name, tested);
-    }
+    });
     Ok(findings)
 }
 
@@ -150,7 +174,7 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
         return Err("the plan has another number of pieces".into());
     }
     for claim in &c.claims {
-        let Claim::Installs { piece, direction } = claim else { continue };
+        let Claim::Installs { piece, direction, .. } = claim else { continue };
         let planned = &plan["pieces"][*piece]["installation_direction"];
         if !(0..3).all(|k| is_near(&planned[k], direction[k])) {
             return Err(format!("the plan installs piece {piece} along another direction"));
@@ -174,7 +198,7 @@ fn test_completeness(c: &Certificate) -> Tested {
     if count(&|claim| matches!(claim, Claim::KeyLeaves { piece, .. } if *piece == c.key)) != 1 {
         return Err("it is not claimed that the key can leave".into());
     }
-    if count(&|claim| matches!(claim, Claim::Apart {})) != 1 {
+    if count(&|claim| matches!(claim, Claim::Apart { .. })) != 1 {
         return Err("it is not claimed that pieces do not overlap".into());
     }
     for &id in c.installation_order.iter().skip(1) {
@@ -251,17 +275,24 @@ fn test_claim(c: &Certificate, meshes: &[Mesh], contacts: Option<&[Contact]>, cl
             let claim = format!("no lock is claimed with {} alone held", names(held));
             (claim, Ok("others can move".into()))
         }
-        Claim::KeyLeaves { piece, direction } => {
+        Claim::KeyLeaves { piece, direction, least } => {
             let others: Vec<usize> = (0..meshes.len()).filter(|p| p != piece).collect();
-            let tested = rays::test_path(meshes, *piece, *direction, &others);
+            let tested = rays::test_path(meshes, *piece, *direction, &others)
+                .and_then(|figure| gap::test(meshes, Some((*piece, *direction)), &others, least, figure));
             (format!("the key, piece {piece}, can leave"), tested)
         }
-        Claim::Installs { piece, direction } => {
+        Claim::Installs { piece, direction, least } => {
             let earlier: Vec<usize> = c.installation_order.iter().copied().take_while(|p| p != piece).collect();
-            let tested = rays::test_path(meshes, *piece, scale(*direction, -1.0), &earlier);
+            let way_out = scale(*direction, -1.0);
+            let tested = rays::test_path(meshes, *piece, way_out, &earlier)
+                .and_then(|figure| gap::test(meshes, Some((*piece, way_out)), &earlier, least, figure));
             (format!("piece {piece} can be installed"), tested)
         }
-        Claim::Apart {} => ("the assembled pieces do not overlap".into(), rays::test_apart(meshes)),
+        Claim::Apart { least } => {
+            let all: Vec<usize> = (0..meshes.len()).collect();
+            let tested = rays::test_apart(meshes).and_then(|figure| gap::test(meshes, None, &all, least, figure));
+            ("the assembled pieces do not overlap".into(), tested)
+        }
     }
 }
 

@@ -81,6 +81,12 @@ impl Mesh {
         })
     }
 
+    /// Distance of `point` to the surface, mm; `None` where it is more than `reach_mm`.
+    pub fn distance_mm(&self, point: Vec3, reach_mm: f64) -> Option<f64> {
+        let distances = self.near(point, reach_mm).map(|t| distance(nearest_point(t, point), point));
+        distances.filter(|d| *d <= reach_mm).min_by(f64::total_cmp)
+    }
+
     /// Triangles whose boxes come within `reach_mm` of `point`.
     fn near(&self, point: Vec3, reach_mm: f64) -> impl Iterator<Item = &[Vec3; 3]> {
         self.triangles.iter().filter(move |[a, b, c]| {

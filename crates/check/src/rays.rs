@@ -129,7 +129,7 @@ impl Grid {
     fn stretches(&self, mesh: &Mesh) -> Vec<Stretch> {
         let mut crossings: Vec<(usize, f64, i32)> = Vec::new();
         mesh.triangles.iter().for_each(|t| self.cross_triangle(t.map(|p| self.project(p)), &mut crossings));
-        crossings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut stretches = Vec::new();
         for ray in crossings.chunk_by(|a, b| a.0 == b.0) {
             let (mut depth, mut start) = (0, 0.0);
@@ -150,6 +150,13 @@ impl Grid {
     fn cross_triangle(&self, t: [Vec3; 3], crossings: &mut Vec<(usize, f64, i32)>) {
         let at = |p: Vec3| [(p[0] - self.origin[0]) / PIXEL_MM, (p[1] - self.origin[1]) / PIXEL_MM];
         let corners = t.map(at);
+        let misses = |k: usize| {
+            let end = self.n[k] as f64;
+            corners.iter().all(|c| c[k] < 0.0) || corners.iter().all(|c| c[k] > end)
+        };
+        if misses(0) || misses(1) {
+            return;
+        }
         let [[ax, ay], [bx, by], [cx, cy]] = corners;
         let twice_area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
         if twice_area == 0.0 {

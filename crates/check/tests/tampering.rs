@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use shellock::certificate::{PieceFile, certify};
 use shellock::plan::{InstallationPlan, InstallationStep};
-use shellock::verify::clearance::KitGaps;
+use shellock::verify::clearance::kit_gaps;
 use shellock::verify::{VerifyParams, examine};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
 use shellock_check::{Finding, check};
@@ -17,6 +17,7 @@ use shellock_geom::io::write_stl_binary;
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 const CLEARANCE_MM: f64 = 0.1;
+const RIM_MM: f64 = 1.0;
 const ALL: [f64; 2] = [0.0, 30.0];
 
 fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
@@ -78,7 +79,8 @@ fn make() -> Made {
         pieces.iter().map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh))).collect();
     let named = pieces.ids().zip(&files);
     let named = named.map(|(id, (file, bytes))| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
-    let certificate = certify(named, &pieces, &plan, &contacts, &verdict, &KitGaps::default(), CLEARANCE_MM).unwrap();
+    let gaps = kit_gaps(&Ctx::new(&report, &stop), &model, &pieces, &plan, RIM_MM).unwrap();
+    let certificate = certify(named, &pieces, &plan, &contacts, &verdict, &gaps, CLEARANCE_MM).unwrap();
     let pieces = plan.steps.iter().map(|s| {
         json!({ "file": format!("{}.stl", s.piece), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
     });
@@ -240,6 +242,26 @@ fn an_open_piece_and_overlapping_pieces_are_refuted() {
         replace(folder, certificate, 2, &cuboid([16.0, 25.0], [12.0, 18.0], [1.0, 30.0]));
     });
     assert!(thick.contains(&"the assembled pieces do not overlap".to_owned()), "{thick:?}");
+}
+
+#[test]
+fn a_gap_that_is_told_wrong_or_at_another_place_is_refuted() {
+    let change = |claim: &'static str, with: &dyn Fn(&mut Value)| {
+        refuted(|_, certificate, _| {
+            let mut claims = certificate["claims"].as_array_mut().unwrap().iter_mut();
+            with(&mut claims.find(|c| c["claim"] == claim).unwrap()["least"]["beneath_rim"]);
+        })
+    };
+    for (claim, text) in [
+        ("key-leaves", "the key, piece 2, can leave"),
+        ("installs", "piece 1 can be installed"),
+        ("apart", "the assembled pieces do not overlap"),
+    ] {
+        assert_eq!(change(claim, &|gap| gap["gap_mm"] = (gap["gap_mm"].as_f64().unwrap() + 0.03).into()), [text]);
+        assert_eq!(change(claim, &|gap| gap["gap_mm"] = (gap["gap_mm"].as_f64().unwrap() - 0.01).into()), [text]);
+        assert_eq!(change(claim, &|gap| gap["at"][2] = (gap["at"][2].as_f64().unwrap() + 50.0).into()), [text]);
+        assert_eq!(change(claim, &|gap| gap["against"] = 9.into()), [text]);
+    }
 }
 
 #[test]

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone};
+use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone, play_together};
 use shellock::key::KeySite;
 use shellock::piece::{PressFit, PressFitKind};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
-    ReportCheck, ReportData, ReportPiece, SeamStress, html, palette, pieces_picture, strength_chart,
+    ReportCheck, ReportData, ReportPiece, ReportQuantity, SeamStress, html, palette, pieces_picture, strength_chart,
 };
 use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::clearance::PathGap;
@@ -38,6 +38,8 @@ pub struct Summary {
     pub thin_share: f64,
     /// How far each piece moves within its gaps; `None` for one that leaves.
     pub rattle: IdVec<PatchId, Option<Play>>,
+    /// The same while all but the key and the first piece may move; `None` for these two, too.
+    pub rattle_together: IdVec<PatchId, Option<Play>>,
 }
 
 /// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
@@ -129,6 +131,7 @@ pub fn files(
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
         rattle: play_alone(&design.pieces, &design.plan, &design.touching),
+        rattle_together: play_together(&design.pieces, &design.plan, &design.touching),
     };
     let plan = plan_json(model, params, design, warnings, &summary, &thin);
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
@@ -184,6 +187,13 @@ pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
     bytes
 }
 
+/// How far a piece moves while no other does, and `together` with others.
+fn rattle_json(summary: &Summary, piece: PatchId) -> Option<Value> {
+    let mut value = json!(summary.rattle[piece]?);
+    value["together"] = json!(summary.rattle_together[piece]);
+    Some(value)
+}
+
 fn plan_json(
     model: &Model,
     params: &Params,
@@ -205,7 +215,7 @@ fn plan_json(
             json!({
                 "id": p, "file": piece_file(p), "neighbors": neighbours, "volume_mm3": mesh.signed_volume(),
                 "installation_direction": (-plan.separation(p).unit() + 0.0).to_array(),
-                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize], "rattle": summary.rattle[p],
+                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize], "rattle": rattle_json(summary, p),
             })
         })
         .collect();
@@ -409,7 +419,9 @@ fn report(
         .iter()
         .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
         .collect();
-    let data = ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures };
+    let quantities = quantities(design, summary);
+    let data =
+        ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
     rayon::join(|| html(&data).into_bytes(), || pieces_picture(&data.pieces).png())
 }
 
@@ -438,12 +450,31 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
     proof.into_iter().chain(weakest).chain(loose).collect()
 }
 
+/// What the report colours pieces by.
+fn quantities(design: &Design, summary: &Summary) -> Vec<ReportQuantity> {
+    // The key is there to leave: how far it gets before unevenness stops it would drown what the others differ by.
+    let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
+        let of_piece =
+            |(id, p): (PatchId, &Option<Play>)| p.filter(|_| id != design.plan.key()).map(|p| p.translation_mm);
+        play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
+    };
+    let order = design.pieces.ids().map(|p| Some(design.plan.position(p) as f64 + 1.0)).collect();
+    [
+        ("order", "", order),
+        ("play alone", "mm", translation_mm(&summary.rattle)),
+        ("play together", "mm", translation_mm(&summary.rattle_together)),
+    ]
+    .map(|(name, unit, values)| ReportQuantity { name: name.into(), unit: unit.into(), values })
+    .into()
+}
+
 /// A piece's volume, and how each of its seams holds.
 fn piece_facts(design: &Design, summary: &Summary, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
     let mut facts = vec![("volume".to_owned(), format!("{volume_cm3:.1} cm³"))];
     facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
     let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
     facts.extend(summary.rattle[piece].map(|p| ("play".to_owned(), play(p))));
+    facts.extend(summary.rattle_together[piece].map(|p| ("play with others".to_owned(), play(p))));
     let seams = design.holding.iter().flat_map(|h| &h.seams);
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use shellock::figure::{self, Figure};
-use shellock::report::{ReportCheck, ReportData, ReportPiece, html, palette, pieces_picture};
+use shellock::report::{ReportCheck, ReportData, ReportPiece, ReportQuantity, html, palette, pieces_picture};
 use shellock::{LatticeDirection, PatchId, Warning};
 use shellock_geom::{TriMesh, Vec3};
 
@@ -23,6 +23,8 @@ fn main() -> std::io::Result<()> {
         at: Some([0.0, 40.0, 118.0]),
     };
     std::fs::write(folder.join("pieces.png"), pieces_picture(&pieces).png())?;
+    let n = meshes.len();
+    let values = (0..n).map(|i| (i + 1 < n).then_some(0.2 + 0.05 * (3 * i % 7) as f64)).collect();
     let data = ReportData {
         title: "Squirrel <sample>".into(),
         facts: vec![
@@ -40,6 +42,7 @@ fn main() -> std::io::Result<()> {
         ],
         warnings: &[warning],
         figures: Vec::new(),
+        quantities: vec![ReportQuantity { name: "play".into(), unit: "mm".into(), values }],
     };
     std::fs::write(folder.join("report.html"), html(&data))
 }

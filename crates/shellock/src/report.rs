@@ -33,6 +33,8 @@ pub struct ReportData<'a> {
     pub warnings: &'a [Warning],
     /// Title and SVG text of what goes below the lists.
     pub figures: Vec<(String, String)>,
+    /// What pieces can be coloured by, besides their own colours.
+    pub quantities: Vec<ReportQuantity>,
 }
 
 /// One piece in assembled position.
@@ -65,6 +67,17 @@ pub struct ReportCheck {
     pub ok: bool,
     /// The figure it was judged by, with unit.
     pub figure: String,
+}
+
+/// A figure of every piece.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReportQuantity {
+    /// What it is, for people.
+    pub name: String,
+    /// Of the values; empty for counts.
+    pub unit: String,
+    /// One for each piece of the report, in its order; `None` where a piece has none.
+    pub values: Vec<Option<f64>>,
 }
 
 /// How far pieces move outwards in the exploded view, as a share of their distance from the middle.

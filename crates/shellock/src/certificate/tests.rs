@@ -73,6 +73,19 @@ fn a_lid_without_its_tongue_is_not_certified() {
 }
 
 #[test]
+fn a_cap_that_touches_nothing_but_a_locked_lid_is_not_certified() {
+    // The cap's tongue slides into the lid from the side: without the lid, the cap would be apart from the rest.
+    let (stem, foot) = (([0.0, 10.0], [11.0, 19.0], [26.0, 31.0]), ([0.0, 10.0], [7.0, 23.0], [22.0, 26.0]));
+    let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([-5.0, p.0[1]], p.1, p.2);
+    let [base, lid, pin] = pinned_lid(PIN);
+    let lid = lid.subtract(&open(stem)).subtract(&open(foot));
+    let top = cuboid([0.0, 10.0], ALL, [30.0 + 2.0 * HALF_GAP_MM, 36.0]);
+    let cap = Volume::union_all(vec![top, cuboid(stem.0, stem.1, stem.2), cuboid(foot.0, foot.1, foot.2)]);
+    let out = [Vec3::X, Vec3::X, Vec3::NEG_X, Vec3::Z];
+    assert_eq!(movers(&Kit::new(cuboid(ALL, ALL, ALL), &[base, lid, cap, pin], &out)), [2]);
+}
+
+#[test]
 fn a_piece_that_alone_joins_another_to_the_rest_does_not_lock_it() {
     // A bar that ends in a turned wheel: the wheel, piece 1, touches the bar alone, along a round axle and two flanks.
     let mut contacts = Vec::new();
@@ -147,15 +160,26 @@ fn a_subset_slides(contacts: &[Contact], n_pieces: u32, directions: &[Vec3]) -> 
     })
 }
 
+/// All directions in which something can begin to slide along faces with these normals, which have their opposites among
+/// them: the extreme rays of all cones that they cut out, and the normals.
+fn critical_directions(normals: &[Vec3]) -> Vec<Vec3> {
+    let mut directions: Vec<Vec3> = normals.to_vec();
+    for d in normals.iter().flat_map(|a| normals.iter().map(|b| a.cross(*b))).filter_map(Vec3::try_normalize) {
+        if directions.iter().all(|known| known.distance_squared(d) > 1e-12) {
+            directions.push(d);
+        }
+    }
+    directions
+}
+
 #[test]
-fn no_subset_slides_out_of_what_is_certified() {
+fn no_subset_slides_out_of_what_is_certified_and_one_piece_slides_where_it_is_not() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let normals: Vec<Vec3> = LatticeDirection::all().map(LatticeDirection::unit).collect();
-    let crosses = normals.iter().flat_map(|a| normals.iter().map(|b| a.cross(*b).normalize_or_zero()));
-    let directions: Vec<Vec3> = normals.iter().copied().chain(crosses.filter(|d| *d != Vec3::ZERO)).collect();
+    let directions = critical_directions(&normals);
     let (mut n_locked, mut n_sliding) = (0, 0);
-    for round in 0..60u32 {
-        let n_pieces = 2 + round % 4;
+    for round in 0..84u32 {
+        let n_pieces = 2 + round % 7;
         let n_contacts = (3 + rng.random_range(0..9)) * n_pieces;
         let contacts: Vec<Contact> = (0..n_contacts)
             .map(|_| {
@@ -167,9 +191,11 @@ fn no_subset_slides_out_of_what_is_certified() {
         let slides = a_subset_slides(&contacts, n_pieces, &directions);
         let locked = is_locked(&contacts, n_pieces as usize, Freedom::Translations);
         assert!(!(slides && locked), "round {round}: {contacts:?}");
+        // Of more pieces, some can slide in different directions at once, which no blocking graph shows.
+        assert!(n_pieces > 2 || slides || locked, "round {round}: {contacts:?}");
         (n_locked, n_sliding) = (n_locked + u32::from(locked), n_sliding + u32::from(slides));
     }
-    assert!(n_locked > 8 && n_sliding > 8, "{n_locked} locked, {n_sliding} sliding");
+    assert!(n_locked > 12 && n_sliding > 12, "{n_locked} locked, {n_sliding} sliding");
 }
 
 #[test]
@@ -204,7 +230,7 @@ fn a_block_in_a_wide_slot_rattles_by_its_gaps() {
     let gap_mm = 2.0 * HALF_GAP_MM;
     assert!(alone.translation_mm > 0.9 * gap_mm && alone.translation_mm < 2.0 * gap_mm, "{alone:?}");
     assert!(alone.rotation_deg > 0.0 && alone.rotation_deg < 2.0, "{alone:?}");
-    assert!((alone.translation_mm - together.translation_mm).abs() < 1e-6, "all other pieces are held: {together:?}");
+    assert!((alone.translation_mm - together.translation_mm).abs() < 1e-4, "all other pieces are held: {together:?}");
 }
 
 #[test]
@@ -228,12 +254,12 @@ fn gaps_of_a_row_add_up_when_all_may_move() {
         let at = system.n - 6;
         (0..3).for_each(|k| objective[at + k] = d[k]);
         let gaps: Vec<f64> = system.rows.iter().map(|row| contacts[row.contact].gap_mm).collect();
-        let mut corner = crate::verify::motion::Corner::at_rest(&system);
-        system.farthest(&objective, &gaps, &mut corner).expect("it is caged")
+        let limits = crate::verify::motion::Limits::new(&system, &gaps);
+        crate::verify::motion::Corner::new(&limits).farthest(&objective).expect("it is caged")
     };
     for d in [Vec3::X, Vec3::NEG_Y, Vec3::Z] {
-        assert!((farthest(&[PatchId(2)], d) - 0.1).abs() < 1e-9);
-        assert!((farthest(&[PatchId(1), PatchId(2)], d) - 0.2).abs() < 1e-9);
+        assert!((farthest(&[PatchId(2)], d) - 0.1).abs() < 1e-5);
+        assert!((farthest(&[PatchId(1), PatchId(2)], d) - 0.2).abs() < 1e-5);
     }
 }
 

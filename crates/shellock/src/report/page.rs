@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 use shellock_geom::{TriMesh, Vec3};
 
-use super::{ReportCheck, ReportData, ReportPiece, exploded_shifts};
+use super::{ReportCheck, ReportData, ReportPiece, ReportQuantity, exploded_shifts};
 
 const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("../../../../viewer/dist/viewer.css");
@@ -25,6 +25,7 @@ pub fn html(data: &ReportData<'_>) -> String {
         checks: &data.checks,
         notes: data.warnings.iter().map(|w| note(w, &data.pieces)).collect(),
         figures: data.figures.iter().map(Figure::new).collect(),
+        quantities: &data.quantities,
     };
     let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
     // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
@@ -51,6 +52,8 @@ struct Header<'a> {
     checks: &'a [ReportCheck],
     notes: Vec<Note<'a>>,
     figures: Vec<Figure<'a>>,
+    /// One value a mesh.
+    quantities: &'a [ReportQuantity],
 }
 
 /// A picture with a title.
@@ -210,6 +213,7 @@ mod tests {
             checks: vec![ReportCheck { name: HOSTILE.into(), ok: true, figure: HOSTILE.into() }],
             warnings: &[warning],
             figures: vec![hostile()],
+            quantities: vec![ReportQuantity { name: HOSTILE.into(), unit: HOSTILE.into(), values: vec![None] }],
         })
     }
 

@@ -17,7 +17,7 @@ use shellock_geom::Vec3;
 
 use super::contact::Contact;
 use crate::PatchId;
-pub(crate) use play::Corner;
+pub(crate) use play::{Corner, Limits};
 pub(crate) use system::System;
 
 /// Which motions of a piece are considered.
@@ -126,6 +126,50 @@ mod tests {
             }
         }
         assert!(n_locked > 5 && n_open > 5, "{n_locked} locked, {n_open} open");
+    }
+
+    /// The greatest `objective · x` in the box of ±1000 mm; `gaps_mm` one a row.
+    fn farthest_by_simplex(system: &System, gaps_mm: &[f64], objective: &DVector<f64>) -> f64 {
+        let mut problem = Problem::new(OptimizationDirection::Maximize);
+        let x: Vec<_> = objective.iter().map(|&c| problem.add_var(c, (-1e3, 1e3))).collect();
+        for (row, &gap_mm) in system.rows.iter().zip(gaps_mm) {
+            let mut dense = DVector::zeros(system.n);
+            system.add(row, 1.0, &mut dense);
+            let terms: Vec<_> = x.iter().copied().zip(dense.iter().copied()).filter(|t| t.1 != 0.0).collect();
+            problem.add_constraint(&terms, ComparisonOp::Le, gap_mm);
+        }
+        let SolveOutcome::Solution(best) = problem.solve().unwrap() else { panic!("no limit was set") };
+        best.objective()
+    }
+
+    #[test]
+    fn pieces_go_as_far_as_the_linear_program_says_whether_gaps_are_equal_or_none() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (mut n_ended, mut n_endless) = (0, 0);
+        for (n, n_pieces) in [(4, 2), (12, 2), (20, 2), (60, 3), (150, 4), (300, 5)] {
+            let contacts = random_contacts(&mut rng, n_pieces, n);
+            let free: Vec<PatchId> = (1..n_pieces).map(PatchId).collect();
+            let system = System::new(&contacts, &free, 1.0, Freedom::Rigid);
+            let equal = vec![0.1; system.rows.len()];
+            let mut some = equal.clone();
+            some.iter_mut().step_by(3).for_each(|gap| *gap = 0.0);
+            for gaps_mm in [equal, some] {
+                let limits = Limits::new(&system, &gaps_mm);
+                let mut corner = Corner::new(&limits);
+                for _ in 0..8 {
+                    let mut objective = DVector::zeros(system.n);
+                    let at = 6 * rng.random_range(0..free.len());
+                    (at..at + 6).for_each(|k| objective[k] = rng.random::<f64>() - 0.5);
+                    let expected = farthest_by_simplex(&system, &gaps_mm, &objective);
+                    match corner.farthest(&objective) {
+                        Some(most) => assert!((most - expected).abs() < 1e-3 * expected.max(1.0), "{most} {expected}"),
+                        None => assert!(expected > 10.0, "{expected}"),
+                    }
+                    *if expected < 10.0 { &mut n_ended } else { &mut n_endless } += 1;
+                }
+            }
+        }
+        assert!(n_ended > 20 && n_endless > 8, "{n_ended} ended, {n_endless} endless");
     }
 
     /// Contacts on the six faces of a box around `center`, normals outwards.

@@ -1,142 +1,281 @@
 //! How far pieces move within their gaps: the greatest `c · x` with `A x ≤ g`.
 //!
-//! From `x = 0`, which gaps of 0 or more allow, along the objective's part that no active contact opposes, to the next
-//! contact, which becomes active; where no such part is left, the contact that pulls is given up, until all push. That is
-//! the simplex method on the polyhedron of allowed motions; the next objective goes on from the corner of the last one.
+//! The allowed motions are a polyhedron; a corner is where as many independent limits meet as there are unknowns. With
+//! `B` the rows of these limits and `λ = B⁻ᵀ c` their forces, the corner is the farthest one where all forces push:
+//! the simplex method, with the inverse of `B` at hand.
+//!
+//! Of many thousand contacts few ever end a motion, and only those are looked at in a step. So
+//! 1. *climb*: let go of the limit that pulls most, go along its edge to the next one that is looked at, until all push;
+//! 2. look at the contacts that the corner overdraws; where there are none, that is it;
+//! 3. *come back*: exchange a limit for the most overdrawn one such that all go on pushing (the dual method), until none
+//!    is overdrawn; again 1.
+//!
+//! Each part ends: gaps are widened by some nanometres, each by its own, so that no more limits meet in a corner than it
+//! takes and every edge has a length; coming back does the like with the forces; and every round looks at more contacts.
+//!
+//! The next objective begins at the corner of the last one, so objectives that are alike should follow each other. Box
+//! limits [`FAR_MM`] away give the first corner.
 
-use nalgebra::DVector;
+use std::collections::BTreeMap;
 
-use super::forces::Active;
-use super::system::System;
+use nalgebra::{DMatrix, DVector};
 
-/// Share of the objective, or of a row, that counts as none.
+use super::system::{Row, System};
+
+/// Motions that go so far have no end, mm: any real gap ends them long before.
+const FAR_MM: f64 = 1e3;
+/// Share of a force or a speed that counts as none.
 const FLAT: f64 = 1e-9;
-/// By how much a contact's gap may be overdrawn, mm: far below what is told.
-const OVERDRAWN_MM: f64 = 1e-5;
-/// Contacts that are added at once, the most overdrawn first.
-const ADDED: usize = 40;
-/// Rounds for each unknown before the search ends with what it has.
-const ROUNDS: usize = 300;
+/// By how much a limit may be overdrawn, mm.
+const OVERDRAWN_MM: f64 = 1e-9;
+/// Most by which gaps are widened to tell them apart, mm; far below what is told.
+const WIDENED_MM: f64 = 1e-6;
+/// The like for forces, as a share of the objective; it is taken out again in the next climb.
+const STRENGTHENED: f64 = 1e-6;
+/// Exchanges after which the inverse is computed anew, against rounding.
+const REFRESH: usize = 100;
 
-/// An allowed motion and the contacts that end it.
-///
-/// Few of many thousand contacts ever end a motion: only those that once did, or would have been overdrawn, are looked at
-/// in every step. They stay for the next objective.
-pub(crate) struct Corner {
-    x: DVector<f64>,
-    active: Active,
+/// One inequality: `wrench` at the unknowns from `plus` on, less the same from `minus` on, stays below `bound_mm`.
+struct Limit {
+    wrench: [f64; 6],
+    plus: usize,
+    minus: usize,
+    bound_mm: f64,
+}
+
+impl Limit {
+    /// What the limit says of a motion. Motions are padded by [`PAD`] zeros, which stand for what does not move.
+    fn along(&self, motion: &[f64]) -> f64 {
+        let (plus, minus) = (&motion[self.plus..][..6], &motion[self.minus..][..6]);
+        (0..6).map(|k| self.wrench[k] * (plus[k] - minus[k])).sum()
+    }
+}
+
+/// Zeros after each motion.
+const PAD: usize = 6;
+
+/// The corner of the allowed motions that the last objective led to.
+#[derive(Clone)]
+pub(crate) struct Corner<'a> {
+    limits: &'a Limits,
+    x: Vec<f64>,
+    active: Vec<usize>,
+    /// Columns of the inverse of the matrix whose rows are those of `active`: the edges of the corner.
+    edges: Vec<Vec<f64>>,
     looked_at: Vec<usize>,
     is_looked_at: Vec<bool>,
+    n_exchanges: usize,
 }
 
-impl Corner {
-    /// At rest.
-    pub fn at_rest(system: &System) -> Self {
-        let is_looked_at = vec![false; system.rows.len()];
-        Self { x: DVector::zeros(system.n), active: Active::default(), looked_at: Vec::new(), is_looked_at }
-    }
+/// What ends motions: first the contact rows, then a side of the box above and one below for each unknown.
+pub(crate) struct Limits {
+    n: usize,
+    n_rows: usize,
+    all: Vec<Limit>,
+}
 
-    fn look_at(&mut self, row: usize) {
-        if !std::mem::replace(&mut self.is_looked_at[row], true) {
-            self.looked_at.push(row);
-        }
+impl Limits {
+    /// Contact rows stay below `gaps_mm`, one a row, ≥ 0.
+    pub fn new(system: &System, gaps_mm: &[f64]) -> Self {
+        let n = system.n;
+        let contact = |(i, (row, gap_mm)): (usize, (&Row, &f64))| Limit {
+            wrench: row.wrench,
+            plus: row.plus.unwrap_or(n),
+            minus: row.minus.unwrap_or(n),
+            bound_mm: gap_mm + WIDENED_MM * scattered(i),
+        };
+        let side = |i: usize| {
+            let sign = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
+            Limit { wrench: [sign, 0.0, 0.0, 0.0, 0.0, 0.0], plus: i / 2, minus: n, bound_mm: FAR_MM }
+        };
+        let contacts = system.rows.iter().zip(gaps_mm).enumerate().map(contact);
+        Self { n, n_rows: system.rows.len(), all: contacts.chain((0..2 * n).map(side)).collect() }
     }
 }
 
-impl System {
-    /// The greatest `objective · x` where contact rows stay below `gaps_mm` (one a row, ≥ 0); `None` where it has no end.
-    ///
-    /// Begins at `corner` and leaves it at the motion found.
-    pub fn farthest(&self, objective: &DVector<f64>, gaps_mm: &[f64], corner: &mut Corner) -> Option<f64> {
-        let mut is_refused = vec![false; self.rows.len()];
-        for _ in 0..ROUNDS * self.n {
-            let (way, forces) = self.unopposed(objective, &corner.active);
-            if way.norm() <= FLAT * objective.norm() {
-                let most = forces.iter().fold(0.0, |m: f64, f| m.max(f.abs()));
-                let pulling = (0..forces.len()).min_by(|&i, &k| forces[i].total_cmp(&forces[k]));
-                is_refused.fill(false);
-                match pulling.filter(|&i| forces[i] < -FLAT * most) {
-                    Some(i) => corner.active.remove(i),
-                    None if self.draw_back(gaps_mm, corner) => {}
-                    None => break,
-                }
-                continue;
-            }
-            corner.active.rows.iter().for_each(|&row| is_refused[row] = true);
-            let known = self.next_contact(&corner.looked_at, &corner.x, &way, gaps_mm, &is_refused);
-            let (row, step) = match known {
-                Some(found) => found,
-                None => {
-                    let all: Vec<usize> = (0..self.rows.len()).collect();
-                    self.next_contact(&all, &corner.x, &way, gaps_mm, &is_refused)?
-                }
-            };
-            corner.look_at(row);
-            corner.x.axpy(step, &way, 1.0);
-            if corner.active.push(self, row) {
-                is_refused.fill(false);
-            } else {
-                is_refused[row] = true;
-            }
-        }
-        Some(objective.dot(&corner.x))
+/// A number in [0.5, 1) for each `i`, in no order: the fractions of multiples of the golden ratio.
+fn scattered(i: usize) -> f64 {
+    0.5 + 0.5 * ((i + 1) as f64 * 0.618_033_988_749_894_9).fract()
+}
+
+impl<'a> Corner<'a> {
+    /// Any corner.
+    pub fn new(limits: &'a Limits) -> Self {
+        let Limits { n, n_rows, .. } = *limits;
+        let edge = |i: usize| (0..n + PAD).map(|k| f64::from(u8::from(i == k))).collect();
+        let mut corner = Self {
+            limits,
+            x: [vec![FAR_MM; n], vec![0.0; PAD]].concat(),
+            active: (0..n).map(|i| n_rows + 2 * i).collect(),
+            edges: (0..n).map(edge).collect(),
+            looked_at: (n_rows..n_rows + 2 * n).collect(),
+            is_looked_at: vec![false; n_rows],
+            n_exchanges: 0,
+        };
+        // All sides that meet here push against this objective.
+        corner.go_farthest(&vec![1.0; n]);
+        corner
     }
 
-    /// Where the motion overdraws contacts that were not looked at, takes it back towards rest until it does not. Whether
-    /// there were any.
-    fn draw_back(&self, gaps_mm: &[f64], corner: &mut Corner) -> bool {
-        let moved = |row: usize| self.dot(&self.rows[row], &corner.x);
-        let mut overdrawn: Vec<(f64, usize)> =
-            (0..self.rows.len()).map(|row| (moved(row) - gaps_mm[row], row)).filter(|o| o.0 > OVERDRAWN_MM).collect();
-        overdrawn.retain(|&(_, row)| !corner.is_looked_at[row]);
-        if overdrawn.is_empty() {
-            return false;
-        }
-        let share = overdrawn.iter().map(|&(by_mm, row)| gaps_mm[row] / (gaps_mm[row] + by_mm)).fold(1.0, f64::min);
-        overdrawn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        overdrawn.iter().take(ADDED).for_each(|&(_, row)| corner.look_at(row));
-        corner.x *= share;
-        corner.active = Active::default();
-        true
+    /// The greatest `objective · x`; `None` where it has no end.
+    pub fn farthest(&mut self, objective: &DVector<f64>) -> Option<f64> {
+        self.go_farthest(objective.as_slice());
+        let forces = self.forces(objective.as_slice());
+        let least = STRENGTHENED * objective.norm();
+        let has_end =
+            self.active.iter().zip(forces).all(|(&limit, force)| limit < self.limits.n_rows || force <= least);
+        has_end.then(|| dot(objective.as_slice(), &self.x))
     }
 
-    /// The part of the objective along which no active contact moves, and the forces of these contacts that oppose the
-    /// rest of it.
-    fn unopposed(&self, objective: &DVector<f64>, active: &Active) -> (DVector<f64>, Vec<f64>) {
-        let (mut way, mut forces) = (objective.clone(), vec![0.0; active.rows.len()]);
-        // The second round takes out the first one's rounding.
-        for _ in 0..2 {
-            let products: Vec<f64> = active.rows.iter().map(|&row| self.dot(&self.rows[row], &way)).collect();
-            let change = active.backward(&active.forward(&products));
-            for ((&row, force), change) in active.rows.iter().zip(&mut forces).zip(change) {
-                self.add(&self.rows[row], -change, &mut way);
-                *force += change;
+    fn go_farthest(&mut self, objective: &[f64]) {
+        self.climb(objective);
+        while self.look_at_overdrawn() {
+            self.come_back(objective);
+            self.climb(objective);
+        }
+    }
+
+    /// From a corner that all limits that are looked at allow to the farthest one.
+    fn climb(&mut self, objective: &[f64]) {
+        while let Some(leaving) = self.most_pulling(&self.forces(objective)) {
+            let way: Vec<f64> = self.edges[leaving].iter().map(|x| -x).collect();
+            let Some(entering) = self.first_met(&way) else { break };
+            self.exchange(leaving, entering);
+        }
+    }
+
+    /// From a corner whose limits all push to the farthest one that all limits that are looked at allow, or one near it.
+    fn come_back(&mut self, objective: &[f64]) {
+        let mut objective = objective.to_vec();
+        let more = STRENGTHENED * dot(&objective, &objective).sqrt();
+        for (i, &limit) in self.active.iter().enumerate() {
+            self.add_row(limit, more * scattered(i), &mut objective);
+        }
+        while let Some(entering) = self.most_overdrawn() {
+            let Some(leaving) = self.first_relieved(&self.forces(&objective), entering) else { break };
+            self.exchange(leaving, entering);
+        }
+    }
+
+    /// Of the active limits, against the objective.
+    fn forces(&self, objective: &[f64]) -> Vec<f64> {
+        self.edges.iter().map(|edge| dot(objective, edge)).collect()
+    }
+
+    /// The place of the limit along whose edge the objective rises most steeply.
+    fn most_pulling(&self, forces: &[f64]) -> Option<usize> {
+        let least = -FLAT * forces.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+        let pulling = (0..forces.len()).filter(|&i| forces[i] < least);
+        let steepness = |i: usize| forces[i].powi(2) / dot(&self.edges[i], &self.edges[i]);
+        pulling.map(|i| (i, steepness(i))).max_by(|a, b| a.1.total_cmp(&b.1)).map(|p| p.0)
+    }
+
+    /// The limit that is met first along `way`: of those met at the same place, the one met most squarely.
+    fn first_met(&self, way: &[f64]) -> Option<usize> {
+        let least_speed = FLAT * dot(way, way).sqrt();
+        let met = self.looked_at.iter().map(|&i| (i, self.limits.all[i].along(way)));
+        let met = met.filter(|&(_, speed)| speed > least_speed);
+        let met: Vec<(usize, f64, f64)> = met.map(|(i, speed)| (i, speed, self.room_mm(i).max(0.0))).collect();
+        let end = met.iter().map(|&(_, speed, room)| (room + OVERDRAWN_MM) / speed).fold(f64::INFINITY, f64::min);
+        let first = met.into_iter().filter(|&(_, speed, room)| room / speed <= end);
+        first.max_by(|a, b| a.1.total_cmp(&b.1)).map(|m| m.0)
+    }
+
+    /// How far the corner is from the limit, mm.
+    fn room_mm(&self, limit: usize) -> f64 {
+        let limit = &self.limits.all[limit];
+        limit.bound_mm - limit.along(&self.x)
+    }
+
+    /// Of what is looked at, the limit that the corner overdraws most.
+    fn most_overdrawn(&self) -> Option<usize> {
+        let overdrawn = self.looked_at.iter().map(|&i| (i, self.room_mm(i))).filter(|o| o.1 < -OVERDRAWN_MM);
+        overdrawn.min_by(|a, b| a.1.total_cmp(&b.1)).map(|o| o.0)
+    }
+
+    /// The place of the limit that `entering`, as it begins to push, takes all force from first.
+    fn first_relieved(&self, forces: &[f64], entering: usize) -> Option<usize> {
+        let shares = self.shares(entering);
+        let least = FLAT * shares.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
+        let relieved: Vec<usize> = (0..shares.len()).filter(|&i| shares[i] > least).collect();
+        let slack = FLAT * forces.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+        let end = relieved.iter().map(|&i| (forces[i].max(0.0) + slack) / shares[i]).fold(f64::INFINITY, f64::min);
+        let first = relieved.into_iter().filter(|&i| forces[i].max(0.0) / shares[i] <= end);
+        first.max_by(|&i, &k| shares[i].total_cmp(&shares[k]))
+    }
+
+    /// The limit's row as a sum of the active ones.
+    fn shares(&self, limit: usize) -> Vec<f64> {
+        self.edges.iter().map(|edge| self.limits.all[limit].along(edge)).collect()
+    }
+
+    /// Adds `factor` times the limit's row to `sum`.
+    fn add_row(&self, limit: usize, factor: f64, sum: &mut [f64]) {
+        let limit = &self.limits.all[limit];
+        for (from, sign) in [(limit.plus, factor), (limit.minus, -factor)] {
+            sum.iter_mut().skip(from).zip(limit.wrench).for_each(|(sum, w)| *sum += sign * w);
+        }
+    }
+
+    /// Puts a limit in the place of an active one and goes to the corner where they all meet.
+    fn exchange(&mut self, leaving: usize, entering: usize) {
+        let shares = self.shares(entering);
+        self.active[leaving] = entering;
+        let way: Vec<f64> = self.edges[leaving].iter().map(|x| x / shares[leaving]).collect();
+        for (edge, &share) in self.edges.iter_mut().zip(&shares).filter(|(_, share)| **share != 0.0) {
+            edge.iter_mut().zip(&way).for_each(|(x, w)| *x -= share * w);
+        }
+        self.edges[leaving] = way;
+        self.n_exchanges += 1;
+        if self.n_exchanges.is_multiple_of(REFRESH) {
+            self.refresh();
+        }
+        self.x.fill(0.0);
+        for (edge, &limit) in self.edges.iter().zip(&self.active) {
+            let bound_mm = self.limits.all[limit].bound_mm;
+            self.x.iter_mut().zip(edge).for_each(|(x, e)| *x += bound_mm * e);
+        }
+    }
+
+    /// Computes the inverse anew, unless rounding has left none.
+    fn refresh(&mut self) {
+        let n = self.limits.n;
+        let mut rows = DMatrix::zeros(n, n);
+        for (i, &limit) in self.active.iter().enumerate() {
+            let mut row = vec![0.0; n];
+            self.add_row(limit, 1.0, &mut row);
+            rows.row_mut(i).copy_from_slice(&row);
+        }
+        if let Some(inverse) = rows.try_inverse() {
+            for (i, edge) in self.edges.iter_mut().enumerate() {
+                edge[..n].copy_from_slice(inverse.column(i).as_slice());
             }
         }
-        (way, forces)
     }
 
-    /// The row of `among` that `x + step way` reaches first, and the step.
-    fn next_contact(
-        &self,
-        among: &[usize],
-        x: &DVector<f64>,
-        way: &DVector<f64>,
-        gaps_mm: &[f64],
-        is_refused: &[bool],
-    ) -> Option<(usize, f64)> {
-        let least_speed = FLAT * way.norm();
-        let mut next: Option<(usize, f64)> = None;
-        for &i in among.iter().filter(|&&i| !is_refused[i]) {
-            let row = &self.rows[i];
-            let speed = self.dot(row, way);
-            if speed > least_speed {
-                let step = (gaps_mm[i] - self.dot(row, x)).max(0.0) / speed;
-                if next.is_none_or(|(_, least)| step < least) {
-                    next = Some((i, step));
+    /// Looks at the contact of each pair of pieces that the corner overdraws most: its neighbours would say the same.
+    /// Whether there is any that was not looked at before.
+    fn look_at_overdrawn(&mut self) -> bool {
+        let mut worst = BTreeMap::<(usize, usize), (f64, usize)>::new();
+        for i in (0..self.is_looked_at.len()).filter(|&i| !self.is_looked_at[i]) {
+            let room_mm = self.room_mm(i);
+            if room_mm < -OVERDRAWN_MM {
+                let Limit { plus, minus, .. } = self.limits.all[i];
+                let of_pair = worst.entry((plus, minus)).or_insert((room_mm, i));
+                if room_mm < of_pair.0 {
+                    *of_pair = (room_mm, i);
                 }
             }
         }
-        next
+        for &(_, i) in worst.values() {
+            self.is_looked_at[i] = true;
+            self.looked_at.push(i);
+        }
+        !worst.is_empty()
     }
+}
+
+/// Scalar product, up to the end of the shorter one.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

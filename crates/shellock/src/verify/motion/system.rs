@@ -21,9 +21,12 @@ const MOVES: f64 = 0.05;
 pub(crate) struct Row {
     /// Its place in the list of contacts.
     pub contact: usize,
-    plus: Option<usize>,
-    minus: Option<usize>,
-    wrench: [f64; 6],
+    /// Where the unknowns of `a` begin; `None` where it is held.
+    pub(super) plus: Option<usize>,
+    /// The same of `b`.
+    pub(super) minus: Option<usize>,
+    /// Force and moment.
+    pub(super) wrench: [f64; 6],
 }
 
 /// The contacts of some free pieces as inequalities `A x ≤ 0` on their velocities and scaled spins.
