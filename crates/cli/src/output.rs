@@ -38,8 +38,8 @@ pub struct Summary {
     pub thin_share: f64,
     /// How far each piece moves within its gaps; `None` for one that leaves.
     pub rattle: IdVec<PatchId, Option<Play>>,
-    /// The same while all but the key and the first piece may move; `None` for these two, too.
-    pub rattle_together: IdVec<PatchId, Option<Play>>,
+    /// The same while all but the key and the first piece may move, if that was asked for; `None` for these two, too.
+    pub rattle_together: Option<IdVec<PatchId, Option<Play>>>,
 }
 
 /// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
@@ -131,7 +131,7 @@ pub fn files(
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
         rattle: play_alone(&design.pieces, &design.plan, &design.touching),
-        rattle_together: play_together(&design.pieces, &design.plan, &design.touching),
+        rattle_together: options.play_together.then(|| play_together(&design.pieces, &design.plan, &design.touching)),
     };
     let plan = plan_json(model, params, design, warnings, &summary, &thin);
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
@@ -187,10 +187,12 @@ pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
     bytes
 }
 
-/// How far a piece moves while no other does, and `together` with others.
+/// How far a piece moves while no other does, and `together` with others where that was asked for.
 fn rattle_json(summary: &Summary, piece: PatchId) -> Option<Value> {
     let mut value = json!(summary.rattle[piece]?);
-    value["together"] = json!(summary.rattle_together[piece]);
+    if let Some(together) = &summary.rattle_together {
+        value["together"] = json!(together[piece]);
+    }
     Some(value)
 }
 
@@ -459,13 +461,11 @@ fn quantities(design: &Design, summary: &Summary) -> Vec<ReportQuantity> {
         play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
     };
     let order = design.pieces.ids().map(|p| Some(design.plan.position(p) as f64 + 1.0)).collect();
-    [
-        ("order", "", order),
-        ("play alone", "mm", translation_mm(&summary.rattle)),
-        ("play together", "mm", translation_mm(&summary.rattle_together)),
-    ]
-    .map(|(name, unit, values)| ReportQuantity { name: name.into(), unit: unit.into(), values })
-    .into()
+    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&summary.rattle))];
+    quantities.extend(summary.rattle_together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
+    let quantity =
+        |(name, unit, values): (&str, &str, _)| ReportQuantity { name: name.into(), unit: unit.into(), values };
+    quantities.into_iter().map(quantity).collect()
 }
 
 /// A piece's volume, and how each of its seams holds.
@@ -474,7 +474,8 @@ fn piece_facts(design: &Design, summary: &Summary, piece: PatchId, volume_cm3: f
     facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
     let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
     facts.extend(summary.rattle[piece].map(|p| ("play".to_owned(), play(p))));
-    facts.extend(summary.rattle_together[piece].map(|p| ("play with others".to_owned(), play(p))));
+    let together = summary.rattle_together.as_ref().and_then(|all| all[piece]);
+    facts.extend(together.map(|p| ("play with others".to_owned(), play(p))));
     let seams = design.holding.iter().flat_map(|h| &h.seams);
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };
