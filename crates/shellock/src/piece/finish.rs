@@ -20,7 +20,7 @@ const ROOT_MM: f64 = 0.4;
 /// A run of which less than this share of either half survives the carving is given up, both halves.
 const LEAST_KEPT: f64 = 0.25;
 
-/// The middle line of a rib stays so far off the rim and off the wall's inner side, mm.
+/// Ribs stay so far off the rim, mm.
 const RIB_MARGIN_MM: f64 = 0.1;
 
 /// How one run came out.
@@ -141,6 +141,17 @@ pub fn make(
     relieve(ctx, &finish.relief, grid, plan, &mut pieces)?;
     if params.key_rib_mm > 0.0 && !joints.iter().any(|j| j.is_rail && j.length_mm > 0.0) {
         let (fits, added) = ribs_of_key(params.key_rib_mm, finish.relief.rim_mm, grid, plan, &pieces);
+        if fits.is_empty() {
+            ctx.warn(Warning {
+                code: "key-without-ribs".into(),
+                message: format!(
+                    "the key, piece {}, has no rails, and no side on which ribs could stand: nothing but tight walls keeps it in",
+                    plan.key()
+                ),
+                pieces: vec![plan.key()],
+                at: None,
+            });
+        }
         press_fits.extend(fits);
         changes.extend(added);
     }
@@ -234,9 +245,8 @@ fn ribs_of_key(
         others.points.extend(mesh.points);
         others.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
     }
-    let depths_mm = [rim_mm + RIB_MARGIN_MM, grid.thickness_mm - RIB_MARGIN_MM];
     let (mesh, others) = (pieces[key].to_mesh(), TriangleBvh::new(&others));
-    let seat = Seat { key, mesh: &mesh, others: &others, along, depths_mm };
+    let seat = Seat { key, mesh: &mesh, others: &others, along, least_depth_mm: rim_mm + RIB_MARGIN_MM };
     ribs(interference_mm, &seat, |p| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY))
 }
 

@@ -1,7 +1,7 @@
 //! Friction ribs: what holds a key that pulls out and has no rails to click on.
 //!
-//! A rib stands on the key's side of a seam, between the rim and the wall's inner side, along the way out, and reaches a little farther
-//! than the other piece's side. Pressed in, the ribs are flattened or bend the walls, and their friction keeps the key in its seat.
+//! A rib stands on the key's side of a seam or of a connector, below the rim, along the way out, and reaches a little farther than the
+//! other piece's side. Pressed in, the ribs are flattened or bend the walls, and their friction keeps the key in its seat.
 
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
@@ -10,19 +10,19 @@ use super::key_parts::{Change, PressFit, PressFitKind};
 use crate::PatchId;
 
 /// Length along the way out, mm; half its width at the foot and at the top; how far the foot stands in the key.
-const LENGTH_MM: f64 = 2.4;
+const LENGTH_MM: f64 = 1.8;
 const FOOT_MM: f64 = 0.5;
 const TOP_MM: f64 = 0.15;
 const ROOT_MM: f64 = 0.2;
 /// Both ends run out over this length, mm.
-const LEAD_MM: f64 = 0.7;
+const LEAD_MM: f64 = 0.5;
 /// At most so many, no two nearer than this, mm.
 const MOST: usize = 6;
 const APART_MM: f64 = 6.0;
-/// The side must be so much along the way out, as |n·s|, and the other side this near, mm, and as near at a rib's ends to this.
-const LEAST_ALONG: f64 = 0.12;
+/// The side leans from the way out by at most this, as |n·s|, and the other side this near, mm, and as near at a rib's ends to this.
+const MOST_ACROSS: f64 = 0.2;
 const WIDEST_GAP_MM: f64 = 0.6;
-const UNEVEN_MM: f64 = 0.06;
+const UNEVEN_MM: f64 = 0.1;
 /// A side is looked at in places so far apart, mm.
 const STEP_MM: f64 = 0.8;
 
@@ -35,8 +35,8 @@ pub(super) struct Seat<'a> {
     pub others: &'a TriangleBvh,
     /// Unit vector of the way out.
     pub along: Vec3,
-    /// Least and greatest depth of a rib's middle line, mm.
-    pub depths_mm: [f64; 2],
+    /// Least depth below the model's surface, mm: what lies higher is rim.
+    pub least_depth_mm: f64,
 }
 
 /// Where a rib can stand.
@@ -65,23 +65,22 @@ pub(super) fn ribs(interference_mm: f64, seat: &Seat<'_>, depth: impl Fn(Vec3) -
 
 fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
     let gap = |p: Vec3, normal: Vec3| Some(seat.others.first_hit(p, normal, WIDEST_GAP_MM)?.1);
-    let [least_mm, most_mm] = seat.depths_mm;
     let mut found = Vec::new();
     for face in 0..seat.mesh.triangles.len() {
         let [a, b, c] = seat.mesh.corners(face);
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        if normal == Vec3::ZERO || normal.dot(seat.along).abs() > LEAST_ALONG {
+        if normal == Vec3::ZERO || normal.dot(seat.along).abs() > MOST_ACROSS {
             continue;
         }
         for at in grid_on([a, b, c]) {
-            if !(least_mm..=most_mm).contains(&depth(at)) {
+            if depth(at) < seat.least_depth_mm {
                 continue;
             }
             let Some(gap_mm) = gap(at, normal) else { continue };
             let goes_on = [-0.5, 0.5].into_iter().all(|share| {
                 let end = at + share * LENGTH_MM * seat.along;
-                let is_deep = (least_mm..=most_mm + 0.5).contains(&depth(end));
-                is_deep && gap(end - 0.1 * normal, normal).is_some_and(|mm| (mm - 0.1 - gap_mm).abs() < UNEVEN_MM)
+                depth(end) >= seat.least_depth_mm
+                    && gap(end - 0.1 * normal, normal).is_some_and(|mm| (mm - 0.1 - gap_mm).abs() < UNEVEN_MM)
             });
             if goes_on {
                 found.push(Place { at, normal, gap_mm });
@@ -148,23 +147,23 @@ mod tests {
     }
 
     /// A block of 20 mm in the middle of a tray that is 0.1 mm wider on each side; it leaves upwards.
-    fn ribs_of_a_block(depths_mm: [f64; 2]) -> (Vec<PressFit>, Vec<Change>) {
+    fn ribs_of_a_block(least_depth_mm: f64) -> (Vec<PressFit>, Vec<Change>) {
         let tray = cuboid([-5.0, -5.0, -5.0], [25.0, 25.0, 10.0]).subtract(&cuboid([-0.1; 3], [20.1, 20.1, 11.0]));
         let others = TriangleBvh::new(&tray.to_mesh());
         let mesh = cuboid([0.0; 3], [20.0, 20.0, 10.0]).to_mesh();
-        let seat = Seat { key: PatchId(4), mesh: &mesh, others: &others, along: Vec3::Z, depths_mm };
+        let seat = Seat { key: PatchId(4), mesh: &mesh, others: &others, along: Vec3::Z, least_depth_mm };
         ribs(0.08, &seat, |p| 10.0 - p.z)
     }
 
     #[test]
     fn ribs_press_by_what_was_asked_for_on_all_sides_along_the_way_and_not_on_the_floor() {
-        let (fits, changes) = ribs_of_a_block([1.5, 6.0]);
+        let (fits, changes) = ribs_of_a_block(1.5);
         assert_eq!((fits.len(), changes.len()), (MOST, MOST));
         for change in &changes {
             let b = change.volume.bounds();
             let beyond = [-b.min.x, -b.min.y, b.max.x - 20.0, b.max.y - 20.0].into_iter().fold(0.0, f64::max);
             assert!((beyond - 0.18).abs() < 1e-9, "{b:?}");
-            assert!(b.min.z > 2.0 && b.max.z < 10.0);
+            assert!(b.min.z > -1.0 && b.max.z < 8.5 + 1e-9);
         }
         let sides: Vec<bool> = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y]
             .map(|side| changes.iter().any(|c| (c.volume.bounds().center() - Vec3::splat(10.0)).dot(side) > 9.0))
@@ -174,6 +173,6 @@ mod tests {
 
     #[test]
     fn there_are_none_where_the_sides_are_all_rim() {
-        assert!(ribs_of_a_block([20.0, 30.0]).0.is_empty());
+        assert!(ribs_of_a_block(20.0).0.is_empty());
     }
 }
