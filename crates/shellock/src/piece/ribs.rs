@@ -19,10 +19,15 @@ const LEAD_MM: f64 = 0.5;
 /// At most so many, no two nearer than this, mm.
 const MOST: usize = 6;
 const APART_MM: f64 = 6.0;
-/// The side leans from the way out by at most this, as |n·s|, and the other side this near, mm, and as near at a rib's ends to this.
+/// The side leans from the way out by at most this, as |n·s|.
 const MOST_ACROSS: f64 = 0.2;
-const WIDEST_GAP_MM: f64 = 0.6;
-const UNEVEN_MM: f64 = 0.1;
+/// The other side is this near, mm; at a rib's corners it is nearer than at its middle, and farther, by at most these.
+const WIDEST_GAP_MM: f64 = 0.4;
+const NEARER_MM: f64 = 0.02;
+const FARTHER_MM: f64 = 0.1;
+/// The way on which a rib rubs is measured in such steps, up to this, mm.
+const TRAVEL_STEP_MM: f64 = 0.5;
+const MOST_TRAVEL_MM: f64 = 100.0;
 /// A side is looked at in places so far apart, mm.
 const STEP_MM: f64 = 0.8;
 
@@ -56,15 +61,25 @@ pub(super) fn ribs(interference_mm: f64, seat: &Seat<'_>, depth: impl Fn(Vec3) -
         piece: seat.key,
         at: p.at,
         interference_mm,
-        travel_mm: LENGTH_MM,
+        travel_mm: travel_mm(seat, p, interference_mm),
     };
     let change =
         |p: &Place| Change { piece: seat.key, volume: rib(p, seat.along, p.gap_mm + interference_mm), is_added: true };
     (places.iter().map(fit).collect(), places.iter().map(change).collect())
 }
 
+/// From how far before its end a rib rubs on the way in, mm.
+fn travel_mm(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> f64 {
+    let rubs = |t: &f64| {
+        let top = place.at + (t + 0.5 * LENGTH_MM - LEAD_MM) * seat.along;
+        seat.others.first_hit(top, place.normal, place.gap_mm + interference_mm).is_some()
+    };
+    let steps = (0..=(MOST_TRAVEL_MM / TRAVEL_STEP_MM) as usize).map(|i| i as f64 * TRAVEL_STEP_MM);
+    steps.filter(rubs).last().unwrap_or(0.0) + LENGTH_MM
+}
+
 fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
-    let gap = |p: Vec3, normal: Vec3| Some(seat.others.first_hit(p, normal, WIDEST_GAP_MM)?.1);
+    let gap = |p: Vec3, normal: Vec3| Some(seat.others.first_hit(p, normal, WIDEST_GAP_MM + ROOT_MM)?.1);
     let mut found = Vec::new();
     for face in 0..seat.mesh.triangles.len() {
         let [a, b, c] = seat.mesh.corners(face);
@@ -76,11 +91,14 @@ fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
             if depth(at) < seat.least_depth_mm {
                 continue;
             }
-            let Some(gap_mm) = gap(at, normal) else { continue };
-            let goes_on = [-0.5, 0.5].into_iter().all(|share| {
-                let end = at + share * LENGTH_MM * seat.along;
-                depth(end) >= seat.least_depth_mm
-                    && gap(end - 0.1 * normal, normal).is_some_and(|mm| (mm - 0.1 - gap_mm).abs() < UNEVEN_MM)
+            let Some(gap_mm) = gap(at, normal).filter(|mm| *mm < WIDEST_GAP_MM) else { continue };
+            let across = seat.along.cross(normal).normalize_or_zero();
+            let corners = [(-0.5, -1.0), (-0.5, 1.0), (0.5, -1.0), (0.5, 1.0)];
+            let goes_on = corners.into_iter().all(|(l, w)| {
+                let corner = at + l * LENGTH_MM * seat.along + w * FOOT_MM * across;
+                // From inside the key, so that a side that leans over is seen too.
+                let apart = gap(corner - ROOT_MM * normal, normal).map(|mm| mm - ROOT_MM - gap_mm);
+                depth(corner) >= seat.least_depth_mm && apart.is_some_and(|mm| (-NEARER_MM..FARTHER_MM).contains(&mm))
             });
             if goes_on {
                 found.push(Place { at, normal, gap_mm });
@@ -164,6 +182,11 @@ mod tests {
             let beyond = [-b.min.x, -b.min.y, b.max.x - 20.0, b.max.y - 20.0].into_iter().fold(0.0, f64::max);
             assert!((beyond - 0.18).abs() < 1e-9, "{b:?}");
             assert!(b.min.z > -1.0 && b.max.z < 8.5 + 1e-9);
+        }
+        // Each rubs from where its upper end passes the tray's rim.
+        for (fit, change) in fits.iter().zip(&changes) {
+            let way_mm = 10.0 - change.volume.bounds().min.z;
+            assert!((fit.travel_mm - way_mm).abs() < 2.0 * TRAVEL_STEP_MM + LEAD_MM, "{} {way_mm}", fit.travel_mm);
         }
         let sides: Vec<bool> = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y]
             .map(|side| changes.iter().any(|c| (c.volume.bounds().center() - Vec3::splat(10.0)).dot(side) > 9.0))
