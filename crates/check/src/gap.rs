@@ -4,23 +4,34 @@
 //! but not farther than half the depth. That a gap is nowhere less is not tested here; rays look for what is in the way.
 
 use crate::mesh::Mesh;
-use crate::vector::{Vec3, scale, sub};
-use crate::{Gap, LeastGaps, Tested};
+use crate::vector::{Vec3, dot, scale, sub};
+use crate::{Gap, LeastGaps, PressFit, Tested};
 
 /// Difference of the gap told and the one found, mm.
 const SAME_GAP_MM: f64 = 1e-3;
 /// By how much the rim, which gaps beneath it leave out, may be nearer than these at their places, mm. 0.006 on a torus.
 const RIM_NEARER_MM: f64 = 0.02;
+/// Deeper crossings are no rounding, mm.
+const CROSSING_MM: f64 = 0.02;
+/// A crossing belongs to a press fit that is so near, mm, and no more than this deeper than its interference.
+const AT_FIT_MM: f64 = 4.0;
+const FIT_DEEPER_MM: f64 = 0.1;
 
 /// Confirms `figure`, with the gap beneath the rim, if the gaps are those that `least` tells: of the moving piece to one of
-/// the `others`, or of any two of these.
+/// the `others`, or of any two of these; and if surfaces cross nowhere but where the key is pressed on purpose.
 pub fn test(
     meshes: &[Mesh],
+    press_fits: &[PressFit],
     moving: Option<(usize, Vec3)>,
     others: &[usize],
     least: &LeastGaps,
     figure: String,
 ) -> Tested {
+    for gap in [&least.overall, &least.beneath_rim].into_iter().flatten() {
+        if gap.gap_mm < -CROSSING_MM && !press_fits.iter().any(|fit| is_of(fit, gap, moving)) {
+            return Err(format!("surfaces cross by {:.3} mm, piece {} one of them", -gap.gap_mm, gap.against));
+        }
+    }
     if let Some(gap) = &least.overall {
         test_place(meshes, moving, others, gap, SAME_GAP_MM)?;
     }
@@ -31,6 +42,14 @@ pub fn test(
         gap_mm => format!("least gap {gap_mm:.3} mm beneath the rim"),
     };
     Ok(format!("{figure}; {least}"))
+}
+
+/// Whether the crossing is that of a press fit, on the piece at rest or on the one that moves.
+fn is_of(fit: &PressFit, gap: &Gap, moving: Option<(usize, Vec3)>) -> bool {
+    let before = moving.map(|(_, direction)| sub(gap.at, scale(direction, gap.travel_mm)));
+    let is_near = |p: Vec3| dot(sub(p, fit.at), sub(p, fit.at)) < AT_FIT_MM * AT_FIT_MM;
+    let is_one = moving.is_none_or(|(piece, _)| piece == fit.piece || gap.against == fit.piece);
+    is_one && (is_near(gap.at) || before.is_some_and(is_near)) && -gap.gap_mm <= fit.interference_mm + FIT_DEEPER_MM
 }
 
 /// `nearer_mm`: how much nearer surfaces may be than the gap.
@@ -62,5 +81,22 @@ fn test_place(
         Some(found_mm) if is_same(found_mm) || is_within(found_mm) => Ok(()),
         Some(found_mm) => Err(format!("a gap of {gap_mm:.3} mm is told where it is {found_mm:.3} mm")),
         None => Err(format!("a gap of {gap_mm:.3} mm is told where surfaces are farther apart")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_crossing_is_meant_only_at_a_press_fit_and_no_deeper_than_that() {
+        let fit = PressFit { piece: 1, at: [1.0, 0.0, 0.0], interference_mm: 0.1 };
+        let gap = |gap_mm, travel_mm, x| Gap { gap_mm, travel_mm, at: [x, 0.0, 0.0], against: 0 };
+        let moving = Some((1, [1.0, 0.0, 0.0]));
+        assert!(is_of(&fit, &gap(-0.15, 0.0, 2.0), moving));
+        assert!(is_of(&fit, &gap(-0.15, 20.0, 21.0), moving), "the fit moves with its piece");
+        assert!(!is_of(&fit, &gap(-0.15, 20.0, 30.0), moving), "elsewhere");
+        assert!(!is_of(&fit, &gap(-0.25, 0.0, 2.0), moving), "deeper");
+        assert!(!is_of(&fit, &gap(-0.15, 0.0, 2.0), Some((2, [1.0, 0.0, 0.0]))), "another piece");
     }
 }

@@ -24,6 +24,9 @@ use vector::{Vec3, scale};
 
 /// Most that a contact's faces may be apart beyond the clearance, mm.
 const MOST_REACH_MM: f64 = 0.15;
+/// More places at which a key is pressed, or pressed more than this, mm, are not a fit but a fault.
+const MOST_PRESS_FITS: usize = 20;
+const MOST_INTERFERENCE_MM: f64 = 0.4;
 /// Difference of two numbers written from one.
 const SAME: f64 = 1e-9;
 
@@ -60,7 +63,17 @@ struct Certificate {
     installation_order: Vec<usize>,
     pieces: Vec<PieceFile>,
     contacts: Vec<Contact>,
+    #[serde(default)]
+    press_fits: Vec<PressFit>,
     claims: Vec<Claim>,
+}
+
+/// A place on a piece where the key is pressed on purpose.
+#[derive(Deserialize)]
+struct PressFit {
+    piece: usize,
+    at: Vec3,
+    interference_mm: f64,
 }
 
 #[derive(Deserialize)]
@@ -133,6 +146,9 @@ pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
         Err(why) => Err(why.clone()),
     };
     add("the contacts lie on both pieces' surfaces", names);
+    if !certificate.press_fits.is_empty() {
+        add("the key is pressed on purpose, but not by much", test_press_fits(&certificate));
+    }
     let (c, meshes, contacts) = (&certificate, &meshes[..], contacts.as_deref().ok());
     let tested: Vec<(String, Tested)> = thread::scope(|scope| {
         let tests: Vec<_> =
@@ -256,6 +272,12 @@ fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
     c.contacts.iter().enumerate().map(locate).collect()
 }
 
+fn test_press_fits(c: &Certificate) -> Tested {
+    let most_mm = c.press_fits.iter().map(|f| f.interference_mm).fold(0.0, f64::max);
+    let figure = format!("{} places, by up to {most_mm:.2} mm", c.press_fits.len());
+    if c.press_fits.len() <= MOST_PRESS_FITS && most_mm <= MOST_INTERFERENCE_MM { Ok(figure) } else { Err(figure) }
+}
+
 fn largest_gap_mm(contacts: &[Contact]) -> f64 {
     contacts.iter().map(|c| c.gap_mm).fold(0.0, f64::max)
 }
@@ -277,20 +299,22 @@ fn test_claim(c: &Certificate, meshes: &[Mesh], contacts: Option<&[Contact]>, cl
         }
         Claim::KeyLeaves { piece, direction, least } => {
             let others: Vec<usize> = (0..meshes.len()).filter(|p| p != piece).collect();
-            let tested = rays::test_path(meshes, *piece, *direction, &others)
-                .and_then(|figure| gap::test(meshes, Some((*piece, *direction)), &others, least, figure));
+            let tested = rays::test_path(meshes, *piece, *direction, &others).and_then(|figure| {
+                gap::test(meshes, &c.press_fits, Some((*piece, *direction)), &others, least, figure)
+            });
             (format!("the key, piece {piece}, can leave"), tested)
         }
         Claim::Installs { piece, direction, least } => {
             let earlier: Vec<usize> = c.installation_order.iter().copied().take_while(|p| p != piece).collect();
             let way_out = scale(*direction, -1.0);
             let tested = rays::test_path(meshes, *piece, way_out, &earlier)
-                .and_then(|figure| gap::test(meshes, Some((*piece, way_out)), &earlier, least, figure));
+                .and_then(|figure| gap::test(meshes, &c.press_fits, Some((*piece, way_out)), &earlier, least, figure));
             (format!("piece {piece} can be installed"), tested)
         }
         Claim::Apart { least } => {
             let all: Vec<usize> = (0..meshes.len()).collect();
-            let tested = rays::test_apart(meshes).and_then(|figure| gap::test(meshes, None, &all, least, figure));
+            let tested =
+                rays::test_apart(meshes).and_then(|figure| gap::test(meshes, &c.press_fits, None, &all, least, figure));
             ("the assembled pieces do not overlap".into(), tested)
         }
     }

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone, play_together};
 use shellock::key::KeySite;
-use shellock::piece::{PressFit, PressFitKind};
 use shellock::pipeline::{Design, Params};
 use shellock::report::{
     ReportCheck, ReportData, ReportPiece, ReportQuantity, SeamStress, html, palette, pieces_picture, strength_chart,
@@ -177,7 +176,7 @@ fn certificate(files: &[(String, Vec<u8>)], design: &Design, clearance_mm: f64) 
     let named = files.iter().zip(design.pieces.ids());
     let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
     certify(named, &design.pieces, &design.plan, &design.touching, &design.verification, &design.gaps, clearance_mm)
-        .map(|c| certificate_bytes(&c))
+        .map(|c| certificate_bytes(&c.with_press_fits(design.press_fits.clone())))
 }
 
 /// As it is written to [`CERTIFICATE`].
@@ -251,7 +250,7 @@ fn plan_json(
         "min_wall": params.connector.min_wall_mm,
         "key_piece": plan.key(),
         "key": design.key.as_ref().map(|k| key_json(design, k)),
-        "press_fits": design.press_fits.iter().map(press_fit_json).collect::<Vec<_>>(),
+        "press_fits": design.press_fits,
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
         "plan": design.proof,
         "holding": design.holding,
@@ -296,18 +295,6 @@ fn gaps_json(design: &Design) -> Value {
         "on_the_way_mm": least(&mut paths.iter().map(|p| p.overall.gap_mm)),
         "on_the_way_beneath_rim_mm": least(&mut paths.iter().filter_map(beneath)),
         "key_on_the_way_beneath_rim_mm": least(&mut paths.iter().filter(|p| p.piece == key).filter_map(beneath)),
-    })
-}
-
-/// What presses on purpose on the key's way in.
-fn press_fit_json(fit: &PressFit) -> Value {
-    let kind = match fit.kind {
-        PressFitKind::Detent => "detent",
-        PressFitKind::Rib => "rib",
-    };
-    json!({
-        "kind": kind, "piece": fit.piece, "at": fit.at.to_array(),
-        "interference_mm": fit.interference_mm, "travel_mm": fit.travel_mm,
     })
 }
 

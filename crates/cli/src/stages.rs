@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use shellock::body::BodyParams;
 use shellock::certificate::{PieceFile, certify};
+use shellock::piece::PressFit;
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
 use shellock::verify::VerifyParams;
@@ -185,7 +186,8 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let claimed = certify(files, &pieces, &order, &contacts, &verdict, &gaps, params.clearance_mm);
     display.finish();
     if let Some(claimed) = claimed {
-        write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed))?;
+        let press_fits: Vec<PressFit> = serde_json::from_value(plan["press_fits"].clone()).unwrap_or_default();
+        write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed.with_press_fits(press_fits)))?;
     }
     let code = u8::from(!verdict.passed());
     if session.is_json {

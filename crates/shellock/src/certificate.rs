@@ -17,6 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
+use crate::piece::PressFit;
 use crate::plan::InstallationPlan;
 use crate::verify::clearance::{KitGaps, NearestPlace};
 use crate::verify::contact::{Contact, REACH_MM};
@@ -166,8 +167,20 @@ pub struct Certificate {
     pub pieces: Vec<PieceFile>,
     /// Contacts with a part in a proof.
     pub contacts: Vec<HoldingContact>,
+    /// Where the key is pressed on purpose: claims of gaps are but for these.
+    #[serde(default)]
+    pub press_fits: Vec<PressFit>,
     /// The claims.
     pub claims: Vec<Claim>,
+}
+
+impl Certificate {
+    /// The same, where the key is pressed at these places on purpose.
+    #[must_use]
+    pub fn with_press_fits(mut self, press_fits: Vec<PressFit>) -> Self {
+        self.press_fits = press_fits;
+        self
+    }
 }
 
 /// Claims what can be proven of finished `pieces`, written as `files`, that are installed as `plan` says and touch at
@@ -207,6 +220,7 @@ pub fn certify(
         installation_order: plan.steps.iter().map(|s| s.piece).collect(),
         pieces: files,
         contacts,
+        press_fits: Vec::new(),
         claims,
     })
 }

@@ -387,6 +387,7 @@ fn finish(
             segmentation::tell(ctx, &params.segmentation, model, labels, &design.surface)?;
             design.warnings.splice(0..0, ctx.take_warnings());
             design.gaps = kit_gaps(ctx, model, &design.pieces, &design.plan, params.body.rim_mm)?;
+            design.warnings.extend(crossing(&design));
             DesignOutcome::Made(Box::new(design))
         }
         (None, Attempt::Failed { reason, blockers, .. }) => DesignOutcome::NoPlan { reason, blockers },
@@ -458,7 +459,7 @@ fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
                 d.travel_mm, d.piece, d.interference_mm
             ),
             pieces: vec![d.piece],
-            at: Some(d.at.to_array()),
+            at: Some(d.at),
         });
     }
     if let Some(rib) = of(PressFitKind::Rib).next() {
@@ -470,9 +471,27 @@ fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
                 of(PressFitKind::Rib).count(), rib.interference_mm, rib.travel_mm
             ),
             pieces: vec![rib.piece],
-            at: Some(rib.at.to_array()),
+            at: Some(rib.at),
         });
     }
+}
+
+/// Says where finished pieces cross that are not meant to press: on a way out, or at rest.
+fn crossing(design: &Design) -> Option<Warning> {
+    /// Less is rounding, mm.
+    const LEAST_MM: f64 = 0.02;
+    let deepest = design.gaps.paths.iter().min_by(|a, b| a.overall.gap_mm.total_cmp(&b.overall.gap_mm))?;
+    let place = deepest.overall;
+    let is_meant = deepest.piece == design.plan.key() && !design.press_fits.is_empty();
+    (place.gap_mm < -LEAST_MM && !is_meant).then(|| Warning {
+        code: "surfaces-cross".into(),
+        message: format!(
+            "pieces {} and {} cross by {:.2} mm after {:.1} mm of the way of the first; it will rub there: sand it a little",
+            deepest.piece, deepest.against, -place.gap_mm, place.travel_mm
+        ),
+        pieces: vec![deepest.piece, deepest.against],
+        at: Some(place.at),
+    })
 }
 
 /// Says which long seams came out without any connector.

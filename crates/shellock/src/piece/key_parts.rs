@@ -1,5 +1,6 @@
 //! What only keys have: detents that click, and a notch to pull at.
 
+use serde::{Deserialize, Serialize};
 use shellock_geom::{TriMesh, Vec3, Volume};
 
 use crate::PatchId;
@@ -21,7 +22,8 @@ const NOTCH_WIDTH_MM: f64 = 12.0;
 const NOTCH_UNEVEN_MM: f64 = 0.4;
 
 /// What presses on purpose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum PressFitKind {
     /// A bump on a rail's tongue that snaps into a dimple in the key's groove.
     Detent,
@@ -30,14 +32,14 @@ pub enum PressFitKind {
 }
 
 /// A place where the key is held by being pressed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PressFit {
     /// Which kind it is.
     pub kind: PressFitKind,
     /// The piece that it stands on.
     pub piece: PatchId,
-    /// Its place.
-    pub at: Vec3,
+    /// Its place, mm.
+    pub at: [f64; 3],
     /// By how much it presses on the other piece on the way in, mm.
     pub interference_mm: f64,
     /// On how much of the way, mm: the last of it.
@@ -80,7 +82,7 @@ pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<PressFit>,
         made.push(PressFit {
             kind: PressFitKind::Detent,
             piece: run.male,
-            at: station.point + AT_MM * station.tangent + tongue.n1 * station.n,
+            at: (station.point + AT_MM * station.tangent + tongue.n1 * station.n).to_array(),
             interference_mm: params.detent_mm,
             travel_mm: AT_MM + FOOT_MM,
         });

@@ -59,7 +59,7 @@ pub(super) fn ribs(interference_mm: f64, seat: &Seat<'_>, depth: impl Fn(Vec3) -
     let fit = |p: &Place| PressFit {
         kind: PressFitKind::Rib,
         piece: seat.key,
-        at: p.at,
+        at: p.at.to_array(),
         interference_mm,
         travel_mm: travel_mm(seat, p, interference_mm),
     };
