@@ -97,8 +97,34 @@ pub fn make(
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<Finished, PieceError> {
     let params = finish.connector;
-    ctx.stage("connectors", plan.steps.len())?;
     let far_mm = rooms.as_slice().iter().fold(Aabb::EMPTY, |b, r| b.union(*r)).diagonal();
+    let halves = carved_halves(ctx, params, grid, shell, plan, runs, far_mm)?;
+    let joints: Vec<Joint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
+    let kept: Vec<Run> = runs.iter().zip(&joints).filter(|(_, j)| j.length_mm > 0.0).map(|(r, _)| r.clone()).collect();
+    ctx.stage("pieces", plan.steps.len())?;
+    let mut pieces = joined(shell, &joints, &halves);
+    relieve(ctx, &finish.relief, grid, plan, &mut pieces)?;
+    let (mut press_fits, mut changes) = detents(params, &kept);
+    changes.extend(finish.grip.as_ref().and_then(|grip| notch_or_warning(ctx, grip, shell)));
+    if params.key_rib_mm > 0.0 && !kept.iter().any(Run::is_rail) {
+        let (fits, added) = ribs_of_key(ctx, params.key_rib_mm, finish.relief.rim_mm, grid, plan, &pieces);
+        press_fits.extend(fits);
+        changes.extend(added);
+    }
+    Ok(Finished { meshes: printed(ctx, &pieces, &changes)?, joints, press_fits })
+}
+
+/// Both halves of each run, carved in the order of taking apart.
+fn carved_halves(
+    ctx: &Ctx,
+    params: &ConnectorParams,
+    grid: &ShellGrid,
+    shell: &ShellBodies,
+    plan: &InstallationPlan,
+    runs: &[Run],
+    far_mm: f64,
+) -> Result<Vec<Halves>, Cancelled> {
+    ctx.stage("connectors", plan.steps.len())?;
     let mut halves = vec![Halves { raw: [0.0; 2], carved: [Volume::empty(), Volume::empty()] }; runs.len()];
     let mut wakes: Vec<Wake> = Vec::new();
     for step in plan.removal() {
@@ -122,40 +148,21 @@ pub fn make(
         wakes.push(Wake::of(params, runs, q, step.separation));
         ctx.step()?;
     }
-    let joints: Vec<Joint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
-    let kept: Vec<Run> = runs.iter().zip(&joints).filter(|(_, j)| j.length_mm > 0.0).map(|(r, _)| r.clone()).collect();
-    let (mut press_fits, mut changes) = detents(params, &kept);
-    if let Some(grip) = &finish.grip {
-        match notch(grip, &shell.bodies[grip.key].to_mesh()) {
-            Some(cut) => changes.push(cut),
-            None => ctx.warn(Warning {
-                code: "key-without-grip".into(),
-                message: format!("piece {}: its surface is too uneven for a notch to pull the key at", grip.key),
-                pieces: vec![grip.key],
-                at: Some(grip.at.to_array()),
-            }),
-        }
+    Ok(halves)
+}
+
+/// The notch, or a word why there is none.
+fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Change> {
+    let cut = notch(grip, &shell.bodies[grip.key].to_mesh());
+    if cut.is_none() {
+        ctx.warn(Warning {
+            code: "key-without-grip".into(),
+            message: format!("piece {}: its surface is too uneven for a notch to pull the key at", grip.key),
+            pieces: vec![grip.key],
+            at: Some(grip.at.to_array()),
+        });
     }
-    ctx.stage("pieces", plan.steps.len())?;
-    let mut pieces = joined(shell, &joints, &halves);
-    relieve(ctx, &finish.relief, grid, plan, &mut pieces)?;
-    if params.key_rib_mm > 0.0 && !joints.iter().any(|j| j.is_rail && j.length_mm > 0.0) {
-        let (fits, added) = ribs_of_key(params.key_rib_mm, finish.relief.rim_mm, grid, plan, &pieces);
-        if fits.is_empty() {
-            ctx.warn(Warning {
-                code: "key-without-ribs".into(),
-                message: format!(
-                    "the key, piece {}, has no rails, and no side on which ribs could stand: nothing but tight walls keeps it in",
-                    plan.key()
-                ),
-                pieces: vec![plan.key()],
-                at: None,
-            });
-        }
-        press_fits.extend(fits);
-        changes.extend(added);
-    }
-    Ok(Finished { meshes: printed(ctx, &pieces, &changes)?, joints, press_fits })
+    cut
 }
 
 /// Where the half connectors of one piece may be.
@@ -228,8 +235,9 @@ fn joined(shell: &ShellBodies, joints: &[Joint], halves: &[Halves]) -> IdVec<Pat
     pieces.into_iter().collect()
 }
 
-/// Ribs around a key that slides on no rails.
+/// Ribs around a key that slides on no rails, or a word that there is no place for any.
 fn ribs_of_key(
+    ctx: &Ctx,
     interference_mm: f64,
     rim_mm: f64,
     grid: &ShellGrid,
@@ -247,7 +255,18 @@ fn ribs_of_key(
     }
     let (mesh, others) = (pieces[key].to_mesh(), TriangleBvh::new(&others));
     let seat = Seat { key, mesh: &mesh, others: &others, along, least_depth_mm: rim_mm + RIB_MARGIN_MM };
-    ribs(interference_mm, &seat, |p| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY))
+    let made = ribs(interference_mm, &seat, |p| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY));
+    if made.0.is_empty() {
+        ctx.warn(Warning {
+            code: "key-without-ribs".into(),
+            message: format!(
+                "the key, piece {key}, has no rails, and no side on which ribs could stand: nothing but tight walls keeps it in"
+            ),
+            pieces: vec![key],
+            at: None,
+        });
+    }
+    made
 }
 
 /// The pieces with all changes as meshes that can be written.

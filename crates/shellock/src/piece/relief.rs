@@ -42,6 +42,7 @@ pub struct Relief {
 struct Skin {
     whole: TriMesh,
     beneath: TriMesh,
+    bounds: Aabb,
 }
 
 /// Takes off each of `pieces` what comes too near to an earlier-installed one on its way out.
@@ -79,6 +80,9 @@ pub(super) fn relieve(
 
 /// What must go of a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`, and that their rims do not touch.
 fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
+    if distances_that_meet(piece.bounds.grown(gap_mm), along, earlier.bounds, f64::INFINITY).is_none() {
+        return Vec::new();
+    }
     let way_out = Translation { along, from_mm: 0.0, far_mm: f64::INFINITY };
     let of = |piece: &TriMesh, earlier: &TriMesh, least_mm: f64, gap_mm: f64| -> Vec<Volume> {
         let passed = faces_passed(piece, earlier, &way_out, least_mm);
@@ -155,7 +159,7 @@ impl Skin {
         let cut = cut_at_zero(&whole, &values, |_| true);
         let sides = cut.mesh.triangles.iter().zip(&cut.side);
         let triangles = sides.filter(|(_, side)| **side == Side::Positive).map(|(t, _)| *t).collect();
-        Self { whole, beneath: TriMesh { points: cut.mesh.points, triangles } }
+        Self { bounds: whole.bounds(), beneath: TriMesh { points: cut.mesh.points, triangles }, whole }
     }
 }
 
@@ -184,7 +188,8 @@ mod tests {
     #[test]
     fn what_was_too_near_on_the_way_keeps_the_gap_afterwards_and_the_rest_stays() {
         let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
-        let skin = |volume: &Volume| Skin { whole: volume.to_mesh(), beneath: volume.to_mesh() };
+        let skin =
+            |volume: &Volume| Skin { whole: volume.to_mesh(), beneath: volume.to_mesh(), bounds: volume.bounds() };
         let block = cuboid([0.0; 3], [4.0, 4.0, 4.0]);
         let wall = cuboid([-2.0, 0.0, 0.0], [-1.0, 4.0, 9.0]);
         let overhang = cuboid([3.97, 1.0, 6.0], [6.0, 3.0, 7.0]);
