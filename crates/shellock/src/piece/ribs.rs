@@ -75,7 +75,7 @@ fn travel_mm(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> f64 {
         seat.others.first_hit(top, place.normal, place.gap_mm + interference_mm).is_some()
     };
     let steps = (0..=(MOST_TRAVEL_MM / TRAVEL_STEP_MM) as usize).map(|i| i as f64 * TRAVEL_STEP_MM);
-    steps.filter(rubs).last().unwrap_or(0.0) + LENGTH_MM
+    steps.rev().find(rubs).unwrap_or(0.0) + LENGTH_MM
 }
 
 fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
