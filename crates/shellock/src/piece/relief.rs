@@ -22,6 +22,8 @@ const SHY_MM: f64 = 0.005;
 /// Rims nearer than the first are cut until they keep the second, mm: by design they are 0.03 mm apart.
 const RIM_LEAST_MM: f64 = 0.003;
 const RIM_GAP_MM: f64 = 0.008;
+/// The rim ends so much higher here than where gaps are measured, mm: depths are read off the grid.
+const RIM_MARGIN_MM: f64 = 0.15;
 /// Triangles within this of a plane, so parallel to it and together no larger are cut out as one.
 const FLAT_MM: f64 = 0.02;
 const FLAT_COS: f64 = 0.97;
@@ -155,7 +157,8 @@ impl Skin {
         let whole = piece.to_mesh();
         let depth = |p: &Vec3| grid.band.sample(&grid.depth, *p).unwrap_or(f64::INFINITY);
         // What is off the band lies far beneath; lines are cut between finite values.
-        let values: Vec<f64> = whole.points.iter().map(|p| (depth(p) - rim_mm).min(10.0 * rim_mm)).collect();
+        let rim_mm = (rim_mm - RIM_MARGIN_MM).max(0.0);
+        let values: Vec<f64> = whole.points.iter().map(|p| (depth(p) - rim_mm).min(10.0)).collect();
         let cut = cut_at_zero(&whole, &values, |_| true);
         let sides = cut.mesh.triangles.iter().zip(&cut.side);
         let triangles = sides.filter(|(_, side)| **side == Side::Positive).map(|(t, _)| *t).collect();
