@@ -29,7 +29,7 @@ fn verdict(path: &Path) -> String {
         Ok(loaded) => loaded,
         Err(error) => return format!("refused: {error}"),
     };
-    let labels = if loaded.face_labels.is_some() { ", labelled" } else { "" };
+    let labels = if loaded.face_labels().is_some() { ", labelled" } else { "" };
     let read = format!("{}, {} triangles{labels}", loaded.format, loaded.mesh.triangles.len());
     match check::into_solid(&loaded.mesh) {
         Ok((solid, _)) => {

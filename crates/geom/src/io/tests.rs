@@ -55,7 +55,9 @@ fn every_format_gives_the_tetrahedron_back() {
         (write_ply(&mesh, None), Format::Ply),
     ] {
         let loaded = read(bytes).unwrap();
-        assert_eq!(loaded, Loaded { mesh: mesh.clone(), face_labels: None, file_face: vec![0, 1, 2, 3], format });
+        let file_face = vec![0, 1, 2, 3];
+        let (mesh, labellings, notes) = (mesh.clone(), vec![], vec![]);
+        assert_eq!(loaded, Loaded { mesh, labellings, file_face, format, unit_mm: None, notes });
     }
     for (bytes, format) in
         [(write_stl_binary(&mesh), Format::StlBinary), (ascii_stl(&mesh, "x").into_bytes(), Format::StlAscii)]
@@ -88,9 +90,6 @@ fn broken_stl_is_refused_with_its_place() {
     let too_few = ReadError::TooFewBytes { at: Place::Byte(80), what: "triangles", promised: 4, room: 3 };
     assert_eq!(stl(&bytes[..270]), too_few);
     assert_eq!(stl(&bytes[..50]), ReadError::CutOff { at: Place::Byte(50), within: "the header" });
-    let mut fewer = bytes.clone();
-    fewer[80] = 2;
-    assert_eq!(stl(&fewer), ReadError::MoreTriangles { at: Place::Byte(80), promised: 2, held: 4 });
     let mut nan = bytes;
     nan[84 + 50 + 24..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     assert_eq!(stl(&nan), ReadError::NotFinite { at: Place::Byte(84 + 50 + 24) });
@@ -126,17 +125,55 @@ fn obj_quirks() {
 }
 
 #[test]
-fn utf16_archives_and_nothing_are_named() {
-    let utf16 = |bom: bool| -> Vec<u8> {
-        let text = if bom { "\u{FEFF}v 0 0 0\nv 1 0 0\n" } else { "v 0 0 0\nv 1 0 0\n" };
-        text.encode_utf16().flat_map(u16::to_be_bytes).collect()
-    };
-    assert_eq!(read(utf16(true)), Err(ReadError::Utf16));
-    assert_eq!(read(utf16(false)), Err(ReadError::Utf16));
-    assert!(read_mesh(&write_3mf(&[]), None).unwrap_err().to_string().starts_with("3MF is not read yet"));
-    assert_eq!(read(b"PK\x03\x04something"), Err(ReadError::Zip));
+fn what_a_file_is_wrapped_in_makes_no_difference() {
+    let plain = obj(&tetrahedron());
+    let expected = read(&plain).unwrap().mesh;
+    for (bom, is_big) in [("\u{FEFF}", true), ("\u{FEFF}", false), ("", true), ("", false)] {
+        let text = format!("{bom}{plain}");
+        let bytes: Vec<u8> =
+            text.encode_utf16().flat_map(|c| if is_big { c.to_be_bytes() } else { c.to_le_bytes() }).collect();
+        assert_eq!(read(bytes).unwrap().mesh, expected);
+    }
+    let packed = gzip(plain.as_bytes());
+    assert_eq!(read(&packed).unwrap().mesh, expected);
+    let archive = zip_of(&[("readme.txt", b"hello"), ("a/model.obj", plain.as_bytes())]);
+    let loaded = read(&archive).unwrap();
+    assert_eq!((loaded.mesh, loaded.notes.len()), (expected.clone(), 1));
+    assert_eq!(read(zip_of(&[("model.obj.gz", &packed)])).unwrap().mesh, expected);
+    // The extension within the archive counts.
+    let bare = b"3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2";
+    assert_eq!(read_mesh(&zip_of(&[("x.OFF", bare)]), Some("zip")).unwrap().format, Format::Off);
+
+    let two = zip_of(&[("a.stl", b""), ("b.stl", b"")]);
+    assert_eq!(read(two), Err(ReadError::Archive { n_models: 2 }));
+    assert!(matches!(read(b"PK\x03\x04something"), Err(ReadError::Damaged { .. })));
+    assert!(matches!(read(&packed[..packed.len() - 9]), Err(ReadError::Damaged { .. })));
     assert_eq!(read(" \r\n"), Err(ReadError::Empty));
-    assert_eq!(read("glTF\x02"), Err(ReadError::UnknownFormat));
+    assert_eq!(read("hello"), Err(ReadError::UnknownFormat));
+}
+
+#[test]
+fn bombs_are_refused_before_they_fill_the_memory() {
+    // 100 MB of blanks pack to a thousandth.
+    let blanks = vec![b' '; 100 << 20];
+    assert_eq!(read(gzip(&blanks)), Err(ReadError::Bomb { limit_mb: 73 }));
+    let limit = read(zip_of(&[("3D/3dmodel.model", &blanks)]));
+    assert!(matches!(limit, Err(ReadError::Bomb { .. })), "{limit:?}");
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut packer, bytes).unwrap();
+    packer.finish().unwrap()
+}
+
+fn zip_of(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in files {
+        archive.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        std::io::Write::write_all(&mut archive, bytes).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
 }
 
 #[test]
@@ -175,7 +212,7 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
     }
     let loaded = read(&ascii).unwrap();
     assert_eq!(loaded, read(&binary).unwrap());
-    assert_eq!(loaded.face_labels, Some(vec![5, 5, -1]));
+    assert_eq!(loaded.face_labels(), Some(&[5, 5, -1][..]));
     assert_eq!(loaded.file_face, [0, 0, 1]);
     assert_eq!(loaded.mesh.points[3], Vec3::new(0.0, 1.0, -2.0));
     assert!(matches!(read(&binary[..binary.len() - 1]), Err(ReadError::CutOff { .. })));
@@ -185,7 +222,7 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
 fn written_labels_are_read_again() {
     let labels = [3, -7, 0, i32::MAX];
     let loaded = read(write_ply(&tetrahedron(), Some(&labels))).unwrap();
-    assert_eq!(loaded.face_labels.unwrap(), labels.map(i64::from));
+    assert_eq!(loaded.face_labels().unwrap(), labels.map(i64::from));
     assert_eq!(read_labels(&write_labels(&[4, 0, 17])), Ok(vec![4, 0, 17]));
 }
 
