@@ -16,6 +16,7 @@ pub mod level_cut;
 pub mod marching_cubes;
 pub mod mesh;
 pub mod remesh;
+pub mod repair;
 pub mod rounding;
 pub mod signed_distance;
 pub mod solid;

@@ -96,7 +96,7 @@ fn hash(bits: [u64; 3]) -> u64 {
 }
 
 /// Replaces each point by `stands_for` of it, then drops what collapses and what is unused.
-fn reindex(mesh: &TriMesh, stands_for: &[u32]) -> Welded {
+pub(crate) fn reindex(mesh: &TriMesh, stands_for: &[u32]) -> Welded {
     let mut kept_face = Vec::with_capacity(mesh.triangles.len());
     let mut triangles = Vec::with_capacity(mesh.triangles.len());
     let mut is_used = vec![false; mesh.points.len()];
