@@ -23,6 +23,7 @@ pub mod solid;
 pub mod sparse;
 pub mod subdivide;
 pub mod sweep;
+pub mod thin;
 pub mod topology;
 pub mod weld;
 
