@@ -275,7 +275,14 @@ pub struct Options {
     #[arg(long, value_name = "FILE", help_heading = "Pieces")]
     pub labels: Option<PathBuf>,
     /// What of the model's own file divides it into pieces
-    #[arg(long, value_enum, default_value = "auto", value_name = "WHAT", help_heading = "Pieces", conflicts_with = "labels")]
+    #[arg(
+        long,
+        value_enum,
+        default_value = "auto",
+        value_name = "WHAT",
+        help_heading = "Pieces",
+        conflicts_with = "labels"
+    )]
     pub labels_from: LabelsFrom,
     /// About how many pieces to make where there are no labels [default: from the size, 10 for a 150 mm figure]
     #[arg(long, value_name = "N", help_heading = "Pieces")]

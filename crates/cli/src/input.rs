@@ -119,7 +119,9 @@ fn own_labels<'a>(
         LabelsFrom::None => return Ok(None),
         LabelsFrom::Auto => {
             match loaded.labellings.iter().find(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint)) {
-                Some(own) if own.source == LabelSource::Paint => notes.push("the paint in the file divides it".to_owned()),
+                Some(own) if own.source == LabelSource::Paint => {
+                    notes.push("the paint in the file divides it".to_owned())
+                }
                 Some(_) => notes.push("the file has a label for each face; they are used as pieces".to_owned()),
                 None => notes.extend(loaded.labellings.iter().map(|other| {
                     let source = other.source;

@@ -76,13 +76,14 @@ pub fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
     }
     let told = |p: &ThinPlace| {
         let [x, y, z] = p.at.to_array();
-        format!("{:.2} mm at ({x:.1}, {y:.1}, {z:.1}) mm", p.thinnest_mm)
+        format!("{:.2} mm at ({x:.1}, {y:.1}, {z:.1}) mm", p.thickness_mm)
     };
-    let worst: Vec<String> = places.iter().take(N_TOLD).map(told).collect();
-    let others = if places.len() > N_TOLD { format!(" and {} smaller places", places.len() - N_TOLD) } else { String::new() };
+    let largest: Vec<String> = places.iter().take(N_TOLD).map(told).collect();
+    let others =
+        if places.len() > N_TOLD { format!(" and {} smaller places", places.len() - N_TOLD) } else { String::new() };
     vec![format!(
         "{percent:.1} % of the surface is thinner than two walls of {wall_mm} mm: {}{others}; it stays solid there, without \
          connectors: make the model larger (--size) or the wall thinner (--thickness)",
-        worst.join(", ")
+        largest.join(", ")
     )]
 }

@@ -73,7 +73,8 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     write(out, &bytes)?;
     let warnings = ctx.take_warnings();
     if session.is_json {
-        let value = json!({ "status": "done", "out": out, "pieces": surface.n_patches, "notes": notes, "warnings": warnings });
+        let value =
+            json!({ "status": "done", "out": out, "pieces": surface.n_patches, "notes": notes, "warnings": warnings });
         println!("{value}");
     } else {
         notes.iter().for_each(|n| println!("note: {n}"));

@@ -256,6 +256,11 @@ pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
     if rebuilt.status() == Error::NoError { Ok(Volume(rebuilt).to_mesh()) } else { Err(refused(&rebuilt)) }
 }
 
+/// Whether triangles of a closed mesh cross or lie upon each other: exact, where crossing in an edge counts too.
+pub fn touches_itself(mesh: &TriMesh) -> bool {
+    Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections()
+}
+
 fn as_gl(mesh: &TriMesh) -> MeshGL64 {
     MeshGL64 {
         num_prop: 3,

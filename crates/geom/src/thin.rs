@@ -16,9 +16,9 @@ const START_SHARE: f64 = 1e-6;
 pub struct ThinPlace {
     /// Its area, mm²; both sides of a wall that goes around an edge count.
     pub area_mm2: f64,
-    /// The least thickness met, mm.
-    pub thinnest_mm: f64,
-    /// Where that is, mm.
+    /// Half of the area is thinner than this, mm: edges taper off to nothing, and the least thickness says little.
+    pub thickness_mm: f64,
+    /// Where it is so thick, mm.
     pub at: Vec3,
 }
 
@@ -34,25 +34,31 @@ pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
         .into_par_iter()
         .map(|face| {
             let inwards = -mesh.face_normal(face);
-            let (other, distance) = bvh.first_hit(mesh.face_center(face) + start * inwards, inwards, below_mm - start)?;
+            let (other, distance) =
+                bvh.first_hit(mesh.face_center(face) + start * inwards, inwards, below_mm - start)?;
             (mesh.face_normal(other as usize).dot(inwards) >= COS_WALL).then_some(distance + start)
         })
         .collect();
     let is_thin = |face: u32| thickness_mm[face as usize].is_some();
     let topology = Topology::new(solid);
     let (place_of_face, n_places) = components(&topology, |a, b| is_thin(a) == is_thin(b));
-    let mut places: Vec<Option<ThinPlace>> = vec![None; n_places];
+    let mut faces_of: Vec<Vec<(f64, usize)>> = vec![Vec::new(); n_places];
     for (face, place) in place_of_face.iter().enumerate() {
-        let Some(thickness_mm) = thickness_mm[face] else { continue };
-        let at = mesh.face_center(face);
-        let new = ThinPlace { area_mm2: 0.0, thinnest_mm: f64::INFINITY, at };
-        let place = places[*place as usize].get_or_insert(new);
-        place.area_mm2 += mesh.face_area(face);
-        if thickness_mm < place.thinnest_mm {
-            (place.thinnest_mm, place.at) = (thickness_mm, at);
-        }
+        faces_of[*place as usize].extend(thickness_mm[face].map(|mm| (mm, face)));
     }
-    let mut places: Vec<ThinPlace> = places.into_iter().flatten().collect();
+    let mut places: Vec<ThinPlace> = faces_of
+        .into_iter()
+        .filter_map(|mut faces| {
+            faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let area_mm2 = faces.iter().map(|&(_, face)| mesh.face_area(face)).sum();
+            let mut below_mm2 = 0.0;
+            let median = faces.iter().find(|&&(_, face)| {
+                below_mm2 += mesh.face_area(face);
+                2.0 * below_mm2 >= area_mm2
+            });
+            median.map(|&(thickness_mm, face)| ThinPlace { area_mm2, thickness_mm, at: mesh.face_center(face) })
+        })
+        .collect();
     places.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
     places
 }
@@ -69,7 +75,7 @@ mod tests {
         let solid = Solid::new(mesh).unwrap();
         let places = thin_places(&solid, 1.0);
         assert!((places.iter().map(|p| p.area_mm2).sum::<f64>() - 200.0).abs() < 1e-9, "{places:?}");
-        assert!(places.iter().all(|p| (p.thinnest_mm - 0.5).abs() < 1e-9 && p.at.z > 10.0));
+        assert!(places.iter().all(|p| (p.thickness_mm - 0.5).abs() < 1e-9 && p.at.z > 10.0));
         assert_eq!(thin_places(&solid, 0.4), []);
     }
 }

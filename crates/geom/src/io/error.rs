@@ -88,7 +88,9 @@ pub enum ReadError {
         reason: String,
     },
     /// Paint of a triangle that is no code of PrusaSlicer or Bambu Studio.
-    #[error("the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove the paint")]
+    #[error(
+        "the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove the paint"
+    )]
     Paint {
         /// The code, shortened.
         code: String,

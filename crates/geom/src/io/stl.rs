@@ -133,8 +133,7 @@ pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
 
 /// The keyword in lower case that `word` is; the word itself where it is none.
 fn keyword(word: &[u8]) -> &[u8] {
-    const ALL: [&[u8]; 8] =
-        [b"vertex", b"facet", b"outer", b"endloop", b"endfacet", b"solid", b"endsolid", b"color"];
+    const ALL: [&[u8]; 8] = [b"vertex", b"facet", b"outer", b"endloop", b"endfacet", b"solid", b"endsolid", b"color"];
     ALL.into_iter().find(|k| k.eq_ignore_ascii_case(word)).unwrap_or(word)
 }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{Draft, Repair, RepairKind};
 use crate::boolean;
 use crate::bvh::TriangleBvh;
-use crate::check::{InputError, inspect_edges};
+use crate::check::{InputError, inspect, inspect_edges};
 use crate::{Aabb, TriMesh, Vec3};
 
 /// Triangles in a leaf of the boxes; 4 to 16 take about the same time.
@@ -37,17 +37,22 @@ pub fn crossings(mesh: &TriMesh) -> Crossings {
     }
 }
 
-/// Makes one surface of what a surface encloses at least once, where it crosses itself or has edges of more than two
-/// triangles.
+/// Makes one surface of what a surface encloses at least once, where it crosses itself, has edges of more than two
+/// triangles, or is several whose faces touch.
 pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     let found = crossings(&draft.mesh);
     let shared = inspect_edges(&draft.mesh).shared;
-    if found.count == 0 && shared.count == 0 {
-        return Ok(None);
-    }
-    let refused = || match found.count {
-        0 => InputError::Shared { count: shared.count, at: shared.first, n_copies: 0 },
-        count => InputError::Crossing { count, at: found.first },
+    let (kind, count, at) = match (found.count, shared.count) {
+        (0, 0) => match touching(&draft.mesh) {
+            Some((n_bodies, at)) => (RepairKind::Fused, n_bodies, at),
+            None => return Ok(None),
+        },
+        (0, count) => (RepairKind::Parted, count, shared.first),
+        (count, _) => (RepairKind::United { before: 0.0, after: 0.0 }, count, found.first),
+    };
+    let refused = || match kind {
+        RepairKind::Parted => InputError::Shared { count, at, n_copies: 0 },
+        _ => InputError::Crossing { count, at },
     };
     let mesh = boolean::rebuild(&draft.mesh).map_err(|_| refused())?;
     if mesh.triangles.is_empty() {
@@ -57,12 +62,27 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     let tree = TriangleBvh::new(&draft.mesh);
     let nearest = |face: usize| tree.nearest(mesh.face_center(face), f64::INFINITY).map_or(0, |n| n.face);
     let source = (0..mesh.triangles.len()).into_par_iter().map(|f| draft.source[nearest(f) as usize]).collect();
-    let [before, after] = [&draft.mesh, &mesh].map(TriMesh::signed_volume);
+    let kind = match kind {
+        RepairKind::United { .. } => {
+            let [before, after] = [&draft.mesh, &mesh].map(TriMesh::signed_volume);
+            RepairKind::United { before, after }
+        }
+        other => other,
+    };
     *draft = Draft { mesh, source };
-    Ok(match found.count {
-        0 => Some(Repair { kind: RepairKind::Parted, count: shared.count, at: shared.first }),
-        count => Some(Repair { kind: RepairKind::United { before, after }, count, at: found.first }),
-    })
+    Ok(Some(Repair { kind, count, at }))
+}
+
+/// How many bodies there are, and the middle of the second, where faces of several touch: [`crossings`] does not see that.
+fn touching(mesh: &TriMesh) -> Option<(usize, Vec3)> {
+    /// Bodies that are compared two by two.
+    const MAX_BODIES: usize = 1000;
+    let bounds: Vec<Aabb> = inspect(mesh).bodies.iter().map(|body| body.bounds).collect();
+    let n = bounds.len();
+    let are_near = (2..=MAX_BODIES).contains(&n)
+        && (0..n).any(|i| (0..i).any(|j| bounds[i].intersects(bounds[j])))
+        && boolean::touches_itself(mesh);
+    are_near.then(|| (n, bounds[1].center()))
 }
 
 /// Triangles along a space-filling curve, in boxes of pairs of boxes.

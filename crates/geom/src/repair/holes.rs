@@ -23,7 +23,8 @@ pub(super) fn close(draft: &mut Draft) -> Option<Repair> {
         work += points.len().pow(3) / 6;
         let is_small = points.len() == 3 || (points.len() <= MAX_EDGES && width <= widest_allowed);
         // A triangle alone has a rim of three edges, too.
-        let is_alone = points.len() == 3 && rim.points.iter().all(|p| draft.mesh.triangles[rim.face as usize].contains(p));
+        let is_alone =
+            points.len() == 3 && rim.points.iter().all(|p| draft.mesh.triangles[rim.face as usize].contains(p));
         if !is_small || is_alone || work > MAX_WORK || !is_simple(&rim.points) {
             continue;
         }

@@ -94,7 +94,9 @@ impl Cells {
         } else {
             for i in 0..n_cells {
                 let step = [i % extent[0], i / extent[0] % extent[1], i / extent[0] / extent[1]];
-                near.extend(self.content.get(&std::array::from_fn(|axis| low[axis] + step[axis])).into_iter().flatten());
+                near.extend(
+                    self.content.get(&std::array::from_fn(|axis| low[axis] + step[axis])).into_iter().flatten(),
+                );
             }
         }
         *work += near.len();

@@ -70,6 +70,7 @@ struct Draft {
 pub fn mend(mesh: &TriMesh, mending: Mending) -> Result<Mended, InputError> {
     check_points(mesh)?;
     let as_read = into_solid(mesh);
+    let n_faces = mesh.triangles.len();
     if let Ok((solid, source_face)) = as_read {
         let crossings = crossings(solid.mesh());
         if crossings.count == 0 {
@@ -95,16 +96,22 @@ pub fn mend(mesh: &TriMesh, mending: Mending) -> Result<Mended, InputError> {
     for stage in [near::merge, faces::drop_copies, junctions::join, faces::turn, holes::close] {
         repairs.extend(stage(&mut draft));
     }
+    let mended = check_edges(&draft).and_then(|()| finish(draft, repairs, mending));
+    // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
+    match mended {
+        Err(_) if 100 * n_collapsed > n_faces => Err(InputError::Collapsed { count: n_collapsed, n_faces }),
+        mended => mended,
+    }
+}
+
+/// Refuses what is open or one-sided after all. Edges with more than two triangles may still bound a volume.
+fn check_edges(draft: &Draft) -> Result<(), InputError> {
     let found = inspect(&draft.mesh);
-    if found.edges.turned.count > 0 {
-        let spots = found.edges.turned;
-        return Err(InputError::OneSided { count: spots.count, at: spots.first });
+    let turned = found.edges.turned;
+    if turned.count > 0 {
+        return Err(InputError::OneSided { count: turned.count, at: turned.first });
     }
-    // Edges with more than two triangles may still bound a volume; all else that is open does not.
-    if found.edges.open.count > 0 {
-        refuse(&found, draft.mesh.triangles.len(), n_collapsed)?;
-    }
-    finish(draft, repairs, mending)
+    if found.edges.open.count > 0 { refuse(&found, draft.mesh.triangles.len(), 0) } else { Ok(()) }
 }
 
 /// From a closed surface to one body.

@@ -49,6 +49,8 @@ pub enum RepairKind {
         /// Enclosed volume after.
         after: f64,
     },
+    /// Bodies that touch each other with their faces became one.
+    Fused,
     /// Points and edges in which the surface touched itself were parted.
     Parted,
     /// Closed surfaces within the body were left out.
@@ -72,6 +74,7 @@ impl RepairKind {
             Self::Everted => "body-turned",
             Self::Specks { .. } => "specks-removed",
             Self::United { .. } => "parts-united",
+            Self::Fused => "bodies-united",
             Self::Parted => "points-parted",
             Self::Filled { .. } => "cavities-filled",
             Self::LeftOut => "bodies-left-out",
@@ -91,7 +94,11 @@ impl fmt::Display for Repair {
                 write!(f, "{} there twice and removed", plural(n, "triangle was", "triangles were"))?;
             }
             RepairKind::Joined => {
-                write!(f, "{} in the middle of a neighbour's edge and joined to it", plural(n, "corner was", "corners were"))?;
+                write!(
+                    f,
+                    "{} in the middle of a neighbour's edge and joined to it",
+                    plural(n, "corner was", "corners were")
+                )?;
             }
             RepairKind::Turned => {
                 write!(f, "{} the wrong way and turned", plural(n, "triangle faced", "triangles faced"))?;
@@ -110,6 +117,7 @@ impl fmt::Display for Repair {
                 write!(f, "the surface crossed itself in {pairs}; overlapping parts were united, ")?;
                 write!(f, "and the enclosed volume went from {} to {}", Short(before), Short(after))?;
             }
+            RepairKind::Fused => write!(f, "{n} bodies, some of which touch with their faces, were united")?,
             RepairKind::Parted => {
                 let points = plural(n, "point", "points");
                 write!(f, "the surface touched itself in {points}; it was parted there")?;

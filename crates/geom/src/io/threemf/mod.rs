@@ -55,9 +55,10 @@ impl<'a> Package<'a> {
     fn text(&mut self, name: &str) -> Result<Option<String>, ReadError> {
         let name = name.trim_start_matches('/');
         // Names in archives differ in case from those that refer to them, rarely.
-        let index = self.archive.index_for_name(name).or_else(|| {
-            self.archive.file_names_raw().position(|other| other.eq_ignore_ascii_case(name.as_bytes()))
-        });
+        let index = self
+            .archive
+            .index_for_name(name)
+            .or_else(|| self.archive.file_names_raw().position(|other| other.eq_ignore_ascii_case(name.as_bytes())));
         let Some(index) = index else { return Ok(None) };
         let file = self.archive.by_index(index).map_err(|e| ReadError::Damaged { reason: e.to_string() })?;
         let bytes = read_bounded(file, self.bytes_left)?;
@@ -160,7 +161,8 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
         mesh.points.extend(painted.mesh.points.iter().map(|&p| placed.transform_point3(p)));
         let is_mirror = placed.matrix3.determinant() < 0.0;
         let mut last_source = None;
-        for ((triangle, &extruder), &source) in painted.mesh.triangles.iter().zip(&painted.colors).zip(&painted.source) {
+        for ((triangle, &extruder), &source) in painted.mesh.triangles.iter().zip(&painted.colors).zip(&painted.source)
+        {
             let [a, b, c] = triangle.map(|v| v.saturating_add(first));
             mesh.triangles.push(if is_mirror { [a, c, b] } else { [a, b, c] });
             if last_source.replace(source) != Some(source) {
@@ -195,3 +197,6 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
     let labellings = labellings.map(|(source, labels)| Labelling { source, labels }).collect();
     Ok(Loaded { mesh, labellings, file_face, format: Format::ThreeMf, unit_mm: None, notes: Vec::new() })
 }
+
+#[cfg(test)]
+mod tests;

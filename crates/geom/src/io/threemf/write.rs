@@ -45,7 +45,7 @@ pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
 /// A 3MF of one body in millimetres whose triangles are painted: colour k, from 1 to 16, is the k-th extruder or filament.
 ///
 /// PrusaSlicer, Bambu Studio and OrcaSlicer show the paint, each reading its own attribute; there it can be changed, and
-/// [`super::super::read_mesh`] reads it back. Coordinates are rounded to `f32`; `turned` is not used.
+/// [`super::super::read_mesh`] reads it back, points and all.
 ///
 /// # Panics
 /// Where `colors` has another length than the triangles.
@@ -67,8 +67,7 @@ fn package(model: &str) -> Vec<u8> {
         .unix_permissions(0o644)
         .system(System::Unix)
         .large_file(model.len() >= u32::MAX as usize);
-    let entries =
-        [("3D/3dmodel.model", model), ("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS)];
+    let entries = [("3D/3dmodel.model", model), ("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS)];
 
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (path, text) in entries {
@@ -125,8 +124,13 @@ fn model_xml(objects: &[NamedObject]) -> String {
 fn add_mesh(xml: &mut String, mesh: &TriMesh, colors: Option<&[u32]>) {
     xml.push_str("<mesh>\n<vertices>\n");
     for p in &mesh.points {
-        let [x, y, z] = p.to_array().map(|x| x as f32);
-        add(xml, format_args!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n"));
+        let exact = p.to_array();
+        let [x, y, z] = exact.map(|x| x as f32);
+        match colors {
+            // Seams of patches come closer together than floats tell apart.
+            Some(_) => add(xml, format_args!("<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>\n", exact[0], exact[1], exact[2])),
+            None => add(xml, format_args!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n")),
+        }
     }
     xml.push_str("</vertices>\n<triangles>\n");
     for (face, [a, b, c]) in mesh.triangles.iter().enumerate() {
