@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 2 << 30;
 const MESH_NAMES: [&[u8]; 8] = [b".stl", b".obj", b".ply", b".off", b".3mf", b".glb", b".gltf", b".gz"];
 
 /// The mesh file itself, without the wrapping, and the name it has in a zip archive.
-pub(super) fn unwrap(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<String>), ReadError> {
+pub(super) fn unpack(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<String>), ReadError> {
     let (mut bytes, mut name) = (Cow::Borrowed(bytes), None);
     // A packed file in an archive is usual, more layers are not.
     for _ in 0..2 {

@@ -92,6 +92,8 @@ pub enum ReadError {
         "the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove the paint"
     )]
     Paint {
+        /// The triangle within its object.
+        face: u32,
         /// The code, shortened.
         code: String,
     },

@@ -5,7 +5,7 @@ use super::{Place, ReadError, container};
 
 /// Reads one label ≥ 0 a line, in the order of the file's faces; blank lines are passed over and `3.0` counts as 3.
 pub fn read_labels(bytes: &[u8]) -> Result<Vec<i64>, ReadError> {
-    let (bytes, _) = container::unwrap(bytes)?;
+    let (bytes, _) = container::unpack(bytes)?;
     let mut labels = Vec::new();
     for (at, line) in Lines::of(&bytes) {
         if let Some(label) = label(line, at)? {

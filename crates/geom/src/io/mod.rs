@@ -176,7 +176,7 @@ impl fmt::Display for Place {
 ///
 /// Guarantees: at least one triangle, all points finite, all indices in range. Not promised: anything about the surface.
 pub fn read_mesh(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
-    let (bytes, name) = container::unwrap(bytes)?;
+    let (bytes, name) = container::unpack(bytes)?;
     let inner = name.as_deref().and_then(|n| n.rsplit_once('.')).map(|(_, extension)| extension);
     let mut loaded = match recognise(&bytes, inner.or(extension))? {
         Format::StlBinary => stl::read_binary(&bytes),

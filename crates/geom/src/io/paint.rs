@@ -57,8 +57,12 @@ pub(super) struct Painted {
 
 /// Splits the triangles of `mesh` as `paint` says (by triangle, ascending), and their neighbours so that edges match.
 ///
-/// Triangles without paint have colour 0. An error names the triangle whose code is wrong.
-pub(super) fn apply(mesh: &TriMesh, paint: &[(u32, &str)]) -> Result<Painted, (u32, ReadError)> {
+/// Triangles without paint have colour 0.
+pub(super) fn apply(mesh: &TriMesh, paint: &[(u32, &str)]) -> Result<Painted, ReadError> {
+    if paint.is_empty() {
+        let n = mesh.triangles.len();
+        return Ok(Painted { mesh: mesh.clone(), colors: vec![0; n], source: (0..n as u32).collect() });
+    }
     // Points in the same place are one here, so that neighbours meet where the file does not say so.
     let stands_for = first_equal(&mesh.points);
     let mut splitter = Splitter { points: mesh.points.clone(), middle_of: BTreeMap::new(), leaves: Vec::new() };
@@ -66,11 +70,11 @@ pub(super) fn apply(mesh: &TriMesh, paint: &[(u32, &str)]) -> Result<Painted, (u
     for (face, triangle) in (0_u32..).zip(&mesh.triangles) {
         let triangle = triangle.map(|v| stands_for[v as usize]);
         match next.next_if(|(painted, _)| *painted == face) {
-            Some((_, code)) => splitter.split(face, triangle, code).map_err(|e| (face, e))?,
+            Some((_, code)) => splitter.split(face, triangle, code)?,
             None => splitter.leaves.push(Leaf { corners: triangle, color: 0, source: face }),
         }
     }
-    splitter.conforming().map_err(|e| (0, e))
+    splitter.conforming()
 }
 
 struct Leaf {
@@ -89,7 +93,7 @@ struct Splitter {
 impl Splitter {
     /// Adds the leaves of a painted triangle.
     fn split(&mut self, source: u32, triangle: [u32; 3], code: &str) -> Result<(), ReadError> {
-        let wrong = || ReadError::Paint { code: code.chars().take(40).collect() };
+        let wrong = || ReadError::Paint { face: source, code: code.chars().take(40).collect() };
         let mut digits = code.chars().rev().map(|c| c.to_digit(16));
         let mut digit = || digits.next().flatten().ok_or_else(wrong);
         // Triangles whose codes are still to come, the next one last, with their depths.
@@ -211,7 +215,7 @@ mod tests {
         for code in ["08403", "841", "4802", "8408493", "4086402"] {
             let painted = match apply(&tetrahedron(), &[(2, code)]) {
                 Ok(painted) => painted,
-                Err((face, e)) => panic!("{code}: {face} {e}"),
+                Err(e) => panic!("{code}: {e}"),
             };
             let found = inspect(&painted.mesh);
             assert!(found.edges.is_closed(), "{code}: {found:?}");
@@ -250,7 +254,7 @@ mod tests {
     #[test]
     fn codes_that_end_early_or_late_or_are_no_numbers_are_refused() {
         for code in ["3", "C", "FC", "44", "G", "0000003", "ü4", &"3".repeat(1000)] {
-            assert!(matches!(apply(&tetrahedron(), &[(1, code)]), Err((1, ReadError::Paint { .. }))), "{code}");
+            assert!(matches!(apply(&tetrahedron(), &[(1, code)]), Err(ReadError::Paint { face: 1, .. })), "{code}");
         }
     }
 }

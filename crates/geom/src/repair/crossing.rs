@@ -10,6 +10,11 @@ use crate::{Aabb, TriMesh, Vec3};
 
 /// Triangles in a leaf of the boxes; 4 to 16 take about the same time.
 const LEAF: usize = 8;
+/// Pairs of boxes that are looked at for each leaf; more meet in the tip of a cone of twenty thousand triangles, and in
+/// hostile files, where not all crossings are found then.
+const MAX_PAIRS_OF_LEAF: usize = 100_000;
+/// Pairs of crossing triangles that are resolved: some minutes' work.
+const MAX_RESOLVED: usize = 100_000;
 /// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles that touch,
 /// or cross in less than that, do not count as crossing.
 const FLAT: f64 = 1e-10;
@@ -54,6 +59,9 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
         RepairKind::Parted => InputError::Shared { count, at, n_copies: 0 },
         _ => InputError::Crossing { count, at },
     };
+    if found.count > MAX_RESOLVED {
+        return Err(refused());
+    }
     let mesh = boolean::rebuild(&draft.mesh).map_err(|_| refused())?;
     if mesh.triangles.is_empty() {
         return Err(refused());
@@ -122,9 +130,9 @@ impl Boxes {
             .map(|&face| (face, mesh.corners(face as usize), Aabb::around(mesh.corners(face as usize))))
             .collect();
         let around = self.levels[0][leaf];
-        let (mut count, mut first) = (0, None);
+        let (mut count, mut first, mut n_pairs) = (0, None, 0);
         let mut todo = vec![(self.levels.len() - 1, 0)];
-        while let Some((level, at)) = todo.pop() {
+        while let Some((level, at)) = todo.pop().filter(|_| n_pairs < MAX_PAIRS_OF_LEAF) {
             // Earlier leaves have looked at this one.
             let is_earlier = (at + 1) << level <= leaf;
             if is_earlier || !self.levels[level][at].intersects(around) {
@@ -135,6 +143,7 @@ impl Boxes {
                 todo.extend(children.map(|child| (level - 1, child)));
                 continue;
             }
+            n_pairs += own.len() * self.faces(at).len();
             for (i, &other) in self.faces(at).iter().enumerate() {
                 let corners = mesh.corners(other as usize);
                 let other_box = Aabb::around(corners);

@@ -124,7 +124,7 @@ fn body<'a>(object: &'a Object, settings: &Settings, notes: &mut Vec<String>) ->
     let n_triangles = object.mesh.triangles.len();
     let extruder = settings.extruders(object.id, n_triangles);
     let n_left_out = extruder.iter().filter(|e| e.is_none()).count();
-    let mut painted = paint::apply(&object.mesh, &object.paint_codes()).map_err(|(_, e)| e)?;
+    let mut painted = paint::apply(&object.mesh, &object.paint_codes())?;
     for (color, &source) in painted.colors.iter_mut().zip(&painted.source) {
         if *color == 0 {
             *color = extruder[source as usize].unwrap_or_default();

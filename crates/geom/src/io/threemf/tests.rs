@@ -105,7 +105,7 @@ fn paint_of_both_kinds_of_slicers_becomes_triangles_with_labels() {
     }
     let wrong = TETRAHEDRON.replace(r#"v2="2" v3="3""#, r#"v2="2" v3="3" paint_color="3""#);
     let refused = read_model(&format!("<object id=\"1\">{wrong}</object>"), r#"<item objectid="1"/>"#);
-    assert_eq!(refused, Err(ReadError::Paint { code: "3".into() }));
+    assert_eq!(refused, Err(ReadError::Paint { face: 2, code: "3".into() }));
 }
 
 #[test]
