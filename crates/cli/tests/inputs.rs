@@ -167,7 +167,11 @@ fn odd_surfaces() -> Vec<Twin> {
         ("unwelded.ply", ply(&unwelded), Sound),
         ("cracks.ply", ply(&cracked), Repaired(&["points-merged"])),
         ("copies.ply", ply(&changed(|m| m.triangles.extend_from_within(..50))), Repaired(&["copies-removed"])),
-        ("turned.ply", ply(&changed(|m| m.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1)))), Repaired(&["triangles-turned"])),
+        (
+            "turned.ply",
+            ply(&changed(|m| m.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1)))),
+            Repaired(&["triangles-turned"]),
+        ),
         ("everted.ply", ply(&everted(good.clone())), Repaired(&["body-turned"])),
         ("one_missing.ply", ply(&changed(|m| drop(m.triangles.pop()))), Repaired(&["holes-closed"])),
         ("open.ply", ply(&changed(|m| m.triangles.truncate(300))), Refused(&["not closed", "1 hole", "near ("])),
@@ -192,9 +196,14 @@ fn every_file_ends_in_a_body_or_in_words_that_help() {
         let told: Value = serde_json::from_slice(&o.stdout).unwrap_or_default();
         let strict = shellock(dir.path(), &["inspect", name, "--no-repair"]).status.code();
         match outcome {
-            Sound => assert_eq!((code, &told["repairs"], strict), (Some(0), &Value::Array(vec![]), Some(0)), "{name}: {errors}"),
+            Sound => assert_eq!(
+                (code, &told["repairs"], strict),
+                (Some(0), &Value::Array(vec![]), Some(0)),
+                "{name}: {errors}"
+            ),
             Repaired(codes) => {
-                let done: Vec<&str> = told["repairs"].as_array().unwrap().iter().filter_map(|r| r["kind"].as_str()).collect();
+                let done: Vec<&str> =
+                    told["repairs"].as_array().unwrap().iter().filter_map(|r| r["kind"].as_str()).collect();
                 assert_eq!((code, done, strict), (Some(0), codes.to_vec(), Some(2)), "{name}: {errors}");
             }
             Refused(words) => {
@@ -214,7 +223,9 @@ fn sizes_follow_units_and_thin_models_are_warned_of() {
         String::from_utf8_lossy(&o.stdout).into_owned()
     };
     let good = ball(Vec3::ZERO);
-    assert!(said("i.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/>")), &[]).contains("60.0 × 60.0 × 60.0 mm"));
+    assert!(
+        said("i.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/>")), &[]).contains("60.0 × 60.0 × 60.0 mm")
+    );
     let metres = ply(&scaled(&good, 1e-3, Vec3::ZERO));
     assert!(said("m.ply", metres.clone(), &[]).contains("60 mm with --unit m "));
     assert!(said("m.ply", metres, &["--unit", "m"]).contains("60.0 × 60.0 × 60.0 mm"));

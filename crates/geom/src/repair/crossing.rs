@@ -96,6 +96,8 @@ fn touching(mesh: &TriMesh) -> Option<(usize, Vec3)> {
 /// Triangles along a space-filling curve, in boxes of pairs of boxes.
 struct Boxes {
     order: Vec<u32>,
+    /// Around each triangle, in that order.
+    boxes: Vec<Aabb>,
     /// From the leaves up; the last has one box.
     levels: Vec<Vec<Aabb>>,
 }
@@ -110,25 +112,23 @@ impl Boxes {
             .collect();
         keys.par_sort_unstable();
         let order: Vec<u32> = keys.into_iter().map(|(_, face)| face).collect();
-        let leaf = |faces: &[u32]| Aabb::around(faces.iter().flat_map(|&f| mesh.corners(f as usize)));
-        let mut levels: Vec<Vec<Aabb>> = vec![order.par_chunks(LEAF).map(leaf).collect()];
+        let boxes: Vec<Aabb> = order.par_iter().map(|&f| Aabb::around(mesh.corners(f as usize))).collect();
+        let join = |boxes: &[Aabb]| boxes.iter().fold(Aabb::EMPTY, |b, &c| b.union(c));
+        let mut levels: Vec<Vec<Aabb>> = vec![boxes.par_chunks(LEAF).map(join).collect()];
         while let Some(last) = levels.last().filter(|l| l.len() > 1) {
-            levels.push(last.chunks(2).map(|pair| pair.iter().fold(Aabb::EMPTY, |b, &c| b.union(c))).collect());
+            levels.push(last.chunks(2).map(join).collect());
         }
-        Self { order, levels }
+        Self { order, boxes, levels }
     }
 
-    fn faces(&self, leaf: usize) -> &[u32] {
-        &self.order[leaf * LEAF..self.order.len().min((leaf + 1) * LEAF)]
+    /// Where the triangles of a leaf stand in the order.
+    fn places(&self, leaf: usize) -> std::ops::Range<usize> {
+        leaf * LEAF..self.order.len().min((leaf + 1) * LEAF)
     }
 
     /// How many triangles of this and later leaves cross those of `leaf`, and the first triangle of `leaf` that is crossed.
     fn crossings_of(&self, mesh: &TriMesh, leaf: usize) -> (usize, Option<u32>) {
-        let own: Vec<(u32, [Vec3; 3], Aabb)> = self
-            .faces(leaf)
-            .iter()
-            .map(|&face| (face, mesh.corners(face as usize), Aabb::around(mesh.corners(face as usize))))
-            .collect();
+        let own = self.places(leaf);
         let around = self.levels[0][leaf];
         let (mut count, mut first, mut n_pairs) = (0, None, 0);
         let mut todo = vec![(self.levels.len() - 1, 0)];
@@ -143,16 +143,14 @@ impl Boxes {
                 todo.extend(children.map(|child| (level - 1, child)));
                 continue;
             }
-            n_pairs += own.len() * self.faces(at).len();
-            for (i, &other) in self.faces(at).iter().enumerate() {
-                let corners = mesh.corners(other as usize);
-                let other_box = Aabb::around(corners);
+            n_pairs += own.len() * self.places(at).len();
+            for other in self.places(at).filter(|&other| self.boxes[other].intersects(around)) {
                 // Within the leaf each pair once.
-                let n_own = if at == leaf { i } else { own.len() };
-                for (face, own_corners, own_box) in &own[..n_own] {
-                    if own_box.intersects(other_box) && cross(mesh, [*face, other], [*own_corners, corners]) {
+                for place in own.clone().take_while(|&place| place < other) {
+                    let faces = [place, other].map(|p| self.order[p]);
+                    if self.boxes[place].intersects(self.boxes[other]) && cross(mesh, faces) {
                         count += 1;
-                        first = Some(first.map_or(*face, |f: u32| f.min(*face)));
+                        first = Some(first.map_or(faces[0], |f: u32| f.min(faces[0])));
                     }
                 }
             }
@@ -180,19 +178,21 @@ fn curve_position(point: Vec3) -> u64 {
 }
 
 /// Whether an edge of one triangle goes through the inside of the other; those that share an edge never do.
-fn cross(mesh: &TriMesh, faces: [u32; 2], corners: [[Vec3; 3]; 2]) -> bool {
+fn cross(mesh: &TriMesh, faces: [u32; 2]) -> bool {
     let [t, u] = faces.map(|face| mesh.triangles[face as usize]);
     let shared = |t: [u32; 3], u: [u32; 3]| [0, 1, 2].map(|k| u.contains(&t[k]));
     let (of_t, of_u) = (shared(t, u), shared(u, t));
-    match of_t.iter().filter(|s| **s).count() {
-        0 => (0..3).any(|k| goes_through(corners[0], k, corners[1]) || goes_through(corners[1], k, corners[0])),
-        // Edges at the shared point touch there and nowhere else.
-        1 => {
-            let opposite = |s: [bool; 3]| (s.iter().position(|s| *s).unwrap_or_default() + 1) % 3;
-            goes_through(corners[0], opposite(of_t), corners[1]) || goes_through(corners[1], opposite(of_u), corners[0])
-        }
-        _ => false,
+    let n_shared = of_t.iter().filter(|s| **s).count();
+    if n_shared > 1 {
+        return false;
     }
+    let [first, second] = faces.map(|face| mesh.corners(face as usize));
+    if n_shared == 0 {
+        return (0..3).any(|k| goes_through(first, k, second) || goes_through(second, k, first));
+    }
+    // Edges at the shared point touch there and nowhere else.
+    let opposite = |s: [bool; 3]| (s.iter().position(|s| *s).unwrap_or_default() + 1) % 3;
+    goes_through(first, opposite(of_t), second) || goes_through(second, opposite(of_u), first)
 }
 
 /// Whether edge `k` of the first triangle goes through the inside of the second.
@@ -201,13 +201,11 @@ fn goes_through(edges: [Vec3; 3], k: usize, [a, b, c]: [Vec3; 3]) -> bool {
     let sign = |a: Vec3, b: Vec3, c: Vec3, d: Vec3| {
         let [u, v, w] = [a - d, b - d, c - d];
         let volume = u.dot(v.cross(w));
-        let flat = FLAT * u.length() * v.length() * w.length();
-        if volume > flat {
-            1
-        } else if volume < -flat {
-            -1
-        } else {
-            0
+        let flat_sq = FLAT * FLAT * u.length_squared() * v.length_squared() * w.length_squared();
+        match volume * volume > flat_sq {
+            true if volume > 0.0 => 1,
+            true => -1,
+            false => 0,
         }
     };
     let below = sign(a, b, c, p);
