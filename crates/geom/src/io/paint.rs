@@ -3,8 +3,8 @@
 //! PrusaSlicer writes it to the attribute `slic3rpe:mmu_segmentation` of a 3MF's triangles, Bambu Studio and OrcaSlicer to
 //! `paint_color`, in the same code: hexadecimal digits, the last one first. A digit's lower two bits are the number of
 //! split sides. Where that is 0, the triangle is a leaf and the upper two bits are its colour; 3 stands for 3 plus the next
-//! digit, and where that is F too, for 18 plus the next two (lower first). Else the upper two bits are the special corner
-//! v₀ and the children follow, the last one first:
+//! digits up to one below F (Bambu Studio; others have 16 colours, which take one digit). Else the upper two bits are the
+//! special corner v₀ and the children follow, the last one first:
 //!
 //! ```text
 //!   1 split side              2 split sides             3 split sides
@@ -28,18 +28,19 @@ use crate::{TriMesh, Vec3};
 
 /// Splits within splits that are followed; brushes stop at a tenth of a millimetre, which takes some 12.
 const MAX_DEPTH: usize = 40;
+/// What a digit F of a colour stands for; the next digit is added to it.
+const MOST_OF_A_DIGIT: u32 = 15;
 /// Triangles that paint may make of a mesh, as memory of each digit of the file.
 const MAX_TRIANGLES: usize = 20_000_000;
 
-/// The code of a triangle that has colour `color` throughout; nothing for 0. At most 273 colours can be told apart.
+/// The code of a triangle that has colour `color` throughout; nothing for 0.
 pub(super) fn whole_triangle_code(color: u32) -> String {
     match color {
         0 => String::new(),
         1..3 => format!("{:X}", color << 2),
-        3..18 => format!("{:X}C", color - 3),
         _ => {
-            let rest = (color - 18).min(255);
-            format!("{:X}{:X}FC", rest >> 4, rest & 15)
+            let more = "F".repeat(((color - 3) / MOST_OF_A_DIGIT) as usize);
+            format!("{:X}{more}C", (color - 3) % MOST_OF_A_DIGIT)
         }
     }
 }
@@ -102,14 +103,14 @@ impl Splitter {
             let code = digit()?;
             let (n_split, upper) = (code & 3, code >> 2);
             if n_split == 0 {
-                let color = if upper == 3 {
-                    match digit()? {
-                        15 => 18 + digit()? + 16 * digit()?,
-                        extra => 3 + extra,
+                let mut color = upper;
+                while color >= 3 {
+                    let more = digit()?;
+                    color = color.saturating_add(more);
+                    if more < MOST_OF_A_DIGIT {
+                        break;
                     }
-                } else {
-                    upper
-                };
+                }
                 self.leaves.push(Leaf { corners, color, source });
                 if self.leaves.len() > MAX_TRIANGLES {
                     return Err(ReadError::TooManyCopies { what: "its paint", limit: MAX_TRIANGLES as u64 });
@@ -199,14 +200,14 @@ mod tests {
 
     #[test]
     fn the_colour_of_a_whole_triangle_comes_back() {
-        for color in 0..=273 {
+        for color in 0..=100 {
             let code = whole_triangle_code(color);
             let paint: Vec<(u32, &str)> = if code.is_empty() { vec![] } else { vec![(2, &code)] };
             let painted = apply(&tetrahedron(), &paint).unwrap();
             assert_eq!((painted.mesh, painted.colors), (tetrahedron(), vec![0, 0, color, 0]), "{code}");
         }
         // As slicers write them.
-        assert_eq!([1, 2, 3, 16].map(whole_triangle_code), ["4", "8", "0C", "DC"]);
+        assert_eq!([1, 2, 3, 16, 17, 18].map(whole_triangle_code), ["4", "8", "0C", "DC", "EC", "0FC"]);
     }
 
     #[test]
