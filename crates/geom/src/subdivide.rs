@@ -54,7 +54,7 @@ fn cut_triangle(points: &[Vec3], t: [u32; 3], m: [Option<u32>; 3], out: &mut Vec
     }
 }
 
-/// Appends the parts of a triangle with further points on its sides: `on_sides[k]` in order from corner `k` to the next.
+/// Appends the parts of a triangle with further points on its sides: `on_sides[k]` in order from corner `k` on.
 ///
 /// Every point becomes a corner, no part has three points on one side, and the orientation stays; O(n log n).
 pub fn fill_triangle([a, b, c]: [u32; 3], on_sides: [&[u32]; 3], out: &mut Vec<[u32; 3]>) {

@@ -1,5 +1,5 @@
-//! glTF 2.0: triangles of all nodes of the scene, moved as they say. Lines, points, skins, animations and images are passed
-//! over; compressed and external data is refused by name.
+//! glTF 2.0: triangles of all nodes of the scene, moved as they say. Lines, points, skins, animations and images are
+//! passed over; compressed and external data is refused by name.
 
 use std::borrow::Cow;
 

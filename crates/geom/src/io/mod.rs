@@ -6,13 +6,13 @@
 //! | OBJ | text; groups, objects, materials | |
 //! | PLY | ASCII, binary of both byte orders, strips, face labels and colours | binary, face labels |
 //! | OFF | text, face colours | |
-//! | 3MF | units, components, transforms, parts in several files, materials and colours, paint of slicers | pieces, coloured; one body, painted |
+//! | 3MF | units, components, transforms, several files, materials, paint | pieces, coloured; one body, painted |
 //! | glTF, GLB | nodes, all modes of triangles, materials | |
 //! | `.seg` | one label a line | the same |
 //!
 //! Any of them may be packed by gzip, lie alone in a zip archive, be stored as UTF-16 or have a wrong name.
 //!
-//! Readers take what files in the wild hold and refuse the rest with a place: a line of a text, a byte of a binary file.
+//! Readers take what files in the wild hold and refuse the rest with a place: a line of a text, a byte of a file.
 //! They never panic and reserve no memory that the bytes at hand do not back. Coordinates are taken as they stand
 //! ([`Loaded::unit_mm`] says where the file has a unit) and points are not merged: that is [`crate::weld`]; whether the
 //! surface is a body is [`crate::check`].

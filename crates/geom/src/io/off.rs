@@ -1,4 +1,4 @@
-//! OFF: points and polygons as text, with the colours of faces. Normals and colours of points (NOFF, COFF) are passed over.
+//! OFF: points and polygons as text, with the colours of faces. Normals and colours of points are passed over.
 
 use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, malformed, point, whole, without_bom, without_comment, words};

@@ -1,10 +1,10 @@
 //! The multi-material paint of slicers: within a triangle, a tree of splits whose leaves have colours.
 //!
-//! PrusaSlicer writes it to the attribute `slic3rpe:mmu_segmentation` of a 3MF's triangles, Bambu Studio and OrcaSlicer to
-//! `paint_color`, in the same code: hexadecimal digits, the last one first. A digit's lower two bits are the number of
-//! split sides. Where that is 0, the triangle is a leaf and the upper two bits are its colour; 3 stands for 3 plus the next
-//! digits up to one below F (Bambu Studio; others have 16 colours, which take one digit). Else the upper two bits are the
-//! special corner v₀ and the children follow, the last one first:
+//! PrusaSlicer writes it to the attribute `slic3rpe:mmu_segmentation` of a 3MF's triangles, Bambu Studio and OrcaSlicer
+//! to `paint_color`, in the same code: hexadecimal digits, the last one first. A digit's lower two bits are the number
+//! of split sides. Where that is 0, the triangle is a leaf and the upper two bits are its colour; 3 stands for 3 plus
+//! the next digits up to one below F (Bambu Studio; others have 16 colours, which take one digit). Else the upper two
+//! bits are the special corner v₀ and the children follow, the last one first:
 //!
 //! ```text
 //!   1 split side              2 split sides             3 split sides

@@ -19,8 +19,8 @@ pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
 
 /// Reads a binary STL.
 ///
-/// Its count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is taken where it
-/// looks like triangles, and passed over where it does not. A count that is too high is a file cut off.
+/// Its count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is taken where
+/// it looks like triangles, and passed over where it does not. A count that is too high is a file cut off.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let Some(promised) = promised(bytes) else {
         return Err(ReadError::CutOff { at: Place::Byte(bytes.len()), within: "the header" });
@@ -57,7 +57,7 @@ fn count(body: &[u8], promised: u64, notes: &mut Vec<String>) -> Result<usize, R
     }
     let n_promised = if is_unknown { 0 } else { promised as usize };
     let is_like_triangles = body[TRIANGLE_BYTES * n_promised..].chunks_exact(TRIANGLE_BYTES).all(is_like_a_triangle);
-    if n_promised < held && (is_unknown || (is_like_triangles && body.len() % TRIANGLE_BYTES == 0)) {
+    if n_promised < held && (is_unknown || (is_like_triangles && body.len().is_multiple_of(TRIANGLE_BYTES))) {
         notes.push(wrong(held));
         return Ok(held);
     }
@@ -78,8 +78,8 @@ fn is_like_a_triangle(bytes: &[u8]) -> bool {
 
 /// The colours in the last two bytes of triangles: 5 bits each of red, green and blue, and one that says whether they hold.
 struct Colors {
-    /// What the highest bit is where a triangle has a colour of its own: set in most programs, not set in Magics, whose
-    /// headers have "COLOR=".
+    /// What the highest bit is where a triangle has a colour of its own: set in most programs, not set in Magics,
+    /// whose headers have "COLOR=".
     valid: u16,
     numbering: Numbering<Option<u16>>,
     labels: Vec<i64>,

@@ -15,8 +15,8 @@ const LEAF: usize = 8;
 const MAX_PAIRS_OF_LEAF: usize = 100_000;
 /// Pairs of crossing triangles that are resolved: some minutes' work.
 const MAX_RESOLVED: usize = 100_000;
-/// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles that touch,
-/// or cross in less than that, do not count as crossing.
+/// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles that
+/// touch, or cross in less than that, do not count as crossing.
 const FLAT: f64 = 1e-10;
 
 /// Where a surface crosses itself.
@@ -28,7 +28,7 @@ pub struct Crossings {
     pub first: Vec3,
 }
 
-/// Pairs of triangles of which an edge of one goes through the other; triangles that touch or lie in a plane do not count.
+/// Pairs of triangles of which an edge of one goes through the other; those that touch or lie in a plane do not count.
 ///
 /// O(n log n) and by the pairs whose boxes meet; the same on any number of threads.
 pub fn crossings(mesh: &TriMesh) -> Crossings {
@@ -126,7 +126,7 @@ impl Boxes {
         leaf * LEAF..self.order.len().min((leaf + 1) * LEAF)
     }
 
-    /// How many triangles of this and later leaves cross those of `leaf`, and the first triangle of `leaf` that is crossed.
+    /// How many triangles of this and later leaves cross those of `leaf`, and the first of `leaf` that is crossed.
     fn crossings_of(&self, mesh: &TriMesh, leaf: usize) -> (usize, Option<u32>) {
         let own = self.places(leaf);
         let around = self.levels[0][leaf];

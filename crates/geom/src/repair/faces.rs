@@ -41,7 +41,7 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle
 }
 
-/// Turns triangles so that neighbours agree, as few as possible in each connected part; leaves one-sided parts as they are.
+/// Turns triangles so that neighbours agree, as few as possible in each connected part; leaves one-sided parts alone.
 pub(super) fn turn(draft: &mut Draft) -> Option<Repair> {
     let mesh = &draft.mesh;
     let sides = sides(mesh);

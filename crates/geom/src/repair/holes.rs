@@ -116,7 +116,7 @@ impl<'a> Rims<'a> {
 
     /// The open side that runs to the point that the side from `corner` begins at.
     fn next(&self, corner: u32, is_open: &[bool]) -> Option<u32> {
-        let before = |c: u32| if c % 3 == 0 { c + 2 } else { c - 1 };
+        let before = |c: u32| if c.is_multiple_of(3) { c + 2 } else { c - 1 };
         let mut at = before(corner);
         // As many steps as there are triangles around the point, at most all.
         for _ in 0..self.opposite.len() {

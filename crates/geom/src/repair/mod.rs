@@ -1,7 +1,7 @@
 //! Mending of surfaces without guessing: from a mesh as read to one solid body, with a word on every change.
 //!
-//! Mended is what has one right answer: points and triangles that stand there twice, triangles turned the wrong way, cracks
-//! and corners on neighbours' edges within [`NEAR_SHARE`] of the size, holes of three edges or smaller than [`HOLE_SHARE`]
+//! Mended is what has one right answer: points and triangles that stand there twice, triangles turned the wrong way,
+//! cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or smaller than a hundredth
 //! of the size, points where the surface pinches itself, specks, closed surfaces within others, parts that overlap, a
 //! surface that crosses itself. What would need a decision about the shape is refused with its place: larger holes,
 //! one-sided surfaces, several bodies apart from each other.

@@ -7,7 +7,7 @@ use crate::Vec3;
 use crate::check::open_edges;
 use crate::weld::reindex;
 
-/// Merges points on open edges that lie within [`NEAR_SHARE`] of the diagonal; keeps the draft where that closes nothing.
+/// Merges points on open edges within [`NEAR_SHARE`] of the diagonal; keeps the draft where that closes nothing.
 ///
 /// A point goes to the first one near it that is not merged itself, so that rows of near points do not become one.
 pub(super) fn merge(draft: &mut Draft) -> Option<Repair> {

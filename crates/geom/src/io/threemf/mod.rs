@@ -1,5 +1,5 @@
-//! 3MF: a zip archive of XML files (core specification 1.3, with materials, colours and parts in several files), and what
-//! slicers add to it: paint, extruders and volumes that are no part of the model.
+//! 3MF: a zip archive of XML files (core specification 1.3, with materials, colours and parts in several files), and
+//! what slicers add to it: paint, extruders and volumes that are no part of the model.
 
 mod model;
 mod settings;
