@@ -45,13 +45,19 @@ fn main() {
         });
         match outcome {
             Ok((read, mended)) => (n_read, n_mended) = (n_read + read, n_mended + mended),
-            Err(_) => println!("PANIC in round {round}: {path}"),
+            Err(_) => keep(&format!("round {round} panicked: {path}"), round, &bytes),
         }
         if start.elapsed() > SLOW {
-            println!("round {round} took {:.1} s: {path}", start.elapsed().as_secs_f64());
+            keep(&format!("round {round} took {:.1} s: {path}", start.elapsed().as_secs_f64()), round, &bytes);
         }
     }
     println!("{n_rounds} rounds: {n_read} read, {n_mended} of them mended to a body");
+}
+
+/// Tells of a file and writes it, to be looked at.
+fn keep(what: &str, round: u64, bytes: &[u8]) {
+    let name = format!("damaged-{round}");
+    println!("{what}, written to {name}: {:?}", std::fs::write(&name, bytes));
 }
 
 /// The file with a few bytes changed, copied, cut out or cut off.

@@ -13,8 +13,8 @@ const LEAF: usize = 8;
 /// Pairs of boxes that are looked at for each leaf; more meet in the tip of a cone of twenty thousand triangles, and in
 /// hostile files, where not all crossings are found then.
 const MAX_PAIRS_OF_LEAF: usize = 100_000;
-/// Pairs of crossing triangles that are resolved: some minutes' work.
-const MAX_RESOLVED: usize = 100_000;
+/// Pairs of crossing triangles that are resolved: at 1 to 5 ms each, a minute or two. Meshes that ask for more are wrecks.
+const MAX_RESOLVED: usize = 20_000;
 /// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles that
 /// touch, or cross in less than that, do not count as crossing.
 const FLAT: f64 = 1e-10;
