@@ -35,11 +35,45 @@ fn shared_colors(surface: &SegmentedSurface) -> Vec<u32> {
         }
     }
     let mut colors: Vec<u32> = Vec::with_capacity(n);
-    for patch in 0..n {
+    for near in &touches {
         let n_uses = |color: u32| colors.iter().filter(|&&c| c == color).count();
-        let is_near = |color: u32| (0..patch).any(|p| touches[patch][p] && colors[p] == color);
+        let is_near = |color: u32| near.iter().zip(&colors).any(|(touches, &c)| *touches && c == color);
         let best = (1..=N_COLORS).min_by_key(|&color| (is_near(color), n_uses(color), color));
         colors.push(best.unwrap_or(1));
     }
     colors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shellock::PatchId;
+    use shellock_geom::io::read_mesh;
+    use shellock_geom::{TriMesh, Vec3};
+
+    /// A strip of quads, each a patch.
+    fn strip(n_patches: usize) -> SegmentedSurface {
+        let points = (0..2 * n_patches + 2).map(|i| Vec3::new((i / 2) as f64, (i % 2) as f64, 0.0)).collect();
+        let quads = (0..n_patches as u32).map(|q| 2 * q);
+        let triangles: Vec<[u32; 3]> = quads.flat_map(|i| [[i, i + 2, i + 3], [i, i + 3, i + 1]]).collect();
+        SegmentedSurface {
+            patch_of_face: (0..triangles.len() as u32).map(|face| PatchId(face / 2)).collect(),
+            source_face: (0..triangles.len() as u32).collect(),
+            mesh: TriMesh { points, triangles },
+            n_patches,
+        }
+    }
+
+    #[test]
+    fn up_to_sixteen_patches_have_their_own_colours_and_more_differ_from_their_neighbours() {
+        for n in [2, 16, 17, 100] {
+            let (bytes, is_distinct) = painted("strip", &strip(n));
+            let loaded = read_mesh(&bytes, None).unwrap();
+            let colors: Vec<i64> = loaded.face_labels().unwrap().iter().step_by(2).copied().collect();
+            assert_eq!((is_distinct, colors.len()), (n <= 16, n));
+            assert!(colors.iter().all(|c| (1..=16).contains(c)));
+            assert!(colors.windows(2).all(|pair| pair[0] != pair[1]));
+            assert!(!is_distinct || colors == (1..=n as i64).collect::<Vec<_>>());
+        }
+    }
 }
