@@ -32,7 +32,7 @@ pub struct Cli {
 pub enum Command {
     /// Make the whole kit of a model: pieces, plan, 3MF, viewer page
     Build {
-        /// STL, OBJ, PLY or OFF file of one closed surface
+        /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface
         model: PathBuf,
         #[command(flatten)]
         options: Options,
@@ -49,19 +49,19 @@ pub enum Command {
         #[command(flatten)]
         out: Out,
     },
-    /// Only divide the surface; write it with one label a triangle (.ply), or the labels of the model's faces (.seg)
+    /// Only divide the surface; write it with one label a triangle (.ply), painted for slicers (.3mf), or the labels of the model's faces (.seg)
     Segment {
-        /// STL, OBJ, PLY or OFF file of one closed surface
+        /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface
         model: PathBuf,
         #[command(flatten)]
         options: Options,
-        /// Where to write: a .ply or .seg file
+        /// Where to write: a .ply, .3mf or .seg file
         #[arg(short, long, value_name = "FILE")]
         out: PathBuf,
     },
     /// Only divide and plan: print the order and the directions
     Plan {
-        /// STL, OBJ, PLY or OFF file of one closed surface, such as a .ply that `segment` wrote
+        /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface, such as one that `segment` wrote
         model: PathBuf,
         #[command(flatten)]
         options: Options,
@@ -82,8 +82,10 @@ pub enum Command {
     },
     /// Say what a file holds and whether it can be made
     Inspect {
-        /// STL, OBJ, PLY or OFF file
+        /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file
         model: PathBuf,
+        #[command(flatten)]
+        options: Options,
     },
     /// Write one of the figures that come with the program
     Figure {
@@ -160,6 +162,52 @@ impl Axis {
     }
 }
 
+/// A unit of length.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Unit {
+    Micron,
+    Mm,
+    Cm,
+    Inch,
+    Foot,
+    M,
+}
+
+impl Unit {
+    /// Its length, mm.
+    pub fn mm(self) -> f64 {
+        match self {
+            Self::Micron => 1e-3,
+            Self::Mm => 1.0,
+            Self::Cm => 10.0,
+            Self::Inch => 25.4,
+            Self::Foot => 304.8,
+            Self::M => 1000.0,
+        }
+    }
+}
+
+/// What of a file is taken for labels.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LabelsFrom {
+    /// Labels of faces, or paint of a slicer
+    Auto,
+    /// A property of the faces (PLY)
+    Labels,
+    /// Multi-material paint of a slicer (3MF)
+    Paint,
+    /// Colours of faces (STL, PLY, OFF, 3MF)
+    Colors,
+    /// Materials (OBJ, 3MF, glTF)
+    Materials,
+    /// Groups (OBJ)
+    Groups,
+    /// Objects, solids or nodes
+    Objects,
+    /// Nothing: pieces are found automatically
+    None,
+}
+
 /// Where the wall's thickness comes from.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Thickness {
@@ -211,12 +259,31 @@ pub struct Options {
     /// Millimetres a file unit
     #[arg(long, value_name = "F", allow_hyphen_values = true, help_heading = "Size")]
     pub scale: Option<f64>,
+    /// Unit of the file's lengths [default: the file's own, as 3MF has one, else mm where that gives a sensible size]
+    #[arg(long, value_enum, help_heading = "Size", conflicts_with_all = ["size", "height", "scale"])]
+    pub unit: Option<Unit>,
     /// Which axis of the file points up
     #[arg(long, value_enum, default_value = "z", help_heading = "Size")]
     pub up: Axis,
+    /// Refuse a surface that needs repair instead of mending it
+    #[arg(long, help_heading = "Surface", conflicts_with = "largest")]
+    pub no_repair: bool,
+    /// Of several bodies apart from each other make the largest
+    #[arg(long, help_heading = "Surface")]
+    pub largest: bool,
     /// One label a face: a .seg file (one integer a line) or a .ply with a face property; a label is a piece
     #[arg(long, value_name = "FILE", help_heading = "Pieces")]
     pub labels: Option<PathBuf>,
+    /// What of the model's own file divides it into pieces
+    #[arg(
+        long,
+        value_enum,
+        default_value = "auto",
+        value_name = "WHAT",
+        help_heading = "Pieces",
+        conflicts_with = "labels"
+    )]
+    pub labels_from: LabelsFrom,
     /// About how many pieces to make where there are no labels [default: from the size, 10 for a 150 mm figure]
     #[arg(long, value_name = "N", help_heading = "Pieces")]
     pub pieces: Option<usize>,

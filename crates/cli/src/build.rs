@@ -17,6 +17,7 @@ use crate::Session;
 use crate::args::{Options, Out};
 use crate::failure::Failure;
 use crate::input::{self, Model};
+use crate::inspect::thin_warnings;
 use crate::output::{Destination, Summary, files};
 use crate::progress::{Display, PlanClock};
 
@@ -53,6 +54,7 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
         model.notes.iter().for_each(|n| println!("note: {n}"));
+        thin_warnings(model, options).iter().for_each(|w| println!("warning: {w}"));
     }
     let display = Display::new(session.is_json);
     let clock = PlanClock::new(options.plan_time);

@@ -14,7 +14,7 @@ pub enum Failure {
     Unreadable { path: PathBuf, source: std::io::Error },
     #[error("{}: {source}", path.display())]
     NotAMesh { path: PathBuf, source: ReadError },
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}{}", path.display(), hint(source))]
     NotOneBody { path: PathBuf, source: InputError },
     #[error("{0}")]
     Wrong(String),
@@ -28,6 +28,11 @@ pub enum Failure {
     Stress(#[from] StressError),
     #[error("stopped; nothing was written")]
     Stopped,
+}
+
+/// The option that helps, where there is one.
+fn hint(error: &InputError) -> &'static str {
+    if matches!(error, InputError::Bodies(_)) { " (--largest keeps the largest)" } else { "" }
 }
 
 impl From<shellock::Cancelled> for Failure {

@@ -4,11 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use shellock_geom::check::into_solid;
-use shellock_geom::io::{Loaded, read_labels, read_mesh};
+use shellock_geom::io::{LabelSource, Loaded, read_labels, read_mesh};
+use shellock_geom::repair::{Mended, Mending, Repair, mend};
 use shellock_geom::{Aabb, Solid, Vec3};
 
-use crate::args::Options;
+use crate::args::{LabelsFrom, Options};
 use crate::failure::Failure;
 
 /// Larger files are refused, bytes: everything is read into memory.
@@ -36,6 +36,8 @@ pub struct Model {
     pub sha256: String,
     /// What a person should know about how the file was taken.
     pub notes: Vec<String>,
+    /// What was changed to make one body of it.
+    pub repairs: Vec<Repair>,
 }
 
 /// Reads a file whole.
@@ -62,29 +64,83 @@ pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
     Ok((loaded, bytes))
 }
 
+/// What may be done to a surface that is no body.
+pub fn mending(no_repair: bool, largest: bool) -> Mending {
+    match (no_repair, largest) {
+        (true, _) => Mending::Refuse,
+        (false, true) => Mending::KeepLargest,
+        (false, false) => Mending::Repair,
+    }
+}
+
+/// The body in what was read from `path`.
+pub fn mended(path: &Path, loaded: &Loaded, mending: Mending) -> Result<Mended, Failure> {
+    mend(&loaded.mesh, mending).map_err(|source| Failure::NotOneBody { path: path.to_owned(), source })
+}
+
 /// The model in a file, scaled, with the labels that go with it.
 pub fn model(path: &Path, options: &Options) -> Result<Model, Failure> {
     let (loaded, bytes) = load(path)?;
-    let (solid, kept) =
-        into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody { path: path.to_owned(), source })?;
-    let file_face: Vec<u32> = kept.iter().map(|&k| loaded.file_face[k as usize]).collect();
-    let mut notes = Vec::new();
-    let labels = match (&options.labels, &loaded.face_labels) {
-        (Some(file), _) => Some(labels_of(file, &loaded, &file_face)?),
-        (None, Some(labels)) => {
-            notes.push("the file has a label for each face; they are used as pieces".to_owned());
-            Some(kept.iter().map(|&k| labels[k as usize]).collect())
+    model_of(path, &loaded, &bytes, options)
+}
+
+/// The model in what was read from `path`.
+pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -> Result<Model, Failure> {
+    let Mended { solid, source_face, repairs } = mended(path, loaded, mending(options.no_repair, options.largest))?;
+    let file_face: Vec<u32> = source_face.iter().map(|&k| loaded.file_face[k as usize]).collect();
+    let mut notes = loaded.notes.clone();
+    notes.extend(repairs.iter().map(|repair| format!("repaired: {repair} (file units)")));
+    let labels = match &options.labels {
+        Some(file) => Some(labels_of(file, loaded, &file_face)?),
+        None => {
+            let own = own_labels(path, options.labels_from, loaded, &mut notes)?;
+            own.map(|labels| source_face.iter().map(|&k| labels[k as usize]).collect())
         }
-        (None, None) => None,
     };
-    let scale = scale(options, solid.mesh().bounds(), &mut notes)?;
+    let scale = scale(options, loaded, solid.mesh().bounds(), &mut notes)?;
     let mut made = made_of(solid, scale, path)?;
     made.labels = labels;
     made.n_file_faces = loaded.n_file_faces();
     made.file_face = file_face;
-    made.sha256 = sha256(&bytes);
+    made.sha256 = sha256(bytes);
     made.notes = notes;
+    made.repairs = repairs;
     Ok(made)
+}
+
+/// The labels that the model's file has itself, one a triangle as read.
+fn own_labels<'a>(
+    path: &Path,
+    from: LabelsFrom,
+    loaded: &'a Loaded,
+    notes: &mut Vec<String>,
+) -> Result<Option<&'a [i64]>, Failure> {
+    let source = match from {
+        LabelsFrom::None => return Ok(None),
+        LabelsFrom::Auto => {
+            match loaded.labellings.iter().find(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint)) {
+                Some(own) if own.source == LabelSource::Paint => {
+                    notes.push("the paint in the file divides it".to_owned())
+                }
+                Some(_) => notes.push("the file has a label for each face; they are used as pieces".to_owned()),
+                None => notes.extend(loaded.labellings.iter().map(|other| {
+                    let source = other.source;
+                    format!("the file has {source}; with --labels-from {source} they divide it into pieces")
+                })),
+            }
+            return Ok(loaded.face_labels());
+        }
+        LabelsFrom::Labels => LabelSource::Property,
+        LabelsFrom::Paint => LabelSource::Paint,
+        LabelsFrom::Colors => LabelSource::Color,
+        LabelsFrom::Materials => LabelSource::Material,
+        LabelsFrom::Groups => LabelSource::Group,
+        LabelsFrom::Objects => LabelSource::Object,
+    };
+    let has: Vec<String> = loaded.labellings.iter().map(|l| l.source.to_string()).collect();
+    let has = if has.is_empty() { "nothing".to_owned() } else { has.join(", ") };
+    let wrong = || Failure::Wrong(format!("{}: no {source} divide it; what does: {has}", path.display()));
+    loaded.labels(source).map(Some).ok_or_else(wrong)
 }
 
 /// A solid in file units as a model of its own.
@@ -109,6 +165,7 @@ fn made_of(solid: Solid, scale: f64, path: &Path) -> Result<Model, Failure> {
         name,
         sha256: String::new(),
         notes: Vec::new(),
+        repairs: Vec::new(),
     })
 }
 
@@ -135,7 +192,8 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<Solid, Failure> {
     Ok(shellock::figure::make(figure, size_mm, size_mm / CELLS))
 }
 
-fn scale(options: &Options, bounds: Aabb, notes: &mut Vec<String>) -> Result<f64, Failure> {
+/// Millimetres a file unit.
+fn scale(options: &Options, loaded: &Loaded, bounds: Aabb, notes: &mut Vec<String>) -> Result<f64, Failure> {
     let longest = bounds.size().max_element();
     let along_up = bounds.size()[options.up.index()];
     let positive = |what: &str, mm: f64| {
@@ -145,19 +203,31 @@ fn scale(options: &Options, bounds: Aabb, notes: &mut Vec<String>) -> Result<f64
             Err(Failure::Wrong(format!("{what} is {mm}; it must be more than 0")))
         }
     };
-    Ok(match (options.size, options.height, options.scale) {
-        (Some(size), _, _) => positive("size", size)? / longest,
-        (_, Some(height), _) => positive("height", height)? / along_up,
-        (_, _, Some(scale)) => positive("scale", scale)?,
-        _ if PLAUSIBLE_MM.contains(&longest) => 1.0,
+    let own_mm = loaded.unit_mm.unwrap_or(1.0);
+    Ok(match (options.size, options.height, options.scale, options.unit) {
+        (Some(size), ..) => positive("size", size)? / longest,
+        (_, Some(height), ..) => positive("height", height)? / along_up,
+        (_, _, Some(scale), _) => positive("scale", scale)?,
+        (.., Some(unit)) => unit.mm(),
+        _ if PLAUSIBLE_MM.contains(&(own_mm * longest)) => own_mm,
         _ => {
-            notes.push(format!(
-                "the file's longest side is {longest:.4} units, which cannot be millimetres; it is made \
-                 {DEFAULT_SIZE_MM} mm long (choose with --size, --height or --scale)"
-            ));
+            notes.push(guess(loaded.unit_mm, longest));
             DEFAULT_SIZE_MM / longest
         }
     })
+}
+
+/// What to say of a size that is no figure's.
+fn guess(unit_mm: Option<f64>, longest: f64) -> String {
+    let what = match unit_mm {
+        Some(mm) => format!("by the file's unit the longest side is {:.4} mm, which is hardly meant", mm * longest),
+        None => format!("the file's longest side is {longest:.4} units, which cannot be millimetres"),
+    };
+    let units = [("m", 1000.0), ("cm", 10.0), ("inch", 25.4)].map(|(name, mm)| (name, mm * longest));
+    let fitting = units.iter().filter(|(_, size)| PLAUSIBLE_MM.contains(size));
+    let others: Vec<String> = fitting.map(|(name, size)| format!("{size:.0} mm with --unit {name}")).collect();
+    let others = if others.is_empty() { String::new() } else { format!("; it would be {}", others.join(", ")) };
+    format!("{what}; it is made {DEFAULT_SIZE_MM} mm long{others} (choose with --unit, --size, --height or --scale)")
 }
 
 /// The labels in `file`, one a triangle of the solid.
@@ -166,7 +236,7 @@ fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>
     let is_ply = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
     let a_file_face: Vec<i64> = if is_ply {
         let (with, _) = load(file)?;
-        let labels = with.face_labels.as_ref().ok_or_else(|| {
+        let labels = with.face_labels().ok_or_else(|| {
             Failure::Wrong(format!("{}: its faces have no property named label, segment or the like", file.display()))
         })?;
         let mut by_face = vec![0; with.n_file_faces()];

@@ -4,7 +4,9 @@ mod args;
 mod build;
 mod failure;
 mod input;
+mod inspect;
 mod output;
+mod paint;
 mod progress;
 mod stages;
 mod stress;
@@ -70,7 +72,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Plan { model, options } => stages::plan(session, &model, &options),
         Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
         Command::Test { kit, blows } => stress::test(session, &kit, &blows),
-        Command::Inspect { model } => stages::inspect(session, &model),
+        Command::Inspect { model, options } => inspect::inspect(session, &model, &options),
         Command::Figure { name, out, size } => stages::figure(&name, &out, size),
     }
 }

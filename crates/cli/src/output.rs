@@ -17,12 +17,14 @@ use shellock::verify::clearance::PathGap;
 use shellock::verify::thin_share;
 use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
+use shellock_geom::repair::{Repair, RepairKind};
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::args::{Axis, Options};
 use crate::build::{bearing, scope};
 use crate::failure::Failure;
 use crate::input::{Model, sha256};
+use crate::paint::painted;
 
 /// The certificate's name within a kit.
 pub const CERTIFICATE: &str = "certificate.json";
@@ -149,6 +151,7 @@ pub fn files(
     files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
     files.push(("assembly.3mf".into(), archive));
     files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
+    files.push(("segmentation.3mf".into(), painted(&model.name, &design.surface).0));
     files.push(("report.html".into(), page));
     files.push(("pieces.png".into(), picture));
     (files, summary)
@@ -238,7 +241,9 @@ fn plan_json(
         .collect();
     let mut value = json!({
         "format": "shellock-plan", "version": 1, "units": "mm", "program": env!("CARGO_PKG_VERSION"),
-        "input": { "file": model.name, "sha256": model.sha256, "transform": transform(model, design) },
+        "input": { "file": model.name, "sha256": model.sha256, "transform": transform(model, design),
+                   "largest_only": model.repairs.iter().any(|r| r.kind == RepairKind::LeftOut),
+                   "repairs": repairs_json(&model.repairs) },
         "seed": params.plan.seed,
         "shell_thickness": design.thickness_mm,
         "strength": design.strength.as_ref().map(|s| strength_json(s, params)),
@@ -269,6 +274,12 @@ fn plan_json(
         value["connector_sizes"] = sizes.into();
     }
     value
+}
+
+/// What was changed to make one body, in file units.
+pub fn repairs_json(repairs: &[Repair]) -> Vec<Value> {
+    let one = |r: &Repair| json!({ "kind": r.kind.code(), "count": r.count, "at": r.at.to_array(), "message": r.to_string() });
+    repairs.iter().map(one).collect()
 }
 
 /// Assembly from file coordinates, 4 × 4, row-major: the model's own, then turned for the key.

@@ -12,7 +12,6 @@ use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOu
 use shellock::verify::VerifyParams;
 use shellock::verify::clearance::kit_gaps;
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, segmentation, sizes};
-use shellock_geom::check::{inspect as inspection, into_solid};
 use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -23,6 +22,7 @@ use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
 use crate::output::{CERTIFICATE, certificate_bytes};
+use crate::paint::painted;
 use crate::progress::{Display, PlanClock};
 
 /// Writes one file: whole or not at all.
@@ -46,8 +46,8 @@ fn extension(path: &Path) -> String {
 pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) -> Result<u8, Failure> {
     let params = checked(options)?;
     let kind = extension(out);
-    if kind != "ply" && kind != "seg" {
-        return Err(Failure::Wrong(format!("{}: choose a name that ends in .ply or .seg", out.display())));
+    if !["ply", "3mf", "seg"].contains(&kind.as_str()) {
+        return Err(Failure::Wrong(format!("{}: choose a name that ends in .ply, .3mf or .seg", out.display())));
     }
     let model = input::model(file, options)?;
     let display = Display::new(session.is_json);
@@ -56,17 +56,29 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
         .map_err(DesignError::from)?;
     display.finish();
-    let bytes = if kind == "ply" {
-        let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
-        write_ply(&surface.mesh, Some(&labels))
-    } else {
-        write_labels(&labels_of_file(&model, &surface))
+    let mut notes = model.notes.clone();
+    let bytes = match kind.as_str() {
+        "ply" => {
+            let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
+            write_ply(&surface.mesh, Some(&labels))
+        }
+        "3mf" => {
+            let (bytes, is_distinct) = painted(&model.name, &surface);
+            if !is_distinct {
+                notes.push("slicers have 16 colours of paint: pieces that do not touch share some".to_owned());
+            }
+            bytes
+        }
+        _ => write_labels(&labels_of_file(&model, &surface)),
     };
     write(out, &bytes)?;
     let warnings = ctx.take_warnings();
     if session.is_json {
-        println!("{}", json!({ "status": "done", "out": out, "pieces": surface.n_patches, "warnings": warnings }));
+        let value =
+            json!({ "status": "done", "out": out, "pieces": surface.n_patches, "notes": notes, "warnings": warnings });
+        println!("{value}");
     } else {
+        notes.iter().for_each(|n| println!("note: {n}"));
         warnings.iter().for_each(|w| println!("warning: {}", w.message));
         println!("{} pieces, written to {}", surface.n_patches, out.display());
     }
@@ -161,7 +173,8 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let named = plan["input"]["file"].as_str().unwrap_or_default();
     let model_path = model.map_or_else(|| PathBuf::from(named), Path::to_owned);
     let (loaded, _) = load(&model_path)?;
-    let (solid, _) = into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody { path: model_path, source })?;
+    let largest = plan["input"]["largest_only"].as_bool().unwrap_or_default();
+    let solid = input::mended(&model_path, &loaded, input::mending(false, largest))?.solid;
     let t: Vec<f64> = plan["input"]["transform"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
     if t.len() != 16 {
         return Err(broken("input.transform is not 16 numbers"));
@@ -252,30 +265,6 @@ pub fn order_of(plan: &Value) -> Result<InstallationPlan, Failure> {
         Some(piece) => Err(wrong(format!("the installation order leaves out piece {piece}"))),
         None => Ok(InstallationPlan { steps }),
     }
-}
-
-/// `shellock inspect`.
-pub fn inspect(session: &Session, file: &Path) -> Result<u8, Failure> {
-    let (loaded, _) = load(file)?;
-    let size = loaded.mesh.bounds().size();
-    let found = inspection(&weld(&loaded.mesh).mesh);
-    let verdict = into_solid(&loaded.mesh);
-    if session.is_json {
-        let error = verdict.as_ref().err().map(ToString::to_string);
-        let value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
-            "size": size.to_array(), "open_edges": found.edges.open.count, "shared_edges": found.edges.shared.count,
-            "has_labels": loaded.face_labels.is_some(), "can_be_made": verdict.is_ok(), "error": error });
-        println!("{value}");
-    } else {
-        println!("{} file, {} faces, {} bodies", loaded.format, loaded.n_file_faces(), found.bodies.len());
-        println!("size {:.4} × {:.4} × {:.4} file units", size.x, size.y, size.z);
-        println!("{} open edges, {} shared edges", found.edges.open.count, found.edges.shared.count);
-    }
-    verdict.map_err(|source| Failure::NotOneBody { path: file.to_owned(), source })?;
-    if !session.is_json {
-        println!("one closed body: it can be made");
-    }
-    Ok(0)
 }
 
 /// `shellock figure`.

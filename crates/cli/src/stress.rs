@@ -118,7 +118,7 @@ fn check_kit(kit: &Path, plan: &Value) -> Result<(), String> {
 fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure> {
     let wrong = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
     let (loaded, _) = load(path)?;
-    let labels = loaded.face_labels.as_ref().ok_or_else(|| wrong("its faces have no labels"))?;
+    let labels = loaded.face_labels().ok_or_else(|| wrong("its faces have no labels"))?;
     let (solid, kept) =
         into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody { path: path.to_owned(), source })?;
     let patch = |&face: &u32| {

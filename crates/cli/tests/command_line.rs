@@ -75,11 +75,13 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
 #[test]
 fn an_open_surface_is_refused_with_its_place() {
     let dir = tempfile::tempdir().unwrap();
-    let open = "v 0 0 0\nv 30 0 0\nv 0 30 0\nv 0 0 30\nf 1 3 2\nf 1 2 4\nf 2 3 4\n";
+    // A box without a lid.
+    let open = "v 0 0 0\nv 30 0 0\nv 30 30 0\nv 0 30 0\nv 0 0 30\nv 30 0 30\nv 30 30 30\nv 0 30 30\n\
+                f 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
     fs::write(dir.path().join("open.obj"), open).unwrap();
     let o = shellock(dir.path(), &["build", "open.obj"]);
     assert_eq!(code(&o), 2);
-    assert!(errors(&o).contains("open.obj") && errors(&o).contains('3'), "{}", errors(&o));
+    assert!(errors(&o).contains("open.obj") && errors(&o).contains("1 hole (4 open edges)"), "{}", errors(&o));
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use shellock_geom::{check, io};
+use shellock_geom::{io, repair};
 
 fn main() {
     for path in std::env::args().skip(1) {
@@ -29,12 +29,15 @@ fn verdict(path: &Path) -> String {
         Ok(loaded) => loaded,
         Err(error) => return format!("refused: {error}"),
     };
-    let labels = if loaded.face_labels.is_some() { ", labelled" } else { "" };
+    let labels = if loaded.face_labels().is_some() { ", labelled" } else { "" };
     let read = format!("{}, {} triangles{labels}", loaded.format, loaded.mesh.triangles.len());
-    match check::into_solid(&loaded.mesh) {
-        Ok((solid, _)) => {
+    match repair::mend(&loaded.mesh, repair::Mending::Repair) {
+        Ok(repair::Mended { solid, repairs, .. }) => {
             let size = solid.mesh().bounds().size();
-            format!("{read}: one body of {:.4} × {:.4} × {:.4}, volume {:.6}", size.x, size.y, size.z, solid.volume())
+            let [x, y, z] = size.to_array();
+            let mut text = format!("{read}: one body of {x:.4} × {y:.4} × {z:.4}, volume {:.6}", solid.volume());
+            repairs.iter().for_each(|repair| text += &format!("\n  {repair}"));
+            text
         }
         Err(error) => format!("{read}: refused: {error}"),
     }

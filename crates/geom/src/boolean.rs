@@ -6,7 +6,7 @@
 use manifold_rust::csg_tree::CsgNode;
 use manifold_rust::linalg::Vec3 as V;
 use manifold_rust::manifold::Manifold;
-use manifold_rust::types::{Error, MeshGL64, OpType};
+use manifold_rust::types::{Error, MeshGL64, OpType, WindingRule};
 
 use crate::topology::{Topology, components};
 use crate::{Aabb, Solid, TriMesh, Vec3};
@@ -44,13 +44,7 @@ impl Volume {
         if mesh.triangles.is_empty() {
             return Ok(Self::empty());
         }
-        let gl = MeshGL64 {
-            num_prop: 3,
-            vert_properties: mesh.points.iter().flat_map(|p| p.to_array()).collect(),
-            tri_verts: mesh.triangles.iter().flatten().map(|&i| u64::from(i)).collect(),
-            ..MeshGL64::default()
-        };
-        let made = Manifold::from_mesh_gl64(&gl);
+        let made = Manifold::from_mesh_gl64(&as_gl(mesh));
         match made.status() {
             Error::NoError => Ok(Self(made)),
             other => Err(NotAVolume { reason: format!("{other:?}") }),
@@ -245,6 +239,34 @@ impl Volume {
 
     fn boxes_meet(&self, other: &Self) -> bool {
         !self.is_empty() && !other.is_empty() && self.bounds().intersects(other.bounds())
+    }
+}
+
+/// The boundary of all that a closed mesh winds around at least once: parts that overlap become one, what lies within is
+/// dissolved, and the result neither crosses itself nor has edges of more than two triangles.
+///
+/// Cost follows the pairs of triangles that cross; it is exact arithmetic. Fails where the mesh is open or not oriented.
+pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
+    let soup = Manifold::from_mesh_gl64_robust(&as_gl(mesh));
+    let refused = |made: &Manifold| NotAVolume { reason: format!("{:?}", made.status()) };
+    if soup.status() != Error::NoError {
+        return Err(refused(&soup));
+    }
+    let rebuilt = soup.rebuild_solid(WindingRule::Positive);
+    if rebuilt.status() == Error::NoError { Ok(Volume(rebuilt).to_mesh()) } else { Err(refused(&rebuilt)) }
+}
+
+/// Whether triangles of a closed mesh cross or lie upon each other: exact, where crossing in an edge counts too.
+pub fn touches_itself(mesh: &TriMesh) -> bool {
+    Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections()
+}
+
+fn as_gl(mesh: &TriMesh) -> MeshGL64 {
+    MeshGL64 {
+        num_prop: 3,
+        vert_properties: mesh.points.iter().flat_map(|p| p.to_array()).collect(),
+        tri_verts: mesh.triangles.iter().flatten().map(|&i| u64::from(i)).collect(),
+        ..MeshGL64::default()
     }
 }
 

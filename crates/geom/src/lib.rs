@@ -16,12 +16,14 @@ pub mod level_cut;
 pub mod marching_cubes;
 pub mod mesh;
 pub mod remesh;
+pub mod repair;
 pub mod rounding;
 pub mod signed_distance;
 pub mod solid;
 pub mod sparse;
 pub mod subdivide;
 pub mod sweep;
+pub mod thin;
 pub mod topology;
 pub mod weld;
 

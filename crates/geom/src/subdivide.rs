@@ -54,6 +54,23 @@ fn cut_triangle(points: &[Vec3], t: [u32; 3], m: [Option<u32>; 3], out: &mut Vec
     }
 }
 
+/// Appends the parts of a triangle with further points on its sides: `on_sides[k]` in order from corner `k` on.
+///
+/// Every point becomes a corner, no part has three points on one side, and the orientation stays; O(n log n).
+pub fn fill_triangle([a, b, c]: [u32; 3], on_sides: [&[u32]; 3], out: &mut Vec<[u32; 3]>) {
+    let fullest = (0..3).rev().max_by_key(|&k| on_sides[k].len()).unwrap_or_default();
+    if on_sides[fullest].is_empty() {
+        out.push([a, b, c]);
+        return;
+    }
+    // Cut from the middle of the fullest side to the opposite corner.
+    let [a, b, c] = [0, 1, 2].map(|k| [a, b, c][(fullest + k) % 3]);
+    let [ab, bc, ca] = [0, 1, 2].map(|k| on_sides[(fullest + k) % 3]);
+    let at = ab.len() / 2;
+    fill_triangle([a, ab[at], c], [&ab[..at], &[], ca], out);
+    fill_triangle([ab[at], b, c], [&ab[at + 1..], bc, &[]], out);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,5 +94,20 @@ mod tests {
             assert!((fine.volume() - solid.volume()).abs() < 1e-15);
             assert!((fine.mesh().area() - solid.mesh().area()).abs() < 1e-14);
         }
+    }
+
+    #[test]
+    fn a_triangle_with_points_on_its_sides_is_filled_without_gaps() {
+        // Points 3 and 4 on side 0, 5 on side 1, 6, 7 and 8 on side 2.
+        let points: Vec<Vec3> = [(0, 0), (12, 0), (0, 12), (4, 0), (8, 0), (6, 6), (0, 9), (0, 6), (0, 3)]
+            .map(|(x, y)| Vec3::new(f64::from(x), f64::from(y), 0.0))
+            .to_vec();
+        let mut triangles = Vec::new();
+        fill_triangle([0, 1, 2], [&[3, 4], &[5], &[6, 7, 8]], &mut triangles);
+        // A polygon of nine corners.
+        assert_eq!(triangles.len(), 7);
+        let mesh = TriMesh { points, triangles };
+        assert!((0..7).all(|face| mesh.area_vector_doubled(face).z > 0.0));
+        assert!((mesh.area() - 72.0).abs() < 1e-12);
     }
 }

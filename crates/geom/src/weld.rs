@@ -53,7 +53,7 @@ pub fn close(mesh: &TriMesh) -> Welded {
 }
 
 /// For each point the first one of equal coordinates.
-fn first_equal(points: &[Vec3]) -> Vec<u32> {
+pub(crate) fn first_equal(points: &[Vec3]) -> Vec<u32> {
     // Adding 0 turns −0 into 0 and changes nothing else, so equal coordinates have equal bits.
     let bits = |i: u32| points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
     // Equal points get into the same bucket by a hash, and within the few points of a bucket sorting finds them. Buckets
@@ -96,7 +96,7 @@ fn hash(bits: [u64; 3]) -> u64 {
 }
 
 /// Replaces each point by `stands_for` of it, then drops what collapses and what is unused.
-fn reindex(mesh: &TriMesh, stands_for: &[u32]) -> Welded {
+pub(crate) fn reindex(mesh: &TriMesh, stands_for: &[u32]) -> Welded {
     let mut kept_face = Vec::with_capacity(mesh.triangles.len());
     let mut triangles = Vec::with_capacity(mesh.triangles.len());
     let mut is_used = vec![false; mesh.points.len()];

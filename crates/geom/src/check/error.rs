@@ -101,6 +101,30 @@ pub enum InputError {
         /// The first.
         at: Vec3,
     },
+    /// The surface goes through itself.
+    #[error(
+        "the surface crosses itself in {}, first near {}; \
+         unite the parts that overlap in a modelling program (boolean union)",
+        plural(*count, "pair of triangles", "pairs of triangles"), Coordinates(*at)
+    )]
+    Crossing {
+        /// How many pairs of triangles cross.
+        count: usize,
+        /// Where the first is.
+        at: Vec3,
+    },
+    /// No way to turn the triangles makes neighbours agree.
+    #[error(
+        "the surface has one side only, like a Möbius band: {} triangles that face opposite ways however they are turned, \
+         first near {}; it bounds no body: model it with a thickness",
+        plural(*count, "edge joins", "edges join"), Coordinates(*at)
+    )]
+    OneSided {
+        /// How many edges.
+        count: usize,
+        /// Middle of the first.
+        at: Vec3,
+    },
     /// All triangles face inwards.
     #[error(
         "the model is inside out: all its triangles face inwards; flip the normals (flip the faces) and export it again"
@@ -146,7 +170,8 @@ impl fmt::Display for Several<'_> {
     }
 }
 
-struct Coordinates(Vec3);
+/// A place, as messages have it.
+pub(crate) struct Coordinates(pub(crate) Vec3);
 
 impl fmt::Display for Coordinates {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -155,7 +180,7 @@ impl fmt::Display for Coordinates {
 }
 
 /// A length with four significant digits, whatever the unit of the file; three decimals from 1 upwards.
-struct Short(f64);
+pub(crate) struct Short(pub(crate) f64);
 
 impl fmt::Display for Short {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -171,7 +196,8 @@ impl fmt::Display for Short {
     }
 }
 
-fn plural(count: usize, one: &str, many: &str) -> String {
+/// "1 hole", "2 holes".
+pub(crate) fn plural(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 

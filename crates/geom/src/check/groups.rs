@@ -1,15 +1,15 @@
 //! Disjoint sets.
 
 /// A partition of `0..n`; [`Groups::find`] names a group by its least member.
-pub(super) struct Groups(Vec<u32>);
+pub(crate) struct Groups(Vec<u32>);
 
 impl Groups {
     /// Everyone alone.
-    pub(super) fn of(n: usize) -> Self {
+    pub(crate) fn of(n: usize) -> Self {
         Self((0..n as u32).collect())
     }
 
-    pub(super) fn find(&mut self, mut member: u32) -> u32 {
+    pub(crate) fn find(&mut self, mut member: u32) -> u32 {
         while self.0[member as usize] != member {
             // Halving the path as it is walked keeps all paths short.
             self.0[member as usize] = self.0[self.0[member as usize] as usize];
@@ -18,7 +18,7 @@ impl Groups {
         member
     }
 
-    pub(super) fn unite(&mut self, a: u32, b: u32) {
+    pub(crate) fn unite(&mut self, a: u32, b: u32) {
         let (a, b) = (self.find(a), self.find(b));
         self.0[a.max(b) as usize] = a.min(b);
     }

@@ -1,11 +1,13 @@
 //! Is it one body? What is wrong with a surface, counted and placed, in words for the person who made it.
 //!
-//! [`inspect`] counts, [`into_solid`] decides. Not checked here: faces that cross each other, and thin walls.
+//! [`inspect`] counts, [`into_solid`] decides; [`crate::repair`] mends what it refuses. Not checked here: faces that cross
+//! each other, and thin walls.
 
 mod error;
 mod groups;
 
 pub use error::InputError;
+pub(crate) use error::{Coordinates, Short, plural};
 
 use rayon::slice::ParallelSliceMut;
 
@@ -92,7 +94,7 @@ pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
 }
 
 /// The first trouble of a mesh in the order in which a person would mend it.
-fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result<(), InputError> {
+pub(crate) fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result<(), InputError> {
     let Inspection { edges, pinched, bodies } = inspection;
     let at = |spots: &Spots| (spots.count, spots.first);
     // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
@@ -124,7 +126,7 @@ fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result
     }
 }
 
-fn check_points(mesh: &TriMesh) -> Result<(), InputError> {
+pub(crate) fn check_points(mesh: &TriMesh) -> Result<(), InputError> {
     let n_points = mesh.points.len();
     for (face, triangle) in mesh.triangles.iter().enumerate() {
         if let Some(&vertex) = triangle.iter().find(|&&v| v as usize >= n_points) {
@@ -144,22 +146,84 @@ fn check_points(mesh: &TriMesh) -> Result<(), InputError> {
 /// Where a triangle names a missing point.
 pub fn inspect(mesh: &TriMesh) -> Inspection {
     let sides = sides(mesh);
-    let mut faces = Groups::of(mesh.triangles.len());
-    // Corners of the same point belong to one fan where an edge joins their triangles.
-    let mut corners = Groups::of(3 * mesh.triangles.len());
-    for edge in sides.chunk_by(Side::same_edge) {
-        for side in &edge[1..] {
-            faces.unite(edge[0].corner / 3, side.corner / 3);
-            for end in [edge[0].low, edge[0].high] {
-                corners.unite(edge[0].corner_at(mesh, end), side.corner_at(mesh, end));
-            }
-        }
-    }
+    let mut faces = connected_faces(mesh, &sides);
+    let mut corners = connected_corners(mesh, &sides);
     Inspection {
         edges: count_edges(mesh, &sides),
         pinched: pinched(mesh, &mut corners),
         bodies: bodies(mesh, &mut faces),
     }
+}
+
+/// Triangles that edges join.
+fn connected_faces(mesh: &TriMesh, sides: &[Side]) -> Groups {
+    let mut faces = Groups::of(mesh.triangles.len());
+    for edge in sides.chunk_by(Side::same_edge) {
+        edge[1..].iter().for_each(|side| faces.unite(edge[0].face(), side.face()));
+    }
+    faces
+}
+
+/// Corners of the same point whose triangles edges join: the fans.
+fn connected_corners(mesh: &TriMesh, sides: &[Side]) -> Groups {
+    let mut corners = Groups::of(3 * mesh.triangles.len());
+    for edge in sides.chunk_by(Side::same_edge) {
+        for side in &edge[1..] {
+            for end in [edge[0].low, edge[0].high] {
+                corners.unite(edge[0].corner_at(mesh, end), side.corner_at(mesh, end));
+            }
+        }
+    }
+    corners
+}
+
+/// The fans of triangles, as groups of corners: three times the triangle, plus 0, 1 or 2.
+pub(crate) fn fans(mesh: &TriMesh) -> Groups {
+    connected_corners(mesh, &sides(mesh))
+}
+
+/// For each triangle the connected part it belongs to, and their number; parts are numbered by their first triangle.
+pub(crate) fn components(mesh: &TriMesh) -> (Vec<u32>, usize) {
+    let mut faces = connected_faces(mesh, &sides(mesh));
+    let mut number = vec![None; mesh.triangles.len()];
+    let mut n_parts = 0;
+    let part_of_face = (0..mesh.triangles.len() as u32)
+        .map(|face| {
+            *number[faces.find(face) as usize].get_or_insert_with(|| {
+                n_parts += 1;
+                n_parts - 1
+            })
+        })
+        .collect();
+    (part_of_face, n_parts as usize)
+}
+
+/// An edge with one triangle, as that runs along it.
+pub(crate) struct OpenEdge {
+    pub(crate) from: u32,
+    pub(crate) to: u32,
+    pub(crate) face: u32,
+    /// Which side of the triangle: 0, 1 or 2.
+    pub(crate) side: u8,
+}
+
+impl OpenEdge {
+    pub(crate) fn length(&self, mesh: &TriMesh) -> f64 {
+        mesh.points[self.from as usize].distance(mesh.points[self.to as usize])
+    }
+}
+
+/// All edges with one triangle, in the order of their points.
+pub(crate) fn open_edges(mesh: &TriMesh) -> Vec<OpenEdge> {
+    let sides = sides(mesh);
+    let single = sides.chunk_by(Side::same_edge).filter(|edge| edge.len() == 1);
+    single
+        .map(|edge| {
+            let (face, side) = (edge[0].face(), (edge[0].corner % 3) as u8);
+            let triangle = mesh.triangles[face as usize];
+            OpenEdge { from: triangle[side as usize], to: triangle[(side as usize + 1) % 3], face, side }
+        })
+        .collect()
 }
 
 /// The part of [`inspect`] about edges.
@@ -169,14 +233,14 @@ pub(crate) fn inspect_edges(mesh: &TriMesh) -> Edges {
 
 /// A triangle's side: from corner `corner` (three times the face, plus 0, 1 or 2) to the next.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
-    low: u32,
-    high: u32,
-    corner: u32,
+pub(crate) struct Side {
+    pub(crate) low: u32,
+    pub(crate) high: u32,
+    pub(crate) corner: u32,
 }
 
 impl Side {
-    fn same_edge(&self, other: &Self) -> bool {
+    pub(crate) fn same_edge(&self, other: &Self) -> bool {
         (self.low, self.high) == (other.low, other.high)
     }
 
@@ -186,13 +250,17 @@ impl Side {
         if mesh.triangles[face as usize][k as usize] == end { self.corner } else { 3 * face + (k + 1) % 3 }
     }
 
-    fn runs_up(&self, mesh: &TriMesh) -> bool {
+    pub(crate) fn runs_up(&self, mesh: &TriMesh) -> bool {
         self.corner_at(mesh, self.low) == self.corner
+    }
+
+    pub(crate) fn face(&self) -> u32 {
+        self.corner / 3
     }
 }
 
 /// All sides, those of an edge next to each other.
-fn sides(mesh: &TriMesh) -> Vec<Side> {
+pub(crate) fn sides(mesh: &TriMesh) -> Vec<Side> {
     let all = || {
         mesh.triangles.iter().zip(0_u32..).flat_map(|(&[a, b, c], face)| {
             [(a, b, 0), (b, c, 1), (c, a, 2)].map(|(from, to, k)| Side {

@@ -1,15 +1,13 @@
 //! `.seg`: one whole number a line, the label of a face in file order (Princeton Segmentation Benchmark).
 
 use super::text::{Lines, whole, words};
-use super::{Place, ReadError, recognise};
+use super::{Place, ReadError, container};
 
 /// Reads one label ≥ 0 a line, in the order of the file's faces; blank lines are passed over and `3.0` counts as 3.
 pub fn read_labels(bytes: &[u8]) -> Result<Vec<i64>, ReadError> {
-    if recognise::is_utf16(bytes) {
-        return Err(ReadError::Utf16);
-    }
+    let (bytes, _) = container::unpack(bytes)?;
     let mut labels = Vec::new();
-    for (at, line) in Lines::of(bytes) {
+    for (at, line) in Lines::of(&bytes) {
         if let Some(label) = label(line, at)? {
             labels.push(label);
         }

@@ -2,21 +2,29 @@
 //!
 //! | format | read | written |
 //! |---|---|---|
-//! | STL | binary, ASCII | binary |
-//! | OBJ | text | |
-//! | PLY | ASCII, binary of both byte orders, face labels | binary, face labels |
-//! | OFF | text | |
-//! | 3MF | refused by name | one object per piece, coloured |
+//! | STL | binary, ASCII, colours of both dialects | binary |
+//! | OBJ | text; groups, objects, materials | |
+//! | PLY | ASCII, binary of both byte orders, strips, face labels and colours | binary, face labels |
+//! | OFF | text, face colours | |
+//! | 3MF | units, components, transforms, several files, materials, paint | pieces, coloured; one body, painted |
+//! | glTF, GLB | nodes, all modes of triangles, materials | |
 //! | `.seg` | one label a line | the same |
 //!
-//! Readers take what files in the wild hold and refuse the rest with a place: a line of a text, a byte of a binary file.
-//! They never panic and reserve no memory that the bytes at hand do not back. Coordinates are taken as they stand (most
-//! formats have no unit) and points are not merged: that is [`crate::weld`]; whether the surface is a body is
-//! [`crate::check`].
+//! Any of them may be packed by gzip, lie alone in a zip archive, be stored as UTF-16 or have a wrong name.
+//!
+//! Readers take what files in the wild hold and refuse the rest with a place: a line of a text, a byte of a file.
+//! They never panic and reserve no memory that the bytes at hand do not back. Coordinates are taken as they stand
+//! ([`Loaded::unit_mm`] says where the file has a unit) and points are not merged: that is [`crate::weld`]; whether the
+//! surface is a body is [`crate::check`].
 
+mod assembly;
+mod container;
+mod error;
+mod gltf;
 mod labels;
 mod obj;
 mod off;
+mod paint;
 mod ply;
 mod polygons;
 mod recognise;
@@ -26,25 +34,30 @@ mod threemf;
 
 use std::fmt;
 
+pub use error::ReadError;
 pub use labels::{read_labels, write_labels};
 pub use ply::write_ply;
 pub use stl::write_stl_binary;
-pub use threemf::{NamedObject, write_3mf};
+pub use threemf::{NamedObject, write_3mf, write_painted_3mf};
 
 use crate::TriMesh;
 use recognise::recognise;
 
-/// A mesh as its file has it, polygons cut into fans of triangles.
+/// A mesh as its file has it, polygons cut into triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// Points in file units, in file order; an STL has three of its own for each triangle.
     pub mesh: TriMesh,
-    /// One label for each triangle, where the file labels its faces (PLY only).
-    pub face_labels: Option<Vec<i64>>,
+    /// The ways in which the file divides its surface, each at most once, in the order of [`LabelSource`].
+    pub labellings: Vec<Labelling>,
     /// For each triangle the face of the file it came from, counted from 0; ascending.
     pub file_face: Vec<u32>,
     /// What the bytes turned out to be.
     pub format: Format,
+    /// Length of a file unit, mm, where the format has one.
+    pub unit_mm: Option<f64>,
+    /// What a person should know about how the bytes were taken.
+    pub notes: Vec<String>,
 }
 
 impl Loaded {
@@ -52,6 +65,56 @@ impl Loaded {
     pub fn n_file_faces(&self) -> usize {
         // No reader drops a face, so the last triangle belongs to the last face.
         self.file_face.last().map_or(0, |&face| face as usize + 1)
+    }
+
+    /// One label for each triangle as `source` has them; `None` where the file has none.
+    pub fn labels(&self, source: LabelSource) -> Option<&[i64]> {
+        self.labellings.iter().find(|l| l.source == source).map(|l| &l.labels[..])
+    }
+
+    /// Labels that somebody gave on purpose: a property of the faces, or paint.
+    pub fn face_labels(&self) -> Option<&[i64]> {
+        self.labels(LabelSource::Property).or_else(|| self.labels(LabelSource::Paint))
+    }
+}
+
+/// One label for each triangle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labelling {
+    /// What of the file tells them apart.
+    pub source: LabelSource,
+    /// As many as triangles. Those of [`LabelSource::Property`] stand in the file; others are numbered from 0 as they
+    /// first occur, paint by its colour.
+    pub labels: Vec<i64>,
+}
+
+/// What can divide a surface in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LabelSource {
+    /// A whole number called "label", "segment" or the like (PLY).
+    Property,
+    /// Multi-material paint of PrusaSlicer, Bambu Studio and OrcaSlicer (3MF).
+    Paint,
+    /// Colours of faces (STL, PLY, OFF, 3MF).
+    Color,
+    /// Materials (OBJ, 3MF, glTF).
+    Material,
+    /// Groups (OBJ).
+    Group,
+    /// Objects, solids or nodes (OBJ, STL, 3MF, glTF).
+    Object,
+}
+
+impl fmt::Display for LabelSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Property => "labels",
+            Self::Paint => "paint",
+            Self::Color => "colors",
+            Self::Material => "materials",
+            Self::Group => "groups",
+            Self::Object => "objects",
+        })
     }
 }
 
@@ -68,6 +131,12 @@ pub enum Format {
     Ply,
     /// Object file format of Geomview.
     Off,
+    /// 3D Manufacturing Format.
+    ThreeMf,
+    /// glTF as text, its data within.
+    Gltf,
+    /// glTF, binary.
+    Glb,
 }
 
 impl fmt::Display for Format {
@@ -78,6 +147,9 @@ impl fmt::Display for Format {
             Self::Obj => "OBJ",
             Self::Ply => "PLY",
             Self::Off => "OFF",
+            Self::ThreeMf => "3MF",
+            Self::Gltf => "glTF",
+            Self::Glb => "GLB",
         })
     }
 }
@@ -100,142 +172,24 @@ impl fmt::Display for Place {
     }
 }
 
-/// Why bytes are no mesh (or no list of labels).
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ReadError {
-    /// No bytes, or nothing but blanks.
-    #[error("the file is empty; export it again")]
-    Empty,
-    /// A 3MF package.
-    #[error("3MF is not read yet; export the model as STL, OBJ, PLY or OFF")]
-    ThreeMf,
-    /// Some other zip archive.
-    #[error("the file is a zip archive; unpack it and give the mesh file inside")]
-    Zip,
-    /// Two bytes a character.
-    #[error("the text is stored as UTF-16; save it as UTF-8 or plain ASCII")]
-    Utf16,
-    /// Neither the content nor the extension says what it is.
-    #[error("the content is neither STL, OBJ, PLY nor OFF; export the model in one of these formats")]
-    UnknownFormat,
-    /// A variant of a known format that is not read.
-    #[error("{at}: {what} is not read; export the model as binary STL or PLY")]
-    Unsupported {
-        /// The variant.
-        what: &'static str,
-        /// Where it says so.
-        at: Place,
-    },
-    /// Something else stands where a certain word or number should.
-    #[error("{at}: expected {expected}, found \"{found}\"; correct it there or export the file again")]
-    Malformed {
-        /// Where.
-        at: Place,
-        /// What should stand there.
-        expected: &'static str,
-        /// What stands there, shortened.
-        found: String,
-    },
-    /// The bytes end too early.
-    #[error("{at}: the file ends in the middle of {within}; it was cut off: copy or export it again")]
-    CutOff {
-        /// The end.
-        at: Place,
-        /// What is incomplete.
-        within: &'static str,
-    },
-    /// A header's count cannot be true.
-    #[error(
-        "{at}: the header promises {promised} {what}, but the file has room for {room} only; \
-         it was cut off or its header is wrong: copy or export it again"
-    )]
-    TooFewBytes {
-        /// Where the count or what it counts stands.
-        at: Place,
-        /// What is counted.
-        what: &'static str,
-        /// The count of the header.
-        promised: u64,
-        /// What the bytes could hold at most.
-        room: u64,
-    },
-    /// A binary STL goes on after its last triangle.
-    #[error(
-        "{at}: the header promises {promised} triangles, but the file holds {held}; \
-         its header is wrong: export it again"
-    )]
-    MoreTriangles {
-        /// Where the promised triangles end.
-        at: Place,
-        /// The count of the header.
-        promised: u64,
-        /// What the bytes hold.
-        held: u64,
-    },
-    /// A coordinate is NaN or infinite, or too large for a float.
-    #[error("{at}: a coordinate is not a finite number (NaN or infinite); repair the model where it was made")]
-    NotFinite {
-        /// Where.
-        at: Place,
-    },
-    /// A face names a point that is not there.
-    #[error(
-        "{at}: a face uses point {index}, but the file has {n_points} points, counted from {first}; \
-         export the model again"
-    )]
-    MissingPoint {
-        /// Where the face stands.
-        at: Place,
-        /// The index as the file has it.
-        index: i64,
-        /// How many points there are.
-        n_points: usize,
-        /// Index of the first point in this format.
-        first: u32,
-    },
-    /// A face of fewer than three corners.
-    #[error("{at}: a face has {n_corners} corners, it needs 3 or more; export the model again")]
-    TooFewCorners {
-        /// Where.
-        at: Place,
-        /// How many it has.
-        n_corners: usize,
-    },
-    /// Points or nothing at all.
-    #[error("the {format} file has no triangles ({n_points} points); export the model as a surface mesh")]
-    NoTriangles {
-        /// The format.
-        format: Format,
-        /// How many points there are.
-        n_points: usize,
-    },
-    /// More than indices of 32 bits can tell apart.
-    #[error("{at}: more than 4 thousand million points or triangles; simplify the model first")]
-    TooLarge {
-        /// Where the limit is passed.
-        at: Place,
-    },
-    /// A label below 0.
-    #[error("{at}: the label {label} is negative; number the parts from 0")]
-    NegativeLabel {
-        /// Where.
-        at: Place,
-        /// The label.
-        label: i64,
-    },
-}
-
 /// Reads a mesh; the content decides what it is, and `extension` ("stl", ".OBJ") only where the content leaves it open.
 ///
 /// Guarantees: at least one triangle, all points finite, all indices in range. Not promised: anything about the surface.
 pub fn read_mesh(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
-    match recognise(bytes, extension)? {
-        Format::StlBinary => stl::read_binary(bytes),
-        Format::StlAscii => stl::read_ascii(bytes),
-        Format::Obj => obj::read(bytes),
-        Format::Ply => ply::read(bytes),
-        Format::Off => off::read(bytes),
-    }
+    let (bytes, name) = container::unpack(bytes)?;
+    let inner = name.as_deref().and_then(|n| n.rsplit_once('.')).map(|(_, extension)| extension);
+    let mut loaded = match recognise(&bytes, inner.or(extension))? {
+        Format::StlBinary => stl::read_binary(&bytes),
+        Format::StlAscii => stl::read_ascii(&bytes),
+        Format::Obj => obj::read(&bytes),
+        Format::Ply => ply::read(&bytes),
+        Format::Off => off::read(&bytes),
+        Format::ThreeMf => threemf::read(&bytes),
+        Format::Gltf => gltf::read_text(&bytes),
+        Format::Glb => gltf::read_binary(&bytes),
+    }?;
+    loaded.notes.extend(name.map(|name| format!("the archive's only mesh was read: {name}")));
+    Ok(loaded)
 }
 
 #[cfg(test)]

@@ -1,8 +1,13 @@
-//! Wavefront OBJ: `v` and `f`; normals, texture, groups, materials, lines and curves are passed over.
+//! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces; normals, texture, lines and curves are
+//! passed over.
 
-use super::polygons::Polygons;
+use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, point, whole, without_comment, words};
-use super::{Format, Loaded, Place, ReadError};
+use super::{Format, LabelSource, Loaded, Place, ReadError};
+
+/// What divides the faces, as it stands in a statement.
+const DIVISIONS: [(&[u8], LabelSource); 3] =
+    [(b"usemtl", LabelSource::Material), (b"g", LabelSource::Group), (b"o", LabelSource::Object)];
 
 /// Reads an OBJ; faces may name points that come later, and count backwards from the last one with negative indices.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
@@ -10,6 +15,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut lines = Lines::of(bytes);
     let mut statement = Vec::new();
     let mut corners = Vec::new();
+    let mut divisions = DIVISIONS.map(|_| Division::default());
     while let Some(at) = next_statement(&mut lines, &mut statement) {
         match statement.split_first() {
             Some((&b"v", rest)) => {
@@ -23,10 +29,43 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
                 }
                 polygons.add_polygon(&corners, at)?;
             }
-            _ => {}
+            Some((&word, rest)) => {
+                if let Some(which) = DIVISIONS.iter().position(|(name, _)| *name == word) {
+                    divisions[which].begin(rest, polygons.n_faces());
+                }
+            }
+            None => {}
         }
     }
-    polygons.finish(Format::Obj, None)
+    let n_faces = polygons.n_faces();
+    let labels = DIVISIONS.iter().zip(divisions).filter_map(|((_, source), d)| Some((*source, d.labels(n_faces)?)));
+    polygons.finish(Format::Obj, labels.collect())
+}
+
+/// Names that hold for the faces after them.
+#[derive(Default)]
+struct Division<'a> {
+    numbering: Numbering<Vec<&'a [u8]>>,
+    /// The first face of each stretch and its label.
+    begins: Vec<(usize, i64)>,
+}
+
+impl<'a> Division<'a> {
+    fn begin(&mut self, name: &[&'a [u8]], face: usize) {
+        let label = self.numbering.number(name.to_vec());
+        self.begins.push((face, label));
+    }
+
+    /// One label for each of `n_faces` faces; `None` where nothing was named.
+    fn labels(self, n_faces: usize) -> Option<Vec<i64>> {
+        // Faces before the first name have none, which is a name too.
+        const NAMELESS: i64 = -1;
+        let mut labels = vec![NAMELESS; self.begins.first()?.0.min(n_faces)];
+        for (i, &(_, label)) in self.begins.iter().enumerate() {
+            labels.resize(self.begins.get(i + 1).map_or(n_faces, |next| next.0), label);
+        }
+        Some(labels)
+    }
 }
 
 /// Fills `statement` with the words up to a line end without a backslash; the place is that of its first line.

@@ -1,8 +1,8 @@
-//! OFF: points and polygons as text. Normals and colours (NOFF, COFF, face colours) are passed over.
+//! OFF: points and polygons as text, with the colours of faces. Normals and colours of points are passed over.
 
-use super::polygons::Polygons;
+use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, malformed, point, whole, without_bom, without_comment, words};
-use super::{Format, Loaded, Place, ReadError};
+use super::{Format, LabelSource, Loaded, Place, ReadError};
 
 /// Fewest bytes a point takes: `0 0 0` and a line end.
 const POINT_BYTES: u64 = 6;
@@ -21,6 +21,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
         polygons.add_point(point(&mut words(line), at)?, at)?;
     }
     let mut corners = Vec::new();
+    let (mut numbering, mut colors) = (Numbering::default(), Vec::with_capacity(n_faces));
     for _ in 0..n_faces {
         let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff { at: lines.place(), within: "the faces" })?;
         let mut words = words(line);
@@ -31,8 +32,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
             corners.push(polygons.corner(index, at)?);
         }
         polygons.add_polygon(&corners, at)?;
+        colors.push(numbering.number(words.map(<[u8]>::to_vec).collect::<Vec<_>>()));
     }
-    polygons.finish(Format::Off, None)
+    polygons.finish(Format::Off, vec![(LabelSource::Color, colors)])
 }
 
 /// The counts of points and faces, on the line of the first word or the next; what the bytes cannot back is refused.

@@ -1,6 +1,6 @@
 //! Collects points and polygons while a file is read.
 
-use super::{Format, Loaded, Place, ReadError};
+use super::{Format, LabelSource, Labelling, Loaded, Place, ReadError};
 use crate::{TriMesh, Vec3};
 
 /// The mesh so far. Polygons may name points that come later; [`Polygons::finish`] settles that.
@@ -29,6 +29,10 @@ impl Polygons {
 
     pub(super) fn n_points(&self) -> usize {
         self.mesh.points.len()
+    }
+
+    pub(super) fn n_faces(&self) -> usize {
+        self.n_faces as usize
     }
 
     /// Adds a point and returns its index.
@@ -68,7 +72,7 @@ impl Polygons {
     }
 
     /// The mesh, with `labels` of the file's faces handed on to the triangles.
-    pub(super) fn finish(self, format: Format, labels: Option<&[i64]>) -> Result<Loaded, ReadError> {
+    pub(super) fn finish(self, format: Format, labels: Vec<(LabelSource, Vec<i64>)>) -> Result<Loaded, ReadError> {
         let n_points = self.n_points();
         if self.mesh.triangles.is_empty() {
             return Err(ReadError::NoTriangles { format, n_points });
@@ -78,12 +82,37 @@ impl Polygons {
         {
             return Err(self.missing(i64::from(index), at));
         }
-        let face_labels = labels.map(|labels| self.file_face.iter().map(|&face| labels[face as usize]).collect());
-        Ok(Loaded { mesh: self.mesh, face_labels, file_face: self.file_face, format })
+        let mut labellings: Vec<Labelling> = labels
+            .into_iter()
+            .filter(|(source, labels)| *source == LabelSource::Property || divides(labels))
+            .map(|(source, labels)| Labelling {
+                source,
+                labels: self.file_face.iter().map(|&face| labels[face as usize]).collect(),
+            })
+            .collect();
+        labellings.sort_by_key(|l| l.source);
+        let (mesh, file_face) = (self.mesh, self.file_face);
+        Ok(Loaded { mesh, labellings, file_face, format, unit_mm: None, notes: Vec::new() })
     }
 
     fn missing(&self, index: i64, at: Place) -> ReadError {
         let index = index.saturating_add(i64::from(self.first));
         ReadError::MissingPoint { at, index, n_points: self.n_points(), first: self.first }
+    }
+}
+
+/// Whether there are two different labels.
+pub(super) fn divides(labels: &[i64]) -> bool {
+    labels.windows(2).any(|pair| pair[0] != pair[1])
+}
+
+/// Numbers names or colours from 0 as they first occur.
+#[derive(Default)]
+pub(super) struct Numbering<T: Ord>(std::collections::BTreeMap<T, i64>);
+
+impl<T: Ord> Numbering<T> {
+    pub(super) fn number(&mut self, name: T) -> i64 {
+        let next = self.0.len() as i64;
+        *self.0.entry(name).or_insert(next)
     }
 }

@@ -13,18 +13,14 @@ pub(super) fn recognise(bytes: &[u8], extension: Option<&str>) -> Result<Format,
         return Err(ReadError::Empty);
     }
     if bytes.starts_with(b"PK\x03\x04") {
-        return Err(if extension == "3mf" || contains(bytes, b"3dmodel.model") {
-            ReadError::ThreeMf
-        } else {
-            ReadError::Zip
-        });
+        return Ok(Format::ThreeMf);
     }
     // Before all words: binary files may begin with any of them, most often with "solid".
     if stl::length_fits_binary(bytes) {
         return Ok(Format::StlBinary);
     }
-    if is_utf16(bytes) {
-        return Err(ReadError::Utf16);
+    if bytes.starts_with(b"glTF") {
+        return Ok(Format::Glb);
     }
     let is_text = !bytes[..bytes.len().min(SAMPLE_BYTES)].contains(&0);
     match (by_first_word(bytes), extension.as_str()) {
@@ -33,8 +29,8 @@ pub(super) fn recognise(bytes: &[u8], extension: Option<&str>) -> Result<Format,
         (None, "stl") => Ok(if is_text { Format::StlAscii } else { Format::StlBinary }),
         (None, "obj") if is_text => Ok(Format::Obj),
         (None, "off") if is_text => Ok(Format::Off),
+        (None, "gltf") if is_text => Ok(Format::Gltf),
         (None, "ply") => Ok(Format::Ply),
-        (None, "3mf") => Err(ReadError::ThreeMf),
         (None, _) => Err(ReadError::UnknownFormat),
     }
 }
@@ -47,6 +43,8 @@ fn by_first_word(bytes: &[u8]) -> Option<Format> {
         b"v" | b"vn" | b"vt" | b"vp" | b"f" | b"o" | b"g" | b"s" | b"l" | b"p" | b"mtllib" | b"usemtl" => {
             Some(Format::Obj)
         }
+        // JSON, and glTF is the only mesh format in it that is read.
+        word if word.starts_with(b"{") => Some(Format::Gltf),
         word if word.len() <= 8 && word.ends_with(b"off") => Some(Format::Off),
         _ => None,
     }
@@ -65,8 +63,4 @@ pub(super) fn is_utf16(bytes: &[u8]) -> bool {
 
 fn is_printed(byte: u8) -> bool {
     byte.is_ascii_graphic() || byte.is_ascii_whitespace()
-}
-
-fn contains(bytes: &[u8], part: &[u8]) -> bool {
-    bytes.windows(part.len()).any(|window| window == part)
 }

@@ -55,7 +55,9 @@ fn every_format_gives_the_tetrahedron_back() {
         (write_ply(&mesh, None), Format::Ply),
     ] {
         let loaded = read(bytes).unwrap();
-        assert_eq!(loaded, Loaded { mesh: mesh.clone(), face_labels: None, file_face: vec![0, 1, 2, 3], format });
+        let file_face = vec![0, 1, 2, 3];
+        let (mesh, labellings, notes) = (mesh.clone(), vec![], vec![]);
+        assert_eq!(loaded, Loaded { mesh, labellings, file_face, format, unit_mm: None, notes });
     }
     for (bytes, format) in
         [(write_stl_binary(&mesh), Format::StlBinary), (ascii_stl(&mesh, "x").into_bytes(), Format::StlAscii)]
@@ -82,15 +84,62 @@ fn stl_quirks() {
 }
 
 #[test]
+fn wrong_counts_trailing_bytes_and_colours_of_stl() {
+    let bytes = write_stl_binary(&tetrahedron());
+    let stl = |bytes: &[u8]| read_mesh(bytes, Some(".STL")).unwrap();
+    // Counts of programs that do not know them, or know them wrongly.
+    for count in [0_u32, 2, u32::MAX] {
+        let mut other = bytes.clone();
+        other[80..84].copy_from_slice(&count.to_le_bytes());
+        let loaded = stl(&other);
+        assert_eq!((loaded.mesh.triangles.len(), loaded.notes.len()), (4, 1), "{count}");
+    }
+    let mut trailing = bytes.clone();
+    trailing.extend([b'x'; 70]);
+    assert_eq!((stl(&trailing).mesh.triangles.len(), stl(&trailing).notes.len()), (4, 1));
+    // Colours: the highest bit says that there is one; in files of Magics that there is none.
+    let mut colored = bytes;
+    colored[84 + 48..84 + 50].copy_from_slice(&0x8003_u16.to_le_bytes());
+    colored[84 + 98..84 + 100].copy_from_slice(&0x8003_u16.to_le_bytes());
+    colored[84 + 148..84 + 150].copy_from_slice(&0x0004_u16.to_le_bytes());
+    assert_eq!(stl(&colored).labels(LabelSource::Color), Some(&[0, 0, 1, 1][..]));
+    colored[..6].copy_from_slice(b"COLOR=");
+    assert_eq!(stl(&colored).labels(LabelSource::Color), Some(&[0, 0, 1, 2][..]));
+    let text = ascii_stl(&tetrahedron(), "x");
+    assert_eq!(read(&text).unwrap().labellings, []);
+    assert_eq!(read(text.clone() + &text).unwrap().labels(LabelSource::Object).unwrap()[3..5], [1, 2]);
+}
+
+#[test]
+fn groups_materials_and_colours_divide_and_a_single_one_does_not() {
+    let grouped = "o thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\ng a b\nusemtl red\nf 1 2 4\ng c\nf 2 3 4\ng a b\nf 1 4 3\n";
+    let loaded = read(grouped).unwrap();
+    assert_eq!(loaded.labels(LabelSource::Group), Some(&[-1, 0, 1, 0][..]));
+    assert_eq!(loaded.labels(LabelSource::Material), Some(&[-1, 0, 0, 0][..]));
+    assert_eq!((loaded.labels(LabelSource::Object), loaded.face_labels()), (None, None));
+    let colored = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                   element face 3\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n\
+                   property uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2 255 0 0\n3 0 1 3 0 0 255\n4 0 1 2 3 255 0 0\n";
+    assert_eq!(read(colored).unwrap().labels(LabelSource::Color), Some(&[0, 1, 0, 0][..]));
+    let off = "OFF 3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 1 0 0\n3 0 2 1 0 1 0\n";
+    assert_eq!(read(off).unwrap().labels(LabelSource::Color), Some(&[0, 1][..]));
+}
+
+#[test]
+fn strips_of_ply_turn_every_other_triangle_and_begin_anew() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+                element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+                0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n9 0 1 2 3 3 -1 1 4 3\n";
+    assert_eq!(read(text).unwrap().mesh.triangles, [[0, 1, 2], [2, 1, 3], [1, 4, 3]]);
+}
+
+#[test]
 fn broken_stl_is_refused_with_its_place() {
     let bytes = write_stl_binary(&tetrahedron());
     let stl = |bytes: &[u8]| read_mesh(bytes, Some(".STL")).unwrap_err();
     let too_few = ReadError::TooFewBytes { at: Place::Byte(80), what: "triangles", promised: 4, room: 3 };
     assert_eq!(stl(&bytes[..270]), too_few);
     assert_eq!(stl(&bytes[..50]), ReadError::CutOff { at: Place::Byte(50), within: "the header" });
-    let mut fewer = bytes.clone();
-    fewer[80] = 2;
-    assert_eq!(stl(&fewer), ReadError::MoreTriangles { at: Place::Byte(80), promised: 2, held: 4 });
     let mut nan = bytes;
     nan[84 + 50 + 24..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     assert_eq!(stl(&nan), ReadError::NotFinite { at: Place::Byte(84 + 50 + 24) });
@@ -126,17 +175,55 @@ fn obj_quirks() {
 }
 
 #[test]
-fn utf16_archives_and_nothing_are_named() {
-    let utf16 = |bom: bool| -> Vec<u8> {
-        let text = if bom { "\u{FEFF}v 0 0 0\nv 1 0 0\n" } else { "v 0 0 0\nv 1 0 0\n" };
-        text.encode_utf16().flat_map(u16::to_be_bytes).collect()
-    };
-    assert_eq!(read(utf16(true)), Err(ReadError::Utf16));
-    assert_eq!(read(utf16(false)), Err(ReadError::Utf16));
-    assert!(read_mesh(&write_3mf(&[]), None).unwrap_err().to_string().starts_with("3MF is not read yet"));
-    assert_eq!(read(b"PK\x03\x04something"), Err(ReadError::Zip));
+fn what_a_file_is_wrapped_in_makes_no_difference() {
+    let plain = obj(&tetrahedron());
+    let expected = read(&plain).unwrap().mesh;
+    for (bom, is_big) in [("\u{FEFF}", true), ("\u{FEFF}", false), ("", true), ("", false)] {
+        let text = format!("{bom}{plain}");
+        let bytes: Vec<u8> =
+            text.encode_utf16().flat_map(|c| if is_big { c.to_be_bytes() } else { c.to_le_bytes() }).collect();
+        assert_eq!(read(bytes).unwrap().mesh, expected);
+    }
+    let packed = gzip(plain.as_bytes());
+    assert_eq!(read(&packed).unwrap().mesh, expected);
+    let archive = zip_of(&[("readme.txt", b"hello"), ("a/model.obj", plain.as_bytes())]);
+    let loaded = read(&archive).unwrap();
+    assert_eq!((loaded.mesh, loaded.notes.len()), (expected.clone(), 1));
+    assert_eq!(read(zip_of(&[("model.obj.gz", &packed)])).unwrap().mesh, expected);
+    // The extension within the archive counts.
+    let bare = b"3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2";
+    assert_eq!(read_mesh(&zip_of(&[("x.OFF", bare)]), Some("zip")).unwrap().format, Format::Off);
+
+    let two = zip_of(&[("a.stl", b""), ("b.stl", b"")]);
+    assert_eq!(read(two), Err(ReadError::Archive { n_models: 2 }));
+    assert!(matches!(read(b"PK\x03\x04something"), Err(ReadError::Damaged { .. })));
+    assert!(matches!(read(&packed[..packed.len() - 9]), Err(ReadError::Damaged { .. })));
     assert_eq!(read(" \r\n"), Err(ReadError::Empty));
-    assert_eq!(read("glTF\x02"), Err(ReadError::UnknownFormat));
+    assert_eq!(read("hello"), Err(ReadError::UnknownFormat));
+}
+
+#[test]
+fn bombs_are_refused_before_they_fill_the_memory() {
+    // Blanks pack to a thousandth.
+    let blanks = vec![b' '; 100 << 20];
+    assert_eq!(read(gzip(&blanks)), Err(ReadError::Bomb { limit_mb: 73 }));
+    let limit = read(zip_of(&[("3D/3dmodel.model", &blanks)]));
+    assert!(matches!(limit, Err(ReadError::Bomb { .. })), "{limit:?}");
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    std::io::Write::write_all(&mut packer, bytes).unwrap();
+    packer.finish().unwrap()
+}
+
+fn zip_of(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in files {
+        archive.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        std::io::Write::write_all(&mut archive, bytes).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
 }
 
 #[test]
@@ -175,7 +262,7 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
     }
     let loaded = read(&ascii).unwrap();
     assert_eq!(loaded, read(&binary).unwrap());
-    assert_eq!(loaded.face_labels, Some(vec![5, 5, -1]));
+    assert_eq!(loaded.face_labels(), Some(&[5, 5, -1][..]));
     assert_eq!(loaded.file_face, [0, 0, 1]);
     assert_eq!(loaded.mesh.points[3], Vec3::new(0.0, 1.0, -2.0));
     assert!(matches!(read(&binary[..binary.len() - 1]), Err(ReadError::CutOff { .. })));
@@ -185,7 +272,7 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
 fn written_labels_are_read_again() {
     let labels = [3, -7, 0, i32::MAX];
     let loaded = read(write_ply(&tetrahedron(), Some(&labels))).unwrap();
-    assert_eq!(loaded.face_labels.unwrap(), labels.map(i64::from));
+    assert_eq!(loaded.face_labels().unwrap(), labels.map(i64::from));
     assert_eq!(read_labels(&write_labels(&[4, 0, 17])), Ok(vec![4, 0, 17]));
 }
 
@@ -266,6 +353,7 @@ fn valid_files() -> Vec<Vec<u8>> {
     let mesh = tetrahedron();
     let mut files = vec![write_stl_binary(&mesh), write_ply(&mesh, Some(&[0, 1, 2, 3])), write_ply(&mesh, None)];
     files.extend([ascii_stl(&mesh, "x"), obj(&mesh), off(&mesh)].map(String::into_bytes));
+    files.push(write_painted_3mf("x", &mesh, &[0, 1, 2, 3]));
     files.push(
         b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
           element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
@@ -277,7 +365,7 @@ fn valid_files() -> Vec<Vec<u8>> {
 /// Everything that meets bytes from outside.
 fn read_all_ways(bytes: &[u8]) {
     let _ = read_labels(bytes);
-    for extension in [None, Some("stl"), Some("obj"), Some("ply"), Some("off"), Some("3mf")] {
+    for extension in [None, Some("stl"), Some("obj"), Some("ply"), Some("off"), Some("gltf")] {
         if let Ok(loaded) = read_mesh(bytes, extension) {
             let _ = crate::check::into_solid(&loaded.mesh);
         }
@@ -294,7 +382,7 @@ proptest! {
 
     #[test]
     fn no_reader_panics_on_damaged_files(
-        file in 0_usize..7,
+        file in 0_usize..8,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
         cut in any::<prop::sample::Index>(),
         is_cut in any::<bool>(),

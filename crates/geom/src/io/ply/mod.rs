@@ -1,4 +1,4 @@
-//! PLY: points, polygons and, optionally, a whole-number label for each face. Everything else is skipped.
+//! PLY: points, polygons or strips, and for each face a whole-number label or a colour. Everything else is skipped.
 //!
 //! A file is a text header that declares elements (`vertex`, `face`, others) with their properties, then the values of
 //! all elements in order, as words or as bytes.
@@ -6,11 +6,11 @@
 mod header;
 mod source;
 
-use super::polygons::Polygons;
+use super::polygons::{Numbering, Polygons};
 use super::text::whole_of;
-use super::{Format, Loaded, ReadError};
+use super::{Format, LabelSource, Loaded, ReadError};
 use crate::TriMesh;
-use header::{Element, Encoding, Header, Kind, Scalar};
+use header::{Element, Encoding, Header, Kind, Property, Scalar};
 use source::{Binary, Source, Words};
 
 /// Names that programs give to the label of a face; where a file has several, the first of this list counts.
@@ -34,6 +34,9 @@ const LABEL_NAMES: [&str; 17] = [
     "group_id",
 ];
 
+/// Channels of the colour of a face, the first three of them needed.
+const COLOR_NAMES: [&str; 4] = ["red", "green", "blue", "alpha"];
+
 /// Reads a PLY of any encoding.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let (header, lines) = Header::read(bytes)?;
@@ -47,11 +50,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
 
 fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
-    let mut labels = None;
+    let mut labels = Vec::new();
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_points(element, &mut source, &mut polygons)?,
             "face" => labels = read_faces(element, &mut source, &mut polygons)?,
+            "tristrips" => read_strips(element, &mut source, &mut polygons)?,
             // Rows without properties have no bytes, so their count is backed by nothing.
             _ if element.properties.is_empty() => {}
             _ => {
@@ -61,7 +65,9 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
             }
         }
     }
-    polygons.finish(Format::Ply, labels.as_deref())
+    // Strips have no labels; with faces that have, they would be told apart by chance.
+    labels.retain(|(_, labels)| labels.len() == polygons.n_faces());
+    polygons.finish(Format::Ply, labels)
 }
 
 fn read_points(element: &Element, source: &mut impl Source, polygons: &mut Polygons) -> Result<(), ReadError> {
@@ -87,28 +93,29 @@ fn read_points(element: &Element, source: &mut impl Source, polygons: &mut Polyg
     Ok(())
 }
 
-/// Adds the polygons; returns one label each where a property has a name for it.
+/// Adds the polygons; returns one label each where a property has a name for it, and one for each colour.
 fn read_faces(
     element: &Element,
     source: &mut impl Source,
     polygons: &mut Polygons,
-) -> Result<Option<Vec<i64>>, ReadError> {
-    let is_corners = |name: &str| name == "vertex_indices" || name == "vertex_index";
-    let Some(corners_property) =
-        element.properties.iter().position(|p| is_corners(&p.name) && matches!(p.kind, Kind::List { .. }))
-    else {
-        return Err(ReadError::Unsupported { what: "a PLY file whose faces lack vertex_indices", at: element.at });
+) -> Result<Vec<(LabelSource, Vec<i64>)>, ReadError> {
+    let corners_property = corners_property(element, "a PLY file whose faces lack vertex_indices")?;
+    let scalar_named = |name: &str| {
+        let is_it = |p: &Property| p.name == name && matches!(p.kind, Kind::Scalar(_));
+        element.properties.iter().position(is_it)
     };
-    let label_property = LABEL_NAMES.iter().find_map(|name| {
-        element.properties.iter().position(|p| p.name == *name && matches!(p.kind, Kind::Scalar(s) if s.is_integer()))
-    });
+    let is_integer = |i: &usize| matches!(element.properties[*i].kind, Kind::Scalar(s) if s.is_integer());
+    let label_property = LABEL_NAMES.iter().find_map(|name| scalar_named(name).filter(is_integer));
+    let color_properties = COLOR_NAMES.map(scalar_named);
+    let has_colors = color_properties[..3].iter().all(Option::is_some);
 
     polygons.reserve(0, element.count);
-    let mut labels = Vec::new();
+    let (mut labels, mut colors, mut numbering) = (Vec::new(), Vec::new(), Numbering::default());
     let mut corners = Vec::new();
     for _ in 0..element.count {
         let at = source.place();
         corners.clear();
+        let mut color = [0_u64; 4];
         for (i, property) in element.properties.iter().enumerate() {
             match property.kind {
                 Kind::List { count, item } if i == corners_property => {
@@ -117,12 +124,64 @@ fn read_faces(
                     }
                 }
                 Kind::Scalar(scalar) if Some(i) == label_property => labels.push(whole(source, scalar)?),
+                Kind::Scalar(scalar) if has_colors && color_properties.contains(&Some(i)) => {
+                    let channel = color_properties.iter().position(|c| *c == Some(i)).unwrap_or_default();
+                    color[channel] = source.next(scalar)?.to_bits();
+                }
                 kind => skip(kind, source)?,
             }
         }
         polygons.add_polygon(&corners, at)?;
+        if has_colors {
+            colors.push(numbering.number(color));
+        }
     }
-    Ok(label_property.map(|_| labels))
+    let mut found = Vec::new();
+    found.extend(label_property.map(|_| (LabelSource::Property, labels)));
+    found.extend(has_colors.then_some((LabelSource::Color, colors)));
+    Ok(found)
+}
+
+fn corners_property(element: &Element, lacking: &'static str) -> Result<usize, ReadError> {
+    let is_corners = |name: &str| name == "vertex_indices" || name == "vertex_index";
+    let found = element.properties.iter().position(|p| is_corners(&p.name) && matches!(p.kind, Kind::List { .. }));
+    found.ok_or(ReadError::Unsupported { what: lacking, at: element.at })
+}
+
+/// Adds strips of triangles, as scans have them: each point makes a triangle with the two before it, turned every other
+/// time; −1 begins anew.
+fn read_strips(element: &Element, source: &mut impl Source, polygons: &mut Polygons) -> Result<(), ReadError> {
+    let corners_property = corners_property(element, "a PLY file whose strips lack vertex_indices")?;
+    for _ in 0..element.count {
+        for (i, property) in element.properties.iter().enumerate() {
+            let Kind::List { count, item } = property.kind else {
+                skip(property.kind, source)?;
+                continue;
+            };
+            if i != corners_property {
+                skip(property.kind, source)?;
+                continue;
+            }
+            let (mut strip, mut n_before) = ([0; 2], 0_usize);
+            for _ in 0..whole(source, count)? {
+                let at = source.place();
+                let index = whole(source, item)?;
+                if index == -1 {
+                    n_before = 0;
+                    continue;
+                }
+                let corner = polygons.corner(index, at)?;
+                let [a, b] = strip;
+                // Strips repeat a point to turn a corner: what has no area is no triangle of theirs.
+                if n_before >= 2 && a != b && b != corner && corner != a {
+                    let triangle = if n_before.is_multiple_of(2) { [a, b, corner] } else { [b, a, corner] };
+                    polygons.add_polygon(&triangle, at)?;
+                }
+                (strip, n_before) = ([b, corner], n_before + 1);
+            }
+        }
+    }
+    Ok(())
 }
 
 fn skip(kind: Kind, source: &mut impl Source) -> Result<(), ReadError> {

@@ -1,4 +1,4 @@
-//! 3MF, written only: a zip archive of three XML files (3MF core specification 1.3, with its base materials).
+//! Writing 3MF: a zip archive of three XML files (3MF core specification 1.3, with its base materials).
 
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
@@ -6,6 +6,7 @@ use std::io::{Cursor, Write as _};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
+use super::super::paint::whole_triangle_code;
 use crate::TriMesh;
 
 /// An object of a 3MF model.
@@ -22,6 +23,11 @@ pub struct NamedObject<'a> {
 }
 
 const TITLE: &str = "Shellock pieces";
+/// Where PrusaSlicer's attributes belong.
+const PAINT_NAMESPACE: &str = r#" xmlns:slic3rpe="http://schemas.slic3r.org/3mf/2017/06""#;
+/// PrusaSlicer's versions of its additions and of the paint.
+const PAINT_VERSION: &str = "<metadata name=\"slic3rpe:Version3mf\">1</metadata>\n\
+                             <metadata name=\"slic3rpe:MmPaintingVersion\">1</metadata>\n";
 const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>
 "#;
@@ -33,7 +39,27 @@ const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 ///
 /// Coordinates are rounded to `f32`, as slicers read them. Slicers refuse objects without triangles.
 pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
-    let model = model_xml(objects);
+    package(&model_xml(objects))
+}
+
+/// A 3MF of one body in millimetres whose triangles are painted: colour k, from 1 to 16, is the k-th extruder or filament.
+///
+/// PrusaSlicer, Bambu Studio and OrcaSlicer show the paint, each reading its own attribute; there it can be changed, and
+/// [`super::super::read_mesh`] reads it back, points and all.
+///
+/// # Panics
+/// Where `colors` has another length than the triangles.
+pub fn write_painted_3mf(name: &str, mesh: &TriMesh, colors: &[u32]) -> Vec<u8> {
+    assert_eq!(colors.len(), mesh.triangles.len(), "one colour for each triangle");
+    let mut xml = head("Shellock segmentation", PAINT_NAMESPACE, PAINT_VERSION);
+    add(&mut xml, format_args!("<object id=\"1\" type=\"model\" name=\"{}\">\n", Escaped(name)));
+    add_mesh(&mut xml, mesh, Some(colors));
+    xml.push_str("</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n");
+    package(&xml)
+}
+
+/// The archive around a model.
+fn package(model: &str) -> Vec<u8> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .compression_level(Some(1))
@@ -41,8 +67,7 @@ pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
         .unix_permissions(0o644)
         .system(System::Unix)
         .large_file(model.len() >= u32::MAX as usize);
-    let entries =
-        [("3D/3dmodel.model", model.as_str()), ("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS)];
+    let entries = [("3D/3dmodel.model", model), ("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS)];
 
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (path, text) in entries {
@@ -52,16 +77,21 @@ pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
     archive.finish().expect("memory takes all bytes").into_inner()
 }
 
+/// The text up to the resources, with a further namespace and further metadata.
+fn head(title: &str, namespace: &str, metadata: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\"{namespace}>\n\
+         <metadata name=\"Title\">{title}</metadata>\n<metadata name=\"Application\">shellock</metadata>\n{metadata}<resources>\n"
+    )
+}
+
 fn model_xml(objects: &[NamedObject]) -> String {
     /// Resource of the colours; objects follow it.
     const MATERIALS_ID: usize = 1;
     let object_id = |i: usize| MATERIALS_ID + 1 + i;
 
-    let mut xml = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\">\n\
-         <metadata name=\"Title\">{TITLE}</metadata>\n<metadata name=\"Application\">shellock</metadata>\n<resources>\n"
-    );
+    let mut xml = head(TITLE, "", "");
     if !objects.is_empty() {
         add(&mut xml, format_args!("<basematerials id=\"{MATERIALS_ID}\">\n"));
         for NamedObject { name, color: [r, g, b], .. } in objects {
@@ -76,7 +106,7 @@ fn model_xml(objects: &[NamedObject]) -> String {
             &mut xml,
             format_args!("<object id=\"{id}\" type=\"model\" name=\"{name}\" pid=\"{MATERIALS_ID}\" pindex=\"{i}\">\n"),
         );
-        add_mesh(&mut xml, object.mesh);
+        add_mesh(&mut xml, object.mesh, None);
         xml.push_str("</object>\n");
     }
     xml.push_str("</resources>\n<build>\n");
@@ -91,15 +121,26 @@ fn model_xml(objects: &[NamedObject]) -> String {
     xml
 }
 
-fn add_mesh(xml: &mut String, mesh: &TriMesh) {
+fn add_mesh(xml: &mut String, mesh: &TriMesh, colors: Option<&[u32]>) {
     xml.push_str("<mesh>\n<vertices>\n");
     for p in &mesh.points {
-        let [x, y, z] = p.to_array().map(|x| x as f32);
-        add(xml, format_args!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n"));
+        let exact = p.to_array();
+        let [x, y, z] = exact.map(|x| x as f32);
+        match colors {
+            // Seams of patches come closer together than floats tell apart.
+            Some(_) => add(xml, format_args!("<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>\n", exact[0], exact[1], exact[2])),
+            None => add(xml, format_args!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n")),
+        }
     }
     xml.push_str("</vertices>\n<triangles>\n");
-    for [a, b, c] in &mesh.triangles {
-        add(xml, format_args!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"/>\n"));
+    for (face, [a, b, c]) in mesh.triangles.iter().enumerate() {
+        add(xml, format_args!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\""));
+        match colors.map(|colors| whole_triangle_code(colors[face])) {
+            Some(code) if !code.is_empty() => {
+                add(xml, format_args!(" slic3rpe:mmu_segmentation=\"{code}\" paint_color=\"{code}\"/>\n"));
+            }
+            _ => xml.push_str("/>\n"),
+        }
     }
     xml.push_str("</triangles>\n</mesh>\n");
 }

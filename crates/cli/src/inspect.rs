@@ -1,0 +1,89 @@
+//! `inspect`: what a file holds, and what would be made of it.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use shellock::pipeline::Params;
+use shellock_geom::check::inspect as inspection;
+use shellock_geom::io::Loaded;
+use shellock_geom::repair::mend;
+use shellock_geom::thin::{ThinPlace, thin_places};
+use shellock_geom::weld::weld;
+
+use crate::Session;
+use crate::args::{Options, Thickness};
+use crate::failure::Failure;
+use crate::input::{Model, load, mending, model_of};
+use crate::output::repairs_json;
+
+/// Thin places that are told one by one.
+const N_TOLD: usize = 3;
+
+/// `shellock inspect`.
+pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
+    let (loaded, bytes) = load(file)?;
+    let size = loaded.mesh.bounds().size();
+    let found = inspection(&weld(&loaded.mesh).mesh);
+    let labellings: Vec<String> = loaded.labellings.iter().map(|l| l.source.to_string()).collect();
+    if !session.is_json {
+        println!("{} file, {} faces, {} bodies", loaded.format, loaded.n_file_faces(), found.bodies.len());
+        println!("size {:.4} × {:.4} × {:.4} file units{}", size.x, size.y, size.z, unit(&loaded));
+        println!("{} open edges, {} shared edges", found.edges.open.count, found.edges.shared.count);
+        if !labellings.is_empty() {
+            println!("divided by {}", labellings.join(", "));
+        }
+    }
+    let model = model_of(file, &loaded, &bytes, options);
+    let thin = model.as_ref().map(|model| thin_warnings(model, options)).unwrap_or_default();
+    if session.is_json {
+        let is_sound = mend(&loaded.mesh, mending(true, false)).is_ok();
+        let (repairs, notes): (Vec<Value>, &[String]) =
+            model.as_ref().map_or_else(|_| (Vec::new(), &[][..]), |m| (repairs_json(&m.repairs), &m.notes));
+        let error = model.as_ref().err().map(ToString::to_string);
+        let value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
+            "size": size.to_array(), "unit_mm": loaded.unit_mm, "open_edges": found.edges.open.count,
+            "shared_edges": found.edges.shared.count, "has_labels": loaded.face_labels().is_some(),
+            "divided_by": labellings, "is_sound": is_sound, "repairs": repairs, "notes": notes, "warnings": thin,
+            "can_be_made": model.is_ok(), "error": error });
+        println!("{value}");
+        return model.map(|_| 0);
+    }
+    let model = model?;
+    model.notes.iter().for_each(|note| println!("note: {note}"));
+    thin.iter().for_each(|warning| println!("warning: {warning}"));
+    let made = model.solid.mesh().bounds().size();
+    let state = if model.repairs.is_empty() { "one closed body" } else { "one closed body after repair" };
+    println!("{state}: it can be made, {:.1} × {:.1} × {:.1} mm", made.x, made.y, made.z);
+    Ok(0)
+}
+
+fn unit(loaded: &Loaded) -> String {
+    loaded.unit_mm.map_or_else(String::new, |mm| format!(" of {mm} mm"))
+}
+
+/// Where a model is too thin for a cavity between two walls, and how thin; nothing where it is thick enough.
+pub fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
+    let wall_mm = match options.thickness {
+        Thickness::Mm(mm) => mm,
+        Thickness::Auto => Params::default().strength.least_mm,
+    };
+    let places = thin_places(&model.solid, 2.0 * wall_mm);
+    let area_mm2: f64 = places.iter().map(|p| p.area_mm2).sum();
+    let percent = 100.0 * area_mm2 / model.solid.mesh().area();
+    // What rounds to nothing is a thin edge somewhere.
+    if percent < 0.5 {
+        return Vec::new();
+    }
+    let told = |p: &ThinPlace| {
+        let [x, y, z] = p.at.to_array();
+        format!("{:.2} mm at ({x:.1}, {y:.1}, {z:.1}) mm", p.thickness_mm)
+    };
+    let largest: Vec<String> = places.iter().take(N_TOLD).map(told).collect();
+    let others =
+        if places.len() > N_TOLD { format!(" and {} smaller places", places.len() - N_TOLD) } else { String::new() };
+    vec![format!(
+        "{percent:.1} % of the surface is thinner than two walls of {wall_mm} mm: {}{others}; it stays solid there, without \
+         connectors: make the model larger (--size) or the wall thinner (--thickness)",
+        largest.join(", ")
+    )]
+}

@@ -1,0 +1,256 @@
+//! Files as people have them, good and bad, each made by code: what becomes of them, and what is said.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{Cursor, Write as _};
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use shellock_geom::io::{write_ply, write_stl_binary};
+use shellock_geom::subdivide::halve_edges;
+use shellock_geom::{Solid, Topology, TriMesh, Vec3};
+
+fn shellock(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_shellock")).current_dir(folder).args(args).output().unwrap()
+}
+
+/// A ball of 512 triangles, 60 mm wide, around `center`.
+fn ball(center: Vec3) -> TriMesh {
+    let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
+    let triangles = vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
+    for _ in 0..3 {
+        solid = halve_edges(&solid, &Topology::new(&solid), |_, _| true).0;
+    }
+    let mut mesh = solid.into_mesh();
+    mesh.points.iter_mut().for_each(|p| *p = center + 30.0 * p.normalize());
+    mesh
+}
+
+fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
+    let n = a.points.len() as u32;
+    a.points.extend(b.points);
+    a.triangles.extend(b.triangles.iter().map(|t| t.map(|v| v + n)));
+    a
+}
+
+fn changed(change: impl Fn(&mut TriMesh)) -> TriMesh {
+    let mut mesh = ball(Vec3::ZERO);
+    change(&mut mesh);
+    mesh
+}
+
+fn scaled(mesh: &TriMesh, factor: f64, by: Vec3) -> TriMesh {
+    let mut mesh = mesh.clone();
+    mesh.points.iter_mut().for_each(|p| *p = factor * *p + by);
+    mesh
+}
+
+fn ply(mesh: &TriMesh) -> Vec<u8> {
+    write_ply(mesh, None)
+}
+
+fn obj(mesh: &TriMesh) -> String {
+    let mut text = String::new();
+    mesh.points.iter().for_each(|p| writeln!(text, "v {} {} {}", p.x, p.y, p.z).unwrap());
+    mesh.triangles.iter().for_each(|[a, b, c]| writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap());
+    text
+}
+
+fn ascii_stl(mesh: &TriMesh) -> String {
+    let mut text = "solid ☠\n".to_owned();
+    for face in 0..mesh.triangles.len() {
+        text += "facet normal 0 0 0\nouter loop\n";
+        mesh.corners(face).iter().for_each(|p| writeln!(text, "vertex {} {} {}", p.x, p.y, p.z).unwrap());
+        text += "endloop\nendfacet\n";
+    }
+    text + "endsolid\n"
+}
+
+fn package(model: &str) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    archive.start_file("3D/3dmodel.model", zip::write::SimpleFileOptions::default()).unwrap();
+    archive.write_all(model.as_bytes()).unwrap();
+    archive.finish().unwrap().into_inner()
+}
+
+/// A 3MF of the ball as object 1, in inches.
+fn three_mf(mesh: &TriMesh, more: &str, build: &str) -> String {
+    let mut model = "<model unit=\"inch\"><resources><object id=\"1\"><mesh><vertices>".to_owned();
+    let inch = 1.0 / 25.4;
+    for p in &mesh.points {
+        write!(model, "<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>", inch * p.x, inch * p.y, inch * p.z).unwrap();
+    }
+    model += "</vertices><triangles>";
+    mesh.triangles.iter().for_each(|[a, b, c]| write!(model, "<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"/>").unwrap());
+    model + "</triangles></mesh></object>" + more + "</resources><build>" + build + "</build></model>"
+}
+
+/// What becomes of a file.
+enum Outcome {
+    /// It can be made as it is.
+    Sound,
+    /// It can be made after these repairs.
+    Repaired(&'static [&'static str]),
+    /// It is refused with these words.
+    Refused(&'static [&'static str]),
+}
+use Outcome::{Refused, Repaired, Sound};
+
+type Twin = (&'static str, Vec<u8>, Outcome);
+
+/// Broken or odd as files.
+fn odd_files() -> Vec<Twin> {
+    let good = ball(Vec3::ZERO);
+    let stl = write_stl_binary(&good);
+    let text = ascii_stl(&good);
+    let with = |change: &dyn Fn(&mut Vec<u8>)| {
+        let mut bytes = stl.clone();
+        change(&mut bytes);
+        bytes
+    };
+    let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_be_bytes).collect::<Vec<u8>>();
+    vec![
+        ("zero.stl", Vec::new(), Refused(&["empty"])),
+        ("good.stl", stl.clone(), Sound),
+        ("named.obj", stl.clone(), Sound),
+        ("header_solid.stl", with(&|b| b[..6].copy_from_slice(b"solid ")), Sound),
+        ("cut.stl", stl[..stl.len() / 2].to_vec(), Refused(&["promises 512 triangles", "cut off"])),
+        ("nan.stl", with(&|b| b[96..100].copy_from_slice(&f32::NAN.to_le_bytes())), Refused(&["byte 96", "NaN"])),
+        ("normals.stl", with(&|b| b[84..88].copy_from_slice(&9_f32.to_le_bytes())), Sound),
+        ("upper.stl", text.to_uppercase().replace('\n', "\r\n").into_bytes(), Sound),
+        ("no_extension", text.clone().into_bytes(), Sound),
+        ("no_facet.stl", b"solid x\nendsolid x\n".to_vec(), Refused(&["no triangles"])),
+        ("points.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n".to_vec(), Refused(&["no triangles"])),
+        ("twice.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nelement vertex 9\nend_header\n".to_vec(), Refused(&["line 5"])),
+        ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 12\n".to_vec(), Refused(&["line 4", "12"])),
+        ("huge.off", b"OFF\n353535235358 6 0\n0 0 0\n".to_vec(), Refused(&["353535235358"])),
+        ("utf16.obj", utf16(&obj(&good)), Sound),
+        ("far.obj", obj(&scaled(&good, 1.0, Vec3::splat(1e9))).into_bytes(), Sound),
+        ("metres.ply", ply(&scaled(&good, 1e-3, Vec3::ZERO)), Sound),
+        ("inch.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/>")), Sound),
+        ("mirror.3mf", package(&three_mf(&good, "", "<item objectid=\"1\" transform=\"-1 0 0 0 1 0 0 0 1 0 0 0\"/>")), Sound),
+        ("missing.3mf", package(&three_mf(&good, "", "<item objectid=\"2\"/>")), Refused(&["object 2"])),
+        ("attribute.3mf", package(&three_mf(&good, "", "<item objectid=\"1\" objectid=\"1\"/>")), Refused(&["duplicated"])),
+        ("two.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/><item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 9 0 0\"/>")), Refused(&["2 separate bodies", "--largest"])),
+        ("cycle.3mf", package(&three_mf(&good, "<object id=\"2\"><components><component objectid=\"2\"/></components></object>", "<item objectid=\"2\"/>")), Refused(&["contains itself"])),
+        ("damaged.3mf", package(&three_mf(&good, "", "")).into_iter().map(|b| if b == b'n' { b'm' } else { b }).collect(), Refused(&["damaged"])),
+        ("garbage.glb", b"glTF\x02\0\0\0garbage".to_vec(), Refused(&["cut off"])),
+    ]
+}
+
+/// Broken or odd as surfaces.
+fn odd_surfaces() -> Vec<Twin> {
+    let good = ball(Vec3::ZERO);
+    let unwelded = TriMesh {
+        points: (0..good.triangles.len()).flat_map(|f| good.corners(f)).collect(),
+        triangles: (0..good.triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
+    };
+    let mut cracked = unwelded.clone();
+    cracked.points.iter_mut().enumerate().for_each(|(i, p)| p.x += 1e-5 * (i % 7) as f64);
+    let divided = changed(|m| {
+        let [a, b, c] = m.triangles[0];
+        m.points.push(0.5 * (m.points[a as usize] + m.points[b as usize]));
+        let middle = m.points.len() as u32 - 1;
+        m.triangles[0] = [a, middle, c];
+        m.triangles.push([middle, b, c]);
+    });
+    let inner = scaled(&good, 0.3, Vec3::ONE);
+    let everted = |mut mesh: TriMesh| {
+        mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        mesh
+    };
+    let soup = TriMesh { triangles: unwelded.triangles.iter().step_by(9).copied().collect(), ..unwelded.clone() };
+    let speck = scaled(&good, 0.001, Vec3::splat(29.0));
+    vec![
+        ("unwelded.ply", ply(&unwelded), Sound),
+        ("cracks.ply", ply(&cracked), Repaired(&["points-merged"])),
+        ("copies.ply", ply(&changed(|m| m.triangles.extend_from_within(..50))), Repaired(&["copies-removed"])),
+        (
+            "turned.ply",
+            ply(&changed(|m| m.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1)))),
+            Repaired(&["triangles-turned"]),
+        ),
+        ("everted.ply", ply(&everted(good.clone())), Repaired(&["body-turned"])),
+        ("one_missing.ply", ply(&changed(|m| m.triangles.truncate(511))), Repaired(&["holes-closed"])),
+        ("open.ply", ply(&changed(|m| m.triangles.truncate(300))), Refused(&["not closed", "1 hole", "near ("])),
+        ("edge.ply", ply(&divided), Repaired(&["edges-joined"])),
+        ("cavity.ply", ply(&both(good.clone(), everted(inner.clone()))), Repaired(&["cavities-filled"])),
+        ("inner.ply", ply(&both(good.clone(), inner)), Repaired(&["cavities-filled"])),
+        ("specks.ply", ply(&both(good.clone(), speck)), Repaired(&["specks-removed"])),
+        ("overlap.ply", ply(&both(good.clone(), ball(Vec3::new(31.0, 7.0, 3.0)))), Repaired(&["parts-united"])),
+        ("apart.ply", ply(&both(good.clone(), ball(Vec3::X * 90.0))), Refused(&["2 separate bodies", "--largest"])),
+        ("soup.ply", ply(&soup), Refused(&["do not hang together"])),
+        ("thin.ply", ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02))), Sound),
+    ]
+}
+
+#[test]
+fn every_file_ends_in_a_body_or_in_words_that_help() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, bytes, outcome) in odd_files().into_iter().chain(odd_surfaces()) {
+        fs::write(dir.path().join(name), bytes).unwrap();
+        let o = shellock(dir.path(), &["inspect", name, "--json"]);
+        let (code, errors) = (o.status.code(), String::from_utf8_lossy(&o.stderr).into_owned());
+        let told: Value = serde_json::from_slice(&o.stdout).unwrap_or_default();
+        let strict = shellock(dir.path(), &["inspect", name, "--no-repair"]).status.code();
+        match outcome {
+            Sound => assert_eq!(
+                (code, &told["repairs"], strict),
+                (Some(0), &Value::Array(vec![]), Some(0)),
+                "{name}: {errors}"
+            ),
+            Repaired(codes) => {
+                let done: Vec<&str> =
+                    told["repairs"].as_array().unwrap().iter().filter_map(|r| r["kind"].as_str()).collect();
+                assert_eq!((code, done, strict), (Some(0), codes.to_vec(), Some(2)), "{name}: {errors}");
+            }
+            Refused(words) => {
+                assert_eq!((code, strict), (Some(2), Some(2)), "{name}: {errors}");
+                words.iter().for_each(|word| assert!(errors.contains(word), "{name}: no \"{word}\" in {errors}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn sizes_follow_units_and_thin_models_are_warned_of() {
+    let dir = tempfile::tempdir().unwrap();
+    let said = |name: &str, bytes: Vec<u8>, options: &[&str]| {
+        fs::write(dir.path().join(name), bytes).unwrap();
+        let o = shellock(dir.path(), &[&["inspect", name], options].concat());
+        String::from_utf8_lossy(&o.stdout).into_owned()
+    };
+    let good = ball(Vec3::ZERO);
+    assert!(
+        said("i.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/>")), &[]).contains("60.0 × 60.0 × 60.0 mm")
+    );
+    let metres = ply(&scaled(&good, 1e-3, Vec3::ZERO));
+    assert!(said("m.ply", metres.clone(), &[]).contains("60 mm with --unit m "));
+    assert!(said("m.ply", metres, &["--unit", "m"]).contains("60.0 × 60.0 × 60.0 mm"));
+    let thin = ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02)));
+    let warned = said("thin.ply", thin, &[]);
+    assert!(warned.contains("warning: ") && warned.contains("thinner than two walls of 1.6 mm"), "{warned}");
+    assert!(!said("thick.ply", ply(&good), &[]).contains("warning"));
+}
+
+#[test]
+fn a_segmentation_written_as_paint_is_read_as_the_same_pieces() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let o = shellock(dir.path(), args);
+        assert_eq!(o.status.code(), Some(0), "{}", String::from_utf8_lossy(&o.stderr));
+        String::from_utf8_lossy(&o.stdout).into_owned()
+    };
+    fs::write(dir.path().join("ball.ply"), ply(&ball(Vec3::ZERO))).unwrap();
+    run(&["segment", "ball.ply", "--pieces", "6", "-o", "painted.3mf"]);
+    let told = run(&["inspect", "painted.3mf"]);
+    assert!(told.contains("divided by paint") && told.contains("the paint in the file divides it"), "{told}");
+    let pieces = |args: &[&str]| -> Value {
+        serde_json::from_str::<Value>(&run(&[args, &["--json", "-o", "again.ply"]].concat())).unwrap()["pieces"].clone()
+    };
+    assert_eq!(pieces(&["segment", "painted.3mf"]), pieces(&["segment", "ball.ply", "--pieces", "6"]));
+    let o = shellock(dir.path(), &["segment", "painted.3mf", "--labels-from", "groups", "-o", "again.ply"]);
+    assert!(String::from_utf8_lossy(&o.stderr).contains("no groups divide it; what does: paint"));
+}

@@ -1,0 +1,174 @@
+//! Refusals of bytes, in words.
+
+use super::{Format, Place};
+
+/// Why bytes are no mesh (or no list of labels).
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ReadError {
+    /// No bytes, or nothing but blanks.
+    #[error("the file is empty; export it again")]
+    Empty,
+    /// An archive without a model, or with several.
+    #[error("the file is a zip archive with {n_models} mesh files in it; unpack it and give the one you want")]
+    Archive {
+        /// Files in it whose names are those of meshes.
+        n_models: usize,
+    },
+    /// A zip or gzip that cannot be unpacked.
+    #[error("the archive is damaged ({reason}); download or export the file again")]
+    Damaged {
+        /// What the unpacker says.
+        reason: String,
+    },
+    /// Unpacking would take more memory than an honest file needs.
+    #[error("unpacked, the file has more than {limit_mb} MB; it is broken or hostile: export a plain mesh file")]
+    Bomb {
+        /// The limit for a file of this size.
+        limit_mb: u64,
+    },
+    /// Parts put together from parts have too many triangles.
+    #[error("{what} gives more than {limit} triangles; simplify the model first")]
+    TooManyCopies {
+        /// What multiplies.
+        what: &'static str,
+        /// The limit.
+        limit: u64,
+    },
+    /// A part is made of parts that contain it.
+    #[error("{kind} {id} contains itself, directly or through others; export the model again")]
+    Cycle {
+        /// "object" or "node".
+        kind: &'static str,
+        /// Its id in the file.
+        id: String,
+    },
+    /// A part names another that is not there.
+    #[error("{kind} {id} is used, but is not in the file; export the model again")]
+    MissingPart {
+        /// "object", "mesh", "buffer", ….
+        kind: &'static str,
+        /// Its id in the file.
+        id: String,
+    },
+    /// Neither the content nor the extension says what it is.
+    #[error("the content is neither STL, OBJ, PLY, OFF, 3MF nor glTF; export the model in one of these formats")]
+    UnknownFormat,
+    /// A variant of a known format that is not read.
+    #[error("{at}: {what} is not read; export the model as 3MF, binary STL or PLY")]
+    Unsupported {
+        /// The variant.
+        what: &'static str,
+        /// Where it says so.
+        at: Place,
+    },
+    /// Something else stands where a certain word or number should.
+    #[error("{at}: expected {expected}, found \"{found}\"; correct it there or export the file again")]
+    Malformed {
+        /// Where.
+        at: Place,
+        /// What should stand there.
+        expected: &'static str,
+        /// What stands there, shortened.
+        found: String,
+    },
+    /// A part of a 3MF package that is not what it should be.
+    #[error("{part}, {at}: {reason}; export the model again")]
+    Xml {
+        /// The file within the package.
+        part: String,
+        /// Where in it.
+        at: Place,
+        /// What is wrong.
+        reason: String,
+    },
+    /// glTF whose description is not what it should be.
+    #[error("the glTF cannot be read: {reason}; export the model again, with its data inside (.glb)")]
+    Gltf {
+        /// What is wrong.
+        reason: String,
+    },
+    /// Paint of a triangle that is no code of PrusaSlicer or Bambu Studio.
+    #[error(
+        "the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove the paint"
+    )]
+    Paint {
+        /// The triangle within its object.
+        face: u32,
+        /// The code, shortened.
+        code: String,
+    },
+    /// The bytes end too early.
+    #[error("{at}: the file ends in the middle of {within}; it was cut off: copy or export it again")]
+    CutOff {
+        /// The end.
+        at: Place,
+        /// What is incomplete.
+        within: &'static str,
+    },
+    /// A header's count cannot be true.
+    #[error(
+        "{at}: the header promises {promised} {what}, but the file has room for {room} only; \
+         it was cut off or its header is wrong: copy or export it again"
+    )]
+    TooFewBytes {
+        /// Where the count or what it counts stands.
+        at: Place,
+        /// What is counted.
+        what: &'static str,
+        /// The count of the header.
+        promised: u64,
+        /// What the bytes could hold at most.
+        room: u64,
+    },
+    /// A coordinate is NaN or infinite, or too large for a float.
+    #[error("{at}: a coordinate is not a finite number (NaN or infinite); repair the model where it was made")]
+    NotFinite {
+        /// Where.
+        at: Place,
+    },
+    /// A face names a point that is not there.
+    #[error(
+        "{at}: a face uses point {index}, but the file has {n_points} points, counted from {first}; \
+         export the model again"
+    )]
+    MissingPoint {
+        /// Where the face stands.
+        at: Place,
+        /// The index as the file has it.
+        index: i64,
+        /// How many points there are.
+        n_points: usize,
+        /// Index of the first point in this format.
+        first: u32,
+    },
+    /// A face of fewer than three corners.
+    #[error("{at}: a face has {n_corners} corners, it needs 3 or more; export the model again")]
+    TooFewCorners {
+        /// Where.
+        at: Place,
+        /// How many it has.
+        n_corners: usize,
+    },
+    /// Points or nothing at all.
+    #[error("the {format} file has no triangles ({n_points} points); export the model as a surface mesh")]
+    NoTriangles {
+        /// The format.
+        format: Format,
+        /// How many points there are.
+        n_points: usize,
+    },
+    /// More than indices of 32 bits can tell apart.
+    #[error("{at}: more than 4 thousand million points or triangles; simplify the model first")]
+    TooLarge {
+        /// Where the limit is passed.
+        at: Place,
+    },
+    /// A label below 0.
+    #[error("{at}: the label {label} is negative; number the parts from 0")]
+    NegativeLabel {
+        /// Where.
+        at: Place,
+        /// The label.
+        label: i64,
+    },
+}

@@ -1,0 +1,217 @@
+//! A surface that crosses itself: finding the pairs of triangles, and making one surface of what lies inside.
+
+use rayon::prelude::*;
+
+use super::{Draft, Repair, RepairKind};
+use crate::boolean;
+use crate::bvh::TriangleBvh;
+use crate::check::{InputError, inspect, inspect_edges};
+use crate::{Aabb, TriMesh, Vec3};
+
+/// Triangles in a leaf of the boxes; 4 to 16 take about the same time.
+const LEAF: usize = 8;
+/// Pairs of boxes that are looked at for each leaf; more meet in the tip of a cone of twenty thousand triangles, and in
+/// hostile files, where not all crossings are found then.
+const MAX_PAIRS_OF_LEAF: usize = 100_000;
+/// Pairs of crossing triangles that are resolved: at 1 to 5 ms each, a minute or two. Meshes that ask for more are wrecks.
+const MAX_RESOLVED: usize = 20_000;
+/// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles that
+/// touch, or cross in less than that, do not count as crossing.
+const FLAT: f64 = 1e-10;
+
+/// Where a surface crosses itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Crossings {
+    /// Pairs of triangles.
+    pub count: usize,
+    /// The middle of the first triangle of one, file units; the origin if `count` is 0.
+    pub first: Vec3,
+}
+
+/// Pairs of triangles of which an edge of one goes through the other; those that touch or lie in a plane do not count.
+///
+/// O(n log n) and by the pairs whose boxes meet; the same on any number of threads.
+pub fn crossings(mesh: &TriMesh) -> Crossings {
+    let tree = Boxes::of(mesh);
+    let found: Vec<(usize, Option<u32>)> =
+        (0..tree.order.len().div_ceil(LEAF)).into_par_iter().map(|leaf| tree.crossings_of(mesh, leaf)).collect();
+    let first = found.iter().filter_map(|(_, first)| *first).min();
+    Crossings {
+        count: found.iter().map(|(count, _)| count).sum(),
+        first: first.map_or(Vec3::ZERO, |face| mesh.face_center(face as usize)),
+    }
+}
+
+/// Makes one surface of what a surface encloses at least once, where it crosses itself, has edges of more than two
+/// triangles, or is several whose faces touch.
+pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
+    let found = crossings(&draft.mesh);
+    let shared = inspect_edges(&draft.mesh).shared;
+    let (kind, count, at) = match (found.count, shared.count) {
+        (0, 0) => match touching(&draft.mesh) {
+            Some((n_bodies, at)) => (RepairKind::Fused, n_bodies, at),
+            None => return Ok(None),
+        },
+        (0, count) => (RepairKind::Parted, count, shared.first),
+        (count, _) => (RepairKind::United { before: 0.0, after: 0.0 }, count, found.first),
+    };
+    let refused = || match kind {
+        RepairKind::Parted => InputError::Shared { count, at, n_copies: 0 },
+        _ => InputError::Crossing { count, at },
+    };
+    if found.count > MAX_RESOLVED {
+        return Err(refused());
+    }
+    let mesh = boolean::rebuild(&draft.mesh).map_err(|_| refused())?;
+    if mesh.triangles.is_empty() {
+        return Err(refused());
+    }
+    // The library keeps no account of single triangles here; the nearest is the one that a triangle is a part of.
+    let tree = TriangleBvh::new(&draft.mesh);
+    let nearest = |face: usize| tree.nearest(mesh.face_center(face), f64::INFINITY).map_or(0, |n| n.face);
+    let source = (0..mesh.triangles.len()).into_par_iter().map(|f| draft.source[nearest(f) as usize]).collect();
+    let kind = match kind {
+        RepairKind::United { .. } => {
+            let [before, after] = [&draft.mesh, &mesh].map(TriMesh::signed_volume);
+            RepairKind::United { before, after }
+        }
+        other => other,
+    };
+    *draft = Draft { mesh, source };
+    Ok(Some(Repair { kind, count, at }))
+}
+
+/// How many bodies there are, and the middle of the second, where faces of several touch: [`crossings`] does not see that.
+fn touching(mesh: &TriMesh) -> Option<(usize, Vec3)> {
+    /// Bodies that are compared two by two.
+    const MAX_BODIES: usize = 1000;
+    let bounds: Vec<Aabb> = inspect(mesh).bodies.iter().map(|body| body.bounds).collect();
+    let n = bounds.len();
+    let are_near = (2..=MAX_BODIES).contains(&n)
+        && (0..n).any(|i| (0..i).any(|j| bounds[i].intersects(bounds[j])))
+        && boolean::touches_itself(mesh);
+    are_near.then(|| (n, bounds[1].center()))
+}
+
+/// Triangles along a space-filling curve, in boxes of pairs of boxes.
+struct Boxes {
+    order: Vec<u32>,
+    /// Around each triangle, in that order.
+    boxes: Vec<Aabb>,
+    /// From the leaves up; the last has one box.
+    levels: Vec<Vec<Aabb>>,
+}
+
+impl Boxes {
+    fn of(mesh: &TriMesh) -> Self {
+        let bounds = mesh.bounds();
+        let scale = bounds.size().max_element().max(f64::MIN_POSITIVE).recip();
+        let mut keys: Vec<(u64, u32)> = (0..mesh.triangles.len() as u32)
+            .into_par_iter()
+            .map(|face| (curve_position((mesh.face_center(face as usize) - bounds.min) * scale), face))
+            .collect();
+        keys.par_sort_unstable();
+        let order: Vec<u32> = keys.into_iter().map(|(_, face)| face).collect();
+        let boxes: Vec<Aabb> = order.par_iter().map(|&f| Aabb::around(mesh.corners(f as usize))).collect();
+        let join = |boxes: &[Aabb]| boxes.iter().fold(Aabb::EMPTY, |b, &c| b.union(c));
+        let mut levels: Vec<Vec<Aabb>> = vec![boxes.par_chunks(LEAF).map(join).collect()];
+        while let Some(last) = levels.last().filter(|l| l.len() > 1) {
+            levels.push(last.chunks(2).map(join).collect());
+        }
+        Self { order, boxes, levels }
+    }
+
+    /// Where the triangles of a leaf stand in the order.
+    fn places(&self, leaf: usize) -> std::ops::Range<usize> {
+        leaf * LEAF..self.order.len().min((leaf + 1) * LEAF)
+    }
+
+    /// How many triangles of this and later leaves cross those of `leaf`, and the first of `leaf` that is crossed.
+    fn crossings_of(&self, mesh: &TriMesh, leaf: usize) -> (usize, Option<u32>) {
+        let own = self.places(leaf);
+        let around = self.levels[0][leaf];
+        let (mut count, mut first, mut n_pairs) = (0, None, 0);
+        let mut todo = vec![(self.levels.len() - 1, 0)];
+        while let Some((level, at)) = todo.pop().filter(|_| n_pairs < MAX_PAIRS_OF_LEAF) {
+            // Earlier leaves have looked at this one.
+            let is_earlier = (at + 1) << level <= leaf;
+            if is_earlier || !self.levels[level][at].intersects(around) {
+                continue;
+            }
+            if level > 0 {
+                let children = 2 * at..self.levels[level - 1].len().min(2 * at + 2);
+                todo.extend(children.map(|child| (level - 1, child)));
+                continue;
+            }
+            n_pairs += own.len() * self.places(at).len();
+            for other in self.places(at).filter(|&other| self.boxes[other].intersects(around)) {
+                // Within the leaf each pair once.
+                for place in own.clone().take_while(|&place| place < other) {
+                    let faces = [place, other].map(|p| self.order[p]);
+                    if self.boxes[place].intersects(self.boxes[other]) && cross(mesh, faces) {
+                        count += 1;
+                        first = Some(first.map_or(faces[0], |f: u32| f.min(faces[0])));
+                    }
+                }
+            }
+        }
+        (count, first)
+    }
+}
+
+/// The position on a Morton curve of a point in the unit cube, 21 bits an axis.
+fn curve_position(point: Vec3) -> u64 {
+    let spread = |x: f64| {
+        let mut bits = (x.clamp(0.0, 1.0) * f64::from((1 << 21) - 1)) as u64;
+        for (shift, mask) in [
+            (32, 0x001F_0000_0000_FFFF),
+            (16, 0x001F_0000_FF00_00FF),
+            (8, 0x100F_00F0_0F00_F00F),
+            (4, 0x10C3_0C30_C30C_30C3),
+            (2, 0x1249_2492_4924_9249),
+        ] {
+            bits = (bits | bits << shift) & mask;
+        }
+        bits
+    };
+    spread(point.x) | spread(point.y) << 1 | spread(point.z) << 2
+}
+
+/// Whether an edge of one triangle goes through the inside of the other; those that share an edge never do.
+fn cross(mesh: &TriMesh, faces: [u32; 2]) -> bool {
+    let [t, u] = faces.map(|face| mesh.triangles[face as usize]);
+    let shared = |t: [u32; 3], u: [u32; 3]| [0, 1, 2].map(|k| u.contains(&t[k]));
+    let (of_t, of_u) = (shared(t, u), shared(u, t));
+    let n_shared = of_t.iter().filter(|s| **s).count();
+    if n_shared > 1 {
+        return false;
+    }
+    let [first, second] = faces.map(|face| mesh.corners(face as usize));
+    if n_shared == 0 {
+        return (0..3).any(|k| goes_through(first, k, second) || goes_through(second, k, first));
+    }
+    // Edges at the shared point touch there and nowhere else.
+    let opposite = |s: [bool; 3]| (s.iter().position(|s| *s).unwrap_or_default() + 1) % 3;
+    goes_through(first, opposite(of_t), second) || goes_through(second, opposite(of_u), first)
+}
+
+/// Whether edge `k` of the first triangle goes through the inside of the second.
+fn goes_through(edges: [Vec3; 3], k: usize, [a, b, c]: [Vec3; 3]) -> bool {
+    let (p, q) = (edges[k], edges[(k + 1) % 3]);
+    let sign = |a: Vec3, b: Vec3, c: Vec3, d: Vec3| {
+        let [u, v, w] = [a - d, b - d, c - d];
+        let volume = u.dot(v.cross(w));
+        let flat_sq = FLAT * FLAT * u.length_squared() * v.length_squared() * w.length_squared();
+        match volume * volume > flat_sq {
+            true if volume > 0.0 => 1,
+            true => -1,
+            false => 0,
+        }
+    };
+    let below = sign(a, b, c, p);
+    if below == 0 || sign(a, b, c, q) != -below {
+        return false;
+    }
+    let around = sign(p, q, a, b);
+    around != 0 && sign(p, q, b, c) == around && sign(p, q, c, a) == around
+}

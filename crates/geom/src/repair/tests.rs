@@ -1,0 +1,278 @@
+use super::*;
+use crate::{Aabb, Vec3, Volume};
+
+/// A ball of 4 · 4ⁿ·2 triangles, outwards.
+fn ball(center: Vec3, radius: f64, n: u32) -> TriMesh {
+    let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
+    let triangles = vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
+    for _ in 0..n {
+        let topology = crate::Topology::new(&solid);
+        solid = crate::subdivide::halve_edges(&solid, &topology, |_, _| true).0;
+    }
+    let mut mesh = solid.into_mesh();
+    mesh.points.iter_mut().for_each(|p| *p = center + radius * p.normalize());
+    mesh
+}
+
+fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
+    let n = a.points.len() as u32;
+    a.points.extend(b.points);
+    a.triangles.extend(b.triangles.iter().map(|t| t.map(|v| v + n)));
+    a
+}
+
+fn flipped(mut mesh: TriMesh) -> TriMesh {
+    mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    mesh
+}
+
+/// Each triangle with points of its own, as in an STL.
+fn unwelded(mesh: &TriMesh) -> TriMesh {
+    TriMesh {
+        points: (0..mesh.triangles.len()).flat_map(|f| mesh.corners(f)).collect(),
+        triangles: (0..mesh.triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
+    }
+}
+
+fn cube(at: Vec3, size: f64) -> TriMesh {
+    Volume::cuboid(Aabb { min: at, max: at + size }).to_mesh()
+}
+
+fn repaired(mesh: &TriMesh) -> Mended {
+    mend(mesh, Mending::Repair).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Mends, and asserts what was done how often, that the volume is right, and that nothing is done without leave.
+fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Mended {
+    let mended = repaired(mesh);
+    let done: Vec<(&str, usize)> = mended.repairs.iter().map(|r| (r.kind.code(), r.count)).collect();
+    assert_eq!(done, codes, "{:?}", mended.repairs);
+    assert!((mended.solid.volume() - volume).abs() < 1e-6 * volume, "{} is not {volume}", mended.solid.volume());
+    assert_eq!(mended.source_face.len(), mended.solid.mesh().triangles.len());
+    assert!(mended.source_face.iter().all(|&f| (f as usize) < mesh.triangles.len()));
+    assert!(mend(mesh, Mending::Refuse).is_err());
+    // What was mended needs no mending.
+    let again = repaired(mended.solid.mesh());
+    assert_eq!((again.repairs.len(), again.solid.mesh()), (0, mended.solid.mesh()));
+    mended
+}
+
+fn base() -> TriMesh {
+    ball(Vec3::new(3.0, -2.0, 1.0), 10.0, 3)
+}
+
+#[test]
+fn a_sound_mesh_comes_out_bit_by_bit_with_leave_or_without() {
+    for mesh in [base(), unwelded(&base())] {
+        let (solid, kept) = into_solid(&mesh).unwrap();
+        for mending in [Mending::Refuse, Mending::Repair, Mending::KeepLargest] {
+            let mended = mend(&mesh, mending).unwrap();
+            assert_eq!((&mended.solid, &mended.source_face), (&solid, &kept));
+            assert_eq!(mended.repairs, []);
+        }
+    }
+}
+
+#[test]
+fn cracks_are_closed_and_gaps_are_not() {
+    let mut cracked = unwelded(&base());
+    let move_by =
+        |i: usize, by: f64| by * Vec3::new(((7 * i) % 11) as f64 - 5.0, ((5 * i) % 7) as f64 - 3.0, (i % 3) as f64);
+    cracked.points.iter_mut().enumerate().for_each(|(i, p)| *p += move_by(i, 1e-6));
+    let mended = repaired(&cracked);
+    assert_eq!(mended.repairs[0].kind.code(), "points-merged");
+    assert!((mended.solid.volume() / base().signed_volume() - 1.0).abs() < 1e-5);
+    assert_eq!(mended.solid.mesh().points.len(), base().points.len());
+    cracked.points.iter_mut().enumerate().for_each(|(i, p)| *p += move_by(i, 1e-3));
+    assert!(matches!(mend(&cracked, Mending::Repair), Err(InputError::Loose { .. })));
+}
+
+#[test]
+fn copies_are_removed_and_those_back_to_back_cancel() {
+    let mut doubled = base();
+    doubled.triangles.extend_from_within(..50);
+    let mended = assert_mended(&doubled, &[("copies-removed", 50)], base().signed_volume());
+    assert_eq!(mended.solid.mesh(), &base());
+    // A flap that hangs on an edge: two triangles back to back.
+    let mut flap = base();
+    let [a, b, _] = flap.triangles[7];
+    flap.points.push(Vec3::splat(20.0));
+    let tip = flap.points.len() as u32 - 1;
+    flap.triangles.extend([[a, b, tip], [b, a, tip]]);
+    assert_mended(&flap, &[("copies-removed", 2)], base().signed_volume());
+}
+
+#[test]
+fn turned_triangles_are_turned_back_and_bodies_inside_out_too() {
+    let mut some = base();
+    some.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1));
+    let n = some.triangles.len().div_ceil(3);
+    assert_mended(&some, &[("triangles-turned", n)], base().signed_volume());
+    assert_mended(&flipped(base()), &[("body-turned", 1)], base().signed_volume());
+    let mut most = flipped(base());
+    most.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1));
+    assert_mended(&most, &[("triangles-turned", n), ("body-turned", 1)], base().signed_volume());
+}
+
+#[test]
+fn corners_on_edges_are_joined() {
+    let mut divided = base();
+    // Every twentieth triangle is divided on its first side, its neighbour is not.
+    for face in (0..divided.triangles.len()).step_by(20) {
+        let [a, b, c] = divided.triangles[face];
+        divided.points.push(0.6 * divided.points[a as usize] + 0.4 * divided.points[b as usize]);
+        let m = divided.points.len() as u32 - 1;
+        divided.triangles[face] = [a, m, c];
+        divided.triangles.push([m, b, c]);
+    }
+    let n = base().triangles.len().div_ceil(20);
+    assert_mended(&divided, &[("edges-joined", n)], base().signed_volume());
+}
+
+#[test]
+fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_their_place() {
+    let mut three = base();
+    three.triangles.swap_remove(17);
+    let mended = assert_mended(&three, &[("holes-closed", 1)], base().signed_volume());
+    assert!(mended.repairs[0].at.distance(Vec3::new(3.0, -2.0, 1.0)) > 9.0);
+    // All triangles around a point: a hole of five or six edges.
+    let around = |mesh: &TriMesh, n: usize| {
+        let mut holed = mesh.clone();
+        holed.triangles.retain(|t| !t.contains(&(n as u32)));
+        holed
+    };
+    let fine = ball(Vec3::ZERO, 10.0, 6);
+    let mended = repaired(&around(&fine, 0));
+    assert_eq!(mended.repairs[0].kind.code(), "holes-closed");
+    assert!((mended.solid.volume() / fine.signed_volume() - 1.0).abs() < 1e-5);
+    let refused = mend(&around(&base(), 100), Mending::Repair).unwrap_err();
+    assert!(matches!(refused, InputError::Open { n_holes: 1, .. }), "{refused}");
+    assert!(refused.to_string().contains("1 hole (6 open edges), first near ("), "{refused}");
+}
+
+#[test]
+fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() {
+    // Two cones that meet in their tips, joined by a belt: one body with one pinched point.
+    let hourglass = both(cube(Vec3::ZERO, 1.0), cube(Vec3::ONE, 1.0));
+    assert!(
+        matches!(mend(&crate::weld::weld(&hourglass).mesh, Mending::Repair), Err(InputError::Bodies(b)) if b.len() == 2)
+    );
+    let edge = both(cube(Vec3::ZERO, 1.0), cube(Vec3::new(1.0, 1.0, 0.0), 1.0));
+    let refused = mend(&unwelded(&edge), Mending::Repair).unwrap_err();
+    assert!(matches!(&refused, InputError::Bodies(b) if b.len() == 2), "{refused}");
+    assert!((mend(&unwelded(&edge), Mending::KeepLargest).unwrap().solid.volume() - 1.0).abs() < 1e-12);
+    // A point of the far side drawn to one of the near side.
+    let mut pinched = base();
+    let (near, far) = (pinched.triangles[0][0], pinched.triangles[300][0]);
+    pinched.points[far as usize] = pinched.points[near as usize];
+    let mended = repaired(&unwelded(&pinched));
+    assert!(mended.repairs.iter().any(|r| matches!(r.kind, RepairKind::Parted | RepairKind::United { .. })));
+}
+
+#[test]
+fn specks_inner_bodies_and_cavities_are_left_out() {
+    let volume = base().signed_volume();
+    let speck = |i: u32| ball(Vec3::new(15.0, f64::from(i), 0.0), 0.02, 0);
+    let specks = (0..20).fold(base(), |mesh, i| both(mesh, speck(i)));
+    assert_mended(&specks, &[("specks-removed", 20)], volume);
+    let inner = ball(Vec3::new(4.0, -2.0, 1.0), 3.0, 2);
+    assert_mended(&both(base(), flipped(inner.clone())), &[("cavities-filled", 1)], volume);
+    assert_mended(&both(base(), inner.clone()), &[("cavities-filled", 1)], volume);
+    assert_mended(&both(flipped(base()), inner), &[("body-turned", 2), ("cavities-filled", 1)], volume);
+}
+
+#[test]
+fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enough() {
+    let other = ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3);
+    let union = [base(), other.clone()].map(|m| Volume::from_closed_mesh(&m).unwrap());
+    let union = union[0].union(&union[1]).volume();
+    let mended = repaired(&both(base(), other));
+    assert!((mended.solid.volume() - union).abs() < 1e-6 * union);
+    assert!(matches!(mended.repairs[..], [Repair { kind: RepairKind::United { .. }, count: 1.., .. }]));
+    // Each triangle lies on the one that it is a part of.
+    let as_read = both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3));
+    for (face, &source) in mended.source_face.iter().enumerate() {
+        let [a, _, _] = as_read.corners(source as usize);
+        let away = (mended.solid.mesh().face_center(face) - a).dot(as_read.face_normal(source as usize));
+        assert!(away.abs() < 1e-9, "{away}");
+    }
+    let apart = both(base(), ball(Vec3::new(40.0, 0.0, 0.0), 6.0, 2));
+    assert!(matches!(mend(&apart, Mending::Repair), Err(InputError::Bodies(bodies)) if bodies.len() == 2));
+    let largest = mend(&apart, Mending::KeepLargest).unwrap();
+    assert_eq!((largest.solid.mesh(), largest.repairs[0].kind), (&base(), RepairKind::LeftOut));
+}
+
+#[test]
+fn bodies_that_touch_with_faces_are_united() {
+    // Half of a side is common; then a part of the volume, with sides in common planes.
+    for (at, volume) in [(Vec3::new(1.0, 0.5, 0.0), 2.0), (Vec3::new(0.5, 0.0, 0.0), 1.5)] {
+        let pair = both(cube(Vec3::ZERO, 1.0), cube(at, 1.0));
+        assert_mended(&pair, &[("bodies-united", 2)], volume);
+    }
+}
+
+#[test]
+fn a_surface_pushed_through_itself_is_found_and_resolved() {
+    let mut pushed = base();
+    // A cap of the ball goes through to beyond the other side.
+    pushed.points.iter_mut().filter(|p| p.z > 9.0).for_each(|p| *p += Vec3::new(0.37, -0.21, -19.0));
+    let found = crossings(&pushed);
+    assert!(found.count > 10, "{found:?}");
+    assert_eq!(mend(&pushed, Mending::Refuse), Err(InputError::Crossing { count: found.count, at: found.first }));
+    match mend(&pushed, Mending::Repair) {
+        Ok(mended) => assert_eq!(crossings(mended.solid.mesh()).count, 0),
+        Err(error) => assert!(matches!(error, InputError::Bodies(_)), "{error}"),
+    }
+    assert_eq!(crossings(&base()).count, 0);
+    assert_eq!(crossings(&TriMesh::default()).count, 0);
+}
+
+#[test]
+fn one_sided_surfaces_soups_and_flat_things_are_refused() {
+    // A band of 12 quads with half a turn, closed by doubling: a Klein bottle of two loops of points.
+    let (n, m) = (12_u32, 8_u32);
+    let at = |i: u32, j: u32| if i == n { (m - j % m) % m } else { i * m + j % m };
+    let mut points = Vec::new();
+    for i in 0..n {
+        for j in 0..m {
+            let (u, v) = (f64::from(i) / f64::from(n), std::f64::consts::TAU * f64::from(j) / f64::from(m));
+            let (s, c) = (std::f64::consts::TAU * u).sin_cos();
+            let (s2, c2) = (std::f64::consts::PI * u).sin_cos();
+            let r = 5.0 + c2 * v.sin() - s2 * (2.0 * v).sin();
+            points.push(Vec3::new(r * c, r * s, s2 * v.sin() + c2 * (2.0 * v).sin() + 0.1 * v));
+        }
+    }
+    let quads = (0..n).flat_map(|i| (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
+    let triangles = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let refused = mend(&TriMesh { points, triangles }, Mending::Repair).unwrap_err();
+    assert!(matches!(refused, InputError::OneSided { .. }), "{refused}");
+
+    let soup = TriMesh {
+        points: (0..30)
+            .map(|i| Vec3::new(f64::from(i * 7 % 11), f64::from(i * 5 % 13), f64::from(i * 3 % 7)))
+            .collect(),
+        triangles: (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+    };
+    assert!(matches!(mend(&soup, Mending::Repair), Err(InputError::Loose { .. })));
+    let flat = TriMesh { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2], [0, 2, 1]] };
+    assert_eq!(mend(&flat, Mending::Repair), Err(InputError::Flat));
+    assert_eq!(mend(&TriMesh::default(), Mending::Repair), Err(InputError::Empty));
+}
+
+#[test]
+fn coordinates_rounded_too_coarsely_are_told_as_such() {
+    let mut rounded = both(cube(Vec3::ZERO, 1.0), cube(Vec3::splat(2.0), 3.0));
+    rounded.points[0] = rounded.points[1];
+    rounded.triangles.pop();
+    let refused = mend(&rounded, Mending::Repair).unwrap_err();
+    assert!(matches!(refused, InputError::Collapsed { .. }), "{refused}");
+}
+
+#[test]
+fn repairs_say_what_how_many_and_where() {
+    let mut three = base();
+    three.triangles.swap_remove(17);
+    let text = repaired(&three).repairs[0].to_string();
+    assert!(text.starts_with("1 small hole was closed, up to ") && text.contains("; first near ("), "{text}");
+}
