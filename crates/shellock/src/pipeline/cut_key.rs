@@ -9,7 +9,7 @@ use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning, segmentat
 
 /// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where the best does not do,
 /// others seldom do.
-const MOST_KITS: [usize; 2] = [3, 1];
+const MOST_KITS: [usize; 3] = [3, 2, 2];
 /// Kits made for one segmentation, and mendings of it.
 const MOST_KITS_EACH: usize = 2;
 const MOST_MENDINGS: usize = 1;
