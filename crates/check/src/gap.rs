@@ -4,7 +4,7 @@
 //! but not farther than half the depth. That a gap is nowhere less is not tested here; rays look for what is in the way.
 
 use crate::mesh::Mesh;
-use crate::vector::{Vec3, dot, scale, sub};
+use crate::vector::{Vec3, scale, sub};
 use crate::{Gap, LeastGaps, PressFit, Tested};
 
 /// Difference of the gap told and the one found, mm.
@@ -13,8 +13,7 @@ const SAME_GAP_MM: f64 = 1e-3;
 const RIM_NEARER_MM: f64 = 0.02;
 /// Deeper crossings are no rounding, mm.
 const CROSSING_MM: f64 = 0.02;
-/// A crossing belongs to a press fit that is so near, mm, and no more than this deeper than its interference.
-const AT_FIT_MM: f64 = 4.0;
+/// A crossing at a press fit is no more than this deeper than its interference, mm.
 const FIT_DEEPER_MM: f64 = 0.1;
 
 /// Confirms `figure`, with the gap beneath the rim, if the gaps are those that `least` tells: of the moving piece to one of
@@ -47,9 +46,17 @@ pub fn test(
 /// Whether the crossing is that of a press fit, on the piece at rest or on the one that moves.
 fn is_of(fit: &PressFit, gap: &Gap, moving: Option<(usize, Vec3)>) -> bool {
     let before = moving.map(|(_, direction)| sub(gap.at, scale(direction, gap.travel_mm)));
-    let is_near = |p: Vec3| dot(sub(p, fit.at), sub(p, fit.at)) < AT_FIT_MM * AT_FIT_MM;
+    let is_near = |p: Vec3| fit.is_near(p);
     let is_one = moving.is_none_or(|(piece, _)| piece == fit.piece || gap.against == fit.piece);
     is_one && (is_near(gap.at) || before.is_some_and(is_near)) && -gap.gap_mm <= fit.interference_mm + FIT_DEEPER_MM
+}
+
+/// Whether what pieces `a` and `b` share around `at` is a press fit's: in its place, and no deeper in either than it may be.
+pub fn is_pressed(meshes: &[Mesh], press_fits: &[PressFit], [a, b]: [usize; 2], at: Vec3) -> bool {
+    press_fits.iter().filter(|fit| (fit.piece == a || fit.piece == b) && fit.is_near(at)).any(|fit| {
+        let most_mm = fit.interference_mm + FIT_DEEPER_MM;
+        [a, b].iter().all(|&piece| meshes[piece].distance_mm(at, most_mm).is_some_and(|mm| mm <= most_mm))
+    })
 }
 
 /// `nearer_mm`: how much nearer surfaces may be than the gap.

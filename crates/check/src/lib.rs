@@ -27,6 +27,8 @@ const MOST_REACH_MM: f64 = 0.15;
 /// More places at which a key is pressed, or pressed more than this, mm, are not a fit but a fault.
 const MOST_PRESS_FITS: usize = 20;
 const MOST_INTERFERENCE_MM: f64 = 0.4;
+/// What is shared or crosses at a press fit is so near to its place, mm.
+const AT_FIT_MM: f64 = 4.0;
 /// Difference of two numbers written from one.
 const SAME: f64 = 1e-9;
 
@@ -74,6 +76,13 @@ struct PressFit {
     piece: usize,
     at: Vec3,
     interference_mm: f64,
+}
+
+impl PressFit {
+    /// Whether `p` is so near, mm, that a crossing there can be its own.
+    fn is_near(&self, p: Vec3) -> bool {
+        vector::distance(p, self.at) < AT_FIT_MM
+    }
 }
 
 #[derive(Deserialize)]
@@ -313,8 +322,8 @@ fn test_claim(c: &Certificate, meshes: &[Mesh], contacts: Option<&[Contact]>, cl
         }
         Claim::Apart { least } => {
             let all: Vec<usize> = (0..meshes.len()).collect();
-            let tested =
-                rays::test_apart(meshes).and_then(|figure| gap::test(meshes, &c.press_fits, None, &all, least, figure));
+            let tested = rays::test_apart(meshes, |pair, at| gap::is_pressed(meshes, &c.press_fits, pair, at))
+                .and_then(|figure| gap::test(meshes, &c.press_fits, None, &all, least, figure));
             ("the assembled pieces do not overlap".into(), tested)
         }
     }

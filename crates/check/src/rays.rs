@@ -43,23 +43,29 @@ pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usiz
     verdict(&grid, &is_blocked, shadow.len(), "in its way")
 }
 
-/// Whether no two pieces overlap as they are.
-pub fn test_apart(meshes: &[Mesh]) -> Tested {
+/// Whether no two pieces overlap as they are, but where they are `pressed` on purpose: two pieces, and a place that they share.
+pub fn test_apart(meshes: &[Mesh], pressed: impl Fn([usize; 2], Vec3) -> bool) -> Tested {
     let length = norm(OBLIQUE);
     let grid = Grid::around(scale(OBLIQUE, 1.0 / length), meshes);
-    let mut all: Vec<Stretch> = meshes.iter().flat_map(|mesh| grid.stretches(mesh)).collect();
-    all.sort_by(|s, t| s.pixel.cmp(&t.pixel).then(s.inside[0].total_cmp(&t.inside[0])));
+    let mut all: Vec<(usize, Stretch)> = Vec::new();
+    meshes.iter().enumerate().for_each(|(i, mesh)| all.extend(grid.stretches(mesh).into_iter().map(|s| (i, s))));
+    all.sort_by(|(_, s), (_, t)| s.pixel.cmp(&t.pixel).then(s.inside[0].total_cmp(&t.inside[0])));
     let mut is_shared = vec![false; grid.n[0] * grid.n[1]];
-    for stretches in all.chunk_by(|s, t| s.pixel == t.pixel) {
-        let mut end = f64::NEG_INFINITY;
-        for s in stretches {
-            if end.min(s.inside[1]) - s.inside[0] > ROUNDING_MM {
+    let by_ray = || all.chunk_by(|(_, s), (_, t)| s.pixel == t.pixel);
+    for stretches in by_ray() {
+        let (mut end, mut last) = (f64::NEG_INFINITY, 0);
+        for (i, s) in stretches {
+            let until = end.min(s.inside[1]);
+            let midway = || grid.place(s.pixel, 0.5 * (s.inside[0] + until));
+            if until - s.inside[0] > ROUNDING_MM && !pressed([last, *i], midway()) {
                 is_shared[s.pixel] = true;
             }
-            end = end.max(s.inside[1]);
+            if s.inside[1] > end {
+                (end, last) = (s.inside[1], *i);
+            }
         }
     }
-    let n_rays = all.chunk_by(|s, t| s.pixel == t.pixel).count();
+    let n_rays = by_ray().count();
     verdict(&grid, &is_shared, n_rays, "shared")
 }
 
@@ -125,6 +131,13 @@ impl Grid {
         self.axes.map(|axis| dot(axis, p))
     }
 
+    /// The point of a ray at a depth, mm.
+    fn place(&self, pixel: usize, depth_mm: f64) -> Vec3 {
+        let at = [pixel % self.n[0], pixel / self.n[0]].map(|k| k as f64 * PIXEL_MM);
+        let along = [at[0] + self.origin[0], at[1] + self.origin[1], depth_mm];
+        std::array::from_fn(|k| (0..3).map(|axis| along[axis] * self.axes[axis][k]).sum())
+    }
+
     /// The stretches inside a closed mesh, in order of their pixels, then of depth.
     fn stretches(&self, mesh: &Mesh) -> Vec<Stretch> {
         let mut crossings: Vec<(usize, f64, i32)> = Vec::new();
@@ -188,5 +201,34 @@ impl Grid {
                 crossings.push((row * self.n[0] + column, depth, step));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PressFit;
+    use crate::gap::is_pressed;
+
+    fn cuboid(min: Vec3, max: Vec3) -> Mesh {
+        let corner = |i: usize| std::array::from_fn(|k| if i >> k & 1 == 1 { max[k] } else { min[k] });
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let halves = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        Mesh { triangles: halves.map(|t| t.map(corner)).collect() }
+    }
+
+    /// Two cubes of 3 mm, one `deep_mm` in the other, with a press fit of 0.08 mm in the middle of what they share.
+    fn pressed_cubes(deep_mm: f64) -> Tested {
+        let meshes = [cuboid([0.0; 3], [3.0; 3]), cuboid([0.0, 0.0, 3.0 - deep_mm], [3.0, 3.0, 6.0])];
+        let fit = PressFit { piece: 1, at: [1.5, 1.5, 3.0], interference_mm: 0.08 };
+        test_apart(&meshes, |pair, at| is_pressed(&meshes, std::slice::from_ref(&fit), pair, at))
+    }
+
+    #[test]
+    fn what_two_pieces_share_is_refuted_unless_a_press_fit_covers_it_and_is_as_shallow() {
+        assert!(pressed_cubes(0.08).is_ok());
+        assert!(pressed_cubes(1.0).is_err(), "too deep for a press fit");
+        let meshes = [cuboid([0.0; 3], [3.0; 3]), cuboid([0.0, 0.0, 2.92], [3.0, 3.0, 6.0])];
+        assert!(test_apart(&meshes, |_, _| false).is_err(), "no press fit");
     }
 }

@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use shellock::certificate::{PieceFile, certify};
 use shellock::plan::{InstallationPlan, InstallationStep};
 use shellock::verify::clearance::kit_gaps;
-use shellock::verify::{VerifyParams, examine};
+use shellock::verify::{Assembly, VerifyParams, examine};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
 use shellock_check::{Finding, check};
 use shellock_geom::io::write_stl_binary;
@@ -74,7 +74,8 @@ fn make() -> Made {
     let (report, stop) = (|_: shellock::context::Progress<'_>| {}, AtomicBool::new(false));
     let model = Solid::new(cuboid(ALL, ALL, ALL).to_mesh()).unwrap();
     let params = VerifyParams { clearance_mm: CLEARANCE_MM, seed: 0 };
-    let (verdict, contacts) = examine(&Ctx::new(&report, &stop), &params, &model, &pieces, &plan).unwrap();
+    let assembly = Assembly { model: &model, pieces: &pieces, plan: &plan, press_fits: &[] };
+    let (verdict, contacts) = examine(&Ctx::new(&report, &stop), &params, &assembly).unwrap();
     let files: Vec<(String, Vec<u8>)> =
         pieces.iter().map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh))).collect();
     let named = pieces.ids().zip(&files);

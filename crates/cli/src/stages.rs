@@ -9,8 +9,8 @@ use shellock::certificate::{PieceFile, certify};
 use shellock::piece::PressFit;
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
-use shellock::verify::VerifyParams;
 use shellock::verify::clearance::kit_gaps;
+use shellock::verify::{Assembly, VerifyParams};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, segmentation, sizes};
 use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
@@ -193,13 +193,14 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let display = Display::new(session.is_json);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &solid, &pieces, &order)?;
+    let press_fits: Vec<PressFit> = serde_json::from_value(plan["press_fits"].clone()).unwrap_or_default();
+    let assembly = Assembly { model: &solid, pieces: &pieces, plan: &order, press_fits: &press_fits };
+    let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &assembly)?;
     let rim_mm = BodyParams::default().rim_mm;
     let gaps = kit_gaps(&ctx, &solid, &pieces, &order, rim_mm)?;
     let claimed = certify(files, &pieces, &order, &contacts, &verdict, &gaps, params.clearance_mm);
     display.finish();
     if let Some(claimed) = claimed {
-        let press_fits: Vec<PressFit> = serde_json::from_value(plan["press_fits"].clone()).unwrap_or_default();
         write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed.with_press_fits(press_fits)))?;
     }
     let code = u8::from(!verdict.passed());

@@ -424,7 +424,8 @@ pub fn make(
     let finish = FinishParams { connector: &params.connector, relief: params.relief(), grip };
     let finished = piece::make(ctx, &finish, grid, &shell, &plan, &runs, &rooms)?;
     warn_of_press_fits(ctx, &finished);
-    let (verification, touching) = verify::examine(ctx, &params.verify, model, &finished.meshes, &plan)?;
+    let assembly = verify::Assembly { model, pieces: &finished.meshes, plan: &plan, press_fits: &finished.press_fits };
+    let (verification, touching) = verify::examine(ctx, &params.verify, &assembly)?;
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
         turn: Turn::default(),

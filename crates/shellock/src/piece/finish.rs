@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::clearance::Shape;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::rounding::{NotPrintable, printable};
-use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
+use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 use super::carve::{Half, Wake, carved, whole_half};
 use super::key_parts::{Change, Grip, PressFit, detents, notch};
@@ -247,14 +248,17 @@ fn ribs_of_key(
     let key = plan.key();
     let along = plan.removal().next().expect("a plan has a step for each piece").separation.unit();
     let mut others = TriMesh::default();
+    let mut shapes = Vec::new();
     for other in pieces.ids().filter(|&p| p != key) {
         let mesh = pieces[other].to_mesh();
         let first = others.points.len() as u32;
-        others.points.extend(mesh.points);
+        others.points.extend(&mesh.points);
         others.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+        shapes.extend(Solid::new(mesh).ok().map(|solid| Shape::new(&solid)));
     }
     let (mesh, others) = (pieces[key].to_mesh(), TriangleBvh::new(&others));
-    let seat = Seat { key, mesh: &mesh, others: &others, along, least_depth_mm: rim_mm + RIB_MARGIN_MM };
+    let least_depth_mm = rim_mm + RIB_MARGIN_MM;
+    let seat = Seat { key, mesh: &mesh, others: &others, shapes: &shapes, along, least_depth_mm };
     let made = ribs(interference_mm, &seat, |p| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY));
     if made.0.is_empty() {
         ctx.warn(Warning {

@@ -21,6 +21,9 @@ const NOTCH_WIDTH_MM: f64 = 12.0;
 /// The surface below a notch is uneven by less than this, mm.
 const NOTCH_UNEVEN_MM: f64 = 0.4;
 
+/// Detents and ribs are no larger than this around their places, mm.
+const REACH_MM: f64 = 4.0;
+
 /// What presses on purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -44,6 +47,13 @@ pub struct PressFit {
     pub interference_mm: f64,
     /// On how much of the way, mm: the last of it.
     pub travel_mm: f64,
+}
+
+impl PressFit {
+    /// Whether `point`, mm, is so near that it can be part of what presses.
+    pub fn reaches(&self, point: Vec3) -> bool {
+        point.distance(Vec3::from_array(self.at)) < REACH_MM
+    }
 }
 
 /// A notch for a fingernail across the key's outer surface.

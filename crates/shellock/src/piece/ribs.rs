@@ -4,7 +4,8 @@
 //! other piece's side. Pressed in, the ribs are flattened or bend the walls, and their friction keeps the key in its seat.
 
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::{TriMesh, Vec3, Volume};
+use shellock_geom::clearance::{Scope, Shape, Translation, swept_gap};
+use shellock_geom::{Solid, TriMesh, Vec3, Volume};
 
 use super::key_parts::{Change, PressFit, PressFitKind};
 use crate::PatchId;
@@ -25,6 +26,10 @@ const MOST_ACROSS: f64 = 0.2;
 const WIDEST_GAP_MM: f64 = 0.4;
 const NEARER_MM: f64 = 0.02;
 const FARTHER_MM: f64 = 0.1;
+/// A rib that crosses a piece anywhere on its way by so much more than it is to press stands in the wrong place, mm.
+const DEEPER_MM: f64 = 0.02;
+/// Places that are measured exactly, at most.
+const MOST_MEASURED: usize = 60;
 /// The way on which a rib rubs is measured in such steps, up to this, mm.
 const TRAVEL_STEP_MM: f64 = 0.5;
 const MOST_TRAVEL_MM: f64 = 100.0;
@@ -36,8 +41,10 @@ pub(super) struct Seat<'a> {
     /// The key, and its finished mesh.
     pub key: PatchId,
     pub mesh: &'a TriMesh,
-    /// All other pieces.
+    /// All other pieces, for rays.
     pub others: &'a TriangleBvh,
+    /// The same, one by one, for exact gaps.
+    pub shapes: &'a [Shape],
     /// Unit vector of the way out.
     pub along: Vec3,
     /// Least depth below the model's surface, mm: what lies higher is rim.
@@ -55,7 +62,7 @@ struct Place {
 /// Ribs that press by `interference_mm` on the pieces around the key, spread over its seams; none where no side lies along the way out.
 /// `depth` is that below the model's surface, mm.
 pub(super) fn ribs(interference_mm: f64, seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> (Vec<PressFit>, Vec<Change>) {
-    let places = spread(places(seat, depth));
+    let places = spread(places(seat, depth), |p| presses_only_as_meant(seat, p, interference_mm));
     let fit = |p: &Place| PressFit {
         kind: PressFitKind::Rib,
         piece: seat.key,
@@ -66,6 +73,15 @@ pub(super) fn ribs(interference_mm: f64, seat: &Seat<'_>, depth: impl Fn(Vec3) -
     let change =
         |p: &Place| Change { piece: seat.key, volume: rib(p, seat.along, p.gap_mm + interference_mm), is_added: true };
     (places.iter().map(fit).collect(), places.iter().map(change).collect())
+}
+
+/// Whether the rib, measured over its whole way and against all pieces, crosses none of them deeper than it is to press.
+fn presses_only_as_meant(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> bool {
+    let Ok(rib) = Solid::new(rib(place, seat.along, place.gap_mm + interference_mm).to_mesh()) else { return false };
+    let rib = Shape::new(&rib);
+    let way_out = Translation { along: seat.along, from_mm: 0.0, far_mm: f64::INFINITY };
+    let gap = |other: &Shape| swept_gap(&rib, other, &way_out, Scope::Everything, DEEPER_MM);
+    seat.shapes.iter().filter_map(gap).all(|gap| gap.gap_mm >= -(interference_mm + DEEPER_MM))
 }
 
 /// From how far before its end a rib rubs on the way in, mm.
@@ -118,23 +134,26 @@ fn grid_on([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
     pairs.filter(inside).map(move |[u, v]| a + u * (b - a) + v * (c - a))
 }
 
-/// Up to [`MOST`] of `places`, each as far from those before as can be, the first as far from the middle.
-fn spread(places: Vec<Place>) -> Vec<Place> {
+/// Up to [`MOST`] of `places` that fit, each as far from those before as can be, the first as far from the middle.
+fn spread(places: Vec<Place>, fits: impl Fn(&Place) -> bool) -> Vec<Place> {
     let middle = places.iter().map(|p| p.at).sum::<Vec3>() / places.len().max(1) as f64;
     let mut apart_mm: Vec<f64> = places.iter().map(|p| p.at.distance(middle)).collect();
     let mut chosen: Vec<Place> = Vec::new();
-    while chosen.len() < MOST {
-        let Some(best) = (0..places.len()).max_by(|&i, &j| apart_mm[i].total_cmp(&apart_mm[j]).then(j.cmp(&i))) else {
+    for _ in 0..MOST_MEASURED {
+        let farthest = (0..places.len()).max_by(|&i, &j| apart_mm[i].total_cmp(&apart_mm[j]).then(j.cmp(&i)));
+        let Some(best) = farthest.filter(|&i| chosen.is_empty() || apart_mm[i] >= APART_MM) else { break };
+        if apart_mm[best] == f64::NEG_INFINITY || chosen.len() == MOST {
             break;
-        };
-        if !chosen.is_empty() && apart_mm[best] < APART_MM {
-            break;
+        }
+        if !fits(&places[best]) {
+            apart_mm[best] = f64::NEG_INFINITY;
+            continue;
         }
         let at = places[best].at;
-        if chosen.is_empty() {
-            apart_mm.fill(f64::INFINITY);
+        let is_first = chosen.is_empty();
+        for (mm, place) in apart_mm.iter_mut().zip(&places).filter(|(mm, _)| **mm != f64::NEG_INFINITY) {
+            *mm = if is_first { place.at.distance(at) } else { mm.min(place.at.distance(at)) };
         }
-        apart_mm.iter_mut().zip(&places).for_each(|(mm, p)| *mm = mm.min(p.at.distance(at)));
         chosen.push(places[best]);
     }
     chosen
@@ -169,7 +188,9 @@ mod tests {
         let tray = cuboid([-5.0, -5.0, -5.0], [25.0, 25.0, 10.0]).subtract(&cuboid([-0.1; 3], [20.1, 20.1, 11.0]));
         let others = TriangleBvh::new(&tray.to_mesh());
         let mesh = cuboid([0.0; 3], [20.0, 20.0, 10.0]).to_mesh();
-        let seat = Seat { key: PatchId(4), mesh: &mesh, others: &others, along: Vec3::Z, least_depth_mm };
+        let shapes = [Shape::new(&Solid::new(tray.to_mesh()).unwrap())];
+        let seat =
+            Seat { key: PatchId(4), mesh: &mesh, others: &others, shapes: &shapes, along: Vec3::Z, least_depth_mm };
         ribs(0.08, &seat, |p| 10.0 - p.z)
     }
 
@@ -192,6 +213,29 @@ mod tests {
             .map(|side| changes.iter().any(|c| (c.volume.bounds().center() - Vec3::splat(10.0)).dot(side) > 9.0))
             .to_vec();
         assert!(sides.iter().filter(|s| **s).count() >= 3, "{sides:?}");
+    }
+
+    /// The tray's walls lean in above the block's top: a rib that fits at its place would be torn off on the way in.
+    #[test]
+    fn there_are_none_that_cross_something_on_their_way() {
+        let collar =
+            cuboid([-5.0, -5.0, 10.5], [25.0, 25.0, 12.0]).subtract(&cuboid([-0.1, -0.1, 10.0], [20.1, 20.1, 13.0]));
+        let narrow = cuboid([-5.0, -5.0, 14.0], [-0.02, 25.0, 15.0]);
+        let tray = cuboid([-5.0, -5.0, -5.0], [25.0, 25.0, 10.0]).subtract(&cuboid([-0.1; 3], [20.1, 20.1, 11.0]));
+        let all = [tray, collar, narrow];
+        let mesh = cuboid([0.0; 3], [20.0, 20.0, 10.0]).to_mesh();
+        let others = TriangleBvh::new(&all[0].to_mesh());
+        let shapes = all.each_ref().map(|volume| Shape::new(&Solid::new(volume.to_mesh()).unwrap()));
+        let seat = Seat {
+            key: PatchId(4),
+            mesh: &mesh,
+            others: &others,
+            shapes: &shapes,
+            along: Vec3::Z,
+            least_depth_mm: 1.5,
+        };
+        let (fits, changes) = ribs(0.08, &seat, |p| 10.0 - p.z);
+        assert!(!fits.is_empty() && changes.iter().all(|c| c.volume.bounds().min.x > -0.1), "none on the narrow side");
     }
 
     #[test]

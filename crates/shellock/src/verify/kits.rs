@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 use super::contact::Contact;
-use super::{Verification, VerifyParams, examine};
+use super::{Assembly, Verification, VerifyParams, examine};
 use crate::plan::{InstallationPlan, InstallationStep};
 use crate::{Ctx, IdVec, LatticeDirection, PatchId};
 
@@ -55,7 +55,8 @@ impl Kit {
     pub fn examined(&self) -> (Verification, Vec<Contact>) {
         let (report, stop) = (|_: crate::context::Progress<'_>| {}, AtomicBool::new(false));
         let params = VerifyParams { clearance_mm: 2.0 * HALF_GAP_MM, seed: 0 };
-        examine(&Ctx::new(&report, &stop), &params, &self.model, &self.pieces, &self.plan).unwrap()
+        let assembly = Assembly { model: &self.model, pieces: &self.pieces, plan: &self.plan, press_fits: &[] };
+        examine(&Ctx::new(&report, &stop), &params, &assembly).unwrap()
     }
 }
 

@@ -6,6 +6,7 @@ use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use super::body::Body;
 use super::columns::{Columns, Frame, Grid};
 use super::{Check, Finding, rounded};
+use crate::piece::PressFit;
 use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 
 /// Common volume of two pieces that is still rounding, mm³; the acceptance test's limit.
@@ -22,8 +23,12 @@ const RAY_SPACING_MM: (f64, f64) = (0.02, 0.3);
 /// Rays parallel to no face of a common model.
 const RAYS: Vec3 = Vec3::new(0.2631, 0.4517, 0.8525);
 
-/// Exact common volume of every pair whose boxes meet.
-pub fn check_pairs(ctx: &Ctx, bodies: &IdVec<PatchId, Body>) -> Result<(Check, Vec<Finding>), Cancelled> {
+/// Exact common volume of every pair whose boxes meet, but for what presses on purpose.
+pub fn check_pairs(
+    ctx: &Ctx,
+    bodies: &IdVec<PatchId, Body>,
+    press_fits: &[PressFit],
+) -> Result<(Check, Vec<Finding>), Cancelled> {
     let solid: Vec<(PatchId, &Volume)> =
         bodies.iter().filter_map(|(id, b)| b.volume.as_ref().map(|v| (id, v))).collect();
     let bounds: Vec<Aabb> = solid.iter().map(|(_, v)| v.bounds()).collect();
@@ -35,7 +40,8 @@ pub fn check_pairs(ctx: &Ctx, bodies: &IdVec<PatchId, Body>) -> Result<(Check, V
         .par_iter()
         .map(|&(a, b)| {
             ctx.check()?;
-            let common = solid[a].1.intersect(solid[b].1);
+            let fits: Vec<_> = press_fits.iter().filter(|fit| [solid[a].0, solid[b].0].contains(&fit.piece)).collect();
+            let common = shared(solid[a].1, solid[b].1, &fits);
             Ok((rounded(common.volume()), common.bounds().center()))
         })
         .collect::<Result<_, Cancelled>>()?;
@@ -52,6 +58,16 @@ pub fn check_pairs(ctx: &Ctx, bodies: &IdVec<PatchId, Body>) -> Result<(Check, V
     }
     let figure = format!("worst {worst:.4} mm³ in {} pairs", pairs.len());
     Ok((Check::new("assembled pieces do not overlap", findings.is_empty(), figure), findings))
+}
+
+/// What both have, but for what presses on purpose.
+fn shared(a: &Volume, b: &Volume, fits: &[&PressFit]) -> Volume {
+    let common = a.intersect(b);
+    if fits.is_empty() {
+        return common;
+    }
+    let is_pressed = |p: Vec3| fits.iter().any(|fit| fit.reaches(p));
+    common.retain(|points| points.map(is_pressed).any(|is_pressed| !is_pressed))
 }
 
 /// Volume of all pieces outside the model, measured along parallel rays.
