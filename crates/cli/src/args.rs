@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use shellock::piece::LabelParams;
 use shellock::pipeline::{KeySource, Params, ThicknessChoice};
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
@@ -258,6 +259,9 @@ pub struct Options {
     /// Cut a notch for a fingernail into the key, 0.45 mm deep
     #[arg(long, help_heading = "Make")]
     pub key_grip: bool,
+    /// Leave the pieces' numbers off their inner sides
+    #[arg(long, help_heading = "Make")]
+    pub no_labels: bool,
     /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
     #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().body.wall_gap_mm, help_heading = "Make")]
     pub wall_gap: f64,
@@ -306,8 +310,20 @@ impl Options {
         p.connector.detent_mm = self.detent;
         p.connector.key_rib_mm = self.key_ribs;
         p.has_grip = self.key_grip;
+        p.label = (!self.no_labels).then(|| self.label());
         p.connector.min_wall_mm = self.min_wall;
         p.verify.seed = self.seed;
         p
+    }
+
+    /// How numbers are engraved: strokes of two lines, and a wall behind them that the printer makes.
+    fn label(&self) -> LabelParams {
+        let usual = LabelParams::default();
+        let two_lines_mm = 2.0 * self.min_wall;
+        LabelParams {
+            stroke_mm: usual.stroke_mm.max(two_lines_mm).min(2.0),
+            least_wall_mm: usual.least_wall_mm.max(two_lines_mm).min(5.0),
+            ..usual
+        }
     }
 }

@@ -163,7 +163,13 @@ fn assembly(design: &Design) -> Vec<u8> {
         .pieces
         .iter()
         .zip(&names)
-        .map(|((p, mesh), name)| NamedObject { name, color: palette::color(design.plan.position(p)), mesh, turned })
+        .map(|((p, mesh), name)| NamedObject {
+            name,
+            color: palette::color(design.plan.position(p)),
+            mesh,
+            turned,
+            moved_mm: [0.0; 3],
+        })
         .collect();
     write_3mf(&objects)
 }
