@@ -129,7 +129,9 @@ pub(crate) fn document(title: &str, pages: Vec<Page>) -> Vec<u8> {
         written.media_box(Rect::new(0.0, 0.0, right, top)).parent(tree).contents(content_id);
         let mut resources = written.resources();
         let mut named = resources.fonts();
-        fonts.iter().for_each(|(id, name, _)| drop(named.pair(Name(name), *id)));
+        for (id, name, _) in fonts {
+            named.pair(Name(name), id);
+        }
         named.finish();
         let mut named = resources.x_objects();
         for (i, id) in picture_ids.iter().enumerate() {

@@ -37,6 +37,8 @@ pub struct Printer {
     pub clearance_mm: f64,
     /// The same on the rails of the key. [0.03, 0.8].
     pub key_clearance_mm: f64,
+    /// Gap that each side of a seam leaves inside the wall. [0, 0.4].
+    pub wall_gap_mm: f64,
     /// Thinnest wall that it makes. [0.1, 2].
     pub min_wall_mm: f64,
     /// Height of a layer. [0.01, 1].
@@ -54,6 +56,7 @@ impl Printer {
             bed_mm: [192.0, 120.0, 200.0],
             clearance_mm: 0.12,
             key_clearance_mm: 0.15,
+            wall_gap_mm: 0.05,
             min_wall_mm: 0.4,
             layer_mm: 0.05,
             material: Material::SLA_RESIN,
@@ -68,6 +71,7 @@ impl Printer {
             bed_mm: [220.0, 220.0, 250.0],
             clearance_mm: 0.2,
             key_clearance_mm: 0.22,
+            wall_gap_mm: 0.1,
             min_wall_mm: 0.45,
             layer_mm: 0.2,
             material: Material::PLA,
@@ -76,8 +80,14 @@ impl Printer {
 
     /// The same with PETG, which oozes more: 0.25 to 0.35 a side.
     pub fn fdm_petg() -> Self {
-        let petg = Material::PETG;
-        Self { name: "fdm-petg".into(), clearance_mm: 0.3, key_clearance_mm: 0.32, material: petg, ..Self::fdm() }
+        Self {
+            name: "fdm-petg".into(),
+            clearance_mm: 0.3,
+            key_clearance_mm: 0.32,
+            wall_gap_mm: 0.14,
+            material: Material::PETG,
+            ..Self::fdm()
+        }
     }
 
     /// A sintering printer and polyamide: about 0.25 a side.
@@ -88,6 +98,7 @@ impl Printer {
             bed_mm: [165.0, 165.0, 300.0],
             clearance_mm: 0.25,
             key_clearance_mm: 0.28,
+            wall_gap_mm: 0.12,
             min_wall_mm: 0.6,
             layer_mm: 0.11,
             material: Material::PA12,
@@ -109,6 +120,7 @@ impl Printer {
             side("height of the printer", height),
             ParamProblem::unless_within("clearance of the printer", "mm", self.clearance_mm, 0.03, 0.6),
             ParamProblem::unless_within("key clearance of the printer", "mm", self.key_clearance_mm, 0.03, 0.8),
+            ParamProblem::unless_within("wall gap of the printer", "mm", self.wall_gap_mm, 0.0, 0.4),
             ParamProblem::unless_within("minimum wall of the printer", "mm", self.min_wall_mm, 0.1, 2.0),
             ParamProblem::unless_within("layer of the printer", "mm", self.layer_mm, 0.01, 1.0),
         ];

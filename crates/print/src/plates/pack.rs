@@ -1,7 +1,7 @@
 //! Rectangles on as few plates as a greedy search needs.
 //!
-//! Each plate keeps its largest free rectangles; a new one goes where the least area of a free rectangle is left over, upright
-//! or turned by a quarter ("maximal rectangles, best area fit"; Jylänki, "A thousand ways to pack the bin", 2010).
+//! Each plate keeps its largest free rectangles; a new one goes as far to the front as it can, upright or turned by a quarter
+//! ("maximal rectangles, bottom left"; Jylänki, "A thousand ways to pack the bin", 2010).
 
 /// Rounding that must not keep a piece off a plate that it just fits, mm.
 const ROUNDING_MM: f64 = 1e-6;
@@ -25,10 +25,6 @@ struct Rect {
 impl Rect {
     fn side(&self, axis: usize) -> f64 {
         self.max[axis] - self.min[axis]
-    }
-
-    fn area(&self) -> f64 {
-        self.side(0) * self.side(1)
     }
 
     fn overlaps(&self, other: &Self) -> bool {
@@ -59,14 +55,15 @@ pub(super) fn pack(plate: [f64; 2], sides: &[[f64; 2]]) -> Vec<Spot> {
     spots
 }
 
-/// The corner of the free rectangle that is filled best, and whether the sides change places.
+/// The corner of the free rectangle in which the far edge stays nearest, and whether the sides change places.
 fn best_of(free: &[Rect], size: [f64; 2]) -> Option<([f64; 2], bool)> {
     let ways = [(size, false), ([size[1], size[0]], true)];
     let tries = free.iter().flat_map(|rect| ways.map(|(size, is_turned)| (rect, size, is_turned)));
     let fitting = tries.filter(|(rect, size, _)| (0..2).all(|k| size[k] <= rect.side(k) + ROUNDING_MM));
-    let slack = |rect: &Rect, size: [f64; 2]| (rect.side(0) - size[0]).min(rect.side(1) - size[1]);
+    let edges = |rect: &Rect, size: [f64; 2]| [rect.min[1] + size[1], rect.min[0] + size[0]];
     let best = fitting.min_by(|a, b| {
-        a.0.area().total_cmp(&b.0.area()).then(slack(a.0, a.1).total_cmp(&slack(b.0, b.1))).then(a.2.cmp(&b.2))
+        let (a_edges, b_edges) = (edges(a.0, a.1), edges(b.0, b.1));
+        a_edges[0].total_cmp(&b_edges[0]).then(a_edges[1].total_cmp(&b_edges[1])).then(a.2.cmp(&b.2))
     });
     best.map(|(rect, _, is_turned)| (rect.min, is_turned))
 }

@@ -61,7 +61,7 @@ fn pieces_are_only_moved_stand_on_the_plate_and_keep_their_distance() {
 
 #[test]
 fn what_the_printer_cannot_make_is_told_and_what_fits_slantwise_is_made() {
-    let rod = cuboid([0.0; 3], [250.0, 4.0, 4.0]).to_mesh();
+    let rod = cuboid([0.0; 3], [280.0, 4.0, 4.0]).to_mesh();
     let long = cuboid([0.0; 3], [400.0, 4.0, 4.0]).to_mesh();
     // The diagonal of 212 × 212 mm is 300.
     let plates = lay(&Printer::fdm(), &[printable(&rod, |_| false), printable(&long, |_| false)]);
