@@ -82,7 +82,7 @@ pub enum Command {
         #[command(flatten)]
         blows: Blows,
     },
-    /// Say what a finished kit saves over the solid model: material, and print time by PrusaSlicer where it is installed
+    /// Say what a finished kit saves over the solid model: material, and print time by PrusaSlicer where it is installed (that takes minutes)
     Report {
         /// Folder of the kit; savings.json goes there
         kit: PathBuf,

@@ -26,9 +26,9 @@ const SLICER: &str = "prusa-slicer";
 
 /// Settings of both technologies, as far as they matter for time, on a bed that holds everything. The display of the resin printer is
 /// coarse: its pixels cost time here and change nothing.
-const ROOMY: &str = "bed_shape = 0x0,2000x0,2000x2000,0x2000\nmax_print_height = 2000\n";
+const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
 const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
-    supports_enable = 0\npad_enable = 0\ndisplay_width = 2000\ndisplay_height = 2000\ndisplay_pixels_x = 1000\n\
+    supports_enable = 0\npad_enable = 0\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
     display_pixels_y = 1000\n";
 const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nperimeters = 2\nfill_density = 15%\n\
     support_material = 1\nperimeter_speed = 45\ninfill_speed = 80\ntravel_speed = 150\nskirts = 0\n";

@@ -104,7 +104,7 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let mut cells = by_number.into_iter().zip(pictures).peekable();
     let mut pages = Vec::new();
     while cells.peek().is_some() {
-        let mut page = headed("Pieces", "seen from inside, where each carries its number");
+        let mut page = headed("Pieces", "seen from inside; each carries its number on its inner side");
         for (i, (d, picture)) in cells.by_ref().take(PIECES[0] * PIECES[1]).enumerate() {
             let [x, y] = corner_mm(i, PIECES, cell, 14.0);
             page.picture([x + 0.5 * (cell[0] - picture_mm), y + 12.0], picture_mm, picture);

@@ -52,7 +52,7 @@ pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
 }
 
 /// Turning the thing in one's hands is worth this much of what is seen.
-const STAYING: f64 = 0.22;
+const STAYING: f64 = 0.5;
 
 /// Directions of sight: the front view first, then eight around, from a little above, from high above and from below.
 fn directions() -> Vec<Vec3> {
