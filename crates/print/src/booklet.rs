@@ -8,7 +8,7 @@ mod view;
 use rayon::prelude::*;
 use shellock::report::stills::{Camera, Image, Painted, crease_normals, projection, render};
 use shellock::report::{ReportPiece, exploded_shifts, from_inside};
-use shellock_geom::{Aabb, Vec3};
+use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::pdf::{Color, PAGE_MM, Page, Style, document, width_mm};
 use view::{Sight, sights};
@@ -17,11 +17,12 @@ use view::{Sight, sights};
 const RIM_MM: f64 = 14.0;
 /// Steps a page: columns and rows.
 const STEPS: [usize; 2] = [2, 2];
-/// Pieces a page.
+/// Pieces a page: columns and rows, more where there are many.
 const PIECES: [usize; 2] = [3, 4];
+const MANY_PIECES: [usize; 2] = [4, 5];
 /// Pixels a mm of a step's picture, and of others.
-const STEP_DENSITY: f64 = 6.0;
-const OTHER_DENSITY: f64 = 5.0;
+const STEP_DENSITY: f64 = 4.8;
+const OTHER_DENSITY: f64 = 4.0;
 
 const INK: Color = [34, 34, 38];
 const FAINT: Color = [110, 110, 118];
@@ -45,10 +46,35 @@ struct Drawn<'a> {
     normals: Vec<[Vec3; 3]>,
 }
 
+/// The faces of a piece that a viewer can see, as pieces are closed: half the work.
+struct Facing {
+    mesh: TriMesh,
+    normals: Vec<[Vec3; 3]>,
+}
+
 impl Drawn<'_> {
-    fn painted(&self, color: Color, shift: Vec3) -> Painted<'_> {
-        Painted { mesh: self.piece.mesh, color, face_colors: None, shift, normals: Some(&self.normals) }
+    /// What is turned towards somebody who looks along `direction`.
+    fn facing(&self, direction: Vec3) -> Facing {
+        let mesh = self.piece.mesh;
+        let seen = (0..mesh.triangles.len()).filter(|&f| mesh.area_vector_doubled(f).dot(direction) < 0.0);
+        let (triangles, normals) = seen.map(|f| (mesh.triangles[f], self.normals[f])).unzip();
+        Facing { mesh: TriMesh { points: mesh.points.clone(), triangles }, normals }
     }
+}
+
+impl Facing {
+    fn painted(&self, color: Color, shift: Vec3) -> Painted<'_> {
+        Painted { mesh: &self.mesh, color, face_colors: None, shift, normals: Some(&self.normals) }
+    }
+}
+
+/// All pieces in their colours from the front, where `shifts` puts them.
+fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2]) -> Image {
+    let camera = Camera::front();
+    let facing: Vec<Facing> = drawn.par_iter().map(|d| d.facing(camera.direction)).collect();
+    let all = facing.iter().zip(drawn).zip(shifts);
+    let scene: Vec<Painted<'_>> = all.map(|((f, d), &shift)| f.painted(d.piece.color, shift)).collect();
+    render(&scene, &camera, width, height)
 }
 
 impl Booklet<'_> {
@@ -75,17 +101,13 @@ impl Booklet<'_> {
         for (i, line) in self.lines.iter().enumerate() {
             page.text([RIM_MM, 40.0 + 6.0 * i as f64], Style { size_mm: 4.2, is_bold: false, color: FAINT }, line);
         }
-        let all = |shifts: &[Vec3]| -> Vec<Painted<'_>> {
-            drawn.iter().zip(shifts).map(|(d, &shift)| d.painted(d.piece.color, shift)).collect()
-        };
         let in_order: Vec<ReportPiece<'_>> = drawn.iter().map(|d| d.piece.clone()).collect();
         let (together, apart) = (vec![Vec3::ZERO; drawn.len()], exploded_shifts(&in_order));
         let top = 46.0 + 6.0 * self.lines.len() as f64;
         let height = 0.5 * (PAGE_MM[1] - RIM_MM - top);
         let width = PAGE_MM[0] - 2.0 * RIM_MM;
         for (i, shifts) in [together, apart].iter().enumerate() {
-            let [w, h] = [width, height].map(|mm| (mm * OTHER_DENSITY) as usize);
-            let picture = render(&all(shifts), &Camera::front(), w, h);
+            let picture = all_pieces(drawn, shifts, [width, height].map(|mm| (mm * OTHER_DENSITY) as usize));
             page.picture([RIM_MM, top + i as f64 * height], width, picture);
         }
         page
@@ -95,7 +117,8 @@ impl Booklet<'_> {
 /// All pieces by number, each from inside.
 fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let middle = drawn.iter().fold(Aabb::EMPTY, |b, d| b.union(d.piece.mesh.bounds())).center();
-    let cell = cell_mm(PIECES, 14.0);
+    let grid = if drawn.len() > PIECES[0] * PIECES[1] { MANY_PIECES } else { PIECES };
+    let cell = cell_mm(grid, 14.0);
     let picture_mm = (cell[1] - 14.0).min(cell[0] - 4.0);
     let side = (picture_mm * OTHER_DENSITY) as usize;
     let mut by_number: Vec<&Drawn<'_>> = drawn.iter().collect();
@@ -105,8 +128,8 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let mut pages = Vec::new();
     while cells.peek().is_some() {
         let mut page = headed("Pieces", "seen from inside; each carries its number on its inner side");
-        for (i, (d, picture)) in cells.by_ref().take(PIECES[0] * PIECES[1]).enumerate() {
-            let [x, y] = corner_mm(i, PIECES, cell, 14.0);
+        for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
+            let [x, y] = corner_mm(i, grid, cell, 14.0);
             page.picture([x + 0.5 * (cell[0] - picture_mm), y + 12.0], picture_mm, picture);
             numbered(&mut page, [x + 5.0, y + 6.0], 4.6, d.piece.color, &d.piece.id.to_string());
             let step = format!("step {}{}", d.piece.order + 1, if d.piece.is_key { ", the key" } else { "" });
@@ -126,8 +149,8 @@ fn steps_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let size = picture_mm.map(|mm| (mm * STEP_DENSITY) as usize);
     let step_pictures: Vec<(Image, Option<[[f64; 2]; 2]>)> =
         (0..drawn.len()).into_par_iter().map(|i| step_picture(drawn, i, &sights[i], size)).collect();
-    let finished: Vec<Painted<'_>> = drawn.iter().map(|d| d.painted(d.piece.color, Vec3::ZERO)).collect();
-    let finished = (!drawn.is_empty()).then(|| (render(&finished, &Camera::front(), size[0], size[1]), None));
+    let together = vec![Vec3::ZERO; drawn.len()];
+    let finished = (!drawn.is_empty()).then(|| (all_pieces(drawn, &together, size), None));
     let mut pages = Vec::new();
     for (i, (picture, way)) in step_pictures.into_iter().chain(finished).enumerate() {
         if i % (STEPS[0] * STEPS[1]) == 0 {
@@ -177,9 +200,10 @@ fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
 fn step_picture(drawn: &[Drawn<'_>], i: usize, sight: &Sight, size: [usize; 2]) -> (Image, Option<[[f64; 2]; 2]>) {
     let new = &drawn[i];
     let back = -sight.travel_mm * Vec3::from(new.piece.installation_direction);
-    let mut scene: Vec<Painted<'_>> = drawn[..i].iter().map(|d| d.painted(GREY, Vec3::ZERO)).collect();
-    scene.push(new.painted(new.piece.color, if i > 0 { back } else { Vec3::ZERO }));
     let camera = sight.camera();
+    let facing: Vec<Facing> = drawn[..=i].iter().map(|d| d.facing(camera.direction)).collect();
+    let mut scene: Vec<Painted<'_>> = facing.iter().map(|f| f.painted(GREY, Vec3::ZERO)).collect();
+    scene[i] = facing[i].painted(new.piece.color, if i > 0 { back } else { Vec3::ZERO });
     let image = render(&scene, &camera, size[0], size[1]);
     let home = new.piece.mesh.bounds().center();
     let place = projection(&scene, &camera, size[0], size[1]);

@@ -1,7 +1,7 @@
 //! Pieces laid flat on the plates of a printer, as they are printed.
 //!
-//! Each piece is laid so that its outer skin needs the least support ([`orient`]), then plates are packed ([`pack`]), largest pieces
-//! first. Plates lie side by side, so that one file can hold all of them.
+//! Each piece is laid so that its outer skin needs the least support ([`orient`]), then plates are packed ([`pack()`]). Plates lie side by
+//! side, so that one file can hold all of them.
 
 mod orient;
 mod pack;
@@ -11,7 +11,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::printer::Printer;
 use orient::Pose;
-use pack::pack;
+use pack::{Spot, pack};
 
 /// Free rim of a plate, mm: room for what slicers add at the foot of a print.
 const EDGE_MM: f64 = 4.0;
@@ -82,16 +82,46 @@ pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
     let poses: Vec<Option<Pose>> =
         pieces.par_iter().map(|piece| orient::best(printer, piece, room_mm(printer))).collect();
     let too_large = (0..pieces.len()).filter(|&i| poses[i].is_none()).collect();
-    let mut fitting: Vec<(usize, Pose)> = poses.into_iter().enumerate().filter_map(|(i, p)| Some((i, p?))).collect();
-    // Large ones first; the sort is stable, so equal ones stay in order.
-    fitting.sort_by(|a, b| b.1.footprint_mm2().total_cmp(&a.1.footprint_mm2()));
-    let sides: Vec<[f64; 2]> = fitting.iter().map(|(_, pose)| [0, 1].map(|k| pose.bounds.size()[k] + GAP_MM)).collect();
-    let [width, depth, _] = room_mm(printer);
-    let spots = pack([width + GAP_MM, depth + GAP_MM], &sides);
-    let n_plates = spots.iter().map(|s| s.plate + 1).max().unwrap_or(0);
-    let mut laid: Vec<Laid> = fitting.iter().zip(&spots).map(|((i, pose), spot)| placed(*i, pose, spot)).collect();
+    let fitting: Vec<(usize, Pose)> = poses.into_iter().enumerate().filter_map(|(i, p)| Some((i, p?))).collect();
+    // High ones first save height, large ones first save plates; the better of both is taken. Equal ones stay in order.
+    let by = |measure: fn(&Pose) -> f64| {
+        let mut order: Vec<usize> = (0..fitting.len()).collect();
+        order.sort_by(|&a, &b| measure(&fitting[b].1).total_cmp(&measure(&fitting[a].1)));
+        packed(printer, &fitting, order)
+    };
+    let (high, large) = (by(|pose| pose.bounds.size().z), by(Pose::footprint_mm2));
+    let fitting_spots = if high.cost(&fitting) < large.cost(&fitting) { high } else { large };
+    let n_plates = fitting_spots.n_plates();
+    let mut laid: Vec<Laid> =
+        fitting_spots.0.iter().map(|(at, spot)| placed(fitting[*at].0, &fitting[*at].1, spot)).collect();
     laid.sort_by_key(|l| l.piece);
     Plates { laid, n_plates, too_large }
+}
+
+/// Positions in a list of poses, each with its spot.
+struct Packing(Vec<(usize, Spot)>);
+
+impl Packing {
+    fn n_plates(&self) -> usize {
+        self.0.iter().map(|(_, spot)| spot.plate + 1).max().unwrap_or(0)
+    }
+
+    /// Plates, and the heights of all of them in one, mm: what takes long on printers that care.
+    fn cost(&self, poses: &[(usize, Pose)]) -> f64 {
+        /// Changing a plate is worth this height.
+        const PLATE_MM: f64 = 15.0;
+        let mut heights = vec![PLATE_MM; self.n_plates()];
+        for (at, spot) in &self.0 {
+            heights[spot.plate] = heights[spot.plate].max(PLATE_MM + poses[*at].1.bounds.size().z);
+        }
+        heights.iter().fold(0.0, |sum, mm| sum + mm)
+    }
+}
+
+fn packed(printer: &Printer, poses: &[(usize, Pose)], order: Vec<usize>) -> Packing {
+    let sides: Vec<[f64; 2]> = order.iter().map(|&at| [0, 1].map(|k| poses[at].1.bounds.size()[k] + GAP_MM)).collect();
+    let [width, depth, _] = room_mm(printer);
+    Packing(order.into_iter().zip(pack([width + GAP_MM, depth + GAP_MM], &sides)).collect())
 }
 
 /// Whether a piece of this shape could be made by `printer` in some pose.
@@ -114,7 +144,7 @@ pub fn fits_whole(printer: &Printer, bounds: Aabb) -> bool {
 pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
     let piece = Printable { mesh, is_outer: vec![true; mesh.triangles.len()] };
     let pose = orient::best(printer, &piece, [f64::INFINITY; 3])?;
-    Some(placed(0, &pose, &pack::Spot { plate: 0, corner_mm: [0.0; 2], is_turned: false }))
+    Some(placed(0, &pose, &Spot { plate: 0, corner_mm: [0.0; 2], is_turned: false }))
 }
 
 /// Width, depth and height that pieces may take, mm.
@@ -123,7 +153,7 @@ fn room_mm(printer: &Printer) -> [f64; 3] {
     [width - 2.0 * EDGE_MM, depth - 2.0 * EDGE_MM, height]
 }
 
-fn placed(piece: usize, pose: &Pose, spot: &pack::Spot) -> Laid {
+fn placed(piece: usize, pose: &Pose, spot: &Spot) -> Laid {
     let pose = if spot.is_turned { pose.quarter_turned() } else { pose.clone() };
     let corner = Vec3::new(spot.corner_mm[0] + EDGE_MM, spot.corner_mm[1] + EDGE_MM, 0.0);
     // Where the axes go: the columns of the rotation.

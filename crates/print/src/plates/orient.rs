@@ -59,6 +59,9 @@ pub(super) struct Support {
 }
 
 /// What counts how much, in shares: of the area, of the diagonal.
+///
+/// Skin goes before all. Supports inside a piece cost a resin printer hardly anything, and height is its time; a filament printer pays for
+/// supports with time and material.
 struct Weights {
     outer: f64,
     all: f64,
@@ -68,7 +71,7 @@ struct Weights {
 
 fn weights(process: Process) -> Weights {
     match process {
-        Process::Sla => Weights { outer: 6.0, all: 1.0, height: 0.5, falling: 0.0 },
+        Process::Sla => Weights { outer: 6.0, all: 0.3, height: 1.0, falling: 0.0 },
         Process::Fdm => Weights { outer: 6.0, all: 2.0, height: 0.3, falling: 1.5 },
         Process::Sls => Weights { outer: 0.0, all: 0.0, height: 1.0, falling: 0.0 },
     }
