@@ -283,6 +283,9 @@ pub struct Options {
     /// Leave the pieces' numbers off their inner sides
     #[arg(long, help_heading = "Make")]
     pub no_labels: bool,
+    /// Leave out instructions.pdf, which takes about a second
+    #[arg(long, help_heading = "Make")]
+    pub no_booklet: bool,
     /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface [default: the printer's]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
     pub wall_gap: Option<f64>,

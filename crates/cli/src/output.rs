@@ -162,7 +162,7 @@ pub fn files(
     files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
     files.push(("report.html".into(), page));
     files.push(("pieces.png".into(), picture));
-    files.push(("instructions.pdf".into(), booklet));
+    files.extend(booklet.map(|bytes| ("instructions.pdf".to_owned(), bytes)));
     (files, summary)
 }
 
@@ -384,7 +384,7 @@ fn standing(up: Axis, design: &Design, v: Vec3) -> Vec3 {
     }
 }
 
-/// The page, the picture and the booklet. All show the model standing on its feet: `up` becomes z.
+/// The page, the picture and the booklet, where it is wanted. All show the model standing on its feet: `up` becomes z.
 fn report(
     model: &Model,
     options: &Options,
@@ -393,7 +393,7 @@ fn report(
     warnings: &[Warning],
     summary: &Summary,
     figures: Vec<(String, String)>,
-) -> (Vec<u8>, Vec<u8>, Vec<u8>) {
+) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
     let stand = |v: Vec3| standing(options.up, design, v);
     let turned: Vec<TriMesh> = design
         .pieces
@@ -445,7 +445,7 @@ fn report(
     let booklet = Booklet { title: title(&model.name), lines: cover_lines(&data.facts), pieces: data.pieces.clone() };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),
-        || rayon::join(|| pieces_picture(&data.pieces).png(), || booklet.pdf()),
+        || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
     );
     (page, picture, booklet)
 }

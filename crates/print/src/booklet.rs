@@ -21,7 +21,7 @@ const STEPS: [usize; 2] = [2, 2];
 const PIECES: [usize; 2] = [3, 4];
 const MANY_PIECES: [usize; 2] = [4, 5];
 /// Pixels a mm of a step's picture, and of others.
-const STEP_DENSITY: f64 = 4.8;
+const STEP_DENSITY: f64 = 4.4;
 const OTHER_DENSITY: f64 = 4.0;
 
 const INK: Color = [34, 34, 38];

@@ -1,7 +1,7 @@
 //! The paper's Table 1 of our own kits: what they save over solid models.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
@@ -32,13 +32,13 @@ const INTRODUCTION: &str = "# What kits save\n\n\
 
 /// Writes the table; returns its file.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
-    let rows = options.kits.iter().map(row).collect::<Result<Vec<_>, _>>()?;
+    let rows = options.kits.iter().map(|kit| row(kit)).collect::<Result<Vec<_>, _>>()?;
     let text = format!("{INTRODUCTION}{}", markdown(&HEAD, &rows));
     fs::write(&options.out, text).map_err(|source| Failure::File { path: options.out.clone(), source })?;
     Ok(vec![options.out.clone()])
 }
 
-fn row(kit: &PathBuf) -> Result<Vec<String>, Failure> {
+fn row(kit: &Path) -> Result<Vec<String>, Failure> {
     let path = kit.join("savings.json");
     let bytes = fs::read(&path).map_err(|source| Failure::File { path: path.clone(), source })?;
     let told: Value =
