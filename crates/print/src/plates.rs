@@ -1,6 +1,6 @@
 //! Pieces laid flat on the plates of a printer, as they are printed.
 //!
-//! Each piece is laid so that its outer skin needs the least support ([`orient`]), then plates are packed ([`pack()`]). Plates lie side by
+//! Each piece is laid so that its outer skin needs the least support (`orient`), then plates are packed (`pack`). Plates lie side by
 //! side, so that one file can hold all of them.
 
 mod orient;
