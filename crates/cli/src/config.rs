@@ -11,8 +11,8 @@
 //! clearance = 0.18
 //! ```
 //!
-//! Options become arguments in front of the user's own, so there is one place that knows them and says what is wrong with them. What
-//! is said on the command line goes before.
+//! Options become arguments in front of the user's own, so there is one place that knows them and says what is wrong
+//! with them. What is said on the command line goes before.
 
 use std::ffi::OsString;
 use std::fs;

@@ -33,7 +33,8 @@ pub struct Printing {
 }
 
 impl Printing {
-    /// Lays `pieces` on plates of `printer`. Of their faces, those on `surface` are the skin that is seen; `solid` is the model.
+    /// Lays `pieces` on plates of `printer`. Of their faces, those on `surface` are the skin that is seen; `solid` is
+    /// the model.
     pub fn of(printer: &Printer, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
         let skin = TriangleBvh::new(surface);
         let printables: Vec<Printable<'_>> = pieces.par_iter().map(|mesh| printable(mesh, &skin)).collect();
@@ -104,7 +105,8 @@ impl Printing {
         })
     }
 
-    /// All plates side by side, and each alone where there are several. `place` is where a piece stands in the order of installation.
+    /// All plates side by side, and each alone where there are several. `place` is where a piece stands in the order of
+    /// installation.
     pub fn files(&self, pieces: &[TriMesh], place: impl Fn(usize) -> usize) -> Vec<(String, Vec<u8>)> {
         let names: Vec<String> = (0..pieces.len()).map(|i| format!("piece {i}")).collect();
         let object = |laid: &Laid, moved_mm: [f64; 3]| {

@@ -1,7 +1,7 @@
 //! `report`: what a kit saves over the solid model, as the paper's Table 1 tells it.
 //!
-//! Print times are PrusaSlicer's own estimates where it is installed, else closed forms. Pieces are laid on plates anew for either
-//! process; the solid lies in the pose that needs the least support.
+//! Print times are PrusaSlicer's own estimates where it is installed, else closed forms. Pieces are laid on plates anew
+//! for either process; the solid lies in the pose that needs the least support.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,8 +24,8 @@ const SAVINGS: &str = "savings.json";
 /// The slicer's program.
 const SLICER: &str = "prusa-slicer";
 
-/// Settings of both technologies, as far as they matter for time, on a bed that holds everything. The display of the resin printer is
-/// coarse: its pixels cost time here and change nothing.
+/// Settings of both technologies, as far as they matter for time, on a bed that holds everything. The display of the
+/// resin printer is coarse: its pixels cost time here and change nothing.
 const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
 const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
     supports_enable = 0\npad_enable = 0\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\

@@ -1,7 +1,8 @@
-//! The booklet: a cover, all pieces with their numbers, then one step a picture, like the sheets that come with furniture.
+//! The booklet: a cover, all pieces with their numbers, then one step a picture, like the sheets that come with
+//! furniture.
 //!
-//! What is there is grey, the new piece has its colour, and an arrow says where it goes. Each step is seen from where most of the new
-//! piece, of its place and of its way is seen (`view`); a note says so where the view changes.
+//! What is there is grey, the new piece has its colour, and an arrow says where it goes. Each step is seen from where
+//! most of the new piece, of its place and of its way is seen (`view`); a note says so where the view changes.
 
 mod view;
 

@@ -1,7 +1,7 @@
 //! Pieces laid flat on the plates of a printer, as they are printed.
 //!
-//! Each piece is laid so that its outer skin needs the least support (`orient`), then plates are packed (`pack`). Plates lie side by
-//! side, so that one file can hold all of them.
+//! Each piece is laid so that its outer skin needs the least support (`orient`), then plates are packed (`pack`).
+//! Plates lie side by side, so that one file can hold all of them.
 
 mod orient;
 mod pack;
@@ -38,7 +38,8 @@ pub struct Laid {
     pub plate: usize,
     /// Where the x, y and z axes go.
     pub turned: [[f64; 3]; 3],
-    /// Where it is moved after that, mm: with its lowest point on z = 0, in the frame of its plate, whose corner is the origin.
+    /// Where it is moved after that, mm: with its lowest point on z = 0, in the frame of its plate, whose corner is the
+    /// origin.
     pub moved_mm: [f64; 3],
     /// Width, depth and height as it lies, mm.
     pub size_mm: [f64; 3],

@@ -62,7 +62,8 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
     };
     let bytes = made();
     let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
-    // Cover, pieces, one page of three steps and the end; two pictures on the cover, one a piece, one a step, one at the end.
+    // Cover, pieces, one page of three steps and the end; two pictures on the cover, one a piece, one a step, one at
+    // the end.
     assert_eq!((count(b"/Type /Page\n"), count(b"/Subtype /Image")), (3, 2 + 3 + 3 + 1));
     assert!(bytes == made());
 }

@@ -1,7 +1,8 @@
 //! How a piece lies best on its plate.
 //!
-//! Tried are the facets of its convex hull, on which it rests by itself, and the 26 lattice directions, on which supports hold it. What
-//! counts is set by the process: marks of supports on the skin that is seen, supports at all, height, and whether it stands.
+//! Tried are the facets of its convex hull, on which it rests by itself, and the 26 lattice directions, on which
+//! supports hold it. What counts is set by the process: marks of supports on the skin that is seen, supports at all,
+//! height, and whether it stands.
 
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
@@ -60,8 +61,8 @@ pub(super) struct Support {
 
 /// What counts how much, in shares: of the area, of the diagonal.
 ///
-/// Skin goes before all. Supports inside a piece cost a resin printer hardly anything, and height is its time; a filament printer pays for
-/// supports with time and material.
+/// Skin goes before all. Supports inside a piece cost a resin printer hardly anything, and height is its time; a
+/// filament printer pays for supports with time and material.
 struct Weights {
     outer: f64,
     all: f64,
@@ -77,7 +78,8 @@ fn weights(process: Process) -> Weights {
     }
 }
 
-/// The best pose within `room_mm`, width, depth and height; `None` where the piece is too large in every pose that is tried.
+/// The best pose within `room_mm`, width, depth and height; `None` where the piece is too large in every pose that is
+/// tried.
 pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) -> Option<Pose> {
     let body = Body::of(piece)?;
     let weights = weights(printer.process);

@@ -1,7 +1,7 @@
 //! Rectangles on as few plates as a greedy search needs.
 //!
-//! Each plate keeps its largest free rectangles; a new one goes as far to the front as it can, upright or turned by a quarter
-//! ("maximal rectangles, bottom left"; Jylänki, "A thousand ways to pack the bin", 2010).
+//! Each plate keeps its largest free rectangles; a new one goes as far to the front as it can, upright or turned by a
+//! quarter ("maximal rectangles, bottom left"; Jylänki, "A thousand ways to pack the bin", 2010).
 
 /// Rounding that must not keep a piece off a plate that it just fits, mm.
 const ROUNDING_MM: f64 = 1e-6;

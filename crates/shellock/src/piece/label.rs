@@ -7,9 +7,9 @@
 //!   ────────────────────   outer side
 //! ```
 //!
-//! A place is good where rays from the cavity meet nothing but the inner side, close to a plane, and pass through the whole wall behind
-//! it: that keeps numbers off connectors, seams, notches and carved walls. The largest size that has a good place is taken, as near to
-//! the middle of the wall as it goes.
+//! A place is good where rays from the cavity meet nothing but the inner side, close to a plane, and pass through the
+//! whole wall behind it: that keeps numbers off connectors, seams, notches and carved walls. The largest size that has
+//! a good place is taken, as near to the middle of the wall as it goes.
 
 mod digits;
 

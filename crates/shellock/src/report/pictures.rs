@@ -41,8 +41,8 @@ fn painted<'a>(piece: &ReportPiece<'a>, shift: Vec3, normals: &'a [[Vec3; 3]]) -
     Painted { mesh: piece.mesh, color: piece.color, shift, face_colors: None, normals: Some(normals) }
 }
 
-/// A piece seen from `middle`, that of the assembly: its inner side with the connectors, `side` pixels wide and high. `normals` are its
-/// [`crease_normals`].
+/// A piece seen from `middle`, that of the assembly: its inner side with the connectors, `side` pixels wide and high.
+/// `normals` are its [`crease_normals`].
 pub fn from_inside(piece: &ReportPiece<'_>, normals: &[[Vec3; 3]], middle: Vec3, side: usize) -> Image {
     let outwards = (piece.mesh.bounds().center() - middle).normalize_or(Vec3::Y);
     // Straight up or down, "up" has no meaning in the picture.

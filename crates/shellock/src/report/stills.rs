@@ -258,7 +258,7 @@ mod tests {
         let far = Painted { shift: Vec3::new(90.0, -20.0, 40.0), ..ball };
         let camera = Camera::front();
         let at = projection(&[ball, far], &camera, 300, 200)(far.shift);
-        let frame = Some(Aabb::around([Vec3::ZERO, far.shift].into_iter()).grown(10.0));
+        let frame = Some(Aabb::around([Vec3::ZERO, far.shift]).grown(10.0));
         let image = render(&[far], &Camera { frame, ..camera }, 300, 200);
         let framed = projection(&[far], &Camera { frame, ..camera }, 300, 200)(far.shift);
         let drawn: Vec<[f64; 2]> = (0..300 * 200)
