@@ -4,9 +4,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use shellock::piece::LabelParams;
 use shellock::pipeline::{KeySource, Params, ThicknessChoice};
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
+use shellock_print::Printer;
 
 use crate::stress;
 
@@ -79,6 +81,16 @@ pub enum Command {
         kit: PathBuf,
         #[command(flatten)]
         blows: Blows,
+    },
+    /// Say what a finished kit saves over the solid model: material, and print time by PrusaSlicer where it is installed (that takes minutes)
+    Report {
+        /// Folder of the kit; savings.json goes there
+        kit: PathBuf,
+        /// The model it was made from [default: the file named in its plan.json]
+        model: Option<PathBuf>,
+        /// Use closed forms for the print time even where PrusaSlicer is installed
+        #[arg(long)]
+        closed_form: bool,
     },
     /// Say what a file holds and whether it can be made
     Inspect {
@@ -250,6 +262,16 @@ impl FromStr for Key {
 
 #[derive(Args)]
 pub struct Options {
+    /// What it is printed on: sla, fdm, fdm-petg, sls, or a printer of the configuration file; its clearances, walls and material are
+    /// used where nothing else is said
+    #[arg(long, value_name = "NAME", default_value = "sla", help_heading = "Printer")]
+    pub printer: String,
+    /// Options and printers, in TOML; what is said on the command line goes before it [default: shellock.toml, if there is one here]
+    #[arg(long, value_name = "FILE", help_heading = "Printer")]
+    pub config: Option<PathBuf>,
+    /// The printers of the configuration file.
+    #[arg(skip)]
+    pub own_printers: Vec<Printer>,
     /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Size", conflicts_with_all = ["height", "scale"])]
     pub size: Option<f64>,
@@ -297,9 +319,9 @@ pub struct Options {
     /// Wall thickness, mm, 0.8 to 10, or auto: the least from 1.6 (or four times --min-wall, if that is more) to 3 mm that bears a fall
     #[arg(long, value_name = "auto|MM", allow_hyphen_values = true, default_value = "auto", help_heading = "Make")]
     pub thickness: Thickness,
-    /// What it is printed of: what it bears decides how thick walls must be
-    #[arg(long, value_name = "NAME", default_value = "sla-resin", value_parser = stress::material, help_heading = "Make")]
-    pub material: Material,
+    /// What it is printed of: what it bears decides how thick walls must be [default: the printer's]
+    #[arg(long, value_name = "NAME", value_parser = stress::material, help_heading = "Make")]
+    pub material: Option<Material>,
     /// Height of the fall that walls must bear, 0.01 to 20 m
     #[arg(long, value_name = "HEIGHT", default_value_t = Params::default().strength.drop_m, allow_hyphen_values = true,
           value_parser = stress::metres, help_heading = "Make")]
@@ -307,12 +329,12 @@ pub struct Options {
     /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by what fits
     #[arg(long, value_name = "auto|MM", allow_hyphen_values = true, default_value = "auto", help_heading = "Make")]
     pub connector: SizeChoice,
-    /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.clearance_mm, help_heading = "Make")]
-    pub clearance: f64,
-    /// The same on the rails of the key, mm, 0.03 to 0.8
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.key_clearance_mm, help_heading = "Make")]
-    pub key_clearance: f64,
+    /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament [default: the printer's]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    pub clearance: Option<f64>,
+    /// The same on the rails of the key, mm, 0.03 to 0.8 [default: the printer's]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    pub key_clearance: Option<f64>,
     /// Height of a bump on each rail that the key clicks past, mm, 0 to 0.4; 0 makes none
     #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = 0.0, help_heading = "Make")]
     pub detent: f64,
@@ -325,12 +347,18 @@ pub struct Options {
     /// Cut a notch for a fingernail into the key, 0.45 mm deep
     #[arg(long, help_heading = "Make")]
     pub key_grip: bool,
-    /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().body.wall_gap_mm, help_heading = "Make")]
-    pub wall_gap: f64,
-    /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.min_wall_mm, help_heading = "Make")]
-    pub min_wall: f64,
+    /// Leave the pieces' numbers off their inner sides
+    #[arg(long, help_heading = "Make")]
+    pub no_labels: bool,
+    /// Leave out instructions.pdf, which takes about a second
+    #[arg(long, help_heading = "Make")]
+    pub no_booklet: bool,
+    /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface [default: the printer's]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    pub wall_gap: Option<f64>,
+    /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported [default: the printer's]
+    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
+    pub min_wall: Option<f64>,
     /// Spacing of the grid behind the walls, mm [default: thickness / 2.5]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
     pub grid: Option<f64>,
@@ -345,8 +373,16 @@ pub struct Options {
 const REVISIONS_PER_SECOND: f64 = 20_000.0;
 
 impl Options {
-    /// The library's parameters.
-    pub fn params(&self) -> Params {
+    /// The printer that is named: of the user's own, or of those that come with the program.
+    pub fn chosen_printer(&self) -> Result<Printer, String> {
+        let known: Vec<Printer> = self.own_printers.iter().cloned().chain(Printer::presets()).collect();
+        let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(&self.printer)).cloned();
+        let names = || known.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
+        found.ok_or_else(|| format!("there is no printer \"{}\"; choose one of {}", self.printer, names()))
+    }
+
+    /// The library's parameters for pieces made on `printer`.
+    pub fn params(&self, printer: &Printer) -> Params {
         let mut p = Params::default();
         p.segmentation.n_pieces = self.pieces;
         p.segmentation.seed = self.seed;
@@ -362,19 +398,30 @@ impl Options {
             Thickness::Auto => p.thickness = ThicknessChoice::Auto,
             Thickness::Mm(mm) => p.body.thickness_mm = mm,
         }
-        p.strength.material = self.material;
+        p.strength.material = self.material.unwrap_or(printer.material);
         p.strength.drop_m = self.drop;
         p.strength.seed = self.seed;
-        p.body.wall_gap_mm = self.wall_gap;
+        p.body.wall_gap_mm = self.wall_gap.unwrap_or(printer.wall_gap_mm);
         p.body.cell_mm = self.grid;
         p.connector.size = self.connector;
-        p.connector.clearance_mm = self.clearance;
-        p.connector.key_clearance_mm = self.key_clearance;
+        p.connector.clearance_mm = self.clearance.unwrap_or(printer.clearance_mm);
+        p.connector.key_clearance_mm = self.key_clearance.unwrap_or(printer.key_clearance_mm);
         p.connector.detent_mm = self.detent;
         p.connector.key_rib_mm = self.key_ribs;
         p.has_grip = self.key_grip;
-        p.connector.min_wall_mm = self.min_wall;
+        p.connector.min_wall_mm = self.min_wall.unwrap_or(printer.min_wall_mm);
+        p.label = (!self.no_labels).then(|| label(p.connector.min_wall_mm));
         p.verify.seed = self.seed;
         p
     }
+}
+
+/// How numbers are engraved: strokes of two lines, and a wall behind them that the printer makes.
+fn label(min_wall_mm: f64) -> LabelParams {
+    let usual = LabelParams::default();
+    let two_lines_mm = 2.0 * min_wall_mm;
+    // A wrong wall is told as such, not as a wrong stroke.
+    let within =
+        |usual: f64, most: f64| if two_lines_mm.is_finite() { usual.max(two_lines_mm).min(most) } else { usual };
+    LabelParams { stroke_mm: within(usual.stroke_mm, 2.0), least_wall_mm: within(usual.least_wall_mm, 5.0), ..usual }
 }

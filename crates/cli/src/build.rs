@@ -19,6 +19,7 @@ use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::inspect::thin_warnings;
 use crate::output::{Destination, Summary, files};
+use crate::printing::{Printing, too_large};
 use crate::progress::{Display, PlanClock};
 
 /// `shellock build`.
@@ -40,8 +41,10 @@ pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Res
 
 /// The parameters, or all that is wrong with them.
 pub fn checked(options: &Options) -> Result<Params, Failure> {
-    let params = options.params();
+    let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+    let params = options.params(&printer);
     let mut problems = params.problems();
+    problems.extend(printer.problems().iter().map(ToString::to_string));
     // An infinite time is one: until the proof is closed.
     if options.plan_time.is_nan() || options.plan_time < 0.0 {
         problems.push(format!("plan time is {} s; it must be 0 or more", options.plan_time));
@@ -50,10 +53,13 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
 }
 
 fn make(session: &Session, model: &Model, options: &Options, params: &Params, to: &Destination) -> Result<u8, Failure> {
+    let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+    let mut notes = model.notes.clone();
+    notes.extend(too_large(session, params, &printer, model)?);
     if !session.is_json {
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
-        model.notes.iter().for_each(|n| println!("note: {n}"));
+        notes.iter().for_each(|n| println!("note: {n}"));
         thin_warnings(model, options).iter().for_each(|w| println!("warning: {w}"));
     }
     let display = Display::new(session.is_json);
@@ -72,9 +78,11 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
             return Err(no_plan(&reason, &blockers));
         }
     };
-    let warnings = &made.warnings;
+    let mut warnings = made.warnings.clone();
     display.show(Progress::Stage { name: "files and pictures", n_steps: 0 });
-    let (files, summary) = files(model, options, params, &made, warnings);
+    let printing = Printing::of(&printer, made.pieces.as_slice(), &made.surface.mesh, &model.solid);
+    warnings.extend(printing.warnings());
+    let (files, summary) = files(model, options, params, &made, &warnings, &printing);
     display.finish();
     if session.stop.load(Ordering::Relaxed) {
         return Err(Failure::Stopped);
@@ -82,9 +90,10 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
     to.write(&files)?;
     let code = u8::from(!made.verification.passed());
     if session.is_json {
-        print_json(to, model, &made, &summary, warnings, code);
+        print_json(to, &notes, &made, &summary, &warnings, code);
     } else {
-        print_text(to, &made, params, &summary, warnings);
+        print_text(to, &made, params, &summary, &warnings);
+        println!("{}", printing.words());
     }
     Ok(code)
 }
@@ -102,12 +111,12 @@ fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> Failure {
     Failure::NoPlan(text)
 }
 
-fn print_json(to: &Destination, model: &Model, made: &Design, summary: &Summary, warnings: &[Warning], code: u8) {
+fn print_json(to: &Destination, notes: &[String], made: &Design, summary: &Summary, warnings: &[Warning], code: u8) {
     let value = json!({
         "status": if code == 0 { "verified" } else { "failed" },
-        "out": to.folder(), "notes": model.notes,
+        "out": to.folder(), "notes": notes,
         "pieces": made.pieces.len(), "key_piece": made.plan.key(),
-        "volume_ratio": summary.volume_ratio, "connector_share": summary.connector_share,
+        "volume_ratio": summary.volume_ratio, "print_time_ratio": summary.print_time_ratio, "connector_share": summary.connector_share,
         "thin_share": summary.thin_share, "thickness_mm": made.thickness_mm,
         "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
         "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.sizes.largest_mm(),
@@ -140,7 +149,7 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
         let percent = 100.0 * summary.thin_share;
         println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", params.connector.min_wall_mm);
     }
-    println!("written to {}: open report.html in a browser, print pieces/*.stl", to.folder().display());
+    println!("written to {}: open report.html in a browser, print plates.3mf", to.folder().display());
 }
 
 /// What the wall bears, in words.

@@ -2,12 +2,15 @@
 
 mod args;
 mod build;
+mod config;
 mod failure;
 mod input;
 mod inspect;
 mod output;
 mod paint;
+mod printing;
 mod progress;
+mod savings;
 mod stages;
 mod stress;
 
@@ -15,11 +18,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::Parser;
 use clap::error::ErrorKind;
 use serde_json::json;
 
-use args::{Cli, Command};
+use args::Command;
 use failure::Failure;
 
 /// What every command gets.
@@ -34,12 +36,16 @@ pub struct Session {
 const MOST_THREADS: usize = 256;
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match config::command_line(std::env::args_os().collect()) {
         Ok(cli) => cli,
-        Err(e) => {
+        Err(config::Refusal::Arguments(e)) => {
             let is_help = matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
             let _ = e.print();
             return ExitCode::from(if is_help { 0 } else { 2 });
+        }
+        Err(config::Refusal::File(problem)) => {
+            eprintln!("error: {problem}");
+            return ExitCode::from(2);
         }
     };
     let session = Session { is_json: cli.json, stop: Arc::new(AtomicBool::new(false)) };
@@ -72,6 +78,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Plan { model, options } => stages::plan(session, &model, &options),
         Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
         Command::Test { kit, blows } => stress::test(session, &kit, &blows),
+        Command::Report { kit, model, closed_form } => savings::report(session, &kit, model.as_deref(), closed_form),
         Command::Inspect { model, options } => inspect::inspect(session, &model, &options),
         Command::Figure { name, out, size } => stages::figure(&name, &out, size),
     }

@@ -19,12 +19,14 @@ use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::repair::{Repair, RepairKind};
 use shellock_geom::{TriMesh, Vec3};
+use shellock_print::booklet::Booklet;
 
 use crate::args::{Axis, Options};
 use crate::build::{bearing, scope};
 use crate::failure::Failure;
 use crate::input::{Model, sha256};
 use crate::paint::painted;
+use crate::printing::Printing;
 
 /// The certificate's name within a kit.
 pub const CERTIFICATE: &str = "certificate.json";
@@ -33,6 +35,8 @@ pub const CERTIFICATE: &str = "certificate.json";
 pub struct Summary {
     /// Material of all pieces over the solid model's.
     pub volume_ratio: f64,
+    /// Print time of all plates over the solid model's, by closed forms.
+    pub print_time_ratio: f64,
     /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].
     pub connector_share: f64,
     /// Greatest share of a piece's volume that is thinner than the thinnest wall.
@@ -121,6 +125,7 @@ pub fn files(
     params: &Params,
     design: &Design,
     warnings: &[Warning],
+    printing: &Printing,
 ) -> (Vec<(String, Vec<u8>)>, Summary) {
     let thin: Vec<f64> =
         design.pieces.as_slice().par_iter().map(|m| thin_share(m, params.connector.min_wall_mm).share).collect();
@@ -129,12 +134,14 @@ pub fn files(
     let made: f64 = design.joints.iter().map(|j| j.length_mm).sum();
     let summary = Summary {
         volume_ratio: volume / model.solid.volume(),
+        print_time_ratio: printing.time_ratio(),
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
         rattle: play_alone(&design.pieces, &design.plan, &design.touching),
         rattle_together: options.play_together.then(|| play_together(&design.pieces, &design.plan, &design.touching)),
     };
-    let plan = plan_json(model, params, design, warnings, &summary, &thin);
+    let mut plan = plan_json(model, params, design, warnings, &summary, &thin);
+    plan["printing"] = printing.json();
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
     text.push('\n');
     let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
@@ -146,14 +153,18 @@ pub fn files(
     let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
     let chart = design.strength.as_ref().map(|strength| stress_chart(options, params, design, strength));
     let figures = chart.iter().map(|svg| ("Stress in a fall".to_owned(), svg.clone())).collect();
-    let (archive, (page, picture)) =
-        rayon::join(|| assembly(design), || report(model, options, params, design, warnings, &summary, figures));
+    let place = |i: usize| design.plan.position(PatchId(i as u32));
+    let archives = || rayon::join(|| assembly(design), || printing.files(design.pieces.as_slice(), place));
+    let ((archive, plates), (page, picture, booklet)) =
+        rayon::join(archives, || report(model, options, params, design, warnings, &summary, figures));
+    files.extend(plates);
     files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
     files.push(("assembly.3mf".into(), archive));
     files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
     files.push(("segmentation.3mf".into(), painted(&model.name, &design.surface).0));
     files.push(("report.html".into(), page));
     files.push(("pieces.png".into(), picture));
+    files.extend(booklet.map(|bytes| ("instructions.pdf".to_owned(), bytes)));
     (files, summary)
 }
 
@@ -165,7 +176,13 @@ fn assembly(design: &Design) -> Vec<u8> {
         .pieces
         .iter()
         .zip(&names)
-        .map(|((p, mesh), name)| NamedObject { name, color: palette::color(design.plan.position(p)), mesh, turned })
+        .map(|((p, mesh), name)| NamedObject {
+            name,
+            color: palette::color(design.plan.position(p)),
+            mesh,
+            turned,
+            moved_mm: [0.0; 3],
+        })
         .collect();
     write_3mf(&objects)
 }
@@ -365,7 +382,7 @@ fn standing(up: Axis, design: &Design, v: Vec3) -> Vec3 {
     }
 }
 
-/// The page and the picture. Both show the model standing on its feet: `up` becomes z.
+/// The page, the picture and the booklet, where it is wanted. All show the model standing on its feet: `up` becomes z.
 fn report(
     model: &Model,
     options: &Options,
@@ -374,7 +391,7 @@ fn report(
     warnings: &[Warning],
     summary: &Summary,
     figures: Vec<(String, String)>,
-) -> (Vec<u8>, Vec<u8>) {
+) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
     let stand = |v: Vec3| standing(options.up, design, v);
     let turned: Vec<TriMesh> = design
         .pieces
@@ -409,6 +426,7 @@ fn report(
         ("connectors".into(), format!("{} mm", connector_sizes(design))),
         ("clearance".into(), format!("{} mm", params.connector.clearance_mm)),
         ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
+        ("print time".into(), format!("about {:.0} % of the solid model's", 100.0 * summary.print_time_ratio)),
         ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
     ];
     facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, params))));
@@ -422,7 +440,26 @@ fn report(
     let quantities = quantities(design, summary);
     let data =
         ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
-    rayon::join(|| html(&data).into_bytes(), || pieces_picture(&data.pieces).png())
+    let booklet = Booklet { title: title(&model.name), lines: cover_lines(&data.facts), pieces: data.pieces.clone() };
+    let (page, (picture, booklet)) = rayon::join(
+        || html(&data).into_bytes(),
+        || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
+    );
+    (page, picture, booklet)
+}
+
+/// A file's name as a heading.
+fn title(name: &str) -> String {
+    Path::new(name).file_stem().map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// What a person who builds the thing wants to know of it.
+fn cover_lines(facts: &[(String, String)]) -> Vec<String> {
+    let fact = |name: &str| facts.iter().find(|f| f.0 == name).map(|f| f.1.as_str()).unwrap_or_default();
+    vec![
+        format!("{} pieces, {}", fact("pieces"), fact("size")),
+        "no glue: each piece locks those before it; the last one, the key, locks all".to_owned(),
+    ]
 }
 
 /// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is made to `stand`.

@@ -170,22 +170,10 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
         Failure::Wrong(what) => broken(&what),
         other => other,
     })?;
-    let named = plan["input"]["file"].as_str().unwrap_or_default();
-    let model_path = model.map_or_else(|| PathBuf::from(named), Path::to_owned);
-    let (loaded, _) = load(&model_path)?;
-    let largest = plan["input"]["largest_only"].as_bool().unwrap_or_default();
-    let solid = input::mended(&model_path, &loaded, input::mending(false, largest))?.solid;
-    let t: Vec<f64> = plan["input"]["transform"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
-    if t.len() != 16 {
-        return Err(broken("input.transform is not 16 numbers"));
-    }
-    let mut mesh = solid.into_mesh();
-    for p in &mut mesh.points {
-        *p = Vec3::from_array(std::array::from_fn(|r| {
-            t[4 * r] * p.x + t[4 * r + 1] * p.y + t[4 * r + 2] * p.z + t[4 * r + 3]
-        }));
-    }
-    let solid = Solid::new(mesh).map_err(|e| broken(&format!("with its transform the model is no solid: {e}")))?;
+    let solid = model_of(&plan, model).map_err(|f| match f {
+        Failure::Wrong(what) => broken(&what),
+        other => other,
+    })?;
     let params = VerifyParams {
         clearance_mm: plan["clearance"].as_f64().unwrap_or_default(),
         seed: plan["seed"].as_u64().unwrap_or_default(),
@@ -215,15 +203,40 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     Ok(code)
 }
 
+/// The solid that a kit was made from, in assembly space: that in the file `model`, or in the one that the plan names.
+pub fn model_of(plan: &Value, model: Option<&Path>) -> Result<Solid, Failure> {
+    let named = plan["input"]["file"].as_str().unwrap_or_default();
+    let model_path = model.map_or_else(|| PathBuf::from(named), Path::to_owned);
+    if model.is_none() && !model_path.exists() {
+        return Err(Failure::Wrong(format!(
+            "there is no file {named} here, from which it was made; name the model after the kit"
+        )));
+    }
+    let (loaded, _) = load(&model_path)?;
+    let largest = plan["input"]["largest_only"].as_bool().unwrap_or_default();
+    let solid = input::mended(&model_path, &loaded, input::mending(false, largest))?.solid;
+    let t: Vec<f64> = plan["input"]["transform"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+    if t.len() != 16 {
+        return Err(Failure::Wrong("input.transform is not 16 numbers".into()));
+    }
+    let mut mesh = solid.into_mesh();
+    for p in &mut mesh.points {
+        *p = Vec3::from_array(std::array::from_fn(|r| {
+            t[4 * r] * p.x + t[4 * r + 1] * p.y + t[4 * r + 2] * p.z + t[4 * r + 3]
+        }));
+    }
+    Solid::new(mesh).map_err(|e| Failure::Wrong(format!("with its transform the model is no solid: {e}")))
+}
+
 /// What a plan file names.
-struct Kit {
-    files: Vec<PieceFile>,
-    pieces: IdVec<PatchId, TriMesh>,
-    order: InstallationPlan,
+pub struct Kit {
+    pub files: Vec<PieceFile>,
+    pub pieces: IdVec<PatchId, TriMesh>,
+    pub order: InstallationPlan,
 }
 
 /// The files, their meshes and the order that a plan file names.
-fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
+pub fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
     let order = order_of(plan)?;
     let (mut files, mut meshes) = (Vec::new(), Vec::new());
     for (i, piece) in plan["pieces"].as_array().into_iter().flatten().enumerate() {

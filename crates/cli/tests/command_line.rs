@@ -60,14 +60,33 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     for piece in plan["pieces"].as_array().unwrap() {
         assert!(dir.path().join("one").join(piece["file"].as_str().unwrap()).is_file());
     }
-    for name in ["assembly.3mf", "certificate.json", "report.html", "pieces.png", "segmentation.ply"] {
+    let files = [
+        "assembly.3mf",
+        "certificate.json",
+        "report.html",
+        "pieces.png",
+        "segmentation.ply",
+        "plates.3mf",
+        "instructions.pdf",
+    ];
+    for name in files {
         assert!(dir.path().join("one").join(name).is_file(), "{name}");
     }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2, "something was left behind");
 
+    let laid = plan["printing"]["laid"].as_array().unwrap();
+    assert_eq!(laid.len(), plan["pieces"].as_array().unwrap().len(), "every piece lies on a plate");
+
     // The kit can be verified again from its files, and a missing piece is noticed.
     assert_eq!(code(&shellock(dir.path(), &["figure", "vase", "--size", "80", "-o", "vase.stl"])), 0);
     assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 0);
+    let o = shellock(dir.path(), &["report", "one", "vase.stl", "--closed-form", "--json"]);
+    let savings: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
+    let written = fs::read(dir.path().join("one/savings.json")).unwrap();
+    assert_eq!(savings, serde_json::from_slice::<serde_json::Value>(&written).unwrap());
+    let ratio = savings["volume_ratio"].as_f64().unwrap();
+    assert!((ratio - plan["volume_ratio"].as_f64().unwrap()).abs() < 1e-5, "{savings:#}");
+    assert_eq!(savings["print_time"]["sla"]["by"], "closed form");
     fs::copy(dir.path().join("one/pieces/piece-01.stl"), dir.path().join("one/pieces/piece-00.stl")).unwrap();
     assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 1);
 }
@@ -99,6 +118,44 @@ fn all_bad_parameters_are_told_at_once() {
         assert!(errors(&o).contains("plan time"), "{}", errors(&o));
     }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn the_configuration_file_stands_behind_the_command_line_and_is_named_where_it_is_wrong() {
+    let dir = tempfile::tempdir().unwrap();
+    let told = |config: &str, args: &[&str]| {
+        fs::write(dir.path().join("shellock.toml"), config).unwrap();
+        let o = shellock(dir.path(), args);
+        assert_eq!(code(&o), 2, "{config}");
+        errors(&o)
+    };
+    let both = "clearance = 7\nthickness = 99\npieces = 5\n";
+    let e = told(both, &["demo"]);
+    assert!(e.contains("clearance") && e.contains("thickness"), "{e}");
+    let e = told(both, &["demo", "--clearance", "0.1"]);
+    assert!(!e.contains("clearance") && e.contains("thickness"), "{e}");
+    // A size on the command line goes before a height in the file.
+    let e = told("height = 90\nthickness = 99\n", &["demo", "--size", "100"]);
+    assert!(!e.contains("cannot be used") && e.contains("thickness"), "{e}");
+    for (config, words) in [
+        ("colour = \"red\"", ["shellock.toml", "colour"]),
+        ("key-grip = 3", ["key-grip", "true or false"]),
+        ("up = \"w\"", ["shellock.toml", "--up"]),
+        ("clearance = ", ["shellock.toml", "line 1"]),
+        ("printer = \"unicorn\"", ["unicorn", "fdm-petg"]),
+        ("[printers.mine]\nbed = [1, 2, 3]", ["mine", "width of the bed"]),
+        ("[printers.mine]\nlike = \"unicorn\"", ["mine", "unicorn"]),
+        ("[printers.mine]\nwidth = 3", ["mine", "width"]),
+    ] {
+        let e = told(config, &["demo"]);
+        assert!(words.iter().all(|w| e.contains(w)), "{config}: {e}");
+    }
+    // The printer's own wall is taken where none is given.
+    let mine = "printer = \"mine\"\nclearance = 7\n[printers.mine]\nlike = \"fdm\"\nmin-wall = 1.9\n";
+    assert!(told(mine, &["demo"]).contains("clearance"));
+    let e = told("", &["demo", "--config", "nowhere.toml"]);
+    assert!(e.contains("nowhere.toml"), "{e}");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
 }
 
 #[test]

@@ -13,7 +13,13 @@ fn main() -> std::io::Result<()> {
         let begin = Instant::now();
         let solid = figure::make(figure, 150.0, 1.5);
         let made = begin.elapsed();
-        let scene = [Painted { mesh: solid.mesh(), color: [214, 132, 72], shift: Vec3::ZERO, face_colors: None }];
+        let scene = [Painted {
+            mesh: solid.mesh(),
+            color: [214, 132, 72],
+            shift: Vec3::ZERO,
+            face_colors: None,
+            normals: None,
+        }];
         pictures.push(render(&scene, &Camera::front(), 480, 480));
         pictures.push(render(&scene, &Camera::back(), 480, 480));
         let n_faces = solid.mesh().triangles.len();

@@ -2,14 +2,16 @@
 //!
 //! Pieces are taken in the order of taking apart. From a piece's half connectors goes whatever lies in its own way out,
 //! and whatever a later piece, its bodies and its connectors, passes on its way out: the socket is what the pin sweeps. Where a joined piece
-//! still comes too near to another, that is taken off too.
+//! still comes too near to another, that is taken off too. Last, its number is cut into the inner side of its wall.
 
 mod carve;
 mod finish;
 mod key_parts;
+mod label;
 mod relief;
 mod ribs;
 
 pub use finish::{FinishParams, Finished, Joint, PieceError, make};
 pub use key_parts::{Grip, PressFit, PressFitKind};
+pub use label::LabelParams;
 pub use relief::Relief;

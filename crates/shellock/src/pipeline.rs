@@ -14,7 +14,7 @@ use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, Run, has_no_bar};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
-use crate::piece::{FinishParams, Finished, Grip, Joint, PieceError, PressFit, PressFitKind, Relief};
+use crate::piece::{FinishParams, Finished, Grip, Joint, LabelParams, PieceError, PressFit, PressFitKind, Relief};
 use crate::plan::{Blocker, InstallationPlan, PlanParams, PlanProof};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams, StressField};
@@ -43,6 +43,8 @@ pub struct Params {
     pub has_grip: bool,
     /// Where that notch is; the key's place decides.
     grip: Option<Grip>,
+    /// How the pieces' numbers are engraved; not at all where `None`.
+    pub label: Option<LabelParams>,
     /// How plans are judged and searched.
     pub plan: PlanParams,
     /// How the wall is made and cut.
@@ -96,7 +98,8 @@ impl Params {
     /// Every problem of every stage, in words.
     pub fn problems(&self) -> Vec<String> {
         let words = |p: Vec<crate::params::ParamProblem>| p.into_iter().map(|p| p.to_string());
-        let stages = [self.body.problems(), self.connector.problems(), self.strength.problems()];
+        let label = self.label.map_or_else(Vec::new, |l| l.problems());
+        let stages = [self.body.problems(), self.connector.problems(), self.strength.problems(), label];
         let mut problems: Vec<String> = stages.into_iter().flat_map(words).collect();
         problems.extend(self.segmentation.problems());
         problems.extend(self.plan.problems());
@@ -421,7 +424,7 @@ pub fn make(
         }
     };
     let grip = params.grip.map(|grip| Grip { key: plan.key(), ..grip });
-    let finish = FinishParams { connector: &params.connector, relief: params.relief(), grip };
+    let finish = FinishParams { connector: &params.connector, relief: params.relief(), grip, label: params.label };
     let finished = piece::make(ctx, &finish, grid, &shell, &plan, &runs, &rooms)?;
     warn_of_press_fits(ctx, &finished);
     let assembly = verify::Assembly { model, pieces: &finished.meshes, plan: &plan, press_fits: &finished.press_fits };

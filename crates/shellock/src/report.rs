@@ -15,7 +15,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use crate::Warning;
 
 pub use page::html;
-pub use pictures::pieces_picture;
+pub use pictures::{from_inside, pieces_picture};
 pub use strength::{SeamStress, strength_chart};
 
 /// Everything the report says, filled by the pipeline.

@@ -1,11 +1,12 @@
 //! Tools for working on Shellock that are no part of it: studies of its metrics and searches, as charts and tables.
 //!
-//! `cargo xtask study --help` lists them.
+//! `cargo xtask --help` lists them.
 
 mod chart;
 mod failure;
 mod metrics;
 mod model;
+mod savings;
 mod search;
 mod statistics;
 mod strength;
@@ -27,11 +28,16 @@ struct Arguments {
 enum Task {
     /// Compare metrics or searches; writes charts (SVG) and tables (CSV, Markdown)
     Study(study::Options),
+    /// Make the table of what kits save over solid models, from what `shellock report` left in their folders
+    Savings(savings::Options),
 }
 
 fn main() -> ExitCode {
-    let Task::Study(options) = Arguments::parse().task;
-    match study::run(&options) {
+    let made = match Arguments::parse().task {
+        Task::Study(options) => study::run(&options),
+        Task::Savings(options) => savings::run(&options),
+    };
+    match made {
         Ok(files) => {
             files.iter().for_each(|f| println!("{}", f.display()));
             ExitCode::SUCCESS

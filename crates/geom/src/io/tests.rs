@@ -324,8 +324,20 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
     // x to y, y to −x.
     let quarter = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
     let objects = [
-        NamedObject { name: "leg <\"1\" & 2>\u{1}", color: [255, 0, 16], mesh: &mesh, turned: None },
-        NamedObject { name: "Kopf ä", color: [1, 2, 3], mesh: &mesh, turned: Some(quarter) },
+        NamedObject {
+            name: "leg <\"1\" & 2>\u{1}",
+            color: [255, 0, 16],
+            mesh: &mesh,
+            turned: None,
+            moved_mm: [0.0; 3],
+        },
+        NamedObject {
+            name: "Kopf ä",
+            color: [1, 2, 3],
+            mesh: &mesh,
+            turned: Some(quarter),
+            moved_mm: [10.0, 0.5, -3.0],
+        },
     ];
     let bytes = write_3mf(&objects);
     assert_eq!(bytes, write_3mf(&objects));
@@ -340,7 +352,7 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
         "<base name=\"leg &lt;&quot;1&quot; &amp; 2&gt;\u{FFFD}\" displaycolor=\"#FF0010FF\"/>",
         "name=\"Kopf ä\" pid=\"1\" pindex=\"1\"",
         "<item objectid=\"2\"/>",
-        "<item objectid=\"3\" transform=\"0 1 0 -1 0 0 0 0 1 0 0 0\"/>",
+        "<item objectid=\"3\" transform=\"0 1 0 -1 0 0 0 0 1 10 0.5 -3\"/>",
         "<triangle v1=\"0\" v2=\"2\" v3=\"1\"/>",
     ] {
         assert!(model.contains(part), "{part} in {model}");

@@ -9,6 +9,7 @@ use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 use super::carve::{Half, Wake, carved, whole_half};
 use super::key_parts::{Change, Grip, PressFit, detents, notch};
+use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
 use super::ribs::{Seat, ribs};
 use crate::body::{ShellBodies, ShellGrid};
@@ -77,6 +78,8 @@ pub struct FinishParams<'a> {
     pub relief: Relief,
     /// The notch that the key is to have.
     pub grip: Option<Grip>,
+    /// How numbers are engraved, if they are.
+    pub label: Option<LabelParams>,
 }
 
 /// Both halves of a run while they are carved.
@@ -87,7 +90,7 @@ struct Halves {
 }
 
 /// Carves every half connector in the order of taking apart and joins it to its body; takes off what is too near to others;
-/// a key gets its detents and its notch.
+/// a key gets its detents and its notch, every piece its number.
 pub fn make(
     ctx: &Ctx,
     finish: &FinishParams<'_>,
@@ -112,7 +115,7 @@ pub fn make(
         press_fits.extend(fits);
         changes.extend(added);
     }
-    Ok(Finished { meshes: printed(ctx, &pieces, &changes)?, joints, press_fits })
+    Ok(Finished { meshes: printed(ctx, finish, grid, &pieces, &changes)?, joints, press_fits })
 }
 
 /// Both halves of each run, carved in the order of taking apart.
@@ -273,14 +276,16 @@ fn ribs_of_key(
     made
 }
 
-/// The pieces with all changes as meshes that can be written.
+/// The pieces with all changes and their numbers as meshes that can be written.
 fn printed(
     ctx: &Ctx,
+    finish: &FinishParams<'_>,
+    grid: &ShellGrid,
     pieces: &IdVec<PatchId, Volume>,
     changes: &[Change],
 ) -> Result<IdVec<PatchId, TriMesh>, PieceError> {
     let ids: Vec<PatchId> = pieces.ids().collect();
-    let meshes: Vec<Result<TriMesh, PieceError>> = ids
+    let meshes: Vec<Result<(TriMesh, bool), PieceError>> = ids
         .par_iter()
         .map(|&q| {
             let mut piece = pieces[q].clone();
@@ -289,10 +294,36 @@ fn printed(
             }
             // What hangs on nothing is a chip that carving cut loose.
             let piece = piece.components().into_iter().next().unwrap_or_else(Volume::empty);
-            let mesh = printable(&piece).map_err(|reason| PieceError::NotPrintable { piece: q, reason });
+            let number = finish.label.as_ref().and_then(|params| label::cut(params, grid, q, &piece));
+            // A number is worth less than a piece that can be written.
+            let numbered = number.and_then(|cut| printable(&piece.subtract(&cut)).ok());
+            let has_number = numbered.is_some();
+            let mesh = numbered.map_or_else(|| printable(&piece), Ok);
             ctx.step()?;
-            mesh
+            Ok((mesh.map_err(|reason| PieceError::NotPrintable { piece: q, reason })?, has_number))
         })
         .collect();
-    meshes.into_iter().collect()
+    let meshes = meshes.into_iter().collect::<Result<Vec<_>, _>>()?;
+    if finish.label.is_some() {
+        warn_of_missing_numbers(ctx, ids.iter().zip(&meshes).filter(|(_, made)| !made.1).map(|(q, _)| *q).collect());
+    }
+    Ok(meshes.into_iter().map(|made| made.0).collect())
+}
+
+/// Says which pieces carry no number.
+fn warn_of_missing_numbers(ctx: &Ctx, pieces: Vec<PatchId>) {
+    if pieces.is_empty() {
+        return;
+    }
+    let names: Vec<String> = pieces.iter().map(ToString::to_string).collect();
+    ctx.warn(Warning {
+        code: "piece-without-number".into(),
+        message: format!(
+            "no number is engraved on piece {}: the inner side has no even place of the wall's full thickness that is large \
+             enough; tell these pieces by their pictures",
+            names.join(", ")
+        ),
+        pieces,
+        at: None,
+    });
 }

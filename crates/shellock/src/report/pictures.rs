@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Vec3};
 
-use super::stills::{Camera, Image, Painted, render};
+use super::stills::{Camera, Image, Painted, crease_normals, render};
 use super::{ReportPiece, exploded_shifts};
 
 /// Pixels of the four large views along each side.
@@ -16,13 +16,12 @@ const SMALL: usize = 400;
 /// 1200 pixels wide on white.
 pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
     let shifts = exploded_shifts(pieces);
-    let painted = |share: f64| -> Vec<Painted<'_>> {
-        let scene = pieces.iter().zip(&shifts);
-        scene
-            .map(|(p, &shift)| Painted { mesh: p.mesh, color: p.color, shift: share * shift, face_colors: None })
-            .collect()
+    let normals: Vec<Vec<[Vec3; 3]>> = pieces.par_iter().map(|p| crease_normals(p.mesh)).collect();
+    let scene = |share: f64| -> Vec<Painted<'_>> {
+        let all = pieces.iter().zip(&shifts).zip(&normals);
+        all.map(|((p, &shift), normals)| painted(p, share * shift, normals)).collect()
     };
-    let (together, apart) = (painted(0.0), painted(1.0));
+    let (together, apart) = (scene(0.0), scene(1.0));
     let views = [
         (&together, Camera::front()),
         (&apart, Camera::front()),
@@ -31,19 +30,24 @@ pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
     ];
     let large: Vec<Image> = views.iter().map(|(scene, camera)| render(scene, camera, LARGE, LARGE)).collect();
     let all = pieces.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
-    let mut in_order: Vec<&ReportPiece<'_>> = pieces.iter().collect();
-    in_order.sort_by_key(|p| p.order);
-    let small: Vec<Image> = in_order.into_par_iter().map(|p| from_inside(p, all.center())).collect();
+    let mut in_order: Vec<usize> = (0..pieces.len()).collect();
+    in_order.sort_by_key(|&i| pieces[i].order);
+    let small = |i: usize| from_inside(&pieces[i], &normals[i], all.center(), SMALL);
+    let small: Vec<Image> = in_order.into_par_iter().map(small).collect();
     stacked(Image::sheet(&large, 2), Image::sheet(&small, 3)).on([255; 3])
 }
 
-/// A piece seen from the middle of the assembly, that is, its inner side with the connectors.
-fn from_inside(piece: &ReportPiece<'_>, middle: Vec3) -> Image {
+fn painted<'a>(piece: &ReportPiece<'a>, shift: Vec3, normals: &'a [[Vec3; 3]]) -> Painted<'a> {
+    Painted { mesh: piece.mesh, color: piece.color, shift, face_colors: None, normals: Some(normals) }
+}
+
+/// A piece seen from `middle`, that of the assembly: its inner side with the connectors, `side` pixels wide and high.
+/// `normals` are its [`crease_normals`].
+pub fn from_inside(piece: &ReportPiece<'_>, normals: &[[Vec3; 3]], middle: Vec3, side: usize) -> Image {
     let outwards = (piece.mesh.bounds().center() - middle).normalize_or(Vec3::Y);
     // Straight up or down, "up" has no meaning in the picture.
     let up = if outwards.z.abs() > 0.9 { Vec3::Y } else { Vec3::Z };
-    let scene = [Painted { mesh: piece.mesh, color: piece.color, shift: Vec3::ZERO, face_colors: None }];
-    render(&scene, &Camera::along(outwards, up), SMALL, SMALL)
+    render(&[painted(piece, Vec3::ZERO, normals)], &Camera::along(outwards, up), side, side)
 }
 
 /// One picture above the other, both from the left edge.

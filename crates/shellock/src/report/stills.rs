@@ -7,11 +7,14 @@
 mod canvas;
 mod shade;
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 pub use canvas::Image;
 use canvas::{Band, Sample};
+pub use shade::crease_normals;
 
 /// Samples a pixel along each axis.
 const SAMPLES: usize = 2;
@@ -28,6 +31,8 @@ pub struct Painted<'a> {
     pub color: [u8; 3],
     /// A colour for each triangle instead.
     pub face_colors: Option<&'a [[u8; 3]]>,
+    /// Its [`crease_normals`], for a mesh that is drawn more than once; made anew where `None`.
+    pub normals: Option<&'a [[Vec3; 3]]>,
     /// Added to every point, mm.
     pub shift: Vec3,
 }
@@ -131,13 +136,27 @@ pub fn render(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usiz
     Image { width, height, rgba: rows.concat() }
 }
 
+/// Where places come to lie in the picture that [`render`] makes of `scene`: pixels from its left and from its top.
+pub fn projection(
+    scene: &[Painted<'_>],
+    camera: &Camera,
+    width: usize,
+    height: usize,
+) -> impl Fn(Vec3) -> [f64; 2] + use<> {
+    let view = View::new(scene, camera, width, height);
+    move |place| {
+        let [x, y, _] = view.project(place);
+        [x, y].map(|samples| f64::from(samples) / SAMPLES as f64)
+    }
+}
+
 fn facets<'a>(painted: &'a Painted<'_>, mesh: usize, view: &'a View) -> Vec<Facet> {
     let points: Vec<[f32; 3]> = painted.mesh.points.par_iter().map(|&p| view.project(p + painted.shift)).collect();
-    let normals = shade::crease_normals(painted.mesh);
+    let normals = painted.normals.map_or_else(|| Cow::Owned(crease_normals(painted.mesh)), Cow::Borrowed);
     let mesh = u16::try_from(mesh + 1).expect("a picture has fewer than 65 000 meshes");
     let in_view = |n: Vec3| view.axes.map(|a| a.dot(n) as f32);
     let triangles = &painted.mesh.triangles;
-    (triangles, &normals)
+    (triangles, &normals[..])
         .into_par_iter()
         .enumerate()
         .map(|(face, (t, n))| {
@@ -216,8 +235,13 @@ mod tests {
     #[test]
     fn a_ball_covers_its_disc() {
         let mesh = ball();
-        let scene =
-            [Painted { mesh: &mesh, color: [200, 120, 40], shift: Vec3::new(3.0, 4.0, 5.0), face_colors: None }];
+        let scene = [Painted {
+            mesh: &mesh,
+            color: [200, 120, 40],
+            shift: Vec3::new(3.0, 4.0, 5.0),
+            face_colors: None,
+            normals: None,
+        }];
         let image = render(&scene, &Camera::front(), 300, 200);
         let covered: f64 = image.rgba.chunks_exact(4).map(|p| f64::from(p[3]) / 255.0).sum();
         // The ball fits the height but for the margin of 4 % on both sides; a line surrounds it by one sample and a bit.
@@ -228,9 +252,29 @@ mod tests {
     }
 
     #[test]
+    fn places_are_told_where_they_are_drawn() {
+        let mesh = ball();
+        let ball = Painted { mesh: &mesh, color: [9; 3], shift: Vec3::ZERO, face_colors: None, normals: None };
+        let far = Painted { shift: Vec3::new(90.0, -20.0, 40.0), ..ball };
+        let camera = Camera::front();
+        let at = projection(&[ball, far], &camera, 300, 200)(far.shift);
+        let frame = Some(Aabb::around([Vec3::ZERO, far.shift]).grown(10.0));
+        let image = render(&[far], &Camera { frame, ..camera }, 300, 200);
+        let framed = projection(&[far], &Camera { frame, ..camera }, 300, 200)(far.shift);
+        let drawn: Vec<[f64; 2]> = (0..300 * 200)
+            .filter(|i| image.rgba[4 * i + 3] > 0)
+            .map(|i| [(i % 300) as f64 + 0.5, (i / 300) as f64 + 0.5])
+            .collect();
+        let middle = [0, 1].map(|k| drawn.iter().map(|p| p[k]).sum::<f64>() / drawn.len() as f64);
+        assert!((0..2).all(|k| (middle[k] - framed[k]).abs() < 0.5), "{middle:?} {framed:?}");
+        assert!((0..2).all(|k| at[k] > 0.0 && at[k] < [300.0, 200.0][k]));
+    }
+
+    #[test]
     fn png_decodes_to_the_same_pixels() {
         let mesh = ball();
-        let scene = [Painted { mesh: &mesh, color: [30, 120, 240], shift: Vec3::ZERO, face_colors: None }];
+        let scene =
+            [Painted { mesh: &mesh, color: [30, 120, 240], shift: Vec3::ZERO, face_colors: None, normals: None }];
         let image = render(&scene, &Camera::back(), 64, 48);
         let mut reader = png::Decoder::new(std::io::Cursor::new(image.png())).read_info().unwrap();
         let mut rgba = vec![0; reader.output_buffer_size().unwrap()];
@@ -241,8 +285,14 @@ mod tests {
     #[test]
     fn the_nearer_mesh_hides_the_other_and_nothing_gives_nothing() {
         let mesh = ball();
-        let far = Painted { mesh: &mesh, color: [255, 0, 0], shift: Vec3::ZERO, face_colors: None };
-        let near = Painted { mesh: &mesh, color: [0, 0, 255], shift: Vec3::new(0.0, -30.0, 0.0), face_colors: None };
+        let far = Painted { mesh: &mesh, color: [255, 0, 0], shift: Vec3::ZERO, face_colors: None, normals: None };
+        let near = Painted {
+            mesh: &mesh,
+            color: [0, 0, 255],
+            shift: Vec3::new(0.0, -30.0, 0.0),
+            face_colors: None,
+            normals: None,
+        };
         let image = render(&[near, far], &Camera::along(Vec3::Y, Vec3::Z), 60, 60);
         let middle = &image.rgba[4 * (30 * 60 + 30)..][..4];
         assert!(middle[2] > middle[0] && middle[3] == 255);

@@ -54,12 +54,12 @@ pub fn strength_chart(
     let model = turned(&strength.mesh);
     let paint = |(mpa, is_solid): (&f64, &bool)| if *is_solid { SOLID } else { color(mpa / strength_mpa) };
     let stress: Vec<[u8; 3]> = strength.deciding_mpa.iter().zip(&strength.is_solid).map(paint).collect();
-    let field = [Painted { mesh: &model, color: PALE, face_colors: Some(&stress), shift: Vec3::ZERO }];
+    let field = [Painted { mesh: &model, color: PALE, face_colors: Some(&stress), shift: Vec3::ZERO, normals: None }];
     let (tubes, tube_colors) = tubes(seams, strength_mpa);
     let tubes = turned(&tubes);
     let along = [
-        Painted { mesh: &model, color: PALE, face_colors: None, shift: Vec3::ZERO },
-        Painted { mesh: &tubes, color: PALE, face_colors: Some(&tube_colors), shift: Vec3::ZERO },
+        Painted { mesh: &model, color: PALE, face_colors: None, shift: Vec3::ZERO, normals: None },
+        Painted { mesh: &tubes, color: PALE, face_colors: Some(&tube_colors), shift: Vec3::ZERO, normals: None },
     ];
     let views =
         [(&field[..], Camera::front()), (&field, Camera::back()), (&along, Camera::front()), (&along, Camera::back())];

@@ -20,6 +20,8 @@ pub struct NamedObject<'a> {
     pub mesh: &'a TriMesh,
     /// How it is turned on the plate: where the x, y and z axes go; as it is where `None`.
     pub turned: Option<[[f64; 3]; 3]>,
+    /// Where it is moved after that, mm.
+    pub moved_mm: [f64; 3],
 }
 
 const TITLE: &str = "Shellock pieces";
@@ -109,11 +111,14 @@ fn model_xml(objects: &[NamedObject]) -> String {
         add_mesh(&mut xml, object.mesh, None);
         xml.push_str("</object>\n");
     }
+    const UNTURNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     xml.push_str("</resources>\n<build>\n");
     for (i, object) in objects.iter().enumerate() {
         add(&mut xml, format_args!("<item objectid=\"{}\"", object_id(i)));
-        if let Some([[a, b, c], [d, e, f], [g, h, i]]) = object.turned {
-            add(&mut xml, format_args!(" transform=\"{a} {b} {c} {d} {e} {f} {g} {h} {i} 0 0 0\""));
+        if object.turned.is_some() || object.moved_mm != [0.0; 3] {
+            let [[a, b, c], [d, e, f], [g, h, i]] = object.turned.unwrap_or(UNTURNED);
+            let [x, y, z] = object.moved_mm;
+            add(&mut xml, format_args!(" transform=\"{a} {b} {c} {d} {e} {f} {g} {h} {i} {x} {y} {z}\""));
         }
         xml.push_str("/>\n");
     }

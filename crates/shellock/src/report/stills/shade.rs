@@ -15,7 +15,7 @@ const DEPTH_JUMP: f32 = 14.0;
 const CREASE_COS: f32 = 0.82;
 
 /// Unit normals at the corners of each triangle: the mean, by area, of the triangles around the corner that face about its way.
-pub(super) fn crease_normals(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
+pub fn crease_normals(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
     let (first, faces) = faces_around_points(mesh);
     let doubled: Vec<Vec3> = (0..mesh.triangles.len()).into_par_iter().map(|f| mesh.area_vector_doubled(f)).collect();
     let units: Vec<Vec3> = doubled.par_iter().map(|n| n.normalize_or_zero()).collect();

@@ -1,0 +1,181 @@
+//! The configuration file: options by the names they have on the command line, and printers of one's own.
+//!
+//! ```toml
+//! printer = "workshop"
+//! size = 180
+//! key-grip = true
+//!
+//! [printers.workshop]
+//! like = "fdm"            # what is not said here is taken from this one
+//! bed = [300, 300, 340]   # width, depth, height, mm
+//! clearance = 0.18
+//! ```
+//!
+//! Options become arguments in front of the user's own, so there is one place that knows them and says what is wrong
+//! with them. What is said on the command line goes before.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Command, CommandFactory, Parser};
+use serde::Deserialize;
+use shellock_print::{Printer, Process};
+
+use crate::args::{self, Cli};
+use crate::stress;
+
+/// The file that is read without being named.
+const USUAL: &str = "shellock.toml";
+/// A larger file is no configuration, bytes.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Why there is no command.
+pub enum Refusal {
+    /// Something is wrong with the arguments, or only help was asked for.
+    Arguments(clap::Error),
+    /// Something is wrong with the file.
+    File(String),
+}
+
+/// The command that these arguments and the configuration file ask for.
+pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
+    let matches = Cli::command().try_get_matches_from(&arguments).map_err(Refusal::Arguments)?;
+    let mut cli = Cli::try_parse_from(&arguments).map_err(Refusal::Arguments)?;
+    let Some((name, given)) = matches.subcommand() else { return Ok(cli) };
+    let Some(path) = file_of(given) else { return Ok(cli) };
+    let refused = |problem: String| Refusal::File(format!("{}: {problem}", path.display()));
+    let Config { options, printers } = read(&path).map_err(refused)?;
+    let extra = extra_arguments(&Cli::command(), name, given, &options).map_err(refused)?;
+    if !extra.is_empty() {
+        let mut all = arguments;
+        let at = all.iter().position(|a| a == name).map_or(all.len(), |at| at + 1);
+        all.splice(at..at, extra.into_iter().map(OsString::from));
+        cli = Cli::try_parse_from(all).map_err(|e| refused(e.to_string()))?;
+    }
+    if let Some(options) = options_of(&mut cli.command) {
+        options.own_printers = printers;
+    }
+    Ok(cli)
+}
+
+/// The file that was named, or the usual one where it exists; `None` for commands that take none.
+fn file_of(given: &ArgMatches) -> Option<PathBuf> {
+    let named = given.try_get_one::<PathBuf>("config").ok()?;
+    named.cloned().or_else(|| Path::new(USUAL).is_file().then(|| PathBuf::from(USUAL)))
+}
+
+fn options_of(command: &mut args::Command) -> Option<&mut args::Options> {
+    use args::Command::{Build, Demo, Plan, Segment};
+    match command {
+        Build { options, .. } | Demo { options, .. } | Segment { options, .. } | Plan { options, .. } => Some(options),
+        _ => None,
+    }
+}
+
+/// What a configuration file holds.
+struct Config {
+    options: toml::Table,
+    printers: Vec<Printer>,
+}
+
+/// A printer as the file has it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct Own {
+    like: Option<String>,
+    process: Option<String>,
+    bed: Option<[f64; 3]>,
+    clearance: Option<f64>,
+    key_clearance: Option<f64>,
+    wall_gap: Option<f64>,
+    min_wall: Option<f64>,
+    layer: Option<f64>,
+    material: Option<String>,
+}
+
+fn read(path: &Path) -> Result<Config, String> {
+    let size = fs::metadata(path).map_err(|e| e.to_string())?.len();
+    if size > MOST_BYTES {
+        return Err(format!("{size} bytes are too many for a configuration"));
+    }
+    let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
+    let mut options: toml::Table = text.parse().map_err(|e: toml::de::Error| e.to_string())?;
+    let printers = match options.remove("printers") {
+        None => Vec::new(),
+        Some(toml::Value::Table(printers)) => {
+            printers.into_iter().map(|(name, value)| own_printer(name, value)).collect::<Result<_, _>>()?
+        }
+        Some(_) => return Err("\"printers\" must be a table; write for example [printers.mine]".to_owned()),
+    };
+    Ok(Config { options, printers })
+}
+
+fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
+    let fault = |problem: String| format!("printer \"{name}\": {problem}");
+    let own: Own = value.try_into().map_err(|e: toml::de::Error| fault(e.message().to_owned()))?;
+    let process = own.process.as_deref().map(|p| {
+        let names = || Process::ALL.map(|(name, _)| name).join(", ");
+        Process::named(p).ok_or_else(|| fault(format!("there is no process \"{p}\"; choose one of {}", names())))
+    });
+    let process = process.transpose()?;
+    let is_base = |p: &Printer| match (&own.like, process) {
+        (Some(like), _) => p.name.eq_ignore_ascii_case(like),
+        (None, process) => p.process == process.unwrap_or(Process::Sla),
+    };
+    let unknown = || fault(format!("it is like \"{}\", which does not exist", own.like.as_deref().unwrap_or_default()));
+    let base = Printer::presets().into_iter().find(is_base).ok_or_else(unknown)?;
+    let material = own.material.as_deref().map(stress::material).transpose().map_err(fault)?;
+    let printer = Printer {
+        process: process.unwrap_or(base.process),
+        bed_mm: own.bed.unwrap_or(base.bed_mm),
+        clearance_mm: own.clearance.unwrap_or(base.clearance_mm),
+        key_clearance_mm: own.key_clearance.unwrap_or(base.key_clearance_mm),
+        wall_gap_mm: own.wall_gap.unwrap_or(base.wall_gap_mm),
+        min_wall_mm: own.min_wall.unwrap_or(base.min_wall_mm),
+        layer_mm: own.layer.unwrap_or(base.layer_mm),
+        material: material.unwrap_or(base.material),
+        name: name.clone(),
+    };
+    match printer.problems().first() {
+        Some(problem) => Err(fault(problem.to_string())),
+        None => Ok(printer),
+    }
+}
+
+/// The options of the file as arguments of the subcommand `name`, but for those that were `given`.
+fn extra_arguments(
+    cli: &Command,
+    name: &str,
+    given: &ArgMatches,
+    options: &toml::Table,
+) -> Result<Vec<String>, String> {
+    /// One of them stands for all.
+    const SIZES: [&str; 3] = ["size", "height", "scale"];
+    let command = cli.find_subcommand(name).ok_or_else(|| format!("there is no command \"{name}\""))?;
+    let is_given = |id: &str| given.value_source(id) == Some(ValueSource::CommandLine);
+    let mut extra = Vec::new();
+    for (key, value) in options {
+        let Some(argument) = command.get_arguments().find(|a| a.get_long() == Some(key)) else {
+            let mut others = cli.get_subcommands().flat_map(Command::get_arguments);
+            if others.any(|a| a.get_long() == Some(key)) {
+                continue;
+            }
+            return Err(format!("there is no option \"{key}\"; `shellock build --help` lists them"));
+        };
+        let id = argument.get_id().as_str();
+        if is_given(id) || SIZES.contains(&id) && SIZES.iter().any(|id| is_given(id)) {
+            continue;
+        }
+        match (value, argument.get_action().takes_values()) {
+            (toml::Value::Boolean(is_on), false) => extra.extend(is_on.then(|| format!("--{key}"))),
+            (_, false) => return Err(format!("\"{key}\" must be true or false")),
+            (toml::Value::String(text), true) => extra.push(format!("--{key}={text}")),
+            (toml::Value::Integer(number), true) => extra.push(format!("--{key}={number}")),
+            (toml::Value::Float(number), true) => extra.push(format!("--{key}={number}")),
+            _ => return Err(format!("\"{key}\" must be a number or a text")),
+        }
+    }
+    Ok(extra)
+}

@@ -1,0 +1,203 @@
+//! A kit on the plates of a printer: files, figures, and what does not fit.
+
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use shellock::pipeline::{DesignError, Params};
+use shellock::report::palette;
+use shellock::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::io::{NamedObject, write_3mf};
+use shellock_geom::{Solid, TriMesh};
+use shellock_print::plates::{Laid, Plates, Printable, fits, fits_whole, lay, lay_alone};
+use shellock_print::time::{Load, seconds};
+use shellock_print::{Printer, Process};
+
+use crate::Session;
+use crate::failure::Failure;
+use crate::input::Model;
+
+/// A face is part of the outer skin where its middle is so near to the model's surface, mm.
+const SKIN_MM: f64 = 0.05;
+/// Numbers of pieces that are tried where some are too large: each so many times the last.
+const MORE_PIECES: f64 = 1.5;
+const MOST_TRIES: u32 = 5;
+/// More pieces cannot be planned.
+const MOST_PIECES: usize = 128;
+
+/// A kit, laid on plates.
+pub struct Printing {
+    printer: Printer,
+    plates: Plates,
+    /// Time by the closed forms, s: all plates, and the solid model.
+    seconds: [f64; 2],
+}
+
+impl Printing {
+    /// Lays `pieces` on plates of `printer`. Of their faces, those on `surface` are the skin that is seen; `solid` is
+    /// the model.
+    pub fn of(printer: &Printer, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
+        let skin = TriangleBvh::new(surface);
+        let printables: Vec<Printable<'_>> = pieces.par_iter().map(|mesh| printable(mesh, &skin)).collect();
+        let plates = lay(printer, &printables);
+        let mut loads = vec![Load::default(); plates.n_plates];
+        for laid in &plates.laid {
+            loads[laid.plate] = loads[laid.plate].and(load(laid, &pieces[laid.piece]));
+        }
+        let pieces_s = loads.iter().map(|load| seconds(printer, load)).fold(0.0, |sum, s| sum + s);
+        let solid_s = lay_alone(printer, solid.mesh()).map_or(0.0, |l| seconds(printer, &load(&l, solid.mesh())));
+        Self { printer: printer.clone(), plates, seconds: [pieces_s, solid_s] }
+    }
+
+    /// Print time of all plates and of the solid model by closed forms, s.
+    pub fn seconds(&self) -> [f64; 2] {
+        self.seconds
+    }
+
+    /// Print time of all plates over that of the solid model, by closed forms.
+    pub fn time_ratio(&self) -> f64 {
+        self.seconds[0] / self.seconds[1].max(f64::MIN_POSITIVE)
+    }
+
+    /// Says which pieces the printer cannot make.
+    pub fn warnings(&self) -> Option<Warning> {
+        let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| PatchId(i as u32)).collect();
+        let names: Vec<String> = pieces.iter().map(ToString::to_string).collect();
+        let message = format!(
+            "piece {} does not fit the printer {}; it is left out of plates.3mf: choose more pieces (--pieces) or another printer",
+            names.join(", "),
+            described(&self.printer)
+        );
+        (!pieces.is_empty()).then(|| Warning { code: "piece-too-large".into(), message, pieces, at: None })
+    }
+
+    /// In one line for people.
+    pub fn words(&self) -> String {
+        let n = self.plates.n_plates;
+        let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
+        let supports = match self.printer.process {
+            Process::Sls => String::new(),
+            _ => format!("; {:.1} cm² of the outer skin need support", outer_mm2 / 100.0),
+        };
+        format!(
+            "plates.3mf: {n} {} of {}{supports}; print time about {:.0} % of the solid model's (closed form; `shellock report` asks PrusaSlicer)",
+            if n == 1 { "plate" } else { "plates" },
+            described(&self.printer),
+            100.0 * self.time_ratio()
+        )
+    }
+
+    /// For plan.json.
+    pub fn json(&self) -> Value {
+        let laid: Vec<Value> = self
+            .plates
+            .laid
+            .iter()
+            .map(|l| {
+                json!({ "piece": l.piece, "plate": l.plate + 1, "size": l.size_mm, "turned": l.turned, "moved": l.moved_mm,
+                        "support_mm2": l.support_mm2, "outer_support_mm2": l.outer_support_mm2 })
+            })
+            .collect();
+        let process = Process::ALL.iter().find(|(_, p)| *p == self.printer.process).map(|(name, _)| *name);
+        json!({
+            "printer": self.printer.name, "process": process, "bed": self.printer.bed_mm, "layer": self.printer.layer_mm,
+            "plates": self.plates.n_plates, "laid": laid, "too_large": self.plates.too_large,
+            "time": { "by": "closed form", "pieces_s": self.seconds[0], "solid_s": self.seconds[1], "ratio": self.time_ratio() },
+        })
+    }
+
+    /// All plates side by side, and each alone where there are several. `place` is where a piece stands in the order of
+    /// installation.
+    pub fn files(&self, pieces: &[TriMesh], place: impl Fn(usize) -> usize) -> Vec<(String, Vec<u8>)> {
+        let names: Vec<String> = (0..pieces.len()).map(|i| format!("piece {i}")).collect();
+        let object = |laid: &Laid, moved_mm: [f64; 3]| {
+            let (name, mesh) = (names[laid.piece].as_str(), &pieces[laid.piece]);
+            NamedObject { name, color: palette::color(place(laid.piece)), mesh, turned: Some(laid.turned), moved_mm }
+        };
+        let of_plate = |plate: usize| -> Vec<NamedObject<'_>> {
+            self.plates.laid.iter().filter(|l| l.plate == plate).map(|l| object(l, l.moved_mm)).collect()
+        };
+        let all = || self.plates.laid.iter().map(|l| object(l, l.moved_among_plates_mm(&self.printer))).collect();
+        let n = self.plates.n_plates;
+        let single = (0..if n > 1 { n } else { 0 }).map(|i| (format!("plates/plate-{}.3mf", i + 1), of_plate(i)));
+        let archives: Vec<(String, Vec<NamedObject<'_>>)> =
+            std::iter::once(("plates.3mf".to_owned(), all())).chain(single).collect();
+        archives.into_par_iter().map(|(name, objects)| (name, write_3mf(&objects))).collect()
+    }
+}
+
+/// A piece, with the faces that lie on the model's surface told apart.
+fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
+    let is_outer = |f: usize| skin.nearest(mesh.face_center(f), SKIN_MM * SKIN_MM).is_some();
+    Printable { mesh, is_outer: (0..mesh.triangles.len()).into_par_iter().map(is_outer).collect() }
+}
+
+fn load(laid: &Laid, mesh: &TriMesh) -> Load {
+    Load {
+        height_mm: laid.size_mm[2],
+        volume_mm3: mesh.signed_volume(),
+        area_mm2: mesh.area(),
+        support_mm3: laid.support_mm3,
+    }
+}
+
+fn described(printer: &Printer) -> String {
+    let [width, depth, height] = printer.bed_mm;
+    format!("\"{}\" ({width} × {depth} × {height} mm)", printer.name)
+}
+
+/// What to say before the work starts where pieces will not fit the printer: which, and how many pieces would do.
+///
+/// What fits the printer in one piece also does in several; only larger models are divided to see.
+pub fn too_large(
+    session: &Session,
+    params: &Params,
+    printer: &Printer,
+    model: &Model,
+) -> Result<Option<String>, Failure> {
+    if fits_whole(printer, model.solid.mesh().bounds()) {
+        return Ok(None);
+    }
+    let silent = |_: shellock::context::Progress<'_>| ();
+    let ctx = Ctx::new(&silent, &session.stop);
+    let wall_mm = params.strength.least_mm.max(params.body.thickness_mm);
+    let misfits = |n_pieces: Option<usize>, labels: Option<&[i64]>| {
+        let params = segmentation::SegmentationParams { n_pieces, ..params.segmentation.clone() };
+        let surface = segmentation::segment(&ctx, &params, &model.solid, labels).map_err(DesignError::from)?;
+        let ids: Vec<u32> = (0..surface.n_patches as u32).collect();
+        let misfits: Vec<u32> =
+            ids.into_par_iter().filter(|&p| !fits(printer, &shell_of(&surface, PatchId(p), wall_mm))).collect();
+        Ok::<_, Failure>((surface.n_patches, misfits))
+    };
+    let (n, misfitting) = misfits(params.segmentation.n_pieces, model.labels.as_deref())?;
+    if misfitting.is_empty() {
+        return Ok(None);
+    }
+    let mut enough = None;
+    let mut tried = n;
+    for _ in 0..MOST_TRIES {
+        tried = ((tried as f64 * MORE_PIECES).ceil() as usize).min(MOST_PIECES);
+        if misfits(Some(tried), None)?.1.is_empty() {
+            enough = Some(tried);
+            break;
+        }
+    }
+    let remedy = match (enough, &model.labels) {
+        (Some(n), None) => format!("about {n} pieces would do (--pieces {n})"),
+        (Some(n), Some(_)) => format!("divide them further: about {n} pieces of even size would do"),
+        (None, _) => "make it smaller (--size), or choose another printer (--printer)".to_owned(),
+    };
+    let count = misfitting.len();
+    Ok(Some(format!("{count} of {n} pieces will not fit the printer {}; {remedy}", described(printer))))
+}
+
+/// A patch with a wall behind it, as points: about the piece it becomes.
+fn shell_of(surface: &SegmentedSurface, patch: PatchId, wall_mm: f64) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    for face in (0..surface.mesh.triangles.len()).filter(|&f| surface.patch_of_face[f] == patch) {
+        let first = mesh.points.len() as u32;
+        mesh.points.extend(surface.mesh.corners(face));
+        mesh.points.push(surface.mesh.face_center(face) - wall_mm * surface.mesh.face_normal(face));
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    mesh
+}

@@ -1,0 +1,206 @@
+//! `report`: what a kit saves over the solid model, as the paper's Table 1 tells it.
+//!
+//! Print times are PrusaSlicer's own estimates where it is installed, else closed forms. Pieces are laid on plates anew
+//! for either process; the solid lies in the pose that needs the least support.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde_json::{Value, json};
+use shellock_geom::io::{NamedObject, write_3mf};
+use shellock_geom::{Solid, TriMesh};
+use shellock_print::plates::lay_alone;
+use shellock_print::{Printer, Process};
+
+use crate::Session;
+use crate::failure::Failure;
+use crate::input::read;
+use crate::printing::Printing;
+use crate::stages::{Kit, model_of, pieces_of, write};
+
+/// The file's name within a kit.
+const SAVINGS: &str = "savings.json";
+/// The slicer's program.
+const SLICER: &str = "prusa-slicer";
+
+/// Settings of both technologies, as far as they matter for time, on a bed that holds everything. The display of the
+/// resin printer is coarse: its pixels cost time here and change nothing.
+const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
+const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
+    supports_enable = 0\npad_enable = 0\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
+    display_pixels_y = 1000\n";
+const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nperimeters = 2\nfill_density = 15%\n\
+    support_material = 1\nperimeter_speed = 45\ninfill_speed = 80\ntravel_speed = 150\nskirts = 0\n";
+
+/// `shellock report`.
+pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<u8, Failure> {
+    let path = kit.join("plan.json");
+    let broken = |what: String| Failure::Wrong(format!("{}: {what}", path.display()));
+    let named = |f: Failure| match f {
+        Failure::Wrong(what) => broken(what),
+        other => other,
+    };
+    let plan: Value = serde_json::from_slice(&read(&path)?).map_err(|e| broken(format!("not a plan: {e}")))?;
+    let Kit { pieces, order, .. } = pieces_of(kit, &plan).map_err(named)?;
+    let solid = model_of(&plan, model).map_err(named)?;
+    let slicer = if closed_form { None } else { Slicer::find()? };
+    let mut times = serde_json::Map::new();
+    for printer in [Printer::sla(), Printer::fdm()] {
+        let bed_mm: Option<Vec<f64>> =
+            plan["printing"]["bed"].as_array().map(|b| b.iter().filter_map(Value::as_f64).collect());
+        let bed_mm = bed_mm.and_then(|b| b.try_into().ok()).unwrap_or(printer.bed_mm);
+        let printer = Printer { bed_mm, ..printer };
+        let printing = Printing::of(&printer, pieces.as_slice(), solid.mesh(), &solid);
+        let place = |i: usize| order.position(shellock::PatchId(i as u32));
+        let sliced = match &slicer {
+            Some(slicer) => slicer.seconds(&printer, printing.files(pieces.as_slice(), place), &solid)?,
+            None => None,
+        };
+        let by = if sliced.is_some() { "PrusaSlicer" } else { "closed form" };
+        let [pieces_s, solid_s] = sliced.unwrap_or(printing.seconds());
+        let ratio = pieces_s / solid_s.max(f64::MIN_POSITIVE);
+        times.insert(printer.name, json!({ "by": by, "pieces_s": pieces_s, "solid_s": solid_s, "ratio": ratio }));
+    }
+    let volume: f64 = pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
+    let told = json!({
+        "model": plan["input"]["file"], "pieces": pieces.len(), "wall_mm": plan["shell_thickness"],
+        "volume_ratio": volume / solid.volume(), "print_time": times,
+    });
+    let mut text = serde_json::to_string_pretty(&told).expect("numbers and strings can be written");
+    text.push('\n');
+    write(&kit.join(SAVINGS), text.as_bytes())?;
+    if session.is_json {
+        println!("{told}")
+    } else {
+        print(&told)
+    }
+    Ok(0)
+}
+
+fn print(told: &Value) {
+    let percent = |v: &Value| 100.0 * v.as_f64().unwrap_or_default();
+    let hours = |v: &Value| v.as_f64().unwrap_or_default() / 3600.0;
+    let wall_mm = told["wall_mm"].as_f64().unwrap_or_default();
+    println!("{} pieces, walls {wall_mm:.2} mm", told["pieces"]);
+    println!("material    {:5.1} % of the solid model's", percent(&told["volume_ratio"]));
+    for (name, time) in told["print_time"].as_object().into_iter().flatten() {
+        println!(
+            "time, {name}   {:5.1} % of the solid model's: {:.1} h instead of {:.1} h, by {}",
+            percent(&time["ratio"]),
+            hours(&time["pieces_s"]),
+            hours(&time["solid_s"]),
+            time["by"].as_str().unwrap_or_default()
+        );
+    }
+}
+
+/// PrusaSlicer, and a folder for its files.
+struct Slicer {
+    folder: tempfile::TempDir,
+}
+
+impl Slicer {
+    /// The slicer, where it is installed.
+    fn find() -> Result<Option<Self>, Failure> {
+        let runs = Command::new(SLICER).arg("--help").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        if !runs.is_ok_and(|status| status.success()) {
+            return Ok(None);
+        }
+        let folder = tempfile::tempdir().map_err(Failure::unwritable(&std::env::temp_dir()))?;
+        Ok(Some(Self { folder }))
+    }
+
+    /// Time for all plates among `files` and for the solid, s; `None` where the slicer refuses something.
+    fn seconds(
+        &self,
+        printer: &Printer,
+        files: Vec<(String, Vec<u8>)>,
+        solid: &Solid,
+    ) -> Result<Option<[f64; 2]>, Failure> {
+        let Some(laid) = lay_alone(printer, solid.mesh()) else { return Ok(None) };
+        let object = NamedObject {
+            name: "solid",
+            color: [200; 3],
+            mesh: solid.mesh(),
+            turned: Some(laid.turned),
+            moved_mm: laid.moved_mm,
+        };
+        let is_single = files.len() == 1;
+        let plates =
+            files.into_iter().filter(|(name, _)| is_single || name.starts_with("plates/")).map(|(_, bytes)| bytes);
+        let mut plates_s = 0.0;
+        for bytes in plates {
+            let Some(s) = self.seconds_of(printer, &bytes)? else { return Ok(None) };
+            plates_s += s;
+        }
+        Ok(self.seconds_of(printer, &write_3mf(&[object]))?.map(|solid_s| [plates_s, solid_s]))
+    }
+
+    /// Time for what a 3MF file holds, s.
+    fn seconds_of(&self, printer: &Printer, bytes: &[u8]) -> Result<Option<f64>, Failure> {
+        let [model, settings, out] = ["job.3mf", "job.ini", "job.out"].map(|name| self.folder.path().join(name));
+        let (text, export) = match printer.process {
+            Process::Fdm => (FDM_SETTINGS, "--export-gcode"),
+            Process::Sla | Process::Sls => (SLA_SETTINGS, "--export-sla"),
+        };
+        let first = if printer.process == Process::Fdm { "first_layer_height" } else { "initial_layer_height" };
+        let layer = printer.layer_mm;
+        let text = format!("{text}{ROOMY}layer_height = {layer}\n{first} = {layer}\n");
+        for (path, bytes) in [(&model, bytes), (&settings, text.as_bytes())] {
+            fs::write(path, bytes).map_err(Failure::unwritable(path))?;
+        }
+        let mut command = Command::new(SLICER);
+        command.arg("--load").arg(&settings).arg(export).arg("--dont-arrange").arg("-o").arg(&out).arg(&model);
+        let done = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+        if !done.is_ok_and(|status| status.success()) {
+            return Ok(None);
+        }
+        Ok(told_time(&out, printer.process))
+    }
+}
+
+/// The time that the slicer wrote into its result, s.
+fn told_time(out: &PathBuf, process: Process) -> Option<f64> {
+    match process {
+        Process::Fdm => {
+            let code = fs::read_to_string(out).ok()?;
+            let line = code.lines().find(|l| l.contains("estimated printing time (normal mode)"))?;
+            Some(seconds_in(line.split_once('=')?.1))
+        }
+        Process::Sla | Process::Sls => {
+            let archive = Command::new("unzip").arg("-p").arg(out).arg("config.ini").output().ok()?;
+            let text = String::from_utf8_lossy(&archive.stdout).into_owned();
+            let line = text.lines().find(|l| l.starts_with("printTime"))?;
+            line.split_once('=')?.1.trim().parse().ok()
+        }
+    }
+}
+
+/// "1d 2h 3m 4s" in seconds.
+fn seconds_in(text: &str) -> f64 {
+    let unit = |word: &str| {
+        let (number, unit) = word.split_at_checked(word.len().checked_sub(1)?)?;
+        let factor = match unit {
+            "d" => 86_400.0,
+            "h" => 3600.0,
+            "m" => 60.0,
+            "s" => 1.0,
+            _ => return None,
+        };
+        Some(number.parse::<f64>().ok()? * factor)
+    };
+    text.split_whitespace().filter_map(unit).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slicers_way_to_tell_time_is_read() {
+        assert_eq!(seconds_in(" 1d 2h 3m 4s"), 93_784.0);
+        assert_eq!(seconds_in(" 15m 30s "), 930.0);
+        assert_eq!(seconds_in(""), 0.0);
+    }
+}

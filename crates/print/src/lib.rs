@@ -1,0 +1,12 @@
+//! From finished pieces to the printer and the workbench: printers, plates, print time, and the booklet.
+//!
+//! Nothing here changes a piece. Pieces come as meshes in assembled position and are only turned, moved and drawn.
+
+pub mod booklet;
+mod pdf;
+pub mod plates;
+pub mod printer;
+pub mod time;
+
+pub use plates::{Plates, lay};
+pub use printer::{Printer, Process};

@@ -1,0 +1,144 @@
+//! Printers: what they can hold, and what their prints need.
+
+use shellock::params::ParamProblem;
+use shellock_mechanics::Material;
+
+/// How a printer makes things.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Process {
+    /// Resin, hardened layer by layer: supports leave marks.
+    Sla,
+    /// Filament, laid in lines: supports leave marks, and what stands on a point falls.
+    Fdm,
+    /// Powder, sintered layer by layer: no supports.
+    Sls,
+}
+
+impl Process {
+    /// All of them, by the names that people use.
+    pub const ALL: [(&'static str, Self); 3] = [("sla", Self::Sla), ("fdm", Self::Fdm), ("sls", Self::Sls)];
+
+    /// The process called `name`.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)).map(|(_, p)| *p)
+    }
+}
+
+/// A printer. Lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Printer {
+    /// What people call it.
+    pub name: String,
+    /// How it prints.
+    pub process: Process,
+    /// Width, depth and height of what it can make. [10, 5000] each.
+    pub bed_mm: [f64; 3],
+    /// Gap between mating faces of connectors. [0.03, 0.6].
+    pub clearance_mm: f64,
+    /// The same on the rails of the key. [0.03, 0.8].
+    pub key_clearance_mm: f64,
+    /// Gap that each side of a seam leaves inside the wall. [0, 0.4].
+    pub wall_gap_mm: f64,
+    /// Thinnest wall that it makes. [0.1, 2].
+    pub min_wall_mm: f64,
+    /// Height of a layer. [0.01, 1].
+    pub layer_mm: f64,
+    /// What it prints with.
+    pub material: Material,
+}
+
+impl Printer {
+    /// A resin printer with a display of ten inches; clearances as others print them, 0.05 to 0.15 a side.
+    pub fn sla() -> Self {
+        Self {
+            name: "sla".into(),
+            process: Process::Sla,
+            bed_mm: [192.0, 120.0, 200.0],
+            clearance_mm: 0.12,
+            key_clearance_mm: 0.15,
+            wall_gap_mm: 0.05,
+            min_wall_mm: 0.4,
+            layer_mm: 0.05,
+            material: Material::SLA_RESIN,
+        }
+    }
+
+    /// A filament printer with a nozzle of 0.4 mm and PLA; clearances 0.15 to 0.25 a side.
+    pub fn fdm() -> Self {
+        Self {
+            name: "fdm".into(),
+            process: Process::Fdm,
+            bed_mm: [220.0, 220.0, 250.0],
+            clearance_mm: 0.2,
+            key_clearance_mm: 0.22,
+            wall_gap_mm: 0.1,
+            min_wall_mm: 0.45,
+            layer_mm: 0.2,
+            material: Material::PLA,
+        }
+    }
+
+    /// The same with PETG, which oozes more: 0.25 to 0.35 a side.
+    pub fn fdm_petg() -> Self {
+        Self {
+            name: "fdm-petg".into(),
+            clearance_mm: 0.3,
+            key_clearance_mm: 0.32,
+            wall_gap_mm: 0.14,
+            material: Material::PETG,
+            ..Self::fdm()
+        }
+    }
+
+    /// A sintering printer and polyamide: about 0.25 a side.
+    pub fn sls() -> Self {
+        Self {
+            name: "sls".into(),
+            process: Process::Sls,
+            bed_mm: [165.0, 165.0, 300.0],
+            clearance_mm: 0.25,
+            key_clearance_mm: 0.28,
+            wall_gap_mm: 0.12,
+            min_wall_mm: 0.6,
+            layer_mm: 0.11,
+            material: Material::PA12,
+        }
+    }
+
+    /// The printers that everybody has.
+    pub fn presets() -> Vec<Self> {
+        vec![Self::sla(), Self::fdm(), Self::fdm_petg(), Self::sls()]
+    }
+
+    /// Every property out of range.
+    pub fn problems(&self) -> Vec<ParamProblem> {
+        let side = |name, mm| ParamProblem::unless_within(name, "mm", mm, 10.0, 5000.0);
+        let [width, depth, height] = self.bed_mm;
+        let checks = [
+            side("width of the bed", width),
+            side("depth of the bed", depth),
+            side("height of the printer", height),
+            ParamProblem::unless_within("clearance of the printer", "mm", self.clearance_mm, 0.03, 0.6),
+            ParamProblem::unless_within("key clearance of the printer", "mm", self.key_clearance_mm, 0.03, 0.8),
+            ParamProblem::unless_within("wall gap of the printer", "mm", self.wall_gap_mm, 0.0, 0.4),
+            ParamProblem::unless_within("minimum wall of the printer", "mm", self.min_wall_mm, 0.1, 2.0),
+            ParamProblem::unless_within("layer of the printer", "mm", self.layer_mm, 0.01, 1.0),
+        ];
+        checks.into_iter().flatten().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_in_range_and_have_names_of_their_own() {
+        let presets = Printer::presets();
+        assert!(presets.iter().all(|p| p.problems().is_empty()));
+        let names: std::collections::BTreeSet<&str> = presets.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names.len(), presets.len());
+        let bad = Printer { bed_mm: [f64::NAN, 5.0, 1e9], layer_mm: 0.0, ..Printer::sla() };
+        assert_eq!(bad.problems().len(), 4);
+    }
+}
