@@ -29,27 +29,51 @@ function arrays({ points, triangles }, buffer) {
   return { positions, indices: new Index(buffer, triangles.offset, 3 * triangles.count) };
 }
 
-/** Positions and normals, three corners a triangle; normals are smooth up to 40° and break at creases. */
-export function shadedCorners(positions, indices) {
+/** Points with normals, and the triangles between them: normals are smooth up to 40°, and a point on a crease is there more than once. */
+export function shaded(positions, indices) {
+  const corners = cornerNormals(positions, indices);
+  // The points that stand for each given one: `first`, then `next` after `next`.
+  const first = new Int32Array(positions.length / 3).fill(-1);
+  const next = new Int32Array(indices.length).fill(-1);
+  const points = new Float32Array(3 * indices.length);
+  const normals = new Float32Array(3 * indices.length);
+  const triangles = new Uint32Array(indices.length);
+  let n = 0;
+  for (let i = 0; i < indices.length; i++) {
+    const [x, y, z] = [corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]];
+    let at = first[indices[i]];
+    while (at >= 0 && (normals[3 * at] !== x || normals[3 * at + 1] !== y || normals[3 * at + 2] !== z)) at = next[at];
+    if (at < 0) {
+      at = n++;
+      next[at] = first[indices[i]];
+      first[indices[i]] = at;
+      normals.set([x, y, z], 3 * at);
+      for (let k = 0; k < 3; k++) points[3 * at + k] = positions[3 * indices[i] + k];
+    }
+    triangles[i] = at;
+  }
+  return { points: points.slice(0, 3 * n), normals: normals.slice(0, 3 * n), indices: triangles };
+}
+
+/** A normal for each corner of each triangle. */
+function cornerNormals(positions, indices) {
   const nFaces = indices.length / 3;
   const area = new Float32Array(3 * nFaces); // face normal × twice the area
   const unit = new Float32Array(3 * nFaces);
-  const corners = new Float32Array(9 * nFaces);
-  for (let i = 0; i < indices.length; i++) {
-    for (let k = 0; k < 3; k++) corners[3 * i + k] = positions[3 * indices[i] + k];
-  }
   for (let f = 0; f < nFaces; f++) {
-    const c = corners.subarray(9 * f, 9 * f + 9);
-    const [ux, uy, uz] = [c[3] - c[0], c[4] - c[1], c[5] - c[2]];
-    const [vx, vy, vz] = [c[6] - c[0], c[7] - c[1], c[8] - c[2]];
-    const n = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
-    const length = Math.hypot(...n) || 1;
-    for (let k = 0; k < 3; k++) {
-      area[3 * f + k] = n[k];
-      unit[3 * f + k] = n[k] / length;
-    }
+    const [a, b, c] = [3 * indices[3 * f], 3 * indices[3 * f + 1], 3 * indices[3 * f + 2]];
+    const [ux, uy, uz] = [positions[b] - positions[a], positions[b + 1] - positions[a + 1], positions[b + 2] - positions[a + 2]];
+    const [vx, vy, vz] = [positions[c] - positions[a], positions[c + 1] - positions[a + 1], positions[c + 2] - positions[a + 2]];
+    const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+    const length = Math.sqrt(x * x + y * y + z * z) || 1;
+    area[3 * f] = x;
+    area[3 * f + 1] = y;
+    area[3 * f + 2] = z;
+    unit[3 * f] = x / length;
+    unit[3 * f + 1] = y / length;
+    unit[3 * f + 2] = z / length;
   }
-  return { corners, normals: creaseNormals(positions.length / 3, indices, area, unit) };
+  return creaseNormals(positions.length / 3, indices, area, unit);
 }
 
 function creaseNormals(nPoints, indices, area, unit) {
@@ -72,8 +96,10 @@ function creaseNormals(nPoints, indices, area, unit) {
         z += area[other + 2];
       }
     }
-    const length = Math.hypot(x, y, z) || 1;
-    normals.set([x / length, y / length, z / length], 3 * i);
+    const length = Math.sqrt(x * x + y * y + z * z) || 1;
+    normals[3 * i] = x / length;
+    normals[3 * i + 1] = y / length;
+    normals[3 * i + 2] = z / length;
   }
   return normals;
 }

@@ -39,7 +39,10 @@ export function buildPanel(header, meshes, order, on) {
   const steps = stepControls(meshes.length, on);
   const cut = cutControls(on);
   const paint = paintControls(header, on);
-  tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, button("Reset view", "Reset view", on.home));
+  const turn = button("Turn", "Turn the model on and on", on.turn);
+  const view = element("div", "modes");
+  view.append(turn, button("Reset", "Reset the view", on.home));
+  tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, view);
   panel.append(element("h1", "", header.title), summary(header));
   const list = meshList(header, meshes, order, on);
   panel.append(list.holder);
@@ -53,6 +56,7 @@ export function buildPanel(header, meshes, order, on) {
       apart.holder.hidden = state.mode !== "apart";
       apart.input.value = state.apart;
       cut.input.value = state.cut;
+      turn.setAttribute("aria-pressed", state.turning);
       paint.update(state);
       steps.update(state, flying === undefined ? "" : meshes[flying].name);
       list.update(state, flying);
@@ -117,12 +121,16 @@ function stepControls(count, on) {
   const holder = element("div", "steps");
   const playing = button("▶", "Play", on.play);
   const text = element("span", "count");
-  holder.append(button("|◀", "First step", () => on.goTo(1)), button("◀", "Previous step", () => on.step(-1)), playing, button("▶|", "Next step", () => on.step(1)), text);
+  const time = slider("", count, on.scrub);
+  Object.assign(time.input, { max: count, step: 0.02, title: "Any moment of the assembly" });
+  time.input.setAttribute("aria-label", time.input.title);
+  holder.append(button("|◀", "First step", () => on.goTo(1)), button("◀", "Previous step", () => on.step(-1)), playing, button("▶|", "Next step", () => on.step(1)), time.holder, text);
   return {
     holder,
     update(state, name) {
       holder.hidden = state.mode !== "steps";
       playing.textContent = state.playing ? "❚❚" : "▶";
+      time.input.value = state.step;
       text.textContent = `${Math.ceil(state.step)} / ${count}  ${name}`;
     },
   };
@@ -190,7 +198,8 @@ function meshList(header, meshes, order, on) {
     const eye = button("hide", `Hide or show ${m.name}`, () => on.toggle(i));
     eye.className = "eye";
     const details = element("div", "details");
-    details.append(table(m.facts), button("Only this", `Show only ${m.name}`, on.alone));
+    const only = button("Only this", `Show only ${m.name}`, on.alone);
+    details.append(table(m.facts), only, button("From inside", `Look at the inner side of ${m.name}`, on.inside));
     row.append(pick, eye, details);
     list.append(row);
     rows.set(i, { row, eye, dot });

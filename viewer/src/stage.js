@@ -1,14 +1,36 @@
 // The 3D half: meshes, arrows and marks on a canvas. Knows nothing of the panel beside it.
 
 import {
-  ArrowHelper, Box3, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, BackSide, FrontSide,
-  Group, HemisphereLight, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Plane, Raycaster, Scene,
-  SphereGeometry, Vector2, Vector3, WebGLRenderer,
+  Box3, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, BackSide, FrontSide,
+  Group, HemisphereLight, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Plane, Quaternion,
+  Raycaster, Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { shadedCorners } from "./data.js";
+import { shaded } from "./data.js";
 
 const UP = new Vector3(0, 0, 1);
+
+// A shaft and a head, unlit, from the origin along +y before it is turned.
+class Arrow extends Group {
+  constructor(color, isOnTop) {
+    super();
+    const material = new MeshBasicMaterial({ color, depthTest: !isOnTop, transparent: isOnTop });
+    this.shaft = new Mesh(new CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), material);
+    this.head = new Mesh(new ConeGeometry(1, 1, 28).translate(0, 0.5, 0), material);
+    this.add(this.shaft, this.head);
+    if (isOnTop) this.shaft.renderOrder = this.head.renderOrder = 9;
+    this.visible = false;
+  }
+
+  point(from, direction, length, width) {
+    const head = Math.min(2.6 * width, 0.6 * length);
+    this.position.copy(from);
+    this.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 1, 0), direction));
+    this.shaft.scale.set(0.36 * width, length - head, 0.36 * width);
+    this.head.scale.set(width, head, width);
+    this.head.position.set(0, length - head, 0);
+  }
+}
 
 export class Stage {
   constructor(holder, meshes) {
@@ -28,7 +50,6 @@ export class Stage {
       this.camera.add(light, light.target);
     }
     this.clip = new Plane(new Vector3(0, -1, 0), Infinity);
-    this.renderer.localClippingEnabled = true;
     this.items = meshes.map((m) => this.#add(m));
     this.box = new Box3();
     for (const item of this.items) this.box.union(item.box);
@@ -36,9 +57,9 @@ export class Stage {
     this.size = this.box.getSize(new Vector3()).length() || 1;
     this.marks = new Group();
     this.scene.add(this.marks);
-    this.arrow = new ArrowHelper(UP, this.center, 1, 0xd33c2f);
-    this.arrow.visible = false;
-    this.scene.add(this.arrow);
+    this.arrow = new Arrow(0xd33c2f, true);
+    this.ways = meshes.map((m) => new Arrow(new Color(...m.color.map((c) => (0.7 * c) / 255)).convertSRGBToLinear(), false));
+    this.scene.add(this.arrow, ...this.ways);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.#resize()).observe(holder);
@@ -47,22 +68,25 @@ export class Stage {
   }
 
   #add(m) {
-    const { corners, normals } = shadedCorners(m.positions, m.indices);
+    const { points, normals, indices } = shaded(m.positions, m.indices);
     const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(corners, 3));
+    geometry.setIndex(new BufferAttribute(indices, 1));
+    geometry.setAttribute("position", new BufferAttribute(points, 3));
     geometry.setAttribute("normal", new BufferAttribute(normals, 3));
     geometry.computeBoundingBox();
     geometry.computeBoundingSphere();
     const color = new Color(...m.color.map((c) => c / 255)).convertSRGBToLinear();
     const clippingPlanes = [this.clip];
-    const skin = new MeshStandardMaterial({ color, roughness: 0.62, metalness: 0, side: FrontSide, clippingPlanes });
+    const skin = new MeshLambertMaterial({ color, side: FrontSide, clippingPlanes });
     // The back of a closed surface shows only where a plane cuts it; unlit, it looks like the face of the cut.
     const cut = new MeshBasicMaterial({ color: color.clone().multiplyScalar(0.55), side: BackSide, clippingPlanes });
     const group = new Group();
-    group.add(new Mesh(geometry, skin), new Mesh(geometry, cut));
+    const inner = new Mesh(geometry, cut);
+    inner.visible = false;
+    group.add(new Mesh(geometry, skin), inner);
     this.scene.add(group);
     const box = geometry.boundingBox.clone();
-    return { group, skin, cut, box, center: box.getCenter(new Vector3()), shift: new Vector3(...m.shift), travel: new Vector3(...m.travel) };
+    return { group, skin, cut, inner, box, center: box.getCenter(new Vector3()), shift: new Vector3(...m.shift), travel: new Vector3(...m.travel) };
   }
 
   #resize() {
@@ -88,6 +112,8 @@ export class Stage {
       this.pending = 0;
       this.renderer.render(this.scene, this.camera);
       this.afterDraw?.();
+      // While it turns, this asks for the next frame.
+      if (this.controls.autoRotate) this.controls.update();
     });
   }
 
@@ -102,6 +128,21 @@ export class Stage {
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.draw();
+  }
+
+  /** Turns the scene on and on, or no more. */
+  turn(on) {
+    this.controls.autoRotate = on;
+    this.draw();
+  }
+
+  /** Looks at a mesh from the middle of the scene: at its inner side, where it lies around that. */
+  lookFromInside(i) {
+    const { center, box, travel } = this.items[i];
+    const inwards = this.center.clone().sub(center);
+    if (inwards.length() < 0.05 * this.size) inwards.copy(travel);
+    if (inwards.lengthSq() === 0) inwards.copy(UP);
+    this.lookFrom(inwards, center, 1.15 * box.getSize(new Vector3()).length());
   }
 
   /** Turns to a place, from the side of the middle of the scene it lies on. */
@@ -149,7 +190,21 @@ export class Stage {
     const at = away > 0 ? high - share * (high - low) : low + share * (high - low);
     this.clip.normal.set(0, 0, 0).setComponent(axis, -away);
     this.clip.constant = share > 0 ? away * at : 1e9;
+    this.renderer.localClippingEnabled = share > 0;
+    for (const { inner } of this.items) inner.visible = share > 0;
     this.draw();
+  }
+
+  /** Shows where mesh `i` goes from `offset` on, or not. */
+  showWay(i, offset) {
+    const { travel, center, box } = this.items[i];
+    const arrow = this.ways[i];
+    arrow.visible = offset !== null && travel.lengthSq() > 0;
+    if (!arrow.visible) return;
+    const direction = travel.clone().normalize();
+    const extent = box.getSize(new Vector3());
+    const half = 0.5 * (Math.abs(direction.x) * extent.x + Math.abs(direction.y) * extent.y + Math.abs(direction.z) * extent.z);
+    arrow.point(center.clone().add(offset).addScaledVector(direction, half), direction, 0.09 * this.size, 0.012 * this.size);
   }
 
   showArrow(i, length) {
@@ -157,14 +212,7 @@ export class Stage {
     this.arrow.visible = travel.lengthSq() > 0;
     if (!this.arrow.visible) return;
     const direction = travel.clone().normalize();
-    const from = center.clone().addScaledVector(direction, -length);
-    this.arrow.position.copy(from);
-    this.arrow.setDirection(direction);
-    this.arrow.setLength(0.85 * length, 0.07 * this.size, 0.035 * this.size);
-    for (const part of [this.arrow.line, this.arrow.cone]) {
-      part.material.depthTest = false;
-      part.renderOrder = 9;
-    }
+    this.arrow.point(center.clone().addScaledVector(direction, -length), direction, 0.85 * length, 0.02 * this.size);
   }
 
   mark(place) {

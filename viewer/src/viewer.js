@@ -19,17 +19,20 @@ function start() {
   }
   const order = meshes.map((_, i) => i).sort((a, b) => meshes[a].step - meshes[b].step);
   // apart: 0 … 1 · step: how many have arrived, with the share of the one on its way
-  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null };
+  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null, turning: false };
   const panel = buildPanel(header, meshes, order, {
     mode: (mode) => { setMode(mode); },
     apart: (share) => { state.apart = share; update(); },
     step: (by) => { goTo(Math.round(state.step) + by); },
     goTo,
+    scrub: (step) => { stop(); enterSteps(); state.step = step; update(); },
     play: () => { state.playing ? stop() : play(); },
     cut: (axis, share) => { Object.assign(state, { cutAxis: axis, cut: share }); stage?.cutAt(axis, share); },
     paint,
     choose,
     toggle: (i) => { state.hidden.has(i) ? state.hidden.delete(i) : state.hidden.add(i); update(); },
+    inside,
+    turn: () => { state.turning = !state.turning; stage?.turn(state.turning); update(); },
     alone: () => { state.alone = !state.alone && state.chosen >= 0; update(); },
     showAll: () => { state.hidden.clear(); state.alone = false; choose(-1); },
     home: () => { stage?.mark(null); state.note = null; stage?.lookFrom(new Vector3(0.62, -0.95, 0.42)); fit(); },
@@ -49,8 +52,16 @@ function start() {
   }
 
   function choose(i) {
-    state.chosen = i;
-    if (i < 0) state.alone = false;
+    state.chosen = meshes[i] ? i : -1;
+    if (state.chosen < 0) state.alone = false;
+    update();
+  }
+
+  // The chosen mesh alone, seen from the middle of the scene.
+  function inside() {
+    stop();
+    Object.assign(state, { mode: "together", alone: state.chosen >= 0 });
+    if (state.chosen >= 0) stage?.lookFromInside(state.chosen);
     update();
   }
 
@@ -123,10 +134,12 @@ function start() {
       if (i === flying) offset.set(...m.travel).multiplyScalar(-(1 - eased(travelled)) * way);
       stage.place(i, offset);
       const hidden = !arrived || state.hidden.has(i) || (state.alone && state.chosen !== i);
-      stage.show(i, { hidden, lit: state.chosen === i });
+      stage.show(i, { hidden, lit: state.chosen === i && !state.alone });
+      stage.showWay(i, state.mode === "apart" && !hidden ? offset : null);
     });
-    if (flying === undefined || travelled === 1) stage.arrow.visible = false;
-    else stage.showArrow(flying, way);
+    if (flying !== undefined && travelled < 1) stage.showArrow(flying, way);
+    else if (state.mode === "together" && state.chosen >= 0 && !state.alone) stage.showArrow(state.chosen, 0.7 * way);
+    else stage.arrow.visible = false;
     stage.draw();
   }
 
@@ -152,7 +165,7 @@ function start() {
     clicks(holder.querySelector("canvas"), (x, y) => choose(stage.pick(x, y)));
   }
   keys({ next: () => goTo(Math.floor(state.step) + 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => (state.playing ? stop() : play()), escape: () => choose(-1) });
-  fromAddress(location.hash, { state, setMode, update, choose, paint, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
+  fromAddress(location.hash, { state, setMode, update, choose, inside, paint, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
   update();
   document.documentElement.dataset.ready = "true";
 }
@@ -178,14 +191,15 @@ function keys({ next, back, play, escape }) {
   });
 }
 
-// #apart, #apart=0.5, #step=3.4, #choose=2, #cut=0.5, #note=0, #paint=1 show that view at once: for links and for pictures.
-function fromAddress(hash, { state, setMode, update, choose, paint, note, cut }) {
+// #apart, #apart=0.5, #step=3.4, #choose=2, #inside=2, #cut=0.5, #note=0, #paint=1 show that view at once: for links and for pictures.
+function fromAddress(hash, { state, setMode, update, choose, inside, paint, note, cut }) {
   for (const [key, text] of new URLSearchParams(hash.slice(1))) {
     const value = Number(text);
     if (!Number.isFinite(value)) continue;
     if (key === "apart") { setMode("apart"); if (text) state.apart = value; }
     if (key === "step") { setMode("steps"); state.step = Math.max(0, value); }
     if (key === "choose") choose(value);
+    if (key === "inside") { choose(value); inside(); }
     if (key === "cut") { state.cut = value; cut(value); }
     if (key === "note") note(value);
     if (key === "paint") paint(value);

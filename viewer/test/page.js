@@ -59,6 +59,9 @@ setTimeout(() => {
   const painted = ["1", "0", "-1"].map((value) => { select.value = value; select.dispatchEvent(new Event("change")); return dots() + " " + document.querySelector(".legend").textContent; });
   document.documentElement.dataset.painted = painted.join("|");
   for (const key of ["ArrowRight", "ArrowLeft", " ", "Escape"]) dispatchEvent(new KeyboardEvent("keydown", { key }));
+  const scrub = document.querySelector(".steps input");
+  const moments = ["0.5", "1.25", "2"].map((value) => { scrub.value = value; scrub.dispatchEvent(new Event("input")); return document.querySelector(".steps .count").textContent; });
+  document.documentElement.dataset.moments = moments.join("|");
   document.documentElement.dataset.clicked = document.querySelectorAll("button").length;
 }, 1500);
 </script>`;

@@ -5,7 +5,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import test from "node:test";
 import { bundle } from "../build.js";
-import { shadedCorners, shades } from "../src/data.js";
+import { shaded, shades } from "../src/data.js";
 import { samplePage } from "./page.js";
 
 /** SHELLOCK_CHROMIUM, or chromium on the path; undefined where neither runs. */
@@ -22,9 +22,12 @@ test("the committed bundle is what the sources give", async () => {
 test("normals break at right angles and are smooth on a plane", () => {
   // Two triangles in z = 0 and one that stands on their common border.
   const positions = Float32Array.of(0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1);
-  const { normals } = shadedCorners(positions, Uint16Array.of(0, 1, 2, 0, 2, 3, 1, 0, 4));
-  assert.deepEqual([...normals.subarray(0, 3)], [0, 0, 1]);
-  assert.deepEqual([...normals.subarray(18, 21)].map(Math.round), [0, 1, 0].map((x, i) => normals[18 + i] < 0 ? -x : x));
+  const { points, normals, indices } = shaded(positions, Uint16Array.of(0, 1, 2, 0, 2, 3, 1, 0, 4));
+  const at = (array, corner) => [...array.subarray(3 * indices[corner], 3 * indices[corner] + 3)];
+  assert.equal(points.length, 3 * 7, "the two points of the crease are there twice, the others once");
+  assert.deepEqual([0, 2, 6, 7].map((corner) => at(points, corner)), [[0, 0, 0], [1, 1, 0], [1, 0, 0], [0, 0, 0]]);
+  assert.deepEqual(at(normals, 0), [0, 0, 1]);
+  assert.deepEqual(at(normals, 6).map(Math.abs), [0, 1, 0]);
 });
 
 test("shades go from the least value to the greatest and leave out what has none", () => {
@@ -53,6 +56,7 @@ test("the page draws, answers every control and reports no error", { skip: witho
     const [nothing, size, back] = data("painted").split("|").map((text) => text.trim());
     assert.ok(nothing.startsWith(own) && back.startsWith(own));
     assert.match(size, /^rgb\(96, 80, 160\) rgb\(150, 147, 156\) 10\.0010\.00 mmgrey: none$/);
+    assert.deepEqual(data("moments").replaceAll("&lt;", "<").replaceAll("&gt;", ">").split("|"), ["1 / 2  mesh 0 <b>", "2 / 2  mesh 1 <b>", "2 / 2  mesh 1 <b>"]);
     assert.match(dom, /<h1>Two cubes &lt;\/script&gt;<\/h1>/);
   } finally {
     await rm(folder, { recursive: true, force: true, maxRetries: 5 });

@@ -229,7 +229,7 @@ pub fn weakest(holding: &Holding) -> Vec<String> {
 /// Each on a line, with its place.
 pub fn print_warnings(warnings: &[Warning]) {
     for w in warnings {
-        let place = w.at.map_or_else(String::new, |[x, y, z]| format!(" at ({x:.1}, {y:.1}, {z:.1}) mm"));
+        let place = w.at.map_or_else(String::new, |[x, y, z]| format!(" [at ({x:.1}, {y:.1}, {z:.1}) mm]"));
         println!("warning: {}{place}", w.message);
     }
 }

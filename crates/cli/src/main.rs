@@ -7,6 +7,7 @@ mod failure;
 mod input;
 mod inspect;
 mod output;
+mod page;
 mod paint;
 mod printing;
 mod progress;

@@ -9,9 +9,7 @@ use serde_json::{Value, json};
 use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone, play_together};
 use shellock::key::KeySite;
 use shellock::pipeline::{Design, Params};
-use shellock::report::{
-    ReportCheck, ReportData, ReportPiece, ReportQuantity, SeamStress, html, palette, pieces_picture, strength_chart,
-};
+use shellock::report::{SeamStress, palette, strength_chart};
 use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::clearance::PathGap;
 use shellock::verify::thin_share;
@@ -19,12 +17,11 @@ use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::repair::{Repair, RepairKind};
 use shellock_geom::{TriMesh, Vec3};
-use shellock_print::booklet::Booklet;
 
 use crate::args::{Axis, Options};
-use crate::build::{bearing, scope};
 use crate::failure::Failure;
 use crate::input::{Model, sha256};
+use crate::page;
 use crate::paint::painted;
 use crate::printing::Printing;
 
@@ -156,7 +153,7 @@ pub fn files(
     let place = |i: usize| design.plan.position(PatchId(i as u32));
     let archives = || rayon::join(|| assembly(design), || printing.files(design.pieces.as_slice(), place));
     let ((archive, plates), (page, picture, booklet)) =
-        rayon::join(archives, || report(model, options, params, design, warnings, &summary, figures));
+        rayon::join(archives, || page::report(model, options, params, design, warnings, &summary, figures));
     files.extend(plates);
     files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
     files.push(("assembly.3mf".into(), archive));
@@ -336,7 +333,7 @@ fn key_json(design: &Design, key: &KeySite) -> Value {
 }
 
 /// The sizes of the connectors that were made, mm, as in "2.5" or "2.0–3.4".
-fn connector_sizes(design: &Design) -> String {
+pub fn connector_sizes(design: &Design) -> String {
     if design.sizes.pairs().next().is_none() {
         return design.sizes.default_mm().to_string();
     }
@@ -373,148 +370,11 @@ fn stress_chart(options: &Options, params: &Params, design: &Design, strength: &
 }
 
 /// From assembly space to the model as it was given, then so that `up` becomes z.
-fn standing(up: Axis, design: &Design, v: Vec3) -> Vec3 {
+pub fn standing(up: Axis, design: &Design, v: Vec3) -> Vec3 {
     let v = design.turn.inverse().apply(v);
     match up {
         Axis::X => Vec3::new(-v.z, v.y, v.x),
         Axis::Y => Vec3::new(v.x, -v.z, v.y),
         Axis::Z => v,
     }
-}
-
-/// The page, the picture and the booklet, where it is wanted. All show the model standing on its feet: `up` becomes z.
-fn report(
-    model: &Model,
-    options: &Options,
-    params: &Params,
-    design: &Design,
-    warnings: &[Warning],
-    summary: &Summary,
-    figures: Vec<(String, String)>,
-) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
-    let stand = |v: Vec3| standing(options.up, design, v);
-    let turned: Vec<TriMesh> = design
-        .pieces
-        .as_slice()
-        .iter()
-        .map(|m| TriMesh { points: m.points.iter().map(|&p| stand(p)).collect(), triangles: m.triangles.clone() })
-        .collect();
-    let warnings: Vec<Warning> = warnings
-        .iter()
-        .map(|w| Warning { at: w.at.map(|at| stand(Vec3::from_array(at)).to_array()), ..w.clone() })
-        .collect();
-    let plan = &design.plan;
-    let pieces: Vec<ReportPiece> = design
-        .pieces
-        .ids()
-        .map(|p| ReportPiece {
-            id: p.0,
-            name: format!("piece {p}"),
-            color: palette::color(plan.position(p)),
-            mesh: &turned[p.0 as usize],
-            installation_direction: stand(-plan.separation(p).unit()).to_array(),
-            order: plan.position(p),
-            is_key: plan.key() == p,
-            facts: piece_facts(design, summary, p, turned[p.0 as usize].signed_volume() / 1000.0),
-        })
-        .collect();
-    let size = model.solid.mesh().bounds().size();
-    let mut facts: Vec<(String, String)> = vec![
-        ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
-        ("pieces".into(), design.pieces.len().to_string()),
-        ("wall".into(), format!("{:.2} mm", design.thickness_mm)),
-        ("connectors".into(), format!("{} mm", connector_sizes(design))),
-        ("clearance".into(), format!("{} mm", params.connector.clearance_mm)),
-        ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
-        ("print time".into(), format!("about {:.0} % of the solid model's", 100.0 * summary.print_time_ratio)),
-        ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
-    ];
-    facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, params))));
-    facts.extend(plan_facts(design, stand));
-    let checks = design
-        .verification
-        .checks
-        .iter()
-        .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
-        .collect();
-    let quantities = quantities(design, summary);
-    let data =
-        ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
-    let booklet = Booklet { title: title(&model.name), lines: cover_lines(&data.facts), pieces: data.pieces.clone() };
-    let (page, (picture, booklet)) = rayon::join(
-        || html(&data).into_bytes(),
-        || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
-    );
-    (page, picture, booklet)
-}
-
-/// A file's name as a heading.
-fn title(name: &str) -> String {
-    Path::new(name).file_stem().map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
-}
-
-/// What a person who builds the thing wants to know of it.
-fn cover_lines(facts: &[(String, String)]) -> Vec<String> {
-    let fact = |name: &str| facts.iter().find(|f| f.0 == name).map(|f| f.1.as_str()).unwrap_or_default();
-    vec![
-        format!("{} pieces, {}", fact("pieces"), fact("size")),
-        "no glue: each piece locks those before it; the last one, the key, locks all".to_owned(),
-    ]
-}
-
-/// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is made to `stand`.
-fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, String)> {
-    let proof = design.proof.as_ref().map(|p| {
-        let how = if p.optimal {
-            "proven to be the least with".into()
-        } else {
-            format!("at least {:.2} with", p.lower_bound)
-        };
-        ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)))
-    });
-    let weakest = design.holding.as_ref().and_then(|h| h.seams.first()).map(|s| {
-        let [x, y, z] = stand(Vec3::from_array(s.at)).to_array();
-        let figure = format!(
-            "{} and {}: opens {:.2} mm at 10 N/m at ({x:.1}, {y:.1}, {z:.1}) mm; {}",
-            s.later, s.earlier, s.opening_mm, s.reason
-        );
-        ("weakest seam".into(), figure)
-    });
-    let loose = design.holding.iter().flat_map(|h| &h.loose).map(|part| {
-        let [x, y, z] = stand(Vec3::from_array(part.at)).to_array();
-        ("comes apart".into(), format!("piece {} at ({x:.1}, {y:.1}, {z:.1}) mm, at 10 N/m", part.piece))
-    });
-    proof.into_iter().chain(weakest).chain(loose).collect()
-}
-
-/// What the report colours pieces by.
-fn quantities(design: &Design, summary: &Summary) -> Vec<ReportQuantity> {
-    // The key is there to leave: how far it gets before unevenness stops it would drown what the others differ by.
-    let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
-        let of_piece =
-            |(id, p): (PatchId, &Option<Play>)| p.filter(|_| id != design.plan.key()).map(|p| p.translation_mm);
-        play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
-    };
-    let order = design.pieces.ids().map(|p| Some(design.plan.position(p) as f64 + 1.0)).collect();
-    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&summary.rattle))];
-    quantities.extend(summary.rattle_together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
-    let quantity =
-        |(name, unit, values): (&str, &str, _)| ReportQuantity { name: name.into(), unit: unit.into(), values };
-    quantities.into_iter().map(quantity).collect()
-}
-
-/// A piece's volume, and how each of its seams holds.
-fn piece_facts(design: &Design, summary: &Summary, piece: PatchId, volume_cm3: f64) -> Vec<(String, String)> {
-    let mut facts = vec![("volume".to_owned(), format!("{volume_cm3:.1} cm³"))];
-    facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
-    let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
-    facts.extend(summary.rattle[piece].map(|p| ("play".to_owned(), play(p))));
-    let together = summary.rattle_together.as_ref().and_then(|all| all[piece]);
-    facts.extend(together.map(|p| ("play with others".to_owned(), play(p))));
-    let seams = design.holding.iter().flat_map(|h| &h.seams);
-    for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
-        let other = if s.later == piece { s.earlier } else { s.later };
-        facts.push((format!("seam with {other}"), format!("opens {:.2} mm at 10 N/m", s.opening_mm)));
-    }
-    facts
 }

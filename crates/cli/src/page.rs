@@ -1,0 +1,183 @@
+//! What people look at: the page, the picture and the booklet of a kit.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use shellock::certificate::Play;
+use shellock::pipeline::{Design, Params};
+use shellock::report::{ReportCheck, ReportData, ReportPiece, ReportQuantity, html, palette, pieces_picture};
+use shellock::verify::Finding;
+use shellock::{IdVec, PatchId, Warning};
+use shellock_geom::decimate::decimate;
+use shellock_geom::{Aabb, TriMesh, Vec3};
+use shellock_print::booklet::Booklet;
+
+use crate::args::Options;
+use crate::build::{bearing, scope};
+use crate::input::Model;
+use crate::output::{Summary, connector_sizes, standing};
+
+/// Pieces are shown within this share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
+const SEEN: f64 = 3e-4;
+
+/// The page, the picture and the booklet, where it is wanted. All show the model standing on its feet: `up` becomes z.
+pub fn report(
+    model: &Model,
+    options: &Options,
+    params: &Params,
+    design: &Design,
+    warnings: &[Warning],
+    summary: &Summary,
+    figures: Vec<(String, String)>,
+) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
+    let stand = |v: Vec3| standing(options.up, design, v);
+    let shown = shown(design, stand);
+    let failed = design.verification.findings.iter().map(failure);
+    let warnings: Vec<Warning> = failed
+        .chain(warnings.iter().cloned())
+        .map(|w| Warning { at: w.at.map(|at| stand(Vec3::from_array(at)).to_array()), ..w })
+        .collect();
+    let plan = &design.plan;
+    let pieces: Vec<ReportPiece> = design
+        .pieces
+        .ids()
+        .map(|p| ReportPiece {
+            id: p.0,
+            name: format!("piece {p}"),
+            color: palette::color(plan.position(p)),
+            mesh: &shown[p.0 as usize],
+            installation_direction: stand(-plan.separation(p).unit()).to_array(),
+            order: plan.position(p),
+            is_key: plan.key() == p,
+            facts: piece_facts(design, summary, p),
+        })
+        .collect();
+    let facts = kit_facts(model, params, design, summary, stand);
+    let checks = design
+        .verification
+        .checks
+        .iter()
+        .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
+        .collect();
+    let quantities = quantities(design, summary);
+    let data =
+        ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
+    let booklet = Booklet { title: title(&model.name), lines: cover_lines(&data.facts), pieces: data.pieces.clone() };
+    let (page, (picture, booklet)) = rayon::join(
+        || html(&data).into_bytes(),
+        || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
+    );
+    (page, picture, booklet)
+}
+
+/// What failed, for the list of warnings.
+fn failure(finding: &Finding) -> Warning {
+    let message = format!("do not print this kit: {finding}");
+    Warning { code: "failed".into(), message, pieces: Vec::new(), at: None }
+}
+
+/// The pieces as they stand, as finely as eyes see them.
+fn shown(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
+    let all = design.pieces.as_slice().iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
+    let tolerance_mm = SEEN * all.diagonal();
+    let shown = |mesh: &TriMesh| {
+        let mesh = decimate(mesh.clone(), &vec![tolerance_mm; mesh.points.len()]);
+        TriMesh { points: mesh.points.iter().map(|&p| stand(p)).collect(), triangles: mesh.triangles }
+    };
+    design.pieces.as_slice().par_iter().map(shown).collect()
+}
+
+/// What a person wants to know of the kit.
+fn kit_facts(
+    model: &Model,
+    params: &Params,
+    design: &Design,
+    summary: &Summary,
+    stand: impl Fn(Vec3) -> Vec3,
+) -> Vec<(String, String)> {
+    let size = model.solid.mesh().bounds().size();
+    let mut facts: Vec<(String, String)> = vec![
+        ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
+        ("pieces".into(), design.pieces.len().to_string()),
+        ("wall".into(), format!("{:.2} mm", design.thickness_mm)),
+        ("connectors".into(), format!("{} mm", connector_sizes(design))),
+        ("clearance".into(), format!("{} mm", params.connector.clearance_mm)),
+        ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
+        ("print time".into(), format!("about {:.0} % of the solid model's", 100.0 * summary.print_time_ratio)),
+        ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
+    ];
+    facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, params))));
+    facts.extend(plan_facts(design, stand));
+    facts
+}
+
+/// A file's name as a heading.
+fn title(name: &str) -> String {
+    Path::new(name).file_stem().map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// What a person who builds the thing wants to know of it.
+fn cover_lines(facts: &[(String, String)]) -> Vec<String> {
+    let fact = |name: &str| facts.iter().find(|f| f.0 == name).map(|f| f.1.as_str()).unwrap_or_default();
+    vec![
+        format!("{} pieces, {}", fact("pieces"), fact("size")),
+        "no glue: each piece locks those before it; the last one, the key, locks all".to_owned(),
+    ]
+}
+
+/// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is made to `stand`.
+fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, String)> {
+    let proof = design.proof.as_ref().map(|p| {
+        let how = if p.optimal {
+            "proven to be the least with".into()
+        } else {
+            format!("at least {:.2} with", p.lower_bound)
+        };
+        ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)))
+    });
+    let weakest = design.holding.as_ref().and_then(|h| h.seams.first()).map(|s| {
+        let [x, y, z] = stand(Vec3::from_array(s.at)).to_array();
+        let figure = format!(
+            "{} and {}: opens {:.2} mm at 10 N/m at ({x:.1}, {y:.1}, {z:.1}) mm; {}",
+            s.later, s.earlier, s.opening_mm, s.reason
+        );
+        ("weakest seam".into(), figure)
+    });
+    let loose = design.holding.iter().flat_map(|h| &h.loose).map(|part| {
+        let [x, y, z] = stand(Vec3::from_array(part.at)).to_array();
+        ("comes apart".into(), format!("piece {} at ({x:.1}, {y:.1}, {z:.1}) mm, at 10 N/m", part.piece))
+    });
+    proof.into_iter().chain(weakest).chain(loose).collect()
+}
+
+/// What the report colours pieces by.
+fn quantities(design: &Design, summary: &Summary) -> Vec<ReportQuantity> {
+    // The key is there to leave: how far it gets before unevenness stops it would drown what the others differ by.
+    let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
+        let of_piece =
+            |(id, p): (PatchId, &Option<Play>)| p.filter(|_| id != design.plan.key()).map(|p| p.translation_mm);
+        play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
+    };
+    let order = design.pieces.ids().map(|p| Some(design.plan.position(p) as f64 + 1.0)).collect();
+    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&summary.rattle))];
+    quantities.extend(summary.rattle_together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
+    let quantity =
+        |(name, unit, values): (&str, &str, _)| ReportQuantity { name: name.into(), unit: unit.into(), values };
+    quantities.into_iter().map(quantity).collect()
+}
+
+/// A piece's volume, and how each of its seams holds.
+fn piece_facts(design: &Design, summary: &Summary, piece: PatchId) -> Vec<(String, String)> {
+    let mut facts = vec![("volume".to_owned(), format!("{:.1} cm³", design.pieces[piece].signed_volume() / 1000.0))];
+    facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
+    let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
+    facts.extend(summary.rattle[piece].map(|p| ("play".to_owned(), play(p))));
+    let together = summary.rattle_together.as_ref().and_then(|all| all[piece]);
+    facts.extend(together.map(|p| ("play with others".to_owned(), play(p))));
+    let seams = design.holding.iter().flat_map(|h| &h.seams);
+    for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
+        let other = if s.later == piece { s.earlier } else { s.later };
+        facts.push((format!("seam with {other}"), format!("opens {:.2} mm at 10 N/m", s.opening_mm)));
+    }
+    facts
+}
