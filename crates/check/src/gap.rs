@@ -16,7 +16,7 @@ const CROSSING_MM: f64 = 0.02;
 /// A crossing at a press fit is no more than this deeper than its interference, mm.
 const FIT_DEEPER_MM: f64 = 0.1;
 
-/// Confirms `figure`, with the gap beneath the rim, if the gaps are those that `least` tells: of the moving piece to one of
+/// An error where no gap is told. Confirms `figure`, with the gap beneath the rim, if the gaps are those that `least` tells: of the moving piece to one of
 /// the `others`, or of any two of these; and if surfaces cross nowhere but where the key is pressed on purpose.
 pub fn test(
     meshes: &[Mesh],
@@ -31,13 +31,12 @@ pub fn test(
             return Err(format!("surfaces cross by {:.3} mm, piece {} one of them", -gap.gap_mm, gap.against));
         }
     }
-    if let Some(gap) = &least.overall {
-        test_place(meshes, moving, others, gap, SAME_GAP_MM)?;
-    }
+    let Some(gap) = &least.overall else { return Err("no least gap is told".into()) };
+    test_place(meshes, moving, others, gap, SAME_GAP_MM)?;
     let Some(gap) = &least.beneath_rim else { return Ok(figure) };
     test_place(meshes, moving, others, gap, RIM_NEARER_MM)?;
     let least = match gap.gap_mm {
-        depth if depth < 0.0 => format!("surfaces cross by {:.3} mm beneath the rim", -depth),
+        depth if depth < 0.0 => format!("where it presses on purpose, by {:.3} mm", -depth),
         gap_mm => format!("least gap {gap_mm:.3} mm beneath the rim"),
     };
     Ok(format!("{figure}; {least}"))

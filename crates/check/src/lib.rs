@@ -7,6 +7,7 @@
 mod gap;
 mod lock;
 mod mesh;
+mod pieces;
 mod rays;
 mod vector;
 
@@ -17,11 +18,12 @@ use std::thread;
 
 use serde::Deserialize;
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 
 use mesh::Mesh;
 use vector::{Vec3, scale};
 
+/// Greater clearances are no joint, mm.
+const MOST_CLEARANCE_MM: f64 = 0.8;
 /// Most that a contact's faces may be apart beyond the clearance, mm.
 const MOST_REACH_MM: f64 = 0.15;
 /// More places at which a key is pressed, or pressed more than this, mm, are not a fit but a fault.
@@ -67,7 +69,18 @@ struct Certificate {
     contacts: Vec<Contact>,
     #[serde(default)]
     press_fits: Vec<PressFit>,
+    /// What the kit's maker found wrong with it.
+    failed: Vec<String>,
+    /// Files besides the pieces' own.
+    #[serde(default)]
+    files: Vec<OtherFile>,
     claims: Vec<Claim>,
+}
+
+#[derive(Deserialize)]
+struct OtherFile {
+    file: String,
+    sha256: String,
 }
 
 /// A place on a piece where the key is pressed on purpose.
@@ -106,7 +119,7 @@ struct Contact {
 #[serde(tag = "claim", rename_all = "kebab-case")]
 enum Claim {
     Locked { held: Vec<usize>, multipliers: Vec<(usize, f64)>, hold: f64 },
-    Moves { held: Vec<usize> },
+    Moves {},
     KeyLeaves { piece: usize, direction: Vec3, least: LeastGaps },
     Installs { piece: usize, direction: Vec3, least: LeastGaps },
     Apart { least: LeastGaps },
@@ -131,7 +144,7 @@ struct Gap {
 /// Tests every claim of the kit in `folder`. An error means that there is no certificate to test.
 pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
     let certificate: Certificate = read_json(&folder.join("certificate.json"))?;
-    if (certificate.format.as_str(), certificate.version) != ("shellock-certificate", 1) {
+    if (certificate.format.as_str(), certificate.version) != ("shellock-certificate", 2) {
         return Err(format!("format \"{}\" version {} is not known", certificate.format, certificate.version));
     }
     let plan: Value = read_json(&folder.join("plan.json"))?;
@@ -143,12 +156,18 @@ pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
     };
     let is_whole = add("the certificate speaks of this plan", test_plan(&certificate, &plan))
         & add("every claim that a kit needs is made", test_completeness(&certificate));
-    let (meshes, files) = read_pieces(folder, &certificate.pieces);
+    add("the kit passed the tests of its maker", test_passed(&certificate));
+    let (meshes, files) = pieces::read(folder, &certificate.pieces);
     let is_read = add("the files are those that were certified", files);
     if !is_whole || (!is_read && meshes.len() < certificate.pieces.len()) {
         return Ok(findings);
     }
-    add("each piece is a closed surface around a volume", test_closed(&meshes));
+    if !certificate.files.is_empty() {
+        add("other files are those that were certified", pieces::test_files(folder, &certificate.files));
+    }
+    if !add("each piece is one closed surface around a volume", pieces::test_closed(&meshes)) {
+        return Ok(findings);
+    }
     let contacts = located(&certificate, &meshes);
     let names = match &contacts {
         Ok(contacts) => Ok(format!("{} contacts, up to {:.3} mm apart", contacts.len(), largest_gap_mm(contacts))),
@@ -163,7 +182,7 @@ pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
         let tests: Vec<_> =
             c.claims.iter().map(|claim| scope.spawn(|| test_claim(c, meshes, contacts, claim))).collect();
         let died = |_| ("a claim".to_owned(), Err("its test came to no end".to_owned()));
-        tests.into_iter().map(|test| test.join().unwrap_or_else(died)).collect()
+        tests.into_iter().filter_map(|test| test.join().unwrap_or_else(|e| Some(died(e)))).collect()
     });
     tested.into_iter().for_each(|(name, tested)| {
         add(&name, tested);
@@ -195,6 +214,9 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
     if c.installation_order.last() != Some(&c.key) || !is_near(&plan["clearance"], c.clearance_mm) {
         return Err("the key is not the last piece, or the plan has another clearance".into());
     }
+    if !(0.0..=MOST_CLEARANCE_MM).contains(&c.clearance_mm) {
+        return Err(format!("a clearance of {} mm; up to {MOST_CLEARANCE_MM} mm are believed", c.clearance_mm));
+    }
     if plan["pieces"].as_array().map(Vec::len) != Some(n) {
         return Err("the plan has another number of pieces".into());
     }
@@ -211,14 +233,33 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
     }
 }
 
-/// A lock with key and first piece held, the key's way out, a way in for all others, and no overlap.
+/// Nothing that the maker's own tests found wrong.
+fn test_passed(c: &Certificate) -> Tested {
+    if c.failed.is_empty() { Ok("nothing failed".into()) } else { Err(format!("failed: {}", c.failed.join("; "))) }
+}
+
+/// A lock with key and first piece held, one of the first piece, the key's way out, a way in for all others, and no overlap.
 fn test_completeness(c: &Certificate) -> Tested {
     let count = |is_it: &dyn Fn(&Claim) -> bool| c.claims.iter().filter(|claim| is_it(claim)).count();
-    let first = c.installation_order.first().copied();
-    let ends = first.map(|first| vec![c.key, first]);
-    let is_lock = |claim: &Claim| matches!(claim, Claim::Locked { held, .. } if Some(held) == ends.as_ref());
-    if count(&is_lock) != 1 {
+    // Every piece, with each lock, and with the pieces that can be put in.
+    let most = 3 + 2 * c.pieces.len();
+    if c.claims.len() > most {
+        return Err(format!("{} claims are more than the {most} that a kit needs", c.claims.len()));
+    }
+    let first = c.installation_order.first().copied().unwrap_or_default();
+    let holds = |claim: &Claim, all: &[usize]| {
+        let Claim::Locked { held, .. } = claim else { return false };
+        let mut held = held.clone();
+        held.sort_unstable();
+        held == all
+    };
+    let ends = [c.key.min(first), c.key.max(first)];
+    if count(&|claim| holds(claim, &ends)) != 1 {
         return Err("it is not claimed that nothing moves while the key and the first piece are held".into());
+    }
+    let all_but_first: Vec<usize> = (0..c.pieces.len()).filter(|&id| id != first).collect();
+    if count(&|claim| holds(claim, &[c.key]) || holds(claim, &all_but_first)) == 0 {
+        return Err(format!("it is not claimed that piece {first}, the first, cannot come off"));
     }
     if count(&|claim| matches!(claim, Claim::KeyLeaves { piece, .. } if *piece == c.key)) != 1 {
         return Err("it is not claimed that the key can leave".into());
@@ -232,35 +273,6 @@ fn test_completeness(c: &Certificate) -> Tested {
         }
     }
     Ok(format!("{} claims", c.claims.len()))
-}
-
-/// The pieces' meshes, as far as they can be read, and whether their bytes are those that were hashed.
-fn read_pieces(folder: &Path, pieces: &[PieceFile]) -> (Vec<Mesh>, Tested) {
-    let (mut meshes, mut tested) = (Vec::new(), Ok(format!("{} files", pieces.len())));
-    for piece in pieces {
-        let mesh = fs::read(folder.join(&piece.file)).map_err(|e| e.to_string()).and_then(|bytes| {
-            let hash: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
-            if hash != piece.sha256 {
-                tested = Err(format!("{} has other bytes", piece.file));
-            }
-            Mesh::from_stl(&bytes)
-        });
-        match mesh {
-            Ok(mesh) => meshes.push(mesh),
-            Err(why) => tested = Err(format!("{}: {why}", piece.file)),
-        }
-    }
-    (meshes, tested)
-}
-
-fn test_closed(meshes: &[Mesh]) -> Tested {
-    for (id, mesh) in meshes.iter().enumerate() {
-        let (n_open, volume_mm3) = (mesh.n_open_edges(), mesh.volume_mm3());
-        if n_open > 0 || volume_mm3.is_nan() || volume_mm3 <= 0.0 {
-            return Err(format!("piece {id} has {n_open} open edges and a volume of {volume_mm3:.1} mm³"));
-        }
-    }
-    Ok(format!("{:.1} mm³ in all", meshes.iter().map(Mesh::volume_mm3).sum::<f64>()))
 }
 
 /// The contacts, with points and normals of the triangles that they really lie on.
@@ -291,9 +303,15 @@ fn largest_gap_mm(contacts: &[Contact]) -> f64 {
     contacts.iter().map(|c| c.gap_mm).fold(0.0, f64::max)
 }
 
-fn test_claim(c: &Certificate, meshes: &[Mesh], contacts: Option<&[Contact]>, claim: &Claim) -> (String, Tested) {
+/// The claim as a sentence, and whether it stands; `None` for one that says nothing.
+fn test_claim(
+    c: &Certificate,
+    meshes: &[Mesh],
+    contacts: Option<&[Contact]>,
+    claim: &Claim,
+) -> Option<(String, Tested)> {
     let names = |held: &[usize]| held.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
-    match claim {
+    Some(match claim {
         Claim::Locked { held, multipliers, hold } => {
             let frame = lock::Frame { center: c.center, length_mm: c.length_mm, n_pieces: meshes.len() };
             let tested = match contacts {
@@ -302,10 +320,7 @@ fn test_claim(c: &Certificate, meshes: &[Mesh], contacts: Option<&[Contact]>, cl
             };
             (format!("nothing moves while {} are held", names(held)).replace("are held", is_or_are(held)), tested)
         }
-        Claim::Moves { held } => {
-            let claim = format!("no lock is claimed with {} alone held", names(held));
-            (claim, Ok("others can move".into()))
-        }
+        Claim::Moves {} => return None,
         Claim::KeyLeaves { piece, direction, least } => {
             let others: Vec<usize> = (0..meshes.len()).filter(|p| p != piece).collect();
             let tested = rays::test_path(meshes, *piece, *direction, &others).and_then(|figure| {
@@ -326,7 +341,7 @@ fn test_claim(c: &Certificate, meshes: &[Mesh], contacts: Option<&[Contact]>, cl
                 .and_then(|figure| gap::test(meshes, &c.press_fits, None, &all, least, figure));
             ("the assembled pieces do not overlap".into(), tested)
         }
-    }
+    })
 }
 
 fn is_or_are(held: &[usize]) -> &'static str {

@@ -1,20 +1,39 @@
-//! `shellock-check OUT`: confirms or refutes each claim in `OUT/certificate.json`, one line a claim.
+//! `shellock-check OUT`: confirms or refutes each claim in `OUT/certificate.json`, one line a claim, and what that means.
 //!
 //! Exit code 0: everything is confirmed; 1: something is refuted; 2: the certificate could not be read.
 
 use std::path::Path;
 use std::process::ExitCode;
 
+const USAGE: &str = "usage: shellock-check OUT, where OUT is the folder of a kit with its certificate.json\n\
+    Confirms or refutes what the certificate claims of the pieces. Exit code 0: all confirmed, 1: something refuted, 2: nothing to check.";
+const NOT_TESTED: &str = "Not tested: that the outside looks like the model, and how thick walls are (`shellock verify` does), \
+    and what report.html and the pictures show";
+
 fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+    let is = |names: &[&str]| arguments.len() == 1 && names.iter().any(|name| arguments[0] == *name);
+    if is(&["-h", "--help"]) {
+        println!("{USAGE}");
+        return ExitCode::SUCCESS;
+    }
+    if is(&["-V", "--version"]) {
+        println!("shellock-check {}", env!("CARGO_PKG_VERSION"));
+        return ExitCode::SUCCESS;
+    }
     let [folder] = &arguments[..] else {
-        eprintln!("usage: shellock-check OUT, where OUT is the folder of a kit with its certificate.json");
+        eprintln!("{USAGE}");
         return ExitCode::from(2);
     };
     match shellock_check::check(Path::new(folder)) {
         Ok(findings) => {
             findings.iter().for_each(|f| println!("{f}"));
-            ExitCode::from(u8::from(findings.iter().any(|f| !f.is_confirmed)))
+            let n_refuted = findings.iter().filter(|f| !f.is_confirmed).count();
+            match n_refuted {
+                0 => println!("all {} confirmed. {NOT_TESTED}", findings.len()),
+                n => println!("{n} of {} REFUTED: do not trust this kit", findings.len()),
+            }
+            ExitCode::from(u8::from(n_refuted > 0))
         }
         Err(why) => {
             eprintln!("error: {why}");

@@ -11,6 +11,9 @@ const SAME_NORMAL: f64 = 1.0 - 1e-9;
 /// Faces whose normals have a greater scalar product do not face each other (26° from opposite).
 const FACING: f64 = -0.9;
 
+/// Nothing that is printed is so far off, mm.
+const FARTHEST_MM: f64 = 1e5;
+
 /// Triangles, counter-clockwise seen from outside, mm.
 pub struct Mesh {
     /// Corners of each.
@@ -31,9 +34,9 @@ impl Mesh {
         let point = |b: &[u8]| [number(b), number(&b[4..]), number(&b[8..])];
         let triangle = |b: &[u8]| [point(&b[12..]), point(&b[24..]), point(&b[36..])];
         let triangles: Vec<[Vec3; 3]> = bytes[HEADER..].chunks_exact(RECORD).map(triangle).collect();
-        match triangles.iter().flatten().flatten().all(|x| x.is_finite()) {
+        match triangles.iter().flatten().flatten().all(|x| x.abs() <= FARTHEST_MM) {
             true => Ok(Self { triangles }),
-            false => Err("a coordinate is no number".into()),
+            false => Err(format!("a coordinate is no number, or beyond {FARTHEST_MM} mm")),
         }
     }
 
@@ -54,6 +57,33 @@ impl Mesh {
         edges.sort_unstable();
         let uses = edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1));
         uses.filter(|uses| 2 * uses.iter().filter(|e| e.2).count() != uses.len()).count()
+    }
+
+    /// Surfaces that hang together over edges.
+    pub fn n_surfaces(&self) -> usize {
+        let name = |p: Vec3| p.map(|x| (x + 0.0).to_bits());
+        let mut edges = Vec::with_capacity(3 * self.triangles.len());
+        for (i, t) in self.triangles.iter().enumerate() {
+            let corners = t.map(name);
+            let between = |k: usize| (corners[k].min(corners[(k + 1) % 3]), corners[k].max(corners[(k + 1) % 3]), i);
+            edges.extend((0..3).map(between));
+        }
+        edges.sort_unstable();
+        let mut leader: Vec<usize> = (0..self.triangles.len()).collect();
+        let mut n_surfaces = leader.len();
+        for pair in edges.windows(2).filter(|pair| (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1)) {
+            let [a, b] = [pair[0].2, pair[1].2].map(|i| {
+                let mut i = i;
+                while leader[i] != i {
+                    leader[i] = leader[leader[i]];
+                    i = leader[i];
+                }
+                i
+            });
+            n_surfaces -= usize::from(a != b);
+            leader[a.max(b)] = a.min(b);
+        }
+        n_surfaces
     }
 
     /// Volume inside, mm³.

@@ -17,6 +17,8 @@ const ROUNDING_MM: f64 = 0.02;
 const SLIVERS: f64 = 1e-3;
 /// The same, mm², for small pieces.
 const SLIVERS_MM2: f64 = 1.0;
+/// More rays are not cast: 2.5 m by 2.5 m.
+const MOST_RAYS: usize = 100_000_000;
 /// Rays for overlaps: parallel to no face of a common model.
 const OBLIQUE: Vec3 = [0.3713, 0.5219, 0.7680];
 
@@ -26,7 +28,7 @@ pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usiz
         return Err("the direction is no unit vector".into());
     }
     let mesh = meshes.get(moving).ok_or("there is no such piece")?;
-    let grid = Grid::around(direction, [mesh]);
+    let grid = Grid::around(direction, [mesh])?;
     let own = grid.stretches(mesh);
     let mut is_blocked = vec![false; grid.n[0] * grid.n[1]];
     for &other in others {
@@ -46,7 +48,7 @@ pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usiz
 /// Whether no two pieces overlap as they are, but where they are `pressed` on purpose: two pieces, and a place that they share.
 pub fn test_apart(meshes: &[Mesh], pressed: impl Fn([usize; 2], Vec3) -> bool) -> Tested {
     let length = norm(OBLIQUE);
-    let grid = Grid::around(scale(OBLIQUE, 1.0 / length), meshes);
+    let grid = Grid::around(scale(OBLIQUE, 1.0 / length), meshes)?;
     let mut all: Vec<(usize, Stretch)> = Vec::new();
     meshes.iter().enumerate().for_each(|(i, mesh)| all.extend(grid.stretches(mesh).into_iter().map(|s| (i, s))));
     all.sort_by(|(_, s), (_, t)| s.pixel.cmp(&t.pixel).then(s.inside[0].total_cmp(&t.inside[0])));
@@ -70,6 +72,9 @@ pub fn test_apart(meshes: &[Mesh], pressed: impl Fn([usize; 2], Vec3) -> bool) -
 }
 
 fn verdict(grid: &Grid, is_hit: &[bool], n_rays: usize, what: &str) -> Tested {
+    if n_rays == 0 {
+        return Err("no ray meets a piece".into());
+    }
     let n_hit = is_hit.iter().filter(|&&hit| hit).count();
     let width = grid.n[0];
     let is_block = |&i: &usize| [i, i + 1, i + width, i + width + 1].iter().all(|&k| is_hit.get(k) == Some(&true));
@@ -106,11 +111,11 @@ struct Grid {
 }
 
 impl Grid {
-    /// Covers the shadow of `meshes`; the rays run along `direction`.
-    fn around<'a>(direction: Vec3, meshes: impl IntoIterator<Item = &'a Mesh>) -> Self {
+    /// Covers the shadow of `meshes`; the rays run along `direction`, a unit vector. An error where that takes too many rays.
+    fn around<'a>(direction: Vec3, meshes: impl IntoIterator<Item = &'a Mesh>) -> Result<Self, String> {
         // Rows parallel to no wall of an axis-aligned model, so that walls along the path are not met all at once.
-        let slant = [0.4217, -0.2873, 0.8600];
-        let u = cross(direction, slant);
+        let across = [[0.4217, -0.2873, 0.8600], [-0.7712, 0.4391, 0.4608]].map(|slant| cross(direction, slant));
+        let u = if norm(across[0]) > norm(across[1]) { across[0] } else { across[1] };
         let u = scale(u, 1.0 / norm(u));
         let mut grid = Self { axes: [u, cross(direction, u), direction], origin: [0.0; 2], n: [0; 2] };
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -123,7 +128,10 @@ impl Grid {
         // An empty shadow has no pixels.
         let n = |k: usize| if low[k] <= high[k] { ((high[k] - low[k]) / PIXEL_MM).ceil() as usize + 1 } else { 0 };
         (grid.n, grid.origin) = ([n(0), n(1)], low);
-        grid
+        match grid.n[0].checked_mul(grid.n[1]) {
+            Some(n_rays) if n_rays <= MOST_RAYS => Ok(grid),
+            _ => Err(format!("a shadow of {:.0} × {:.0} mm is too large", high[0] - low[0], high[1] - low[1])),
+        }
     }
 
     /// Place across the rays, and depth.
@@ -138,7 +146,7 @@ impl Grid {
         std::array::from_fn(|k| (0..3).map(|axis| along[axis] * self.axes[axis][k]).sum())
     }
 
-    /// The stretches inside a closed mesh, in order of their pixels, then of depth.
+    /// The stretches inside a closed mesh, also where it is inside out, since printers may fill that; in order of their pixels, then of depth.
     fn stretches(&self, mesh: &Mesh) -> Vec<Stretch> {
         let mut crossings: Vec<(usize, f64, i32)> = Vec::new();
         mesh.triangles.iter().for_each(|t| self.cross_triangle(t.map(|p| self.project(p)), &mut crossings));
@@ -147,13 +155,13 @@ impl Grid {
         for ray in crossings.chunk_by(|a, b| a.0 == b.0) {
             let (mut depth, mut start) = (0, 0.0);
             for &(pixel, at, step) in ray {
-                if depth == 0 && step > 0 {
+                if depth == 0 {
                     start = at;
                 }
-                if depth == 1 && step < 0 {
+                depth += step;
+                if depth == 0 {
                     stretches.push(Stretch { pixel, inside: [start, at] });
                 }
-                depth += step;
             }
         }
         stretches

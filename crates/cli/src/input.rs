@@ -1,6 +1,7 @@
 //! From a file to a solid in millimetres, with its labels.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -48,7 +49,10 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
         let gib = size as f64 / f64::from(1 << 30);
         return Err(Failure::Wrong(format!("{}: {gib:.1} GiB are more than the 2 GiB that are read", path.display())));
     }
-    fs::read(path).map_err(unreadable)
+    // A device tells no size.
+    let mut bytes = Vec::new();
+    fs::File::open(path).and_then(|file| file.take(MAX_FILE_BYTES).read_to_end(&mut bytes)).map_err(unreadable)?;
+    Ok(bytes)
 }
 
 /// SHA-256 in lower-case hexadecimal digits.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use shellock::certificate::{Certificate, PieceFile, Play, certify, play_alone, play_together};
+use shellock::certificate::{Certificate, OtherFile, PieceFile, Play, certify, play_alone, play_together};
 use shellock::key::KeySite;
 use shellock::pipeline::{Design, Params};
 use shellock::report::{SeamStress, palette, strength_chart};
@@ -144,9 +144,6 @@ pub fn files(
     let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
     let meshes = design.pieces.iter().map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
     let pieces: Vec<(String, Vec<u8>)> = meshes.collect();
-    let claimed = certificate(&pieces, design, params.verify.clearance_mm);
-    files.extend(claimed.map(|bytes| (CERTIFICATE.to_owned(), bytes)));
-    files.extend(pieces);
     let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
     let chart = design.strength.as_ref().map(|strength| stress_chart(options, params, design, strength));
     let figures = chart.iter().map(|svg| ("Stress in a fall".to_owned(), svg.clone())).collect();
@@ -154,9 +151,13 @@ pub fn files(
     let archives = || rayon::join(|| assembly(design), || printing.files(design.pieces.as_slice(), place));
     let ((archive, plates), (page, picture, booklet)) =
         rayon::join(archives, || page::report(model, options, params, design, warnings, &summary, figures));
-    files.extend(plates);
+    let mut archives = vec![("assembly.3mf".to_owned(), archive)];
+    archives.extend(plates);
+    let claimed = certificate(&pieces, &archives, design, params.verify.clearance_mm);
+    files.extend(claimed.map(|bytes| (CERTIFICATE.to_owned(), bytes)));
+    files.extend(pieces);
+    files.extend(archives);
     files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
-    files.push(("assembly.3mf".into(), archive));
     files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
     files.push(("segmentation.3mf".into(), painted(&model.name, &design.surface).0));
     files.push(("report.html".into(), page));
@@ -188,12 +189,19 @@ fn piece_file(p: PatchId) -> String {
     format!("pieces/piece-{:02}.stl", p.0)
 }
 
-/// What is claimed of the kit whose pieces are these files, in order of their ids.
-fn certificate(files: &[(String, Vec<u8>)], design: &Design, clearance_mm: f64) -> Option<Vec<u8>> {
+/// What is claimed of the kit whose pieces are these files, in order of their ids; `others` are certified as they are.
+fn certificate(
+    files: &[(String, Vec<u8>)],
+    others: &[(String, Vec<u8>)],
+    design: &Design,
+    clearance_mm: f64,
+) -> Option<Vec<u8>> {
+    let other = |(file, bytes): &(String, Vec<u8>)| OtherFile { file: file.clone(), sha256: sha256(bytes) };
     let named = files.iter().zip(design.pieces.ids());
     let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
     certify(named, &design.pieces, &design.plan, &design.touching, &design.verification, &design.gaps, clearance_mm)
-        .map(|c| certificate_bytes(&c.with_press_fits(design.press_fits.clone())))
+        .map(|c| c.with_press_fits(design.press_fits.clone()).with_files(others.iter().map(other).collect()))
+        .map(|c| certificate_bytes(&c))
 }
 
 /// As it is written to [`CERTIFICATE`].

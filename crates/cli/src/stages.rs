@@ -1,11 +1,11 @@
 //! Each stage alone, from what an earlier one wrote.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use serde_json::{Value, json};
 use shellock::body::BodyParams;
-use shellock::certificate::{PieceFile, certify};
+use shellock::certificate::{OtherFile, PieceFile, certify};
 use shellock::piece::PressFit;
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
@@ -189,7 +189,8 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let claimed = certify(files, &pieces, &order, &contacts, &verdict, &gaps, params.clearance_mm);
     display.finish();
     if let Some(claimed) = claimed {
-        write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed.with_press_fits(press_fits)))?;
+        let claimed = claimed.with_press_fits(press_fits).with_files(certified_files(kit));
+        write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed))?;
     }
     let code = u8::from(!verdict.passed());
     if session.is_json {
@@ -201,6 +202,12 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
         print_verdict(&verdict);
     }
     Ok(code)
+}
+
+/// Files besides the pieces, as the earlier certificate names and hashes them: what they hold is not verified again.
+fn certified_files(kit: &Path) -> Vec<OtherFile> {
+    let earlier = read(&kit.join(CERTIFICATE)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+    earlier.and_then(|c| serde_json::from_value(c["files"].clone()).ok()).unwrap_or_default()
 }
 
 /// The solid that a kit was made from, in assembly space: that in the file `model`, or in the one that the plan names.
@@ -241,6 +248,9 @@ pub fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
     let (mut files, mut meshes) = (Vec::new(), Vec::new());
     for (i, piece) in plan["pieces"].as_array().into_iter().flatten().enumerate() {
         let file = piece["file"].as_str().ok_or_else(|| Failure::Wrong(format!("piece {i} names no file")))?;
+        if !Path::new(file).components().all(|c| matches!(c, Component::Normal(_))) {
+            return Err(Failure::Wrong(format!("piece {i} names \"{file}\", which is no file within the kit")));
+        }
         let (loaded, bytes) = load(&kit.join(file))?;
         files.push(PieceFile { id: i.into(), file: file.to_owned(), sha256: sha256(&bytes) });
         meshes.push(weld(&loaded.mesh).mesh);

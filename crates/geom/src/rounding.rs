@@ -56,6 +56,21 @@ pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
     Solid::new(mesh).map(Solid::into_mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))
 }
 
+/// As [`printable`], but of the largest part of `volume` alone, as one closed surface: chips that hang on nothing go, and slivers of
+/// hollow, which also arise where a surface that touched itself is moved apart, are filled.
+pub fn printable_body(volume: &Volume) -> Result<TriMesh, NotPrintable> {
+    let largest = |volume: &Volume| volume.components().into_iter().next().unwrap_or_else(Volume::empty);
+    let mut mesh = printable(&largest(volume))?;
+    for _ in 0..MAX_ROUNDS {
+        let again = Volume::from_closed_mesh(&mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))?;
+        if again.components().len() == 1 {
+            break;
+        }
+        mesh = printable(&largest(&again))?;
+    }
+    Ok(mesh)
+}
+
 fn rounded(mesh: &TriMesh) -> TriMesh {
     // Adding 0 turns −0 into 0, so equal points have equal bits.
     let round = |x: f64| f64::from(x as f32) + 0.0;
@@ -135,6 +150,16 @@ fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
 mod tests {
     use super::*;
     use crate::Aabb;
+
+    #[test]
+    fn a_body_loses_its_chips_and_its_slivers_of_hollow() {
+        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let body = cuboid([0.0; 3], [9.0; 3]);
+        let hollow = body.subtract(&cuboid([4.0; 3], [4.01, 4.1, 5.0])).union(&cuboid([11.0; 3], [12.0; 3]));
+        assert_eq!(hollow.components().len(), 3);
+        let made = printable_body(&hollow).unwrap();
+        assert_eq!((made.triangles.len(), made.signed_volume()), (12, body.volume()));
+    }
 
     #[test]
     fn boxes_that_touch_along_an_edge_come_apart() {

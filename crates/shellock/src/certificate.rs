@@ -30,13 +30,22 @@ pub use rattle::{Play, play_alone, play_together};
 /// What [`Certificate::format`] says.
 pub const FORMAT: &str = "shellock-certificate";
 /// What [`Certificate::version`] says: readers refuse what they do not know.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// A file of a kit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PieceFile {
     /// The piece.
     pub id: PatchId,
+    /// Its path within the kit.
+    pub file: String,
+    /// SHA-256 of the file's bytes, in lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+/// Another file of a kit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OtherFile {
     /// Its path within the kit.
     pub file: String,
     /// SHA-256 of the file's bytes, in lower-case hexadecimal digits.
@@ -170,6 +179,10 @@ pub struct Certificate {
     /// Where the key is pressed on purpose: claims of gaps are but for these.
     #[serde(default)]
     pub press_fits: Vec<PressFit>,
+    /// The checks of the verification that failed, by name and figure: a kit with any is not to be printed.
+    pub failed: Vec<String>,
+    /// Files besides the pieces' own.
+    pub files: Vec<OtherFile>,
     /// The claims.
     pub claims: Vec<Claim>,
 }
@@ -179,6 +192,13 @@ impl Certificate {
     #[must_use]
     pub fn with_press_fits(mut self, press_fits: Vec<PressFit>) -> Self {
         self.press_fits = press_fits;
+        self
+    }
+
+    /// The same, with the hashes of other files.
+    #[must_use]
+    pub fn with_files(mut self, files: Vec<OtherFile>) -> Self {
+        self.files = files;
         self
     }
 }
@@ -205,8 +225,12 @@ pub fn certify(
     let (center, length_mm) = frame(pieces);
     let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - center, ..*c }).collect();
     let (key, first) = (plan.key(), plan.steps[0].piece);
-    let mut claims: Vec<Claim> =
-        [vec![key, first], vec![key]].map(|held| claim_lock(&centered, pieces.len(), held, length_mm)).into();
+    let lock = |held: Vec<PatchId>| claim_lock(&centered, pieces.len(), held, length_mm);
+    let mut claims: Vec<Claim> = vec![lock(vec![key, first]), lock(vec![key])];
+    if matches!(claims[1], Claim::Moves { .. }) {
+        // The key may come off; the first piece alone may not.
+        claims.push(lock(pieces.ids().filter(|id| *id != first).collect()));
+    }
     let contacts = keep_holding(contacts, &mut claims);
     claims.extend(claim_paths(plan, verdict, gaps));
     Some(Certificate {
@@ -221,6 +245,8 @@ pub fn certify(
         pieces: files,
         contacts,
         press_fits: Vec::new(),
+        failed: verdict.checks.iter().filter(|c| !c.ok).map(|c| format!("{}: {}", c.name, c.figure)).collect(),
+        files: Vec::new(),
         claims,
     })
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::Shape;
 use shellock_geom::marching_cubes::{OffBand, contour};
-use shellock_geom::rounding::{NotPrintable, printable};
+use shellock_geom::rounding::{NotPrintable, printable_body};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 use super::carve::{Half, Wake, carved, whole_half};
@@ -292,13 +292,11 @@ fn printed(
             for change in changes.iter().filter(|c| c.piece == q) {
                 piece = if change.is_added { piece.union(&change.volume) } else { piece.subtract(&change.volume) };
             }
-            // What hangs on nothing is a chip that carving cut loose.
-            let piece = piece.components().into_iter().next().unwrap_or_else(Volume::empty);
             let number = finish.label.as_ref().and_then(|params| label::cut(params, grid, q, &piece));
             // A number is worth less than a piece that can be written.
-            let numbered = number.and_then(|cut| printable(&piece.subtract(&cut)).ok());
+            let numbered = number.and_then(|cut| printable_body(&piece.subtract(&cut)).ok());
             let has_number = numbered.is_some();
-            let mesh = numbered.map_or_else(|| printable(&piece), Ok);
+            let mesh = numbered.map_or_else(|| printable_body(&piece), Ok);
             ctx.step()?;
             Ok((mesh.map_err(|reason| PieceError::NotPrintable { piece: q, reason })?, has_number))
         })

@@ -1,0 +1,74 @@
+//! The files of a kit: whether they are those that were certified, and whether each piece is one body.
+
+use std::fs;
+use std::path::{Component, Path};
+
+use sha2::{Digest, Sha256};
+
+use crate::mesh::Mesh;
+use crate::{OtherFile, PieceFile, Tested};
+
+/// Larger files are not read, bytes.
+const MOST_BYTES: u64 = 2 << 30;
+
+/// The pieces' meshes, as far as they can be read, and whether their bytes are those that were hashed.
+pub fn read(folder: &Path, pieces: &[PieceFile]) -> (Vec<Mesh>, Tested) {
+    let (mut meshes, mut tested) = (Vec::new(), Ok(format!("{} files", pieces.len())));
+    for piece in pieces {
+        let mesh = bytes_of(folder, &piece.file).and_then(|bytes| {
+            if hash(&bytes) != piece.sha256 {
+                tested = Err(format!("{} has other bytes", piece.file));
+            }
+            Mesh::from_stl(&bytes).map_err(|why| format!("{}: {why}", piece.file))
+        });
+        match mesh {
+            Ok(mesh) => meshes.push(mesh),
+            Err(why) => tested = Err(why),
+        }
+    }
+    (meshes, tested)
+}
+
+/// Whether other files have the bytes that were hashed.
+pub fn test_files(folder: &Path, files: &[OtherFile]) -> Tested {
+    for other in files {
+        if hash(&bytes_of(folder, &other.file)?) != other.sha256 {
+            return Err(format!("{} has other bytes", other.file));
+        }
+    }
+    Ok(files.iter().map(|f| f.file.as_str()).collect::<Vec<_>>().join(", "))
+}
+
+/// Whether every piece is one closed surface, right side out.
+pub fn test_closed(meshes: &[Mesh]) -> Tested {
+    for (id, mesh) in meshes.iter().enumerate() {
+        let (n_open, n_surfaces, volume_mm3) = (mesh.n_open_edges(), mesh.n_surfaces(), mesh.volume_mm3());
+        if n_open > 0 || volume_mm3.is_nan() || volume_mm3 <= 0.0 {
+            return Err(format!("piece {id} has {n_open} open edges and a volume of {volume_mm3:.1} mm³"));
+        }
+        if n_surfaces > 1 {
+            return Err(format!("piece {id} falls into {n_surfaces} surfaces"));
+        }
+    }
+    Ok(format!("{:.1} mm³ in all", meshes.iter().map(Mesh::volume_mm3).sum::<f64>()))
+}
+
+/// A file within the folder, whatever its name pretends.
+fn bytes_of(folder: &Path, file: &str) -> Result<Vec<u8>, String> {
+    let told = |e: std::io::Error| format!("{file}: {e}");
+    let is_plain = !file.is_empty() && Path::new(file).components().all(|c| matches!(c, Component::Normal(_)));
+    if !is_plain {
+        return Err(format!("{file} is no path within the kit"));
+    }
+    let path = folder.join(file).canonicalize().map_err(told)?;
+    let is_within = path.starts_with(folder.canonicalize().map_err(told)?);
+    let about = fs::metadata(&path).map_err(told)?;
+    if !is_within || !about.is_file() || about.len() > MOST_BYTES {
+        return Err(format!("{file} is no file within the kit, or larger than 2 GiB"));
+    }
+    fs::read(path).map_err(told)
+}
+
+fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
