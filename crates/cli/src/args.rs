@@ -22,9 +22,12 @@ const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
-    /// Print one JSON object on standard output instead of text
+    /// Print one JSON object on standard output instead of text, and progress as JSON lines on standard error
     #[arg(long, global = true)]
     pub json: bool,
+    /// Show no progress; a kit that is made says nothing but what is wrong with it
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
     /// Threads to use; the result does not depend on it [default: all]
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,
@@ -91,6 +94,16 @@ pub enum Command {
         /// Use closed forms for the print time even where PrusaSlicer is installed
         #[arg(long)]
         closed_form: bool,
+    },
+    /// Print what a shell needs to complete commands and options, for example `shellock completions bash`
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write manual pages, one a command
+    Manual {
+        /// Folder for them
+        folder: PathBuf,
     },
     /// Say what a file holds and whether it can be made
     Inspect {

@@ -20,7 +20,7 @@ use crate::input::{self, Model};
 use crate::inspect::thin_warnings;
 use crate::output::{Destination, Summary, files};
 use crate::printing::{Printing, too_large};
-use crate::progress::{Display, PlanClock};
+use crate::progress::{Display, PlanClock, Shown};
 
 /// `shellock build`.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
@@ -56,13 +56,13 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
     let mut notes = model.notes.clone();
     notes.extend(too_large(session, params, &printer, model)?);
-    if !session.is_json {
+    if session.shown == Shown::ForPeople {
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
         notes.iter().for_each(|n| println!("note: {n}"));
         thin_warnings(model, options).iter().for_each(|w| println!("warning: {w}"));
     }
-    let display = Display::new(session.is_json);
+    let display = Display::new(session.shown);
     let clock = PlanClock::new(options.plan_time);
     let report = |p: Progress<'_>| {
         clock.see(&p);
@@ -91,6 +91,9 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
     let code = u8::from(!made.verification.passed());
     if session.is_json {
         print_json(to, &notes, &made, &summary, &warnings, code);
+    } else if session.shown == Shown::Nothing {
+        print_failures(&made.verification);
+        print_warnings(&warnings);
     } else {
         print_text(to, &made, params, &summary, &warnings);
         println!("{}", printing.words());
@@ -239,6 +242,11 @@ pub fn print_verdict(verdict: &Verification) {
     for c in &verdict.checks {
         println!("{}  {:52} {}", if c.ok { "ok  " } else { "FAIL" }, c.name, c.figure);
     }
+    print_failures(verdict);
+}
+
+/// What failed and where, if something did.
+fn print_failures(verdict: &Verification) {
     if !verdict.passed() {
         eprintln!("FAILED: this kit does not hold together as it should; do not print it. What failed, and where:");
         for finding in &verdict.findings {

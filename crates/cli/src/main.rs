@@ -6,6 +6,7 @@ mod config;
 mod failure;
 mod input;
 mod inspect;
+mod manual;
 mod output;
 mod page;
 mod paint;
@@ -29,6 +30,8 @@ use failure::Failure;
 pub struct Session {
     /// Whether to print one JSON object instead of text.
     pub is_json: bool,
+    /// How progress is shown.
+    pub shown: progress::Shown,
     /// Becomes true with Ctrl-C.
     pub stop: Arc<AtomicBool>,
 }
@@ -49,7 +52,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    let session = Session { is_json: cli.json, stop: Arc::new(AtomicBool::new(false)) };
+    let session = Session { is_json: cli.json, shown: shown(&cli), stop: Arc::new(AtomicBool::new(false)) };
     let stop = Arc::clone(&session.stop);
     // Without a handler Ctrl-C would still end the program, only less tidily.
     let _ = ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed));
@@ -71,6 +74,15 @@ fn main() -> ExitCode {
     }
 }
 
+/// Events go with JSON; what is quiet shows neither.
+fn shown(cli: &args::Cli) -> progress::Shown {
+    match (cli.quiet, cli.json) {
+        (true, _) => progress::Shown::Nothing,
+        (false, true) => progress::Shown::Events,
+        (false, false) => progress::Shown::ForPeople,
+    }
+}
+
 fn run(session: &Session, command: Command) -> Result<u8, Failure> {
     match command {
         Command::Build { model, options, out } => build::build(session, &model, &options, out),
@@ -81,6 +93,8 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Test { kit, blows } => stress::test(session, &kit, &blows),
         Command::Report { kit, model, closed_form } => savings::report(session, &kit, model.as_deref(), closed_form),
         Command::Inspect { model, options } => inspect::inspect(session, &model, &options),
+        Command::Completions { shell } => Ok(manual::completions(shell)),
+        Command::Manual { folder } => manual::write(&folder),
         Command::Figure { name, out, size } => stages::figure(&name, &out, size),
     }
 }

@@ -28,6 +28,23 @@ use crate::printing::Printing;
 /// The certificate's name within a kit.
 pub const CERTIFICATE: &str = "certificate.json";
 
+/// What commands write into a kit besides pieces and plates.
+const KIT_FILES: [&str; 13] = [
+    "plan.json",
+    CERTIFICATE,
+    "assembly.3mf",
+    "plates.3mf",
+    "segmentation.ply",
+    "segmentation.3mf",
+    "report.html",
+    "pieces.png",
+    "instructions.pdf",
+    "strength.svg",
+    "savings.json",
+    "stress.json",
+    "stress.svg",
+];
+
 /// Figures of a kit that people and machines ask for.
 pub struct Summary {
     /// Material of all pieces over the solid model's.
@@ -64,6 +81,12 @@ impl Destination {
         }
         if has_content && !force {
             return refuse("holds a kit already; choose another folder with -o, or --force to replace it");
+        }
+        if let Some(foreign) = foreign_file(&folder) {
+            return refuse(&format!(
+                "holds {}, which is not of the kit and would be lost; move it away, or choose another folder with -o",
+                foreign.display()
+            ));
         }
         let made = Self { folder, may_replace: force };
         // Now, not after a minute's work.
@@ -113,6 +136,28 @@ impl Destination {
         }
         fs::rename(&made, &self.folder).map_err(Failure::unwritable(&self.folder))
     }
+}
+
+/// A file in the folder of a kit that no command of this program writes.
+fn foreign_file(folder: &Path) -> Option<PathBuf> {
+    let mut names: Vec<PathBuf> = Vec::new();
+    let mut left = vec![PathBuf::new()];
+    while let Some(within) = left.pop() {
+        for entry in fs::read_dir(folder.join(&within)).into_iter().flatten().flatten() {
+            let name = within.join(entry.file_name());
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) { left.push(name) } else { names.push(name) }
+        }
+    }
+    names.sort();
+    names.into_iter().find(|name| !is_of_kits(&name.to_string_lossy()))
+}
+
+fn is_of_kits(name: &str) -> bool {
+    let numbered = |prefix: &str, end: &str| {
+        let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(end));
+        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    KIT_FILES.contains(&name) || numbered("pieces/piece-", ".stl") || numbered("plates/plate-", ".3mf")
 }
 
 /// All files of a kit, and its figures.

@@ -5,26 +5,55 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
 use shellock::context::Progress;
 
-/// Shows stages as they come: a bar on a terminal, plain lines elsewhere, nothing when quiet.
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// A bar on a terminal, plain lines elsewhere.
+    ForPeople,
+    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, `{"event": "note", "text", "seconds"}`.
+    Events,
+    /// Not at all.
+    Nothing,
+}
+
+/// Shows stages as they come.
 pub struct Display {
     bar: Mutex<Option<ProgressBar>>,
     is_terminal: bool,
-    is_quiet: bool,
+    shown: Shown,
+    since: Instant,
 }
 
 impl Display {
-    /// A display; `is_quiet` shows nothing.
-    pub fn new(is_quiet: bool) -> Self {
-        Self { bar: Mutex::new(None), is_terminal: std::io::stderr().is_terminal(), is_quiet }
+    /// A display that has shown nothing yet.
+    pub fn new(shown: Shown) -> Self {
+        Self { bar: Mutex::new(None), is_terminal: std::io::stderr().is_terminal(), shown, since: Instant::now() }
     }
 
     /// What the library reports.
     pub fn show(&self, progress: Progress<'_>) {
-        if self.is_quiet {
-            return;
+        match self.shown {
+            Shown::ForPeople => self.show_people(progress),
+            Shown::Events => self.show_event(&progress),
+            Shown::Nothing => {}
         }
+    }
+
+    fn show_event(&self, progress: &Progress<'_>) {
+        let seconds = (1000.0 * self.since.elapsed().as_secs_f64()).round() / 1000.0;
+        match progress {
+            Progress::Stage { name, n_steps } => {
+                eprintln!("{}", json!({ "event": "stage", "name": name, "n_steps": n_steps, "seconds": seconds }));
+            }
+            Progress::Note(text) => eprintln!("{}", json!({ "event": "note", "text": text, "seconds": seconds })),
+            Progress::Step => {}
+        }
+    }
+
+    fn show_people(&self, progress: Progress<'_>) {
         let mut bar = self.bar.lock().expect("no holder of this lock panics");
         match progress {
             Progress::Stage { name, n_steps } if self.is_terminal => {
@@ -83,7 +112,7 @@ impl PlanClock {
 
 fn stage_bar(name: &str, n_steps: usize) -> ProgressBar {
     let (bar, template) = if n_steps > 0 {
-        (ProgressBar::new(n_steps as u64), "{elapsed:>4} {msg} {wide_bar} {pos}/{len}")
+        (ProgressBar::new(n_steps as u64), "{elapsed:>4} {msg} {wide_bar} {pos}/{len}, {eta} left")
     } else {
         (ProgressBar::new_spinner(), "{elapsed:>4} {msg} {spinner}")
     };

@@ -50,7 +50,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         return Err(Failure::Wrong(format!("{}: choose a name that ends in .ply, .3mf or .seg", out.display())));
     }
     let model = input::model(file, options)?;
-    let display = Display::new(session.is_json);
+    let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
     let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
@@ -114,7 +114,7 @@ fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) ->
 pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
     let params = checked(options)?;
     let model = input::model(file, options)?;
-    let display = Display::new(session.is_json);
+    let display = Display::new(session.shown);
     let clock = PlanClock::new(options.plan_time);
     let report = |p: shellock::context::Progress<'_>| {
         clock.see(&p);
@@ -178,7 +178,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
         clearance_mm: plan["clearance"].as_f64().unwrap_or_default(),
         seed: plan["seed"].as_u64().unwrap_or_default(),
     };
-    let display = Display::new(session.is_json);
+    let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
     let press_fits: Vec<PressFit> = serde_json::from_value(plan["press_fits"].clone()).unwrap_or_default();

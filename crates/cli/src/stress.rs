@@ -70,7 +70,7 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
     let surface = surface_of(&kit.join("segmentation.ply"), order.steps.len())?;
     let params = params_of(&plan, blows).map_err(|what| broken(&what))?;
 
-    let display = Display::new(session.is_json);
+    let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
     let tested = stress_test(&ctx, &params, &surface, &order).inspect_err(|_| display.finish())?;

@@ -38,6 +38,10 @@ const LEAST_COS: f64 = 0.2;
 const LEAST_HEIGHT: f64 = 0.05;
 /// A bridge is turned away if that leaves triangles with more than this share, or no worse ones; else it is split.
 const LEAST_TURNED_HEIGHT: f64 = 0.25;
+/// An edge is not turned if that takes the surface farther off than this, in target lengths.
+const MOST_OFF: f64 = 0.3;
+/// Coarse triangles at a point that is smoothed face along their mean to this cosine, 18°.
+const MOST_BENT: f64 = 0.95;
 /// Coarsening and refining halve something in each pass, and 2⁻³⁰ of any model is below its precision.
 const MOST_PASSES: u32 = 30;
 /// A coarsening pass that merges a smaller share of the points is the last.
@@ -91,7 +95,7 @@ pub fn remesh(params: &RemeshParams, mesh: &TriMesh, labels: &[u32]) -> Remeshed
         work.merge_short();
         work.turn_edges();
         work.split_bridges();
-        work.smooth();
+        work.smooth(f64::NEG_INFINITY);
     }
     let (mesh, labels) = work.surface.finish();
     Remeshed { mesh, labels }
@@ -230,7 +234,8 @@ impl Remesher {
                 break;
             }
             self.turn_edges();
-            self.smooth();
+            // By a crease the middle of such far neighbours lies off the surface.
+            self.smooth(MOST_BENT);
         }
     }
 
@@ -299,6 +304,10 @@ impl Remesher {
         let [u, v, w] = s.corners(h);
         let x = s.points[s.apex(s.opposite[h as usize]) as usize];
         let turned = [[x, w, u], [w, x, v]];
+        // Over a crease of the input the surface would go from one side of this tetrahedron to the other.
+        if distance_of_lines([u, v], [w, x]) > MOST_OFF * self.target_mm {
+            return false;
+        }
         let makes_bridge = [h, s.opposite[h as usize]].iter().all(|&h| !s.is_inside(s.apex(h)));
         let least_height = if s.is_bridge(h) { LEAST_TURNED_HEIGHT } else { LEAST_HEIGHT };
         if makes_bridge || !(s.is_bridge(h) || angles_exceed_pi([u, v], [w, x])) || !s.may_turn(h) {
@@ -330,8 +339,13 @@ impl Remesher {
 
     /// Moves points to the middle of their neighbours: in the tangent plane and back onto the input, or along the seam.
     /// Where the whole way spoils a triangle, half or a quarter of it may not.
-    fn smooth(&mut self) {
+    ///
+    /// Left are points inside regions where the cosine of a triangle's normal and the mean one is less than `least_cos`.
+    fn smooth(&mut self, least_cos: f64) {
         for v in 0..self.surface.points.len() as u32 {
+            if matches!(self.surface.place[v as usize], Place::Inside) && self.is_bent(v, least_cos) {
+                continue;
+            }
             for share in [1.0, 0.5, 0.25] {
                 let Some((at, place)) = self.relaxed(v, share) else { break };
                 if self.may_move(v, at, None, |h, t| self.may_face(h, t)) {
@@ -341,6 +355,15 @@ impl Remesher {
                 }
             }
         }
+    }
+
+    fn is_bent(&self, v: u32, least_cos: f64) -> bool {
+        let normal = |h: HalfEdge| {
+            let [a, b, c] = self.surface.corners(h);
+            (b - a).cross(c - a)
+        };
+        let mean = self.surface.around(v).map(normal).sum::<Vec3>().normalize_or_zero();
+        self.surface.around(v).any(|h| normal(h).normalize_or_zero().dot(mean) < least_cos)
     }
 
     /// Where `v` is after this share of the way to the middle of its neighbours; `None` if it does not move.
@@ -380,6 +403,11 @@ fn faces_along(area_vector: Vec3, normal: Vec3) -> bool {
 fn height_share([a, b, c]: [Vec3; 3]) -> f64 {
     let longest_sq = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
     if longest_sq > 0.0 { (b - a).cross(c - a).length() / longest_sq } else { 0.0 }
+}
+
+/// Distance of two lines, each through two points; 0 where they are parallel.
+fn distance_of_lines([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f64 {
+    (b - a).cross(d - c).normalize_or_zero().dot(c - a).abs()
 }
 
 /// Whether the angles at `apexes` over the edge `ends` sum to more than π: the edge is not Delaunay.

@@ -87,7 +87,7 @@ impl ConnectorParams {
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
             ParamProblem::unless_within("key clearance", "mm", self.key_clearance_mm, 0.03, 0.8),
             ParamProblem::unless_within("detent", "mm", self.detent_mm, 0.0, 0.4),
-            ParamProblem::unless_within("key rib", "mm", self.key_rib_mm, 0.0, 0.3),
+            ParamProblem::unless_within("press of the key's ribs (--key-ribs)", "mm", self.key_rib_mm, 0.0, 0.3),
             ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
         ];
         self.size.problems().into_iter().chain(others.into_iter().flatten()).collect()

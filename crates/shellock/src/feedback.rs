@@ -133,7 +133,7 @@ impl std::fmt::Display for Lesson {
             Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
             Self::FailedPlan { loose, .. } => {
                 let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
-                write!(f, "pieces {} came out loose", list.join(", "))
+                write!(f, "{} {} came out loose", if list.len() == 1 { "piece" } else { "pieces" }, list.join(", "))
             }
         }
     }

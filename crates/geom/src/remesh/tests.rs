@@ -2,6 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
 use crate::Solid;
+use crate::Volume;
 use crate::bvh::TriangleBvh;
 
 /// A torus around z as a grid of `n_around` × `n_across` quadrilaterals, each cut in two.
@@ -263,6 +264,22 @@ fn what_is_no_task_comes_back_unchanged() {
     assert_eq!(remesh(&params(4.0), &open, &labels[1..]).mesh, open);
     assert_eq!(remesh(&params(4.0), &TriMesh::default(), &[]).mesh, TriMesh::default());
 }
+/// Twelve triangles with edges of up to 128 mm: creases stay where they are to a fraction of an edge, and no triangle is a needle.
+#[test]
+fn a_plate_of_twelve_triangles_keeps_its_shape() {
+    let plate = Volume::cuboid(crate::Aabb { min: Vec3::ZERO, max: Vec3::new(100.0, 80.0, 8.0) }).to_mesh();
+    let out = remesh(&RemeshParams { target_edge_mm: 2.1, n_rounds: 5 }, &plate, &[0; 12]);
+    assert_near(out.mesh.signed_volume(), plate.signed_volume(), 0.02);
+    assert_near(out.mesh.area(), plate.area(), 0.02);
+    let share = |f: usize| {
+        let [a, b, c] = out.mesh.corners(f);
+        let longest_sq = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+        (b - a).cross(c - a).length() / longest_sq
+    };
+    let least = (0..out.mesh.triangles.len()).map(share).fold(1.0, f64::min);
+    assert!(least > 0.02, "a triangle's height is {least} of its longest edge");
+}
+
 #[test]
 fn coarse_input_is_refined() {
     let octahedron = ellipsoid(0, Vec3::splat(30.0));

@@ -36,8 +36,10 @@ pub fn conditions(surface: &SegmentedSurface, key: PatchId, slide: Vec3) -> Opti
 }
 
 impl KeyConditions {
-    /// What is broken, in words and with places. `connector_mm` is the size of its connectors.
-    pub fn problems(&self, key: PatchId, connector_mm: f64) -> Vec<Warning> {
+    /// What is broken, in words and with places. `connector_mm` is the size of its connectors; whether a key `may_be_cut`
+    /// instead, which was not tried.
+    pub fn problems(&self, key: PatchId, connector_mm: f64, may_be_cut: bool) -> Vec<Warning> {
+        let or_cut = if may_be_cut { ", or let the key be cut (--key auto)" } else { "" };
         let warning = |code: &str, at: Vec3, message: String| Warning {
             code: code.into(),
             message,
@@ -49,7 +51,7 @@ impl KeyConditions {
             let (at, off_mm) = self.farthest;
             found.push(warning("key-not-flat", at, format!(
                 "the key, piece {key}, is curved, so it may sit loosely: {:.0} % of it lies in a plane ({:.0} % would do), and it is {off_mm:.1} mm \
-                 off at the farthest; give it a flatter place, or let the key be cut (--key auto)",
+                 off at the farthest; give it a flatter place{or_cut}",
                 100.0 * self.flat_share,
                 100.0 * LEAST_FLAT
             )));
@@ -59,7 +61,7 @@ impl KeyConditions {
         if straight_mm < least_mm {
             found.push(warning("key-not-straight", at, format!(
                 "no side of the key, piece {key}, is straight along its way out for the {least_mm:.0} mm that rails need (longest: \
-                 {straight_mm:.1} mm), so friction alone holds it; draw straight seams along its way out, or let the key be cut (--key auto)"
+                 {straight_mm:.1} mm), so friction alone holds it; draw straight seams along its way out{or_cut}"
             )));
         }
         found
@@ -142,14 +144,14 @@ mod tests {
         let found = conditions(&cube(), PatchId(0), Vec3::X).unwrap();
         assert!((found.flat_share - 1.0).abs() < 1e-9 && found.farthest.1 < 1e-9);
         assert!((found.straight.0 - 40.0).abs() < 1e-9, "{found:?}");
-        assert_eq!(found.problems(PatchId(0), 2.5), []);
+        assert_eq!(found.problems(PatchId(0), 2.5, true), []);
     }
 
     #[test]
     fn a_lid_that_leaves_across_its_edges_has_no_straight_side_and_is_told_where() {
         let diagonal = Vec3::new(1.0, 1.0, 0.0).normalize();
         let found = conditions(&cube(), PatchId(0), diagonal).unwrap();
-        let problems = found.problems(PatchId(0), 2.5);
+        let problems = found.problems(PatchId(0), 2.5, true);
         assert_eq!(problems.iter().map(|p| p.code.as_str()).collect::<Vec<_>>(), ["key-not-straight"]);
         assert!(problems[0].at.is_some_and(|at| (at[2] - 40.0).abs() < 1e-9));
     }

@@ -161,7 +161,10 @@ fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Chang
     if cut.is_none() {
         ctx.warn(Warning {
             code: "key-without-grip".into(),
-            message: format!("piece {}: its surface is too uneven for a notch to pull the key at", grip.key),
+            message: format!(
+                "piece {} has no notch to pull it out by: its surface has no even place of 12 × 3 mm in the middle",
+                grip.key
+            ),
             pieces: vec![grip.key],
             at: Some(grip.at.to_array()),
         });

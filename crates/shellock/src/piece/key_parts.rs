@@ -1,6 +1,7 @@
 //! What only keys have: detents that click, and a notch to pull at.
 
 use serde::{Deserialize, Serialize};
+use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
 
 use crate::PatchId;
@@ -18,6 +19,8 @@ const PLAY_MM: f64 = 0.08;
 const NOTCH_MM: f64 = 0.45;
 const NOTCH_HALF_MM: f64 = 1.6;
 const NOTCH_WIDTH_MM: f64 = 12.0;
+/// The surface is looked for up to so far above and below the notch's middle, mm.
+const NOTCH_LOOK_MM: f64 = 2.0;
 /// The surface below a notch is uneven by less than this, mm.
 const NOTCH_UNEVEN_MM: f64 = 0.4;
 
@@ -116,19 +119,19 @@ fn wedge(station: &Station, [foot, top]: [f64; 2], [s0, s1]: [f64; 2], play_mm: 
 /// The notch, to be cut from the key whose body is `body`; `None` where the surface is too uneven for one.
 pub(super) fn notch(grip: &Grip, body: &TriMesh) -> Option<Change> {
     let across = grip.normal.cross(grip.slide);
-    let local = |p: &Vec3| {
-        let d = *p - grip.at;
-        [d.dot(grip.slide), d.dot(across), d.dot(grip.normal)]
+    // Seen from outside, all over the place of the notch.
+    let surface = TriangleBvh::new(body);
+    let height = |along: f64, aside: f64| {
+        let from = grip.at + along * grip.slide + aside * across + NOTCH_LOOK_MM * grip.normal;
+        surface.first_hit(from, -grip.normal, 2.0 * NOTCH_LOOK_MM).map(|(_, far_mm)| NOTCH_LOOK_MM - far_mm)
     };
-    let is_below = |[along, aside, height]: &[f64; 3]| {
-        along.abs() < NOTCH_HALF_MM && aside.abs() < 0.5 * NOTCH_WIDTH_MM && height.abs() < 2.0
-    };
-    // The outer side: within the wall's half next to the plane.
-    let heights: Vec<f64> = body.points.iter().map(local).filter(is_below).map(|[_, _, height]| height).collect();
+    let places = (-2..=2).flat_map(|i| (-6..=6).map(move |j| [f64::from(i) / 2.0, f64::from(j) / 6.0]));
+    let heights: Option<Vec<f64>> =
+        places.map(|[along, aside]| height(along * NOTCH_HALF_MM, aside * 0.5 * NOTCH_WIDTH_MM)).collect();
+    let heights = heights?;
     let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let outer: Vec<f64> = heights.into_iter().filter(|h| highest - h < 1.0).collect();
-    let lowest = outer.iter().copied().fold(f64::INFINITY, f64::min);
-    if outer.len() < 3 || highest - lowest > NOTCH_UNEVEN_MM {
+    let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
+    if highest - lowest > NOTCH_UNEVEN_MM {
         return None;
     }
     // Deepest in front, where the nail pushes; running out towards the back.
@@ -175,12 +178,15 @@ mod tests {
     #[test]
     fn a_notch_is_cut_into_a_flat_key_and_left_out_of_a_bent_one() {
         let plate = |bend: f64| {
+            let at = |x: i32, y: i32| {
+                let (x, y) = (0.5 * f64::from(x), 0.5 * f64::from(y));
+                Vec3::new(x, y, bend * x * x)
+            };
             let mut mesh = TriMesh::default();
-            for x in -20..20 {
-                for y in -20..20 {
-                    let (x, y) = (0.5 * f64::from(x), 0.5 * f64::from(y));
-                    mesh.points.push(Vec3::new(x, y, bend * x * x));
-                }
+            for (x, y) in (-20..20).flat_map(|x| (-20..20).map(move |y| (x, y))) {
+                let first = mesh.points.len() as u32;
+                mesh.points.extend([at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]);
+                mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
             }
             mesh
         };
@@ -188,5 +194,11 @@ mod tests {
         let cut = notch(&grip, &plate(0.0)).unwrap();
         assert!((cut.volume.bounds().min.z + NOTCH_MM).abs() < 1e-9 && !cut.is_added);
         assert!(notch(&grip, &plate(0.3)).is_none());
+        // As coarse as a plane can be.
+        let corners = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
+        let coarse = TriMesh { points: corners.into(), triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        assert!(notch(&grip, &coarse).is_some());
+        // The notch reaches over the plate's edge.
+        assert!(notch(&Grip { at: Vec3::new(8.5, 0.0, 0.0), ..grip }, &coarse).is_none());
     }
 }

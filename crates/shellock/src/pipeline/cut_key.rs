@@ -144,7 +144,7 @@ fn without_rails(made: &Design, site: &KeySite) -> Warning {
 fn told(site: &KeySite) -> String {
     let (s, [x, y, z]) = (site.prism.slide, site.prism.origin.to_array());
     format!(
-        "a key of {:.0} mm² cut at ({x:.0}, {y:.0}, {z:.0}) mm, sliding along ({:.2}, {:.2}, {:.2}), {:.0} % flat, with room for rails of {:.0} mm",
+        "a key of {:.0} mm² cut at ({x:.0}, {y:.0}, {z:.0}) mm, sliding along ({:.2}, {:.2}, {:.2}), {:.0} % flat, straight along its sides for {:.0} mm",
         site.area_mm2,
         s.x,
         s.y,

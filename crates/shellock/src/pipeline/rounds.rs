@@ -2,7 +2,7 @@
 
 use shellock_geom::Solid;
 
-use super::{Design, DesignError, Params, make};
+use super::{Design, DesignError, KeySource, Params, make};
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::feedback::{Lesson, lessons};
 use crate::metric::Holding;
@@ -178,7 +178,7 @@ fn planned(
         PlanOutcome::Found(found) => {
             let (found, holding) = metric::choose(ctx, &params.plan, surface, sizes, *found)?;
             if params.plan.key_slide.is_none() {
-                warn_of_key(ctx, surface, sizes, &found.plan);
+                warn_of_key(ctx, params, surface, sizes, &found.plan);
             }
             Planned::Found(Box::new(found), holding)
         }
@@ -189,10 +189,17 @@ fn planned(
 }
 
 /// Says which conditions a key breaks that was not cut to meet them.
-fn warn_of_key(ctx: &Ctx, surface: &SegmentedSurface, sizes: &ConnectorSizes, plan: &InstallationPlan) {
+fn warn_of_key(
+    ctx: &Ctx,
+    params: &Params,
+    surface: &SegmentedSurface,
+    sizes: &ConnectorSizes,
+    plan: &InstallationPlan,
+) {
+    let may_be_cut = params.key == KeySource::Piece;
     let Some(last) = plan.steps.last() else { return };
     if let Some(found) = key::conditions(surface, last.piece, last.separation.unit()) {
-        found.problems(last.piece, sizes.largest_mm()).into_iter().for_each(|problem| ctx.warn(problem));
+        found.problems(last.piece, sizes.largest_mm(), may_be_cut).into_iter().for_each(|problem| ctx.warn(problem));
     }
 }
 

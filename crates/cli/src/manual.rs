@@ -1,0 +1,35 @@
+//! Completions and manual pages, made from the same declarations as the command line.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use clap::CommandFactory;
+
+use crate::args::Cli;
+use crate::failure::Failure;
+use crate::stages::write as write_file;
+
+/// `shellock completions`.
+pub fn completions(shell: clap_complete::Shell) -> u8 {
+    let mut bytes = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "shellock", &mut bytes);
+    // A reader that closes the pipe has seen enough.
+    let _ = std::io::stdout().write_all(&bytes);
+    0
+}
+
+/// `shellock manual`: `shellock.1` and a page for each command.
+pub fn write(folder: &Path) -> Result<u8, Failure> {
+    fs::create_dir_all(folder).map_err(Failure::unwritable(folder))?;
+    let mut root = Cli::command();
+    root.build();
+    for command in std::iter::once(&root).chain(root.get_subcommands().filter(|c| c.get_name() != "help")) {
+        let page = clap_mangen::Man::new(command.clone());
+        let path = folder.join(page.get_filename());
+        let mut bytes = Vec::new();
+        page.render(&mut bytes).map_err(Failure::unwritable(&path))?;
+        write_file(&path, &bytes)?;
+    }
+    Ok(0)
+}
