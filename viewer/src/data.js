@@ -2,13 +2,14 @@
 //
 // header.meshes[i].points    = { offset, count, min, max }: 3 × uint16 a point, 0 … 65535 from min to max
 // header.meshes[i].triangles = { offset, count, bytes }: 3 × uint16 or uint32 a triangle
+// header.meshes[i].draft     = { points, triangles }: the same, coarser, for what moves on slow machines; may be missing
 // header.quantities[j]       = { name, unit, values }: one number or null a mesh, to colour meshes by
 // Offsets count bytes. Everything else in the header is text and numbers to show.
 
 export function readPage(document) {
   const header = JSON.parse(document.getElementById("header").textContent);
   const buffer = bytesFromBase64(document.getElementById("arrays").textContent.trim()).buffer;
-  return { header, meshes: header.meshes.map((m) => ({ ...m, ...arrays(m, buffer) })) };
+  return { header, meshes: header.meshes.map((m) => ({ ...m, ...arrays(m, buffer), draft: m.draft && arrays(m.draft, buffer) })) };
 }
 
 function bytesFromBase64(text) {

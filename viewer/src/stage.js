@@ -9,6 +9,10 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { shaded } from "./data.js";
 
 const UP = new Vector3(0, 0, 1);
+// Frames that follow each other more slowly than this, ms, show drafts.
+const SLOW_MS = 30;
+// What has not moved for so long, ms, rests.
+const REST_MS = 200;
 
 // A shaft and a head, unlit, from the origin along +y before it is turned.
 class Arrow extends Group {
@@ -32,12 +36,28 @@ class Arrow extends Group {
   }
 }
 
+function shape({ positions, indices }) {
+  const { points, normals, indices: corners } = shaded(positions, indices);
+  const geometry = new BufferGeometry();
+  geometry.setIndex(new BufferAttribute(corners, 1));
+  geometry.setAttribute("position", new BufferAttribute(points, 3));
+  geometry.setAttribute("normal", new BufferAttribute(normals, 3));
+  geometry.computeBoundingBox();
+  geometry.computeBoundingSphere();
+  return geometry;
+}
+
 export class Stage {
   constructor(holder, meshes) {
     this.holder = holder;
     this.room = 0;
-    this.renderer = new WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer = new WebGLRenderer({ alpha: true, preserveDrawingBuffer: true });
+    // Four samples a pixel on plain screens: edges are smooth without the library's own way, which cannot be turned off in motion.
+    this.renderer.setPixelRatio(2);
+    this.isDraft = false;
+    this.isSlow = false;
+    this.gaps = [];
+    this.last = -Infinity;
     holder.prepend(this.renderer.domElement);
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(32, 1, 1, 1e5);
@@ -68,13 +88,8 @@ export class Stage {
   }
 
   #add(m) {
-    const { points, normals, indices } = shaded(m.positions, m.indices);
-    const geometry = new BufferGeometry();
-    geometry.setIndex(new BufferAttribute(indices, 1));
-    geometry.setAttribute("position", new BufferAttribute(points, 3));
-    geometry.setAttribute("normal", new BufferAttribute(normals, 3));
-    geometry.computeBoundingBox();
-    geometry.computeBoundingSphere();
+    const geometry = shape(m);
+    const draft = m.draft ? shape(m.draft) : geometry;
     const color = new Color(...m.color.map((c) => c / 255)).convertSRGBToLinear();
     const clippingPlanes = [this.clip];
     const skin = new MeshLambertMaterial({ color, side: FrontSide, clippingPlanes });
@@ -86,7 +101,7 @@ export class Stage {
     group.add(new Mesh(geometry, skin), inner);
     this.scene.add(group);
     const box = geometry.boundingBox.clone();
-    return { group, skin, cut, inner, box, center: box.getCenter(new Vector3()), shift: new Vector3(...m.shift), travel: new Vector3(...m.travel) };
+    return { group, fine: geometry, draft, skin, cut, inner, box, center: box.getCenter(new Vector3()), shift: new Vector3(...m.shift), travel: new Vector3(...m.travel) };
   }
 
   #resize() {
@@ -108,13 +123,37 @@ export class Stage {
   /** Draws soon; many calls make one frame. */
   draw() {
     if (this.pending) return;
-    this.pending = requestAnimationFrame(() => {
+    this.pending = requestAnimationFrame((now) => {
       this.pending = 0;
+      this.#pace(now);
       this.renderer.render(this.scene, this.camera);
       this.afterDraw?.();
       // While it turns, this asks for the next frame.
       if (this.controls.autoRotate) this.controls.update();
     });
+  }
+
+  // Drafts while frames follow each other too slowly, everything once nothing moves.
+  #pace(now) {
+    const gap = now - this.last;
+    this.last = now;
+    this.gaps = gap < 1000 ? [...this.gaps, gap].slice(-3) : [];
+    if (this.gaps.length === 3 && this.gaps.every((ms) => ms > SLOW_MS)) this.isSlow = true;
+    if (this.isSlow && this.gaps.length) this.#show(true);
+    clearTimeout(this.rest);
+    const settle = () => {
+      if (this.pending) { this.rest = setTimeout(settle, REST_MS); return; }
+      this.last = -Infinity;
+      if (this.isDraft) { this.#show(false); this.draw(); }
+    };
+    this.rest = setTimeout(settle, REST_MS);
+  }
+
+  #show(isDraft) {
+    if (this.isDraft === isDraft) return;
+    this.isDraft = isDraft;
+    this.renderer.setPixelRatio(isDraft ? 1 : 2);
+    for (const { group, fine, draft } of this.items) for (const mesh of group.children) mesh.geometry = isDraft ? draft : fine;
   }
 
   lookFrom(direction, center = this.center, size = this.size) {
