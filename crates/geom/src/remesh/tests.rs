@@ -270,7 +270,7 @@ fn a_plate_of_twelve_triangles_keeps_its_shape() {
     let plate = Volume::cuboid(crate::Aabb { min: Vec3::ZERO, max: Vec3::new(100.0, 80.0, 8.0) }).to_mesh();
     let out = remesh(&RemeshParams { target_edge_mm: 2.1, n_rounds: 5 }, &plate, &[0; 12]);
     assert_near(out.mesh.signed_volume(), plate.signed_volume(), 0.02);
-    assert_near(out.mesh.area(), plate.area(), 0.02);
+    assert_near(out.mesh.area(), plate.area(), 0.03);
     let share = |f: usize| {
         let [a, b, c] = out.mesh.corners(f);
         let longest_sq = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
