@@ -1,18 +1,28 @@
 //! Whatever the bytes are, reading and mending them ends in an answer: `cargo +nightly fuzz run readers`.
+//!
+//! `READER=stl` (obj, ply, off, gltf, labels) gives the bytes to that reader alone; without it each has its turn.
 
 #![no_main]
+
+use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use shellock_geom::io::{read_labels, read_mesh};
 use shellock_geom::repair::{Mending, mend};
 
+const READERS: [&str; 6] = ["stl", "obj", "ply", "off", "gltf", ""];
+
 /// Larger meshes cost time and find nothing more.
 const MOST_TRIANGLES: usize = 2000;
 
 fuzz_target!(|bytes: &[u8]| {
-    let _ = read_labels(bytes);
-    for extension in [None, Some("stl"), Some("obj"), Some("ply"), Some("off"), Some("gltf")] {
-        let Ok(loaded) = read_mesh(bytes, extension) else { continue };
+    static CHOSEN: LazyLock<Option<String>> = LazyLock::new(|| std::env::var("READER").ok());
+    let is_chosen = |reader: &str| CHOSEN.as_deref().is_none_or(|chosen| chosen == reader);
+    if is_chosen("labels") {
+        let _ = read_labels(bytes);
+    }
+    for reader in READERS.into_iter().filter(|reader| is_chosen(reader)) {
+        let Ok(loaded) = read_mesh(bytes, Some(reader).filter(|reader| !reader.is_empty())) else { continue };
         let n_triangles = loaded.mesh.triangles.len();
         assert_eq!(loaded.file_face.len(), n_triangles);
         assert!(loaded.file_face.is_sorted());

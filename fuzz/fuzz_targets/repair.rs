@@ -13,7 +13,8 @@ fuzz_target!(|bytes: &[u8]| {
     let (points, corners) = rest.split_at(rest.len().min(usize::from(n_points)));
     // Five steps an axis, and a last bit of slack for cracks.
     let coordinate = |step: u8, slack: u8| f64::from(step) + 1e-6 * f64::from(slack);
-    let point = |&b: &u8| Vec3::new(coordinate(b % 5, b >> 7), coordinate(b / 5 % 5, 0), coordinate(b / 25 % 5, b >> 7));
+    let point =
+        |&b: &u8| Vec3::new(coordinate(b % 5, b >> 7), coordinate(b / 5 % 5, 0), coordinate(b / 25 % 5, b >> 7));
     let points: Vec<Vec3> = points.iter().map(point).collect();
     let Ok(n) = u8::try_from(points.len()) else { return };
     if n == 0 {

@@ -20,6 +20,14 @@ pub struct Mesh {
     pub triangles: Vec<[Vec3; 3]>,
 }
 
+/// An edge of a triangle; points are one where their bytes are.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Edge {
+    ends: [[u64; 3]; 2],
+    is_forward: bool,
+    triangle: usize,
+}
+
 impl Mesh {
     /// From the bytes of a binary STL file; its normals are not read.
     pub fn from_stl(bytes: &[u8]) -> Result<Self, String> {
@@ -40,39 +48,37 @@ impl Mesh {
         }
     }
 
-    /// Edges that are not used equally often in both directions. Points are one where their bytes are.
+    /// Edges that are not used equally often in both directions.
     pub fn n_open_edges(&self) -> usize {
+        let edges = self.edges();
+        let between = edges.iter().filter(|e| e.ends[0] != e.ends[1]).collect::<Vec<_>>();
+        let uses = between.chunk_by(|x, y| x.ends == y.ends);
+        uses.filter(|uses| 2 * uses.iter().filter(|e| e.is_forward).count() != uses.len()).count()
+    }
+
+    /// The edges of all triangles, those between the same points beside each other.
+    fn edges(&self) -> Vec<Edge> {
         // Zero has two signs; adding it leaves one.
         let name = |p: Vec3| p.map(|x| (x + 0.0).to_bits());
         let mut edges = Vec::with_capacity(3 * self.triangles.len());
-        for t in &self.triangles {
+        for (triangle, t) in self.triangles.iter().enumerate() {
             let corners = t.map(name);
-            for k in 0..3 {
+            edges.extend((0..3).map(|k| {
                 let (from, to) = (corners[k], corners[(k + 1) % 3]);
-                if from != to {
-                    edges.push((from.min(to), from.max(to), from < to));
-                }
-            }
+                Edge { ends: [from.min(to), from.max(to)], is_forward: from < to, triangle }
+            }));
         }
         edges.sort_unstable();
-        let uses = edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1));
-        uses.filter(|uses| 2 * uses.iter().filter(|e| e.2).count() != uses.len()).count()
+        edges
     }
 
     /// Surfaces that hang together over edges.
     pub fn n_surfaces(&self) -> usize {
-        let name = |p: Vec3| p.map(|x| (x + 0.0).to_bits());
-        let mut edges = Vec::with_capacity(3 * self.triangles.len());
-        for (i, t) in self.triangles.iter().enumerate() {
-            let corners = t.map(name);
-            let between = |k: usize| (corners[k].min(corners[(k + 1) % 3]), corners[k].max(corners[(k + 1) % 3]), i);
-            edges.extend((0..3).map(between));
-        }
-        edges.sort_unstable();
+        let edges = self.edges();
         let mut leader: Vec<usize> = (0..self.triangles.len()).collect();
         let mut n_surfaces = leader.len();
-        for pair in edges.windows(2).filter(|pair| (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1)) {
-            let [a, b] = [pair[0].2, pair[1].2].map(|i| {
+        for pair in edges.windows(2).filter(|pair| pair[0].ends == pair[1].ends) {
+            let [a, b] = [pair[0].triangle, pair[1].triangle].map(|i| {
                 let mut i = i;
                 while leader[i] != i {
                     leader[i] = leader[leader[i]];

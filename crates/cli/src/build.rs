@@ -27,7 +27,7 @@ pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Res
     let params = checked(options)?;
     let stem = file.file_stem().map_or_else(|| "model".into(), |s| s.to_string_lossy().into_owned());
     let to = Destination::new(out.out.unwrap_or_else(|| PathBuf::from(format!("{stem}-kit"))), out.force)?;
-    let model = input::model(file, options)?;
+    let model = input::model(session, file, options)?;
     make(session, &model, options, &params, &to)
 }
 

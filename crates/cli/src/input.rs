@@ -9,6 +9,7 @@ use shellock_geom::io::{LabelSource, Loaded, read_labels, read_mesh};
 use shellock_geom::repair::{Mended, Mending, Repair, mend};
 use shellock_geom::{Aabb, Solid, Vec3};
 
+use crate::Session;
 use crate::args::{LabelsFrom, Options};
 use crate::failure::Failure;
 
@@ -83,9 +84,11 @@ pub fn mended(path: &Path, loaded: &Loaded, mending: Mending) -> Result<Mended, 
 }
 
 /// The model in a file, scaled, with the labels that go with it.
-pub fn model(path: &Path, options: &Options) -> Result<Model, Failure> {
-    let (loaded, bytes) = load(path)?;
-    model_of(path, &loaded, &bytes, options)
+pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model, Failure> {
+    session.during("reading", || {
+        let (loaded, bytes) = load(path)?;
+        model_of(path, &loaded, &bytes, options)
+    })
 }
 
 /// The model in what was read from `path`.

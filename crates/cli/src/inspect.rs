@@ -21,7 +21,7 @@ const N_TOLD: usize = 3;
 
 /// `shellock inspect`.
 pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
-    let (loaded, bytes) = load(file)?;
+    let (loaded, bytes) = session.during("reading", || load(file))?;
     let size = loaded.mesh.bounds().size();
     let found = inspection(&weld(&loaded.mesh).mesh);
     let labellings: Vec<String> = loaded.labellings.iter().map(|l| l.source.to_string()).collect();
@@ -33,8 +33,11 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
             println!("divided by {}", labellings.join(", "));
         }
     }
-    let model = model_of(file, &loaded, &bytes, options);
-    let thin = model.as_ref().map(|model| thin_warnings(model, options)).unwrap_or_default();
+    let (model, thin) = session.during("looking for what is wrong", || {
+        let model = model_of(file, &loaded, &bytes, options);
+        let thin = model.as_ref().map(|model| thin_warnings(model, options)).unwrap_or_default();
+        (model, thin)
+    });
     if session.is_json {
         let is_sound = mend(&loaded.mesh, mending(true, false)).is_ok();
         let (repairs, notes): (Vec<Value>, &[String]) =

@@ -36,6 +36,17 @@ pub struct Session {
     pub stop: Arc<AtomicBool>,
 }
 
+impl Session {
+    /// Shows that `name` goes on while `work` is done.
+    pub fn during<T>(&self, name: &str, work: impl FnOnce() -> T) -> T {
+        let display = progress::Display::new(self.shown);
+        display.show(shellock::context::Progress::Stage { name, n_steps: 0 });
+        let done = work();
+        display.finish();
+        done
+    }
+}
+
 /// More threads than this are not made: each has a stack, and no computer has as many cores.
 const MOST_THREADS: usize = 256;
 

@@ -62,7 +62,7 @@ pub fn report(
     let quantities = quantities(design, summary);
     let data =
         ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
-    let booklet = Booklet { title: title(&model.name), lines: cover_lines(&data.facts), pieces: data.pieces.clone() };
+    let booklet = Booklet { title: title(&model.name), lines: cover_lines(model, design), pieces: data.pieces.clone() };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),
         || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
@@ -73,7 +73,7 @@ pub fn report(
 /// What failed, for the list of warnings.
 fn failure(finding: &Finding) -> Warning {
     let message = format!("do not print this kit: {finding}");
-    Warning { code: "failed".into(), message, pieces: Vec::new(), at: None }
+    Warning { code: "failed".into(), message, pieces: Vec::new(), at: finding.place() }
 }
 
 /// The pieces as they stand, as finely as eyes see them.
@@ -95,9 +95,8 @@ fn kit_facts(
     summary: &Summary,
     stand: impl Fn(Vec3) -> Vec3,
 ) -> Vec<(String, String)> {
-    let size = model.solid.mesh().bounds().size();
     let mut facts: Vec<(String, String)> = vec![
-        ("size".into(), format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)),
+        ("size".into(), size(model)),
         ("pieces".into(), design.pieces.len().to_string()),
         ("wall".into(), format!("{:.2} mm", design.thickness_mm)),
         ("connectors".into(), format!("{} mm", connector_sizes(design))),
@@ -111,16 +110,20 @@ fn kit_facts(
     facts
 }
 
+fn size(model: &Model) -> String {
+    let size = model.solid.mesh().bounds().size();
+    format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)
+}
+
 /// A file's name as a heading.
 fn title(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
 /// What a person who builds the thing wants to know of it.
-fn cover_lines(facts: &[(String, String)]) -> Vec<String> {
-    let fact = |name: &str| facts.iter().find(|f| f.0 == name).map(|f| f.1.as_str()).unwrap_or_default();
+fn cover_lines(model: &Model, design: &Design) -> Vec<String> {
     vec![
-        format!("{} pieces, {}", fact("pieces"), fact("size")),
+        format!("{} pieces, {}", design.pieces.len(), size(model)),
         "no glue: each piece locks those before it; the last one, the key, locks all".to_owned(),
     ]
 }

@@ -49,7 +49,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     if !["ply", "3mf", "seg"].contains(&kind.as_str()) {
         return Err(Failure::Wrong(format!("{}: choose a name that ends in .ply, .3mf or .seg", out.display())));
     }
-    let model = input::model(file, options)?;
+    let model = input::model(session, file, options)?;
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
@@ -113,7 +113,7 @@ fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) ->
 /// `shellock plan`.
 pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
     let params = checked(options)?;
-    let model = input::model(file, options)?;
+    let model = input::model(session, file, options)?;
     let display = Display::new(session.shown);
     let clock = PlanClock::new(options.plan_time);
     let report = |p: shellock::context::Progress<'_>| {
@@ -181,7 +181,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let press_fits: Vec<PressFit> = serde_json::from_value(plan["press_fits"].clone()).unwrap_or_default();
+    let press_fits = press_fits_of(&plan).map_err(|what| broken(&what))?;
     let assembly = Assembly { model: &solid, pieces: &pieces, plan: &order, press_fits: &press_fits };
     let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &assembly)?;
     let rim_mm = BodyParams::default().rim_mm;
@@ -204,7 +204,22 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     Ok(code)
 }
 
-/// Files besides the pieces, as the earlier certificate names and hashes them: what they hold is not verified again.
+/// The places where the key presses on purpose. A plan without any names none.
+fn press_fits_of(plan: &Value) -> Result<Vec<PressFit>, String> {
+    let fits = if plan["press_fits"].is_null() { Value::Array(Vec::new()) } else { plan["press_fits"].clone() };
+    let fits: Vec<PressFit> = serde_json::from_value(fits).map_err(|e| format!("press_fits: {e}"))?;
+    let range_mm = 0.0..=PressFit::MOST_INTERFERENCE_MM;
+    match fits.iter().find(|fit| !range_mm.contains(&fit.interference_mm)) {
+        Some(fit) => Err(format!(
+            "a press fit of {} mm is none; up to {} mm are",
+            fit.interference_mm,
+            PressFit::MOST_INTERFERENCE_MM
+        )),
+        None => Ok(fits),
+    }
+}
+
+/// Files besides the pieces, as the earlier certificate names and hashes them, if there is one: what they hold is not verified again.
 fn certified_files(kit: &Path) -> Vec<OtherFile> {
     let earlier = read(&kit.join(CERTIFICATE)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
     earlier.and_then(|c| serde_json::from_value(c["files"].clone()).ok()).unwrap_or_default()

@@ -169,6 +169,52 @@ fn a_strangers_folder_is_never_replaced() {
 }
 
 #[test]
+fn a_kits_folder_with_a_strangers_file_is_not_replaced_even_by_force() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir_all(dir.path().join("kit/pieces")).unwrap();
+    for own in ["plan.json", "pieces/piece-07.stl", "savings.json"] {
+        fs::write(dir.path().join("kit").join(own), "{}").unwrap();
+    }
+    fs::write(dir.path().join("kit/pieces/mine.gcode"), "mine").unwrap();
+    let before = content(dir.path());
+    let o = shellock(dir.path(), &["demo", "-o", "kit", "--force"]);
+    assert_eq!(code(&o), 2);
+    assert!(errors(&o).contains("mine.gcode"), "{}", errors(&o));
+    assert_eq!(content(dir.path()), before);
+}
+
+#[test]
+fn completions_and_manual_pages_name_every_command_and_option() {
+    let dir = tempfile::tempdir().unwrap();
+    let completions = shellock(dir.path(), &["completions", "bash"]);
+    let text = String::from_utf8(completions.stdout).unwrap();
+    assert!(["build", "verify", "report", "--key-ribs", "--quiet"].iter().all(|word| text.contains(word)));
+    assert_eq!(code(&shellock(dir.path(), &["manual", "man"])), 0);
+    let page = fs::read_to_string(dir.path().join("man/shellock-build.1")).unwrap();
+    assert!(page.contains("key\\-ribs") && dir.path().join("man/shellock.1").is_file(), "{page}");
+}
+
+#[test]
+fn progress_is_lines_or_events_or_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    assert_eq!(code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])), 0);
+    let segment = |more: &str| {
+        let o = shellock(dir.path(), &["segment", "t.stl", "-o", "t.ply", "--pieces", "4", more]);
+        assert_eq!(code(&o), 0, "{}", errors(&o));
+        errors(&o)
+    };
+    assert_eq!(segment("--quiet"), "");
+    let events = segment("--json");
+    let names: Vec<String> = events
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
+        .filter(|event| event["event"] == "stage" && event["seconds"].is_number())
+        .map(|event| event["name"].as_str().unwrap().to_owned())
+        .collect();
+    assert!(!names.is_empty(), "{events}");
+}
+
+#[test]
 fn what_is_not_there_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let o = shellock(dir.path(), &["build", "nowhere.stl"]);

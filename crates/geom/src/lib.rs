@@ -18,6 +18,8 @@ pub mod mesh;
 pub mod remesh;
 pub mod repair;
 pub mod rounding;
+#[cfg(test)]
+mod samples;
 pub mod signed_distance;
 pub mod solid;
 pub mod sparse;

@@ -131,13 +131,7 @@ fn check_edges(mesh: &TriMesh) -> Result<(), NotSolid> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn tetrahedron() -> TriMesh {
-        TriMesh {
-            points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
-        }
-    }
+    use crate::samples::tetrahedron;
 
     #[test]
     fn a_tetrahedron_has_its_volume() {

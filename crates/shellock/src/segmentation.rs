@@ -239,6 +239,7 @@ pub fn segment(
     solid: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<SegmentedSurface, SegmentationError> {
+    ctx.stage("segmentation", 0)?;
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
     let (fine, source_face) = halve_long_edges(params, solid);
     let mut surface = match given {

@@ -178,6 +178,19 @@ pub enum Finding {
     },
 }
 
+impl Finding {
+    /// Where it is, mm in assembly space, if it is at one place.
+    pub fn place(&self) -> Option<[f64; 3]> {
+        match self {
+            Self::SharedEdges { at, .. }
+            | Self::Overlap { at, .. }
+            | Self::PathRubs { at, .. }
+            | Self::SurfaceLost { at, .. } => Some(*at),
+            _ => None,
+        }
+    }
+}
+
 /// The verdict.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verification {

@@ -22,6 +22,17 @@ pub enum InputError {
         /// How many there are.
         count: usize,
     },
+    /// Coordinates with which no volume can be computed.
+    #[error(
+        "{count} points lie farther than 1e30 from the origin, the first is point {vertex} (from 0); \
+         the file is damaged: export the model again"
+    )]
+    TooFar {
+        /// The first such point.
+        vertex: usize,
+        /// How many there are.
+        count: usize,
+    },
     /// Edges with more than two triangles.
     #[error(
         "{} more than two triangles, first near {}{}; \

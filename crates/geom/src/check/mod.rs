@@ -15,6 +15,9 @@ use crate::weld::{Welded, close};
 use crate::{Aabb, NotSolid, Solid, TriMesh, Vec3};
 use groups::Groups;
 
+/// Farther from the origin, file units, products of six lengths, as exact unions form them, leave the range of numbers.
+const FARTHEST: f64 = 1e30;
+
 /// What a mesh is, as far as its triangles and their neighbours tell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
@@ -133,9 +136,15 @@ pub(crate) fn check_points(mesh: &TriMesh) -> Result<(), InputError> {
             return Err(InputError::NotSolid(NotSolid::MissingPoint { face, vertex, n_points }));
         }
     }
-    let mut bad = mesh.points.iter().enumerate().filter(|(_, p)| !p.is_finite());
-    match bad.next() {
-        Some((vertex, _)) => Err(InputError::NotFinite { vertex, count: 1 + bad.count() }),
+    let count = |is_bad: fn(Vec3) -> bool| {
+        let mut bad = mesh.points.iter().enumerate().filter(|(_, p)| is_bad(**p));
+        bad.next().map(|(vertex, _)| (vertex, 1 + bad.count()))
+    };
+    if let Some((vertex, count)) = count(|p| !p.is_finite()) {
+        return Err(InputError::NotFinite { vertex, count });
+    }
+    match count(|p| p.abs().max_element() > FARTHEST) {
+        Some((vertex, count)) => Err(InputError::TooFar { vertex, count }),
         None => Ok(()),
     }
 }

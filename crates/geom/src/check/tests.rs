@@ -1,30 +1,11 @@
 use super::*;
+use crate::samples::{both, flipped, unwelded};
 
 /// A cube of edge `size` with its least corner at `at`, outwards.
 fn cube(at: Vec3, size: f64) -> TriMesh {
     let points = (0..8).map(|i| at + size * Vec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64)).collect();
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     TriMesh { points, triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
-}
-
-fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
-    let n = a.points.len() as u32;
-    a.points.extend(b.points);
-    a.triangles.extend(b.triangles.iter().map(|t| t.map(|v| v + n)));
-    a
-}
-
-fn flipped(mut mesh: TriMesh) -> TriMesh {
-    mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
-    mesh
-}
-
-/// Each triangle with points of its own, as in an STL.
-fn unwelded(mesh: &TriMesh) -> TriMesh {
-    TriMesh {
-        points: (0..mesh.triangles.len()).flat_map(|f| mesh.corners(f)).collect(),
-        triangles: (0..mesh.triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
-    }
 }
 
 fn error(mesh: &TriMesh) -> InputError {
@@ -133,6 +114,8 @@ fn wrong_numbers_are_refused() {
     let mut mesh = cube(Vec3::ZERO, 1.0);
     mesh.points[3].z = f64::INFINITY;
     assert_eq!(error(&mesh), InputError::NotFinite { vertex: 3, count: 1 });
+    mesh.points[3].z = -1e31;
+    assert_eq!(error(&mesh), InputError::TooFar { vertex: 3, count: 1 });
     let mut mesh = cube(Vec3::ZERO, 1.0);
     mesh.triangles[1][2] = 8;
     assert!(matches!(error(&mesh), InputError::NotSolid(NotSolid::MissingPoint { face: 1, vertex: 8, n_points: 8 })));

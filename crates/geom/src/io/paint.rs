@@ -190,13 +190,7 @@ fn add_points_between(middle_of: &BTreeMap<(u32, u32), u32>, from: u32, to: u32,
 mod tests {
     use super::*;
     use crate::check::inspect;
-
-    fn tetrahedron() -> TriMesh {
-        TriMesh {
-            points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
-        }
-    }
+    use crate::samples::tetrahedron;
 
     #[test]
     fn the_colour_of_a_whole_triangle_comes_back() {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::samples::{both, flipped, unwelded};
 use crate::{Aabb, Vec3, Volume};
 
 /// A ball of 4 · 4ⁿ·2 triangles, outwards.
@@ -13,26 +14,6 @@ fn ball(center: Vec3, radius: f64, n: u32) -> TriMesh {
     let mut mesh = solid.into_mesh();
     mesh.points.iter_mut().for_each(|p| *p = center + radius * p.normalize());
     mesh
-}
-
-fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
-    let n = a.points.len() as u32;
-    a.points.extend(b.points);
-    a.triangles.extend(b.triangles.iter().map(|t| t.map(|v| v + n)));
-    a
-}
-
-fn flipped(mut mesh: TriMesh) -> TriMesh {
-    mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
-    mesh
-}
-
-/// Each triangle with points of its own, as in an STL.
-fn unwelded(mesh: &TriMesh) -> TriMesh {
-    TriMesh {
-        points: (0..mesh.triangles.len()).flat_map(|f| mesh.corners(f)).collect(),
-        triangles: (0..mesh.triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
-    }
 }
 
 fn cube(at: Vec3, size: f64) -> TriMesh {

@@ -254,18 +254,25 @@ fn ribs_of_key(
     let key = plan.key();
     let along = plan.removal().next().expect("a plan has a step for each piece").separation.unit();
     let mut others = TriMesh::default();
-    let mut shapes = Vec::new();
+    let mut shapes = Some(Vec::new());
     for other in pieces.ids().filter(|&p| p != key) {
         let mesh = pieces[other].to_mesh();
         let first = others.points.len() as u32;
         others.points.extend(&mesh.points);
         others.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
-        shapes.extend(Solid::new(mesh).ok().map(|solid| Shape::new(&solid)));
+        // Where one cannot be measured no rib is known to fit.
+        shapes = shapes.zip(Solid::new(mesh).ok()).map(|(mut shapes, solid)| {
+            shapes.push(Shape::new(&solid));
+            shapes
+        });
     }
     let (mesh, others) = (pieces[key].to_mesh(), TriangleBvh::new(&others));
     let least_depth_mm = rim_mm + RIB_MARGIN_MM;
-    let seat = Seat { key, mesh: &mesh, others: &others, shapes: &shapes, along, least_depth_mm };
-    let made = ribs(interference_mm, &seat, |p| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY));
+    let depth = |p: Vec3| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY);
+    let made = shapes.map_or_else(Default::default, |shapes| {
+        let seat = Seat { key, mesh: &mesh, others: &others, shapes: &shapes, along, least_depth_mm };
+        ribs(interference_mm, &seat, depth)
+    });
     if made.0.is_empty() {
         ctx.warn(Warning {
             code: "key-without-ribs".into(),

@@ -53,6 +53,9 @@ pub struct PressFit {
 }
 
 impl PressFit {
+    /// More than this presses nowhere on purpose, mm.
+    pub const MOST_INTERFERENCE_MM: f64 = 0.4;
+
     /// Whether `point`, mm, is so near that it can be part of what presses.
     pub fn reaches(&self, point: Vec3) -> bool {
         point.distance(Vec3::from_array(self.at)) < REACH_MM
