@@ -13,7 +13,8 @@ use zip::write::SimpleFileOptions;
 const MODEL: &str = "3D/3dmodel.model";
 const SETTINGS: [&str; 2] = ["Metadata/Slic3r_PE_model.config", "Metadata/model_settings.config"];
 
-fuzz_target!(|bytes: &[u8]| {
+// Panics that are caught and become an error are none: without this the first one would end the process.
+fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
     let (model, settings) = bytes.split_at(bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len()));
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);

@@ -15,7 +15,8 @@ const READERS: [&str; 6] = ["stl", "obj", "ply", "off", "gltf", ""];
 /// Larger meshes cost time and find nothing more.
 const MOST_TRIANGLES: usize = 2000;
 
-fuzz_target!(|bytes: &[u8]| {
+// Panics that are caught and become an error are none: without this the first one would end the process.
+fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
     static CHOSEN: LazyLock<Option<String>> = LazyLock::new(|| std::env::var("READER").ok());
     let is_chosen = |reader: &str| CHOSEN.as_deref().is_none_or(|chosen| chosen == reader);
     if is_chosen("labels") {

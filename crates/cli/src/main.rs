@@ -63,6 +63,13 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        // What becomes an error is told as one.
+        if !shellock_geom::boolean::is_guarded() {
+            tell(panic);
+        }
+    }));
     let session = Session { is_json: cli.json, shown: shown(&cli), stop: Arc::new(AtomicBool::new(false)) };
     let stop = Arc::clone(&session.stop);
     // Without a handler Ctrl-C would still end the program, only less tidily.

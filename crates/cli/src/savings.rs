@@ -30,8 +30,9 @@ const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height =
 const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
     supports_enable = 0\npad_enable = 0\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
     display_pixels_y = 1000\n";
-const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nperimeters = 2\nfill_density = 15%\n\
-    support_material = 1\nperimeter_speed = 45\ninfill_speed = 80\ntravel_speed = 150\nskirts = 0\n";
+const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\n";
+/// Instead of the slicer's 20 %.
+const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 
 /// `shellock report`.
 pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<u8, Failure> {
@@ -58,9 +59,12 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
             None => None,
         };
         let by = if sliced.is_some() { "PrusaSlicer" } else { "closed form" };
-        let [pieces_s, solid_s] = sliced.unwrap_or(printing.seconds());
-        let ratio = pieces_s / solid_s.max(f64::MIN_POSITIVE);
-        times.insert(printer.name, json!({ "by": by, "pieces_s": pieces_s, "solid_s": solid_s, "ratio": ratio }));
+        let [pieces_s, solid_s] = printing.seconds();
+        let Times { pieces_s, solid_s, filled_s } = sliced.unwrap_or(Times { pieces_s, solid_s, filled_s: None });
+        let ratio = |whole_s: f64| pieces_s / whole_s.max(f64::MIN_POSITIVE);
+        let told = json!({ "by": by, "pieces_s": pieces_s, "solid_s": solid_s, "ratio": ratio(solid_s),
+            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(ratio) });
+        times.insert(printer.name, told);
     }
     let volume: f64 = pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
     let told = json!({
@@ -92,7 +96,24 @@ fn print(told: &Value) {
             hours(&time["solid_s"]),
             time["by"].as_str().unwrap_or_default()
         );
+        if !time["filled_ratio"].is_null() {
+            println!(
+                "            {:5.1} % of {:.1} h where the solid is filled to 100 %",
+                percent(&time["filled_ratio"]),
+                hours(&time["filled_solid_s"])
+            );
+        }
     }
+}
+
+/// Print times, s.
+struct Times {
+    /// Of all plates.
+    pieces_s: f64,
+    /// Of the solid model, by filament with a fifth of its inside filled.
+    solid_s: f64,
+    /// Of the solid model, filled, where that is another.
+    filled_s: Option<f64>,
 }
 
 /// PrusaSlicer, and a folder for its files.
@@ -111,13 +132,13 @@ impl Slicer {
         Ok(Some(Self { folder }))
     }
 
-    /// Time for all plates among `files` and for the solid, s; `None` where the slicer refuses something.
+    /// Times for all plates among `files` and for the solid; `None` where the slicer refuses something.
     fn seconds(
         &self,
         printer: &Printer,
         files: Vec<(String, Vec<u8>)>,
         solid: &Solid,
-    ) -> Result<Option<[f64; 2]>, Failure> {
+    ) -> Result<Option<Times>, Failure> {
         let Some(laid) = lay_alone(printer, solid.mesh()) else { return Ok(None) };
         let object = NamedObject {
             name: "solid",
@@ -129,16 +150,19 @@ impl Slicer {
         let is_single = files.len() == 1;
         let plates =
             files.into_iter().filter(|(name, _)| is_single || name.starts_with("plates/")).map(|(_, bytes)| bytes);
-        let mut plates_s = 0.0;
+        let mut pieces_s = 0.0;
         for bytes in plates {
-            let Some(s) = self.seconds_of(printer, &bytes)? else { return Ok(None) };
-            plates_s += s;
+            let Some(s) = self.seconds_of(printer, &bytes, "")? else { return Ok(None) };
+            pieces_s += s;
         }
-        Ok(self.seconds_of(printer, &write_3mf(&[object]))?.map(|solid_s| [plates_s, solid_s]))
+        let whole = write_3mf(&[object]);
+        let Some(solid_s) = self.seconds_of(printer, &whole, "")? else { return Ok(None) };
+        let filled_s = if printer.process == Process::Fdm { self.seconds_of(printer, &whole, FILLED)? } else { None };
+        Ok(Some(Times { pieces_s, solid_s, filled_s }))
     }
 
-    /// Time for what a 3MF file holds, s.
-    fn seconds_of(&self, printer: &Printer, bytes: &[u8]) -> Result<Option<f64>, Failure> {
+    /// Time for what a 3MF file holds, s; `more` settings stand last.
+    fn seconds_of(&self, printer: &Printer, bytes: &[u8], more: &str) -> Result<Option<f64>, Failure> {
         let [model, settings, out] = ["job.3mf", "job.ini", "job.out"].map(|name| self.folder.path().join(name));
         let (text, export) = match printer.process {
             Process::Fdm => (FDM_SETTINGS, "--export-gcode"),
@@ -146,7 +170,7 @@ impl Slicer {
         };
         let first = if printer.process == Process::Fdm { "first_layer_height" } else { "initial_layer_height" };
         let layer = printer.layer_mm;
-        let text = format!("{text}{ROOMY}layer_height = {layer}\n{first} = {layer}\n");
+        let text = format!("{text}{ROOMY}layer_height = {layer}\n{first} = {layer}\n{more}");
         for (path, bytes) in [(&model, bytes), (&settings, text.as_bytes())] {
             fs::write(path, bytes).map_err(Failure::unwritable(path))?;
         }

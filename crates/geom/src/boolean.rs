@@ -3,6 +3,9 @@
 //! A [`Volume`] is a possibly empty region of space bounded by a manifold mesh; unions, intersections and differences of
 //! volumes are volumes, always. The library promises the topology of its results; [`Volume::to_mesh`] hands them on.
 
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use manifold_rust::csg_tree::CsgNode;
 use manifold_rust::linalg::Vec3 as V;
 use manifold_rust::manifold::Manifold;
@@ -247,18 +250,82 @@ impl Volume {
 ///
 /// Cost follows the pairs of triangles that cross; it is exact arithmetic. Fails where the mesh is open or not oriented.
 pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
-    let soup = Manifold::from_mesh_gl64_robust(&as_gl(mesh));
-    let refused = |made: &Manifold| NotAVolume { reason: format!("{:?}", made.status()) };
-    if soup.status() != Error::NoError {
-        return Err(refused(&soup));
-    }
-    let rebuilt = soup.rebuild_solid(WindingRule::Positive);
-    if rebuilt.status() == Error::NoError { Ok(Volume(rebuilt).to_mesh()) } else { Err(refused(&rebuilt)) }
+    guarded(mesh, |mesh| {
+        let soup = Manifold::from_mesh_gl64_robust(&as_gl(mesh));
+        let refused = |made: &Manifold| NotAVolume { reason: format!("{:?}", made.status()) };
+        if soup.status() != Error::NoError {
+            return Err(refused(&soup));
+        }
+        let rebuilt = soup.rebuild_solid(WindingRule::Positive);
+        if rebuilt.status() == Error::NoError { Ok(Volume(rebuilt).to_mesh()) } else { Err(refused(&rebuilt)) }
+    })
+    .and_then(|(rebuilt, turn)| Ok(turn.back(rebuilt?)))
 }
 
 /// Whether triangles of a closed mesh cross or lie upon each other: exact, where crossing in an edge counts too.
-pub fn touches_itself(mesh: &TriMesh) -> bool {
-    Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections()
+///
+/// Fails where the library cannot tell.
+pub fn touches_itself(mesh: &TriMesh) -> Result<bool, NotAVolume> {
+    guarded(mesh, |mesh| Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections())
+        .map(|(touches, _)| touches)
+}
+
+/// How many threads are within [`guarded`].
+static N_GUARDED: AtomicUsize = AtomicUsize::new(0);
+
+/// Whether a panic now may be one of the library's that becomes an error, so that a panic hook need not tell it.
+pub fn is_guarded() -> bool {
+    N_GUARDED.load(Ordering::Relaxed) > 0
+}
+
+/// A rotation that rounds no coordinate: the axes are passed on by some places, then half a turn about z or none.
+#[derive(Clone, Copy)]
+struct Turn {
+    n_places: usize,
+    is_half: bool,
+}
+
+impl Turn {
+    fn all() -> impl Iterator<Item = Self> {
+        [false, true].into_iter().flat_map(|is_half| (0..3).map(move |n_places| Self { n_places, is_half }))
+    }
+
+    fn half(self, p: Vec3) -> Vec3 {
+        if self.is_half { Vec3::new(-p.x, -p.y, p.z) } else { p }
+    }
+
+    fn forth(self, mut mesh: TriMesh) -> TriMesh {
+        for p in &mut mesh.points {
+            let mut axes = p.to_array();
+            axes.rotate_left(self.n_places);
+            *p = self.half(Vec3::from_array(axes));
+        }
+        mesh
+    }
+
+    fn back(self, mut mesh: TriMesh) -> TriMesh {
+        for p in &mut mesh.points {
+            let mut axes = self.half(*p).to_array();
+            axes.rotate_right(self.n_places);
+            *p = Vec3::from_array(axes);
+        }
+        mesh
+    }
+}
+
+/// What `work` makes of the mesh turned, and the turn.
+///
+/// The library casts rays in a dozen directions, and panics where each of them meets an edge, as on meshes of whole
+/// numbers; turned they go elsewhere.
+fn guarded<T>(mesh: &TriMesh, work: impl Fn(&TriMesh) -> T) -> Result<(T, Turn), NotAVolume> {
+    N_GUARDED.fetch_add(1, Ordering::Relaxed);
+    let tried = |turn: Turn| {
+        let turned = turn.forth(mesh.clone());
+        panic::catch_unwind(AssertUnwindSafe(|| work(&turned))).ok().map(|made| (made, turn))
+    };
+    let done = Turn::all().find_map(tried);
+    N_GUARDED.fetch_sub(1, Ordering::Relaxed);
+    done.ok_or_else(|| NotAVolume { reason: "the exact union gave up".into() })
 }
 
 fn as_gl(mesh: &TriMesh) -> MeshGL64 {

@@ -20,7 +20,8 @@ pub struct Options {
     out: PathBuf,
 }
 
-const HEAD: [&str; 8] = ["model", "pieces", "wall, mm", "material", "SLA time", "by", "FDM time", "by"];
+const HEAD: [&str; 9] =
+    ["model", "pieces", "wall, mm", "material", "SLA time", "by", "FDM time", "by", "FDM, solid filled"];
 
 const INTRODUCTION: &str = "# What kits save\n\n\
     Of finished kits, as `shellock report` tells it: material and print time of all pieces over those of the solid model (the paper's \
@@ -28,8 +29,9 @@ const INTRODUCTION: &str = "# What kits save\n\n\
     Pieces lie on plates as in `plates.3mf`, the solid in the pose that needs the least support. Resin printers with a display take \
     the same time for every layer, so there the height of the plates counts alone, and a solid that lies low leaves little to save; \
     filament printers pay for material and supports. Times by PrusaSlicer are its own estimates with 0.05 mm layers for resin \
-    without supports, and with 0.2 mm layers, 2 perimeters, 15 % infill and supports for filament. There, shells that lie with their skin \
-    up are filled with supports, which takes longer than hollowing saves; a solid with 15 % infill is mostly air already.\n\n";
+    without supports, and with its own defaults, 0.2 mm layers and supports for filament: a solid with 20 % of its inside filled is \
+    mostly air already, and shells that lie with their skin up are filled with supports, which takes longer than hollowing saves. The \
+    last column is over a solid that is filled to 100 %.\n\n";
 
 /// Writes the table; returns its file.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
@@ -60,6 +62,8 @@ fn cells(told: &Value) -> Option<Vec<String>> {
         let time = &told["print_time"][process];
         cells.extend([percent(&time["ratio"])?, time["by"].as_str()?.to_owned()]);
     }
+    let filled = &told["print_time"]["fdm"]["filled_ratio"];
+    cells.push(if filled.is_null() { "–".to_owned() } else { percent(filled)? });
     Some(cells)
 }
 
@@ -73,7 +77,7 @@ mod tests {
             "print_time": { "sla": { "ratio": 0.8, "by": "PrusaSlicer" }, "fdm": { "ratio": 1.2, "by": "closed form" } } }"#;
         let told: Value = serde_json::from_str(text).unwrap();
         let row = cells(&told).unwrap();
-        assert_eq!(row.join("|"), "cat.obj|9|1.60|19 %|80 %|PrusaSlicer|120 %|closed form");
+        assert_eq!(row.join("|"), "cat.obj|9|1.60|19 %|80 %|PrusaSlicer|120 %|closed form|–");
         assert_eq!(row.len(), HEAD.len());
         assert!(cells(&serde_json::json!({ "model": "cat.obj" })).is_none());
     }

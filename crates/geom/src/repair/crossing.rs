@@ -48,7 +48,7 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     let found = crossings(&draft.mesh);
     let shared = inspect_edges(&draft.mesh).shared;
     let (kind, count, at) = match (found.count, shared.count) {
-        (0, 0) => match touching(&draft.mesh) {
+        (0, 0) => match touching(&draft.mesh)? {
             Some((n_bodies, at)) => (RepairKind::Fused, n_bodies, at),
             None => return Ok(None),
         },
@@ -82,15 +82,20 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
 }
 
 /// How many bodies there are, and the middle of the second, where faces of several touch: [`crossings`] does not see that.
-fn touching(mesh: &TriMesh) -> Option<(usize, Vec3)> {
+fn touching(mesh: &TriMesh) -> Result<Option<(usize, Vec3)>, InputError> {
     /// Bodies that are compared two by two.
     const MAX_BODIES: usize = 1000;
     let bounds: Vec<Aabb> = inspect(mesh).bodies.iter().map(|body| body.bounds).collect();
     let n = bounds.len();
-    let are_near = (2..=MAX_BODIES).contains(&n)
-        && (0..n).any(|i| (0..i).any(|j| bounds[i].intersects(bounds[j])))
-        && boolean::touches_itself(mesh);
-    are_near.then(|| (n, bounds[1].center()))
+    let are_near = (2..=MAX_BODIES).contains(&n) && (0..n).any(|i| (0..i).any(|j| bounds[i].intersects(bounds[j])));
+    if !are_near {
+        return Ok(None);
+    }
+    let at = bounds[1].center();
+    match boolean::touches_itself(mesh) {
+        Ok(touches) => Ok(touches.then_some((n, at))),
+        Err(_) => Err(InputError::Crossing { count: 1, at }),
+    }
 }
 
 /// Triangles along a space-filling curve, in boxes of pairs of boxes.

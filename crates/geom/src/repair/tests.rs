@@ -257,3 +257,14 @@ fn repairs_say_what_how_many_and_where() {
     let text = repaired(&three).repairs[0].to_string();
     assert!(text.starts_with("1 small hole was closed, up to ") && text.contains("; first near ("), "{text}");
 }
+
+/// Found by fuzzing: from some points all rays that the library casts along axes and diagonals meet edges.
+#[test]
+fn tetrahedra_on_whole_numbers_are_united() {
+    let points = [[4, 2, 2], [0, 2, 0], [0, 0, 2], [3, 1, 1], [1, 1, 1], [2, 3, 2], [1, 3, 1], [1, 1, 3]];
+    let points = points.map(|p: [i8; 3]| Vec3::from_array(p.map(f64::from))).to_vec();
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 1, 2], [0, 3, 2], [4, 7, 6], [7, 5, 6], [5, 6, 4], [4, 7, 6]];
+    let mended = repaired(&TriMesh { points, triangles });
+    // 2 and 2/3, of which 1/120 is common.
+    assert!((mended.solid.volume() - 319.0 / 120.0).abs() < 1e-12, "{}", mended.solid.volume());
+}
