@@ -88,7 +88,7 @@ pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
     let by = |measure: fn(&Pose) -> f64| {
         let mut order: Vec<usize> = (0..fitting.len()).collect();
         order.sort_by(|&a, &b| measure(&fitting[b].1).total_cmp(&measure(&fitting[a].1)));
-        packed(printer, &fitting, order)
+        improved(printer, &fitting, order)
     };
     let (high, large) = (by(|pose| pose.bounds.size().z), by(Pose::footprint_mm2));
     let fitting_spots = if high.cost(&fitting) < large.cost(&fitting) { high } else { large };
@@ -119,10 +119,37 @@ impl Packing {
     }
 }
 
-fn packed(printer: &Printer, poses: &[(usize, Pose)], order: Vec<usize>) -> Packing {
+/// The packing of the best order that swaps of two pieces lead to.
+fn improved(printer: &Printer, poses: &[(usize, Pose)], mut order: Vec<usize>) -> Packing {
+    /// Orders that are tried: all swaps of 15 pieces twenty times, 0.1 s.
+    const MOST_TRIES: usize = 2000;
+    let mut best = packed(printer, poses, &order);
+    let mut cost = best.cost(poses);
+    let (mut n_tries, mut is_better) = (0, true);
+    while is_better {
+        is_better = false;
+        for (i, j) in (0..order.len()).flat_map(|i| (0..i).map(move |j| (i, j))) {
+            order.swap(i, j);
+            let other = packed(printer, poses, &order);
+            let other_cost = other.cost(poses);
+            if other_cost < cost {
+                (best, cost, is_better) = (other, other_cost, true);
+            } else {
+                order.swap(i, j);
+            }
+            n_tries += 1;
+            if n_tries == MOST_TRIES {
+                return best;
+            }
+        }
+    }
+    best
+}
+
+fn packed(printer: &Printer, poses: &[(usize, Pose)], order: &[usize]) -> Packing {
     let sides: Vec<[f64; 2]> = order.iter().map(|&at| [0, 1].map(|k| poses[at].1.bounds.size()[k] + GAP_MM)).collect();
     let [width, depth, _] = room_mm(printer);
-    Packing(order.into_iter().zip(pack([width + GAP_MM, depth + GAP_MM], &sides)).collect())
+    Packing(order.iter().copied().zip(pack([width + GAP_MM, depth + GAP_MM], &sides)).collect())
 }
 
 /// Whether a piece of this shape could be made by `printer` in some pose.
