@@ -78,6 +78,13 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
             return Err(no_plan(&reason, &blockers));
         }
     };
+    if let Some(asked) = options.pieces.filter(|asked| made.pieces.len() > asked + 1) {
+        let note = format!("{} pieces instead of {asked}: fewer would not lock", made.pieces.len());
+        if session.shown == Shown::ForPeople {
+            println!("note: {note}");
+        }
+        notes.push(note);
+    }
     let mut warnings = made.warnings.clone();
     display.show(Progress::Stage { name: "files and pictures", n_steps: 0 });
     let printing = Printing::of(&printer, made.pieces.as_slice(), &made.surface.mesh, &model.solid);

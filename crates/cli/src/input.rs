@@ -17,6 +17,8 @@ use crate::failure::Failure;
 const MAX_FILE_BYTES: u64 = 2 << 30;
 /// A file whose longest side lies in this range, in its own units, is taken to be in millimetres.
 const PLAUSIBLE_MM: std::ops::RangeInclusive<f64> = 20.0..=1000.0;
+/// Longest side of what is made, mm: beyond, hours and tens of GB.
+const MADE_MM: std::ops::RangeInclusive<f64> = 10.0..=2000.0;
 /// Longest side of everything else, mm.
 const DEFAULT_SIZE_MM: f64 = 150.0;
 
@@ -211,7 +213,7 @@ fn scale(options: &Options, loaded: &Loaded, bounds: Aabb, notes: &mut Vec<Strin
         }
     };
     let own_mm = loaded.unit_mm.unwrap_or(1.0);
-    Ok(match (options.size, options.height, options.scale, options.unit) {
+    let scale = match (options.size, options.height, options.scale, options.unit) {
         (Some(size), ..) => positive("size", size)? / longest,
         (_, Some(height), ..) => positive("height", height)? / along_up,
         (_, _, Some(scale), _) => positive("scale", scale)?,
@@ -221,7 +223,16 @@ fn scale(options: &Options, loaded: &Loaded, bounds: Aabb, notes: &mut Vec<Strin
             notes.push(guess(loaded.unit_mm, longest));
             DEFAULT_SIZE_MM / longest
         }
-    })
+    };
+    let made_mm = scale * longest;
+    if MADE_MM.contains(&made_mm) {
+        Ok(scale)
+    } else {
+        let (least, most) = (MADE_MM.start(), MADE_MM.end());
+        Err(Failure::Wrong(format!(
+            "the longest side would be {made_mm:.4e} mm; kits are made from {least} to {most} mm: choose with --size"
+        )))
+    }
 }
 
 /// What to say of a size that is no figure's.

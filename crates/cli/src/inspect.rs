@@ -26,9 +26,11 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
     let found = inspection(&weld(&loaded.mesh).mesh);
     let labellings: Vec<String> = loaded.labellings.iter().map(|l| l.source.to_string()).collect();
     if !session.is_json {
-        println!("{} file, {} faces, {} bodies", loaded.format, loaded.n_file_faces(), found.bodies.len());
+        let n = found.bodies.len();
+        let bodies = if n == 1 { "body" } else { "bodies" };
+        println!("{} file, {} faces, {n} {bodies}", loaded.format, loaded.n_file_faces());
         println!("size {:.4} × {:.4} × {:.4} file units{}", size.x, size.y, size.z, unit(&loaded));
-        println!("{} open edges, {} shared edges", found.edges.open.count, found.edges.shared.count);
+        println!("{} open edges, {} edges of more than two faces", found.edges.open.count, found.edges.shared.count);
         if !labellings.is_empty() {
             println!("divided by {}", labellings.join(", "));
         }

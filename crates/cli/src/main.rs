@@ -51,23 +51,29 @@ impl Session {
 const MOST_THREADS: usize = 256;
 
 fn main() -> ExitCode {
+    let wants_json = std::env::args_os().any(|word| word == "--json");
     let cli = match config::command_line(std::env::args_os().collect()) {
         Ok(cli) => cli,
         Err(config::Refusal::Arguments(e)) => {
             let is_help = matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
+            if !is_help && wants_json {
+                let text = e.render().to_string();
+                return refuse(true, text.trim().trim_start_matches("error: "), 2);
+            }
             let _ = e.print();
             return ExitCode::from(if is_help { 0 } else { 2 });
         }
-        Err(config::Refusal::File(problem)) => {
-            eprintln!("error: {problem}");
-            return ExitCode::from(2);
-        }
+        Err(config::Refusal::File(problem)) => return refuse(wants_json, &problem.to_string(), 2),
     };
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         // What becomes an error is told as one.
-        if !shellock_geom::boolean::is_guarded() {
-            tell(panic);
+        if shellock_geom::boolean::is_guarded() {
+            return;
+        }
+        match panic.payload().downcast_ref::<String>().filter(|what| what.starts_with("failed printing to stdout")) {
+            Some(what) => unprinted(what),
+            None => tell(panic),
         }
     }));
     let session = Session { is_json: cli.json, shown: shown(&cli), stop: Arc::new(AtomicBool::new(false)) };
@@ -83,13 +89,27 @@ fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
             let code = failure.exit_code();
-            if session.is_json {
-                println!("{}", json!({ "status": "error", "error": failure.to_string(), "exit_code": code }));
-            }
-            eprintln!("error: {failure}");
-            ExitCode::from(code)
+            refuse(session.is_json, &failure.to_string(), code)
         }
     }
+}
+
+/// Says what is wrong: one JSON object on standard output, or a line on standard error.
+fn refuse(is_json: bool, problem: &str, code: u8) -> ExitCode {
+    if is_json {
+        println!("{}", json!({ "status": "error", "error": problem, "exit_code": code }));
+    } else {
+        eprintln!("error: {problem}");
+    }
+    ExitCode::from(code)
+}
+
+/// Ends where standard output takes no more: a full disk is told, a reader that has seen enough is not.
+fn unprinted(what: &str) -> ! {
+    if !what.contains("Broken pipe") {
+        eprintln!("error: {what}");
+    }
+    std::process::exit(4)
 }
 
 /// Events go with JSON; what is quiet shows neither.

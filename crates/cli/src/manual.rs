@@ -1,7 +1,7 @@
 //! Completions and manual pages, made from the same declarations as the command line.
 
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use clap::CommandFactory;
@@ -14,9 +14,9 @@ use crate::stages::write as write_file;
 pub fn completions(shell: clap_complete::Shell) -> u8 {
     let mut bytes = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "shellock", &mut bytes);
+    let mut out = std::io::stdout();
     // A reader that closes the pipe has seen enough.
-    let _ = std::io::stdout().write_all(&bytes);
-    0
+    u8::from(out.write_all(&bytes).and_then(|()| out.flush()).is_err_and(|e| e.kind() != ErrorKind::BrokenPipe)) * 4
 }
 
 /// `shellock manual`: `shellock.1` and a page for each command.

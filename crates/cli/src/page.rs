@@ -52,7 +52,7 @@ pub fn report(
             facts: piece_facts(design, summary, p),
         })
         .collect();
-    let facts = kit_facts(model, params, design, summary, stand);
+    let facts = kit_facts(&shown, params, design, summary, stand);
     let checks = design
         .verification
         .checks
@@ -62,7 +62,7 @@ pub fn report(
     let quantities = quantities(design, summary);
     let data =
         ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
-    let booklet = Booklet { title: title(&model.name), lines: cover_lines(model, design), pieces: data.pieces.clone() };
+    let booklet = Booklet { title: title(&model.name), lines: cover_lines(&shown), pieces: data.pieces.clone() };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),
         || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
@@ -89,14 +89,14 @@ fn shown(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
 
 /// What a person wants to know of the kit.
 fn kit_facts(
-    model: &Model,
+    shown: &[TriMesh],
     params: &Params,
     design: &Design,
     summary: &Summary,
     stand: impl Fn(Vec3) -> Vec3,
 ) -> Vec<(String, String)> {
     let mut facts: Vec<(String, String)> = vec![
-        ("size".into(), size(model)),
+        ("size".into(), size(shown)),
         ("pieces".into(), design.pieces.len().to_string()),
         ("wall".into(), format!("{:.2} mm", design.thickness_mm)),
         ("connectors".into(), format!("{} mm", connector_sizes(design))),
@@ -110,9 +110,10 @@ fn kit_facts(
     facts
 }
 
-fn size(model: &Model) -> String {
-    let size = model.solid.mesh().bounds().size();
-    format!("{:.1} × {:.1} × {:.1} mm", size.x, size.y, size.z)
+/// Of what stands assembled.
+fn size(shown: &[TriMesh]) -> String {
+    let size = shown.iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds())).size();
+    format!("{:.1} × {:.1} × {:.1} mm high", size.x, size.y, size.z)
 }
 
 /// A file's name as a heading.
@@ -121,9 +122,9 @@ fn title(name: &str) -> String {
 }
 
 /// What a person who builds the thing wants to know of it.
-fn cover_lines(model: &Model, design: &Design) -> Vec<String> {
+fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
     vec![
-        format!("{} pieces, {}", design.pieces.len(), size(model)),
+        format!("{} pieces, {}", shown.len(), size(shown)),
         "no glue: each piece locks those before it; the last one, the key, locks all".to_owned(),
     ]
 }

@@ -195,6 +195,42 @@ fn completions_and_manual_pages_name_every_command_and_option() {
 }
 
 #[test]
+fn refusals_are_json_where_asked_for_and_sizes_have_limits() {
+    let dir = tempfile::tempdir().unwrap();
+    assert_eq!(code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])), 0);
+    for words in [
+        &["inspect", "t.stl", "--size", "1e9", "--json"][..],
+        &["inspect", "t.stl", "--size", "1", "--json"],
+        &["inspect", "none.stl", "--json"],
+        &["bild", "--json"],
+    ] {
+        let o = shellock(dir.path(), words);
+        assert_eq!(code(&o), 2);
+        let told: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
+        assert!(told["error"].as_str().is_some_and(|e| !e.is_empty()), "{told}");
+        assert!(
+            errors(&o).lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()),
+            "{}",
+            errors(&o)
+        );
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_nobody_takes_is_no_panic() {
+    let dir = tempfile::tempdir().unwrap();
+    assert_eq!(code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])), 0);
+    for words in [&["inspect", "t.stl"][..], &["completions", "bash"]] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_shellock"));
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let o = command.current_dir(dir.path()).args(words).stdout(full).output().unwrap();
+        assert_eq!(code(&o), 4, "{}", errors(&o));
+        assert!(!errors(&o).contains("panicked"), "{}", errors(&o));
+    }
+}
+
+#[test]
 fn progress_is_lines_or_events_or_nothing() {
     let dir = tempfile::tempdir().unwrap();
     assert_eq!(code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])), 0);

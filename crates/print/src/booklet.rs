@@ -12,7 +12,7 @@ use shellock::report::{ReportPiece, exploded_shifts, from_inside};
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::pdf::{Color, PAGE_MM, Page, Style, document, width_mm};
-use view::{Sight, sights};
+use view::{Sight, side, sights};
 
 /// Free rim of a page, mm.
 const RIM_MM: f64 = 14.0;
@@ -99,12 +99,14 @@ impl Booklet<'_> {
     fn cover(&self, drawn: &[Drawn<'_>]) -> Page {
         let mut page = Page::new();
         page.text([RIM_MM, 30.0], bold(11.0, INK), &self.title);
-        for (i, line) in self.lines.iter().enumerate() {
+        let seen = format!("in these pictures it is seen from {}", side(-Camera::front().direction));
+        let lines: Vec<&String> = self.lines.iter().chain([&seen]).collect();
+        for (i, line) in lines.iter().enumerate() {
             page.text([RIM_MM, 40.0 + 6.0 * i as f64], Style { size_mm: 4.2, is_bold: false, color: FAINT }, line);
         }
         let in_order: Vec<ReportPiece<'_>> = drawn.iter().map(|d| d.piece.clone()).collect();
         let (together, apart) = (vec![Vec3::ZERO; drawn.len()], exploded_shifts(&in_order));
-        let top = 46.0 + 6.0 * self.lines.len() as f64;
+        let top = 46.0 + 6.0 * lines.len() as f64;
         let height = 0.5 * (PAGE_MM[1] - RIM_MM - top);
         let width = PAGE_MM[0] - 2.0 * RIM_MM;
         for (i, shifts) in [together, apart].iter().enumerate() {
@@ -121,14 +123,15 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let grid = if drawn.len() > PIECES[0] * PIECES[1] { MANY_PIECES } else { PIECES };
     let cell = cell_mm(grid, 14.0);
     let picture_mm = (cell[1] - 14.0).min(cell[0] - 4.0);
-    let side = (picture_mm * OTHER_DENSITY) as usize;
+    let n_pixels = (picture_mm * OTHER_DENSITY) as usize;
     let mut by_number: Vec<&Drawn<'_>> = drawn.iter().collect();
     by_number.sort_by_key(|d| d.piece.id);
-    let pictures: Vec<Image> = by_number.par_iter().map(|d| from_inside(d.piece, &d.normals, middle, side)).collect();
+    let pictures: Vec<Image> =
+        by_number.par_iter().map(|d| from_inside(d.piece, &d.normals, middle, n_pixels)).collect();
     let mut cells = by_number.into_iter().zip(pictures).peekable();
     let mut pages = Vec::new();
     while cells.peek().is_some() {
-        let mut page = headed("Pieces", "seen from inside; each carries its number on its inner side");
+        let mut page = headed("Pieces", "each carries its number on its inner side");
         for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
             let [x, y] = corner_mm(i, grid, cell, 14.0);
             page.picture([x + 0.5 * (cell[0] - picture_mm), y + 12.0], picture_mm, picture);

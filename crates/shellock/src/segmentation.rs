@@ -80,10 +80,7 @@ impl SegmentationParams {
     pub fn problems(&self) -> Vec<String> {
         let mut found = Vec::new();
         if self.n_pieces.is_some_and(|n| !(2..=MOST_PIECES).contains(&n)) {
-            found.push(format!(
-                "n_pieces is {}, but must be from 2 to {MOST_PIECES}",
-                self.n_pieces.unwrap_or_default()
-            ));
+            found.push(format!("pieces is {}, but must be from 2 to {MOST_PIECES}", self.n_pieces.unwrap_or_default()));
         }
         for (name, value, low, high) in [
             ("smoothing_mm2", self.smoothing_mm2, 0.0, 100.0),

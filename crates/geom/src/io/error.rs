@@ -50,6 +50,12 @@ pub enum ReadError {
         /// Its id in the file.
         id: String,
     },
+    /// Something else that people have lying beside their models.
+    #[error("this is {what}, not a model; give the model itself as STL, OBJ, PLY, OFF, 3MF or glTF")]
+    NotAModel {
+        /// What it is.
+        what: &'static str,
+    },
     /// Neither the content nor the extension says what it is.
     #[error("the content is neither STL, OBJ, PLY, OFF, 3MF nor glTF; export the model in one of these formats")]
     UnknownFormat,

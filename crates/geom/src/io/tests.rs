@@ -200,6 +200,13 @@ fn what_a_file_is_wrapped_in_makes_no_difference() {
     assert!(matches!(read(&packed[..packed.len() - 9]), Err(ReadError::Damaged { .. })));
     assert_eq!(read(" \r\n"), Err(ReadError::Empty));
     assert_eq!(read("hello"), Err(ReadError::UnknownFormat));
+    for (text, what) in [
+        (" <!DOCTYPE html><html>", "a web page"),
+        ("%PDF-1.7", "a PDF document"),
+        ("G28\nG1 X1", "G-code for a printer"),
+    ] {
+        assert_eq!(read(text), Err(ReadError::NotAModel { what }));
+    }
 }
 
 #[test]

@@ -20,6 +20,8 @@ pub(super) struct Model {
     pub(super) objects: Vec<Object>,
     /// What is built.
     pub(super) items: Vec<Component>,
+    /// What the slicer was told not to print.
+    switched_off: Vec<Component>,
     /// Colours of each colour group, by part and id.
     pub(super) color_groups: BTreeMap<(u32, u32), Vec<String>>,
     pub(super) notes: Vec<String>,
@@ -90,11 +92,18 @@ impl Model {
             unit_mm: 1.0,
             objects: Vec::new(),
             items: Vec::new(),
+            switched_off: Vec::new(),
             color_groups: BTreeMap::new(),
             notes: Vec::new(),
             parts: Vec::new(),
         };
         model.read_part(name.trim_start_matches('/'), package)?;
+        let off = std::mem::take(&mut model.switched_off);
+        if model.items.is_empty() {
+            model.items = off;
+        } else if !off.is_empty() {
+            model.notes.push(format!("objects that the slicer is not to print: {}; left out", off.len()));
+        }
         Ok(model)
     }
 
@@ -165,7 +174,8 @@ impl PartReader<'_, '_> {
                 (b"component", Some(object), _) => object.components.push(self.read_component(&element)?),
                 (b"item", None, _) => {
                     let item = self.read_component(&element)?;
-                    self.model.items.push(item);
+                    let is_off = self.string(&element, "printable")? == "0";
+                    if is_off { &mut self.model.switched_off } else { &mut self.model.items }.push(item);
                 }
                 _ => {}
             }
