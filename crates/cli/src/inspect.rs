@@ -51,7 +51,8 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
             "divided_by": labellings, "is_sound": is_sound, "repairs": repairs, "notes": notes, "warnings": thin,
             "can_be_made": model.is_ok(), "error": error });
         println!("{value}");
-        return model.map(|_| 0);
+        // Why not is in what was printed.
+        return Ok(model.err().map_or(0, |failure| failure.exit_code()));
     }
     let model = model?;
     model.notes.iter().for_each(|note| println!("note: {note}"));

@@ -62,11 +62,12 @@ impl Printing {
     pub fn warnings(&self) -> Option<Warning> {
         let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| PatchId(i as u32)).collect();
         let names: Vec<String> = pieces.iter().map(ToString::to_string).collect();
-        let message = format!(
-            "piece {} does not fit the printer {}; it is left out of plates.3mf: choose more pieces (--pieces) or another printer",
-            names.join(", "),
-            described(&self.printer)
-        );
+        let (names, printer) = (names.join(", "), described(&self.printer));
+        let what = match pieces.len() {
+            1 => format!("piece {names} does not fit the printer {printer}; it is"),
+            _ => format!("pieces {names} do not fit the printer {printer}; they are"),
+        };
+        let message = format!("{what} left out of plates.3mf: choose more pieces (--pieces) or another printer");
         (!pieces.is_empty()).then(|| Warning { code: "piece-too-large".into(), message, pieces, at: None })
     }
 
@@ -78,12 +79,15 @@ impl Printing {
             Process::Sls => String::new(),
             _ => format!("; {:.1} cm² of the outer skin need support", outer_mm2 / 100.0),
         };
-        format!(
-            "plates.3mf: {n} {} of {}{supports}; print time about {:.0} % of the solid model's (closed form; `shellock report` asks PrusaSlicer)",
-            if n == 1 { "plate" } else { "plates" },
-            described(&self.printer),
-            100.0 * self.time_ratio()
-        )
+        let ratio = 100.0 * self.time_ratio();
+        let time = match self.plates.too_large.len() {
+            0 => format!(
+                "; print time about {ratio:.0} % of the solid model's (closed form; `shellock report` asks PrusaSlicer)"
+            ),
+            n => format!("; {n} pieces are not on them"),
+        };
+        let plates = if n == 1 { "plate" } else { "plates" };
+        format!("plates.3mf: {n} {plates} of {}{supports}{time}", described(&self.printer))
     }
 
     /// For plan.json.
