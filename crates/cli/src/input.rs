@@ -17,7 +17,7 @@ use crate::failure::Failure;
 const MAX_FILE_BYTES: u64 = 2 << 30;
 /// A file whose longest side lies in this range, in its own units, is taken to be in millimetres.
 const PLAUSIBLE_MM: std::ops::RangeInclusive<f64> = 20.0..=1000.0;
-/// Longest side of what is made, mm: beyond, hours and tens of GB.
+/// Longest side of what is made, mm: a torus of 2000 mm already takes 8 GB and more than three minutes.
 const MADE_MM: std::ops::RangeInclusive<f64> = 10.0..=2000.0;
 /// Longest side of everything else, mm.
 const DEFAULT_SIZE_MM: f64 = 150.0;
