@@ -79,7 +79,8 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
         }
     };
     if let Some(asked) = options.pieces.filter(|asked| made.pieces.len() > asked + 1) {
-        let note = format!("{} pieces instead of {asked}: fewer would not lock", made.pieces.len());
+        let note =
+            format!("{} pieces instead of {asked}: some were divided until every piece locks", made.pieces.len());
         if session.shown == Shown::ForPeople {
             println!("note: {note}");
         }

@@ -195,9 +195,7 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<Solid, Failure> {
         let all: Vec<&str> = shellock::figure::Figure::ALL.iter().map(|f| f.name()).collect();
         Failure::Wrong(format!("there is no figure \"{name}\"; choose one of {}", all.join(", ")))
     })?;
-    if !(10.0..=2000.0).contains(&size_mm) {
-        return Err(Failure::Wrong(format!("size is {size_mm} mm; it must lie between 10 and 2000 mm")));
-    }
+    check_size(size_mm)?;
     Ok(shellock::figure::make(figure, size_mm, size_mm / CELLS))
 }
 
@@ -224,15 +222,18 @@ fn scale(options: &Options, loaded: &Loaded, bounds: Aabb, notes: &mut Vec<Strin
             DEFAULT_SIZE_MM / longest
         }
     };
-    let made_mm = scale * longest;
-    if MADE_MM.contains(&made_mm) {
-        Ok(scale)
-    } else {
-        let (least, most) = (MADE_MM.start(), MADE_MM.end());
-        Err(Failure::Wrong(format!(
-            "the longest side would be {made_mm:.4e} mm; kits are made from {least} to {most} mm: choose with --size"
-        )))
+    check_size(scale * longest)?;
+    Ok(scale)
+}
+
+fn check_size(longest_mm: f64) -> Result<(), Failure> {
+    if MADE_MM.contains(&longest_mm) {
+        return Ok(());
     }
+    let (least, most) = (MADE_MM.start(), MADE_MM.end());
+    Err(Failure::Wrong(format!(
+        "the longest side would be {longest_mm:.4e} mm; it must lie between {least} and {most} mm: choose with --size"
+    )))
 }
 
 /// What to say of a size that is no figure's.

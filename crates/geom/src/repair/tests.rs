@@ -265,6 +265,8 @@ fn tetrahedra_on_whole_numbers_are_united() {
     let points = points.map(|p: [i8; 3]| Vec3::from_array(p.map(f64::from))).to_vec();
     let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 1, 2], [0, 3, 2], [4, 7, 6], [7, 5, 6], [5, 6, 4], [4, 7, 6]];
     let mended = repaired(&TriMesh { points, triangles });
+    let bounds = mended.solid.mesh().bounds();
+    assert_eq!((bounds.min, bounds.max), (Vec3::ZERO, Vec3::new(4.0, 3.0, 3.0)));
     // 2 and 2/3, of which 1/120 is common.
     assert!((mended.solid.volume() - 319.0 / 120.0).abs() < 1e-12, "{}", mended.solid.volume());
 }

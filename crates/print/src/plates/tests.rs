@@ -76,3 +76,29 @@ fn nothing_needs_no_plate_and_a_flat_mesh_is_no_piece() {
     let flat = TriMesh { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
     assert_eq!(lay(&Printer::sla(), &[printable(&flat, |_| true)]).too_large, [0]);
 }
+
+#[test]
+fn swaps_make_plates_no_worse_and_lose_no_piece() {
+    let printer = Printer { bed_mm: [100.0, 80.0, 100.0], ..Printer::sla() };
+    let room = room_mm(&printer);
+    let mut n_better = 0;
+    for seed in 0..6 {
+        let side = |i: u32, factor: u32, range: u32| f64::from(10 + (i + 7 * seed) * factor % range);
+        let boxes: Vec<TriMesh> =
+            (0..12).map(|i| cuboid([0.0; 3], [side(i, 37, 50), side(i, 53, 40), side(i, 29, 20)]).to_mesh()).collect();
+        let poses: Vec<(usize, Pose)> = boxes
+            .iter()
+            .map(|mesh| orient::best(&printer, &printable(mesh, |_| false), room).unwrap())
+            .enumerate()
+            .collect();
+        let order: Vec<usize> = (0..poses.len()).collect();
+        let before = packed(&printer, &poses, &order).cost(&poses);
+        let after = improved(&printer, &poses, order.clone());
+        assert!(after.cost(&poses) <= before);
+        n_better += usize::from(after.cost(&poses) < before);
+        let mut packed: Vec<usize> = after.0.iter().map(|(at, _)| *at).collect();
+        packed.sort_unstable();
+        assert_eq!(packed, order);
+    }
+    assert!(n_better >= 3, "{n_better}");
+}

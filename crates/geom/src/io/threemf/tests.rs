@@ -86,6 +86,16 @@ fn colours_and_materials_divide_and_supports_are_left_out() {
 }
 
 #[test]
+fn what_is_not_to_print_is_left_out_unless_nothing_else_is_there() {
+    let resources = format!(r#"<object id="1">{TETRAHEDRON}</object><object id="2">{TETRAHEDRON}</object>"#);
+    let loaded = read_model(&resources, r#"<item objectid="1"/><item objectid="2" printable="0"/>"#).unwrap();
+    assert_eq!(loaded.mesh.triangles.len(), 4);
+    assert!(loaded.notes.iter().any(|n| n.contains("not to print")), "{:?}", loaded.notes);
+    let alone = read_model(&resources, r#"<item objectid="2" printable="0"/>"#).unwrap();
+    assert_eq!(alone.mesh.triangles.len(), 4);
+}
+
+#[test]
 fn paint_of_both_kinds_of_slicers_becomes_triangles_with_labels() {
     for attribute in ["slic3rpe:mmu_segmentation", "paint_color"] {
         // Three sides split; the corner at point 0 has colour 2, all else is unpainted.
