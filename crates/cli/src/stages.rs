@@ -318,3 +318,19 @@ pub fn figure(name: &str, out: &Path, size_mm: f64) -> Result<u8, Failure> {
     println!("{name}, {size_mm} mm, {} triangles, written to {}", solid.mesh().triangles.len(), out.display());
     Ok(0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn press_fits_are_read_strictly_and_none_is_deeper_than_any_is_made() {
+        let fit = |interference_mm: f64| json!({ "kind": "rib", "piece": 3, "at": [0.0, 0.0, 0.0], "interference_mm": interference_mm, "travel_mm": 2.0 });
+        let n_read = |fits: Value| press_fits_of(&json!({ "press_fits": fits })).map(|fits| fits.len());
+        assert_eq!(n_read(Value::Null), Ok(0));
+        assert_eq!(n_read(json!([fit(0.08)])), Ok(1));
+        assert!(n_read(json!([fit(0.08), fit(0.5)])).unwrap_err().contains("0.5 mm"));
+        assert!(n_read(json!([fit(-0.1)])).is_err() && n_read(json!([3])).is_err());
+    }
+}

@@ -101,3 +101,24 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
     let check = Check::new("nothing outside the model", ok, format!("{volume_mm3:.3} mm³"));
     (check, (!ok).then_some(Finding::Outside { volume_mm3 }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::piece::PressFitKind;
+    use shellock_geom::Aabb;
+
+    #[test]
+    fn a_press_fit_explains_what_it_takes_and_nothing_larger_or_elsewhere() {
+        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let piece = PatchId(1);
+        let fit = PressFit { kind: PressFitKind::Rib, piece, at: [0.0; 3], interference_mm: 0.2, travel_mm: 2.0 };
+        let floor = cuboid([-9.0, -9.0, -9.0], [9.0, 9.0, 0.0]);
+        let shared_with = |bump: Volume| shared(&floor, &bump, &[&fit]).volume();
+        assert_eq!(shared_with(cuboid([-0.5, -0.5, -0.2], [0.5, 0.5, 3.0])), 0.0);
+        let large = shared_with(cuboid([-1.0, -1.0, -0.4], [1.0, 1.0, 3.0]));
+        assert!((large - 1.6).abs() < 1e-9, "{large}");
+        let elsewhere = shared_with(cuboid([7.0, 7.0, -0.2], [8.0, 8.0, 3.0]));
+        assert!((elsewhere - 0.2).abs() < 1e-9, "{elsewhere}");
+    }
+}
