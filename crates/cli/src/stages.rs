@@ -184,6 +184,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let press_fits = press_fits_of(&plan).map_err(|what| broken(&what))?;
     let assembly = Assembly { model: &solid, pieces: &pieces, plan: &order, press_fits: &press_fits };
     let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &assembly)?;
+    shellock::play::trial(&ctx, &pieces, &order, params.clearance_mm);
     let rim_mm = BodyParams::default().rim_mm;
     let gaps = kit_gaps(&ctx, &solid, &pieces, &order, rim_mm)?;
     let claimed = certify(files, &pieces, &order, &contacts, &verdict, &gaps, params.clearance_mm);

@@ -26,6 +26,7 @@ use crate::verify::{Finding, Motion, Verification};
 use crate::{IdVec, PatchId};
 use proof::prove;
 pub use rattle::{Play, play_alone, play_together};
+pub(crate) use rattle::centroid;
 
 /// What [`Certificate::format`] says.
 pub const FORMAT: &str = "shellock-certificate";

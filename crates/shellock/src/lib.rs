@@ -17,6 +17,7 @@ pub mod key;
 pub mod metric;
 pub mod params;
 pub mod piece;
+pub mod play;
 pub mod pipeline;
 pub mod plan;
 pub mod push;

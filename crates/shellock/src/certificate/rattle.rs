@@ -147,7 +147,7 @@ const WAYS: [Way; 14] = [
 ];
 
 /// Centre of the volume; that of the box where there is none.
-fn centroid(mesh: &TriMesh) -> Vec3 {
+pub(crate) fn centroid(mesh: &TriMesh) -> Vec3 {
     let origin = mesh.bounds().center();
     let (mut moment, mut volume) = (Vec3::ZERO, 0.0);
     for face in 0..mesh.triangles.len() {

@@ -13,6 +13,8 @@
 //! Each part ends: gaps are widened by some nanometres, each by its own, so that no more limits meet in a corner than it
 //! takes and every edge has a length; coming back does the like with the forces; and every round looks at more contacts.
 //!
+//! Bounds may come late: until a contact is looked at, no more than a lower end of its bound needs to be known.
+//!
 //! The next objective begins at the corner of the last one, so objectives that are alike should follow each other. Box
 //! limits [`FAR_MM`] away give the first corner.
 
@@ -57,24 +59,38 @@ const PAD: usize = 6;
 /// The corner of the allowed motions that the last objective led to.
 #[derive(Clone)]
 pub(crate) struct Corner<'a> {
-    limits: &'a Limits,
+    limits: &'a Limits<'a>,
     x: Vec<f64>,
     active: Vec<usize>,
     /// Columns of the inverse of the matrix whose rows are those of `active`: the edges of the corner.
     edges: Vec<Vec<f64>>,
     looked_at: Vec<usize>,
     is_looked_at: Vec<bool>,
+    /// Of all limits, as far as they are known; mm.
+    bounds_mm: Vec<f64>,
+    /// Rows whose bound is known.
+    is_settled: Vec<bool>,
     n_exchanges: usize,
 }
 
 /// What ends motions: first the contact rows, then a side of the box above and one below for each unknown.
-pub(crate) struct Limits {
+pub(crate) struct Limits<'a> {
     n: usize,
     n_rows: usize,
     all: Vec<Limit>,
+    /// The bound of a row, mm, infinite for none; where there is none, bounds are those of `all`.
+    late: Option<&'a LateBound<'a>>,
 }
 
-impl Limits {
+/// The bound of a contact row, mm; infinite where it ends nothing.
+pub(crate) type LateBound<'a> = dyn Fn(usize) -> f64 + Sync + 'a;
+
+impl<'a> Limits<'a> {
+    /// Contact rows stay below the bounds that `late_mm` tells when they are looked at, at least `gaps_mm` ≥ 0, one a row.
+    pub fn late(system: &System, gaps_mm: &[f64], late_mm: &'a LateBound<'a>) -> Self {
+        Self { late: Some(late_mm), ..Self::new(system, gaps_mm) }
+    }
+
     /// Contact rows stay below `gaps_mm`, one a row, ≥ 0.
     pub fn new(system: &System, gaps_mm: &[f64]) -> Self {
         let n = system.n;
@@ -89,7 +105,8 @@ impl Limits {
             Limit { wrench: [sign, 0.0, 0.0, 0.0, 0.0, 0.0], plus: i / 2, minus: n, bound_mm: FAR_MM }
         };
         let contacts = system.rows.iter().zip(gaps_mm).enumerate().map(contact);
-        Self { n, n_rows: system.rows.len(), all: contacts.chain((0..2 * n).map(side)).collect() }
+        let all = contacts.chain((0..2 * n).map(side)).collect();
+        Self { n, n_rows: system.rows.len(), all, late: None }
     }
 }
 
@@ -100,7 +117,7 @@ fn scattered(i: usize) -> f64 {
 
 impl<'a> Corner<'a> {
     /// Any corner.
-    pub fn new(limits: &'a Limits) -> Self {
+    pub fn new(limits: &'a Limits<'a>) -> Self {
         let Limits { n, n_rows, .. } = *limits;
         let edge = |i: usize| (0..n + PAD).map(|k| f64::from(u8::from(i == k))).collect();
         let mut corner = Self {
@@ -110,6 +127,8 @@ impl<'a> Corner<'a> {
             edges: (0..n).map(edge).collect(),
             looked_at: (n_rows..n_rows + 2 * n).collect(),
             is_looked_at: vec![false; n_rows],
+            bounds_mm: limits.all.iter().map(|limit| limit.bound_mm).collect(),
+            is_settled: vec![limits.late.is_none(); n_rows],
             n_exchanges: 0,
         };
         // All sides that meet here push against this objective.
@@ -119,12 +138,34 @@ impl<'a> Corner<'a> {
 
     /// The greatest `objective · x`; `None` where it has no end.
     pub fn farthest(&mut self, objective: &DVector<f64>) -> Option<f64> {
+        self.ended(objective).map(|_| dot(objective.as_slice(), &self.x))
+    }
+
+    /// Rows with the forces that show how far `objective · x` goes: they add up to the objective, but for rounding. `None` where it has
+    /// no end.
+    pub fn ended(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.go_farthest(objective.as_slice());
+        self.ending(objective)
+    }
+
+    /// As [`Corner::ended`], by the rows alone that were looked at before: no nearer an end, and sooner found.
+    pub fn ended_by_known(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
+        self.climb(objective.as_slice());
+        self.ending(objective)
+    }
+
+    /// The motion of the corner.
+    pub fn motion(&self) -> &[f64] {
+        &self.x[..self.limits.n]
+    }
+
+    /// Rows with forces in the corner that was found for an objective.
+    fn ending(&self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         let forces = self.forces(objective.as_slice());
         let least = STRENGTHENED * objective.norm();
-        let has_end =
-            self.active.iter().zip(forces).all(|(&limit, force)| limit < self.limits.n_rows || force <= least);
-        has_end.then(|| dot(objective.as_slice(), &self.x))
+        let pushing = || self.active.iter().copied().zip(forces.iter().copied());
+        let has_end = pushing().all(|(limit, force)| limit < self.limits.n_rows || force <= least);
+        has_end.then(|| pushing().filter(|(limit, force)| *limit < self.limits.n_rows && *force > 0.0).collect())
     }
 
     fn go_farthest(&mut self, objective: &[f64]) {
@@ -183,8 +224,7 @@ impl<'a> Corner<'a> {
 
     /// How far the corner is from the limit, mm.
     fn room_mm(&self, limit: usize) -> f64 {
-        let limit = &self.limits.all[limit];
-        limit.bound_mm - limit.along(&self.x)
+        self.bounds_mm[limit] - self.limits.all[limit].along(&self.x)
     }
 
     /// Of what is looked at, the limit that the corner overdraws most.
@@ -232,7 +272,7 @@ impl<'a> Corner<'a> {
         }
         self.x.fill(0.0);
         for (edge, &limit) in self.edges.iter().zip(&self.active) {
-            let bound_mm = self.limits.all[limit].bound_mm;
+            let bound_mm = self.bounds_mm[limit];
             self.x.iter_mut().zip(edge).for_each(|(x, e)| *x += bound_mm * e);
         }
     }
@@ -256,22 +296,49 @@ impl<'a> Corner<'a> {
     /// Looks at the contact of each pair of pieces that the corner overdraws most: its neighbours would say the same.
     /// Whether there is any that was not looked at before.
     fn look_at_overdrawn(&mut self) -> bool {
-        let mut worst = BTreeMap::<(usize, usize), (f64, usize)>::new();
+        let mut overdrawn = BTreeMap::<(usize, usize), Vec<(f64, usize)>>::new();
         for i in (0..self.is_looked_at.len()).filter(|&i| !self.is_looked_at[i]) {
             let room_mm = self.room_mm(i);
             if room_mm < -OVERDRAWN_MM {
                 let Limit { plus, minus, .. } = self.limits.all[i];
-                let of_pair = worst.entry((plus, minus)).or_insert((room_mm, i));
-                if room_mm < of_pair.0 {
-                    *of_pair = (room_mm, i);
-                }
+                overdrawn.entry((plus, minus)).or_default().push((room_mm, i));
             }
         }
-        for &(_, i) in worst.values() {
-            self.is_looked_at[i] = true;
-            self.looked_at.push(i);
+        let mut has_any = false;
+        for mut of_pair in overdrawn.into_values() {
+            // Late bounds may let go of a contact; the next one is asked then.
+            while let Some(at) = (0..of_pair.len()).min_by(|&i, &k| of_pair[i].0.total_cmp(&of_pair[k].0)) {
+                let (room_mm, i) = of_pair[at];
+                if room_mm >= -OVERDRAWN_MM {
+                    break;
+                }
+                if self.is_settled[i] {
+                    self.look_at(i);
+                    has_any = true;
+                    break;
+                }
+                self.settle(i);
+                of_pair[at].0 = self.room_mm(i);
+            }
         }
-        !worst.is_empty()
+        has_any
+    }
+
+    /// Looks at a row from now on.
+    pub fn look_at(&mut self, row: usize) {
+        self.settle(row);
+        if !self.is_looked_at[row] {
+            self.is_looked_at[row] = true;
+            self.looked_at.push(row);
+        }
+    }
+
+    /// Learns the row's bound.
+    fn settle(&mut self, row: usize) {
+        if let Some(late) = self.limits.late.filter(|_| !self.is_settled[row]) {
+            self.bounds_mm[row] = late(row) + WIDENED_MM * scattered(row);
+            self.is_settled[row] = true;
+        }
     }
 }
 

@@ -1,0 +1,200 @@
+//! What is bounded: how far some turns and displacements go.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use serde::{Deserialize, Serialize};
+use shellock_geom::Vec3;
+
+use super::barrier::Region;
+use super::bearing::Bearing;
+use crate::{IdVec, LatticeDirection, PatchId};
+
+/// Side of the cells that bearings of a pair are gathered in, mm.
+const CELL_MM: f64 = 2.5;
+/// A vector that goes no farther than 1 along any lattice direction is no longer than this: the inverse of `1/√(1 + (√2−1)² + (√3−√2)²)`.
+const BETWEEN_LATTICE: f64 = 1.1281;
+/// Rounding of regions, mm.
+const ROUNDING_MM: f64 = 1e-6;
+
+/// A vector that depends linearly on the logarithms of poses: of one piece, or of one against another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quantity {
+    /// The piece that counts as positive; `None` where it is held.
+    pub plus: Option<PatchId>,
+    /// The one that counts as negative; `None` where it is held.
+    pub minus: Option<PatchId>,
+    /// A displacement at this place, mm; else a turn, rad.
+    pub at: Option<[f64; 3]>,
+    /// Directions in which it is bounded, unit vectors; the first three are orthogonal.
+    pub axes: Vec<[f64; 3]>,
+    /// The most against each axis and along it, ≥ 0, mm or rad.
+    pub most: Vec<[f64; 2]>,
+}
+
+impl Quantity {
+    fn new(plus: Option<PatchId>, minus: Option<PatchId>, at: Option<Vec3>, axes: Vec<[f64; 3]>) -> Self {
+        let most = vec![[0.0; 2]; axes.len()];
+        Self { plus, minus, at: at.map(|p| p.to_array()), axes, most }
+    }
+
+    /// No vector within the bounds is longer.
+    pub fn norm(&self) -> f64 {
+        let longest = |[low, high]: &[f64; 2]| low.max(*high);
+        let of_box = self.most[..3].iter().map(|m| longest(m).powi(2)).sum::<f64>().sqrt();
+        if self.axes.len() < LINES {
+            return of_box;
+        }
+        of_box.min(BETWEEN_LATTICE * self.most.iter().map(longest).fold(0.0, f64::max))
+    }
+
+    /// The most of it along `t`.
+    fn along(&self, t: Vec3) -> f64 {
+        let part = |k: usize| match Vec3::from_array(self.axes[k]).dot(t) {
+            x if x > 0.0 => x * self.most[k][1],
+            x => -x * self.most[k][0],
+        };
+        (0..3).map(part).sum()
+    }
+}
+
+/// Lines of the lattice's directions.
+const LINES: usize = LatticeDirection::COUNT / 2;
+
+/// The lattice's lines, the coordinate axes first.
+fn lattice_lines() -> Vec<[f64; 3]> {
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+    let is_new = |d: &Vec3| axes.iter().all(|a| a.dot(*d).abs() < 0.99);
+    let lines = LatticeDirection::all().filter(|d| *d < d.opposite()).map(LatticeDirection::unit).filter(is_new);
+    axes.into_iter().chain(lines).map(|d| d.to_array()).collect()
+}
+
+/// Which quantities say how far a bearing's point goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Displacement in the bearing's cell.
+    pub cell: usize,
+    /// 1 where it counts `a` against `b`, −1 where `b` against `a`.
+    cell_sign: f64,
+    /// From the cell's place to the point.
+    off: Vec3,
+    /// Turn of one against the other, likewise.
+    pub turn: usize,
+    turn_sign: f64,
+    /// Turn and displacement of `a` where it is free and `b`, too.
+    of_a: Option<[usize; 2]>,
+    /// Turn of `b` where it is free.
+    of_b: Option<usize>,
+}
+
+/// All quantities of some free pieces.
+pub(super) struct Quantities {
+    pub all: Vec<Quantity>,
+    /// Turn and displacement of each free piece, the latter at its centre.
+    pub of_piece: BTreeMap<PatchId, [usize; 2]>,
+    /// One a bearing.
+    pub places: Vec<Place>,
+}
+
+impl Quantities {
+    /// Of the pieces of `free` (in ascending order) and their `bearings`.
+    pub fn new(free: &[PatchId], centers: &IdVec<PatchId, Vec3>, bearings: &[Bearing]) -> Self {
+        let freed = |p: PatchId| Some(p).filter(|p| free.binary_search(p).is_ok());
+        let mut made = Self { all: Vec::new(), of_piece: BTreeMap::new(), places: Vec::with_capacity(bearings.len()) };
+        for &p in free {
+            let turn = made.add(Quantity::new(Some(p), None, None, lattice_lines()[..3].to_vec()));
+            let shift = made.add(Quantity::new(Some(p), None, Some(centers[p]), lattice_lines()[..3].to_vec()));
+            made.of_piece.insert(p, [turn, shift]);
+        }
+        let key = |b: &Bearing| {
+            (b.a.min(b.b), b.a.max(b.b), (b.point / CELL_MM).floor().to_array().map(|x| x as i64))
+        };
+        let mut cells: BTreeMap<(PatchId, PatchId, [i64; 3]), Vec<usize>> = BTreeMap::new();
+        bearings.iter().enumerate().for_each(|(i, b)| cells.entry(key(b)).or_default().push(i));
+        let mut of_cell = BTreeMap::new();
+        let mut turns: BTreeMap<(PatchId, PatchId), usize> = BTreeMap::new();
+        for (cell, list) in &cells {
+            let (plus, minus) = (freed(cell.0), freed(cell.1));
+            turns.entry((cell.0, cell.1)).or_insert_with(|| match plus.xor(minus) {
+                Some(alone) => made.of_piece[&alone][0],
+                None => made.add(Quantity::new(plus, minus, None, principal([].into_iter()))),
+            });
+            let middle = list.iter().map(|&i| bearings[i].point).sum::<Vec3>() / list.len() as f64;
+            let axes = principal(list.iter().map(|&i| bearings[i].normal));
+            of_cell.insert(*cell, (made.add(Quantity::new(plus, minus, Some(middle), axes)), middle));
+        }
+        for b in bearings {
+            let (cell, middle) = of_cell[&key(b)];
+            let turn = turns[&(b.a.min(b.b), b.a.max(b.b))];
+            made.places.push(made.place(b, cell, middle, turn));
+        }
+        made
+    }
+
+    fn add(&mut self, quantity: Quantity) -> usize {
+        self.all.push(quantity);
+        self.all.len() - 1
+    }
+
+    fn place(&self, b: &Bearing, cell: usize, middle: Vec3, turn: usize) -> Place {
+        let (of_a, of_b) = (self.of_piece.get(&b.a), self.of_piece.get(&b.b));
+        let sign = if b.a < b.b { 1.0 } else { -1.0 };
+        // The turn of a free piece against a held one is its own, whichever it is.
+        let turn_sign = match (of_a, of_b) {
+            (Some(_), None) => 1.0,
+            (None, Some(_)) => -1.0,
+            _ => sign,
+        };
+        let of_a = of_a.filter(|_| of_b.is_some()).copied();
+        let of_b = of_b.map(|q| q[0]);
+        Place { cell, cell_sign: sign, off: b.point - middle, turn, turn_sign, of_a, of_b }
+    }
+
+    /// How far the bearing's point, seen from `b`, can be from where the logarithms of poses say, mm: docs/certificate.md.
+    pub fn error_mm(&self, b: &Bearing, p: &Place, centers: &IdVec<PatchId, Vec3>) -> f64 {
+        let norm = |k: usize| self.all[k].norm();
+        let turn = norm(p.turn);
+        let move_mm = norm(p.cell) + turn * p.off.length();
+        let of_b = p.of_b.map_or(0.0, norm);
+        let of_a_mm = match (p.of_a, p.of_b) {
+            (Some([w, u]), _) => norm(u) + norm(w) * b.point.distance(centers[b.a]),
+            // All that moves is `b`.
+            (None, Some(_)) => 0.0,
+            (None, None) => move_mm,
+        };
+        0.5 * of_b * move_mm + 0.5 * turn * of_a_mm
+    }
+
+    /// How far the point goes sideways, seen from `b`, where the error is so much.
+    pub fn region(&self, b: &Bearing, p: &Place, error_mm: f64) -> Region {
+        let (cell, turn) = (&self.all[p.cell], &self.all[p.turn]);
+        let far = |t: Vec3| {
+            cell.along(t * p.cell_sign) + turn.along(p.off.cross(t) * p.turn_sign) + error_mm + ROUNDING_MM
+        };
+        Region { far_mm: b.axis().sides().map(far) }
+    }
+}
+
+/// Axes along which displacements are bounded best: those of the bearings' normals.
+fn principal(normals: impl Iterator<Item = Vec3>) -> Vec<[f64; 3]> {
+    let sum = normals.map(|n| Vector3::new(n.x, n.y, n.z)).fold(Matrix3::zeros(), |m, n| m + n * n.transpose());
+    let vectors = SymmetricEigen::new(sum).eigenvectors;
+    (0..3).map(|k| [vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_direction_is_farther_from_the_lattice_than_is_told() {
+        let lines = lattice_lines();
+        assert_eq!(lines.len(), LINES);
+        for i in 0..20_000 {
+            let t = f64::from(i);
+            let d = Vec3::new((1.7 * t).sin(), (2.3 * t).cos(), (0.9 * t + 1.0).sin()).normalize();
+            let most = lines.iter().map(|l| Vec3::from_array(*l).dot(d).abs()).fold(0.0, f64::max);
+            assert!(most * BETWEEN_LATTICE >= 1.0, "{d}: {most}");
+        }
+    }
+}
