@@ -425,6 +425,7 @@ impl Options {
         p.connector.min_wall_mm = self.min_wall.unwrap_or(printer.min_wall_mm);
         p.label = (!self.no_labels).then(|| label(p.connector.min_wall_mm));
         p.verify.seed = self.seed;
+        p.play_together = self.play_together;
         p
     }
 }

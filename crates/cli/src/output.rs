@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use shellock::certificate::{Certificate, OtherFile, PieceFile, Play, certify, play_alone, play_together};
+use shellock::certificate::{Certificate, Evidence, OtherFile, PieceFile, certify};
 use shellock::key::KeySite;
 use shellock::pipeline::{Design, Params};
 use shellock::report::{SeamStress, palette, strength_chart};
@@ -55,10 +55,6 @@ pub struct Summary {
     pub connector_share: f64,
     /// Greatest share of a piece's volume that is thinner than the thinnest wall.
     pub thin_share: f64,
-    /// How far each piece moves within its gaps; `None` for one that leaves.
-    pub rattle: IdVec<PatchId, Option<Play>>,
-    /// The same while all but the key and the first piece may move, if that was asked for; `None` for these two, too.
-    pub rattle_together: Option<IdVec<PatchId, Option<Play>>>,
 }
 
 /// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
@@ -179,8 +175,6 @@ pub fn files(
         print_time_ratio: printing.time_ratio(),
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
-        rattle: play_alone(&design.pieces, &design.plan, &design.touching),
-        rattle_together: options.play_together.then(|| play_together(&design.pieces, &design.plan, &design.touching)),
     };
     let mut plan = plan_json(model, params, design, warnings, &summary, &thin);
     plan["printing"] = printing.json();
@@ -243,8 +237,14 @@ fn certificate(
 ) -> Option<Vec<u8>> {
     let other = |(file, bytes): &(String, Vec<u8>)| OtherFile { file: file.clone(), sha256: sha256(bytes) };
     let named = files.iter().zip(design.pieces.ids());
-    let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes) }).collect();
-    certify(named, &design.pieces, &design.plan, &design.touching, &design.verification, &design.gaps, clearance_mm)
+    let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes), play: None }).collect();
+    let evidence = Evidence {
+        contacts: &design.touching,
+        verdict: &design.verification,
+        gaps: &design.gaps,
+        play: Some(&design.play),
+    };
+    certify(named, &design.pieces, &design.plan, &evidence, clearance_mm)
         .map(|c| c.with_press_fits(design.press_fits.clone()).with_files(others.iter().map(other).collect()))
         .map(|c| certificate_bytes(&c))
 }
@@ -256,10 +256,10 @@ pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
     bytes
 }
 
-/// How far a piece moves while no other does, and `together` with others where that was asked for.
-fn rattle_json(summary: &Summary, piece: PatchId) -> Option<Value> {
-    let mut value = json!(summary.rattle[piece]?);
-    if let Some(together) = &summary.rattle_together {
+/// How far a piece moves while no other does, and `together` with others where that is proven.
+fn rattle_json(design: &Design, piece: PatchId) -> Option<Value> {
+    let mut value = json!(design.play.alone[piece]?);
+    if let Some(together) = &design.play.together {
         value["together"] = json!(together[piece]);
     }
     Some(value)
@@ -286,7 +286,7 @@ fn plan_json(
             json!({
                 "id": p, "file": piece_file(p), "neighbors": neighbours, "volume_mm3": mesh.signed_volume(),
                 "installation_direction": (-plan.separation(p).unit() + 0.0).to_array(),
-                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize], "rattle": rattle_json(summary, p),
+                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize], "rattle": rattle_json(design, p),
             })
         })
         .collect();

@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use shellock::certificate::Play;
 use shellock::pipeline::{Design, Params};
 use shellock::report::{ReportCheck, ReportData, ReportPiece, ReportQuantity, html, palette, pieces_picture};
-use shellock::verify::Finding;
+use shellock::verify::{Finding, Play};
 use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
@@ -49,7 +48,7 @@ pub fn report(
             installation_direction: stand(-plan.separation(p).unit()).to_array(),
             order: plan.position(p),
             is_key: plan.key() == p,
-            facts: piece_facts(design, summary, p),
+            facts: piece_facts(design, p),
         })
         .collect();
     let facts = kit_facts(&shown, params, design, summary, stand);
@@ -59,7 +58,7 @@ pub fn report(
         .iter()
         .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
         .collect();
-    let quantities = quantities(design, summary);
+    let quantities = quantities(design);
     let data =
         ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
     let booklet = Booklet { title: title(&model.name), lines: cover_lines(&shown), pieces: data.pieces.clone() };
@@ -155,7 +154,7 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
 }
 
 /// What the report colours pieces by.
-fn quantities(design: &Design, summary: &Summary) -> Vec<ReportQuantity> {
+fn quantities(design: &Design) -> Vec<ReportQuantity> {
     // The key is there to leave: how far it gets before unevenness stops it would drown what the others differ by.
     let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
         let of_piece =
@@ -163,20 +162,23 @@ fn quantities(design: &Design, summary: &Summary) -> Vec<ReportQuantity> {
         play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
     };
     let order = design.pieces.ids().map(|p| Some(design.plan.position(p) as f64 + 1.0)).collect();
-    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&summary.rattle))];
-    quantities.extend(summary.rattle_together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
+    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&design.play.alone))];
+    quantities.extend(design.play.together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
     let quantity =
         |(name, unit, values): (&str, &str, _)| ReportQuantity { name: name.into(), unit: unit.into(), values };
     quantities.into_iter().map(quantity).collect()
 }
 
 /// A piece's volume, and how each of its seams holds.
-fn piece_facts(design: &Design, summary: &Summary, piece: PatchId) -> Vec<(String, String)> {
+fn piece_facts(design: &Design, piece: PatchId) -> Vec<(String, String)> {
     let mut facts = vec![("volume".to_owned(), format!("{:.1} cm³", design.pieces[piece].signed_volume() / 1000.0))];
     facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
-    let play = |p: Play| format!("{:.2} mm, {:.2}°", p.translation_mm, p.rotation_deg);
-    facts.extend(summary.rattle[piece].map(|p| ("play".to_owned(), play(p))));
-    let together = summary.rattle_together.as_ref().and_then(|all| all[piece]);
+    let play = |p: Play| {
+        let proven = if p.is_proven { "" } else { ", not proven" };
+        format!("{:.2} mm, {:.2}°{proven}", p.translation_mm, p.rotation_deg)
+    };
+    facts.extend(design.play.alone[piece].map(|p| ("play".to_owned(), play(p))));
+    let together = design.play.together.as_ref().and_then(|all| all[piece]);
     facts.extend(together.map(|p| ("play with others".to_owned(), play(p))));
     let seams = design.holding.iter().flat_map(|h| &h.seams);
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {

@@ -5,13 +5,14 @@ use std::path::{Component, Path, PathBuf};
 
 use serde_json::{Value, json};
 use shellock::body::BodyParams;
-use shellock::certificate::{OtherFile, PieceFile, certify};
+use shellock::certificate::{Evidence, OtherFile, PieceFile, certify};
 use shellock::piece::PressFit;
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
 use shellock::verify::clearance::kit_gaps;
-use shellock::verify::{Assembly, VerifyParams};
-use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, segmentation, sizes};
+use shellock::play::{KitPlay, PlayParams};
+use shellock::verify::{Assembly, Verification, VerifyParams};
+use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, play, segmentation, sizes};
 use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -183,11 +184,18 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let ctx = Ctx::new(&report, &session.stop);
     let press_fits = press_fits_of(&plan).map_err(|what| broken(&what))?;
     let assembly = Assembly { model: &solid, pieces: &pieces, plan: &order, press_fits: &press_fits };
-    let (verdict, contacts) = shellock::verify::examine(&ctx, &params, &assembly)?;
-    shellock::play::trial(&ctx, &pieces, &order, params.clearance_mm);
+    let (mut verdict, contacts) = shellock::verify::examine(&ctx, &params, &assembly)?;
+    let is_plan = verdict.checks.first().is_some_and(|check| check.ok);
+    let measured = if is_plan { Some(played(&ctx, &params, &assembly, &mut verdict)?) } else { None };
     let rim_mm = BodyParams::default().rim_mm;
     let gaps = kit_gaps(&ctx, &solid, &pieces, &order, rim_mm)?;
-    let claimed = certify(files, &pieces, &order, &contacts, &verdict, &gaps, params.clearance_mm);
+    let claimed = certify(
+        files,
+        &pieces,
+        &order,
+        &Evidence { contacts: &contacts, verdict: &verdict, gaps: &gaps, play: measured.as_ref() },
+        params.clearance_mm,
+    );
     display.finish();
     if let Some(claimed) = claimed {
         let claimed = claimed.with_press_fits(press_fits).with_files(certified_files(kit));
@@ -203,6 +211,15 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
         print_verdict(&verdict);
     }
     Ok(code)
+}
+
+/// How far pieces move, which the verdict then tells.
+fn played(ctx: &Ctx, params: &VerifyParams, kit: &Assembly<'_>, verdict: &mut Verification) -> Result<KitPlay, Failure> {
+    let VerifyParams { clearance_mm, seed } = *params;
+    let measured = play::measure(ctx, &PlayParams { clearance_mm, slide_mm: play::SLIDE_MM, is_together: true, seed }, kit.pieces, kit.plan)?;
+    let most = play::most_play(kit.model.mesh().bounds().size().max_element(), clearance_mm);
+    verdict.add(play::check(&measured, kit.pieces, most));
+    Ok(measured)
 }
 
 /// The places where the key presses on purpose. A plan without any names none.
@@ -268,7 +285,7 @@ pub fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
             return Err(Failure::Wrong(format!("piece {i} names \"{file}\", which is no file within the kit")));
         }
         let (loaded, bytes) = load(&kit.join(file))?;
-        files.push(PieceFile { id: i.into(), file: file.to_owned(), sha256: sha256(&bytes) });
+        files.push(PieceFile { id: i.into(), file: file.to_owned(), sha256: sha256(&bytes), play: None });
         meshes.push(weld(&loaded.mesh).mesh);
     }
     Ok(Kit { files, pieces: meshes.into_iter().collect(), order })

@@ -44,6 +44,19 @@ impl TriMesh {
         (0..self.triangles.len()).map(|f| self.face_area(f)).sum()
     }
 
+    /// Centre of the volume; that of the box where there is none.
+    pub fn centroid(&self) -> Vec3 {
+        let origin = self.bounds().center();
+        let (mut moment, mut volume) = (Vec3::ZERO, 0.0);
+        for face in 0..self.triangles.len() {
+            let [a, b, c] = self.corners(face).map(|p| p - origin);
+            let part = a.dot(b.cross(c)) / 6.0;
+            volume += part;
+            moment += (a + b + c) * (0.25 * part);
+        }
+        if volume > 0.0 { origin + moment / volume } else { origin }
+    }
+
     /// Signed volume, mm³: positive where a closed mesh is oriented outwards.
     pub fn signed_volume(&self) -> f64 {
         let origin = self.points.first().copied().unwrap_or_default();

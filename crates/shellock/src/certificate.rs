@@ -7,8 +7,8 @@
 //!
 //! Coordinates are mm in assembly space. Motions are twists about [`Certificate::center`].
 
+mod bounded;
 mod proof;
-mod rattle;
 #[cfg(test)]
 mod tests;
 
@@ -21,20 +21,21 @@ use crate::piece::PressFit;
 use crate::plan::InstallationPlan;
 use crate::verify::clearance::{KitGaps, NearestPlace};
 use crate::verify::contact::{Contact, REACH_MM};
-use crate::verify::motion::{Freedom, free_motion};
-use crate::verify::{Finding, Motion, Verification};
+use crate::play::{KitPlay, Slide};
+use crate::verify::motion::Freedom;
+use crate::verify::{Finding, Play, Verification};
 use crate::{IdVec, PatchId};
-use proof::prove;
-pub use rattle::{Play, play_alone, play_together};
-pub(crate) use rattle::centroid;
+pub use bounded::{BearingPoint, Bounded};
+use bounded::bounded;
+use proof::{Proof, Question, prove};
 
 /// What [`Certificate::format`] says.
 pub const FORMAT: &str = "shellock-certificate";
 /// What [`Certificate::version`] says: readers refuse what they do not know.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// A file of a kit.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PieceFile {
     /// The piece.
     pub id: PatchId,
@@ -42,6 +43,9 @@ pub struct PieceFile {
     pub file: String,
     /// SHA-256 of the file's bytes, in lower-case hexadecimal digits.
     pub sha256: String,
+    /// How far the piece moves while all others are held, where that is proven.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub play: Option<Play>,
 }
 
 /// Another file of a kit.
@@ -111,24 +115,21 @@ impl LeastGaps {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "claim", rename_all = "kebab-case")]
 pub enum Claim {
-    /// No piece moves, alone or with others, by however little, while the held ones do not.
+    /// Whatever pieces move, alone or together, by however little, while the held one does not: only `leaves` can.
     Locked {
-        /// Pieces that do not move.
+        /// The piece that does not move; which one it is does not matter.
         held: Vec<PatchId>,
+        /// The key, which may move.
+        leaves: PatchId,
         /// Contacts, by their places in the certificate's list, with positive multipliers.
         multipliers: Vec<(usize, f64)>,
         /// Length of the multipliers' sum of wrenches. Less than `hold`, which is the proof.
         residual: f64,
-        /// Least singular value of the contacts' wrenches, weighted by their multipliers up to 1.
+        /// Least singular value of the contacts' wrenches, weighted by their multipliers up to 1, that is left for the other pieces.
         hold: f64,
     },
-    /// Nothing is claimed while these are held: the contacts allow this motion.
-    Moves {
-        /// Pieces that do not move.
-        held: Vec<PatchId>,
-        /// Who moves and how.
-        motions: Vec<Motion>,
-    },
+    /// Some pieces stay within their play on every path of motions of any size, at the clearance as it is.
+    Bounded(Bounded),
     /// The key can be taken out: it moves along `direction` and meets nothing.
     KeyLeaves {
         /// The key.
@@ -175,8 +176,12 @@ pub struct Certificate {
     pub installation_order: Vec<PatchId>,
     /// All pieces, in order of their ids.
     pub pieces: Vec<PieceFile>,
-    /// Contacts with a part in a proof.
+    /// Contacts with a part in the proof of the lock.
     pub contacts: Vec<HoldingContact>,
+    /// Contacts with an area, with a part in a proof of play.
+    pub bearings: Vec<BearingPoint>,
+    /// How far the key may have slid while the play is proven.
+    pub slide: Option<Slide>,
     /// Where the key is pressed on purpose: claims of gaps are but for these.
     #[serde(default)]
     pub press_fits: Vec<PressFit>,
@@ -204,36 +209,44 @@ impl Certificate {
     }
 }
 
-/// Claims what can be proven of finished `pieces`, written as `files`, that are installed as `plan` says and touch at
-/// `contacts`; [`crate::verify::examine`] gives these with its verdict, and what that speaks against is not claimed. `gaps` go with the
-/// claims of paths.
+/// What was found of a finished kit.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence<'a> {
+    /// Where its pieces touch, from [`crate::verify::examine`], and its verdict: what that speaks against is not claimed.
+    pub contacts: &'a [Contact],
+    /// The verdict.
+    pub verdict: &'a Verification,
+    /// How near pieces come; they go with the claims of paths.
+    pub gaps: &'a KitGaps,
+    /// How far pieces move, from [`crate::play::measure`]; where there is none, nothing is claimed of it.
+    pub play: Option<&'a KitPlay>,
+}
+
+/// Claims what can be proven of finished `pieces`, written as `files`, that are installed as `plan` says.
 ///
 /// `None` where the plan does not name every piece once, of at least two. Takes 0.04 s for 9 pieces with 12 000 contacts.
 pub fn certify(
-    files: Vec<PieceFile>,
+    mut files: Vec<PieceFile>,
     pieces: &IdVec<PatchId, TriMesh>,
     plan: &InstallationPlan,
-    contacts: &[Contact],
-    verdict: &Verification,
-    gaps: &KitGaps,
+    evidence: &Evidence<'_>,
     clearance_mm: f64,
 ) -> Option<Certificate> {
+    let &Evidence { contacts, verdict, gaps, play } = evidence;
     let mut named: Vec<PatchId> = plan.steps.iter().map(|s| s.piece).collect();
     named.sort_unstable();
     if named.len() < 2 || !named.into_iter().eq(pieces.ids()) {
         return None;
     }
     let (center, length_mm) = frame(pieces);
-    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - center, ..*c }).collect();
-    let (key, first) = (plan.key(), plan.steps[0].piece);
-    let lock = |held: Vec<PatchId>| claim_lock(&centered, pieces.len(), held, length_mm);
-    let mut claims: Vec<Claim> = vec![lock(vec![key, first]), lock(vec![key])];
-    if matches!(claims[1], Claim::Moves { .. }) {
-        // The key may come off; the first piece alone may not.
-        claims.push(lock(pieces.ids().filter(|id| *id != first).collect()));
-    }
+    let mut claims: Vec<Claim> = claim_lock(plan, contacts, center, length_mm).into_iter().collect();
     let contacts = keep_holding(contacts, &mut claims);
+    let (bearings, proven) = play.map_or_else(Default::default, bounded);
+    claims.extend(proven.into_iter().map(Claim::Bounded));
     claims.extend(claim_paths(plan, verdict, gaps));
+    for file in &mut files {
+        file.play = play.and_then(|play| play.alone[file.id]).filter(|play| play.is_proven);
+    }
     Some(Certificate {
         format: FORMAT.into(),
         version: VERSION,
@@ -241,10 +254,12 @@ pub fn certify(
         reach_mm: clearance_mm + REACH_MM,
         center: center.to_array(),
         length_mm,
-        key,
+        key: plan.key(),
         installation_order: plan.steps.iter().map(|s| s.piece).collect(),
         pieces: files,
         contacts,
+        bearings,
+        slide: play.map(|play| play.slide),
         press_fits: Vec::new(),
         failed: verdict.checks.iter().filter(|c| !c.ok).map(|c| format!("{}: {}", c.name, c.figure)).collect(),
         files: Vec::new(),
@@ -258,17 +273,15 @@ fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
     (bounds.center(), 0.5 * bounds.diagonal())
 }
 
-/// The lock with its proof, or the motion that there is instead.
-fn claim_lock(contacts: &[Contact], n_pieces: usize, held: Vec<PatchId>, length_mm: f64) -> Claim {
-    match prove(contacts, n_pieces, &held, length_mm, Freedom::Rigid) {
-        Some(proof) => {
-            Claim::Locked { held, multipliers: proof.multipliers, residual: proof.residual, hold: proof.hold }
-        }
-        None => {
-            let twists = free_motion(contacts, n_pieces, &held, length_mm, Freedom::Rigid);
-            Claim::Moves { held, motions: twists.iter().map(Motion::from).collect() }
-        }
-    }
+/// The lock with its proof, if there is one: with the first piece held, nothing but the key moves.
+fn claim_lock(plan: &InstallationPlan, contacts: &[Contact], center: Vec3, length_mm: f64) -> Option<Claim> {
+    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - center, ..*c }).collect();
+    let (held, key) = (vec![plan.steps[0].piece], plan.key());
+    let leaves = Some((key, plan.separation(key).unit()));
+    let freedom = Freedom::Rigid;
+    let proof = prove(&centered, &Question { n_pieces: plan.steps.len(), held: &held, leaves, length_mm, freedom })?;
+    let Proof { multipliers, residual, hold } = proof;
+    Some(Claim::Locked { held, leaves: key, multipliers, residual, hold })
 }
 
 /// That the key leaves, that all but the first piece can be installed, and that nothing overlaps: as far as the verdict

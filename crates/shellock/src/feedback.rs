@@ -40,13 +40,6 @@ pub enum Lesson {
         /// Share of its wall that it could take along, in [0, 1].
         kept: f64,
     },
-    /// All other pieces leave the key as one.
-    BadKey {
-        /// The key.
-        key: PatchId,
-        /// Its direction.
-        separation: LatticeDirection,
-    },
     /// The plan as a whole failed.
     FailedPlan {
         /// The plan.
@@ -85,10 +78,6 @@ impl Lesson {
             Self::Blocked { piece, separation, .. } => {
                 constraints.forbidden.insert((*piece, *separation));
             }
-            Self::BadKey { key, separation } => {
-                constraints.bad_keys.insert(*key);
-                constraints.forbidden.insert((*key, *separation));
-            }
             Self::FailedPlan { plan, .. } => constraints.rejected.push(plan.clone()),
         }
     }
@@ -98,7 +87,6 @@ impl Lesson {
         match self {
             Self::WeakJoints(_) => Vec::new(),
             Self::RubbingPath { piece, .. } | Self::Blocked { piece, .. } => vec![*piece],
-            Self::BadKey { key, .. } => vec![*key],
             Self::FailedPlan { loose, .. } => loose.clone(),
         }
     }
@@ -129,7 +117,6 @@ impl std::fmt::Display for Lesson {
             Self::Blocked { piece, kept, .. } => {
                 write!(f, "piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)
             }
-            Self::BadKey { key, .. } => write!(f, "all other pieces can leave the key, piece {key}, as one"),
             Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
             Self::FailedPlan { loose, .. } => {
                 let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
@@ -152,11 +139,9 @@ pub fn lessons(design: &Design) -> Vec<Lesson> {
                 let separation = design.plan.separation(piece);
                 learned.push(Lesson::RubbingPath { piece, separation, against, travel_mm, thickness_mm, volume_mm3 });
             }
-            Finding::KeyLeaves { motion } => {
-                let separation = design.plan.separation(motion.piece);
-                learned.push(Lesson::BadKey { key: motion.piece, separation });
+            Finding::Loose { piece, .. } | Finding::PlayTooWide { piece, .. } | Finding::ComesOut { piece, .. } => {
+                loose.push(*piece);
             }
-            Finding::Loose { piece, .. } => loose.push(*piece),
             Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| m.piece)),
             _ => {}
         }

@@ -15,6 +15,7 @@ use crate::connector::{ConnectorParams, Contact, Run, has_no_bar};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
 use crate::piece::{FinishParams, Finished, Grip, Joint, LabelParams, PieceError, PressFit, PressFitKind, Relief};
+use crate::play::{KitPlay, PlayParams};
 use crate::plan::{Blocker, InstallationPlan, PlanParams, PlanProof};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams, StressField};
@@ -22,7 +23,7 @@ use crate::strength::{Strength, StrengthError, StrengthParams, StressMap};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
-    Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece, segmentation,
+    Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece, play, segmentation,
     sizes, strength, verify,
 };
 use cut_key::CutKey;
@@ -53,6 +54,8 @@ pub struct Params {
     pub connector: ConnectorParams,
     /// How the finished kit is judged.
     pub verify: VerifyParams,
+    /// Whether the play of all pieces together is looked for, too.
+    pub play_together: bool,
     /// How often a kit that failed its verification is planned and made again.
     pub rounds: Rounds,
 }
@@ -131,6 +134,11 @@ impl Params {
         Relief { rim_mm: self.body.rim_mm, gap_mm, key_gap_mm: self.body.key_gap_mm.map_or(gap_mm, of_key) }
     }
 
+    /// How the play of finished kits is measured.
+    pub fn play(&self) -> PlayParams {
+        PlayParams { clearance_mm: self.verify.clearance_mm, slide_mm: play::SLIDE_MM, is_together: self.play_together, seed: self.verify.seed }
+    }
+
     /// What decides on connector sizes.
     pub fn sizes(&self) -> SizeParams {
         SizeParams {
@@ -174,6 +182,8 @@ pub struct Design {
     pub verification: Verification,
     /// Where the finished pieces touch.
     pub touching: Vec<verify::contact::Contact>,
+    /// How far the finished pieces move within their gaps.
+    pub play: KitPlay,
     /// How near pieces come, at rest and on their way.
     pub gaps: KitGaps,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
@@ -428,7 +438,11 @@ pub fn make(
     let finished = piece::make(ctx, &finish, grid, &shell, &plan, &runs, &rooms)?;
     warn_of_press_fits(ctx, &finished);
     let assembly = verify::Assembly { model, pieces: &finished.meshes, plan: &plan, press_fits: &finished.press_fits };
-    let (verification, touching) = verify::examine(ctx, &params.verify, &assembly)?;
+    let (mut verification, touching) = verify::examine(ctx, &params.verify, &assembly)?;
+    let measured = play::measure(ctx, &params.play(), &finished.meshes, &plan)?;
+    let size_mm = model.mesh().bounds().size().max_element();
+    let most = play::most_play(size_mm, params.verify.clearance_mm);
+    verification.add(play::check(&measured, &finished.meshes, most));
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
         turn: Turn::default(),
@@ -446,6 +460,7 @@ pub fn make(
         contacts,
         verification,
         touching,
+        play: measured,
         gaps: KitGaps::default(),
         warnings: ctx.take_warnings(),
     })

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module may name those before it. `plan` stands before `body` because bodies are split along a plan.
-const ORDER: [&str; 15] = [
+const ORDER: [&str; 16] = [
     "strength",
     "segmentation",
     "key",
@@ -16,6 +16,7 @@ const ORDER: [&str; 15] = [
     "connector",
     "piece",
     "verify",
+    "play",
     "certificate",
     "report",
     "feedback",

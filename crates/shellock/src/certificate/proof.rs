@@ -18,6 +18,9 @@
 //! which leaves `|x| = 0`. The conclusion is exact although `μ` is not: rounding only has to stay under `hold`. Weights end
 //! at 1 so that a few great forces do not drown the rest in the rounding of `(D A)ᵀ D A`.
 //!
+//! With a piece that may leave, the multipliers are in equilibrium on it, too, and `hold` is the least singular value of the Schur complement
+//! that is left for the others: they then move by no more than `residual / hold` of the whole motion.
+//!
 //! Multipliers are found by giving each contact of a well-conditioned spanning set `S` the force 1 (a Cholesky factor of
 //! `A Aᵀ` with pivoting chooses it) and balancing `Aᵀ1_S` by the least-squares forces of all contacts. They exist exactly
 //! where nothing moves [Stiemke1915], and there are never more than `2 n` of them, for `n` unknowns. Because the
@@ -27,9 +30,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
+use shellock_geom::Vec3;
+
 use crate::PatchId;
 use crate::verify::contact::Contact;
-use crate::verify::motion::{Freedom, System};
+use crate::verify::motion::{Freedom, Row, System};
 
 /// Rest of a load, as the sum of its components, from which refining starts.
 const BALANCED: f64 = 1e-10;
@@ -38,6 +43,8 @@ const LEAST_FORCE: f64 = 1e-9;
 /// Squared part of a row outside the span of others below which it adds no rank. Rows are 1 to 2 long; a lock that
 /// rests on less is one of rounding.
 const DEPENDENT: f64 = 1e-9;
+/// Added to a matrix that may be singular, as a share of its mean diagonal.
+const SINGULAR: f64 = 1e-13;
 /// Corrections of the multipliers; each gains several digits, and two have been enough.
 const CORRECTIONS: usize = 4;
 
@@ -51,22 +58,31 @@ pub(super) struct Proof {
     pub hold: f64,
 }
 
-/// A proof that of `n_pieces` none moves while those of `held` do not; `None` where there is none.
-///
-/// Twists are about the origin, and spins count as velocities at `length_mm` from it.
-pub(super) fn prove(
-    contacts: &[Contact],
-    n_pieces: usize,
-    held: &[PatchId],
-    length_mm: f64,
-    freedom: Freedom,
-) -> Option<Proof> {
+/// What may move.
+#[derive(Clone, Copy)]
+pub(super) struct Question<'a> {
+    /// All pieces.
+    pub n_pieces: usize,
+    /// Those that do not move.
+    pub held: &'a [PatchId],
+    /// A piece that may move as it likes, along this direction at least: nothing is claimed of it.
+    pub leaves: Option<(PatchId, Vec3)>,
+    /// Spins count as velocities at this distance from the origin, which twists are about, mm.
+    pub length_mm: f64,
+    pub freedom: Freedom,
+}
+
+/// A proof that no piece moves but the one that may leave; `None` where there is none.
+pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Proof> {
+    let Question { n_pieces, held, leaves, length_mm, freedom } = *question;
     let free: Vec<PatchId> = (0..n_pieces).map(PatchId::from).filter(|id| !held.contains(id)).collect();
-    if free.is_empty() {
+    let system = System::new(contacts, &free, length_mm, freedom);
+    let leaving = leaves.and_then(|(piece, way)| Some((free.binary_search(&piece).ok()?, way)));
+    if free.len() == usize::from(leaving.is_some()) {
         return Some(Proof { multipliers: Vec::new(), residual: 0.0, hold: 1.0 });
     }
-    let system = System::new(contacts, &free, length_mm, freedom);
-    let mut multipliers: BTreeMap<usize, f64> = spanning_rows(&system)?.into_iter().map(|row| (row, 1.0)).collect();
+    let spanning = spanning_rows(&system, leaving)?;
+    let mut multipliers: BTreeMap<usize, f64> = spanning.into_iter().map(|row| (row, 1.0)).collect();
     let load = rest(&system, &multipliers);
     for (row, force) in system.balance(&load, BALANCED).forces {
         if force > LEAST_FORCE {
@@ -77,16 +93,52 @@ pub(super) fn prove(
         correct(&system, &mut multipliers)?;
     }
     let residual = rest(&system, &multipliers).norm();
-    let hold = SymmetricEigen::new(weighted_gram(&system, &multipliers, 1.0)).eigenvalues.min().max(0.0).sqrt();
+    let gram = weighted_gram(&system, &multipliers, 1.0);
+    let of_others = leaving.map_or_else(|| gram.clone(), |(piece, _)| without(&gram, &system, piece));
+    let hold = SymmetricEigen::new(of_others).eigenvalues.min().max(0.0).sqrt();
     let named = multipliers.into_iter().map(|(row, value)| (system.rows[row].contact, value));
     (residual < hold).then(|| Proof { multipliers: named.collect(), residual, hold })
 }
 
-/// Rows of full rank, each the one with the largest part outside the span of those before it; the first of equals.
-fn spanning_rows(system: &System) -> Option<Vec<usize>> {
-    let mut outside_sq: Vec<f64> = system.rows.iter().map(|row| system.dot_rows(row, row)).collect();
-    let (mut chosen, mut basis) = (Vec::new(), Vec::<DVector<f64>>::new());
-    for _ in 0..system.n {
+/// What the Gram matrix is worth for the other pieces when the free piece at `leaving` moves as it likes: the Schur complement, by the
+/// pseudo-inverse of its block.
+fn without(gram: &DMatrix<f64>, system: &System, leaving: usize) -> DMatrix<f64> {
+    /// Eigenvalues that are a smaller share of the greatest are the piece's own way out.
+    const NO_HOLD: f64 = 1e-9;
+    let own: Vec<usize> = (system.column(leaving)..system.column(leaving + 1)).collect();
+    let others: Vec<usize> = (0..system.n).filter(|k| !own.contains(k)).collect();
+    let block = |rows: &[usize], columns: &[usize]| DMatrix::from_fn(rows.len(), columns.len(), |i, k| gram[(rows[i], columns[k])]);
+    let eigen = SymmetricEigen::new(block(&own, &own));
+    let least = NO_HOLD * eigen.eigenvalues.max();
+    let across = block(&others, &own) * &eigen.eigenvectors;
+    let mut rest = block(&others, &others);
+    for (k, &value) in eigen.eigenvalues.iter().enumerate().filter(|(_, value)| **value > least) {
+        let column = across.column(k);
+        rest -= column * column.transpose() / value;
+    }
+    rest
+}
+
+/// Rows of full rank, each the one with the largest part outside the span of those before it; the first of equals. Where a piece
+/// is leaving they span the unknowns of the others, and none is opened or closed by its way out.
+fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<usize>> {
+    /// A row along which the way out goes by more, as a share, opens or closes with it.
+    const TOUCHED: f64 = 1e-6;
+    let mut way_out = DVector::zeros(system.n);
+    let mut basis = Vec::<DVector<f64>>::new();
+    if let Some((piece, way)) = leaving {
+        (0..3).for_each(|k| way_out[system.column(piece) + k] = way[k]);
+        let unit = |k: usize| DVector::from_fn(system.n, |i, _| f64::from(u8::from(i == k)));
+        basis.extend((system.column(piece)..system.column(piece + 1)).map(unit));
+    }
+    let n_chosen = system.n - basis.len();
+    let outside = |row: &Row| -> f64 {
+        let inside: f64 = basis.iter().map(|b| system.dot(row, b).powi(2)).sum();
+        if system.dot(row, &way_out).abs() > TOUCHED { 0.0 } else { system.dot_rows(row, row) - inside }
+    };
+    let mut outside_sq: Vec<f64> = system.rows.iter().map(outside).collect();
+    let mut chosen = Vec::new();
+    for _ in 0..n_chosen {
         let first_of_most = |best: usize, i: usize| if outside_sq[i] > outside_sq[best] { i } else { best };
         let next = (0..outside_sq.len()).reduce(first_of_most).filter(|&i| outside_sq[i] > DEPENDENT)?;
         let mut direction = DVector::zeros(system.n);
@@ -121,7 +173,11 @@ fn weighted_gram(system: &System, multipliers: &BTreeMap<usize, f64>, most: f64)
 /// Takes what is left of equilibrium out of the multipliers, by the change `δ` with the least `Σ (δ/μ)²`: small
 /// multipliers change little, and stay positive. `None` where one would not.
 fn correct(system: &System, multipliers: &mut BTreeMap<usize, f64>) -> Option<()> {
-    let spread = Cholesky::new(weighted_gram(system, multipliers, f64::INFINITY))?.solve(&rest(system, multipliers));
+    let mut gram = weighted_gram(system, multipliers, f64::INFINITY);
+    // A piece's way out is held by nothing, and nothing is to be taken out there.
+    let little = SINGULAR * gram.trace() / system.n as f64;
+    (0..system.n).for_each(|k| gram[(k, k)] += little);
+    let spread = Cholesky::new(gram)?.solve(&rest(system, multipliers));
     for (&row, value) in multipliers.iter_mut() {
         *value *= 1.0 - *value * system.dot(&system.rows[row], &spread);
         if !(*value > 0.0 && value.is_finite()) {

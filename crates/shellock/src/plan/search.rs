@@ -168,8 +168,7 @@ fn with_any_key<'k>(
 ) -> Result<Result<(FoundPlan, &'k KeyChoice), PieceSet>, Cancelled> {
     let mut tries_left = params.max_tries;
     let mut stuck = space.all();
-    let is_bad = |key: &KeyChoice| params.key.is_none() && space.constraints.bad_keys.contains(&key.piece);
-    let keys: Vec<&KeyChoice> = keys.iter().filter(|k| !k.directions.is_empty() && !is_bad(k)).collect();
+    let keys: Vec<&KeyChoice> = keys.iter().filter(|k| !k.directions.is_empty()).collect();
     for &key in &keys {
         if tries_left == 0 {
             break;

@@ -242,14 +242,11 @@ fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
 }
 
 #[test]
-fn a_key_that_held_nothing_is_not_chosen_again_and_a_short_joint_only_in_another_direction() {
+fn a_short_joint_counts_only_in_another_direction() {
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let params = PlanParams { n_plans: 40, ..PlanParams::default() };
     let mut constraints = PlanConstraints::default();
     let plan = plan_of(&params, &survey, &constraints).expect("a ball has a plan");
-    constraints.bad_keys.insert(plan.key());
-    let other = plan_of(&params, &survey, &constraints).expect("enough is left");
-    assert_ne!(plan.key(), other.key());
     let (later, earlier) = (plan.steps[3], plan.steps[0].piece);
     constraints.weak_joints.insert((later.piece, earlier, later.separation));
     assert!(constraints.is_weak(later.piece, earlier, later.separation));

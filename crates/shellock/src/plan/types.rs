@@ -56,8 +56,6 @@ pub struct PlanConstraints {
     pub weak_joints: BTreeSet<(PatchId, PatchId, LatticeDirection)>,
     /// Directions that a piece must not take, because its path rubbed.
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
-    /// Pieces that held nothing as the key: all others left them as one. Kept to unless the user chose the key.
-    pub bad_keys: BTreeSet<PatchId>,
     /// How often a piece rubbed against an earlier one; twice, along two directions, and it must go in before it.
     pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason that none of the above says.
@@ -67,9 +65,9 @@ pub struct PlanConstraints {
 impl PlanConstraints {
     /// How many things there are that restrict plans.
     pub fn n_lessons(&self) -> usize {
-        let Self { weak_contacts, weak_joints, forbidden, bad_keys, rubbed, rejected } = self;
+        let Self { weak_contacts, weak_joints, forbidden, rubbed, rejected } = self;
         let n_orders = rubbed.values().filter(|&&n| n >= MOST_RUBS).count();
-        weak_contacts.len() + weak_joints.len() + forbidden.len() + bad_keys.len() + n_orders + rejected.len()
+        weak_contacts.len() + weak_joints.len() + forbidden.len() + n_orders + rejected.len()
     }
 
     /// Whether nothing joins the two where `later` leaves along `s`.

@@ -123,6 +123,11 @@ impl Surfaces {
 }
 
 impl Bearing {
+    /// Unit vector across the normal, towards the first side of its regions.
+    pub fn across(&self) -> Vec3 {
+        self.axis().sides()[0]
+    }
+
     /// Where regions of sideways moves are.
     pub(super) fn axis(&self) -> Axis {
         Axis::new(self.point, self.normal)

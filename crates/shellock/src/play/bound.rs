@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
 use super::bearing::{Bearing, Surfaces};
-use super::quantity::{Quantities, Quantity};
+use super::quantity::{Quantities, Quantity, other_lines};
 use crate::verify::contact::Contact;
 use crate::verify::motion::{Corner, Freedom, Limits, System};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
@@ -54,13 +54,28 @@ pub struct Slide {
 
 /// The proof that some pieces go no farther than told.
 #[derive(Clone, Debug)]
-pub(super) struct Proof {
-    /// What is bounded. Turn and displacement of each free piece come first.
+pub struct Proof {
+    /// Who moves, in ascending order; all others are held.
+    pub free: Vec<PatchId>,
+    /// The places of the turn and the displacement of each free piece among the quantities.
+    pub of_piece: Vec<[usize; 2]>,
+    /// What is bounded.
     pub quantities: Vec<Quantity>,
     /// The bearings that end motions, by their place in the list of all, each with the quantities of its cell and its turn.
     pub rows: Vec<(usize, [usize; 2])>,
     /// For each quantity and axis, against it and along it: rows with multipliers. The row after the last is the slide.
     pub multipliers: Vec<Vec<[Vec<(usize, f64)>; 2]>>,
+}
+
+/// What became of a question.
+pub(super) struct Answer {
+    /// How far each free piece goes where sideways moves and turns are taken as none: its displacement, mm, and its turn, rad; empty where
+    /// something has no end.
+    pub linear: Vec<[f64; 2]>,
+    /// The bearings that hold, of those that were asked in any round.
+    pub asked: BTreeSet<usize>,
+    /// The proof, or why there is none.
+    pub proof: Result<Proof, Open>,
 }
 
 /// Why a proof does not close.
@@ -72,11 +87,22 @@ pub(super) enum Open {
     Rounds,
 }
 
+/// Which bearings are looked at.
+#[derive(Clone, Copy)]
+pub(super) enum Candidates<'a> {
+    /// All of the free pieces.
+    All,
+    /// Of these, the free pieces' own.
+    Some(&'a BTreeSet<usize>),
+}
+
 /// The question: who is free, and what is known of bearings.
 pub(super) struct Problem<'a> {
     pub surfaces: &'a Surfaces,
-    /// Those that may end motions.
+    /// All there are.
     pub bearings: &'a [Bearing],
+    /// Those that are looked at.
+    pub candidates: Candidates<'a>,
     pub centers: &'a IdVec<PatchId, Vec3>,
     pub slide: &'a Slide,
     /// In ascending order.
@@ -91,29 +117,36 @@ impl Problem<'_> {
         self.free.binary_search(&p).is_ok()
     }
 
-    /// The proof, or why there is none.
-    pub fn solve(&self, ctx: &Ctx) -> Result<Result<Proof, Open>, Cancelled> {
-        let own: Vec<usize> = (0..self.bearings.len())
-            .filter(|&i| self.is_free(self.bearings[i].a) || self.is_free(self.bearings[i].b))
-            .collect();
+    /// Looks for the proof. The answer is a function of the question alone, on any number of threads.
+    pub fn solve(&self, ctx: &Ctx) -> Result<Answer, Cancelled> {
+        let is_candidate = |i: usize| match self.candidates {
+            Candidates::All => true,
+            Candidates::Some(some) => some.contains(&i),
+        };
+        let is_own = |i: usize| self.is_free(self.bearings[i].a) || self.is_free(self.bearings[i].b);
+        let own: Vec<usize> = (0..self.bearings.len()).filter(|&i| is_own(i) && is_candidate(i)).collect();
         let bearings: Vec<Bearing> = own.iter().map(|&i| self.bearings[i]).collect();
         let mut quantities = Quantities::new(self.free, self.centers, &bearings);
         let beds: Vec<OnceLock<bool>> = bearings.iter().map(|_| OnceLock::new()).collect();
-        for _ in 0..ROUNDS {
+        let mut answer = Answer { linear: Vec::new(), asked: BTreeSet::new(), proof: Err(Open::Rounds) };
+        let open = |answer: Answer, why: Open| Ok(Answer { proof: Err(why), ..answer });
+        for n_before in 0..ROUNDS {
             ctx.check()?;
             let round = Round::new(self, &bearings, &quantities, &beds);
-            let Some((ends, motions)) = round.ends() else { return Ok(Err(Open::Far)) };
+            let Some((ends, motions)) = round.ends() else { return open(answer, Open::Far) };
             let guesses = round.guesses(&ends, &motions);
             let found: BTreeMap<usize, Vec<[f64; 2]>> =
                 ends.iter().map(|(&q, ends)| (q, ends.iter().map(|e| round.values(q, e)).collect())).collect();
-            if std::env::var("SHOW").is_ok_and(|v| self.free.len() == 1 && v == self.free[0].to_string()) {
-                for (q, f) in found.iter().take(2) { eprintln!("   {q}: {:.4?}", f); }
-            }
             let is_within = |(&q, found): (&usize, &Vec<[f64; 2]>)| {
                 found.iter().zip(&quantities.all[q].most).all(|(f, a)| f[0] <= a[0] && f[1] <= a[1])
             };
+            if n_before == 0 {
+                answer.linear = quantities.linear(&found);
+            }
+            answer.asked.extend(round.holding().map(|i| own[i]));
             if found.iter().all(is_within) {
-                return Ok(Ok(round.proof(&own, ends)));
+                let proof = Ok(round.proof(&own, ends, found));
+                return Ok(Answer { proof, ..answer });
             }
             // What no bearing needed yet is assumed to go as far as in the motions that were found.
             for (q, found) in found.into_iter().chain(guesses) {
@@ -124,12 +157,12 @@ impl Problem<'_> {
                         *assumed = found * WIDER + least;
                     }
                     if *assumed > most {
-                        return Ok(Err(Open::Far));
+                        return open(answer, Open::Far);
                     }
                 }
             }
         }
-        Ok(Err(Open::Rounds))
+        Ok(answer)
     }
 }
 
@@ -156,7 +189,9 @@ impl<'a> Round<'a> {
         let mut contacts: Vec<Contact> =
             bearings.iter().map(|b| contact(b.a, b.b, b.point, b.normal, b.gap_mm)).collect();
         let slide = problem.slide;
-        contacts.push(contact(slide.key, slide.seat, slide.at.into(), slide.along.into(), slide.most_mm));
+        if problem.is_free(slide.key) {
+            contacts.push(contact(slide.key, slide.seat, slide.at.into(), slide.along.into(), slide.most_mm));
+        }
         let system = System::new(&contacts, problem.free, LENGTH_MM, Freedom::Rigid);
         let told = system.rows.iter().map(|_| OnceLock::new()).collect();
         Self { problem, bearings, quantities, beds, center, system, errors_mm, told }
@@ -181,6 +216,13 @@ impl<'a> Round<'a> {
     /// A row's bound: how far its bearing's point rises, and the error.
     fn bound_mm(&self, row: usize) -> f64 {
         *self.told[row].get_or_init(|| self.measured_mm(row))
+    }
+
+    /// The bearings that were asked and hold.
+    fn holding(&self) -> impl Iterator<Item = usize> + '_ {
+        let is_held = |row: &usize| self.told[*row].get().is_some_and(|mm| mm.is_finite());
+        let contact = |row: usize| self.system.rows[row].contact;
+        (0..self.told.len()).filter(is_held).map(contact).filter(|&i| i < self.bearings.len())
     }
 
     fn measured_mm(&self, row: usize) -> f64 {
@@ -252,8 +294,13 @@ impl<'a> Round<'a> {
 
     /// How far a quantity goes along an axis (`side` 1) or against it (0), as a function of the unknowns.
     fn objective(&self, quantity: usize, axis: usize, side: usize) -> DVector<f64> {
+        let d = Vec3::from(self.quantities.all[quantity].axes[axis]);
+        self.along(quantity, if side == 1 { d } else { -d })
+    }
+
+    /// How far a quantity goes along a direction, as a function of the unknowns.
+    fn along(&self, quantity: usize, d: Vec3) -> DVector<f64> {
         let q = &self.quantities.all[quantity];
-        let d = Vec3::from(q.axes[axis]) * if side == 1 { 1.0 } else { -1.0 };
         let (velocity, spin) = match q.at {
             None => (Vec3::ZERO, d / LENGTH_MM),
             Some(at) => (d, (Vec3::from(at) - self.center).cross(d) / LENGTH_MM),
@@ -279,9 +326,15 @@ impl<'a> Round<'a> {
         })
     }
 
-    fn proof(&self, own: &[usize], ends: BTreeMap<usize, Ends>) -> Proof {
+    /// The proof that all quantities stay within what was `found`. A piece's own are bounded along more lines, by the rows that are known.
+    fn proof(&self, own: &[usize], mut ends: BTreeMap<usize, Ends>, found: BTreeMap<usize, Vec<[f64; 2]>>) -> Proof {
+        let mut quantities: BTreeMap<usize, Quantity> = BTreeMap::new();
+        for (&q, most) in &found {
+            quantities.insert(q, Quantity { most: most.clone(), ..self.quantities.all[q].clone() });
+        }
+        self.add_lines(&mut quantities, &mut ends);
         let rows: BTreeSet<usize> = ends.values().flatten().flatten().flatten().flatten().map(|r| r.0).collect();
-        let quantity: BTreeMap<usize, usize> = ends.keys().copied().zip(0..).collect();
+        let name_of: BTreeMap<usize, usize> = ends.keys().copied().zip(0..).collect();
         let contact = |row: usize| self.system.rows[row].contact;
         let of_bearings: Vec<usize> = rows.into_iter().filter(|&row| contact(row) < self.bearings.len()).collect();
         let place: BTreeMap<usize, usize> = of_bearings.iter().copied().zip(0..).collect();
@@ -291,12 +344,37 @@ impl<'a> Round<'a> {
         };
         let named = |row: &usize| {
             let p = &self.quantities.places[contact(*row)];
-            (own[contact(*row)], [quantity[&p.cell], quantity[&p.turn]])
+            (own[contact(*row)], [name_of[&p.cell], name_of[&p.turn]])
         };
         Proof {
-            quantities: ends.keys().map(|&q| self.quantities.all[q].clone()).collect(),
+            free: self.problem.free.to_vec(),
+            of_piece: self.quantities.of_piece.values().map(|of_piece| of_piece.map(|q| name_of[&q])).collect(),
+            quantities: quantities.into_values().collect(),
             rows: of_bearings.iter().map(named).collect(),
-            multipliers: ends.into_values().map(|ends| ends.into_iter().map(|sides| sides.map(renamed)).collect()).collect(),
+            multipliers: ends.into_values().map(|e| e.into_iter().map(|sides| sides.map(renamed)).collect()).collect(),
+        }
+    }
+
+    /// Bounds the pieces' own quantities along the lattice's other lines, by rows that have a part in the proof already.
+    fn add_lines(&self, quantities: &mut BTreeMap<usize, Quantity>, ends: &mut BTreeMap<usize, Ends>) {
+        let known: BTreeSet<usize> = ends.values().flatten().flatten().flatten().flatten().map(|r| r.0).collect();
+        let late = |row: usize| if known.contains(&row) { self.bound_mm(row) } else { f64::INFINITY };
+        let gaps: Vec<f64> = (0..self.system.rows.len()).map(late).collect();
+        let limits = Limits::new(&self.system, &gaps);
+        let mut corner = Corner::new(&limits);
+        for q in self.quantities.of_piece.values().flatten() {
+            for line in other_lines() {
+                let sides = [-line, line].map(|d| corner.ended(&self.along(*q, d)));
+                if sides.iter().any(Option::is_none) {
+                    continue;
+                }
+                let values = self.values(*q, &sides);
+                if let (Some(quantity), Some(ends)) = (quantities.get_mut(q), ends.get_mut(q)) {
+                    quantity.axes.push(line.to_array());
+                    quantity.most.push(values);
+                    ends.push(sides);
+                }
+            }
         }
     }
 }

@@ -61,12 +61,13 @@ impl Quantity {
 /// Lines of the lattice's directions.
 const LINES: usize = LatticeDirection::COUNT / 2;
 
-/// The lattice's lines, the coordinate axes first.
-fn lattice_lines() -> Vec<[f64; 3]> {
-    let axes = [Vec3::X, Vec3::Y, Vec3::Z];
-    let is_new = |d: &Vec3| axes.iter().all(|a| a.dot(*d).abs() < 0.99);
-    let lines = LatticeDirection::all().filter(|d| *d < d.opposite()).map(LatticeDirection::unit).filter(is_new);
-    axes.into_iter().chain(lines).map(|d| d.to_array()).collect()
+/// The coordinate axes, along which a piece's own turn and displacement are bounded.
+const COORDINATES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
+
+/// The lattice's lines, but for the coordinate axes.
+pub(super) fn other_lines() -> impl Iterator<Item = Vec3> {
+    let is_other = |d: &Vec3| COORDINATES.iter().all(|a| a.dot(*d).abs() < 0.99);
+    LatticeDirection::all().filter(|d| *d < d.opposite()).map(LatticeDirection::unit).filter(is_other)
 }
 
 /// Which quantities say how far a bearing's point goes.
@@ -102,8 +103,8 @@ impl Quantities {
         let freed = |p: PatchId| Some(p).filter(|p| free.binary_search(p).is_ok());
         let mut made = Self { all: Vec::new(), of_piece: BTreeMap::new(), places: Vec::with_capacity(bearings.len()) };
         for &p in free {
-            let turn = made.add(Quantity::new(Some(p), None, None, lattice_lines()[..3].to_vec()));
-            let shift = made.add(Quantity::new(Some(p), None, Some(centers[p]), lattice_lines()[..3].to_vec()));
+            let turn = made.add(Quantity::new(Some(p), None, None, COORDINATES.map(|d| d.to_array()).to_vec()));
+            let shift = made.add(Quantity::new(Some(p), None, Some(centers[p]), COORDINATES.map(|d| d.to_array()).to_vec()));
             made.of_piece.insert(p, [turn, shift]);
         }
         let key = |b: &Bearing| {
@@ -150,6 +151,12 @@ impl Quantities {
         Place { cell, cell_sign: sign, off: b.point - middle, turn, turn_sign, of_a, of_b }
     }
 
+    /// Displacement, mm, and turn, rad, of each free piece in what was `found`.
+    pub fn linear(&self, found: &BTreeMap<usize, Vec<[f64; 2]>>) -> Vec<[f64; 2]> {
+        let norm = |q: usize| Quantity { most: found[&q].clone(), ..self.all[q].clone() }.norm();
+        self.of_piece.values().map(|&[turn, shift]| [norm(shift), norm(turn)]).collect()
+    }
+
     /// How far the bearing's point, seen from `b`, can be from where the logarithms of poses say, mm: docs/certificate.md.
     pub fn error_mm(&self, b: &Bearing, p: &Place, centers: &IdVec<PatchId, Vec3>) -> f64 {
         let norm = |k: usize| self.all[k].norm();
@@ -188,12 +195,12 @@ mod tests {
 
     #[test]
     fn no_direction_is_farther_from_the_lattice_than_is_told() {
-        let lines = lattice_lines();
+        let lines: Vec<Vec3> = COORDINATES.into_iter().chain(other_lines()).collect();
         assert_eq!(lines.len(), LINES);
         for i in 0..20_000 {
             let t = f64::from(i);
             let d = Vec3::new((1.7 * t).sin(), (2.3 * t).cos(), (0.9 * t + 1.0).sin()).normalize();
-            let most = lines.iter().map(|l| Vec3::from_array(*l).dot(d).abs()).fold(0.0, f64::max);
+            let most = lines.iter().map(|l| l.dot(d).abs()).fold(0.0, f64::max);
             assert!(most * BETWEEN_LATTICE >= 1.0, "{d}: {most}");
         }
     }

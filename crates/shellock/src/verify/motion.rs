@@ -13,12 +13,16 @@ mod forces;
 mod play;
 mod system;
 
+use nalgebra::DVector;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
 use shellock_geom::Vec3;
 
 use super::contact::Contact;
 use crate::PatchId;
 pub(crate) use play::{Corner, Limits};
-pub(crate) use system::System;
+pub(crate) use system::{Row, System};
 
 /// Which motions of a piece are considered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +44,8 @@ pub struct Twist {
     pub spin: Vec3,
 }
 
-/// How the pieces not in `held` (of `n_pieces`) can move; empty where they cannot.
+/// How the pieces not in `held` (of `n_pieces`) can move; empty where they cannot. With `leaves`, that piece may move as it likes, and
+/// only motions in which others move count.
 ///
 /// `scale_mm` makes spins comparable to velocities: half the model's diagonal. All free pieces count as moving where
 /// there is no contact.
@@ -48,6 +53,7 @@ pub fn free_motion(
     contacts: &[Contact],
     n_pieces: usize,
     held: &[PatchId],
+    leaves: Option<PatchId>,
     scale_mm: f64,
     freedom: Freedom,
 ) -> Vec<Twist> {
@@ -57,17 +63,44 @@ pub fn free_motion(
     }
     let system = System::new(contacts, &free, scale_mm, freedom);
     let motion = system.opening_motion().or_else(|| system.sliding_motion());
-    motion.map_or_else(Vec::new, |x| system.twists(&x, &free))
+    let Some(motion) = motion else { return Vec::new() };
+    let Some(leaves) = leaves else { return system.twists(&motion, &free) };
+    let without = |twists: Vec<Twist>| -> Vec<Twist> { twists.into_iter().filter(|t| t.piece != leaves).collect() };
+    match moving_others(&system, &free, leaves) {
+        Some(motion) => without(system.twists(&motion, &free)),
+        None => Vec::new(),
+    }
+}
+
+/// A motion in which pieces but `leaves` move; `None` where there is none.
+///
+/// A cone that is more than 0 in their unknowns shows along almost any direction or its opposite; three are tried.
+fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<DVector<f64>> {
+    /// Others move where they get so far of the 1000 mm that motions end at; gaps that are 0 are taken as some nanometres.
+    const MOVED_MM: f64 = 0.5;
+    let limits = Limits::new(system, &vec![0.0; system.rows.len()]);
+    let mut corner = Corner::new(&limits);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let width = system.n / free.len().max(1);
+    let is_other = |k: usize| free[k / width] != leaves;
+    for _ in 0..3 {
+        let towards = DVector::from_fn(system.n, |k, _| if is_other(k) { rng.random_range(-1.0..1.0) } else { 0.0 });
+        for sign in [1.0, -1.0] {
+            corner.farthest(&(&towards * sign));
+            let moved = (0..system.n).filter(|&k| is_other(k)).map(|k| corner.motion()[k].abs()).fold(0.0, f64::max);
+            if moved > MOVED_MM {
+                let of_others = |k: usize| if is_other(k) { corner.motion()[k] } else { 0.0 };
+                return Some(DVector::from_fn(system.n, |k, _| of_others(k)));
+            }
+        }
+    }
+    None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOutcome};
-    use nalgebra::DVector;
-    use rand::RngExt;
-    use rand_chacha::ChaCha8Rng;
-    use rand_chacha::rand_core::SeedableRng;
 
     fn random_contacts(rng: &mut ChaCha8Rng, n_pieces: u32, n: usize) -> Vec<Contact> {
         let mut unit = || Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
@@ -196,13 +229,13 @@ mod tests {
     #[test]
     fn a_caged_box_is_locked_and_without_one_face_it_leaves_there() {
         let mut contacts = box_contacts(1, 0, Vec3::new(3.0, 1.0, 2.0));
-        assert!(free_motion(&contacts, 2, &[PatchId(0)], 1.0, Freedom::Rigid).is_empty());
+        assert!(free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Rigid).is_empty());
         contacts.retain(|c| c.normal != Vec3::X);
-        let moving = free_motion(&contacts, 2, &[PatchId(0)], 1.0, Freedom::Translations);
+        let moving = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Translations);
         assert_eq!(moving.len(), 1);
         assert!((moving[0].velocity - Vec3::X).length() < 1e-6);
         contacts.retain(|c| c.normal != Vec3::NEG_X);
-        let sliding = free_motion(&contacts, 2, &[PatchId(0)], 1.0, Freedom::Translations);
+        let sliding = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Translations);
         assert!(sliding[0].velocity.x.abs() > 0.999, "{sliding:?}");
     }
 
@@ -221,9 +254,9 @@ mod tests {
             }
         }
         assert!(contacts.len() > 20_000);
-        assert!(free_motion(&contacts, 40, &[PatchId(0)], 2.0, Freedom::Rigid).is_empty());
+        assert!(free_motion(&contacts, 40, &[PatchId(0)], None, 2.0, Freedom::Rigid).is_empty());
         contacts.retain(|c| c.a.0 != 38 || c.normal != Vec3::X);
-        let moving = free_motion(&contacts, 40, &[PatchId(0)], 2.0, Freedom::Rigid);
+        let moving = free_motion(&contacts, 40, &[PatchId(0)], None, 2.0, Freedom::Rigid);
         assert_eq!(moving.iter().map(|t| t.piece.0).collect::<Vec<_>>(), [38, 39]);
     }
 }

@@ -33,9 +33,20 @@ impl Display for Finding {
                 )
             }
             Self::ClusterMoves { motions } => write!(f, "these pieces come apart from the rest: {}", named(motions)),
-            Self::KeyLeaves { motion } => {
-                write!(f, "the key, piece {}, holds nothing: all others leave it together", motion.piece)
-            }
+            Self::PlayTooWide { piece, play, most: [most_mm, most_deg], at } => write!(
+                f,
+                "piece {piece} rattles by {:.1} mm and {:.1}°, where {most_mm:.1} mm and {most_deg:.1}° are allowed, {}: its seams are too short for \
+                 the clearance; try fewer pieces, a larger model, labels that cut where it is wider, or a smaller --clearance if your printer \
+                 holds it",
+                play.translation_mm,
+                play.rotation_deg,
+                At(at)
+            ),
+            Self::ComesOut { piece, at } => write!(
+                f,
+                "piece {piece} can be worked out by hand, turned past its connectors, {}: join it to a neighbour, or cut where it is wider",
+                At(at)
+            ),
             Self::SurfaceLost { fraction, at } => write!(
                 f,
                 "{:.2} % of the model's surface are on no piece, farthest from any {}",
