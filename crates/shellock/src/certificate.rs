@@ -22,7 +22,7 @@ use crate::plan::InstallationPlan;
 use crate::verify::clearance::{KitGaps, NearestPlace};
 use crate::verify::contact::{Contact, REACH_MM};
 use crate::play::{KitPlay, Slide};
-use crate::verify::motion::Freedom;
+use crate::motion::Freedom;
 use crate::verify::{Finding, Play, Verification};
 use crate::{IdVec, PatchId};
 pub use bounded::{BearingPoint, Bounded};

@@ -15,6 +15,7 @@ pub mod ids;
 mod impact;
 pub mod key;
 pub mod metric;
+pub mod motion;
 pub mod params;
 pub mod piece;
 pub mod play;

@@ -9,7 +9,6 @@
 
 pub mod clearance;
 pub mod contact;
-pub mod motion;
 pub mod sample;
 
 mod body;
@@ -32,7 +31,7 @@ use crate::piece::PressFit;
 use crate::plan::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 use contact::Contact;
-use motion::{Freedom, Twist};
+use crate::motion::{self, Freedom, Twist};
 pub use thin::{ThinShare, thin_share};
 
 /// How the finished kit is judged.

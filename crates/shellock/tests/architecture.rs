@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module may name those before it. `plan` stands before `body` because bodies are split along a plan.
-const ORDER: [&str; 16] = [
+const ORDER: [&str; 17] = [
+    "motion",
     "strength",
     "segmentation",
     "key",

@@ -1,6 +1,6 @@
 //! Proofs that contacts allow no motion, which need no solver to be checked.
 //!
-//! The contacts of some free pieces allow the motions `x` with `A x ≤ 0` ([`crate::verify::motion`]). A proof is a positive
+//! The contacts of some free pieces allow the motions `x` with `A x ≤ 0` ([`crate::motion`]). A proof is a positive
 //! multiplier `μ` for some of them. With `D = diag(min(μ, 1))`, let
 //!
 //! ```text
@@ -34,7 +34,7 @@ use shellock_geom::Vec3;
 
 use crate::PatchId;
 use crate::verify::contact::Contact;
-use crate::verify::motion::{Freedom, Row, System};
+use crate::motion::{Freedom, Row, System};
 
 /// Rest of a load, as the sum of its components, from which refining starts.
 const BALANCED: f64 = 1e-10;

@@ -251,13 +251,13 @@ fn gaps_of_a_row_add_up_when_all_may_move() {
         }
     }
     let farthest = |free: &[PatchId], d: Vec3| {
-        let system = crate::verify::motion::System::new(&contacts, free, 1.0, Freedom::Rigid);
+        let system = crate::motion::System::new(&contacts, free, 1.0, Freedom::Rigid);
         let mut objective = nalgebra::DVector::zeros(system.n);
         let at = system.n - 6;
         (0..3).for_each(|k| objective[at + k] = d[k]);
         let gaps: Vec<f64> = system.rows.iter().map(|row| contacts[row.contact].gap_mm).collect();
-        let limits = crate::verify::motion::Limits::new(&system, &gaps);
-        crate::verify::motion::Corner::new(&limits).farthest(&objective).expect("it is caged")
+        let limits = crate::motion::Limits::new(&system, &gaps);
+        crate::motion::Corner::new(&limits).farthest(&objective).expect("it is caged")
     };
     for d in [Vec3::X, Vec3::NEG_Y, Vec3::Z] {
         assert!((farthest(&[PatchId(2)], d) - 0.1).abs() < 1e-5);

@@ -18,7 +18,7 @@ use shellock_geom::Vec3;
 use super::bearing::{Bearing, Surfaces};
 use super::quantity::{Quantities, Quantity, other_lines};
 use crate::verify::contact::Contact;
-use crate::verify::motion::{Corner, Freedom, Limits, System};
+use crate::motion::{Corner, Freedom, Limits, System};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Widenings of an assumption before it is given up.

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::{Aabb, Vec3};
+use shellock_geom::Aabb;
 
 use super::body::Body;
 use super::sample;
+pub use crate::motion::Contact;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Distance between neighbouring samples, mm: several on every side of a 2 mm connector.
@@ -18,23 +19,6 @@ pub const REACH_MM: f64 = 0.15;
 const FACING: f64 = -0.9;
 /// Most contacts that are kept; every k-th of a longer list.
 const MOST_CONTACTS: usize = 20_000;
-
-/// A point of piece `a` that piece `b` lies against.
-#[derive(Clone, Copy, Debug)]
-pub struct Contact {
-    /// The piece the point is on.
-    pub a: PatchId,
-    /// The piece it faces.
-    pub b: PatchId,
-    /// Position, mm.
-    pub point: Vec3,
-    /// Unit normal of `a` at the point, towards `b`.
-    pub normal: Vec3,
-    /// Distance to `b`, mm.
-    pub gap_mm: f64,
-    /// Area of `a` that the point stands for, mm².
-    pub area_mm2: f64,
-}
 
 /// All contacts, in order of `a`, then along its surface, then of `b`.
 pub fn find(ctx: &Ctx, bodies: &IdVec<PatchId, Body>, clearance_mm: f64, seed: u64) -> Result<Vec<Contact>, Cancelled> {

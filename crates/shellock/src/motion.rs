@@ -19,10 +19,26 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use shellock_geom::Vec3;
 
-use super::contact::Contact;
 use crate::PatchId;
 pub(crate) use play::{Corner, Limits};
 pub(crate) use system::{Row, System};
+
+/// A point of piece `a` that piece `b` lies against.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact {
+    /// The piece the point is on.
+    pub a: PatchId,
+    /// The piece it faces.
+    pub b: PatchId,
+    /// Position, mm.
+    pub point: Vec3,
+    /// Unit normal of `a` at the point, towards `b`.
+    pub normal: Vec3,
+    /// Distance to `b`, mm.
+    pub gap_mm: f64,
+    /// Area of `a` that the point stands for, mm².
+    pub area_mm2: f64,
+}
 
 /// Which motions of a piece are considered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
