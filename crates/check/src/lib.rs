@@ -9,6 +9,7 @@ mod lock;
 mod mesh;
 mod pieces;
 mod rays;
+mod tree;
 mod vector;
 
 use std::fmt;
