@@ -353,3 +353,22 @@ fn test_press_fits(c: &Certificate) -> Tested {
 fn largest_gap_mm(contacts: &[Contact]) -> f64 {
     contacts.iter().map(|c| c.gap_mm).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_versions_and_formats_are_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let why = |text: &str| {
+            fs::write(folder.path().join("certificate.json"), text).unwrap();
+            check(folder.path()).unwrap_err()
+        };
+        let older = why(r#"{ "format": "shellock-certificate", "version": 2 }"#);
+        assert!(older.ends_with("version 2 is not known"), "{older}");
+        assert!(why(r#"{ "format": "another", "version": 3 }"#).ends_with("is not known"));
+        let empty = why(r#"{ "format": "shellock-certificate", "version": 3 }"#);
+        assert!(empty.starts_with("certificate.json"), "no certificate of this version, nor a plan: {empty}");
+    }
+}

@@ -59,11 +59,14 @@ pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], key: usize, cla
         return Err(format!("{figures}: the multipliers are not in equilibrium"));
     }
     let n_others = column(key).unwrap_or(n);
+    if n_others == 0 {
+        return Ok("no other piece is left to move".into());
+    }
     let of_key = columns.split_off(n_others);
     let left_over = eliminate(&mut columns, of_key);
     let least = HOLD * hold;
     // Twice the residual leaves room for the rounding of the sum.
-    if n_others > 0 && !(2.0 * (residual + left_over) < least && exceeds(gram(&columns), n_others, least)) {
+    if !(2.0 * (residual + left_over) < least && exceeds(gram(&columns), n_others, least)) {
         return Err(format!("{figures}: that does not hold"));
     }
     Ok(format!("{figures}; others move by up to {:.0e} of the key's motion", (residual + left_over) / least))

@@ -287,3 +287,38 @@ fn moved([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
 fn back([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
     moved([w.map(|x| -x), v.map(|x| -x)], p)
 }
+
+/// The same surface in `n²` parts of each triangle.
+fn divided(mesh: &Mesh, n: usize) -> Mesh {
+    let mut triangles = Vec::new();
+    for &[a, b, c] in &mesh.triangles {
+        // From the corners' weights, so that neighbours have the same points but for rounding that f32 takes away.
+        let at = |i: usize, k: usize| -> Vec3 {
+            let weights = [n - i - k, i, k].map(|w| w as f64 / n as f64);
+            std::array::from_fn(|axis| {
+                f64::from((weights[0] * a[axis] + weights[1] * b[axis] + weights[2] * c[axis]) as f32)
+            })
+        };
+        for i in 0..n {
+            for k in 0..n - i {
+                triangles.push([at(i, k), at(i + 1, k), at(i, k + 1)]);
+                if i + k + 2 <= n {
+                    triangles.push([at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)]);
+                }
+            }
+        }
+    }
+    let divided = Mesh::new(triangles);
+    assert_eq!(divided.n_open_edges(), 0);
+    divided
+}
+
+#[test]
+fn many_small_triangles_bound_as_few_large_ones_do() {
+    let mut caged = Caged::new();
+    // Rounding moves walls by a millionth.
+    caged.meshes = caged.meshes.iter().map(|mesh| divided(mesh, 18)).collect();
+    assert!(caged.meshes.iter().all(|mesh| mesh.triangles.len() > 3000));
+    caged.bearings = located(&caged.meshes, &caged.bearings).unwrap();
+    assert!(caged.test().is_ok());
+}
