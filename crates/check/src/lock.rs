@@ -69,7 +69,7 @@ pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], key: usize, cla
     if !(2.0 * (residual + left_over) < least && exceeds(gram(&columns), n_others, least)) {
         return Err(format!("{figures}: that does not hold"));
     }
-    Ok(format!("{figures}; others move by up to {:.0e} of the key's motion", (residual + left_over) / least))
+    Ok(format!("{figures}; others move by up to {:.0e} of the whole motion", (residual + left_over) / least))
 }
 
 /// What is told of a lock.
