@@ -4,24 +4,35 @@
 //! choice of contacts and multipliers, and those only as far as they stand the test. What each claim means and why its
 //! test is enough: docs/certificate.md.
 
+mod barrier;
+mod bearing;
+mod bounded;
+mod claims;
 mod gap;
 mod lock;
 mod mesh;
 mod pieces;
+mod quantity;
 mod rays;
+mod tree;
 mod vector;
 
 use std::fmt;
 use std::fs;
 use std::path::Path;
-use std::thread;
 
 use serde::Deserialize;
 use serde_json::Value;
 
+use bearing::Bearing;
+use bounded::{Bounded, Slide};
+use claims::Kit;
 use mesh::Mesh;
-use vector::{Vec3, scale};
+use vector::Vec3;
 
+/// What is read.
+const FORMAT: &str = "shellock-certificate";
+const VERSION: u64 = 3;
 /// Greater clearances are no joint, mm.
 const MOST_CLEARANCE_MM: f64 = 0.8;
 /// Most that a contact's faces may be apart beyond the clearance, mm.
@@ -34,20 +45,42 @@ const AT_FIT_MM: f64 = 4.0;
 /// Difference of two numbers written from one.
 const SAME: f64 = 1e-9;
 
+/// What became of a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It stood the test.
+    Confirmed,
+    /// It did not.
+    Refuted,
+    /// Nothing is claimed, which no kit needs.
+    Unproven,
+}
+
 /// One claim and what became of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// The claim, as a statement.
     pub claim: String,
     /// Whether it stood the test.
-    pub is_confirmed: bool,
+    pub verdict: Verdict,
     /// The figure that decided.
     pub figure: String,
 }
 
+impl Finding {
+    fn new(claim: &str, tested: Tested) -> Self {
+        let verdict = if tested.is_ok() { Verdict::Confirmed } else { Verdict::Refuted };
+        Self { claim: claim.to_owned(), verdict, figure: tested.unwrap_or_else(|bad| bad) }
+    }
+}
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let verdict = if self.is_confirmed { "confirmed" } else { "refuted" };
+        let verdict = match self.verdict {
+            Verdict::Confirmed => "confirmed",
+            Verdict::Refuted => "refuted",
+            Verdict::Unproven => "unproven",
+        };
         write!(f, "{verdict:9}  {:52}  {}", self.claim, self.figure)
     }
 }
@@ -57,8 +90,6 @@ type Tested = Result<String, String>;
 
 #[derive(Deserialize)]
 struct Certificate {
-    format: String,
-    version: u32,
     clearance_mm: f64,
     reach_mm: f64,
     center: Vec3,
@@ -67,6 +98,9 @@ struct Certificate {
     installation_order: Vec<usize>,
     pieces: Vec<PieceFile>,
     contacts: Vec<Contact>,
+    #[serde(default)]
+    bearings: Vec<Bearing>,
+    slide: Option<Slide>,
     #[serde(default)]
     press_fits: Vec<PressFit>,
     /// What the kit's maker found wrong with it.
@@ -103,6 +137,14 @@ struct PieceFile {
     id: usize,
     file: String,
     sha256: String,
+    play: Option<ToldPlay>,
+}
+
+/// How far a piece goes while the others are at rest, as users are told.
+#[derive(Deserialize)]
+struct ToldPlay {
+    translation_mm: f64,
+    rotation_deg: f64,
 }
 
 /// A point of piece `a`, its normal there, and the piece that it faces.
@@ -118,8 +160,8 @@ struct Contact {
 #[derive(Deserialize)]
 #[serde(tag = "claim", rename_all = "kebab-case")]
 enum Claim {
-    Locked { held: Vec<usize>, multipliers: Vec<(usize, f64)>, hold: f64 },
-    Moves {},
+    Locked { held: Vec<usize>, leaves: usize, multipliers: Vec<(usize, f64)>, hold: f64 },
+    Bounded(Bounded),
     KeyLeaves { piece: usize, direction: Vec3, least: LeastGaps },
     Installs { piece: usize, direction: Vec3, least: LeastGaps },
     Apart { least: LeastGaps },
@@ -143,51 +185,68 @@ struct Gap {
 
 /// Tests every claim of the kit in `folder`. An error means that there is no certificate to test.
 pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
-    let certificate: Certificate = read_json(&folder.join("certificate.json"))?;
-    if (certificate.format.as_str(), certificate.version) != ("shellock-certificate", 2) {
-        return Err(format!("format \"{}\" version {} is not known", certificate.format, certificate.version));
+    let certificate: Value = read_json(&folder.join("certificate.json"))?;
+    let (format, version) = (&certificate["format"], &certificate["version"]);
+    if (format.as_str(), version.as_u64()) != (Some(FORMAT), Some(VERSION)) {
+        return Err(format!("format {format} version {version} is not known"));
     }
+    let certificate = serde_json::from_value(certificate).map_err(|e| format!("certificate.json: {e}"))?;
     let plan: Value = read_json(&folder.join("plan.json"))?;
+    Ok(findings(folder, &certificate, &plan))
+}
+
+fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut add = |claim: &str, tested: Tested| {
         let is_confirmed = tested.is_ok();
-        findings.push(Finding { claim: claim.to_owned(), is_confirmed, figure: tested.unwrap_or_else(|bad| bad) });
+        findings.push(Finding::new(claim, tested));
         is_confirmed
     };
-    let is_whole = add("the certificate speaks of this plan", test_plan(&certificate, &plan))
-        & add("every claim that a kit needs is made", test_completeness(&certificate));
-    add("the kit passed the tests of its maker", test_passed(&certificate));
-    let (meshes, files) = pieces::read(folder, &certificate.pieces);
+    let is_whole = add("the certificate speaks of this plan", test_plan(c, plan))
+        & add("every claim that a kit needs is made", test_completeness(c));
+    add("the kit passed the tests of its maker", test_passed(c));
+    let (meshes, files) = pieces::read(folder, &c.pieces);
     let is_read = add("the files are those that were certified", files);
-    if !is_whole || (!is_read && meshes.len() < certificate.pieces.len()) {
-        return Ok(findings);
+    if !is_whole || (!is_read && meshes.len() < c.pieces.len()) {
+        return findings;
     }
-    if !certificate.files.is_empty() {
-        add("other files are those that were certified", pieces::test_files(folder, &certificate.files));
+    if !c.files.is_empty() {
+        add("other files are those that were certified", pieces::test_files(folder, &c.files));
     }
     if !add("each piece is one closed surface around a volume", pieces::test_closed(&meshes)) {
-        return Ok(findings);
+        return findings;
     }
-    let contacts = located(&certificate, &meshes);
-    let names = match &contacts {
-        Ok(contacts) => Ok(format!("{} contacts, up to {:.3} mm apart", contacts.len(), largest_gap_mm(contacts))),
-        Err(why) => Err(why.clone()),
+    let contacts = located(c, &meshes);
+    let told = |contacts: &Vec<Contact>| {
+        format!("{} contacts, up to {:.3} mm apart", contacts.len(), largest_gap_mm(contacts))
     };
-    add("the contacts lie on both pieces' surfaces", names);
-    if !certificate.press_fits.is_empty() {
-        add("the key is pressed on purpose, but not by much", test_press_fits(&certificate));
+    add("the contacts lie on both pieces' surfaces", contacts.as_ref().map(told).map_err(String::clone));
+    let bearings = bearing::located(&meshes, &c.bearings);
+    if !c.bearings.is_empty() {
+        let told = |bearings: &Vec<Bearing>| format!("{} bearings", bearings.len());
+        add("the bearings lie on their pieces' surfaces", bearings.as_ref().map(told).map_err(String::clone));
     }
-    let (c, meshes, contacts) = (&certificate, &meshes[..], contacts.as_deref().ok());
-    let tested: Vec<(String, Tested)> = thread::scope(|scope| {
-        let tests: Vec<_> =
-            c.claims.iter().map(|claim| scope.spawn(|| test_claim(c, meshes, contacts, claim))).collect();
-        let died = |_| ("a claim".to_owned(), Err("its test came to no end".to_owned()));
-        tests.into_iter().filter_map(|test| test.join().unwrap_or_else(|e| Some(died(e)))).collect()
-    });
-    tested.into_iter().for_each(|(name, tested)| {
-        add(&name, tested);
-    });
-    Ok(findings)
+    if !c.press_fits.is_empty() {
+        add("the key is pressed on purpose, but not by much", test_press_fits(c));
+    }
+    let kit = Kit { c, meshes: &meshes, contacts: contacts.as_deref().ok(), bearings: bearings.as_deref().ok() };
+    findings.extend(kit.test_claims());
+    findings.extend(unproven(c));
+    findings
+}
+
+/// Pieces of which it is not claimed that they stay within their play.
+fn unproven(c: &Certificate) -> impl Iterator<Item = Finding> {
+    let is_claimed = |id: usize| c.claims.iter().any(|claim| matches!(claim, Claim::Bounded(b) if b.free == [id]));
+    (0..c.pieces.len()).filter(move |&id| !is_claimed(id)).map(|id| Finding {
+        claim: within_play(id),
+        verdict: Verdict::Unproven,
+        figure: "not claimed".into(),
+    })
+}
+
+fn within_play(piece: usize) -> String {
+    format!("piece {piece} stays within its play")
 }
 
 fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
@@ -238,28 +297,20 @@ fn test_passed(c: &Certificate) -> Tested {
     if c.failed.is_empty() { Ok("nothing failed".into()) } else { Err(format!("failed: {}", c.failed.join("; "))) }
 }
 
-/// A lock with key and first piece held, one of the first piece, the key's way out, a way in for all others, and no overlap.
+/// One lock, with the first piece held, that the key leaves; the key's way out, a way in for all others, and no overlap.
 fn test_completeness(c: &Certificate) -> Tested {
     let count = |is_it: &dyn Fn(&Claim) -> bool| c.claims.iter().filter(|claim| is_it(claim)).count();
-    // Every piece, with each lock, and with the pieces that can be put in.
-    let most = 3 + 2 * c.pieces.len();
+    // Each piece: put in, bounded alone, and at rest while all others are bounded.
+    let most = 3 + 3 * c.pieces.len();
     if c.claims.len() > most {
         return Err(format!("{} claims are more than the {most} that a kit needs", c.claims.len()));
     }
     let first = c.installation_order.first().copied().unwrap_or_default();
-    let holds = |claim: &Claim, all: &[usize]| {
-        let Claim::Locked { held, .. } = claim else { return false };
-        let mut held = held.clone();
-        held.sort_unstable();
-        held == all
-    };
-    let ends = [c.key.min(first), c.key.max(first)];
-    if count(&|claim| holds(claim, &ends)) != 1 {
-        return Err("it is not claimed that nothing moves while the key and the first piece are held".into());
-    }
-    let all_but_first: Vec<usize> = (0..c.pieces.len()).filter(|&id| id != first).collect();
-    if count(&|claim| holds(claim, &[c.key]) || holds(claim, &all_but_first)) == 0 {
-        return Err(format!("it is not claimed that piece {first}, the first, cannot come off"));
+    let is_lock = |claim: &Claim| matches!(claim, Claim::Locked { .. });
+    let is_needed_lock =
+        |claim: &Claim| matches!(claim, Claim::Locked { held, leaves, .. } if *held == [first] && *leaves == c.key);
+    if first == c.key || count(&is_lock) != 1 || count(&is_needed_lock) != 1 {
+        return Err(format!("it is not claimed, once, that nothing but the key moves while piece {first} is held"));
     }
     if count(&|claim| matches!(claim, Claim::KeyLeaves { piece, .. } if *piece == c.key)) != 1 {
         return Err("it is not claimed that the key can leave".into());
@@ -303,47 +354,21 @@ fn largest_gap_mm(contacts: &[Contact]) -> f64 {
     contacts.iter().map(|c| c.gap_mm).fold(0.0, f64::max)
 }
 
-/// The claim as a sentence, and whether it stands; `None` for one that says nothing.
-fn test_claim(
-    c: &Certificate,
-    meshes: &[Mesh],
-    contacts: Option<&[Contact]>,
-    claim: &Claim,
-) -> Option<(String, Tested)> {
-    let names = |held: &[usize]| held.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
-    Some(match claim {
-        Claim::Locked { held, multipliers, hold } => {
-            let frame = lock::Frame { center: c.center, length_mm: c.length_mm, n_pieces: meshes.len() };
-            let tested = match contacts {
-                Some(contacts) => lock::test(&frame, contacts, held, multipliers, *hold),
-                None => Err("its contacts are not there".into()),
-            };
-            (format!("nothing moves while {} are held", names(held)).replace("are held", is_or_are(held)), tested)
-        }
-        Claim::Moves {} => return None,
-        Claim::KeyLeaves { piece, direction, least } => {
-            let others: Vec<usize> = (0..meshes.len()).filter(|p| p != piece).collect();
-            let tested = rays::test_path(meshes, *piece, *direction, &others).and_then(|figure| {
-                gap::test(meshes, &c.press_fits, Some((*piece, *direction)), &others, least, figure)
-            });
-            (format!("the key, piece {piece}, can leave"), tested)
-        }
-        Claim::Installs { piece, direction, least } => {
-            let earlier: Vec<usize> = c.installation_order.iter().copied().take_while(|p| p != piece).collect();
-            let way_out = scale(*direction, -1.0);
-            let tested = rays::test_path(meshes, *piece, way_out, &earlier)
-                .and_then(|figure| gap::test(meshes, &c.press_fits, Some((*piece, way_out)), &earlier, least, figure));
-            (format!("piece {piece} can be installed"), tested)
-        }
-        Claim::Apart { least } => {
-            let all: Vec<usize> = (0..meshes.len()).collect();
-            let tested = rays::test_apart(meshes, |pair, at| gap::is_pressed(meshes, &c.press_fits, pair, at))
-                .and_then(|figure| gap::test(meshes, &c.press_fits, None, &all, least, figure));
-            ("the assembled pieces do not overlap".into(), tested)
-        }
-    })
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn is_or_are(held: &[usize]) -> &'static str {
-    if held.len() == 1 { "is held" } else { "are held" }
+    #[test]
+    fn other_versions_and_formats_are_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let why = |text: &str| {
+            fs::write(folder.path().join("certificate.json"), text).unwrap();
+            check(folder.path()).unwrap_err()
+        };
+        let older = why(r#"{ "format": "shellock-certificate", "version": 2 }"#);
+        assert!(older.ends_with("version 2 is not known"), "{older}");
+        assert!(why(r#"{ "format": "another", "version": 3 }"#).ends_with("is not known"));
+        let empty = why(r#"{ "format": "shellock-certificate", "version": 3 }"#);
+        assert!(empty.starts_with("certificate.json"), "no certificate of this version, nor a plan: {empty}");
+    }
 }

@@ -1,8 +1,14 @@
-//! Whether contacts and their multipliers show that nothing moves.
+//! Whether contacts and their multipliers show that nothing moves but the key.
 //!
 //! A motion gives each piece that is not held a velocity `v` and a spin `w`. A contact with normal `n` at `p`, from `a`
-//! to `b`, allows it where `n · (v_a − v_b) + (p × n) · (w_a − w_b) ≤ 0`: one row of `A x ≤ 0`. If multipliers `μ > 0`
-//! have `|Aᵀμ| < σ_min(D A)`, with `D = diag(min(μ, 1))`, then `x = 0` is the only solution (docs/certificate.md).
+//! to `b`, allows it where `n · (v_a − v_b) + (p × n) · (w_a − w_b) ≤ 0`: one row of `A x ≤ 0`. With multipliers `μ > 0`,
+//! over all columns, such an `x` has `‖D A x‖ ≤ |Aᵀμ| |x|`, where `D = diag(min(μ, 1))` (docs/certificate.md).
+//!
+//! Let `x = (x_o, x_k)`, the key's unknowns last, `B = D A_o`, `C = D A_k`. An orthonormal basis `Q` of the columns of `C` but
+//! for those that are nearly sums of others has `C = Q R + E`, where `E` is what is left of these: `‖E‖ ≤ ε`, measured. So
+//! `‖D A x‖ ≥ |(1 − Q Qᵀ) (B x_o + C x_k)| ≥ σ |x_o| − ε |x_k|`, where `σ²` is the least eigenvalue of `S = Bᵀ (1 − Q Qᵀ) B`, and
+//! the others move by at most `(|Aᵀμ| + ε) / σ` of the whole motion. The key's way out is such a nearly empty column: its walls
+//! are parallel to it but for the rounding of files. Where walls are exactly parallel, `ε` is rounding, as `|Aᵀμ|` is.
 
 use crate::vector::{Vec3, cross, scale, sub};
 use crate::{Contact, Tested};
@@ -11,6 +17,10 @@ use crate::{Contact, Tested};
 const EQUILIBRIUM: f64 = 1e-9;
 /// Share of the stated hold that must be there.
 const HOLD: f64 = 0.999;
+/// A column of the key that is a sum of others but for this share of all, squared, is left out.
+const LEFT_OUT: f64 = 1e-9;
+/// Unknowns of a piece.
+const UNKNOWNS: usize = 6;
 
 /// What twists are about.
 pub struct Frame {
@@ -22,39 +32,81 @@ pub struct Frame {
     pub n_pieces: usize,
 }
 
-/// Whether nothing moves while `held` do not.
-pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], multipliers: &[(usize, f64)], hold: f64) -> Tested {
-    let free: Vec<usize> = (0..frame.n_pieces).filter(|id| !held.contains(id)).collect();
-    let column = |id: usize| free.binary_search(&id).ok().map(|i| 6 * i);
-    let n = 6 * free.len();
-    if n == 0 {
-        return Ok("no piece is left to move".into());
-    }
-    let (mut sum, mut gram, mut total) = (vec![0.0; n], vec![0.0; n * n], 0.0);
-    for &(i, multiplier) in multipliers {
+/// Whether nothing but `key` moves while `held` do not.
+pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], key: usize, claim: &Held) -> Tested {
+    let others = (0..frame.n_pieces).filter(|id| *id != key && !held.contains(id));
+    let free: Vec<usize> = others.chain(Some(key).filter(|id| !held.contains(id))).collect();
+    let column = |id: usize| free.iter().position(|other| *other == id).map(|i| UNKNOWNS * i);
+    let n = UNKNOWNS * free.len();
+    // Weighted rows, as columns.
+    let mut columns = vec![vec![0.0; claim.multipliers.len()]; n];
+    let (mut sum, mut total) = (vec![0.0; n], 0.0);
+    for (r, &(i, multiplier)) in claim.multipliers.iter().enumerate() {
         let contact = contacts.get(i).ok_or("a multiplier of no contact")?;
         if !(multiplier > 0.0 && multiplier.is_finite()) {
             return Err(format!("the multiplier of contact {i} is {multiplier}"));
         }
-        let row = sparse_row(frame, contact, column(contact.a), column(contact.b));
-        let weight = multiplier.min(1.0);
-        for &(c, x) in &row {
+        for (c, x) in sparse_row(frame, contact, column(contact.a), column(contact.b)) {
             sum[c] += multiplier * x;
-            row.iter().for_each(|&(d, y)| gram[c * n + d] += weight * weight * x * y);
+            columns[c][r] += multiplier.min(1.0) * x;
         }
         total += multiplier;
     }
     let residual = sum.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let figures = format!("residual {residual:.1e}, hold {hold:.4}, {} contacts", multipliers.len());
+    let hold = claim.hold;
+    let figures = format!("residual {residual:.1e}, hold {hold:.4}, {} contacts", claim.multipliers.len());
     if residual.is_nan() || residual > EQUILIBRIUM * total {
         return Err(format!("{figures}: the multipliers are not in equilibrium"));
     }
+    let n_others = column(key).unwrap_or(n);
+    if n_others == 0 {
+        return Ok("no other piece is left to move".into());
+    }
+    let of_key = columns.split_off(n_others);
+    let left_over = eliminate(&mut columns, of_key);
     let least = HOLD * hold;
     // Twice the residual leaves room for the rounding of the sum.
-    if !(2.0 * residual < least && exceeds(gram, n, least)) {
+    if !(2.0 * (residual + left_over) < least && exceeds(gram(&columns), n_others, least)) {
         return Err(format!("{figures}: that does not hold"));
     }
-    Ok(figures)
+    Ok(format!("{figures}; others move by up to {:.0e} of the whole motion", (residual + left_over) / least))
+}
+
+/// What is told of a lock.
+pub struct Held<'a> {
+    /// Contacts with their forces.
+    pub multipliers: &'a [(usize, f64)],
+    /// The least that a motion of the others, of length 1, does to the contacts.
+    pub hold: f64,
+}
+
+/// Takes from `columns` what lies in the space of the key's. Of these, whatever is nearly a sum of others is left out; the length
+/// of all that is left of it is told.
+fn eliminate(columns: &mut [Vec<f64>], mut of_key: Vec<Vec<f64>>) -> f64 {
+    let length_sq = |c: &[f64]| c.iter().map(|x| x * x).sum::<f64>();
+    let least_sq = LEFT_OUT * of_key.iter().map(|c| length_sq(c)).sum::<f64>();
+    let longest = |of_key: &[Vec<f64>]| {
+        (0..of_key.len()).max_by(|&i, &j| length_sq(&of_key[i]).total_cmp(&length_sq(&of_key[j])))
+    };
+    while let Some(pivot) = longest(&of_key).filter(|&i| length_sq(&of_key[i]) > least_sq) {
+        let mut unit = of_key.swap_remove(pivot);
+        let length = length_sq(&unit).sqrt();
+        unit.iter_mut().for_each(|x| *x /= length);
+        // Twice, so that what rounding leaves the first time goes, too.
+        for column in columns.iter_mut().chain(&mut of_key) {
+            for _ in 0..2 {
+                let share: f64 = column.iter().zip(&unit).map(|(x, u)| x * u).sum();
+                column.iter_mut().zip(&unit).for_each(|(x, u)| *x -= share * u);
+            }
+        }
+    }
+    of_key.iter().map(|c| length_sq(c)).sum::<f64>().sqrt()
+}
+
+/// All scalar products of columns.
+fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    columns.iter().flat_map(|a| columns.iter().map(move |b| product(a, b))).collect()
 }
 
 /// The columns of a row that are not 0.
@@ -85,4 +137,96 @@ fn exceeds(mut gram: Vec<f64>, n: usize, least: f64) -> bool {
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME: Frame = Frame { center: [0.0; 3], length_mm: 5.0, n_pieces: 3 };
+    const KEY: usize = 2;
+
+    /// Four contacts of piece `a` with `b` on the side of a cube of 10 mm around (x, 0, 0).
+    fn on_side(a: usize, b: usize, x: f64, axis: usize, sign: f64) -> Vec<Contact> {
+        let place = |i: usize| {
+            let (mut point, mut normal) = ([x, 0.0, 0.0], [0.0; 3]);
+            normal[axis] = sign;
+            point[axis] += 5.0 * sign;
+            point[(axis + 1) % 3] += if i & 1 == 1 { 4.0 } else { -4.0 };
+            point[(axis + 2) % 3] += if i & 2 == 2 { 4.0 } else { -4.0 };
+            Contact { a, b, point, normal, gap_mm: 0.1 }
+        };
+        (0..4).map(place).collect()
+    }
+
+    /// Piece 1, a cube in a box, piece 0, whose side along x is the key, which slides along z.
+    fn contacts() -> Vec<Contact> {
+        let of_cube =
+            [(1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0), (0, -1.0)].map(|(axis, sign)| on_side(1, 0, 0.0, axis, sign));
+        let of_key = [(1, -1.0), (1, 1.0), (0, 1.0)].map(|(axis, sign)| on_side(KEY, 0, 10.0, axis, sign));
+        [of_cube.concat(), of_key.concat(), on_side(1, KEY, 0.0, 0, 1.0)].concat()
+    }
+
+    fn tested(contacts: &[Contact], held: &[usize], key: usize, hold: f64) -> Tested {
+        let multipliers: Vec<(usize, f64)> = (0..contacts.len()).map(|i| (i, 1.0)).collect();
+        test(&FRAME, contacts, held, key, &Held { multipliers: &multipliers, hold })
+    }
+
+    /// The greatest hold that is confirmed, but for a share of 0.001.
+    fn greatest_hold(contacts: &[Contact]) -> f64 {
+        let steps = (0..20_000).map(|i| f64::from(i) * 0.001).skip(1);
+        steps.take_while(|&hold| tested(contacts, &[0], KEY, hold).is_ok()).last().unwrap_or(0.0)
+    }
+
+    #[test]
+    fn a_cube_behind_a_sliding_key_is_held_and_the_key_is_not() {
+        let told = tested(&contacts(), &[0], KEY, 0.5).unwrap();
+        assert!(told.contains("hold 0.5000, 36 contacts; others move by up to "), "{told}");
+        assert!(tested(&contacts(), &[0], 1, 0.1).is_err(), "the key moves while the cube counts as free");
+        let greatest = greatest_hold(&contacts());
+        assert!(tested(&contacts(), &[0], KEY, 1.01 * greatest).is_err());
+        assert!((0.5..5.0).contains(&greatest), "{greatest}");
+    }
+
+    #[test]
+    fn a_hold_is_what_the_best_motion_of_the_key_leaves() {
+        // Along x the cube meets 4 contacts with the box and 4 with the key, which follows and meets 4 with the box.
+        let all: f64 = 4.0 + 4.0 * 4.0 / (4.0 + 4.0);
+        let along_x = greatest_hold(&contacts());
+        assert!(along_x <= all.sqrt() / HOLD + 1e-3, "{along_x}");
+        assert!(along_x > 0.9 * all.sqrt(), "{along_x}");
+    }
+
+    #[test]
+    fn a_cube_that_can_follow_the_key_is_not_held() {
+        let along_z = |c: &Contact| c.a == 1 && c.normal[2] != 0.0;
+        let loose: Vec<Contact> = contacts().into_iter().filter(|c| !along_z(c)).collect();
+        assert!(tested(&loose, &[0], KEY, 1e-3).is_err());
+    }
+
+    #[test]
+    fn multipliers_are_positive_and_in_equilibrium_also_at_the_key() {
+        let contacts = contacts();
+        let of_key = contacts.iter().position(|c| c.a == KEY).unwrap();
+        let told = |change: fn(&mut [(usize, f64)], usize)| {
+            let mut multipliers: Vec<(usize, f64)> = (0..contacts.len()).map(|i| (i, 1.0)).collect();
+            change(&mut multipliers, of_key);
+            test(&FRAME, &contacts, &[0], KEY, &Held { multipliers: &multipliers, hold: 0.1 })
+        };
+        assert!(told(|_, _| ()).is_ok());
+        assert!(told(|m, _| m[7].1 = -1.0).is_err());
+        assert!(told(|m, _| m[7].0 = 99).is_err());
+        assert!(told(|m, of_key| m[of_key].1 = 1.001).unwrap_err().ends_with("not in equilibrium"));
+    }
+
+    #[test]
+    fn walls_of_the_key_that_are_uneven_by_rounding_change_little() {
+        let mut rough = contacts();
+        let exact = greatest_hold(&rough);
+        rough.iter_mut().enumerate().filter(|(_, c)| c.a == KEY).for_each(|(i, c)| {
+            let slant = 1e-11 * (i as f64).sin();
+            c.normal[2] += slant;
+        });
+        assert!((greatest_hold(&rough) - exact).abs() < 2e-3);
+    }
 }

@@ -1,12 +1,14 @@
 //! `shellock-check OUT`: confirms or refutes each claim in `OUT/certificate.json`, one line a claim, and what that means.
 //!
-//! Exit code 0: everything is confirmed; 1: something is refuted; 2: the certificate could not be read.
+//! Exit code 0: everything that is claimed is confirmed; 1: something is refuted; 2: the certificate could not be read.
 
 use std::path::Path;
 use std::process::ExitCode;
 
+use shellock_check::Verdict;
+
 const USAGE: &str = "usage: shellock-check OUT, where OUT is the folder of a kit with its certificate.json\n\
-    Confirms or refutes what the certificate claims of the pieces. Exit code 0: all confirmed, 1: something refuted, 2: nothing to check.";
+    Confirms or refutes what the certificate claims of the pieces. Exit code 0: nothing refuted, 1: something refuted, 2: nothing to check.";
 const NOT_TESTED: &str = "Not tested: that the outside looks like the model, and how thick walls are (`shellock verify` does), \
     and what report.html and the pictures show";
 
@@ -28,10 +30,13 @@ fn main() -> ExitCode {
     match shellock_check::check(Path::new(folder)) {
         Ok(findings) => {
             findings.iter().for_each(|f| println!("{f}"));
-            let n_refuted = findings.iter().filter(|f| !f.is_confirmed).count();
+            let count = |verdict: Verdict| findings.iter().filter(|f| f.verdict == verdict).count();
+            let [n_refuted, n_unproven] = [Verdict::Refuted, Verdict::Unproven].map(count);
+            let n_claimed = findings.len() - n_unproven;
+            let unproven = if n_unproven > 0 { format!(", {n_unproven} unproven") } else { String::new() };
             match n_refuted {
-                0 => println!("all {} confirmed. {NOT_TESTED}", findings.len()),
-                n => println!("{n} of {} REFUTED: do not trust this kit", findings.len()),
+                0 => println!("all {n_claimed} confirmed{unproven}. {NOT_TESTED}"),
+                n => println!("{n} of {n_claimed} REFUTED{unproven}: do not trust this kit"),
             }
             ExitCode::from(u8::from(n_refuted > 0))
         }

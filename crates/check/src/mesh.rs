@@ -1,5 +1,8 @@
 //! A piece as the triangles of its file.
 
+use std::sync::OnceLock;
+
+use crate::tree::Tree;
 use crate::vector::{Vec3, add, cross, distance, dot, norm, scale, sub};
 
 /// How far a contact's point may be from the triangle that it is said to lie on, mm: rounding of files.
@@ -18,6 +21,15 @@ const FARTHEST_MM: f64 = 1e5;
 pub struct Mesh {
     /// Corners of each.
     pub triangles: Vec<[Vec3; 3]>,
+    tree: OnceLock<Tree>,
+    edges: OnceLock<Edges>,
+}
+
+/// The edges of all triangles, those between the same points beside each other.
+struct Edges {
+    all: Vec<Edge>,
+    /// For side `k` of triangle `t`, at `3 t + k`: which of all lie between its ends.
+    of_side: Vec<[usize; 2]>,
 }
 
 /// An edge of a triangle; points are one where their bytes are.
@@ -25,10 +37,16 @@ pub struct Mesh {
 struct Edge {
     ends: [[u64; 3]; 2],
     is_forward: bool,
-    triangle: usize,
+    /// Side `k` of triangle `t`, as `3 t + k`.
+    side: usize,
 }
 
 impl Mesh {
+    /// Of these triangles.
+    pub fn new(triangles: Vec<[Vec3; 3]>) -> Self {
+        Self { triangles, tree: OnceLock::new(), edges: OnceLock::new() }
+    }
+
     /// From the bytes of a binary STL file; its normals are not read.
     pub fn from_stl(bytes: &[u8]) -> Result<Self, String> {
         const HEADER: usize = 84;
@@ -43,42 +61,55 @@ impl Mesh {
         let triangle = |b: &[u8]| [point(&b[12..]), point(&b[24..]), point(&b[36..])];
         let triangles: Vec<[Vec3; 3]> = bytes[HEADER..].chunks_exact(RECORD).map(triangle).collect();
         match triangles.iter().flatten().flatten().all(|x| x.abs() <= FARTHEST_MM) {
-            true => Ok(Self { triangles }),
+            true => Ok(Self::new(triangles)),
             false => Err(format!("a coordinate is no number, or beyond {FARTHEST_MM} mm")),
         }
     }
 
     /// Edges that are not used equally often in both directions.
     pub fn n_open_edges(&self) -> usize {
-        let edges = self.edges();
-        let between = edges.iter().filter(|e| e.ends[0] != e.ends[1]).collect::<Vec<_>>();
-        let uses = between.chunk_by(|x, y| x.ends == y.ends);
+        let uses = self.edges().all.chunk_by(|x, y| x.ends == y.ends).filter(|uses| uses[0].ends[0] != uses[0].ends[1]);
         uses.filter(|uses| 2 * uses.iter().filter(|e| e.is_forward).count() != uses.len()).count()
     }
 
-    /// The edges of all triangles, those between the same points beside each other.
-    fn edges(&self) -> Vec<Edge> {
-        // Zero has two signs; adding it leaves one.
-        let name = |p: Vec3| p.map(|x| (x + 0.0).to_bits());
-        let mut edges = Vec::with_capacity(3 * self.triangles.len());
-        for (triangle, t) in self.triangles.iter().enumerate() {
-            let corners = t.map(name);
-            edges.extend((0..3).map(|k| {
-                let (from, to) = (corners[k], corners[(k + 1) % 3]);
-                Edge { ends: [from.min(to), from.max(to)], is_forward: from < to, triangle }
-            }));
-        }
-        edges.sort_unstable();
-        edges
+    /// Triangles that share the edge of side `k` of triangle `t`: itself, and those on the other side.
+    pub fn sharing(&self, t: usize, k: usize) -> impl Iterator<Item = usize> {
+        let edges = self.edges();
+        let [from, to] = edges.of_side[3 * t + k];
+        edges.all[from..to].iter().map(|e| e.side / 3)
+    }
+
+    /// Found once.
+    fn edges(&self) -> &Edges {
+        self.edges.get_or_init(|| {
+            // Zero has two signs; adding it leaves one.
+            let name = |p: Vec3| p.map(|x| (x + 0.0).to_bits());
+            let mut all = Vec::with_capacity(3 * self.triangles.len());
+            for (triangle, t) in self.triangles.iter().enumerate() {
+                let corners = t.map(name);
+                all.extend((0..3).map(|k| {
+                    let (from, to) = (corners[k], corners[(k + 1) % 3]);
+                    Edge { ends: [from.min(to), from.max(to)], is_forward: from < to, side: 3 * triangle + k }
+                }));
+            }
+            all.sort_unstable();
+            let (mut of_side, mut from) = (vec![[0; 2]; all.len()], 0);
+            for uses in all.chunk_by(|x, y| x.ends == y.ends) {
+                let to = from + uses.len();
+                uses.iter().for_each(|e| of_side[e.side] = [from, to]);
+                from = to;
+            }
+            Edges { all, of_side }
+        })
     }
 
     /// Surfaces that hang together over edges.
     pub fn n_surfaces(&self) -> usize {
-        let edges = self.edges();
+        let edges = &self.edges().all;
         let mut leader: Vec<usize> = (0..self.triangles.len()).collect();
         let mut n_surfaces = leader.len();
         for pair in edges.windows(2).filter(|pair| pair[0].ends == pair[1].ends) {
-            let [a, b] = [pair[0].triangle, pair[1].triangle].map(|i| {
+            let [a, b] = [pair[0].side / 3, pair[1].side / 3].map(|i| {
                 let mut i = i;
                 while leader[i] != i {
                     leader[i] = leader[leader[i]];
@@ -95,6 +126,31 @@ impl Mesh {
     /// Volume inside, mm³.
     pub fn volume_mm3(&self) -> f64 {
         self.triangles.iter().map(|[a, b, c]| dot(*a, cross(*b, *c)) / 6.0).sum()
+    }
+
+    /// The triangle nearest to `point`, with the point of it that is, where that is no farther than rounding.
+    pub fn on_surface(&self, point: Vec3) -> Option<(usize, Vec3)> {
+        let near =
+            self.numbers_near(point, ON_SURFACE_MM).into_iter().map(|i| (i, nearest_point(&self.triangles[i], point)));
+        let on = near.filter(|(_, nearest)| distance(*nearest, point) <= ON_SURFACE_MM);
+        on.min_by(|a, b| distance(a.1, point).total_cmp(&distance(b.1, point)).then(a.0.cmp(&b.0)))
+    }
+
+    /// Triangles that may come into a box: all that do, and a few beside it.
+    pub fn in_box(&self, low: Vec3, high: Vec3) -> Vec<usize> {
+        self.tree().near(low, high)
+    }
+
+    /// Whether `point` is within `reach_mm` of the box around all triangles.
+    pub fn is_in_bounds(&self, point: Vec3, reach_mm: f64) -> bool {
+        let is_in =
+            |[low, high]: [Vec3; 2]| (0..3).all(|k| low[k] - reach_mm <= point[k] && point[k] <= high[k] + reach_mm);
+        self.tree().bounds().is_some_and(is_in)
+    }
+
+    /// Made once.
+    fn tree(&self) -> &Tree {
+        self.tree.get_or_init(|| Tree::new(&self.triangles))
     }
 
     /// The point and the normal of the triangle on which `point` lies with this `normal`.
@@ -123,13 +179,13 @@ impl Mesh {
         distances.filter(|d| *d <= reach_mm).min_by(f64::total_cmp)
     }
 
-    /// Triangles whose boxes come within `reach_mm` of `point`.
+    /// Triangles that may come within `reach_mm` of `point`: all that do, and a few more.
     fn near(&self, point: Vec3, reach_mm: f64) -> impl Iterator<Item = &[Vec3; 3]> {
-        self.triangles.iter().filter(move |[a, b, c]| {
-            (0..3).all(|k| {
-                a[k].min(b[k]).min(c[k]) <= point[k] + reach_mm && a[k].max(b[k]).max(c[k]) >= point[k] - reach_mm
-            })
-        })
+        self.numbers_near(point, reach_mm).into_iter().map(|i| &self.triangles[i])
+    }
+
+    fn numbers_near(&self, point: Vec3, reach_mm: f64) -> Vec<usize> {
+        self.tree().near(point.map(|x| x - reach_mm), point.map(|x| x + reach_mm))
     }
 }
 
@@ -156,4 +212,41 @@ fn nearest_point(t: &[Vec3; 3], p: Vec3) -> Vec3 {
         }
     }
     (0..3).map(on_edge).min_by(|a, b| distance(*a, p).total_cmp(&distance(*b, p))).unwrap_or(t[0])
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// A box between two corners.
+    pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
+        let corner = |i: usize| std::array::from_fn(|k| if i >> k & 1 == 1 { max[k] } else { min[k] });
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let halves = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        Mesh::new(halves.map(|t| t.map(corner)).collect())
+    }
+
+    /// A box with a hollow inside, half sides in mm, around the origin.
+    pub fn hollow(outside_mm: f64, inside_mm: f64) -> Mesh {
+        let [mut all, inside] = [outside_mm, inside_mm].map(|h| cuboid([-h; 3], [h; 3]).triangles);
+        all.extend(inside.into_iter().map(|[a, b, c]| [a, c, b]));
+        Mesh::new(all)
+    }
+
+    #[test]
+    fn edges_and_places_are_those_of_the_triangles() {
+        let cube = cuboid([0.0; 3], [1.0; 3]);
+        assert_eq!((cube.n_open_edges(), cube.n_surfaces()), (0, 1));
+        assert_eq!(hollow(2.0, 1.0).n_surfaces(), 2);
+        for (t, k) in (0..12).flat_map(|t| (0..3).map(move |k| (t, k))) {
+            assert_eq!(cube.sharing(t, k).count(), 2);
+            assert!(cube.sharing(t, k).any(|other| other == t));
+        }
+        let (_, on) = cube.on_surface([0.3, 0.4, 1.00005]).unwrap();
+        assert!(distance(on, [0.3, 0.4, 1.0]) < 1e-12);
+        assert_eq!(cube.on_surface([0.3, 0.4, 1.001]), None);
+        assert!(cube.is_in_bounds([0.5; 3], 0.0) && !cube.is_in_bounds([1.5; 3], 0.0));
+        let open = Mesh::new(cube.triangles[1..].to_vec());
+        assert_eq!(open.n_open_edges(), 3);
+    }
 }

@@ -217,13 +217,7 @@ mod tests {
     use super::*;
     use crate::PressFit;
     use crate::gap::is_pressed;
-
-    fn cuboid(min: Vec3, max: Vec3) -> Mesh {
-        let corner = |i: usize| std::array::from_fn(|k| if i >> k & 1 == 1 { max[k] } else { min[k] });
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let halves = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
-        Mesh { triangles: halves.map(|t| t.map(corner)).collect() }
-    }
+    use crate::mesh::tests::cuboid;
 
     /// Two cubes of 3 mm, one `deep_mm` in the other, with a press fit of 0.08 mm in the middle of what they share.
     fn pressed_cubes(deep_mm: f64) -> Tested {

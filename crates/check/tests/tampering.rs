@@ -12,7 +12,7 @@ use shellock::plan::{InstallationPlan, InstallationStep};
 use shellock::verify::clearance::kit_gaps;
 use shellock::verify::{Assembly, VerifyParams, examine};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
-use shellock_check::{Finding, check};
+use shellock_check::{Finding, Verdict, check};
 use shellock_geom::io::write_stl_binary;
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
@@ -107,7 +107,7 @@ fn refuted(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
         fs::write(folder.path().join(name), serde_json::to_vec(&value).unwrap()).unwrap();
     }
     let findings: Vec<Finding> = check(folder.path()).unwrap();
-    findings.into_iter().filter(|f| !f.is_confirmed).map(|f| f.claim).collect()
+    findings.into_iter().filter(|f| f.verdict == Verdict::Refuted).map(|f| f.claim).collect()
 }
 
 /// Puts `mesh` in the place of a piece, with its hash.
@@ -328,7 +328,7 @@ fn a_first_piece_that_comes_off_is_not_certified() {
     fs::write(folder.path().join("certificate.json"), made.certificate.to_string()).unwrap();
     fs::write(folder.path().join("plan.json"), made.plan.to_string()).unwrap();
     let findings = check(folder.path()).unwrap();
-    assert!(findings.iter().any(|f| f.claim == COMPLETE && !f.is_confirmed), "{findings:?}");
+    assert!(findings.iter().any(|f| f.claim == COMPLETE && f.verdict == Verdict::Refuted), "{findings:?}");
 }
 
 #[test]

@@ -1,0 +1,295 @@
+//! How far a point rises before a closed surface stops it, while it stays within a prism.
+//!
+//! The prism is open, eight-sided and endless along a normal. From a triangle above the point one goes on over every edge
+//! that has a part in the prism, to all triangles of that edge. What is found, `S`, ends nowhere within the prism: each of
+//! its edges there has an even number of triangles of `S`, as the surface is closed. So how often, modulo 2, `S` is met above
+//! a place changes only where a path within the prism crosses `S`. A point that starts with an odd number above it and
+//! crosses no surface keeps an odd number above it, hence never comes higher than the highest place of `S` in the prism.
+//! Going on over more edges than needed does no harm.
+
+use crate::mesh::Mesh;
+use crate::vector::{Vec3, add, cross, dot, scale, sub};
+
+/// Sides of a prism.
+pub const SIDES: usize = 8;
+/// Barriers that are no lower hold nothing, mm.
+pub const MOST_RISE_MM: f64 = 1.0;
+/// More triangles are not gone through.
+const MOST_TRIANGLES: usize = 400;
+/// The box around a ray is so much wider, mm: rounding.
+const BESIDE_RAY_MM: f64 = 1e-6;
+
+/// A place, a normal there, and a direction across that; unit vectors.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Heights are 0 there, mm.
+    pub origin: Vec3,
+    /// Heights are along it.
+    pub normal: Vec3,
+    /// Perpendicular to the normal: the first side is on that side.
+    pub across: Vec3,
+}
+
+impl Frame {
+    /// Unit vectors towards the sides, each 45° from the one before.
+    pub fn sides(&self) -> [Vec3; SIDES] {
+        let [u, v] = [self.across, self.up()];
+        let slanted = |x: Vec3, y: Vec3| scale(add(x, y), std::f64::consts::FRAC_1_SQRT_2);
+        let [minus_u, minus_v] = [u, v].map(|x| scale(x, -1.0));
+        [u, slanted(u, v), v, slanted(minus_u, v), minus_u, slanted(minus_u, minus_v), minus_v, slanted(u, minus_v)]
+    }
+
+    fn up(&self) -> Vec3 {
+        cross(self.normal, self.across)
+    }
+
+    fn height(&self, p: Vec3) -> f64 {
+        dot(self.normal, sub(p, self.origin))
+    }
+
+    /// Height at which the line through the origin along the normal meets a triangle. Of triangles that share an edge it meets
+    /// either one or none on each side: ends are compared by the same sum whichever triangle asks.
+    fn meets(&self, t: &[Vec3; 3]) -> Option<f64> {
+        let flat = t.map(|p| {
+            let off = sub(p, self.origin);
+            [dot(self.across, off), dot(self.up(), off)]
+        });
+        let mut n_beside = 0;
+        for k in 0..3 {
+            let (p, q) = (flat[k], flat[(k + 1) % 3]);
+            let (low, high) = if p[1] <= q[1] { (p, q) } else { (q, p) };
+            let is_beside = low[1] <= 0.0 && high[1] > 0.0 && low[0] * high[1] - high[0] * low[1] > 0.0;
+            n_beside += usize::from(is_beside);
+        }
+        let slant = cross(sub(t[1], t[0]), sub(t[2], t[0]));
+        let at = dot(slant, sub(t[0], self.origin)) / dot(slant, self.normal);
+        let heights = t.map(|p| self.height(p));
+        let [low, high] = [heights.iter().copied().fold(at, f64::min), heights.iter().copied().fold(at, f64::max)];
+        let at = if at.is_finite() { at.clamp(low, high) } else { low };
+        (n_beside == 1).then_some(at)
+    }
+}
+
+/// What is nearer to the line along the normal than each side.
+#[derive(Clone, Debug)]
+pub struct Prism {
+    frame: Frame,
+    sides: [Vec3; SIDES],
+    far_mm: [f64; SIDES],
+}
+
+impl Prism {
+    /// Sides are `far_mm` from the line, in the order of [`Frame::sides`].
+    pub fn new(frame: Frame, far_mm: [f64; SIDES]) -> Self {
+        Self { frame, sides: frame.sides(), far_mm }
+    }
+
+    /// By how much `p` is beyond a side, mm; negative within.
+    fn beyond(&self, side: usize, p: Vec3) -> f64 {
+        dot(self.sides[side], sub(p, self.frame.origin)) - self.far_mm[side]
+    }
+
+    /// Height of the highest place of a triangle within; `None` where no part of it is.
+    fn highest_mm(&self, t: &[Vec3; 3]) -> Option<f64> {
+        let mut polygon = t.to_vec();
+        for side in 0..SIDES {
+            let mut kept = Vec::with_capacity(polygon.len() + 1);
+            for (i, &p) in polygon.iter().enumerate() {
+                let q = polygon[(i + 1) % polygon.len()];
+                let (from, to) = (self.beyond(side, p), self.beyond(side, q));
+                if from < 0.0 {
+                    kept.push(p);
+                }
+                if (from < 0.0) != (to < 0.0) {
+                    kept.push(add(p, scale(sub(q, p), from / (from - to))));
+                }
+            }
+            polygon = kept;
+        }
+        polygon.into_iter().map(|p| self.frame.height(p)).max_by(f64::total_cmp)
+    }
+
+    /// Whether a part of the edge from `p` to `q` is within.
+    fn has_part(&self, p: Vec3, q: Vec3) -> bool {
+        let mut part = [0.0_f64, 1.0];
+        for side in 0..SIDES {
+            let (from, to) = (self.beyond(side, p), self.beyond(side, q));
+            match (from < 0.0, to < 0.0) {
+                (true, true) => {}
+                (true, false) => part[1] = part[1].min(from / (from - to)),
+                (false, true) => part[0] = part[0].max(from / (from - to)),
+                (false, false) => return false,
+            }
+        }
+        part[0] < part[1]
+    }
+}
+
+/// What hangs together within a prism.
+#[derive(Debug)]
+struct Flooded {
+    highest_mm: f64,
+    /// How often the line along the normal meets it above the origin.
+    n_above: usize,
+}
+
+/// All that hangs together with triangle `first` within `prism`; an error where that is too much or not lower than `most_mm`.
+fn flood(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> Result<Flooded, String> {
+    let mut flooded = Flooded { highest_mm: f64::NEG_INFINITY, n_above: 0 };
+    let (mut found, mut next) = (vec![first], 0);
+    while let Some(&t) = found.get(next) {
+        next += 1;
+        let corners = &mesh.triangles[t];
+        let Some(highest_mm) = prism.highest_mm(corners) else { continue };
+        flooded.highest_mm = flooded.highest_mm.max(highest_mm);
+        flooded.n_above += usize::from(prism.frame.meets(corners).is_some_and(|height| height > 0.0));
+        if flooded.highest_mm >= most_mm {
+            return Err(format!("a surface goes on to {:.2} mm above", flooded.highest_mm));
+        }
+        for k in (0..3).filter(|&k| prism.has_part(corners[k], corners[(k + 1) % 3])) {
+            for other in mesh.sharing(t, k) {
+                if !found.contains(&other) {
+                    found.push(other);
+                }
+            }
+        }
+        if found.len() > MOST_TRIANGLES {
+            return Err(format!("more than {MOST_TRIANGLES} triangles are above"));
+        }
+    }
+    if flooded.highest_mm.is_finite() { Ok(flooded) } else { Err("no surface is there".into()) }
+}
+
+/// Height of the barrier that `mesh` is for a point at the prism's origin, mm: it rises no higher while it stays within.
+pub fn rise_mm(mesh: &Mesh, prism: &Prism) -> Result<f64, String> {
+    let (from, to) = (prism.frame.origin, add(prism.frame.origin, scale(prism.frame.normal, MOST_RISE_MM)));
+    let low = std::array::from_fn(|k| from[k].min(to[k]) - BESIDE_RAY_MM);
+    let high = std::array::from_fn(|k| from[k].max(to[k]) + BESIDE_RAY_MM);
+    let hits = mesh.in_box(low, high).into_iter().filter_map(|t| Some((t, prism.frame.meets(&mesh.triangles[t])?)));
+    let above = hits.filter(|(_, height)| (0.0..=MOST_RISE_MM).contains(height) && *height > 0.0);
+    let Some((first, _)) = above.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))) else {
+        return Err("nothing is above".into());
+    };
+    let flooded = flood(mesh, first, prism, MOST_RISE_MM)?;
+    match flooded.n_above % 2 {
+        1 => Ok(flooded.highest_mm),
+        _ => Err(format!("{} sheets are above", flooded.n_above)),
+    }
+}
+
+/// Whether what hangs together with triangle `first` within the prism stays lower than `most_mm`.
+pub fn stays_below(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> bool {
+    flood(mesh, first, prism, most_mm).is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::tests::cuboid;
+
+    const UP: Frame = Frame { origin: [0.0, 0.0123, 0.0], normal: [0.0, 0.0, 1.0], across: [1.0, 0.0, 0.0] };
+
+    /// As far to all sides, from a point that is `sideways` along x.
+    fn around(sideways: f64, far_mm: f64) -> Prism {
+        Prism::new(Frame { origin: [sideways, 0.0123, 0.0], ..UP }, [far_mm; SIDES])
+    }
+
+    fn is_near(found: Result<f64, String>, expected_mm: f64) -> bool {
+        found.is_ok_and(|mm| (mm - expected_mm).abs() < 1e-12)
+    }
+
+    /// A closed surface below `top_mm`, with a lower side that follows points (x, z), from y −2 to y 2.
+    fn roof(profile: &[[f64; 2]], top_mm: f64) -> Mesh {
+        let mut outline = profile.to_vec();
+        outline.extend(profile.iter().rev().map(|&[x, _]| [x, top_mm]));
+        let at = |[x, z]: [f64; 2], y: f64| [x, y, z];
+        let n = outline.len();
+        let mut triangles = Vec::new();
+        for i in 0..n {
+            let (p, q) = (outline[i], outline[(i + 1) % n]);
+            triangles.extend([[at(p, -2.0), at(q, -2.0), at(q, 2.0)], [at(p, -2.0), at(q, 2.0), at(p, 2.0)]]);
+        }
+        for i in 0..profile.len() - 1 {
+            let [p, q, r, s] = [outline[i], outline[i + 1], outline[n - 2 - i], outline[n - 1 - i]];
+            for (y, is_front) in [(-2.0, true), (2.0, false)] {
+                for [a, b, c] in [[p, q, r], [p, r, s]].map(|t| t.map(|p| at(p, y))) {
+                    triangles.push(if is_front { [a, c, b] } else { [a, b, c] });
+                }
+            }
+        }
+        let roof = Mesh::new(triangles);
+        assert_eq!(roof.n_open_edges(), 0);
+        roof
+    }
+
+    #[test]
+    fn a_flat_roof_stops_a_point_at_its_height_as_far_as_it_reaches() {
+        let high = cuboid([-2.0, -2.0, 0.3], [2.0, 2.0, 8.0]);
+        assert!(is_near(rise_mm(&high, &around(0.0, 1.9)), 0.3));
+        assert!(is_near(rise_mm(&high, &around(1.0, 0.99)), 0.3));
+        assert!(rise_mm(&high, &around(1.0, 1.01)).is_err(), "beside it a point rises to the top");
+        let low = cuboid([-2.0, -2.0, 0.3], [2.0, 2.0, 0.9]);
+        assert!(rise_mm(&low, &around(1.0, 1.01)).is_err(), "beside a low one, too");
+        let far = cuboid([-2.0, -2.0, 1.1], [2.0, 2.0, 8.0]);
+        assert!(rise_mm(&far, &around(0.0, 0.5)).is_err(), "too far above");
+    }
+
+    #[test]
+    fn a_step_or_a_pit_counts_only_where_it_is_reached() {
+        let step = roof(&[[-2.0, 0.3], [0.5, 0.3], [0.5, 0.4], [2.0, 0.4]], 8.0);
+        assert!(is_near(rise_mm(&step, &around(0.0, 0.49)), 0.3));
+        assert!(is_near(rise_mm(&step, &around(0.0, 0.51)), 0.4));
+        let mut far_mm = [0.51; SIDES];
+        far_mm[0] = 0.49;
+        assert!(is_near(rise_mm(&step, &Prism::new(UP, far_mm)), 0.3), "that side alone is near");
+        let pit = |deep_mm: f64| {
+            let z = 0.3 + deep_mm;
+            roof(&[[-2.0, 0.3], [0.5, 0.3], [0.5, z], [0.7, z], [0.7, 0.3], [2.0, 0.3]], 8.0)
+        };
+        assert!(is_near(rise_mm(&pit(0.2), &around(0.0, 0.6)), 0.5));
+        assert!(is_near(rise_mm(&pit(2.0), &around(0.0, 0.49)), 0.3));
+        assert!(rise_mm(&pit(2.0), &around(0.0, 0.6)).is_err(), "too deep a pit");
+    }
+
+    #[test]
+    fn a_slope_is_as_high_as_its_highest_place_within() {
+        let slope = roof(&[[-2.0, -1.5], [2.0, 2.5]], 8.0);
+        for far_mm in [0.1, 0.3, 0.45] {
+            assert!(is_near(rise_mm(&slope, &around(0.0, far_mm)), 0.5 + far_mm));
+        }
+    }
+
+    #[test]
+    fn the_top_of_a_solid_is_no_barrier_for_what_is_above_it_or_in_a_shell() {
+        let below = cuboid([-2.0, -2.0, -3.0], [2.0, 2.0, -1.0]);
+        assert!(rise_mm(&below, &around(0.0, 0.5)).is_err(), "nothing is above");
+        let thin = cuboid([-0.4, -2.0, 0.3], [0.4, 2.0, 0.5]);
+        assert!(rise_mm(&thin, &around(0.0, 0.5)).is_err(), "two sheets: the point passes beside");
+        assert!(is_near(rise_mm(&thin, &around(0.0, 0.39)), 0.3));
+        // A top whose edges are within is reached from the triangle below it.
+        let first = (0..12).find(|&t| below.triangles[t].iter().all(|p| p[2] == -1.0)).unwrap();
+        assert_eq!(flood(&below, first, &around(0.0, 0.5), 1.0).unwrap().n_above, 0);
+    }
+
+    #[test]
+    fn a_triangle_is_clipped_to_the_prism() {
+        let large = [[-9.0, -9.0, 1.0], [9.0, -9.0, 1.0], [0.0, 18.0, 1.0]];
+        assert_eq!(around(0.0, 0.5).highest_mm(&large), Some(1.0), "larger than the prism, no edge within");
+        assert!(!around(0.0, 0.5).has_part(large[0], large[1]));
+        let steep = [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0], [0.0, 0.01, 0.0]];
+        assert!((around(0.0, 0.25).highest_mm(&steep).unwrap() - 0.5).abs() < 1e-12);
+        assert!(around(0.0, 0.25).has_part(steep[0], steep[1]));
+        let wall = [[0.2, -1.0, -1.0], [0.2, 1.0, -1.0], [0.2, 0.0, 0.6]];
+        assert!((around(0.0, 0.25).highest_mm(&wall).unwrap() - 0.6).abs() < 1e-12, "parallel to the normal");
+        assert_eq!(around(0.0, 0.15).highest_mm(&wall), None);
+        assert!(!around(0.0, 0.25).has_part([0.4, 0.0, 0.0], [0.0, 0.4123, 0.0]), "beyond a slanted side");
+        assert!(around(0.0, 0.29).has_part([0.4, 0.0123, 0.0], [0.0, 0.4123, 0.0]));
+    }
+
+    #[test]
+    fn a_line_meets_one_of_the_triangles_around_a_point_or_an_edge() {
+        let ring: Vec<Vec3> = (0..6).map(f64::from).map(|a| [a.cos(), a.sin() + 0.0123, 0.5]).collect();
+        let fan = (0..6).map(|i| [[0.0, 0.0123, 0.5], ring[i], ring[(i + 1) % 6]]);
+        assert_eq!(fan.filter(|t| UP.meets(t).is_some()).count(), 1);
+    }
+}

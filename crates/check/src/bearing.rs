@@ -1,0 +1,106 @@
+//! Places where a piece bears on another: whether they are on the piece, on a surface that is no speck.
+
+use serde::Deserialize;
+
+use crate::barrier::{Frame, Prism, SIDES, stays_below};
+use crate::mesh::Mesh;
+use crate::vector::{Vec3, dot, norm, scale};
+
+/// Difference of unit vectors, and of perpendicular ones.
+const SAME: f64 = 1e-9;
+/// Beside its point the surface goes on so far to one side, mm.
+const BED_MM: f64 = 0.3;
+/// Where this begins, behind the point, mm: the point may be at an edge.
+const BEHIND_MM: f64 = 0.01;
+/// Within that it falls away by no more than this, mm, and rounding.
+const BED_DROP_MM: f64 = 0.08 + 1e-6;
+
+/// A point of piece `a` that rises along the normal, towards piece `b`.
+#[derive(Clone, Deserialize)]
+pub struct Bearing {
+    pub a: usize,
+    pub b: usize,
+    /// On `a`, mm.
+    pub point: Vec3,
+    /// Unit vector, from `a` to `b`.
+    pub normal: Vec3,
+    /// Unit vector perpendicular to the normal: the first side of regions.
+    pub across: Vec3,
+}
+
+impl Bearing {
+    /// Where its point is and what it rises along.
+    pub fn frame(&self) -> Frame {
+        Frame { origin: self.point, normal: self.normal, across: self.across }
+    }
+
+    /// With the point that is on the surface of `a`; an error where it is not there, or on a speck.
+    fn located(&self, meshes: &[Mesh]) -> Result<Self, String> {
+        let is_unit = |v: Vec3| (norm(v) - 1.0).abs() <= SAME;
+        if !is_unit(self.normal) || !is_unit(self.across) || dot(self.normal, self.across).abs() > SAME {
+            return Err("has directions that are no perpendicular unit vectors".into());
+        }
+        let (Some(own), Some(_), true) = (meshes.get(self.a), meshes.get(self.b), self.a != self.b) else {
+            return Err("is not one of two pieces".into());
+        };
+        let (triangle, point) = own.on_surface(self.point).ok_or_else(|| format!("is not on piece {}", self.a))?;
+        let bearing = Self { point, ..self.clone() };
+        match bearing.has_bed(own, triangle) {
+            true => Ok(bearing),
+            false => Err(format!("is on a speck of piece {}", self.a)),
+        }
+    }
+
+    /// Whether the surface around `triangle` is wide enough to one side of the point.
+    fn has_bed(&self, own: &Mesh, triangle: usize) -> bool {
+        let down = Frame { normal: scale(self.normal, -1.0), ..self.frame() };
+        (0..SIDES).any(|side| {
+            let mut far_mm = [BED_MM; SIDES];
+            [side, side + 1, side + 2].iter().for_each(|k| far_mm[k % SIDES] = BEHIND_MM);
+            stays_below(own, triangle, &Prism::new(down, far_mm), BED_DROP_MM)
+        })
+    }
+}
+
+/// All with the points that are on the pieces' surfaces.
+pub fn located(meshes: &[Mesh], bearings: &[Bearing]) -> Result<Vec<Bearing>, String> {
+    let locate = |(i, bearing): (usize, &Bearing)| bearing.located(meshes).map_err(|why| format!("bearing {i} {why}"));
+    bearings.iter().enumerate().map(locate).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::tests::cuboid;
+
+    /// At the top of a box of `width_mm`, so far from the middle.
+    fn at_top(width_mm: f64, x: f64, y: f64, z: f64) -> Result<Vec<Bearing>, String> {
+        let half = 0.5 * width_mm;
+        let meshes = [cuboid([-half, -half, -5.0], [half, half, 0.0]), cuboid([-9.0, -9.0, 0.1], [9.0, 9.0, 5.0])];
+        let up = Bearing { a: 0, b: 1, point: [x, y, z], normal: [0.0, 0.0, 1.0], across: [1.0, 0.0, 0.0] };
+        located(&meshes, &[up])
+    }
+
+    #[test]
+    fn a_bearing_lies_on_its_piece_also_at_an_edge_but_not_on_a_speck() {
+        assert!(at_top(4.0, 0.3, 0.2, 0.0).is_ok());
+        let moved = at_top(4.0, 0.3, 0.2, 0.00009).unwrap();
+        assert_eq!(moved[0].point[2], 0.0, "taken to the surface");
+        assert!(at_top(4.0, 0.3, 0.2, 0.0002).is_err(), "above it");
+        assert!(at_top(4.0, 0.3, 0.2, f64::NAN).is_err());
+        assert!(at_top(4.0, 1.985, 0.2, 0.0).is_ok(), "at an edge");
+        assert!(at_top(0.2, 0.0, 0.0, 0.0).is_err(), "a needle");
+    }
+
+    #[test]
+    fn directions_are_perpendicular_unit_vectors_of_two_pieces() {
+        let meshes = [cuboid([-2.0; 3], [2.0, 2.0, 0.0]), cuboid([-2.0, -2.0, 0.1], [2.0; 3])];
+        let good = Bearing { a: 0, b: 1, point: [0.3, 0.2, 0.0], normal: [0.0, 0.0, 1.0], across: [1.0, 0.0, 0.0] };
+        let is_good = |bearing: Bearing| located(&meshes, &[bearing]).is_ok();
+        assert!(is_good(good.clone()));
+        assert!(!is_good(Bearing { normal: [0.0, 0.0, 1.00001], ..good.clone() }));
+        assert!(!is_good(Bearing { across: [0.8, 0.0, 0.6], ..good.clone() }));
+        assert!(!is_good(Bearing { b: 0, ..good.clone() }));
+        assert!(!is_good(Bearing { b: 2, ..good }));
+    }
+}
