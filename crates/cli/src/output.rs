@@ -13,7 +13,7 @@ use shellock::report::{SeamStress, palette, strength_chart};
 use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::clearance::PathGap;
 use shellock::verify::thin_share;
-use shellock::{IdVec, PatchId, Warning};
+use shellock::{PatchId, Warning};
 use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::repair::{Repair, RepairKind};
 use shellock_geom::{TriMesh, Vec3};
@@ -237,7 +237,9 @@ fn certificate(
 ) -> Option<Vec<u8>> {
     let other = |(file, bytes): &(String, Vec<u8>)| OtherFile { file: file.clone(), sha256: sha256(bytes) };
     let named = files.iter().zip(design.pieces.ids());
-    let named = named.map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes), play: None }).collect();
+    let named = named
+        .map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes), play: None })
+        .collect();
     let evidence = Evidence {
         contacts: &design.touching,
         verdict: &design.verification,
@@ -251,7 +253,7 @@ fn certificate(
 
 /// As it is written to [`CERTIFICATE`].
 pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
-    let mut bytes = serde_json::to_vec_pretty(certificate).expect("numbers and strings can be written");
+    let mut bytes = serde_json::to_vec(certificate).expect("numbers and strings can be written");
     bytes.push(b'\n');
     bytes
 }

@@ -6,11 +6,12 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::{Value, json};
 use shellock::body::BodyParams;
 use shellock::certificate::{Evidence, OtherFile, PieceFile, certify};
+use shellock::motion::most_play;
 use shellock::piece::PressFit;
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
-use shellock::verify::clearance::kit_gaps;
 use shellock::play::{KitPlay, PlayParams};
+use shellock::verify::clearance::kit_gaps;
 use shellock::verify::{Assembly, Verification, VerifyParams};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, play, segmentation, sizes};
 use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
@@ -214,10 +215,20 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
 }
 
 /// How far pieces move, which the verdict then tells.
-fn played(ctx: &Ctx, params: &VerifyParams, kit: &Assembly<'_>, verdict: &mut Verification) -> Result<KitPlay, Failure> {
+fn played(
+    ctx: &Ctx,
+    params: &VerifyParams,
+    kit: &Assembly<'_>,
+    verdict: &mut Verification,
+) -> Result<KitPlay, Failure> {
     let VerifyParams { clearance_mm, seed } = *params;
-    let measured = play::measure(ctx, &PlayParams { clearance_mm, slide_mm: play::SLIDE_MM, is_together: true, seed }, kit.pieces, kit.plan)?;
-    let most = play::most_play(kit.model.mesh().bounds().size().max_element(), clearance_mm);
+    let measured = play::measure(
+        ctx,
+        &PlayParams { clearance_mm, slide_mm: play::SLIDE_MM, is_together: true, seed },
+        kit.pieces,
+        kit.plan,
+    )?;
+    let most = most_play(kit.model.mesh().bounds().size().max_element(), clearance_mm);
     verdict.add(play::check(&measured, kit.pieces, most));
     Ok(measured)
 }

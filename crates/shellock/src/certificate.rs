@@ -17,16 +17,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
+use crate::motion::Freedom;
 use crate::piece::PressFit;
 use crate::plan::InstallationPlan;
+use crate::play::{KitPlay, Slide};
 use crate::verify::clearance::{KitGaps, NearestPlace};
 use crate::verify::contact::{Contact, REACH_MM};
-use crate::play::{KitPlay, Slide};
-use crate::motion::Freedom;
 use crate::verify::{Finding, Play, Verification};
 use crate::{IdVec, PatchId};
-pub use bounded::{BearingPoint, Bounded};
 use bounded::bounded;
+pub use bounded::{BearingPoint, Bounded};
 use proof::{Proof, Question, prove};
 
 /// What [`Certificate::format`] says.

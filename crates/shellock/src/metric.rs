@@ -6,10 +6,12 @@
 
 mod choice;
 mod data_driven;
+mod foreseen;
 mod model;
 #[cfg(test)]
 mod tests;
 
 pub use choice::{ChoiceError, Holding, LoosePart, SeamHolding, choose};
 pub use data_driven::{data_driven, pieces_alone};
+pub use foreseen::foreseen;
 pub use model::{MetricParams, PlanModel};

@@ -14,20 +14,21 @@ use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, Run, has_no_bar};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
+use crate::motion::most_play;
 use crate::piece::{FinishParams, Finished, Grip, Joint, LabelParams, PieceError, PressFit, PressFitKind, Relief};
-use crate::play::{KitPlay, PlayParams};
 use crate::plan::{Blocker, InstallationPlan, PlanParams, PlanProof};
+use crate::play::{KitPlay, PlayParams};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams, StressField};
 use crate::strength::{Strength, StrengthError, StrengthParams, StressMap};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::{Verification, VerifyParams};
 use crate::{
-    Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece, play, segmentation,
-    sizes, strength, verify,
+    Cancelled, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece, play,
+    segmentation, sizes, strength, verify,
 };
 use cut_key::CutKey;
-use rounds::{Attempt, Kits, WallGrid, mended, with_segmentation};
+use rounds::{Attempt, Kits, WallGrid, joined, mended, only_rattles, with_segmentation};
 
 /// Everything that may be set. Each stage's parameters are declared beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -136,7 +137,12 @@ impl Params {
 
     /// How the play of finished kits is measured.
     pub fn play(&self) -> PlayParams {
-        PlayParams { clearance_mm: self.verify.clearance_mm, slide_mm: play::SLIDE_MM, is_together: self.play_together, seed: self.verify.seed }
+        PlayParams {
+            clearance_mm: self.verify.clearance_mm,
+            slide_mm: play::SLIDE_MM,
+            is_together: self.play_together,
+            seed: self.verify.seed,
+        }
     }
 
     /// What decides on connector sizes.
@@ -262,7 +268,8 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
     let surface = segmentation::segment(ctx, &params.segmentation, model, labels)?;
     let job = Job { params, model, labels, bearing: &bearing, surface: &surface };
     let cut = if params.key == KeySource::Cut { cut_key::design(ctx, &job)? } else { cut_key::Cut::default() };
-    if cut.best.as_ref().is_some_and(|d| d.verification.passed()) {
+    // A piece as it is rattles no less as the key than one that was cut.
+    if cut.best.as_ref().is_some_and(|d| d.verification.passed() || only_rattles(d)) {
         return Ok(DesignOutcome::Made(Box::new(cut.best.expect("it was looked at"))));
     }
     let outcome = job.kit(ctx, params, &Laid::of(&job), None)?;
@@ -331,12 +338,15 @@ impl Job<'_> {
         let attempt = loop {
             grid.make_room(params.connector.room_mm(sizes.sizes.largest_mm()));
             let attempt = with_segmentation(ctx, &params, &mut grid, &surface, &sizes, &mut kits)?;
-            let Attempt::Failed { blamed, loose, .. } = &attempt else { break attempt };
+            let Attempt::Failed { blamed, loose, rattling, .. } = &attempt else { break attempt };
             if mending == params.rounds.mendings || kits.n_left == 0 {
                 break attempt;
             }
             let is_hopeless = kits.best.is_none() && 2 * mending >= params.rounds.mendings;
-            let mended = mended(ctx, &params, &surface, blamed, loose, is_hopeless);
+            let mended = match rattling.is_empty() {
+                false => joined(ctx, &params, &surface, rattling),
+                true => mended(ctx, &params, &surface, blamed, loose, is_hopeless),
+            };
             let Some(mended) = mended.and_then(|m| cut_again(&mut params, m)) else { break attempt };
             ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
             surface = mended;
@@ -441,7 +451,7 @@ pub fn make(
     let (mut verification, touching) = verify::examine(ctx, &params.verify, &assembly)?;
     let measured = play::measure(ctx, &params.play(), &finished.meshes, &plan)?;
     let size_mm = model.mesh().bounds().size().max_element();
-    let most = play::most_play(size_mm, params.verify.clearance_mm);
+    let most = most_play(size_mm, params.verify.clearance_mm);
     verification.add(play::check(&measured, &finished.meshes, most));
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {

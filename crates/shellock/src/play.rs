@@ -28,9 +28,9 @@ use crate::plan::InstallationPlan;
 use crate::verify::{Check, Finding, Play};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 pub use bearing::Bearing;
-pub use bound::{Proof, Slide};
-use bound::{Answer, Candidates, Problem};
 use bearing::Surfaces;
+use bound::{Answer, Candidates, Problem};
+pub use bound::{Proof, Slide};
 pub use quantity::Quantity;
 
 /// How far the key may slide on its way out before what is proven ends, mm: friction, ribs or a detent keep it nearer.
@@ -63,6 +63,9 @@ pub struct KitPlay {
     pub bearings: Vec<Bearing>,
     /// Of each piece while all others are held; `None` where nothing ends its motions.
     pub alone: IdVec<PatchId, Option<Play>>,
+    /// The same for small motions, as if sideways moves and turns changed nothing: nearer to the real play than what is proven, but on its
+    /// lower side.
+    pub estimates: IdVec<PatchId, Option<Play>>,
     /// Of each piece while all but one move; `None` for that one. Nothing where it is not proven.
     pub together: Option<IdVec<PatchId, Option<Play>>>,
     /// One for each piece whose play is proven, in order, then that of all together.
@@ -89,29 +92,39 @@ pub fn measure(
     ctx.stage("play", 0)?;
     let surfaces = Surfaces::new(pieces);
     let bearings = surfaces.bearings(ctx, params.clearance_mm, params.seed)?;
-    let centers: IdVec<PatchId, Vec3> = pieces.as_slice().par_iter().map(TriMesh::centroid).collect::<Vec<_>>().into_iter().collect();
+    let centers: IdVec<PatchId, Vec3> =
+        pieces.as_slice().par_iter().map(TriMesh::centroid).collect::<Vec<_>>().into_iter().collect();
     let slide = slide(params, plan, &bearings, &centers);
     let solve = |free: &[PatchId]| {
         let candidates = Candidates::All;
-        Problem { surfaces: &surfaces, bearings: &bearings, candidates, centers: &centers, slide: &slide, free }.solve(ctx)
+        Problem { surfaces: &surfaces, bearings: &bearings, candidates, centers: &centers, slide: &slide, free }
+            .solve(ctx)
     };
     let ids: Vec<PatchId> = pieces.ids().collect();
     let answers: Vec<Answer> = ids.par_iter().map(|&id| solve(&[id])).collect::<Result<_, Cancelled>>()?;
     let alone = answers.iter().map(alone).collect();
+    let estimates = answers.iter().map(|a| a.linear.first().map(|&linear| play_of(linear, false))).collect();
     let asked: BTreeSet<usize> = answers.iter().flat_map(|a| a.asked.iter().copied()).collect();
     let mut proofs: Vec<Proof> = answers.into_iter().filter_map(|a| a.proof.ok()).collect();
     let mut together = None;
     if params.is_together && proofs.len() == ids.len() {
         let free = all_but_one(&ids, &bearings);
         let candidates = Candidates::Some(&asked);
-        let question = Problem { surfaces: &surfaces, bearings: &bearings, candidates, centers: &centers, slide: &slide, free: &free };
+        let question = Problem {
+            surfaces: &surfaces,
+            bearings: &bearings,
+            candidates,
+            centers: &centers,
+            slide: &slide,
+            free: &free,
+        };
         if let Ok(proof) = question.solve(ctx)?.proof {
             let plays: BTreeMap<PatchId, Play> = proof.plays().collect();
             together = Some(ids.iter().map(|id| plays.get(id).copied()).collect());
             proofs.push(proof);
         }
     }
-    Ok(KitPlay { slide, bearings, alone, together, proofs })
+    Ok(KitPlay { slide, bearings, alone, estimates, together, proofs })
 }
 
 /// All but the piece that touches others at most points: held, it leaves the others least room.
@@ -143,22 +156,23 @@ fn slide(params: &PlayParams, plan: &InstallationPlan, bearings: &[Bearing], cen
     Slide { key, seat, at: centers[key].to_array(), along, most_mm: params.slide_mm }
 }
 
-/// How far pieces may rattle: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in proportion to the clearance; displacements also to the size of
-/// the model, but no less than for 75 mm. docs/certificate.md has the evidence.
-pub fn most_play(size_mm: f64, clearance_mm: f64) -> [f64; 2] {
-    const AT_MM: f64 = 150.0;
-    const AT_CLEARANCE_MM: f64 = 0.12;
-    let wider = (clearance_mm / AT_CLEARANCE_MM).max(1.0);
-    [wider * (size_mm / AT_MM).max(0.5), 2.0 * wider]
-}
-
-/// Whether no piece rattles farther than `most`, mm and degrees.
+/// Whether no piece rattles farther than `most`; findings are those of the loosest first.
+///
+/// `most` is in mm and degrees; judged is the estimate for small motions: what is proven is more than the real play.
 pub fn check(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>, most: [f64; 2]) -> (Check, Vec<Finding>) {
     let is_wide = |play: &Play| play.translation_mm > most[0] || play.rotation_deg > most[1];
     let endless = Play { translation_mm: f64::INFINITY, rotation_deg: f64::INFINITY, is_proven: false };
-    let told = |piece: PatchId, play: &Play| Finding::PlayTooWide { piece, play: *play, most, at: pieces[piece].centroid().to_array() };
-    let plays = || play.alone.iter().map(|(piece, play)| (piece, play.unwrap_or(endless)));
-    let findings: Vec<Finding> = plays().filter(|(_, play)| is_wide(play)).map(|(piece, play)| told(piece, &play)).collect();
+    let told = |piece: PatchId, play: &Play| Finding::PlayTooWide {
+        piece,
+        play: *play,
+        most,
+        at: pieces[piece].centroid().to_array(),
+    };
+    let plays = || play.estimates.iter().map(|(piece, play)| (piece, play.unwrap_or(endless)));
+    let mut wide: Vec<(PatchId, Play)> = plays().filter(|(_, play)| is_wide(play)).collect();
+    let excess = |play: &Play| (play.translation_mm / most[0]).max(play.rotation_deg / most[1]);
+    wide.sort_by(|a, b| excess(&b.1).total_cmp(&excess(&a.1)));
+    let findings: Vec<Finding> = wide.into_iter().map(|(piece, play)| told(piece, &play)).collect();
     (Check::new("pieces sit within their play", findings.is_empty(), words(play)), findings)
 }
 
@@ -166,7 +180,11 @@ pub fn check(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>, most: [f64; 2]) -
 pub fn words(play: &KitPlay) -> String {
     let Some((loosest, widest)) = play.loosest() else { return "some piece has no end of its play".into() };
     let n_proven = play.alone.iter().filter(|(_, play)| play.is_some_and(|p| p.is_proven)).count();
-    let proven = if n_proven == play.alone.len() { "proven".to_owned() } else { format!("proven for {n_proven} of {}", play.alone.len()) };
+    let proven = if n_proven == play.alone.len() {
+        "proven".to_owned()
+    } else {
+        format!("proven for {n_proven} of {}", play.alone.len())
+    };
     let most_deg = play.alone.iter().filter_map(|(_, p)| *p).map(|p| p.rotation_deg).fold(0.0, f64::max);
     format!("within {:.1} mm and {most_deg:.1}°; loosest: piece {loosest}; {proven}", widest.translation_mm)
 }
@@ -174,7 +192,8 @@ pub fn words(play: &KitPlay) -> String {
 impl KitPlay {
     /// The piece that moves farthest; `None` where some piece has no end.
     pub fn loosest(&self) -> Option<(PatchId, Play)> {
-        let all: Vec<(PatchId, Play)> = self.alone.iter().map(|(piece, play)| Some((piece, (*play)?))).collect::<Option<_>>()?;
+        let all: Vec<(PatchId, Play)> =
+            self.alone.iter().map(|(piece, play)| Some((piece, (*play)?))).collect::<Option<_>>()?;
         all.into_iter().max_by(|a, b| a.1.translation_mm.total_cmp(&b.1.translation_mm))
     }
 }

@@ -27,11 +27,11 @@ mod words;
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Solid, TriMesh};
 
+use crate::motion::{self, Freedom, Twist};
 use crate::piece::PressFit;
 use crate::plan::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 use contact::Contact;
-use crate::motion::{self, Freedom, Twist};
 pub use thin::{ThinShare, thin_share};
 
 /// How the finished kit is judged.
@@ -224,6 +224,7 @@ impl Verification {
         self.checks.iter().all(|c| c.ok)
     }
 
+    /// One more check, with what it found.
     pub fn add(&mut self, (check, findings): (Check, impl IntoIterator<Item = Finding>)) {
         self.checks.push(check);
         self.findings.extend(findings);

@@ -33,8 +33,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use shellock_geom::Vec3;
 
 use crate::PatchId;
-use crate::verify::contact::Contact;
 use crate::motion::{Freedom, Row, System};
+use crate::verify::contact::Contact;
 
 /// Rest of a load, as the sum of its components, from which refining starts.
 const BALANCED: f64 = 1e-10;
@@ -107,7 +107,9 @@ fn without(gram: &DMatrix<f64>, system: &System, leaving: usize) -> DMatrix<f64>
     const NO_HOLD: f64 = 1e-9;
     let own: Vec<usize> = (system.column(leaving)..system.column(leaving + 1)).collect();
     let others: Vec<usize> = (0..system.n).filter(|k| !own.contains(k)).collect();
-    let block = |rows: &[usize], columns: &[usize]| DMatrix::from_fn(rows.len(), columns.len(), |i, k| gram[(rows[i], columns[k])]);
+    let block = |rows: &[usize], columns: &[usize]| {
+        DMatrix::from_fn(rows.len(), columns.len(), |i, k| gram[(rows[i], columns[k])])
+    };
     let eigen = SymmetricEigen::new(block(&own, &own));
     let least = NO_HOLD * eigen.eigenvalues.max();
     let across = block(&others, &own) * &eigen.eigenvectors;

@@ -1,11 +1,13 @@
 //! The plan that holds best among those that the search cannot tell apart, and what is weak about it (Sect. 6.2).
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
-use super::{MetricParams, PlanModel};
+use super::{MetricParams, PlanModel, foreseen};
+use crate::motion::most_play;
 use crate::plan::{FoundPlan, InstallationPlan, PlanParams};
 use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
@@ -14,6 +16,15 @@ use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 /// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins hold), so it
 /// decides among plans of about the same cost only.
 const COST_SLACK: f64 = 0.05;
+
+/// Where pieces of all these would rattle too far, plans up to this share above the best one's cost are looked at, too.
+const COST_SLACK_FOR_PLAY: f64 = 0.5;
+
+/// Plans whose widest play is within this share of the least are alike.
+const PLAY_TIE: f64 = 0.05;
+
+/// Play that is foreseen, over that of the finished kit: docs/metrics.md.
+const FORESEEN_SHARE: f64 = 0.6;
 
 /// Costs that differ by less than this share are the same but for rounding.
 const COST_TIE: f64 = 1e-9;
@@ -33,6 +44,8 @@ pub struct Holding {
     pub seams: Vec<SeamHolding>,
     /// Plans that were compared.
     pub n_compared: usize,
+    /// The play of each piece that was foreseen from the plan: displacement, mm, and turn, degrees; zeros for the key.
+    pub foreseen_play: Vec<[f64; 2]>,
 }
 
 /// A piece that comes apart.
@@ -63,7 +76,8 @@ pub struct SeamHolding {
     pub reason: String,
 }
 
-/// Simulates the plans of the pool that cost about as little as the best one; the chosen plan takes the place of `found`'s.
+/// Simulates the plans of the pool that cost about as little as the best one and are not foreseen to rattle; the chosen plan takes the
+/// place of `found`'s. Where all of these would, more costly ones are looked at, and those that rattle least are simulated.
 ///
 /// Warns with `comes-apart` where none of them holds without friction, and with `piece-loose` of each piece that hardly
 /// anything holds by the estimate of the costs.
@@ -76,8 +90,7 @@ pub fn choose(
 ) -> Result<(FoundPlan, Holding), ChoiceError> {
     ctx.stage("which plan holds best", 0)?;
     let model = PlanModel::new(&MetricParams::of_plan(params, sizes), surface, sizes);
-    let limit = found.score.worst * (1.0 + COST_SLACK);
-    let plans: Vec<usize> = (0..found.pool.len()).filter(|&i| found.pool[i].score.worst <= limit).collect();
+    let plans = shortlist(&model, surface, params.clearance_mm, &found);
     let meetings: Vec<Vec<Meeting>> = plans.iter().map(|&i| model.meetings(&found.pool[i].plan)).collect();
     let key = found.plan.key();
     ctx.check()?;
@@ -90,7 +103,9 @@ pub fn choose(
     let best = (0..plans.len()).reduce(|best, i| if quality(i) > quality(best) { i } else { best });
     let Some(best) = best else { return Err(ChoiceError::NoPlan) };
     let chosen = found.pool.remove(plans[best]);
-    let holding = holding(&model, &chosen.plan, &meetings[best], &solved[best].resistance, plans.len());
+    let foreseen_play = play_of(&model, &chosen.plan, &meetings[best], params.clearance_mm);
+    let holding = holding(&model, &chosen.plan, &meetings[best], &solved[best].resistance);
+    let holding = Holding { n_compared: plans.len(), foreseen_play, ..holding };
     if !holding.loose.is_empty() {
         warn_of_parting(ctx, &holding.loose);
     }
@@ -99,6 +114,36 @@ pub fn choose(
     (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
     found.pool.insert(0, chosen);
     Ok((found, holding))
+}
+
+/// The plans that are worth a simulation, by their places in the pool.
+fn shortlist(model: &PlanModel, surface: &SegmentedSurface, clearance_mm: f64, found: &FoundPlan) -> Vec<usize> {
+    let size_mm = surface.mesh.bounds().size().max_element();
+    let most = most_play(size_mm, clearance_mm).map(|most| FORESEEN_SHARE * most);
+    // How far the loosest piece goes beyond what is allowed; 1 for plans in which none does.
+    let excess = |&i: &usize| {
+        let plan = &found.pool[i].plan;
+        let of_piece = |[mm, deg]: &[f64; 2]| (mm / most[0]).max(deg / most[1]);
+        play_of(model, plan, &model.meetings(plan), clearance_mm).iter().map(of_piece).fold(1.0, f64::max)
+    };
+    let within = |slack: f64| -> Vec<(usize, f64)> {
+        let limit = found.score.worst * (1.0 + slack);
+        let plans: Vec<usize> = (0..found.pool.len()).filter(|&i| found.pool[i].score.worst <= limit).collect();
+        plans.par_iter().map(|i| (*i, excess(i))).collect()
+    };
+    let least = |plans: &[(usize, f64)]| plans.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+    let mut plans = within(COST_SLACK);
+    if least(&plans) > 1.0 {
+        plans = within(COST_SLACK_FOR_PLAY);
+    }
+    let most = least(&plans) * (1.0 + PLAY_TIE);
+    plans.into_iter().filter(|p| p.1 <= most).map(|p| p.0).collect()
+}
+
+/// The play of pieces that is foreseen: displacement, mm, and turn, degrees.
+fn play_of(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
+    let play = foreseen(model, plan, meetings, clearance_mm);
+    play.into_iter().map(|[mm, turn]| [mm, turn.to_degrees()]).collect()
 }
 
 fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePart]) {
@@ -132,24 +177,18 @@ fn middle_of(model: &PlanModel, piece: PatchId) -> Vec3 {
 }
 
 /// Puts the stations' openings together by pairs of pieces.
-fn holding(
-    model: &PlanModel,
-    plan: &InstallationPlan,
-    meetings: &[Meeting],
-    resistance: &Resistance,
-    n_compared: usize,
-) -> Holding {
+fn holding(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], resistance: &Resistance) -> Holding {
     let (opening, loose) = match resistance {
         Resistance::Holds(opening) => (opening, Vec::new()),
         Resistance::Separable(parts) => {
             let part = |&p: &u32| LoosePart { piece: PatchId(p), at: middle_of(model, PatchId(p)).to_array() };
             let loose = parts.iter().map(part).collect();
-            return Holding { quality_mm: None, loose, seams: Vec::new(), n_compared };
+            return Holding { quality_mm: None, loose, seams: Vec::new(), n_compared: 0, foreseen_play: Vec::new() };
         }
     };
     let mut seams = weakest_places(model, plan, meetings, opening);
     seams.sort_by(|x, y| y.score_mm.total_cmp(&x.score_mm).then((x.later, x.earlier).cmp(&(y.later, y.earlier))));
-    Holding { quality_mm: Some(opening.quality_mm), loose, seams, n_compared }
+    Holding { quality_mm: Some(opening.quality_mm), loose, seams, n_compared: 0, foreseen_play: Vec::new() }
 }
 
 /// The weakest place of every pair of pieces that has a connector.

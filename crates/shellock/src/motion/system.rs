@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use shellock_geom::Vec3;
 
+use super::Contact;
 use super::forces::Balance;
 use super::{Freedom, Twist};
 use crate::PatchId;
-use super::Contact;
 
 /// Mean opening speed of the contacts that counts as none. The acceptance test's bound is 1e-6 for the program's
 /// optimum, which ours is an upper bound of.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::rounds::{is_better, only_rattles, rattling};
 use super::{Design, DesignError, DesignOutcome, Job, Laid, Params};
 use crate::key::{self, KeyParams, KeyPrism, KeySite};
 use crate::piece::Grip;
@@ -115,7 +116,15 @@ pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
                     return Ok(Cut { best: Some(*made), reasons: Vec::new() });
                 }
                 let reason = format!("with {} it fails: {}", told(site), failed.join(", "));
-                cut.best.get_or_insert(*made);
+                // Where other pieces than the key rattle, another key changes nothing.
+                let is_of_pieces = only_rattles(&made) && !rattling(&made).is_empty();
+                if cut.best.as_ref().is_none_or(|best| is_better(&made, best)) {
+                    cut.best = Some(*made);
+                }
+                if is_of_pieces {
+                    cut.reasons.push(reason);
+                    break;
+                }
                 reason
             }
             Ok(DesignOutcome::NoPlan { reason, .. }) => format!("with {} there is no plan: {reason}", told(site)),

@@ -8,6 +8,7 @@ use crate::feedback::{Lesson, lessons};
 use crate::metric::Holding;
 use crate::plan::{Blocker, FoundPlan, InstallationPlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::sizes::ChosenSizes;
+use crate::verify::Finding;
 use crate::{ConnectorSizes, Ctx, PatchId, SegmentedSurface, key, metric, plan, segmentation};
 
 /// The surface with other pieces, which may do better.
@@ -35,9 +36,31 @@ pub(super) fn mended(
     joined.or_else(divided)
 }
 
+/// The pieces that rattle, the loosest first; the key, which is cut where there is room for it, is left out.
+pub(super) fn rattling(design: &Design) -> Vec<PatchId> {
+    let piece = |f: &Finding| match f {
+        Finding::PlayTooWide { piece, .. } if *piece != design.plan.key() => Some(*piece),
+        _ => None,
+    };
+    design.verification.findings.iter().filter_map(piece).collect()
+}
+
+/// The surface with the loosest pieces joined to neighbours; `None` where that leaves nothing to lock.
+pub(super) fn joined(
+    ctx: &Ctx,
+    params: &Params,
+    surface: &SegmentedSurface,
+    rattling: &[PatchId],
+) -> Option<SegmentedSurface> {
+    /// More would change what holds.
+    const MOST_JOINED: usize = 2;
+    let loosest = &rattling[..rattling.len().min(MOST_JOINED)];
+    (!loosest.is_empty()).then(|| segmentation::unite(ctx, &params.segmentation, surface, loosest)).flatten()
+}
+
 /// The kits made so far.
 pub(super) struct Kits {
-    /// The one with the fewest failures, the earliest of several.
+    /// The one with the fewest failures, then that rattles least, the earliest of several.
     pub best: Option<Design>,
     pub n_left: usize,
 }
@@ -46,7 +69,7 @@ impl Kits {
     /// Counts a kit and keeps it where it is the best so far.
     fn add(&mut self, design: Design) {
         self.n_left -= 1;
-        if self.best.as_ref().is_none_or(|b| failures(&design) < failures(b)) {
+        if self.best.as_ref().is_none_or(|b| is_better(&design, b)) {
             self.best = Some(design);
         }
     }
@@ -62,6 +85,8 @@ pub(super) enum Attempt {
         blamed: Vec<PatchId>,
         /// Pieces that came out loose in the last kit.
         loose: Vec<PatchId>,
+        /// Pieces that rattle in the last kit, where nothing else is wrong with it; the loosest first, and without the key.
+        rattling: Vec<PatchId>,
     },
 }
 
@@ -126,7 +151,7 @@ pub(super) fn with_segmentation(
             Planned::Found(found, holding) => (found, holding),
             Planned::Infeasible { reason, blockers, articulations } => {
                 blamed.splice(0..0, articulations.into_iter().chain(blockers.iter().map(|b| b.piece)));
-                return Ok(Attempt::Failed { reason, blockers, blamed, loose });
+                return Ok(Attempt::Failed { reason, blockers, blamed, loose, rattling: Vec::new() });
             }
         };
         let (model, grid) = (wall.model, wall.get()?);
@@ -145,9 +170,21 @@ pub(super) fn with_segmentation(
         };
         kit += 1;
         let learned: Vec<Lesson> = lessons(&design);
+        let rattling = only_rattles(&design).then(|| rattling(&design));
         kits.add(design);
         if learned.is_empty() {
             return Ok(Attempt::Passed);
+        }
+        if let Some(rattling) = rattling {
+            // The plan was chosen to rattle least: other pieces are what helps.
+            let reason = "pieces rattle".into();
+            return Ok(Attempt::Failed {
+                reason,
+                blockers: Vec::new(),
+                blamed: Vec::new(),
+                loose: Vec::new(),
+                rattling,
+            });
         }
         blamed.extend(learned.iter().flat_map(Lesson::blamed));
         loose = learned.iter().flat_map(Lesson::loose).collect();
@@ -157,7 +194,7 @@ pub(super) fn with_segmentation(
         learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
     }
     let reason = "no kit passed its verification within the allowed rounds".into();
-    Ok(Attempt::Failed { reason, blockers: Vec::new(), blamed, loose })
+    Ok(Attempt::Failed { reason, blockers: Vec::new(), blamed, loose, rattling: Vec::new() })
 }
 
 /// A plan that holds best of those that cost about the least, or why there is none.
@@ -205,4 +242,23 @@ fn warn_of_key(
 
 pub(super) fn failures(design: &Design) -> usize {
     design.verification.checks.iter().filter(|c| !c.ok).count()
+}
+
+/// Whether the only thing wrong with a kit is that pieces rattle.
+pub(super) fn only_rattles(design: &Design) -> bool {
+    let is_rattle = |f: &Finding| matches!(f, Finding::PlayTooWide { .. });
+    failures(design) == 1
+        && !design.verification.findings.is_empty()
+        && design.verification.findings.iter().all(is_rattle)
+}
+
+/// Whether a kit has fewer failures, or as many and rattles less.
+pub(super) fn is_better(design: &Design, than: &Design) -> bool {
+    let excess = |finding: &Finding| match finding {
+        Finding::PlayTooWide { play, most, .. } => (play.translation_mm / most[0]).max(play.rotation_deg / most[1]),
+        _ => 0.0,
+    };
+    let rattles = |d: &Design| d.verification.findings.iter().map(excess).fold(0.0, f64::max);
+    let (own, other) = (failures(design), failures(than));
+    own < other || (own == other && rattles(design) < rattles(than))
 }

@@ -250,7 +250,8 @@ mod tests {
         let surface = Surface::new(&mesh);
         let from = surface.tree.first_hit(Vec3::ZERO, Vec3::Z, 10.0).unwrap().0;
         for radius in [0.1, 0.5, 1.0] {
-            let found = surface.barrier_mm(from, &Axis::new(Vec3::ZERO, Vec3::Z), &Region::of_radius(radius), 5.0).unwrap();
+            let found =
+                surface.barrier_mm(from, &Axis::new(Vec3::ZERO, Vec3::Z), &Region::of_radius(radius), 5.0).unwrap();
             assert!((found - (0.5 + radius)).abs() < 1e-9, "{radius}: {found}");
         }
     }
@@ -279,7 +280,8 @@ mod tests {
         let surface = Surface::new(&roof.to_mesh());
         let from = surface.tree.first_hit(Vec3::ZERO, Vec3::Z, 10.0).unwrap().0;
         let radius = 0.9;
-        let height = surface.barrier_mm(from, &Axis::new(Vec3::ZERO, Vec3::Z), &Region::of_radius(radius), 2.0).unwrap();
+        let height =
+            surface.barrier_mm(from, &Axis::new(Vec3::ZERO, Vec3::Z), &Region::of_radius(radius), 2.0).unwrap();
         let mut p = Vec3::ZERO;
         for _ in 0..20_000 {
             let step = Vec3::new(rng.random_range(-0.2..0.2), rng.random_range(-0.2..0.2), rng.random_range(-0.1..0.2));

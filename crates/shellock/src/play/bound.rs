@@ -17,8 +17,8 @@ use shellock_geom::Vec3;
 
 use super::bearing::{Bearing, Surfaces};
 use super::quantity::{Quantities, Quantity, other_lines};
-use crate::verify::contact::Contact;
 use crate::motion::{Corner, Freedom, Limits, System};
+use crate::verify::contact::Contact;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Widenings of an assumption before it is given up.
@@ -151,7 +151,8 @@ impl Problem<'_> {
             // What no bearing needed yet is assumed to go as far as in the motions that were found.
             for (q, found) in found.into_iter().chain(guesses) {
                 let quantity = &mut quantities.all[q];
-                let (most, least) = if quantity.at.is_some() { (MOST_SHIFT_MM, WIDER_MM) } else { (MOST_TURN, WIDER_RAD) };
+                let (most, least) =
+                    if quantity.at.is_some() { (MOST_SHIFT_MM, WIDER_MM) } else { (MOST_TURN, WIDER_RAD) };
                 for (assumed, found) in quantity.most.iter_mut().flatten().zip(found.iter().flatten()) {
                     if *found > *assumed {
                         *assumed = found * WIDER + least;
@@ -180,12 +181,18 @@ struct Round<'a> {
 }
 
 impl<'a> Round<'a> {
-    fn new(problem: &'a Problem<'a>, bearings: &'a [Bearing], quantities: &'a Quantities, beds: &'a [OnceLock<bool>]) -> Self {
+    fn new(
+        problem: &'a Problem<'a>,
+        bearings: &'a [Bearing],
+        quantities: &'a Quantities,
+        beds: &'a [OnceLock<bool>],
+    ) -> Self {
         let centers = problem.centers;
         let center = problem.free.iter().map(|&p| centers[p]).sum::<Vec3>() / problem.free.len() as f64;
         let errors_mm: Vec<f64> =
             bearings.iter().zip(&quantities.places).map(|(b, p)| quantities.error_mm(b, p, centers)).collect();
-        let contact = |a, b, point: Vec3, normal, gap_mm| Contact { a, b, point: point - center, normal, gap_mm, area_mm2: 0.0 };
+        let contact =
+            |a, b, point: Vec3, normal, gap_mm| Contact { a, b, point: point - center, normal, gap_mm, area_mm2: 0.0 };
         let mut contacts: Vec<Contact> =
             bearings.iter().map(|b| contact(b.a, b.b, b.point, b.normal, b.gap_mm)).collect();
         let slide = problem.slide;
@@ -283,7 +290,8 @@ impl<'a> Round<'a> {
         let all = 0..self.quantities.all.len();
         let unknown: Vec<usize> = all.filter(|q| !ends.contains_key(q)).collect();
         let farthest = |objective: DVector<f64>| motions.iter().map(|m| objective.dot(m)).fold(0.0, f64::max);
-        let guess = |&q: &usize| (q, (0..3).map(|axis| [0, 1].map(|side| farthest(self.objective(q, axis, side)))).collect());
+        let guess =
+            |&q: &usize| (q, (0..3).map(|axis| [0, 1].map(|side| farthest(self.objective(q, axis, side)))).collect());
         unknown.par_iter().map(guess).collect()
     }
 

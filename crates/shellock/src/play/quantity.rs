@@ -104,12 +104,11 @@ impl Quantities {
         let mut made = Self { all: Vec::new(), of_piece: BTreeMap::new(), places: Vec::with_capacity(bearings.len()) };
         for &p in free {
             let turn = made.add(Quantity::new(Some(p), None, None, COORDINATES.map(|d| d.to_array()).to_vec()));
-            let shift = made.add(Quantity::new(Some(p), None, Some(centers[p]), COORDINATES.map(|d| d.to_array()).to_vec()));
+            let shift =
+                made.add(Quantity::new(Some(p), None, Some(centers[p]), COORDINATES.map(|d| d.to_array()).to_vec()));
             made.of_piece.insert(p, [turn, shift]);
         }
-        let key = |b: &Bearing| {
-            (b.a.min(b.b), b.a.max(b.b), (b.point / CELL_MM).floor().to_array().map(|x| x as i64))
-        };
+        let key = |b: &Bearing| (b.a.min(b.b), b.a.max(b.b), (b.point / CELL_MM).floor().to_array().map(|x| x as i64));
         let mut cells: BTreeMap<(PatchId, PatchId, [i64; 3]), Vec<usize>> = BTreeMap::new();
         bearings.iter().enumerate().for_each(|(i, b)| cells.entry(key(b)).or_default().push(i));
         let mut of_cell = BTreeMap::new();
@@ -175,9 +174,8 @@ impl Quantities {
     /// How far the point goes sideways, seen from `b`, where the error is so much.
     pub fn region(&self, b: &Bearing, p: &Place, error_mm: f64) -> Region {
         let (cell, turn) = (&self.all[p.cell], &self.all[p.turn]);
-        let far = |t: Vec3| {
-            cell.along(t * p.cell_sign) + turn.along(p.off.cross(t) * p.turn_sign) + error_mm + ROUNDING_MM
-        };
+        let far =
+            |t: Vec3| cell.along(t * p.cell_sign) + turn.along(p.off.cross(t) * p.turn_sign) + error_mm + ROUNDING_MM;
         Region { far_mm: b.axis().sides().map(far) }
     }
 }

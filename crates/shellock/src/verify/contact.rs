@@ -1,8 +1,8 @@
 //! Where the finished pieces face each other closely enough to hold each other.
 
 use rayon::prelude::*;
-use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::Aabb;
+use shellock_geom::bvh::TriangleBvh;
 
 use super::body::Body;
 use super::sample;

@@ -1,0 +1,94 @@
+//! The play of pieces, foreseen from a plan before anything is built.
+//!
+//! At a station the walls of two pieces are a clearance apart, and so are a pin and its channel on all sides but the one that the
+//! pin leaves by. Each is a limit on small motions of a piece while its neighbours rest; a linear program for a piece says
+//! how far it gets.
+//!
+//! ```text
+//!   ───a──┐┌──b───   walls: at the outside and at the inside of the wall
+//!       ┌─┘└─┐
+//!       │ pin│       pin: at its root and its end, across ŝ and u, and against ŝ
+//!       └────┘
+//! ```
+//!
+//! Limits: rails and ribs are not known, so nothing is said of a key; pins are taken as long as their stations' seams.
+
+use nalgebra::DVector;
+use shellock_geom::Vec3;
+use shellock_mechanics::{Meeting, Side};
+
+use super::PlanModel;
+use crate::PatchId;
+use crate::motion::{Contact, Corner, Freedom, Limits, System};
+use crate::plan::InstallationPlan;
+
+/// Share of the connector size that a pin is deep.
+const PIN_DEPTH: f64 = 0.6;
+/// Half of a pin's thickness, as a share of the connector size.
+const PIN_HALF: f64 = 0.25;
+/// Turns count as displacements at this distance, mm.
+const LENGTH_MM: f64 = 50.0;
+/// What has no end goes so far: mm and rad.
+const ENDLESS: [f64; 2] = [100.0, 1.0];
+
+/// How far each piece but the key goes: displacement of the middle of its stations, mm, and turn, rad, no less than the greatest along the
+/// coordinate axes and no more than √3 of that; zeros for the key.
+pub fn foreseen(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
+    let mut contacts: Vec<Vec<Contact>> = vec![Vec::new(); model.assembly.n_parts];
+    for (station, meeting) in meetings.iter().enumerate() {
+        let found = at_station(model, station, meeting, clearance_mm);
+        for piece in model.pieces_at(station) {
+            contacts[usize::from(piece)].extend(&found);
+        }
+    }
+    let key = plan.key();
+    let of_piece = |(i, own): (usize, &Vec<Contact>)| {
+        let piece = PatchId::from(i);
+        if piece == key { [0.0; 2] } else { farthest(piece, own) }
+    };
+    contacts.iter().enumerate().map(of_piece).collect()
+}
+
+/// What a station stops.
+fn at_station(model: &PlanModel, station: usize, meeting: &Meeting, clearance_mm: f64) -> Vec<Contact> {
+    let [a, b] = model.pieces_at(station);
+    let frame = &model.assembly.stations[station];
+    let below = |depth_mm: f64| model.place_of(station) - depth_mm * frame.normal;
+    let contact = |a, b, point, normal| Contact { a, b, point, normal, gap_mm: clearance_mm, area_mm2: 0.0 };
+    let wall_mm = model.params.wall_mm;
+    let mut found: Vec<Contact> = [0.1, 0.9].map(|share| contact(a, b, below(share * wall_mm), meeting.wall)).to_vec();
+    if let Some(joint) = &meeting.joint {
+        let (male, female) = if joint.male == Side::A { (a, b) } else { (b, a) };
+        let across = joint.leaves.cross(frame.tangent).normalize_or_zero();
+        for depth_mm in [wall_mm + 0.1 * joint.size_mm, wall_mm + PIN_DEPTH * joint.size_mm] {
+            let (middle, half) = (below(depth_mm), PIN_HALF * joint.size_mm);
+            found.push(contact(male, female, middle - half * joint.leaves, -joint.leaves));
+            found.extend([across, -across].map(|side| contact(male, female, middle + half * side, side)));
+        }
+    }
+    found
+}
+
+/// How far a piece goes within its contacts while its neighbours rest.
+fn farthest(piece: PatchId, contacts: &[Contact]) -> [f64; 2] {
+    if contacts.is_empty() {
+        return ENDLESS;
+    }
+    let middle = contacts.iter().map(|c| c.point).sum::<Vec3>() / contacts.len() as f64;
+    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - middle, ..*c }).collect();
+    let system = System::new(&centered, &[piece], LENGTH_MM, Freedom::Rigid);
+    let gaps: Vec<f64> = system.rows.iter().map(|row| centered[row.contact].gap_mm).collect();
+    let limits = Limits::new(&system, &gaps);
+    let mut corner = Corner::new(&limits);
+    let mut most = |from: usize, end: f64, scale: f64| {
+        let mut axes = [0.0f64; 3];
+        for (k, most) in axes.iter_mut().enumerate() {
+            for sign in [1.0, -1.0] {
+                let towards = DVector::from_fn(system.n, |i, _| if i == from + k { sign * scale } else { 0.0 });
+                *most = most.max(corner.farthest(&towards).map_or(end, |x| x.min(end)));
+            }
+        }
+        Vec3::from(axes).length()
+    };
+    [most(0, ENDLESS[0], 1.0), most(3, ENDLESS[1], 1.0 / LENGTH_MM)]
+}
