@@ -60,8 +60,16 @@ pub fn report(
         .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
         .collect();
     let quantities = quantities(design, summary);
-    let data =
-        ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
+    let data = ReportData {
+        title: model.name.clone(),
+        facts,
+        pieces,
+        checks,
+        warnings: &warnings,
+        figures,
+        quantities,
+        motions: Vec::new(),
+    };
     let booklet = Booklet { title: title(&model.name), lines: cover_lines(&shown), pieces: data.pieces.clone() };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),
