@@ -191,8 +191,10 @@ function motionControls(header, on) {
   const motions = header.motions ?? [];
   const buttons = motions.map(({ name, title }, i) => button(name, title, () => on.motion(i)));
   const large = button("×5", "Show moves five times as large as they are", on.magnify);
+  const plays = element("div", "plays");
+  plays.append(...buttons);
   const holder = element("div", "modes motions");
-  holder.append(...buttons, large);
+  holder.append(plays, large);
   return {
     holders: motions.length ? [holder] : [],
     update(state) {
