@@ -4,6 +4,7 @@
 // header.meshes[i].triangles = { offset, count, bytes }: 3 × uint16 or uint32 a triangle
 // header.meshes[i].draft     = { points, triangles }: the same, coarser, for what moves on slow machines; may be missing
 // header.quantities[j]       = { name, unit, values }: one number or null a mesh, to colour meshes by
+// header.motions             = what moves how: see motion.js; may be missing
 // Offsets count bytes. Everything else in the header is text and numbers to show.
 
 export function readPage(document) {

@@ -39,10 +39,11 @@ export function buildPanel(header, meshes, order, on) {
   const steps = stepControls(meshes.length, on);
   const cut = cutControls(on);
   const paint = paintControls(header, on);
+  const motions = motionControls(header, on);
   const turn = button("Turn", "Turn the model on and on", on.turn);
   const view = element("div", "modes");
   view.append(turn, button("Reset", "Reset the view", on.home));
-  tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, view);
+  tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, ...motions.holders, view);
   panel.append(element("h1", "", header.title), summary(header));
   const list = meshList(header, meshes, order, on);
   panel.append(list.holder);
@@ -58,6 +59,7 @@ export function buildPanel(header, meshes, order, on) {
       cut.input.value = state.cut;
       turn.setAttribute("aria-pressed", state.turning);
       paint.update(state);
+      motions.update(state);
       steps.update(state, flying === undefined ? "" : meshes[flying].name);
       list.update(state, flying);
     },
@@ -180,6 +182,24 @@ function paintControls(header, on) {
       low.textContent = text(shades.low);
       high.textContent = `${text(shades.high)} ${unit}`;
       none.textContent = shades.hasGaps ? "grey: none" : "";
+    },
+  };
+}
+
+// A button for each motion, and how large they show; nothing where there are none.
+function motionControls(header, on) {
+  const motions = header.motions ?? [];
+  const buttons = motions.map(({ name, title }, i) => button(name, title, () => on.motion(i)));
+  const large = button("×5", "Show moves five times as large as they are", on.magnify);
+  const plays = element("div", "plays");
+  plays.append(...buttons);
+  const holder = element("div", "modes motions");
+  holder.append(plays, large);
+  return {
+    holders: motions.length ? [holder] : [],
+    update(state) {
+      buttons.forEach((b, i) => b.setAttribute("aria-pressed", state.motion === i));
+      large.setAttribute("aria-pressed", state.magnified);
     },
   };
 }

@@ -2,7 +2,7 @@
 
 import {
   Box3, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, BackSide, FrontSide,
-  Group, HemisphereLight, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Plane, Quaternion,
+  Group, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Plane, Quaternion,
   Raycaster, Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -13,6 +13,8 @@ const UP = new Vector3(0, 0, 1);
 const SLOW_MS = 30;
 // What has not moved for so long, ms, rests.
 const REST_MS = 200;
+// How much of what is seen through is seen.
+const FAINT = 0.3;
 
 // A shaft and a head, unlit, from the origin along +y before it is turned.
 class Arrow extends Group {
@@ -34,6 +36,16 @@ class Arrow extends Group {
     this.head.scale.set(width, head, width);
     this.head.position.set(0, length - head, 0);
   }
+}
+
+/** Where a pose of a motion puts points: x goes to about + t + R(w) (x − about). */
+export function poseMatrix(about, [tx, ty, tz, ...w]) {
+  const axis = new Vector3(...w);
+  const angle = axis.length();
+  const turn = new Matrix4();
+  if (angle > 0) turn.makeRotationAxis(axis.divideScalar(angle), angle);
+  const center = new Vector3(...about);
+  return turn.setPosition(center.clone().add(new Vector3(tx, ty, tz)).sub(center.applyMatrix4(turn)));
 }
 
 function shape({ positions, indices }) {
@@ -199,8 +211,28 @@ export class Stage {
     this.lookFrom(from, box.getCenter(new Vector3()), air * box.getSize(new Vector3()).length());
   }
 
+  /** Fits the view where moves, so many times as large as they are, lead out of the scene; says whether they do. */
+  fitMoves(moves, scale) {
+    const reach = this.box.clone();
+    for (const { mesh, about, poses } of moves) {
+      const { box } = this.items[mesh];
+      for (const pose of poses) reach.union(box.clone().applyMatrix4(poseMatrix(about, pose.map((x) => scale * x))));
+    }
+    const leads = !this.box.clone().expandByScalar(0.05 * this.size).containsBox(reach);
+    if (leads) this.lookFrom(this.camera.position.clone().sub(this.controls.target), reach.getCenter(new Vector3()), reach.getSize(new Vector3()).length());
+    return leads;
+  }
+
   place(i, offset) {
-    this.items[i].group.position.copy(offset);
+    const { group } = this.items[i];
+    group.position.copy(offset);
+    group.quaternion.identity();
+  }
+
+  /** Puts a mesh where a pose of a motion has it. */
+  pose(i, { about, pose }) {
+    const { group } = this.items[i];
+    poseMatrix(about, pose).decompose(group.position, group.quaternion, new Vector3());
   }
 
   /** Gives a mesh another colour, sRGB. */
@@ -215,8 +247,10 @@ export class Stage {
     const { group, skin, cut } = this.items[i];
     group.visible = !hidden;
     for (const material of [skin, cut]) {
+      // The shader of what is opaque ignores opacity.
+      if (material.transparent !== faint) material.needsUpdate = true;
       material.transparent = faint;
-      material.opacity = faint ? 0.12 : 1;
+      material.opacity = faint ? FAINT : 1;
       material.depthWrite = !faint;
     }
     skin.emissive.copy(skin.color).multiplyScalar(lit ? 0.45 : 0);

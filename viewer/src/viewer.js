@@ -2,11 +2,13 @@
 
 import { Vector3 } from "three";
 import { readPage, shades } from "./data.js";
+import { Player } from "./motion.js";
 import { buildPanel, element } from "./panel.js";
 import { Stage } from "./stage.js";
 
 const FLIGHT_MS = 1100;
 const REST_MS = 350;
+const LARGE = 5;
 
 function start() {
   const { header, meshes } = readPage(document);
@@ -19,7 +21,10 @@ function start() {
   }
   const order = meshes.map((_, i) => i).sort((a, b) => meshes[a].step - meshes[b].step);
   // apart: 0 … 1 · step: how many have arrived, with the share of the one on its way
-  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null, turning: false };
+  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null, turning: false, motion: -1, magnified: false };
+  const player = new Player(header.motions ?? [], () => update());
+  const caption = element("p", "caption");
+  caption.setAttribute("role", "status");
   const panel = buildPanel(header, meshes, order, {
     mode: (mode) => { setMode(mode); },
     apart: (share) => { state.apart = share; update(); },
@@ -29,6 +34,8 @@ function start() {
     play: () => { state.playing ? stop() : play(); },
     cut: (axis, share) => { Object.assign(state, { cutAxis: axis, cut: share }); stage?.cutAt(axis, share); },
     paint,
+    motion,
+    magnify,
     choose,
     toggle: (i) => { state.hidden.has(i) ? state.hidden.delete(i) : state.hidden.add(i); update(); },
     inside,
@@ -73,6 +80,42 @@ function start() {
     update();
   }
 
+  // Plays a motion of assembled meshes, or puts them back; shows its next pose instead to who wants no animation.
+  function motion(i) {
+    if (!stage || !player.motions[i]) return;
+    const isStepped = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (player.index === i) {
+      if (!isStepped || !player.step(i)) stop();
+      return update();
+    }
+    stop();
+    assemble();
+    isStepped ? player.step(i) : player.play(i);
+    fitMotion();
+    update();
+  }
+
+  function assemble() {
+    const isWhole = state.mode === "together" && !state.alone;
+    Object.assign(state, { mode: "together", alone: false, step: meshes.length });
+    // Who looks at a seam from near by wants to see it there.
+    if (!isWhole) fit();
+  }
+
+  function magnify() {
+    state.magnified = !state.magnified;
+    player.scale = state.magnified ? LARGE : 1;
+    fitMotion();
+    update();
+  }
+
+  function fitMotion() {
+    if (!player.motion) return;
+    const isFar = stage.fitMoves(player.motion.moves, player.scale);
+    if (state.isFar && !isFar) fit();
+    state.isFar = isFar;
+  }
+
   function goTo(step) {
     stop();
     const from = Math.max(0, Math.min(meshes.length, step) - 1);
@@ -101,6 +144,7 @@ function start() {
   }
 
   function play() {
+    stop();
     enterSteps();
     state.playing = true;
     const next = (from) => {
@@ -115,30 +159,37 @@ function start() {
     cancelAnimationFrame(state.flight);
     clearTimeout(state.pause);
     state.playing = false;
+    player.stop();
+    if (state.isFar) { state.isFar = false; fit(); }
     update();
   }
 
   function update() {
+    state.motion = player.index;
     const flying = state.mode === "steps" ? order[Math.ceil(state.step) - 1] : undefined;
     if (stage) arrange(flying);
     panel.update(state, flying);
+    const text = player.caption();
+    // Said once, not with every frame.
+    if (caption.textContent !== text) caption.textContent = text;
   }
 
   function arrange(flying) {
     const travelled = state.step - Math.ceil(state.step) + 1;
     const way = 0.55 * stage.size;
+    const places = player.places();
     meshes.forEach((m, i) => {
       const arrived = state.mode !== "steps" || order.indexOf(i) < Math.ceil(state.step);
       const offset = new Vector3();
       if (state.mode === "apart") offset.set(...m.shift).multiplyScalar(state.apart);
       if (i === flying) offset.set(...m.travel).multiplyScalar(-(1 - eased(travelled)) * way);
-      stage.place(i, offset);
+      places.has(i) ? stage.pose(i, places.get(i)) : stage.place(i, offset);
       const hidden = !arrived || state.hidden.has(i) || (state.alone && state.chosen !== i);
-      stage.show(i, { hidden, lit: state.chosen === i && !state.alone });
+      stage.show(i, { hidden, faint: places.size > 0 && !places.has(i), lit: state.chosen === i && !state.alone });
       stage.showWay(i, state.mode === "apart" && !hidden ? offset : null);
     });
     if (flying !== undefined && travelled < 1) stage.showArrow(flying, way);
-    else if (state.mode === "together" && state.chosen >= 0 && !state.alone) stage.showArrow(state.chosen, 0.7 * way);
+    else if (state.mode === "together" && state.chosen >= 0 && !state.alone && !places.size) stage.showArrow(state.chosen, 0.7 * way);
     else stage.arrow.visible = false;
     stage.draw();
   }
@@ -156,7 +207,7 @@ function start() {
     stage.leaveRoom(tools.offsetHeight + 16);
     fit();
     const label = element("div", "label");
-    holder.append(label);
+    holder.append(label, caption);
     stage.afterDraw = () => {
       const at = state.note?.at && stage.onScreen(new Vector3(...state.note.at));
       label.hidden = !at;
@@ -164,8 +215,8 @@ function start() {
     };
     clicks(holder.querySelector("canvas"), (x, y) => choose(stage.pick(x, y)));
   }
-  keys({ next: () => goTo(Math.floor(state.step) + 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => (state.playing ? stop() : play()), escape: () => choose(-1) });
-  fromAddress(location.hash, { state, setMode, update, choose, inside, paint, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
+  keys({ next: () => goTo(Math.floor(state.step) + 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => (state.playing ? stop() : play()), escape: () => { if (player.motion) stop(); choose(-1); } });
+  fromAddress(location.hash, { state, setMode, update, choose, inside, paint, motion, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
   update();
   document.documentElement.dataset.ready = "true";
 }
@@ -191,8 +242,8 @@ function keys({ next, back, play, escape }) {
   });
 }
 
-// #apart, #apart=0.5, #step=3.4, #choose=2, #inside=2, #cut=0.5, #note=0, #paint=1 show that view at once: for links and for pictures.
-function fromAddress(hash, { state, setMode, update, choose, inside, paint, note, cut }) {
+// #apart, #apart=0.5, #step=3.4, #choose=2, #inside=2, #cut=0.5, #note=0, #paint=1, #motion=0 show that view at once: for links and for pictures.
+function fromAddress(hash, { state, setMode, update, choose, inside, paint, motion, note, cut }) {
   for (const [key, text] of new URLSearchParams(hash.slice(1))) {
     const value = Number(text);
     if (!Number.isFinite(value)) continue;
@@ -203,6 +254,7 @@ function fromAddress(hash, { state, setMode, update, choose, inside, paint, note
     if (key === "cut") { state.cut = value; cut(value); }
     if (key === "note") note(value);
     if (key === "paint") paint(value);
+    if (key === "motion") motion(value);
   }
   state.step = Math.min(state.step, document.querySelectorAll(".mesh").length);
   update();

@@ -8,7 +8,90 @@ function cube(center, half) {
   return { corners: Uint16Array.from(corners.flat()), triangles: Uint16Array.from(triangles), min: center.map((x) => x - half), max: center.map((x) => x + half) };
 }
 
-export async function samplePage() {
+// Counts what the canvas shows and clicks through every control.
+const CLICKS = `
+setTimeout(() => {
+  const canvas = document.querySelector("canvas");
+  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height }).getContext("2d");
+  copy.drawImage(canvas, 0, 0);
+  const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data;
+  let covered = 0;
+  for (let i = 3; i < pixels.length; i += 4) covered += pixels[i] > 127;
+  document.documentElement.dataset.covered = (covered / (pixels.length / 4)).toFixed(4);
+  for (const b of document.querySelectorAll("button")) b.click();
+  const select = document.querySelector(".paint select");
+  const dots = () => [...document.querySelectorAll(".mesh .dot")].map((d) => d.style.background).join(" ");
+  const painted = ["1", "0", "-1"].map((value) => { select.value = value; select.dispatchEvent(new Event("change")); return dots() + " " + document.querySelector(".legend").textContent; });
+  document.documentElement.dataset.painted = painted.join("|");
+  for (const key of ["ArrowRight", "ArrowLeft", " ", "Escape"]) dispatchEvent(new KeyboardEvent("keydown", { key }));
+  const scrub = document.querySelector(".steps input");
+  const moments = ["0.5", "1.25", "2"].map((value) => { scrub.value = value; scrub.dispatchEvent(new Event("input")); return document.querySelector(".steps .count").textContent; });
+  document.documentElement.dataset.moments = moments.join("|");
+  document.documentElement.dataset.clicked = document.querySelectorAll("button").length;
+}, 1500);`;
+
+// Plays the first motion, large and as it is, and puts it back; says where the second mesh is, and what shows besides.
+const MOTIONS = `
+// Frames come when the script says so: a browser without a window draws few of them, and when it likes.
+let [clock, id] = [performance.now(), 0];
+const asked = new Map();
+performance.now = () => clock;
+window.requestAnimationFrame = (then) => (asked.set(++id, then), id);
+window.cancelAnimationFrame = (i) => asked.delete(i);
+const wait = (ms) => {
+  for (const end = clock + ms; clock < end;) {
+    clock += 20;
+    const frame = [...asked.values()];
+    asked.clear();
+    for (const then of frame) then(clock);
+  }
+};
+const [first, second, large] = document.querySelectorAll(".motions button");
+const moments = [];
+const note = (name) => {
+  scene.updateMatrixWorld();
+  const [still, moving] = scene.children.filter((c) => c.type === "Group");
+  const opacity = (group) => group.children[0].material.opacity;
+  moments.push({
+    name, matrix: [...moving.matrixWorld.elements], still: [...still.matrixWorld.elements], faint: [opacity(still), opacity(moving)],
+    caption: document.querySelector(".caption").textContent, pressed: [first, second, large].map((b) => b.getAttribute("aria-pressed")),
+    isAssembled: document.querySelector(".modes button").getAttribute("aria-pressed"), label: first.getAttribute("aria-label"),
+  });
+};
+setTimeout(() => {
+  note("before");
+  document.querySelectorAll(".modes button")[1].click();
+  note("apart");
+  first.click();
+  wait(300);
+  note("under way");
+  wait(2200);
+  note("end");
+  large.click();
+  note("large");
+  large.click();
+  first.click();
+  note("back");
+  second.click();
+  wait(900);
+  note("loop");
+  wait(900);
+  note("loop later");
+  dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
+  note("escaped");
+  document.documentElement.dataset.moments = btoa(JSON.stringify(moments));
+}, 1000);`;
+
+// The same where people want no animation: each click shows the next pose.
+const STEPS = `${MOTIONS.split("setTimeout(")[0]}
+setTimeout(() => {
+  for (const name of ["first", "second", "back"]) { first.click(); note(name); }
+  document.documentElement.dataset.moments = btoa(JSON.stringify(moments));
+}, 1000);`;
+
+export const scripts = { clicks: CLICKS, motions: MOTIONS, steps: STEPS };
+
+export async function samplePage({ motions, script = CLICKS } = {}) {
   const parts = [];
   let offset = 0;
   const add = (array) => {
@@ -32,6 +115,7 @@ export async function samplePage() {
     checks: [{ name: "closed", ok: true, figure: "2 of 2" }, { name: "apart", ok: false, figure: "2 mm" }],
     notes: [{ title: "corner", text: "look here", at: [11, 5, 10] }, { title: "general", text: "no place", at: null }],
     quantities: [{ name: "size <i>", unit: "mm", values: [10, null] }, { name: "nothing", unit: "", values: [null, null] }],
+    motions,
   };
   const dist = (name) => readFile(new URL(`../dist/${name}`, import.meta.url), "utf8");
   return `<!doctype html><meta charset="utf-8"><title>t</title><style>${await dist("viewer.css")}</style>
@@ -40,29 +124,12 @@ export async function samplePage() {
 <script type="text/plain" id="arrays">${Buffer.concat(parts).toString("base64")}</script>
 <script>
 addEventListener("error", (e) => { document.documentElement.dataset.error = e.message; });
+// three tells who listens here of its scene.
+let scene;
+window.__THREE_DEVTOOLS__ = new EventTarget();
+__THREE_DEVTOOLS__.addEventListener("observe", ({ detail }) => { if (detail.isScene) scene = detail; });
 const say = console.error; console.error = (...a) => { document.documentElement.dataset.error = a.join(" "); say(...a); };
 </script>
 <script>${await dist("viewer.js")}</script>
-<script>
-// Counts what the canvas shows and clicks through every control, for the test to read from the dumped page.
-setTimeout(() => {
-  const canvas = document.querySelector("canvas");
-  const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height }).getContext("2d");
-  copy.drawImage(canvas, 0, 0);
-  const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data;
-  let covered = 0;
-  for (let i = 3; i < pixels.length; i += 4) covered += pixels[i] > 127;
-  document.documentElement.dataset.covered = (covered / (pixels.length / 4)).toFixed(4);
-  for (const b of document.querySelectorAll("button")) b.click();
-  const select = document.querySelector(".paint select");
-  const dots = () => [...document.querySelectorAll(".mesh .dot")].map((d) => d.style.background).join(" ");
-  const painted = ["1", "0", "-1"].map((value) => { select.value = value; select.dispatchEvent(new Event("change")); return dots() + " " + document.querySelector(".legend").textContent; });
-  document.documentElement.dataset.painted = painted.join("|");
-  for (const key of ["ArrowRight", "ArrowLeft", " ", "Escape"]) dispatchEvent(new KeyboardEvent("keydown", { key }));
-  const scrub = document.querySelector(".steps input");
-  const moments = ["0.5", "1.25", "2"].map((value) => { scrub.value = value; scrub.dispatchEvent(new Event("input")); return document.querySelector(".steps .count").textContent; });
-  document.documentElement.dataset.moments = moments.join("|");
-  document.documentElement.dataset.clicked = document.querySelectorAll("button").length;
-}, 1500);
-</script>`;
+<script>${script}</script>`;
 }

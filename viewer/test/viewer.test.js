@@ -6,7 +6,9 @@ import { join } from "node:path";
 import test from "node:test";
 import { bundle } from "../build.js";
 import { shaded, shades } from "../src/data.js";
-import { samplePage } from "./page.js";
+import { duration, momentAt, Player, poseAt } from "../src/motion.js";
+import { poseMatrix } from "../src/stage.js";
+import { samplePage, scripts } from "./page.js";
 
 /** SHELLOCK_CHROMIUM, or chromium on the path; undefined where neither runs. */
 const browser = [process.env.SHELLOCK_CHROMIUM, "chromium"].find((b) => b && spawnSync(b, ["--version"]).status === 0);
@@ -39,26 +41,104 @@ test("shades go from the least value to the greatest and leave out what has none
   assert.ok(shades({ values: [5, 5] }).colors.flat().every(Number.isFinite));
 });
 
-test("the page draws, answers every control and reports no error", { skip: withoutBrowser }, async () => {
+/** Opens a page in the browser and gives its text once its script is done, and what it says of itself. */
+async function opened(text, ...flags) {
   const folder = await mkdtemp(join(tmpdir(), "viewer-"));
   try {
     const page = join(folder, "page.html");
-    await writeFile(page, await samplePage());
-    const flags = ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
-    flags.push("--window-size=900,600", "--virtual-time-budget=8000", `--user-data-dir=${folder}/profile`, "--dump-dom");
-    const dom = execFileSync(browser, [...flags, `file://${page}`], { encoding: "utf8", stdio: ["ignore", "pipe", "ignore"], maxBuffer: 1e8, timeout: 120_000 });
+    await writeFile(page, text);
+    const all = ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", ...flags];
+    all.push("--window-size=900,600", "--virtual-time-budget=8000", `--user-data-dir=${folder}/profile`, "--dump-dom");
+    const dom = execFileSync(browser, [...all, `file://${page}`], { encoding: "utf8", stdio: ["ignore", "pipe", "ignore"], maxBuffer: 1e8, timeout: 120_000 });
     const data = (name) => dom.match(new RegExp(`<html[^>]* data-${name}="([^"]*)"`))?.[1];
     assert.equal(data("error"), undefined);
     assert.equal(data("ready"), "true");
-    assert.ok(Number(data("covered")) > 0.05, `the canvas is blank: ${data("covered")} of it is covered`);
-    assert.ok(Number(data("clicked")) > 10);
-    const own = "rgb(60, 120, 200) rgb(180, 120, 80)";
-    const [nothing, size, back] = data("painted").split("|").map((text) => text.trim());
-    assert.ok(nothing.startsWith(own) && back.startsWith(own));
-    assert.match(size, /^rgb\(96, 80, 160\) rgb\(150, 147, 156\) 10\.0010\.00 mmgrey: none$/);
-    assert.deepEqual(data("moments").replaceAll("&lt;", "<").replaceAll("&gt;", ">").split("|"), ["1 / 2  mesh 0 <b>", "2 / 2  mesh 1 <b>", "2 / 2  mesh 1 <b>"]);
-    assert.match(dom, /<h1>Two cubes &lt;\/script&gt;<\/h1>/);
+    return { dom, data };
   } finally {
     await rm(folder, { recursive: true, force: true, maxRetries: 5 });
   }
+}
+
+test("the page draws, answers every control and reports no error", { skip: withoutBrowser }, async () => {
+  const { dom, data } = await opened(await samplePage());
+  assert.ok(Number(data("covered")) > 0.05, `the canvas is blank: ${data("covered")} of it is covered`);
+  assert.ok(Number(data("clicked")) > 10);
+  const own = "rgb(60, 120, 200) rgb(180, 120, 80)";
+  const [nothing, size, back] = data("painted").split("|").map((text) => text.trim());
+  assert.ok(nothing.startsWith(own) && back.startsWith(own));
+  assert.match(size, /^rgb\(96, 80, 160\) rgb\(150, 147, 156\) 10\.0010\.00 mmgrey: none$/);
+  assert.deepEqual(data("moments").replaceAll("&lt;", "<").replaceAll("&gt;", ">").split("|"), ["1 / 2  mesh 0 <b>", "2 / 2  mesh 1 <b>", "2 / 2  mesh 1 <b>"]);
+  assert.match(dom, /<h1>Two cubes &lt;\/script&gt;<\/h1>/);
+  assert.ok(!dom.includes('class="modes motions"'), "no motions, no buttons");
+});
+
+const REST = [0, 0, 0, 0, 0, 0];
+const OUT = { name: "take out", title: "How it comes out <b>.", is_loop: false, moves: [{ mesh: 1, about: [6, 0, 5], poses: [REST, [1, 0, 0, 0, 0, 0], [2, 0, 1, 0, 0, 0.1]] }] };
+const SHAKE = { name: "shake", title: "How it rattles.", is_loop: true, moves: [{ mesh: 1, about: [6, 0, 5], poses: [[0.1, 0, 0, 0, 0, 0], [-0.1, 0, 0, 0, 0, 0]] }] };
+
+test("motions go evenly from pose to pose, loops back to the first", () => {
+  assert.equal(duration(SHAKE), 2.4);
+  assert.equal(duration(OUT), 2.4);
+  assert.equal(duration({ moves: [{ poses: Array(40).fill(REST) }], is_loop: true }), 6);
+  assert.deepEqual(poseAt(OUT.moves[0], 0.75, false), [1.5, 0, 0.5, 0, 0, 0.05]);
+  assert.deepEqual(poseAt(OUT.moves[0], 1, false), OUT.moves[0].poses[2]);
+  assert.ok(Math.abs(poseAt(SHAKE.moves[0], 0.75, true)[0]) < 1e-12, "half the way back to the first");
+  assert.deepEqual(momentAt(SHAKE, 0.3), { share: 0, part: 0.25, isOver: false }, "from the assembled pose to the first");
+  assert.equal(momentAt(SHAKE, 1.2 + 2.4 + 0.6).share.toFixed(6), "0.250000");
+  assert.deepEqual(momentAt(OUT, 9), { share: 1, part: 1, isOver: true });
+});
+
+test("motions of one pose or of none move nothing they should not", () => {
+  for (const poses of [[], [REST], [[1, 0, 0, 0, 0, 0]]]) {
+    for (const is_loop of [true, false]) {
+      const player = new Player([{ name: "", title: "", is_loop, moves: [{ mesh: 0, about: [0, 0, 0], poses }] }], () => {});
+      player.step(0);
+      assert.deepEqual(player.places().get(0).pose, poses[0] ?? REST);
+      const { share, part } = momentAt(player.motion, 2);
+      assert.ok(share >= 0 && share <= 1 && part === 1);
+    }
+  }
+});
+
+test("a pose displaces its point and turns about it", () => {
+  const m = poseMatrix([6, 0, 5], [1, 2, 3, 0, 0, Math.PI / 2]);
+  const at = (x, y, z) => [0, 1, 2].map((k) => +(m.elements[k] * x + m.elements[4 + k] * y + m.elements[8 + k] * z + m.elements[12 + k]).toFixed(9));
+  assert.deepEqual(at(6, 0, 5), [7, 2, 8]);
+  assert.deepEqual(at(7, 0, 5), [7, 3, 8], "x turns towards y");
+});
+
+/** What the page noted of its moments, by name. */
+const moments = (data) => Object.fromEntries(JSON.parse(atob(data("moments"))).map((m) => [m.name, m]));
+const isClose = (a, b) => a.every((x, i) => Math.abs(x - b[i]) < 1e-6);
+const posed = (pose, scale) => poseMatrix([6, 0, 5], pose.map((x) => scale * x)).elements;
+const ASSEMBLED = posed(REST, 1);
+
+test("a motion plays, shows five times as large, and is put back", { skip: withoutBrowser }, async () => {
+  const { dom, data } = await opened(await samplePage({ motions: [OUT, SHAKE], script: scripts.motions }));
+  const m = moments(data);
+  assert.ok(isClose(m.before.matrix, ASSEMBLED) && !isClose(m.apart.matrix, ASSEMBLED));
+  assert.equal(m.before.label, OUT.title);
+  const way = m["under way"];
+  assert.ok(Math.abs(way.matrix[12] - 0.25) < 0.02, `a quarter of the first way: ${way.matrix[12]}`);
+  assert.ok(isClose(way.still, ASSEMBLED), "the motion starts from what is assembled");
+  assert.deepEqual([way.isAssembled, way.pressed, way.caption], ["true", ["true", "false", "false"], OUT.title]);
+  assert.ok(way.faint[0] < 0.6 && way.faint[1] === 1, "what moves is seen through what stays");
+  assert.ok(isClose(m.end.matrix, posed(OUT.moves[0].poses[2], 1)));
+  assert.ok(isClose(m.large.matrix, posed(OUT.moves[0].poses[2], 5)));
+  assert.deepEqual([m.large.pressed, m.large.caption], [["true", "false", "true"], `${OUT.title} (shown 5 times as large)`]);
+  for (const back of [m.back, m.escaped]) {
+    assert.ok(isClose(back.matrix, ASSEMBLED));
+    assert.deepEqual([back.pressed, back.caption, back.faint], [["false", "false", "false"], "", [1, 1]]);
+  }
+  assert.ok(!isClose(m.loop.matrix, ASSEMBLED) && !isClose(m.loop.matrix, m["loop later"].matrix), "a loop goes on");
+  assert.ok(!dom.includes("<b>"), "text stays text");
+});
+
+test("who wants no animation sees pose after pose", { skip: withoutBrowser }, async () => {
+  const { data } = await opened(await samplePage({ motions: [OUT, SHAKE], script: scripts.steps }), "--force-prefers-reduced-motion");
+  const m = moments(data);
+  assert.ok(isClose(m.first.matrix, posed(OUT.moves[0].poses[1], 1)) && isClose(m.second.matrix, posed(OUT.moves[0].poses[2], 1)));
+  assert.equal(m.second.caption, `${OUT.title} (pose 3 of 3)`);
+  assert.ok(isClose(m.back.matrix, ASSEMBLED));
+  assert.deepEqual(m.back.pressed, ["false", "false", "false"]);
 });

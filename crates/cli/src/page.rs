@@ -4,7 +4,9 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use shellock::pipeline::{Design, Params};
-use shellock::report::{ReportCheck, ReportData, ReportPiece, ReportQuantity, html, palette, pieces_picture};
+use shellock::report::{
+    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
+};
 use shellock::verify::{Finding, Play};
 use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
@@ -59,14 +61,47 @@ pub fn report(
         .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
         .collect();
     let quantities = quantities(design);
-    let data =
-        ReportData { title: model.name.clone(), facts, pieces, checks, warnings: &warnings, figures, quantities };
+    let data = ReportData {
+        title: model.name.clone(),
+        facts,
+        pieces,
+        checks,
+        warnings: &warnings,
+        figures,
+        quantities,
+        motions: motions(design, stand),
+    };
     let booklet = Booklet { title: title(&model.name), lines: cover_lines(&shown), pieces: data.pieces.clone() };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),
         || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
     );
     (page, picture, booklet)
+}
+
+/// What the report can show moving: each piece within its play.
+fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
+    let turned = |v: [f64; 3]| stand(Vec3::from(v)).to_array();
+    let pose = |[x, y, z, u, v, w]: [f64; 6]| {
+        let ([x, y, z], [u, v, w]) = (turned([x, y, z]), turned([u, v, w]));
+        [x, y, z, u, v, w]
+    };
+    let shake = |(piece, swings): (PatchId, &Vec<[f64; 6]>)| ReportMove {
+        piece: usize::from(piece),
+        about: turned(design.pieces[piece].centroid().to_array()),
+        // There and back, so that it comes through its place between any two.
+        poses: swings.iter().flat_map(|swing| [pose(*swing), [0.0; 6]]).collect(),
+    };
+    let moves: Vec<ReportMove> = design
+        .play
+        .swings
+        .iter()
+        .filter(|(piece, swings)| *piece != design.plan.key() && !swings.is_empty())
+        .map(shake)
+        .collect();
+    let title = "each piece as far as its clearance lets it move while the others rest".to_owned();
+    let shake = ReportMotion { name: "shake".into(), title, is_loop: true, moves };
+    (!shake.moves.is_empty()).then_some(shake).into_iter().collect()
 }
 
 /// What failed, for the list of warnings.

@@ -4,7 +4,9 @@
 use std::path::PathBuf;
 
 use shellock::figure::{self, Figure};
-use shellock::report::{ReportCheck, ReportData, ReportPiece, ReportQuantity, html, palette, pieces_picture};
+use shellock::report::{
+    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
+};
 use shellock::{LatticeDirection, PatchId, Warning};
 use shellock_geom::{TriMesh, Vec3};
 
@@ -25,6 +27,7 @@ fn main() -> std::io::Result<()> {
     std::fs::write(folder.join("pieces.png"), pieces_picture(&pieces).png())?;
     let n = meshes.len();
     let values = (0..n).map(|i| (i + 1 < n).then_some(0.2 + 0.05 * (3 * i % 7) as f64)).collect();
+    let motions = vec![shake(&pieces), take_out(&pieces)];
     let data = ReportData {
         title: "Squirrel <sample>".into(),
         facts: vec![
@@ -43,8 +46,42 @@ fn main() -> std::io::Result<()> {
         warnings: &[warning],
         figures: Vec::new(),
         quantities: vec![ReportQuantity { name: "play".into(), unit: "mm".into(), values }],
+        motions,
     };
     std::fs::write(folder.join("report.html"), html(&data))
+}
+
+/// All pieces but the first, each a bit along its way and turned a little.
+fn shake(pieces: &[ReportPiece<'_>]) -> ReportMotion {
+    let sway = |piece: &ReportPiece<'_>, sign: f64| {
+        let [x, y, z] = piece.installation_direction.map(|d| 0.2 * sign * d);
+        [x, y, z, 0.0, 0.004 * sign, 0.0]
+    };
+    let to_and_fro =
+        |(i, piece)| ReportMove { piece: i, about: middle(piece), poses: vec![sway(piece, 1.0), sway(piece, -1.0)] };
+    ReportMotion {
+        name: "shake".into(),
+        title: "How far the pieces rattle when the finished shell is shaken.".into(),
+        is_loop: true,
+        moves: pieces.iter().enumerate().skip(1).map(to_and_fro).collect(),
+    }
+}
+
+/// The last piece back along the way it came.
+fn take_out(pieces: &[ReportPiece<'_>]) -> ReportMotion {
+    let last = pieces.len() - 1;
+    let [x, y, z] = pieces[last].installation_direction.map(|d| -60.0 * d);
+    let poses = vec![[0.0; 6], [x, y, z, 0.0, 0.0, 0.0], [1.5 * x, 1.5 * y, 1.5 * z, 0.0, 0.0, 0.4]];
+    ReportMotion {
+        name: "take out the key".into(),
+        title: "How the key comes out.".into(),
+        is_loop: false,
+        moves: vec![ReportMove { piece: last, about: middle(&pieces[last]), poses }],
+    }
+}
+
+fn middle(piece: &ReportPiece<'_>) -> [f64; 3] {
+    piece.mesh.bounds().center().to_array()
 }
 
 /// Parts of the surface by the nearest of some points.

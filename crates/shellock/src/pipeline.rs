@@ -276,6 +276,9 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
     Ok(cut.compared_with(outcome))
 }
 
+/// How often pieces are joined because they are foreseen to rattle, which costs a search for a plan each time and no kit.
+const MOST_JOININGS: usize = 5;
+
 /// What all kits of a job have in common, as it was given.
 struct Job<'a> {
     params: &'a Params,
@@ -333,11 +336,30 @@ impl Job<'_> {
         let mut sizes = choose(&params, &surface)?;
         let body = params.body.clone();
         let mut grid = WallGrid { params: &body, model: &laid.model, room_mm: 0.0, made: None };
-        let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all };
+        let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all, may_join: true };
+        let mut n_joined = 0;
         let mut mending = 0;
         let attempt = loop {
             grid.make_room(params.connector.room_mm(sizes.sizes.largest_mm()));
             let attempt = with_segmentation(ctx, &params, &mut grid, &surface, &sizes, &mut kits)?;
+            let attempt = match attempt {
+                Attempt::Joined(fewer) => {
+                    n_joined += 1;
+                    kits.may_join = n_joined < MOST_JOININGS;
+                    if let Some(fewer) = cut_again(&mut params, fewer) {
+                        ctx.note(&format!(
+                            "pieces would rattle: {} pieces instead of {}",
+                            fewer.n_patches, surface.n_patches
+                        ));
+                        surface = fewer;
+                        sizes = choose(&params, &surface)?;
+                    } else {
+                        kits.may_join = false;
+                    }
+                    continue;
+                }
+                other => other,
+            };
             let Attempt::Failed { blamed, loose, rattling, .. } = &attempt else { break attempt };
             if mending == params.rounds.mendings || kits.n_left == 0 {
                 break attempt;
@@ -414,7 +436,7 @@ fn finish(
             DesignOutcome::Made(Box::new(design))
         }
         (None, Attempt::Failed { reason, blockers, .. }) => DesignOutcome::NoPlan { reason, blockers },
-        (None, Attempt::Passed) => unreachable!("what passed was kept"),
+        (None, Attempt::Passed | Attempt::Joined(_)) => unreachable!("what passed was kept"),
     })
 }
 

@@ -66,6 +66,8 @@ pub struct KitPlay {
     /// The same for small motions, as if sideways moves and turns changed nothing: nearer to the real play than what is proven, but on its
     /// lower side.
     pub estimates: IdVec<PatchId, Option<Play>>,
+    /// Small motions of each piece that go that far: displacement of its centroid, mm, and turn, rad.
+    pub swings: IdVec<PatchId, Vec<[f64; 6]>>,
     /// Of each piece while all but one move; `None` for that one. Nothing where it is not proven.
     pub together: Option<IdVec<PatchId, Option<Play>>>,
     /// One for each piece whose play is proven, in order, then that of all together.
@@ -104,6 +106,7 @@ pub fn measure(
     let answers: Vec<Answer> = ids.par_iter().map(|&id| solve(&[id])).collect::<Result<_, Cancelled>>()?;
     let alone = answers.iter().map(alone).collect();
     let estimates = answers.iter().map(|a| a.linear.first().map(|&linear| play_of(linear, false))).collect();
+    let swings = answers.iter().map(|a| a.swings.clone()).collect();
     let asked: BTreeSet<usize> = answers.iter().flat_map(|a| a.asked.iter().copied()).collect();
     let mut proofs: Vec<Proof> = answers.into_iter().filter_map(|a| a.proof.ok()).collect();
     let mut together = None;
@@ -124,7 +127,7 @@ pub fn measure(
             proofs.push(proof);
         }
     }
-    Ok(KitPlay { slide, bearings, alone, estimates, together, proofs })
+    Ok(KitPlay { slide, bearings, alone, estimates, swings, together, proofs })
 }
 
 /// All but the piece that touches others at most points: held, it leaves the others least room.

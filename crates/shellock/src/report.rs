@@ -35,6 +35,8 @@ pub struct ReportData<'a> {
     pub figures: Vec<(String, String)>,
     /// What pieces can be coloured by, besides their own colours.
     pub quantities: Vec<ReportQuantity>,
+    /// What the page can play, in the order of its buttons; may be empty.
+    pub motions: Vec<ReportMotion>,
 }
 
 /// One piece in assembled position.
@@ -78,6 +80,32 @@ pub struct ReportQuantity {
     pub unit: String,
     /// One for each piece of the report, in its order; `None` where a piece has none.
     pub values: Vec<Option<f64>>,
+}
+
+/// Pieces that move at the same time, for the page to play: how far they rattle, or how one comes out.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReportMotion {
+    /// A word or two for its button.
+    pub name: String,
+    /// One sentence that says what is to be seen.
+    pub title: String,
+    /// Whether it goes from its last poses back to its first and on; else it stays at its last.
+    pub is_loop: bool,
+    /// Of different pieces, each with as many poses; pieces not named here stay.
+    pub moves: Vec<ReportMove>,
+}
+
+/// How one piece moves from where it is assembled.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReportMove {
+    /// Index into the pieces of the report.
+    #[serde(rename = "mesh")]
+    pub piece: usize,
+    /// The point that poses displace and turn about, mm, assembly space.
+    pub about: [f64; 3],
+    /// Played evenly in time and with straight ways between them: displacement of `about` in mm, then a rotation vector in
+    /// radians, so that `x` goes to `about + t + R(w) (x - about)`. All zeros is the assembled pose.
+    pub poses: Vec<[f64; 6]>,
 }
 
 /// How far pieces move outwards in the exploded view, as a share of their distance from the middle.

@@ -18,13 +18,10 @@ use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 const COST_SLACK: f64 = 0.05;
 
 /// Where pieces of all these would rattle too far, plans up to this share above the best one's cost are looked at, too.
-const COST_SLACK_FOR_PLAY: f64 = 0.5;
+const COST_SLACK_FOR_PLAY: f64 = 0.25;
 
 /// Plans whose widest play is within this share of the least are alike.
 const PLAY_TIE: f64 = 0.05;
-
-/// Play that is foreseen, over that of the finished kit: docs/metrics.md.
-const FORESEEN_SHARE: f64 = 0.6;
 
 /// Costs that differ by less than this share are the same but for rounding.
 const COST_TIE: f64 = 1e-9;
@@ -119,7 +116,7 @@ pub fn choose(
 /// The plans that are worth a simulation, by their places in the pool.
 fn shortlist(model: &PlanModel, surface: &SegmentedSurface, clearance_mm: f64, found: &FoundPlan) -> Vec<usize> {
     let size_mm = surface.mesh.bounds().size().max_element();
-    let most = most_play(size_mm, clearance_mm).map(|most| FORESEEN_SHARE * most);
+    let most = most_play(size_mm, clearance_mm);
     // How far the loosest piece goes beyond what is allowed; 1 for plans in which none does.
     let excess = |&i: &usize| {
         let plan = &found.pool[i].plan;

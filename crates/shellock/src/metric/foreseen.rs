@@ -31,7 +31,7 @@ const LENGTH_MM: f64 = 50.0;
 /// What has no end goes so far: mm and rad.
 const ENDLESS: [f64; 2] = [100.0, 1.0];
 
-/// How far each piece but the key goes: displacement of the middle of its stations, mm, and turn, rad, no less than the greatest along the
+/// How far each piece but the key goes: displacement of the middle of its surface, mm, and turn, rad, no less than the greatest along the
 /// coordinate axes and no more than √3 of that; zeros for the key.
 pub fn foreseen(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
     let mut contacts: Vec<Vec<Contact>> = vec![Vec::new(); model.assembly.n_parts];
@@ -41,10 +41,11 @@ pub fn foreseen(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting]
             contacts[usize::from(piece)].extend(&found);
         }
     }
+    let centers = centers(model);
     let key = plan.key();
     let of_piece = |(i, own): (usize, &Vec<Contact>)| {
         let piece = PatchId::from(i);
-        if piece == key { [0.0; 2] } else { farthest(piece, own) }
+        if piece == key { [0.0; 2] } else { farthest(piece, own, centers[i]) }
     };
     contacts.iter().enumerate().map(of_piece).collect()
 }
@@ -69,12 +70,24 @@ fn at_station(model: &PlanModel, station: usize, meeting: &Meeting, clearance_mm
     found
 }
 
-/// How far a piece goes within its contacts while its neighbours rest.
-fn farthest(piece: PatchId, contacts: &[Contact]) -> [f64; 2] {
+/// The middle of each part's surface, mm.
+fn centers(model: &PlanModel) -> Vec<Vec3> {
+    let assembly = &model.assembly;
+    let mut sums = vec![(Vec3::ZERO, 0.0); assembly.n_parts];
+    for t in &assembly.triangles {
+        let [a, b, c] = t.map(|v| assembly.points[v as usize]);
+        let area = (b - a).cross(c - a).length();
+        let sum = &mut sums[assembly.part_of_point[t[0] as usize] as usize];
+        *sum = (sum.0 + area * (a + b + c) / 3.0, sum.1 + area);
+    }
+    sums.into_iter().map(|(moment, area)| if area > 0.0 { moment / area } else { moment }).collect()
+}
+
+/// How far a piece goes within its contacts while its neighbours rest: its middle, and its turn.
+fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
     if contacts.is_empty() {
         return ENDLESS;
     }
-    let middle = contacts.iter().map(|c| c.point).sum::<Vec3>() / contacts.len() as f64;
     let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - middle, ..*c }).collect();
     let system = System::new(&centered, &[piece], LENGTH_MM, Freedom::Rigid);
     let gaps: Vec<f64> = system.rows.iter().map(|row| centered[row.contact].gap_mm).collect();

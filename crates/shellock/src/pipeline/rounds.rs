@@ -6,6 +6,7 @@ use super::{Design, DesignError, KeySource, Params, make};
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::feedback::{Lesson, lessons};
 use crate::metric::Holding;
+use crate::motion::most_play;
 use crate::plan::{Blocker, FoundPlan, InstallationPlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::sizes::ChosenSizes;
 use crate::verify::Finding;
@@ -45,6 +46,24 @@ pub(super) fn rattling(design: &Design) -> Vec<PatchId> {
     design.verification.findings.iter().filter_map(piece).collect()
 }
 
+/// The pieces that are foreseen to rattle far more than they may, the loosest first.
+fn foreseen_to_rattle(
+    params: &Params,
+    surface: &SegmentedSurface,
+    found: &FoundPlan,
+    holding: &Holding,
+) -> Vec<PatchId> {
+    /// Play is foreseen within about this factor.
+    const SURELY: f64 = 1.4;
+    let [most_mm, most_deg] = most_play(surface.mesh.bounds().size().max_element(), params.plan.clearance_mm);
+    let excess = |[mm, deg]: &[f64; 2]| (mm / most_mm).max(deg / most_deg);
+    let plays = holding.foreseen_play.iter().enumerate().map(|(i, play)| (PatchId::from(i), excess(play)));
+    let mut wide: Vec<(PatchId, f64)> =
+        plays.filter(|(p, excess)| *excess > SURELY && *p != found.plan.key()).collect();
+    wide.sort_by(|a, b| b.1.total_cmp(&a.1));
+    wide.into_iter().map(|w| w.0).collect()
+}
+
 /// The surface with the loosest pieces joined to neighbours; `None` where that leaves nothing to lock.
 pub(super) fn joined(
     ctx: &Ctx,
@@ -63,6 +82,8 @@ pub(super) struct Kits {
     /// The one with the fewest failures, then that rattles least, the earliest of several.
     pub best: Option<Design>,
     pub n_left: usize,
+    /// Whether pieces that are foreseen to rattle may still be joined.
+    pub may_join: bool,
 }
 
 impl Kits {
@@ -78,6 +99,8 @@ impl Kits {
 /// How one segmentation went.
 pub(super) enum Attempt {
     Passed,
+    /// Nothing was made, since pieces are foreseen to rattle; with these pieces less.
+    Joined(SegmentedSurface),
     Failed {
         reason: String,
         blockers: Vec<Blocker>,
@@ -154,6 +177,11 @@ pub(super) fn with_segmentation(
                 return Ok(Attempt::Failed { reason, blockers, blamed, loose, rattling: Vec::new() });
             }
         };
+        if kits.may_join
+            && let Some(surface) = joined(ctx, params, surface, &foreseen_to_rattle(params, surface, &found, &holding))
+        {
+            return Ok(Attempt::Joined(surface));
+        }
         let (model, grid) = (wall.model, wall.get()?);
         let distances = distances.as_ref().expect("they were measured beside the plan");
         let proof = Some(found.proof());

@@ -72,6 +72,8 @@ pub(super) struct Answer {
     /// How far each free piece goes where sideways moves and turns are taken as none: its displacement, mm, and its turn, rad; empty where
     /// something has no end.
     pub linear: Vec<[f64; 2]>,
+    /// Motions of the one free piece that go there: displacement of its centre, mm, and turn, rad; empty where several are free.
+    pub swings: Vec<[f64; 6]>,
     /// The bearings that hold, of those that were asked in any round.
     pub asked: BTreeSet<usize>,
     /// The proof, or why there is none.
@@ -128,7 +130,8 @@ impl Problem<'_> {
         let bearings: Vec<Bearing> = own.iter().map(|&i| self.bearings[i]).collect();
         let mut quantities = Quantities::new(self.free, self.centers, &bearings);
         let beds: Vec<OnceLock<bool>> = bearings.iter().map(|_| OnceLock::new()).collect();
-        let mut answer = Answer { linear: Vec::new(), asked: BTreeSet::new(), proof: Err(Open::Rounds) };
+        let mut answer =
+            Answer { linear: Vec::new(), swings: Vec::new(), asked: BTreeSet::new(), proof: Err(Open::Rounds) };
         let open = |answer: Answer, why: Open| Ok(Answer { proof: Err(why), ..answer });
         for n_before in 0..ROUNDS {
             ctx.check()?;
@@ -142,6 +145,7 @@ impl Problem<'_> {
             };
             if n_before == 0 {
                 answer.linear = quantities.linear(&found);
+                answer.swings = self.swings(&motions);
             }
             answer.asked.extend(round.holding().map(|i| own[i]));
             if found.iter().all(is_within) {
@@ -164,6 +168,15 @@ impl Problem<'_> {
             }
         }
         Ok(answer)
+    }
+}
+
+impl Problem<'_> {
+    /// The motions that go farthest along the axes of a piece's own quantities, which are asked first.
+    fn swings(&self, motions: &[DVector<f64>]) -> Vec<[f64; 6]> {
+        let n_own = if self.free.len() == 1 { 2 * WAYS } else { 0 };
+        let swing = |m: &DVector<f64>| std::array::from_fn(|k| if k < 3 { m[k] } else { m[k] / LENGTH_MM });
+        motions.iter().take(n_own).map(swing).collect()
     }
 }
 

@@ -7,7 +7,7 @@ use serde::Serialize;
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
-use super::{ReportCheck, ReportData, ReportPiece, ReportQuantity, exploded_shifts};
+use super::{ReportCheck, ReportData, ReportMotion, ReportPiece, ReportQuantity, exploded_shifts};
 
 const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("../../../../viewer/dist/viewer.css");
@@ -33,6 +33,7 @@ pub fn html(data: &ReportData<'_>) -> String {
         notes: data.warnings.iter().map(|w| note(w, &data.pieces)).collect(),
         figures: data.figures.iter().map(Figure::new).collect(),
         quantities: &data.quantities,
+        motions: &data.motions,
     };
     let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
     // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
@@ -69,6 +70,8 @@ struct Header<'a> {
     figures: Vec<Figure<'a>>,
     /// One value a mesh.
     quantities: &'a [ReportQuantity],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    motions: &'a [ReportMotion],
 }
 
 /// A picture with a title.
@@ -212,11 +215,16 @@ fn fill(template: &str, values: &[(&str, &str)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::ReportMove;
     use crate::{PatchId, Warning};
 
     const HOSTILE: &str = "</script><script>alert('x')</script>{{arrays}}<!--";
 
     fn page() -> String {
+        page_with(Vec::new())
+    }
+
+    fn page_with(motions: Vec<ReportMotion>) -> String {
         let mesh = TriMesh { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
         let hostile = || (HOSTILE.to_owned(), HOSTILE.to_owned());
         let piece = ReportPiece {
@@ -238,7 +246,14 @@ mod tests {
             warnings: &[warning],
             figures: vec![hostile()],
             quantities: vec![ReportQuantity { name: HOSTILE.into(), unit: HOSTILE.into(), values: vec![None] }],
+            motions,
         })
+    }
+
+    fn header(page: &str) -> serde_json::Value {
+        let (_, header) = page.split_once("id=\"header\">").unwrap();
+        let (header, _) = header.split_once("</script>").unwrap();
+        serde_json::from_str(header).unwrap()
     }
 
     #[test]
@@ -247,11 +262,29 @@ mod tests {
         assert!(!page.contains("<script>alert"));
         // Three script elements of the template; the viewer itself never says so.
         assert_eq!(page.matches("</script").count(), 3);
-        let (_, header) = page.split_once("id=\"header\">").unwrap();
-        let (header, _) = header.split_once("</script>").unwrap();
-        let header: serde_json::Value = serde_json::from_str(header).unwrap();
+        let header = header(&page);
         assert_eq!(header["title"], HOSTILE);
         assert_eq!(header["notes"][0]["text"], HOSTILE);
+    }
+
+    #[test]
+    fn motions_are_told_in_the_words_of_any_scene() {
+        let poses = vec![[0.0; 6], [0.1, 0.0, -0.2, 0.0, 0.01, 0.0]];
+        let moves = vec![ReportMove { piece: 0, about: [1.0, 2.0, 3.0], poses }];
+        let page = page_with(vec![ReportMotion { name: HOSTILE.into(), title: HOSTILE.into(), is_loop: true, moves }]);
+        assert!(!page.contains("<script>alert"));
+        let told = serde_json::json!([{
+            "name": HOSTILE,
+            "title": HOSTILE,
+            "is_loop": true,
+            "moves": [{
+                "mesh": 0,
+                "about": [1.0, 2.0, 3.0],
+                "poses": [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.1, 0.0, -0.2, 0.0, 0.01, 0.0]],
+            }],
+        }]);
+        assert_eq!(header(&page)["motions"], told);
+        assert!(header(&self::page()).get("motions").is_none(), "a page without motions says nothing of them");
     }
 
     #[test]
