@@ -11,7 +11,7 @@ use shellock::plan::key::KeyDirections;
 use shellock::plan::{PlanProof, ProofScope};
 use shellock::strength::{Strength, StrengthParams};
 use shellock::verify::Verification;
-use shellock::{Ctx, Warning};
+use shellock::{Ctx, Warning, play};
 
 use crate::Session;
 use crate::args::{Options, Out};
@@ -153,6 +153,7 @@ fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summar
         println!("{}", quality(proof));
     }
     made.holding.iter().flat_map(weakest).for_each(|line| println!("{line}"));
+    println!("pieces sit {}", play::words(&made.play));
     println!("connectors on {:.0} % of the seam length that fits any", 100.0 * summary.connector_share);
     print_verdict(&made.verification);
     print_warnings(warnings);

@@ -101,7 +101,20 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
         .collect();
     let title = "each piece as far as its clearance lets it move while the others rest".to_owned();
     let shake = ReportMotion { name: "shake".into(), title, is_loop: true, moves };
-    (!shake.moves.is_empty()).then_some(shake).into_iter().collect()
+    let way_out = |(piece, poses): &(PatchId, Vec<[f64; 6]>)| ReportMotion {
+        name: format!("piece {piece} comes out"),
+        title: format!(
+            "how piece {piece} can be worked out of its place though it is not the key: do not print this kit"
+        ),
+        is_loop: false,
+        moves: vec![ReportMove {
+            piece: usize::from(*piece),
+            about: turned(design.pieces[*piece].centroid().to_array()),
+            poses: poses.iter().map(|p| pose(*p)).collect(),
+        }],
+    };
+    let ways_out = design.play.ways_out.iter().map(way_out);
+    (!shake.moves.is_empty()).then_some(shake).into_iter().chain(ways_out).collect()
 }
 
 /// What failed, for the list of warnings.

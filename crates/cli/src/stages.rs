@@ -230,6 +230,7 @@ fn played(
     )?;
     let most = most_play(kit.model.mesh().bounds().size().max_element(), clearance_mm);
     verdict.add(play::check(&measured, kit.pieces, most));
+    verdict.add(play::check_ways_out(&measured, kit.pieces));
     Ok(measured)
 }
 

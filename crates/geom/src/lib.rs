@@ -31,7 +31,7 @@ pub mod weld;
 
 pub use band::Band;
 pub use boolean::Volume;
-pub use glam::DVec3 as Vec3;
+pub use glam::{DQuat as Quat, DVec3 as Vec3};
 pub use mesh::{Aabb, TriMesh};
 pub use solid::{NotSolid, Solid};
 pub use topology::{HalfEdge, Topology};

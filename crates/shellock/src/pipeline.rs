@@ -475,6 +475,8 @@ pub fn make(
     let size_mm = model.mesh().bounds().size().max_element();
     let most = most_play(size_mm, params.verify.clearance_mm);
     verification.add(play::check(&measured, &finished.meshes, most));
+    verification.add(play::check_ways_out(&measured, &finished.meshes));
+    play::warning(&measured).into_iter().for_each(|warning| ctx.warn(warning));
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {
         turn: Turn::default(),

@@ -18,6 +18,7 @@ mod barrier;
 mod bearing;
 mod bound;
 mod quantity;
+mod way_out;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,12 +27,13 @@ use shellock_geom::{TriMesh, Vec3};
 
 use crate::plan::InstallationPlan;
 use crate::verify::{Check, Finding, Play};
-use crate::{Cancelled, Ctx, IdVec, PatchId};
+use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 pub use bearing::Bearing;
 use bearing::Surfaces;
 use bound::{Answer, Candidates, Problem};
 pub use bound::{Proof, Slide};
 pub use quantity::Quantity;
+use way_out::Walk;
 
 /// How far the key may slide on its way out before what is proven ends, mm: friction, ribs or a detent keep it nearer.
 pub const SLIDE_MM: f64 = 0.3;
@@ -68,6 +70,9 @@ pub struct KitPlay {
     pub estimates: IdVec<PatchId, Option<Play>>,
     /// Small motions of each piece that go that far: displacement of its centroid, mm, and turn, rad.
     pub swings: IdVec<PatchId, Vec<[f64; 6]>>,
+    /// Ways on which pieces can be taken out by hand though they are not the key: poses from rest on, displacement of the centroid, mm, and
+    /// rotation vector, rad.
+    pub ways_out: Vec<(PatchId, Vec<[f64; 6]>)>,
     /// Of each piece while all but one move; `None` for that one. Nothing where it is not proven.
     pub together: Option<IdVec<PatchId, Option<Play>>>,
     /// One for each piece whose play is proven, in order, then that of all together.
@@ -107,6 +112,14 @@ pub fn measure(
     let alone = answers.iter().map(alone).collect();
     let estimates = answers.iter().map(|a| a.linear.first().map(|&linear| play_of(linear, false))).collect();
     let swings = answers.iter().map(|a| a.swings.clone()).collect();
+    let doubtful = |id: &PatchId| *id != plan.key() && answers[usize::from(*id)].proof.is_err();
+    let walked = |id: PatchId| {
+        let way = Walk::new(&surfaces, id, centers[id]).find(ctx, &answers[usize::from(id)].swings, pieces)?;
+        Ok(way.map(|poses| (id, poses)))
+    };
+    let ways_out: Vec<Option<(PatchId, Vec<[f64; 6]>)>> =
+        ids.par_iter().copied().filter(doubtful).map(walked).collect::<Result<_, Cancelled>>()?;
+    let ways_out = ways_out.into_iter().flatten().collect();
     let asked: BTreeSet<usize> = answers.iter().flat_map(|a| a.asked.iter().copied()).collect();
     let mut proofs: Vec<Proof> = answers.into_iter().filter_map(|a| a.proof.ok()).collect();
     let mut together = None;
@@ -127,7 +140,7 @@ pub fn measure(
             proofs.push(proof);
         }
     }
-    Ok(KitPlay { slide, bearings, alone, estimates, swings, together, proofs })
+    Ok(KitPlay { slide, bearings, alone, estimates, swings, ways_out, together, proofs })
 }
 
 /// All but the piece that touches others at most points: held, it leaves the others least room.
@@ -177,6 +190,40 @@ pub fn check(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>, most: [f64; 2]) -
     wide.sort_by(|a, b| excess(&b.1).total_cmp(&excess(&a.1)));
     let findings: Vec<Finding> = wide.into_iter().map(|(piece, play)| told(piece, &play)).collect();
     (Check::new("pieces sit within their play", findings.is_empty(), words(play)), findings)
+}
+
+/// Whether no piece but the key was found to come out by hand.
+pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> (Check, Vec<Finding>) {
+    let found = |(piece, _): &(PatchId, Vec<[f64; 6]>)| Finding::ComesOut {
+        piece: *piece,
+        at: pieces[*piece].centroid().to_array(),
+    };
+    let findings: Vec<Finding> = play.ways_out.iter().map(found).collect();
+    let n_open = play.alone.iter().filter(|(_, play)| play.is_none_or(|p| !p.is_proven)).count();
+    let figure = match n_open {
+        0 => "proven for all pieces".to_owned(),
+        n => format!("a way out was looked for for {n} pieces without a proof; {} found", findings.len()),
+    };
+    (Check::new("no piece can be worked out by hand", findings.is_empty(), figure), findings)
+}
+
+/// The pieces of which it is neither proven how far they go nor found that they come out, with the figures of small motions.
+pub fn warning(play: &KitPlay) -> Option<Warning> {
+    let comes_out = |id: PatchId| play.ways_out.iter().any(|way| way.0 == id);
+    let open = play.alone.iter().filter_map(|(id, play)| Some((id, (*play)?)));
+    let open: Vec<(PatchId, Play)> = open.filter(|(id, play)| !play.is_proven && !comes_out(*id)).collect();
+    let line =
+        |(id, play): &(PatchId, Play)| format!("{id} (about {:.1} mm, {:.1}°)", play.translation_mm, play.rotation_deg);
+    let list: Vec<String> = open.iter().map(line).collect();
+    (!open.is_empty()).then(|| Warning {
+        code: "not-proven".into(),
+        message: format!(
+            "how far these pieces can be moved within the clearance is estimated, not proven: {}; no way to take one out was found",
+            list.join(", ")
+        ),
+        pieces: open.iter().map(|o| o.0).collect(),
+        at: None,
+    })
 }
 
 /// The widest play, for people.

@@ -16,7 +16,7 @@
 //! Nothing else is asked of the surface: it may be rough, and neither a graph over the disc nor parallel to it.
 
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::{TriMesh, Vec3};
+use shellock_geom::{Aabb, TriMesh, Vec3};
 
 /// Triangles of a barrier before it is given up: real ones have some tens.
 const MOST_TRIANGLES: usize = 400;
@@ -46,6 +46,7 @@ impl Region {
 pub(super) struct Surface {
     pub mesh: TriMesh,
     pub tree: TriangleBvh,
+    pub bounds: Aabb,
     /// Triangles that share an edge with each, three lists a triangle: `start[3 f + k]..start[3 f + k + 1]`.
     neighbours: Vec<u32>,
     start: Vec<u32>,
@@ -108,7 +109,7 @@ impl Surface {
         let n_sides = 3 * mesh.triangles.len();
         let start = (0..=n_sides as u32).map(|side| beyond.partition_point(|b| b.0 < side) as u32).collect();
         let neighbours = beyond.into_iter().map(|b| b.1).collect();
-        Self { tree: TriangleBvh::new(mesh), mesh: mesh.clone(), neighbours, start }
+        Self { tree: TriangleBvh::new(mesh), bounds: mesh.bounds(), mesh: mesh.clone(), neighbours, start }
     }
 
     /// The height of the barrier that hangs together with triangle `from`, above the origin, for sideways moves of up to `radius_mm`;
@@ -208,7 +209,7 @@ fn height_on_axis(t: [Vec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shellock_geom::{Aabb, Volume};
+    use shellock_geom::Volume;
 
     fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
         Volume::cuboid(Aabb { min: min.into(), max: max.into() })

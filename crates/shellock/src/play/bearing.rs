@@ -52,6 +52,30 @@ impl Surfaces {
         Self(surfaces.into_iter().collect())
     }
 
+    /// All pieces.
+    pub fn ids(&self) -> impl Iterator<Item = PatchId> + '_ {
+        self.0.ids()
+    }
+
+    /// The surface of a piece.
+    pub fn mesh(&self, piece: PatchId) -> &TriMesh {
+        &self.0[piece].mesh
+    }
+
+    /// Of the pieces that count, the place nearest to `p` within `reach_mm`: which piece, where, and the outward normal of the triangle there.
+    pub fn nearest(&self, p: Vec3, reach_mm: f64, counts: &dyn Fn(PatchId) -> bool) -> Option<(PatchId, Vec3, Vec3)> {
+        let mut best: Option<(f64, PatchId, Vec3, Vec3)> = None;
+        for (id, surface) in self.0.iter().filter(|(id, _)| counts(*id)) {
+            let limit_sq = best.map_or(reach_mm * reach_mm, |b| b.0);
+            if surface.bounds.distance_sq(p) <= limit_sq
+                && let Some(near) = surface.tree.nearest(p, limit_sq)
+            {
+                best = Some((near.distance_sq, id, near.point, surface.mesh.face_normal(near.face as usize)));
+            }
+        }
+        best.map(|(_, id, point, normal)| (id, point, normal))
+    }
+
     /// Points of all pieces that face others, in order of `a`, then along its surface, then of `b`.
     pub fn bearings(&self, ctx: &Ctx, clearance_mm: f64, seed: u64) -> Result<Vec<Bearing>, Cancelled> {
         let ids: Vec<PatchId> = self.0.ids().collect();

@@ -1,0 +1,227 @@
+//! A guided search for a way to take a piece out by hand, where it is not proven that there is none.
+//!
+//! From rest the piece goes by small steps. At each pose the points near its joints ask for the nearest surface of the other
+//! side, which gives a linear limit on the next step, and a linear program finds the step that carries on best in the direction of
+//! the walk. A walk that is stuck ends; walks begin with the motions of the widest play. Only a walk that gets out is looked at exactly:
+//! at every pose the piece must share no volume with the others.
+//!
+//! Limits: that no way is found proves nothing. Other pieces rest.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+use shellock_geom::{Quat, TriMesh, Vec3, Volume};
+
+use super::bearing::Surfaces;
+use crate::motion::{Contact, Corner, Freedom, Limits, System};
+use crate::verify::sample;
+use crate::{Cancelled, Ctx, IdVec, PatchId};
+
+/// What of a piece is so near to others is its joint, mm.
+const JOINT_MM: f64 = 2.5;
+/// Distance of neighbouring points of joints, mm.
+const SPACING_MM: f64 = 1.0;
+/// Most points of either side.
+const MOST_POINTS: usize = 500;
+/// Faces farther off limit no step, mm.
+const REACH_MM: f64 = 0.6;
+/// A joint that was moved so far in the mean is out, mm.
+const OUT_MM: f64 = 12.0;
+/// No point of the joint moves farther in a step, mm: thinner things than pins could be jumped.
+const STEP_MM: f64 = 0.15;
+/// A step by less gets nowhere, mm.
+const LEAST_STEP_MM: f64 = 0.01;
+/// Steps of one walk, and steps without coming farther before it ends.
+const MOST_STEPS: usize = 260;
+const MOST_STUCK: usize = 8;
+/// Common volume that is rounding, mm³, on top of that at rest.
+const SHARED_MM3: f64 = 0.01;
+/// Poses of a way that are kept.
+const KEPT_POSES: usize = 60;
+
+/// Where a piece is: turned about a centre, then shifted.
+#[derive(Clone, Copy)]
+struct Pose {
+    turn: Quat,
+    shift: Vec3,
+}
+
+impl Pose {
+    fn apply(&self, center: Vec3, p: Vec3) -> Vec3 {
+        center + self.shift + self.turn * (p - center)
+    }
+
+    fn undo(&self, center: Vec3, p: Vec3) -> Vec3 {
+        center + self.turn.inverse() * (p - center - self.shift)
+    }
+
+    /// Displacement of the centre, mm, and rotation vector, rad.
+    fn written(&self) -> [f64; 6] {
+        let (s, w) = (self.shift.to_array(), self.turn.to_scaled_axis().to_array());
+        [s[0], s[1], s[2], w[0], w[1], w[2]]
+    }
+}
+
+/// A piece that is to be taken out past all others.
+pub(super) struct Walk<'a> {
+    surfaces: &'a Surfaces,
+    piece: PatchId,
+    center: Vec3,
+    /// Points of the piece's joint, and points of others beside it with their pieces.
+    own: Vec<Vec3>,
+    others: Vec<Vec3>,
+}
+
+impl<'a> Walk<'a> {
+    pub fn new(surfaces: &'a Surfaces, piece: PatchId, center: Vec3) -> Self {
+        let beside = |a: PatchId, b: &dyn Fn(PatchId) -> bool| -> Vec<Vec3> {
+            let mesh = surfaces.mesh(a);
+            let n = (mesh.area() / (SPACING_MM * SPACING_MM)) as usize;
+            let points = sample::on_surface(mesh, n.max(1), u64::from(a.0)).into_iter().map(|s| s.point);
+            let is_near = |p: &Vec3| surfaces.nearest(*p, JOINT_MM, b).is_some();
+            points.filter(is_near).collect()
+        };
+        let own = thinned(beside(piece, &|b| b != piece));
+        let ids: Vec<PatchId> = surfaces.ids().filter(|&b| b != piece).collect();
+        let others = thinned(ids.iter().flat_map(|&b| beside(b, &|a| a == piece)).collect());
+        Self { surfaces, piece, center, own, others }
+    }
+
+    /// The poses of a way out, from rest; `None` where none was found. Walks begin with `swings`: displacement of the centre, mm, and turn, rad.
+    pub fn find(
+        &self,
+        ctx: &Ctx,
+        swings: &[[f64; 6]],
+        pieces: &IdVec<PatchId, TriMesh>,
+    ) -> Result<Option<Vec<[f64; 6]>>, Cancelled> {
+        if self.own.is_empty() {
+            return Ok(None);
+        }
+        for swing in swings {
+            ctx.check()?;
+            if let Some(poses) = self.walk(ctx, swing)?
+                && self.is_free(&poses, pieces)
+            {
+                let every = poses.len().div_ceil(KEPT_POSES).max(1);
+                let kept = poses.iter().step_by(every).chain(poses.last());
+                return Ok(Some(kept.map(Pose::written).collect()));
+            }
+        }
+        Ok(None)
+    }
+
+    /// All poses of a walk that gets out.
+    fn walk(&self, ctx: &Ctx, swing: &[f64; 6]) -> Result<Option<Vec<Pose>>, Cancelled> {
+        let mut pose = Pose { turn: Quat::IDENTITY, shift: Vec3::ZERO };
+        let mut poses = vec![pose];
+        let ([x, y, z, u, v, w], mut farthest_mm, mut n_stuck) = (*swing, 0.0, 0);
+        let mut heading = (Vec3::new(x, y, z), Vec3::new(u, v, w));
+        for _ in 0..MOST_STEPS {
+            ctx.check()?;
+            let Some((shift, spin)) = self.step(&pose, heading) else { return Ok(None) };
+            let turn = Quat::from_scaled_axis(spin);
+            pose = Pose { turn: (turn * pose.turn).normalize(), shift: pose.shift + shift };
+            poses.push(pose);
+            let moved_mm = self.moved_mm(&pose);
+            if moved_mm > OUT_MM {
+                return Ok(Some(poses));
+            }
+            n_stuck = if moved_mm > farthest_mm + LEAST_STEP_MM { 0 } else { n_stuck + 1 };
+            farthest_mm = f64::max(farthest_mm, moved_mm);
+            if n_stuck > MOST_STUCK {
+                return Ok(None);
+            }
+            heading = self.heading(&pose);
+        }
+        Ok(None)
+    }
+
+    /// How far the joint is from its place in the mean, mm.
+    fn moved_mm(&self, pose: &Pose) -> f64 {
+        self.own.iter().map(|&p| pose.apply(self.center, p).distance(p)).sum::<f64>() / self.own.len() as f64
+    }
+
+    /// The small motion that carries the joint's points on as they went so far: the sum of their ways, and its moment.
+    fn heading(&self, pose: &Pose) -> (Vec3, Vec3) {
+        let at = self.center + pose.shift;
+        let way = |p: &Vec3| {
+            let to = pose.apply(self.center, *p);
+            let on = (to - *p).normalize_or_zero();
+            (on, (to - at).cross(on))
+        };
+        let sum = self.own.iter().map(way).fold((Vec3::ZERO, Vec3::ZERO), |s, w| (s.0 + w.0, s.1 + w.1));
+        // As far as a unit force and its moment would go: moments count by the square of the joint's size.
+        let n = self.own.len() as f64;
+        let size_sq = self.own.iter().map(|p| p.distance_squared(self.center)).sum::<f64>() / n;
+        (sum.0 / n, sum.1 / (n * size_sq.max(1.0)))
+    }
+
+    /// The step that goes farthest along `heading`: displacement of the centre and turn about it.
+    fn step(&self, pose: &Pose, heading: (Vec3, Vec3)) -> Option<(Vec3, Vec3)> {
+        let at = self.center + pose.shift;
+        let radius_mm = self.own.iter().map(|&p| p.distance(self.center)).fold(1.0, f64::max);
+        let contacts: Vec<Contact> = self.limits(pose, at).into_iter().chain(bounds(radius_mm)).collect();
+        let (moving, fixed) = (PatchId(0), PatchId(1));
+        let contacts: Vec<Contact> = contacts.into_iter().map(|c| Contact { a: moving, b: fixed, ..c }).collect();
+        let system = System::new(&contacts, &[moving], radius_mm, Freedom::Rigid);
+        let gaps: Vec<f64> = system.rows.iter().map(|row| contacts[row.contact].gap_mm).collect();
+        let towards = [heading.0, heading.1 * radius_mm];
+        let objective = DVector::from_fn(6, |k, _| towards[k / 3][k % 3]);
+        let limits = Limits::new(&system, &gaps);
+        let mut corner = Corner::new(&limits);
+        corner.farthest(&objective)?;
+        let x = corner.motion();
+        let (shift, spin) = (Vec3::new(x[0], x[1], x[2]), Vec3::new(x[3], x[4], x[5]) / radius_mm);
+        (shift.length() + spin.length() * radius_mm > LEAST_STEP_MM).then_some((shift, spin))
+    }
+
+    /// What the surfaces around leave to the next step; points are from `at`.
+    fn limits(&self, pose: &Pose, at: Vec3) -> Vec<Contact> {
+        let is_other = |b: PatchId| b != self.piece;
+        let of_own = |p: &Vec3| {
+            let to = pose.apply(self.center, *p);
+            let (_, near, normal) = self.surfaces.nearest(to, REACH_MM, &is_other)?;
+            Some(limit(to - at, -normal, (to - near).dot(normal)))
+        };
+        let of_other = |p: &Vec3| {
+            let within = pose.undo(self.center, *p);
+            let (_, near, normal) = self.surfaces.nearest(within, REACH_MM, &|b| b == self.piece)?;
+            Some(limit(*p - at, pose.turn * normal, (within - near).dot(normal)))
+        };
+        self.own.iter().filter_map(of_own).chain(self.others.iter().filter_map(of_other)).collect()
+    }
+
+    /// Whether the piece shares no more with the others at any pose than at rest.
+    fn is_free(&self, poses: &[Pose], pieces: &IdVec<PatchId, TriMesh>) -> bool {
+        let others: Vec<Volume> = pieces
+            .iter()
+            .filter(|(id, _)| *id != self.piece)
+            .filter_map(|(_, mesh)| Volume::from_closed_mesh(mesh).ok())
+            .collect();
+        let shared_mm3 = |pose: &Pose| -> f64 {
+            let mut mesh = pieces[self.piece].clone();
+            mesh.points.iter_mut().for_each(|p| *p = pose.apply(self.center, *p));
+            let room = mesh.bounds();
+            let Ok(moved) = Volume::from_closed_mesh(&mesh) else { return f64::INFINITY };
+            others.iter().filter(|o| o.bounds().intersects(room)).map(|o| moved.intersect(o).volume()).sum()
+        };
+        let at_rest = shared_mm3(&poses[0]);
+        poses.par_iter().all(|pose| shared_mm3(pose) <= at_rest + SHARED_MM3)
+    }
+}
+
+fn limit(point: Vec3, normal: Vec3, gap_mm: f64) -> Contact {
+    Contact { a: PatchId(0), b: PatchId(1), point, normal, gap_mm: gap_mm.max(0.0), area_mm2: 0.0 }
+}
+
+/// No point so far from the centre moves by more than a step.
+fn bounds(radius_mm: f64) -> impl Iterator<Item = Contact> {
+    const WAYS: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    let at = move |arm: Vec3| WAYS.into_iter().map(move |way| limit(arm * radius_mm, way, STEP_MM / 3f64.sqrt()));
+    WAYS.into_iter().chain([Vec3::ZERO]).flat_map(at)
+}
+
+/// Every k-th of too many points.
+fn thinned(points: Vec<Vec3>) -> Vec<Vec3> {
+    let every = points.len().div_ceil(MOST_POINTS).max(1);
+    points.into_iter().step_by(every).collect()
+}
