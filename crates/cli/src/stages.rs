@@ -6,7 +6,6 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::{Value, json};
 use shellock::body::BodyParams;
 use shellock::certificate::{Evidence, OtherFile, PieceFile, certify};
-use shellock::motion::most_play;
 use shellock::piece::PressFit;
 use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
@@ -228,8 +227,8 @@ fn played(
         kit.pieces,
         kit.plan,
     )?;
-    let most = most_play(kit.model.mesh().bounds().size().max_element(), clearance_mm);
-    verdict.add(play::check(&measured, kit.pieces, most));
+    let size_mm = kit.model.mesh().bounds().size().max_element();
+    verdict.add(play::check(&measured, kit.pieces, size_mm, clearance_mm));
     verdict.add(play::check_ways_out(&measured, kit.pieces));
     Ok(measured)
 }

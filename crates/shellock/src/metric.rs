@@ -13,5 +13,5 @@ mod tests;
 
 pub use choice::{ChoiceError, Holding, LoosePart, SeamHolding, choose};
 pub use data_driven::{data_driven, pieces_alone};
-pub use foreseen::foreseen;
+pub use foreseen::{Foreseen, foreseen};
 pub use model::{MetricParams, PlanModel};

@@ -40,13 +40,15 @@ pub struct Contact {
     pub area_mm2: f64,
 }
 
-/// How far pieces may rattle: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in proportion to the clearance; displacements also to the size of
-/// the model, but no less than for 75 mm. docs/certificate.md has the evidence.
-pub fn most_play(size_mm: f64, clearance_mm: f64) -> [f64; 2] {
+/// How far a piece may rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in proportion to the clearance;
+/// displacements also to the size of the model, but no less than for 75 mm; turns of pieces with a diagonal under 60 mm, whose rims move less, in
+/// inverse proportion to that, up to twice. docs/certificate.md has the evidence.
+pub fn most_play(size_mm: f64, clearance_mm: f64, piece_mm: f64) -> [f64; 2] {
     const AT_MM: f64 = 150.0;
     const AT_CLEARANCE_MM: f64 = 0.12;
+    const AT_PIECE_MM: f64 = 60.0;
     let wider = (clearance_mm / AT_CLEARANCE_MM).max(1.0);
-    [wider * (size_mm / AT_MM).max(0.5), 2.0 * wider]
+    [wider * (size_mm / AT_MM).max(0.5), 2.0 * wider * (AT_PIECE_MM / piece_mm).clamp(1.0, 2.0)]
 }
 
 /// Which motions of a piece are considered.

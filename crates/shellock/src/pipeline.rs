@@ -14,7 +14,6 @@ use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::connector::{ConnectorParams, Contact, Run, has_no_bar};
 use crate::key::{KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
-use crate::motion::most_play;
 use crate::piece::{FinishParams, Finished, Grip, Joint, LabelParams, PieceError, PressFit, PressFitKind, Relief};
 use crate::plan::{Blocker, InstallationPlan, PlanParams, PlanProof};
 use crate::play::{KitPlay, PlayParams};
@@ -473,8 +472,7 @@ pub fn make(
     let (mut verification, touching) = verify::examine(ctx, &params.verify, &assembly)?;
     let measured = play::measure(ctx, &params.play(), &finished.meshes, &plan)?;
     let size_mm = model.mesh().bounds().size().max_element();
-    let most = most_play(size_mm, params.verify.clearance_mm);
-    verification.add(play::check(&measured, &finished.meshes, most));
+    verification.add(play::check(&measured, &finished.meshes, size_mm, params.verify.clearance_mm));
     verification.add(play::check_ways_out(&measured, &finished.meshes));
     play::warning(&measured).into_iter().for_each(|warning| ctx.warn(warning));
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);

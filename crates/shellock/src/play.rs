@@ -25,6 +25,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3};
 
+use crate::motion::most_play;
 use crate::plan::InstallationPlan;
 use crate::verify::{Check, Finding, Play};
 use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
@@ -98,17 +99,32 @@ pub fn measure(
 ) -> Result<KitPlay, Cancelled> {
     ctx.stage("play", 0)?;
     let surfaces = Surfaces::new(pieces);
-    let bearings = surfaces.bearings(ctx, params.clearance_mm, params.seed)?;
+    let mut bearings = surfaces.bearings(ctx, params.clearance_mm, params.seed)?;
     let centers: IdVec<PatchId, Vec3> =
         pieces.as_slice().par_iter().map(TriMesh::centroid).collect::<Vec<_>>().into_iter().collect();
     let slide = slide(params, plan, &bearings, &centers);
-    let solve = |free: &[PatchId]| {
-        let candidates = Candidates::All;
-        Problem { surfaces: &surfaces, bearings: &bearings, candidates, centers: &centers, slide: &slide, free }
-            .solve(ctx)
-    };
     let ids: Vec<PatchId> = pieces.ids().collect();
-    let answers: Vec<Answer> = ids.par_iter().map(|&id| solve(&[id])).collect::<Result<_, Cancelled>>()?;
+    let solve = |bearings: &[Bearing], candidates, id: PatchId| {
+        let question =
+            Problem { surfaces: &surfaces, bearings, candidates, centers: &centers, slide: &slide, free: &[id] };
+        question.solve(ctx)
+    };
+    let mut answers: Vec<Answer> =
+        ids.par_iter().map(|&id| solve(&bearings, Candidates::All, id)).collect::<Result<_, Cancelled>>()?;
+    // Where that is not enough, more points are: the best of them are nearer to the ends of short connectors.
+    let again: Vec<PatchId> = ids.iter().copied().filter(|&id| is_close(&answers[usize::from(id)])).collect();
+    let finer: Vec<(Vec<Bearing>, Answer)> = again
+        .par_iter()
+        .map(|&id| {
+            let finer = surfaces.finer(id, params.clearance_mm, params.seed);
+            let answer = solve(&finer, Candidates::All, id)?;
+            Ok((finer, answer))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    for (id, (finer, answer)) in again.into_iter().zip(finer) {
+        answers[usize::from(id)] = answer.after(bearings.len());
+        bearings.extend(finer);
+    }
     let alone = answers.iter().map(alone).collect();
     let estimates = answers.iter().map(|a| a.linear.first().map(|&linear| play_of(linear, false))).collect();
     let swings = answers.iter().map(|a| a.swings.clone()).collect();
@@ -151,6 +167,14 @@ fn all_but_one(ids: &[PatchId], bearings: &[Bearing]) -> Vec<PatchId> {
     ids.iter().copied().filter(|&id| Some(id) != held).collect()
 }
 
+/// Whether a proof that does not close may do so with more points.
+fn is_close(answer: &Answer) -> bool {
+    /// Displacement, mm, and turn, rad, of small motions from which that is hopeless.
+    const HOPELESS: [f64; 2] = [1.6, 0.06];
+    let is_hopeless = answer.linear.first().is_none_or(|l| l[0] > HOPELESS[0] || l[1] > HOPELESS[1]);
+    answer.proof.is_err() && !is_hopeless
+}
+
 /// What an answer says of the one piece that was free.
 fn alone(answer: &Answer) -> Option<Play> {
     match &answer.proof {
@@ -172,23 +196,20 @@ fn slide(params: &PlayParams, plan: &InstallationPlan, bearings: &[Bearing], cen
     Slide { key, seat, at: centers[key].to_array(), along, most_mm: params.slide_mm }
 }
 
-/// Whether no piece rattles farther than `most`; findings are those of the loosest first.
+/// Whether no piece of a model of `size_mm` rattles farther than [`most_play`] says; findings are those of the loosest first.
 ///
-/// `most` is in mm and degrees; judged is the estimate for small motions: what is proven is more than the real play.
-pub fn check(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>, most: [f64; 2]) -> (Check, Vec<Finding>) {
-    let is_wide = |play: &Play| play.translation_mm > most[0] || play.rotation_deg > most[1];
+/// Judged is the estimate for small motions: what is proven is more than the real play.
+pub fn check(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>, size_mm: f64, clearance_mm: f64) -> (Check, Vec<Finding>) {
     let endless = Play { translation_mm: f64::INFINITY, rotation_deg: f64::INFINITY, is_proven: false };
-    let told = |piece: PatchId, play: &Play| Finding::PlayTooWide {
-        piece,
-        play: *play,
-        most,
-        at: pieces[piece].centroid().to_array(),
+    let told = |(piece, play): (PatchId, &Option<Play>)| {
+        let (play, mesh) = (play.unwrap_or(endless), &pieces[piece]);
+        let most = most_play(size_mm, clearance_mm, mesh.bounds().diagonal());
+        let excess = (play.translation_mm / most[0]).max(play.rotation_deg / most[1]);
+        (excess, Finding::PlayTooWide { piece, play, most, at: mesh.centroid().to_array() })
     };
-    let plays = || play.estimates.iter().map(|(piece, play)| (piece, play.unwrap_or(endless)));
-    let mut wide: Vec<(PatchId, Play)> = plays().filter(|(_, play)| is_wide(play)).collect();
-    let excess = |play: &Play| (play.translation_mm / most[0]).max(play.rotation_deg / most[1]);
-    wide.sort_by(|a, b| excess(&b.1).total_cmp(&excess(&a.1)));
-    let findings: Vec<Finding> = wide.into_iter().map(|(piece, play)| told(piece, &play)).collect();
+    let mut wide: Vec<(f64, Finding)> = play.estimates.iter().map(told).filter(|(excess, _)| *excess > 1.0).collect();
+    wide.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let findings: Vec<Finding> = wide.into_iter().map(|w| w.1).collect();
     (Check::new("pieces sit within their play", findings.is_empty(), words(play)), findings)
 }
 

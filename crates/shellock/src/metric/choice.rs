@@ -6,8 +6,7 @@ use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
-use super::{MetricParams, PlanModel, foreseen};
-use crate::motion::most_play;
+use super::{Foreseen, MetricParams, PlanModel, foreseen};
 use crate::plan::{FoundPlan, InstallationPlan, PlanParams};
 use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
@@ -43,6 +42,8 @@ pub struct Holding {
     pub n_compared: usize,
     /// The play of each piece that was foreseen from the plan: displacement, mm, and turn, degrees; zeros for the key.
     pub foreseen_play: Vec<[f64; 2]>,
+    /// By how many times that is more than the piece may.
+    pub foreseen_excess: Vec<f64>,
 }
 
 /// A piece that comes apart.
@@ -100,9 +101,10 @@ pub fn choose(
     let best = (0..plans.len()).reduce(|best, i| if quality(i) > quality(best) { i } else { best });
     let Some(best) = best else { return Err(ChoiceError::NoPlan) };
     let chosen = found.pool.remove(plans[best]);
-    let foreseen_play = play_of(&model, &chosen.plan, &meetings[best], params.clearance_mm);
+    let Foreseen { play: foreseen_play, excess: foreseen_excess } =
+        foreseen(&model, &chosen.plan, &meetings[best], size_mm(surface), params.clearance_mm);
     let holding = holding(&model, &chosen.plan, &meetings[best], &solved[best].resistance);
-    let holding = Holding { n_compared: plans.len(), foreseen_play, ..holding };
+    let holding = Holding { n_compared: plans.len(), foreseen_play, foreseen_excess, ..holding };
     if !holding.loose.is_empty() {
         warn_of_parting(ctx, &holding.loose);
     }
@@ -115,13 +117,11 @@ pub fn choose(
 
 /// The plans that are worth a simulation, by their places in the pool.
 fn shortlist(model: &PlanModel, surface: &SegmentedSurface, clearance_mm: f64, found: &FoundPlan) -> Vec<usize> {
-    let size_mm = surface.mesh.bounds().size().max_element();
-    let most = most_play(size_mm, clearance_mm);
     // How far the loosest piece goes beyond what is allowed; 1 for plans in which none does.
     let excess = |&i: &usize| {
         let plan = &found.pool[i].plan;
-        let of_piece = |[mm, deg]: &[f64; 2]| (mm / most[0]).max(deg / most[1]);
-        play_of(model, plan, &model.meetings(plan), clearance_mm).iter().map(of_piece).fold(1.0, f64::max)
+        let foreseen = foreseen(model, plan, &model.meetings(plan), size_mm(surface), clearance_mm);
+        foreseen.excess.into_iter().fold(1.0, f64::max)
     };
     let within = |slack: f64| -> Vec<(usize, f64)> {
         let limit = found.score.worst * (1.0 + slack);
@@ -137,10 +137,9 @@ fn shortlist(model: &PlanModel, surface: &SegmentedSurface, clearance_mm: f64, f
     plans.into_iter().filter(|p| p.1 <= most).map(|p| p.0).collect()
 }
 
-/// The play of pieces that is foreseen: displacement, mm, and turn, degrees.
-fn play_of(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
-    let play = foreseen(model, plan, meetings, clearance_mm);
-    play.into_iter().map(|[mm, turn]| [mm, turn.to_degrees()]).collect()
+/// The longest side of the model.
+fn size_mm(surface: &SegmentedSurface) -> f64 {
+    surface.mesh.bounds().size().max_element()
 }
 
 fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePart]) {
@@ -180,12 +179,12 @@ fn holding(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], res
         Resistance::Separable(parts) => {
             let part = |&p: &u32| LoosePart { piece: PatchId(p), at: middle_of(model, PatchId(p)).to_array() };
             let loose = parts.iter().map(part).collect();
-            return Holding { quality_mm: None, loose, seams: Vec::new(), n_compared: 0, foreseen_play: Vec::new() };
+            return Holding { quality_mm: None, loose, seams: Vec::new(), n_compared: 0, foreseen_play: Vec::new(), foreseen_excess: Vec::new() };
         }
     };
     let mut seams = weakest_places(model, plan, meetings, opening);
     seams.sort_by(|x, y| y.score_mm.total_cmp(&x.score_mm).then((x.later, x.earlier).cmp(&(y.later, y.earlier))));
-    Holding { quality_mm: Some(opening.quality_mm), loose, seams, n_compared: 0, foreseen_play: Vec::new() }
+    Holding { quality_mm: Some(opening.quality_mm), loose, seams, n_compared: 0, foreseen_play: Vec::new(), foreseen_excess: Vec::new() }
 }
 
 /// The weakest place of every pair of pieces that has a connector.

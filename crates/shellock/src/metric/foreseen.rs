@@ -14,12 +14,12 @@
 //! Limits: rails and ribs are not known, so nothing is said of a key; pins are taken as long as their stations' seams.
 
 use nalgebra::DVector;
-use shellock_geom::Vec3;
+use shellock_geom::{Aabb, Vec3};
 use shellock_mechanics::{Meeting, Side};
 
 use super::PlanModel;
 use crate::PatchId;
-use crate::motion::{Contact, Corner, Freedom, Limits, System};
+use crate::motion::{Contact, Corner, Freedom, Limits, System, most_play};
 use crate::plan::InstallationPlan;
 
 /// Share of the connector size that a pin is deep.
@@ -31,9 +31,38 @@ const LENGTH_MM: f64 = 50.0;
 /// What has no end goes so far: mm and rad.
 const ENDLESS: [f64; 2] = [100.0, 1.0];
 
-/// How far each piece but the key goes: displacement of the middle of its surface, mm, and turn, rad, no less than the greatest along the
-/// coordinate axes and no more than √3 of that; zeros for the key.
-pub fn foreseen(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
+/// How far each piece but the key goes, and by how much that is more than it may: at most 1 where it is not.
+pub struct Foreseen {
+    /// Displacement of the middle of its surface, mm, and turn, degrees, no less than the greatest along the coordinate axes and no more than √3
+    /// of that; zeros for the key.
+    pub play: Vec<[f64; 2]>,
+    /// Of each piece, in the same order; 0 for the key.
+    pub excess: Vec<f64>,
+}
+
+/// How far pieces go, and whether they may. `size_mm` is the longest side of the model.
+pub fn foreseen(
+    model: &PlanModel,
+    plan: &InstallationPlan,
+    meetings: &[Meeting],
+    size_mm: f64,
+    clearance_mm: f64,
+) -> Foreseen {
+    let play = plays(model, plan, meetings, clearance_mm);
+    let mut bounds = vec![Aabb::EMPTY; model.assembly.n_parts];
+    for (p, part) in model.assembly.points.iter().zip(&model.assembly.part_of_point) {
+        bounds[*part as usize] = bounds[*part as usize].union(Aabb::around([*p]));
+    }
+    let excess = |(play, room): (&[f64; 2], &Aabb)| {
+        let [most_mm, most_deg] = most_play(size_mm, clearance_mm, room.diagonal());
+        (play[0] / most_mm).max(play[1] / most_deg)
+    };
+    let excess = play.iter().zip(&bounds).map(excess).collect();
+    Foreseen { play, excess }
+}
+
+/// Displacement, mm, and turn, degrees, of each piece.
+fn plays(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
     let mut contacts: Vec<Vec<Contact>> = vec![Vec::new(); model.assembly.n_parts];
     for (station, meeting) in meetings.iter().enumerate() {
         let found = at_station(model, station, meeting, clearance_mm);
@@ -103,5 +132,5 @@ fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
         }
         Vec3::from(axes).length()
     };
-    [most(0, ENDLESS[0], 1.0), most(3, ENDLESS[1], 1.0 / LENGTH_MM)]
+    [most(0, ENDLESS[0], 1.0), most(3, ENDLESS[1], 1.0 / LENGTH_MM).to_degrees()]
 }

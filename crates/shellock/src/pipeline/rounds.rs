@@ -6,7 +6,6 @@ use super::{Design, DesignError, KeySource, Params, make};
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::feedback::{Lesson, lessons};
 use crate::metric::Holding;
-use crate::motion::most_play;
 use crate::plan::{Blocker, FoundPlan, InstallationPlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::sizes::ChosenSizes;
 use crate::verify::Finding;
@@ -47,19 +46,11 @@ pub(super) fn rattling(design: &Design) -> Vec<PatchId> {
 }
 
 /// The pieces that are foreseen to rattle far more than they may, the loosest first.
-fn foreseen_to_rattle(
-    params: &Params,
-    surface: &SegmentedSurface,
-    found: &FoundPlan,
-    holding: &Holding,
-) -> Vec<PatchId> {
+fn foreseen_to_rattle(found: &FoundPlan, holding: &Holding) -> Vec<PatchId> {
     /// Play is foreseen within about this factor.
     const SURELY: f64 = 1.4;
-    let [most_mm, most_deg] = most_play(surface.mesh.bounds().size().max_element(), params.plan.clearance_mm);
-    let excess = |[mm, deg]: &[f64; 2]| (mm / most_mm).max(deg / most_deg);
-    let plays = holding.foreseen_play.iter().enumerate().map(|(i, play)| (PatchId::from(i), excess(play)));
-    let mut wide: Vec<(PatchId, f64)> =
-        plays.filter(|(p, excess)| *excess > SURELY && *p != found.plan.key()).collect();
+    let excess = holding.foreseen_excess.iter().enumerate().map(|(i, excess)| (PatchId::from(i), *excess));
+    let mut wide: Vec<(PatchId, f64)> = excess.filter(|(p, excess)| *excess > SURELY && *p != found.plan.key()).collect();
     wide.sort_by(|a, b| b.1.total_cmp(&a.1));
     wide.into_iter().map(|w| w.0).collect()
 }
@@ -178,7 +169,7 @@ pub(super) fn with_segmentation(
             }
         };
         if kits.may_join
-            && let Some(surface) = joined(ctx, params, surface, &foreseen_to_rattle(params, surface, &found, &holding))
+            && let Some(surface) = joined(ctx, params, surface, &foreseen_to_rattle(&found, &holding))
         {
             return Ok(Attempt::Joined(surface));
         }

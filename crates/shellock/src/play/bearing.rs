@@ -12,7 +12,9 @@ use crate::verify::sample;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Distance of neighbouring points, mm: the best of them ends a turn about a connector of 1 mm.
-const SPACING_MM: f64 = 0.35;
+pub(super) const SPACING_MM: f64 = 0.35;
+/// The same for pieces whose proof does not close with the former.
+pub(super) const FINE_SPACING_MM: f64 = 0.15;
 /// What may come on top of the clearance between faces that end motions, mm.
 const REACH_MM: f64 = 0.2;
 /// Faces whose normals have a greater scalar product do not face each other (37° from opposite).
@@ -83,17 +85,38 @@ impl Surfaces {
             .par_iter()
             .map(|&a| {
                 ctx.check()?;
-                Ok(self.of_piece(a, clearance_mm + REACH_MM, seed.wrapping_add(u64::from(a.0))))
+                let seed = seed.wrapping_add(u64::from(a.0));
+                Ok(self.on_piece(a, &|_| true, clearance_mm + REACH_MM, SPACING_MM, seed))
             })
             .collect::<Result<_, Cancelled>>()?;
         Ok(found.into_iter().flatten().collect())
     }
 
-    fn of_piece(&self, a: PatchId, reach_mm: f64, seed: u64) -> Vec<Bearing> {
+    /// More points of `piece` that face others, and of others that face it.
+    pub fn finer(&self, piece: PatchId, clearance_mm: f64, seed: u64) -> Vec<Bearing> {
+        let reach_mm = clearance_mm + REACH_MM;
+        let seed = seed.wrapping_add(1000 + u64::from(piece.0));
+        let room = self.0[piece].bounds.grown(reach_mm);
+        let is_beside = |a: &PatchId| *a != piece && self.0[*a].bounds.intersects(room);
+        let own = self.on_piece(piece, &|_| true, reach_mm, FINE_SPACING_MM, seed);
+        let of_others = self.0.ids().filter(is_beside);
+        let of_others = of_others.flat_map(|a| self.on_piece(a, &|b| b == piece, reach_mm, FINE_SPACING_MM, seed));
+        own.into_iter().chain(of_others).collect()
+    }
+
+    /// Points of `a` that face those pieces that count.
+    fn on_piece(
+        &self,
+        a: PatchId,
+        counts: &(dyn Fn(PatchId) -> bool + Sync),
+        reach_mm: f64,
+        spacing_mm: f64,
+        seed: u64,
+    ) -> Vec<Bearing> {
         let own = &self.0[a].mesh;
         let room = own.bounds().grown(reach_mm);
         let others: Vec<PatchId> =
-            self.0.ids().filter(|&b| b != a && self.0[b].mesh.bounds().intersects(room)).collect();
+            self.0.ids().filter(|&b| b != a && counts(b) && self.0[b].bounds.intersects(room)).collect();
         let is_near = |f: u32| {
             let corners = own.corners(f as usize);
             let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
@@ -105,7 +128,7 @@ impl Surfaces {
             points: own.points.clone(),
             triangles: faces.iter().map(|&f| own.triangles[f as usize]).collect(),
         };
-        let n = (near.area() / (SPACING_MM * SPACING_MM)).ceil() as usize;
+        let n = (near.area() / (spacing_mm * spacing_mm)).ceil() as usize;
         let samples = sample::on_surface(&near, n.max(1), seed);
         let bearing = |s: &sample::Sample, b: PatchId| {
             let nearest = self.0[b].tree.nearest(s.point, reach_mm * reach_mm)?;

@@ -80,6 +80,17 @@ pub(super) struct Answer {
     pub proof: Result<Proof, Open>,
 }
 
+impl Answer {
+    /// The same, where the bearings it was found of follow `n_before` others.
+    pub fn after(self, n_before: usize) -> Self {
+        let proof = self.proof.map(|proof| Proof {
+            rows: proof.rows.into_iter().map(|(bearing, quantities)| (n_before + bearing, quantities)).collect(),
+            ..proof
+        });
+        Self { asked: self.asked.into_iter().map(|bearing| n_before + bearing).collect(), proof, ..self }
+    }
+}
+
 /// Why a proof does not close.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Open {
