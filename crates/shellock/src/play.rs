@@ -170,7 +170,7 @@ fn all_but_one(ids: &[PatchId], bearings: &[Bearing]) -> Vec<PatchId> {
 /// Whether a proof that does not close may do so with more points.
 fn is_close(answer: &Answer) -> bool {
     /// Displacement, mm, and turn, rad, of small motions from which that is hopeless.
-    const HOPELESS: [f64; 2] = [1.6, 0.06];
+    const HOPELESS: [f64; 2] = [1.2, 0.05];
     let is_hopeless = answer.linear.first().is_none_or(|l| l[0] > HOPELESS[0] || l[1] > HOPELESS[1]);
     answer.proof.is_err() && !is_hopeless
 }

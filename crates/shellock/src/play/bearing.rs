@@ -14,7 +14,7 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 /// Distance of neighbouring points, mm: the best of them ends a turn about a connector of 1 mm.
 pub(super) const SPACING_MM: f64 = 0.35;
 /// The same for pieces whose proof does not close with the former.
-pub(super) const FINE_SPACING_MM: f64 = 0.15;
+pub(super) const FINE_SPACING_MM: f64 = 0.2;
 /// What may come on top of the clearance between faces that end motions, mm.
 const REACH_MM: f64 = 0.2;
 /// Faces whose normals have a greater scalar product do not face each other (37° from opposite).
