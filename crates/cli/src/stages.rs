@@ -223,7 +223,7 @@ fn played(
     let VerifyParams { clearance_mm, seed } = *params;
     let measured = play::measure(
         ctx,
-        &PlayParams { clearance_mm, slide_mm: play::SLIDE_MM, is_together: true, seed },
+        &PlayParams { clearance_mm, slide_mm: play::SLIDE_MM, is_together: false, seed },
         kit.pieces,
         kit.plan,
     )?;

@@ -18,6 +18,8 @@ mod barrier;
 mod bearing;
 mod bound;
 mod quantity;
+#[cfg(test)]
+mod tests;
 mod way_out;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -199,7 +201,12 @@ fn slide(params: &PlayParams, plan: &InstallationPlan, bearings: &[Bearing], cen
 /// Whether no piece of a model of `size_mm` rattles farther than [`most_play`] says; findings are those of the loosest first.
 ///
 /// Judged is the estimate for small motions: what is proven is more than the real play.
-pub fn check(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>, size_mm: f64, clearance_mm: f64) -> (Check, Vec<Finding>) {
+pub fn check(
+    play: &KitPlay,
+    pieces: &IdVec<PatchId, TriMesh>,
+    size_mm: f64,
+    clearance_mm: f64,
+) -> (Check, Vec<Finding>) {
     let endless = Play { translation_mm: f64::INFINITY, rotation_deg: f64::INFINITY, is_proven: false };
     let told = |(piece, play): (PatchId, &Option<Play>)| {
         let (play, mesh) = (play.unwrap_or(endless), &pieces[piece]);

@@ -43,6 +43,8 @@ const LEAST_FORCE: f64 = 1e-9;
 /// Squared part of a row outside the span of others below which it adds no rank. Rows are 1 to 2 long; a lock that
 /// rests on less is one of rounding.
 const DEPENDENT: f64 = 1e-9;
+/// A lock that rests on less is one of rounding: eigenvalues of 1 are known to about 1e-15, their roots to 3e-8.
+const LEAST_HOLD: f64 = 1e-6;
 /// Added to a matrix that may be singular, as a share of its mean diagonal.
 const SINGULAR: f64 = 1e-13;
 /// Corrections of the multipliers; each gains several digits, and two have been enough.
@@ -97,7 +99,7 @@ pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Pro
     let of_others = leaving.map_or_else(|| gram.clone(), |(piece, _)| without(&gram, &system, piece));
     let hold = SymmetricEigen::new(of_others).eigenvalues.min().max(0.0).sqrt();
     let named = multipliers.into_iter().map(|(row, value)| (system.rows[row].contact, value));
-    (residual < hold).then(|| Proof { multipliers: named.collect(), residual, hold })
+    (residual < hold && hold > LEAST_HOLD).then(|| Proof { multipliers: named.collect(), residual, hold })
 }
 
 /// What the Gram matrix is worth for the other pieces when the free piece at `leaving` moves as it likes: the Schur complement, by the
@@ -122,7 +124,7 @@ fn without(gram: &DMatrix<f64>, system: &System, leaving: usize) -> DMatrix<f64>
 }
 
 /// Rows of full rank, each the one with the largest part outside the span of those before it; the first of equals. Where a piece
-/// is leaving they span the unknowns of the others, and none is opened or closed by its way out.
+/// is leaving none is opened or closed by its way out, and they span all else that any do.
 fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<usize>> {
     /// A row along which the way out goes by more, as a share, opens or closes with it.
     const TOUCHED: f64 = 1e-6;
@@ -130,8 +132,7 @@ fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<
     let mut basis = Vec::<DVector<f64>>::new();
     if let Some((piece, way)) = leaving {
         (0..3).for_each(|k| way_out[system.column(piece) + k] = way[k]);
-        let unit = |k: usize| DVector::from_fn(system.n, |i, _| f64::from(u8::from(i == k)));
-        basis.extend((system.column(piece)..system.column(piece + 1)).map(unit));
+        basis.push(way_out.clone().normalize());
     }
     let n_chosen = system.n - basis.len();
     let outside = |row: &Row| -> f64 {
@@ -142,7 +143,11 @@ fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<
     let mut chosen = Vec::new();
     for _ in 0..n_chosen {
         let first_of_most = |best: usize, i: usize| if outside_sq[i] > outside_sq[best] { i } else { best };
-        let next = (0..outside_sq.len()).reduce(first_of_most).filter(|&i| outside_sq[i] > DEPENDENT)?;
+        let next = (0..outside_sq.len()).reduce(first_of_most).filter(|&i| outside_sq[i] > DEPENDENT);
+        let Some(next) = next else {
+            // What is left may be other ways of the piece that leaves; the hold tells.
+            return leaving.map(|_| chosen);
+        };
         let mut direction = DVector::zeros(system.n);
         system.add(&system.rows[next], 1.0, &mut direction);
         // Twice is enough.

@@ -179,12 +179,26 @@ fn holding(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], res
         Resistance::Separable(parts) => {
             let part = |&p: &u32| LoosePart { piece: PatchId(p), at: middle_of(model, PatchId(p)).to_array() };
             let loose = parts.iter().map(part).collect();
-            return Holding { quality_mm: None, loose, seams: Vec::new(), n_compared: 0, foreseen_play: Vec::new(), foreseen_excess: Vec::new() };
+            return Holding {
+                quality_mm: None,
+                loose,
+                seams: Vec::new(),
+                n_compared: 0,
+                foreseen_play: Vec::new(),
+                foreseen_excess: Vec::new(),
+            };
         }
     };
     let mut seams = weakest_places(model, plan, meetings, opening);
     seams.sort_by(|x, y| y.score_mm.total_cmp(&x.score_mm).then((x.later, x.earlier).cmp(&(y.later, y.earlier))));
-    Holding { quality_mm: Some(opening.quality_mm), loose, seams, n_compared: 0, foreseen_play: Vec::new(), foreseen_excess: Vec::new() }
+    Holding {
+        quality_mm: Some(opening.quality_mm),
+        loose,
+        seams,
+        n_compared: 0,
+        foreseen_play: Vec::new(),
+        foreseen_excess: Vec::new(),
+    }
 }
 
 /// The weakest place of every pair of pieces that has a connector.

@@ -151,7 +151,14 @@ impl<'a> Corner<'a> {
     /// As [`Corner::ended`], by the rows alone that were looked at before: no nearer an end, and sooner found.
     pub fn ended_by_known(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.climb(objective.as_slice());
+        self.come_back(objective.as_slice());
+        self.climb(objective.as_slice());
         self.ending(objective)
+    }
+
+    /// Rows that are looked at.
+    pub fn looked_at(&self) -> impl Iterator<Item = usize> + '_ {
+        self.looked_at.iter().copied().filter(|&limit| limit < self.limits.n_rows)
     }
 
     /// The motion of the corner.

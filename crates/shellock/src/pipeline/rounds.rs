@@ -50,7 +50,8 @@ fn foreseen_to_rattle(found: &FoundPlan, holding: &Holding) -> Vec<PatchId> {
     /// Play is foreseen within about this factor.
     const SURELY: f64 = 1.4;
     let excess = holding.foreseen_excess.iter().enumerate().map(|(i, excess)| (PatchId::from(i), *excess));
-    let mut wide: Vec<(PatchId, f64)> = excess.filter(|(p, excess)| *excess > SURELY && *p != found.plan.key()).collect();
+    let mut wide: Vec<(PatchId, f64)> =
+        excess.filter(|(p, excess)| *excess > SURELY && *p != found.plan.key()).collect();
     wide.sort_by(|a, b| b.1.total_cmp(&a.1));
     wide.into_iter().map(|w| w.0).collect()
 }

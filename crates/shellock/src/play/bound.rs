@@ -305,6 +305,9 @@ impl<'a> Round<'a> {
                 }
             }
             wanted = needed.into_iter().filter(|q| !ends.contains_key(q)).collect();
+            // What one lane looked at, all know: the rest is bounded by known rows.
+            let known: BTreeSet<usize> = lanes.iter().flat_map(Corner::looked_at).collect();
+            lanes.par_iter_mut().for_each(|corner| known.iter().for_each(|&row| corner.look_at(row)));
         }
         Some((ends, motions))
     }

@@ -8,6 +8,9 @@
 //! Limits: that no way is found proves nothing. Other pieces rest.
 
 use nalgebra::DVector;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
 use rayon::prelude::*;
 use shellock_geom::{Quat, TriMesh, Vec3, Volume};
 
@@ -32,7 +35,9 @@ const STEP_MM: f64 = 0.15;
 const LEAST_STEP_MM: f64 = 0.01;
 /// Steps of one walk, and steps without coming farther before it ends.
 const MOST_STEPS: usize = 260;
-const MOST_STUCK: usize = 8;
+const MOST_STUCK: usize = 30;
+/// Share of chance in the direction of a step: a walk along a wall must find the way round its end.
+const CHANCE: f64 = 0.7;
 /// Common volume that is rounding, mm³, on top of that at rest.
 const SHARED_MM3: f64 = 0.01;
 /// Poses of a way that are kept.
@@ -115,9 +120,17 @@ impl<'a> Walk<'a> {
         let mut poses = vec![pose];
         let ([x, y, z, u, v, w], mut farthest_mm, mut n_stuck) = (*swing, 0.0, 0);
         let mut heading = (Vec3::new(x, y, z), Vec3::new(u, v, w));
+        let mut rng = ChaCha8Rng::seed_from_u64(u64::from(self.piece.0));
         for _ in 0..MOST_STEPS {
             ctx.check()?;
-            let Some((shift, spin)) = self.step(&pose, heading) else { return Ok(None) };
+            let towards = self.with_chance(heading, &mut rng);
+            let Some((shift, spin)) = self.step(&pose, towards) else {
+                n_stuck += 1;
+                if n_stuck > MOST_STUCK {
+                    return Ok(None);
+                }
+                continue;
+            };
             let turn = Quat::from_scaled_axis(spin);
             pose = Pose { turn: (turn * pose.turn).normalize(), shift: pose.shift + shift };
             poses.push(pose);
@@ -133,6 +146,20 @@ impl<'a> Walk<'a> {
             heading = self.heading(&pose);
         }
         Ok(None)
+    }
+
+    /// The direction, made as long for shifts as for turns, with chance.
+    fn with_chance(&self, heading: (Vec3, Vec3), rng: &mut ChaCha8Rng) -> (Vec3, Vec3) {
+        let radius_mm = self.radius_mm();
+        let length =
+            (heading.0.length_squared() + (heading.1 * radius_mm).length_squared()).sqrt().max(f64::MIN_POSITIVE);
+        let mut random = || Vec3::from_array(std::array::from_fn(|_| rng.random_range(-CHANCE..CHANCE)));
+        (heading.0 / length + random(), (heading.1 * radius_mm / length + random()) / radius_mm)
+    }
+
+    /// The joint's farthest point is so far from the centre, mm.
+    fn radius_mm(&self) -> f64 {
+        self.own.iter().map(|&p| p.distance(self.center)).fold(1.0, f64::max)
     }
 
     /// How far the joint is from its place in the mean, mm.
@@ -158,7 +185,7 @@ impl<'a> Walk<'a> {
     /// The step that goes farthest along `heading`: displacement of the centre and turn about it.
     fn step(&self, pose: &Pose, heading: (Vec3, Vec3)) -> Option<(Vec3, Vec3)> {
         let at = self.center + pose.shift;
-        let radius_mm = self.own.iter().map(|&p| p.distance(self.center)).fold(1.0, f64::max);
+        let radius_mm = self.radius_mm();
         let contacts: Vec<Contact> = self.limits(pose, at).into_iter().chain(bounds(radius_mm)).collect();
         let (moving, fixed) = (PatchId(0), PatchId(1));
         let contacts: Vec<Contact> = contacts.into_iter().map(|c| Contact { a: moving, b: fixed, ..c }).collect();

@@ -7,13 +7,11 @@ use super::*;
 use crate::{LatticeDirection, PatchId};
 
 #[test]
-fn of_a_pinned_lid_only_the_key_can_move_and_only_outwards() {
+fn of_a_pinned_lid_nothing_but_the_key_moves() {
     let verdict = pinned_kit(|_| {}).verdict();
     let failed: Vec<&str> = verdict.checks.iter().filter(|c| !c.ok).map(|c| c.name.as_str()).collect();
-    assert_eq!(failed, ["nothing moves, key alone held (6 dof)"], "{verdict:#?}");
-    let [Finding::KeyLeaves { motion }] = &verdict.findings[..] else { panic!("{:?}", verdict.findings) };
-    assert_eq!(motion.piece, PatchId(2));
-    assert!(Vec3::from(motion.velocity).distance(Vec3::Z) < 1e-3, "{motion:?}");
+    assert_eq!(failed, [""; 0], "{verdict:#?}");
+    assert_eq!(verdict.findings, []);
 }
 
 #[test]
