@@ -354,7 +354,7 @@ pub struct Options {
     /// How far ribs on a key without rails press on the pieces around it, mm, 0 to 0.3; 0 makes none
     #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.key_rib_mm, help_heading = "Make")]
     pub key_ribs: f64,
-    /// Also tell how far each piece moves within the gaps while the others move too; takes some seconds, more with many pieces
+    /// Also look for a proof of how far pieces move within the gaps while all others but one move too; closes for small kits only, and takes some seconds to a minute
     #[arg(long, help_heading = "Make")]
     pub play_together: bool,
     /// Cut a notch for a fingernail into the key, 0.45 mm deep

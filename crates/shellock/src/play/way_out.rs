@@ -24,22 +24,26 @@ const JOINT_MM: f64 = 2.5;
 /// Distance of neighbouring points of joints, mm.
 const SPACING_MM: f64 = 1.0;
 /// Most points of either side.
-const MOST_POINTS: usize = 500;
+const MOST_POINTS: usize = 700;
 /// Faces farther off limit no step, mm.
 const REACH_MM: f64 = 0.6;
 /// A joint that was moved so far in the mean is out, mm.
 const OUT_MM: f64 = 12.0;
+/// What is kept of each gap, mm, for what lies between points.
+const KEPT_MM: f64 = 0.02;
 /// No point of the joint moves farther in a step, mm: thinner things than pins could be jumped.
 const STEP_MM: f64 = 0.15;
 /// A step by less gets nowhere, mm.
 const LEAST_STEP_MM: f64 = 0.01;
 /// Steps of one walk, and steps without coming farther before it ends.
-const MOST_STEPS: usize = 260;
+const MOST_STEPS: usize = 400;
 const MOST_STUCK: usize = 30;
-/// Share of chance in the direction of a step: a walk along a wall must find the way round its end.
-const CHANCE: f64 = 0.7;
+/// Share of chance in the direction of a step that got on, and of one that did not: a walk along a wall must find the way round its end.
+const CHANCE: [f64; 2] = [0.1, 0.8];
 /// Common volume that is rounding, mm³, on top of that at rest.
 const SHARED_MM3: f64 = 0.01;
+/// Shifts and turns.
+const WAYS: usize = 6;
 /// Poses of a way that are kept.
 const KEPT_POSES: usize = 60;
 
@@ -81,7 +85,9 @@ impl<'a> Walk<'a> {
         let beside = |a: PatchId, b: &dyn Fn(PatchId) -> bool| -> Vec<Vec3> {
             let mesh = surfaces.mesh(a);
             let n = (mesh.area() / (SPACING_MM * SPACING_MM)) as usize;
-            let points = sample::on_surface(mesh, n.max(1), u64::from(a.0)).into_iter().map(|s| s.point);
+            let samples = sample::on_surface(mesh, n.max(1), u64::from(a.0)).into_iter().map(|s| s.point);
+            // Corners are what meets others first.
+            let points = thinned(mesh.points.clone()).into_iter().chain(samples);
             let is_near = |p: &Vec3| surfaces.nearest(*p, JOINT_MM, b).is_some();
             points.filter(is_near).collect()
         };
@@ -101,9 +107,11 @@ impl<'a> Walk<'a> {
         if self.own.is_empty() {
             return Ok(None);
         }
-        for swing in swings {
+        // Then along and about the axes: where nothing ends a small motion there are no swings.
+        let axes = (0..2 * WAYS).map(|i| std::array::from_fn(|k| if k == i / 2 { [1.0, -1.0][i % 2] } else { 0.0 }));
+        for swing in swings.iter().copied().chain(axes) {
             ctx.check()?;
-            if let Some(poses) = self.walk(ctx, swing)?
+            if let Some(poses) = self.walk(ctx, &swing)?
                 && self.is_free(&poses, pieces)
             {
                 let every = poses.len().div_ceil(KEPT_POSES).max(1);
@@ -123,7 +131,7 @@ impl<'a> Walk<'a> {
         let mut rng = ChaCha8Rng::seed_from_u64(u64::from(self.piece.0));
         for _ in 0..MOST_STEPS {
             ctx.check()?;
-            let towards = self.with_chance(heading, &mut rng);
+            let towards = self.with_chance(heading, CHANCE[usize::from(n_stuck > 0)], &mut rng);
             let Some((shift, spin)) = self.step(&pose, towards) else {
                 n_stuck += 1;
                 if n_stuck > MOST_STUCK {
@@ -149,11 +157,11 @@ impl<'a> Walk<'a> {
     }
 
     /// The direction, made as long for shifts as for turns, with chance.
-    fn with_chance(&self, heading: (Vec3, Vec3), rng: &mut ChaCha8Rng) -> (Vec3, Vec3) {
+    fn with_chance(&self, heading: (Vec3, Vec3), chance: f64, rng: &mut ChaCha8Rng) -> (Vec3, Vec3) {
         let radius_mm = self.radius_mm();
         let length =
             (heading.0.length_squared() + (heading.1 * radius_mm).length_squared()).sqrt().max(f64::MIN_POSITIVE);
-        let mut random = || Vec3::from_array(std::array::from_fn(|_| rng.random_range(-CHANCE..CHANCE)));
+        let mut random = || Vec3::from_array(std::array::from_fn(|_| rng.random_range(-chance..chance)));
         (heading.0 / length + random(), (heading.1 * radius_mm / length + random()) / radius_mm)
     }
 
@@ -207,12 +215,14 @@ impl<'a> Walk<'a> {
         let of_own = |p: &Vec3| {
             let to = pose.apply(self.center, *p);
             let (_, near, normal) = self.surfaces.nearest(to, REACH_MM, &is_other)?;
-            Some(limit(to - at, -normal, (to - near).dot(normal)))
+            let (away, gap_mm) = apart(to, near, normal);
+            Some(limit(to - at, -away, gap_mm))
         };
         let of_other = |p: &Vec3| {
             let within = pose.undo(self.center, *p);
             let (_, near, normal) = self.surfaces.nearest(within, REACH_MM, &|b| b == self.piece)?;
-            Some(limit(*p - at, pose.turn * normal, (within - near).dot(normal)))
+            let (away, gap_mm) = apart(within, near, normal);
+            Some(limit(*p - at, pose.turn * away, gap_mm))
         };
         self.own.iter().filter_map(of_own).chain(self.others.iter().filter_map(of_other)).collect()
     }
@@ -234,6 +244,16 @@ impl<'a> Walk<'a> {
         let at_rest = shared_mm3(&poses[0]);
         poses.par_iter().all(|pose| shared_mm3(pose) <= at_rest + SHARED_MM3)
     }
+}
+
+/// The direction from the nearest place of a surface to a point, and how far that is, mm: beside an edge the point may pass it. Where it touches or is
+/// inside, the triangle's normal, and nothing.
+fn apart(p: Vec3, near: Vec3, normal: Vec3) -> (Vec3, f64) {
+    /// Less is touching, mm.
+    const TOUCHING_MM: f64 = 0.01;
+    let away = p - near;
+    let gap_mm = away.length();
+    if gap_mm > TOUCHING_MM && away.dot(normal) > 0.0 { (away / gap_mm, gap_mm - KEPT_MM) } else { (normal, 0.0) }
 }
 
 fn limit(point: Vec3, normal: Vec3, gap_mm: f64) -> Contact {
