@@ -34,7 +34,7 @@ use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 pub use bearing::Bearing;
 use bearing::Surfaces;
 use bound::{Answer, Candidates, Problem};
-pub use bound::{Proof, Slide};
+pub use bound::{Multipliers, Proof, Slide};
 pub use quantity::Quantity;
 use way_out::Walk;
 

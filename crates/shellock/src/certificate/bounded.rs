@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::PatchId;
-use crate::play::{KitPlay, Quantity};
+use crate::play::{KitPlay, Multipliers, Quantity};
 
 /// A contact with an area: a point of `a` that cannot rise past `b` while it moves sideways within a region.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,9 +22,6 @@ pub struct BearingPoint {
     pub across: [f64; 3],
 }
 
-/// Multipliers of rows, by their places in [`Bounded::rows`]; the row after the last is the key's slide.
-pub type Multipliers = Vec<(usize, f64)>;
-
 /// That some pieces stay within bounds, with the proof. docs/certificate.md has the theorem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounded {
@@ -36,7 +33,8 @@ pub struct Bounded {
     pub quantities: Vec<Quantity>,
     /// A bearing, by its place in the certificate's list, and the quantities that say how far it goes: displacement and turn.
     pub rows: Vec<[usize; 3]>,
-    /// For each quantity and each of its axes: what bounds it against the axis, and along it.
+    /// For each quantity and each of its axes: what bounds it against the axis, and along it, by places in [`Bounded::rows`]; the row after the
+    /// last is the key's slide.
     pub multipliers: Vec<Vec<[Multipliers; 2]>>,
 }
 

@@ -52,6 +52,9 @@ pub struct Slide {
     pub most_mm: f64,
 }
 
+/// Rows by their places, with multipliers, which are positive.
+pub type Multipliers = Vec<(usize, f64)>;
+
 /// The proof that some pieces go no farther than told.
 #[derive(Clone, Debug)]
 pub struct Proof {
@@ -64,7 +67,7 @@ pub struct Proof {
     /// The bearings that end motions, by their place in the list of all, each with the quantities of its cell and its turn.
     pub rows: Vec<(usize, [usize; 2])>,
     /// For each quantity and axis, against it and along it: rows with multipliers. The row after the last is the slide.
-    pub multipliers: Vec<Vec<[Vec<(usize, f64)>; 2]>>,
+    pub multipliers: Vec<Vec<[Multipliers; 2]>>,
 }
 
 /// What became of a question.
@@ -123,7 +126,16 @@ pub(super) struct Problem<'a> {
 }
 
 /// What one round found of a quantity: for each axis, against it and along it, the multipliers; or that it has no end.
-type Ends = Vec<[Option<Vec<(usize, f64)>>; 2]>;
+type Ends = Vec<[Option<Multipliers>; 2]>;
+
+/// What ends one way of a quantity, if anything does, and the motion that goes there.
+type End = (Option<Multipliers>, DVector<f64>);
+
+/// What a round found: what ends each quantity that matters, and all motions that go there.
+struct Found {
+    ends: BTreeMap<usize, Ends>,
+    motions: Vec<DVector<f64>>,
+}
 
 impl Problem<'_> {
     fn is_free(&self, p: PatchId) -> bool {
@@ -147,7 +159,7 @@ impl Problem<'_> {
         for n_before in 0..ROUNDS {
             ctx.check()?;
             let round = Round::new(self, &bearings, &quantities, &beds);
-            let Some((ends, motions)) = round.ends() else { return open(answer, Open::Far) };
+            let Some(Found { ends, motions }) = round.ends() else { return open(answer, Open::Far) };
             let guesses = round.guesses(&ends, &motions);
             let found: BTreeMap<usize, Vec<[f64; 2]>> =
                 ends.iter().map(|(&q, ends)| (q, ends.iter().map(|e| round.values(q, e)).collect())).collect();
@@ -268,7 +280,7 @@ impl<'a> Round<'a> {
     }
 
     /// What ends each quantity that matters, and the motions that go there; `None` where one has no end.
-    fn ends(&self) -> Option<(BTreeMap<usize, Ends>, Vec<DVector<f64>>)> {
+    fn ends(&self) -> Option<Found> {
         let least: Vec<f64> = (0..self.system.rows.len()).map(|row| self.least_mm(row)).collect();
         let late = |row: usize| self.bound_mm(row);
         let limits = Limits::late(&self.system, &least, &late);
@@ -280,7 +292,7 @@ impl<'a> Round<'a> {
         let mut wanted: BTreeSet<usize> = self.quantities.of_piece.values().flatten().copied().collect();
         let mut motions = Vec::new();
         while !wanted.is_empty() {
-            let of_lane = |(lane, corner): (usize, &mut Corner<'_>)| -> Vec<(Option<Vec<(usize, f64)>>, DVector<f64>)> {
+            let of_lane = |(lane, corner): (usize, &mut Corner<'_>)| -> Vec<End> {
                 let ways = (lane..WAYS).step_by(n_lanes);
                 ways.flat_map(|way| wanted.iter().map(move |&q| (q, way)))
                     .map(|(q, way)| (self.objective(q, way / 2, way % 2), self.is_of_piece(q)))
@@ -309,7 +321,7 @@ impl<'a> Round<'a> {
             let known: BTreeSet<usize> = lanes.iter().flat_map(Corner::looked_at).collect();
             lanes.par_iter_mut().for_each(|corner| known.iter().for_each(|&row| corner.look_at(row)));
         }
-        Some((ends, motions))
+        Some(Found { ends, motions })
     }
 
     /// How far the quantities that no bearing needed go in these motions.
@@ -353,7 +365,7 @@ impl<'a> Round<'a> {
     }
 
     /// How far the multipliers show that a quantity goes, against an axis and along it.
-    fn values(&self, quantity: usize, ends: &[Option<Vec<(usize, f64)>>; 2]) -> [f64; 2] {
+    fn values(&self, quantity: usize, ends: &[Option<Multipliers>; 2]) -> [f64; 2] {
         let least = if self.quantities.all[quantity].at.is_some() { ROUNDING } else { ROUNDING / LENGTH_MM };
         ends.each_ref().map(|rows| {
             let sum: f64 = rows.iter().flatten().map(|&(row, force)| force * self.bound_mm(row)).sum();
@@ -373,7 +385,7 @@ impl<'a> Round<'a> {
         let contact = |row: usize| self.system.rows[row].contact;
         let of_bearings: Vec<usize> = rows.into_iter().filter(|&row| contact(row) < self.bearings.len()).collect();
         let place: BTreeMap<usize, usize> = of_bearings.iter().copied().zip(0..).collect();
-        let renamed = |rows: Option<Vec<(usize, f64)>>| -> Vec<(usize, f64)> {
+        let renamed = |rows: Option<Multipliers>| -> Multipliers {
             let name = |row: usize| place.get(&row).copied().unwrap_or(of_bearings.len());
             rows.into_iter().flatten().map(|(row, force)| (name(row), force)).collect()
         };
