@@ -47,26 +47,26 @@ impl Frame {
         dot(self.normal, sub(p, self.origin))
     }
 
-    /// Height at which the line through the origin along the normal meets a triangle. Of triangles that share an edge it meets
-    /// either one or none on each side: ends are compared by the same sum whichever triangle asks.
+    /// Height at which the line through the origin along the normal meets a triangle. Of triangles that share an edge it meets either one or none on each side: ends are compared by the same sum whichever
+    /// triangle asks, and heights are those of the ends that decided.
     fn meets(&self, t: &[Vec3; 3]) -> Option<f64> {
         let flat = t.map(|p| {
             let off = sub(p, self.origin);
-            [dot(self.across, off), dot(self.up(), off)]
+            [dot(self.across, off), dot(self.up(), off), self.height(p)]
         });
-        let mut n_beside = 0;
+        let mut crossings = Vec::with_capacity(3);
         for k in 0..3 {
             let (p, q) = (flat[k], flat[(k + 1) % 3]);
             let (low, high) = if p[1] <= q[1] { (p, q) } else { (q, p) };
-            let is_beside = low[1] <= 0.0 && high[1] > 0.0 && low[0] * high[1] - high[0] * low[1] > 0.0;
-            n_beside += usize::from(is_beside);
+            if !(low[1] <= 0.0 && high[1] > 0.0) {
+                continue;
+            }
+            let (beside, rise) = (low[0] * high[1] - high[0] * low[1], high[1] - low[1]);
+            crossings.push([beside, beside / rise, low[2] - (high[2] - low[2]) * (low[1] / rise)]);
         }
-        let slant = cross(sub(t[1], t[0]), sub(t[2], t[0]));
-        let at = dot(slant, sub(t[0], self.origin)) / dot(slant, self.normal);
-        let heights = t.map(|p| self.height(p));
-        let [low, high] = [heights.iter().copied().fold(at, f64::min), heights.iter().copied().fold(at, f64::max)];
-        let at = if at.is_finite() { at.clamp(low, high) } else { low };
-        (n_beside == 1).then_some(at)
+        let [[p, x, from], [q, y, to]] = crossings[..] else { return None };
+        let share = if x == y { 0.5 } else { (x / (x - y)).clamp(0.0, 1.0) };
+        ((p > 0.0) != (q > 0.0)).then(|| from + (to - from) * share)
     }
 }
 
@@ -165,14 +165,23 @@ pub fn rise_mm(mesh: &Mesh, prism: &Prism) -> Result<f64, String> {
     let (from, to) = (prism.frame.origin, add(prism.frame.origin, scale(prism.frame.normal, MOST_RISE_MM)));
     let low = std::array::from_fn(|k| from[k].min(to[k]) - BESIDE_RAY_MM);
     let high = std::array::from_fn(|k| from[k].max(to[k]) + BESIDE_RAY_MM);
-    let hits = mesh.in_box(low, high).into_iter().filter_map(|t| Some((t, prism.frame.meets(&mesh.triangles[t])?)));
-    let above = hits.filter(|(_, height)| (0.0..=MOST_RISE_MM).contains(height) && *height > 0.0);
-    let Some((first, _)) = above.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))) else {
-        return Err("nothing is above".into());
-    };
+    let mut above: Option<(usize, f64)> = None;
+    for t in mesh.in_box(low, high) {
+        let height = prism.frame.meets(&mesh.triangles[t]).filter(|height| *height > 0.0 && *height <= MOST_RISE_MM);
+        above = match (above, height) {
+            (Some(least), Some(height)) if least.1 <= height => Some(least),
+            (least, height) => height.map(|height| (t, height)).or(least),
+        };
+    }
+    let Some((first, height)) = above else { return Err("nothing is above".into()) };
+    let [a, b, c] = mesh.triangles[first];
+    // A point within the other piece has its surface from inside above it: that stops nothing.
+    if dot(cross(sub(b, a), sub(c, a)), prism.frame.normal) >= 0.0 {
+        return Err("what is above does not face the point".into());
+    }
     let flooded = flood(mesh, first, prism, MOST_RISE_MM)?;
     match flooded.n_above % 2 {
-        1 => Ok(flooded.highest_mm),
+        1 if flooded.highest_mm >= height * (1.0 - 1e-9) => Ok(flooded.highest_mm),
         _ => Err(format!("{} sheets are above", flooded.n_above)),
     }
 }
@@ -217,9 +226,17 @@ mod tests {
                 }
             }
         }
-        let roof = Mesh::new(triangles);
+        let roof = Mesh::new(triangles.into_iter().map(|[a, b, c]| [a, c, b]).collect());
         assert_eq!(roof.n_open_edges(), 0);
         roof
+    }
+
+    /// A wedge below the point: with a frame that is perpendicular to 1e-9 alone, hits and heights told by different directions found it above.
+    #[test]
+    fn a_height_is_told_by_the_ends_that_decide_the_hit() {
+        let frame = Frame { origin: [3e-10, 0.0, 0.0], normal: [-4e-10, 0.0, 1.0], across: [1.0, 0.0, -5e-10] };
+        let wedge = [[12.5, -1.0, -2.0], [12.5, 1.0, -2.0], [12.5, 1.0, 0.9]].map(|[x, y, z]| [x - 12.5, y, z]);
+        assert!(frame.meets(&wedge).is_none_or(|height| height < 0.0));
     }
 
     #[test]

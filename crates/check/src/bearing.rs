@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use crate::barrier::{Frame, Prism, SIDES, stays_below};
 use crate::mesh::Mesh;
-use crate::vector::{Vec3, dot, norm, scale};
+use crate::vector::{Vec3, dot, norm, scale, sub};
 
 /// Difference of unit vectors, and of perpendicular ones.
 const SAME: f64 = 1e-9;
@@ -44,7 +44,8 @@ impl Bearing {
             return Err("is not one of two pieces".into());
         };
         let (triangle, point) = own.on_surface(self.point).ok_or_else(|| format!("is not on piece {}", self.a))?;
-        let bearing = Self { point, ..self.clone() };
+        let (normal, across) = exact(self.normal, self.across);
+        let bearing = Self { point, normal, across, ..self.clone() };
         match bearing.has_bed(own, triangle) {
             true => Ok(bearing),
             false => Err(format!("is on a speck of piece {}", self.a)),
@@ -60,6 +61,15 @@ impl Bearing {
             stays_below(own, triangle, &Prism::new(down, far_mm), BED_DROP_MM)
         })
     }
+}
+
+/// The nearest unit vectors that are perpendicular but for rounding: hits and heights are told by the same frame.
+fn exact(normal: Vec3, across: Vec3) -> (Vec3, Vec3) {
+    let unit = |v: Vec3| scale(v, 1.0 / norm(v));
+    let normal = unit(unit(normal));
+    // Twice is enough.
+    let square = |v: Vec3| unit(sub(v, scale(normal, dot(normal, v))));
+    (normal, square(square(across)))
 }
 
 /// All with the points that are on the pieces' surfaces.

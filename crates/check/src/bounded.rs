@@ -102,8 +102,15 @@ pub fn test(kit: &Kit<'_>, claim: &Bounded) -> Result<Play, String> {
         }
     }
     let farthest = |k: usize| claim.of_piece.iter().map(|q| claim.quantities[q[k]].norm()).fold(0.0, f64::max);
+    // Told is how far a centroid goes, wherever displacements are bounded.
+    let of_centroid = |(&piece, &[turn, shift]): (&usize, &[usize; 2])| {
+        let (turn, shift) = (&claim.quantities[turn], &claim.quantities[shift]);
+        let off_mm = shift.at.map_or(0.0, |at| distance(at, kit.meshes[piece].centroid()));
+        shift.norm() + turn.norm() * off_mm
+    };
+    let shift_mm = claim.free.iter().zip(&claim.of_piece).map(of_centroid).fold(0.0, f64::max);
     let slid_mm = kit.slide.filter(|_| is_slide_named).map(|s| s.most_mm);
-    Ok(Play { shift_mm: farthest(1), turn_deg: farthest(0).to_degrees(), slid_mm })
+    Ok(Play { shift_mm, turn_deg: farthest(0).to_degrees(), slid_mm })
 }
 
 impl Bounded {

@@ -238,10 +238,11 @@ fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
 /// Pieces of which it is not claimed that they stay within their play.
 fn unproven(c: &Certificate) -> impl Iterator<Item = Finding> {
     let is_claimed = |id: usize| c.claims.iter().any(|claim| matches!(claim, Claim::Bounded(b) if b.free == [id]));
-    (0..c.pieces.len()).filter(move |&id| !is_claimed(id)).map(|id| Finding {
-        claim: within_play(id),
-        verdict: Verdict::Unproven,
-        figure: "not claimed".into(),
+    (0..c.pieces.len()).filter(move |&id| !is_claimed(id)).map(|id| match c.pieces[id].play {
+        Some(_) => {
+            Finding { claim: within_play(id), verdict: Verdict::Refuted, figure: "told, but not claimed".into() }
+        }
+        None => Finding { claim: within_play(id), verdict: Verdict::Unproven, figure: "not claimed".into() },
     })
 }
 
@@ -284,6 +285,15 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
         let planned = &plan["pieces"][*piece]["installation_direction"];
         if !(0..3).all(|k| is_near(&planned[k], direction[k])) {
             return Err(format!("the plan installs piece {piece} along another direction"));
+        }
+    }
+    for (piece, rattle) in c.pieces.iter().map(|p| (p, &plan["pieces"][p.id]["rattle"])) {
+        let is_no_less = |play: &ToldPlay| {
+            let told = |name: &str| rattle[name].as_f64().unwrap_or(f64::NEG_INFINITY) + SAME;
+            told("translation_mm") >= play.translation_mm && told("rotation_deg") >= play.rotation_deg
+        };
+        if rattle["is_proven"] == true && !piece.play.as_ref().is_some_and(is_no_less) {
+            return Err(format!("the plan calls a play of piece {} proven that is not the certificate's", piece.id));
         }
     }
     match c.pieces.iter().find(|p| plan["pieces"][p.id]["file"] != p.file.as_str()) {

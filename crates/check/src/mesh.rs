@@ -123,6 +123,19 @@ impl Mesh {
         n_surfaces
     }
 
+    /// Centre of the volume; the first corner where there is none.
+    pub fn centroid(&self) -> Vec3 {
+        let origin = self.triangles.first().map_or([0.0; 3], |t| t[0]);
+        let (mut moment, mut volume) = ([0.0; 3], 0.0);
+        for t in &self.triangles {
+            let [a, b, c] = t.map(|p| sub(p, origin));
+            let part = dot(a, cross(b, c)) / 6.0;
+            volume += part;
+            moment = add(moment, scale(add(a, add(b, c)), 0.25 * part));
+        }
+        if volume > 0.0 { add(origin, scale(moment, 1.0 / volume)) } else { origin }
+    }
+
     /// Volume inside, mm³.
     pub fn volume_mm3(&self) -> f64 {
         self.triangles.iter().map(|[a, b, c]| dot(*a, cross(*b, *c)) / 6.0).sum()

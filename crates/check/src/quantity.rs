@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::vector::{Vec3, dot, norm};
+use crate::vector::{Vec3, distance, dot, norm, scale};
 
 /// Difference of directions that are unit vectors or perpendicular, and of such written in full.
 const SAME: f64 = 1e-9;
@@ -25,6 +25,11 @@ pub struct Quantity {
     pub axes: Vec<Vec3>,
     /// For each axis how far against it and along it, mm or rad, above 0.
     pub most: Vec<[f64; 2]>,
+}
+
+/// Whether a unit vector is another one, either way.
+fn is_along(axis: Vec3, line: Vec3) -> bool {
+    distance(axis, line) <= SAME || distance(axis, scale(line, -1.0)) <= SAME
 }
 
 impl Quantity {
@@ -63,8 +68,7 @@ impl Quantity {
 
     /// Whether the axes are, either way, all lines of the directions with coordinates −1, 0 or 1.
     fn covers_lines(&self) -> bool {
-        let is_covered =
-            |line: Vec3| self.axes.iter().any(|axis| (dot(*axis, line).abs() / norm(line) - 1.0).abs() <= SAME);
+        let is_covered = |line: Vec3| self.axes.iter().any(|axis| is_along(*axis, scale(line, 1.0 / norm(line))));
         let digits = |i: usize| [i % 3, i / 3 % 3, i / 9].map(|digit| digit as f64 - 1.0);
         // The numbers up to the middle, which is no direction, are one way along each line.
         self.axes.len() >= LINES && (0..LINES).map(digits).all(is_covered)

@@ -19,7 +19,7 @@ use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 /// Triangles of a barrier before it is given up: real ones have some tens.
-const MOST_TRIANGLES: usize = 400;
+const MOST_TRIANGLES: usize = 380;
 /// Sides of a region.
 pub(super) const SIDES: usize = 8;
 
@@ -134,7 +134,7 @@ impl Surface {
             let Some(clip) = clip(corners, region) else { continue };
             highest = highest.max(clip.highest);
             n_above += usize::from(clip.on_axis.is_some_and(|height| height > 0.0));
-            if highest > most_mm || found.len() > MOST_TRIANGLES {
+            if highest >= most_mm || found.len() > MOST_TRIANGLES {
                 return None;
             }
             for k in (0..3).filter(|&k| clip.edges[k]) {

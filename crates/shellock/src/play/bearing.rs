@@ -152,6 +152,10 @@ impl Surfaces {
         let axis = bearing.axis();
         let above = &self.0[bearing.b];
         let (from, _) = above.tree.first_hit(bearing.point, bearing.normal, MOST_RISE_MM)?;
+        // From within the other piece its surface is seen from inside, and stops nothing.
+        if above.mesh.face_normal(from as usize).dot(bearing.normal) >= 0.0 {
+            return None;
+        }
         above.barrier_mm(from, &axis, region, MOST_RISE_MM)
     }
 
