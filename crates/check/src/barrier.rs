@@ -66,7 +66,7 @@ impl Frame {
         }
         let [[p, x, from], [q, y, to]] = crossings[..] else { return None };
         let share = if x == y { 0.5 } else { (x / (x - y)).clamp(0.0, 1.0) };
-        ((p > 0.0) != (q > 0.0)).then(|| from + (to - from) * share)
+        ((p > 0.0) != (q > 0.0)).then_some(from + (to - from) * share)
     }
 }
 
