@@ -11,7 +11,7 @@ use shellock::pipeline::DesignError;
 use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
 use shellock::play::{KitPlay, PlayParams};
 use shellock::verify::clearance::kit_gaps;
-use shellock::verify::{Assembly, Verification, VerifyParams};
+use shellock::verify::{Assembly, Finding, Verification, VerifyParams};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, play, segmentation, sizes};
 use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
@@ -186,7 +186,10 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let assembly = Assembly { model: &solid, pieces: &pieces, plan: &order, press_fits: &press_fits };
     let (mut verdict, contacts) = shellock::verify::examine(&ctx, &params, &assembly)?;
     let is_plan = verdict.checks.first().is_some_and(|check| check.ok);
-    let measured = if is_plan { Some(played(&ctx, &params, &assembly, &mut verdict)?) } else { None };
+    // Barriers are those of closed surfaces.
+    let is_open = |f: &Finding| matches!(f, Finding::NotClosed { .. } | Finding::SharedEdges { .. });
+    let is_sound = is_plan && !verdict.findings.iter().any(is_open);
+    let measured = if is_sound { Some(played(&ctx, &params, &assembly, &mut verdict)?) } else { None };
     let rim_mm = BodyParams::default().rim_mm;
     let gaps = kit_gaps(&ctx, &solid, &pieces, &order, rim_mm)?;
     let claimed = certify(

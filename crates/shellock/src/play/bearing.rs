@@ -15,6 +15,8 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 pub(super) const SPACING_MM: f64 = 0.35;
 /// The same for pieces whose proof does not close with the former.
 pub(super) const FINE_SPACING_MM: f64 = 0.2;
+/// Most points on one piece: what has more area beside others is no piece of a kit.
+const MOST_POINTS: f64 = 1e6;
 /// What may come on top of the clearance between faces that end motions, mm.
 const REACH_MM: f64 = 0.2;
 /// Faces whose normals have a greater scalar product do not face each other (37° from opposite).
@@ -128,8 +130,8 @@ impl Surfaces {
             points: own.points.clone(),
             triangles: faces.iter().map(|&f| own.triangles[f as usize]).collect(),
         };
-        let n = (near.area() / (spacing_mm * spacing_mm)).ceil() as usize;
-        let samples = sample::on_surface(&near, n.max(1), seed);
+        let n = (near.area() / (spacing_mm * spacing_mm)).ceil().clamp(1.0, MOST_POINTS) as usize;
+        let samples = sample::on_surface(&near, n, seed);
         let bearing = |s: &sample::Sample, b: PatchId| {
             let nearest = self.0[b].tree.nearest(s.point, reach_mm * reach_mm)?;
             let above = self.0[b].mesh.face_normal(nearest.face as usize);

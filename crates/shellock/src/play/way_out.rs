@@ -23,6 +23,8 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 const JOINT_MM: f64 = 2.5;
 /// Distance of neighbouring points of joints, mm.
 const SPACING_MM: f64 = 1.0;
+/// Most samples of one piece, of which those beside others count.
+const MOST_SAMPLES: f64 = 1e6;
 /// Most points of either side.
 const MOST_POINTS: usize = 700;
 /// Faces farther off limit no step, mm.
@@ -84,7 +86,7 @@ impl<'a> Walk<'a> {
     pub fn new(surfaces: &'a Surfaces, piece: PatchId, center: Vec3) -> Self {
         let beside = |a: PatchId, b: &dyn Fn(PatchId) -> bool| -> Vec<Vec3> {
             let mesh = surfaces.mesh(a);
-            let n = (mesh.area() / (SPACING_MM * SPACING_MM)) as usize;
+            let n = (mesh.area() / (SPACING_MM * SPACING_MM)).min(MOST_SAMPLES) as usize;
             let samples = sample::on_surface(mesh, n.max(1), u64::from(a.0)).into_iter().map(|s| s.point);
             // Corners are what meets others first.
             let points = thinned(mesh.points.clone()).into_iter().chain(samples);
