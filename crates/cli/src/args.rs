@@ -46,7 +46,7 @@ pub enum Command {
     },
     /// Make the kit of a figure that comes with the program
     Demo {
-        /// Which figure: squirrel, cat, teddy, octopus, dinosaur, vase or torus
+        /// Which figure: squirrel, cat, teddy, octopus, dinosaur, vase, torus, fish or arms
         #[arg(long, default_value = "squirrel", value_name = "NAME")]
         figure: String,
         #[command(flatten)]
@@ -114,7 +114,7 @@ pub enum Command {
     },
     /// Write one of the figures that come with the program
     Figure {
-        /// Which: squirrel, cat, teddy, octopus, dinosaur, vase or torus
+        /// Which: squirrel, cat, teddy, octopus, dinosaur, vase, torus, fish or arms
         name: String,
         /// Where to write: a .stl or .ply file
         #[arg(short, long, value_name = "FILE")]
@@ -122,6 +122,9 @@ pub enum Command {
         /// Longest side, mm
         #[arg(long, default_value_t = 150.0, value_name = "MM")]
         size: f64,
+        /// Also write the limb of each triangle there, for `build --labels` (fish and arms)
+        #[arg(long, value_name = "FILE")]
+        labels: Option<PathBuf>,
     },
 }
 

@@ -180,15 +180,15 @@ fn made_of(solid: Solid, scale: f64, path: &Path) -> Result<Model, Failure> {
 
 /// A figure that the program makes itself, as if it came from a file.
 pub fn figure(name: &str, options: &Options) -> Result<Model, Failure> {
-    let solid = shellock_figure(name, options.size.or(options.height).unwrap_or(DEFAULT_SIZE_MM))?;
+    let (solid, _) = shellock_figure(name, options.size.or(options.height).unwrap_or(DEFAULT_SIZE_MM))?;
     let bytes = shellock_geom::io::write_stl_binary(solid.mesh());
     let mut model = made_of(solid, 1.0, &PathBuf::from(format!("{name}.stl")))?;
     model.sha256 = sha256(&bytes);
     Ok(model)
 }
 
-/// The figure called `name`, its longest side `size_mm`.
-pub fn shellock_figure(name: &str, size_mm: f64) -> Result<Solid, Failure> {
+/// The figure called `name`, its longest side `size_mm`, and the limb that each triangle is on.
+pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Failure> {
     /// Polygons of about 1/95 of the size: smooth to the eye, some 55 000 triangles.
     const CELLS: f64 = 94.0;
     let figure = shellock::figure::Figure::named(name).ok_or_else(|| {
@@ -196,7 +196,7 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<Solid, Failure> {
         Failure::Wrong(format!("there is no figure \"{name}\"; choose one of {}", all.join(", ")))
     })?;
     check_size(size_mm)?;
-    Ok(shellock::figure::make(figure, size_mm, size_mm / CELLS))
+    Ok(shellock::figure::make_with_limbs(figure, size_mm, size_mm / CELLS))
 }
 
 /// Millimetres a file unit.

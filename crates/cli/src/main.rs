@@ -133,6 +133,6 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Inspect { model, options } => inspect::inspect(session, &model, &options),
         Command::Completions { shell } => Ok(manual::completions(shell)),
         Command::Manual { folder } => manual::write(&folder),
-        Command::Figure { name, out, size } => stages::figure(&name, &out, size),
+        Command::Figure { name, out, size, labels } => stages::figure(&name, &out, size, labels.as_deref()),
     }
 }

@@ -339,14 +339,21 @@ pub fn order_of(plan: &Value) -> Result<InstallationPlan, Failure> {
 }
 
 /// `shellock figure`.
-pub fn figure(name: &str, out: &Path, size_mm: f64) -> Result<u8, Failure> {
-    let solid = input::shellock_figure(name, size_mm)?;
+pub fn figure(name: &str, out: &Path, size_mm: f64, labels: Option<&Path>) -> Result<u8, Failure> {
+    let (solid, limbs) = input::shellock_figure(name, size_mm)?;
+    if labels.is_some() && limbs.iter().all(|limb| *limb == 0) {
+        return Err(Failure::Wrong(format!("{name} is not made of limbs, so it has no labels; fish and arms have")));
+    }
     let bytes = match extension(out).as_str() {
         "stl" => write_stl_binary(solid.mesh()),
         "ply" => write_ply(solid.mesh(), None),
         _ => return Err(Failure::Wrong(format!("{}: choose a name that ends in .stl or .ply", out.display()))),
     };
     write(out, &bytes)?;
+    if let Some(labels) = labels {
+        let lines: String = limbs.iter().map(|limb| format!("{limb}\n")).collect();
+        write(labels, lines.as_bytes())?;
+    }
     println!("{name}, {size_mm} mm, {} triangles, written to {}", solid.mesh().triangles.len(), out.display());
     Ok(0)
 }

@@ -30,12 +30,25 @@ pub enum Figure {
     Vase,
     /// A torus that lies on its side, cut flat: genus 1.
     Torus,
+    /// A fish whose tail hangs on a narrow neck.
+    Fish,
+    /// A body with six round arms of 12 to 40 units: a test of what narrow necks hold.
+    Arms,
 }
 
 impl Figure {
     /// All of them, the demo first.
-    pub const ALL: [Self; 7] =
-        [Self::Squirrel, Self::Cat, Self::Teddy, Self::Octopus, Self::Dinosaur, Self::Vase, Self::Torus];
+    pub const ALL: [Self; 9] = [
+        Self::Squirrel,
+        Self::Cat,
+        Self::Teddy,
+        Self::Octopus,
+        Self::Dinosaur,
+        Self::Vase,
+        Self::Torus,
+        Self::Fish,
+        Self::Arms,
+    ];
 
     /// Lower-case name, as a file would have it.
     pub fn name(self) -> &'static str {
@@ -47,6 +60,8 @@ impl Figure {
             Self::Dinosaur => "dinosaur",
             Self::Vase => "vase",
             Self::Torus => "torus",
+            Self::Fish => "fish",
+            Self::Arms => "arms",
         }
     }
 
@@ -64,6 +79,8 @@ impl Figure {
             Self::Dinosaur => animals::dinosaur(),
             Self::Vase => things::vase(),
             Self::Torus => things::torus(),
+            Self::Fish => animals::fish(),
+            Self::Arms => things::arms(),
         }
     }
 }
@@ -76,10 +93,24 @@ impl Figure {
 ///
 /// Where the cell is larger than about a tenth of the size, so that nothing is left of the figure.
 pub fn make(figure: Figure, size_mm: f64, cell_mm: f64) -> Solid {
+    make_with_limbs(figure, size_mm, cell_mm).0
+}
+
+/// As [`make`], with the limb that each triangle is on: 0 is the trunk. All are 0 where a figure is not made of limbs.
+///
+/// # Panics
+///
+/// As [`make`].
+pub fn make_with_limbs(figure: Figure, size_mm: f64, cell_mm: f64) -> (Solid, Vec<u32>) {
     let sculpture = figure.sculpture();
     let bounds = sculpture.bounds();
     let units_from_mm = bounds.size().max_element() / size_mm;
     let mut mesh = contour(bounds, cell_mm * units_from_mm, |p| sculpture.value(p));
+    let middle = |f: usize| mesh.corners(f).into_iter().sum::<Vec3>() / 3.0;
+    let limbs = match sculpture.n_limbs() {
+        1 => vec![0; mesh.triangles.len()],
+        _ => (0..mesh.triangles.len()).map(|f| sculpture.limb_at(middle(f))).collect(),
+    };
     // Boxes of ellipsoids are not tight: scale by what came out.
     let made = mesh.bounds();
     let mm_from_units = size_mm / made.size().max_element();
@@ -91,7 +122,7 @@ pub fn make(figure: Figure, size_mm: f64, cell_mm: f64) -> Solid {
             p.z = 0.0;
         }
     }
-    Solid::new(mesh).expect("contours are closed; the cell is small against the figure")
+    (Solid::new(mesh).expect("contours are closed; the cell is small against the figure"), limbs)
 }
 
 #[cfg(test)]
@@ -110,6 +141,16 @@ mod tests {
             let flat_mm2: f64 = (0..mesh.triangles.len()).filter(on_floor).map(|f| mesh.face_area(f)).sum();
             assert!(flat_mm2 > 300.0, "{figure:?} stands on {flat_mm2} mm²");
             assert_eq!(Figure::named(figure.name()), Some(figure));
+        }
+    }
+
+    #[test]
+    fn each_limb_of_a_figure_hangs_on_its_trunk() {
+        for (figure, n_limbs) in [(Figure::Fish, 3), (Figure::Arms, 7), (Figure::Teddy, 1)] {
+            let (solid, limbs) = make_with_limbs(figure, 150.0, 3.0);
+            assert_eq!(limbs.len(), solid.mesh().triangles.len());
+            let names: std::collections::BTreeSet<u32> = limbs.iter().copied().collect();
+            assert_eq!(names.into_iter().collect::<Vec<_>>(), (0..n_limbs).collect::<Vec<_>>(), "{figure:?}");
         }
     }
 

@@ -26,6 +26,8 @@ pub(super) enum Form {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sculpture {
     parts: Vec<Part>,
+    /// The limb that forms are added to.
+    limb: u32,
 }
 
 #[derive(Clone, Debug)]
@@ -33,6 +35,7 @@ struct Part {
     form: Form,
     blend: f64,
     bounds: Aabb,
+    limb: u32,
 }
 
 /// Radius of the fillet at the edge of the base, units.
@@ -44,7 +47,7 @@ impl Sculpture {
     /// Adds a form; `blend` is the width, in units, over which it runs into what is there.
     pub fn add(&mut self, form: Form, blend: f64) -> &mut Self {
         let bounds = form.bounds();
-        self.parts.push(Part { form, blend, bounds });
+        self.parts.push(Part { form, blend, bounds, limb: self.limb });
         self
     }
 
@@ -57,6 +60,23 @@ impl Sculpture {
     /// Adds a tube through `stations` of (point, radius), bent smoothly.
     pub fn add_chain(&mut self, stations: &[(Vec3, f64)], blend: f64) -> &mut Self {
         self.add(Form::Chain { stations: spline(stations) }, blend)
+    }
+
+    /// What is added from now on is another limb.
+    pub fn limb(&mut self) -> &mut Self {
+        self.limb += 1;
+        self
+    }
+
+    /// How many limbs there are, the trunk among them.
+    pub fn n_limbs(&self) -> u32 {
+        self.limb + 1
+    }
+
+    /// The limb that a place of the surface is on: 0 is the trunk.
+    pub fn limb_at(&self, p: Vec3) -> u32 {
+        let value = |part: &Part| part.form.value(p, f64::NEG_INFINITY);
+        self.parts.iter().max_by(|a, b| value(a).total_cmp(&value(b))).map_or(0, |part| part.limb)
     }
 
     /// Positive inside.

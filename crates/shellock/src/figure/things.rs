@@ -1,4 +1,4 @@
-//! A vase and a ring.
+//! A vase, a ring, and a body with arms.
 
 use std::f64::consts::TAU;
 
@@ -33,4 +33,17 @@ pub(super) fn torus() -> Sculpture {
     let mut torus = Sculpture::default();
     torus.add(Form::Ring { center: Vec3::new(0.0, 0.0, 18.0), radius: 52.0, thickness: 23.0 }, 0.0);
     torus
+}
+
+/// A body with six round arms of 12 to 40 units: what necks of these widths hold.
+pub(super) fn arms() -> Sculpture {
+    let mut arms = Sculpture::default();
+    arms.add(Form::ellipsoid(Vec3::new(0.0, 0.0, 42.0), Vec3::new(40.0, 40.0, 46.0)), 0.0);
+    // Thick ones far from each other.
+    for (i, radius) in [20.0, 6.0, 13.0, 10.0, 16.0, 8.0].into_iter().enumerate() {
+        let turn = TAU * i as f64 / 6.0;
+        let along = |far: f64| Vec3::new(far * turn.cos(), far * turn.sin(), 42.0);
+        arms.limb().add(Form::RoundCone { a: along(30.0), b: along(75.0 - radius), radius_a: radius, radius_b: radius }, 4.0);
+    }
+    arms
 }
