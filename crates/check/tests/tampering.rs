@@ -32,7 +32,13 @@ fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
 
 /// A cube in three parts: a base with a T-shaped groove, a lid whose tongue slides in along −x, and a pin through both.
 fn parts() -> [Volume; 3] {
-    let (stem, foot) = (([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]), ([10.0, 30.0], [7.0, 23.0], [5.0, 9.0]));
+    parts_with_lips(4.0)
+}
+
+/// The same with lips that reach over the tongue's foot by so much.
+fn parts_with_lips(lip_mm: f64) -> [Volume; 3] {
+    let stem = ([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]);
+    let foot = ([10.0, 30.0], [11.0 - lip_mm, 19.0 + lip_mm], [5.0, 9.0]);
     let pin = ([17.0, 24.0], [13.0, 17.0]);
     let hole = grown(pin.0, pin.1, [1.0, 40.0]);
     let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([p.0[0], 40.0], p.1, p.2);
@@ -419,4 +425,37 @@ fn a_play_that_is_told_less_than_it_is_or_proven_by_less_is_refuted() {
     assert_eq!(lighter, [LID]);
     let told = refuted(|_, c, _| scaled(&mut c["pieces"][1]["play"]["translation_mm"], 0.5));
     assert_eq!(told, [LID]);
+}
+
+/// What is found of the lid's play, and the names of what is refuted.
+fn of_lid(made: &Made, change: impl FnOnce(&Path, &mut Value)) -> (Vec<Verdict>, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    made.files.iter().for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes).unwrap());
+    let mut certificate = made.certificate.clone();
+    change(folder.path(), &mut certificate);
+    fs::write(folder.path().join("certificate.json"), serde_json::to_vec(&certificate).unwrap()).unwrap();
+    fs::write(folder.path().join("plan.json"), serde_json::to_vec(&made.plan).unwrap()).unwrap();
+    let findings = check(folder.path()).unwrap();
+    let of_lid = findings.iter().filter(|f| f.claim == LID).map(|f| f.verdict).collect();
+    (of_lid, findings.into_iter().filter(|f| f.verdict == Verdict::Refuted).map(|f| f.claim).collect())
+}
+
+/// As a tail that came off by hand: it hangs under two lips that reach over it by 0.2 mm each, a clearance of 0.1 mm off.
+#[test]
+fn a_tail_on_two_short_connectors_has_no_proof_and_can_borrow_none() {
+    let ways = [Vec3::X, Vec3::X, Vec3::Z];
+    let (sound, loose) = (made_of(&parts(), &ways), made_of(&parts_with_lips(0.2), &ways));
+    let verdicts = of_lid(&sound, |_, _| {});
+    assert_eq!(verdicts.0, [Verdict::Confirmed], "{verdicts:?}");
+    let verdicts = of_lid(&loose, |_, _| {});
+    assert_eq!(verdicts.0, [Verdict::Unproven], "{verdicts:?}");
+    let borrowed = of_lid(&loose, |_, certificate| {
+        for part in ["claims", "bearings", "slide"] {
+            certificate[part] = sound.certificate[part].clone();
+        }
+    });
+    assert!(borrowed.1.contains(&LID.to_owned()), "{borrowed:?}");
+    // The tongue of the sound one, filed down to that.
+    let filed = of_lid(&sound, |folder, certificate| replace(folder, certificate, 1, &parts_with_lips(0.2)[1]));
+    assert!(filed.1.contains(&LID.to_owned()), "{filed:?}");
 }

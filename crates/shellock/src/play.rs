@@ -132,7 +132,11 @@ pub fn measure(
     let swings = answers.iter().map(|a| a.swings.clone()).collect();
     let doubtful = |id: &PatchId| *id != plan.key() && answers[usize::from(*id)].proof.is_err();
     let walked = |id: PatchId| {
-        let way = Walk::new(&surfaces, id, centers[id]).find(ctx, &answers[usize::from(id)].swings, pieces)?;
+        let way = Walk::new(&surfaces, id, centers[id], params.clearance_mm).find(
+            ctx,
+            &answers[usize::from(id)].swings,
+            pieces,
+        )?;
         Ok(way.map(|poses| (id, poses)))
     };
     let ways_out: Vec<Option<(PatchId, Vec<[f64; 6]>)>> =

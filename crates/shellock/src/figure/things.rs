@@ -43,7 +43,8 @@ pub(super) fn arms() -> Sculpture {
     for (i, radius) in [20.0, 6.0, 13.0, 10.0, 16.0, 8.0].into_iter().enumerate() {
         let turn = TAU * i as f64 / 6.0;
         let along = |far: f64| Vec3::new(far * turn.cos(), far * turn.sin(), 42.0);
-        arms.limb().add(Form::RoundCone { a: along(30.0), b: along(75.0 - radius), radius_a: radius, radius_b: radius }, 4.0);
+        arms.limb()
+            .add(Form::RoundCone { a: along(30.0), b: along(75.0 - radius), radius_a: radius, radius_b: radius }, 4.0);
     }
     arms
 }

@@ -7,11 +7,13 @@
 //! ```text
 //!   ───a──┐┌──b───   walls: at the outside and at the inside of the wall
 //!       ┌─┘└─┐
-//!       │ pin│       pin: at its root and its end, across ŝ and u, and against ŝ
+//!       │ pin│       pin: at its root and its tip, across ŝ and u, and against ŝ; where it ends, along u
 //!       └────┘
 //! ```
 //!
 //! Limits: rails and ribs are not known, so nothing is said of a key; pins are taken as long as their stations' seams.
+
+use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 use shellock_geom::{Aabb, Vec3};
@@ -26,6 +28,10 @@ use crate::plan::InstallationPlan;
 const PIN_DEPTH: f64 = 0.6;
 /// Half of a pin's thickness, as a share of the connector size.
 const PIN_HALF: f64 = 0.25;
+/// Gap at the outside of the wall, as a share of the clearance: rims are nearer to each other than what is beneath them.
+const AT_RIM: f64 = 0.3;
+/// A pin goes on to a station that is no farther than this many times their mean length.
+const NEXT: f64 = 1.6;
 /// Turns count as displacements at this distance, mm.
 const LENGTH_MM: f64 = 50.0;
 /// What has no end goes so far: mm and rad.
@@ -64,8 +70,9 @@ pub fn foreseen(
 /// Displacement, mm, and turn, degrees, of each piece.
 fn plays(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
     let mut contacts: Vec<Vec<Contact>> = vec![Vec::new(); model.assembly.n_parts];
+    let ends = pin_ends(model, meetings);
     for (station, meeting) in meetings.iter().enumerate() {
-        let found = at_station(model, station, meeting, clearance_mm);
+        let found = at_station(model, station, meeting, ends[station], clearance_mm);
         for piece in model.pieces_at(station) {
             contacts[usize::from(piece)].extend(&found);
         }
@@ -79,14 +86,46 @@ fn plays(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clear
     contacts.iter().enumerate().map(of_piece).collect()
 }
 
-/// What a station stops.
-fn at_station(model: &PlanModel, station: usize, meeting: &Meeting, clearance_mm: f64) -> Vec<Contact> {
+/// Names a seam: its pieces and its ends.
+type SeamName = ([PatchId; 2], [[u64; 3]; 2]);
+
+/// Whether the pin of each station ends there, against the seam's tangent and along it.
+fn pin_ends(model: &PlanModel, meetings: &[Meeting]) -> Vec<[bool; 2]> {
+    let seam = |station: usize| -> SeamName {
+        (model.pieces_at(station), model.seam_ends(station).map(|p| p.to_array().map(f64::to_bits)))
+    };
+    let mut of_seam: BTreeMap<SeamName, Vec<usize>> = BTreeMap::new();
+    (0..meetings.len()).for_each(|station| of_seam.entry(seam(station)).or_default().push(station));
+    let mut ends = vec![[true; 2]; meetings.len()];
+    let male = |station: usize| meetings[station].joint.as_ref().map(|joint| joint.male);
+    for &one in of_seam.values().flatten() {
+        let frame = &model.assembly.stations[one];
+        for &other in of_seam[&seam(one)].iter().filter(|&&other| male(other) == male(one)) {
+            let to = model.place_of(other) - model.place_of(one);
+            let far_mm = NEXT * 0.5 * (frame.length_mm + model.assembly.stations[other].length_mm);
+            if other != one && to.length() <= far_mm {
+                ends[one][usize::from(to.dot(frame.tangent) > 0.0)] = false;
+            }
+        }
+    }
+    ends
+}
+
+/// What a station stops; `ends` as [`pin_ends`] says.
+fn at_station(
+    model: &PlanModel,
+    station: usize,
+    meeting: &Meeting,
+    ends: [bool; 2],
+    clearance_mm: f64,
+) -> Vec<Contact> {
     let [a, b] = model.pieces_at(station);
     let frame = &model.assembly.stations[station];
     let below = |depth_mm: f64| model.place_of(station) - depth_mm * frame.normal;
     let contact = |a, b, point, normal| Contact { a, b, point, normal, gap_mm: clearance_mm, area_mm2: 0.0 };
     let wall_mm = model.params.wall_mm;
     let mut found: Vec<Contact> = [0.1, 0.9].map(|share| contact(a, b, below(share * wall_mm), meeting.wall)).to_vec();
+    found[0].gap_mm *= AT_RIM;
     if let Some(joint) = &meeting.joint {
         let (male, female) = if joint.male == Side::A { (a, b) } else { (b, a) };
         let across = joint.leaves.cross(frame.tangent).normalize_or_zero();
@@ -94,6 +133,8 @@ fn at_station(model: &PlanModel, station: usize, meeting: &Meeting, clearance_mm
             let (middle, half) = (below(depth_mm), PIN_HALF * joint.size_mm);
             found.push(contact(male, female, middle - half * joint.leaves, -joint.leaves));
             found.extend([across, -across].map(|side| contact(male, female, middle + half * side, side)));
+            let outwards = [-frame.tangent, frame.tangent].into_iter().zip(ends).filter(|(_, is_end)| *is_end);
+            found.extend(outwards.map(|(side, _)| contact(male, female, middle + 0.5 * frame.length_mm * side, side)));
         }
     }
     found

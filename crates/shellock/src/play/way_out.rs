@@ -1,9 +1,11 @@
 //! A guided search for a way to take a piece out by hand, where it is not proven that there is none.
 //!
 //! From rest the piece goes by small steps. At each pose the points near its joints ask for the nearest surface of the other
-//! side, which gives a linear limit on the next step, and a linear program finds the step that carries on best in the direction of
-//! the walk. A walk that is stuck ends; walks begin with the motions of the widest play. Only a walk that gets out is looked at exactly:
-//! at every pose the piece must share no volume with the others.
+//! side, which gives a linear limit on the next step, and a linear program finds the step that carries on best in some direction.
+//! *Walks* begin with the motions of the widest play and carry on as they went, which finds open shafts. Then a *tree* of poses is grown
+//! towards random poses, each from the nearest one that was reached [LaValle1998], which also finds ways that go forth and back: shifted under one lip,
+//! tilted past the other. From each pose that is farther than all before a walk carries on. Only a walk that gets out is looked at
+//! exactly: at every pose the piece must share no volume with the others.
 //!
 //! Limits: that no way is found proves nothing. Other pieces rest.
 
@@ -22,7 +24,7 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 /// What of a piece is so near to others is its joint, mm.
 const JOINT_MM: f64 = 2.5;
 /// Distance of neighbouring points of joints, mm.
-const SPACING_MM: f64 = 1.0;
+const SPACING_MM: f64 = 0.7;
 /// Most samples of one piece, of which those beside others count.
 const MOST_SAMPLES: f64 = 1e6;
 /// Most points of either side.
@@ -31,21 +33,37 @@ const MOST_POINTS: usize = 700;
 const REACH_MM: f64 = 0.6;
 /// A joint that was moved so far in the mean is out, mm.
 const OUT_MM: f64 = 12.0;
-/// What is kept of each gap, mm, for what lies between points.
-const KEPT_MM: f64 = 0.02;
+/// Rims are some µm apart, and rough: so much they give way, mm.
+const GIVE_MM: f64 = 0.01;
+/// What is kept of wider gaps, mm, for what lies between points.
+const KEPT_MM: f64 = 0.04;
 /// No point of the joint moves farther in a step, mm: thinner things than pins could be jumped.
 const STEP_MM: f64 = 0.15;
 /// A step by less gets nowhere, mm.
 const LEAST_STEP_MM: f64 = 0.01;
 /// Steps of one walk, and steps without coming farther before it ends.
 const MOST_STEPS: usize = 400;
-const MOST_STUCK: usize = 30;
+const MOST_STUCK: usize = 12;
 /// Share of chance in the direction of a step that got on, and of one that did not: a walk along a wall must find the way round its end.
 const CHANCE: [f64; 2] = [0.1, 0.8];
-/// Common volume that is rounding, mm³, on top of that at rest.
-const SHARED_MM3: f64 = 0.01;
+/// Common volume of two pieces that they give way, mm³, on top of that at rest.
+const SHARED_MM3: f64 = 0.05;
 /// Shifts and turns.
 const WAYS: usize = 6;
+/// Poses of a tree, for a piece that small motions hold well and for one that they do not.
+const MOST_NODES: [usize; 2] = [400, 1500];
+/// Small motions that go farther, as multiples of the clearance and in rad for a mm of it, do not hold a piece well.
+const LOOSE: [f64; 2] = [4.0, 0.25];
+/// Steps towards one target.
+const MOST_ON: usize = 8;
+/// Share of the targets that are only turned or shifted on from the farthest pose.
+const ONWARDS: f64 = 0.5;
+/// Targets are up to so many times as far as the farthest pose, and so much, mm.
+const BEYOND: f64 = 1.3;
+const BEYOND_MM: f64 = 0.5;
+/// A pose must be so much farther than the one that the last walk carried on from, as a multiple and mm.
+const FARTHER: f64 = 1.5;
+const FARTHER_MM: f64 = 0.4;
 /// Poses of a way that are kept.
 const KEPT_POSES: usize = 60;
 
@@ -57,6 +75,8 @@ struct Pose {
 }
 
 impl Pose {
+    const REST: Self = Self { turn: Quat::IDENTITY, shift: Vec3::ZERO };
+
     fn apply(&self, center: Vec3, p: Vec3) -> Vec3 {
         center + self.shift + self.turn * (p - center)
     }
@@ -72,18 +92,58 @@ impl Pose {
     }
 }
 
+/// Poses that were reached.
+struct Tree {
+    /// Each with the one that it was reached from.
+    nodes: Vec<(Pose, usize)>,
+    /// The one whose joint is farthest from its place, and how far, mm.
+    farthest: usize,
+    farthest_mm: f64,
+}
+
+impl Tree {
+    fn add(&mut self, pose: Pose, from: usize, moved_mm: f64) -> usize {
+        self.nodes.push((pose, from));
+        let last = self.nodes.len() - 1;
+        if moved_mm > self.farthest_mm {
+            (self.farthest, self.farthest_mm) = (last, moved_mm);
+        }
+        last
+    }
+
+    /// The node nearest to a displacement and turn, which counts by the radius.
+    fn nearest(&self, target: (Vec3, Vec3), radius_mm: f64) -> usize {
+        let far = |(pose, _): &(Pose, usize)| {
+            let turn = (pose.turn.to_scaled_axis() - target.1) * radius_mm;
+            (pose.shift - target.0).length_squared() + turn.length_squared()
+        };
+        let nodes = &self.nodes;
+        (0..nodes.len()).min_by(|&a, &b| far(&nodes[a]).total_cmp(&far(&nodes[b]))).unwrap_or(0)
+    }
+
+    /// The poses from rest to that of `last`.
+    fn path(&self, last: usize) -> Vec<Pose> {
+        let mut on_way = vec![last];
+        while let Some(&node) = on_way.last().filter(|node| **node != 0) {
+            on_way.push(self.nodes[node].1);
+        }
+        on_way.into_iter().rev().map(|node| self.nodes[node].0).collect()
+    }
+}
+
 /// A piece that is to be taken out past all others.
 pub(super) struct Walk<'a> {
     surfaces: &'a Surfaces,
     piece: PatchId,
     center: Vec3,
+    clearance_mm: f64,
     /// Points of the piece's joint, and points of others beside it with their pieces.
     own: Vec<Vec3>,
     others: Vec<Vec3>,
 }
 
 impl<'a> Walk<'a> {
-    pub fn new(surfaces: &'a Surfaces, piece: PatchId, center: Vec3) -> Self {
+    pub fn new(surfaces: &'a Surfaces, piece: PatchId, center: Vec3, clearance_mm: f64) -> Self {
         let beside = |a: PatchId, b: &dyn Fn(PatchId) -> bool| -> Vec<Vec3> {
             let mesh = surfaces.mesh(a);
             let n = (mesh.area() / (SPACING_MM * SPACING_MM)).min(MOST_SAMPLES) as usize;
@@ -96,7 +156,7 @@ impl<'a> Walk<'a> {
         let own = thinned(beside(piece, &|b| b != piece));
         let ids: Vec<PatchId> = surfaces.ids().filter(|&b| b != piece).collect();
         let others = thinned(ids.iter().flat_map(|&b| beside(b, &|a| a == piece)).collect());
-        Self { surfaces, piece, center, own, others }
+        Self { surfaces, piece, center, clearance_mm, own, others }
     }
 
     /// The poses of a way out, from rest; `None` where none was found. Walks begin with `swings`: displacement of the centre, mm, and turn, rad.
@@ -109,40 +169,89 @@ impl<'a> Walk<'a> {
         if self.own.is_empty() {
             return Ok(None);
         }
-        // Then along and about the axes: where nothing ends a small motion there are no swings.
+        // Along and about the axes where nothing ends a small motion.
         let axes = (0..2 * WAYS).map(|i| std::array::from_fn(|k| if k == i / 2 { [1.0, -1.0][i % 2] } else { 0.0 }));
-        for swing in swings.iter().copied().chain(axes) {
-            ctx.check()?;
-            if let Some(poses) = self.walk(ctx, &swing)?
+        let axes = axes.filter(|_| swings.is_empty());
+        for [x, y, z, u, v, w] in swings.iter().copied().chain(axes) {
+            let heading = (Vec3::new(x, y, z), Vec3::new(u, v, w));
+            if let Some(poses) = self.walk(ctx, vec![Pose::REST], heading)?
                 && self.is_free(&poses, pieces)
             {
-                let every = poses.len().div_ceil(KEPT_POSES).max(1);
-                let kept = poses.iter().step_by(every).chain(poses.last());
-                return Ok(Some(kept.map(Pose::written).collect()));
+                return Ok(Some(kept(&poses)));
+            }
+        }
+        let is_loose = swings.iter().any(|s| {
+            let [shift, turn] = [0, 3].map(|k| Vec3::new(s[k], s[k + 1], s[k + 2]).length());
+            shift > LOOSE[0] * self.clearance_mm || turn > LOOSE[1] * self.clearance_mm
+        });
+        self.tree(ctx, pieces, MOST_NODES[usize::from(is_loose || swings.is_empty())])
+    }
+
+    /// The poses of a way out that a tree of poses leads to.
+    fn tree(
+        &self,
+        ctx: &Ctx,
+        pieces: &IdVec<PatchId, TriMesh>,
+        most_nodes: usize,
+    ) -> Result<Option<Vec<[f64; 6]>>, Cancelled> {
+        let mut rng = ChaCha8Rng::seed_from_u64(1 + u64::from(self.piece.0));
+        let radius_mm = self.radius_mm();
+        let mut tree = Tree { nodes: vec![(Pose::REST, 0)], farthest: 0, farthest_mm: 0.0 };
+        let mut walked_mm = 0.0;
+        for _ in 0..most_nodes {
+            ctx.check()?;
+            let size_mm = BEYOND * tree.farthest_mm + BEYOND_MM;
+            let mut random = || Vec3::from_array(std::array::from_fn(|_| rng.random_range(-size_mm..size_mm)));
+            let target = (random(), random() / radius_mm);
+            let (mut last, heading) = if rng.random_bool(ONWARDS) {
+                (tree.farthest, target)
+            } else {
+                let near = tree.nearest(target, radius_mm);
+                let pose = tree.nodes[near].0;
+                (near, (target.0 - pose.shift, target.1 - pose.turn.to_scaled_axis()))
+            };
+            for _ in 0..MOST_ON {
+                let Some(next) = self.moved(&tree.nodes[last].0, heading) else { break };
+                let moved_mm = self.moved_mm(&next);
+                last = tree.add(next, last, moved_mm);
+                if moved_mm > FARTHER * walked_mm + FARTHER_MM {
+                    walked_mm = moved_mm;
+                    let poses = self.walk(ctx, tree.path(last), self.heading(&next))?;
+                    if let Some(poses) = poses.filter(|poses| self.is_free(poses, pieces)) {
+                        return Ok(Some(kept(&poses)));
+                    }
+                }
+            }
+            if tree.nodes.len() > most_nodes {
+                break;
             }
         }
         Ok(None)
     }
 
-    /// All poses of a walk that gets out.
-    fn walk(&self, ctx: &Ctx, swing: &[f64; 6]) -> Result<Option<Vec<Pose>>, Cancelled> {
-        let mut pose = Pose { turn: Quat::IDENTITY, shift: Vec3::ZERO };
-        let mut poses = vec![pose];
-        let ([x, y, z, u, v, w], mut farthest_mm, mut n_stuck) = (*swing, 0.0, 0);
-        let mut heading = (Vec3::new(x, y, z), Vec3::new(u, v, w));
+    /// The pose a step on.
+    fn moved(&self, pose: &Pose, heading: (Vec3, Vec3)) -> Option<Pose> {
+        let (shift, spin) = self.step(pose, heading)?;
+        let turn = Quat::from_scaled_axis(spin);
+        Some(Pose { turn: (turn * pose.turn).normalize(), shift: pose.shift + shift })
+    }
+
+    /// All poses of a walk that carries on from the last of `poses` and gets out.
+    fn walk(&self, ctx: &Ctx, mut poses: Vec<Pose>, mut heading: (Vec3, Vec3)) -> Result<Option<Vec<Pose>>, Cancelled> {
+        let mut pose = *poses.last().unwrap_or(&Pose::REST);
+        let (mut farthest_mm, mut n_stuck) = (self.moved_mm(&pose), 0);
         let mut rng = ChaCha8Rng::seed_from_u64(u64::from(self.piece.0));
         for _ in 0..MOST_STEPS {
             ctx.check()?;
             let towards = self.with_chance(heading, CHANCE[usize::from(n_stuck > 0)], &mut rng);
-            let Some((shift, spin)) = self.step(&pose, towards) else {
+            let Some(next) = self.moved(&pose, towards) else {
                 n_stuck += 1;
                 if n_stuck > MOST_STUCK {
                     return Ok(None);
                 }
                 continue;
             };
-            let turn = Quat::from_scaled_axis(spin);
-            pose = Pose { turn: (turn * pose.turn).normalize(), shift: pose.shift + shift };
+            pose = next;
             poses.push(pose);
             let moved_mm = self.moved_mm(&pose);
             if moved_mm > OUT_MM {
@@ -236,26 +345,41 @@ impl<'a> Walk<'a> {
             .filter(|(id, _)| *id != self.piece)
             .filter_map(|(_, mesh)| Volume::from_closed_mesh(mesh).ok())
             .collect();
-        let shared_mm3 = |pose: &Pose| -> f64 {
+        // With each of the others.
+        let shared_mm3 = |pose: &Pose| -> Vec<f64> {
             let mut mesh = pieces[self.piece].clone();
             mesh.points.iter_mut().for_each(|p| *p = pose.apply(self.center, *p));
             let room = mesh.bounds();
-            let Ok(moved) = Volume::from_closed_mesh(&mesh) else { return f64::INFINITY };
-            others.iter().filter(|o| o.bounds().intersects(room)).map(|o| moved.intersect(o).volume()).sum()
+            let Ok(moved) = Volume::from_closed_mesh(&mesh) else { return vec![f64::INFINITY; others.len()] };
+            let with = |o: &Volume| if o.bounds().intersects(room) { moved.intersect(o).volume() } else { 0.0 };
+            others.iter().map(with).collect()
         };
         let at_rest = shared_mm3(&poses[0]);
-        poses.par_iter().all(|pose| shared_mm3(pose) <= at_rest + SHARED_MM3)
+        let is_free = |shared: Vec<f64>| shared.iter().zip(&at_rest).all(|(mm3, rest)| *mm3 <= rest + SHARED_MM3);
+        poses.par_iter().all(|pose| is_free(shared_mm3(pose)))
     }
 }
 
-/// The direction from the nearest place of a surface to a point, and how far that is, mm: beside an edge the point may pass it. Where it touches or is
-/// inside, the triangle's normal, and nothing.
+/// Some of the poses, the last among them, as they are written.
+fn kept(poses: &[Pose]) -> Vec<[f64; 6]> {
+    let every = poses.len().div_ceil(KEPT_POSES).max(1);
+    poses.iter().step_by(every).chain(poses.last()).map(Pose::written).collect()
+}
+
+/// The direction from the nearest place of a surface to a point, and how far it may come nearer, mm: beside an edge the point may pass it. Where it
+/// touches or is inside, the triangle's normal.
 fn apart(p: Vec3, near: Vec3, normal: Vec3) -> (Vec3, f64) {
     /// Less is touching, mm.
-    const TOUCHING_MM: f64 = 0.01;
+    const TOUCHING_MM: f64 = 5e-4;
+    /// No step leads so far in, mm: what is farther from the surface is outside, whatever the normal beside an edge says.
+    const DEEPEST_MM: f64 = 2.0 * GIVE_MM;
     let away = p - near;
     let gap_mm = away.length();
-    if gap_mm > TOUCHING_MM && away.dot(normal) > 0.0 { (away / gap_mm, gap_mm - KEPT_MM) } else { (normal, 0.0) }
+    if gap_mm > DEEPEST_MM || (gap_mm > TOUCHING_MM && away.dot(normal) > 0.0) {
+        (away / gap_mm, (gap_mm - KEPT_MM).max(GIVE_MM))
+    } else {
+        (normal, GIVE_MM - gap_mm)
+    }
 }
 
 fn limit(point: Vec3, normal: Vec3, gap_mm: f64) -> Contact {
