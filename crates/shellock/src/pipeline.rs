@@ -275,6 +275,9 @@ pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>)
     Ok(cut.compared_with(outcome))
 }
 
+/// How often pieces are joined because they rattle in a kit that was made and is sound else.
+const MOST_RATTLING: usize = 2;
+
 /// How often pieces are joined because they are foreseen to rattle, which costs a search for a plan each time and no kit.
 const MOST_JOININGS: usize = 5;
 
@@ -337,7 +340,7 @@ impl Job<'_> {
         let mut grid = WallGrid { params: &body, model: &laid.model, room_mm: 0.0, made: None };
         let mut kits = Kits { best: None, n_left: params.rounds.kits_in_all, may_join: true };
         let mut n_joined = 0;
-        let mut mending = 0;
+        let (mut mending, mut n_rattled) = (0, 0);
         let attempt = loop {
             grid.make_room(params.connector.room_mm(sizes.sizes.largest_mm()));
             let attempt = with_segmentation(ctx, &params, &mut grid, &surface, &sizes, &mut kits)?;
@@ -360,7 +363,11 @@ impl Job<'_> {
                 other => other,
             };
             let Attempt::Failed { blamed, loose, rattling, .. } = &attempt else { break attempt };
-            if mending == params.rounds.mendings || kits.n_left == 0 {
+            let is_last = match rattling.is_empty() {
+                true => mending == params.rounds.mendings,
+                false => n_rattled == MOST_RATTLING,
+            };
+            if is_last || kits.n_left == 0 {
                 break attempt;
             }
             let is_hopeless = kits.best.is_none() && 2 * mending >= params.rounds.mendings;
@@ -371,7 +378,11 @@ impl Job<'_> {
             let Some(mended) = mended.and_then(|m| cut_again(&mut params, m)) else { break attempt };
             ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
             surface = mended;
-            mending += 1;
+            if rattling.is_empty() {
+                mending += 1;
+            } else {
+                n_rattled += 1;
+            }
             sizes = choose(&params, &surface)?;
         };
         // Warnings of segmentations and plans that were given up go with them.

@@ -28,8 +28,6 @@ use crate::plan::InstallationPlan;
 const PIN_DEPTH: f64 = 0.6;
 /// Half of a pin's thickness, as a share of the connector size.
 const PIN_HALF: f64 = 0.25;
-/// Gap at the outside of the wall, as a share of the clearance: rims are nearer to each other than what is beneath them.
-const AT_RIM: f64 = 0.3;
 /// A pin goes on to a station that is no farther than this many times their mean length.
 const NEXT: f64 = 1.6;
 /// Turns count as displacements at this distance, mm.
@@ -125,7 +123,6 @@ fn at_station(
     let contact = |a, b, point, normal| Contact { a, b, point, normal, gap_mm: clearance_mm, area_mm2: 0.0 };
     let wall_mm = model.params.wall_mm;
     let mut found: Vec<Contact> = [0.1, 0.9].map(|share| contact(a, b, below(share * wall_mm), meeting.wall)).to_vec();
-    found[0].gap_mm *= AT_RIM;
     if let Some(joint) = &meeting.joint {
         let (male, female) = if joint.male == Side::A { (a, b) } else { (b, a) };
         let across = joint.leaves.cross(frame.tangent).normalize_or_zero();

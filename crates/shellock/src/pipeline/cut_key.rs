@@ -11,6 +11,8 @@ use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning, segmentat
 /// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where the best does not do,
 /// others seldom do.
 const MOST_KITS: [usize; 3] = [3, 2, 2];
+/// Keys whose kits fail by pieces that rattle alone before no others are tried.
+const MOST_RATTLING: usize = 2;
 /// Kits made for one segmentation, and mendings of it.
 const MOST_KITS_EACH: usize = 2;
 const MOST_MENDINGS: usize = 1;
@@ -91,6 +93,7 @@ impl Cut {
 /// Makes kits with keys cut at the best places, until one passes.
 pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
     let mut cut = Cut::default();
+    let mut n_rattling = 0;
     let mut params = job.params.clone();
     params.rounds.kits = params.rounds.kits.min(MOST_KITS_EACH);
     params.rounds.mendings = params.rounds.mendings.min(MOST_MENDINGS);
@@ -116,12 +119,12 @@ pub(super) fn design(ctx: &Ctx, job: &Job<'_>) -> Result<Cut, DesignError> {
                     return Ok(Cut { best: Some(*made), reasons: Vec::new() });
                 }
                 let reason = format!("with {} it fails: {}", told(site), failed.join(", "));
-                // Where other pieces than the key rattle, another key changes nothing.
-                let is_of_pieces = only_rattles(&made) && !rattling(&made).is_empty();
+                // Where other pieces than the key rattle, another key changes little: one more is tried.
+                n_rattling += usize::from(only_rattles(&made) && !rattling(&made).is_empty());
                 if cut.best.as_ref().is_none_or(|best| is_better(&made, best)) {
                     cut.best = Some(*made);
                 }
-                if is_of_pieces {
+                if n_rattling == MOST_RATTLING {
                     cut.reasons.push(reason);
                     break;
                 }
