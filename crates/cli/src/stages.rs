@@ -338,11 +338,23 @@ pub fn order_of(plan: &Value) -> Result<InstallationPlan, Failure> {
     }
 }
 
+/// Whether both are the same name in the same folder.
+fn same_file(a: &Path, b: &Path) -> bool {
+    let folder = |p: &Path| match p.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => fs::canonicalize(folder).ok(),
+        _ => fs::canonicalize(".").ok(),
+    };
+    a.file_name() == b.file_name() && folder(a) == folder(b)
+}
+
 /// `shellock figure`.
 pub fn figure(name: &str, out: &Path, size_mm: f64, labels: Option<&Path>) -> Result<u8, Failure> {
     let (solid, limbs) = input::shellock_figure(name, size_mm)?;
     if labels.is_some() && limbs.iter().all(|limb| *limb == 0) {
         return Err(Failure::Wrong(format!("{name} is not made of limbs, so it has no labels; fish and arms have")));
+    }
+    if labels.is_some_and(|labels| same_file(labels, out)) {
+        return Err(Failure::Wrong("the figure and its labels need two different files".into()));
     }
     let bytes = match extension(out).as_str() {
         "stl" => write_stl_binary(solid.mesh()),

@@ -231,9 +231,11 @@ pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> (Chec
         at: pieces[*piece].centroid().to_array(),
     };
     let findings: Vec<Finding> = play.ways_out.iter().map(found).collect();
-    let n_open = play.alone.iter().filter(|(_, play)| play.is_none_or(|p| !p.is_proven)).count();
+    let is_open = |(id, p): &(PatchId, &Option<Play>)| *id != play.slide.key && p.is_none_or(|p| !p.is_proven);
+    let n_open = play.alone.iter().filter(is_open).count();
     let figure = match n_open {
-        0 => "proven for all pieces".to_owned(),
+        0 if play.alone.iter().all(|(_, p)| p.is_some_and(|p| p.is_proven)) => "proven for all pieces".to_owned(),
+        0 => "proven for all pieces but the key".to_owned(),
         n => format!("a way out was looked for for {n} pieces without a proof; {} found", findings.len()),
     };
     (Check::new("no piece can be worked out by hand", findings.is_empty(), figure), findings)
@@ -247,10 +249,12 @@ pub fn warning(play: &KitPlay) -> Option<Warning> {
     let line =
         |(id, play): &(PatchId, Play)| format!("{id} (about {:.1} mm, {:.1}°)", play.translation_mm, play.rotation_deg);
     let list: Vec<String> = open.iter().map(line).collect();
+    let is_searched = open.iter().any(|o| o.0 != play.slide.key);
+    let search = if is_searched { "; no way to take out one that is not the key was found" } else { "" };
     (!open.is_empty()).then(|| Warning {
         code: "not-proven".into(),
         message: format!(
-            "how far these pieces can be moved within the clearance is estimated, not proven: {}; no way to take one out was found",
+            "how far these pieces can be moved within the clearance is estimated, not proven: {}{search}",
             list.join(", ")
         ),
         pieces: open.iter().map(|o| o.0).collect(),

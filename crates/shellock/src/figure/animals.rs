@@ -191,7 +191,7 @@ pub(super) fn dinosaur() -> Sculpture {
 /// A fish on its belly: its tail hangs on a neck of 13 units with two short seams.
 pub(super) fn fish() -> Sculpture {
     let mut fish = Sculpture::default();
-    fish.add(Form::ellipsoid(at(-14.0, 0.0, 26.0), at(58.0, 18.0, 29.0)), 0.0);
+    fish.add(Form::ellipsoid(at(-14.0, 0.0, 23.0), at(58.0, 18.0, 29.0)), 0.0);
     fish.limb()
         .add_chain(&[(at(34.0, 0.0, 27.0), 10.0), (at(52.0, 0.0, 29.0), 6.5), (at(62.0, 0.0, 30.0), 6.5)], 8.0)
         .add(Form::ellipsoid(at(68.0, 0.0, 32.0), at(12.0, 6.5, 30.0)), 5.0);

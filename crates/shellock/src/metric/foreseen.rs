@@ -29,7 +29,7 @@ const PIN_DEPTH: f64 = 0.6;
 /// Half of a pin's thickness, as a share of the connector size.
 const PIN_HALF: f64 = 0.25;
 /// A pin goes on to a station that is no farther than this many times their mean length.
-const NEXT: f64 = 1.6;
+const NEXT: f64 = 2.2;
 /// Turns count as displacements at this distance, mm.
 const LENGTH_MM: f64 = 50.0;
 /// What has no end goes so far: mm and rad.
@@ -101,7 +101,7 @@ fn pin_ends(model: &PlanModel, meetings: &[Meeting]) -> Vec<[bool; 2]> {
         for &other in of_seam[&seam(one)].iter().filter(|&&other| male(other) == male(one)) {
             let to = model.place_of(other) - model.place_of(one);
             let far_mm = NEXT * 0.5 * (frame.length_mm + model.assembly.stations[other].length_mm);
-            if other != one && to.length() <= far_mm {
+            if other != one && to.length() > 0.0 && to.length() <= far_mm {
                 ends[one][usize::from(to.dot(frame.tangent) > 0.0)] = false;
             }
         }

@@ -117,8 +117,6 @@ fn what_lies_under_wide_lips_is_proven_to_stay_and_under_narrow_ones_it_is_not()
     // Shifted under one lip by 0.4 mm it is free of the other, which reaches over it by 0.3.
     let loose = measured(&under_lips(0.3, 0.4), 0.4);
     assert!(!loose.alone[PatchId(1)].is_some_and(|p| p.is_proven), "{:?}", loose.alone);
-    // Forth, up and back: the only way.
-    assert!(loose.ways_out.iter().any(|way| way.0 == PatchId(1)), "it is not found to come out");
 }
 
 #[test]

@@ -9,6 +9,8 @@
 //!
 //! Limits: that no way is found proves nothing. Other pieces rest.
 
+use std::sync::OnceLock;
+
 use nalgebra::DVector;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +26,7 @@ use crate::{Cancelled, Ctx, IdVec, PatchId};
 /// What of a piece is so near to others is its joint, mm.
 const JOINT_MM: f64 = 2.5;
 /// Distance of neighbouring points of joints, mm.
-const SPACING_MM: f64 = 0.7;
+const SPACING_MM: f64 = 1.0;
 /// Most samples of one piece, of which those beside others count.
 const MOST_SAMPLES: f64 = 1e6;
 /// Most points of either side.
@@ -33,8 +35,8 @@ const MOST_POINTS: usize = 700;
 const REACH_MM: f64 = 0.6;
 /// A joint that was moved so far in the mean is out, mm.
 const OUT_MM: f64 = 12.0;
-/// Rims are some µm apart, and rough: so much they give way, mm.
-const GIVE_MM: f64 = 0.01;
+/// How far faces give way, mm: rims are some µm apart, and rough. With the first, wide faces share no volume that counts.
+const GIVE_MM: [f64; 2] = [0.001, 0.01];
 /// What is kept of wider gaps, mm, for what lies between points.
 const KEPT_MM: f64 = 0.04;
 /// No point of the joint moves farther in a step, mm: thinner things than pins could be jumped.
@@ -48,10 +50,12 @@ const MOST_STUCK: usize = 12;
 const CHANCE: [f64; 2] = [0.1, 0.8];
 /// Common volume of two pieces that they give way, mm³, on top of that at rest.
 const SHARED_MM3: f64 = 0.05;
+/// The same as a share of the piece, where that is less.
+const SHARED: f64 = 1e-4;
 /// Shifts and turns.
 const WAYS: usize = 6;
 /// Poses of a tree, for a piece that small motions hold well and for one that they do not.
-const MOST_NODES: [usize; 2] = [400, 1500];
+const MOST_NODES: [usize; 2] = [150, 700];
 /// Small motions that go farther, as multiples of the clearance and in rad for a mm of it, do not hold a piece well.
 const LOOSE: [f64; 2] = [4.0, 0.25];
 /// Steps towards one target.
@@ -137,6 +141,9 @@ pub(super) struct Walk<'a> {
     piece: PatchId,
     center: Vec3,
     clearance_mm: f64,
+    give_mm: f64,
+    /// The others, and the volume of the piece, mm³, once they are needed; nothing where one is no volume.
+    solids: OnceLock<Option<(Vec<Volume>, f64)>>,
     /// Points of the piece's joint, and points of others beside it with their pieces.
     own: Vec<Vec3>,
     others: Vec<Vec3>,
@@ -156,12 +163,12 @@ impl<'a> Walk<'a> {
         let own = thinned(beside(piece, &|b| b != piece));
         let ids: Vec<PatchId> = surfaces.ids().filter(|&b| b != piece).collect();
         let others = thinned(ids.iter().flat_map(|&b| beside(b, &|a| a == piece)).collect());
-        Self { surfaces, piece, center, clearance_mm, own, others }
+        Self { surfaces, piece, center, clearance_mm, give_mm: GIVE_MM[0], solids: OnceLock::new(), own, others }
     }
 
     /// The poses of a way out, from rest; `None` where none was found. Walks begin with `swings`: displacement of the centre, mm, and turn, rad.
     pub fn find(
-        &self,
+        mut self,
         ctx: &Ctx,
         swings: &[[f64; 6]],
         pieces: &IdVec<PatchId, TriMesh>,
@@ -172,12 +179,16 @@ impl<'a> Walk<'a> {
         // Along and about the axes where nothing ends a small motion.
         let axes = (0..2 * WAYS).map(|i| std::array::from_fn(|k| if k == i / 2 { [1.0, -1.0][i % 2] } else { 0.0 }));
         let axes = axes.filter(|_| swings.is_empty());
-        for [x, y, z, u, v, w] in swings.iter().copied().chain(axes) {
-            let heading = (Vec3::new(x, y, z), Vec3::new(u, v, w));
-            if let Some(poses) = self.walk(ctx, vec![Pose::REST], heading)?
-                && self.is_free(&poses, pieces)
-            {
-                return Ok(Some(kept(&poses)));
+        let starts: Vec<[f64; 6]> = swings.iter().copied().chain(axes).collect();
+        for give_mm in GIVE_MM {
+            self.give_mm = give_mm;
+            for &[x, y, z, u, v, w] in starts.iter().step_by(if give_mm > GIVE_MM[0] { 1 } else { 2 }) {
+                let heading = (Vec3::new(x, y, z), Vec3::new(u, v, w));
+                if let Some(poses) = self.walk(ctx, vec![Pose::REST], heading)?
+                    && self.is_free(ctx, &poses, pieces)?
+                {
+                    return Ok(Some(kept(&poses)));
+                }
             }
         }
         let is_loose = swings.iter().any(|s| {
@@ -217,7 +228,9 @@ impl<'a> Walk<'a> {
                 if moved_mm > FARTHER * walked_mm + FARTHER_MM {
                     walked_mm = moved_mm;
                     let poses = self.walk(ctx, tree.path(last), self.heading(&next))?;
-                    if let Some(poses) = poses.filter(|poses| self.is_free(poses, pieces)) {
+                    if let Some(poses) = poses
+                        && self.is_free(ctx, &poses, pieces)?
+                    {
                         return Ok(Some(kept(&poses)));
                     }
                 }
@@ -254,7 +267,7 @@ impl<'a> Walk<'a> {
             pose = next;
             poses.push(pose);
             let moved_mm = self.moved_mm(&pose);
-            if moved_mm > OUT_MM {
+            if moved_mm > OUT_MM && self.is_apart(&pose) {
                 return Ok(Some(poses));
             }
             n_stuck = if moved_mm > farthest_mm + LEAST_STEP_MM { 0 } else { n_stuck + 1 };
@@ -284,6 +297,13 @@ impl<'a> Walk<'a> {
     /// How far the joint is from its place in the mean, mm.
     fn moved_mm(&self, pose: &Pose) -> f64 {
         self.own.iter().map(|&p| pose.apply(self.center, p).distance(p)).sum::<f64>() / self.own.len() as f64
+    }
+
+    /// Whether a quarter of the joint is away from the others: what only spins in its place is not out.
+    fn is_apart(&self, pose: &Pose) -> bool {
+        let is_near =
+            |p: &&Vec3| self.surfaces.nearest(pose.apply(self.center, **p), JOINT_MM, &|b| b != self.piece).is_some();
+        4 * self.own.iter().filter(is_near).count() < 3 * self.own.len()
     }
 
     /// The small motion that carries the joint's points on as they went so far: the sum of their ways, and its moment.
@@ -326,37 +346,46 @@ impl<'a> Walk<'a> {
         let of_own = |p: &Vec3| {
             let to = pose.apply(self.center, *p);
             let (_, near, normal) = self.surfaces.nearest(to, REACH_MM, &is_other)?;
-            let (away, gap_mm) = apart(to, near, normal);
+            let (away, gap_mm) = apart(to, near, normal, self.give_mm);
             Some(limit(to - at, -away, gap_mm))
         };
         let of_other = |p: &Vec3| {
             let within = pose.undo(self.center, *p);
             let (_, near, normal) = self.surfaces.nearest(within, REACH_MM, &|b| b == self.piece)?;
-            let (away, gap_mm) = apart(within, near, normal);
+            let (away, gap_mm) = apart(within, near, normal, self.give_mm);
             Some(limit(*p - at, pose.turn * away, gap_mm))
         };
         self.own.iter().filter_map(of_own).chain(self.others.iter().filter_map(of_other)).collect()
     }
 
-    /// Whether the piece shares no more with the others at any pose than at rest.
-    fn is_free(&self, poses: &[Pose], pieces: &IdVec<PatchId, TriMesh>) -> bool {
-        let others: Vec<Volume> = pieces
-            .iter()
-            .filter(|(id, _)| *id != self.piece)
-            .filter_map(|(_, mesh)| Volume::from_closed_mesh(mesh).ok())
-            .collect();
-        // With each of the others.
-        let shared_mm3 = |pose: &Pose| -> Vec<f64> {
+    /// Whether the piece shares no more with any of the others at any pose than at rest.
+    fn is_free(&self, ctx: &Ctx, poses: &[Pose], pieces: &IdVec<PatchId, TriMesh>) -> Result<bool, Cancelled> {
+        let solids = self.solids.get_or_init(|| {
+            let others = pieces.iter().filter(|(id, _)| *id != self.piece);
+            let others: Vec<Volume> =
+                others.map(|(_, mesh)| Volume::from_closed_mesh(mesh).ok()).collect::<Option<_>>()?;
+            Some((others, Volume::from_closed_mesh(&pieces[self.piece]).ok()?.volume()))
+        });
+        let Some((others, own_mm3)) = solids else { return Ok(false) };
+        let most_mm3 = SHARED_MM3.min(SHARED * own_mm3);
+        // With each of the others; nothing where the piece is no volume any more.
+        let shared_mm3 = |pose: &Pose| -> Option<Vec<f64>> {
             let mut mesh = pieces[self.piece].clone();
             mesh.points.iter_mut().for_each(|p| *p = pose.apply(self.center, *p));
             let room = mesh.bounds();
-            let Ok(moved) = Volume::from_closed_mesh(&mesh) else { return vec![f64::INFINITY; others.len()] };
+            let moved = Volume::from_closed_mesh(&mesh).ok()?;
             let with = |o: &Volume| if o.bounds().intersects(room) { moved.intersect(o).volume() } else { 0.0 };
-            others.iter().map(with).collect()
+            Some(others.iter().map(with).collect())
         };
-        let at_rest = shared_mm3(&poses[0]);
-        let is_free = |shared: Vec<f64>| shared.iter().zip(&at_rest).all(|(mm3, rest)| *mm3 <= rest + SHARED_MM3);
-        poses.par_iter().all(|pose| is_free(shared_mm3(pose)))
+        let Some(at_rest) = shared_mm3(&poses[0]) else { return Ok(false) };
+        let is_free = |shared: &Vec<f64>| shared.iter().zip(&at_rest).all(|(mm3, rest)| *mm3 <= rest + most_mm3);
+        for some in poses.chunks(8) {
+            ctx.check()?;
+            if !some.par_iter().all(|pose| shared_mm3(pose).as_ref().is_some_and(is_free)) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 }
 
@@ -368,17 +397,17 @@ fn kept(poses: &[Pose]) -> Vec<[f64; 6]> {
 
 /// The direction from the nearest place of a surface to a point, and how far it may come nearer, mm: beside an edge the point may pass it. Where it
 /// touches or is inside, the triangle's normal.
-fn apart(p: Vec3, near: Vec3, normal: Vec3) -> (Vec3, f64) {
+fn apart(p: Vec3, near: Vec3, normal: Vec3, give_mm: f64) -> (Vec3, f64) {
     /// Less is touching, mm.
     const TOUCHING_MM: f64 = 5e-4;
     /// No step leads so far in, mm: what is farther from the surface is outside, whatever the normal beside an edge says.
-    const DEEPEST_MM: f64 = 2.0 * GIVE_MM;
+    const DEEPEST_MM: f64 = 2.0 * GIVE_MM[1];
     let away = p - near;
     let gap_mm = away.length();
     if gap_mm > DEEPEST_MM || (gap_mm > TOUCHING_MM && away.dot(normal) > 0.0) {
-        (away / gap_mm, (gap_mm - KEPT_MM).max(GIVE_MM))
+        (away / gap_mm, (gap_mm - KEPT_MM).max(give_mm))
     } else {
-        (normal, GIVE_MM - gap_mm)
+        (normal, give_mm - gap_mm)
     }
 }
 
