@@ -29,7 +29,7 @@ const PIN_DEPTH: f64 = 0.6;
 /// Half of a pin's thickness, as a share of the connector size.
 const PIN_HALF: f64 = 0.25;
 /// A pin goes on to a station that is no farther than this many times their mean length.
-const NEXT: f64 = 2.2;
+const NEXT: f64 = 1.6;
 /// Turns count as displacements at this distance, mm.
 const LENGTH_MM: f64 = 50.0;
 /// What has no end goes so far: mm and rad.
