@@ -113,7 +113,7 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
             poses: poses.iter().map(|p| pose(*p)).collect(),
         }],
     };
-    let ways_out = design.play.ways_out.iter().map(way_out);
+    let ways_out = design.play.ways_out.iter().flatten().map(way_out);
     (!shake.moves.is_empty()).then_some(shake).into_iter().chain(ways_out).collect()
 }
 

@@ -224,7 +224,7 @@ fn played(
     verdict: &mut Verification,
 ) -> Result<KitPlay, Failure> {
     let VerifyParams { clearance_mm, seed } = *params;
-    let measured = play::measure(
+    let mut measured = play::measure(
         ctx,
         &PlayParams { clearance_mm, slide_mm: play::SLIDE_MM, is_together: false, seed },
         kit.pieces,
@@ -232,7 +232,8 @@ fn played(
     )?;
     let size_mm = kit.model.mesh().bounds().size().max_element();
     verdict.add(play::check(&measured, kit.pieces, size_mm, clearance_mm));
-    verdict.add(play::check_ways_out(&measured, kit.pieces));
+    play::look_for_ways_out(ctx, clearance_mm, kit.pieces, &mut measured)?;
+    play::check_ways_out(&measured, kit.pieces).into_iter().for_each(|check| verdict.add(check));
     Ok(measured)
 }
 

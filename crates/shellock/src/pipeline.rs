@@ -481,10 +481,14 @@ pub fn make(
     warn_of_press_fits(ctx, &finished);
     let assembly = verify::Assembly { model, pieces: &finished.meshes, plan: &plan, press_fits: &finished.press_fits };
     let (mut verification, touching) = verify::examine(ctx, &params.verify, &assembly)?;
-    let measured = play::measure(ctx, &params.play(), &finished.meshes, &plan)?;
+    let mut measured = play::measure(ctx, &params.play(), &finished.meshes, &plan)?;
     let size_mm = model.mesh().bounds().size().max_element();
     verification.add(play::check(&measured, &finished.meshes, size_mm, params.verify.clearance_mm));
-    verification.add(play::check_ways_out(&measured, &finished.meshes));
+    if verification.passed() {
+        // It is slow; what fails already is not given out.
+        play::look_for_ways_out(ctx, params.verify.clearance_mm, &finished.meshes, &mut measured)?;
+        play::check_ways_out(&measured, &finished.meshes).into_iter().for_each(|check| verification.add(check));
+    }
     play::warning(&measured).into_iter().for_each(|warning| ctx.warn(warning));
     warn_of_bare_seams(ctx, sizes, &contacts, &finished.joints);
     Ok(Design {

@@ -59,6 +59,9 @@ fn play_of([shift_mm, turn]: [f64; 2], is_proven: bool) -> Play {
     Play { translation_mm: shift_mm, rotation_deg: turn.to_degrees(), is_proven }
 }
 
+/// A piece, and poses from rest on that take it out: displacement of the centroid, mm, and rotation vector, rad.
+pub type WayOut = (PatchId, Vec<[f64; 6]>);
+
 /// The play of a kit's pieces, with its proofs.
 #[derive(Clone, Debug)]
 pub struct KitPlay {
@@ -73,9 +76,9 @@ pub struct KitPlay {
     pub estimates: IdVec<PatchId, Option<Play>>,
     /// Small motions of each piece that go that far: displacement of its centroid, mm, and turn, rad.
     pub swings: IdVec<PatchId, Vec<[f64; 6]>>,
-    /// Ways on which pieces can be taken out by hand though they are not the key: poses from rest on, displacement of the centroid, mm, and
-    /// rotation vector, rad.
-    pub ways_out: Vec<(PatchId, Vec<[f64; 6]>)>,
+    /// Ways on which pieces can be taken out by hand though they are not the key; `None` where nobody looked, see
+    /// [`look_for_ways_out`].
+    pub ways_out: Option<Vec<WayOut>>,
     /// Of each piece while all but one move; `None` for that one. Nothing where it is not proven.
     pub together: Option<IdVec<PatchId, Option<Play>>>,
     /// One for each piece whose play is proven, in order, then that of all together.
@@ -92,7 +95,7 @@ impl Proof {
 }
 
 /// Measures the play of finished `pieces` that are installed as `plan` says, whose last step is the key. A function of its
-/// arguments alone, on any number of threads. A kit of 13 pieces takes 3 s of processor time, more where pieces are loose.
+/// arguments alone, on any number of threads. A kit of 13 pieces takes 3 s of processor time. Ways out are not looked for.
 pub fn measure(
     ctx: &Ctx,
     params: &PlayParams,
@@ -130,18 +133,6 @@ pub fn measure(
     let alone = answers.iter().map(alone).collect();
     let estimates = answers.iter().map(|a| a.linear.first().map(|&linear| play_of(linear, false))).collect();
     let swings = answers.iter().map(|a| a.swings.clone()).collect();
-    let doubtful = |id: &PatchId| *id != plan.key() && answers[usize::from(*id)].proof.is_err();
-    let walked = |id: PatchId| {
-        let way = Walk::new(&surfaces, id, centers[id], params.clearance_mm).find(
-            ctx,
-            &answers[usize::from(id)].swings,
-            pieces,
-        )?;
-        Ok(way.map(|poses| (id, poses)))
-    };
-    let ways_out: Vec<Option<(PatchId, Vec<[f64; 6]>)>> =
-        ids.par_iter().copied().filter(doubtful).map(walked).collect::<Result<_, Cancelled>>()?;
-    let ways_out = ways_out.into_iter().flatten().collect();
     let asked: BTreeSet<usize> = answers.iter().flat_map(|a| a.asked.iter().copied()).collect();
     let mut proofs: Vec<Proof> = answers.into_iter().filter_map(|a| a.proof.ok()).collect();
     let mut together = None;
@@ -162,7 +153,31 @@ pub fn measure(
             proofs.push(proof);
         }
     }
-    Ok(KitPlay { slide, bearings, alone, estimates, swings, ways_out, together, proofs })
+    Ok(KitPlay { slide, bearings, alone, estimates, swings, ways_out: None, together, proofs })
+}
+
+/// Looks for ways out of the `pieces` that `play` has no proof for; the key's is no secret. A function of its arguments alone, on any
+/// number of threads. A piece takes 2 to 4 s of processor time: it is for kits that pass all else.
+pub fn look_for_ways_out(
+    ctx: &Ctx,
+    clearance_mm: f64,
+    pieces: &IdVec<PatchId, TriMesh>,
+    play: &mut KitPlay,
+) -> Result<(), Cancelled> {
+    let doubtful: Vec<PatchId> = play.unproven().filter(|id| *id != play.slide.key).collect();
+    let found = if doubtful.is_empty() {
+        Vec::new()
+    } else {
+        ctx.stage("ways out", 0)?;
+        let surfaces = Surfaces::new(pieces);
+        let walked = |id: PatchId| {
+            let walk = Walk::new(&surfaces, id, pieces[id].centroid(), clearance_mm);
+            Ok(walk.find(ctx, &play.swings[id], pieces)?.map(|poses| (id, poses)))
+        };
+        doubtful.into_par_iter().map(walked).collect::<Result<Vec<Option<WayOut>>, Cancelled>>()?
+    };
+    play.ways_out = Some(found.into_iter().flatten().collect());
+    Ok(())
 }
 
 /// All but the piece that touches others at most points: held, it leaves the others least room.
@@ -224,32 +239,31 @@ pub fn check(
     (Check::new("pieces sit within their play", findings.is_empty(), words(play)), findings)
 }
 
-/// Whether no piece but the key was found to come out by hand.
-pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> (Check, Vec<Finding>) {
-    let found = |(piece, _): &(PatchId, Vec<[f64; 6]>)| Finding::ComesOut {
-        piece: *piece,
-        at: pieces[*piece].centroid().to_array(),
+/// Whether no piece but the key was found to come out by hand; `None` where nobody looked.
+pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> Option<(Check, Vec<Finding>)> {
+    let found = |(piece, _): &WayOut| Finding::ComesOut { piece: *piece, at: pieces[*piece].centroid().to_array() };
+    let findings: Vec<Finding> = play.ways_out.as_ref()?.iter().map(found).collect();
+    let open: Vec<PatchId> = play.unproven().collect();
+    let figure = match open.as_slice() {
+        [] => "proven for all pieces".to_owned(),
+        [only] if *only == play.slide.key => "proven for all pieces but the key".to_owned(),
+        open => {
+            let n = open.iter().filter(|id| **id != play.slide.key).count();
+            format!("a way out was looked for for {n} pieces without a proof; {} found", findings.len())
+        }
     };
-    let findings: Vec<Finding> = play.ways_out.iter().map(found).collect();
-    let is_open = |(id, p): &(PatchId, &Option<Play>)| *id != play.slide.key && p.is_none_or(|p| !p.is_proven);
-    let n_open = play.alone.iter().filter(is_open).count();
-    let figure = match n_open {
-        0 if play.alone.iter().all(|(_, p)| p.is_some_and(|p| p.is_proven)) => "proven for all pieces".to_owned(),
-        0 => "proven for all pieces but the key".to_owned(),
-        n => format!("a way out was looked for for {n} pieces without a proof; {} found", findings.len()),
-    };
-    (Check::new("no piece can be worked out by hand", findings.is_empty(), figure), findings)
+    Some((Check::new("no piece can be worked out by hand", findings.is_empty(), figure), findings))
 }
 
 /// The pieces of which it is neither proven how far they go nor found that they come out, with the figures of small motions.
 pub fn warning(play: &KitPlay) -> Option<Warning> {
-    let comes_out = |id: PatchId| play.ways_out.iter().any(|way| way.0 == id);
+    let comes_out = |id: PatchId| play.ways_out.iter().flatten().any(|way| way.0 == id);
     let open = play.alone.iter().filter_map(|(id, play)| Some((id, (*play)?)));
     let open: Vec<(PatchId, Play)> = open.filter(|(id, play)| !play.is_proven && !comes_out(*id)).collect();
     let line =
         |(id, play): &(PatchId, Play)| format!("{id} (about {:.1} mm, {:.1}°)", play.translation_mm, play.rotation_deg);
     let list: Vec<String> = open.iter().map(line).collect();
-    let is_searched = open.iter().any(|o| o.0 != play.slide.key);
+    let is_searched = play.ways_out.is_some() && open.iter().any(|o| o.0 != play.slide.key);
     let search = if is_searched { "; no way to take out one that is not the key was found" } else { "" };
     (!open.is_empty()).then(|| Warning {
         code: "not-proven".into(),
@@ -276,6 +290,11 @@ pub fn words(play: &KitPlay) -> String {
 }
 
 impl KitPlay {
+    /// The pieces without a proof of how far they go.
+    pub fn unproven(&self) -> impl Iterator<Item = PatchId> + '_ {
+        self.alone.iter().filter(|(_, play)| play.is_none_or(|p| !p.is_proven)).map(|(id, _)| id)
+    }
+
     /// The piece that moves farthest; `None` where some piece has no end.
     pub fn loosest(&self) -> Option<(PatchId, Play)> {
         let all: Vec<(PatchId, Play)> =

@@ -15,7 +15,10 @@ const CLEARANCE_MM: f64 = 2.0 * HALF_GAP_MM;
 fn measured(kit: &Kit, clearance_mm: f64) -> KitPlay {
     let (report, stop) = (|_: crate::context::Progress<'_>| {}, AtomicBool::new(false));
     let params = PlayParams { clearance_mm, slide_mm: SLIDE_MM, is_together: true, seed: 0 };
-    measure(&Ctx::new(&report, &stop), &params, &kit.pieces, &kit.plan).unwrap()
+    let ctx = Ctx::new(&report, &stop);
+    let mut play = measure(&ctx, &params, &kit.pieces, &kit.plan).unwrap();
+    look_for_ways_out(&ctx, clearance_mm, &kit.pieces, &mut play).unwrap();
+    play
 }
 
 /// A cube of 10 mm in a closed cage with a gap all round; the key is elsewhere.
@@ -103,20 +106,46 @@ fn what_nothing_holds_is_found_to_come_out() {
     let kit = Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X; 3]);
     let play = measured(&kit, 0.1);
     assert!(!play.alone[PatchId(1)].is_some_and(|p| p.is_proven), "{:?}", play.alone);
-    let (_, poses) = play.ways_out.iter().find(|way| way.0 == PatchId(1)).expect("it slides out upwards");
+    let (_, poses) = play.ways_out.iter().flatten().find(|way| way.0 == PatchId(1)).expect("it slides out upwards");
     assert_eq!(poses[0], [0.0; 6]);
     assert!(poses[poses.len() - 1][2] > 9.0, "{:?}", poses.last());
-    let (check, findings) = check_ways_out(&play, &kit.pieces);
+    let (check, findings) = check_ways_out(&play, &kit.pieces).expect("it was looked for");
     assert!(!check.ok && findings.iter().any(|f| matches!(f, Finding::ComesOut { piece: PatchId(1), .. })));
 }
 
 #[test]
 fn what_lies_under_wide_lips_is_proven_to_stay_and_under_narrow_ones_it_is_not() {
     let held = measured(&under_lips(3.0, 0.12), 0.12);
-    assert!(held.alone[PatchId(1)].is_some_and(|p| p.is_proven) && held.ways_out.is_empty(), "{:?}", held.alone);
+    assert!(
+        held.alone[PatchId(1)].is_some_and(|p| p.is_proven) && held.ways_out == Some(Vec::new()),
+        "{:?}",
+        held.alone
+    );
     // Shifted under one lip by 0.4 mm it is free of the other, which reaches over it by 0.3.
     let loose = measured(&under_lips(0.3, 0.4), 0.4);
     assert!(!loose.alone[PatchId(1)].is_some_and(|p| p.is_proven), "{:?}", loose.alone);
+}
+
+#[test]
+fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
+    let key = cuboid([60.0, 61.0], ALL, ALL);
+    // Open in front alone; a drawer of 16 mm that must be pulled all its way.
+    let cabinet = cuboid(ALL, ALL, ALL).subtract(&cuboid([10.0, 40.0], [9.9, 20.1], [9.9, 20.1]));
+    let drawer = cuboid([14.0, 30.0], [10.0, 20.0], [10.0, 20.0]);
+    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[cabinet, drawer, key.clone()], &[Vec3::X; 3]);
+    let play = measured(&kit, 0.1);
+    assert!(play.ways_out.iter().flatten().any(|way| way.0 == PatchId(1)), "{:?}", play.alone);
+    // Nothing ends the ball's turns; still it is where it was.
+    let ball = |radius_mm: f64| {
+        let sphere = crate::testing::sphere(3, Vec3::splat(radius_mm));
+        Volume::from_closed_mesh(&sphere).unwrap().translate(Vec3::splat(15.0))
+    };
+    let socket =
+        cuboid(ALL, ALL, ALL).subtract(&ball(8.15)).subtract(&cuboid([14.0, 16.0], [14.0, 16.0], [15.0, 40.0]));
+    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[socket, ball(8.0), key], &[Vec3::X; 3]);
+    let play = measured(&kit, 0.1);
+    assert!(play.unproven().any(|id| id == PatchId(1)));
+    assert_eq!(play.ways_out, Some(Vec::new()));
 }
 
 #[test]
