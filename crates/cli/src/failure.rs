@@ -44,18 +44,8 @@ impl From<shellock::Cancelled> for Failure {
 impl Failure {
     /// The process exit code.
     pub fn exit_code(&self) -> u8 {
-        use shellock::body::BodyError;
-        use shellock::piece::PieceError;
-        use shellock::segmentation::SegmentationError;
         match self {
-            Self::Stopped
-            | Self::Stress(StressError::Cancelled(_))
-            | Self::Design(
-                DesignError::Cancelled(_)
-                | DesignError::Body(BodyError::Cancelled(_))
-                | DesignError::Piece(PieceError::Cancelled(_))
-                | DesignError::Segmentation(SegmentationError::Cancelled(_)),
-            ) => 130,
+            Self::Stopped | Self::Stress(StressError::Cancelled(_)) | Self::Design(DesignError::Cancelled(_)) => 130,
             Self::NoPlan(_) => 3,
             Self::Unwritable { .. } | Self::Design(DesignError::Piece(_)) => 4,
             _ => 2,

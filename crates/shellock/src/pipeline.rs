@@ -223,40 +223,44 @@ pub enum DesignError {
     Strength(StrengthError),
     /// The surface cannot be divided.
     #[error(transparent)]
-    Segmentation(#[from] SegmentationError),
+    Segmentation(SegmentationError),
     /// The wall cannot be made.
     #[error(transparent)]
     Grid(#[from] GridError),
     /// The wall cannot be split.
     #[error(transparent)]
-    Body(#[from] BodyError),
+    Body(BodyError),
     /// Plans cannot be compared.
     #[error(transparent)]
     Choice(ChoiceError),
     /// A piece cannot be finished.
     #[error(transparent)]
-    Piece(#[from] PieceError),
+    Piece(PieceError),
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
-impl From<StrengthError> for DesignError {
-    fn from(e: StrengthError) -> Self {
-        match e {
-            StrengthError::Cancelled(c) => c.into(),
-            other => Self::Strength(other),
+/// A stage's error becomes the job's; a stop inside of a stage is a stop of the job.
+macro_rules! from_stage {
+    ($($stage:ident => $variant:ident),+ $(,)?) => {$(
+        impl From<$stage> for DesignError {
+            fn from(e: $stage) -> Self {
+                match e {
+                    $stage::Cancelled(stop) => stop.into(),
+                    other => Self::$variant(other),
+                }
+            }
         }
-    }
+    )+};
 }
 
-impl From<ChoiceError> for DesignError {
-    fn from(e: ChoiceError) -> Self {
-        match e {
-            ChoiceError::Cancelled(c) => c.into(),
-            other => Self::Choice(other),
-        }
-    }
+from_stage! {
+    StrengthError => Strength,
+    SegmentationError => Segmentation,
+    BodyError => Body,
+    ChoiceError => Choice,
+    PieceError => Piece,
 }
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds
@@ -322,10 +326,10 @@ impl Job<'_> {
         let mut surface = laid.surface.clone();
         let cut_again = |params: &mut Params, surface: SegmentedSurface| match key {
             Some(key) => key.cut(ctx, params, surface),
-            None => Some(surface),
+            None => Ok(Some(surface)),
         };
         let no_key = || DesignOutcome::NoPlan { reason: "the key falls apart".into(), blockers: Vec::new() };
-        let Some(cut) = cut_again(&mut params, surface) else { return Ok(no_key()) };
+        let Some(cut) = cut_again(&mut params, surface)? else { return Ok(no_key()) };
         surface = cut;
         let choose = |params: &Params, surface: &SegmentedSurface| {
             let mut chosen = sizes::choose(ctx, &params.sizes(), surface, stress_mpa)?;
@@ -348,7 +352,7 @@ impl Job<'_> {
                 Attempt::Joined(fewer) => {
                     n_joined += 1;
                     kits.may_join = n_joined < MOST_JOININGS;
-                    if let Some(fewer) = cut_again(&mut params, fewer) {
+                    if let Some(fewer) = cut_again(&mut params, fewer)? {
                         ctx.note(&format!(
                             "pieces would rattle: {} pieces instead of {}",
                             fewer.n_patches, surface.n_patches
@@ -372,10 +376,11 @@ impl Job<'_> {
             }
             let is_hopeless = kits.best.is_none() && 2 * mending >= params.rounds.mendings;
             let mended = match rattling.is_empty() {
-                false => joined(ctx, &params, &surface, rattling),
-                true => mended(ctx, &params, &surface, blamed, loose, is_hopeless),
+                false => joined(ctx, &params, &surface, rattling)?,
+                true => mended(ctx, &params, &surface, blamed, loose, is_hopeless)?,
             };
-            let Some(mended) = mended.and_then(|m| cut_again(&mut params, m)) else { break attempt };
+            let Some(mended) = mended else { break attempt };
+            let Some(mended) = cut_again(&mut params, mended)? else { break attempt };
             ctx.note(&format!("another segmentation: {} pieces instead of {}", mended.n_patches, surface.n_patches));
             surface = mended;
             if rattling.is_empty() {
@@ -591,3 +596,6 @@ fn rooms(params: &Params, surface: &SegmentedSurface, sizes: &ConnectorSizes) ->
     let reach = params.body.thickness_mm + params.connector.room_mm(sizes.largest_mm()) + SHIFT_MM;
     rooms.as_slice().iter().map(|r| r.grown(reach)).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -361,18 +361,23 @@ fn held_twice(
 
 /// The same surface with `patch` divided in two, mended and smoothed again; `None` where it cannot be divided.
 ///
-/// The feedback loop asks for this where no plan takes the piece out or holds it. Patches may be renumbered.
+/// The feedback loop asks for this where no plan takes the piece out or holds it. Patches may be renumbered. Fails where the user stopped,
+/// or the seams cannot be smoothed.
 pub fn divide(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     patch: PatchId,
-) -> Option<SegmentedSurface> {
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
     changed(ctx, params, surface, |solid, labels| split_piece(solid, labels, patch))
 }
 
-/// The same surface mended and smoothed again, as its patches are; patches may be renumbered.
-pub fn mended_again(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface) -> Option<SegmentedSurface> {
+/// The same surface mended and smoothed again, as its patches are; `None` where a patch would vanish. Patches may be renumbered.
+pub fn mended_again(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    surface: &SegmentedSurface,
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
     changed(ctx, params, surface, |_, labels| Some(labels.clone()))
 }
 
@@ -385,12 +390,12 @@ pub fn unite(
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     patches: &[PatchId],
-) -> Option<SegmentedSurface> {
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
     let graph = surface.contact_graph(0.0);
     let mut number: Vec<u32> = (0..surface.n_patches as u32).collect();
     for &patch in patches {
         let touching = graph.contacts().iter().filter(|c| c.a == patch || c.b == patch);
-        let longest = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm))?;
+        let Some(longest) = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm)) else { return Ok(None) };
         let into = number[usize::from(if longest.a == patch { longest.b } else { longest.a })];
         let own = number[usize::from(patch)];
         number.iter_mut().filter(|k| **k == own).for_each(|k| *k = into);
@@ -412,15 +417,20 @@ fn changed(
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     change: impl Fn(&Solid, &FaceLabels) -> Option<FaceLabels>,
-) -> Option<SegmentedSurface> {
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
     let limited = SegmentationParams { min_contact_mm: kept_limit_mm(params, surface), ..params.clone() };
-    let solid = Solid::new(surface.mesh.clone()).ok()?;
+    let Ok(solid) = Solid::new(surface.mesh.clone()) else { return Ok(None) };
     let label: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
     let labels = FaceLabels::from_connected(&Topology::new(&solid), &label);
-    let mended = mend(ctx, &limited, &solid, &change(&solid, &labels)?).ok()?;
-    let mut next = smooth_and_cut(ctx, params, &solid, &mended).ok()?;
+    let Some(changed) = change(&solid, &labels) else { return Ok(None) };
+    let mended = mend(ctx, &limited, &solid, &changed)?;
+    let mut next = match smooth_and_cut(ctx, params, &solid, &mended) {
+        // Other pieces may do.
+        Err(SegmentationError::PatchVanished { .. }) => return Ok(None),
+        made => made?,
+    };
     next.source_face.iter_mut().for_each(|f| *f = surface.source_face[*f as usize]);
-    Some(next)
+    Ok(Some(next))
 }
 
 /// Halves edges until none is longer than the limit, which grows with models far larger than 300 mm to bound their triangles.

@@ -6,6 +6,7 @@ use super::rounds::{is_better, only_rattles, rattling};
 use super::{Design, DesignError, DesignOutcome, Job, Laid, Params};
 use crate::key::{self, KeyParams, KeyPrism, KeySite};
 use crate::piece::Grip;
+use crate::segmentation::SegmentationError;
 use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning, segmentation};
 
 /// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where the best does not do,
@@ -37,14 +38,19 @@ impl CutKey {
     /// The surface with the key as a patch, which `params` then name; `None` where it does not come out as one piece.
     ///
     /// Where the key leaves a piece hanging on another, the pieces are mended first.
-    pub(super) fn cut(&self, ctx: &Ctx, params: &mut Params, surface: SegmentedSurface) -> Option<SegmentedSurface> {
+    pub(super) fn cut(
+        &self,
+        ctx: &Ctx,
+        params: &mut Params,
+        surface: SegmentedSurface,
+    ) -> Result<Option<SegmentedSurface>, SegmentationError> {
         let faults = |s: &SegmentedSurface| {
             let p = &params.segmentation;
             s.contact_graph_below(p.wall_mm, p.least_contact_mm).n_faults()
         };
-        let mut best = key::imprint(&surface, &self.site.prism)?;
+        let Some(mut best) = key::imprint(&surface, &self.site.prism) else { return Ok(None) };
         if faults(&best.0) > 0
-            && let Some(mended) = segmentation::mended_again(ctx, &params.segmentation, &best.0)
+            && let Some(mended) = segmentation::mended_again(ctx, &params.segmentation, &best.0)?
             && let Some(again) = key::imprint(&mended, &self.site.prism)
             && faults(&again.0) < faults(&best.0)
         {
@@ -54,7 +60,7 @@ impl CutKey {
         params.plan.key_slide = Some(self.along);
         params.body.key_gap_mm = Some(params.body.wall_gap_mm.max(0.5 * params.connector.key_clearance_mm));
         params.grip = params.has_grip.then(|| self.grip());
-        Some(best.0)
+        Ok(Some(best.0))
     }
 }
 

@@ -7,6 +7,7 @@ use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
 use crate::feedback::{Lesson, lessons};
 use crate::metric::Holding;
 use crate::plan::{Blocker, FoundPlan, InstallationPlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::segmentation::SegmentationError;
 use crate::sizes::ChosenSizes;
 use crate::verify::Finding;
 use crate::{ConnectorSizes, Ctx, PatchId, SegmentedSurface, key, metric, plan, segmentation};
@@ -22,18 +23,35 @@ pub(super) fn mended(
     blamed: &[PatchId],
     loose: &[PatchId],
     is_hopeless: bool,
-) -> Option<SegmentedSurface> {
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
     /// Pieces joined at once; more would change what holds.
     const MOST_JOINED: usize = 2;
     let params = &params.segmentation;
-    let divided = || blamed.iter().find_map(|&p| segmentation::divide(ctx, params, surface, p));
     let united = |pieces: &[PatchId]| segmentation::unite(ctx, params, surface, pieces);
     if is_hopeless {
-        return blamed.iter().find_map(|&p| united(&[p]));
+        return first(blamed, |p| united(&[p]));
     }
-    let is_thin = !loose.is_empty() && segmentation::has_short_contacts(params, surface);
-    let joined = is_thin.then(|| united(&loose[..loose.len().min(MOST_JOINED)])).flatten();
-    joined.or_else(divided)
+    if !loose.is_empty() && segmentation::has_short_contacts(params, surface) {
+        let joined = united(&loose[..loose.len().min(MOST_JOINED)])?;
+        if joined.is_some() {
+            return Ok(joined);
+        }
+    }
+    first(blamed, |p| segmentation::divide(ctx, params, surface, p))
+}
+
+/// The first change of a piece that can be made.
+fn first<T>(
+    pieces: &[PatchId],
+    mut change: impl FnMut(PatchId) -> Result<Option<T>, SegmentationError>,
+) -> Result<Option<T>, SegmentationError> {
+    for &piece in pieces {
+        let changed = change(piece)?;
+        if changed.is_some() {
+            return Ok(changed);
+        }
+    }
+    Ok(None)
 }
 
 /// The pieces that rattle, the loosest first; the key, which is cut where there is room for it, is left out.
@@ -62,11 +80,11 @@ pub(super) fn joined(
     params: &Params,
     surface: &SegmentedSurface,
     rattling: &[PatchId],
-) -> Option<SegmentedSurface> {
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
     /// More would change what holds.
     const MOST_JOINED: usize = 2;
     let loosest = &rattling[..rattling.len().min(MOST_JOINED)];
-    (!loosest.is_empty()).then(|| segmentation::unite(ctx, &params.segmentation, surface, loosest)).flatten()
+    if loosest.is_empty() { Ok(None) } else { segmentation::unite(ctx, &params.segmentation, surface, loosest) }
 }
 
 /// The kits made so far.
@@ -170,7 +188,7 @@ pub(super) fn with_segmentation(
             }
         };
         if kits.may_join
-            && let Some(surface) = joined(ctx, params, surface, &foreseen_to_rattle(&found, &holding))
+            && let Some(surface) = joined(ctx, params, surface, &foreseen_to_rattle(&found, &holding))?
         {
             return Ok(Attempt::Joined(surface));
         }
