@@ -9,6 +9,7 @@
 //!            and the two may slide along u; every other relative motion is blocked
 //! ```
 
+use crate::connector::PIN_DEPTH;
 use shellock_geom::Vec3;
 
 /// The two sides of a station.
@@ -96,16 +97,13 @@ pub struct Joint {
     pub pull_on_a: Vec3,
     /// Weight w of Eq. 4, > 0.
     pub weight: f64,
-    /// Connector size D, mm, > 0: the pin is 0.6 D deep and half as thick as D.
+    /// Connector size D, mm, > 0; its proportions: [`crate::connector`].
     pub size_mm: f64,
 }
 
-/// An opening this wide, in connector sizes, has let the pin out of its channel: the joint does not hold.
-const LOST_SIZES: f64 = 0.6;
-
-/// Whether `opening_mm` lets the connector go that `meeting` has.
+/// Whether `opening_mm` lets the connector go that `meeting` has: the pin is out of its channel.
 pub(crate) fn is_lost(meeting: &Meeting, opening_mm: f64) -> bool {
-    let lost_mm = meeting.joint.map_or(f64::INFINITY, |joint| LOST_SIZES * joint.size_mm);
+    let lost_mm = meeting.joint.map_or(f64::INFINITY, |joint| PIN_DEPTH * joint.size_mm);
     opening_mm.is_nan() || opening_mm >= lost_mm
 }
 

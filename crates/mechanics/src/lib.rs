@@ -5,6 +5,7 @@
 //! from outside. This crate knows parts and stations, but neither patches nor plans.
 
 pub mod assembly;
+pub mod connector;
 pub mod material;
 pub mod neighbourhood;
 pub mod sample;

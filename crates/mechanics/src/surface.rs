@@ -37,6 +37,7 @@ use shellock_geom::sparse::SparseError;
 
 use crate::Material;
 use crate::assembly::{Joint, Meeting, Resistance, ShellAssembly, Station};
+use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 use parts::{N_MOTIONS, Part, parts};
 
 /// How the shell resists. Lengths in mm.
@@ -75,12 +76,12 @@ impl Default for SurfaceParams {
 impl SurfaceParams {
     /// Depth of a joint's strips below mid-wall, mm.
     fn strip_mm(&self, joint: &Joint) -> f64 {
-        0.5 * self.wall_mm + 0.6 * joint.size_mm
+        0.5 * self.wall_mm + PIN_DEPTH * joint.size_mm
     }
 
     /// Stiffness of a contact along that much seam, N/mm: that of a pin of size D, as deep as wide, bent like a cantilever.
     fn contact_n_mm(&self, size_mm: f64, length_mm: f64) -> f64 {
-        let (thickness, depth) = (0.5 * size_mm, 0.6 * size_mm);
+        let (thickness, depth) = (PIN_WIDTH * size_mm, PIN_DEPTH * size_mm);
         3.0 * self.stiffness_ratios[2] * terms::bending(self, thickness) * length_mm / depth.powi(3)
     }
 }

@@ -4,12 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::pipeline::Design;
 use crate::plan::{InstallationPlan, PlanConstraints};
+use crate::seam::rules::SHORTEST_RUN_SIZES;
 use crate::verify::Finding;
 use crate::{LatticeDirection, PatchId};
-
-/// A contact holds if its connectors are at least this long in all, in connector sizes. One run is at least 1.2 long; on
-/// the models tried, joints under this were the ones that came loose.
-const LEAST_JOINT: f64 = 1.2;
 
 /// One thing learned.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,7 +162,7 @@ fn weak_joints(design: &Design) -> Option<Lesson> {
     for joint in &design.joints {
         lengths.entry(by_order(joint.male, joint.female)).or_default()[0] += joint.length_mm;
     }
-    let is_weak = |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < LEAST_JOINT * design.sizes.of(a, b);
+    let is_weak = |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * design.sizes.of(a, b);
     let weak = lengths.into_iter().filter(|(pair, [length_mm, _])| is_weak(*pair, *length_mm));
     let joints: Vec<WeakJoint> = weak
         .map(|((later, earlier), [length_mm, seam_mm])| {

@@ -6,7 +6,6 @@
 pub mod body;
 pub mod certificate;
 pub mod connector;
-pub mod contact_graph;
 pub mod context;
 pub mod direction;
 pub mod feedback;
@@ -23,7 +22,7 @@ pub mod plan;
 pub mod play;
 pub mod push;
 pub mod report;
-mod seams;
+pub mod seam;
 pub mod segmentation;
 pub mod sizes;
 pub mod strength;
@@ -34,9 +33,9 @@ mod svg;
 mod testing;
 pub mod verify;
 
-pub use contact_graph::{Contact, ContactGraph};
 pub use context::{Cancelled, Ctx, Warning};
 pub use direction::LatticeDirection;
 pub use ids::{IdVec, PatchId};
+pub use seam::graph::{Contact, ContactGraph};
 pub use sizes::ConnectorSizes;
 pub use surface::{Seam, SegmentedSurface};

@@ -2,7 +2,7 @@
 //!
 //! Labels come from the user or from clustering; they are mended until every patch is a disk and no single piece holds others alone;
 //! then the seams are smoothed and the triangles cut along them. Deviation from the paper, which takes the labels as given: without
-//! mending most labelled models have no plan that locks (see [`crate::contact_graph`]).
+//! mending most labelled models have no plan that locks (see [`crate::seam::graph`]).
 
 mod auto;
 mod changes;

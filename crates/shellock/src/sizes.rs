@@ -22,6 +22,7 @@
 //! Limits: the plan is not known yet, so neither is the angle of a connector, and a channel that leans may be twice as deep;
 //! connectors on the wall opposite are not looked at. What does not fit after all is left out or carved, as with any size.
 
+use shellock_mechanics::connector::CHANNEL_DEPTH;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
@@ -40,8 +41,6 @@ pub(crate) const LEAST_CONTACT_SIZES: f64 = 4.2;
 /// A closed seam has no ends that need gaps: only the run.
 const LOOP_SIZES: f64 = 2.5;
 
-/// Depth of a straight channel without its clearance, in connector sizes: pin and floor.
-const DEPTH_SIZES: f64 = 1.05;
 /// Share of a pair's seams on which the cavity must have room for the size; the rest is left out or carved.
 const ROOM_SHARE: f64 = 0.8;
 /// Distance between the places where the cavity is measured, mm: below the smallest connector.
@@ -56,7 +55,7 @@ pub type StressField<'a> = &'a (dyn Fn(Vec3) -> f64 + Sync);
 
 /// Depth of a channel below the wall where the piece leaves straight out, mm; `clearance_mm` between the pin and the floor.
 pub fn depth_mm(size_mm: f64, clearance_mm: f64) -> f64 {
-    DEPTH_SIZES * size_mm + clearance_mm
+    CHANNEL_DEPTH * size_mm + clearance_mm
 }
 
 /// Connector size D of every pair of pieces, mm.
@@ -338,7 +337,7 @@ impl Cavity {
 
 /// The largest size whose channel fits where the model is so thick, the clearance away from the wall opposite, mm; may be < 0.
 fn size_within_mm(params: &SizeParams, thickness_mm: f64) -> f64 {
-    (thickness_mm - 2.0 * (params.wall_mm + params.clearance_mm)) / DEPTH_SIZES
+    (thickness_mm - 2.0 * (params.wall_mm + params.clearance_mm)) / CHANNEL_DEPTH
 }
 
 impl ChosenSizes {

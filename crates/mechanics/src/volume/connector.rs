@@ -19,12 +19,9 @@ use super::VolumeModel;
 use super::element::{EDGES, Order, gradients, lame, stiffness, volume_6};
 use super::front::Front;
 use super::rows::ROWS;
+use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 use crate::{Joint, Meeting, SIDES, Side};
 
-/// How far the pin reaches, as a share of the connector size D.
-const DEPTH: f64 = 0.6;
-/// Thickness of pin, channel side and foot, as a share of D.
-const THICKNESS: f64 = 0.5;
 /// Corners this far outside the wall still count as inside, as a share of D: places on the inner surface are inside.
 const SLACK: f64 = 0.05;
 /// Least volume of a tetrahedron of a bar, as a share of a straight one's; below, frames twist too far for a connector.
@@ -67,9 +64,10 @@ impl Section {
         // n = −u × ŝ with u = v × N, v from male to female.
         let s = joint.leaves;
         let n = male_to_female * s.dot(place.normal) - place.normal * s.dot(male_to_female);
-        let thick = n * (if joint.male == side { -THICKNESS } else { THICKNESS } * size);
+        let thick = n * (if joint.male == side { -PIN_WIDTH } else { PIN_WIDTH } * size);
         let edge = model.inner_edge[station][side.index()] + along_mm * place.tangent;
-        let at = [-DEPTH, 0.0, THICKNESS].map(|s_share| [0.0, 1.0].map(|k| edge + s * (s_share * size) + thick * k));
+        let at =
+            [-PIN_DEPTH, 0.0, PIN_WIDTH].map(|s_share| [0.0, 1.0].map(|k| edge + s * (s_share * size) + thick * k));
 
         let is_inside = |x: Vec3| {
             let least = -SLACK * size;

@@ -1,6 +1,7 @@
 //! The cross-section of a connector.
 
 use shellock_geom::Vec3;
+use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, PIN_DEPTH, PIN_WIDTH};
 
 use super::run::RailPart;
 use super::{ConnectorParams, Shape, Station};
@@ -101,10 +102,10 @@ impl Section {
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
         // Stretch along ŝ; ŝ leans against the seam by the angle whose cosine is `depth`.
         let k = 1.0 / station.depth.max(0.4);
-        let (pin_width, foot_width) = (0.5 * d, 0.5 * d);
-        let (wall, bottom) = (0.5 * d - c, 0.45 * d);
+        let (pin_width, foot_width) = (PIN_WIDTH * d, FOOT_WIDTH * d);
+        let (wall, bottom) = (PIN_WIDTH * d - c, FLOOR * d);
         let lean = pin_width * backward.tan();
-        let pin_depth = (0.6 * d + lean) * k;
+        let pin_depth = (PIN_DEPTH * d + lean) * k;
         let top_male = d.min(pin_width * forward.min(1.48).tan() + ROOT_MM) * k;
         let is_tongue = station.theta < TONGUE_ANGLE;
         let top_near = if is_tongue { 0.0 } else { (foot_width * backward.tan() + 0.5) * k };

@@ -8,8 +8,8 @@ use shellock_geom::Vec3;
 
 use super::ConnectorParams;
 use super::frame::Curve;
-use super::run::{RailPart, Run, SHALLOWEST, Shape, Station, has_room};
-use crate::plan::contact::{MAX_OUT_OF_RAIL, end_gap_mm};
+use super::run::{RailPart, Run, Shape, Station, has_room};
+use crate::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, end_gap_mm};
 
 /// The seam may leave a straight line by this much across, and the wall's inner side by this much up and down, in connector sizes.
 const MOST_ASIDE_SIZES: f64 = 0.16;
@@ -77,7 +77,9 @@ fn along_slide(curve: &Curve, slide: Vec3, size_mm: f64) -> Vec<(usize, usize)> 
     let end_mm = if curve.is_loop { 0.0 } else { end_gap_mm(size_mm, length_mm) };
     let is_along = |i: usize| {
         let clear = arc_mm[i] >= end_mm && arc_mm[i] <= length_mm - end_mm;
-        clear && curve.tangents[i].dot(slide).abs() > SHALLOWEST && curve.normals[i].dot(slide).abs() < MAX_OUT_OF_RAIL
+        clear
+            && curve.tangents[i].dot(slide).abs() > MAX_ALONG_SEAM
+            && curve.normals[i].dot(slide).abs() < MAX_OUT_OF_RAIL
     };
     let mut found = Vec::new();
     let mut from = 0;

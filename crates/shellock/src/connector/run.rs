@@ -6,19 +6,11 @@ use super::frame::Curve;
 use super::rail::rails;
 use super::{ConnectorParams, Section};
 use crate::plan::InstallationPlan;
-use crate::plan::contact::end_gap_mm;
+use crate::seam::rules::{MAX_ALONG_SEAM, MAX_BACKWARD_RAD, ROLE_HYSTERESIS, SHORTEST_RUN_SIZES, end_gap_mm};
 use crate::{ConnectorSizes, PatchId};
 
-/// Steepest backward angle T that gives a sound pin, rad: 60°.
-const STEEPEST: f64 = 1.047;
-/// Where the separation direction runs along the seam by more than this (|ŝ·u|), a connector is too shallow to hold.
-pub(super) const SHALLOWEST: f64 = 0.9;
-/// The male role changes sides only where |ŝ·N| exceeds this, so that it does not flicker along a run.
-const ROLE_HYSTERESIS: f64 = 0.1;
 /// Frames that turn by more than this between neighbouring points, rad, cannot be swept.
 const SHARPEST_TURN: f64 = 0.42;
-/// Shortest run, in connector sizes.
-const SHORTEST_RUN: f64 = 1.2;
 /// A cell of a run may leave its curve by this much, mm, turn by this much, rad, and be this long, mm.
 const CELL_SAG_MM: f64 = 0.03;
 const CELL_TURN: f64 = 0.12;
@@ -159,7 +151,7 @@ pub fn runs(
         for (from, to) in stretches(&allowed, &later_is_male) {
             let run = thinned(&stations[from..=to]);
             let (male, female) = sides(curve, later_is_male[from]);
-            if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN * size_mm {
+            if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN_SIZES * size_mm {
                 runs.push(Run { male, female, stations: run });
             }
         }
@@ -223,8 +215,8 @@ fn allowed(size_mm: f64, curve: &Curve, stations: &[Station], later_is_male: &[b
             let same_role = near.clone().all(|j| later_is_male[j] == later_is_male[i]);
             let gentle = near.clone().all(|j| !turns(i, j));
             // Just below −90° is a tongue that hysteresis kept; anything beyond is the other side's pin.
-            let sound = s.theta <= STEEPEST && s.theta >= -1.75;
-            clear_of_ends && same_role && gentle && sound && s.s.dot(s.tangent).abs() <= SHALLOWEST
+            let sound = s.theta <= MAX_BACKWARD_RAD && s.theta >= -1.75;
+            clear_of_ends && same_role && gentle && sound && s.s.dot(s.tangent).abs() <= MAX_ALONG_SEAM
         })
         .collect()
 }

@@ -9,9 +9,10 @@ use shellock_mechanics::{
 };
 
 use crate::params::ParamProblem;
-use crate::plan::contact::{end_gap_mm, meeting};
+use crate::plan::contact::meeting;
 use crate::plan::{InstallationPlan, PlanParams};
-use crate::seams::{seam_half_edges, stretches};
+use crate::seam::rules::end_gap_mm;
+use crate::seam::{seam_half_edges, stretches};
 use crate::{ConnectorSizes, LatticeDirection, PatchId, SegmentedSurface};
 
 /// How the model is made.

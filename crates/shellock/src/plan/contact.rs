@@ -24,38 +24,14 @@ use bars::{Barred, Bars};
 pub use hold::{HoldTable, Pushes};
 
 use super::PlanParams;
+use crate::seam::rules::{
+    COUNTED_RUN_SIZES, MAX_ALONG_SEAM, MAX_BACKWARD_RAD, MAX_OUT_OF_RAIL, ROLE_HYSTERESIS, SHORTEST_RUN_SIZES,
+    end_gap_mm,
+};
 use crate::{ConnectorSizes, LatticeDirection, PatchId, Seam, SegmentedSurface};
 
 /// Distance between samples of a seam, mm: below the size of any connector.
 const SAMPLE_STEP_MM: f64 = 1.0;
-
-/// Most `|s · u|` that a connector bears; beyond, it is too shallow to hold.
-const MAX_ALONG_SEAM: f64 = 0.9;
-
-/// Most backward angle T that a connector bears, rad (60°); beyond, it is ill-shaped.
-const MAX_BACKWARD_RAD: f64 = std::f64::consts::FRAC_PI_3;
-
-/// Most `|s · N|` at which a rail can run under the seam.
-pub const MAX_OUT_OF_RAIL: f64 = 0.25;
-
-/// How clearly, as `|s · N|`, a sample must ask for the other male piece before a run of connectors ends there.
-const ROLE_HYSTERESIS: f64 = 0.1;
-
-/// Room kept free at both ends of an open seam, where three pieces meet, in connector sizes D: least, most, and in between the share of
-/// the seam. The connectors of three seams have room side by side with the most; with the least they take a part of each other.
-const END_GAP_SIZES: [f64; 2] = [0.9, 1.5];
-const END_GAP_SHARE: f64 = 0.27;
-
-/// Room kept free of connectors of `size_mm` at both ends of an open seam of `length_mm` on the inner side of the wall, mm.
-pub fn end_gap_mm(size_mm: f64, length_mm: f64) -> f64 {
-    (END_GAP_SHARE * length_mm).clamp(END_GAP_SIZES[0] * size_mm, END_GAP_SIZES[1] * size_mm)
-}
-
-/// Shortest runs of connectors that count as holding, in connector sizes D: the first is asked for as long as plans exist with it.
-///
-/// With the gaps at its ends an open seam must be 5.5, 4.1 or 3 D long. A cat's piece whose connectors were too short came loose. Thin
-/// limbs have no longer seams than for the last, the shortest run that is made; what turns and carving leave of it, a kit must show.
-pub(super) const SHORTEST_RUN_SIZES: [f64; 3] = [2.5, 1.85, 1.2];
 
 /// What the seams between two pieces offer for one order and one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -247,7 +223,7 @@ fn contact(params: &PlanParams, size_mm: f64, seams: &[(PatchId, PatchId, Vec<Sa
             joint(params, size_mm, &lines, Way::new(params, [*a, *b], side, s))
         })
     });
-    let least_mm = SHORTEST_RUN_SIZES[SHORTEST_RUN_SIZES.len() - 1] * size_mm;
+    let least_mm = SHORTEST_RUN_SIZES * size_mm;
     let holds = |order: usize, s: LatticeDirection| joints[order][s.index()].run_mm >= least_mm;
     let hold = HoldTable::new(params, size_mm, [*a, *b], &lines, holds);
     Some(Contact { a: *a, b: *b, length_mm, size_mm, joints, hold })
@@ -299,7 +275,7 @@ fn joint(params: &PlanParams, size_mm: f64, lines: &[(&[Sample], bool)], way: Wa
         }
         run_mm = run_mm.max(longest_run_mm(samples, is_loop, way));
     }
-    let holds = run_mm >= SHORTEST_RUN_SIZES[0] * size_mm;
+    let holds = run_mm >= COUNTED_RUN_SIZES[0] * size_mm;
     Joint { weight: weight / length_mm, usable: usable / length_mm, run_mm, holds }
 }
 

@@ -1,11 +1,11 @@
 //! Random plans that keep every condition, for studies of metrics (Sect. 5.4).
 
-use super::contact::SHORTEST_RUN_SIZES;
 use super::draw::{DrawLimits, draw};
 use super::key::choices;
 use super::search::stream;
 use super::space::Space;
 use super::{InstallationPlan, PlanConstraints, PlanParams, PlanSurvey};
+use crate::seam::rules::COUNTED_RUN_SIZES;
 
 /// Draws with the widest spread, which hardly look at costs, have this index among the spreads.
 const WIDEST: usize = 3;
@@ -17,7 +17,7 @@ const TRIES_PER_PIECE: usize = 20;
 pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<InstallationPlan> {
     let constraints = PlanConstraints::default();
     let mut most = Vec::new();
-    for sizes in SHORTEST_RUN_SIZES {
+    for sizes in COUNTED_RUN_SIZES {
         let mut counted = survey.clone();
         counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes));
         let space = Space::new(&counted, &constraints, params.relaxed_tolerance);

@@ -13,7 +13,6 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::contact::SHORTEST_RUN_SIZES;
 use super::draw::{DrawLimits, Drawn, draw};
 use super::exact::{Budget, Candidate, least_cost, lower_bound, prove, vary};
 use super::improve::{Improved, improve};
@@ -26,6 +25,7 @@ use super::{
     FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey, ProofScope,
     RankedPlan, diagnose,
 };
+use crate::seam::rules::COUNTED_RUN_SIZES;
 use crate::{Cancelled, Ctx, PatchId, Warning};
 
 /// Draws that run side by side before anybody looks at the results.
@@ -81,7 +81,7 @@ pub fn search_with(
     }
     let keys = choices(params, survey);
     let mut first_answer = None;
-    for (i, sizes) in SHORTEST_RUN_SIZES.into_iter().enumerate() {
+    for (i, sizes) in COUNTED_RUN_SIZES.into_iter().enumerate() {
         let mut counted = survey.clone();
         counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes));
         let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys, costs)?;

@@ -1,7 +1,7 @@
 //! Makes all patches disks and their contacts 2-connected, by dividing the patches that stand in the way.
 //!
 //! A piece that alone holds others is divided through its seam with them, so that two pieces hold them; a ring around a limb is divided
-//! lengthwise, as it could hardly be put on otherwise. See [`crate::contact_graph`] for why. Where no division helps, because the seam is
+//! lengthwise, as it could hardly be put on otherwise. See [`crate::seam::graph`] for why. Where no division helps, because the seam is
 //! too short for two contacts, what hangs on a piece is joined to it.
 
 use shellock_geom::{HalfEdge, Solid, Topology};
@@ -9,7 +9,7 @@ use shellock_geom::{HalfEdge, Solid, Topology};
 use super::dual_graph::{CreaseCost, DualGraph};
 use super::split::{Divider, Division, euler_characteristics, raw_contact_graph};
 use super::{FaceLabels, SegmentationError, SegmentationParams};
-use crate::seams::seam_half_edges;
+use crate::seam::seam_half_edges;
 use crate::{ContactGraph, Ctx, PatchId};
 
 /// How much longer a seam along triangle edges is than the smooth one: 4/π for random directions on a square grid.

@@ -10,7 +10,7 @@ use shellock_geom::{HalfEdge, Solid, Topology, TriMesh, Vec3};
 
 use super::FaceLabels;
 use super::dual_graph::DualGraph;
-use crate::seams::{seam_half_edges, stretches};
+use crate::seam::{seam_half_edges, stretches};
 use crate::{ContactGraph, LatticeDirection, PatchId};
 
 /// What one fault of topology weighs against shape: more than the worst shape.

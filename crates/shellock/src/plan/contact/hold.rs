@@ -16,15 +16,12 @@
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
+use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
 
 use super::{Sample, Way};
 use crate::plan::PlanParams;
 use crate::push::{self, N_PUSHES};
 use crate::{LatticeDirection, PatchId};
-
-/// Depth and width of a pin, in connector sizes.
-const PIN_DEPTH_SIZES: f64 = 0.6;
-const PIN_WIDTH_SIZES: f64 = 0.5;
 
 /// Gap between walls, mm, and height of the wall that counts: half of the usual 2 mm, since walls are rounded and carved.
 const WALL_GAP_MM: f64 = 0.1;
@@ -94,7 +91,7 @@ fn add(
     let leaves = (role * s).reject_from_normalized(x.tangent).normalize_or_zero();
     let n = leaves.cross(x.tangent);
     let across = side * x.across;
-    let (depth, width) = (PIN_DEPTH_SIZES * size_mm, PIN_WIDTH_SIZES * size_mm - gap);
+    let (depth, width) = (PIN_DEPTH * size_mm, PIN_WIDTH * size_mm - gap);
     let is_forward = s.dot(across) <= 0.0;
     for (held, sign) in held.iter_mut().zip([1.0, -1.0]) {
         for (held, &push) in held.iter_mut().zip(pushes) {

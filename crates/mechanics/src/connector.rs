@@ -1,0 +1,22 @@
+//! Proportions of a connector of size D, as multiples of it: what is made, planned for and simulated is one shape.
+//!
+//! ```text
+//!       female │ male         ↑ ŝ
+//!     ───┐     │  ─────       wall
+//!        │ ┌───┤              pin: PIN_DEPTH deep, PIN_WIDTH thick
+//!        │ │pin│ ┌──┐
+//!        │ └───┘ │ft│         foot: FOOT_WIDTH thick
+//!        └───────┘  │         floor: FLOOR thick
+//!        └──────────┘
+//! ```
+
+/// How deep the pin of the male reaches into the channel of the female. [Yao et al. 2017, Sect. 4.2, gives D alone; chosen by eye]
+pub const PIN_DEPTH: f64 = 0.6;
+/// Thickness of the pin across the seam.
+pub const PIN_WIDTH: f64 = 0.5;
+/// Thickness of the channel's foot, under the male piece, with the clearance.
+pub const FOOT_WIDTH: f64 = 0.5;
+/// Thickness of the channel's floor.
+pub const FLOOR: f64 = 0.45;
+/// Depth of a straight channel without its clearance: pin and floor.
+pub const CHANNEL_DEPTH: f64 = PIN_DEPTH + FLOOR;

@@ -1,0 +1,7 @@
+//! Seams: where two patches meet, which pieces they make neighbours of, and the rules for connectors under them.
+
+pub mod graph;
+mod line;
+pub mod rules;
+
+pub(crate) use line::{seam_half_edges, stretches};
