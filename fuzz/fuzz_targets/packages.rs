@@ -7,7 +7,7 @@
 use std::io::{Cursor, Write as _};
 
 use libfuzzer_sys::fuzz_target;
-use shellock_geom::io::read_mesh;
+use shellock_formats::read_mesh;
 use zip::write::SimpleFileOptions;
 
 const MODEL: &str = "3D/3dmodel.model";

@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
-use shellock_geom::io::{read_labels, read_mesh};
+use shellock_formats::{read_labels, read_mesh};
 use shellock_geom::repair::{Mending, mend};
 
 const READERS: [&str; 6] = ["stl", "obj", "ply", "off", "gltf", ""];

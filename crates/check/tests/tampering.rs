@@ -14,7 +14,7 @@ use shellock::verify::clearance::kit_gaps;
 use shellock::verify::{Assembly, VerifyParams, examine};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
 use shellock_check::{Finding, Verdict, check};
-use shellock_geom::io::write_stl_binary;
+use shellock_formats::write_stl_binary;
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 const CLEARANCE_MM: f64 = 0.1;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use shellock::pipeline::DesignError;
 use shellock::stress_test::StressError;
+use shellock_formats::ReadError;
 use shellock_geom::check::InputError;
-use shellock_geom::io::ReadError;
 
 /// Why a command failed; each message says what to do where something can be done.
 #[derive(Debug, thiserror::Error)]

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use shellock_geom::io::{LabelSource, Loaded, read_labels, read_mesh};
+use shellock_formats::{LabelSource, Loaded, read_labels, read_mesh};
 use shellock_geom::repair::{Mended, Mending, Repair, mend};
 use shellock_geom::{Aabb, Solid, Vec3};
 
@@ -181,7 +181,7 @@ fn made_of(solid: Solid, scale: f64, path: &Path) -> Result<Model, Failure> {
 /// A figure that the program makes itself, as if it came from a file.
 pub fn figure(name: &str, options: &Options) -> Result<Model, Failure> {
     let (solid, _) = shellock_figure(name, options.size.or(options.height).unwrap_or(DEFAULT_SIZE_MM))?;
-    let bytes = shellock_geom::io::write_stl_binary(solid.mesh());
+    let bytes = shellock_formats::write_stl_binary(solid.mesh());
     let mut model = made_of(solid, 1.0, &PathBuf::from(format!("{name}.stl")))?;
     model.sha256 = sha256(&bytes);
     Ok(model)

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use shellock::pipeline::Params;
+use shellock_formats::Loaded;
 use shellock_geom::check::inspect as inspection;
-use shellock_geom::io::Loaded;
 use shellock_geom::repair::mend;
 use shellock_geom::thin::{ThinPlace, thin_places};
 use shellock_geom::weld::weld;

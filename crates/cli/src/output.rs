@@ -9,14 +9,15 @@ use serde_json::{Value, json};
 use shellock::certificate::{Certificate, Evidence, OtherFile, PieceFile, certify};
 use shellock::key::KeySite;
 use shellock::pipeline::{Design, Params};
-use shellock::report::{SeamStress, palette, strength_chart};
+use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::clearance::PathGap;
 use shellock::verify::thin_share;
 use shellock::{PatchId, Warning};
-use shellock_geom::io::{NamedObject, write_3mf, write_ply, write_stl_binary};
+use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::repair::{Repair, RepairKind};
 use shellock_geom::{TriMesh, Vec3};
+use shellock_render::palette;
 
 use crate::args::{Axis, Options};
 use crate::failure::Failure;

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use shellock::pipeline::{Design, Params};
-use shellock::report::{
-    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
-};
 use shellock::verify::{Finding, Play};
 use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_print::booklet::Booklet;
+use shellock_render::{
+    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
+};
 
 use crate::args::Options;
 use crate::build::{bearing, scope};

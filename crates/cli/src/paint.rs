@@ -1,7 +1,7 @@
 //! A segmentation as paint for slicers.
 
 use shellock::SegmentedSurface;
-use shellock_geom::io::write_painted_3mf;
+use shellock_formats::write_painted_3mf;
 
 /// Colours that all slicers with paint can tell apart.
 const N_COLORS: u32 = 16;
@@ -48,7 +48,7 @@ fn shared_colors(surface: &SegmentedSurface) -> Vec<u32> {
 mod tests {
     use super::*;
     use shellock::PatchId;
-    use shellock_geom::io::read_mesh;
+    use shellock_formats::read_mesh;
     use shellock_geom::{TriMesh, Vec3};
 
     /// A strip of quads, each a patch.

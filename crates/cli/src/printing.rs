@@ -3,14 +3,14 @@
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::pipeline::{DesignError, Params};
-use shellock::report::palette;
 use shellock::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
+use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::io::{NamedObject, write_3mf};
 use shellock_geom::{Solid, TriMesh};
 use shellock_print::plates::{Laid, Plates, Printable, fits, fits_whole, lay, lay_alone};
 use shellock_print::time::{Load, seconds};
 use shellock_print::{Printer, Process};
+use shellock_render::palette;
 
 use crate::Session;
 use crate::failure::Failure;
@@ -21,8 +21,6 @@ const SKIN_MM: f64 = 0.05;
 /// Numbers of pieces that are tried where some are too large: each so many times the last.
 const MORE_PIECES: f64 = 1.5;
 const MOST_TRIES: u32 = 5;
-/// More pieces cannot be planned.
-const MOST_PIECES: usize = 128;
 
 /// A kit, laid on plates.
 pub struct Printing {
@@ -179,7 +177,7 @@ pub fn too_large(
     let mut enough = None;
     let mut tried = n;
     for _ in 0..MOST_TRIES {
-        tried = ((tried as f64 * MORE_PIECES).ceil() as usize).min(MOST_PIECES);
+        tried = ((tried as f64 * MORE_PIECES).ceil() as usize).min(shellock::segmentation::MOST_PIECES);
         if misfits(Some(tried), None)?.1.is_empty() {
             enough = Some(tried);
             break;

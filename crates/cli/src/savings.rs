@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
-use shellock_geom::io::{NamedObject, write_3mf};
+use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::{Solid, TriMesh};
 use shellock_print::plates::lay_alone;
 use shellock_print::{Printer, Process};

@@ -13,7 +13,7 @@ use shellock::play::{KitPlay, PlayParams};
 use shellock::verify::clearance::kit_gaps;
 use shellock::verify::{Assembly, Finding, Verification, VerifyParams};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, play, segmentation, sizes};
-use shellock_geom::io::{write_labels, write_ply, write_stl_binary};
+use shellock_formats::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
 

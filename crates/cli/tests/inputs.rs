@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use shellock_geom::io::{write_ply, write_stl_binary};
+use shellock_formats::{write_ply, write_stl_binary};
 use shellock_geom::subdivide::halve_edges;
 use shellock_geom::{Solid, Topology, TriMesh, Vec3};
 

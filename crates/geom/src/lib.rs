@@ -1,4 +1,4 @@
-//! Geometry that cannot fail: meshes, solids, fields, contouring, booleans, distances, sparse solves and file formats.
+//! Geometry that cannot fail: meshes, solids, fields, contouring, booleans, distances and sparse solves.
 //!
 //! This crate knows no patch, piece, plan or printer. Lengths are millimetres unless a name says otherwise; fields are
 //! positive inside; triangles are counter-clockwise seen from outside.
@@ -10,7 +10,6 @@ pub mod check;
 pub mod clearance;
 pub mod contour;
 pub mod decimate;
-pub mod io;
 pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;

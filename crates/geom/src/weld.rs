@@ -53,7 +53,7 @@ pub fn close(mesh: &TriMesh) -> Welded {
 }
 
 /// For each point the first one of equal coordinates.
-pub(crate) fn first_equal(points: &[Vec3]) -> Vec<u32> {
+pub fn first_equal(points: &[Vec3]) -> Vec<u32> {
     // Adding 0 turns −0 into 0 and changes nothing else, so equal coordinates have equal bits.
     let bits = |i: u32| points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
     // Equal points get into the same bucket by a hash, and within the few points of a bucket sorting finds them. Buckets

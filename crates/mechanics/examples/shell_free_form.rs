@@ -8,8 +8,9 @@
 use std::fmt::{Debug, Write as _};
 use std::io::Write as _;
 
+use shellock_formats as io;
 use shellock_geom::remesh::{RemeshParams, remesh};
-use shellock_geom::{TriMesh, Vec3, io};
+use shellock_geom::{TriMesh, Vec3};
 use shellock_mechanics::{Displacements, LoadCase, Material, ShellModel, ShellSolver, Support};
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;

@@ -7,9 +7,9 @@
 mod view;
 
 use rayon::prelude::*;
-use shellock::report::stills::{Camera, Image, Painted, crease_normals, projection, render};
-use shellock::report::{ReportPiece, exploded_shifts, from_inside};
 use shellock_geom::{Aabb, TriMesh, Vec3};
+use shellock_render::stills::{Camera, Image, Painted, crease_normals, projection, render};
+use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 
 use crate::pdf::{Color, PAGE_MM, Page, Style, document, width_mm};
 use view::{Sight, side, sights};

@@ -6,7 +6,7 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::types::Predictor;
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 use rayon::prelude::*;
-use shellock::report::stills::Image;
+use shellock_render::stills::Image;
 
 /// A4, mm.
 pub(crate) const PAGE_MM: [f64; 2] = [210.0, 297.0];

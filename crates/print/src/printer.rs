@@ -1,6 +1,6 @@
 //! Printers: what they can hold, and what their prints need.
 
-use shellock::params::ParamProblem;
+use shellock_assembly::params::ParamProblem;
 use shellock_mechanics::Material;
 
 /// How a printer makes things.

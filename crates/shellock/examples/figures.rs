@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use shellock::figure::{self, Figure};
-use shellock::report::stills::{Camera, Image, Painted, render};
 use shellock_geom::Vec3;
+use shellock_render::stills::{Camera, Image, Painted, render};
 
 fn main() -> std::io::Result<()> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "figures.png".into());

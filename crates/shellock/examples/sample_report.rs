@@ -4,11 +4,11 @@
 use std::path::PathBuf;
 
 use shellock::figure::{self, Figure};
-use shellock::report::{
-    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
-};
 use shellock::{LatticeDirection, PatchId, Warning};
 use shellock_geom::{TriMesh, Vec3};
+use shellock_render::{
+    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
+};
 
 fn main() -> std::io::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".into()));

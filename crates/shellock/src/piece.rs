@@ -11,7 +11,8 @@ mod label;
 mod relief;
 mod ribs;
 
+pub use crate::{PressFit, PressFitKind};
 pub use finish::{FinishParams, Finished, Joint, PieceError, make};
-pub use key_parts::{Grip, PressFit, PressFitKind};
+pub use key_parts::Grip;
 pub use label::LabelParams;
 pub use relief::Relief;

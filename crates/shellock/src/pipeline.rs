@@ -4,6 +4,7 @@
 //! out, the segmentation is mended at the piece to blame, and planning starts afresh.
 
 mod cut_key;
+mod lesson;
 mod rounds;
 
 use std::borrow::Cow;

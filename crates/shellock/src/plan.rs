@@ -32,6 +32,7 @@ pub mod study;
 mod survey;
 pub mod types;
 
+pub use crate::{InstallationPlan, InstallationStep};
 pub use local_cost::{PieceCosts, SeamCosts};
 pub use params::PlanParams;
 pub use piece_set::PieceSet;
@@ -39,7 +40,4 @@ pub use sample::random_plans;
 pub use score::{PlanScore, score};
 pub use search::{MakeCosts, search, search_with};
 pub use survey::{PlanSurvey, survey};
-pub use types::{
-    Blocker, FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanProof, ProofScope,
-    RankedPlan,
-};
+pub use types::{Blocker, FoundPlan, PlanConstraints, PlanOutcome, PlanProof, ProofScope, RankedPlan};

@@ -19,6 +19,7 @@
 //! worst triangles, in creases and at tips, tell more of the mesh than of the model, and their stress grows with every
 //! refinement. docs/strength.md has what the share and the mesh change.
 
+pub mod chart;
 mod thin;
 
 use std::f64::consts::{PI, TAU};

@@ -34,6 +34,17 @@ pub enum Failure {
         /// Why not.
         problem: String,
     },
+    /// The program could not be built or run.
+    #[error("{program}: {problem}")]
+    Program {
+        /// Which.
+        program: String,
+        /// What it says.
+        problem: String,
+    },
+    /// The program no longer writes or says what it did.
+    #[error("other than before: {}", .0.join("; "))]
+    Changed(Vec<String>),
     /// What a metric computes once for all plans could not be computed.
     #[error("{metric}: {problem}")]
     Metric {

@@ -4,6 +4,7 @@
 
 mod chart;
 mod failure;
+mod golden;
 mod metrics;
 mod model;
 mod savings;
@@ -30,12 +31,15 @@ enum Task {
     Study(study::Options),
     /// Make the table of what kits save over solid models, from what `shellock report` left in their folders
     Savings(savings::Options),
+    /// Compare what the program writes and says with what it wrote and said before, byte by byte
+    Golden(golden::Options),
 }
 
 fn main() -> ExitCode {
     let made = match Arguments::parse().task {
         Task::Study(options) => study::run(&options),
         Task::Savings(options) => savings::run(&options),
+        Task::Golden(options) => golden::run(&options),
     };
     match made {
         Ok(files) => {

@@ -12,9 +12,9 @@ use shellock::plan::{PlanSurvey, survey};
 use shellock::segmentation::segment;
 use shellock::sizes;
 use shellock::{ConnectorSizes, Ctx, SegmentedSurface};
+use shellock_formats::{read_labels, read_mesh};
 use shellock_geom::Solid;
 use shellock_geom::check::into_solid;
-use shellock_geom::io::{read_labels, read_mesh};
 
 use crate::failure::Failure;
 

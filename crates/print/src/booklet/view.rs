@@ -1,10 +1,10 @@
 //! From where each step is seen.
 
 use rayon::prelude::*;
-use shellock::report::ReportPiece;
-use shellock::report::stills::Camera;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Aabb, TriMesh, Vec3};
+use shellock_render::ReportPiece;
+use shellock_render::stills::Camera;
 
 /// Points of a piece that are looked at.
 const N_POINTS: usize = 48;

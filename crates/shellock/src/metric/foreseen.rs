@@ -15,13 +15,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DVector;
 use shellock_geom::{Aabb, Vec3};
 use shellock_mechanics::{Meeting, Side};
 
 use super::PlanModel;
 use crate::PatchId;
-use crate::motion::{Contact, Corner, Freedom, Limits, System, most_play};
+use crate::motion::{Contact, farthest, most_play};
 use crate::plan::InstallationPlan;
 
 /// Share of the connector size that a pin is deep.
@@ -30,11 +29,6 @@ const PIN_DEPTH: f64 = 0.6;
 const PIN_HALF: f64 = 0.25;
 /// A pin goes on to a station that is no farther than this many times their mean length.
 const NEXT: f64 = 1.6;
-/// Turns count as displacements at this distance, mm.
-const LENGTH_MM: f64 = 50.0;
-/// What has no end goes so far: mm and rad.
-const ENDLESS: [f64; 2] = [100.0, 1.0];
-
 /// How far each piece but the key goes, and by how much that is more than it may: at most 1 where it is not.
 pub struct Foreseen {
     /// Displacement of the middle of its surface, mm, and turn, degrees, no less than the greatest along the coordinate axes and no more than √3
@@ -148,27 +142,4 @@ fn centers(model: &PlanModel) -> Vec<Vec3> {
         *sum = (sum.0 + area * (a + b + c) / 3.0, sum.1 + area);
     }
     sums.into_iter().map(|(moment, area)| if area > 0.0 { moment / area } else { moment }).collect()
-}
-
-/// How far a piece goes within its contacts while its neighbours rest: its middle, and its turn.
-fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
-    if contacts.is_empty() {
-        return ENDLESS;
-    }
-    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - middle, ..*c }).collect();
-    let system = System::new(&centered, &[piece], LENGTH_MM, Freedom::Rigid);
-    let gaps: Vec<f64> = system.rows.iter().map(|row| centered[row.contact].gap_mm).collect();
-    let limits = Limits::new(&system, &gaps);
-    let mut corner = Corner::new(&limits);
-    let mut most = |from: usize, end: f64, scale: f64| {
-        let mut axes = [0.0f64; 3];
-        for (k, most) in axes.iter_mut().enumerate() {
-            for sign in [1.0, -1.0] {
-                let towards = DVector::from_fn(system.n, |i, _| if i == from + k { sign * scale } else { 0.0 });
-                *most = most.max(corner.farthest(&towards).map_or(end, |x| x.min(end)));
-            }
-        }
-        Vec3::from(axes).length()
-    };
-    [most(0, ENDLESS[0], 1.0), most(3, ENDLESS[1], 1.0 / LENGTH_MM).to_degrees()]
 }

@@ -8,10 +8,11 @@ use shellock_geom::rounding::{NotPrintable, printable_body};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 use super::carve::{Half, Wake, carved, whole_half};
-use super::key_parts::{Change, Grip, PressFit, detents, notch};
+use super::key_parts::{Change, Grip, detents, notch};
 use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
 use super::ribs::{Seat, ribs};
+use crate::PressFit;
 use crate::body::{ShellBodies, ShellGrid};
 use crate::connector::{ConnectorParams, Run};
 use crate::plan::InstallationPlan;

@@ -1,11 +1,11 @@
 //! What only keys have: detents that click, and a notch to pull at.
 
-use serde::{Deserialize, Serialize};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
 
 use crate::PatchId;
 use crate::connector::{ConnectorParams, Run, Section, Station};
+use crate::{PressFit, PressFitKind};
 
 /// Where on a rail the detent sits, mm from its back end, so that it presses on the last millimetres of the way alone; half its length
 /// at its foot and at its top.
@@ -15,52 +15,15 @@ const TOP_MM: f64 = 0.3;
 /// How far its foot stands in the tongue, and how much larger the dimple is, mm.
 const ROOT_MM: f64 = 0.2;
 const PLAY_MM: f64 = 0.08;
-/// A notch is so deep, mm: less than what the verification takes for a hole. Half its length along the slide, and its width.
-const NOTCH_MM: f64 = 0.45;
+/// A notch is as deep, mm, as the verification does not yet take for a hole.
+const NOTCH_MM: f64 = crate::verify::limits::WIDEST_HALF_GAP_MM;
+/// Half its length along the slide, and its width.
 const NOTCH_HALF_MM: f64 = 1.6;
 const NOTCH_WIDTH_MM: f64 = 12.0;
 /// The surface is looked for up to so far above and below the notch's middle, mm.
 const NOTCH_LOOK_MM: f64 = 2.0;
 /// The surface below a notch is uneven by less than this, mm.
 const NOTCH_UNEVEN_MM: f64 = 0.4;
-
-/// Detents and ribs are no larger than this around their places, mm.
-const REACH_MM: f64 = 4.0;
-
-/// What presses on purpose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PressFitKind {
-    /// A bump on a rail's tongue that snaps into a dimple in the key's groove.
-    Detent,
-    /// A rib on the key's side of a seam that rubs on the other side.
-    Rib,
-}
-
-/// A place where the key is held by being pressed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PressFit {
-    /// Which kind it is.
-    pub kind: PressFitKind,
-    /// The piece that it stands on.
-    pub piece: PatchId,
-    /// Its place, mm.
-    pub at: [f64; 3],
-    /// By how much it presses on the other piece on the way in, mm.
-    pub interference_mm: f64,
-    /// On how much of the way, mm: the last of it.
-    pub travel_mm: f64,
-}
-
-impl PressFit {
-    /// More than this presses nowhere on purpose, mm.
-    pub const MOST_INTERFERENCE_MM: f64 = 0.4;
-
-    /// Whether `point`, mm, is so near that it can be part of what presses.
-    pub fn reaches(&self, point: Vec3) -> bool {
-        point.distance(Vec3::from_array(self.at)) < REACH_MM
-    }
-}
 
 /// A notch for a fingernail across the key's outer surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,8 +7,9 @@ use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::{Scope, Shape, Translation, swept_gap};
 use shellock_geom::{Solid, TriMesh, Vec3, Volume};
 
-use super::key_parts::{Change, PressFit, PressFitKind};
+use super::key_parts::Change;
 use crate::PatchId;
+use crate::{PressFit, PressFitKind};
 
 /// Length along the way out, mm; half its width at the foot and at the top; how far the foot stands in the key.
 const LENGTH_MM: f64 = 1.8;

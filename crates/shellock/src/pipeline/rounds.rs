@@ -2,9 +2,9 @@
 
 use shellock_geom::Solid;
 
+use super::lesson::{Lesson, lessons};
 use super::{Design, DesignError, KeySource, Params, make};
 use crate::body::{BodyError, BodyParams, GridError, PatchDistances, ShellGrid};
-use crate::feedback::{Lesson, lessons};
 use crate::metric::Holding;
 use crate::plan::{Blocker, FoundPlan, InstallationPlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::segmentation::SegmentationError;

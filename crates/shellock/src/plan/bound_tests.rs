@@ -80,7 +80,7 @@ fn lessons(n: usize, rng: &mut ChaCha8Rng) -> PlanConstraints {
             continue;
         }
         match rng.random_range(0..4) {
-            0 => constraints.weak_contacts.extend([(p.min(q), p.max(q))]),
+            0 => constraints.weaken(p, q),
             1 => constraints.weak_joints.extend([(p, q, s)]),
             2 => constraints.forbidden.extend([(p, s)]),
             _ => constraints.rubbed.extend([((p, q), 2)]),

@@ -152,7 +152,7 @@ mod tests {
         let steps = [0, 1].map(|p| InstallationStep { piece: PatchId(p), separation }).to_vec();
         let mut constraints = PlanConstraints::default();
         if is_weak {
-            constraints.weak_contacts.insert((PatchId(0), PatchId(1)));
+            constraints.weaken(PatchId(0), PatchId(1));
         }
         let plan = InstallationPlan { steps };
         let space = Space::new(&survey, &constraints, 0.0);

@@ -222,8 +222,7 @@ fn what_earlier_rounds_forbid_is_kept_to() {
         constraints.rejected.push(plan);
     }
     // Contacts that hold nothing: with all of one piece's contacts weak, it hangs on nothing.
-    let weak = survey.contacts.iter().filter(|c| c.a == PatchId(0)).map(|c| (c.a, c.b));
-    constraints.weak_contacts.extend(weak);
+    survey.contacts.iter().filter(|c| c.a == PatchId(0)).for_each(|c| constraints.weaken(c.a, c.b));
     assert!(matches!(searched(&params, &survey, &constraints), PlanOutcome::Infeasible { .. }));
 }
 

@@ -65,14 +65,13 @@ impl<'a> Space<'a> {
         let mut neighbours = vec![PieceSet::EMPTY; n];
         let mut contacts_of = vec![Vec::new(); n];
         for (i, c) in survey.contacts.iter().enumerate() {
-            let is_weak = constraints.weak_contacts.contains(&(c.a, c.b));
             for (p, q) in [(c.a, c.b), (c.b, c.a)] {
                 contacts_of[usize::from(p)].push(i);
                 for s in LatticeDirection::all().filter(|&s| c.joint(p, s).holds && !constraints.is_weak(p, q, s)) {
                     let set = &mut joins[usize::from(p)][s.index()];
                     *set = set.union(PieceSet::one(q));
                 }
-                if !is_weak && c.can_hold() {
+                if c.can_hold() {
                     neighbours[usize::from(p)] = neighbours[usize::from(p)].union(PieceSet::one(q));
                 }
             }

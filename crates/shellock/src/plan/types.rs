@@ -7,52 +7,13 @@ use serde::{Deserialize, Serialize};
 use super::PlanScore;
 use super::key::KeyDirections;
 use super::space::MOST_RUBS;
-use crate::{IdVec, LatticeDirection, PatchId};
-
-/// One piece of a plan and the direction along which it leaves everything installed before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct InstallationStep {
-    /// The piece that is put in.
-    pub piece: PatchId,
-    /// The unit step along which it separates; it is installed along the opposite. Without meaning for the first piece.
-    pub separation: LatticeDirection,
-}
-
-/// The order in which pieces are installed, first to last, each with its direction. The last piece is the key.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct InstallationPlan {
-    /// First to last; every piece once; at least two.
-    pub steps: Vec<InstallationStep>,
-}
-
-impl InstallationPlan {
-    /// The piece installed last, the only one that can be taken out.
-    pub fn key(&self) -> PatchId {
-        self.steps[self.steps.len() - 1].piece
-    }
-
-    /// Position of `piece` in the order, 0 for the first installed.
-    pub fn position(&self, piece: PatchId) -> usize {
-        self.steps.iter().position(|s| s.piece == piece).expect("a plan names every piece once")
-    }
-
-    /// The separation direction of `piece`.
-    pub fn separation(&self, piece: PatchId) -> LatticeDirection {
-        self.steps[self.position(piece)].separation
-    }
-
-    /// Steps in the order of taking apart: key first, first-installed last.
-    pub fn removal(&self) -> impl Iterator<Item = InstallationStep> + '_ {
-        self.steps.iter().rev().copied()
-    }
-}
+use crate::{IdVec, InstallationPlan, LatticeDirection, PatchId};
 
 /// What earlier rounds taught: the search must respect all of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PlanConstraints {
-    /// Pairs (lower id first) whose connectors came out too small to hold: they touch, but join nothing.
-    pub weak_contacts: BTreeSet<(PatchId, PatchId)>,
-    /// The same for a later piece, an earlier one and the direction of the later one alone; along others they may hold.
+    /// A later piece, an earlier one and the direction of the later one with which their connectors came out too small to hold: they
+    /// touch, but join nothing. Along other directions they may.
     pub weak_joints: BTreeSet<(PatchId, PatchId, LatticeDirection)>,
     /// Directions that a piece must not take, because its path rubbed.
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
@@ -65,15 +26,20 @@ pub struct PlanConstraints {
 impl PlanConstraints {
     /// How many things there are that restrict plans.
     pub fn n_lessons(&self) -> usize {
-        let Self { weak_contacts, weak_joints, forbidden, rubbed, rejected } = self;
+        let Self { weak_joints, forbidden, rubbed, rejected } = self;
         let n_orders = rubbed.values().filter(|&&n| n >= MOST_RUBS).count();
-        weak_contacts.len() + weak_joints.len() + forbidden.len() + n_orders + rejected.len()
+        weak_joints.len() + forbidden.len() + n_orders + rejected.len()
+    }
+
+    /// The two join nothing any more, whatever goes in later and along which direction.
+    #[cfg(test)]
+    pub fn weaken(&mut self, a: PatchId, b: PatchId) {
+        self.weak_joints.extend(LatticeDirection::all().flat_map(|s| [(a, b, s), (b, a, s)]));
     }
 
     /// Whether nothing joins the two where `later` leaves along `s`.
     pub fn is_weak(&self, later: PatchId, earlier: PatchId, s: LatticeDirection) -> bool {
-        let pair = (later.min(earlier), later.max(earlier));
-        self.weak_contacts.contains(&pair) || self.weak_joints.contains(&(later, earlier, s))
+        self.weak_joints.contains(&(later, earlier, s))
     }
 }
 

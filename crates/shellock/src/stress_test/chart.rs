@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::svg::{begin, end, text};
+use shellock_render::svg::{begin, end, text};
 
 use super::{Outcome, Pair, StressReport, Verdict};
 

@@ -1,0 +1,316 @@
+//! Whether any pieces can move at all, alone or together, by however little.
+//!
+//! A motion gives each free piece a velocity (and a spin). A contact with normal `n` from `a` to `b` allows it where
+//! `n · (v_a − v_b) ≤ 0`; over all contacts, `A x ≤ 0`. Nothing moves iff `x = 0` is the only solution.
+//!
+//! With `b = Aᵀ1 / m`, the least-norm point `r = b + Aᵀμ`, `μ ≥ 0`, decides everything (the alternatives of Stiemke):
+//! where `r = 0` the contacts are in equilibrium with positive forces, so `A x ≤ 0` implies `A x = 0` and only a null
+//! space of `A` can move; otherwise `x = −r` is a motion that opens contacts. For every motion with `|x| ≤ 1`,
+//! `−1ᵀA x ≤ m ‖r‖₁`, which bounds the linear program of an outside judge. `r` is found by non-negative least squares
+//! [LawsonHanson1974, ch. 23] on a Cholesky factor of the active contacts, never more of them than unknowns.
+
+mod forces;
+mod play;
+mod system;
+
+use nalgebra::DVector;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use shellock_geom::Vec3;
+
+use crate::PatchId;
+pub(crate) use play::{Corner, Limits};
+pub(crate) use system::{Row, System};
+
+/// A point of piece `a` that piece `b` lies against.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact {
+    /// The piece the point is on.
+    pub a: PatchId,
+    /// The piece it faces.
+    pub b: PatchId,
+    /// Position, mm.
+    pub point: Vec3,
+    /// Unit normal of `a` at the point, towards `b`.
+    pub normal: Vec3,
+    /// Distance to `b`, mm.
+    pub gap_mm: f64,
+    /// Area of `a` that the point stands for, mm².
+    pub area_mm2: f64,
+}
+
+/// How far a piece may rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in proportion to the clearance;
+/// displacements also to the size of the model, but no less than for 75 mm; turns of pieces with a diagonal under 60 mm, whose rims move less, in
+/// inverse proportion to that, up to twice. docs/certificate.md has the evidence.
+pub fn most_play(size_mm: f64, clearance_mm: f64, piece_mm: f64) -> [f64; 2] {
+    const AT_MM: f64 = 150.0;
+    const AT_CLEARANCE_MM: f64 = 0.12;
+    const AT_PIECE_MM: f64 = 60.0;
+    let wider = (clearance_mm / AT_CLEARANCE_MM).max(1.0);
+    [wider * (size_mm / AT_MM).max(0.5), 2.0 * wider * (AT_PIECE_MM / piece_mm).clamp(1.0, 2.0)]
+}
+
+/// Which motions of a piece are considered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freedom {
+    /// Three components of velocity.
+    Translations,
+    /// Velocity and spin.
+    Rigid,
+}
+
+/// The motion of one piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Twist {
+    /// The piece.
+    pub piece: PatchId,
+    /// Velocity of the piece at the origin, the fastest component of the whole motion being 1.
+    pub velocity: Vec3,
+    /// Spin times the scale given to [`free_motion`].
+    pub spin: Vec3,
+}
+
+/// How far small motions take a piece within its contacts while its neighbours rest: the displacement of `middle`, mm, and the turn,
+/// degrees; each along the axes of space, taken together. What has no end goes 100 mm and 1 rad.
+pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
+    /// Turns count as displacements at this distance, mm.
+    const LENGTH_MM: f64 = 50.0;
+    const ENDLESS: [f64; 2] = [100.0, 1.0];
+    if contacts.is_empty() {
+        return ENDLESS;
+    }
+    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - middle, ..*c }).collect();
+    let system = System::new(&centered, &[piece], LENGTH_MM, Freedom::Rigid);
+    let gaps: Vec<f64> = system.rows.iter().map(|row| centered[row.contact].gap_mm).collect();
+    let limits = Limits::new(&system, &gaps);
+    let mut corner = Corner::new(&limits);
+    let mut most = |from: usize, end: f64, scale: f64| {
+        let mut axes = [0.0f64; 3];
+        for (k, most) in axes.iter_mut().enumerate() {
+            for sign in [1.0, -1.0] {
+                let towards = DVector::from_fn(system.n, |i, _| if i == from + k { sign * scale } else { 0.0 });
+                *most = most.max(corner.farthest(&towards).map_or(end, |x| x.min(end)));
+            }
+        }
+        Vec3::from(axes).length()
+    };
+    [most(0, ENDLESS[0], 1.0), most(3, ENDLESS[1], 1.0 / LENGTH_MM).to_degrees()]
+}
+
+/// How the pieces not in `held` (of `n_pieces`) can move; empty where they cannot. With `leaves`, that piece may move as it likes, and
+/// only motions in which others move count.
+///
+/// `scale_mm` makes spins comparable to velocities: half the model's diagonal. All free pieces count as moving where
+/// there is no contact.
+pub fn free_motion(
+    contacts: &[Contact],
+    n_pieces: usize,
+    held: &[PatchId],
+    leaves: Option<PatchId>,
+    scale_mm: f64,
+    freedom: Freedom,
+) -> Vec<Twist> {
+    let free: Vec<PatchId> = (0..n_pieces).map(PatchId::from).filter(|id| !held.contains(id)).collect();
+    if free.is_empty() {
+        return Vec::new();
+    }
+    let system = System::new(contacts, &free, scale_mm, freedom);
+    let motion = system.opening_motion().or_else(|| system.sliding_motion());
+    let Some(motion) = motion else { return Vec::new() };
+    let Some(leaves) = leaves else { return system.twists(&motion, &free) };
+    let without = |twists: Vec<Twist>| -> Vec<Twist> { twists.into_iter().filter(|t| t.piece != leaves).collect() };
+    match moving_others(&system, &free, leaves) {
+        Some(motion) => without(system.twists(&motion, &free)),
+        None => Vec::new(),
+    }
+}
+
+/// A motion in which pieces but `leaves` move; `None` where there is none.
+///
+/// A cone that is more than 0 in their unknowns shows along almost any direction or its opposite; three are tried.
+fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<DVector<f64>> {
+    /// Others move where they get so far of the 1000 mm that motions end at; gaps that are 0 are taken as some nanometres.
+    const MOVED_MM: f64 = 0.5;
+    let limits = Limits::new(system, &vec![0.0; system.rows.len()]);
+    let mut corner = Corner::new(&limits);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let width = system.n / free.len().max(1);
+    let is_other = |k: usize| free[k / width] != leaves;
+    for _ in 0..3 {
+        let towards = DVector::from_fn(system.n, |k, _| if is_other(k) { rng.random_range(-1.0..1.0) } else { 0.0 });
+        for sign in [1.0, -1.0] {
+            corner.farthest(&(&towards * sign));
+            let moved = (0..system.n).filter(|&k| is_other(k)).map(|k| corner.motion()[k].abs()).fold(0.0, f64::max);
+            if moved > MOVED_MM {
+                let of_others = |k: usize| if is_other(k) { corner.motion()[k] } else { 0.0 };
+                return Some(DVector::from_fn(system.n, |k, _| of_others(k)));
+            }
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOutcome};
+
+    fn random_contacts(rng: &mut ChaCha8Rng, n_pieces: u32, n: usize) -> Vec<Contact> {
+        let mut unit = || Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
+        let mut contacts: Vec<Contact> = (0..n)
+            .map(|_| Contact {
+                a: PatchId(0),
+                b: PatchId(0),
+                point: unit(),
+                normal: unit().normalize(),
+                gap_mm: 0.0,
+                area_mm2: 1.0,
+            })
+            .collect();
+        for c in &mut contacts {
+            c.a = PatchId(rng.random_range(0..n_pieces));
+            c.b = PatchId((c.a.0 + rng.random_range(1..n_pieces)) % n_pieces);
+        }
+        contacts
+    }
+
+    /// The outside judge's own program: the most that contacts can open, over their number.
+    fn opening_by_simplex(system: &System) -> f64 {
+        let mut base = DVector::zeros(system.n);
+        system.rows.iter().for_each(|row| system.add(row, 1.0, &mut base));
+        let mut problem = Problem::new(OptimizationDirection::Minimize);
+        let x: Vec<_> = base.iter().map(|&c| problem.add_var(c, (-1.0, 1.0))).collect();
+        for row in &system.rows {
+            let mut dense = DVector::zeros(system.n);
+            system.add(row, 1.0, &mut dense);
+            let terms: Vec<_> = x.iter().copied().zip(dense.iter().copied()).filter(|t| t.1 != 0.0).collect();
+            problem.add_constraint(&terms, ComparisonOp::Le, 0.0);
+        }
+        let SolveOutcome::Solution(best) = problem.solve().unwrap() else { panic!("no limit was set") };
+        -best.objective() / system.rows.len() as f64
+    }
+
+    #[test]
+    fn opening_motions_exist_exactly_where_the_linear_program_finds_one() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let (mut n_locked, mut n_open) = (0, 0);
+        for n in [5, 8, 10, 12, 13, 14, 16, 20, 24, 26, 28, 30, 34, 40, 60] {
+            for n_pieces in [2, 3] {
+                let contacts = random_contacts(&mut rng, n_pieces, n);
+                let free: Vec<PatchId> = (1..n_pieces).map(PatchId).collect();
+                let system = System::new(&contacts, &free, 1.0, Freedom::Rigid);
+                let motion = system.opening_motion();
+                let opening = opening_by_simplex(&system);
+                assert_eq!(motion.is_some(), opening > 1e-6, "{n} contacts: {opening}");
+                if let Some(x) = &motion {
+                    n_open += 1;
+                    let worst = system.rows.iter().map(|r| system.dot(r, x)).fold(f64::NEG_INFINITY, f64::max);
+                    assert!(worst <= 1e-5 * x.norm(), "violates a contact by {worst}");
+                } else {
+                    n_locked += 1;
+                }
+            }
+        }
+        assert!(n_locked > 5 && n_open > 5, "{n_locked} locked, {n_open} open");
+    }
+
+    /// The greatest `objective · x` in the box of ±1000 mm; `gaps_mm` one a row.
+    fn farthest_by_simplex(system: &System, gaps_mm: &[f64], objective: &DVector<f64>) -> f64 {
+        let mut problem = Problem::new(OptimizationDirection::Maximize);
+        let x: Vec<_> = objective.iter().map(|&c| problem.add_var(c, (-1e3, 1e3))).collect();
+        for (row, &gap_mm) in system.rows.iter().zip(gaps_mm) {
+            let mut dense = DVector::zeros(system.n);
+            system.add(row, 1.0, &mut dense);
+            let terms: Vec<_> = x.iter().copied().zip(dense.iter().copied()).filter(|t| t.1 != 0.0).collect();
+            problem.add_constraint(&terms, ComparisonOp::Le, gap_mm);
+        }
+        let SolveOutcome::Solution(best) = problem.solve().unwrap() else { panic!("no limit was set") };
+        best.objective()
+    }
+
+    #[test]
+    fn pieces_go_as_far_as_the_linear_program_says_whether_gaps_are_equal_or_none() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (mut n_ended, mut n_endless) = (0, 0);
+        for (n, n_pieces) in [(4, 2), (12, 2), (20, 2), (60, 3), (150, 4), (300, 5)] {
+            let contacts = random_contacts(&mut rng, n_pieces, n);
+            let free: Vec<PatchId> = (1..n_pieces).map(PatchId).collect();
+            let system = System::new(&contacts, &free, 1.0, Freedom::Rigid);
+            let equal = vec![0.1; system.rows.len()];
+            let mut some = equal.clone();
+            some.iter_mut().step_by(3).for_each(|gap| *gap = 0.0);
+            for gaps_mm in [equal, some] {
+                let limits = Limits::new(&system, &gaps_mm);
+                let mut corner = Corner::new(&limits);
+                for _ in 0..8 {
+                    let mut objective = DVector::zeros(system.n);
+                    let at = 6 * rng.random_range(0..free.len());
+                    (at..at + 6).for_each(|k| objective[k] = rng.random::<f64>() - 0.5);
+                    let expected = farthest_by_simplex(&system, &gaps_mm, &objective);
+                    match corner.farthest(&objective) {
+                        Some(most) => assert!((most - expected).abs() < 1e-3 * expected.max(1.0), "{most} {expected}"),
+                        None => assert!(expected > 10.0, "{expected}"),
+                    }
+                    *if expected < 10.0 { &mut n_ended } else { &mut n_endless } += 1;
+                }
+            }
+        }
+        assert!(n_ended > 20 && n_endless > 8, "{n_ended} ended, {n_endless} endless");
+    }
+
+    /// Contacts on the six faces of a box around `center`, normals outwards.
+    fn box_contacts(a: u32, b: u32, center: Vec3) -> Vec<Contact> {
+        let mut contacts = Vec::new();
+        for (n, u, v) in [(Vec3::X, Vec3::Y, Vec3::Z), (Vec3::Y, Vec3::Z, Vec3::X), (Vec3::Z, Vec3::X, Vec3::Y)] {
+            for (p, q) in [(0.9, 0.8), (0.9, -0.8), (-0.7, 0.8), (-0.7, -0.8)] {
+                for side in [1.0, -1.0] {
+                    let point = center + n * side + u * p + v * q;
+                    contacts.push(Contact {
+                        a: PatchId(a),
+                        b: PatchId(b),
+                        point,
+                        normal: n * side,
+                        gap_mm: 0.0,
+                        area_mm2: 1.0,
+                    });
+                }
+            }
+        }
+        contacts
+    }
+
+    #[test]
+    fn a_caged_box_is_locked_and_without_one_face_it_leaves_there() {
+        let mut contacts = box_contacts(1, 0, Vec3::new(3.0, 1.0, 2.0));
+        assert!(free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Rigid).is_empty());
+        contacts.retain(|c| c.normal != Vec3::X);
+        let moving = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Translations);
+        assert_eq!(moving.len(), 1);
+        assert!((moving[0].velocity - Vec3::X).length() < 1e-6);
+        contacts.retain(|c| c.normal != Vec3::NEG_X);
+        let sliding = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Translations);
+        assert!(sliding[0].velocity.x.abs() > 0.999, "{sliding:?}");
+    }
+
+    #[test]
+    fn forty_caged_pieces_with_twenty_thousand_contacts_are_decided_and_one_loose_pair_is_named() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let mut contacts = Vec::new();
+        for piece in 1..40u32 {
+            let center = Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0;
+            for _ in 0..22 {
+                let mut cage = box_contacts(piece, piece - 1, center);
+                for c in &mut cage {
+                    c.point += Vec3::new(rng.random(), rng.random(), rng.random()) * 0.05;
+                }
+                contacts.extend(cage);
+            }
+        }
+        assert!(contacts.len() > 20_000);
+        assert!(free_motion(&contacts, 40, &[PatchId(0)], None, 2.0, Freedom::Rigid).is_empty());
+        contacts.retain(|c| c.a.0 != 38 || c.normal != Vec3::X);
+        let moving = free_motion(&contacts, 40, &[PatchId(0)], None, 2.0, Freedom::Rigid);
+        assert_eq!(moving.iter().map(|t| t.piece.0).collect::<Vec<_>>(), [38, 39]);
+    }
+}

@@ -1,0 +1,228 @@
+//! How far the finished pieces stay apart: each pair at rest, and each path over all of its travels. Nothing is sampled.
+//!
+//! The outer rims of a seam's two sides are meant to meet, and may rub by some µm: that only shows. So each gap is asked
+//! twice, of everything and of what lies beneath the rim. The pieces are cut at the rim's depth for that, along lines
+//! that are straight on each triangle.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::clearance::{Scope, Shape, Translation, least_gap, swept_gap};
+use shellock_geom::level_cut::{Side, cut_at_zero};
+use shellock_geom::{Solid, TriMesh};
+
+use super::body::{finite, merged};
+use crate::InstallationPlan;
+use crate::{Cancelled, Ctx, IdVec, PatchId};
+
+/// Wider gaps are of no interest, mm: the widest clearance is 1 mm.
+const WITHIN_MM: f64 = 1.0;
+
+/// Finished pieces, prepared for questions of clearance; `None` where a mesh bounds no volume.
+pub struct PieceShapes(IdVec<PatchId, Option<Shape>>);
+
+/// The least gap of two pieces and where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NearestPlace {
+    /// Least distance, mm, to 0.1 µm; minus the depth where surfaces cross, as [`shellock_geom::clearance`] defines it.
+    pub gap_mm: f64,
+    /// Travel of the moving piece there, mm; 0 at rest.
+    pub travel_mm: f64,
+    /// Midway between the surfaces, mm in assembly space.
+    pub at: [f64; 3],
+}
+
+/// How near two pieces come in the assembly.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PairGap {
+    /// The piece with the lower id.
+    pub a: PatchId,
+    /// The other.
+    pub b: PatchId,
+    /// Of their whole surfaces.
+    pub overall: NearestPlace,
+    /// Of what lies beneath the rim, if that comes within 1 mm.
+    pub beneath_rim: Option<NearestPlace>,
+}
+
+/// How near a piece comes to one installed before it, over its whole way out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathGap {
+    /// The piece that moves.
+    pub piece: PatchId,
+    /// The earlier piece.
+    pub against: PatchId,
+    /// Of their whole surfaces.
+    pub overall: NearestPlace,
+    /// Of what lies beneath the rim, if that comes within 1 mm.
+    pub beneath_rim: Option<NearestPlace>,
+}
+
+/// All gaps of a kit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct KitGaps {
+    /// At rest, see [`pair_gaps`].
+    pub pairs: Vec<PairGap>,
+    /// On the way, see [`path_gaps`].
+    pub paths: Vec<PathGap>,
+}
+
+/// All gaps of the finished `pieces` of `model`, installed as `plan` says. What is within `rim_mm` of the model's surface is rim.
+pub fn kit_gaps(
+    ctx: &Ctx,
+    model: &Solid,
+    pieces: &IdVec<PatchId, TriMesh>,
+    plan: &InstallationPlan,
+    rim_mm: f64,
+) -> Result<KitGaps, Cancelled> {
+    ctx.stage("gaps", 0)?;
+    let shapes = prepare(ctx, model, pieces, rim_mm)?;
+    let (pairs, paths) = rayon::join(|| pair_gaps(ctx, &shapes), || path_gaps(ctx, &shapes, plan));
+    Ok(KitGaps { pairs: pairs?, paths: paths? })
+}
+
+/// Prepares `pieces` of `model`. What is within `rim_mm` of the model's surface is rim.
+pub fn prepare(
+    ctx: &Ctx,
+    model: &Solid,
+    pieces: &IdVec<PatchId, TriMesh>,
+    rim_mm: f64,
+) -> Result<PieceShapes, Cancelled> {
+    let outside = TriangleBvh::new(model.mesh());
+    let shapes = pieces.as_slice().par_iter().map(|mesh| {
+        ctx.check()?;
+        Ok(shape(&outside, mesh, rim_mm))
+    });
+    Ok(PieceShapes(shapes.collect::<Result<Vec<_>, Cancelled>>()?.into_iter().collect()))
+}
+
+/// Every pair of pieces that comes within 1 mm, in order of their ids.
+pub fn pair_gaps(ctx: &Ctx, shapes: &PieceShapes) -> Result<Vec<PairGap>, Cancelled> {
+    let ids: Vec<PatchId> = shapes.0.ids().collect();
+    let pairs = ids.iter().enumerate().flat_map(|(i, &a)| ids[i + 1..].iter().map(move |&b| (a, b)));
+    among(ctx, pairs.collect(), |(a, b)| {
+        let (shape_a, shape_b) = (shapes.0[a].as_ref()?, shapes.0[b].as_ref()?);
+        let of = |scope| least_gap(shape_a, shape_b, scope, WITHIN_MM).map(|g| place(g.gap_mm, 0.0, g.at.to_array()));
+        Some(PairGap { a, b, overall: of(Scope::Everything)?, beneath_rim: of(Scope::WhatCounts) })
+    })
+}
+
+/// Every path of `plan`, against each earlier piece that it comes within 1 mm of, in order of installation. What the plan
+/// names and is not there is left out.
+pub fn path_gaps(ctx: &Ctx, shapes: &PieceShapes, plan: &InstallationPlan) -> Result<Vec<PathGap>, Cancelled> {
+    let steps = &plan.steps;
+    let pairs = (0..steps.len()).flat_map(|i| (0..i).map(move |earlier| (i, earlier)));
+    among(ctx, pairs.collect(), |(i, earlier)| {
+        let (piece, against) = (steps[i].piece, steps[earlier].piece);
+        let shape = |p: PatchId| shapes.0.as_slice().get(usize::from(p))?.as_ref();
+        let (moving, fixed) = (shape(piece)?, shape(against)?);
+        let way_out = Translation { along: steps[i].separation.unit(), from_mm: 0.0, far_mm: f64::INFINITY };
+        let of = |scope| {
+            let gap = swept_gap(moving, fixed, &way_out, scope, WITHIN_MM)?;
+            Some(place(gap.gap_mm, gap.travel_mm, gap.at.to_array()))
+        };
+        Some(PathGap { piece, against, overall: of(Scope::Everything)?, beneath_rim: of(Scope::WhatCounts) })
+    })
+}
+
+/// What `ask` answers for each of `pairs`, in their order.
+fn among<P: Send, G: Send>(
+    ctx: &Ctx,
+    pairs: Vec<P>,
+    ask: impl Fn(P) -> Option<G> + Sync + Send,
+) -> Result<Vec<G>, Cancelled> {
+    let gaps: Vec<Option<G>> = pairs
+        .into_par_iter()
+        .map(|pair| {
+            ctx.check()?;
+            Ok(ask(pair))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    Ok(gaps.into_iter().flatten().collect())
+}
+
+fn shape(outside: &TriangleBvh, mesh: &TriMesh, rim_mm: f64) -> Option<Shape> {
+    let mesh = finite(mesh).map(merged)?;
+    let below_rim = |p| outside.nearest(p, rim_mm * rim_mm).map_or(1.0, |near| near.distance_sq.sqrt() - rim_mm);
+    let values: Vec<f64> = mesh.points.iter().map(|&p| below_rim(p)).collect();
+    let cut = cut_at_zero(&mesh, &values, |_| true);
+    let solid = Solid::new(cut.mesh).ok()?;
+    Some(Shape::new(&solid).counting(|face| cut.side[face] == Side::Positive))
+}
+
+fn place(gap_mm: f64, travel_mm: f64, at: [f64; 3]) -> NearestPlace {
+    NearestPlace { gap_mm, travel_mm, at }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::InstallationStep;
+    use crate::{LatticeDirection, context};
+    use shellock_geom::{Aabb, Vec3, Volume};
+    use std::sync::atomic::AtomicBool;
+
+    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
+        Volume::cuboid(Aabb { min: min.into(), max: max.into() })
+    }
+
+    /// A block that lies in a tray, flush with its rim, and touches the walls there alone. It leaves upwards.
+    fn kit() -> (Solid, IdVec<PatchId, TriMesh>, InstallationPlan) {
+        let model = cuboid([0.0; 3], [20.0, 20.0, 10.0]);
+        let seat = cuboid([5.0, 5.0, 4.0], [15.0, 15.0, 11.0]);
+        let collar = cuboid([5.0, 5.0, 9.8], [15.0, 15.0, 10.0]);
+        let block = cuboid([5.05, 5.04, 4.07], [14.9, 14.9, 10.0]).union(&collar);
+        let ledge = cuboid([4.0, 7.0, 12.0], [5.08, 8.0, 13.0]);
+        let steps = [Vec3::Z, Vec3::Z, Vec3::X].into_iter().zip(0..);
+        let steps =
+            steps.map(|(d, i)| InstallationStep { piece: PatchId(i), separation: LatticeDirection::nearest(d) });
+        let pieces = [model.subtract(&seat), block, ledge].iter().map(Volume::to_mesh).collect();
+        (Solid::new(model.to_mesh()).unwrap(), pieces, InstallationPlan { steps: steps.collect() })
+    }
+
+    fn with_ctx<T>(run: impl FnOnce(&Ctx) -> T) -> T {
+        let (report, stop) = (|_: context::Progress<'_>| {}, AtomicBool::new(false));
+        run(&Ctx::new(&report, &stop))
+    }
+
+    #[test]
+    fn gaps_beneath_the_rim_are_those_of_the_walls() {
+        let (model, pieces, plan) = kit();
+        with_ctx(|ctx| {
+            let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+            let pairs = pair_gaps(ctx, &shapes).unwrap();
+            assert_eq!(pairs.len(), 1, "the ledge is 2 mm off");
+            assert!(pairs[0].overall.gap_mm.abs() < 1e-4, "{pairs:?}");
+            assert!((pairs[0].beneath_rim.unwrap().gap_mm - 0.04).abs() < 1e-9, "{pairs:?}");
+            let paths = path_gaps(ctx, &shapes, &plan).unwrap();
+            assert_eq!(paths[0].beneath_rim.map(|g| g.gap_mm), pairs[0].beneath_rim.map(|g| g.gap_mm));
+        });
+    }
+
+    #[test]
+    fn a_path_is_measured_past_what_is_only_met_on_the_way() {
+        let (model, pieces, mut plan) = kit();
+        plan.steps.swap(1, 2);
+        with_ctx(|ctx| {
+            let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+            let paths = path_gaps(ctx, &shapes, &plan).unwrap();
+            let met = paths.iter().find(|p| (p.piece, p.against) == (PatchId(1), PatchId(2))).unwrap();
+            // The collar runs into the ledge by 0.08 mm on its way, the block beneath it by 0.03.
+            assert!((met.overall.gap_mm + 0.08).abs() < 2e-4, "{met:?}");
+            assert!((2.0..3.2).contains(&met.overall.travel_mm), "{met:?}");
+        });
+    }
+
+    #[test]
+    fn broken_pieces_and_plans_are_left_out() {
+        let (model, mut pieces, mut plan) = kit();
+        pieces[PatchId(1)].triangles.pop();
+        pieces[PatchId(2)].points[0].x = f64::NAN;
+        plan.steps[2].piece = PatchId(77);
+        with_ctx(|ctx| {
+            let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+            assert_eq!(pair_gaps(ctx, &shapes).unwrap(), []);
+            assert_eq!(path_gaps(ctx, &shapes, &plan).unwrap(), []);
+        });
+    }
+}

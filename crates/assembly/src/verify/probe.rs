@@ -1,0 +1,118 @@
+//! Whether each piece but the key is held in every direction by the others.
+//!
+//! Each piece is pushed a small step in 66 directions and must run into the rest. Where its contacts face the push, they
+//! tell how much; elsewhere rays through the piece do, and an exact boolean decides near the limit.
+
+use std::cell::LazyCell;
+
+use rayon::prelude::*;
+use shellock_geom::{Aabb, Vec3, Volume};
+
+use super::body::Body;
+use super::columns::{Columns, Frame, Grid};
+use super::contact::Contact;
+use super::limits::HOLD_MM3;
+use super::{Check, Finding, rounded};
+use crate::{Cancelled, Ctx, IdVec, PatchId, push};
+
+/// Ray spacings, mm, each with the estimated overlap, mm³, from which a piece is held: at a depth of 0.9 mm
+/// some thirty rays meet it then. A margin against the sampling error, not a bound.
+const LEVELS: [(f64, f64); 2] = [(0.5, 6.0), (0.2, 1.2)];
+/// Estimated overlap below which a piece is called loose, mm³: on the strict side of the limit, whatever the error.
+const SURELY_LOOSE_MM3: f64 = 0.1;
+/// Overlap told by contacts from which a piece is held, mm³: ten times the limit. Each contact counts with its area and the
+/// depth to which it is pushed, up to this many mm, which no wall is thinner than.
+const CONTACTS_HOLD_MM3: f64 = 5.5;
+const CONTACT_DEPTH_MM: f64 = 0.4;
+/// Most rays across the longer side of a piece's shadow; larger prints get wider spacings.
+const MOST_PIXELS: f64 = 1200.0;
+/// Rays parallel to no face of a common model.
+const RAYS: Vec3 = Vec3::new(0.3713, 0.5219, 0.7680);
+
+/// Pushes every piece but `key` by three clearances and 0.6 mm.
+pub fn check(
+    ctx: &Ctx,
+    bodies: &IdVec<PatchId, Body>,
+    contacts: &[Contact],
+    key: PatchId,
+    clearance_mm: f64,
+) -> Result<(Check, Vec<Finding>), Cancelled> {
+    let step_mm = push::length_mm(clearance_mm);
+    let directions = push::directions();
+    let frame = Frame::along(RAYS.normalize());
+    let projected: Vec<Vec<Vec3>> =
+        bodies.iter().map(|(_, b)| b.mesh.points.iter().map(|&p| frame.project(p)).collect()).collect();
+    let ids: Vec<PatchId> = bodies.ids().filter(|&id| id != key).collect();
+    let loose: Vec<Option<Finding>> = ids
+        .into_par_iter()
+        .map(|piece| {
+            ctx.check()?;
+            let own: Vec<&Contact> = contacts.iter().filter(|c| c.a == piece).collect();
+            let doubtful: Vec<Vec3> =
+                directions.iter().copied().filter(|d| !contacts_hold(&own, *d * step_mm)).collect();
+            let free = free_directions(bodies, &projected, &frame, piece, step_mm, &doubtful);
+            Ok((!free.is_empty()).then_some(Finding::Loose { piece, directions: free }))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let findings: Vec<Finding> = loose.into_iter().flatten().collect();
+    let figure = format!("{} pieces loose in some of {} directions", findings.len(), directions.len());
+    Ok((Check::new("every piece but the key is blocked", findings.is_empty(), figure), findings))
+}
+
+/// Whether the contacts of a piece alone show that a push by `step` is held.
+fn contacts_hold(contacts: &[&Contact], step: Vec3) -> bool {
+    let overlap_mm3: f64 =
+        contacts.iter().map(|c| c.area_mm2 * (c.normal.dot(step) - c.gap_mm).clamp(0.0, CONTACT_DEPTH_MM)).sum();
+    overlap_mm3 >= CONTACTS_HOLD_MM3
+}
+
+fn free_directions(
+    bodies: &IdVec<PatchId, Body>,
+    projected: &[Vec<Vec3>],
+    frame: &Frame,
+    piece: PatchId,
+    step_mm: f64,
+    directions: &[Vec3],
+) -> Vec<[f64; 3]> {
+    let Some(own) = &bodies[piece].volume else { return Vec::new() };
+    let room = own.bounds().grown(step_mm);
+    let others: Vec<(PatchId, &Volume)> = bodies
+        .iter()
+        .filter_map(|(id, b)| Some((id, b.volume.as_ref()?)))
+        .filter(|(id, v)| *id != piece && v.bounds().intersects(room))
+        .collect();
+    let points = &projected[usize::from(piece)];
+    let shadow = Aabb::around(points.iter().copied()).grown(step_mm);
+    let levels = LEVELS.map(|(spacing_mm, surely_held_mm3)| {
+        let grid = Grid::covering(shadow, spacing_mm.max(shadow.size().truncate().max_element() / MOST_PIXELS));
+        let columns = move |&(id, _): &(PatchId, &Volume)| {
+            Columns::of(&grid, &projected[usize::from(id)], &bodies[id].mesh.triangles, Vec3::ZERO)
+        };
+        let others = &others;
+        (grid, surely_held_mm3, LazyCell::new(move || others.iter().map(columns).collect::<Vec<Columns>>()))
+    });
+    let is_held = |direction: Vec3| {
+        let step = direction * step_mm;
+        for (grid, surely_held_mm3, around) in &levels {
+            let moved = Columns::of(grid, points, &bodies[piece].mesh.triangles, frame.project(step));
+            let length: f64 = around.iter().map(|other| moved.common_length_mm(other)).sum();
+            let estimate_mm3 = length * grid.cell_mm2();
+            if estimate_mm3 >= *surely_held_mm3 {
+                return true;
+            }
+            if estimate_mm3 < SURELY_LOOSE_MM3 {
+                return false;
+            }
+        }
+        is_held_exactly(&own.translate(step), &others)
+    };
+    directions.iter().filter(|&&d| !is_held(d)).map(|d| d.to_array()).collect()
+}
+
+fn is_held_exactly(moved: &Volume, others: &[(PatchId, &Volume)]) -> bool {
+    let mut sum = 0.0;
+    others.iter().any(|(_, other)| {
+        sum += rounded(moved.intersect(other).volume());
+        sum >= HOLD_MM3
+    })
+}

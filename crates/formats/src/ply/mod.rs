@@ -1,0 +1,230 @@
+//! PLY: points, polygons or strips, and for each face a whole-number label or a colour. Everything else is skipped.
+//!
+//! A file is a text header that declares elements (`vertex`, `face`, others) with their properties, then the values of
+//! all elements in order, as words or as bytes.
+
+mod header;
+mod source;
+
+use super::polygons::{Numbering, Polygons};
+use super::text::whole_of;
+use super::{Format, LabelSource, Loaded, ReadError};
+use header::{Element, Encoding, Header, Kind, Property, Scalar};
+use shellock_geom::TriMesh;
+use source::{Binary, Source, Words};
+
+/// Names that programs give to the label of a face; where a file has several, the first of this list counts.
+const LABEL_NAMES: [&str; 17] = [
+    "label",
+    "labels",
+    "face_label",
+    "segment",
+    "segments",
+    "segment_id",
+    "segmentation",
+    "seg",
+    "patch",
+    "patch_id",
+    "region",
+    "region_id",
+    "part",
+    "part_id",
+    "object_id",
+    "group",
+    "group_id",
+];
+
+/// Channels of the colour of a face, the first three of them needed.
+const COLOR_NAMES: [&str; 4] = ["red", "green", "blue", "alpha"];
+
+/// Reads a PLY of any encoding.
+pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
+    let (header, lines) = Header::read(bytes)?;
+    header.check_counts(lines.rest().len(), lines.place())?;
+    let body_at = bytes.len() - lines.rest().len();
+    match header.encoding {
+        Encoding::Ascii => read_body(&header, Words::of(lines)),
+        Encoding::Binary { big_endian } => read_body(&header, Binary { bytes, at: body_at, big_endian }),
+    }
+}
+
+fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadError> {
+    let mut polygons = Polygons::counted_from(0);
+    let mut labels = Vec::new();
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => read_points(element, &mut source, &mut polygons)?,
+            "face" => labels = read_faces(element, &mut source, &mut polygons)?,
+            "tristrips" => read_strips(element, &mut source, &mut polygons)?,
+            // Rows without properties have no bytes, so their count is backed by nothing.
+            _ if element.properties.is_empty() => {}
+            _ => {
+                for _ in 0..element.count {
+                    element.properties.iter().try_for_each(|p| skip(p.kind, &mut source))?;
+                }
+            }
+        }
+    }
+    // Strips have no labels; with faces that have, they would be told apart by chance.
+    labels.retain(|(_, labels)| labels.len() == polygons.n_faces());
+    polygons.finish(Format::Ply, labels)
+}
+
+fn read_points(element: &Element, source: &mut impl Source, polygons: &mut Polygons) -> Result<(), ReadError> {
+    for name in ["x", "y", "z"] {
+        if !element.properties.iter().any(|p| p.name == name && matches!(p.kind, Kind::Scalar(_))) {
+            return Err(ReadError::Unsupported { what: "a PLY file whose points lack x, y or z", at: element.at });
+        }
+    }
+    let axis_of = |name: &str| ["x", "y", "z"].iter().position(|&axis| axis == name);
+    let columns: Vec<_> = element.properties.iter().map(|p| (p.kind, axis_of(&p.name))).collect();
+    polygons.reserve(element.count, 0);
+    for _ in 0..element.count {
+        let at = source.place();
+        let mut coordinates = [0.0; 3];
+        for &(kind, axis) in &columns {
+            match (kind, axis) {
+                (Kind::Scalar(scalar), Some(axis)) => coordinates[axis] = source.next(scalar)?,
+                _ => skip(kind, source)?,
+            }
+        }
+        polygons.add_point(coordinates, at)?;
+    }
+    Ok(())
+}
+
+/// Adds the polygons; returns one label each where a property has a name for it, and one for each colour.
+fn read_faces(
+    element: &Element,
+    source: &mut impl Source,
+    polygons: &mut Polygons,
+) -> Result<Vec<(LabelSource, Vec<i64>)>, ReadError> {
+    let corners_property = corners_property(element, "a PLY file whose faces lack vertex_indices")?;
+    let scalar_named = |name: &str| {
+        let is_it = |p: &Property| p.name == name && matches!(p.kind, Kind::Scalar(_));
+        element.properties.iter().position(is_it)
+    };
+    let is_integer = |i: &usize| matches!(element.properties[*i].kind, Kind::Scalar(s) if s.is_integer());
+    let label_property = LABEL_NAMES.iter().find_map(|name| scalar_named(name).filter(is_integer));
+    let color_properties = COLOR_NAMES.map(scalar_named);
+    let has_colors = color_properties[..3].iter().all(Option::is_some);
+
+    polygons.reserve(0, element.count);
+    let (mut labels, mut colors, mut numbering) = (Vec::new(), Vec::new(), Numbering::default());
+    let mut corners = Vec::new();
+    for _ in 0..element.count {
+        let at = source.place();
+        corners.clear();
+        let mut color = [0_u64; 4];
+        for (i, property) in element.properties.iter().enumerate() {
+            match property.kind {
+                Kind::List { count, item } if i == corners_property => {
+                    for _ in 0..whole(source, count)? {
+                        corners.push(polygons.corner(whole(source, item)?, at)?);
+                    }
+                }
+                Kind::Scalar(scalar) if Some(i) == label_property => labels.push(whole(source, scalar)?),
+                Kind::Scalar(scalar) if has_colors && color_properties.contains(&Some(i)) => {
+                    let channel = color_properties.iter().position(|c| *c == Some(i)).unwrap_or_default();
+                    color[channel] = source.next(scalar)?.to_bits();
+                }
+                kind => skip(kind, source)?,
+            }
+        }
+        polygons.add_polygon(&corners, at)?;
+        if has_colors {
+            colors.push(numbering.number(color));
+        }
+    }
+    let mut found = Vec::new();
+    found.extend(label_property.map(|_| (LabelSource::Property, labels)));
+    found.extend(has_colors.then_some((LabelSource::Color, colors)));
+    Ok(found)
+}
+
+fn corners_property(element: &Element, lacking: &'static str) -> Result<usize, ReadError> {
+    let is_corners = |name: &str| name == "vertex_indices" || name == "vertex_index";
+    let found = element.properties.iter().position(|p| is_corners(&p.name) && matches!(p.kind, Kind::List { .. }));
+    found.ok_or(ReadError::Unsupported { what: lacking, at: element.at })
+}
+
+/// Adds strips of triangles, as scans have them: each point makes a triangle with the two before it, turned every other
+/// time; −1 begins anew.
+fn read_strips(element: &Element, source: &mut impl Source, polygons: &mut Polygons) -> Result<(), ReadError> {
+    let corners_property = corners_property(element, "a PLY file whose strips lack vertex_indices")?;
+    for _ in 0..element.count {
+        for (i, property) in element.properties.iter().enumerate() {
+            let Kind::List { count, item } = property.kind else {
+                skip(property.kind, source)?;
+                continue;
+            };
+            if i != corners_property {
+                skip(property.kind, source)?;
+                continue;
+            }
+            let (mut strip, mut n_before) = ([0; 2], 0_usize);
+            for _ in 0..whole(source, count)? {
+                let at = source.place();
+                let index = whole(source, item)?;
+                if index == -1 {
+                    n_before = 0;
+                    continue;
+                }
+                let corner = polygons.corner(index, at)?;
+                let [a, b] = strip;
+                // Strips repeat a point to turn a corner: what has no area is no triangle of theirs.
+                if n_before >= 2 && a != b && b != corner && corner != a {
+                    let triangle = if n_before.is_multiple_of(2) { [a, b, corner] } else { [b, a, corner] };
+                    polygons.add_polygon(&triangle, at)?;
+                }
+                (strip, n_before) = ([b, corner], n_before + 1);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn skip(kind: Kind, source: &mut impl Source) -> Result<(), ReadError> {
+    match kind {
+        Kind::Scalar(scalar) => source.next(scalar).map(|_| ()),
+        Kind::List { count, item } => {
+            // The source ends before a wrong count does harm: each item takes bytes.
+            (0..whole(source, count)?).try_for_each(|_| source.next(item).map(|_| ()))
+        }
+    }
+}
+
+fn whole(source: &mut impl Source, scalar: Scalar) -> Result<i64, ReadError> {
+    let at = source.place();
+    let value = source.next(scalar)?;
+    whole_of(value).ok_or_else(|| ReadError::Malformed { at, expected: "a whole number", found: value.to_string() })
+}
+
+/// A binary little-endian PLY with coordinates as `double` and, if given, one `label` for each triangle.
+///
+/// # Panics
+/// Where `face_labels` has another length than the triangles.
+pub fn write_ply(mesh: &TriMesh, face_labels: Option<&[i32]>) -> Vec<u8> {
+    assert!(face_labels.is_none_or(|labels| labels.len() == mesh.triangles.len()), "one label for each triangle");
+    let label_line = if face_labels.is_some() { "property int label\n" } else { "" };
+    let header = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment written by shellock\n\
+         element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+         element face {}\nproperty list uchar uint vertex_indices\n{label_line}end_header\n",
+        mesh.points.len(),
+        mesh.triangles.len(),
+    );
+    let mut bytes = header.into_bytes();
+    bytes.reserve(24 * mesh.points.len() + 17 * mesh.triangles.len());
+    for point in &mesh.points {
+        point.to_array().iter().for_each(|x| bytes.extend_from_slice(&x.to_le_bytes()));
+    }
+    for (face, triangle) in mesh.triangles.iter().enumerate() {
+        bytes.push(3);
+        triangle.iter().for_each(|corner| bytes.extend_from_slice(&corner.to_le_bytes()));
+        if let Some(labels) = face_labels {
+            bytes.extend_from_slice(&labels[face].to_le_bytes());
+        }
+    }
+    bytes
+}

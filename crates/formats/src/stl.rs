@@ -1,0 +1,167 @@
+//! STL, binary and ASCII. Stored normals are ignored: the order of the corners says what is outside.
+
+use super::polygons::{Numbering, Polygons};
+use super::text::{Lines, malformed, point, words};
+use super::{Format, LabelSource, Loaded, Place, ReadError};
+use shellock_geom::TriMesh;
+
+/// Free text, then the number of triangles.
+const HEADER_BYTES: usize = 84;
+/// Normal, three corners, 2 bytes of no agreed meaning.
+const TRIANGLE_BYTES: usize = 50;
+/// Must not begin with "solid", which many programs take for ASCII.
+const HEADER_TEXT: &[u8] = b"binary STL by shellock, millimetres";
+
+/// Whether the length is exactly what the count in a binary header asks for.
+pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
+    promised(bytes).is_some_and(|n| n > 0 && bytes.len() as u64 == HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * n)
+}
+
+/// Reads a binary STL.
+///
+/// Its count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is taken where
+/// it looks like triangles, and passed over where it does not. A count that is too high is a file cut off.
+pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
+    let Some(promised) = promised(bytes) else {
+        return Err(ReadError::CutOff { at: Place::Byte(bytes.len()), within: "the header" });
+    };
+    let (body, mut notes) = (&bytes[HEADER_BYTES..], Vec::new());
+    let n_triangles = count(body, promised, &mut notes)?;
+    let mut polygons = Polygons::counted_from(0);
+    polygons.reserve(3 * n_triangles, n_triangles);
+    let mut colors = Colors::of_header(&bytes[..HEADER_BYTES - 4]);
+    for (face, triangle) in body.chunks_exact(TRIANGLE_BYTES).take(n_triangles).enumerate() {
+        let at = HEADER_BYTES + TRIANGLE_BYTES * face;
+        let mut corners = [0; 3];
+        for (k, corner) in corners.iter_mut().enumerate() {
+            let from = 12 + 12 * k;
+            let coordinates = [0, 4, 8].map(|i| f64::from(float(&triangle[from + i..])));
+            *corner = polygons.add_point(coordinates, Place::Byte(at + from))?;
+        }
+        polygons.add_polygon(&corners, Place::Byte(at))?;
+        colors.add(u16::from_le_bytes([triangle[48], triangle[49]]));
+    }
+    let mut loaded = polygons.finish(Format::StlBinary, vec![(LabelSource::Color, colors.labels)])?;
+    loaded.notes = notes;
+    Ok(loaded)
+}
+
+/// How many triangles to take of `body`.
+fn count(body: &[u8], promised: u64, notes: &mut Vec<String>) -> Result<usize, ReadError> {
+    let held = body.len() / TRIANGLE_BYTES;
+    let is_unknown = promised == 0 || promised == u64::from(u32::MAX);
+    let wrong = |held: usize| format!("the header promises {promised} triangles, the file holds {held}; all are read");
+    if promised > held as u64 && !is_unknown {
+        let at = Place::Byte(HEADER_BYTES - 4);
+        return Err(ReadError::TooFewBytes { at, what: "triangles", promised, room: held as u64 });
+    }
+    let n_promised = if is_unknown { 0 } else { promised as usize };
+    let is_like_triangles = body[TRIANGLE_BYTES * n_promised..].chunks_exact(TRIANGLE_BYTES).all(is_like_a_triangle);
+    if n_promised < held && (is_unknown || (is_like_triangles && body.len().is_multiple_of(TRIANGLE_BYTES))) {
+        notes.push(wrong(held));
+        return Ok(held);
+    }
+    let n_trailing = body.len() - TRIANGLE_BYTES * n_promised;
+    // Up to a triangle's length is padding.
+    if n_trailing >= TRIANGLE_BYTES {
+        notes.push(format!("{n_trailing} bytes after the last triangle are no triangles and were passed over"));
+    }
+    Ok(n_promised)
+}
+
+/// Whether the normal is a unit vector or zero and the corners are finite.
+fn is_like_a_triangle(bytes: &[u8]) -> bool {
+    let float = |i: usize| float(&bytes[4 * i..]);
+    let length_sq: f32 = (0..3).map(|i| float(i) * float(i)).sum();
+    (length_sq == 0.0 || (length_sq - 1.0).abs() < 0.1) && (3..12).all(|i| float(i).is_finite())
+}
+
+/// The colours in the last two bytes of triangles: 5 bits each of red, green and blue, and one that says whether they hold.
+struct Colors {
+    /// What the highest bit is where a triangle has a colour of its own: set in most programs, not set in Magics,
+    /// whose headers have "COLOR=".
+    valid: u16,
+    numbering: Numbering<Option<u16>>,
+    labels: Vec<i64>,
+}
+
+impl Colors {
+    fn of_header(header: &[u8]) -> Self {
+        let is_magics = header.windows(6).any(|w| w == b"COLOR=");
+        Self { valid: u16::from(!is_magics), numbering: Numbering::default(), labels: Vec::new() }
+    }
+
+    fn add(&mut self, bits: u16) {
+        let color = (bits >> 15 == self.valid).then_some(bits & 0x7FFF);
+        self.labels.push(self.numbering.number(color));
+    }
+}
+
+/// Reads an ASCII STL of any number of solids; upper and lower case are the same, and a missing `endsolid` is forgiven.
+pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
+    let mut polygons = Polygons::counted_from(0);
+    let mut lines = Lines::of(bytes);
+    let mut corners = Vec::new();
+    let mut in_facet = false;
+    let (mut solid, mut solids) = (0_i64, Vec::new());
+    while let Some((at, line)) = lines.next() {
+        let mut words = words(line);
+        let Some(first) = words.next() else { continue };
+        match (keyword(first), in_facet) {
+            (b"facet", false) => in_facet = true,
+            (b"vertex", true) => corners.push(polygons.add_point(point(&mut words, at)?, at)?),
+            (b"outer" | b"endloop", true) => {}
+            (b"endfacet", true) => {
+                polygons.add_polygon(&corners, at)?;
+                solids.push(solid);
+                corners.clear();
+                in_facet = false;
+            }
+            (b"solid", false) => solid += 1,
+            (b"endsolid" | b"color", false) => {}
+            // Half a word at the very end.
+            (_, true) if lines.rest().is_empty() => break,
+            (_, true) => return Err(malformed(at, "\"vertex\" or \"endfacet\"", first)),
+            (_, false) => return Err(malformed(at, "\"facet\" or \"endsolid\"", first)),
+        }
+    }
+    if in_facet {
+        return Err(ReadError::CutOff { at: lines.place(), within: "a facet" });
+    }
+    polygons.finish(Format::StlAscii, vec![(LabelSource::Object, solids)])
+}
+
+/// The keyword in lower case that `word` is; the word itself where it is none.
+fn keyword(word: &[u8]) -> &[u8] {
+    const ALL: [&[u8]; 8] = [b"vertex", b"facet", b"outer", b"endloop", b"endfacet", b"solid", b"endsolid", b"color"];
+    ALL.into_iter().find(|k| k.eq_ignore_ascii_case(word)).unwrap_or(word)
+}
+
+/// A binary STL: normals computed (zero for degenerate triangles), coordinates rounded to `f32`.
+///
+/// # Panics
+/// Where a triangle names a missing point.
+pub fn write_stl_binary(mesh: &TriMesh) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(HEADER_BYTES + TRIANGLE_BYTES * mesh.triangles.len());
+    bytes.extend_from_slice(HEADER_TEXT);
+    bytes.resize(HEADER_BYTES - 4, 0);
+    bytes.extend_from_slice(&(mesh.triangles.len() as u32).to_le_bytes());
+    for face in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(face);
+        for vector in [mesh.face_normal(face), a, b, c] {
+            vector.to_array().iter().for_each(|&x| bytes.extend_from_slice(&(x as f32).to_le_bytes()));
+        }
+        bytes.extend_from_slice(&[0; 2]);
+    }
+    bytes
+}
+
+/// The number of triangles that a binary header promises.
+fn promised(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
+    Some(u64::from(u32::from_le_bytes([count[0], count[1], count[2], count[3]])))
+}
+
+fn float(bytes: &[u8]) -> f32 {
+    f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+}

@@ -1,0 +1,171 @@
+//! Writing 3MF: a zip archive of three XML files (3MF core specification 1.3, with its base materials).
+
+use std::fmt::Write as _;
+use std::io::{Cursor, Write as _};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, System, ZipWriter};
+
+use super::super::paint::whole_triangle_code;
+use shellock_geom::TriMesh;
+
+/// An object of a 3MF model.
+#[derive(Clone, Copy, Debug)]
+pub struct NamedObject<'a> {
+    /// Shown by slicers; any text.
+    pub name: &'a str,
+    /// sRGB.
+    pub color: [u8; 3],
+    /// mm.
+    pub mesh: &'a TriMesh,
+    /// How it is turned on the plate: where the x, y and z axes go; as it is where `None`.
+    pub turned: Option<[[f64; 3]; 3]>,
+    /// Where it is moved after that, mm.
+    pub moved_mm: [f64; 3],
+}
+
+const TITLE: &str = "Shellock pieces";
+/// Where PrusaSlicer's attributes belong.
+const PAINT_NAMESPACE: &str = r#" xmlns:slic3rpe="http://schemas.slic3r.org/3mf/2017/06""#;
+/// PrusaSlicer's versions of its additions and of the paint.
+const PAINT_VERSION: &str = "<metadata name=\"slic3rpe:Version3mf\">1</metadata>\n\
+                             <metadata name=\"slic3rpe:MmPaintingVersion\">1</metadata>\n";
+const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>
+"#;
+const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
+"#;
+
+/// A 3MF model with one build item for each object, in millimetres; the same objects give the same bytes everywhere.
+///
+/// Coordinates are rounded to `f32`, as slicers read them. Slicers refuse objects without triangles.
+pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
+    package(&model_xml(objects))
+}
+
+/// A 3MF of one body in millimetres whose triangles are painted: colour k, from 1 to 16, is the k-th extruder or filament.
+///
+/// PrusaSlicer, Bambu Studio and OrcaSlicer show the paint, each reading its own attribute; there it can be changed, and
+/// [`super::super::read_mesh`] reads it back, points and all.
+///
+/// # Panics
+/// Where `colors` has another length than the triangles.
+pub fn write_painted_3mf(name: &str, mesh: &TriMesh, colors: &[u32]) -> Vec<u8> {
+    assert_eq!(colors.len(), mesh.triangles.len(), "one colour for each triangle");
+    let mut xml = head("Shellock segmentation", PAINT_NAMESPACE, PAINT_VERSION);
+    add(&mut xml, format_args!("<object id=\"1\" type=\"model\" name=\"{}\">\n", Escaped(name)));
+    add_mesh(&mut xml, mesh, Some(colors));
+    xml.push_str("</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n");
+    package(&xml)
+}
+
+/// The archive around a model.
+fn package(model: &str) -> Vec<u8> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(1))
+        .last_modified_time(DateTime::DEFAULT)
+        .unix_permissions(0o644)
+        .system(System::Unix)
+        .large_file(model.len() >= u32::MAX as usize);
+    let entries = [("3D/3dmodel.model", model), ("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS)];
+
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (path, text) in entries {
+        archive.start_file(path, options).expect("fixed and distinct paths are accepted");
+        archive.write_all(text.as_bytes()).expect("memory takes all bytes");
+    }
+    archive.finish().expect("memory takes all bytes").into_inner()
+}
+
+/// The text up to the resources, with a further namespace and further metadata.
+fn head(title: &str, namespace: &str, metadata: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\"{namespace}>\n\
+         <metadata name=\"Title\">{title}</metadata>\n<metadata name=\"Application\">shellock</metadata>\n{metadata}<resources>\n"
+    )
+}
+
+fn model_xml(objects: &[NamedObject]) -> String {
+    /// Resource of the colours; objects follow it.
+    const MATERIALS_ID: usize = 1;
+    let object_id = |i: usize| MATERIALS_ID + 1 + i;
+
+    let mut xml = head(TITLE, "", "");
+    if !objects.is_empty() {
+        add(&mut xml, format_args!("<basematerials id=\"{MATERIALS_ID}\">\n"));
+        for NamedObject { name, color: [r, g, b], .. } in objects {
+            let name = Escaped(name);
+            add(&mut xml, format_args!("<base name=\"{name}\" displaycolor=\"#{r:02X}{g:02X}{b:02X}FF\"/>\n"));
+        }
+        xml.push_str("</basematerials>\n");
+    }
+    for (i, object) in objects.iter().enumerate() {
+        let (id, name) = (object_id(i), Escaped(object.name));
+        add(
+            &mut xml,
+            format_args!("<object id=\"{id}\" type=\"model\" name=\"{name}\" pid=\"{MATERIALS_ID}\" pindex=\"{i}\">\n"),
+        );
+        add_mesh(&mut xml, object.mesh, None);
+        xml.push_str("</object>\n");
+    }
+    const UNTURNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    xml.push_str("</resources>\n<build>\n");
+    for (i, object) in objects.iter().enumerate() {
+        add(&mut xml, format_args!("<item objectid=\"{}\"", object_id(i)));
+        if object.turned.is_some() || object.moved_mm != [0.0; 3] {
+            let [[a, b, c], [d, e, f], [g, h, i]] = object.turned.unwrap_or(UNTURNED);
+            let [x, y, z] = object.moved_mm;
+            add(&mut xml, format_args!(" transform=\"{a} {b} {c} {d} {e} {f} {g} {h} {i} {x} {y} {z}\""));
+        }
+        xml.push_str("/>\n");
+    }
+    xml.push_str("</build>\n</model>\n");
+    xml
+}
+
+fn add_mesh(xml: &mut String, mesh: &TriMesh, colors: Option<&[u32]>) {
+    xml.push_str("<mesh>\n<vertices>\n");
+    for p in &mesh.points {
+        let exact = p.to_array();
+        let [x, y, z] = exact.map(|x| x as f32);
+        match colors {
+            // Seams of patches come closer together than floats tell apart.
+            Some(_) => add(xml, format_args!("<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>\n", exact[0], exact[1], exact[2])),
+            None => add(xml, format_args!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n")),
+        }
+    }
+    xml.push_str("</vertices>\n<triangles>\n");
+    for (face, [a, b, c]) in mesh.triangles.iter().enumerate() {
+        add(xml, format_args!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\""));
+        match colors.map(|colors| whole_triangle_code(colors[face])) {
+            Some(code) if !code.is_empty() => {
+                add(xml, format_args!(" slic3rpe:mmu_segmentation=\"{code}\" paint_color=\"{code}\"/>\n"));
+            }
+            _ => xml.push_str("/>\n"),
+        }
+    }
+    xml.push_str("</triangles>\n</mesh>\n");
+}
+
+fn add(xml: &mut String, text: std::fmt::Arguments) {
+    xml.write_fmt(text).expect("a string takes all text");
+}
+
+/// A text as XML attribute; characters that XML 1.0 forbids become "�".
+struct Escaped<'a>(&'a str);
+
+impl std::fmt::Display for Escaped<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.chars().try_for_each(|c| match c {
+            '&' => f.write_str("&amp;"),
+            '<' => f.write_str("&lt;"),
+            '>' => f.write_str("&gt;"),
+            '"' => f.write_str("&quot;"),
+            '\u{0}'..='\u{1F}' | '\u{FFFE}' | '\u{FFFF}' => f.write_char('\u{FFFD}'),
+            c => f.write_char(c),
+        })
+    }
+}

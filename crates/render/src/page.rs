@@ -1,0 +1,301 @@
+//! The page: a template, a JSON header, and all arrays as one block of base64.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use rayon::prelude::*;
+use serde::Serialize;
+use shellock_assembly::{PatchId, Warning};
+use shellock_geom::decimate::decimate;
+use shellock_geom::{Aabb, TriMesh, Vec3};
+
+use super::{ReportCheck, ReportData, ReportMotion, ReportPiece, ReportQuantity, exploded_shifts};
+
+const TEMPLATE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("../../../viewer/dist/viewer.css");
+const VIEWER: &str = include_str!("../../../viewer/dist/viewer.js");
+
+/// What moves is drawn within this share of the pieces' diagonal where a machine is slow: 0.3 mm on 240 mm.
+const DRAFT: f64 = 1.2e-3;
+
+/// The page as one text that needs nothing else; equal data give equal bytes.
+///
+/// Positions are kept in 1/65 535 of each piece's box, some micrometres. About 11 bytes a triangle and 0.6 MB for the viewer.
+pub fn html(data: &ReportData<'_>) -> String {
+    let mut arrays = Vec::new();
+    let shifts = exploded_shifts(&data.pieces);
+    let drafts = drafts(&data.pieces);
+    let meshes = data.pieces.iter().zip(&drafts).zip(shifts);
+    let header = Header {
+        title: &data.title,
+        meshes_title: "Pieces",
+        meshes: meshes.map(|((p, draft), shift)| MeshHeader::new(p, draft, shift, &mut arrays)).collect(),
+        facts: &data.facts,
+        checks: &data.checks,
+        notes: data.warnings.iter().map(|w| note(w, &data.pieces)).collect(),
+        figures: data.figures.iter().map(Figure::new).collect(),
+        quantities: &data.quantities,
+        motions: &data.motions,
+    };
+    let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
+    // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
+    let json = json.replace('<', "\\u003c");
+    fill(
+        TEMPLATE,
+        &[
+            ("title", &escaped(&data.title)),
+            ("style", STYLE),
+            ("header", &json),
+            ("arrays", &STANDARD.encode(&arrays)),
+            ("viewer", VIEWER),
+        ],
+    )
+}
+
+/// The pieces as coarsely as they may be seen while they move.
+fn drafts(pieces: &[ReportPiece<'_>]) -> Vec<TriMesh> {
+    let all = pieces.iter().fold(Aabb::EMPTY, |b, piece| b.union(piece.mesh.bounds()));
+    let tolerance_mm = DRAFT * all.diagonal();
+    let draft = |piece: &ReportPiece<'_>| decimate(piece.mesh.clone(), &vec![tolerance_mm; piece.mesh.points.len()]);
+    pieces.par_iter().map(draft).collect()
+}
+
+/// What the viewer reads; its words are those of any scene, not of shells.
+#[derive(Serialize)]
+struct Header<'a> {
+    title: &'a str,
+    meshes_title: &'a str,
+    meshes: Vec<MeshHeader<'a>>,
+    facts: &'a [(String, String)],
+    checks: &'a [ReportCheck],
+    notes: Vec<Note<'a>>,
+    figures: Vec<Figure<'a>>,
+    /// One value a mesh.
+    quantities: &'a [ReportQuantity],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    motions: &'a [ReportMotion],
+}
+
+/// A picture with a title.
+#[derive(Serialize)]
+struct Figure<'a> {
+    title: &'a str,
+    /// A `data:` address.
+    source: String,
+}
+
+impl<'a> Figure<'a> {
+    fn new((title, svg): &'a (String, String)) -> Self {
+        Self { title, source: format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg)) }
+    }
+}
+
+#[derive(Serialize)]
+struct MeshHeader<'a> {
+    name: &'a str,
+    badge: Option<&'a str>,
+    color: [u8; 3],
+    /// Position in the order of arrival.
+    step: usize,
+    /// Unit vector along which it arrives.
+    travel: [f64; 3],
+    /// Where it goes in the exploded view, mm.
+    shift: [f64; 3],
+    facts: &'a [(String, String)],
+    points: PointArray,
+    triangles: TriangleArray,
+    draft: Draft,
+}
+
+/// A coarser mesh, for what moves on slow machines.
+#[derive(Serialize)]
+struct Draft {
+    points: PointArray,
+    triangles: TriangleArray,
+}
+
+#[derive(Serialize)]
+struct PointArray {
+    offset: usize,
+    count: usize,
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct TriangleArray {
+    offset: usize,
+    count: usize,
+    /// Bytes of a corner: 2 or 4.
+    bytes: usize,
+}
+
+/// A point with a label, or a label alone.
+#[derive(Serialize)]
+struct Note<'a> {
+    title: String,
+    text: &'a str,
+    at: Option<[f64; 3]>,
+}
+
+fn note<'a>(warning: &'a Warning, pieces: &[ReportPiece<'_>]) -> Note<'a> {
+    let named = |id: &PatchId| match pieces.iter().find(|p| p.id == id.0) {
+        Some(piece) => piece.name.clone(),
+        None => format!("piece {id}"),
+    };
+    let names: Vec<String> = warning.pieces.iter().map(named).collect();
+    let title =
+        if names.is_empty() { warning.code.clone() } else { format!("{} · {}", warning.code, names.join(", ")) };
+    Note { title, text: &warning.message, at: warning.at }
+}
+
+impl<'a> MeshHeader<'a> {
+    /// Appends the arrays of the piece to `arrays`.
+    fn new(piece: &'a ReportPiece<'_>, draft: &TriMesh, shift: Vec3, arrays: &mut Vec<u8>) -> Self {
+        Self {
+            name: &piece.name,
+            badge: piece.is_key.then_some("key"),
+            color: piece.color,
+            step: piece.order,
+            travel: piece.installation_direction,
+            shift: shift.to_array(),
+            facts: &piece.facts,
+            points: append_points(piece.mesh, arrays),
+            triangles: append_triangles(piece.mesh, arrays),
+            draft: Draft { points: append_points(draft, arrays), triangles: append_triangles(draft, arrays) },
+        }
+    }
+}
+
+fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
+    let bounds = mesh.bounds();
+    let (min, size) = if mesh.points.is_empty() { (Vec3::ZERO, Vec3::ZERO) } else { (bounds.min, bounds.size()) };
+    align(arrays);
+    let offset = arrays.len();
+    // A flat box has one value along that axis.
+    let steps_per_mm = size.map(|side| if side > 0.0 { 65_535.0 / side } else { 0.0 });
+    for &p in &mesh.points {
+        for step in ((p - min) * steps_per_mm).to_array() {
+            arrays.extend((step.round() as u16).to_le_bytes());
+        }
+    }
+    PointArray { offset, count: mesh.points.len(), min: min.to_array(), max: (min + size).to_array() }
+}
+
+fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
+    align(arrays);
+    let offset = arrays.len();
+    let bytes = if mesh.points.len() <= 65_536 { 2 } else { 4 };
+    for &v in mesh.triangles.as_flattened() {
+        arrays.extend(&v.to_le_bytes()[..bytes]);
+    }
+    TriangleArray { offset, count: mesh.triangles.len(), bytes }
+}
+
+/// Typed arrays begin at multiples of their element size.
+fn align(arrays: &mut Vec<u8>) {
+    arrays.resize(arrays.len().next_multiple_of(4), 0);
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
+}
+
+/// Puts each value in place of `{{name}}`. What a value contains is never looked at again.
+fn fill(template: &str, values: &[(&str, &str)]) -> String {
+    let mut out = String::with_capacity(template.len() + values.iter().map(|v| v.1.len()).sum::<usize>());
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, after) = after.split_once("}}").expect("the template closes its braces");
+        out.push_str(before);
+        out.push_str(values.iter().find(|v| v.0 == name).expect("the template names what there is").1);
+        rest = after;
+    }
+    out + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ReportMove;
+
+    const HOSTILE: &str = "</script><script>alert('x')</script>{{arrays}}<!--";
+
+    fn page() -> String {
+        page_with(Vec::new())
+    }
+
+    fn page_with(motions: Vec<ReportMotion>) -> String {
+        let mesh = TriMesh { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
+        let hostile = || (HOSTILE.to_owned(), HOSTILE.to_owned());
+        let piece = ReportPiece {
+            id: 0,
+            name: HOSTILE.into(),
+            color: [1, 2, 3],
+            mesh: &mesh,
+            installation_direction: [0.0, 0.0, 1.0],
+            order: 0,
+            is_key: true,
+            facts: vec![hostile()],
+        };
+        let warning = Warning { code: HOSTILE.into(), message: HOSTILE.into(), pieces: vec![PatchId(0)], at: None };
+        html(&ReportData {
+            title: HOSTILE.into(),
+            facts: vec![hostile()],
+            pieces: vec![piece],
+            checks: vec![ReportCheck { name: HOSTILE.into(), ok: true, figure: HOSTILE.into() }],
+            warnings: &[warning],
+            figures: vec![hostile()],
+            quantities: vec![ReportQuantity { name: HOSTILE.into(), unit: HOSTILE.into(), values: vec![None] }],
+            motions,
+        })
+    }
+
+    fn header(page: &str) -> serde_json::Value {
+        let (_, header) = page.split_once("id=\"header\">").unwrap();
+        let (header, _) = header.split_once("</script>").unwrap();
+        serde_json::from_str(header).unwrap()
+    }
+
+    #[test]
+    fn no_text_leaves_its_place() {
+        let page = page();
+        assert!(!page.contains("<script>alert"));
+        // Three script elements of the template; the viewer itself never says so.
+        assert_eq!(page.matches("</script").count(), 3);
+        let header = header(&page);
+        assert_eq!(header["title"], HOSTILE);
+        assert_eq!(header["notes"][0]["text"], HOSTILE);
+    }
+
+    #[test]
+    fn motions_are_told_in_the_words_of_any_scene() {
+        let poses = vec![[0.0; 6], [0.1, 0.0, -0.2, 0.0, 0.01, 0.0]];
+        let moves = vec![ReportMove { piece: 0, about: [1.0, 2.0, 3.0], poses }];
+        let page = page_with(vec![ReportMotion { name: HOSTILE.into(), title: HOSTILE.into(), is_loop: true, moves }]);
+        assert!(!page.contains("<script>alert"));
+        let told = serde_json::json!([{
+            "name": HOSTILE,
+            "title": HOSTILE,
+            "is_loop": true,
+            "moves": [{
+                "mesh": 0,
+                "about": [1.0, 2.0, 3.0],
+                "poses": [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.1, 0.0, -0.2, 0.0, 0.01, 0.0]],
+            }],
+        }]);
+        assert_eq!(header(&page)["motions"], told);
+        assert!(header(&self::page()).get("motions").is_none(), "a page without motions says nothing of them");
+    }
+
+    #[test]
+    fn the_same_data_give_the_same_bytes() {
+        assert_eq!(page(), page());
+    }
+
+    #[test]
+    fn the_page_asks_for_nothing_from_outside() {
+        assert!(!TEMPLATE.contains("http://") && !TEMPLATE.contains("https://"));
+        assert!(TEMPLATE.contains("default-src 'none'"));
+        assert!(VIEWER.contains("Permission is hereby granted"), "three's notice goes with its code");
+    }
+}

@@ -1,0 +1,174 @@
+//! What a finished kit that failed its verification teaches the next round.
+
+use std::collections::BTreeMap;
+
+use super::Design;
+use crate::plan::{InstallationPlan, PlanConstraints};
+use crate::seam::rules::SHORTEST_RUN_SIZES;
+use crate::verify::Finding;
+use crate::{LatticeDirection, PatchId};
+
+/// One thing learned.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Lesson {
+    /// Connectors came out too short to hold.
+    WeakJoints(Vec<WeakJoint>),
+    /// A piece rubs on its way along a direction.
+    RubbingPath {
+        /// The piece.
+        piece: PatchId,
+        /// The direction.
+        separation: LatticeDirection,
+        /// The earlier piece that is worst in its way.
+        against: PatchId,
+        /// How far from its place, mm.
+        travel_mm: f64,
+        /// Mean thickness of the overlap, mm.
+        thickness_mm: f64,
+        /// Volume of the overlap, mm³.
+        volume_mm3: f64,
+    },
+    /// A piece would have to leave most of its wall behind.
+    Blocked {
+        /// The piece.
+        piece: PatchId,
+        /// Its direction.
+        separation: LatticeDirection,
+        /// Share of its wall that it could take along, in [0, 1].
+        kept: f64,
+    },
+    /// The plan as a whole failed.
+    FailedPlan {
+        /// The plan.
+        plan: InstallationPlan,
+        /// Pieces that were loose or moved.
+        loose: Vec<PatchId>,
+    },
+}
+
+/// What two pieces hold each other by is too little, where the later one leaves along this direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WeakJoint {
+    /// The piece installed later.
+    pub later: PatchId,
+    /// The piece installed earlier.
+    pub earlier: PatchId,
+    /// The later piece's direction.
+    pub separation: LatticeDirection,
+    /// Length of their connectors, mm.
+    pub length_mm: f64,
+    /// Length of their seams on the inner side of the wall, mm.
+    pub seam_mm: f64,
+}
+
+impl Lesson {
+    /// Adds what was learned to what plans must respect.
+    pub fn teach(&self, constraints: &mut PlanConstraints) {
+        match self {
+            Self::WeakJoints(joints) => {
+                constraints.weak_joints.extend(joints.iter().map(|j| (j.later, j.earlier, j.separation)));
+            }
+            Self::RubbingPath { piece, separation, against, .. } => {
+                constraints.forbidden.insert((*piece, *separation));
+                *constraints.rubbed.entry((*piece, *against)).or_default() += 1;
+            }
+            Self::Blocked { piece, separation, .. } => {
+                constraints.forbidden.insert((*piece, *separation));
+            }
+            Self::FailedPlan { plan, .. } => constraints.rejected.push(plan.clone()),
+        }
+    }
+
+    /// The pieces whose division may help.
+    pub fn blamed(&self) -> Vec<PatchId> {
+        match self {
+            Self::WeakJoints(_) => Vec::new(),
+            Self::RubbingPath { piece, .. } | Self::Blocked { piece, .. } => vec![*piece],
+            Self::FailedPlan { loose, .. } => loose.clone(),
+        }
+    }
+}
+
+impl Lesson {
+    /// The pieces that came out loose.
+    pub fn loose(&self) -> Vec<PatchId> {
+        if let Self::FailedPlan { loose, .. } = self { loose.clone() } else { Vec::new() }
+    }
+}
+
+impl std::fmt::Display for Lesson {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::WeakJoints(joints) => {
+                let line = |j: &WeakJoint| {
+                    let WeakJoint { later, earlier, length_mm, seam_mm, .. } = j;
+                    format!("{later} and {earlier} ({length_mm:.1} mm on {seam_mm:.0} mm of seam)")
+                };
+                let list: Vec<String> = joints.iter().map(line).collect();
+                write!(f, "connectors came out too short between pieces {}", list.join(", "))
+            }
+            Self::RubbingPath { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => write!(
+                f,
+                "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
+            ),
+            Self::Blocked { piece, kept, .. } => {
+                write!(f, "piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)
+            }
+            Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
+            Self::FailedPlan { loose, .. } => {
+                let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
+                write!(f, "{} {} came out loose", if list.len() == 1 { "piece" } else { "pieces" }, list.join(", "))
+            }
+        }
+    }
+}
+
+/// The lessons of a kit; none where it passed. The last one always rules this plan out.
+pub fn lessons(design: &Design) -> Vec<Lesson> {
+    if design.verification.passed() {
+        return Vec::new();
+    }
+    let mut loose = Vec::new();
+    let mut learned = Vec::new();
+    for finding in &design.verification.findings {
+        match finding {
+            &Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => {
+                let separation = design.plan.separation(piece);
+                learned.push(Lesson::RubbingPath { piece, separation, against, travel_mm, thickness_mm, volume_mm3 });
+            }
+            Finding::Loose { piece, .. } | Finding::PlayTooWide { piece, .. } | Finding::ComesOut { piece, .. } => {
+                loose.push(*piece);
+            }
+            Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| m.piece)),
+            _ => {}
+        }
+    }
+    loose.sort_unstable();
+    loose.dedup();
+    learned.extend(weak_joints(design).filter(|_| !loose.is_empty()));
+    learned.push(Lesson::FailedPlan { plan: design.plan.clone(), loose });
+    learned
+}
+
+/// Pairs whose connectors are too short: they must not be counted on again in this way.
+fn weak_joints(design: &Design) -> Option<Lesson> {
+    let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
+    let by_order = |a: PatchId, b: PatchId| {
+        if design.plan.position(a) > design.plan.position(b) { (a, b) } else { (b, a) }
+    };
+    for contact in &design.contacts {
+        lengths.entry(by_order(contact.later, contact.earlier)).or_default()[1] += contact.length_mm;
+    }
+    for joint in &design.joints {
+        lengths.entry(by_order(joint.male, joint.female)).or_default()[0] += joint.length_mm;
+    }
+    let is_weak = |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * design.sizes.of(a, b);
+    let weak = lengths.into_iter().filter(|(pair, [length_mm, _])| is_weak(*pair, *length_mm));
+    let joints: Vec<WeakJoint> = weak
+        .map(|((later, earlier), [length_mm, seam_mm])| {
+            let separation = design.plan.separation(later);
+            WeakJoint { later, earlier, separation, length_mm, seam_mm }
+        })
+        .collect();
+    (!joints.is_empty()).then_some(Lesson::WeakJoints(joints))
+}

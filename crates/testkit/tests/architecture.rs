@@ -1,0 +1,203 @@
+//! Floors of the house and the order of its rooms, read from the sources.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use syn::visit::Visit;
+
+/// Modules of a crate; each may name those before it. `plan` stands before `body` because bodies are split along a plan.
+const DESIGN: [&str; 12] = [
+    "seam",
+    "strength",
+    "segmentation",
+    "key",
+    "sizes",
+    "plan",
+    "metric",
+    "stress_test",
+    "body",
+    "connector",
+    "piece",
+    "pipeline",
+];
+const ASSEMBLY: [&str; 10] =
+    ["ids", "context", "direction", "sequence", "press_fit", "push", "motion", "verify", "play", "certificate"];
+
+/// Crates from the ground up, each with those that its product may name.
+const FLOORS: [(&str, &[&str]); 10] = [
+    ("geom", &[]),
+    ("formats", &["geom"]),
+    ("check", &[]),
+    ("mechanics", &["geom"]),
+    ("assembly", &["geom", "mechanics"]),
+    ("render", &["geom", "assembly"]),
+    ("shellock", &["geom", "mechanics", "assembly", "render"]),
+    ("print", &["geom", "mechanics", "assembly", "render"]),
+    ("cli", &["geom", "formats", "mechanics", "assembly", "render", "shellock", "print"]),
+    ("testkit", &["geom"]),
+];
+
+fn crates() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+/// All source files of a crate.
+fn sources(krate: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![crates().join(krate).join("src")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The module path of a file within its crate: `plan/contact/hold.rs` is `plan::contact::hold`.
+fn module(krate: &str, file: &Path) -> Vec<String> {
+    let inside = file.strip_prefix(crates().join(krate).join("src")).unwrap().with_extension("");
+    let mut path: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+    if matches!(path.last().map(String::as_str), Some("lib" | "main" | "mod")) {
+        path.pop();
+    }
+    path
+}
+
+/// Collects the paths that a file names, from the root of its crate; those of other crates begin with an empty word.
+struct Names {
+    at: Vec<String>,
+    found: BTreeSet<Vec<String>>,
+}
+
+impl Names {
+    fn add(&mut self, path: &[String]) {
+        let mut from = match path[0].as_str() {
+            "crate" => Vec::new(),
+            "self" => self.at.clone(),
+            "super" => self.at[..self.at.len().saturating_sub(1)].to_vec(),
+            _ => return,
+        };
+        for word in &path[1..] {
+            if word == "super" {
+                from.pop();
+            } else {
+                from.push(word.clone());
+            }
+        }
+        self.found.insert(from);
+    }
+
+    fn tree(&mut self, before: &[String], tree: &syn::UseTree) {
+        let with = |word: &syn::Ident| before.iter().cloned().chain([word.to_string()]).collect::<Vec<_>>();
+        match tree {
+            syn::UseTree::Path(path) => self.tree(&with(&path.ident), &path.tree),
+            syn::UseTree::Name(name) => self.add(&with(&name.ident)),
+            syn::UseTree::Rename(name) => self.add(&with(&name.ident)),
+            syn::UseTree::Glob(_) => self.add(before),
+            syn::UseTree::Group(group) => group.items.iter().for_each(|tree| self.tree(before, tree)),
+        }
+    }
+}
+
+impl<'a> Visit<'a> for Names {
+    fn visit_item_use(&mut self, item: &'a syn::ItemUse) {
+        self.tree(&[], &item.tree);
+    }
+
+    fn visit_item_mod(&mut self, item: &'a syn::ItemMod) {
+        // Tests may name anything.
+        let is_test = item.attrs.iter().any(|a| a.path().is_ident("cfg"));
+        if !is_test {
+            self.at.push(item.ident.to_string());
+            syn::visit::visit_item_mod(self, item);
+            self.at.pop();
+        }
+    }
+
+    fn visit_path(&mut self, path: &'a syn::Path) {
+        let words: Vec<String> = path.segments.iter().map(|s| s.ident.to_string()).collect();
+        if words.len() > 1 {
+            self.add(&words);
+        }
+        syn::visit::visit_path(self, path);
+    }
+}
+
+fn names(krate: &str, file: &Path) -> BTreeSet<Vec<String>> {
+    let parsed = syn::parse_file(&fs::read_to_string(file).unwrap()).unwrap();
+    let mut names = Names { at: module(krate, file), found: BTreeSet::new() };
+    names.visit_file(&parsed);
+    names.found
+}
+
+/// Names of later modules in files of earlier ones.
+fn upward(krate: &str, order: &[&str]) -> Vec<String> {
+    let place = |path: &[String]| path.first().and_then(|first| order.iter().position(|m| m == first));
+    let mut found = Vec::new();
+    for file in sources(krate) {
+        let path = module(krate, &file);
+        let is_test = path.last().is_some_and(|name| name.ends_with("tests") || name == "kits" || name == "testing");
+        let Some(own) = place(&path).filter(|_| !is_test) else { continue };
+        for name in names(krate, &file) {
+            if place(&name).is_some_and(|named| named > own) {
+                found.push(format!("{} names {}", file.display(), name.join("::")));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn modules_depend_only_on_earlier_modules() {
+    let found = [upward("shellock", &DESIGN), upward("assembly", &ASSEMBLY)].concat();
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn grouped_and_relative_imports_are_seen() {
+    let text = "use crate::{plan::{self, Way}, body}; use super::super::report; fn f() { crate::verify::go() }";
+    let mut names = Names { at: vec!["plan".into(), "contact".into()], found: BTreeSet::new() };
+    names.visit_file(&syn::parse_file(text).unwrap());
+    let found: Vec<String> = names.found.iter().map(|name| name.join("::")).collect();
+    assert_eq!(found, ["body", "plan::Way", "plan::self", "report", "verify::go"].map(String::from));
+}
+
+#[test]
+fn crates_depend_only_on_lower_floors() {
+    let mut found = Vec::new();
+    for (krate, lower) in FLOORS {
+        let manifest = fs::read_to_string(crates().join(krate).join("Cargo.toml")).unwrap();
+        let product = manifest.split("[dev-dependencies]").next().unwrap();
+        let named = product.lines().filter_map(|line| line.strip_suffix(".workspace = true"));
+        for name in named.filter(|name| name.starts_with("shellock")) {
+            let short = if name == "shellock" { name } else { &name["shellock-".len()..] };
+            if !lower.contains(&short) {
+                found.push(format!("{krate} depends on {short}"));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn library_crates_touch_no_file_clock_or_stdout() {
+    let mut found = Vec::new();
+    for krate in ["geom", "formats", "mechanics", "assembly", "render", "shellock", "print"] {
+        for file in sources(krate) {
+            let text = fs::read_to_string(&file).unwrap();
+            for forbidden in ["std::fs", "Instant::now", "SystemTime", "println!", "eprintln!", "std::env"] {
+                if text.contains(forbidden) {
+                    found.push(format!("{} uses {forbidden}", file.display()));
+                }
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+}
