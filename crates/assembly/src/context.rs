@@ -55,6 +55,12 @@ impl<'a> Ctx<'a> {
         Self { report, stop, is_time_up: None, warnings: Mutex::new(Vec::new()) }
     }
 
+    /// A context that tells nobody and is never stopped.
+    pub fn quiet() -> Ctx<'static> {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Ctx::new(&|_| {}, &NEVER)
+    }
+
     /// The same with a clock, which libraries do not read: searches that get better with time end soon after it says true.
     ///
     /// What they return then depends on how fast the machine is, so limits of work should end them before.
@@ -94,10 +100,15 @@ impl<'a> Ctx<'a> {
         self.warnings.lock().expect("no holder of this lock panics").push(warning);
     }
 
-    /// Takes the warnings so far, in the order they came; equal ones once.
-    pub fn take_warnings(&self) -> Vec<Warning> {
+    /// A context of the same job whose warnings are its own: what is given up takes them with it.
+    pub fn fork(&self) -> Ctx<'a> {
+        Ctx { report: self.report, stop: self.stop, is_time_up: self.is_time_up, warnings: Mutex::new(Vec::new()) }
+    }
+
+    /// The warnings, in the order they came; equal ones once.
+    pub fn into_warnings(self) -> Vec<Warning> {
         let mut seen: Vec<Warning> = Vec::new();
-        for w in std::mem::take(&mut *self.warnings.lock().expect("no holder of this lock panics")) {
+        for w in self.warnings.into_inner().expect("no holder of this lock panics") {
             if !seen.contains(&w) {
                 seen.push(w);
             }

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use shellock::connector::ConnectorParams;
+use shellock::design::{self, KeySource, Params};
 use shellock::piece::LabelParams;
-use shellock::pipeline::{KeySource, Params, ThicknessChoice};
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
 use shellock_print::Printer;
@@ -339,7 +340,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME", value_parser = stress::material, help_heading = "Make")]
     pub material: Option<Material>,
     /// Height of the fall that walls must bear, 0.01 to 20 m
-    #[arg(long, value_name = "HEIGHT", default_value_t = Params::default().strength.drop_m, allow_hyphen_values = true,
+    #[arg(long, value_name = "HEIGHT", default_value_t = Params::default().drop_m, allow_hyphen_values = true,
           value_parser = stress::metres, help_heading = "Make")]
     pub drop: f64,
     /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by what fits
@@ -400,35 +401,34 @@ impl Options {
     /// The library's parameters for pieces made on `printer`.
     pub fn params(&self, printer: &Printer) -> Params {
         let mut p = Params::default();
-        p.segmentation.n_pieces = self.pieces;
-        p.segmentation.seed = self.seed;
-        p.plan.seed = self.seed;
-        (p.key, p.plan.key) = match self.key {
-            Key::Auto => (KeySource::Cut, None),
-            Key::Flattest => (KeySource::Piece, None),
-            Key::Piece(id) => (KeySource::Piece, Some(shellock::PatchId(id))),
+        p.seed = self.seed;
+        p.n_pieces = self.pieces;
+        p.up = self.up.unit();
+        p.key = match self.key {
+            Key::Auto => KeySource::Cut,
+            Key::Flattest => KeySource::Flattest,
+            Key::Piece(id) => KeySource::Piece(shellock::PatchId(id)),
         };
-        p.plan.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
-        p.plan.up = self.up.unit();
-        match self.thickness {
-            Thickness::Auto => p.thickness = ThicknessChoice::Auto,
-            Thickness::Mm(mm) => p.body.thickness_mm = mm,
-        }
-        p.strength.material = self.material.unwrap_or(printer.material);
-        p.strength.drop_m = self.drop;
-        p.strength.seed = self.seed;
-        p.body.wall_gap_mm = self.wall_gap.unwrap_or(printer.wall_gap_mm);
-        p.body.cell_mm = self.grid;
-        p.connector.size = self.connector;
-        p.connector.clearance_mm = self.clearance.unwrap_or(printer.clearance_mm);
-        p.connector.key_clearance_mm = self.key_clearance.unwrap_or(printer.key_clearance_mm);
-        p.connector.detent_mm = self.detent;
-        p.connector.key_rib_mm = self.key_ribs;
         p.has_grip = self.key_grip;
-        p.connector.min_wall_mm = self.min_wall.unwrap_or(printer.min_wall_mm);
+        p.thickness = match self.thickness {
+            Thickness::Auto => design::Thickness::Auto,
+            Thickness::Mm(mm) => design::Thickness::Mm(mm),
+        };
+        p.material = self.material.unwrap_or(printer.material);
+        p.drop_m = self.drop;
+        p.wall_gap_mm = self.wall_gap.unwrap_or(printer.wall_gap_mm);
+        p.cell_mm = self.grid;
+        p.connector = ConnectorParams {
+            size: self.connector,
+            clearance_mm: self.clearance.unwrap_or(printer.clearance_mm),
+            key_clearance_mm: self.key_clearance.unwrap_or(printer.key_clearance_mm),
+            detent_mm: self.detent,
+            key_rib_mm: self.key_ribs,
+            min_wall_mm: self.min_wall.unwrap_or(printer.min_wall_mm),
+        };
         p.label = (!self.no_labels).then(|| label(p.connector.min_wall_mm));
-        p.verify.seed = self.seed;
-        p.play_together = self.play_together;
+        p.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
+        p.is_play_together = self.play_together;
         p
     }
 }

@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 
 use serde_json::json;
 use shellock::context::Progress;
+use shellock::design::{Design, DesignOutcome, Params, Settings, design};
 use shellock::metric::Holding;
-use shellock::pipeline::{Design, DesignOutcome, Params, design};
 use shellock::plan::key::KeyDirections;
 use shellock::plan::{PlanProof, ProofScope};
 use shellock::strength::{Strength, StrengthParams};
@@ -49,13 +49,14 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
     if options.plan_time.is_nan() || options.plan_time < 0.0 {
         problems.push(format!("plan time is {} s; it must be 0 or more", options.plan_time));
     }
-    if problems.is_empty() { Ok(params.agreed()) } else { Err(Failure::Wrong(problems.join("\nerror: "))) }
+    if problems.is_empty() { Ok(params) } else { Err(Failure::Wrong(problems.join("\nerror: "))) }
 }
 
 fn make(session: &Session, model: &Model, options: &Options, params: &Params, to: &Destination) -> Result<u8, Failure> {
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+    let settings = &Settings::resolve(params);
     let mut notes = model.notes.clone();
-    notes.extend(too_large(session, params, &printer, model)?);
+    notes.extend(too_large(session, settings, &printer, model)?);
     if session.shown == Shown::ForPeople {
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
@@ -78,9 +79,9 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
             return Err(no_plan(&reason, &blockers));
         }
     };
-    if let Some(asked) = options.pieces.filter(|asked| made.pieces.len() > asked + 1) {
+    if let Some(asked) = options.pieces.filter(|asked| made.kit.pieces.len() > asked + 1) {
         let note =
-            format!("{} pieces instead of {asked}: some were divided until every piece locks", made.pieces.len());
+            format!("{} pieces instead of {asked}: some were divided until every piece locks", made.kit.pieces.len());
         if session.shown == Shown::ForPeople {
             println!("note: {note}");
         }
@@ -88,22 +89,22 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
     }
     let mut warnings = made.warnings.clone();
     display.show(Progress::Stage { name: "files and pictures", n_steps: 0 });
-    let printing = Printing::of(&printer, made.pieces.as_slice(), &made.surface.mesh, &model.solid);
+    let printing = Printing::of(&printer, made.kit.pieces.as_slice(), &made.kit.surface.mesh, &model.solid);
     warnings.extend(printing.warnings());
-    let (files, summary) = files(model, options, params, &made, &warnings, &printing);
+    let (files, summary) = files(model, options, settings, &made, &warnings, &printing);
     display.finish();
     if session.stop.load(Ordering::Relaxed) {
         return Err(Failure::Stopped);
     }
     to.write(&files)?;
-    let code = u8::from(!made.verification.passed());
+    let code = u8::from(!made.kit.verification.passed());
     if session.is_json {
         print_json(to, &notes, &made, &summary, &warnings, code);
     } else if session.shown == Shown::Nothing {
-        print_failures(&made.verification);
+        print_failures(&made.kit.verification);
         print_warnings(&warnings);
     } else {
-        print_text(to, &made, params, &summary, &warnings);
+        print_text(to, &made, settings, &summary, &warnings);
         println!("{}", printing.words());
     }
     Ok(code)
@@ -126,48 +127,46 @@ fn print_json(to: &Destination, notes: &[String], made: &Design, summary: &Summa
     let value = json!({
         "status": if code == 0 { "verified" } else { "failed" },
         "out": to.folder(), "notes": notes,
-        "pieces": made.pieces.len(), "key_piece": made.plan.key(),
+        "pieces": made.kit.pieces.len(), "key_piece": made.kit.plan.key(),
         "volume_ratio": summary.volume_ratio, "print_time_ratio": summary.print_time_ratio, "connector_share": summary.connector_share,
-        "thin_share": summary.thin_share, "thickness_mm": made.thickness_mm,
+        "thin_share": summary.thin_share, "thickness_mm": made.kit.thickness_mm,
         "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
-        "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.sizes.largest_mm(),
-        "key_slides_on_rails_mm": made.rails_mm(),
-        "checks": made.verification.checks, "findings": made.verification.findings,
+        "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.kit.sizes.largest_mm(),
+        "key_slides_on_rails_mm": made.kit.rails_mm(),
+        "checks": made.kit.verification.checks, "findings": made.kit.verification.findings,
         "warnings": warnings, "exit_code": code,
     });
     println!("{value}");
 }
 
-fn print_text(to: &Destination, made: &Design, params: &Params, summary: &Summary, warnings: &[Warning]) {
+fn print_text(to: &Destination, made: &Design, settings: &Settings, summary: &Summary, warnings: &[Warning]) {
     println!(
         "{} pieces, the last is piece {}; walls {:.2} mm; material {:.0} % of the solid model",
-        made.pieces.len(),
-        made.plan.key(),
-        made.thickness_mm,
+        made.kit.pieces.len(),
+        made.kit.plan.key(),
+        made.kit.thickness_mm,
         100.0 * summary.volume_ratio
     );
     if let Some(strength) = &made.strength {
-        println!("{}", bearing(strength, params));
+        println!("{}", bearing(strength, settings));
     }
-    if let Some(proof) = &made.proof {
-        println!("{}", quality(proof));
-    }
-    made.holding.iter().flat_map(weakest).for_each(|line| println!("{line}"));
-    println!("pieces sit {}", play::words(&made.play));
+    println!("{}", quality(&made.kit.proof));
+    weakest(&made.kit.holding).into_iter().for_each(|line| println!("{line}"));
+    println!("pieces sit {}", play::words(&made.kit.play));
     println!("connectors on {:.0} % of the seam length that fits any", 100.0 * summary.connector_share);
-    print_verdict(&made.verification);
+    print_verdict(&made.kit.verification);
     print_warnings(warnings);
     if summary.thin_share > 0.002 {
         let percent = 100.0 * summary.thin_share;
-        println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", params.connector.min_wall_mm);
+        println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", settings.connector.min_wall_mm);
     }
     println!("written to {}: open report.html in a browser, print plates.3mf", to.folder().display());
 }
 
 /// What the wall bears, in words.
-pub fn bearing(strength: &Strength, params: &Params) -> String {
+pub fn bearing(strength: &Strength, settings: &Settings) -> String {
     let [x, y, z] = strength.at.to_array();
-    let StrengthParams { drop_m, material, .. } = &params.strength;
+    let StrengthParams { drop_m, material, .. } = &settings.strength;
     let hollow = 100.0 * (1.0 - strength.solid_share());
     // Hardly anything was judged where hardly anything is hollow.
     let judged = if hollow < 80.0 {

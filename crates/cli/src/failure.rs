@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use shellock::pipeline::DesignError;
+use shellock::design::DesignError;
 use shellock::stress_test::StressError;
 use shellock_formats::ReadError;
 use shellock_geom::check::InputError;

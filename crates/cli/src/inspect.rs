@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use shellock::pipeline::Params;
+use shellock::strength::StrengthParams;
 use shellock_formats::Loaded;
 use shellock_geom::check::inspect as inspection;
 use shellock_geom::repair::mend;
@@ -71,7 +71,7 @@ fn unit(loaded: &Loaded) -> String {
 pub fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
     let wall_mm = match options.thickness {
         Thickness::Mm(mm) => mm,
-        Thickness::Auto => Params::default().strength.least_mm,
+        Thickness::Auto => StrengthParams::default().least_mm,
     };
     let places = thin_places(&model.solid, 2.0 * wall_mm);
     let area_mm2: f64 = places.iter().map(|p| p.area_mm2).sum();

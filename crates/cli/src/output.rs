@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use shellock::certificate::{Certificate, Evidence, OtherFile, PieceFile, certify};
+use shellock::design::{Design, Settings};
 use shellock::key::KeySite;
-use shellock::pipeline::{Design, Params};
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StrengthParams, StressMap};
 use shellock::verify::clearance::PathGap;
@@ -161,45 +161,45 @@ fn is_of_kits(name: &str) -> bool {
 pub fn files(
     model: &Model,
     options: &Options,
-    params: &Params,
+    settings: &Settings,
     design: &Design,
     warnings: &[Warning],
     printing: &Printing,
 ) -> (Vec<(String, Vec<u8>)>, Summary) {
     let thin: Vec<f64> =
-        design.pieces.as_slice().par_iter().map(|m| thin_share(m, params.connector.min_wall_mm).share).collect();
-    let volume: f64 = design.pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
-    let usable: f64 = design.contacts.iter().map(|c| c.usable_mm).sum();
-    let made: f64 = design.joints.iter().map(|j| j.length_mm).sum();
+        design.kit.pieces.as_slice().par_iter().map(|m| thin_share(m, settings.connector.min_wall_mm).share).collect();
+    let volume: f64 = design.kit.pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
+    let usable: f64 = design.kit.contacts.iter().map(|c| c.usable_mm).sum();
+    let made: f64 = design.kit.joints.iter().map(|j| j.length_mm).sum();
     let summary = Summary {
         volume_ratio: volume / model.solid.volume(),
         print_time_ratio: printing.time_ratio(),
         connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
     };
-    let mut plan = plan_json(model, params, design, warnings, &summary, &thin);
+    let mut plan = plan_json(model, settings, design, warnings, &summary, &thin);
     plan["printing"] = printing.json();
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
     text.push('\n');
     let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
-    let meshes = design.pieces.iter().map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
+    let meshes = design.kit.pieces.iter().map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
     let pieces: Vec<(String, Vec<u8>)> = meshes.collect();
-    let labels: Vec<i32> = design.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
-    let chart = design.strength.as_ref().map(|strength| stress_chart(options, params, design, strength));
+    let labels: Vec<i32> = design.kit.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
+    let chart = design.strength.as_ref().map(|strength| stress_chart(options, settings, design, strength));
     let figures = chart.iter().map(|svg| ("Stress in a fall".to_owned(), svg.clone())).collect();
-    let place = |i: usize| design.plan.position(PatchId(i as u32));
-    let archives = || rayon::join(|| assembly(design), || printing.files(design.pieces.as_slice(), place));
+    let place = |i: usize| design.kit.plan.position(PatchId(i as u32));
+    let archives = || rayon::join(|| assembly(design), || printing.files(design.kit.pieces.as_slice(), place));
     let ((archive, plates), (page, picture, booklet)) =
-        rayon::join(archives, || page::report(model, options, params, design, warnings, &summary, figures));
+        rayon::join(archives, || page::report(model, options, settings, design, warnings, &summary, figures));
     let mut archives = vec![("assembly.3mf".to_owned(), archive)];
     archives.extend(plates);
-    let claimed = certificate(&pieces, &archives, design, params.verify.clearance_mm);
+    let claimed = certificate(&pieces, &archives, design, settings.verify.clearance_mm);
     files.extend(claimed.map(|bytes| (CERTIFICATE.to_owned(), bytes)));
     files.extend(pieces);
     files.extend(archives);
     files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
-    files.push(("segmentation.ply".into(), write_ply(&design.surface.mesh, Some(&labels))));
-    files.push(("segmentation.3mf".into(), painted(&model.name, &design.surface).0));
+    files.push(("segmentation.ply".into(), write_ply(&design.kit.surface.mesh, Some(&labels))));
+    files.push(("segmentation.3mf".into(), painted(&model.name, &design.kit.surface).0));
     files.push(("report.html".into(), page));
     files.push(("pieces.png".into(), picture));
     files.extend(booklet.map(|bytes| ("instructions.pdf".to_owned(), bytes)));
@@ -209,14 +209,15 @@ pub fn files(
 /// All pieces in place, named and coloured; on the plate they stand as the model was given.
 fn assembly(design: &Design) -> Vec<u8> {
     let turned = (!design.turn.is_none()).then(|| design.turn.rows());
-    let names: Vec<String> = design.pieces.ids().map(|p| format!("piece {p}")).collect();
+    let names: Vec<String> = design.kit.pieces.ids().map(|p| format!("piece {p}")).collect();
     let objects: Vec<NamedObject> = design
+        .kit
         .pieces
         .iter()
         .zip(&names)
         .map(|((p, mesh), name)| NamedObject {
             name,
-            color: palette::color(design.plan.position(p)),
+            color: palette::color(design.kit.plan.position(p)),
             mesh,
             turned,
             moved_mm: [0.0; 3],
@@ -237,18 +238,18 @@ fn certificate(
     clearance_mm: f64,
 ) -> Option<Vec<u8>> {
     let other = |(file, bytes): &(String, Vec<u8>)| OtherFile { file: file.clone(), sha256: sha256(bytes) };
-    let named = files.iter().zip(design.pieces.ids());
+    let named = files.iter().zip(design.kit.pieces.ids());
     let named = named
         .map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes), play: None })
         .collect();
     let evidence = Evidence {
-        contacts: &design.touching,
-        verdict: &design.verification,
+        contacts: &design.kit.touching,
+        verdict: &design.kit.verification,
         gaps: &design.gaps,
-        play: Some(&design.play),
+        play: Some(&design.kit.play),
     };
-    certify(named, &design.pieces, &design.plan, &evidence, clearance_mm)
-        .map(|c| c.with_press_fits(design.press_fits.clone()).with_files(others.iter().map(other).collect()))
+    certify(named, &design.kit.pieces, &design.kit.plan, &evidence, clearance_mm)
+        .map(|c| c.with_press_fits(design.kit.press_fits.clone()).with_files(others.iter().map(other).collect()))
         .map(|c| certificate_bytes(&c))
 }
 
@@ -261,8 +262,8 @@ pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
 
 /// How far a piece moves while no other does, and `together` with others where that is proven.
 fn rattle_json(design: &Design, piece: PatchId) -> Option<Value> {
-    let mut value = json!(design.play.alone[piece]?);
-    if let Some(together) = &design.play.together {
+    let mut value = json!(design.kit.play.alone[piece]?);
+    if let Some(together) = &design.kit.play.together {
         value["together"] = json!(together[piece]);
     }
     Some(value)
@@ -270,18 +271,20 @@ fn rattle_json(design: &Design, piece: PatchId) -> Option<Value> {
 
 fn plan_json(
     model: &Model,
-    params: &Params,
+    settings: &Settings,
     design: &Design,
     warnings: &[Warning],
     summary: &Summary,
     thin: &[f64],
 ) -> Value {
-    let plan = &design.plan;
+    let plan = &design.kit.plan;
     let pieces: Vec<Value> = design
+        .kit
         .pieces
         .iter()
         .map(|(p, mesh)| {
             let neighbours: BTreeSet<PatchId> = design
+                .kit
                 .contacts
                 .iter()
                 .filter_map(|c| if c.later == p { Some(c.earlier) } else { (c.earlier == p).then_some(c.later) })
@@ -294,6 +297,7 @@ fn plan_json(
         })
         .collect();
     let joints: Vec<Value> = design
+        .kit
         .joints
         .iter()
         .map(|j| {
@@ -302,6 +306,7 @@ fn plan_json(
         })
         .collect();
     let contacts: Vec<Value> = design
+        .kit
         .contacts
         .iter()
         .map(|c| {
@@ -314,32 +319,32 @@ fn plan_json(
         "input": { "file": model.name, "sha256": model.sha256, "transform": transform(model, design),
                    "largest_only": model.repairs.iter().any(|r| r.kind == RepairKind::LeftOut),
                    "repairs": repairs_json(&model.repairs) },
-        "seed": params.plan.seed,
-        "shell_thickness": design.thickness_mm,
-        "strength": design.strength.as_ref().map(|s| strength_json(s, params)),
-        "clearance": params.connector.clearance_mm.max(2.0 * params.body.wall_gap_mm),
+        "seed": settings.plan.seed,
+        "shell_thickness": design.kit.thickness_mm,
+        "strength": design.strength.as_ref().map(|s| strength_json(s, settings)),
+        "clearance": settings.connector.clearance_mm.max(2.0 * settings.body.wall_gap_mm),
         // The largest, where pairs have sizes of their own.
-        "connector_size": design.sizes.largest_mm(),
-        "wall_gap": params.body.wall_gap_mm,
-        "up": design.turn.apply(Vec3::from(params.plan.up)).to_array(),
-        "min_wall": params.connector.min_wall_mm,
+        "connector_size": design.kit.sizes.largest_mm(),
+        "wall_gap": settings.body.wall_gap_mm,
+        "up": design.turn.apply(Vec3::from(settings.plan.up)).to_array(),
+        "min_wall": settings.connector.min_wall_mm,
         "key_piece": plan.key(),
         "key": design.key.as_ref().map(|k| key_json(design, k)),
-        "press_fits": design.press_fits,
+        "press_fits": design.kit.press_fits,
         "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
-        "plan": design.proof,
-        "holding": design.holding,
+        "plan": design.kit.proof,
+        "holding": design.kit.holding,
         "volume_ratio": summary.volume_ratio,
         "connector_share": summary.connector_share,
         "pieces": pieces, "joints": joints, "contacts": contacts,
         "gaps": gaps_json(design),
-        "verification": { "passed": design.verification.passed(), "checks": design.verification.checks,
-                          "findings": design.verification.findings },
+        "verification": { "passed": design.kit.verification.passed(), "checks": design.kit.verification.checks,
+                          "findings": design.kit.verification.findings },
         "warnings": warnings,
     });
     // Only where pairs have sizes of their own; `connector_size` is then the largest.
     let sizes: Vec<Value> =
-        design.sizes.pairs().map(|(pair, size_mm)| json!({ "pieces": pair, "size_mm": size_mm })).collect();
+        design.kit.sizes.pairs().map(|(pair, size_mm)| json!({ "pieces": pair, "size_mm": size_mm })).collect();
     if !sizes.is_empty() {
         value["connector_sizes"] = sizes.into();
     }
@@ -368,7 +373,7 @@ fn transform(model: &Model, design: &Design) -> [f64; 16] {
 fn gaps_json(design: &Design) -> Value {
     let least = |gaps: &mut dyn Iterator<Item = f64>| gaps.min_by(f64::total_cmp);
     let (pairs, paths) = (&design.gaps.pairs, &design.gaps.paths);
-    let key = design.plan.key();
+    let key = design.kit.plan.key();
     let beneath = |p: &PathGap| p.beneath_rim.map(|place| place.gap_mm);
     json!({
         "at_rest_mm": least(&mut pairs.iter().map(|p| p.overall.gap_mm)),
@@ -382,7 +387,7 @@ fn gaps_json(design: &Design) -> Value {
 /// How the key was cut.
 fn key_json(design: &Design, key: &KeySite) -> Value {
     json!({
-        "rails": design.rails_mm(), "area_mm2": key.area_mm2, "flat_share": key.flat_share, "side_share": key.side_share,
+        "rails": design.kit.rails_mm(), "area_mm2": key.area_mm2, "flat_share": key.flat_share, "side_share": key.side_share,
         "slide": key.prism.slide.to_array(), "plane_normal": key.prism.normal.to_array(),
         "turned_degrees": design.turn.angle().to_degrees(),
     })
@@ -390,17 +395,18 @@ fn key_json(design: &Design, key: &KeySite) -> Value {
 
 /// The sizes of the connectors that were made, mm, as in "2.5" or "2.0–3.4".
 pub fn connector_sizes(design: &Design) -> String {
-    if design.sizes.pairs().next().is_none() {
-        return design.sizes.default_mm().to_string();
+    if design.kit.sizes.pairs().next().is_none() {
+        return design.kit.sizes.default_mm().to_string();
     }
-    let made = design.joints.iter().filter(|j| j.length_mm > 0.0).map(|j| [design.sizes.of(j.male, j.female); 2]);
-    let ends = made.reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])]).unwrap_or([design.sizes.default_mm(); 2]);
+    let made =
+        design.kit.joints.iter().filter(|j| j.length_mm > 0.0).map(|j| [design.kit.sizes.of(j.male, j.female); 2]);
+    let ends = made.reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])]).unwrap_or([design.kit.sizes.default_mm(); 2]);
     let [least, most] = ends.map(|d| format!("{d:.1}"));
     if least == most { most } else { format!("{least}–{most}") }
 }
 
-fn strength_json(strength: &Strength, params: &Params) -> Value {
-    let StrengthParams { material, drop_m, n_cases, .. } = &params.strength;
+fn strength_json(strength: &Strength, settings: &Settings) -> Value {
+    let StrengthParams { material, drop_m, n_cases, .. } = &settings.strength;
     json!({
         "material": material, "drop_m": drop_m, "n_falls": n_cases,
         "stress_mpa": strength.stress_mpa, "is_too_weak": strength.is_too_weak, "at": strength.at.to_array(),
@@ -410,19 +416,20 @@ fn strength_json(strength: &Strength, params: &Params) -> Value {
 }
 
 /// The model's stress, and that along its seams.
-fn stress_chart(options: &Options, params: &Params, design: &Design, strength: &Strength) -> String {
+fn stress_chart(options: &Options, settings: &Settings, design: &Design, strength: &Strength) -> String {
     let map = StressMap::new(strength);
     let seams: Vec<SeamStress> = design
+        .kit
         .surface
         .seams()
         .into_iter()
         .map(|seam| SeamStress {
             stress_mpa: seam.points.par_iter().map(|p| map.at(*p)).collect(),
-            size_mm: design.sizes.of(seam.a, seam.b),
+            size_mm: design.kit.sizes.of(seam.a, seam.b),
             points: seam.points,
         })
         .collect();
-    strength_chart(strength, params.strength.material.strength_mpa, &seams, |v| standing(options.up, design, v))
+    strength_chart(strength, settings.strength.material.strength_mpa, &seams, |v| standing(options.up, design, v))
 }
 
 /// From assembly space to the model as it was given, then so that `up` becomes z.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use shellock::pipeline::{Design, Params};
+use shellock::design::{Design, Kit, Settings};
 use shellock::verify::{Finding, Play};
 use shellock::{IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
@@ -25,7 +25,7 @@ const SEEN: f64 = 3e-4;
 pub fn report(
     model: &Model,
     options: &Options,
-    params: &Params,
+    settings: &Settings,
     design: &Design,
     warnings: &[Warning],
     summary: &Summary,
@@ -33,13 +33,14 @@ pub fn report(
 ) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
     let stand = |v: Vec3| standing(options.up, design, v);
     let shown = shown(design, stand);
-    let failed = design.verification.findings.iter().map(failure);
+    let failed = design.kit.verification.findings.iter().map(failure);
     let warnings: Vec<Warning> = failed
         .chain(warnings.iter().cloned())
         .map(|w| Warning { at: w.at.map(|at| stand(Vec3::from_array(at)).to_array()), ..w })
         .collect();
-    let plan = &design.plan;
+    let plan = &design.kit.plan;
     let pieces: Vec<ReportPiece> = design
+        .kit
         .pieces
         .ids()
         .map(|p| ReportPiece {
@@ -53,8 +54,9 @@ pub fn report(
             facts: piece_facts(design, p),
         })
         .collect();
-    let facts = kit_facts(&shown, params, design, summary, stand);
+    let facts = kit_facts(&shown, settings, design, summary, stand);
     let checks = design
+        .kit
         .verification
         .checks
         .iter()
@@ -88,15 +90,16 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
     };
     let shake = |(piece, swings): (PatchId, &Vec<[f64; 6]>)| ReportMove {
         piece: usize::from(piece),
-        about: turned(design.pieces[piece].centroid().to_array()),
+        about: turned(design.kit.pieces[piece].centroid().to_array()),
         // There and back, so that it comes through its place between any two.
         poses: swings.iter().flat_map(|swing| [pose(*swing), [0.0; 6]]).collect(),
     };
     let moves: Vec<ReportMove> = design
+        .kit
         .play
         .swings
         .iter()
-        .filter(|(piece, swings)| *piece != design.plan.key() && !swings.is_empty())
+        .filter(|(piece, swings)| *piece != design.kit.plan.key() && !swings.is_empty())
         .map(shake)
         .collect();
     let title = "each piece as far as its clearance lets it move while the others rest".to_owned();
@@ -109,11 +112,11 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
         is_loop: false,
         moves: vec![ReportMove {
             piece: usize::from(*piece),
-            about: turned(design.pieces[*piece].centroid().to_array()),
+            about: turned(design.kit.pieces[*piece].centroid().to_array()),
             poses: poses.iter().map(|p| pose(*p)).collect(),
         }],
     };
-    let ways_out = design.play.ways_out.iter().flatten().map(way_out);
+    let ways_out = design.kit.play.ways_out.iter().flatten().map(way_out);
     (!shake.moves.is_empty()).then_some(shake).into_iter().chain(ways_out).collect()
 }
 
@@ -125,34 +128,34 @@ fn failure(finding: &Finding) -> Warning {
 
 /// The pieces as they stand, as finely as eyes see them.
 fn shown(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
-    let all = design.pieces.as_slice().iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
+    let all = design.kit.pieces.as_slice().iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
     let tolerance_mm = SEEN * all.diagonal();
     let shown = |mesh: &TriMesh| {
         let mesh = decimate(mesh.clone(), &vec![tolerance_mm; mesh.points.len()]);
         TriMesh { points: mesh.points.iter().map(|&p| stand(p)).collect(), triangles: mesh.triangles }
     };
-    design.pieces.as_slice().par_iter().map(shown).collect()
+    design.kit.pieces.as_slice().par_iter().map(shown).collect()
 }
 
 /// What a person wants to know of the kit.
 fn kit_facts(
     shown: &[TriMesh],
-    params: &Params,
+    settings: &Settings,
     design: &Design,
     summary: &Summary,
     stand: impl Fn(Vec3) -> Vec3,
 ) -> Vec<(String, String)> {
     let mut facts: Vec<(String, String)> = vec![
         ("size".into(), size(shown)),
-        ("pieces".into(), design.pieces.len().to_string()),
-        ("wall".into(), format!("{:.2} mm", design.thickness_mm)),
+        ("pieces".into(), design.kit.pieces.len().to_string()),
+        ("wall".into(), format!("{:.2} mm", design.kit.thickness_mm)),
         ("connectors".into(), format!("{} mm", connector_sizes(design))),
-        ("clearance".into(), format!("{} mm", params.connector.clearance_mm)),
+        ("clearance".into(), format!("{} mm", settings.connector.clearance_mm)),
         ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
         ("print time".into(), format!("about {:.0} % of the solid model's", 100.0 * summary.print_time_ratio)),
         ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
     ];
-    facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, params))));
+    facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, settings))));
     facts.extend(plan_facts(design, stand));
     facts
 }
@@ -178,15 +181,11 @@ fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
 
 /// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is made to `stand`.
 fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, String)> {
-    let proof = design.proof.as_ref().map(|p| {
-        let how = if p.optimal {
-            "proven to be the least with".into()
-        } else {
-            format!("at least {:.2} with", p.lower_bound)
-        };
-        ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)))
-    });
-    let weakest = design.holding.as_ref().and_then(|h| h.seams.first()).map(|s| {
+    let Kit { proof: p, holding, .. } = &design.kit;
+    let how =
+        if p.optimal { "proven to be the least with".into() } else { format!("at least {:.2} with", p.lower_bound) };
+    let cost = ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)));
+    let weakest = holding.seams.first().map(|s| {
         let [x, y, z] = stand(Vec3::from_array(s.at)).to_array();
         let figure = format!(
             "{} and {}: opens {:.2} mm at 10 N/m at ({x:.1}, {y:.1}, {z:.1}) mm; {}",
@@ -194,11 +193,11 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
         );
         ("weakest seam".into(), figure)
     });
-    let loose = design.holding.iter().flat_map(|h| &h.loose).map(|part| {
+    let loose = holding.loose.iter().map(|part| {
         let [x, y, z] = stand(Vec3::from_array(part.at)).to_array();
         ("comes apart".into(), format!("piece {} at ({x:.1}, {y:.1}, {z:.1}) mm, at 10 N/m", part.piece))
     });
-    proof.into_iter().chain(weakest).chain(loose).collect()
+    [cost].into_iter().chain(weakest).chain(loose).collect()
 }
 
 /// What the report colours pieces by.
@@ -206,12 +205,12 @@ fn quantities(design: &Design) -> Vec<ReportQuantity> {
     // The key is there to leave: how far it gets before unevenness stops it would drown what the others differ by.
     let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
         let of_piece =
-            |(id, p): (PatchId, &Option<Play>)| p.filter(|_| id != design.plan.key()).map(|p| p.translation_mm);
+            |(id, p): (PatchId, &Option<Play>)| p.filter(|_| id != design.kit.plan.key()).map(|p| p.translation_mm);
         play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
     };
-    let order = design.pieces.ids().map(|p| Some(design.plan.position(p) as f64 + 1.0)).collect();
-    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&design.play.alone))];
-    quantities.extend(design.play.together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
+    let order = design.kit.pieces.ids().map(|p| Some(design.kit.plan.position(p) as f64 + 1.0)).collect();
+    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&design.kit.play.alone))];
+    quantities.extend(design.kit.play.together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
     let quantity =
         |(name, unit, values): (&str, &str, _)| ReportQuantity { name: name.into(), unit: unit.into(), values };
     quantities.into_iter().map(quantity).collect()
@@ -219,16 +218,18 @@ fn quantities(design: &Design) -> Vec<ReportQuantity> {
 
 /// A piece's volume, and how each of its seams holds.
 fn piece_facts(design: &Design, piece: PatchId) -> Vec<(String, String)> {
-    let mut facts = vec![("volume".to_owned(), format!("{:.1} cm³", design.pieces[piece].signed_volume() / 1000.0))];
-    facts.extend(design.proof.iter().map(|p| ("cost in the plan".to_owned(), format!("{:.2}", p.piece_costs[piece]))));
+    let mut facts = vec![
+        ("volume".to_owned(), format!("{:.1} cm³", design.kit.pieces[piece].signed_volume() / 1000.0)),
+        ("cost in the plan".to_owned(), format!("{:.2}", design.kit.proof.piece_costs[piece])),
+    ];
     let play = |p: Play| {
         let proven = if p.is_proven { "" } else { ", not proven" };
         format!("{:.2} mm, {:.2}°{proven}", p.translation_mm, p.rotation_deg)
     };
-    facts.extend(design.play.alone[piece].map(|p| ("play".to_owned(), play(p))));
-    let together = design.play.together.as_ref().and_then(|all| all[piece]);
+    facts.extend(design.kit.play.alone[piece].map(|p| ("play".to_owned(), play(p))));
+    let together = design.kit.play.together.as_ref().and_then(|all| all[piece]);
     facts.extend(together.map(|p| ("play with others".to_owned(), play(p))));
-    let seams = design.holding.iter().flat_map(|h| &h.seams);
+    let seams = design.kit.holding.seams.iter();
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };
         facts.push((format!("seam with {other}"), format!("opens {:.2} mm at 10 N/m", s.opening_mm)));

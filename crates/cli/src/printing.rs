@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use shellock::pipeline::{DesignError, Params};
+use shellock::design::{DesignError, Settings};
 use shellock::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
@@ -152,7 +152,7 @@ fn described(printer: &Printer) -> String {
 /// What fits the printer in one piece also does in several; only larger models are divided to see.
 pub fn too_large(
     session: &Session,
-    params: &Params,
+    settings: &Settings,
     printer: &Printer,
     model: &Model,
 ) -> Result<Option<String>, Failure> {
@@ -161,16 +161,16 @@ pub fn too_large(
     }
     let silent = |_: shellock::context::Progress<'_>| ();
     let ctx = Ctx::new(&silent, &session.stop);
-    let wall_mm = params.strength.least_mm.max(params.body.thickness_mm);
+    let wall_mm = settings.strength.least_mm.max(settings.body.thickness_mm);
     let misfits = |n_pieces: Option<usize>, labels: Option<&[i64]>| {
-        let params = segmentation::SegmentationParams { n_pieces, ..params.segmentation.clone() };
+        let params = segmentation::SegmentationParams { n_pieces, ..settings.segmentation.clone() };
         let surface = segmentation::segment(&ctx, &params, &model.solid, labels).map_err(DesignError::from)?;
         let ids: Vec<u32> = (0..surface.n_patches as u32).collect();
         let misfits: Vec<u32> =
             ids.into_par_iter().filter(|&p| !fits(printer, &shell_of(&surface, PatchId(p), wall_mm))).collect();
         Ok::<_, Failure>((surface.n_patches, misfits))
     };
-    let (n, misfitting) = misfits(params.segmentation.n_pieces, model.labels.as_deref())?;
+    let (n, misfitting) = misfits(settings.segmentation.n_pieces, model.labels.as_deref())?;
     if misfitting.is_empty() {
         return Ok(None);
     }

@@ -6,13 +6,13 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::{Value, json};
 use shellock::body::BodyParams;
 use shellock::certificate::{Evidence, OtherFile, PieceFile, certify};
+use shellock::design::{self, DesignError, Planned, Settings};
 use shellock::piece::PressFit;
-use shellock::pipeline::DesignError;
-use shellock::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, search, survey};
+use shellock::plan::{InstallationPlan, InstallationStep};
 use shellock::play::{KitPlay, PlayParams};
 use shellock::verify::clearance::kit_gaps;
 use shellock::verify::{Assembly, Finding, Verification, VerifyParams};
-use shellock::{Ctx, IdVec, LatticeDirection, PatchId, metric, play, segmentation, sizes};
+use shellock::{Ctx, IdVec, LatticeDirection, PatchId, play, segmentation};
 use shellock_formats::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -45,7 +45,7 @@ fn extension(path: &Path) -> String {
 
 /// `shellock segment`.
 pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) -> Result<u8, Failure> {
-    let params = checked(options)?;
+    let settings = Settings::resolve(&checked(options)?);
     let kind = extension(out);
     if !["ply", "3mf", "seg"].contains(&kind.as_str()) {
         return Err(Failure::Wrong(format!("{}: choose a name that ends in .ply, .3mf or .seg", out.display())));
@@ -54,7 +54,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
+    let surface = segmentation::segment(&ctx, &settings.segmentation, &model.solid, model.labels.as_deref())
         .map_err(DesignError::from)?;
     display.finish();
     let mut notes = model.notes.clone();
@@ -73,7 +73,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         _ => write_labels(&labels_of_file(&model, &surface)),
     };
     write(out, &bytes)?;
-    let warnings = ctx.take_warnings();
+    let warnings = ctx.into_warnings();
     if session.is_json {
         let value =
             json!({ "status": "done", "out": out, "pieces": surface.n_patches, "notes": notes, "warnings": warnings });
@@ -123,21 +123,11 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     };
     let is_time_up = || clock.is_up();
     let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
-    let surface = segmentation::segment(&ctx, &params.segmentation, &model.solid, model.labels.as_deref())
-        .map_err(DesignError::from)?;
-    let sizes = sizes::choose(&ctx, &params.sizes(), &surface, None)?.sizes;
-    let tables = survey(&ctx, &params.plan, &surface, &surface.seams(), &sizes)?;
-    let found = match search(&ctx, &params.plan, &tables, &PlanConstraints::default())? {
-        PlanOutcome::Found(found) => *found,
-        PlanOutcome::Infeasible { reason, .. } => {
-            display.finish();
-            return Err(Failure::NoPlan(format!("no plan was found: {reason}")));
-        }
-    };
-    // The same choice as when a kit is made.
-    let (found, holding) = metric::choose(&ctx, &params.plan, &surface, &sizes, found).map_err(DesignError::from)?;
+    let planned =
+        design::plan(&ctx, &params, &model.solid, model.labels.as_deref()).inspect_err(|_| display.finish())?;
     display.finish();
-    let warnings = ctx.take_warnings();
+    let Planned { found, holding, warnings, .. } =
+        planned.map_err(|reason| Failure::NoPlan(format!("no plan was found: {reason}")))?;
     let (proof, steps) = (found.proof(), &found.plan.steps);
     if session.is_json {
         let order: Vec<PatchId> = steps.iter().map(|s| s.piece).collect();

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
+use shellock::design::{Params, Settings, Thickness};
 use shellock::metric::MetricParams;
-use shellock::pipeline::Params;
 use shellock::sizes::SizeChoice;
 use shellock::stress_test::{Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test};
 use shellock::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface};
@@ -136,35 +136,35 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
 fn params_of(plan_value: &Value, blows: &Blows) -> Result<StressParams, String> {
     let plan = plan_value;
     let mut params = Params::default();
-    params.body.thickness_mm = plan["shell_thickness"].as_f64().ok_or("\"shell_thickness\" is no number of mm")?;
+    params.thickness = Thickness::Mm(plan["shell_thickness"].as_f64().ok_or("\"shell_thickness\" is no number of mm")?);
     let sizes = sizes_of(plan)?;
     params.connector.size = SizeChoice::Fixed(sizes.largest_mm());
-    params.plan.seed = plan["seed"].as_u64().unwrap_or_default();
+    params.seed = plan["seed"].as_u64().unwrap_or_default();
     let told: Vec<f64> = plan["up"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
-    params.plan.up = match (blows.up, &told[..]) {
+    params.up = match (blows.up, &told[..]) {
         (Some(axis), _) => axis.unit(),
         (None, [x, y, z]) => [*x, *y, *z],
         _ => Axis::Z.unit(),
     };
-    if let [x, y, z] =
-        plan["key"]["slide"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect::<Vec<_>>()[..]
-    {
-        params.plan.key = plan["key_piece"].as_u64().and_then(|key| u32::try_from(key).ok()).map(PatchId);
-        params.plan.key_slide = Some(LatticeDirection::nearest(shellock_geom::Vec3::new(x, y, z)));
-    }
     let problems = params.problems();
     if !problems.is_empty() {
         return Err(problems.join("; "));
     }
-    let plan = params.agreed().plan;
+    let mut plan_params = Settings::resolve(&params).plan;
+    if let [x, y, z] =
+        plan["key"]["slide"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect::<Vec<_>>()[..]
+    {
+        plan_params.key = plan["key_piece"].as_u64().and_then(|key| u32::try_from(key).ok()).map(PatchId);
+        plan_params.key_slide = Some(LatticeDirection::nearest(shellock_geom::Vec3::new(x, y, z)));
+    }
     let built = || serde_json::from_value::<Material>(plan_value["strength"]["material"].clone()).ok();
     let (material, edge_share) = (blows.material.or_else(built).unwrap_or_default(), blows.edges);
-    let metric = MetricParams { material, edge_share, ..MetricParams::of_plan(&plan, &sizes) };
+    let metric = MetricParams { material, edge_share, ..MetricParams::of_plan(&plan_params, &sizes) };
     let punch_at = match blows.at {
         Place::Top => PunchAt::Top,
         Place::Middle => PunchAt::Middle,
     };
-    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: 1000.0 * blows.drop, metric, sizes, plan })
+    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: 1000.0 * blows.drop, metric, sizes, plan: plan_params })
 }
 
 /// The connectors' sizes: one for all, or those of each pair.

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use divan::{Bencher, black_box};
 use shellock::body::{BodyParams, PatchDistances, ShellGrid};
+use shellock::design::{Params, design};
 use shellock::figure::{Figure, make};
-use shellock::pipeline::{Params, design};
 use shellock::plan::{PlanConstraints, PlanParams, search, survey};
 use shellock::segmentation::{SegmentationParams, segment};
 use shellock::strength::{self, StrengthParams};

@@ -6,12 +6,12 @@
 
 pub mod body;
 pub mod connector;
+pub mod design;
 pub mod figure;
 mod impact;
 pub mod key;
 pub mod metric;
 pub mod piece;
-pub mod pipeline;
 pub mod plan;
 pub mod seam;
 pub mod segmentation;
@@ -22,6 +22,7 @@ pub mod surface;
 #[cfg(test)]
 mod testing;
 
+pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, design};
 pub use seam::graph::{Contact, ContactGraph};
 pub use shellock_assembly::{
     Cancelled, Ctx, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit, PressFitKind,

@@ -19,7 +19,7 @@ const DESIGN: [&str; 12] = [
     "body",
     "connector",
     "piece",
-    "pipeline",
+    "design",
 ];
 const ASSEMBLY: [&str; 10] =
     ["ids", "context", "direction", "sequence", "press_fit", "push", "motion", "verify", "play", "certificate"];

@@ -7,6 +7,7 @@ mod report;
 use std::path::PathBuf;
 
 use clap::Args;
+use shellock::design::Settings;
 use shellock::metric::{MetricParams, PlanModel};
 use shellock::plan::{InstallationPlan, PlanSurvey, random_plans};
 use shellock_mechanics::Meeting;
@@ -98,11 +99,12 @@ fn subject(options: &MetricsOptions) -> Result<Subject, Failure> {
     let params = options.model.params();
     let solid = load(&options.model)?;
     let Divided { surface, sizes, survey } = with_ctx(|ctx| divide(ctx, &params, &solid, path))?;
-    let plans = random_plans(&params.plan, &survey, options.plans);
+    let plan_params = Settings::resolve(&params).plan;
+    let plans = random_plans(&plan_params, &survey, options.plans);
     let Some(key) = plans.first().map(|p| p.key().0) else {
         return Err(Failure::Model { path: path.clone(), problem: "no plan was found".to_owned() });
     };
-    let metric = MetricParams { edge_share: metric.edge_share, ..MetricParams::of_plan(&params.plan, &sizes) };
+    let metric = MetricParams { edge_share: metric.edge_share, ..MetricParams::of_plan(&plan_params, &sizes) };
     Failure::unless_right(metric.problems())?;
     let model = PlanModel::new(&metric, &surface, &sizes);
     let meetings = plans.iter().map(|p| model.meetings(p)).collect();

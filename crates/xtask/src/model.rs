@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 use shellock::context::Progress;
+use shellock::design::{Params, Settings};
 use shellock::params::ParamProblem;
-use shellock::pipeline::Params;
 use shellock::plan::{PlanSurvey, survey};
 use shellock::segmentation::segment;
 use shellock::sizes;
@@ -51,10 +51,9 @@ pub enum Axis {
 impl ModelOptions {
     /// The product's own parameters, but for the seeds and the axis that points up.
     pub fn params(&self) -> Params {
-        let mut params = Params::default().agreed();
-        params.segmentation.seed = self.seed;
-        params.plan.seed = self.seed;
-        params.plan.up = std::array::from_fn(|axis| if axis == self.up as usize { 1.0 } else { 0.0 });
+        let mut params = Params::default();
+        params.seed = self.seed;
+        params.up = std::array::from_fn(|axis| if axis == self.up as usize { 1.0 } else { 0.0 });
         params
     }
 
@@ -120,16 +119,17 @@ pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
 
 /// Divides the model and surveys the pieces.
 pub fn divide(ctx: &Ctx<'_>, params: &Params, model: &Model, path: &Path) -> Result<Divided, Failure> {
+    let settings = Settings::resolve(params);
     let problems = params.problems();
     if !problems.is_empty() {
         return Err(Failure::Options(problems));
     }
     let fault = |problem: String| Failure::Model { path: path.to_owned(), problem };
-    let surface =
-        segment(ctx, &params.segmentation, &model.solid, model.labels.as_deref()).map_err(|e| fault(e.to_string()))?;
+    let surface = segment(ctx, &settings.segmentation, &model.solid, model.labels.as_deref())
+        .map_err(|e| fault(e.to_string()))?;
     let stopped = |_| fault("the study was stopped".into());
-    let sizes = sizes::choose(ctx, &params.sizes(), &surface, None).map_err(stopped)?.sizes;
-    let survey = survey(ctx, &params.plan, &surface, &surface.seams(), &sizes).map_err(stopped)?;
+    let sizes = sizes::choose(ctx, &settings.sizes, &surface, None).map_err(stopped)?.sizes;
+    let survey = survey(ctx, &settings.plan, &surface, &surface.seams(), &sizes).map_err(stopped)?;
     Ok(Divided { surface, sizes, survey })
 }
 

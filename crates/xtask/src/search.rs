@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use shellock::Ctx;
-use shellock::pipeline::Params;
+use shellock::design::{Params, Settings};
 use shellock::plan::study::{Technique, convergence};
 use shellock::plan::{FoundPlan, PlanConstraints, PlanOutcome, PlanParams, search};
 
@@ -72,20 +72,20 @@ fn subject(
     seed: u64,
 ) -> Result<Subject, Failure> {
     let mut params: Params = options.model.params();
-    params.segmentation.seed = seed;
-    params.segmentation.n_pieces = n_pieces;
+    params.seed = seed;
+    params.n_pieces = n_pieces;
     let divided = divide(ctx, &params, model, &options.model.model)?;
     let fault = |problem: String| Failure::Model { path: options.model.model.clone(), problem };
     let name = format!("{} pieces", divided.surface.n_patches);
-    let mut params = params.plan;
+    let mut params = PlanParams { seed: options.model.seed, ..Settings::resolve(&params).plan };
     let best = loop {
-        ctx.take_warnings();
-        let outcome = search(ctx, &params, &divided.survey, &PlanConstraints::default());
+        let ctx = ctx.fork();
+        let outcome = search(&ctx, &params, &divided.survey, &PlanConstraints::default());
         let best = match outcome.map_err(|_| fault("the study was stopped".into()))? {
             PlanOutcome::Found(found) => found,
             PlanOutcome::Infeasible { reason, .. } => return Err(fault(format!("{name}: {reason}"))),
         };
-        if ctx.take_warnings().iter().any(|w| w.code == "occlusion-tolerance-raised") {
+        if ctx.into_warnings().iter().any(|w| w.code == "occlusion-tolerance-raised") {
             params.occlusion_tolerance = params.relaxed_tolerance;
         }
         // Once more with the key given, as the searches will be run.

@@ -1,7 +1,5 @@
 //! Proven play against exact intersections, and pieces that come out.
 
-use std::sync::atomic::AtomicBool;
-
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -13,9 +11,8 @@ use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, cuboid, pinned_kit};
 const CLEARANCE_MM: f64 = 2.0 * HALF_GAP_MM;
 
 fn measured(kit: &Kit, clearance_mm: f64) -> KitPlay {
-    let (report, stop) = (|_: crate::context::Progress<'_>| {}, AtomicBool::new(false));
     let params = PlayParams { clearance_mm, slide_mm: SLIDE_MM, is_together: true, seed: 0 };
-    let ctx = Ctx::new(&report, &stop);
+    let ctx = Ctx::quiet();
     let mut play = measure(&ctx, &params, &kit.pieces, &kit.plan).unwrap();
     look_for_ways_out(&ctx, clearance_mm, &kit.pieces, &mut play).unwrap();
     play

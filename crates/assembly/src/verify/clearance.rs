@@ -158,9 +158,8 @@ fn place(gap_mm: f64, travel_mm: f64, at: [f64; 3]) -> NearestPlace {
 mod tests {
     use super::*;
     use crate::InstallationStep;
-    use crate::{LatticeDirection, context};
+    use crate::LatticeDirection;
     use shellock_geom::{Aabb, Vec3, Volume};
-    use std::sync::atomic::AtomicBool;
 
     fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
         Volume::cuboid(Aabb { min: min.into(), max: max.into() })
@@ -180,37 +179,30 @@ mod tests {
         (Solid::new(model.to_mesh()).unwrap(), pieces, InstallationPlan { steps: steps.collect() })
     }
 
-    fn with_ctx<T>(run: impl FnOnce(&Ctx) -> T) -> T {
-        let (report, stop) = (|_: context::Progress<'_>| {}, AtomicBool::new(false));
-        run(&Ctx::new(&report, &stop))
-    }
-
     #[test]
     fn gaps_beneath_the_rim_are_those_of_the_walls() {
         let (model, pieces, plan) = kit();
-        with_ctx(|ctx| {
-            let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
-            let pairs = pair_gaps(ctx, &shapes).unwrap();
-            assert_eq!(pairs.len(), 1, "the ledge is 2 mm off");
-            assert!(pairs[0].overall.gap_mm.abs() < 1e-4, "{pairs:?}");
-            assert!((pairs[0].beneath_rim.unwrap().gap_mm - 0.04).abs() < 1e-9, "{pairs:?}");
-            let paths = path_gaps(ctx, &shapes, &plan).unwrap();
-            assert_eq!(paths[0].beneath_rim.map(|g| g.gap_mm), pairs[0].beneath_rim.map(|g| g.gap_mm));
-        });
+        let ctx = &Ctx::quiet();
+        let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+        let pairs = pair_gaps(ctx, &shapes).unwrap();
+        assert_eq!(pairs.len(), 1, "the ledge is 2 mm off");
+        assert!(pairs[0].overall.gap_mm.abs() < 1e-4, "{pairs:?}");
+        assert!((pairs[0].beneath_rim.unwrap().gap_mm - 0.04).abs() < 1e-9, "{pairs:?}");
+        let paths = path_gaps(ctx, &shapes, &plan).unwrap();
+        assert_eq!(paths[0].beneath_rim.map(|g| g.gap_mm), pairs[0].beneath_rim.map(|g| g.gap_mm));
     }
 
     #[test]
     fn a_path_is_measured_past_what_is_only_met_on_the_way() {
         let (model, pieces, mut plan) = kit();
         plan.steps.swap(1, 2);
-        with_ctx(|ctx| {
-            let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
-            let paths = path_gaps(ctx, &shapes, &plan).unwrap();
-            let met = paths.iter().find(|p| (p.piece, p.against) == (PatchId(1), PatchId(2))).unwrap();
-            // The collar runs into the ledge by 0.08 mm on its way, the block beneath it by 0.03.
-            assert!((met.overall.gap_mm + 0.08).abs() < 2e-4, "{met:?}");
-            assert!((2.0..3.2).contains(&met.overall.travel_mm), "{met:?}");
-        });
+        let ctx = &Ctx::quiet();
+        let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+        let paths = path_gaps(ctx, &shapes, &plan).unwrap();
+        let met = paths.iter().find(|p| (p.piece, p.against) == (PatchId(1), PatchId(2))).unwrap();
+        // The collar runs into the ledge by 0.08 mm on its way, the block beneath it by 0.03.
+        assert!((met.overall.gap_mm + 0.08).abs() < 2e-4, "{met:?}");
+        assert!((2.0..3.2).contains(&met.overall.travel_mm), "{met:?}");
     }
 
     #[test]
@@ -219,10 +211,9 @@ mod tests {
         pieces[PatchId(1)].triangles.pop();
         pieces[PatchId(2)].points[0].x = f64::NAN;
         plan.steps[2].piece = PatchId(77);
-        with_ctx(|ctx| {
-            let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
-            assert_eq!(pair_gaps(ctx, &shapes).unwrap(), []);
-            assert_eq!(path_gaps(ctx, &shapes, &plan).unwrap(), []);
-        });
+        let ctx = &Ctx::quiet();
+        let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+        assert_eq!(pair_gaps(ctx, &shapes).unwrap(), []);
+        assert_eq!(path_gaps(ctx, &shapes, &plan).unwrap(), []);
     }
 }

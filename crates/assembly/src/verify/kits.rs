@@ -1,7 +1,5 @@
 //! Small assemblies of boxes, for tests.
 
-use std::sync::atomic::AtomicBool;
-
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
 use super::contact::Contact;
@@ -53,10 +51,9 @@ impl Kit {
     }
 
     pub fn examined(&self) -> (Verification, Vec<Contact>) {
-        let (report, stop) = (|_: crate::context::Progress<'_>| {}, AtomicBool::new(false));
         let params = VerifyParams { clearance_mm: 2.0 * HALF_GAP_MM, seed: 0 };
         let assembly = Assembly { model: &self.model, pieces: &self.pieces, plan: &self.plan, press_fits: &[] };
-        examine(&Ctx::new(&report, &stop), &params, &assembly).unwrap()
+        examine(&Ctx::quiet(), &params, &assembly).unwrap()
     }
 }
 

@@ -1,5 +1,3 @@
-use std::sync::atomic::AtomicBool;
-
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 
 use super::*;
@@ -25,8 +23,7 @@ fn built(
     plan: &InstallationPlan,
 ) -> (ShellGrid, Result<ShellBodies, BodyError>) {
     let model = Solid::new(surface.mesh.clone()).unwrap();
-    let stop = AtomicBool::new(false);
-    let ctx = Ctx::new(&|_| {}, &stop);
+    let ctx = Ctx::quiet();
     let grid = ShellGrid::new(params, &model, 4.0).unwrap();
     let distances = PatchDistances::measure(&grid, surface);
     let everywhere = Aabb { min: Vec3::splat(-50.0), max: Vec3::splat(50.0) };

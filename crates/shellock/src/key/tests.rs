@@ -20,8 +20,7 @@ fn params_of(surface: &SegmentedSurface) -> KeyParams {
 }
 
 fn sites_of(surface: &SegmentedSurface) -> Vec<KeySite> {
-    let stop = std::sync::atomic::AtomicBool::new(false);
-    sites(&Ctx::new(&|_| {}, &stop), &params_of(surface), surface).unwrap()
+    sites(&Ctx::quiet(), &params_of(surface), surface).unwrap()
 }
 
 fn random_unit(rng: &mut ChaCha8Rng) -> Vec3 {

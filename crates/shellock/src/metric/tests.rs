@@ -104,15 +104,14 @@ fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction
 
 /// The plan that is chosen for `surface`, how it holds, and what is warned of at that.
 fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
-    let stop = std::sync::atomic::AtomicBool::new(false);
-    let ctx = Ctx::new(&|_| {}, &stop);
+    let ctx = Ctx::quiet();
     let (params, sizes) = (PlanParams { n_plans: 40, ..PlanParams::default() }, ConnectorSizes::default());
     let survey = survey(&ctx, &params, surface, &seams(surface), &sizes).unwrap();
     let outcome = search(&ctx, &params, &survey, &PlanConstraints::default()).unwrap();
     let PlanOutcome::Found(found) = outcome else { panic!("{outcome:?}") };
-    ctx.take_warnings();
+    let ctx = ctx.fork();
     let (found, holding) = choose(&ctx, &params, surface, &sizes, *found).unwrap();
-    (found, holding, ctx.take_warnings())
+    (found, holding, ctx.into_warnings())
 }
 
 #[test]

@@ -125,8 +125,7 @@ mod tests {
     #[test]
     fn a_hemisphere_that_leaves_along_its_axis_beats_every_other_direction() {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0));
-        let stop = std::sync::atomic::AtomicBool::new(false);
-        let ctx = crate::Ctx::new(&|_| {}, &stop);
+        let ctx = crate::Ctx::quiet();
         let survey =
             survey(&ctx, &PlanParams::default(), &surface, &seams(&surface), &crate::ConnectorSizes::default())
                 .unwrap();
@@ -143,8 +142,7 @@ mod tests {
     /// Hold of a plate in the +z plane, whose only neighbour, all round it, leaves later along `s`.
     fn hold_of_plate(s: Vec3, is_weak: bool) -> f64 {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z < 0.0));
-        let stop = std::sync::atomic::AtomicBool::new(false);
-        let ctx = crate::Ctx::new(&|_| {}, &stop);
+        let ctx = crate::Ctx::quiet();
         let survey =
             survey(&ctx, &PlanParams::default(), &surface, &seams(&surface), &crate::ConnectorSizes::default())
                 .unwrap();

@@ -1,7 +1,5 @@
 //! The search against brute force, on made-up and on real surfaces.
 
-use std::sync::atomic::AtomicBool;
-
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shellock_geom::Vec3;
@@ -18,8 +16,7 @@ use crate::testing::{label, seams, sphere, voronoi};
 use crate::{Ctx, IdVec, LatticeDirection, PatchId};
 
 pub fn on_ctx<T>(run: impl FnOnce(&Ctx<'_>) -> T) -> T {
-    let stop = AtomicBool::new(false);
-    run(&Ctx::new(&|_| {}, &stop))
+    run(&Ctx::quiet())
 }
 
 fn searched(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> PlanOutcome {

@@ -123,7 +123,6 @@ fn finished(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicBool;
 
     use shellock_geom::Vec3;
 
@@ -133,8 +132,7 @@ mod tests {
 
     #[test]
     fn every_technique_gets_better_with_work_and_none_beats_the_proven_bound() {
-        let stop = AtomicBool::new(false);
-        let ctx = Ctx::new(&|_| {}, &stop);
+        let ctx = Ctx::quiet();
         let params = PlanParams { n_plans: 40, ..PlanParams::default() };
         let surface = voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1);
         let survey = survey(&ctx, &params, &surface, &seams(&surface), &crate::ConnectorSizes::default()).unwrap();

@@ -1,12 +1,15 @@
-use std::sync::atomic::AtomicBool;
-
 use shellock_geom::{TriMesh, Vec3};
 
 use super::*;
 
 fn with_ctx<T>(run: impl FnOnce(&Ctx) -> T) -> T {
-    let stop = AtomicBool::new(false);
-    run(&Ctx::new(&|_| {}, &stop))
+    run(&Ctx::quiet())
+}
+
+/// What was made, and what was warned of.
+fn with_warnings<T>(run: impl FnOnce(&Ctx) -> T) -> (T, Vec<crate::Warning>) {
+    let ctx = Ctx::quiet();
+    (run(&ctx), ctx.into_warnings())
 }
 
 /// A sphere of `radius_mm` with four arms, star-shaped around its centre.
@@ -87,10 +90,7 @@ fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
     let solid = limbed();
     let labels = arm_labels(&solid);
     let params = SegmentationParams::default();
-    let (surface, warnings) = with_ctx(|ctx| {
-        let surface = segment(ctx, &params, &solid, Some(&labels)).unwrap();
-        (surface, ctx.take_warnings())
-    });
+    let (surface, warnings) = with_warnings(|ctx| segment(ctx, &params, &solid, Some(&labels)).unwrap());
     assert!(surface.n_patches > 5);
     assert!(surface.contact_graph(params.min_contact_mm).is_two_connected());
     assert!(warnings.iter().any(|w| w.code == "piece-split" && w.at.is_some()));
@@ -101,10 +101,7 @@ fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
 fn segment_thin_arms(least_contact_mm: f64) -> (SegmentationParams, SegmentedSurface, Vec<crate::Warning>) {
     let solid = limbed();
     let params = SegmentationParams { min_contact_mm: 45.0, least_contact_mm, ..Default::default() };
-    let (surface, warnings) = with_ctx(|ctx| {
-        let surface = segment(ctx, &params, &solid, Some(&arm_labels(&solid))).unwrap();
-        (surface, ctx.take_warnings())
-    });
+    let (surface, warnings) = with_warnings(|ctx| segment(ctx, &params, &solid, Some(&arm_labels(&solid))).unwrap());
     (params, surface, warnings)
 }
 
@@ -208,10 +205,8 @@ fn islands_join_what_surrounds_them_and_far_parts_become_pieces() {
     let is_lone = |l: &i64| *l == 7;
     let lone = [labels.iter().position(is_lone), labels.iter().rposition(is_lone)];
     lone.into_iter().flatten().for_each(|face| labels[face] = 12);
-    let (patches, warnings) = with_ctx(|ctx| {
-        let patches = user_labels(ctx, &SegmentationParams::default(), &solid, &labels).unwrap();
-        (patches, ctx.take_warnings())
-    });
+    let (patches, warnings) =
+        with_warnings(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, &labels).unwrap());
     assert_eq!(patches.n_patches(), 5);
     let codes: Vec<&str> = warnings.iter().map(|w| w.code.as_str()).collect();
     assert_eq!(codes, ["label-split", "label-island"]);

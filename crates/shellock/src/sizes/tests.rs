@@ -1,5 +1,3 @@
-use std::sync::atomic::AtomicBool;
-
 use shellock_geom::TriMesh;
 
 use super::*;
@@ -17,11 +15,10 @@ fn chosen(
     params: &SizeParams,
     stress_mpa: Option<StressField>,
 ) -> (ChosenSizes, Vec<Warning>) {
-    let stop = AtomicBool::new(false);
-    let ctx = Ctx::new(&|_| {}, &stop);
+    let ctx = Ctx::quiet();
     let chosen = choose(&ctx, params, surface, stress_mpa).unwrap();
     chosen.tell(&ctx);
-    (chosen, ctx.take_warnings())
+    (chosen, ctx.into_warnings())
 }
 
 /// Two halves of an ellipsoid that meet in a ring at z = 0.

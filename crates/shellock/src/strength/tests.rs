@@ -12,8 +12,7 @@ fn quick(drop_m: f64) -> StrengthParams {
 }
 
 fn found(params: &StrengthParams, model: &Solid) -> Strength {
-    let stop = AtomicBool::new(false);
-    thickness(&Ctx::new(&|_| {}, &stop), params, model).unwrap()
+    thickness(&Ctx::quiet(), params, model).unwrap()
 }
 
 #[test]
@@ -21,9 +20,8 @@ fn the_wall_found_is_stressed_to_the_strength_and_no_thinner_one_bears_it() {
     let model = Solid::new(sphere(4, Vec3::new(60.0, 60.0, 25.0))).unwrap();
     let mut params = quick(1.275);
     params.refinement = 0.3;
-    let stop = AtomicBool::new(false);
     for wall_mm in [0.9, 1.7, 2.6] {
-        let limit_mpa = stress(&Ctx::new(&|_| {}, &stop), &params, &model, wall_mm).unwrap().stress_mpa;
+        let limit_mpa = stress(&Ctx::quiet(), &params, &model, wall_mm).unwrap().stress_mpa;
         params.material.strength_mpa = limit_mpa;
         let strength = found(&params, &model);
         assert!((strength.stress_mpa / limit_mpa - 1.0).abs() < 0.02, "{wall_mm}: {limit_mpa} {:?}", strength.tried);
@@ -35,8 +33,7 @@ fn the_wall_found_is_stressed_to_the_strength_and_no_thinner_one_bears_it() {
 
 #[test]
 fn stress_is_proportional_to_the_speed() {
-    let stop = AtomicBool::new(false);
-    let at = |drop_m| stress(&Ctx::new(&|_| {}, &stop), &quick(drop_m), &ball(60.0), 2.0).unwrap().stress_mpa;
+    let at = |drop_m| stress(&Ctx::quiet(), &quick(drop_m), &ball(60.0), 2.0).unwrap().stress_mpa;
     assert!((at(4.0) / at(1.0) - 2.0).abs() < 1e-9);
 }
 
@@ -70,8 +67,7 @@ fn what_no_wall_bears_is_told_and_gets_no_wall_that_does_not_help() {
 fn arms_thinner_than_two_walls_are_solid_and_a_ball_is_nowhere() {
     let mut params = quick(1.0);
     params.refinement = 1.0;
-    let stop = AtomicBool::new(false);
-    let solid = |model: &Solid, mm| stress(&Ctx::new(&|_| {}, &stop), &params, model, mm).unwrap().solid;
+    let solid = |model: &Solid, mm| stress(&Ctx::quiet(), &params, model, mm).unwrap().solid;
     assert_eq!(solid(&ball(60.0), 4.0), []);
     let flat = Solid::new(sphere(4, Vec3::new(60.0, 60.0, 3.0))).unwrap();
     let area_mm2: f64 = solid(&flat, 4.0).iter().map(|r| r.area_mm2).sum();
@@ -96,9 +92,8 @@ fn a_plate_ends_with_a_wall_that_leaves_a_cavity_or_with_a_sentence() {
         let strength = found(&params, &plate(half_mm));
         assert!(strength.thickness_mm < half_mm && strength.solid_share() < 1.0 - LEAST_HOLLOW + 0.05, "{half_mm}");
     }
-    let stop = AtomicBool::new(false);
     let params = StrengthParams { least_mm: 1.6, ..params };
-    let refused = thickness(&Ctx::new(&|_| {}, &stop), &params, &plate(1.2));
+    let refused = thickness(&Ctx::quiet(), &params, &plate(1.2));
     assert!(matches!(refused, Err(StrengthError::NothingHollow { .. })));
 }
 

@@ -1,5 +1,3 @@
-use std::sync::atomic::AtomicBool;
-
 use super::*;
 use crate::LatticeDirection;
 use crate::plan::InstallationStep;
@@ -40,8 +38,7 @@ fn forces_are_spread_over_what_they_hit_and_add_up() {
 
 #[test]
 fn half_connectors_fare_worse_than_whole_ones_and_the_report_says_so() {
-    let stop = AtomicBool::new(false);
-    let ctx = Ctx::new(&|_| {}, &stop);
+    let ctx = Ctx::quiet();
     let tested = stress_test(&ctx, &coarse(), &octants(), &outwards()).unwrap();
     let (kit, half) = (&tested.kit, &tested.half_connectors);
     for (whole, half) in [(&kit.punch, &half.punch), (&kit.drop, &half.drop)] {
@@ -73,8 +70,7 @@ fn a_stronger_material_bears_what_a_weaker_one_does_not() {
 
 #[test]
 fn what_does_not_belong_together_is_refused() {
-    let stop = AtomicBool::new(false);
-    let ctx = Ctx::new(&|_| {}, &stop);
+    let ctx = Ctx::quiet();
     let mut plan = outwards();
     plan.steps.pop();
     let refused = stress_test(&ctx, &coarse(), &octants(), &plan);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::Design;
+use super::Kit;
 use crate::plan::{InstallationPlan, PlanConstraints};
 use crate::seam::rules::SHORTEST_RUN_SIZES;
 use crate::verify::Finding;
@@ -124,16 +124,16 @@ impl std::fmt::Display for Lesson {
 }
 
 /// The lessons of a kit; none where it passed. The last one always rules this plan out.
-pub fn lessons(design: &Design) -> Vec<Lesson> {
-    if design.verification.passed() {
+pub fn lessons(kit: &Kit) -> Vec<Lesson> {
+    if kit.verification.passed() {
         return Vec::new();
     }
     let mut loose = Vec::new();
     let mut learned = Vec::new();
-    for finding in &design.verification.findings {
+    for finding in &kit.verification.findings {
         match finding {
             &Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => {
-                let separation = design.plan.separation(piece);
+                let separation = kit.plan.separation(piece);
                 learned.push(Lesson::RubbingPath { piece, separation, against, travel_mm, thickness_mm, volume_mm3 });
             }
             Finding::Loose { piece, .. } | Finding::PlayTooWide { piece, .. } | Finding::ComesOut { piece, .. } => {
@@ -145,28 +145,28 @@ pub fn lessons(design: &Design) -> Vec<Lesson> {
     }
     loose.sort_unstable();
     loose.dedup();
-    learned.extend(weak_joints(design).filter(|_| !loose.is_empty()));
-    learned.push(Lesson::FailedPlan { plan: design.plan.clone(), loose });
+    learned.extend(weak_joints(kit).filter(|_| !loose.is_empty()));
+    learned.push(Lesson::FailedPlan { plan: kit.plan.clone(), loose });
     learned
 }
 
 /// Pairs whose connectors are too short: they must not be counted on again in this way.
-fn weak_joints(design: &Design) -> Option<Lesson> {
+fn weak_joints(kit: &Kit) -> Option<Lesson> {
     let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
     let by_order = |a: PatchId, b: PatchId| {
-        if design.plan.position(a) > design.plan.position(b) { (a, b) } else { (b, a) }
+        if kit.plan.position(a) > kit.plan.position(b) { (a, b) } else { (b, a) }
     };
-    for contact in &design.contacts {
+    for contact in &kit.contacts {
         lengths.entry(by_order(contact.later, contact.earlier)).or_default()[1] += contact.length_mm;
     }
-    for joint in &design.joints {
+    for joint in &kit.joints {
         lengths.entry(by_order(joint.male, joint.female)).or_default()[0] += joint.length_mm;
     }
-    let is_weak = |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * design.sizes.of(a, b);
+    let is_weak = |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * kit.sizes.of(a, b);
     let weak = lengths.into_iter().filter(|(pair, [length_mm, _])| is_weak(*pair, *length_mm));
     let joints: Vec<WeakJoint> = weak
         .map(|((later, earlier), [length_mm, seam_mm])| {
-            let separation = design.plan.separation(later);
+            let separation = kit.plan.separation(later);
             WeakJoint { later, earlier, separation, length_mm, seam_mm }
         })
         .collect();

@@ -1,0 +1,213 @@
+//! The whole job: from a closed mesh to interlocking pieces that were verified.
+//!
+//! Feedback goes one way: what a finished kit teaches becomes a constraint for the next plan of the same division; when plans run
+//! out, the division is revised at the pieces to blame, and planning starts afresh; when revisions run out, the next key is tried.
+//!
+//! ```text
+//!  Params ─► Settings ─► Candidate (a key) ─► Division (pieces) ─► plan ─► Kit ─► verdict ─► Design
+//!                           ▲                    ▲                  ▲                │
+//!                           └─ next key ─────────┴─ revised ────────┴─ lessons ◄─────┘
+//! ```
+
+mod attempt;
+mod budget;
+mod candidate;
+mod division;
+mod kit;
+mod lesson;
+mod outcome;
+mod params;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+use shellock_geom::Solid;
+
+use crate::key::Turn;
+use crate::metric::Holding;
+use crate::plan::{FoundPlan, PlanConstraints, survey};
+use crate::strength::{Strength, StrengthError, StressMap};
+use crate::{Ctx, SegmentedSurface, Warning, segmentation, strength};
+use attempt::{Attempt, Failure, Next};
+use budget::Budget;
+use candidate::Candidate;
+use division::{Division, WallGrid, revised};
+pub use kit::Kit;
+use outcome::Best;
+pub use outcome::{Design, DesignError, DesignOutcome};
+pub use params::{KeySource, Params, Rounds, Thickness};
+pub use settings::Settings;
+
+/// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds
+/// are used up; then the best of them is returned, its failures told.
+pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
+    let wall = Wall::decide(ctx, params, model)?;
+    let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
+    let stress = wall.strength.as_ref().map(StressMap::new);
+    let job = Job { params, model, labels, wall: &wall, stress, surface };
+    let mut best = Best::default();
+    let places = candidate::places(ctx, &job)?;
+    for (i, place) in places.iter().enumerate() {
+        if best.is_enough(place.as_ref()) {
+            continue;
+        }
+        if let Some(site) = place {
+            ctx.note(&candidate::words(site));
+        }
+        if let Some(candidate) = Candidate::new(&job, i, place.as_ref()) {
+            let explored = explore(ctx, &job, &candidate);
+            best.add(ctx, place.as_ref(), candidate, explored)?;
+        }
+    }
+    best.finished(ctx, &job)
+}
+
+/// The plan that [`design`] would make first.
+#[non_exhaustive]
+pub struct Planned {
+    /// The pieces, in the space of the model as it was given, turned by `turn`.
+    pub surface: SegmentedSurface,
+    /// How the model was turned.
+    pub turn: Turn,
+    /// The plan and how good it is.
+    pub found: FoundPlan,
+    /// How it holds by simulation.
+    pub holding: Holding,
+    /// What was warned of on the way.
+    pub warnings: Vec<Warning>,
+}
+
+/// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and connector sizes.
+pub fn plan(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    labels: Option<&[i64]>,
+) -> Result<Result<Planned, String>, DesignError> {
+    let wall = Wall::decide(ctx, params, model)?;
+    let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
+    let stress = wall.strength.as_ref().map(StressMap::new);
+    let job = Job { params, model, labels, wall: &wall, stress, surface };
+    let mut reason = "the key falls apart".to_owned();
+    for (i, place) in candidate::places(ctx, &job)?.iter().enumerate() {
+        let Some(candidate) = Candidate::new(&job, i, place.as_ref()) else { continue };
+        let mut n_joinings = candidate.budget.foreseen_joinings;
+        let mut division = candidate.division(ctx, &job, candidate.surface.clone())?;
+        while let Some(current) = division {
+            let ctx = ctx.fork();
+            let Division { surface, settings, chosen, .. } = &current;
+            chosen.tell(&ctx);
+            let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
+            let none = PlanConstraints::default();
+            division = match attempt::next_plan(&ctx, params, &current, &survey, &none, n_joinings > 0)? {
+                Next::Plan(found, holding) => {
+                    let (turn, warnings) = (candidate.turn, ctx.into_warnings());
+                    return Ok(Ok(Planned { surface: current.surface, turn, found: *found, holding, warnings }));
+                }
+                Next::Joined(fewer) => {
+                    n_joinings -= 1;
+                    candidate.division(&ctx, &job, fewer)?
+                }
+                Next::None(failure) => {
+                    reason = failure.reason;
+                    None
+                }
+            };
+        }
+    }
+    Ok(Err(reason))
+}
+
+/// What all kits of a job have in common.
+struct Job<'a> {
+    params: &'a Params,
+    /// As it was given, with its labels.
+    model: &'a Solid,
+    labels: Option<&'a [i64]>,
+    wall: &'a Wall,
+    stress: Option<StressMap<'a>>,
+    surface: SegmentedSurface,
+}
+
+impl Job<'_> {
+    fn settings(&self) -> &Settings {
+        &self.wall.settings
+    }
+}
+
+/// The wall's thickness in what stages are given, what it bears, and what to tell of it.
+struct Wall {
+    settings: Settings,
+    strength: Option<Strength>,
+    warnings: Vec<Warning>,
+}
+
+impl Wall {
+    fn decide(ctx: &Ctx, params: &Params, model: &Solid) -> Result<Self, DesignError> {
+        let nominal = Settings::resolve(params);
+        let ctx = &ctx.fork();
+        let found = match params.thickness {
+            Thickness::Mm(mm) => strength::stress(ctx, &nominal.strength, model, mm),
+            Thickness::Auto => strength::thickness(ctx, &nominal.strength, model),
+        };
+        match found {
+            Ok(strength) => {
+                let settings = Settings::with_thickness(params, strength.thickness_mm);
+                let warnings = strength.warnings(&nominal.strength);
+                Ok(Self { settings, strength: Some(strength), warnings })
+            }
+            Err(StrengthError::Shell(e)) if params.thickness != Thickness::Auto => {
+                let message = format!(
+                    "what the wall bears could not be computed ({e}); connectors are sized as if nothing pressed on them"
+                );
+                let warning = Warning { code: "strength-unknown".into(), message, pieces: Vec::new(), at: None };
+                Ok(Self { settings: nominal, strength: None, warnings: vec![warning] })
+            }
+            Err(e) => Err(e.into()),
+        }
+    }
+}
+
+/// What came of one candidate.
+struct Explored {
+    /// The best of its kits.
+    kit: Option<Kit>,
+    /// Why there is none, for people, and who is in whose way.
+    failure: Failure,
+}
+
+/// Kits of one candidate until one passes or its budget is used up.
+fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explored, DesignError> {
+    let mut budget: Budget = candidate.budget;
+    let mut wall = WallGrid::new(&job.settings().body, &candidate.model);
+    let mut kit = None;
+    let Some(mut division) = candidate.division(ctx, job, candidate.surface.clone())? else {
+        let failure = Failure { reason: "the key falls apart".into(), ..Failure::default() };
+        return Ok(Explored { kit, failure });
+    };
+    loop {
+        wall.make_room(division.settings.connector.room_mm(division.chosen.sizes.largest_mm()));
+        let n_pieces = division.surface.n_patches;
+        match attempt::plans(ctx, job.params, &mut wall, &division, &mut budget, &mut kit)? {
+            Attempt::Passed => return Ok(Explored { kit, failure: Failure::default() }),
+            Attempt::Joined(fewer) => {
+                budget.foreseen_joinings -= 1;
+                match candidate.division(ctx, job, fewer)? {
+                    Some(next) => {
+                        let n = next.surface.n_patches;
+                        ctx.note(&format!("pieces would rattle: {n} pieces instead of {n_pieces}"));
+                        division = next;
+                    }
+                    None => budget.foreseen_joinings = 0,
+                }
+            }
+            Attempt::Failed(failure) => {
+                let next = revised(ctx, &division, &failure, kit.is_some(), &mut budget)?;
+                let next = next.map(|surface| candidate.division(ctx, job, surface)).transpose()?.flatten();
+                let Some(next) = next else { return Ok(Explored { kit, failure }) };
+                ctx.note(&format!("another segmentation: {} pieces instead of {n_pieces}", next.surface.n_patches));
+                division = next;
+            }
+        }
+    }
+}

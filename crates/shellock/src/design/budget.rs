@@ -1,0 +1,66 @@
+//! What a job may cost: one table for all its bounds.
+
+use super::Rounds;
+
+/// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where the best does not do,
+/// others seldom do.
+pub(super) const KITS_OF_CUT_KEYS: [usize; 3] = [3, 2, 2];
+/// Kits made for one division and divisions revised, with a key that was cut.
+const KITS_WITH_CUT_KEY: usize = 2;
+const REVISIONS_WITH_CUT_KEY: usize = 1;
+/// Keys whose kits fail by pieces that rattle alone before no others are cut.
+pub(super) const RATTLING_KEYS: usize = 2;
+/// How often pieces are joined because they rattle in a kit that was made and is sound else.
+const JOININGS_OF_RATTLING: usize = 2;
+/// How often pieces are joined because they are foreseen to rattle, which costs a search for a plan each time and no kit.
+const JOININGS_FORESEEN: usize = 5;
+/// Plans of one division that may be given up because a piece could not take its wall along; they cost seconds.
+pub(super) const BLOCKED_PLANS: usize = 8;
+
+/// What is left to one candidate for a key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Budget {
+    /// Kits of one division, at most.
+    pub kits_each: usize,
+    /// Kits of all divisions that may still be made.
+    pub kits: usize,
+    /// Divisions that may still be revised for what failed, and how many there were at first.
+    pub revisions: usize,
+    revisions_at_first: usize,
+    /// How often pieces that rattle may still be joined.
+    pub joinings: usize,
+    /// How often pieces that are foreseen to rattle may still be joined.
+    pub foreseen_joinings: usize,
+}
+
+impl Budget {
+    /// Of the `i`-th place for a key that is cut.
+    pub fn of_cut_key(rounds: &Rounds, i: usize) -> Self {
+        Self {
+            kits_each: rounds.kits.min(KITS_WITH_CUT_KEY),
+            kits: rounds.kits_in_all.min(KITS_OF_CUT_KEYS[i]),
+            ..Self::with(rounds, rounds.mendings.min(REVISIONS_WITH_CUT_KEY))
+        }
+    }
+
+    /// Of a key that is one of the pieces.
+    pub fn of_piece(rounds: &Rounds) -> Self {
+        Self::with(rounds, rounds.mendings)
+    }
+
+    fn with(rounds: &Rounds, revisions: usize) -> Self {
+        Self {
+            kits_each: rounds.kits,
+            kits: rounds.kits_in_all,
+            revisions,
+            revisions_at_first: revisions,
+            joinings: JOININGS_OF_RATTLING,
+            foreseen_joinings: JOININGS_FORESEEN,
+        }
+    }
+
+    /// Whether half of the revisions are gone.
+    pub fn is_half_gone(&self) -> bool {
+        2 * (self.revisions_at_first - self.revisions) >= self.revisions_at_first
+    }
+}

@@ -1,0 +1,231 @@
+//! One kit: a plan made into pieces, and the verdict on them.
+
+use shellock_geom::{Aabb, Solid, TriMesh};
+
+use super::{DesignError, Params, Settings};
+use crate::body::{PatchDistances, ShellGrid};
+use crate::connector::{Contact, Run, has_no_bar};
+use crate::metric::Holding;
+use crate::piece::{FinishParams, Finished, Grip, Joint, PressFit, PressFitKind};
+use crate::plan::{FoundPlan, InstallationPlan, PlanProof};
+use crate::play::{self, KitPlay};
+use crate::sizes::CONTACT_SIZES;
+use crate::verify::{self, Finding, Verification};
+use crate::{ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece};
+
+/// Pieces that were made as planned, and what is known of them. All places are in the space of the model that they were made from.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Kit {
+    /// The segmented surface it was made from.
+    pub surface: SegmentedSurface,
+    /// Connector sizes of its pairs of pieces.
+    pub sizes: ConnectorSizes,
+    /// Order and directions.
+    pub plan: InstallationPlan,
+    /// How good the plan is.
+    pub proof: PlanProof,
+    /// How it holds by simulation, and where it is weak.
+    pub holding: Holding,
+    /// Thickness of its walls, mm.
+    pub thickness_mm: f64,
+    /// One printable mesh a piece, in assembled position, mm.
+    pub pieces: IdVec<PatchId, TriMesh>,
+    /// Connector runs and how they came out.
+    pub joints: Vec<Joint>,
+    /// What clicks on the key's way in.
+    pub press_fits: Vec<PressFit>,
+    /// What the seams offered.
+    pub contacts: Vec<Contact>,
+    /// The verdict on the finished meshes.
+    pub verification: Verification,
+    /// Where the finished pieces touch.
+    pub touching: Vec<verify::contact::Contact>,
+    /// How far the finished pieces move within their gaps.
+    pub play: KitPlay,
+    /// What its stages warned of.
+    pub warnings: Vec<Warning>,
+}
+
+impl Kit {
+    /// Length of the rails that the key slides on, mm; 0 where it has none.
+    pub fn rails_mm(&self) -> f64 {
+        self.joints.iter().filter(|j| j.is_rail).map(|j| j.length_mm).fold(0.0, |sum, mm| sum + mm)
+    }
+
+    /// Names of the checks that it fails.
+    pub fn failures(&self) -> Vec<String> {
+        self.verification.checks.iter().filter(|c| !c.ok).map(|c| c.name.clone()).collect()
+    }
+
+    /// Whether the only thing wrong with it is that pieces rattle.
+    pub fn only_rattles(&self) -> bool {
+        let is_rattle = |f: &Finding| matches!(f, Finding::PlayTooWide { .. });
+        let findings = &self.verification.findings;
+        self.failures().len() == 1 && !findings.is_empty() && findings.iter().all(is_rattle)
+    }
+
+    /// The pieces that rattle, the loosest first; the key, which is cut where there is room for it, is left out.
+    pub fn rattling(&self) -> Vec<PatchId> {
+        let piece = |f: &Finding| match f {
+            Finding::PlayTooWide { piece, .. } if *piece != self.plan.key() => Some(*piece),
+            _ => None,
+        };
+        self.verification.findings.iter().filter_map(piece).collect()
+    }
+
+    /// Whether it has fewer failures, or as many and rattles less.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        let excess = |finding: &Finding| match finding {
+            Finding::PlayTooWide { play, most, .. } => (play.translation_mm / most[0]).max(play.rotation_deg / most[1]),
+            _ => 0.0,
+        };
+        let rattles = |k: &Self| k.verification.findings.iter().map(excess).fold(0.0, f64::max);
+        let (own, others) = (self.failures().len(), other.failures().len());
+        own < others || (own == others && rattles(self) < rattles(other))
+    }
+}
+
+/// What a kit is made of, each from an earlier stage.
+pub(super) struct Recipe<'a> {
+    pub params: &'a Params,
+    pub settings: &'a Settings,
+    pub model: &'a Solid,
+    /// It must have room for connectors of the largest of `sizes`.
+    pub grid: &'a ShellGrid,
+    pub distances: &'a PatchDistances,
+    pub surface: &'a SegmentedSurface,
+    pub sizes: &'a ConnectorSizes,
+    /// The notch that the key is to have.
+    pub grip: Option<Grip>,
+    pub found: FoundPlan,
+    pub holding: Holding,
+}
+
+/// Makes and verifies the kit of one plan; `ctx` has what was warned of on the way to the plan.
+pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError> {
+    let Recipe { params, settings, model, grid, distances, surface, sizes, grip, found, holding } = recipe;
+    let (proof, plan) = (found.proof(), found.plan);
+    let ctx_ref = &ctx;
+    let rooms = rooms(settings, surface, sizes);
+    // The wall, split along the plan.
+    let shell = body::build(ctx_ref, &settings.body, grid, distances, &plan, &rooms)?;
+    // Connectors under its seams.
+    let curves = shell.inner.as_ref().map_or(Vec::new(), |inner| connector::curves(grid, inner, &plan));
+    let is_free = has_no_bar(&settings.connector, grid, &shell);
+    let runs_for = |slide| connector::runs(&settings.connector, sizes, &plan, &curves, slide, &is_free);
+    let (runs, contacts) = match settings.plan.key.and(settings.plan.key_slide) {
+        Some(cut) => runs_for(Some(cut.unit())),
+        // A piece that is the key has rails where its seams happen to allow them.
+        None => {
+            let own = runs_for(plan.steps.last().map(|step| step.separation.unit()));
+            if own.0.iter().any(Run::is_rail) { own } else { runs_for(None) }
+        }
+    };
+    // Pieces, joined and carved.
+    let finish = FinishParams { connector: &settings.connector, relief: settings.relief(), grip, label: params.label };
+    let finished = piece::make(ctx_ref, &finish, grid, &shell, &plan, &runs, &rooms)?;
+    warn_of_press_fits(ctx_ref, &finished);
+    // The verdict, from the finished meshes alone.
+    let (verification, touching, play) = judged(ctx_ref, settings, model, &finished, &plan)?;
+    play::warning(&play).into_iter().for_each(|warning| ctx_ref.warn(warning));
+    warn_of_bare_seams(ctx_ref, sizes, &contacts, &finished.joints);
+    Ok(Kit {
+        surface: surface.clone(),
+        sizes: sizes.clone(),
+        plan,
+        proof,
+        holding,
+        thickness_mm: settings.body.thickness_mm,
+        pieces: finished.meshes,
+        joints: finished.joints,
+        press_fits: finished.press_fits,
+        contacts,
+        verification,
+        touching,
+        play,
+        warnings: ctx.into_warnings(),
+    })
+}
+
+/// What the meshes are worth: the verdict with that on play, where they touch, and how far they move.
+fn judged(
+    ctx: &Ctx,
+    settings: &Settings,
+    model: &Solid,
+    finished: &Finished,
+    plan: &InstallationPlan,
+) -> Result<(Verification, Vec<verify::contact::Contact>, KitPlay), DesignError> {
+    let assembly = verify::Assembly { model, pieces: &finished.meshes, plan, press_fits: &finished.press_fits };
+    let (mut verification, touching) = verify::examine(ctx, &settings.verify, &assembly)?;
+    let mut measured = play::measure(ctx, &settings.play, &finished.meshes, plan)?;
+    let size_mm = model.mesh().bounds().size().max_element();
+    verification.add(play::check(&measured, &finished.meshes, size_mm, settings.verify.clearance_mm));
+    if verification.passed() {
+        // It is slow; what fails already is not given out.
+        play::look_for_ways_out(ctx, settings.verify.clearance_mm, &finished.meshes, &mut measured)?;
+        play::check_ways_out(&measured, &finished.meshes).into_iter().for_each(|check| verification.add(check));
+    }
+    Ok((verification, touching, measured))
+}
+
+/// Says what the key must be pressed past, and what holds a key without rails.
+fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
+    let of = |kind: PressFitKind| finished.press_fits.iter().filter(move |f| f.kind == kind);
+    for d in of(PressFitKind::Detent) {
+        ctx.warn(Warning {
+            code: "detent".into(),
+            message: format!(
+                "on the last {:.1} mm of its way the key is pressed past a bump of piece {} that is {:.2} mm too high for its \
+                 groove, on purpose: it clicks; the proofs of free paths are without it",
+                d.travel_mm, d.piece, d.interference_mm
+            ),
+            pieces: vec![d.piece],
+            at: Some(d.at),
+        });
+    }
+    if let Some(rib) = of(PressFitKind::Rib).next() {
+        ctx.warn(Warning {
+            code: "key-ribs".into(),
+            message: format!(
+                "the key has no rails: {} ribs on its sides press by {:.2} mm on the last {:.1} mm of its way, on purpose, so that it \
+                 stays in; file them down if it is too tight; the proofs of free paths are without them",
+                of(PressFitKind::Rib).count(), rib.interference_mm, rib.travel_mm
+            ),
+            pieces: vec![rib.piece],
+            at: Some(rib.at),
+        });
+    }
+}
+
+/// Says which long seams came out without any connector.
+fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[Contact], joints: &[Joint]) {
+    let has_room = |c: &&Contact| c.length_mm >= CONTACT_SIZES * sizes.of(c.later, c.earlier);
+    for contact in contacts.iter().filter(has_room) {
+        let pair = [contact.later, contact.earlier];
+        let joins = |j: &&Joint| pair.contains(&j.male) && pair.contains(&j.female);
+        if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
+            ctx.warn(Warning {
+                code: "seam-without-connector".into(),
+                message: format!(
+                    "the seam of {:.0} mm between pieces {} and {} has no connector; other seams hold these pieces",
+                    contact.length_mm, contact.later, contact.earlier
+                ),
+                pieces: pair.to_vec(),
+                at: Some(contact.at.to_array()),
+            });
+        }
+    }
+}
+
+/// The box around each patch and all connectors its piece can have.
+fn rooms(settings: &Settings, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> IdVec<PatchId, Aabb> {
+    /// Carving shifts seams by less than this, mm.
+    const SHIFT_MM: f64 = 2.0;
+    let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
+    for (face, &p) in surface.patch_of_face.iter().enumerate() {
+        rooms[p] = rooms[p].union(Aabb::around(surface.mesh.corners(face)));
+    }
+    let reach = settings.body.thickness_mm + settings.connector.room_mm(sizes.largest_mm()) + SHIFT_MM;
+    rooms.as_slice().iter().map(|r| r.grown(reach)).collect()
+}

@@ -1,0 +1,235 @@
+//! How a job ends.
+
+use shellock_geom::Vec3;
+
+use super::attempt::Failure;
+use super::budget::RATTLING_KEYS;
+use super::candidate::{self, Candidate};
+use super::{Explored, Job, KeySource, Kit};
+use crate::body::{BodyError, GridError};
+use crate::key::{KeySite, Turn};
+use crate::metric::ChoiceError;
+use crate::piece::PieceError;
+use crate::plan::Blocker;
+use crate::segmentation::{self, SegmentationError};
+use crate::strength::{Strength, StrengthError};
+use crate::verify::clearance::{KitGaps, kit_gaps};
+use crate::{Cancelled, Ctx, Warning};
+
+/// A finished kit and the wall that it is made of. All places are in assembly space: the model as it was given, turned by `turn`.
+#[non_exhaustive]
+pub struct Design {
+    /// The pieces, their plan and the verdict on them.
+    pub kit: Kit,
+    /// How the model was turned to make it.
+    pub turn: Turn,
+    /// How its key was cut; `None` where the key is one of the pieces.
+    pub key: Option<KeySite>,
+    /// What the wall bears; `None` where the stress could not be computed, which is warned of.
+    pub strength: Option<Strength>,
+    /// How near pieces come, at rest and on their way.
+    pub gaps: KitGaps,
+    /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
+    pub warnings: Vec<Warning>,
+}
+
+/// How the job ended.
+pub enum DesignOutcome {
+    /// There is a kit. Whether it passed is in its verification.
+    Made(Box<Design>),
+    /// No plan was found for any segmentation.
+    NoPlan {
+        /// Why, for people.
+        reason: String,
+        /// Who is in whose way.
+        blockers: Vec<Blocker>,
+    },
+}
+
+/// The best kit so far, and why the keys that were cut did not do.
+#[derive(Default)]
+pub(super) struct Best<'a> {
+    kit: Option<Kept<'a>>,
+    /// Why keys that were cut fail, for people.
+    reasons: Vec<String>,
+    /// How many of their kits fail by pieces that rattle alone.
+    n_rattling: usize,
+    /// Why there is no plan where a piece is the key.
+    failure: Failure,
+}
+
+/// A kit and what it was made for.
+struct Kept<'a> {
+    kit: Kit,
+    candidate: Candidate<'a>,
+}
+
+impl<'a> Best<'a> {
+    /// Whether a key at `place` need not be tried. A piece as it is rattles no less as the key than one that was cut.
+    pub fn is_enough(&self, place: Option<&KeySite>) -> bool {
+        let is_enough = |kit: &Kit| kit.verification.passed() || (place.is_none() && kit.only_rattles());
+        let rattles = place.is_some() && self.n_rattling == RATTLING_KEYS;
+        rattles || self.kit.as_ref().is_some_and(|kept| is_enough(&kept.kit))
+    }
+
+    /// Keeps the kit of a candidate where it is better; says why it will not do. What goes wrong with a key that is cut need not with
+    /// another.
+    pub fn add(
+        &mut self,
+        ctx: &Ctx,
+        place: Option<&KeySite>,
+        candidate: Candidate<'a>,
+        explored: Result<Explored, DesignError>,
+    ) -> Result<(), DesignError> {
+        let Some(site) = place else {
+            let Explored { kit, failure } = explored?;
+            self.failure = failure;
+            // Of equals a piece as it is.
+            let is_worse = |kit: &Kit| self.kit.as_ref().is_some_and(|b| b.kit.failures().len() < kit.failures().len());
+            if let Some(kit) = kit.filter(|kit| !is_worse(kit)) {
+                self.kit = Some(Kept { kit, candidate });
+            }
+            return Ok(());
+        };
+        let words = candidate::words(site);
+        let reason = match explored {
+            Err(DesignError::Cancelled(stop)) => return Err(stop.into()),
+            Err(e) => format!("with {words} it cannot be made: {e}"),
+            Ok(Explored { kit: None, failure }) => format!("with {words} there is no plan: {}", failure.reason),
+            Ok(Explored { kit: Some(kit), .. }) => {
+                let failed = kit.failures();
+                // Where other pieces than the key rattle, another key changes little.
+                self.n_rattling += usize::from(kit.only_rattles() && !kit.rattling().is_empty());
+                if self.kit.as_ref().is_none_or(|b| kit.is_better_than(&b.kit)) {
+                    self.kit = Some(Kept { kit, candidate });
+                }
+                if failed.is_empty() {
+                    return Ok(());
+                }
+                format!("with {words} it fails: {}", failed.join(", "))
+            }
+        };
+        ctx.note(&reason);
+        self.reasons.push(reason);
+        Ok(())
+    }
+
+    /// The best kit with all that is known of it.
+    pub fn finished(self, ctx: &Ctx, job: &Job<'_>) -> Result<DesignOutcome, DesignError> {
+        let Self { kit, mut reasons, failure: Failure { reason, blockers, .. }, .. } = self;
+        let Some(Kept { kit, candidate }) = kit else { return Ok(DesignOutcome::NoPlan { reason, blockers }) };
+        let Candidate { turn, model, key, .. } = candidate;
+        let gaps = kit_gaps(ctx, &model, &kit.pieces, &kit.plan, job.settings().body.rim_mm)?;
+        let ctx = ctx.fork();
+        segmentation::tell(&ctx, &job.settings().segmentation, &model, job.labels, &kit.surface)?;
+        let mut warnings = ctx.into_warnings();
+        warnings.extend(kit.warnings.iter().cloned());
+        let place = |at: [f64; 3]| turn.apply(Vec3::from(at)).to_array();
+        warnings.extend(job.wall.warnings.iter().map(|w| Warning { at: w.at.map(place), ..w.clone() }));
+        warnings.extend(crossing(&kit, &gaps));
+        match &key {
+            Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, &key.site)),
+            None if job.params.key == KeySource::Cut => {
+                if reasons.is_empty() {
+                    reasons.push("nowhere is the surface flat, free and thick enough to cut one".into());
+                }
+                warnings.push(not_cut(&kit, &reasons));
+            }
+            _ => {}
+        }
+        let strength = job.wall.strength.clone().map(|s| s.turned(|v| turn.apply(v)));
+        let key = key.map(|k| k.site);
+        Ok(DesignOutcome::Made(Box::new(Design { kit, turn, key, strength, gaps, warnings })))
+    }
+}
+
+/// Says why a piece as it is became the key.
+fn not_cut(kit: &Kit, reasons: &[String]) -> Warning {
+    let key = kit.plan.key();
+    Warning {
+        code: "key-not-cut".into(),
+        message: format!("piece {key} is the key as it is, without rails: {}", reasons.join("; ")),
+        pieces: vec![key],
+        at: None,
+    }
+}
+
+/// Says that a key slides on nothing.
+fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
+    let key = kit.plan.key();
+    Warning {
+        code: "key-without-rails".into(),
+        message: format!(
+            "piece {key} is the key, but nothing straight runs under its sides: it slides along its plane without rails and is held by \
+             its other connectors"
+        ),
+        pieces: vec![key],
+        at: Some(site.prism.origin.to_array()),
+    }
+}
+
+/// Says where finished pieces cross that are not meant to press: on a way out, or at rest.
+fn crossing(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
+    /// Less is rounding, mm.
+    const LEAST_MM: f64 = 0.02;
+    let deepest = gaps.paths.iter().min_by(|a, b| a.overall.gap_mm.total_cmp(&b.overall.gap_mm))?;
+    let place = deepest.overall;
+    let is_meant = deepest.piece == kit.plan.key() && !kit.press_fits.is_empty();
+    (place.gap_mm < -LEAST_MM && !is_meant).then(|| Warning {
+        code: "surfaces-cross".into(),
+        message: format!(
+            "pieces {} and {} cross by {:.2} mm after {:.1} mm of the way of the first; it will rub there: sand it a little",
+            deepest.piece, deepest.against, -place.gap_mm, place.travel_mm
+        ),
+        pieces: vec![deepest.piece, deepest.against],
+        at: Some(place.at),
+    })
+}
+
+/// Why the job could not be done.
+#[derive(Debug, thiserror::Error)]
+pub enum DesignError {
+    /// No thickness can be found.
+    #[error(transparent)]
+    Strength(StrengthError),
+    /// The surface cannot be divided.
+    #[error(transparent)]
+    Segmentation(SegmentationError),
+    /// The wall cannot be made.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// The wall cannot be split.
+    #[error(transparent)]
+    Body(BodyError),
+    /// Plans cannot be compared.
+    #[error(transparent)]
+    Choice(ChoiceError),
+    /// A piece cannot be finished.
+    #[error(transparent)]
+    Piece(PieceError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// A stage's error becomes the job's; a stop inside of a stage is a stop of the job.
+macro_rules! from_stage {
+    ($($stage:ident => $variant:ident),+ $(,)?) => {$(
+        impl From<$stage> for DesignError {
+            fn from(e: $stage) -> Self {
+                match e {
+                    $stage::Cancelled(stop) => stop.into(),
+                    other => Self::$variant(other),
+                }
+            }
+        }
+    )+};
+}
+
+from_stage! {
+    StrengthError => Strength,
+    SegmentationError => Segmentation,
+    BodyError => Body,
+    ChoiceError => Choice,
+    PieceError => Piece,
+}

@@ -1,0 +1,122 @@
+//! What a user may set.
+
+use shellock_mechanics::Material;
+
+use crate::PatchId;
+use crate::connector::ConnectorParams;
+use crate::piece::LabelParams;
+
+/// Everything that a user may set, each once; what stages are given follows from it, see [`Settings`](super::Settings).
+///
+/// ```
+/// let mut params = shellock::Params::default();
+/// params.n_pieces = Some(8);
+/// assert!(params.problems().is_empty());
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Params {
+    /// Seed of all random choices: the same seed gives the same kit. 0.
+    pub seed: u64,
+    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: from the area, 10 for a figure of 150 mm.
+    pub n_pieces: Option<usize>,
+    /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
+    pub up: [f64; 3],
+    /// Where the wall's thickness comes from; 2 mm.
+    pub thickness: Thickness,
+    /// What pieces are printed of.
+    pub material: Material,
+    /// Height of the fall that the wall is to bear, m. [0.01, 20]; 1.275.
+    pub drop_m: f64,
+    /// Where the key comes from.
+    pub key: KeySource,
+    /// Whether a key that is cut gets a notch for a fingernail.
+    pub has_grip: bool,
+    /// How the pieces' numbers are engraved; not at all where `None`.
+    pub label: Option<LabelParams>,
+    /// How connectors are made.
+    pub connector: ConnectorParams,
+    /// Gap that each side of a seam leaves inside the wall, mm. [0, 0.4]; 0.05.
+    pub wall_gap_mm: f64,
+    /// Spacing of the grid that fields live on, mm. (0, thickness / 2]; `None` takes the thickness over 2.5.
+    pub cell_mm: Option<f64>,
+    /// Work that the exact search for a plan may do: pieces revised. [0, 10⁹]; 100 000.
+    pub proof_budget: usize,
+    /// Whether the play of all pieces together is looked for, too.
+    pub is_play_together: bool,
+    /// How often a kit that failed its verification is planned and made again.
+    pub rounds: Rounds,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            n_pieces: None,
+            up: [0.0, 0.0, 1.0],
+            thickness: Thickness::default(),
+            material: Material::default(),
+            drop_m: 1.275,
+            key: KeySource::default(),
+            has_grip: false,
+            label: None,
+            connector: ConnectorParams::default(),
+            wall_gap_mm: 0.05,
+            cell_mm: None,
+            proof_budget: 100_000,
+            is_play_together: false,
+            rounds: Rounds::default(),
+        }
+    }
+}
+
+impl Params {
+    /// Every problem of every stage, in words; empty where there is none.
+    pub fn problems(&self) -> Vec<String> {
+        super::settings::problems(self)
+    }
+}
+
+/// Where the wall's thickness comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Thickness {
+    /// It is so much, mm, in [0.8, 10]; the stress in it is reported.
+    Mm(f64),
+    /// The least that bears a fall.
+    Auto,
+}
+
+impl Default for Thickness {
+    fn default() -> Self {
+        Self::Mm(2.0)
+    }
+}
+
+/// Where the key comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KeySource {
+    /// It is cut out of the surface where it slides best, see [`crate::key`]; where no such kit passes, as with `Flattest`.
+    #[default]
+    Cut,
+    /// The flattest piece that works.
+    Flattest,
+    /// This piece.
+    Piece(PatchId),
+}
+
+/// Bounds of the feedback loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rounds {
+    /// Kits made for one segmentation, at most. ≥ 1; 3.
+    pub kits: usize,
+    /// Segmentations revised after the first, at most; 4.
+    pub mendings: usize,
+    /// Kits made of all segmentations, at most. ≥ 1; 8.
+    pub kits_in_all: usize,
+}
+
+impl Default for Rounds {
+    fn default() -> Self {
+        Self { kits: 3, mendings: 4, kits_in_all: 8 }
+    }
+}

@@ -1,0 +1,137 @@
+//! What stages are given, resolved once from what the user set and from what the wall must bear.
+
+use super::{KeySource, Params, Thickness};
+use crate::body::BodyParams;
+use crate::connector::ConnectorParams;
+use crate::piece::Relief;
+use crate::plan::PlanParams;
+use crate::play::{self, PlayParams};
+use crate::segmentation::SegmentationParams;
+use crate::sizes::{CONTACT_SIZES, LEAST_CONTACT_SIZES, SizeParams};
+use crate::strength::StrengthParams;
+use crate::verify::VerifyParams;
+use crate::{LatticeDirection, PatchId};
+
+/// The parameters of each stage. Nothing changes them on the way; a kit with a key that is cut has some of its own, see
+/// [`Self::with_key`].
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Settings {
+    /// Of the wall's stress.
+    pub strength: StrengthParams,
+    /// Of the division.
+    pub segmentation: SegmentationParams,
+    /// Of connector sizes.
+    pub sizes: SizeParams,
+    /// Of the plan.
+    pub plan: PlanParams,
+    /// Of the wall.
+    pub body: BodyParams,
+    /// Of connectors.
+    pub connector: ConnectorParams,
+    /// Of the verdict.
+    pub verify: VerifyParams,
+    /// Of the play.
+    pub play: PlayParams,
+}
+
+impl Settings {
+    /// Those for `params`; a thickness that is still to be found counts as 2 mm.
+    pub fn resolve(params: &Params) -> Self {
+        let thickness_mm = match params.thickness {
+            Thickness::Mm(mm) => mm,
+            Thickness::Auto => BodyParams::default().thickness_mm,
+        };
+        Self::with_thickness(params, thickness_mm)
+    }
+
+    /// Those for a wall of this thickness, mm.
+    pub fn with_thickness(params: &Params, thickness_mm: f64) -> Self {
+        let Params { seed, wall_gap_mm, cell_mm, .. } = *params;
+        let connector = params.connector.clone();
+        let clearance_mm = connector.clearance_mm;
+        let smallest_mm = connector.size.smallest_mm();
+        let verify = VerifyParams { clearance_mm: clearance_mm.max(2.0 * wall_gap_mm), seed };
+        Self {
+            strength: strength(params),
+            segmentation: SegmentationParams {
+                min_contact_mm: CONTACT_SIZES * smallest_mm,
+                least_contact_mm: LEAST_CONTACT_SIZES * smallest_mm,
+                wall_mm: thickness_mm,
+                ..segmentation(params)
+            },
+            sizes: SizeParams {
+                choice: connector.size,
+                wall_mm: thickness_mm,
+                clearance_mm,
+                strength_mpa: params.material.strength_mpa,
+            },
+            plan: PlanParams { wall_mm: thickness_mm, clearance_mm, ..plan(params) },
+            body: BodyParams { thickness_mm, cell_mm, wall_gap_mm, ..BodyParams::default() },
+            connector,
+            verify,
+            play: PlayParams {
+                clearance_mm: verify.clearance_mm,
+                slide_mm: play::SLIDE_MM,
+                is_together: params.is_play_together,
+                seed,
+            },
+        }
+    }
+
+    /// The same for pieces of which `key` was cut to leave along `slide` alone.
+    pub(super) fn with_key(&self, key: PatchId, slide: LatticeDirection) -> Self {
+        let key_gap_mm = self.body.wall_gap_mm.max(0.5 * self.connector.key_clearance_mm);
+        Self {
+            plan: PlanParams { key: Some(key), key_slide: Some(slide), ..self.plan.clone() },
+            body: BodyParams { key_gap_mm: Some(key_gap_mm), ..self.body.clone() },
+            ..self.clone()
+        }
+    }
+
+    /// The least gaps that finished pieces keep beneath the rim: those of connectors and of walls, whichever is narrower.
+    pub(super) fn relief(&self) -> Relief {
+        let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.wall_gap_mm);
+        let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
+        Relief { rim_mm: self.body.rim_mm, gap_mm, key_gap_mm: self.body.key_gap_mm.map_or(gap_mm, of_key) }
+    }
+}
+
+/// Every problem of every stage, in words. What follows from other values is not told twice.
+pub(super) fn problems(params: &Params) -> Vec<String> {
+    let settings = Settings::resolve(params);
+    let label = params.label.map_or_else(Vec::new, |l| l.problems());
+    let stages = [settings.body.problems(), settings.connector.problems(), settings.strength.problems(), label];
+    let mut problems: Vec<String> = stages.into_iter().flatten().map(|p| p.to_string()).collect();
+    problems.extend(segmentation(params).problems());
+    problems.extend(plan(params).problems());
+    problems
+}
+
+/// What the user says of the division.
+fn segmentation(params: &Params) -> SegmentationParams {
+    SegmentationParams { n_pieces: params.n_pieces, seed: params.seed, ..SegmentationParams::default() }
+}
+
+/// What the user says of the plan.
+fn plan(params: &Params) -> PlanParams {
+    let Params { seed, up, proof_budget, .. } = *params;
+    let key = if let KeySource::Piece(id) = params.key { Some(id) } else { None };
+    PlanParams { seed, key, up, proof_budget, ..PlanParams::default() }
+}
+
+/// What the wall must bear. Two lines stand on either side of a seam's pin.
+fn strength(params: &Params) -> StrengthParams {
+    const LEAST_WALLS: f64 = 4.0;
+    let usual = StrengthParams::default();
+    let least_mm = (LEAST_WALLS * params.connector.min_wall_mm).max(0.8).max(2.0 * params.cell_mm.unwrap_or(0.0));
+    let least_mm = least_mm.min(5.0);
+    StrengthParams {
+        material: params.material,
+        drop_m: params.drop_m,
+        seed: params.seed,
+        least_mm,
+        most_mm: usual.most_mm.max(least_mm),
+        ..usual
+    }
+}

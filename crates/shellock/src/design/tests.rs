@@ -1,0 +1,348 @@
+//! The loop, its budgets and lessons, with kits that are made up.
+
+use std::borrow::Cow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use shellock_geom::{Solid, TriMesh, Vec3};
+
+use super::lesson::{Lesson, lessons};
+use super::*;
+use crate::body::BodyError;
+use crate::connector::Contact;
+use crate::context::Progress;
+use crate::key::{KeyPrism, KeySite, Turn};
+use crate::metric::{ChoiceError, Holding};
+use crate::piece::PieceError;
+use crate::plan::key::KeyDirections;
+use crate::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanProof, ProofScope};
+use crate::play::{KitPlay, Slide};
+use crate::segmentation::{SegmentationError, SegmentationParams};
+use crate::verify::{Check, Finding, Play, Verification};
+use crate::{Cancelled, ConnectorSizes, IdVec, LatticeDirection, PatchId, testing};
+
+const N: usize = 3;
+
+fn ids() -> impl Iterator<Item = PatchId> {
+    (0..N).map(PatchId::from)
+}
+
+fn check(name: &str, ok: bool) -> Check {
+    Check { name: name.into(), ok, figure: String::new() }
+}
+
+/// A kit of three pieces, the last of them the key, that has these checks and findings.
+fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
+    let separation = LatticeDirection::nearest(Vec3::Z);
+    let plan = InstallationPlan { steps: ids().map(|piece| InstallationStep { piece, separation }).collect() };
+    let slide = Slide { key: plan.key(), seat: PatchId(0), at: [0.0; 3], along: [0.0, 0.0, 1.0], most_mm: 0.3 };
+    let nothing = || ids().map(|_| None).collect::<IdVec<PatchId, Option<Play>>>();
+    Kit {
+        surface: testing::voronoi(testing::sphere(2, Vec3::splat(20.0)), N, 1),
+        sizes: ConnectorSizes::default(),
+        plan,
+        proof: PlanProof {
+            cost: 1.0,
+            lower_bound: 1.0,
+            gap: 0.0,
+            optimal: true,
+            least_cost: 1.0,
+            key_lower_bound: 1.0,
+            proven_for: ProofScope { keys: Vec::new(), slides: KeyDirections::WithinPlane, n_lessons: 0 },
+            piece_costs: ids().map(|_| 1.0).collect(),
+        },
+        holding: Holding {
+            quality_mm: None,
+            loose: Vec::new(),
+            seams: Vec::new(),
+            n_compared: 1,
+            foreseen_play: Vec::new(),
+            foreseen_excess: Vec::new(),
+        },
+        thickness_mm: 2.0,
+        pieces: ids().map(|_| TriMesh::default()).collect(),
+        joints: Vec::new(),
+        press_fits: Vec::new(),
+        contacts: Vec::new(),
+        verification: Verification { checks: checks.iter().map(|&(name, ok)| check(name, ok)).collect(), findings },
+        touching: Vec::new(),
+        play: KitPlay {
+            slide,
+            bearings: Vec::new(),
+            alone: nothing(),
+            estimates: nothing(),
+            swings: ids().map(|_| Vec::new()).collect(),
+            ways_out: None,
+            together: None,
+            proofs: Vec::new(),
+        },
+        warnings: vec![Warning { code: "of-the-kit".into(), message: String::new(), pieces: Vec::new(), at: None }],
+    }
+}
+
+fn good() -> Kit {
+    kit(&[("holds", true)], Vec::new())
+}
+
+fn rattling(piece: u32, translation_mm: f64) -> Kit {
+    let play = Play { translation_mm, rotation_deg: 0.0, is_proven: false };
+    let finding = Finding::PlayTooWide { piece: PatchId(piece), play, most: [1.0, 2.0], at: [0.0; 3] };
+    kit(&[("holds", true), ("sits", false)], vec![finding])
+}
+
+fn loose(piece: u32) -> Kit {
+    kit(&[("holds", false), ("sits", true)], vec![Finding::Loose { piece: PatchId(piece), directions: Vec::new() }])
+}
+
+#[test]
+fn a_stop_inside_of_a_stage_is_a_stop_of_the_job() {
+    let stopped = [
+        DesignError::from(StrengthError::Cancelled(Cancelled)),
+        SegmentationError::Cancelled(Cancelled).into(),
+        BodyError::Cancelled(Cancelled).into(),
+        ChoiceError::Cancelled(Cancelled).into(),
+        PieceError::Cancelled(Cancelled).into(),
+    ];
+    assert!(stopped.iter().all(|e| matches!(e, DesignError::Cancelled(_))), "{stopped:?}");
+}
+
+#[test]
+fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_changed() {
+    let ball = testing::sphere(3, Vec3::splat(20.0));
+    let surface = testing::voronoi(ball, 6, 1);
+    let (report, stop) = (|_: Progress<'_>| {}, AtomicBool::new(false));
+    let ctx = Ctx::new(&report, &stop);
+    let params = SegmentationParams::default();
+    let divided = || segmentation::divide(&ctx, &params, &surface, PatchId(0));
+    assert!(matches!(divided(), Ok(Some(_))), "it can be divided");
+    stop.store(true, Ordering::Relaxed);
+    let united = segmentation::unite(&ctx, &params, &surface, &[PatchId(0)]);
+    let stopped = [divided(), united, segmentation::mended_again(&ctx, &params, &surface)];
+    assert!(stopped.iter().all(|s| matches!(s, Err(SegmentationError::Cancelled(_)))));
+}
+
+#[test]
+fn the_best_kit_fails_least_then_rattles_least_then_is_the_earliest() {
+    let two_failures = kit(&[("holds", false), ("sits", false)], Vec::new());
+    let mut best = None;
+    for (made, keeps) in [
+        (two_failures, true),
+        (loose(1), true),
+        // As many failures, and it rattles besides.
+        (rattling(1, 3.0), false),
+        (loose(0), false),
+        (good(), true),
+        (good(), false),
+    ] {
+        let mut made = made;
+        made.thickness_mm = 9.0;
+        best.iter_mut().for_each(|kit: &mut Kit| kit.thickness_mm = 2.0);
+        attempt::keep(&mut best, made);
+        assert_eq!(best.as_ref().unwrap().thickness_mm == 9.0, keeps);
+    }
+    let mut best = Some(rattling(1, 3.0));
+    attempt::keep(&mut best, rattling(0, 2.0));
+    assert_eq!(best.unwrap().rattling(), [PatchId(0)]);
+}
+
+#[test]
+fn a_key_that_rattles_is_nobody_to_join() {
+    assert_eq!(rattling(2, 3.0).rattling(), []);
+    assert!(rattling(2, 3.0).only_rattles() && !loose(1).only_rattles() && !good().only_rattles());
+}
+
+#[test]
+fn a_kit_that_passed_teaches_nothing_and_one_that_failed_never_comes_again() {
+    assert_eq!(lessons(&good()), []);
+    for failed in [loose(1), rattling(1, 3.0), kit(&[("closed", false)], Vec::new())] {
+        let mut constraints = PlanConstraints::default();
+        lessons(&failed).iter().for_each(|lesson| lesson.teach(&mut constraints));
+        assert_eq!(constraints.rejected, [failed.plan]);
+    }
+}
+
+#[test]
+fn a_piece_that_rubs_takes_another_way_and_twice_another_turn() {
+    let rubs = Finding::PathRubs {
+        piece: PatchId(1),
+        against: PatchId(0),
+        travel_mm: 4.0,
+        thickness_mm: 0.1,
+        volume_mm3: 2.0,
+        at: [0.0; 3],
+    };
+    let failed = kit(&[("free", false)], vec![rubs]);
+    let learned = lessons(&failed);
+    assert_eq!(learned.iter().flat_map(Lesson::blamed).collect::<Vec<_>>(), [PatchId(1)]);
+    let mut constraints = PlanConstraints::default();
+    for times in 1..=2 {
+        learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
+        assert_eq!(constraints.rubbed[&(PatchId(1), PatchId(0))], times);
+    }
+    assert_eq!(constraints.forbidden, [(PatchId(1), failed.plan.separation(PatchId(1)))].into());
+}
+
+#[test]
+fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_loose() {
+    let contact = |later: u32, earlier: u32| Contact {
+        later: PatchId(later),
+        earlier: PatchId(earlier),
+        length_mm: 20.0,
+        usable_mm: 10.0,
+        at: Vec3::ZERO,
+    };
+    let mut failed = loose(1);
+    failed.contacts = vec![contact(1, 0)];
+    let learned = lessons(&failed);
+    let mut constraints = PlanConstraints::default();
+    learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
+    let s = failed.plan.separation(PatchId(1));
+    assert!(constraints.is_weak(PatchId(1), PatchId(0), s) && !constraints.is_weak(PatchId(0), PatchId(1), s));
+    assert_eq!(learned.iter().flat_map(Lesson::loose).collect::<Vec<_>>(), [PatchId(1)]);
+    // Where nothing is loose, short joints hold.
+    let mut rubs = kit(&[("closed", false)], Vec::new());
+    rubs.contacts = vec![contact(1, 0)];
+    assert!(lessons(&rubs).iter().all(|lesson| !matches!(lesson, Lesson::WeakJoints(_))));
+}
+
+#[test]
+fn cut_keys_cost_less_than_a_piece_that_is_the_key() {
+    let rounds = Rounds::default();
+    let of_piece = Budget::of_piece(&rounds);
+    for i in 0..budget::KITS_OF_CUT_KEYS.len() {
+        let cut = Budget::of_cut_key(&rounds, i);
+        assert!(cut.kits < of_piece.kits && cut.kits_each < of_piece.kits_each && cut.revisions < of_piece.revisions);
+    }
+    let few = Budget::of_cut_key(&Rounds { kits: 1, mendings: 0, kits_in_all: 1 }, 0);
+    assert_eq!((few.kits_each, few.kits, few.revisions), (1, 1, 0), "the user's bounds are bounds");
+    let half_gone = |gone| {
+        let mut left = of_piece;
+        left.revisions -= gone;
+        left.is_half_gone()
+    };
+    assert_eq!([0, 1, 2, 3].map(half_gone), [false, false, true, true]);
+}
+
+/// A job on a ball, of which no kit is made.
+struct Ball {
+    model: Solid,
+    params: Params,
+    wall: Wall,
+}
+
+impl Ball {
+    fn new() -> Self {
+        let params = Params::default();
+        let told = Warning { code: "of-the-wall".into(), message: String::new(), pieces: Vec::new(), at: None };
+        let wall = Wall { settings: Settings::resolve(&params), strength: None, warnings: vec![told] };
+        Self { model: Solid::new(testing::sphere(2, Vec3::splat(20.0))).unwrap(), params, wall }
+    }
+
+    fn job(&self) -> Job<'_> {
+        let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
+        Job { params: &self.params, model: &self.model, labels: None, wall: &self.wall, stress: None, surface }
+    }
+
+    fn candidate(&self) -> Candidate<'_> {
+        Candidate {
+            turn: Turn::default(),
+            model: Cow::Borrowed(&self.model),
+            surface: self.job().surface,
+            key: None,
+            budget: Budget::of_piece(&self.params.rounds),
+        }
+    }
+
+    /// The outcome of kits that are made one after the other for these places.
+    fn outcome(&self, tried: Vec<(Option<KeySite>, Result<Explored, DesignError>)>) -> (Vec<bool>, Option<Design>) {
+        let (ctx, mut best, mut needed) = (Ctx::quiet(), Best::default(), Vec::new());
+        for (place, explored) in tried {
+            needed.push(!best.is_enough(place.as_ref()));
+            if needed[needed.len() - 1] {
+                best.add(&ctx, place.as_ref(), self.candidate(), explored).unwrap();
+            }
+        }
+        match best.finished(&ctx, &self.job()).unwrap() {
+            DesignOutcome::Made(design) => (needed, Some(*design)),
+            DesignOutcome::NoPlan { .. } => (needed, None),
+        }
+    }
+}
+
+fn site() -> KeySite {
+    let prism = KeyPrism {
+        origin: Vec3::ZERO,
+        slide: Vec3::X,
+        normal: Vec3::Z,
+        half_width_mm: 5.0,
+        depth_mm: 5.0,
+        corner_mm: 1.0,
+    };
+    KeySite { prism, flat_share: 1.0, side_share: 1.0, rail_mm: 0.0, area_mm2: 100.0, score: 1.0 }
+}
+
+fn made(kit: Kit) -> Result<Explored, DesignError> {
+    Ok(Explored { kit: Some(kit), failure: Failure::default() })
+}
+
+fn codes(design: &Design) -> Vec<&str> {
+    design.warnings.iter().map(|w| w.code.as_str()).collect()
+}
+
+#[test]
+fn a_kit_that_passes_ends_the_job() {
+    let (needed, design) = Ball::new().outcome(vec![(Some(site()), made(good())), (Some(site()), made(good()))]);
+    assert_eq!(needed, [true, false]);
+    assert!(design.unwrap().kit.verification.passed());
+}
+
+#[test]
+fn keys_whose_kits_only_rattle_are_two_and_no_piece_is_tried_as_the_key() {
+    let rattles = || (Some(site()), made(rattling(1, 3.0)));
+    let (needed, design) = Ball::new().outcome(vec![rattles(), rattles(), rattles(), (None, made(good()))]);
+    assert_eq!(needed, [true, true, false, false]);
+    assert!(design.unwrap().kit.only_rattles());
+}
+
+#[test]
+fn a_key_that_cannot_be_cut_is_a_reason_and_no_end() {
+    let impossible = || (Some(site()), Err(DesignError::Choice(ChoiceError::NoPlan)));
+    let (_, design) = Ball::new().outcome(vec![impossible(), (None, made(good()))]);
+    let design = design.unwrap();
+    let told = design.warnings.iter().find(|w| w.code == "key-not-cut").expect("it is told");
+    assert!(told.message.contains("it cannot be made"), "{}", told.message);
+    assert!(Best::default().add(&Ctx::quiet(), Some(&site()), Ball::new().candidate(), Err(Cancelled.into())).is_err());
+}
+
+#[test]
+fn of_kits_that_fail_alike_the_piece_as_it_is_stays_and_a_worse_one_does_not() {
+    let ball = Ball::new();
+    let with_key = |own: Kit, piece: Kit| {
+        ball.outcome(vec![(Some(site()), made(own)), (None, made(piece))]).1.expect("a kit was made")
+    };
+    assert_eq!(with_key(loose(1), loose(0)).kit.verification.findings, loose(0).verification.findings);
+    let worse = kit(&[("holds", false), ("closed", false)], Vec::new());
+    assert_eq!(with_key(loose(1), worse).kit.verification.findings, loose(1).verification.findings);
+}
+
+#[test]
+fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_given_out() {
+    let mut other = loose(1);
+    other.warnings[0].code = "of-another-kit".into();
+    let (_, design) = Ball::new().outcome(vec![(Some(site()), made(other)), (None, made(good()))]);
+    let design = design.unwrap();
+    let all = codes(&design);
+    assert!(all.contains(&"of-the-kit") && all.contains(&"of-the-wall") && all.contains(&"key-not-cut"), "{all:?}");
+    assert!(!all.contains(&"of-another-kit"));
+}
+
+#[test]
+fn without_any_plan_the_answer_is_why() {
+    let failure = || Failure { reason: "all are in each other's way".into(), ..Failure::default() };
+    let none = || Ok(Explored { kit: None, failure: failure() });
+    let ball = Ball::new();
+    let (ctx, mut best) = (Ctx::quiet(), Best::default());
+    best.add(&ctx, Some(&site()), ball.candidate(), none()).unwrap();
+    best.add(&ctx, None, ball.candidate(), none()).unwrap();
+    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job()).unwrap() else { panic!("no kit") };
+    assert_eq!(reason, failure().reason);
+}
