@@ -1,6 +1,7 @@
 //! Whatever the bytes are, reading and mending them ends in an answer: `cargo +nightly fuzz run readers`.
 //!
-//! `READER=stl` (obj, ply, off, gltf, labels) gives the bytes to that reader alone; without it each has its turn.
+//! `READER=stl` (obj, ply, off, gltf, labels) gives the bytes to that reader alone; without it each has its
+//! turn.
 
 #![no_main]
 

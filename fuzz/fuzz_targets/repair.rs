@@ -1,6 +1,7 @@
 //! Whatever the triangles are, mending ends in a body or a refusal: `cargo +nightly fuzz run repair`.
 //!
-//! Points lie on a coarse grid, so that they meet, lie on edges and in planes as often as in the worst of files.
+//! Points lie on a coarse grid, so that they meet, lie on edges and in planes as often as in the worst of
+//! files.
 
 #![no_main]
 

@@ -19,7 +19,8 @@ fn main() {
     divan::main();
 }
 
-/// Pieces of a round shell, installed in the order of their numbers, and the contacts of the connectors along their seams.
+/// Pieces of a round shell, installed in the order of their numbers, and the contacts of the connectors along
+/// their seams.
 struct Shell {
     pieces: IdVec<PatchId, TriMesh>,
     plan: InstallationPlan,
@@ -27,38 +28,67 @@ struct Shell {
 }
 
 impl Shell {
-    /// Seams are where two of evenly spread centers are equally near. Across a seam the later piece may leave along its
-    /// direction `s` only: contacts are square to `s`, all around, or face against it.
+    /// Seams are where two of evenly spread centers are equally near. Across a seam the later piece may leave
+    /// along its direction `s` only: contacts are square to `s`, all around, or face against it.
     fn new(n_pieces: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(13);
         let centers = spread(n_pieces);
         let outwards = |c: &Vec3| {
-            let ways: Vec<LatticeDirection> = LatticeDirection::all().filter(|d| d.unit().dot(*c) > 0.5).collect();
+            let ways: Vec<LatticeDirection> = LatticeDirection::all()
+                .filter(|d| d.unit().dot(*c) > 0.5)
+                .collect();
             ways[rng.random_range(0..ways.len())]
         };
         let separations: Vec<LatticeDirection> = centers.iter().map(outwards).collect();
         let mut contacts = Vec::new();
         while contacts.len() < N_CONTACTS {
-            let Some((p, q, on_seam)) = seam_point(&centers, random_unit(&mut rng)) else { continue };
+            let Some((p, q, on_seam)) = seam_point(&centers, random_unit(&mut rng)) else {
+                continue;
+            };
             let (later, earlier) = (p.max(q), p.min(q));
             let s = separations[later].unit();
             let square = s.cross(random_unit(&mut rng)).normalize();
             let normal = if rng.random_range(0..5) == 0 { -s } else { square };
             let point = on_seam * (RADIUS_MM - 3.0 * rng.random::<f64>()) + normal * 1.5;
             let gap_mm = CLEARANCE_MM * (0.9 + 0.2 * rng.random::<f64>());
-            contacts.push(Contact { a: later.into(), b: earlier.into(), point, normal, gap_mm, area_mm2: 0.5 });
+            contacts.push(Contact {
+                a: later.into(),
+                b: earlier.into(),
+                point,
+                normal,
+                gap_mm,
+                area_mm2: 0.5,
+            });
         }
         let steps = separations.into_iter().enumerate();
-        let steps = steps.map(|(piece, separation)| InstallationStep { piece: piece.into(), separation }).collect();
+        let steps = steps
+            .map(|(piece, separation)| InstallationStep {
+                piece: piece.into(),
+                separation,
+            })
+            .collect();
         // Only their boxes are asked for.
-        let bodies = centers.iter().map(|&c| TriMesh { points: vec![c * RADIUS_MM], triangles: Vec::new() });
-        Self { pieces: bodies.collect(), plan: InstallationPlan { steps }, contacts }
+        let bodies = centers.iter().map(|&c| TriMesh {
+            points: vec![c * RADIUS_MM],
+            triangles: Vec::new(),
+        });
+        Self {
+            pieces: bodies.collect(),
+            plan: InstallationPlan { steps },
+            contacts,
+        }
     }
 
     fn certified(&self) -> Certificate {
         let (verdict, gaps) = (Verification::default(), KitGaps::default());
-        let evidence = Evidence { contacts: &self.contacts, verdict: &verdict, gaps: &gaps, play: None };
-        certify(Vec::new(), &self.pieces, &self.plan, &evidence, CLEARANCE_MM).expect("the plan names every piece")
+        let evidence = Evidence {
+            contacts: &self.contacts,
+            verdict: &verdict,
+            gaps: &gaps,
+            play: None,
+        };
+        certify(Vec::new(), &self.pieces, &self.plan, &evidence, CLEARANCE_MM)
+            .expect("the plan names every piece")
     }
 }
 
@@ -82,7 +112,8 @@ fn random_unit(rng: &mut ChaCha8Rng) -> Vec3 {
     }
 }
 
-/// The two nearest centers, and the place of their seam beside `at`; `None` where a third center is nearer to it.
+/// The two nearest centers, and the place of their seam beside `at`; `None` where a third center is nearer to
+/// it.
 fn seam_point(centers: &[Vec3], at: Vec3) -> Option<(usize, usize, Vec3)> {
     let nearest = |at: Vec3| {
         let mut order: Vec<usize> = (0..centers.len()).collect();
@@ -99,6 +130,10 @@ fn seam_point(centers: &[Vec3], at: Vec3) -> Option<(usize, usize, Vec3)> {
 fn certificate(bencher: Bencher, n_pieces: usize) {
     let shell = Shell::new(n_pieces);
     let claims = shell.certified().claims;
-    assert!(matches!(claims[0], Claim::Locked { .. }), "no proof was found: {:?}", claims[0]);
+    assert!(
+        matches!(claims[0], Claim::Locked { .. }),
+        "no proof was found: {:?}",
+        claims[0]
+    );
     bencher.bench(|| shell.certified());
 }

@@ -1,9 +1,9 @@
 //! What is claimed of a finished kit, each claim with what a stranger needs to check it.
 //!
-//! A verdict ([`crate::verify`]) asks for trust in the program that made it. A certificate does not: it names the files by
-//! their hashes, and what is hard to find (which contacts hold the pieces, and with what forces) is written down, so that
-//! checking takes arithmetic only. The package `shellock-check` does that without any of this code. The format, the
-//! derivation and what is *not* proven are told in docs/certificate.md.
+//! A verdict ([`crate::verify`]) asks for trust in the program that made it. A certificate does not: it names
+//! the files by their hashes, and what is hard to find (which contacts hold the pieces, and with what forces)
+//! is written down, so that checking takes arithmetic only. The package `shellock-check` does that without
+//! any of this code. The format, the derivation and what is *not* proven are told in docs/certificate.md.
 //!
 //! Coordinates are mm in assembly space. Motions are twists about [`Certificate::center`].
 
@@ -106,7 +106,9 @@ impl LeastGaps {
         let less = |x: &LeastGap, y: &LeastGap| x.gap_mm.total_cmp(&y.gap_mm);
         Self {
             overall: gaps.clone().map(|(id, place, _)| named(id, place)).min_by(less),
-            beneath_rim: gaps.filter_map(|(id, _, place)| Some(named(id, place?))).min_by(less),
+            beneath_rim: gaps
+                .filter_map(|(id, _, place)| Some(named(id, place?)))
+                .min_by(less),
         }
     }
 }
@@ -115,7 +117,8 @@ impl LeastGaps {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "claim", rename_all = "kebab-case")]
 pub enum Claim {
-    /// Whatever pieces move, alone or together, by however little, while the held one does not: only `leaves` can.
+    /// Whatever pieces move, alone or together, by however little, while the held one does not: only `leaves`
+    /// can.
     Locked {
         /// The piece that does not move; which one it is does not matter.
         held: Vec<PatchId>,
@@ -125,7 +128,8 @@ pub enum Claim {
         multipliers: Vec<(usize, f64)>,
         /// Length of the multipliers' sum of wrenches. Less than `hold`, which is the proof.
         residual: f64,
-        /// Least singular value of the contacts' wrenches, weighted by their multipliers up to 1, that is left for the other pieces.
+        /// Least singular value of the contacts' wrenches, weighted by their multipliers up to 1, that is
+        /// left for the other pieces.
         hold: f64,
     },
     /// Some pieces stay within their play on every path of motions of any size, at the clearance as it is.
@@ -212,7 +216,8 @@ impl Certificate {
 /// What was found of a finished kit.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
-    /// Where its pieces touch, from [`crate::verify::examine`], and its verdict: what that speaks against is not claimed.
+    /// Where its pieces touch, from [`crate::verify::examine`], and its verdict: what that speaks against is
+    /// not claimed.
     pub contacts: &'a [Contact],
     /// The verdict.
     pub verdict: &'a Verification,
@@ -224,7 +229,8 @@ pub struct Evidence<'a> {
 
 /// Claims what can be proven of finished `pieces`, written as `files`, that are installed as `plan` says.
 ///
-/// `None` where the plan does not name every piece once, of at least two. Takes 0.04 s for 9 pieces with 12 000 contacts.
+/// `None` where the plan does not name every piece once, of at least two. Takes 0.04 s for 9 pieces with 12
+/// 000 contacts.
 pub fn certify(
     mut files: Vec<PieceFile>,
     pieces: &IdVec<PatchId, TriMesh>,
@@ -232,20 +238,29 @@ pub fn certify(
     evidence: &Evidence<'_>,
     clearance_mm: f64,
 ) -> Option<Certificate> {
-    let &Evidence { contacts, verdict, gaps, play } = evidence;
+    let &Evidence {
+        contacts,
+        verdict,
+        gaps,
+        play,
+    } = evidence;
     let mut named: Vec<PatchId> = plan.steps.iter().map(|s| s.piece).collect();
     named.sort_unstable();
     if named.len() < 2 || !named.into_iter().eq(pieces.ids()) {
         return None;
     }
     let (center, length_mm) = frame(pieces);
-    let mut claims: Vec<Claim> = claim_lock(plan, contacts, center, length_mm).into_iter().collect();
+    let mut claims: Vec<Claim> = claim_lock(plan, contacts, center, length_mm)
+        .into_iter()
+        .collect();
     let contacts = keep_holding(contacts, &mut claims);
     let (bearings, proven) = play.map_or_else(Default::default, bounded);
     claims.extend(proven.into_iter().map(Claim::Bounded));
     claims.extend(claim_paths(plan, verdict, gaps));
     for file in &mut files {
-        file.play = play.and_then(|play| play.alone[file.id]).filter(|play| play.is_proven);
+        file.play = play
+            .and_then(|play| play.alone[file.id])
+            .filter(|play| play.is_proven);
     }
     Some(Certificate {
         format: FORMAT.into(),
@@ -261,31 +276,65 @@ pub fn certify(
         bearings,
         slide: play.map(|play| play.slide),
         press_fits: Vec::new(),
-        failed: verdict.checks.iter().filter(|c| !c.ok).map(|c| format!("{}: {}", c.name, c.figure)).collect(),
+        failed: verdict
+            .checks
+            .iter()
+            .filter(|c| !c.ok)
+            .map(|c| format!("{}: {}", c.name, c.figure))
+            .collect(),
         files: Vec::new(),
         claims,
     })
 }
 
-/// The middle of all pieces and half their diagonal, mm: what twists are about, and at what distance spins count.
+/// The middle of all pieces and half their diagonal, mm: what twists are about, and at what distance spins
+/// count.
 fn frame(pieces: &IdVec<PatchId, TriMesh>) -> (Vec3, f64) {
-    let bounds = pieces.as_slice().iter().fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()));
+    let bounds = pieces
+        .as_slice()
+        .iter()
+        .fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()));
     (bounds.center(), 0.5 * bounds.diagonal())
 }
 
 /// The lock with its proof, if there is one: with the first piece held, nothing but the key moves.
 fn claim_lock(plan: &InstallationPlan, contacts: &[Contact], center: Vec3, length_mm: f64) -> Option<Claim> {
-    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - center, ..*c }).collect();
+    let centered: Vec<Contact> = contacts
+        .iter()
+        .map(|c| Contact {
+            point: c.point - center,
+            ..*c
+        })
+        .collect();
     let (held, key) = (vec![plan.steps[0].piece], plan.key());
     let leaves = Some((key, plan.separation(key).unit()));
     let freedom = Freedom::Rigid;
-    let proof = prove(&centered, &Question { n_pieces: plan.steps.len(), held: &held, leaves, length_mm, freedom })?;
-    let Proof { multipliers, residual, hold } = proof;
-    Some(Claim::Locked { held, leaves: key, multipliers, residual, hold })
+    let proof = prove(
+        &centered,
+        &Question {
+            n_pieces: plan.steps.len(),
+            held: &held,
+            leaves,
+            length_mm,
+            freedom,
+        },
+    )?;
+    let Proof {
+        multipliers,
+        residual,
+        hold,
+    } = proof;
+    Some(Claim::Locked {
+        held,
+        leaves: key,
+        multipliers,
+        residual,
+        hold,
+    })
 }
 
-/// That the key leaves, that all but the first piece can be installed, and that nothing overlaps: as far as the verdict
-/// found nothing against it.
+/// That the key leaves, that all but the first piece can be installed, and that nothing overlaps: as far as
+/// the verdict found nothing against it.
 fn claim_paths(plan: &InstallationPlan, verdict: &Verification, gaps: &KitGaps) -> Vec<Claim> {
     let is_free = |id: PatchId| {
         let rubs = |f: &Finding| matches!(f, Finding::PathRubs { piece, .. } if *piece == id);
@@ -299,15 +348,29 @@ fn claim_paths(plan: &InstallationPlan, verdict: &Verification, gaps: &KitGaps) 
     let key = plan.key();
     if is_free(key) {
         let direction = plan.separation(key).unit().to_array();
-        claims.push(Claim::KeyLeaves { piece: key, direction, least: on_way(key) });
+        claims.push(Claim::KeyLeaves {
+            piece: key,
+            direction,
+            least: on_way(key),
+        });
     }
     for step in plan.steps[1..].iter().filter(|step| is_free(step.piece)) {
         let direction = (-step.separation.unit() + 0.0).to_array();
-        claims.push(Claim::Installs { piece: step.piece, direction, least: on_way(step.piece) });
+        claims.push(Claim::Installs {
+            piece: step.piece,
+            direction,
+            least: on_way(step.piece),
+        });
     }
-    if !verdict.findings.iter().any(|f| matches!(f, Finding::Overlap { .. })) {
+    if !verdict
+        .findings
+        .iter()
+        .any(|f| matches!(f, Finding::Overlap { .. }))
+    {
         let pairs = gaps.pairs.iter().map(|p| (p.b, p.overall, p.beneath_rim));
-        claims.push(Claim::Apart { least: LeastGaps::of(pairs) });
+        claims.push(Claim::Apart {
+            least: LeastGaps::of(pairs),
+        });
     }
     claims
 }

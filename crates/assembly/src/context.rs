@@ -52,7 +52,12 @@ pub struct Ctx<'a> {
 impl<'a> Ctx<'a> {
     /// A context that tells `report` how far it is and ends soon after `stop` becomes true.
     pub fn new(report: &'a (dyn Fn(Progress<'_>) + Sync), stop: &'a AtomicBool) -> Self {
-        Self { report, stop, is_time_up: None, warnings: Mutex::new(Vec::new()) }
+        Self {
+            report,
+            stop,
+            is_time_up: None,
+            warnings: Mutex::new(Vec::new()),
+        }
     }
 
     /// A context that tells nobody and is never stopped.
@@ -61,11 +66,15 @@ impl<'a> Ctx<'a> {
         Ctx::new(&|_| {}, &NEVER)
     }
 
-    /// The same with a clock, which libraries do not read: searches that get better with time end soon after it says true.
+    /// The same with a clock, which libraries do not read: searches that get better with time end soon after
+    /// it says true.
     ///
     /// What they return then depends on how fast the machine is, so limits of work should end them before.
     pub fn with_time_limit(self, is_time_up: &'a (dyn Fn() -> bool + Sync)) -> Self {
-        Self { is_time_up: Some(is_time_up), ..self }
+        Self {
+            is_time_up: Some(is_time_up),
+            ..self
+        }
     }
 
     /// Whether to be content with what was found.
@@ -92,17 +101,29 @@ impl<'a> Ctx<'a> {
 
     /// Fails where the user asked to stop; long loops call it now and then.
     pub fn check(&self) -> Result<(), Cancelled> {
-        if self.stop.load(Ordering::Relaxed) { Err(Cancelled) } else { Ok(()) }
+        if self.stop.load(Ordering::Relaxed) {
+            Err(Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     /// Keeps a warning for the plan and the report.
     pub fn warn(&self, warning: Warning) {
-        self.warnings.lock().expect("no holder of this lock panics").push(warning);
+        self.warnings
+            .lock()
+            .expect("no holder of this lock panics")
+            .push(warning);
     }
 
     /// A context of the same job whose warnings are its own: what is given up takes them with it.
     pub fn fork(&self) -> Ctx<'a> {
-        Ctx { report: self.report, stop: self.stop, is_time_up: self.is_time_up, warnings: Mutex::new(Vec::new()) }
+        Ctx {
+            report: self.report,
+            stop: self.stop,
+            is_time_up: self.is_time_up,
+            warnings: Mutex::new(Vec::new()),
+        }
     }
 
     /// The warnings, in the order they came; equal ones once.

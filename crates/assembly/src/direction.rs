@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 
-/// One of the 26 directions from a grid cell to its neighbours: 6 axial, 12 in-plane diagonal, 8 space diagonal.
+/// One of the 26 directions from a grid cell to its neighbours: 6 axial, 12 in-plane diagonal, 8 space
+/// diagonal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct LatticeDirection(u8);
@@ -24,7 +25,10 @@ impl LatticeDirection {
 
     /// The direction at this position in [`Self::all`].
     pub fn from_index(index: usize) -> Option<Self> {
-        u8::try_from(index).ok().filter(|&i| usize::from(i) < Self::COUNT).map(Self)
+        u8::try_from(index)
+            .ok()
+            .filter(|&i| usize::from(i) < Self::COUNT)
+            .map(Self)
     }
 
     /// The step to the neighbouring cell: components in {−1, 0, 1}, not all 0.
@@ -63,7 +67,8 @@ mod tests {
 
     #[test]
     fn opposite_directions_cancel_and_all_differ() {
-        let steps: std::collections::BTreeSet<_> = LatticeDirection::all().map(LatticeDirection::step).collect();
+        let steps: std::collections::BTreeSet<_> =
+            LatticeDirection::all().map(LatticeDirection::step).collect();
         assert_eq!(steps.len(), 26);
         for d in LatticeDirection::all() {
             assert_eq!(d.opposite().step(), d.step().map(|x| -x));

@@ -71,7 +71,10 @@ impl<I: From<usize> + Into<usize>, T> IdVec<I, T> {
 
 impl<I, T> FromIterator<T> for IdVec<I, T> {
     fn from_iter<It: IntoIterator<Item = T>>(iter: It) -> Self {
-        Self { items: iter.into_iter().collect(), id: PhantomData }
+        Self {
+            items: iter.into_iter().collect(),
+            id: PhantomData,
+        }
     }
 }
 

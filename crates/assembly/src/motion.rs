@@ -1,13 +1,15 @@
 //! Whether any pieces can move at all, alone or together, by however little.
 //!
-//! A motion gives each free piece a velocity (and a spin). A contact with normal `n` from `a` to `b` allows it where
-//! `n · (v_a − v_b) ≤ 0`; over all contacts, `A x ≤ 0`. Nothing moves iff `x = 0` is the only solution.
+//! A motion gives each free piece a velocity (and a spin). A contact with normal `n` from `a` to `b` allows
+//! it where `n · (v_a − v_b) ≤ 0`; over all contacts, `A x ≤ 0`. Nothing moves iff `x = 0` is the only
+//! solution.
 //!
-//! With `b = Aᵀ1 / m`, the least-norm point `r = b + Aᵀμ`, `μ ≥ 0`, decides everything (the alternatives of Stiemke):
-//! where `r = 0` the contacts are in equilibrium with positive forces, so `A x ≤ 0` implies `A x = 0` and only a null
-//! space of `A` can move; otherwise `x = −r` is a motion that opens contacts. For every motion with `|x| ≤ 1`,
-//! `−1ᵀA x ≤ m ‖r‖₁`, which bounds the linear program of an outside judge. `r` is found by non-negative least squares
-//! [LawsonHanson1974, ch. 23] on a Cholesky factor of the active contacts, never more of them than unknowns.
+//! With `b = Aᵀ1 / m`, the least-norm point `r = b + Aᵀμ`, `μ ≥ 0`, decides everything (the alternatives of
+//! Stiemke): where `r = 0` the contacts are in equilibrium with positive forces, so `A x ≤ 0` implies `A x =
+//! 0` and only a null space of `A` can move; otherwise `x = −r` is a motion that opens contacts. For every
+//! motion with `|x| ≤ 1`, `−1ᵀA x ≤ m ‖r‖₁`, which bounds the linear program of an outside judge. `r` is
+//! found by non-negative least squares [LawsonHanson1974, ch. 23] on a Cholesky factor of the active
+//! contacts, never more of them than unknowns.
 
 mod forces;
 mod play;
@@ -40,15 +42,19 @@ pub struct Contact {
     pub area_mm2: f64,
 }
 
-/// How far a piece may rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in proportion to the clearance;
-/// displacements also to the size of the model, but no less than for 75 mm; turns of pieces with a diagonal under 60 mm, whose rims move less, in
-/// inverse proportion to that, up to twice. docs/certificate.md has the evidence.
+/// How far a piece may rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in
+/// proportion to the clearance; displacements also to the size of the model, but no less than for 75 mm;
+/// turns of pieces with a diagonal under 60 mm, whose rims move less, in inverse proportion to that, up to
+/// twice. docs/certificate.md has the evidence.
 pub fn most_play(size_mm: f64, clearance_mm: f64, piece_mm: f64) -> [f64; 2] {
     const AT_MM: f64 = 150.0;
     const AT_CLEARANCE_MM: f64 = 0.12;
     const AT_PIECE_MM: f64 = 60.0;
     let wider = (clearance_mm / AT_CLEARANCE_MM).max(1.0);
-    [wider * (size_mm / AT_MM).max(0.5), 2.0 * wider * (AT_PIECE_MM / piece_mm).clamp(1.0, 2.0)]
+    [
+        wider * (size_mm / AT_MM).max(0.5),
+        2.0 * wider * (AT_PIECE_MM / piece_mm).clamp(1.0, 2.0),
+    ]
 }
 
 /// Which motions of a piece are considered.
@@ -71,8 +77,9 @@ pub struct Twist {
     pub spin: Vec3,
 }
 
-/// How far small motions take a piece within its contacts while its neighbours rest: the displacement of `middle`, mm, and the turn,
-/// degrees; each along the axes of space, taken together. What has no end goes 100 mm and 1 rad.
+/// How far small motions take a piece within its contacts while its neighbours rest: the displacement of
+/// `middle`, mm, and the turn, degrees; each along the axes of space, taken together. What has no end goes
+/// 100 mm and 1 rad.
 pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] {
     /// Turns count as displacements at this distance, mm.
     const LENGTH_MM: f64 = 50.0;
@@ -80,29 +87,43 @@ pub fn farthest(piece: PatchId, contacts: &[Contact], middle: Vec3) -> [f64; 2] 
     if contacts.is_empty() {
         return ENDLESS;
     }
-    let centered: Vec<Contact> = contacts.iter().map(|c| Contact { point: c.point - middle, ..*c }).collect();
+    let centered: Vec<Contact> = contacts
+        .iter()
+        .map(|c| Contact {
+            point: c.point - middle,
+            ..*c
+        })
+        .collect();
     let system = System::new(&centered, &[piece], LENGTH_MM, Freedom::Rigid);
-    let gaps: Vec<f64> = system.rows.iter().map(|row| centered[row.contact].gap_mm).collect();
+    let gaps: Vec<f64> = system
+        .rows
+        .iter()
+        .map(|row| centered[row.contact].gap_mm)
+        .collect();
     let limits = Limits::new(&system, &gaps);
     let mut corner = Corner::new(&limits);
     let mut most = |from: usize, end: f64, scale: f64| {
         let mut axes = [0.0f64; 3];
         for (k, most) in axes.iter_mut().enumerate() {
             for sign in [1.0, -1.0] {
-                let towards = DVector::from_fn(system.n, |i, _| if i == from + k { sign * scale } else { 0.0 });
+                let towards =
+                    DVector::from_fn(system.n, |i, _| if i == from + k { sign * scale } else { 0.0 });
                 *most = most.max(corner.farthest(&towards).map_or(end, |x| x.min(end)));
             }
         }
         Vec3::from(axes).length()
     };
-    [most(0, ENDLESS[0], 1.0), most(3, ENDLESS[1], 1.0 / LENGTH_MM).to_degrees()]
+    [
+        most(0, ENDLESS[0], 1.0),
+        most(3, ENDLESS[1], 1.0 / LENGTH_MM).to_degrees(),
+    ]
 }
 
-/// How the pieces not in `held` (of `n_pieces`) can move; empty where they cannot. With `leaves`, that piece may move as it likes, and
-/// only motions in which others move count.
+/// How the pieces not in `held` (of `n_pieces`) can move; empty where they cannot. With `leaves`, that piece
+/// may move as it likes, and only motions in which others move count.
 ///
-/// `scale_mm` makes spins comparable to velocities: half the model's diagonal. All free pieces count as moving where
-/// there is no contact.
+/// `scale_mm` makes spins comparable to velocities: half the model's diagonal. All free pieces count as
+/// moving where there is no contact.
 pub fn free_motion(
     contacts: &[Contact],
     n_pieces: usize,
@@ -111,15 +132,21 @@ pub fn free_motion(
     scale_mm: f64,
     freedom: Freedom,
 ) -> Vec<Twist> {
-    let free: Vec<PatchId> = (0..n_pieces).map(PatchId::from).filter(|id| !held.contains(id)).collect();
+    let free: Vec<PatchId> = (0..n_pieces)
+        .map(PatchId::from)
+        .filter(|id| !held.contains(id))
+        .collect();
     if free.is_empty() {
         return Vec::new();
     }
     let system = System::new(contacts, &free, scale_mm, freedom);
     let motion = system.opening_motion().or_else(|| system.sliding_motion());
     let Some(motion) = motion else { return Vec::new() };
-    let Some(leaves) = leaves else { return system.twists(&motion, &free) };
-    let without = |twists: Vec<Twist>| -> Vec<Twist> { twists.into_iter().filter(|t| t.piece != leaves).collect() };
+    let Some(leaves) = leaves else {
+        return system.twists(&motion, &free);
+    };
+    let without =
+        |twists: Vec<Twist>| -> Vec<Twist> { twists.into_iter().filter(|t| t.piece != leaves).collect() };
     match moving_others(&system, &free, leaves) {
         Some(motion) => without(system.twists(&motion, &free)),
         None => Vec::new(),
@@ -128,9 +155,11 @@ pub fn free_motion(
 
 /// A motion in which pieces but `leaves` move; `None` where there is none.
 ///
-/// A cone that is more than 0 in their unknowns shows along almost any direction or its opposite; three are tried.
+/// A cone that is more than 0 in their unknowns shows along almost any direction or its opposite; three are
+/// tried.
 fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<DVector<f64>> {
-    /// Others move where they get so far of the 1000 mm that motions end at; gaps that are 0 are taken as some nanometres.
+    /// Others move where they get so far of the 1000 mm that motions end at; gaps that are 0 are taken as
+    /// some nanometres.
     const MOVED_MM: f64 = 0.5;
     let limits = Limits::new(system, &vec![0.0; system.rows.len()]);
     let mut corner = Corner::new(&limits);
@@ -138,10 +167,19 @@ fn moving_others(system: &System, free: &[PatchId], leaves: PatchId) -> Option<D
     let width = system.n / free.len().max(1);
     let is_other = |k: usize| free[k / width] != leaves;
     for _ in 0..3 {
-        let towards = DVector::from_fn(system.n, |k, _| if is_other(k) { rng.random_range(-1.0..1.0) } else { 0.0 });
+        let towards = DVector::from_fn(system.n, |k, _| {
+            if is_other(k) {
+                rng.random_range(-1.0..1.0)
+            } else {
+                0.0
+            }
+        });
         for sign in [1.0, -1.0] {
             corner.farthest(&(&towards * sign));
-            let moved = (0..system.n).filter(|&k| is_other(k)).map(|k| corner.motion()[k].abs()).fold(0.0, f64::max);
+            let moved = (0..system.n)
+                .filter(|&k| is_other(k))
+                .map(|k| corner.motion()[k].abs())
+                .fold(0.0, f64::max);
             if moved > MOVED_MM {
                 let of_others = |k: usize| if is_other(k) { corner.motion()[k] } else { 0.0 };
                 return Some(DVector::from_fn(system.n, |k, _| of_others(k)));
@@ -184,10 +222,17 @@ mod tests {
         for row in &system.rows {
             let mut dense = DVector::zeros(system.n);
             system.add(row, 1.0, &mut dense);
-            let terms: Vec<_> = x.iter().copied().zip(dense.iter().copied()).filter(|t| t.1 != 0.0).collect();
+            let terms: Vec<_> = x
+                .iter()
+                .copied()
+                .zip(dense.iter().copied())
+                .filter(|t| t.1 != 0.0)
+                .collect();
             problem.add_constraint(&terms, ComparisonOp::Le, 0.0);
         }
-        let SolveOutcome::Solution(best) = problem.solve().unwrap() else { panic!("no limit was set") };
+        let SolveOutcome::Solution(best) = problem.solve().unwrap() else {
+            panic!("no limit was set")
+        };
         -best.objective() / system.rows.len() as f64
     }
 
@@ -205,7 +250,11 @@ mod tests {
                 assert_eq!(motion.is_some(), opening > 1e-6, "{n} contacts: {opening}");
                 if let Some(x) = &motion {
                     n_open += 1;
-                    let worst = system.rows.iter().map(|r| system.dot(r, x)).fold(f64::NEG_INFINITY, f64::max);
+                    let worst = system
+                        .rows
+                        .iter()
+                        .map(|r| system.dot(r, x))
+                        .fold(f64::NEG_INFINITY, f64::max);
                     assert!(worst <= 1e-5 * x.norm(), "violates a contact by {worst}");
                 } else {
                     n_locked += 1;
@@ -218,14 +267,24 @@ mod tests {
     /// The greatest `objective · x` in the box of ±1000 mm; `gaps_mm` one a row.
     fn farthest_by_simplex(system: &System, gaps_mm: &[f64], objective: &DVector<f64>) -> f64 {
         let mut problem = Problem::new(OptimizationDirection::Maximize);
-        let x: Vec<_> = objective.iter().map(|&c| problem.add_var(c, (-1e3, 1e3))).collect();
+        let x: Vec<_> = objective
+            .iter()
+            .map(|&c| problem.add_var(c, (-1e3, 1e3)))
+            .collect();
         for (row, &gap_mm) in system.rows.iter().zip(gaps_mm) {
             let mut dense = DVector::zeros(system.n);
             system.add(row, 1.0, &mut dense);
-            let terms: Vec<_> = x.iter().copied().zip(dense.iter().copied()).filter(|t| t.1 != 0.0).collect();
+            let terms: Vec<_> = x
+                .iter()
+                .copied()
+                .zip(dense.iter().copied())
+                .filter(|t| t.1 != 0.0)
+                .collect();
             problem.add_constraint(&terms, ComparisonOp::Le, gap_mm);
         }
-        let SolveOutcome::Solution(best) = problem.solve().unwrap() else { panic!("no limit was set") };
+        let SolveOutcome::Solution(best) = problem.solve().unwrap() else {
+            panic!("no limit was set")
+        };
         best.objective()
     }
 
@@ -249,20 +308,34 @@ mod tests {
                     (at..at + 6).for_each(|k| objective[k] = rng.random::<f64>() - 0.5);
                     let expected = farthest_by_simplex(&system, &gaps_mm, &objective);
                     match corner.farthest(&objective) {
-                        Some(most) => assert!((most - expected).abs() < 1e-3 * expected.max(1.0), "{most} {expected}"),
+                        Some(most) => assert!(
+                            (most - expected).abs() < 1e-3 * expected.max(1.0),
+                            "{most} {expected}"
+                        ),
                         None => assert!(expected > 10.0, "{expected}"),
                     }
-                    *if expected < 10.0 { &mut n_ended } else { &mut n_endless } += 1;
+                    *if expected < 10.0 {
+                        &mut n_ended
+                    } else {
+                        &mut n_endless
+                    } += 1;
                 }
             }
         }
-        assert!(n_ended > 20 && n_endless > 8, "{n_ended} ended, {n_endless} endless");
+        assert!(
+            n_ended > 20 && n_endless > 8,
+            "{n_ended} ended, {n_endless} endless"
+        );
     }
 
     /// Contacts on the six faces of a box around `center`, normals outwards.
     fn box_contacts(a: u32, b: u32, center: Vec3) -> Vec<Contact> {
         let mut contacts = Vec::new();
-        for (n, u, v) in [(Vec3::X, Vec3::Y, Vec3::Z), (Vec3::Y, Vec3::Z, Vec3::X), (Vec3::Z, Vec3::X, Vec3::Y)] {
+        for (n, u, v) in [
+            (Vec3::X, Vec3::Y, Vec3::Z),
+            (Vec3::Y, Vec3::Z, Vec3::X),
+            (Vec3::Z, Vec3::X, Vec3::Y),
+        ] {
             for (p, q) in [(0.9, 0.8), (0.9, -0.8), (-0.7, 0.8), (-0.7, -0.8)] {
                 for side in [1.0, -1.0] {
                     let point = center + n * side + u * p + v * q;

@@ -18,13 +18,29 @@ pub struct ParamProblem {
 
 impl ParamProblem {
     /// The problem, unless `value` lies in [`min`, `max`]. NaN is a problem.
-    pub fn unless_within(name: &'static str, unit: &'static str, value: f64, min: f64, max: f64) -> Option<Self> {
-        (!(min..=max).contains(&value)).then_some(Self { name, unit, value, min, max })
+    pub fn unless_within(
+        name: &'static str,
+        unit: &'static str,
+        value: f64,
+        min: f64,
+        max: f64,
+    ) -> Option<Self> {
+        (!(min..=max).contains(&value)).then_some(Self {
+            name,
+            unit,
+            value,
+            min,
+            max,
+        })
     }
 }
 
 fn with_unit(value: f64, unit: &str) -> String {
-    if unit.is_empty() { value.to_string() } else { format!("{value} {unit}") }
+    if unit.is_empty() {
+        value.to_string()
+    } else {
+        format!("{value} {unit}")
+    }
 }
 
 #[cfg(test)]
@@ -34,7 +50,11 @@ mod tests {
     #[test]
     fn a_value_outside_or_none_is_a_problem_told_with_its_unit_if_it_has_one() {
         assert_eq!(ParamProblem::unless_within("size", "mm", 2.0, 1.0, 2.0), None);
-        let said = |unit, value| ParamProblem::unless_within("size", unit, value, 1.0, 2.0).unwrap().to_string();
+        let said = |unit, value| {
+            ParamProblem::unless_within("size", unit, value, 1.0, 2.0)
+                .unwrap()
+                .to_string()
+        };
         assert_eq!(said("mm", 3.0), "size is 3 mm; it must lie between 1 and 2 mm");
         assert_eq!(said("", f64::NAN), "size is NaN; it must lie between 1 and 2");
     }

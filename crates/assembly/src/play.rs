@@ -1,9 +1,10 @@
 //! How far the pieces of a finished kit can go, proven for rigid motions of any size.
 //!
-//! The lock of [`crate::certificate`] is one of faces that touch. Printed faces are a clearance apart, and what has room can be
-//! turned past a short connector. Here the clearance counts: contacts are taken with an area, and a linear program over all of them
-//! bounds what pieces can do on any path from rest, first each piece while all others are held, then all together with one held.
-//! docs/certificate.md has the theorem; the proofs go into the certificate.
+//! The lock of [`crate::certificate`] is one of faces that touch. Printed faces are a clearance apart, and
+//! what has room can be turned past a short connector. Here the clearance counts: contacts are taken with an
+//! area, and a linear program over all of them bounds what pieces can do on any path from rest, first each
+//! piece while all others are held, then all together with one held. docs/certificate.md has the theorem; the
+//! proofs go into the certificate.
 //!
 //! ```text
 //!  surfaces ─► bearings ─► bounds ─► KitPlay
@@ -11,8 +12,9 @@
 //!              barriers)      solve, widen, until it closes)
 //! ```
 //!
-//! Limits: rigid pieces; bearings are sampled, so the play that is proven is more than the real one (by a third to twice in kits);
-//! where no proof closes the play is that of the first, linear program, which is less than the real one may be.
+//! Limits: rigid pieces; bearings are sampled, so the play that is proven is more than the real one (by a
+//! third to twice in kits); where no proof closes the play is that of the first, linear program, which is
+//! less than the real one may be.
 
 mod barrier;
 mod bearing;
@@ -38,7 +40,8 @@ pub use bound::{Multipliers, Proof, Slide};
 pub use quantity::Quantity;
 use way_out::Walk;
 
-/// How far the key may slide on its way out before what is proven ends, mm: friction, ribs or a detent keep it nearer.
+/// How far the key may slide on its way out before what is proven ends, mm: friction, ribs or a detent keep
+/// it nearer.
 pub const SLIDE_MM: f64 = 0.3;
 
 /// How play is measured.
@@ -56,10 +59,15 @@ pub struct PlayParams {
 
 /// Displacement, mm, and turn, rad.
 fn play_of([shift_mm, turn]: [f64; 2], is_proven: bool) -> Play {
-    Play { translation_mm: shift_mm, rotation_deg: turn.to_degrees(), is_proven }
+    Play {
+        translation_mm: shift_mm,
+        rotation_deg: turn.to_degrees(),
+        is_proven,
+    }
 }
 
-/// A piece, and poses from rest on that take it out: displacement of the centroid, mm, and rotation vector, rad.
+/// A piece, and poses from rest on that take it out: displacement of the centroid, mm, and rotation vector,
+/// rad.
 pub type WayOut = (PatchId, Vec<[f64; 6]>);
 
 /// The play of a kit's pieces, with its proofs.
@@ -71,13 +79,13 @@ pub struct KitPlay {
     pub bearings: Vec<Bearing>,
     /// Of each piece while all others are held; `None` where nothing ends its motions.
     pub alone: IdVec<PatchId, Option<Play>>,
-    /// The same for small motions, as if sideways moves and turns changed nothing: nearer to the real play than what is proven, but on its
-    /// lower side.
+    /// The same for small motions, as if sideways moves and turns changed nothing: nearer to the real play
+    /// than what is proven, but on its lower side.
     pub estimates: IdVec<PatchId, Option<Play>>,
     /// Small motions of each piece that go that far: displacement of its centroid, mm, and turn, rad.
     pub swings: IdVec<PatchId, Vec<[f64; 6]>>,
-    /// Ways on which pieces can be taken out by hand though they are not the key; `None` where nobody looked, see
-    /// [`look_for_ways_out`].
+    /// Ways on which pieces can be taken out by hand though they are not the key; `None` where nobody looked,
+    /// see [`look_for_ways_out`].
     pub ways_out: Option<Vec<WayOut>>,
     /// Of each piece while all but one move; `None` for that one. Nothing where it is not proven.
     pub together: Option<IdVec<PatchId, Option<Play>>>,
@@ -89,13 +97,16 @@ impl Proof {
     /// What it proves of each free piece.
     pub fn plays(&self) -> impl Iterator<Item = (PatchId, Play)> + '_ {
         let norm = |q: usize| self.quantities[q].norm();
-        let play = move |(&p, &[turn, shift]): (&PatchId, &[usize; 2])| (p, play_of([norm(shift), norm(turn)], true));
+        let play = move |(&p, &[turn, shift]): (&PatchId, &[usize; 2])| {
+            (p, play_of([norm(shift), norm(turn)], true))
+        };
         self.free.iter().zip(&self.of_piece).map(play)
     }
 }
 
-/// Measures the play of finished `pieces` that are installed as `plan` says, whose last step is the key. A function of its
-/// arguments alone, on any number of threads. A kit of 13 pieces takes 3 s of processor time. Ways out are not looked for.
+/// Measures the play of finished `pieces` that are installed as `plan` says, whose last step is the key. A
+/// function of its arguments alone, on any number of threads. A kit of 13 pieces takes 3 s of processor time.
+/// Ways out are not looked for.
 pub fn measure(
     ctx: &Ctx,
     params: &PlayParams,
@@ -105,19 +116,36 @@ pub fn measure(
     ctx.stage("play", 0)?;
     let surfaces = Surfaces::new(pieces);
     let mut bearings = surfaces.bearings(ctx, params.clearance_mm, params.seed)?;
-    let centers: IdVec<PatchId, Vec3> =
-        pieces.as_slice().par_iter().map(TriMesh::centroid).collect::<Vec<_>>().into_iter().collect();
+    let centers: IdVec<PatchId, Vec3> = pieces
+        .as_slice()
+        .par_iter()
+        .map(TriMesh::centroid)
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect();
     let slide = slide(params, plan, &bearings, &centers);
     let ids: Vec<PatchId> = pieces.ids().collect();
     let solve = |bearings: &[Bearing], candidates, id: PatchId| {
-        let question =
-            Problem { surfaces: &surfaces, bearings, candidates, centers: &centers, slide: &slide, free: &[id] };
+        let question = Problem {
+            surfaces: &surfaces,
+            bearings,
+            candidates,
+            centers: &centers,
+            slide: &slide,
+            free: &[id],
+        };
         question.solve(ctx)
     };
-    let mut answers: Vec<Answer> =
-        ids.par_iter().map(|&id| solve(&bearings, Candidates::All, id)).collect::<Result<_, Cancelled>>()?;
+    let mut answers: Vec<Answer> = ids
+        .par_iter()
+        .map(|&id| solve(&bearings, Candidates::All, id))
+        .collect::<Result<_, Cancelled>>()?;
     // Where that is not enough, more points are: the best of them are nearer to the ends of short connectors.
-    let again: Vec<PatchId> = ids.iter().copied().filter(|&id| is_close(&answers[usize::from(id)])).collect();
+    let again: Vec<PatchId> = ids
+        .iter()
+        .copied()
+        .filter(|&id| is_close(&answers[usize::from(id)]))
+        .collect();
     let finer: Vec<(Vec<Bearing>, Answer)> = again
         .par_iter()
         .map(|&id| {
@@ -131,7 +159,10 @@ pub fn measure(
         bearings.extend(finer);
     }
     let alone = answers.iter().map(alone).collect();
-    let estimates = answers.iter().map(|a| a.linear.first().map(|&linear| play_of(linear, false))).collect();
+    let estimates = answers
+        .iter()
+        .map(|a| a.linear.first().map(|&linear| play_of(linear, false)))
+        .collect();
     let swings = answers.iter().map(|a| a.swings.clone()).collect();
     let asked: BTreeSet<usize> = answers.iter().flat_map(|a| a.asked.iter().copied()).collect();
     let mut proofs: Vec<Proof> = answers.into_iter().filter_map(|a| a.proof.ok()).collect();
@@ -153,11 +184,21 @@ pub fn measure(
             proofs.push(proof);
         }
     }
-    Ok(KitPlay { slide, bearings, alone, estimates, swings, ways_out: None, together, proofs })
+    Ok(KitPlay {
+        slide,
+        bearings,
+        alone,
+        estimates,
+        swings,
+        ways_out: None,
+        together,
+        proofs,
+    })
 }
 
-/// Looks for ways out of the `pieces` that `play` has no proof for; the key's is no secret. A function of its arguments alone, on any
-/// number of threads. A piece takes 2 to 4 s of processor time: it is for kits that pass all else.
+/// Looks for ways out of the `pieces` that `play` has no proof for; the key's is no secret. A function of its
+/// arguments alone, on any number of threads. A piece takes 2 to 4 s of processor time: it is for kits that
+/// pass all else.
 pub fn look_for_ways_out(
     ctx: &Ctx,
     clearance_mm: f64,
@@ -174,7 +215,10 @@ pub fn look_for_ways_out(
             let walk = Walk::new(&surfaces, id, pieces[id].centroid(), clearance_mm);
             Ok(walk.find(ctx, &play.swings[id], pieces)?.map(|poses| (id, poses)))
         };
-        doubtful.into_par_iter().map(walked).collect::<Result<Vec<Option<WayOut>>, Cancelled>>()?
+        doubtful
+            .into_par_iter()
+            .map(walked)
+            .collect::<Result<Vec<Option<WayOut>>, Cancelled>>()?
     };
     play.ways_out = Some(found.into_iter().flatten().collect());
     Ok(())
@@ -192,7 +236,10 @@ fn all_but_one(ids: &[PatchId], bearings: &[Bearing]) -> Vec<PatchId> {
 fn is_close(answer: &Answer) -> bool {
     /// Displacement, mm, and turn, rad, of small motions from which that is hopeless.
     const HOPELESS: [f64; 2] = [1.2, 0.05];
-    let is_hopeless = answer.linear.first().is_none_or(|l| l[0] > HOPELESS[0] || l[1] > HOPELESS[1]);
+    let is_hopeless = answer
+        .linear
+        .first()
+        .is_none_or(|l| l[0] > HOPELESS[0] || l[1] > HOPELESS[1]);
     answer.proof.is_err() && !is_hopeless
 }
 
@@ -205,19 +252,35 @@ fn alone(answer: &Answer) -> Option<Play> {
 }
 
 /// The key's way out, against the piece that it bears on at most points.
-fn slide(params: &PlayParams, plan: &InstallationPlan, bearings: &[Bearing], centers: &IdVec<PatchId, Vec3>) -> Slide {
+fn slide(
+    params: &PlayParams,
+    plan: &InstallationPlan,
+    bearings: &[Bearing],
+    centers: &IdVec<PatchId, Vec3>,
+) -> Slide {
     let key = plan.key();
     let mut n_points: BTreeMap<PatchId, usize> = BTreeMap::new();
     for b in bearings.iter().filter(|b| b.a == key || b.b == key) {
         *n_points.entry(if b.a == key { b.b } else { b.a }).or_default() += 1;
     }
     // The first of equals.
-    let seat = n_points.iter().rev().max_by_key(|(_, n)| **n).map_or(plan.steps[0].piece, |(seat, _)| *seat);
+    let seat = n_points
+        .iter()
+        .rev()
+        .max_by_key(|(_, n)| **n)
+        .map_or(plan.steps[0].piece, |(seat, _)| *seat);
     let along = plan.separation(key).unit().to_array();
-    Slide { key, seat, at: centers[key].to_array(), along, most_mm: params.slide_mm }
+    Slide {
+        key,
+        seat,
+        at: centers[key].to_array(),
+        along,
+        most_mm: params.slide_mm,
+    }
 }
 
-/// Whether no piece of a model of `size_mm` rattles farther than [`most_play`] says; findings are those of the loosest first.
+/// Whether no piece of a model of `size_mm` rattles farther than [`most_play`] says; findings are those of
+/// the loosest first.
 ///
 /// Judged is the estimate for small motions: what is proven is more than the real play.
 pub fn check(
@@ -226,22 +289,45 @@ pub fn check(
     size_mm: f64,
     clearance_mm: f64,
 ) -> (Check, Vec<Finding>) {
-    let endless = Play { translation_mm: f64::INFINITY, rotation_deg: f64::INFINITY, is_proven: false };
+    let endless = Play {
+        translation_mm: f64::INFINITY,
+        rotation_deg: f64::INFINITY,
+        is_proven: false,
+    };
     let told = |(piece, play): (PatchId, &Option<Play>)| {
         let (play, mesh) = (play.unwrap_or(endless), &pieces[piece]);
         let most = most_play(size_mm, clearance_mm, mesh.bounds().diagonal());
         let excess = (play.translation_mm / most[0]).max(play.rotation_deg / most[1]);
-        (excess, Finding::PlayTooWide { piece, play, most, at: mesh.centroid().to_array() })
+        (
+            excess,
+            Finding::PlayTooWide {
+                piece,
+                play,
+                most,
+                at: mesh.centroid().to_array(),
+            },
+        )
     };
-    let mut wide: Vec<(f64, Finding)> = play.estimates.iter().map(told).filter(|(excess, _)| *excess > 1.0).collect();
+    let mut wide: Vec<(f64, Finding)> = play
+        .estimates
+        .iter()
+        .map(told)
+        .filter(|(excess, _)| *excess > 1.0)
+        .collect();
     wide.sort_by(|a, b| b.0.total_cmp(&a.0));
     let findings: Vec<Finding> = wide.into_iter().map(|w| w.1).collect();
-    (Check::new("pieces sit within their play", findings.is_empty(), words(play)), findings)
+    (
+        Check::new("pieces sit within their play", findings.is_empty(), words(play)),
+        findings,
+    )
 }
 
 /// Whether no piece but the key was found to come out by hand; `None` where nobody looked.
 pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> Option<(Check, Vec<Finding>)> {
-    let found = |(piece, _): &WayOut| Finding::ComesOut { piece: *piece, at: pieces[*piece].centroid().to_array() };
+    let found = |(piece, _): &WayOut| Finding::ComesOut {
+        piece: *piece,
+        at: pieces[*piece].centroid().to_array(),
+    };
     let findings: Vec<Finding> = play.ways_out.as_ref()?.iter().map(found).collect();
     let open: Vec<PatchId> = play.unproven().collect();
     let figure = match open.as_slice() {
@@ -249,22 +335,39 @@ pub fn check_ways_out(play: &KitPlay, pieces: &IdVec<PatchId, TriMesh>) -> Optio
         [only] if *only == play.slide.key => "proven for all pieces but the key".to_owned(),
         open => {
             let n = open.iter().filter(|id| **id != play.slide.key).count();
-            format!("a way out was looked for for {n} pieces without a proof; {} found", findings.len())
+            format!(
+                "a way out was looked for for {n} pieces without a proof; {} found",
+                findings.len()
+            )
         }
     };
-    Some((Check::new("no piece can be worked out by hand", findings.is_empty(), figure), findings))
+    Some((
+        Check::new("no piece can be worked out by hand", findings.is_empty(), figure),
+        findings,
+    ))
 }
 
-/// The pieces of which it is neither proven how far they go nor found that they come out, with the figures of small motions.
+/// The pieces of which it is neither proven how far they go nor found that they come out, with the figures of
+/// small motions.
 pub fn warning(play: &KitPlay) -> Option<Warning> {
     let comes_out = |id: PatchId| play.ways_out.iter().flatten().any(|way| way.0 == id);
     let open = play.alone.iter().filter_map(|(id, play)| Some((id, (*play)?)));
-    let open: Vec<(PatchId, Play)> = open.filter(|(id, play)| !play.is_proven && !comes_out(*id)).collect();
-    let line =
-        |(id, play): &(PatchId, Play)| format!("{id} (about {:.1} mm, {:.1}°)", play.translation_mm, play.rotation_deg);
+    let open: Vec<(PatchId, Play)> = open
+        .filter(|(id, play)| !play.is_proven && !comes_out(*id))
+        .collect();
+    let line = |(id, play): &(PatchId, Play)| {
+        format!(
+            "{id} (about {:.1} mm, {:.1}°)",
+            play.translation_mm, play.rotation_deg
+        )
+    };
     let list: Vec<String> = open.iter().map(line).collect();
     let is_searched = play.ways_out.is_some() && open.iter().any(|o| o.0 != play.slide.key);
-    let search = if is_searched { "; no way to take out one that is not the key was found" } else { "" };
+    let search = if is_searched {
+        "; no way to take out one that is not the key was found"
+    } else {
+        ""
+    };
     (!open.is_empty()).then(|| Warning {
         code: "not-proven".into(),
         message: format!(
@@ -278,27 +381,48 @@ pub fn warning(play: &KitPlay) -> Option<Warning> {
 
 /// The widest play, for people.
 pub fn words(play: &KitPlay) -> String {
-    let Some((loosest, widest)) = play.loosest() else { return "some piece has no end of its play".into() };
-    let n_proven = play.alone.iter().filter(|(_, play)| play.is_some_and(|p| p.is_proven)).count();
+    let Some((loosest, widest)) = play.loosest() else {
+        return "some piece has no end of its play".into();
+    };
+    let n_proven = play
+        .alone
+        .iter()
+        .filter(|(_, play)| play.is_some_and(|p| p.is_proven))
+        .count();
     let proven = if n_proven == play.alone.len() {
         "proven".to_owned()
     } else {
         format!("proven for {n_proven} of {}", play.alone.len())
     };
-    let most_deg = play.alone.iter().filter_map(|(_, p)| *p).map(|p| p.rotation_deg).fold(0.0, f64::max);
-    format!("within {:.1} mm and {most_deg:.1}°; loosest: piece {loosest}; {proven}", widest.translation_mm)
+    let most_deg = play
+        .alone
+        .iter()
+        .filter_map(|(_, p)| *p)
+        .map(|p| p.rotation_deg)
+        .fold(0.0, f64::max);
+    format!(
+        "within {:.1} mm and {most_deg:.1}°; loosest: piece {loosest}; {proven}",
+        widest.translation_mm
+    )
 }
 
 impl KitPlay {
     /// The pieces without a proof of how far they go.
     pub fn unproven(&self) -> impl Iterator<Item = PatchId> + '_ {
-        self.alone.iter().filter(|(_, play)| play.is_none_or(|p| !p.is_proven)).map(|(id, _)| id)
+        self.alone
+            .iter()
+            .filter(|(_, play)| play.is_none_or(|p| !p.is_proven))
+            .map(|(id, _)| id)
     }
 
     /// The piece that moves farthest; `None` where some piece has no end.
     pub fn loosest(&self) -> Option<(PatchId, Play)> {
-        let all: Vec<(PatchId, Play)> =
-            self.alone.iter().map(|(piece, play)| Some((piece, (*play)?))).collect::<Option<_>>()?;
-        all.into_iter().max_by(|a, b| a.1.translation_mm.total_cmp(&b.1.translation_mm))
+        let all: Vec<(PatchId, Play)> = self
+            .alone
+            .iter()
+            .map(|(piece, play)| Some((piece, (*play)?)))
+            .collect::<Option<_>>()?;
+        all.into_iter()
+            .max_by(|a, b| a.1.translation_mm.total_cmp(&b.1.translation_mm))
     }
 }

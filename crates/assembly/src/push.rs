@@ -16,7 +16,10 @@ const PUSH_MM: f64 = 0.6;
 pub fn directions() -> [Vec3; N_PUSHES] {
     let spiral = (0..N_SPHERE).map(|i| {
         let i = i as f64 + 0.5;
-        let (turn, z) = (std::f64::consts::PI * (1.0 + 5f64.sqrt()) * i, 1.0 - 2.0 * i / N_SPHERE as f64);
+        let (turn, z) = (
+            std::f64::consts::PI * (1.0 + 5f64.sqrt()) * i,
+            1.0 - 2.0 * i / N_SPHERE as f64,
+        );
         let radius = (1.0 - z * z).sqrt();
         Vec3::new(radius * turn.cos(), radius * turn.sin(), z)
     });

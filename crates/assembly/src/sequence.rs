@@ -9,11 +9,13 @@ use crate::{LatticeDirection, PatchId};
 pub struct InstallationStep {
     /// The piece that is put in.
     pub piece: PatchId,
-    /// The unit step along which it separates; it is installed along the opposite. Without meaning for the first piece.
+    /// The unit step along which it separates; it is installed along the opposite. Without meaning for the
+    /// first piece.
     pub separation: LatticeDirection,
 }
 
-/// The order in which pieces are installed, first to last, each with its direction. The last piece is the key.
+/// The order in which pieces are installed, first to last, each with its direction. The last piece is the
+/// key.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InstallationPlan {
     /// First to last; every piece once; at least two.
@@ -28,7 +30,10 @@ impl InstallationPlan {
 
     /// Position of `piece` in the order, 0 for the first installed.
     pub fn position(&self, piece: PatchId) -> usize {
-        self.steps.iter().position(|s| s.piece == piece).expect("a plan names every piece once")
+        self.steps
+            .iter()
+            .position(|s| s.piece == piece)
+            .expect("a plan names every piece once")
     }
 
     /// The separation direction of `piece`.

@@ -1,10 +1,11 @@
 //! Whether the finished pieces are solids, keep the model's look, go together and hold.
 //!
-//! Works on the meshes as they will be written and the plan alone, and knows nothing of how they were made. The limits and
-//! their reasons are in [`limits`]. A broken piece is reported and left out of the checks that need its volume.
+//! Works on the meshes as they will be written and the plan alone, and knows nothing of how they were made.
+//! The limits and their reasons are in [`limits`]. A broken piece is reported and left out of the checks that
+//! need its volume.
 //!
-//! Limits: motions are infinitesimal here and contacts taken as touching; what the clearance leaves is the question of [`crate::play`].
-//! Walls may bend in reality, and friction is ignored.
+//! Limits: motions are infinitesimal here and contacts taken as touching; what the clearance leaves is the
+//! question of [`crate::play`]. Walls may bend in reality, and friction is ignored.
 
 pub mod clearance;
 pub mod contact;
@@ -37,7 +38,8 @@ pub use thin::{ThinShare, thin_share};
 /// How the finished kit is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerifyParams {
-    /// Gap left between mating faces, mm. [0, 1]; 0.12. Faces up to 0.15 mm farther apart still hold each other.
+    /// Gap left between mating faces, mm. [0, 1]; 0.12. Faces up to 0.15 mm farther apart still hold each
+    /// other.
     pub clearance_mm: f64,
     /// Where the sample points fall; any number.
     pub seed: u64,
@@ -45,7 +47,10 @@ pub struct VerifyParams {
 
 impl Default for VerifyParams {
     fn default() -> Self {
-        Self { clearance_mm: 0.12, seed: 0 }
+        Self {
+            clearance_mm: 0.12,
+            seed: 0,
+        }
     }
 }
 
@@ -62,7 +67,11 @@ pub struct Check {
 
 impl Check {
     pub(crate) fn new(name: &str, ok: bool, figure: String) -> Self {
-        Self { name: name.to_owned(), ok, figure }
+        Self {
+            name: name.to_owned(),
+            ok,
+            figure,
+        }
     }
 }
 
@@ -79,7 +88,11 @@ pub struct Motion {
 
 impl From<&Twist> for Motion {
     fn from(t: &Twist) -> Self {
-        Self { piece: t.piece, velocity: t.velocity.to_array(), spin: t.spin.to_array() }
+        Self {
+            piece: t.piece,
+            velocity: t.velocity.to_array(),
+            spin: t.spin.to_array(),
+        }
     }
 }
 
@@ -98,7 +111,8 @@ pub struct Play {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Finding {
-    /// The plan does not name `piece` exactly once, or there is no such piece; what needs a plan was not checked.
+    /// The plan does not name `piece` exactly once, or there is no such piece; what needs a plan was not
+    /// checked.
     PlanBroken {
         /// The piece.
         piece: PatchId,
@@ -244,17 +258,23 @@ pub struct Assembly<'a> {
     pub press_fits: &'a [PressFit],
 }
 
-/// Judges the finished pieces of a model and their plan; every ending but a stop is an answer. Also the contacts of the pieces,
-/// from which a certificate is made; none where the plan is broken.
+/// Judges the finished pieces of a model and their plan; every ending but a stop is an answer. Also the
+/// contacts of the pieces, from which a certificate is made; none where the plan is broken.
 ///
-/// A function of its arguments alone, on any number of threads. Ten pieces of 26 000 triangles take 3.5 s on two cores where every
-/// contact is doubtful, because no joint has a gap or a connector; most of it goes into the pushes.
+/// A function of its arguments alone, on any number of threads. Ten pieces of 26 000 triangles take 3.5 s on
+/// two cores where every contact is doubtful, because no joint has a gap or a connector; most of it goes into
+/// the pushes.
 pub fn examine(
     ctx: &Ctx,
     params: &VerifyParams,
     assembly: &Assembly<'_>,
 ) -> Result<(Verification, Vec<Contact>), Cancelled> {
-    let &Assembly { model, pieces, plan, press_fits } = assembly;
+    let &Assembly {
+        model,
+        pieces,
+        plan,
+        press_fits,
+    } = assembly;
     ctx.stage("verify", 0)?;
     let mut verdict = Verification::default();
     verdict.add(check_plan(pieces, plan));
@@ -273,9 +293,18 @@ pub fn examine(
     let length_mm = model.mesh().bounds().diagonal();
     verdict.add(path::check(ctx, &bodies, &plan.steps, length_mm)?);
     let contacts = contact::find(ctx, &bodies, params.clearance_mm, params.seed)?;
-    verdict.add(probe::check(ctx, &bodies, &contacts, plan.key(), params.clearance_mm)?);
+    verdict.add(probe::check(
+        ctx,
+        &bodies,
+        &contacts,
+        plan.key(),
+        params.clearance_mm,
+    )?);
     for (name, freedom) in [
-        ("no cluster but the key slides (translations)", Freedom::Translations),
+        (
+            "no cluster but the key slides (translations)",
+            Freedom::Translations,
+        ),
         ("nothing but the key moves (6 dof)", Freedom::Rigid),
     ] {
         ctx.check()?;
@@ -296,13 +325,21 @@ fn check_plan(pieces: &IdVec<PatchId, TriMesh>, plan: &InstallationPlan) -> (Che
         .map(|p| Finding::PlanBroken { piece: p.into() })
         .collect();
     let ok = wrong.is_empty() && n >= 2;
-    (Check::new("plan names every piece once", ok, format!("{} steps, {} pieces", named.len(), pieces.len())), wrong)
+    (
+        Check::new(
+            "plan names every piece once",
+            ok,
+            format!("{} steps, {} pieces", named.len(), pieces.len()),
+        ),
+        wrong,
+    )
 }
 
-/// Whether contacts, taken as touching, allow a motion of other pieces than the key while the first piece rests.
+/// Whether contacts, taken as touching, allow a motion of other pieces than the key while the first piece
+/// rests.
 ///
-/// Which piece is held does not matter: of a group that moves and the rest, one lacks it. The key may move: else its own way out,
-/// seen from the key, would count as a motion of all others.
+/// Which piece is held does not matter: of a group that moves and the rest, one lacks it. The key may move:
+/// else its own way out, seen from the key, would count as a motion of all others.
 fn check_motion(
     name: &str,
     plan: &InstallationPlan,
@@ -311,7 +348,14 @@ fn check_motion(
     freedom: Freedom,
 ) -> (Check, Option<Finding>) {
     let held = [plan.steps[0].piece];
-    let moving = motion::free_motion(contacts, plan.steps.len(), &held, Some(plan.key()), scale_mm, freedom);
+    let moving = motion::free_motion(
+        contacts,
+        plan.steps.len(),
+        &held,
+        Some(plan.key()),
+        scale_mm,
+        freedom,
+    );
     let figure = format!("{} pieces move; {} contacts", moving.len(), contacts.len());
     let motions = || moving.iter().map(Motion::from).collect();
     let finding = (!moving.is_empty()).then(|| Finding::ClusterMoves { motions: motions() });

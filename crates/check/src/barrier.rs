@@ -1,11 +1,12 @@
 //! How far a point rises before a closed surface stops it, while it stays within a prism.
 //!
-//! The prism is open, eight-sided and endless along a normal. From a triangle above the point one goes on over every edge
-//! that has a part in the prism, to all triangles of that edge. What is found, `S`, ends nowhere within the prism: each of
-//! its edges there has an even number of triangles of `S`, as the surface is closed. So how often, modulo 2, `S` is met above
-//! a place changes only where a path within the prism crosses `S`. A point that starts with an odd number above it and
-//! crosses no surface keeps an odd number above it, hence never comes higher than the highest place of `S` in the prism.
-//! Going on over more edges than needed does no harm.
+//! The prism is open, eight-sided and endless along a normal. From a triangle above the point one goes on
+//! over every edge that has a part in the prism, to all triangles of that edge. What is found, `S`, ends
+//! nowhere within the prism: each of its edges there has an even number of triangles of `S`, as the surface
+//! is closed. So how often, modulo 2, `S` is met above a place changes only where a path within the prism
+//! crosses `S`. A point that starts with an odd number above it and crosses no surface keeps an odd number
+//! above it, hence never comes higher than the highest place of `S` in the prism. Going on over more edges
+//! than needed does no harm.
 
 use crate::mesh::Mesh;
 use crate::vector::{Vec3, add, cross, dot, scale, sub};
@@ -36,7 +37,16 @@ impl Frame {
         let [u, v] = [self.across, self.up()];
         let slanted = |x: Vec3, y: Vec3| scale(add(x, y), std::f64::consts::FRAC_1_SQRT_2);
         let [minus_u, minus_v] = [u, v].map(|x| scale(x, -1.0));
-        [u, slanted(u, v), v, slanted(minus_u, v), minus_u, slanted(minus_u, minus_v), minus_v, slanted(u, minus_v)]
+        [
+            u,
+            slanted(u, v),
+            v,
+            slanted(minus_u, v),
+            minus_u,
+            slanted(minus_u, minus_v),
+            minus_v,
+            slanted(u, minus_v),
+        ]
     }
 
     fn up(&self) -> Vec3 {
@@ -47,8 +57,9 @@ impl Frame {
         dot(self.normal, sub(p, self.origin))
     }
 
-    /// Height at which the line through the origin along the normal meets a triangle. Of triangles that share an edge it meets either one or none on each side: ends are compared by the same sum whichever
-    /// triangle asks, and heights are those of the ends that decided.
+    /// Height at which the line through the origin along the normal meets a triangle. Of triangles that share
+    /// an edge it meets either one or none on each side: ends are compared by the same sum whichever triangle
+    /// asks, and heights are those of the ends that decided.
     fn meets(&self, t: &[Vec3; 3]) -> Option<f64> {
         let flat = t.map(|p| {
             let off = sub(p, self.origin);
@@ -62,10 +73,20 @@ impl Frame {
                 continue;
             }
             let (beside, rise) = (low[0] * high[1] - high[0] * low[1], high[1] - low[1]);
-            crossings.push([beside, beside / rise, low[2] - (high[2] - low[2]) * (low[1] / rise)]);
+            crossings.push([
+                beside,
+                beside / rise,
+                low[2] - (high[2] - low[2]) * (low[1] / rise),
+            ]);
         }
-        let [[p, x, from], [q, y, to]] = crossings[..] else { return None };
-        let share = if x == y { 0.5 } else { (x / (x - y)).clamp(0.0, 1.0) };
+        let [[p, x, from], [q, y, to]] = crossings[..] else {
+            return None;
+        };
+        let share = if x == y {
+            0.5
+        } else {
+            (x / (x - y)).clamp(0.0, 1.0)
+        };
         ((p > 0.0) != (q > 0.0)).then_some(from + (to - from) * share)
     }
 }
@@ -81,7 +102,11 @@ pub struct Prism {
 impl Prism {
     /// Sides are `far_mm` from the line, in the order of [`Frame::sides`].
     pub fn new(frame: Frame, far_mm: [f64; SIDES]) -> Self {
-        Self { frame, sides: frame.sides(), far_mm }
+        Self {
+            frame,
+            sides: frame.sides(),
+            far_mm,
+        }
     }
 
     /// By how much `p` is beyond a side, mm; negative within.
@@ -106,7 +131,10 @@ impl Prism {
             }
             polygon = kept;
         }
-        polygon.into_iter().map(|p| self.frame.height(p)).max_by(f64::total_cmp)
+        polygon
+            .into_iter()
+            .map(|p| self.frame.height(p))
+            .max_by(f64::total_cmp)
     }
 
     /// Whether a part of the edge from `p` to `q` is within.
@@ -133,14 +161,20 @@ struct Flooded {
     n_above: usize,
 }
 
-/// All that hangs together with triangle `first` within `prism`; an error where that is too much or not lower than `most_mm`.
+/// All that hangs together with triangle `first` within `prism`; an error where that is too much or not lower
+/// than `most_mm`.
 fn flood(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> Result<Flooded, String> {
-    let mut flooded = Flooded { highest_mm: f64::NEG_INFINITY, n_above: 0 };
+    let mut flooded = Flooded {
+        highest_mm: f64::NEG_INFINITY,
+        n_above: 0,
+    };
     let (mut found, mut next) = (vec![first], 0);
     while let Some(&t) = found.get(next) {
         next += 1;
         let corners = &mesh.triangles[t];
-        let Some(highest_mm) = prism.highest_mm(corners) else { continue };
+        let Some(highest_mm) = prism.highest_mm(corners) else {
+            continue;
+        };
         flooded.highest_mm = flooded.highest_mm.max(highest_mm);
         flooded.n_above += usize::from(prism.frame.meets(corners).is_some_and(|height| height > 0.0));
         if flooded.highest_mm >= most_mm {
@@ -157,23 +191,36 @@ fn flood(mesh: &Mesh, first: usize, prism: &Prism, most_mm: f64) -> Result<Flood
             return Err(format!("more than {MOST_TRIANGLES} triangles are above"));
         }
     }
-    if flooded.highest_mm.is_finite() { Ok(flooded) } else { Err("no surface is there".into()) }
+    if flooded.highest_mm.is_finite() {
+        Ok(flooded)
+    } else {
+        Err("no surface is there".into())
+    }
 }
 
-/// Height of the barrier that `mesh` is for a point at the prism's origin, mm: it rises no higher while it stays within.
+/// Height of the barrier that `mesh` is for a point at the prism's origin, mm: it rises no higher while it
+/// stays within.
 pub fn rise_mm(mesh: &Mesh, prism: &Prism) -> Result<f64, String> {
-    let (from, to) = (prism.frame.origin, add(prism.frame.origin, scale(prism.frame.normal, MOST_RISE_MM)));
+    let (from, to) = (
+        prism.frame.origin,
+        add(prism.frame.origin, scale(prism.frame.normal, MOST_RISE_MM)),
+    );
     let low = std::array::from_fn(|k| from[k].min(to[k]) - BESIDE_RAY_MM);
     let high = std::array::from_fn(|k| from[k].max(to[k]) + BESIDE_RAY_MM);
     let mut above: Option<(usize, f64)> = None;
     for t in mesh.in_box(low, high) {
-        let height = prism.frame.meets(&mesh.triangles[t]).filter(|height| *height > 0.0 && *height <= MOST_RISE_MM);
+        let height = prism
+            .frame
+            .meets(&mesh.triangles[t])
+            .filter(|height| *height > 0.0 && *height <= MOST_RISE_MM);
         above = match (above, height) {
             (Some(least), Some(height)) if least.1 <= height => Some(least),
             (least, height) => height.map(|height| (t, height)).or(least),
         };
     }
-    let Some((first, height)) = above else { return Err("nothing is above".into()) };
+    let Some((first, height)) = above else {
+        return Err("nothing is above".into());
+    };
     let [a, b, c] = mesh.triangles[first];
     // A point within the other piece has its surface from inside above it: that stops nothing.
     if dot(cross(sub(b, a), sub(c, a)), prism.frame.normal) >= 0.0 {
@@ -196,11 +243,21 @@ mod tests {
     use super::*;
     use crate::mesh::tests::cuboid;
 
-    const UP: Frame = Frame { origin: [0.0, 0.0123, 0.0], normal: [0.0, 0.0, 1.0], across: [1.0, 0.0, 0.0] };
+    const UP: Frame = Frame {
+        origin: [0.0, 0.0123, 0.0],
+        normal: [0.0, 0.0, 1.0],
+        across: [1.0, 0.0, 0.0],
+    };
 
     /// As far to all sides, from a point that is `sideways` along x.
     fn around(sideways: f64, far_mm: f64) -> Prism {
-        Prism::new(Frame { origin: [sideways, 0.0123, 0.0], ..UP }, [far_mm; SIDES])
+        Prism::new(
+            Frame {
+                origin: [sideways, 0.0123, 0.0],
+                ..UP
+            },
+            [far_mm; SIDES],
+        )
     }
 
     fn is_near(found: Result<f64, String>, expected_mm: f64) -> bool {
@@ -216,7 +273,10 @@ mod tests {
         let mut triangles = Vec::new();
         for i in 0..n {
             let (p, q) = (outline[i], outline[(i + 1) % n]);
-            triangles.extend([[at(p, -2.0), at(q, -2.0), at(q, 2.0)], [at(p, -2.0), at(q, 2.0), at(p, 2.0)]]);
+            triangles.extend([
+                [at(p, -2.0), at(q, -2.0), at(q, 2.0)],
+                [at(p, -2.0), at(q, 2.0), at(p, 2.0)],
+            ]);
         }
         for i in 0..profile.len() - 1 {
             let [p, q, r, s] = [outline[i], outline[i + 1], outline[n - 2 - i], outline[n - 1 - i]];
@@ -231,11 +291,17 @@ mod tests {
         roof
     }
 
-    /// A wedge below the point: with a frame that is perpendicular to 1e-9 alone, hits and heights told by different directions found it above.
+    /// A wedge below the point: with a frame that is perpendicular to 1e-9 alone, hits and heights told by
+    /// different directions found it above.
     #[test]
     fn a_height_is_told_by_the_ends_that_decide_the_hit() {
-        let frame = Frame { origin: [3e-10, 0.0, 0.0], normal: [-4e-10, 0.0, 1.0], across: [1.0, 0.0, -5e-10] };
-        let wedge = [[12.5, -1.0, -2.0], [12.5, 1.0, -2.0], [12.5, 1.0, 0.9]].map(|[x, y, z]| [x - 12.5, y, z]);
+        let frame = Frame {
+            origin: [3e-10, 0.0, 0.0],
+            normal: [-4e-10, 0.0, 1.0],
+            across: [1.0, 0.0, -5e-10],
+        };
+        let wedge =
+            [[12.5, -1.0, -2.0], [12.5, 1.0, -2.0], [12.5, 1.0, 0.9]].map(|[x, y, z]| [x - 12.5, y, z]);
         assert!(frame.meets(&wedge).is_none_or(|height| height < 0.0));
     }
 
@@ -244,9 +310,15 @@ mod tests {
         let high = cuboid([-2.0, -2.0, 0.3], [2.0, 2.0, 8.0]);
         assert!(is_near(rise_mm(&high, &around(0.0, 1.9)), 0.3));
         assert!(is_near(rise_mm(&high, &around(1.0, 0.99)), 0.3));
-        assert!(rise_mm(&high, &around(1.0, 1.01)).is_err(), "beside it a point rises to the top");
+        assert!(
+            rise_mm(&high, &around(1.0, 1.01)).is_err(),
+            "beside it a point rises to the top"
+        );
         let low = cuboid([-2.0, -2.0, 0.3], [2.0, 2.0, 0.9]);
-        assert!(rise_mm(&low, &around(1.0, 1.01)).is_err(), "beside a low one, too");
+        assert!(
+            rise_mm(&low, &around(1.0, 1.01)).is_err(),
+            "beside a low one, too"
+        );
         let far = cuboid([-2.0, -2.0, 1.1], [2.0, 2.0, 8.0]);
         assert!(rise_mm(&far, &around(0.0, 0.5)).is_err(), "too far above");
     }
@@ -258,10 +330,23 @@ mod tests {
         assert!(is_near(rise_mm(&step, &around(0.0, 0.51)), 0.4));
         let mut far_mm = [0.51; SIDES];
         far_mm[0] = 0.49;
-        assert!(is_near(rise_mm(&step, &Prism::new(UP, far_mm)), 0.3), "that side alone is near");
+        assert!(
+            is_near(rise_mm(&step, &Prism::new(UP, far_mm)), 0.3),
+            "that side alone is near"
+        );
         let pit = |deep_mm: f64| {
             let z = 0.3 + deep_mm;
-            roof(&[[-2.0, 0.3], [0.5, 0.3], [0.5, z], [0.7, z], [0.7, 0.3], [2.0, 0.3]], 8.0)
+            roof(
+                &[
+                    [-2.0, 0.3],
+                    [0.5, 0.3],
+                    [0.5, z],
+                    [0.7, z],
+                    [0.7, 0.3],
+                    [2.0, 0.3],
+                ],
+                8.0,
+            )
         };
         assert!(is_near(rise_mm(&pit(0.2), &around(0.0, 0.6)), 0.5));
         assert!(is_near(rise_mm(&pit(2.0), &around(0.0, 0.49)), 0.3));
@@ -281,31 +366,49 @@ mod tests {
         let below = cuboid([-2.0, -2.0, -3.0], [2.0, 2.0, -1.0]);
         assert!(rise_mm(&below, &around(0.0, 0.5)).is_err(), "nothing is above");
         let thin = cuboid([-0.4, -2.0, 0.3], [0.4, 2.0, 0.5]);
-        assert!(rise_mm(&thin, &around(0.0, 0.5)).is_err(), "two sheets: the point passes beside");
+        assert!(
+            rise_mm(&thin, &around(0.0, 0.5)).is_err(),
+            "two sheets: the point passes beside"
+        );
         assert!(is_near(rise_mm(&thin, &around(0.0, 0.39)), 0.3));
         // A top whose edges are within is reached from the triangle below it.
-        let first = (0..12).find(|&t| below.triangles[t].iter().all(|p| p[2] == -1.0)).unwrap();
+        let first = (0..12)
+            .find(|&t| below.triangles[t].iter().all(|p| p[2] == -1.0))
+            .unwrap();
         assert_eq!(flood(&below, first, &around(0.0, 0.5), 1.0).unwrap().n_above, 0);
     }
 
     #[test]
     fn a_triangle_is_clipped_to_the_prism() {
         let large = [[-9.0, -9.0, 1.0], [9.0, -9.0, 1.0], [0.0, 18.0, 1.0]];
-        assert_eq!(around(0.0, 0.5).highest_mm(&large), Some(1.0), "larger than the prism, no edge within");
+        assert_eq!(
+            around(0.0, 0.5).highest_mm(&large),
+            Some(1.0),
+            "larger than the prism, no edge within"
+        );
         assert!(!around(0.0, 0.5).has_part(large[0], large[1]));
         let steep = [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0], [0.0, 0.01, 0.0]];
         assert!((around(0.0, 0.25).highest_mm(&steep).unwrap() - 0.5).abs() < 1e-12);
         assert!(around(0.0, 0.25).has_part(steep[0], steep[1]));
         let wall = [[0.2, -1.0, -1.0], [0.2, 1.0, -1.0], [0.2, 0.0, 0.6]];
-        assert!((around(0.0, 0.25).highest_mm(&wall).unwrap() - 0.6).abs() < 1e-12, "parallel to the normal");
+        assert!(
+            (around(0.0, 0.25).highest_mm(&wall).unwrap() - 0.6).abs() < 1e-12,
+            "parallel to the normal"
+        );
         assert_eq!(around(0.0, 0.15).highest_mm(&wall), None);
-        assert!(!around(0.0, 0.25).has_part([0.4, 0.0, 0.0], [0.0, 0.4123, 0.0]), "beyond a slanted side");
+        assert!(
+            !around(0.0, 0.25).has_part([0.4, 0.0, 0.0], [0.0, 0.4123, 0.0]),
+            "beyond a slanted side"
+        );
         assert!(around(0.0, 0.29).has_part([0.4, 0.0123, 0.0], [0.0, 0.4123, 0.0]));
     }
 
     #[test]
     fn a_line_meets_one_of_the_triangles_around_a_point_or_an_edge() {
-        let ring: Vec<Vec3> = (0..6).map(f64::from).map(|a| [a.cos(), a.sin() + 0.0123, 0.5]).collect();
+        let ring: Vec<Vec3> = (0..6)
+            .map(f64::from)
+            .map(|a| [a.cos(), a.sin() + 0.0123, 0.5])
+            .collect();
         let fan = (0..6).map(|i| [[0.0, 0.0123, 0.5], ring[i], ring[(i + 1) % 6]]);
         assert_eq!(fan.filter(|t| UP.meets(t).is_some()).count(), 1);
     }

@@ -31,7 +31,11 @@ pub struct Bearing {
 impl Bearing {
     /// Where its point is and what it rises along.
     pub fn frame(&self) -> Frame {
-        Frame { origin: self.point, normal: self.normal, across: self.across }
+        Frame {
+            origin: self.point,
+            normal: self.normal,
+            across: self.across,
+        }
     }
 
     /// With the point that is on the surface of `a`; an error where it is not there, or on a speck.
@@ -43,9 +47,16 @@ impl Bearing {
         let (Some(own), Some(_), true) = (meshes.get(self.a), meshes.get(self.b), self.a != self.b) else {
             return Err("is not one of two pieces".into());
         };
-        let (triangle, point) = own.on_surface(self.point).ok_or_else(|| format!("is not on piece {}", self.a))?;
+        let (triangle, point) = own
+            .on_surface(self.point)
+            .ok_or_else(|| format!("is not on piece {}", self.a))?;
         let (normal, across) = exact(self.normal, self.across);
-        let bearing = Self { point, normal, across, ..self.clone() };
+        let bearing = Self {
+            point,
+            normal,
+            across,
+            ..self.clone()
+        };
         match bearing.has_bed(own, triangle) {
             true => Ok(bearing),
             false => Err(format!("is on a speck of piece {}", self.a)),
@@ -54,16 +65,22 @@ impl Bearing {
 
     /// Whether the surface around `triangle` is wide enough to one side of the point.
     fn has_bed(&self, own: &Mesh, triangle: usize) -> bool {
-        let down = Frame { normal: scale(self.normal, -1.0), ..self.frame() };
+        let down = Frame {
+            normal: scale(self.normal, -1.0),
+            ..self.frame()
+        };
         (0..SIDES).any(|side| {
             let mut far_mm = [BED_MM; SIDES];
-            [side, side + 1, side + 2].iter().for_each(|k| far_mm[k % SIDES] = BEHIND_MM);
+            [side, side + 1, side + 2]
+                .iter()
+                .for_each(|k| far_mm[k % SIDES] = BEHIND_MM);
             stays_below(own, triangle, &Prism::new(down, far_mm), BED_DROP_MM)
         })
     }
 }
 
-/// The nearest unit vectors that are perpendicular but for rounding: hits and heights are told by the same frame.
+/// The nearest unit vectors that are perpendicular but for rounding: hits and heights are told by the same
+/// frame.
 fn exact(normal: Vec3, across: Vec3) -> (Vec3, Vec3) {
     let unit = |v: Vec3| scale(v, 1.0 / norm(v));
     let normal = unit(unit(normal));
@@ -74,7 +91,11 @@ fn exact(normal: Vec3, across: Vec3) -> (Vec3, Vec3) {
 
 /// All with the points that are on the pieces' surfaces.
 pub fn located(meshes: &[Mesh], bearings: &[Bearing]) -> Result<Vec<Bearing>, String> {
-    let locate = |(i, bearing): (usize, &Bearing)| bearing.located(meshes).map_err(|why| format!("bearing {i} {why}"));
+    let locate = |(i, bearing): (usize, &Bearing)| {
+        bearing
+            .located(meshes)
+            .map_err(|why| format!("bearing {i} {why}"))
+    };
     bearings.iter().enumerate().map(locate).collect()
 }
 
@@ -86,8 +107,17 @@ mod tests {
     /// At the top of a box of `width_mm`, so far from the middle.
     fn at_top(width_mm: f64, x: f64, y: f64, z: f64) -> Result<Vec<Bearing>, String> {
         let half = 0.5 * width_mm;
-        let meshes = [cuboid([-half, -half, -5.0], [half, half, 0.0]), cuboid([-9.0, -9.0, 0.1], [9.0, 9.0, 5.0])];
-        let up = Bearing { a: 0, b: 1, point: [x, y, z], normal: [0.0, 0.0, 1.0], across: [1.0, 0.0, 0.0] };
+        let meshes = [
+            cuboid([-half, -half, -5.0], [half, half, 0.0]),
+            cuboid([-9.0, -9.0, 0.1], [9.0, 9.0, 5.0]),
+        ];
+        let up = Bearing {
+            a: 0,
+            b: 1,
+            point: [x, y, z],
+            normal: [0.0, 0.0, 1.0],
+            across: [1.0, 0.0, 0.0],
+        };
         located(&meshes, &[up])
     }
 
@@ -104,12 +134,27 @@ mod tests {
 
     #[test]
     fn directions_are_perpendicular_unit_vectors_of_two_pieces() {
-        let meshes = [cuboid([-2.0; 3], [2.0, 2.0, 0.0]), cuboid([-2.0, -2.0, 0.1], [2.0; 3])];
-        let good = Bearing { a: 0, b: 1, point: [0.3, 0.2, 0.0], normal: [0.0, 0.0, 1.0], across: [1.0, 0.0, 0.0] };
+        let meshes = [
+            cuboid([-2.0; 3], [2.0, 2.0, 0.0]),
+            cuboid([-2.0, -2.0, 0.1], [2.0; 3]),
+        ];
+        let good = Bearing {
+            a: 0,
+            b: 1,
+            point: [0.3, 0.2, 0.0],
+            normal: [0.0, 0.0, 1.0],
+            across: [1.0, 0.0, 0.0],
+        };
         let is_good = |bearing: Bearing| located(&meshes, &[bearing]).is_ok();
         assert!(is_good(good.clone()));
-        assert!(!is_good(Bearing { normal: [0.0, 0.0, 1.00001], ..good.clone() }));
-        assert!(!is_good(Bearing { across: [0.8, 0.0, 0.6], ..good.clone() }));
+        assert!(!is_good(Bearing {
+            normal: [0.0, 0.0, 1.00001],
+            ..good.clone()
+        }));
+        assert!(!is_good(Bearing {
+            across: [0.8, 0.0, 0.6],
+            ..good.clone()
+        }));
         assert!(!is_good(Bearing { b: 0, ..good.clone() }));
         assert!(!is_good(Bearing { b: 2, ..good }));
     }

@@ -1,9 +1,10 @@
 //! Whether multipliers show that some pieces go no farther than told, however they move.
 //!
-//! Poses are `exp(ξ)`, `ξ = (w, v)`, of each piece that is free, with the velocity field `u(x) = v + w × x`. What is bounded is
-//! linear in the `ξ`, and so are the rows, which say how far a bearing's point rises. As long as all bounds hold, each point
-//! stays within its prism, so below its barrier, so each row is at most a number. If from the rows the multipliers give bounds
-//! that are below those told, nothing that moves on a path from rest is ever at one of these (docs/certificate.md).
+//! Poses are `exp(ξ)`, `ξ = (w, v)`, of each piece that is free, with the velocity field `u(x) = v + w × x`.
+//! What is bounded is linear in the `ξ`, and so are the rows, which say how far a bearing's point rises. As
+//! long as all bounds hold, each point stays within its prism, so below its barrier, so each row is at most a
+//! number. If from the rows the multipliers give bounds that are below those told, nothing that moves on a
+//! path from rest is ever at one of these (docs/certificate.md).
 
 use serde::Deserialize;
 
@@ -88,7 +89,12 @@ pub fn test(kit: &Kit<'_>, claim: &Bounded) -> Result<Play, String> {
     claim.test_form(kit.meshes.len())?;
     let n_rows = claim.rows.len();
     let row = |(i, row): (usize, &[usize; 3])| claim.row(kit, row).map_err(|why| format!("row {i}: {why}"));
-    let mut rows = claim.rows.iter().enumerate().map(row).collect::<Result<Vec<Row>, String>>()?;
+    let mut rows = claim
+        .rows
+        .iter()
+        .enumerate()
+        .map(row)
+        .collect::<Result<Vec<Row>, String>>()?;
     let mut named = claim.multipliers.iter().flatten().flatten().flatten();
     let is_slide_named = named.any(|(row, _)| *row == n_rows);
     if is_slide_named {
@@ -101,16 +107,33 @@ pub fn test(kit: &Kit<'_>, claim: &Bounded) -> Result<Play, String> {
             }
         }
     }
-    let farthest = |k: usize| claim.of_piece.iter().map(|q| claim.quantities[q[k]].norm()).fold(0.0, f64::max);
+    let farthest = |k: usize| {
+        claim
+            .of_piece
+            .iter()
+            .map(|q| claim.quantities[q[k]].norm())
+            .fold(0.0, f64::max)
+    };
     // Told is how far a centroid goes, wherever displacements are bounded.
     let of_centroid = |(&piece, &[turn, shift]): (&usize, &[usize; 2])| {
         let (turn, shift) = (&claim.quantities[turn], &claim.quantities[shift]);
-        let off_mm = shift.at.map_or(0.0, |at| distance(at, kit.meshes[piece].centroid()));
+        let off_mm = shift
+            .at
+            .map_or(0.0, |at| distance(at, kit.meshes[piece].centroid()));
         shift.norm() + turn.norm() * off_mm
     };
-    let shift_mm = claim.free.iter().zip(&claim.of_piece).map(of_centroid).fold(0.0, f64::max);
+    let shift_mm = claim
+        .free
+        .iter()
+        .zip(&claim.of_piece)
+        .map(of_centroid)
+        .fold(0.0, f64::max);
     let slid_mm = kit.slide.filter(|_| is_slide_named).map(|s| s.most_mm);
-    Ok(Play { shift_mm, turn_deg: farthest(0).to_degrees(), slid_mm })
+    Ok(Play {
+        shift_mm,
+        turn_deg: farthest(0).to_degrees(),
+        slid_mm,
+    })
 }
 
 impl Bounded {
@@ -124,7 +147,8 @@ impl Bounded {
         self.place(piece).map(|_| piece)
     }
 
-    /// Everything is there and names what is there; each piece's turn and displacement are among the quantities.
+    /// Everything is there and names what is there; each piece's turn and displacement are among the
+    /// quantities.
     fn test_form(&self, n_pieces: usize) -> Result<(), String> {
         let n = self.quantities.len();
         let is_ascending = self.free.windows(2).all(|pair| pair[0] < pair[1]);
@@ -132,14 +156,17 @@ impl Bounded {
             return Err("the free pieces are not some pieces in ascending order".into());
         }
         for (i, quantity) in self.quantities.iter().enumerate() {
-            quantity.test(&self.free).map_err(|why| format!("quantity {i} {why}"))?;
+            quantity
+                .test(&self.free)
+                .map_err(|why| format!("quantity {i} {why}"))?;
         }
         let is_of = |q: usize, piece: usize, is_turn: bool| {
             let is_it = |q: &Quantity| (q.plus, q.minus, q.at.is_none()) == (Some(piece), None, is_turn);
             self.quantities.get(q).is_some_and(is_it)
         };
         let mut own = self.free.iter().zip(&self.of_piece);
-        let are_own = own.all(|(&piece, &[turn, shift])| is_of(turn, piece, true) && is_of(shift, piece, false));
+        let are_own =
+            own.all(|(&piece, &[turn, shift])| is_of(turn, piece, true) && is_of(shift, piece, false));
         if self.of_piece.len() != self.free.len() || !are_own {
             return Err("a free piece has no bounds of its turn and displacement".into());
         }
@@ -155,7 +182,9 @@ impl Bounded {
 
     /// Most turn of a piece, rad, and most displacement of its place `at`, mm; 0 for one at rest.
     fn most_of(&self, piece: usize, at: Vec3) -> [f64; 2] {
-        let Some(i) = self.place(piece) else { return [0.0; 2] };
+        let Some(i) = self.place(piece) else {
+            return [0.0; 2];
+        };
         let [turn, shift] = self.of_piece[i].map(|q| self.quantities[q].norm());
         [turn, shift + turn * distance(at, self.place_of(i))]
     }
@@ -165,11 +194,20 @@ impl Bounded {
         self.quantities[self.of_piece[i][1]].at.unwrap_or_default()
     }
 
-    /// The displacement along `d` at a place (or with none the turn about `d`) of `plus` less that of `minus`.
-    fn factors(&self, plus: Option<usize>, minus: Option<usize>, at: Option<Vec3>, d: Vec3) -> Vec<(usize, f64)> {
+    /// The displacement along `d` at a place (or with none the turn about `d`) of `plus` less that of
+    /// `minus`.
+    fn factors(
+        &self,
+        plus: Option<usize>,
+        minus: Option<usize>,
+        at: Option<Vec3>,
+        d: Vec3,
+    ) -> Vec<(usize, f64)> {
         let mut factors = Vec::with_capacity(2 * UNKNOWNS);
         for (piece, sign) in [(plus, 1.0), (minus, -1.0)] {
-            let Some(i) = piece.and_then(|piece| self.place(piece)) else { continue };
+            let Some(i) = piece.and_then(|piece| self.place(piece)) else {
+                continue;
+            };
             let parts = match at {
                 Some(at) => [d, cross(sub(at, self.place_of(i)), d)],
                 None => [[0.0; 3], d],
@@ -187,7 +225,9 @@ impl Bounded {
             return Err(format!("pieces {} and {} are at rest", b.a, b.b));
         }
         let [cell, turn] = [cell, turn].map(|q| &self.quantities[q]);
-        let (Some(at), None) = (cell.at, turn.at) else { return Err("has no displacement and turn".into()) };
+        let (Some(at), None) = (cell.at, turn.at) else {
+            return Err("has no displacement and turn".into());
+        };
         let signs = cell.sign(freed_a, freed_b).zip(turn.sign(freed_a, freed_b));
         let Some((of_cell, of_turn)) = signs else {
             return Err(format!("its quantities are not of pieces {} and {}", b.a, b.b));
@@ -196,7 +236,11 @@ impl Bounded {
         let most_turn = turn.norm();
         let most_mm = cell.norm() + most_turn * norm(off);
         // Where `b` is at rest, the displacement of `a` is that of the cell; where `a` is, it is 0.
-        let of_a_mm = if freed_b.is_none() { most_mm } else { self.most_of(b.a, b.point)[1] };
+        let of_a_mm = if freed_b.is_none() {
+            most_mm
+        } else {
+            self.most_of(b.a, b.point)[1]
+        };
         let error_mm = 0.5 * self.most_of(b.b, b.point)[0] * most_mm + 0.5 * most_turn * of_a_mm;
         let far_mm = b.frame().sides().map(|side| {
             let turned_mm = turn.most_along(scale(cross(off, side), of_turn));
@@ -204,7 +248,10 @@ impl Bounded {
         });
         let rise_mm = rise_mm(&kit.meshes[b.b], &Prism::new(b.frame(), far_mm))?;
         let factors = self.factors(freed_a, freed_b, Some(b.point), b.normal);
-        Ok(Row { factors, most_mm: rise_mm + error_mm })
+        Ok(Row {
+            factors,
+            most_mm: rise_mm + error_mm,
+        })
     }
 
     /// What the slide says of a free key.
@@ -214,14 +261,30 @@ impl Bounded {
         if self.place(slide.key).is_none() {
             return Err("the slide is that of a key at rest".into());
         }
-        let ([key, key_mm], [seat, seat_mm]) = (self.most_of(slide.key, slide.at), self.most_of(slide.seat, slide.at));
+        let ([key, key_mm], [seat, seat_mm]) = (
+            self.most_of(slide.key, slide.at),
+            self.most_of(slide.seat, slide.at),
+        );
         let error_mm = 0.5 * seat * (key_mm + seat_mm) + 0.5 * (key + seat) * key_mm;
-        let factors = self.factors(self.freed(slide.key), self.freed(slide.seat), Some(slide.at), slide.along);
-        Ok(Row { factors, most_mm: slide.most_mm + error_mm })
+        let factors = self.factors(
+            self.freed(slide.key),
+            self.freed(slide.seat),
+            Some(slide.at),
+            slide.along,
+        );
+        Ok(Row {
+            factors,
+            most_mm: slide.most_mm + error_mm,
+        })
     }
 
     /// Whether the rows named end a quantity along an axis (side 1) or against it (0), below its bound.
-    fn test_bound(&self, rows: &[Row], [q, axis, side]: [usize; 3], named: &[(usize, f64)]) -> Result<(), String> {
+    fn test_bound(
+        &self,
+        rows: &[Row],
+        [q, axis, side]: [usize; 3],
+        named: &[(usize, f64)],
+    ) -> Result<(), String> {
         let quantity = &self.quantities[q];
         let mut rest = vec![0.0; UNKNOWNS * self.free.len()];
         let towards = scale(quantity.axes[axis], if side == 1 { 1.0 } else { -1.0 });
@@ -238,12 +301,15 @@ impl Bounded {
         }
         for (&[turn, shift], rest) in self.of_piece.iter().zip(rest.chunks(UNKNOWNS)) {
             let sum = |part: &[f64]| part.iter().map(|x| x.abs()).sum::<f64>();
-            value += sum(&rest[..3]) * self.quantities[shift].norm() + sum(&rest[3..]) * self.quantities[turn].norm();
+            value += sum(&rest[..3]) * self.quantities[shift].norm()
+                + sum(&rest[3..]) * self.quantities[turn].norm();
         }
         let (value, most) = (value * (1.0 + ROUNDING) + ROUNDING, quantity.most[axis][side]);
         match value < most {
             true => Ok(()),
-            false => Err(format!("quantity {q} goes to {value:.6} along axis {axis}, beyond {most:.6}")),
+            false => Err(format!(
+                "quantity {q} goes to {value:.6} along axis {axis}, beyond {most:.6}"
+            )),
         }
     }
 }
@@ -251,11 +317,19 @@ impl Bounded {
 impl Slide {
     /// Whether it is that of the key along its way out, measured at the key.
     fn test(&self, kit: &Kit<'_>) -> Result<(), String> {
-        let Self { key, seat, at, along, most_mm } = self;
+        let Self {
+            key,
+            seat,
+            at,
+            along,
+            most_mm,
+        } = self;
         if *key != kit.key || seat == key || *seat >= kit.meshes.len() {
             return Err("the slide is not that of the key against another piece".into());
         }
-        let is_way_out = kit.way_out.is_some_and(|way_out| distance(way_out, *along) <= SAME_WAY);
+        let is_way_out = kit
+            .way_out
+            .is_some_and(|way_out| distance(way_out, *along) <= SAME_WAY);
         if !is_way_out || (dot(*along, *along) - 1.0).abs() > SAME_WAY {
             return Err("the slide is not along the key's way out".into());
         }
@@ -264,7 +338,9 @@ impl Slide {
         }
         match (0.0..=MOST_SLIDE_MM).contains(most_mm) {
             true => Ok(()),
-            false => Err(format!("a slide of {most_mm} mm; up to {MOST_SLIDE_MM} mm count as play")),
+            false => Err(format!(
+                "a slide of {most_mm} mm; up to {MOST_SLIDE_MM} mm count as play"
+            )),
         }
     }
 }

@@ -6,7 +6,9 @@ use crate::bearing::Bearing;
 use crate::bounded::{self, Bounded};
 use crate::mesh::Mesh;
 use crate::vector::{Vec3, scale};
-use crate::{Certificate, Claim, Contact, Finding, LeastGaps, Tested, ToldPlay, gap, lock, rays, within_play};
+use crate::{
+    Certificate, Claim, Contact, Finding, LeastGaps, Tested, ToldPlay, gap, lock, rays, within_play,
+};
 
 /// What a play told may be below the one proven: rounding, mm and degrees.
 const SAME_PLAY: f64 = 1e-6;
@@ -28,24 +30,53 @@ impl Kit<'_> {
             let test = |claim| scope.spawn(move || self.test_claim(claim));
             let tests: Vec<_> = self.c.claims.iter().map(test).collect();
             let died = |_| Finding::new("a claim", Err("its test came to no end".to_owned()));
-            tests.into_iter().map(|test| test.join().unwrap_or_else(died)).collect()
+            tests
+                .into_iter()
+                .map(|test| test.join().unwrap_or_else(died))
+                .collect()
         })
     }
 
     fn test_claim(&self, claim: &Claim) -> Finding {
         let fits = &self.c.press_fits;
         let (name, tested) = match claim {
-            Claim::Locked { held, leaves, multipliers, hold } => {
-                let name = format!("nothing but the key, piece {leaves}, moves while {} held", are(held));
-                (name, self.test_lock(held, *leaves, &lock::Held { multipliers, hold: *hold }))
+            Claim::Locked {
+                held,
+                leaves,
+                multipliers,
+                hold,
+            } => {
+                let name = format!(
+                    "nothing but the key, piece {leaves}, moves while {} held",
+                    are(held)
+                );
+                (
+                    name,
+                    self.test_lock(
+                        held,
+                        *leaves,
+                        &lock::Held {
+                            multipliers,
+                            hold: *hold,
+                        },
+                    ),
+                )
             }
             Claim::Bounded(claim) => self.test_bounded(claim),
-            Claim::KeyLeaves { piece, direction, least } => {
+            Claim::KeyLeaves {
+                piece,
+                direction,
+                least,
+            } => {
                 let others: Vec<usize> = (0..self.meshes.len()).filter(|p| p != piece).collect();
                 let tested = self.test_path(*piece, *direction, &others, least);
                 (format!("the key, piece {piece}, can leave"), tested)
             }
-            Claim::Installs { piece, direction, least } => {
+            Claim::Installs {
+                piece,
+                direction,
+                least,
+            } => {
                 let order = self.c.installation_order.iter().copied();
                 let earlier: Vec<usize> = order.take_while(|p| p != piece).collect();
                 let tested = self.test_path(*piece, scale(*direction, -1.0), &earlier, least);
@@ -53,8 +84,10 @@ impl Kit<'_> {
             }
             Claim::Apart { least } => {
                 let all: Vec<usize> = (0..self.meshes.len()).collect();
-                let tested = rays::test_apart(self.meshes, |pair, at| gap::is_pressed(self.meshes, fits, pair, at))
-                    .and_then(|figure| gap::test(self.meshes, fits, None, &all, least, figure));
+                let tested = rays::test_apart(self.meshes, |pair, at| {
+                    gap::is_pressed(self.meshes, fits, pair, at)
+                })
+                .and_then(|figure| gap::test(self.meshes, fits, None, &all, least, figure));
                 ("the assembled pieces do not overlap".into(), tested)
             }
         };
@@ -63,25 +96,54 @@ impl Kit<'_> {
 
     fn test_path(&self, piece: usize, way_out: Vec3, others: &[usize], least: &LeastGaps) -> Tested {
         let figure = rays::test_path(self.meshes, piece, way_out, others)?;
-        gap::test(self.meshes, &self.c.press_fits, Some((piece, way_out)), others, least, figure)
+        gap::test(
+            self.meshes,
+            &self.c.press_fits,
+            Some((piece, way_out)),
+            others,
+            least,
+            figure,
+        )
     }
 
     fn test_lock(&self, held: &[usize], leaves: usize, told: &lock::Held<'_>) -> Tested {
         let contacts = self.contacts.ok_or("its contacts are not there")?;
-        let frame = lock::Frame { center: self.c.center, length_mm: self.c.length_mm, n_pieces: self.meshes.len() };
+        let frame = lock::Frame {
+            center: self.c.center,
+            length_mm: self.c.length_mm,
+            n_pieces: self.meshes.len(),
+        };
         lock::test(&frame, contacts, held, leaves, told)
     }
 
     /// Also whether the play that users are told of a piece is not less.
     fn test_bounded(&self, claim: &Bounded) -> (String, Tested) {
-        let alone = if let [piece] = claim.free[..] { Some(piece) } else { None };
-        let at_rest: Vec<usize> = (0..self.meshes.len()).filter(|id| !claim.free.contains(id)).collect();
-        let together = || format!("all pieces together stay within their play ({} held)", named(&at_rest));
+        let alone = if let [piece] = claim.free[..] {
+            Some(piece)
+        } else {
+            None
+        };
+        let at_rest: Vec<usize> = (0..self.meshes.len())
+            .filter(|id| !claim.free.contains(id))
+            .collect();
+        let together = || {
+            format!(
+                "all pieces together stay within their play ({} held)",
+                named(&at_rest)
+            )
+        };
         let name = alone.map_or_else(together, within_play);
         let tested = self.play(claim).and_then(|play| {
             let told = alone.and_then(|piece| self.c.pieces.get(piece)?.play.as_ref());
-            let slid = play.slid_mm.map_or(String::new(), |mm| format!(", the key slid by up to {mm:.2} mm"));
-            let figure = format!("{:.2} mm, {:.2}°, {} bearings{slid}", play.shift_mm, play.turn_deg, claim.rows.len());
+            let slid = play
+                .slid_mm
+                .map_or(String::new(), |mm| format!(", the key slid by up to {mm:.2} mm"));
+            let figure = format!(
+                "{:.2} mm, {:.2}°, {} bearings{slid}",
+                play.shift_mm,
+                play.turn_deg,
+                claim.rows.len()
+            );
             match told.is_none_or(|told| is_enough(told, &play)) {
                 true => Ok(figure),
                 false => Err(format!("{figure}: the play told is less than the one proven")),
@@ -101,7 +163,16 @@ impl Kit<'_> {
             _ => None,
         });
         let slide = self.c.slide.as_ref();
-        bounded::test(&bounded::Kit { meshes: self.meshes, bearings, slide, key: self.c.key, way_out }, claim)
+        bounded::test(
+            &bounded::Kit {
+                meshes: self.meshes,
+                bearings,
+                slide,
+                key: self.c.key,
+                way_out,
+            },
+            claim,
+        )
     }
 }
 
@@ -111,14 +182,30 @@ fn is_enough(told: &ToldPlay, proven: &bounded::Play) -> bool {
 
 /// "0 is", "1 and 2 are".
 fn are(held: &[usize]) -> String {
-    let names = held.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
-    if held.len() == 1 { format!("{names} is") } else { format!("{names} are") }
+    let names = held
+        .iter()
+        .map(usize::to_string)
+        .collect::<Vec<_>>()
+        .join(" and ");
+    if held.len() == 1 {
+        format!("{names} is")
+    } else {
+        format!("{names} are")
+    }
 }
 
 /// "piece 7", "pieces 1 and 7".
 fn named(pieces: &[usize]) -> String {
-    let names = pieces.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
-    if pieces.len() == 1 { format!("piece {names}") } else { format!("pieces {names}") }
+    let names = pieces
+        .iter()
+        .map(usize::to_string)
+        .collect::<Vec<_>>()
+        .join(" and ");
+    if pieces.len() == 1 {
+        format!("piece {names}")
+    } else {
+        format!("pieces {names}")
+    }
 }
 
 #[cfg(test)]
@@ -135,7 +222,8 @@ mod tests {
         let (mut bearings, mut multipliers) = (Vec::new(), [Vec::new(), Vec::new()]);
         for i in 0..24 {
             let signs = [i / 4 % 2, i / 2 % 2, i % 2].map(|bit| 2.0 * f64::from(bit) - 1.0);
-            let turned = |v: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| v[(k + 3 - i as usize / 8) % 3]) };
+            let turned =
+                |v: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| v[(k + 3 - i as usize / 8) % 3]) };
             let point = turned([5.0 * signs[0], 4.9 * signs[1], 4.9 * signs[2]]);
             let (normal, across) = (turned([signs[0], 0.0, 0.0]), turned([0.0, 1.0, 0.0]));
             bearings.push(json!({ "a": 1, "b": 0, "point": point, "normal": normal, "across": across }));
@@ -143,9 +231,12 @@ mod tests {
         for axis in 0..3 {
             let face = (axis + 1) % 3;
             let pair = |rows: [usize; 4], factor: f64| json!(rows.map(|row| json!([row, factor])));
-            let rises = [[0, 1, 6, 7], [2, 3, 4, 5]].map(|rows| pair(rows.map(|row| 8 * face + row), 0.25 / 4.9));
+            let rises =
+                [[0, 1, 6, 7], [2, 3, 4, 5]].map(|rows| pair(rows.map(|row| 8 * face + row), 0.25 / 4.9));
             multipliers[0].push(json!(rises));
-            multipliers[1].push(json!([0, 4].map(|side| pair([0, 1, 2, 3].map(|i| 8 * axis + side + i), 0.25))));
+            multipliers[1].push(json!(
+                [0, 4].map(|side| pair([0, 1, 2, 3].map(|i| 8 * axis + side + i), 0.25))
+            ));
         }
         let quantity = |at: Value, most: f64| json!({ "plus": 1, "minus": null, "at": at, "axes": axes, "most": vec![[most; 2]; 3] });
         let bounded = json!({ "claim": "bounded", "free": [1], "of_piece": [[0, 1]],
@@ -161,23 +252,35 @@ mod tests {
         let c: Certificate = serde_json::from_value(certificate).unwrap();
         let meshes = [hollow(8.0, 5.1), cuboid([-5.0; 3], [5.0; 3])];
         let bearings = crate::bearing::located(&meshes, &c.bearings);
-        let kit = Kit { c: &c, meshes: &meshes, contacts: None, bearings: bearings.as_deref().ok() };
+        let kit = Kit {
+            c: &c,
+            meshes: &meshes,
+            contacts: None,
+            bearings: bearings.as_deref().ok(),
+        };
         kit.test_claims().into_iter().chain(unproven(&c)).collect()
     }
 
     #[test]
     fn a_piece_is_told_to_stay_within_its_play_or_not_to_be_claimed_to() {
-        let lines: Vec<String> = findings(certificate(&Value::Null)).iter().map(Finding::to_string).collect();
+        let lines: Vec<String> = findings(certificate(&Value::Null))
+            .iter()
+            .map(Finding::to_string)
+            .collect();
         let claim = |id: usize| format!("{:52}", format!("piece {id} stays within its play"));
-        assert_eq!(lines[0], format!("confirmed  {}  0.21 mm, 2.38°, 24 bearings", claim(1)));
+        assert_eq!(
+            lines[0],
+            format!("confirmed  {}  0.21 mm, 2.38°, 24 bearings", claim(1))
+        );
         assert_eq!(lines[1], format!("unproven   {}  not claimed", claim(0)));
         assert_eq!(lines.len(), 2);
     }
 
     #[test]
     fn a_play_told_is_no_less_than_the_one_proven() {
-        let verdict =
-            |mm: f64, deg: f64| findings(certificate(&json!({ "translation_mm": mm, "rotation_deg": deg })))[0].verdict;
+        let verdict = |mm: f64, deg: f64| {
+            findings(certificate(&json!({ "translation_mm": mm, "rotation_deg": deg })))[0].verdict
+        };
         assert_eq!(verdict(0.21, 2.39), Verdict::Confirmed);
         assert_eq!(verdict(0.20, 2.39), Verdict::Refuted);
         assert_eq!(verdict(0.21, 2.37), Verdict::Refuted);
@@ -197,8 +300,7 @@ mod tests {
     #[test]
     fn one_lock_that_the_key_leaves_is_needed() {
         let least = json!({ "overall": null, "beneath_rim": null });
-        let lock =
-            json!({ "claim": "locked", "held": [0], "leaves": 1, "multipliers": [], "residual": 0.0, "hold": 0.1 });
+        let lock = json!({ "claim": "locked", "held": [0], "leaves": 1, "multipliers": [], "residual": 0.0, "hold": 0.1 });
         let up = [0.0, 0.0, 1.0];
         let others = [
             json!({ "claim": "key-leaves", "piece": 1, "direction": up, "least": least }),

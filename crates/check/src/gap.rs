@@ -1,7 +1,8 @@
 //! Whether the least gaps that a claim tells are those of the surfaces at the places that it tells.
 //!
-//! At the place, which is midway, both surfaces are half the gap away; where they cross, other parts of them may be nearer,
-//! but not farther than half the depth. That a gap is nowhere less is not tested here; rays look for what is in the way.
+//! At the place, which is midway, both surfaces are half the gap away; where they cross, other parts of them
+//! may be nearer, but not farther than half the depth. That a gap is nowhere less is not tested here; rays
+//! look for what is in the way.
 
 use crate::mesh::Mesh;
 use crate::vector::{Vec3, scale, sub};
@@ -9,15 +10,17 @@ use crate::{Gap, LeastGaps, PressFit, Tested};
 
 /// Difference of the gap told and the one found, mm.
 const SAME_GAP_MM: f64 = 1e-3;
-/// By how much the rim, which gaps beneath it leave out, may be nearer than these at their places, mm. 0.006 on a torus.
+/// By how much the rim, which gaps beneath it leave out, may be nearer than these at their places, mm. 0.006
+/// on a torus.
 const RIM_NEARER_MM: f64 = 0.02;
 /// Deeper crossings are no rounding, mm.
 const CROSSING_MM: f64 = 0.02;
 /// A crossing at a press fit is no more than this deeper than its interference, mm.
 const FIT_DEEPER_MM: f64 = 0.1;
 
-/// An error where no gap is told. Confirms `figure`, with the gap beneath the rim, if the gaps are those that `least` tells: of the moving piece to one of
-/// the `others`, or of any two of these; and if surfaces cross nowhere but where the key is pressed on purpose.
+/// An error where no gap is told. Confirms `figure`, with the gap beneath the rim, if the gaps are those that
+/// `least` tells: of the moving piece to one of the `others`, or of any two of these; and if surfaces cross
+/// nowhere but where the key is pressed on purpose.
 pub fn test(
     meshes: &[Mesh],
     press_fits: &[PressFit],
@@ -28,12 +31,19 @@ pub fn test(
 ) -> Tested {
     for gap in [&least.overall, &least.beneath_rim].into_iter().flatten() {
         if gap.gap_mm < -CROSSING_MM && !press_fits.iter().any(|fit| is_of(fit, gap, moving)) {
-            return Err(format!("surfaces cross by {:.3} mm, piece {} one of them", -gap.gap_mm, gap.against));
+            return Err(format!(
+                "surfaces cross by {:.3} mm, piece {} one of them",
+                -gap.gap_mm, gap.against
+            ));
         }
     }
-    let Some(gap) = &least.overall else { return Err("no least gap is told".into()) };
+    let Some(gap) = &least.overall else {
+        return Err("no least gap is told".into());
+    };
     test_place(meshes, moving, others, gap, SAME_GAP_MM)?;
-    let Some(gap) = &least.beneath_rim else { return Ok(figure) };
+    let Some(gap) = &least.beneath_rim else {
+        return Ok(figure);
+    };
     test_place(meshes, moving, others, gap, RIM_NEARER_MM)?;
     let least = match gap.gap_mm {
         depth if depth < 0.0 => format!("where it presses on purpose, by {:.3} mm", -depth),
@@ -47,15 +57,25 @@ fn is_of(fit: &PressFit, gap: &Gap, moving: Option<(usize, Vec3)>) -> bool {
     let before = moving.map(|(_, direction)| sub(gap.at, scale(direction, gap.travel_mm)));
     let is_near = |p: Vec3| fit.is_near(p);
     let is_one = moving.is_none_or(|(piece, _)| piece == fit.piece || gap.against == fit.piece);
-    is_one && (is_near(gap.at) || before.is_some_and(is_near)) && -gap.gap_mm <= fit.interference_mm + FIT_DEEPER_MM
+    is_one
+        && (is_near(gap.at) || before.is_some_and(is_near))
+        && -gap.gap_mm <= fit.interference_mm + FIT_DEEPER_MM
 }
 
-/// Whether what pieces `a` and `b` share around `at` is a press fit's: in its place, and no deeper in either than it may be.
+/// Whether what pieces `a` and `b` share around `at` is a press fit's: in its place, and no deeper in either
+/// than it may be.
 pub fn is_pressed(meshes: &[Mesh], press_fits: &[PressFit], [a, b]: [usize; 2], at: Vec3) -> bool {
-    press_fits.iter().filter(|fit| (fit.piece == a || fit.piece == b) && fit.is_near(at)).any(|fit| {
-        let most_mm = fit.interference_mm + FIT_DEEPER_MM;
-        [a, b].iter().all(|&piece| meshes[piece].distance_mm(at, most_mm).is_some_and(|mm| mm <= most_mm))
-    })
+    press_fits
+        .iter()
+        .filter(|fit| (fit.piece == a || fit.piece == b) && fit.is_near(at))
+        .any(|fit| {
+            let most_mm = fit.interference_mm + FIT_DEEPER_MM;
+            [a, b].iter().all(|&piece| {
+                meshes[piece]
+                    .distance_mm(at, most_mm)
+                    .is_some_and(|mm| mm <= most_mm)
+            })
+        })
 }
 
 /// `nearer_mm`: how much nearer surfaces may be than the gap.
@@ -66,14 +86,23 @@ fn test_place(
     gap: &Gap,
     nearer_mm: f64,
 ) -> Result<(), String> {
-    let Gap { gap_mm, travel_mm, at, against } = gap;
+    let Gap {
+        gap_mm,
+        travel_mm,
+        at,
+        against,
+    } = gap;
     if !others.contains(against) || *travel_mm < 0.0 {
-        return Err(format!("a least gap against piece {against}, which is not in the way"));
+        return Err(format!(
+            "a least gap against piece {against}, which is not in the way"
+        ));
     }
     let reach_mm = 0.5 * gap_mm.abs() + SAME_GAP_MM;
     let to_other = meshes[*against].distance_mm(*at, reach_mm);
     let to_moving = match moving {
-        Some((piece, direction)) => meshes[piece].distance_mm(sub(*at, scale(direction, *travel_mm)), reach_mm),
+        Some((piece, direction)) => {
+            meshes[piece].distance_mm(sub(*at, scale(direction, *travel_mm)), reach_mm)
+        }
         None => others
             .iter()
             .filter(|id| *id != against)
@@ -85,8 +114,12 @@ fn test_place(
     let is_within = |found_mm: f64| found_mm <= SAME_GAP_MM - gap_mm;
     match found_mm {
         Some(found_mm) if is_same(found_mm) || is_within(found_mm) => Ok(()),
-        Some(found_mm) => Err(format!("a gap of {gap_mm:.3} mm is told where it is {found_mm:.3} mm")),
-        None => Err(format!("a gap of {gap_mm:.3} mm is told where surfaces are farther apart")),
+        Some(found_mm) => Err(format!(
+            "a gap of {gap_mm:.3} mm is told where it is {found_mm:.3} mm"
+        )),
+        None => Err(format!(
+            "a gap of {gap_mm:.3} mm is told where surfaces are farther apart"
+        )),
     }
 }
 
@@ -96,13 +129,28 @@ mod tests {
 
     #[test]
     fn a_crossing_is_meant_only_at_a_press_fit_and_no_deeper_than_that() {
-        let fit = PressFit { piece: 1, at: [1.0, 0.0, 0.0], interference_mm: 0.1 };
-        let gap = |gap_mm, travel_mm, x| Gap { gap_mm, travel_mm, at: [x, 0.0, 0.0], against: 0 };
+        let fit = PressFit {
+            piece: 1,
+            at: [1.0, 0.0, 0.0],
+            interference_mm: 0.1,
+        };
+        let gap = |gap_mm, travel_mm, x| Gap {
+            gap_mm,
+            travel_mm,
+            at: [x, 0.0, 0.0],
+            against: 0,
+        };
         let moving = Some((1, [1.0, 0.0, 0.0]));
         assert!(is_of(&fit, &gap(-0.15, 0.0, 2.0), moving));
-        assert!(is_of(&fit, &gap(-0.15, 20.0, 21.0), moving), "the fit moves with its piece");
+        assert!(
+            is_of(&fit, &gap(-0.15, 20.0, 21.0), moving),
+            "the fit moves with its piece"
+        );
         assert!(!is_of(&fit, &gap(-0.15, 20.0, 30.0), moving), "elsewhere");
         assert!(!is_of(&fit, &gap(-0.25, 0.0, 2.0), moving), "deeper");
-        assert!(!is_of(&fit, &gap(-0.15, 0.0, 2.0), Some((2, [1.0, 0.0, 0.0]))), "another piece");
+        assert!(
+            !is_of(&fit, &gap(-0.15, 0.0, 2.0), Some((2, [1.0, 0.0, 0.0]))),
+            "another piece"
+        );
     }
 }

@@ -1,8 +1,8 @@
 //! Checks the certificate of a kit of shell pieces with none of the code that made it.
 //!
-//! Everything is recomputed from `certificate.json`, `plan.json` and the pieces' STL files; nothing is believed but the
-//! choice of contacts and multipliers, and those only as far as they stand the test. What each claim means and why its
-//! test is enough: docs/certificate.md.
+//! Everything is recomputed from `certificate.json`, `plan.json` and the pieces' STL files; nothing is
+//! believed but the choice of contacts and multipliers, and those only as far as they stand the test. What
+//! each claim means and why its test is enough: docs/certificate.md.
 
 mod barrier;
 mod bearing;
@@ -69,8 +69,16 @@ pub struct Finding {
 
 impl Finding {
     fn new(claim: &str, tested: Tested) -> Self {
-        let verdict = if tested.is_ok() { Verdict::Confirmed } else { Verdict::Refuted };
-        Self { claim: claim.to_owned(), verdict, figure: tested.unwrap_or_else(|bad| bad) }
+        let verdict = if tested.is_ok() {
+            Verdict::Confirmed
+        } else {
+            Verdict::Refuted
+        };
+        Self {
+            claim: claim.to_owned(),
+            verdict,
+            figure: tested.unwrap_or_else(|bad| bad),
+        }
     }
 }
 
@@ -160,11 +168,26 @@ struct Contact {
 #[derive(Deserialize)]
 #[serde(tag = "claim", rename_all = "kebab-case")]
 enum Claim {
-    Locked { held: Vec<usize>, leaves: usize, multipliers: Vec<(usize, f64)>, hold: f64 },
+    Locked {
+        held: Vec<usize>,
+        leaves: usize,
+        multipliers: Vec<(usize, f64)>,
+        hold: f64,
+    },
     Bounded(Bounded),
-    KeyLeaves { piece: usize, direction: Vec3, least: LeastGaps },
-    Installs { piece: usize, direction: Vec3, least: LeastGaps },
-    Apart { least: LeastGaps },
+    KeyLeaves {
+        piece: usize,
+        direction: Vec3,
+        least: LeastGaps,
+    },
+    Installs {
+        piece: usize,
+        direction: Vec3,
+        least: LeastGaps,
+    },
+    Apart {
+        least: LeastGaps,
+    },
 }
 
 /// The least gaps of a claim, as far as they are told.
@@ -174,7 +197,8 @@ struct LeastGaps {
     beneath_rim: Option<Gap>,
 }
 
-/// Where two surfaces come nearest: midway between them, after the moving one has travelled. Negative is a depth.
+/// Where two surfaces come nearest: midway between them, after the moving one has travelled. Negative is a
+/// depth.
 #[derive(Deserialize)]
 struct Gap {
     gap_mm: f64,
@@ -211,25 +235,49 @@ fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
         return findings;
     }
     if !c.files.is_empty() {
-        add("other files are those that were certified", pieces::test_files(folder, &c.files));
+        add(
+            "other files are those that were certified",
+            pieces::test_files(folder, &c.files),
+        );
     }
-    if !add("each piece is one closed surface around a volume", pieces::test_closed(&meshes)) {
+    if !add(
+        "each piece is one closed surface around a volume",
+        pieces::test_closed(&meshes),
+    ) {
         return findings;
     }
     let contacts = located(c, &meshes);
     let told = |contacts: &Vec<Contact>| {
-        format!("{} contacts, up to {:.3} mm apart", contacts.len(), largest_gap_mm(contacts))
+        format!(
+            "{} contacts, up to {:.3} mm apart",
+            contacts.len(),
+            largest_gap_mm(contacts)
+        )
     };
-    add("the contacts lie on both pieces' surfaces", contacts.as_ref().map(told).map_err(String::clone));
+    add(
+        "the contacts lie on both pieces' surfaces",
+        contacts.as_ref().map(told).map_err(String::clone),
+    );
     let bearings = bearing::located(&meshes, &c.bearings);
     if !c.bearings.is_empty() {
         let told = |bearings: &Vec<Bearing>| format!("{} bearings", bearings.len());
-        add("the bearings lie on their pieces' surfaces", bearings.as_ref().map(told).map_err(String::clone));
+        add(
+            "the bearings lie on their pieces' surfaces",
+            bearings.as_ref().map(told).map_err(String::clone),
+        );
     }
     if !c.press_fits.is_empty() {
-        add("the key is pressed on purpose, but not by much", test_press_fits(c));
+        add(
+            "the key is pressed on purpose, but not by much",
+            test_press_fits(c),
+        );
     }
-    let kit = Kit { c, meshes: &meshes, contacts: contacts.as_deref().ok(), bearings: bearings.as_deref().ok() };
+    let kit = Kit {
+        c,
+        meshes: &meshes,
+        contacts: contacts.as_deref().ok(),
+        bearings: bearings.as_deref().ok(),
+    };
     findings.extend(kit.test_claims());
     findings.extend(unproven(c));
     findings
@@ -237,13 +285,25 @@ fn findings(folder: &Path, c: &Certificate, plan: &Value) -> Vec<Finding> {
 
 /// Pieces of which it is not claimed that they stay within their play.
 fn unproven(c: &Certificate) -> impl Iterator<Item = Finding> {
-    let is_claimed = |id: usize| c.claims.iter().any(|claim| matches!(claim, Claim::Bounded(b) if b.free == [id]));
-    (0..c.pieces.len()).filter(move |&id| !is_claimed(id)).map(|id| match c.pieces[id].play {
-        Some(_) => {
-            Finding { claim: within_play(id), verdict: Verdict::Refuted, figure: "told, but not claimed".into() }
-        }
-        None => Finding { claim: within_play(id), verdict: Verdict::Unproven, figure: "not claimed".into() },
-    })
+    let is_claimed = |id: usize| {
+        c.claims
+            .iter()
+            .any(|claim| matches!(claim, Claim::Bounded(b) if b.free == [id]))
+    };
+    (0..c.pieces.len())
+        .filter(move |&id| !is_claimed(id))
+        .map(|id| match c.pieces[id].play {
+            Some(_) => Finding {
+                claim: within_play(id),
+                verdict: Verdict::Refuted,
+                figure: "told, but not claimed".into(),
+            },
+            None => Finding {
+                claim: within_play(id),
+                verdict: Verdict::Unproven,
+                figure: "not claimed".into(),
+            },
+        })
 }
 
 fn within_play(piece: usize) -> String {
@@ -275,13 +335,18 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
         return Err("the key is not the last piece, or the plan has another clearance".into());
     }
     if !(0.0..=MOST_CLEARANCE_MM).contains(&c.clearance_mm) {
-        return Err(format!("a clearance of {} mm; up to {MOST_CLEARANCE_MM} mm are believed", c.clearance_mm));
+        return Err(format!(
+            "a clearance of {} mm; up to {MOST_CLEARANCE_MM} mm are believed",
+            c.clearance_mm
+        ));
     }
     if plan["pieces"].as_array().map(Vec::len) != Some(n) {
         return Err("the plan has another number of pieces".into());
     }
     for claim in &c.claims {
-        let Claim::Installs { piece, direction, .. } = claim else { continue };
+        let Claim::Installs { piece, direction, .. } = claim else {
+            continue;
+        };
         let planned = &plan["pieces"][*piece]["installation_direction"];
         if !(0..3).all(|k| is_near(&planned[k], direction[k])) {
             return Err(format!("the plan installs piece {piece} along another direction"));
@@ -293,10 +358,17 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
             told("translation_mm") >= play.translation_mm && told("rotation_deg") >= play.rotation_deg
         };
         if rattle["is_proven"] == true && !piece.play.as_ref().is_some_and(is_no_less) {
-            return Err(format!("the plan calls a play of piece {} proven that is not the certificate's", piece.id));
+            return Err(format!(
+                "the plan calls a play of piece {} proven that is not the certificate's",
+                piece.id
+            ));
         }
     }
-    match c.pieces.iter().find(|p| plan["pieces"][p.id]["file"] != p.file.as_str()) {
+    match c
+        .pieces
+        .iter()
+        .find(|p| plan["pieces"][p.id]["file"] != p.file.as_str())
+    {
         Some(p) => Err(format!("the plan has another file for piece {}", p.id)),
         None => Ok(format!("{n} pieces, key {}", c.key)),
     }
@@ -304,23 +376,32 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
 
 /// Nothing that the maker's own tests found wrong.
 fn test_passed(c: &Certificate) -> Tested {
-    if c.failed.is_empty() { Ok("nothing failed".into()) } else { Err(format!("failed: {}", c.failed.join("; "))) }
+    if c.failed.is_empty() {
+        Ok("nothing failed".into())
+    } else {
+        Err(format!("failed: {}", c.failed.join("; ")))
+    }
 }
 
-/// One lock, with the first piece held, that the key leaves; the key's way out, a way in for all others, and no overlap.
+/// One lock, with the first piece held, that the key leaves; the key's way out, a way in for all others, and
+/// no overlap.
 fn test_completeness(c: &Certificate) -> Tested {
     let count = |is_it: &dyn Fn(&Claim) -> bool| c.claims.iter().filter(|claim| is_it(claim)).count();
     // Each piece: put in, bounded alone, and at rest while all others are bounded.
     let most = 3 + 3 * c.pieces.len();
     if c.claims.len() > most {
-        return Err(format!("{} claims are more than the {most} that a kit needs", c.claims.len()));
+        return Err(format!(
+            "{} claims are more than the {most} that a kit needs",
+            c.claims.len()
+        ));
     }
     let first = c.installation_order.first().copied().unwrap_or_default();
     let is_lock = |claim: &Claim| matches!(claim, Claim::Locked { .. });
-    let is_needed_lock =
-        |claim: &Claim| matches!(claim, Claim::Locked { held, leaves, .. } if *held == [first] && *leaves == c.key);
+    let is_needed_lock = |claim: &Claim| matches!(claim, Claim::Locked { held, leaves, .. } if *held == [first] && *leaves == c.key);
     if first == c.key || count(&is_lock) != 1 || count(&is_needed_lock) != 1 {
-        return Err(format!("it is not claimed, once, that nothing but the key moves while piece {first} is held"));
+        return Err(format!(
+            "it is not claimed, once, that nothing but the key moves while piece {first} is held"
+        ));
     }
     if count(&|claim| matches!(claim, Claim::KeyLeaves { piece, .. } if *piece == c.key)) != 1 {
         return Err("it is not claimed that the key can leave".into());
@@ -342,14 +423,24 @@ fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
         return Err(format!("contacts {} mm apart hold nothing", c.reach_mm));
     }
     let locate = |(i, contact): (usize, &Contact)| {
-        let Contact { a, b, point, normal, gap_mm } = contact;
+        let Contact {
+            a,
+            b,
+            point,
+            normal,
+            gap_mm,
+        } = contact;
         let on_a = meshes[*a].triangle_at(*point, *normal);
         let (point, normal) = on_a.ok_or_else(|| format!("contact {i} is not on piece {a}"))?;
         let is_near = *gap_mm <= c.reach_mm && meshes[*b].is_faced(point, normal, *gap_mm);
         if !is_near {
             return Err(format!("contact {i} does not face piece {b} at {gap_mm:.3} mm"));
         }
-        Ok(Contact { point, normal, ..contact.clone() })
+        Ok(Contact {
+            point,
+            normal,
+            ..contact.clone()
+        })
     };
     c.contacts.iter().enumerate().map(locate).collect()
 }
@@ -357,7 +448,11 @@ fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
 fn test_press_fits(c: &Certificate) -> Tested {
     let most_mm = c.press_fits.iter().map(|f| f.interference_mm).fold(0.0, f64::max);
     let figure = format!("{} places, by up to {most_mm:.2} mm", c.press_fits.len());
-    if c.press_fits.len() <= MOST_PRESS_FITS && most_mm <= MOST_INTERFERENCE_MM { Ok(figure) } else { Err(figure) }
+    if c.press_fits.len() <= MOST_PRESS_FITS && most_mm <= MOST_INTERFERENCE_MM {
+        Ok(figure)
+    } else {
+        Err(figure)
+    }
 }
 
 fn largest_gap_mm(contacts: &[Contact]) -> f64 {
@@ -379,6 +474,9 @@ mod tests {
         assert!(older.ends_with("version 2 is not known"), "{older}");
         assert!(why(r#"{ "format": "another", "version": 3 }"#).ends_with("is not known"));
         let empty = why(r#"{ "format": "shellock-certificate", "version": 3 }"#);
-        assert!(empty.starts_with("certificate.json"), "no certificate of this version, nor a plan: {empty}");
+        assert!(
+            empty.starts_with("certificate.json"),
+            "no certificate of this version, nor a plan: {empty}"
+        );
     }
 }

@@ -1,14 +1,16 @@
 //! Whether contacts and their multipliers show that nothing moves but the key.
 //!
-//! A motion gives each piece that is not held a velocity `v` and a spin `w`. A contact with normal `n` at `p`, from `a`
-//! to `b`, allows it where `n · (v_a − v_b) + (p × n) · (w_a − w_b) ≤ 0`: one row of `A x ≤ 0`. With multipliers `μ > 0`,
-//! over all columns, such an `x` has `‖D A x‖ ≤ |Aᵀμ| |x|`, where `D = diag(min(μ, 1))` (docs/certificate.md).
+//! A motion gives each piece that is not held a velocity `v` and a spin `w`. A contact with normal `n` at
+//! `p`, from `a` to `b`, allows it where `n · (v_a − v_b) + (p × n) · (w_a − w_b) ≤ 0`: one row of `A x ≤ 0`.
+//! With multipliers `μ > 0`, over all columns, such an `x` has `‖D A x‖ ≤ |Aᵀμ| |x|`, where `D = diag(min(μ,
+//! 1))` (docs/certificate.md).
 //!
-//! Let `x = (x_o, x_k)`, the key's unknowns last, `B = D A_o`, `C = D A_k`. An orthonormal basis `Q` of the columns of `C` but
-//! for those that are nearly sums of others has `C = Q R + E`, where `E` is what is left of these: `‖E‖ ≤ ε`, measured. So
-//! `‖D A x‖ ≥ |(1 − Q Qᵀ) (B x_o + C x_k)| ≥ σ |x_o| − ε |x_k|`, where `σ²` is the least eigenvalue of `S = Bᵀ (1 − Q Qᵀ) B`, and
-//! the others move by at most `(|Aᵀμ| + ε) / σ` of the whole motion. The key's way out is such a nearly empty column: its walls
-//! are parallel to it but for the rounding of files. Where walls are exactly parallel, `ε` is rounding, as `|Aᵀμ|` is.
+//! Let `x = (x_o, x_k)`, the key's unknowns last, `B = D A_o`, `C = D A_k`. An orthonormal basis `Q` of the
+//! columns of `C` but for those that are nearly sums of others has `C = Q R + E`, where `E` is what is left
+//! of these: `‖E‖ ≤ ε`, measured. So `‖D A x‖ ≥ |(1 − Q Qᵀ) (B x_o + C x_k)| ≥ σ |x_o| − ε |x_k|`, where `σ²`
+//! is the least eigenvalue of `S = Bᵀ (1 − Q Qᵀ) B`, and the others move by at most `(|Aᵀμ| + ε) / σ` of the
+//! whole motion. The key's way out is such a nearly empty column: its walls are parallel to it but for the
+//! rounding of files. Where walls are exactly parallel, `ε` is rounding, as `|Aᵀμ|` is.
 
 use crate::vector::{Vec3, cross, scale, sub};
 use crate::{Contact, Tested};
@@ -54,7 +56,10 @@ pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], key: usize, cla
     }
     let residual = sum.iter().map(|x| x * x).sum::<f64>().sqrt();
     let hold = claim.hold;
-    let figures = format!("residual {residual:.1e}, hold {hold:.4}, {} contacts", claim.multipliers.len());
+    let figures = format!(
+        "residual {residual:.1e}, hold {hold:.4}, {} contacts",
+        claim.multipliers.len()
+    );
     if residual.is_nan() || residual > EQUILIBRIUM * total {
         return Err(format!("{figures}: the multipliers are not in equilibrium"));
     }
@@ -69,7 +74,10 @@ pub fn test(frame: &Frame, contacts: &[Contact], held: &[usize], key: usize, cla
     if !(2.0 * (residual + left_over) < least && exceeds(gram(&columns), n_others, least)) {
         return Err(format!("{figures}: that does not hold"));
     }
-    Ok(format!("{figures}; others move by up to {:.0e} of the whole motion", (residual + left_over) / least))
+    Ok(format!(
+        "{figures}; others move by up to {:.0e} of the whole motion",
+        (residual + left_over) / least
+    ))
 }
 
 /// What is told of a lock.
@@ -80,8 +88,8 @@ pub struct Held<'a> {
     pub hold: f64,
 }
 
-/// Takes from `columns` what lies in the space of the key's. Of these, whatever is nearly a sum of others is left out; the length
-/// of all that is left of it is told.
+/// Takes from `columns` what lies in the space of the key's. Of these, whatever is nearly a sum of others is
+/// left out; the length of all that is left of it is told.
 fn eliminate(columns: &mut [Vec<f64>], mut of_key: Vec<Vec<f64>>) -> f64 {
     let length_sq = |c: &[f64]| c.iter().map(|x| x * x).sum::<f64>();
     let least_sq = LEFT_OUT * of_key.iter().map(|c| length_sq(c)).sum::<f64>();
@@ -106,22 +114,33 @@ fn eliminate(columns: &mut [Vec<f64>], mut of_key: Vec<Vec<f64>>) -> f64 {
 /// All scalar products of columns.
 fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    columns.iter().flat_map(|a| columns.iter().map(move |b| product(a, b))).collect()
+    columns
+        .iter()
+        .flat_map(|a| columns.iter().map(move |b| product(a, b)))
+        .collect()
 }
 
 /// The columns of a row that are not 0.
-fn sparse_row(frame: &Frame, contact: &Contact, plus: Option<usize>, minus: Option<usize>) -> Vec<(usize, f64)> {
+fn sparse_row(
+    frame: &Frame,
+    contact: &Contact,
+    plus: Option<usize>,
+    minus: Option<usize>,
+) -> Vec<(usize, f64)> {
     let arm = scale(sub(contact.point, frame.center), 1.0 / frame.length_mm);
     let wrench = [contact.normal, cross(arm, contact.normal)].concat();
-    let columns = [(plus, 1.0), (minus, -1.0)].into_iter().filter_map(|(at, sign)| Some((at?, sign)));
+    let columns = [(plus, 1.0), (minus, -1.0)]
+        .into_iter()
+        .filter_map(|(at, sign)| Some((at?, sign)));
     let part = |(at, sign): (usize, f64)| wrench.iter().zip(at..).map(move |(x, at)| (at, sign * x));
     columns.flat_map(part).collect()
 }
 
 /// Whether all eigenvalues of the symmetric `gram` are above `least²`, in spite of rounding.
 ///
-/// By whether `gram − shift` has a Cholesky factor. Where it has one in floating point, the least eigenvalue is above
-/// `shift − (n + 1) u tr(gram)`, about [Rump2006, theorem 2.3]; the shift has room for eight times that.
+/// By whether `gram − shift` has a Cholesky factor. Where it has one in floating point, the least eigenvalue
+/// is above `shift − (n + 1) u tr(gram)`, about [Rump2006, theorem 2.3]; the shift has room for eight times
+/// that.
 fn exceeds(mut gram: Vec<f64>, n: usize, least: f64) -> bool {
     let trace: f64 = (0..n).map(|i| gram[i * n + i]).sum();
     let shift = least * least + 8.0 * (n + 2) as f64 * f64::EPSILON * trace;
@@ -133,7 +152,11 @@ fn exceeds(mut gram: Vec<f64>, n: usize, least: f64) -> bool {
             if i == k && (rest.is_nan() || rest <= 0.0) {
                 return false;
             }
-            gram[i * n + k] = if i == k { rest.sqrt() } else { rest / gram[k * n + k] };
+            gram[i * n + k] = if i == k {
+                rest.sqrt()
+            } else {
+                rest / gram[k * n + k]
+            };
         }
     }
     true
@@ -143,7 +166,11 @@ fn exceeds(mut gram: Vec<f64>, n: usize, least: f64) -> bool {
 mod tests {
     use super::*;
 
-    const FRAME: Frame = Frame { center: [0.0; 3], length_mm: 5.0, n_pieces: 3 };
+    const FRAME: Frame = Frame {
+        center: [0.0; 3],
+        length_mm: 5.0,
+        n_pieces: 3,
+    };
     const KEY: usize = 2;
 
     /// Four contacts of piece `a` with `b` on the side of a cube of 10 mm around (x, 0, 0).
@@ -154,35 +181,59 @@ mod tests {
             point[axis] += 5.0 * sign;
             point[(axis + 1) % 3] += if i & 1 == 1 { 4.0 } else { -4.0 };
             point[(axis + 2) % 3] += if i & 2 == 2 { 4.0 } else { -4.0 };
-            Contact { a, b, point, normal, gap_mm: 0.1 }
+            Contact {
+                a,
+                b,
+                point,
+                normal,
+                gap_mm: 0.1,
+            }
         };
         (0..4).map(place).collect()
     }
 
     /// Piece 1, a cube in a box, piece 0, whose side along x is the key, which slides along z.
     fn contacts() -> Vec<Contact> {
-        let of_cube =
-            [(1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0), (0, -1.0)].map(|(axis, sign)| on_side(1, 0, 0.0, axis, sign));
+        let of_cube = [(1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0), (0, -1.0)]
+            .map(|(axis, sign)| on_side(1, 0, 0.0, axis, sign));
         let of_key = [(1, -1.0), (1, 1.0), (0, 1.0)].map(|(axis, sign)| on_side(KEY, 0, 10.0, axis, sign));
         [of_cube.concat(), of_key.concat(), on_side(1, KEY, 0.0, 0, 1.0)].concat()
     }
 
     fn tested(contacts: &[Contact], held: &[usize], key: usize, hold: f64) -> Tested {
         let multipliers: Vec<(usize, f64)> = (0..contacts.len()).map(|i| (i, 1.0)).collect();
-        test(&FRAME, contacts, held, key, &Held { multipliers: &multipliers, hold })
+        test(
+            &FRAME,
+            contacts,
+            held,
+            key,
+            &Held {
+                multipliers: &multipliers,
+                hold,
+            },
+        )
     }
 
     /// The greatest hold that is confirmed, but for a share of 0.001.
     fn greatest_hold(contacts: &[Contact]) -> f64 {
         let steps = (0..20_000).map(|i| f64::from(i) * 0.001).skip(1);
-        steps.take_while(|&hold| tested(contacts, &[0], KEY, hold).is_ok()).last().unwrap_or(0.0)
+        steps
+            .take_while(|&hold| tested(contacts, &[0], KEY, hold).is_ok())
+            .last()
+            .unwrap_or(0.0)
     }
 
     #[test]
     fn a_cube_behind_a_sliding_key_is_held_and_the_key_is_not() {
         let told = tested(&contacts(), &[0], KEY, 0.5).unwrap();
-        assert!(told.contains("hold 0.5000, 36 contacts; others move by up to "), "{told}");
-        assert!(tested(&contacts(), &[0], 1, 0.1).is_err(), "the key moves while the cube counts as free");
+        assert!(
+            told.contains("hold 0.5000, 36 contacts; others move by up to "),
+            "{told}"
+        );
+        assert!(
+            tested(&contacts(), &[0], 1, 0.1).is_err(),
+            "the key moves while the cube counts as free"
+        );
         let greatest = greatest_hold(&contacts());
         assert!(tested(&contacts(), &[0], KEY, 1.01 * greatest).is_err());
         assert!((0.5..5.0).contains(&greatest), "{greatest}");
@@ -190,7 +241,8 @@ mod tests {
 
     #[test]
     fn a_hold_is_what_the_best_motion_of_the_key_leaves() {
-        // Along x the cube meets 4 contacts with the box and 4 with the key, which follows and meets 4 with the box.
+        // Along x the cube meets 4 contacts with the box and 4 with the key, which follows and meets 4 with
+        // the box.
         let all: f64 = 4.0 + 4.0 * 4.0 / (4.0 + 4.0);
         let along_x = greatest_hold(&contacts());
         assert!(along_x <= all.sqrt() / HOLD + 1e-3, "{along_x}");
@@ -211,22 +263,39 @@ mod tests {
         let told = |change: fn(&mut [(usize, f64)], usize)| {
             let mut multipliers: Vec<(usize, f64)> = (0..contacts.len()).map(|i| (i, 1.0)).collect();
             change(&mut multipliers, of_key);
-            test(&FRAME, &contacts, &[0], KEY, &Held { multipliers: &multipliers, hold: 0.1 })
+            test(
+                &FRAME,
+                &contacts,
+                &[0],
+                KEY,
+                &Held {
+                    multipliers: &multipliers,
+                    hold: 0.1,
+                },
+            )
         };
         assert!(told(|_, _| ()).is_ok());
         assert!(told(|m, _| m[7].1 = -1.0).is_err());
         assert!(told(|m, _| m[7].0 = 99).is_err());
-        assert!(told(|m, of_key| m[of_key].1 = 1.001).unwrap_err().ends_with("not in equilibrium"));
+        assert!(
+            told(|m, of_key| m[of_key].1 = 1.001)
+                .unwrap_err()
+                .ends_with("not in equilibrium")
+        );
     }
 
     #[test]
     fn walls_of_the_key_that_are_uneven_by_rounding_change_little() {
         let mut rough = contacts();
         let exact = greatest_hold(&rough);
-        rough.iter_mut().enumerate().filter(|(_, c)| c.a == KEY).for_each(|(i, c)| {
-            let slant = 1e-11 * (i as f64).sin();
-            c.normal[2] += slant;
-        });
+        rough
+            .iter_mut()
+            .enumerate()
+            .filter(|(_, c)| c.a == KEY)
+            .for_each(|(i, c)| {
+                let slant = 1e-11 * (i as f64).sin();
+                c.normal[2] += slant;
+            });
         assert!((greatest_hold(&rough) - exact).abs() < 2e-3);
     }
 }

@@ -1,6 +1,8 @@
-//! `shellock-check OUT`: confirms or refutes each claim in `OUT/certificate.json`, one line a claim, and what that means.
+//! `shellock-check OUT`: confirms or refutes each claim in `OUT/certificate.json`, one line a claim, and what
+//! that means.
 //!
-//! Exit code 0: everything that is claimed is confirmed; 1: something is refuted; 2: the certificate could not be read.
+//! Exit code 0: everything that is claimed is confirmed; 1: something is refuted; 2: the certificate could
+//! not be read.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -33,7 +35,11 @@ fn main() -> ExitCode {
             let count = |verdict: Verdict| findings.iter().filter(|f| f.verdict == verdict).count();
             let [n_refuted, n_unproven] = [Verdict::Refuted, Verdict::Unproven].map(count);
             let n_claimed = findings.len() - n_unproven;
-            let unproven = if n_unproven > 0 { format!(", {n_unproven} unproven") } else { String::new() };
+            let unproven = if n_unproven > 0 {
+                format!(", {n_unproven} unproven")
+            } else {
+                String::new()
+            };
             match n_refuted {
                 0 => println!("all {n_claimed} confirmed{unproven}. {NOT_TESTED}"),
                 n => println!("{n} of {n_claimed} REFUTED{unproven}: do not trust this kit"),

@@ -44,23 +44,38 @@ struct Edge {
 impl Mesh {
     /// Of these triangles.
     pub fn new(triangles: Vec<[Vec3; 3]>) -> Self {
-        Self { triangles, tree: OnceLock::new(), edges: OnceLock::new() }
+        Self {
+            triangles,
+            tree: OnceLock::new(),
+            edges: OnceLock::new(),
+        }
     }
 
     /// From the bytes of a binary STL file; its normals are not read.
     pub fn from_stl(bytes: &[u8]) -> Result<Self, String> {
         const HEADER: usize = 84;
         const RECORD: usize = 50;
-        let count = bytes.get(80..HEADER).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+        let count = bytes
+            .get(80..HEADER)
+            .and_then(|b| b.try_into().ok())
+            .map(u32::from_le_bytes);
         let n = count.ok_or("shorter than the head of a binary STL file")? as usize;
         if bytes.len() != n.saturating_mul(RECORD).saturating_add(HEADER) {
-            return Err(format!("{} bytes are no binary STL file of {n} triangles", bytes.len()));
+            return Err(format!(
+                "{} bytes are no binary STL file of {n} triangles",
+                bytes.len()
+            ));
         }
         let number = |b: &[u8]| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let point = |b: &[u8]| [number(b), number(&b[4..]), number(&b[8..])];
         let triangle = |b: &[u8]| [point(&b[12..]), point(&b[24..]), point(&b[36..])];
         let triangles: Vec<[Vec3; 3]> = bytes[HEADER..].chunks_exact(RECORD).map(triangle).collect();
-        match triangles.iter().flatten().flatten().all(|x| x.abs() <= FARTHEST_MM) {
+        match triangles
+            .iter()
+            .flatten()
+            .flatten()
+            .all(|x| x.abs() <= FARTHEST_MM)
+        {
             true => Ok(Self::new(triangles)),
             false => Err(format!("a coordinate is no number, or beyond {FARTHEST_MM} mm")),
         }
@@ -68,8 +83,13 @@ impl Mesh {
 
     /// Edges that are not used equally often in both directions.
     pub fn n_open_edges(&self) -> usize {
-        let uses = self.edges().all.chunk_by(|x, y| x.ends == y.ends).filter(|uses| uses[0].ends[0] != uses[0].ends[1]);
-        uses.filter(|uses| 2 * uses.iter().filter(|e| e.is_forward).count() != uses.len()).count()
+        let uses = self
+            .edges()
+            .all
+            .chunk_by(|x, y| x.ends == y.ends)
+            .filter(|uses| uses[0].ends[0] != uses[0].ends[1]);
+        uses.filter(|uses| 2 * uses.iter().filter(|e| e.is_forward).count() != uses.len())
+            .count()
     }
 
     /// Triangles that share the edge of side `k` of triangle `t`: itself, and those on the other side.
@@ -89,7 +109,11 @@ impl Mesh {
                 let corners = t.map(name);
                 all.extend((0..3).map(|k| {
                     let (from, to) = (corners[k], corners[(k + 1) % 3]);
-                    Edge { ends: [from.min(to), from.max(to)], is_forward: from < to, side: 3 * triangle + k }
+                    Edge {
+                        ends: [from.min(to), from.max(to)],
+                        is_forward: from < to,
+                        side: 3 * triangle + k,
+                    }
                 }));
             }
             all.sort_unstable();
@@ -133,20 +157,33 @@ impl Mesh {
             volume += part;
             moment = add(moment, scale(add(a, add(b, c)), 0.25 * part));
         }
-        if volume > 0.0 { add(origin, scale(moment, 1.0 / volume)) } else { origin }
+        if volume > 0.0 {
+            add(origin, scale(moment, 1.0 / volume))
+        } else {
+            origin
+        }
     }
 
     /// Volume inside, mm³.
     pub fn volume_mm3(&self) -> f64 {
-        self.triangles.iter().map(|[a, b, c]| dot(*a, cross(*b, *c)) / 6.0).sum()
+        self.triangles
+            .iter()
+            .map(|[a, b, c]| dot(*a, cross(*b, *c)) / 6.0)
+            .sum()
     }
 
     /// The triangle nearest to `point`, with the point of it that is, where that is no farther than rounding.
     pub fn on_surface(&self, point: Vec3) -> Option<(usize, Vec3)> {
-        let near =
-            self.numbers_near(point, ON_SURFACE_MM).into_iter().map(|i| (i, nearest_point(&self.triangles[i], point)));
+        let near = self
+            .numbers_near(point, ON_SURFACE_MM)
+            .into_iter()
+            .map(|i| (i, nearest_point(&self.triangles[i], point)));
         let on = near.filter(|(_, nearest)| distance(*nearest, point) <= ON_SURFACE_MM);
-        on.min_by(|a, b| distance(a.1, point).total_cmp(&distance(b.1, point)).then(a.0.cmp(&b.0)))
+        on.min_by(|a, b| {
+            distance(a.1, point)
+                .total_cmp(&distance(b.1, point))
+                .then(a.0.cmp(&b.0))
+        })
     }
 
     /// Triangles that may come into a box: all that do, and a few beside it.
@@ -156,8 +193,9 @@ impl Mesh {
 
     /// Whether `point` is within `reach_mm` of the box around all triangles.
     pub fn is_in_bounds(&self, point: Vec3, reach_mm: f64) -> bool {
-        let is_in =
-            |[low, high]: [Vec3; 2]| (0..3).all(|k| low[k] - reach_mm <= point[k] && point[k] <= high[k] + reach_mm);
+        let is_in = |[low, high]: [Vec3; 2]| {
+            (0..3).all(|k| low[k] - reach_mm <= point[k] && point[k] <= high[k] + reach_mm)
+        };
         self.tree().bounds().is_some_and(is_in)
     }
 
@@ -171,7 +209,8 @@ impl Mesh {
         let on = self.near(point, ON_SURFACE_MM).filter_map(|t| {
             let own = normal_of(t)?;
             let nearest = nearest_point(t, point);
-            (dot(own, normal) >= SAME_NORMAL && distance(nearest, point) <= ON_SURFACE_MM).then_some((nearest, own))
+            (dot(own, normal) >= SAME_NORMAL && distance(nearest, point) <= ON_SURFACE_MM)
+                .then_some((nearest, own))
         });
         on.min_by(|a, b| distance(a.0, point).total_cmp(&distance(b.0, point)))
     }
@@ -188,17 +227,22 @@ impl Mesh {
 
     /// Distance of `point` to the surface, mm; `None` where it is more than `reach_mm`.
     pub fn distance_mm(&self, point: Vec3, reach_mm: f64) -> Option<f64> {
-        let distances = self.near(point, reach_mm).map(|t| distance(nearest_point(t, point), point));
+        let distances = self
+            .near(point, reach_mm)
+            .map(|t| distance(nearest_point(t, point), point));
         distances.filter(|d| *d <= reach_mm).min_by(f64::total_cmp)
     }
 
     /// Triangles that may come within `reach_mm` of `point`: all that do, and a few more.
     fn near(&self, point: Vec3, reach_mm: f64) -> impl Iterator<Item = &[Vec3; 3]> {
-        self.numbers_near(point, reach_mm).into_iter().map(|i| &self.triangles[i])
+        self.numbers_near(point, reach_mm)
+            .into_iter()
+            .map(|i| &self.triangles[i])
     }
 
     fn numbers_near(&self, point: Vec3, reach_mm: f64) -> Vec<usize> {
-        self.tree().near(point.map(|x| x - reach_mm), point.map(|x| x + reach_mm))
+        self.tree()
+            .near(point.map(|x| x - reach_mm), point.map(|x| x + reach_mm))
     }
 }
 
@@ -214,7 +258,11 @@ fn nearest_point(t: &[Vec3; 3], p: Vec3) -> Vec3 {
     let on_edge = |k: usize| {
         let (a, b) = (t[k], t[(k + 1) % 3]);
         let (along, length_sq) = (sub(b, a), dot(sub(b, a), sub(b, a)));
-        let share = if length_sq > 0.0 { (dot(sub(p, a), along) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
+        let share = if length_sq > 0.0 {
+            (dot(sub(p, a), along) / length_sq).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         add(a, scale(along, share))
     };
     if let Some(normal) = normal_of(t) {
@@ -224,7 +272,10 @@ fn nearest_point(t: &[Vec3; 3], p: Vec3) -> Vec3 {
             return foot;
         }
     }
-    (0..3).map(on_edge).min_by(|a, b| distance(*a, p).total_cmp(&distance(*b, p))).unwrap_or(t[0])
+    (0..3)
+        .map(on_edge)
+        .min_by(|a, b| distance(*a, p).total_cmp(&distance(*b, p)))
+        .unwrap_or(t[0])
 }
 
 #[cfg(test)]
@@ -234,7 +285,14 @@ pub mod tests {
     /// A box between two corners.
     pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
         let corner = |i: usize| std::array::from_fn(|k| if i >> k & 1 == 1 { max[k] } else { min[k] });
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
         let halves = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
         Mesh::new(halves.map(|t| t.map(corner)).collect())
     }

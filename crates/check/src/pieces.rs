@@ -36,7 +36,11 @@ pub fn test_files(folder: &Path, files: &[OtherFile]) -> Tested {
             return Err(format!("{} has other bytes", other.file));
         }
     }
-    Ok(files.iter().map(|f| f.file.as_str()).collect::<Vec<_>>().join(", "))
+    Ok(files
+        .iter()
+        .map(|f| f.file.as_str())
+        .collect::<Vec<_>>()
+        .join(", "))
 }
 
 /// Whether every piece is one closed surface, right side out.
@@ -44,19 +48,27 @@ pub fn test_closed(meshes: &[Mesh]) -> Tested {
     for (id, mesh) in meshes.iter().enumerate() {
         let (n_open, n_surfaces, volume_mm3) = (mesh.n_open_edges(), mesh.n_surfaces(), mesh.volume_mm3());
         if n_open > 0 || volume_mm3.is_nan() || volume_mm3 <= 0.0 {
-            return Err(format!("piece {id} has {n_open} open edges and a volume of {volume_mm3:.1} mm³"));
+            return Err(format!(
+                "piece {id} has {n_open} open edges and a volume of {volume_mm3:.1} mm³"
+            ));
         }
         if n_surfaces > 1 {
             return Err(format!("piece {id} falls into {n_surfaces} surfaces"));
         }
     }
-    Ok(format!("{:.1} mm³ in all", meshes.iter().map(Mesh::volume_mm3).sum::<f64>()))
+    Ok(format!(
+        "{:.1} mm³ in all",
+        meshes.iter().map(Mesh::volume_mm3).sum::<f64>()
+    ))
 }
 
 /// A file within the folder, whatever its name pretends.
 fn bytes_of(folder: &Path, file: &str) -> Result<Vec<u8>, String> {
     let told = |e: std::io::Error| format!("{file}: {e}");
-    let is_plain = !file.is_empty() && Path::new(file).components().all(|c| matches!(c, Component::Normal(_)));
+    let is_plain = !file.is_empty()
+        && Path::new(file)
+            .components()
+            .all(|c| matches!(c, Component::Normal(_)));
     if !is_plain {
         return Err(format!("{file} is no path within the kit"));
     }

@@ -10,7 +10,8 @@ const SAME: f64 = 1e-9;
 const MOST_TURN: f64 = 0.5;
 /// Lines of the directions whose coordinates are −1, 0 or 1.
 const LINES: usize = 13;
-/// No vector that goes at most 1 along each of these lines is longer: `√(1 + (√2 − 1)² + (√3 − √2)²)`, rounded up.
+/// No vector that goes at most 1 along each of these lines is longer: `√(1 + (√2 − 1)² + (√3 − √2)²)`,
+/// rounded up.
 const BETWEEN_LINES: f64 = 1.1281;
 
 /// A vector that is linear in the logarithms of the poses, and how far it goes.
@@ -44,13 +45,17 @@ impl Quantity {
         if n < 3 || self.most.len() != n || !self.axes.iter().all(is_unit) {
             return Err("has not three axes or more of length 1, with a bound each".into());
         }
-        if ![[0, 1], [1, 2], [2, 0]].iter().all(|&[i, j]| dot(self.axes[i], self.axes[j]).abs() <= SAME) {
+        if ![[0, 1], [1, 2], [2, 0]]
+            .iter()
+            .all(|&[i, j]| dot(self.axes[i], self.axes[j]).abs() <= SAME)
+        {
             return Err("has axes that are not perpendicular".into());
         }
         if !self.most.iter().flatten().all(|m| *m > 0.0 && m.is_finite()) {
             return Err("has a bound that is not above 0".into());
         }
-        if self.at.is_some_and(|at| !norm(at).is_finite()) || (self.at.is_none() && self.norm() >= MOST_TURN) {
+        if self.at.is_some_and(|at| !norm(at).is_finite()) || (self.at.is_none() && self.norm() >= MOST_TURN)
+        {
             return Err("is a turn, or a place, that is too far".into());
         }
         Ok(())
@@ -59,7 +64,13 @@ impl Quantity {
     /// No vector within the bounds is longer, mm or rad.
     pub fn norm(&self) -> f64 {
         let longer = |[low, high]: &[f64; 2]| low.max(*high);
-        let of_box = self.most.iter().take(3).map(|m| longer(m).powi(2)).sum::<f64>().sqrt();
+        let of_box = self
+            .most
+            .iter()
+            .take(3)
+            .map(|m| longer(m).powi(2))
+            .sum::<f64>()
+            .sqrt();
         if !self.covers_lines() {
             return of_box;
         }
@@ -68,13 +79,18 @@ impl Quantity {
 
     /// Whether the axes are, either way, all lines of the directions with coordinates −1, 0 or 1.
     fn covers_lines(&self) -> bool {
-        let is_covered = |line: Vec3| self.axes.iter().any(|axis| is_along(*axis, scale(line, 1.0 / norm(line))));
+        let is_covered = |line: Vec3| {
+            self.axes
+                .iter()
+                .any(|axis| is_along(*axis, scale(line, 1.0 / norm(line))))
+        };
         let digits = |i: usize| [i % 3, i / 3 % 3, i / 9].map(|digit| digit as f64 - 1.0);
         // The numbers up to the middle, which is no direction, are one way along each line.
         self.axes.len() >= LINES && (0..LINES).map(digits).all(is_covered)
     }
 
-    /// The most of it along `t`, a vector of any length: with perpendicular axes, of the box around the origin that the bounds are.
+    /// The most of it along `t`, a vector of any length: with perpendicular axes, of the box around the
+    /// origin that the bounds are.
     pub fn most_along(&self, t: Vec3) -> f64 {
         let part = |(axis, [low, high]): (&Vec3, &[f64; 2])| {
             let share = dot(*axis, t);
@@ -83,7 +99,8 @@ impl Quantity {
         self.axes.iter().zip(&self.most).take(3).map(part).sum()
     }
 
-    /// 1 where it counts `a` against `b`, −1 where `b` against `a`; both `None` where they are at rest. `None` for other pieces.
+    /// 1 where it counts `a` against `b`, −1 where `b` against `a`; both `None` where they are at rest.
+    /// `None` for other pieces.
     pub fn sign(&self, a: Option<usize>, b: Option<usize>) -> Option<f64> {
         match (self.plus, self.minus) {
             pair if pair == (a, b) => Some(1.0),
@@ -100,7 +117,13 @@ pub mod tests {
     /// As far along each coordinate axis.
     pub fn cube(plus: Option<usize>, minus: Option<usize>, at: Option<Vec3>, most: f64) -> Quantity {
         let axes = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        Quantity { plus, minus, at, axes, most: vec![[most; 2]; 3] }
+        Quantity {
+            plus,
+            minus,
+            at,
+            axes,
+            most: vec![[most; 2]; 3],
+        }
     }
 
     #[test]
@@ -125,7 +148,10 @@ pub mod tests {
         assert_eq!(q.axes.len(), LINES);
         assert!((q.norm() - 0.11281).abs() < 1e-12);
         let way = |i: i32| [1.7, 2.3, 0.9].map(|f| (f * f64::from(i) + f).sin());
-        for d in (0..20_000).map(way).chain([[1.0, 2.0_f64.sqrt() - 1.0, 3.0_f64.sqrt() - 2.0_f64.sqrt()]]) {
+        for d in (0..20_000)
+            .map(way)
+            .chain([[1.0, 2.0_f64.sqrt() - 1.0, 3.0_f64.sqrt() - 2.0_f64.sqrt()]])
+        {
             let most = q.axes.iter().map(|axis| dot(*axis, d).abs()).fold(0.0, f64::max);
             assert!(norm(d) <= BETWEEN_LINES * most, "{d:?}");
         }
@@ -139,13 +165,23 @@ pub mod tests {
         assert!(good.test(&[1, 2]).is_ok());
         assert!(good.test(&[2]).is_err(), "at rest");
         assert!(cube(None, None, None, 0.1).test(&[1]).is_err());
-        assert!(cube(Some(1), None, None, 0.3).test(&[1]).is_err(), "turned by more than 0.5");
+        assert!(
+            cube(Some(1), None, None, 0.3).test(&[1]).is_err(),
+            "turned by more than 0.5"
+        );
         assert!(cube(Some(1), None, None, f64::NAN).test(&[1]).is_err());
-        let slanted = |axis: Vec3| Quantity { axes: vec![axis, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ..good.clone() };
+        let slanted = |axis: Vec3| Quantity {
+            axes: vec![axis, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            ..good.clone()
+        };
         assert!(slanted([1.1, 0.0, 0.0]).test(&[1]).is_err());
         assert!(slanted([0.6, 0.8, 0.0]).test(&[1]).is_err());
         assert_eq!(
-            [good.sign(Some(1), None), good.sign(None, Some(1)), good.sign(Some(1), Some(2))],
+            [
+                good.sign(Some(1), None),
+                good.sign(None, Some(1)),
+                good.sign(Some(1), Some(2))
+            ],
             [Some(1.0), Some(-1.0), None]
         );
     }

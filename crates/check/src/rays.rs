@@ -1,9 +1,9 @@
 //! Paths and overlaps by parallel rays through the pieces.
 //!
-//! Along each ray a piece is a list of stretches inside it. A piece that leaves along the rays meets another one exactly
-//! where, on some ray, a stretch of the other does not lie behind its own. Rays are [`PIXEL_MM`] apart, so what is seen
-//! surely is an obstacle that covers a block of two by two rays; single rays hit the slivers that rounding leaves along
-//! walls parallel to the path, and count with their area alone.
+//! Along each ray a piece is a list of stretches inside it. A piece that leaves along the rays meets another
+//! one exactly where, on some ray, a stretch of the other does not lie behind its own. Rays are [`PIXEL_MM`]
+//! apart, so what is seen surely is an obstacle that covers a block of two by two rays; single rays hit the
+//! slivers that rounding leaves along walls parallel to the path, and count with their area alone.
 
 use crate::Tested;
 use crate::mesh::Mesh;
@@ -34,7 +34,9 @@ pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usiz
     for &other in others {
         let theirs = grid.stretches(&meshes[other]);
         visit_pairs(&own, &theirs, |pixel, mine, other| {
-            let past_mm = (other[1] - mine[0]).min(other[1] - other[0]).min(mine[1] - mine[0]);
+            let past_mm = (other[1] - mine[0])
+                .min(other[1] - other[0])
+                .min(mine[1] - mine[0]);
             if past_mm > ROUNDING_MM {
                 is_blocked[pixel] = true;
             }
@@ -45,12 +47,16 @@ pub fn test_path(meshes: &[Mesh], moving: usize, direction: Vec3, others: &[usiz
     verdict(&grid, &is_blocked, shadow.len(), "in its way")
 }
 
-/// Whether no two pieces overlap as they are, but where they are `pressed` on purpose: two pieces, and a place that they share.
+/// Whether no two pieces overlap as they are, but where they are `pressed` on purpose: two pieces, and a
+/// place that they share.
 pub fn test_apart(meshes: &[Mesh], pressed: impl Fn([usize; 2], Vec3) -> bool) -> Tested {
     let length = norm(OBLIQUE);
     let grid = Grid::around(scale(OBLIQUE, 1.0 / length), meshes)?;
     let mut all: Vec<(usize, Stretch)> = Vec::new();
-    meshes.iter().enumerate().for_each(|(i, mesh)| all.extend(grid.stretches(mesh).into_iter().map(|s| (i, s))));
+    meshes
+        .iter()
+        .enumerate()
+        .for_each(|(i, mesh)| all.extend(grid.stretches(mesh).into_iter().map(|s| (i, s))));
     all.sort_by(|(_, s), (_, t)| s.pixel.cmp(&t.pixel).then(s.inside[0].total_cmp(&t.inside[0])));
     let mut is_shared = vec![false; grid.n[0] * grid.n[1]];
     let by_ray = || all.chunk_by(|(_, s), (_, t)| s.pixel == t.pixel);
@@ -77,12 +83,23 @@ fn verdict(grid: &Grid, is_hit: &[bool], n_rays: usize, what: &str) -> Tested {
     }
     let n_hit = is_hit.iter().filter(|&&hit| hit).count();
     let width = grid.n[0];
-    let is_block = |&i: &usize| [i, i + 1, i + width, i + width + 1].iter().all(|&k| is_hit.get(k) == Some(&true));
+    let is_block = |&i: &usize| {
+        [i, i + 1, i + width, i + width + 1]
+            .iter()
+            .all(|&k| is_hit.get(k) == Some(&true))
+    };
     let n_blocks = (0..is_hit.len()).filter(is_block).count();
     let cell_mm2 = PIXEL_MM * PIXEL_MM;
-    let (area_mm2, most_mm2) = (n_hit as f64 * cell_mm2, SLIVERS_MM2.max(SLIVERS * n_rays as f64 * cell_mm2));
+    let (area_mm2, most_mm2) = (
+        n_hit as f64 * cell_mm2,
+        SLIVERS_MM2.max(SLIVERS * n_rays as f64 * cell_mm2),
+    );
     let figure = format!("{n_hit} of {n_rays} rays find something {what}, {n_blocks} blocks of four");
-    if n_blocks > 0 || area_mm2 > most_mm2 { Err(figure) } else { Ok(figure) }
+    if n_blocks > 0 || area_mm2 > most_mm2 {
+        Err(figure)
+    } else {
+        Ok(figure)
+    }
 }
 
 /// A stretch of a ray inside a body.
@@ -99,7 +116,10 @@ fn visit_pairs(a: &[Stretch], b: &[Stretch], mut visit: impl FnMut(usize, [f64; 
         while from < b.len() && b[from].pixel < s.pixel {
             from += 1;
         }
-        b[from..].iter().take_while(|t| t.pixel == s.pixel).for_each(|t| visit(s.pixel, s.inside, t.inside));
+        b[from..]
+            .iter()
+            .take_while(|t| t.pixel == s.pixel)
+            .for_each(|t| visit(s.pixel, s.inside, t.inside));
     }
 }
 
@@ -111,13 +131,24 @@ struct Grid {
 }
 
 impl Grid {
-    /// Covers the shadow of `meshes`; the rays run along `direction`, a unit vector. An error where that takes too many rays.
+    /// Covers the shadow of `meshes`; the rays run along `direction`, a unit vector. An error where that
+    /// takes too many rays.
     fn around<'a>(direction: Vec3, meshes: impl IntoIterator<Item = &'a Mesh>) -> Result<Self, String> {
-        // Rows parallel to no wall of an axis-aligned model, so that walls along the path are not met all at once.
-        let across = [[0.4217, -0.2873, 0.8600], [-0.7712, 0.4391, 0.4608]].map(|slant| cross(direction, slant));
-        let u = if norm(across[0]) > norm(across[1]) { across[0] } else { across[1] };
+        // Rows parallel to no wall of an axis-aligned model, so that walls along the path are not met all at
+        // once.
+        let across =
+            [[0.4217, -0.2873, 0.8600], [-0.7712, 0.4391, 0.4608]].map(|slant| cross(direction, slant));
+        let u = if norm(across[0]) > norm(across[1]) {
+            across[0]
+        } else {
+            across[1]
+        };
         let u = scale(u, 1.0 / norm(u));
-        let mut grid = Self { axes: [u, cross(direction, u), direction], origin: [0.0; 2], n: [0; 2] };
+        let mut grid = Self {
+            axes: [u, cross(direction, u), direction],
+            origin: [0.0; 2],
+            n: [0; 2],
+        };
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for corner in meshes.into_iter().flat_map(|m| m.triangles.iter().flatten()) {
             let p = grid.project(*corner);
@@ -126,11 +157,21 @@ impl Grid {
             }
         }
         // An empty shadow has no pixels.
-        let n = |k: usize| if low[k] <= high[k] { ((high[k] - low[k]) / PIXEL_MM).ceil() as usize + 1 } else { 0 };
+        let n = |k: usize| {
+            if low[k] <= high[k] {
+                ((high[k] - low[k]) / PIXEL_MM).ceil() as usize + 1
+            } else {
+                0
+            }
+        };
         (grid.n, grid.origin) = ([n(0), n(1)], low);
         match grid.n[0].checked_mul(grid.n[1]) {
             Some(n_rays) if n_rays <= MOST_RAYS => Ok(grid),
-            _ => Err(format!("a shadow of {:.0} × {:.0} mm is too large", high[0] - low[0], high[1] - low[1])),
+            _ => Err(format!(
+                "a shadow of {:.0} × {:.0} mm is too large",
+                high[0] - low[0],
+                high[1] - low[1]
+            )),
         }
     }
 
@@ -146,10 +187,13 @@ impl Grid {
         std::array::from_fn(|k| (0..3).map(|axis| along[axis] * self.axes[axis][k]).sum())
     }
 
-    /// The stretches inside a closed mesh, also where it is inside out, since printers may fill that; in order of their pixels, then of depth.
+    /// The stretches inside a closed mesh, also where it is inside out, since printers may fill that; in
+    /// order of their pixels, then of depth.
     fn stretches(&self, mesh: &Mesh) -> Vec<Stretch> {
         let mut crossings: Vec<(usize, f64, i32)> = Vec::new();
-        mesh.triangles.iter().for_each(|t| self.cross_triangle(t.map(|p| self.project(p)), &mut crossings));
+        mesh.triangles
+            .iter()
+            .for_each(|t| self.cross_triangle(t.map(|p| self.project(p)), &mut crossings));
         crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut stretches = Vec::new();
         for ray in crossings.chunk_by(|a, b| a.0 == b.0) {
@@ -160,16 +204,25 @@ impl Grid {
                 }
                 depth += step;
                 if depth == 0 {
-                    stretches.push(Stretch { pixel, inside: [start, at] });
+                    stretches.push(Stretch {
+                        pixel,
+                        inside: [start, at],
+                    });
                 }
             }
         }
         stretches
     }
 
-    /// The rays that cross a triangle: its rows are cut at half-open ends that neighbours share to the last bit.
+    /// The rays that cross a triangle: its rows are cut at half-open ends that neighbours share to the last
+    /// bit.
     fn cross_triangle(&self, t: [Vec3; 3], crossings: &mut Vec<(usize, f64, i32)>) {
-        let at = |p: Vec3| [(p[0] - self.origin[0]) / PIXEL_MM, (p[1] - self.origin[1]) / PIXEL_MM];
+        let at = |p: Vec3| {
+            [
+                (p[0] - self.origin[0]) / PIXEL_MM,
+                (p[1] - self.origin[1]) / PIXEL_MM,
+            ]
+        };
         let corners = t.map(at);
         let misses = |k: usize| {
             let end = self.n[k] as f64;
@@ -189,7 +242,8 @@ impl Grid {
         ];
         // Outward normals against the rays are entries.
         let step = if twice_area < 0.0 { 1 } else { -1 };
-        let rows = [ay.min(by).min(cy), ay.max(by).max(cy)].map(|y| y.ceil().clamp(0.0, self.n[1] as f64) as usize);
+        let rows =
+            [ay.min(by).min(cy), ay.max(by).max(cy)].map(|y| y.ceil().clamp(0.0, self.n[1] as f64) as usize);
         for row in rows[0]..rows[1] {
             let y = row as f64;
             let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
@@ -219,18 +273,31 @@ mod tests {
     use crate::gap::is_pressed;
     use crate::mesh::tests::cuboid;
 
-    /// Two cubes of 3 mm, one `deep_mm` in the other, with a press fit of 0.08 mm in the middle of what they share.
+    /// Two cubes of 3 mm, one `deep_mm` in the other, with a press fit of 0.08 mm in the middle of what they
+    /// share.
     fn pressed_cubes(deep_mm: f64) -> Tested {
-        let meshes = [cuboid([0.0; 3], [3.0; 3]), cuboid([0.0, 0.0, 3.0 - deep_mm], [3.0, 3.0, 6.0])];
-        let fit = PressFit { piece: 1, at: [1.5, 1.5, 3.0], interference_mm: 0.08 };
-        test_apart(&meshes, |pair, at| is_pressed(&meshes, std::slice::from_ref(&fit), pair, at))
+        let meshes = [
+            cuboid([0.0; 3], [3.0; 3]),
+            cuboid([0.0, 0.0, 3.0 - deep_mm], [3.0, 3.0, 6.0]),
+        ];
+        let fit = PressFit {
+            piece: 1,
+            at: [1.5, 1.5, 3.0],
+            interference_mm: 0.08,
+        };
+        test_apart(&meshes, |pair, at| {
+            is_pressed(&meshes, std::slice::from_ref(&fit), pair, at)
+        })
     }
 
     #[test]
     fn what_two_pieces_share_is_refuted_unless_a_press_fit_covers_it_and_is_as_shallow() {
         assert!(pressed_cubes(0.08).is_ok());
         assert!(pressed_cubes(1.0).is_err(), "too deep for a press fit");
-        let meshes = [cuboid([0.0; 3], [3.0; 3]), cuboid([0.0, 0.0, 2.92], [3.0, 3.0, 6.0])];
+        let meshes = [
+            cuboid([0.0; 3], [3.0; 3]),
+            cuboid([0.0, 0.0, 2.92], [3.0, 3.0, 6.0]),
+        ];
         assert!(test_apart(&meshes, |_, _| false).is_err(), "no press fit");
     }
 }

@@ -25,7 +25,10 @@ struct Node {
 impl Tree {
     /// Of all `triangles`.
     pub fn new(triangles: &[[Vec3; 3]]) -> Self {
-        let mut tree = Self { nodes: Vec::new(), order: (0..triangles.len()).collect() };
+        let mut tree = Self {
+            nodes: Vec::new(),
+            order: (0..triangles.len()).collect(),
+        };
         if !triangles.is_empty() {
             tree.add(triangles, 0, triangles.len());
         }
@@ -41,7 +44,13 @@ impl Tree {
             }
         }
         let (node, is_leaf) = (self.nodes.len(), to - from <= LEAF);
-        self.nodes.push(Node { low, high, after: 0, from, to: if is_leaf { to } else { from } });
+        self.nodes.push(Node {
+            low,
+            high,
+            after: 0,
+            from,
+            to: if is_leaf { to } else { from },
+        });
         if !is_leaf {
             let width = |k: &usize| high[*k] - low[*k];
             let axis = (0..3).max_by(|i, j| width(i).total_cmp(&width(j))).unwrap_or(0);
@@ -80,15 +89,22 @@ mod tests {
     #[test]
     fn whatever_comes_into_a_box_is_found() {
         let place = |i: usize| [1.7, 2.3, 0.9].map(|f| 10.0 * (f * i as f64).sin());
-        let triangles: Vec<[Vec3; 3]> = (0..500).map(|i| [place(i), place(i + 500), place(i + 1000)]).collect();
+        let triangles: Vec<[Vec3; 3]> = (0..500)
+            .map(|i| [place(i), place(i + 500), place(i + 1000)])
+            .collect();
         let tree = Tree::new(&triangles);
         for i in 0..50 {
             let low = place(2000 + i);
             let high = low.map(|x| x + 0.5);
             let found = tree.near(low, high);
             for (t, corners) in triangles.iter().enumerate() {
-                let is_in = corners.iter().any(|p| (0..3).all(|k| low[k] <= p[k] && p[k] <= high[k]));
-                assert!(!is_in || found.contains(&t), "triangle {t} has a corner in box {i}");
+                let is_in = corners
+                    .iter()
+                    .any(|p| (0..3).all(|k| low[k] <= p[k] && p[k] <= high[k]));
+                assert!(
+                    !is_in || found.contains(&t),
+                    "triangle {t} has a corner in box {i}"
+                );
             }
         }
         assert!(Tree::new(&[]).near([0.0; 3], [1.0; 3]).is_empty());

@@ -22,7 +22,10 @@ const RIM_MM: f64 = 1.0;
 const ALL: [f64; 2] = [0.0, 30.0];
 
 fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
-    Volume::cuboid(Aabb { min: Vec3::new(x[0], y[0], z[0]), max: Vec3::new(x[1], y[1], z[1]) })
+    Volume::cuboid(Aabb {
+        min: Vec3::new(x[0], y[0], z[0]),
+        max: Vec3::new(x[1], y[1], z[1]),
+    })
 }
 
 fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
@@ -30,7 +33,8 @@ fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
     cuboid(wide(x), wide(y), wide(z))
 }
 
-/// A cube in three parts: a base with a T-shaped groove, a lid whose tongue slides in along −x, and a pin through both.
+/// A cube in three parts: a base with a T-shaped groove, a lid whose tongue slides in along −x, and a pin
+/// through both.
 fn parts() -> [Volume; 3] {
     parts_with_lips(4.0)
 }
@@ -69,7 +73,9 @@ struct Made {
 /// The kit's certificate and plan; the files of the pieces lie in `folder` then.
 fn made_kit(folder: &Path) -> (Value, Value) {
     static KIT: LazyLock<Made> = LazyLock::new(make);
-    KIT.files.iter().for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
+    KIT.files
+        .iter()
+        .for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
     (KIT.certificate.clone(), KIT.plan.clone())
 }
 
@@ -81,24 +87,54 @@ fn make() -> Made {
 fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let pieces: IdVec<PatchId, TriMesh> = parts.iter().map(as_written).collect();
     let steps = ways.iter().copied().enumerate();
-    let steps = steps.map(|(i, d)| InstallationStep { piece: i.into(), separation: LatticeDirection::nearest(d) });
-    let plan = InstallationPlan { steps: steps.collect() };
+    let steps = steps.map(|(i, d)| InstallationStep {
+        piece: i.into(),
+        separation: LatticeDirection::nearest(d),
+    });
+    let plan = InstallationPlan {
+        steps: steps.collect(),
+    };
     let (report, stop) = (|_: shellock::context::Progress<'_>| {}, AtomicBool::new(false));
     let model = Solid::new(cuboid(ALL, ALL, ALL).to_mesh()).unwrap();
-    let params = VerifyParams { clearance_mm: CLEARANCE_MM, seed: 0 };
-    let assembly = Assembly { model: &model, pieces: &pieces, plan: &plan, press_fits: &[] };
+    let params = VerifyParams {
+        clearance_mm: CLEARANCE_MM,
+        seed: 0,
+    };
+    let assembly = Assembly {
+        model: &model,
+        pieces: &pieces,
+        plan: &plan,
+        press_fits: &[],
+    };
     let (verdict, contacts) = examine(&Ctx::new(&report, &stop), &params, &assembly).unwrap();
-    let files: Vec<(String, Vec<u8>)> =
-        pieces.iter().map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh))).collect();
+    let files: Vec<(String, Vec<u8>)> = pieces
+        .iter()
+        .map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh)))
+        .collect();
     let named = pieces.ids().zip(&files);
     let named = named
-        .map(|(id, (file, bytes))| PieceFile { id, file: file.clone(), sha256: sha256(bytes), play: None })
+        .map(|(id, (file, bytes))| PieceFile {
+            id,
+            file: file.clone(),
+            sha256: sha256(bytes),
+            play: None,
+        })
         .collect();
     let gaps = kit_gaps(&Ctx::new(&report, &stop), &model, &pieces, &plan, RIM_MM).unwrap();
     let ctx = Ctx::new(&report, &stop);
-    let params = PlayParams { clearance_mm: CLEARANCE_MM, slide_mm: SLIDE_MM, is_together: false, seed: 0 };
+    let params = PlayParams {
+        clearance_mm: CLEARANCE_MM,
+        slide_mm: SLIDE_MM,
+        is_together: false,
+        seed: 0,
+    };
     let play = measure(&ctx, &params, &pieces, &plan).unwrap();
-    let evidence = Evidence { contacts: &contacts, verdict: &verdict, gaps: &gaps, play: Some(&play) };
+    let evidence = Evidence {
+        contacts: &contacts,
+        verdict: &verdict,
+        gaps: &gaps,
+        play: Some(&play),
+    };
     let certificate = certify(named, &pieces, &plan, &evidence, CLEARANCE_MM).unwrap();
     let pieces = plan.steps.iter().map(|s| {
         json!({ "file": format!("{}.stl", s.piece), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
@@ -108,7 +144,11 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let mut certificate = serde_json::to_value(certificate).unwrap();
     // Gaps show outside, which is not of interest here.
     certificate["failed"] = json!([]);
-    Made { files, certificate, plan }
+    Made {
+        files,
+        certificate,
+        plan,
+    }
 }
 
 /// The claims that are refuted once `change` has been at the kit.
@@ -120,7 +160,11 @@ fn refuted(change: impl FnOnce(&Path, &mut Value, &mut Value)) -> Vec<String> {
         fs::write(folder.path().join(name), serde_json::to_vec(&value).unwrap()).unwrap();
     }
     let findings: Vec<Finding> = check(folder.path()).unwrap();
-    findings.into_iter().filter(|f| f.verdict == Verdict::Refuted).map(|f| f.claim).collect()
+    findings
+        .into_iter()
+        .filter(|f| f.verdict == Verdict::Refuted)
+        .map(|f| f.claim)
+        .collect()
 }
 
 /// Puts `mesh` in the place of a piece, with its hash.
@@ -134,7 +178,9 @@ fn replace(folder: &Path, certificate: &mut Value, piece: usize, mesh: &Volume) 
 fn multipliers(certificate: &mut Value) -> (&mut Vec<Value>, usize) {
     let list = certificate["claims"][0]["multipliers"].as_array_mut().unwrap();
     let value = |i: &usize| list[*i][1].as_f64().unwrap();
-    let greatest = (0..list.len()).max_by(|i, k| value(i).total_cmp(&value(k))).unwrap();
+    let greatest = (0..list.len())
+        .max_by(|i, k| value(i).total_cmp(&value(k)))
+        .unwrap();
     (list, greatest)
 }
 
@@ -170,7 +216,10 @@ fn a_piece_moved_by_less_than_a_clearance_or_two_is_off_its_contacts() {
         let lost = refuted(|folder, certificate, _| {
             replace(folder, certificate, 1, &parts()[1].translate(step * 0.2));
         });
-        assert!(lost.contains(&CONTACTS.to_owned()) && lost.contains(&LOCK.to_owned()), "{step}: {lost:?}");
+        assert!(
+            lost.contains(&CONTACTS.to_owned()) && lost.contains(&LOCK.to_owned()),
+            "{step}: {lost:?}"
+        );
         assert!(!lost.contains(&FILES.to_owned()));
     }
 }
@@ -181,7 +230,10 @@ fn a_piece_without_its_connector_is_off_its_contacts() {
         let bare = parts()[1].intersect(&cuboid([-1.0, 31.0], [-1.0, 31.0], [15.0, 31.0]));
         replace(folder, certificate, 1, &bare);
     });
-    assert!(lost.contains(&CONTACTS.to_owned()) && lost.contains(&LOCK.to_owned()), "{lost:?}");
+    assert!(
+        lost.contains(&CONTACTS.to_owned()) && lost.contains(&LOCK.to_owned()),
+        "{lost:?}"
+    );
 }
 
 #[test]
@@ -225,7 +277,12 @@ fn a_changed_direction_is_not_the_plans_and_not_free() {
     let turned = json!([0.0, 1.0, 0.0]);
     let is_lid = |c: &&mut Value| c["claim"] == "installs" && c["piece"] == 1;
     let turn = |certificate: &mut Value| {
-        let claim = certificate["claims"].as_array_mut().unwrap().iter_mut().find(is_lid).unwrap();
+        let claim = certificate["claims"]
+            .as_array_mut()
+            .unwrap()
+            .iter_mut()
+            .find(is_lid)
+            .unwrap();
         claim["direction"] = turned.clone();
     };
     assert_eq!(refuted(|_, certificate, _| turn(certificate)), [PLAN]);
@@ -250,7 +307,11 @@ fn a_missing_piece_or_claim_is_missed() {
         });
         // What is not proven of play is not claimed, and told as such.
         let is_play = (1..4).contains(&claim);
-        assert_eq!(silent.contains(&COMPLETE.to_owned()), !is_play, "{claim}: {silent:?}");
+        assert_eq!(
+            silent.contains(&COMPLETE.to_owned()),
+            !is_play,
+            "{claim}: {silent:?}"
+        );
     }
     let more = refuted(|_, certificate, _| {
         let claims = certificate["claims"].as_array_mut().unwrap();
@@ -271,9 +332,17 @@ fn an_open_piece_and_overlapping_pieces_are_refuted() {
     });
     assert!(open.contains(&BODIES.to_owned()));
     let thick = refuted(|folder, certificate, _| {
-        replace(folder, certificate, 2, &cuboid([16.0, 25.0], [12.0, 18.0], [1.0, 30.0]));
+        replace(
+            folder,
+            certificate,
+            2,
+            &cuboid([16.0, 25.0], [12.0, 18.0], [1.0, 30.0]),
+        );
     });
-    assert!(thick.contains(&"the assembled pieces do not overlap".to_owned()), "{thick:?}");
+    assert!(
+        thick.contains(&"the assembled pieces do not overlap".to_owned()),
+        "{thick:?}"
+    );
 }
 
 /// Both halves of a piece are closed, and their faces are where they were but for the cut.
@@ -285,7 +354,12 @@ fn a_piece_in_two_halves_or_with_something_inside_is_refuted() {
     });
     assert_eq!(sawn, [BODIES]);
     let hollow = refuted(|folder, certificate, _| {
-        replace(folder, certificate, 0, &parts()[0].subtract(&cuboid([1.0, 5.0], [1.0, 5.0], [1.0, 4.0])));
+        replace(
+            folder,
+            certificate,
+            0,
+            &parts()[0].subtract(&cuboid([1.0, 5.0], [1.0, 5.0], [1.0, 4.0])),
+        );
     });
     assert_eq!(hollow, [BODIES]);
 }
@@ -304,7 +378,10 @@ fn what_keeps_rays_from_being_cast_is_refuted() {
     assert_eq!(far, [FILES]);
     let untold = refuted(|_, certificate, _| {
         let claims = certificate["claims"].as_array_mut().unwrap();
-        claims.iter_mut().filter(|c| c["claim"] == "apart").for_each(|c| c["least"] = json!({}));
+        claims
+            .iter_mut()
+            .filter(|c| c["claim"] == "apart")
+            .for_each(|c| c["least"] = json!({}));
     });
     assert_eq!(untold, ["the assembled pieces do not overlap"]);
 }
@@ -341,11 +418,22 @@ fn a_first_piece_that_comes_off_is_not_certified() {
     ];
     let made = made_of(&pieces, &[Vec3::X, Vec3::X, Vec3::Z]);
     let folder = tempfile::tempdir().unwrap();
-    made.files.iter().for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes).unwrap());
-    fs::write(folder.path().join("certificate.json"), made.certificate.to_string()).unwrap();
+    made.files
+        .iter()
+        .for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes).unwrap());
+    fs::write(
+        folder.path().join("certificate.json"),
+        made.certificate.to_string(),
+    )
+    .unwrap();
     fs::write(folder.path().join("plan.json"), made.plan.to_string()).unwrap();
     let findings = check(folder.path()).unwrap();
-    assert!(findings.iter().any(|f| f.claim == COMPLETE && f.verdict == Verdict::Refuted), "{findings:?}");
+    assert!(
+        findings
+            .iter()
+            .any(|f| f.claim == COMPLETE && f.verdict == Verdict::Refuted),
+        "{findings:?}"
+    );
 }
 
 #[test]
@@ -361,9 +449,21 @@ fn a_gap_that_is_told_wrong_or_at_another_place_is_refuted() {
         ("installs", "piece 1 can be installed"),
         ("apart", "the assembled pieces do not overlap"),
     ] {
-        assert_eq!(change(claim, &|gap| gap["gap_mm"] = (gap["gap_mm"].as_f64().unwrap() + 0.03).into()), [text]);
-        assert_eq!(change(claim, &|gap| gap["gap_mm"] = (gap["gap_mm"].as_f64().unwrap() - 0.01).into()), [text]);
-        assert_eq!(change(claim, &|gap| gap["at"][2] = (gap["at"][2].as_f64().unwrap() + 50.0).into()), [text]);
+        assert_eq!(
+            change(claim, &|gap| gap["gap_mm"] =
+                (gap["gap_mm"].as_f64().unwrap() + 0.03).into()),
+            [text]
+        );
+        assert_eq!(
+            change(claim, &|gap| gap["gap_mm"] =
+                (gap["gap_mm"].as_f64().unwrap() - 0.01).into()),
+            [text]
+        );
+        assert_eq!(
+            change(claim, &|gap| gap["at"][2] =
+                (gap["at"][2].as_f64().unwrap() + 50.0).into()),
+            [text]
+        );
         assert_eq!(change(claim, &|gap| gap["against"] = 9.into()), [text]);
     }
 }
@@ -381,7 +481,8 @@ fn what_is_no_certificate_is_an_error() {
     assert!(check(folder.path()).is_err());
 }
 
-/// The lid turned by 10° about its own axis, its bottom filed, its gaps doubled: whatever is done to it, its play is not proven any more.
+/// The lid turned by 10° about its own axis, its bottom filed, its gaps doubled: whatever is done to it, its
+/// play is not proven any more.
 #[test]
 fn what_is_done_to_a_piece_refutes_its_play() {
     let by = |change: &dyn Fn(&Volume) -> Volume| {
@@ -400,10 +501,15 @@ fn what_is_done_to_a_piece_refutes_its_play() {
     // Twice the gap on the tongue's sides.
     let slim = by(&|lid| {
         let sides = [[6.0, 7.0 + CLEARANCE_MM], [23.0 - CLEARANCE_MM, 24.0]];
-        sides.iter().fold(lid.clone(), |lid, y| lid.subtract(&cuboid([-1.0, 31.0], *y, [4.0, 9.5])))
+        sides.iter().fold(lid.clone(), |lid, y| {
+            lid.subtract(&cuboid([-1.0, 31.0], *y, [4.0, 9.5]))
+        })
     });
     for lost in [turned, filed, slim] {
-        assert!(lost.contains(&BEARINGS.to_owned()) && lost.contains(&LID.to_owned()), "{lost:?}");
+        assert!(
+            lost.contains(&BEARINGS.to_owned()) && lost.contains(&LID.to_owned()),
+            "{lost:?}"
+        );
     }
 }
 
@@ -411,7 +517,11 @@ fn what_is_done_to_a_piece_refutes_its_play() {
 fn a_play_that_is_told_less_than_it_is_or_proven_by_less_is_refuted() {
     let claim = |certificate: &mut Value, with: &dyn Fn(&mut Value)| {
         let mut claims = certificate["claims"].as_array_mut().unwrap().iter_mut();
-        with(claims.find(|c| c["claim"] == "bounded" && c["free"] == json!([1])).unwrap());
+        with(
+            claims
+                .find(|c| c["claim"] == "bounded" && c["free"] == json!([1]))
+                .unwrap(),
+        );
     };
     let scaled = |value: &mut Value, by: f64| *value = (value.as_f64().unwrap() * by).into();
     let smaller = refuted(|_, c, _| claim(c, &|b| scaled(&mut b["quantities"][0]["most"][0][1], 0.9)));
@@ -430,17 +540,39 @@ fn a_play_that_is_told_less_than_it_is_or_proven_by_less_is_refuted() {
 /// What is found of the lid's play, and the names of what is refuted.
 fn of_lid(made: &Made, change: impl FnOnce(&Path, &mut Value)) -> (Vec<Verdict>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
-    made.files.iter().for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes).unwrap());
+    made.files
+        .iter()
+        .for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes).unwrap());
     let mut certificate = made.certificate.clone();
     change(folder.path(), &mut certificate);
-    fs::write(folder.path().join("certificate.json"), serde_json::to_vec(&certificate).unwrap()).unwrap();
-    fs::write(folder.path().join("plan.json"), serde_json::to_vec(&made.plan).unwrap()).unwrap();
+    fs::write(
+        folder.path().join("certificate.json"),
+        serde_json::to_vec(&certificate).unwrap(),
+    )
+    .unwrap();
+    fs::write(
+        folder.path().join("plan.json"),
+        serde_json::to_vec(&made.plan).unwrap(),
+    )
+    .unwrap();
     let findings = check(folder.path()).unwrap();
-    let of_lid = findings.iter().filter(|f| f.claim == LID).map(|f| f.verdict).collect();
-    (of_lid, findings.into_iter().filter(|f| f.verdict == Verdict::Refuted).map(|f| f.claim).collect())
+    let of_lid = findings
+        .iter()
+        .filter(|f| f.claim == LID)
+        .map(|f| f.verdict)
+        .collect();
+    (
+        of_lid,
+        findings
+            .into_iter()
+            .filter(|f| f.verdict == Verdict::Refuted)
+            .map(|f| f.claim)
+            .collect(),
+    )
 }
 
-/// As a tail that came off by hand: it hangs under two lips that reach over it by 0.2 mm each, a clearance of 0.1 mm off.
+/// As a tail that came off by hand: it hangs under two lips that reach over it by 0.2 mm each, a clearance of
+/// 0.1 mm off.
 #[test]
 fn a_tail_on_two_short_connectors_has_no_proof_and_can_borrow_none() {
     let ways = [Vec3::X, Vec3::X, Vec3::Z];
@@ -456,6 +588,8 @@ fn a_tail_on_two_short_connectors_has_no_proof_and_can_borrow_none() {
     });
     assert!(borrowed.1.contains(&LID.to_owned()), "{borrowed:?}");
     // The tongue of the sound one, filed down to that.
-    let filed = of_lid(&sound, |folder, certificate| replace(folder, certificate, 1, &parts_with_lips(0.2)[1]));
+    let filed = of_lid(&sound, |folder, certificate| {
+        replace(folder, certificate, 1, &parts_with_lips(0.2)[1])
+    });
     assert!(filed.1.contains(&LID.to_owned()), "{filed:?}");
 }

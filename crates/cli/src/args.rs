@@ -55,7 +55,8 @@ pub enum Command {
         #[command(flatten)]
         out: Out,
     },
-    /// Only divide the surface; write it with one label a triangle (.ply), painted for slicers (.3mf), or the labels of the model's faces (.seg)
+    /// Only divide the surface; write it with one label a triangle (.ply), painted for slicers (.3mf), or the
+    /// labels of the model's faces (.seg)
     Segment {
         /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface
         model: PathBuf,
@@ -79,14 +80,16 @@ pub enum Command {
         /// The model it was made from [default: the file named in its plan.json]
         model: Option<PathBuf>,
     },
-    /// Punch a finished kit and let it fall, in simulation; compare it with half connectors and with a plan of half the score
+    /// Punch a finished kit and let it fall, in simulation; compare it with half connectors and with a plan
+    /// of half the score
     Test {
         /// Folder of the kit; stress.json and stress.svg go there. Exit code 0: it holds, 1: it does not
         kit: PathBuf,
         #[command(flatten)]
         blows: Blows,
     },
-    /// Say what a finished kit saves over the solid model: material, and print time by PrusaSlicer where it is installed (that takes minutes)
+    /// Say what a finished kit saves over the solid model: material, and print time by PrusaSlicer where it
+    /// is installed (that takes minutes)
     Report {
         /// Folder of the kit; savings.json goes there
         kit: PathBuf,
@@ -152,7 +155,8 @@ pub struct Blows {
     /// What the pieces are printed of: sla-resin, pla, petg or pa12 [default: as the kit was built]
     #[arg(long, value_name = "NAME", value_parser = stress::material)]
     pub material: Option<Material>,
-    /// Length of the simulation's triangle edges, as a share of the usual one, 0.2 to 5; half takes some ten times as long
+    /// Length of the simulation's triangle edges, as a share of the usual one, 0.2 to 5; half takes some ten
+    /// times as long
     #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
     pub edges: f64,
     /// Which axis points up [default: as the kit was built]
@@ -251,7 +255,9 @@ impl FromStr for Thickness {
         if text.eq_ignore_ascii_case("auto") {
             return Ok(Self::Auto);
         }
-        text.parse().map(Self::Mm).map_err(|_| "give millimetres, such as 2.4, or auto".to_owned())
+        text.parse()
+            .map(Self::Mm)
+            .map_err(|_| "give millimetres, such as 2.4, or auto".to_owned())
     }
 }
 
@@ -270,20 +276,22 @@ impl FromStr for Key {
         match text.to_ascii_lowercase().as_str() {
             "auto" => Ok(Self::Auto),
             "piece" => Ok(Self::Flattest),
-            number => {
-                number.parse().map(Self::Piece).map_err(|_| "give auto, piece, or the number of a piece".to_owned())
-            }
+            number => number
+                .parse()
+                .map(Self::Piece)
+                .map_err(|_| "give auto, piece, or the number of a piece".to_owned()),
         }
     }
 }
 
 #[derive(Args)]
 pub struct Options {
-    /// What it is printed on: sla, fdm, fdm-petg, sls, or a printer of the configuration file; its clearances, walls and material are
-    /// used where nothing else is said
+    /// What it is printed on: sla, fdm, fdm-petg, sls, or a printer of the configuration file; its
+    /// clearances, walls and material are used where nothing else is said
     #[arg(long, value_name = "NAME", default_value = "sla", help_heading = "Printer")]
     pub printer: String,
-    /// Options and printers, in TOML; what is said on the command line goes before it [default: shellock.toml, if there is one here]
+    /// Options and printers, in TOML; what is said on the command line goes before it [default:
+    /// shellock.toml, if there is one here]
     #[arg(long, value_name = "FILE", help_heading = "Printer")]
     pub config: Option<PathBuf>,
     /// The printers of the configuration file.
@@ -293,12 +301,19 @@ pub struct Options {
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Size", conflicts_with_all = ["height", "scale"])]
     pub size: Option<f64>,
     /// Height of the made thing along --up, mm
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Size", conflicts_with = "scale")]
+    #[arg(
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        help_heading = "Size",
+        conflicts_with = "scale"
+    )]
     pub height: Option<f64>,
     /// Millimetres a file unit
     #[arg(long, value_name = "F", allow_hyphen_values = true, help_heading = "Size")]
     pub scale: Option<f64>,
-    /// Unit of the file's lengths [default: the file's own, as 3MF has one, else mm where that gives a sensible size]
+    /// Unit of the file's lengths [default: the file's own, as 3MF has one, else mm where that gives a
+    /// sensible size]
     #[arg(long, value_enum, help_heading = "Size", conflicts_with_all = ["size", "height", "scale"])]
     pub unit: Option<Unit>,
     /// Which axis of the file points up
@@ -323,18 +338,38 @@ pub struct Options {
         conflicts_with = "labels"
     )]
     pub labels_from: LabelsFrom,
-    /// About how many pieces to make where there are no labels [default: from the size, 10 for a 150 mm figure]
+    /// About how many pieces to make where there are no labels [default: from the size, 10 for a 150 mm
+    /// figure]
     #[arg(long, value_name = "N", help_heading = "Pieces")]
     pub pieces: Option<usize>,
-    /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best; piece, the flattest
-    /// piece that works, as it is; or the number of a piece
-    #[arg(long, value_name = "auto|piece|N", default_value = "auto", help_heading = "Pieces")]
+    /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
+    /// piece, the flattest piece that works, as it is; or the number of a piece
+    #[arg(
+        long,
+        value_name = "auto|piece|N",
+        default_value = "auto",
+        help_heading = "Pieces"
+    )]
     pub key: Key,
-    /// Work spent on proving that no plan is better, in seconds of an ordinary computer; a slower one ends after twice that
-    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, default_value_t = 10.0, help_heading = "Pieces")]
+    /// Work spent on proving that no plan is better, in seconds of an ordinary computer; a slower one ends
+    /// after twice that
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        allow_hyphen_values = true,
+        default_value_t = 10.0,
+        help_heading = "Pieces"
+    )]
     pub plan_time: f64,
-    /// Wall thickness, mm, 0.8 to 10, or auto: the least from 1.6 (or four times --min-wall, if that is more) to 3 mm that bears a fall
-    #[arg(long, value_name = "auto|MM", allow_hyphen_values = true, default_value = "auto", help_heading = "Make")]
+    /// Wall thickness, mm, 0.8 to 10, or auto: the least from 1.6 (or four times --min-wall, if that is more)
+    /// to 3 mm that bears a fall
+    #[arg(
+        long,
+        value_name = "auto|MM",
+        allow_hyphen_values = true,
+        default_value = "auto",
+        help_heading = "Make"
+    )]
     pub thickness: Thickness,
     /// What it is printed of: what it bears decides how thick walls must be [default: the printer's]
     #[arg(long, value_name = "NAME", value_parser = stress::material, help_heading = "Make")]
@@ -343,22 +378,37 @@ pub struct Options {
     #[arg(long, value_name = "HEIGHT", default_value_t = Params::default().drop_m, allow_hyphen_values = true,
           value_parser = stress::metres, help_heading = "Make")]
     pub drop: f64,
-    /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by what fits
-    #[arg(long, value_name = "auto|MM", allow_hyphen_values = true, default_value = "auto", help_heading = "Make")]
+    /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by
+    /// what fits
+    #[arg(
+        long,
+        value_name = "auto|MM",
+        allow_hyphen_values = true,
+        default_value = "auto",
+        help_heading = "Make"
+    )]
     pub connector: SizeChoice,
-    /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for filament [default: the printer's]
+    /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for
+    /// filament [default: the printer's]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
     pub clearance: Option<f64>,
     /// The same on the rails of the key, mm, 0.03 to 0.8 [default: the printer's]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
     pub key_clearance: Option<f64>,
     /// Height of a bump on each rail that the key clicks past, mm, 0 to 0.4; 0 makes none
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = 0.0, help_heading = "Make")]
+    #[arg(
+        long,
+        value_name = "MM",
+        allow_hyphen_values = true,
+        default_value_t = 0.0,
+        help_heading = "Make"
+    )]
     pub detent: f64,
     /// How far ribs on a key without rails press on the pieces around it, mm, 0 to 0.3; 0 makes none
     #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.key_rib_mm, help_heading = "Make")]
     pub key_ribs: f64,
-    /// Also look for a proof of how far pieces move within the gaps while all others but one move too; closes for small kits only, and takes some seconds to a minute
+    /// Also look for a proof of how far pieces move within the gaps while all others but one move too; closes
+    /// for small kits only, and takes some seconds to a minute
     #[arg(long, help_heading = "Make")]
     pub play_together: bool,
     /// Cut a notch for a fingernail into the key, 0.45 mm deep
@@ -370,10 +420,12 @@ pub struct Options {
     /// Leave out instructions.pdf, which takes about a second
     #[arg(long, help_heading = "Make")]
     pub no_booklet: bool,
-    /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface [default: the printer's]
+    /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
+    /// [default: the printer's]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
     pub wall_gap: Option<f64>,
-    /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported [default: the printer's]
+    /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported [default: the
+    /// printer's]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
     pub min_wall: Option<f64>,
     /// Spacing of the grid behind the walls, mm [default: thickness / 2.5]
@@ -392,10 +444,30 @@ const REVISIONS_PER_SECOND: f64 = 20_000.0;
 impl Options {
     /// The printer that is named: of the user's own, or of those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
-        let known: Vec<Printer> = self.own_printers.iter().cloned().chain(Printer::presets()).collect();
-        let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(&self.printer)).cloned();
-        let names = || known.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
-        found.ok_or_else(|| format!("there is no printer \"{}\"; choose one of {}", self.printer, names()))
+        let known: Vec<Printer> = self
+            .own_printers
+            .iter()
+            .cloned()
+            .chain(Printer::presets())
+            .collect();
+        let found = known
+            .iter()
+            .find(|p| p.name.eq_ignore_ascii_case(&self.printer))
+            .cloned();
+        let names = || {
+            known
+                .iter()
+                .map(|p| p.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        found.ok_or_else(|| {
+            format!(
+                "there is no printer \"{}\"; choose one of {}",
+                self.printer,
+                names()
+            )
+        })
     }
 
     /// The library's parameters for pieces made on `printer`.
@@ -438,7 +510,16 @@ fn label(min_wall_mm: f64) -> LabelParams {
     let usual = LabelParams::default();
     let two_lines_mm = 2.0 * min_wall_mm;
     // A wrong wall is told as such, not as a wrong stroke.
-    let within =
-        |usual: f64, most: f64| if two_lines_mm.is_finite() { usual.max(two_lines_mm).min(most) } else { usual };
-    LabelParams { stroke_mm: within(usual.stroke_mm, 2.0), least_wall_mm: within(usual.least_wall_mm, 5.0), ..usual }
+    let within = |usual: f64, most: f64| {
+        if two_lines_mm.is_finite() {
+            usual.max(two_lines_mm).min(most)
+        } else {
+            usual
+        }
+    };
+    LabelParams {
+        stroke_mm: within(usual.stroke_mm, 2.0),
+        least_wall_mm: within(usual.least_wall_mm, 5.0),
+        ..usual
+    }
 }

@@ -25,8 +25,13 @@ use crate::progress::{Display, PlanClock, Shown};
 /// `shellock build`.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
     let params = checked(options)?;
-    let stem = file.file_stem().map_or_else(|| "model".into(), |s| s.to_string_lossy().into_owned());
-    let to = Destination::new(out.out.unwrap_or_else(|| PathBuf::from(format!("{stem}-kit"))), out.force)?;
+    let stem = file
+        .file_stem()
+        .map_or_else(|| "model".into(), |s| s.to_string_lossy().into_owned());
+    let to = Destination::new(
+        out.out.unwrap_or_else(|| PathBuf::from(format!("{stem}-kit"))),
+        out.force,
+    )?;
     let model = input::model(session, file, options)?;
     make(session, &model, options, &params, &to)
 }
@@ -34,7 +39,10 @@ pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Res
 /// `shellock demo`.
 pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Result<u8, Failure> {
     let params = checked(options)?;
-    let to = Destination::new(out.out.unwrap_or_else(|| PathBuf::from("shellock-demo")), out.force)?;
+    let to = Destination::new(
+        out.out.unwrap_or_else(|| PathBuf::from("shellock-demo")),
+        out.force,
+    )?;
     let model = input::figure(figure, options)?;
     make(session, &model, options, &params, &to)
 }
@@ -47,12 +55,25 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
     problems.extend(printer.problems().iter().map(ToString::to_string));
     // An infinite time is one: until the proof is closed.
     if options.plan_time.is_nan() || options.plan_time < 0.0 {
-        problems.push(format!("plan time is {} s; it must be 0 or more", options.plan_time));
+        problems.push(format!(
+            "plan time is {} s; it must be 0 or more",
+            options.plan_time
+        ));
     }
-    if problems.is_empty() { Ok(params) } else { Err(Failure::Wrong(problems.join("\nerror: "))) }
+    if problems.is_empty() {
+        Ok(params)
+    } else {
+        Err(Failure::Wrong(problems.join("\nerror: ")))
+    }
 }
 
-fn make(session: &Session, model: &Model, options: &Options, params: &Params, to: &Destination) -> Result<u8, Failure> {
+fn make(
+    session: &Session,
+    model: &Model,
+    options: &Options,
+    params: &Params,
+    to: &Destination,
+) -> Result<u8, Failure> {
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
     let settings = &Settings::resolve(params);
     let mut notes = model.notes.clone();
@@ -61,7 +82,9 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
         notes.iter().for_each(|n| println!("note: {n}"));
-        thin_warnings(model, options).iter().for_each(|w| println!("warning: {w}"));
+        thin_warnings(model, options)
+            .iter()
+            .for_each(|w| println!("warning: {w}"));
     }
     let display = Display::new(session.shown);
     let clock = PlanClock::new(options.plan_time);
@@ -71,7 +94,8 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
     };
     let is_time_up = || clock.is_up();
     let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
-    let outcome = design(&ctx, params, &model.solid, model.labels.as_deref()).inspect_err(|_| display.finish())?;
+    let outcome =
+        design(&ctx, params, &model.solid, model.labels.as_deref()).inspect_err(|_| display.finish())?;
     let made = match outcome {
         DesignOutcome::Made(made) => made,
         DesignOutcome::NoPlan { reason, blockers } => {
@@ -80,16 +104,26 @@ fn make(session: &Session, model: &Model, options: &Options, params: &Params, to
         }
     };
     if let Some(asked) = options.pieces.filter(|asked| made.kit.pieces.len() > asked + 1) {
-        let note =
-            format!("{} pieces instead of {asked}: some were divided until every piece locks", made.kit.pieces.len());
+        let note = format!(
+            "{} pieces instead of {asked}: some were divided until every piece locks",
+            made.kit.pieces.len()
+        );
         if session.shown == Shown::ForPeople {
             println!("note: {note}");
         }
         notes.push(note);
     }
     let mut warnings = made.warnings.clone();
-    display.show(Progress::Stage { name: "files and pictures", n_steps: 0 });
-    let printing = Printing::of(&printer, made.kit.pieces.as_slice(), &made.kit.surface.mesh, &model.solid);
+    display.show(Progress::Stage {
+        name: "files and pictures",
+        n_steps: 0,
+    });
+    let printing = Printing::of(
+        &printer,
+        made.kit.pieces.as_slice(),
+        &made.kit.surface.mesh,
+        &model.solid,
+    );
     warnings.extend(printing.warnings());
     let (files, summary) = files(model, options, settings, &made, &warnings, &printing);
     display.finish();
@@ -123,7 +157,14 @@ fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> Failure {
     Failure::NoPlan(text)
 }
 
-fn print_json(to: &Destination, notes: &[String], made: &Design, summary: &Summary, warnings: &[Warning], code: u8) {
+fn print_json(
+    to: &Destination,
+    notes: &[String],
+    made: &Design,
+    summary: &Summary,
+    warnings: &[Warning],
+    code: u8,
+) {
     let value = json!({
         "status": if code == 0 { "verified" } else { "failed" },
         "out": to.folder(), "notes": notes,
@@ -151,16 +192,27 @@ fn print_text(to: &Destination, made: &Design, settings: &Settings, summary: &Su
         println!("{}", bearing(strength, settings));
     }
     println!("{}", quality(&made.kit.proof));
-    weakest(&made.kit.holding).into_iter().for_each(|line| println!("{line}"));
+    weakest(&made.kit.holding)
+        .into_iter()
+        .for_each(|line| println!("{line}"));
     println!("pieces sit {}", play::words(&made.kit.play));
-    println!("connectors on {:.0} % of the seam length that fits any", 100.0 * summary.connector_share);
+    println!(
+        "connectors on {:.0} % of the seam length that fits any",
+        100.0 * summary.connector_share
+    );
     print_verdict(&made.kit.verification);
     print_warnings(warnings);
     if summary.thin_share > 0.002 {
         let percent = 100.0 * summary.thin_share;
-        println!("warning: up to {percent:.1} % of a piece is thinner than {} mm", settings.connector.min_wall_mm);
+        println!(
+            "warning: up to {percent:.1} % of a piece is thinner than {} mm",
+            settings.connector.min_wall_mm
+        );
     }
-    println!("written to {}: open report.html in a browser, print plates.3mf", to.folder().display());
+    println!(
+        "written to {}: open report.html in a browser, print plates.3mf",
+        to.folder().display()
+    );
 }
 
 /// What the wall bears, in words.
@@ -183,18 +235,31 @@ pub fn bearing(strength: &Strength, settings: &Settings) -> String {
 
 /// How good a plan is, in words.
 pub fn quality(proof: &PlanProof) -> String {
-    let PlanProof { cost, lower_bound, gap, least_cost, key_lower_bound, .. } = proof;
+    let PlanProof {
+        cost,
+        lower_bound,
+        gap,
+        least_cost,
+        key_lower_bound,
+        ..
+    } = proof;
     let scope = scope(proof);
     // Bounds that meet the least known cost are proofs; what is left is rounding.
     let is_met = |bound: &f64| *bound >= least_cost * (1.0 - 1e-9);
     let chosen = match least_cost < cost {
-        true => format!("{cost:.3}, chosen since it holds better than those from {least_cost:.3} on; that is"),
+        true => {
+            format!("{cost:.3}, chosen since it holds better than those from {least_cost:.3} on; that is")
+        }
         false => format!("{cost:.3},"),
     };
     if is_met(lower_bound) {
         return format!("plan: its worst piece costs {chosen} proven to be the least with {scope}");
     }
-    let of_key = if is_met(key_lower_bound) { " the least with its key;" } else { " not proven to be the least;" };
+    let of_key = if is_met(key_lower_bound) {
+        " the least with its key;"
+    } else {
+        " not proven to be the least;"
+    };
     let percent = 100.0 * gap;
     format!(
         "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} ({percent:.1} % below)"
@@ -203,7 +268,11 @@ pub fn quality(proof: &PlanProof) -> String {
 
 /// For which plans a proof holds, in words.
 pub fn scope(proof: &PlanProof) -> String {
-    let ProofScope { keys, slides, n_lessons } = &proof.proven_for;
+    let ProofScope {
+        keys,
+        slides,
+        n_lessons,
+    } = &proof.proven_for;
     let who = match &keys[..] {
         [key] => format!("piece {key} as the key"),
         all if all.len() == proof.piece_costs.len() => "any piece as the key".into(),
@@ -231,16 +300,24 @@ pub fn weakest(holding: &Holding) -> Vec<String> {
     let seam = holding.seams.first().map(|s| {
         let (later, earlier, opening_mm) = (s.later, s.earlier, s.opening_mm);
         let at = place(s.at);
-        format!("weakest seam: pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m {at}: {}", s.reason)
+        format!(
+            "weakest seam: pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m {at}: {}",
+            s.reason
+        )
     });
-    let loose = holding.loose.iter().map(|l| format!("comes apart at 10 N/m: piece {}, {}", l.piece, place(l.at)));
+    let loose = holding
+        .loose
+        .iter()
+        .map(|l| format!("comes apart at 10 N/m: piece {}, {}", l.piece, place(l.at)));
     seam.into_iter().chain(loose).collect()
 }
 
 /// Each on a line, with its place.
 pub fn print_warnings(warnings: &[Warning]) {
     for w in warnings {
-        let place = w.at.map_or_else(String::new, |[x, y, z]| format!(" [at ({x:.1}, {y:.1}, {z:.1}) mm]"));
+        let place = w.at.map_or_else(String::new, |[x, y, z]| {
+            format!(" [at ({x:.1}, {y:.1}, {z:.1}) mm]")
+        });
         println!("warning: {}{place}", w.message);
     }
 }
@@ -248,7 +325,12 @@ pub fn print_warnings(warnings: &[Warning]) {
 /// Each check on a line, and loudly what failed and where.
 pub fn print_verdict(verdict: &Verification) {
     for c in &verdict.checks {
-        println!("{}  {:52} {}", if c.ok { "ok  " } else { "FAIL" }, c.name, c.figure);
+        println!(
+            "{}  {:52} {}",
+            if c.ok { "ok  " } else { "FAIL" },
+            c.name,
+            c.figure
+        );
     }
     print_failures(verdict);
 }
@@ -256,7 +338,9 @@ pub fn print_verdict(verdict: &Verification) {
 /// What failed and where, if something did.
 fn print_failures(verdict: &Verification) {
     if !verdict.passed() {
-        eprintln!("FAILED: this kit does not hold together as it should; do not print it. What failed, and where:");
+        eprintln!(
+            "FAILED: this kit does not hold together as it should; do not print it. What failed, and where:"
+        );
         for finding in &verdict.findings {
             eprintln!("  {finding}");
         }

@@ -11,8 +11,8 @@
 //! clearance = 0.18
 //! ```
 //!
-//! Options become arguments in front of the user's own, so there is one place that knows them and says what is wrong
-//! with them. What is said on the command line goes before.
+//! Options become arguments in front of the user's own, so there is one place that knows them and says what
+//! is wrong with them. What is said on the command line goes before.
 
 use std::ffi::OsString;
 use std::fs;
@@ -41,10 +41,16 @@ pub enum Refusal {
 
 /// The command that these arguments and the configuration file ask for.
 pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
-    let matches = Cli::command().try_get_matches_from(&arguments).map_err(Refusal::Arguments)?;
+    let matches = Cli::command()
+        .try_get_matches_from(&arguments)
+        .map_err(Refusal::Arguments)?;
     let mut cli = Cli::try_parse_from(&arguments).map_err(Refusal::Arguments)?;
-    let Some((name, given)) = matches.subcommand() else { return Ok(cli) };
-    let Some(path) = file_of(given) else { return Ok(cli) };
+    let Some((name, given)) = matches.subcommand() else {
+        return Ok(cli);
+    };
+    let Some(path) = file_of(given) else {
+        return Ok(cli);
+    };
     let refused = |problem: String| Refusal::File(format!("{}: {problem}", path.display()));
     let Config { options, printers } = read(&path).map_err(refused)?;
     let extra = extra_arguments(&Cli::command(), name, given, &options).map_err(refused)?;
@@ -63,13 +69,17 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
 /// The file that was named, or the usual one where it exists; `None` for commands that take none.
 fn file_of(given: &ArgMatches) -> Option<PathBuf> {
     let named = given.try_get_one::<PathBuf>("config").ok()?;
-    named.cloned().or_else(|| Path::new(USUAL).is_file().then(|| PathBuf::from(USUAL)))
+    named
+        .cloned()
+        .or_else(|| Path::new(USUAL).is_file().then(|| PathBuf::from(USUAL)))
 }
 
 fn options_of(command: &mut args::Command) -> Option<&mut args::Options> {
     use args::Command::{Build, Demo, Plan, Segment};
     match command {
-        Build { options, .. } | Demo { options, .. } | Segment { options, .. } | Plan { options, .. } => Some(options),
+        Build { options, .. } | Demo { options, .. } | Segment { options, .. } | Plan { options, .. } => {
+            Some(options)
+        }
         _ => None,
     }
 }
@@ -104,9 +114,10 @@ fn read(path: &Path) -> Result<Config, String> {
     let mut options: toml::Table = text.parse().map_err(|e: toml::de::Error| e.to_string())?;
     let printers = match options.remove("printers") {
         None => Vec::new(),
-        Some(toml::Value::Table(printers)) => {
-            printers.into_iter().map(|(name, value)| own_printer(name, value)).collect::<Result<_, _>>()?
-        }
+        Some(toml::Value::Table(printers)) => printers
+            .into_iter()
+            .map(|(name, value)| own_printer(name, value))
+            .collect::<Result<_, _>>()?,
         Some(_) => return Err("\"printers\" must be a table; write for example [printers.mine]".to_owned()),
     };
     Ok(Config { options, printers })
@@ -114,19 +125,32 @@ fn read(path: &Path) -> Result<Config, String> {
 
 fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
     let fault = |problem: String| format!("printer \"{name}\": {problem}");
-    let own: Own = value.try_into().map_err(|e: toml::de::Error| fault(e.message().to_owned()))?;
+    let own: Own = value
+        .try_into()
+        .map_err(|e: toml::de::Error| fault(e.message().to_owned()))?;
     let process = own.process.as_deref().map(|p| {
         let names = || Process::ALL.map(|(name, _)| name).join(", ");
-        Process::named(p).ok_or_else(|| fault(format!("there is no process \"{p}\"; choose one of {}", names())))
+        Process::named(p)
+            .ok_or_else(|| fault(format!("there is no process \"{p}\"; choose one of {}", names())))
     });
     let process = process.transpose()?;
     let is_base = |p: &Printer| match (&own.like, process) {
         (Some(like), _) => p.name.eq_ignore_ascii_case(like),
         (None, process) => p.process == process.unwrap_or(Process::Sla),
     };
-    let unknown = || fault(format!("it is like \"{}\", which does not exist", own.like.as_deref().unwrap_or_default()));
+    let unknown = || {
+        fault(format!(
+            "it is like \"{}\", which does not exist",
+            own.like.as_deref().unwrap_or_default()
+        ))
+    };
     let base = Printer::presets().into_iter().find(is_base).ok_or_else(unknown)?;
-    let material = own.material.as_deref().map(stress::material).transpose().map_err(fault)?;
+    let material = own
+        .material
+        .as_deref()
+        .map(stress::material)
+        .transpose()
+        .map_err(fault)?;
     let printer = Printer {
         process: process.unwrap_or(base.process),
         bed_mm: own.bed.unwrap_or(base.bed_mm),
@@ -153,7 +177,9 @@ fn extra_arguments(
 ) -> Result<Vec<String>, String> {
     /// One of them stands for all.
     const SIZES: [&str; 3] = ["size", "height", "scale"];
-    let command = cli.find_subcommand(name).ok_or_else(|| format!("there is no command \"{name}\""))?;
+    let command = cli
+        .find_subcommand(name)
+        .ok_or_else(|| format!("there is no command \"{name}\""))?;
     let is_given = |id: &str| given.value_source(id) == Some(ValueSource::CommandLine);
     let mut extra = Vec::new();
     for (key, value) in options {
@@ -162,7 +188,9 @@ fn extra_arguments(
             if others.any(|a| a.get_long() == Some(key)) {
                 continue;
             }
-            return Err(format!("there is no option \"{key}\"; `shellock build --help` lists them"));
+            return Err(format!(
+                "there is no option \"{key}\"; `shellock build --help` lists them"
+            ));
         };
         let id = argument.get_id().as_str();
         if is_given(id) || SIZES.contains(&id) && SIZES.iter().any(|id| is_given(id)) {

@@ -32,7 +32,11 @@ pub enum Failure {
 
 /// The option that helps, where there is one.
 fn hint(error: &InputError) -> &'static str {
-    if matches!(error, InputError::Bodies(_)) { " (--largest keeps the largest)" } else { "" }
+    if matches!(error, InputError::Bodies(_)) {
+        " (--largest keeps the largest)"
+    } else {
+        ""
+    }
 }
 
 impl From<shellock::Cancelled> for Failure {
@@ -45,7 +49,9 @@ impl Failure {
     /// The process exit code.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Stopped | Self::Stress(StressError::Cancelled(_)) | Self::Design(DesignError::Cancelled(_)) => 130,
+            Self::Stopped
+            | Self::Stress(StressError::Cancelled(_))
+            | Self::Design(DesignError::Cancelled(_)) => 130,
             Self::NoPlan(_) => 3,
             Self::Unwritable { .. } | Self::Design(DesignError::Piece(_)) => 4,
             _ => 2,
@@ -54,6 +60,9 @@ impl Failure {
 
     /// A file that could not be written.
     pub fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
-        move |source| Self::Unwritable { path: path.to_owned(), source }
+        move |source| Self::Unwritable {
+            path: path.to_owned(),
+            source,
+        }
     }
 }

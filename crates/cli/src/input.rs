@@ -46,15 +46,23 @@ pub struct Model {
 
 /// Reads a file whole.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    let unreadable = |source| Failure::Unreadable { path: path.to_owned(), source };
+    let unreadable = |source| Failure::Unreadable {
+        path: path.to_owned(),
+        source,
+    };
     let size = fs::metadata(path).map_err(unreadable)?.len();
     if size > MAX_FILE_BYTES {
         let gib = size as f64 / f64::from(1 << 30);
-        return Err(Failure::Wrong(format!("{}: {gib:.1} GiB are more than the 2 GiB that are read", path.display())));
+        return Err(Failure::Wrong(format!(
+            "{}: {gib:.1} GiB are more than the 2 GiB that are read",
+            path.display()
+        )));
     }
     // A device tells no size.
     let mut bytes = Vec::new();
-    fs::File::open(path).and_then(|file| file.take(MAX_FILE_BYTES).read_to_end(&mut bytes)).map_err(unreadable)?;
+    fs::File::open(path)
+        .and_then(|file| file.take(MAX_FILE_BYTES).read_to_end(&mut bytes))
+        .map_err(unreadable)?;
     Ok(bytes)
 }
 
@@ -67,7 +75,10 @@ pub fn sha256(bytes: &[u8]) -> String {
 pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
     let bytes = read(path)?;
     let extension = path.extension().and_then(|e| e.to_str());
-    let loaded = read_mesh(&bytes, extension).map_err(|source| Failure::NotAMesh { path: path.to_owned(), source })?;
+    let loaded = read_mesh(&bytes, extension).map_err(|source| Failure::NotAMesh {
+        path: path.to_owned(),
+        source,
+    })?;
     Ok((loaded, bytes))
 }
 
@@ -82,7 +93,10 @@ pub fn mending(no_repair: bool, largest: bool) -> Mending {
 
 /// The body in what was read from `path`.
 pub fn mended(path: &Path, loaded: &Loaded, mending: Mending) -> Result<Mended, Failure> {
-    mend(&loaded.mesh, mending).map_err(|source| Failure::NotOneBody { path: path.to_owned(), source })
+    mend(&loaded.mesh, mending).map_err(|source| Failure::NotOneBody {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// The model in a file, scaled, with the labels that go with it.
@@ -95,10 +109,21 @@ pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model,
 
 /// The model in what was read from `path`.
 pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -> Result<Model, Failure> {
-    let Mended { solid, source_face, repairs } = mended(path, loaded, mending(options.no_repair, options.largest))?;
-    let file_face: Vec<u32> = source_face.iter().map(|&k| loaded.file_face[k as usize]).collect();
+    let Mended {
+        solid,
+        source_face,
+        repairs,
+    } = mended(path, loaded, mending(options.no_repair, options.largest))?;
+    let file_face: Vec<u32> = source_face
+        .iter()
+        .map(|&k| loaded.file_face[k as usize])
+        .collect();
     let mut notes = loaded.notes.clone();
-    notes.extend(repairs.iter().map(|repair| format!("repaired: {repair} (file units)")));
+    notes.extend(
+        repairs
+            .iter()
+            .map(|repair| format!("repaired: {repair} (file units)")),
+    );
     let labels = match &options.labels {
         Some(file) => Some(labels_of(file, loaded, &file_face)?),
         None => {
@@ -127,11 +152,17 @@ fn own_labels<'a>(
     let source = match from {
         LabelsFrom::None => return Ok(None),
         LabelsFrom::Auto => {
-            match loaded.labellings.iter().find(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint)) {
+            match loaded
+                .labellings
+                .iter()
+                .find(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint))
+            {
                 Some(own) if own.source == LabelSource::Paint => {
                     notes.push("the paint in the file divides it".to_owned())
                 }
-                Some(_) => notes.push("the file has a label for each face; they are used as pieces".to_owned()),
+                Some(_) => {
+                    notes.push("the file has a label for each face; they are used as pieces".to_owned())
+                }
                 None => notes.extend(loaded.labellings.iter().map(|other| {
                     let source = other.source;
                     format!("the file has {source}; with --labels-from {source} they divide it into pieces")
@@ -147,8 +178,17 @@ fn own_labels<'a>(
         LabelsFrom::Objects => LabelSource::Object,
     };
     let has: Vec<String> = loaded.labellings.iter().map(|l| l.source.to_string()).collect();
-    let has = if has.is_empty() { "nothing".to_owned() } else { has.join(", ") };
-    let wrong = || Failure::Wrong(format!("{}: no {source} divide it; what does: {has}", path.display()));
+    let has = if has.is_empty() {
+        "nothing".to_owned()
+    } else {
+        has.join(", ")
+    };
+    let wrong = || {
+        Failure::Wrong(format!(
+            "{}: no {source} divide it; what does: {has}",
+            path.display()
+        ))
+    };
     loaded.labels(source).map(Some).ok_or_else(wrong)
 }
 
@@ -161,10 +201,15 @@ fn made_of(solid: Solid, scale: f64, path: &Path) -> Result<Model, Failure> {
     let shift = if far { -bounds.center() } else { Vec3::ZERO };
     mesh.points.iter_mut().for_each(|p| *p = (*p + shift) * scale);
     let t = shift * scale;
-    let transform =
-        [scale, 0.0, 0.0, t.x, 0.0, scale, 0.0, t.y, 0.0, 0.0, scale, t.z, 0.0, 0.0, 0.0, 1.0].map(|x: f64| x + 0.0);
-    let solid = Solid::new(mesh).map_err(|e| Failure::Wrong(format!("{}: after scaling, {e}", path.display())))?;
-    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let transform = [
+        scale, 0.0, 0.0, t.x, 0.0, scale, 0.0, t.y, 0.0, 0.0, scale, t.z, 0.0, 0.0, 0.0, 1.0,
+    ]
+    .map(|x: f64| x + 0.0);
+    let solid =
+        Solid::new(mesh).map_err(|e| Failure::Wrong(format!("{}: after scaling, {e}", path.display())))?;
+    let name = path
+        .file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     Ok(Model {
         solid,
         labels: None,
@@ -193,10 +238,17 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Fa
     const CELLS: f64 = 94.0;
     let figure = shellock::figure::Figure::named(name).ok_or_else(|| {
         let all: Vec<&str> = shellock::figure::Figure::ALL.iter().map(|f| f.name()).collect();
-        Failure::Wrong(format!("there is no figure \"{name}\"; choose one of {}", all.join(", ")))
+        Failure::Wrong(format!(
+            "there is no figure \"{name}\"; choose one of {}",
+            all.join(", ")
+        ))
     })?;
     check_size(size_mm)?;
-    Ok(shellock::figure::make_with_limbs(figure, size_mm, size_mm / CELLS))
+    Ok(shellock::figure::make_with_limbs(
+        figure,
+        size_mm,
+        size_mm / CELLS,
+    ))
 }
 
 /// Millimetres a file unit.
@@ -239,14 +291,25 @@ fn check_size(longest_mm: f64) -> Result<(), Failure> {
 /// What to say of a size that is no figure's.
 fn guess(unit_mm: Option<f64>, longest: f64) -> String {
     let what = match unit_mm {
-        Some(mm) => format!("by the file's unit the longest side is {:.4} mm, which is hardly meant", mm * longest),
+        Some(mm) => format!(
+            "by the file's unit the longest side is {:.4} mm, which is hardly meant",
+            mm * longest
+        ),
         None => format!("the file's longest side is {longest:.4} units, which cannot be millimetres"),
     };
     let units = [("m", 1000.0), ("cm", 10.0), ("inch", 25.4)].map(|(name, mm)| (name, mm * longest));
     let fitting = units.iter().filter(|(_, size)| PLAUSIBLE_MM.contains(size));
-    let others: Vec<String> = fitting.map(|(name, size)| format!("{size:.0} mm with --unit {name}")).collect();
-    let others = if others.is_empty() { String::new() } else { format!("; it would be {}", others.join(", ")) };
-    format!("{what}; it is made {DEFAULT_SIZE_MM} mm long{others} (choose with --unit, --size, --height or --scale)")
+    let others: Vec<String> = fitting
+        .map(|(name, size)| format!("{size:.0} mm with --unit {name}"))
+        .collect();
+    let others = if others.is_empty() {
+        String::new()
+    } else {
+        format!("; it would be {}", others.join(", "))
+    };
+    format!(
+        "{what}; it is made {DEFAULT_SIZE_MM} mm long{others} (choose with --unit, --size, --height or --scale)"
+    )
 }
 
 /// The labels in `file`, one a triangle of the solid.
@@ -256,7 +319,10 @@ fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>
     let a_file_face: Vec<i64> = if is_ply {
         let (with, _) = load(file)?;
         let labels = with.face_labels().ok_or_else(|| {
-            Failure::Wrong(format!("{}: its faces have no property named label, segment or the like", file.display()))
+            Failure::Wrong(format!(
+                "{}: its faces have no property named label, segment or the like",
+                file.display()
+            ))
         })?;
         let mut by_face = vec![0; with.n_file_faces()];
         for (triangle, &face) in with.file_face.iter().enumerate() {
@@ -265,7 +331,10 @@ fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>
         by_face
     } else {
         let bytes = read(file)?;
-        read_labels(&bytes).map_err(|source| Failure::NotAMesh { path: file.to_owned(), source })?
+        read_labels(&bytes).map_err(|source| Failure::NotAMesh {
+            path: file.to_owned(),
+            source,
+        })?
     };
     if a_file_face.len() != n {
         return Err(Failure::Wrong(format!(

@@ -28,22 +28,40 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
     if !session.is_json {
         let n = found.bodies.len();
         let bodies = if n == 1 { "body" } else { "bodies" };
-        println!("{} file, {} faces, {n} {bodies}", loaded.format, loaded.n_file_faces());
-        println!("size {:.4} × {:.4} × {:.4} file units{}", size.x, size.y, size.z, unit(&loaded));
-        println!("{} open edges, {} edges of more than two faces", found.edges.open.count, found.edges.shared.count);
+        println!(
+            "{} file, {} faces, {n} {bodies}",
+            loaded.format,
+            loaded.n_file_faces()
+        );
+        println!(
+            "size {:.4} × {:.4} × {:.4} file units{}",
+            size.x,
+            size.y,
+            size.z,
+            unit(&loaded)
+        );
+        println!(
+            "{} open edges, {} edges of more than two faces",
+            found.edges.open.count, found.edges.shared.count
+        );
         if !labellings.is_empty() {
             println!("divided by {}", labellings.join(", "));
         }
     }
     let (model, thin) = session.during("looking for what is wrong", || {
         let model = model_of(file, &loaded, &bytes, options);
-        let thin = model.as_ref().map(|model| thin_warnings(model, options)).unwrap_or_default();
+        let thin = model
+            .as_ref()
+            .map(|model| thin_warnings(model, options))
+            .unwrap_or_default();
         (model, thin)
     });
     if session.is_json {
         let is_sound = mend(&loaded.mesh, mending(true, false)).is_ok();
-        let (repairs, notes): (Vec<Value>, &[String]) =
-            model.as_ref().map_or_else(|_| (Vec::new(), &[][..]), |m| (repairs_json(&m.repairs), &m.notes));
+        let (repairs, notes): (Vec<Value>, &[String]) = model.as_ref().map_or_else(
+            |_| (Vec::new(), &[][..]),
+            |m| (repairs_json(&m.repairs), &m.notes),
+        );
         let error = model.as_ref().err().map(ToString::to_string);
         let value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
             "size": size.to_array(), "unit_mm": loaded.unit_mm, "open_edges": found.edges.open.count,
@@ -58,13 +76,22 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
     model.notes.iter().for_each(|note| println!("note: {note}"));
     thin.iter().for_each(|warning| println!("warning: {warning}"));
     let made = model.solid.mesh().bounds().size();
-    let state = if model.repairs.is_empty() { "one closed body" } else { "one closed body after repair" };
-    println!("{state}: it can be made, {:.1} × {:.1} × {:.1} mm", made.x, made.y, made.z);
+    let state = if model.repairs.is_empty() {
+        "one closed body"
+    } else {
+        "one closed body after repair"
+    };
+    println!(
+        "{state}: it can be made, {:.1} × {:.1} × {:.1} mm",
+        made.x, made.y, made.z
+    );
     Ok(0)
 }
 
 fn unit(loaded: &Loaded) -> String {
-    loaded.unit_mm.map_or_else(String::new, |mm| format!(" of {mm} mm"))
+    loaded
+        .unit_mm
+        .map_or_else(String::new, |mm| format!(" of {mm} mm"))
 }
 
 /// Where a model is too thin for a cavity between two walls, and how thin; nothing where it is thick enough.
@@ -85,8 +112,11 @@ pub fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
         format!("{:.2} mm at ({x:.1}, {y:.1}, {z:.1}) mm", p.thickness_mm)
     };
     let largest: Vec<String> = places.iter().take(N_TOLD).map(told).collect();
-    let others =
-        if places.len() > N_TOLD { format!(" and {} smaller places", places.len() - N_TOLD) } else { String::new() };
+    let others = if places.len() > N_TOLD {
+        format!(" and {} smaller places", places.len() - N_TOLD)
+    } else {
+        String::new()
+    };
     vec![format!(
         "{percent:.1} % of the surface is thinner than two walls of {wall_mm} mm: {}{others}; it stays solid there, without \
          connectors: make the model larger (--size) or the wall thinner (--thickness)",

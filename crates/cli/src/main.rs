@@ -71,17 +71,27 @@ fn main() -> ExitCode {
         if shellock_geom::boolean::is_guarded() {
             return;
         }
-        match panic.payload().downcast_ref::<String>().filter(|what| what.starts_with("failed printing to stdout")) {
+        match panic
+            .payload()
+            .downcast_ref::<String>()
+            .filter(|what| what.starts_with("failed printing to stdout"))
+        {
             Some(what) => unprinted(what),
             None => tell(panic),
         }
     }));
-    let session = Session { is_json: cli.json, shown: shown(&cli), stop: Arc::new(AtomicBool::new(false)) };
+    let session = Session {
+        is_json: cli.json,
+        shown: shown(&cli),
+        stop: Arc::new(AtomicBool::new(false)),
+    };
     let stop = Arc::clone(&session.stop);
     // Without a handler Ctrl-C would still end the program, only less tidily.
     let _ = ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed));
     if let Some(n) = cli.threads
-        && let Err(e) = rayon::ThreadPoolBuilder::new().num_threads(n.clamp(1, MOST_THREADS)).build_global()
+        && let Err(e) = rayon::ThreadPoolBuilder::new()
+            .num_threads(n.clamp(1, MOST_THREADS))
+            .build_global()
     {
         eprintln!("warning: --threads {n} was not taken: {e}");
     }
@@ -97,7 +107,10 @@ fn main() -> ExitCode {
 /// Says what is wrong: one JSON object on standard output, or a line on standard error.
 fn refuse(is_json: bool, problem: &str, code: u8) -> ExitCode {
     if is_json {
-        println!("{}", json!({ "status": "error", "error": problem, "exit_code": code }));
+        println!(
+            "{}",
+            json!({ "status": "error", "error": problem, "exit_code": code })
+        );
     } else {
         eprintln!("error: {problem}");
     }
@@ -129,10 +142,19 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Plan { model, options } => stages::plan(session, &model, &options),
         Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
         Command::Test { kit, blows } => stress::test(session, &kit, &blows),
-        Command::Report { kit, model, closed_form } => savings::report(session, &kit, model.as_deref(), closed_form),
+        Command::Report {
+            kit,
+            model,
+            closed_form,
+        } => savings::report(session, &kit, model.as_deref(), closed_form),
         Command::Inspect { model, options } => inspect::inspect(session, &model, &options),
         Command::Completions { shell } => Ok(manual::completions(shell)),
         Command::Manual { folder } => manual::write(&folder),
-        Command::Figure { name, out, size, labels } => stages::figure(&name, &out, size, labels.as_deref()),
+        Command::Figure {
+            name,
+            out,
+            size,
+            labels,
+        } => stages::figure(&name, &out, size, labels.as_deref()),
     }
 }

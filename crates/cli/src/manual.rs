@@ -16,7 +16,11 @@ pub fn completions(shell: clap_complete::Shell) -> u8 {
     clap_complete::generate(shell, &mut Cli::command(), "shellock", &mut bytes);
     let mut out = std::io::stdout();
     // A reader that closes the pipe has seen enough.
-    u8::from(out.write_all(&bytes).and_then(|()| out.flush()).is_err_and(|e| e.kind() != ErrorKind::BrokenPipe)) * 4
+    u8::from(
+        out.write_all(&bytes)
+            .and_then(|()| out.flush())
+            .is_err_and(|e| e.kind() != ErrorKind::BrokenPipe),
+    ) * 4
 }
 
 /// `shellock manual`: `shellock.1` and a page for each command.

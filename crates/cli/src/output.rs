@@ -58,7 +58,8 @@ pub struct Summary {
     pub thin_share: f64,
 }
 
-/// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the end.
+/// The folder a kit goes to, and how it gets there: everything is written beside it first and moved at the
+/// end.
 pub struct Destination {
     folder: PathBuf,
     may_replace: bool,
@@ -85,7 +86,10 @@ impl Destination {
                 foreign.display()
             ));
         }
-        let made = Self { folder, may_replace: force };
+        let made = Self {
+            folder,
+            may_replace: force,
+        };
         // Now, not after a minute's work.
         made.temporary()?;
         Ok(made)
@@ -102,7 +106,10 @@ impl Destination {
             source: std::io::Error::new(source.kind(), source.kind().to_string()),
         };
         fs::create_dir_all(&parent).map_err(unwritable)?;
-        tempfile::Builder::new().prefix(".shellock-").tempdir_in(&parent).map_err(unwritable)
+        tempfile::Builder::new()
+            .prefix(".shellock-")
+            .tempdir_in(&parent)
+            .map_err(unwritable)
     }
 
     /// The folder.
@@ -142,11 +149,17 @@ fn foreign_file(folder: &Path) -> Option<PathBuf> {
     while let Some(within) = left.pop() {
         for entry in fs::read_dir(folder.join(&within)).into_iter().flatten().flatten() {
             let name = within.join(entry.file_name());
-            if entry.file_type().is_ok_and(|kind| kind.is_dir()) { left.push(name) } else { names.push(name) }
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                left.push(name)
+            } else {
+                names.push(name)
+            }
         }
     }
     names.sort();
-    names.into_iter().find(|name| !is_of_kits(&name.to_string_lossy()))
+    names
+        .into_iter()
+        .find(|name| !is_of_kits(&name.to_string_lossy()))
 }
 
 fn is_of_kits(name: &str) -> bool {
@@ -166,15 +179,30 @@ pub fn files(
     warnings: &[Warning],
     printing: &Printing,
 ) -> (Vec<(String, Vec<u8>)>, Summary) {
-    let thin: Vec<f64> =
-        design.kit.pieces.as_slice().par_iter().map(|m| thin_share(m, settings.connector.min_wall_mm).share).collect();
-    let volume: f64 = design.kit.pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
+    let thin: Vec<f64> = design
+        .kit
+        .pieces
+        .as_slice()
+        .par_iter()
+        .map(|m| thin_share(m, settings.connector.min_wall_mm).share)
+        .collect();
+    let volume: f64 = design
+        .kit
+        .pieces
+        .as_slice()
+        .iter()
+        .map(TriMesh::signed_volume)
+        .sum();
     let usable: f64 = design.kit.contacts.iter().map(|c| c.usable_mm).sum();
     let made: f64 = design.kit.joints.iter().map(|j| j.length_mm).sum();
     let summary = Summary {
         volume_ratio: volume / model.solid.volume(),
         print_time_ratio: printing.time_ratio(),
-        connector_share: if usable > 0.0 { (made / usable).min(1.0) } else { 0.0 },
+        connector_share: if usable > 0.0 {
+            (made / usable).min(1.0)
+        } else {
+            0.0
+        },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
     };
     let mut plan = plan_json(model, settings, design, warnings, &summary, &thin);
@@ -182,15 +210,37 @@ pub fn files(
     let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
     text.push('\n');
     let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
-    let meshes = design.kit.pieces.iter().map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
+    let meshes = design
+        .kit
+        .pieces
+        .iter()
+        .map(|(p, mesh)| (piece_file(p), write_stl_binary(mesh)));
     let pieces: Vec<(String, Vec<u8>)> = meshes.collect();
-    let labels: Vec<i32> = design.kit.surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
-    let chart = design.strength.as_ref().map(|strength| stress_chart(options, settings, design, strength));
-    let figures = chart.iter().map(|svg| ("Stress in a fall".to_owned(), svg.clone())).collect();
+    let labels: Vec<i32> = design
+        .kit
+        .surface
+        .patch_of_face
+        .iter()
+        .map(|p| p.0 as i32)
+        .collect();
+    let chart = design
+        .strength
+        .as_ref()
+        .map(|strength| stress_chart(options, settings, design, strength));
+    let figures = chart
+        .iter()
+        .map(|svg| ("Stress in a fall".to_owned(), svg.clone()))
+        .collect();
     let place = |i: usize| design.kit.plan.position(PatchId(i as u32));
-    let archives = || rayon::join(|| assembly(design), || printing.files(design.kit.pieces.as_slice(), place));
-    let ((archive, plates), (page, picture, booklet)) =
-        rayon::join(archives, || page::report(model, options, settings, design, warnings, &summary, figures));
+    let archives = || {
+        rayon::join(
+            || assembly(design),
+            || printing.files(design.kit.pieces.as_slice(), place),
+        )
+    };
+    let ((archive, plates), (page, picture, booklet)) = rayon::join(archives, || {
+        page::report(model, options, settings, design, warnings, &summary, figures)
+    });
     let mut archives = vec![("assembly.3mf".to_owned(), archive)];
     archives.extend(plates);
     let claimed = certificate(&pieces, &archives, design, settings.verify.clearance_mm);
@@ -198,8 +248,14 @@ pub fn files(
     files.extend(pieces);
     files.extend(archives);
     files.extend(chart.map(|svg| ("strength.svg".to_owned(), svg.into_bytes())));
-    files.push(("segmentation.ply".into(), write_ply(&design.kit.surface.mesh, Some(&labels))));
-    files.push(("segmentation.3mf".into(), painted(&model.name, &design.kit.surface).0));
+    files.push((
+        "segmentation.ply".into(),
+        write_ply(&design.kit.surface.mesh, Some(&labels)),
+    ));
+    files.push((
+        "segmentation.3mf".into(),
+        painted(&model.name, &design.kit.surface).0,
+    ));
     files.push(("report.html".into(), page));
     files.push(("pieces.png".into(), picture));
     files.extend(booklet.map(|bytes| ("instructions.pdf".to_owned(), bytes)));
@@ -230,17 +286,26 @@ fn piece_file(p: PatchId) -> String {
     format!("pieces/piece-{:02}.stl", p.0)
 }
 
-/// What is claimed of the kit whose pieces are these files, in order of their ids; `others` are certified as they are.
+/// What is claimed of the kit whose pieces are these files, in order of their ids; `others` are certified as
+/// they are.
 fn certificate(
     files: &[(String, Vec<u8>)],
     others: &[(String, Vec<u8>)],
     design: &Design,
     clearance_mm: f64,
 ) -> Option<Vec<u8>> {
-    let other = |(file, bytes): &(String, Vec<u8>)| OtherFile { file: file.clone(), sha256: sha256(bytes) };
+    let other = |(file, bytes): &(String, Vec<u8>)| OtherFile {
+        file: file.clone(),
+        sha256: sha256(bytes),
+    };
     let named = files.iter().zip(design.kit.pieces.ids());
     let named = named
-        .map(|((file, bytes), id)| PieceFile { id, file: file.clone(), sha256: sha256(bytes), play: None })
+        .map(|((file, bytes), id)| PieceFile {
+            id,
+            file: file.clone(),
+            sha256: sha256(bytes),
+            play: None,
+        })
         .collect();
     let evidence = Evidence {
         contacts: &design.kit.touching,
@@ -248,9 +313,18 @@ fn certificate(
         gaps: &design.gaps,
         play: Some(&design.kit.play),
     };
-    certify(named, &design.kit.pieces, &design.kit.plan, &evidence, clearance_mm)
-        .map(|c| c.with_press_fits(design.kit.press_fits.clone()).with_files(others.iter().map(other).collect()))
-        .map(|c| certificate_bytes(&c))
+    certify(
+        named,
+        &design.kit.pieces,
+        &design.kit.plan,
+        &evidence,
+        clearance_mm,
+    )
+    .map(|c| {
+        c.with_press_fits(design.kit.press_fits.clone())
+            .with_files(others.iter().map(other).collect())
+    })
+    .map(|c| certificate_bytes(&c))
 }
 
 /// As it is written to [`CERTIFICATE`].
@@ -343,8 +417,12 @@ fn plan_json(
         "warnings": warnings,
     });
     // Only where pairs have sizes of their own; `connector_size` is then the largest.
-    let sizes: Vec<Value> =
-        design.kit.sizes.pairs().map(|(pair, size_mm)| json!({ "pieces": pair, "size_mm": size_mm })).collect();
+    let sizes: Vec<Value> = design
+        .kit
+        .sizes
+        .pairs()
+        .map(|(pair, size_mm)| json!({ "pieces": pair, "size_mm": size_mm }))
+        .collect();
     if !sizes.is_empty() {
         value["connector_sizes"] = sizes.into();
     }
@@ -369,7 +447,8 @@ fn transform(model: &Model, design: &Design) -> [f64; 16] {
     all
 }
 
-/// How near pieces come, at rest and on their way, mm: the least of all and beneath the rim, which is meant to touch.
+/// How near pieces come, at rest and on their way, mm: the least of all and beneath the rim, which is meant
+/// to touch.
 fn gaps_json(design: &Design) -> Value {
     let least = |gaps: &mut dyn Iterator<Item = f64>| gaps.min_by(f64::total_cmp);
     let (pairs, paths) = (&design.gaps.pairs, &design.gaps.paths);
@@ -398,15 +477,30 @@ pub fn connector_sizes(design: &Design) -> String {
     if design.kit.sizes.pairs().next().is_none() {
         return design.kit.sizes.default_mm().to_string();
     }
-    let made =
-        design.kit.joints.iter().filter(|j| j.length_mm > 0.0).map(|j| [design.kit.sizes.of(j.male, j.female); 2]);
-    let ends = made.reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])]).unwrap_or([design.kit.sizes.default_mm(); 2]);
+    let made = design
+        .kit
+        .joints
+        .iter()
+        .filter(|j| j.length_mm > 0.0)
+        .map(|j| [design.kit.sizes.of(j.male, j.female); 2]);
+    let ends = made
+        .reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])])
+        .unwrap_or([design.kit.sizes.default_mm(); 2]);
     let [least, most] = ends.map(|d| format!("{d:.1}"));
-    if least == most { most } else { format!("{least}–{most}") }
+    if least == most {
+        most
+    } else {
+        format!("{least}–{most}")
+    }
 }
 
 fn strength_json(strength: &Strength, settings: &Settings) -> Value {
-    let StrengthParams { material, drop_m, n_cases, .. } = &settings.strength;
+    let StrengthParams {
+        material,
+        drop_m,
+        n_cases,
+        ..
+    } = &settings.strength;
     json!({
         "material": material, "drop_m": drop_m, "n_falls": n_cases,
         "stress_mpa": strength.stress_mpa, "is_too_weak": strength.is_too_weak, "at": strength.at.to_array(),
@@ -429,7 +523,9 @@ fn stress_chart(options: &Options, settings: &Settings, design: &Design, strengt
             points: seam.points,
         })
         .collect();
-    strength_chart(strength, settings.strength.material.strength_mpa, &seams, |v| standing(options.up, design, v))
+    strength_chart(strength, settings.strength.material.strength_mpa, &seams, |v| {
+        standing(options.up, design, v)
+    })
 }
 
 /// From assembly space to the model as it was given, then so that `up` becomes z.

@@ -10,7 +10,8 @@ use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_print::booklet::Booklet;
 use shellock_render::{
-    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
+    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette,
+    pieces_picture,
 };
 
 use crate::args::Options;
@@ -21,7 +22,8 @@ use crate::output::{Summary, connector_sizes, standing};
 /// Pieces are shown within this share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
 const SEEN: f64 = 3e-4;
 
-/// The page, the picture and the booklet, where it is wanted. All show the model standing on its feet: `up` becomes z.
+/// The page, the picture and the booklet, where it is wanted. All show the model standing on its feet: `up`
+/// becomes z.
 pub fn report(
     model: &Model,
     options: &Options,
@@ -36,7 +38,10 @@ pub fn report(
     let failed = design.kit.verification.findings.iter().map(failure);
     let warnings: Vec<Warning> = failed
         .chain(warnings.iter().cloned())
-        .map(|w| Warning { at: w.at.map(|at| stand(Vec3::from_array(at)).to_array()), ..w })
+        .map(|w| Warning {
+            at: w.at.map(|at| stand(Vec3::from_array(at)).to_array()),
+            ..w
+        })
         .collect();
     let plan = &design.kit.plan;
     let pieces: Vec<ReportPiece> = design
@@ -60,7 +65,11 @@ pub fn report(
         .verification
         .checks
         .iter()
-        .map(|c| ReportCheck { name: c.name.clone(), ok: c.ok, figure: c.figure.clone() })
+        .map(|c| ReportCheck {
+            name: c.name.clone(),
+            ok: c.ok,
+            figure: c.figure.clone(),
+        })
         .collect();
     let quantities = quantities(design);
     let data = ReportData {
@@ -73,10 +82,19 @@ pub fn report(
         quantities,
         motions: motions(design, stand),
     };
-    let booklet = Booklet { title: title(&model.name), lines: cover_lines(&shown), pieces: data.pieces.clone() };
+    let booklet = Booklet {
+        title: title(&model.name),
+        lines: cover_lines(&shown),
+        pieces: data.pieces.clone(),
+    };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),
-        || rayon::join(|| pieces_picture(&data.pieces).png(), || (!options.no_booklet).then(|| booklet.pdf())),
+        || {
+            rayon::join(
+                || pieces_picture(&data.pieces).png(),
+                || (!options.no_booklet).then(|| booklet.pdf()),
+            )
+        },
     );
     (page, picture, booklet)
 }
@@ -103,7 +121,12 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
         .map(shake)
         .collect();
     let title = "each piece as far as its clearance lets it move while the others rest".to_owned();
-    let shake = ReportMotion { name: "shake".into(), title, is_loop: true, moves };
+    let shake = ReportMotion {
+        name: "shake".into(),
+        title,
+        is_loop: true,
+        moves,
+    };
     let way_out = |(piece, poses): &(PatchId, Vec<[f64; 6]>)| ReportMotion {
         name: format!("piece {piece} comes out"),
         title: format!(
@@ -117,22 +140,39 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
         }],
     };
     let ways_out = design.kit.play.ways_out.iter().flatten().map(way_out);
-    (!shake.moves.is_empty()).then_some(shake).into_iter().chain(ways_out).collect()
+    (!shake.moves.is_empty())
+        .then_some(shake)
+        .into_iter()
+        .chain(ways_out)
+        .collect()
 }
 
 /// What failed, for the list of warnings.
 fn failure(finding: &Finding) -> Warning {
     let message = format!("do not print this kit: {finding}");
-    Warning { code: "failed".into(), message, pieces: Vec::new(), at: finding.place() }
+    Warning {
+        code: "failed".into(),
+        message,
+        pieces: Vec::new(),
+        at: finding.place(),
+    }
 }
 
 /// The pieces as they stand, as finely as eyes see them.
 fn shown(design: &Design, stand: impl Fn(Vec3) -> Vec3 + Sync) -> Vec<TriMesh> {
-    let all = design.kit.pieces.as_slice().iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
+    let all = design
+        .kit
+        .pieces
+        .as_slice()
+        .iter()
+        .fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()));
     let tolerance_mm = SEEN * all.diagonal();
     let shown = |mesh: &TriMesh| {
         let mesh = decimate(mesh.clone(), &vec![tolerance_mm; mesh.points.len()]);
-        TriMesh { points: mesh.points.iter().map(|&p| stand(p)).collect(), triangles: mesh.triangles }
+        TriMesh {
+            points: mesh.points.iter().map(|&p| stand(p)).collect(),
+            triangles: mesh.triangles,
+        }
     };
     design.kit.pieces.as_slice().par_iter().map(shown).collect()
 }
@@ -150,25 +190,50 @@ fn kit_facts(
         ("pieces".into(), design.kit.pieces.len().to_string()),
         ("wall".into(), format!("{:.2} mm", design.kit.thickness_mm)),
         ("connectors".into(), format!("{} mm", connector_sizes(design))),
-        ("clearance".into(), format!("{} mm", settings.connector.clearance_mm)),
-        ("material".into(), format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio)),
-        ("print time".into(), format!("about {:.0} % of the solid model's", 100.0 * summary.print_time_ratio)),
-        ("seams with connectors".into(), format!("{:.0} % of what fits", 100.0 * summary.connector_share)),
+        (
+            "clearance".into(),
+            format!("{} mm", settings.connector.clearance_mm),
+        ),
+        (
+            "material".into(),
+            format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio),
+        ),
+        (
+            "print time".into(),
+            format!(
+                "about {:.0} % of the solid model's",
+                100.0 * summary.print_time_ratio
+            ),
+        ),
+        (
+            "seams with connectors".into(),
+            format!("{:.0} % of what fits", 100.0 * summary.connector_share),
+        ),
     ];
-    facts.extend(design.strength.iter().map(|s| ("fall".into(), bearing(s, settings))));
+    facts.extend(
+        design
+            .strength
+            .iter()
+            .map(|s| ("fall".into(), bearing(s, settings))),
+    );
     facts.extend(plan_facts(design, stand));
     facts
 }
 
 /// Of what stands assembled.
 fn size(shown: &[TriMesh]) -> String {
-    let size = shown.iter().fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds())).size();
+    let size = shown
+        .iter()
+        .fold(Aabb::EMPTY, |b, mesh| b.union(mesh.bounds()))
+        .size();
     format!("{:.1} × {:.1} × {:.1} mm high", size.x, size.y, size.z)
 }
 
 /// A file's name as a heading.
 fn title(name: &str) -> String {
-    Path::new(name).file_stem().map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
+    Path::new(name)
+        .file_stem()
+        .map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
 /// What a person who builds the thing wants to know of it.
@@ -179,11 +244,17 @@ fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
     ]
 }
 
-/// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is made to `stand`.
+/// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is
+/// made to `stand`.
 fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, String)> {
-    let Kit { proof: p, holding, .. } = &design.kit;
-    let how =
-        if p.optimal { "proven to be the least with".into() } else { format!("at least {:.2} with", p.lower_bound) };
+    let Kit {
+        proof: p, holding, ..
+    } = &design.kit;
+    let how = if p.optimal {
+        "proven to be the least with".into()
+    } else {
+        format!("at least {:.2} with", p.lower_bound)
+    };
     let cost = ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)));
     let weakest = holding.seams.first().map(|s| {
         let [x, y, z] = stand(Vec3::from_array(s.at)).to_array();
@@ -195,32 +266,62 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
     });
     let loose = holding.loose.iter().map(|part| {
         let [x, y, z] = stand(Vec3::from_array(part.at)).to_array();
-        ("comes apart".into(), format!("piece {} at ({x:.1}, {y:.1}, {z:.1}) mm, at 10 N/m", part.piece))
+        (
+            "comes apart".into(),
+            format!("piece {} at ({x:.1}, {y:.1}, {z:.1}) mm, at 10 N/m", part.piece),
+        )
     });
     [cost].into_iter().chain(weakest).chain(loose).collect()
 }
 
 /// What the report colours pieces by.
 fn quantities(design: &Design) -> Vec<ReportQuantity> {
-    // The key is there to leave: how far it gets before unevenness stops it would drown what the others differ by.
+    // The key is there to leave: how far it gets before unevenness stops it would drown what the others
+    // differ by.
     let translation_mm = |play: &IdVec<PatchId, Option<Play>>| {
-        let of_piece =
-            |(id, p): (PatchId, &Option<Play>)| p.filter(|_| id != design.kit.plan.key()).map(|p| p.translation_mm);
+        let of_piece = |(id, p): (PatchId, &Option<Play>)| {
+            p.filter(|_| id != design.kit.plan.key())
+                .map(|p| p.translation_mm)
+        };
         play.iter().map(of_piece).collect::<Vec<Option<f64>>>()
     };
-    let order = design.kit.pieces.ids().map(|p| Some(design.kit.plan.position(p) as f64 + 1.0)).collect();
-    let mut quantities = vec![("order", "", order), ("play", "mm", translation_mm(&design.kit.play.alone))];
-    quantities.extend(design.kit.play.together.as_ref().map(|play| ("play with others", "mm", translation_mm(play))));
-    let quantity =
-        |(name, unit, values): (&str, &str, _)| ReportQuantity { name: name.into(), unit: unit.into(), values };
+    let order = design
+        .kit
+        .pieces
+        .ids()
+        .map(|p| Some(design.kit.plan.position(p) as f64 + 1.0))
+        .collect();
+    let mut quantities = vec![
+        ("order", "", order),
+        ("play", "mm", translation_mm(&design.kit.play.alone)),
+    ];
+    quantities.extend(
+        design
+            .kit
+            .play
+            .together
+            .as_ref()
+            .map(|play| ("play with others", "mm", translation_mm(play))),
+    );
+    let quantity = |(name, unit, values): (&str, &str, _)| ReportQuantity {
+        name: name.into(),
+        unit: unit.into(),
+        values,
+    };
     quantities.into_iter().map(quantity).collect()
 }
 
 /// A piece's volume, and how each of its seams holds.
 fn piece_facts(design: &Design, piece: PatchId) -> Vec<(String, String)> {
     let mut facts = vec![
-        ("volume".to_owned(), format!("{:.1} cm³", design.kit.pieces[piece].signed_volume() / 1000.0)),
-        ("cost in the plan".to_owned(), format!("{:.2}", design.kit.proof.piece_costs[piece])),
+        (
+            "volume".to_owned(),
+            format!("{:.1} cm³", design.kit.pieces[piece].signed_volume() / 1000.0),
+        ),
+        (
+            "cost in the plan".to_owned(),
+            format!("{:.2}", design.kit.proof.piece_costs[piece]),
+        ),
     ];
     let play = |p: Play| {
         let proven = if p.is_proven { "" } else { ", not proven" };
@@ -232,7 +333,10 @@ fn piece_facts(design: &Design, piece: PatchId) -> Vec<(String, String)> {
     let seams = design.kit.holding.seams.iter();
     for s in seams.filter(|s| s.later == piece || s.earlier == piece) {
         let other = if s.later == piece { s.earlier } else { s.later };
-        facts.push((format!("seam with {other}"), format!("opens {:.2} mm at 10 N/m", s.opening_mm)));
+        facts.push((
+            format!("seam with {other}"),
+            format!("opens {:.2} mm at 10 N/m", s.opening_mm),
+        ));
     }
     facts
 }

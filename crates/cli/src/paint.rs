@@ -8,11 +8,20 @@ const N_COLORS: u32 = 16;
 
 /// A 3MF of the surface with its patches painted, and whether each patch has a colour of its own.
 ///
-/// Patch k has colour k + 1 up to 16 patches. With more, patches share colours; those that touch do not, unless they must.
+/// Patch k has colour k + 1 up to 16 patches. With more, patches share colours; those that touch do not,
+/// unless they must.
 pub fn painted(name: &str, surface: &SegmentedSurface) -> (Vec<u8>, bool) {
     let is_distinct = surface.n_patches <= N_COLORS as usize;
-    let color_of_patch = if is_distinct { (1..=surface.n_patches as u32).collect() } else { shared_colors(surface) };
-    let colors: Vec<u32> = surface.patch_of_face.iter().map(|p| color_of_patch[p.0 as usize]).collect();
+    let color_of_patch = if is_distinct {
+        (1..=surface.n_patches as u32).collect()
+    } else {
+        shared_colors(surface)
+    };
+    let colors: Vec<u32> = surface
+        .patch_of_face
+        .iter()
+        .map(|p| color_of_patch[p.0 as usize])
+        .collect();
     (write_painted_3mf(name, &surface.mesh, &colors), is_distinct)
 }
 
@@ -37,7 +46,11 @@ fn shared_colors(surface: &SegmentedSurface) -> Vec<u32> {
     let mut colors: Vec<u32> = Vec::with_capacity(n);
     for near in &touches {
         let n_uses = |color: u32| colors.iter().filter(|&&c| c == color).count();
-        let is_near = |color: u32| near.iter().zip(&colors).any(|(touches, &c)| *touches && c == color);
+        let is_near = |color: u32| {
+            near.iter()
+                .zip(&colors)
+                .any(|(touches, &c)| *touches && c == color)
+        };
         let best = (1..=N_COLORS).min_by_key(|&color| (is_near(color), n_uses(color), color));
         colors.push(best.unwrap_or(1));
     }
@@ -53,11 +66,17 @@ mod tests {
 
     /// A strip of quads, each a patch.
     fn strip(n_patches: usize) -> SegmentedSurface {
-        let points = (0..2 * n_patches + 2).map(|i| Vec3::new((i / 2) as f64, (i % 2) as f64, 0.0)).collect();
+        let points = (0..2 * n_patches + 2)
+            .map(|i| Vec3::new((i / 2) as f64, (i % 2) as f64, 0.0))
+            .collect();
         let quads = (0..n_patches as u32).map(|q| 2 * q);
-        let triangles: Vec<[u32; 3]> = quads.flat_map(|i| [[i, i + 2, i + 3], [i, i + 3, i + 1]]).collect();
+        let triangles: Vec<[u32; 3]> = quads
+            .flat_map(|i| [[i, i + 2, i + 3], [i, i + 3, i + 1]])
+            .collect();
         SegmentedSurface {
-            patch_of_face: (0..triangles.len() as u32).map(|face| PatchId(face / 2)).collect(),
+            patch_of_face: (0..triangles.len() as u32)
+                .map(|face| PatchId(face / 2))
+                .collect(),
             source_face: (0..triangles.len() as u32).collect(),
             mesh: TriMesh { points, triangles },
             n_patches,

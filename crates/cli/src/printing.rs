@@ -31,8 +31,8 @@ pub struct Printing {
 }
 
 impl Printing {
-    /// Lays `pieces` on plates of `printer`. Of their faces, those on `surface` are the skin that is seen; `solid` is
-    /// the model.
+    /// Lays `pieces` on plates of `printer`. Of their faces, those on `surface` are the skin that is seen;
+    /// `solid` is the model.
     pub fn of(printer: &Printer, pieces: &[TriMesh], surface: &TriMesh, solid: &Solid) -> Self {
         let skin = TriangleBvh::new(surface);
         let printables: Vec<Printable<'_>> = pieces.par_iter().map(|mesh| printable(mesh, &skin)).collect();
@@ -41,9 +41,17 @@ impl Printing {
         for laid in &plates.laid {
             loads[laid.plate] = loads[laid.plate].and(load(laid, &pieces[laid.piece]));
         }
-        let pieces_s = loads.iter().map(|load| seconds(printer, load)).fold(0.0, |sum, s| sum + s);
-        let solid_s = lay_alone(printer, solid.mesh()).map_or(0.0, |l| seconds(printer, &load(&l, solid.mesh())));
-        Self { printer: printer.clone(), plates, seconds: [pieces_s, solid_s] }
+        let pieces_s = loads
+            .iter()
+            .map(|load| seconds(printer, load))
+            .fold(0.0, |sum, s| sum + s);
+        let solid_s =
+            lay_alone(printer, solid.mesh()).map_or(0.0, |l| seconds(printer, &load(&l, solid.mesh())));
+        Self {
+            printer: printer.clone(),
+            plates,
+            seconds: [pieces_s, solid_s],
+        }
     }
 
     /// Print time of all plates and of the solid model by closed forms, s.
@@ -65,8 +73,14 @@ impl Printing {
             1 => format!("piece {names} does not fit the printer {printer}; it is"),
             _ => format!("pieces {names} do not fit the printer {printer}; they are"),
         };
-        let message = format!("{what} left out of plates.3mf: choose more pieces (--pieces) or another printer");
-        (!pieces.is_empty()).then(|| Warning { code: "piece-too-large".into(), message, pieces, at: None })
+        let message =
+            format!("{what} left out of plates.3mf: choose more pieces (--pieces) or another printer");
+        (!pieces.is_empty()).then(|| Warning {
+            code: "piece-too-large".into(),
+            message,
+            pieces,
+            at: None,
+        })
     }
 
     /// In one line for people.
@@ -85,7 +99,10 @@ impl Printing {
             n => format!("; {n} pieces are not on them"),
         };
         let plates = if n == 1 { "plate" } else { "plates" };
-        format!("plates.3mf: {n} {plates} of {}{supports}{time}", described(&self.printer))
+        format!(
+            "plates.3mf: {n} {plates} of {}{supports}{time}",
+            described(&self.printer)
+        )
     }
 
     /// For plan.json.
@@ -99,7 +116,10 @@ impl Printing {
                         "support_mm2": l.support_mm2, "outer_support_mm2": l.outer_support_mm2 })
             })
             .collect();
-        let process = Process::ALL.iter().find(|(_, p)| *p == self.printer.process).map(|(name, _)| *name);
+        let process = Process::ALL
+            .iter()
+            .find(|(_, p)| *p == self.printer.process)
+            .map(|(name, _)| *name);
         json!({
             "printer": self.printer.name, "process": process, "bed": self.printer.bed_mm, "layer": self.printer.layer_mm,
             "plates": self.plates.n_plates, "laid": laid, "too_large": self.plates.too_large,
@@ -107,30 +127,55 @@ impl Printing {
         })
     }
 
-    /// All plates side by side, and each alone where there are several. `place` is where a piece stands in the order of
-    /// installation.
+    /// All plates side by side, and each alone where there are several. `place` is where a piece stands in
+    /// the order of installation.
     pub fn files(&self, pieces: &[TriMesh], place: impl Fn(usize) -> usize) -> Vec<(String, Vec<u8>)> {
         let names: Vec<String> = (0..pieces.len()).map(|i| format!("piece {i}")).collect();
         let object = |laid: &Laid, moved_mm: [f64; 3]| {
             let (name, mesh) = (names[laid.piece].as_str(), &pieces[laid.piece]);
-            NamedObject { name, color: palette::color(place(laid.piece)), mesh, turned: Some(laid.turned), moved_mm }
+            NamedObject {
+                name,
+                color: palette::color(place(laid.piece)),
+                mesh,
+                turned: Some(laid.turned),
+                moved_mm,
+            }
         };
         let of_plate = |plate: usize| -> Vec<NamedObject<'_>> {
-            self.plates.laid.iter().filter(|l| l.plate == plate).map(|l| object(l, l.moved_mm)).collect()
+            self.plates
+                .laid
+                .iter()
+                .filter(|l| l.plate == plate)
+                .map(|l| object(l, l.moved_mm))
+                .collect()
         };
-        let all = || self.plates.laid.iter().map(|l| object(l, l.moved_among_plates_mm(&self.printer))).collect();
+        let all = || {
+            self.plates
+                .laid
+                .iter()
+                .map(|l| object(l, l.moved_among_plates_mm(&self.printer)))
+                .collect()
+        };
         let n = self.plates.n_plates;
-        let single = (0..if n > 1 { n } else { 0 }).map(|i| (format!("plates/plate-{}.3mf", i + 1), of_plate(i)));
-        let archives: Vec<(String, Vec<NamedObject<'_>>)> =
-            std::iter::once(("plates.3mf".to_owned(), all())).chain(single).collect();
-        archives.into_par_iter().map(|(name, objects)| (name, write_3mf(&objects))).collect()
+        let single =
+            (0..if n > 1 { n } else { 0 }).map(|i| (format!("plates/plate-{}.3mf", i + 1), of_plate(i)));
+        let archives: Vec<(String, Vec<NamedObject<'_>>)> = std::iter::once(("plates.3mf".to_owned(), all()))
+            .chain(single)
+            .collect();
+        archives
+            .into_par_iter()
+            .map(|(name, objects)| (name, write_3mf(&objects)))
+            .collect()
     }
 }
 
 /// A piece, with the faces that lie on the model's surface told apart.
 fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
     let is_outer = |f: usize| skin.nearest(mesh.face_center(f), SKIN_MM * SKIN_MM).is_some();
-    Printable { mesh, is_outer: (0..mesh.triangles.len()).into_par_iter().map(is_outer).collect() }
+    Printable {
+        mesh,
+        is_outer: (0..mesh.triangles.len()).into_par_iter().map(is_outer).collect(),
+    }
 }
 
 fn load(laid: &Laid, mesh: &TriMesh) -> Load {
@@ -147,7 +192,8 @@ fn described(printer: &Printer) -> String {
     format!("\"{}\" ({width} × {depth} × {height} mm)", printer.name)
 }
 
-/// What to say before the work starts where pieces will not fit the printer: which, and how many pieces would do.
+/// What to say before the work starts where pieces will not fit the printer: which, and how many pieces would
+/// do.
 ///
 /// What fits the printer in one piece also does in several; only larger models are divided to see.
 pub fn too_large(
@@ -163,11 +209,17 @@ pub fn too_large(
     let ctx = Ctx::new(&silent, &session.stop);
     let wall_mm = settings.strength.least_mm.max(settings.body.thickness_mm);
     let misfits = |n_pieces: Option<usize>, labels: Option<&[i64]>| {
-        let params = segmentation::SegmentationParams { n_pieces, ..settings.segmentation.clone() };
-        let surface = segmentation::segment(&ctx, &params, &model.solid, labels).map_err(DesignError::from)?;
+        let params = segmentation::SegmentationParams {
+            n_pieces,
+            ..settings.segmentation.clone()
+        };
+        let surface =
+            segmentation::segment(&ctx, &params, &model.solid, labels).map_err(DesignError::from)?;
         let ids: Vec<u32> = (0..surface.n_patches as u32).collect();
-        let misfits: Vec<u32> =
-            ids.into_par_iter().filter(|&p| !fits(printer, &shell_of(&surface, PatchId(p), wall_mm))).collect();
+        let misfits: Vec<u32> = ids
+            .into_par_iter()
+            .filter(|&p| !fits(printer, &shell_of(&surface, PatchId(p), wall_mm)))
+            .collect();
         Ok::<_, Failure>((surface.n_patches, misfits))
     };
     let (n, misfitting) = misfits(settings.segmentation.n_pieces, model.labels.as_deref())?;
@@ -189,7 +241,10 @@ pub fn too_large(
         (None, _) => "make it smaller (--size), or choose another printer (--printer)".to_owned(),
     };
     let count = misfitting.len();
-    Ok(Some(format!("{count} of {n} pieces will not fit the printer {}; {remedy}", described(printer))))
+    Ok(Some(format!(
+        "{count} of {n} pieces will not fit the printer {}; {remedy}",
+        described(printer)
+    )))
 }
 
 /// A patch with a wall behind it, as points: about the piece it becomes.
@@ -198,7 +253,8 @@ fn shell_of(surface: &SegmentedSurface, patch: PatchId, wall_mm: f64) -> TriMesh
     for face in (0..surface.mesh.triangles.len()).filter(|&f| surface.patch_of_face[f] == patch) {
         let first = mesh.points.len() as u32;
         mesh.points.extend(surface.mesh.corners(face));
-        mesh.points.push(surface.mesh.face_center(face) - wall_mm * surface.mesh.face_normal(face));
+        mesh.points
+            .push(surface.mesh.face_center(face) - wall_mm * surface.mesh.face_normal(face));
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     mesh

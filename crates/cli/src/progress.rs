@@ -13,7 +13,8 @@ use shellock::context::Progress;
 pub enum Shown {
     /// A bar on a terminal, plain lines elsewhere.
     ForPeople,
-    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, `{"event": "note", "text", "seconds"}`.
+    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, `{"event": "note", "text",
+    /// "seconds"}`.
     Events,
     /// Not at all.
     Nothing,
@@ -30,7 +31,12 @@ pub struct Display {
 impl Display {
     /// A display that has shown nothing yet.
     pub fn new(shown: Shown) -> Self {
-        Self { bar: Mutex::new(None), is_terminal: std::io::stderr().is_terminal(), shown, since: Instant::now() }
+        Self {
+            bar: Mutex::new(None),
+            is_terminal: std::io::stderr().is_terminal(),
+            shown,
+            since: Instant::now(),
+        }
     }
 
     /// What the library reports.
@@ -46,9 +52,14 @@ impl Display {
         let seconds = (1000.0 * self.since.elapsed().as_secs_f64()).round() / 1000.0;
         match progress {
             Progress::Stage { name, n_steps } => {
-                eprintln!("{}", json!({ "event": "stage", "name": name, "n_steps": n_steps, "seconds": seconds }));
+                eprintln!(
+                    "{}",
+                    json!({ "event": "stage", "name": name, "n_steps": n_steps, "seconds": seconds })
+                );
             }
-            Progress::Note(text) => eprintln!("{}", json!({ "event": "note", "text": text, "seconds": seconds })),
+            Progress::Note(text) => {
+                eprintln!("{}", json!({ "event": "note", "text": text, "seconds": seconds }))
+            }
             Progress::Step => {}
         }
     }
@@ -90,11 +101,15 @@ pub struct PlanClock {
 }
 
 impl PlanClock {
-    /// A clock for searches that were allowed work of `plan_time_s`; they get twice the time, and some to find any plan.
+    /// A clock for searches that were allowed work of `plan_time_s`; they get twice the time, and some to
+    /// find any plan.
     pub fn new(plan_time_s: f64) -> Self {
         const GRACE_S: f64 = 10.0;
         let limit = Duration::try_from_secs_f64(2.0 * plan_time_s + GRACE_S).unwrap_or(Duration::MAX);
-        Self { since: Mutex::new(Instant::now()), limit }
+        Self {
+            since: Mutex::new(Instant::now()),
+            limit,
+        }
     }
 
     /// Every stage starts the clock anew, so each search has its own time.
@@ -106,13 +121,20 @@ impl PlanClock {
 
     /// Whether the stage has gone on for longer than planning may.
     pub fn is_up(&self) -> bool {
-        self.since.lock().expect("no holder of this lock panics").elapsed() > self.limit
+        self.since
+            .lock()
+            .expect("no holder of this lock panics")
+            .elapsed()
+            > self.limit
     }
 }
 
 fn stage_bar(name: &str, n_steps: usize) -> ProgressBar {
     let (bar, template) = if n_steps > 0 {
-        (ProgressBar::new(n_steps as u64), "{elapsed:>4} {msg} {wide_bar} {pos}/{len}, {eta} left")
+        (
+            ProgressBar::new(n_steps as u64),
+            "{elapsed:>4} {msg} {wide_bar} {pos}/{len}, {eta} left",
+        )
     } else {
         (ProgressBar::new_spinner(), "{elapsed:>4} {msg} {spinner}")
     };

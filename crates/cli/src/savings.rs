@@ -1,7 +1,7 @@
 //! `report`: what a kit saves over the solid model, as the paper's Table 1 tells it.
 //!
-//! Print times are PrusaSlicer's own estimates where it is installed, else closed forms. Pieces are laid on plates anew
-//! for either process; the solid lies in the pose that needs the least support.
+//! Print times are PrusaSlicer's own estimates where it is installed, else closed forms. Pieces are laid on
+//! plates anew for either process; the solid lies in the pose that needs the least support.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,13 +24,14 @@ const SAVINGS: &str = "savings.json";
 /// The slicer's program.
 const SLICER: &str = "prusa-slicer";
 
-/// Settings of both technologies, as far as they matter for time, on a bed that holds everything. The display of the
-/// resin printer is coarse: its pixels cost time here and change nothing.
+/// Settings of both technologies, as far as they matter for time, on a bed that holds everything. The display
+/// of the resin printer is coarse: its pixels cost time here and change nothing.
 const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
 const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
     supports_enable = 0\npad_enable = 0\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
     display_pixels_y = 1000\n";
-const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\n";
+const FDM_SETTINGS: &str =
+    "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\n";
 /// Instead of the slicer's 20 %.
 const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 
@@ -42,14 +43,16 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
         Failure::Wrong(what) => broken(what),
         other => other,
     };
-    let plan: Value = serde_json::from_slice(&read(&path)?).map_err(|e| broken(format!("not a plan: {e}")))?;
+    let plan: Value =
+        serde_json::from_slice(&read(&path)?).map_err(|e| broken(format!("not a plan: {e}")))?;
     let Kit { pieces, order, .. } = pieces_of(kit, &plan).map_err(named)?;
     let solid = model_of(&plan, model).map_err(named)?;
     let slicer = if closed_form { None } else { Slicer::find()? };
     let mut times = serde_json::Map::new();
     for printer in [Printer::sla(), Printer::fdm()] {
-        let bed_mm: Option<Vec<f64>> =
-            plan["printing"]["bed"].as_array().map(|b| b.iter().filter_map(Value::as_f64).collect());
+        let bed_mm: Option<Vec<f64>> = plan["printing"]["bed"]
+            .as_array()
+            .map(|b| b.iter().filter_map(Value::as_f64).collect());
         let bed_mm = bed_mm.and_then(|b| b.try_into().ok()).unwrap_or(printer.bed_mm);
         let printer = Printer { bed_mm, ..printer };
         let printing = Printing::of(&printer, pieces.as_slice(), solid.mesh(), &solid);
@@ -58,9 +61,21 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
             Some(slicer) => slicer.seconds(&printer, printing.files(pieces.as_slice(), place), &solid)?,
             None => None,
         };
-        let by = if sliced.is_some() { "PrusaSlicer" } else { "closed form" };
+        let by = if sliced.is_some() {
+            "PrusaSlicer"
+        } else {
+            "closed form"
+        };
         let [pieces_s, solid_s] = printing.seconds();
-        let Times { pieces_s, solid_s, filled_s } = sliced.unwrap_or(Times { pieces_s, solid_s, filled_s: None });
+        let Times {
+            pieces_s,
+            solid_s,
+            filled_s,
+        } = sliced.unwrap_or(Times {
+            pieces_s,
+            solid_s,
+            filled_s: None,
+        });
         let ratio = |whole_s: f64| pieces_s / whole_s.max(f64::MIN_POSITIVE);
         let told = json!({ "by": by, "pieces_s": pieces_s, "solid_s": solid_s, "ratio": ratio(solid_s),
             "filled_solid_s": filled_s, "filled_ratio": filled_s.map(ratio) });
@@ -87,7 +102,10 @@ fn print(told: &Value) {
     let hours = |v: &Value| v.as_f64().unwrap_or_default() / 3600.0;
     let wall_mm = told["wall_mm"].as_f64().unwrap_or_default();
     println!("{} pieces, walls {wall_mm:.2} mm", told["pieces"]);
-    println!("material    {:5.1} % of the solid model's", percent(&told["volume_ratio"]));
+    println!(
+        "material    {:5.1} % of the solid model's",
+        percent(&told["volume_ratio"])
+    );
     for (name, time) in told["print_time"].as_object().into_iter().flatten() {
         println!(
             "time, {name}   {:5.1} % of the solid model's: {:.1} h instead of {:.1} h, by {}",
@@ -124,7 +142,11 @@ struct Slicer {
 impl Slicer {
     /// The slicer, where it is installed.
     fn find() -> Result<Option<Self>, Failure> {
-        let runs = Command::new(SLICER).arg("--help").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        let runs = Command::new(SLICER)
+            .arg("--help")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status();
         if !runs.is_ok_and(|status| status.success()) {
             return Ok(None);
         }
@@ -139,7 +161,9 @@ impl Slicer {
         files: Vec<(String, Vec<u8>)>,
         solid: &Solid,
     ) -> Result<Option<Times>, Failure> {
-        let Some(laid) = lay_alone(printer, solid.mesh()) else { return Ok(None) };
+        let Some(laid) = lay_alone(printer, solid.mesh()) else {
+            return Ok(None);
+        };
         let object = NamedObject {
             name: "solid",
             color: [200; 3],
@@ -148,34 +172,60 @@ impl Slicer {
             moved_mm: laid.moved_mm,
         };
         let is_single = files.len() == 1;
-        let plates =
-            files.into_iter().filter(|(name, _)| is_single || name.starts_with("plates/")).map(|(_, bytes)| bytes);
+        let plates = files
+            .into_iter()
+            .filter(|(name, _)| is_single || name.starts_with("plates/"))
+            .map(|(_, bytes)| bytes);
         let mut pieces_s = 0.0;
         for bytes in plates {
-            let Some(s) = self.seconds_of(printer, &bytes, "")? else { return Ok(None) };
+            let Some(s) = self.seconds_of(printer, &bytes, "")? else {
+                return Ok(None);
+            };
             pieces_s += s;
         }
         let whole = write_3mf(&[object]);
-        let Some(solid_s) = self.seconds_of(printer, &whole, "")? else { return Ok(None) };
-        let filled_s = if printer.process == Process::Fdm { self.seconds_of(printer, &whole, FILLED)? } else { None };
-        Ok(Some(Times { pieces_s, solid_s, filled_s }))
+        let Some(solid_s) = self.seconds_of(printer, &whole, "")? else {
+            return Ok(None);
+        };
+        let filled_s = if printer.process == Process::Fdm {
+            self.seconds_of(printer, &whole, FILLED)?
+        } else {
+            None
+        };
+        Ok(Some(Times {
+            pieces_s,
+            solid_s,
+            filled_s,
+        }))
     }
 
     /// Time for what a 3MF file holds, s; `more` settings stand last.
     fn seconds_of(&self, printer: &Printer, bytes: &[u8], more: &str) -> Result<Option<f64>, Failure> {
-        let [model, settings, out] = ["job.3mf", "job.ini", "job.out"].map(|name| self.folder.path().join(name));
+        let [model, settings, out] =
+            ["job.3mf", "job.ini", "job.out"].map(|name| self.folder.path().join(name));
         let (text, export) = match printer.process {
             Process::Fdm => (FDM_SETTINGS, "--export-gcode"),
             Process::Sla | Process::Sls => (SLA_SETTINGS, "--export-sla"),
         };
-        let first = if printer.process == Process::Fdm { "first_layer_height" } else { "initial_layer_height" };
+        let first = if printer.process == Process::Fdm {
+            "first_layer_height"
+        } else {
+            "initial_layer_height"
+        };
         let layer = printer.layer_mm;
         let text = format!("{text}{ROOMY}layer_height = {layer}\n{first} = {layer}\n{more}");
         for (path, bytes) in [(&model, bytes), (&settings, text.as_bytes())] {
             fs::write(path, bytes).map_err(Failure::unwritable(path))?;
         }
         let mut command = Command::new(SLICER);
-        command.arg("--load").arg(&settings).arg(export).arg("--dont-arrange").arg("-o").arg(&out).arg(&model);
+        command
+            .arg("--load")
+            .arg(&settings)
+            .arg(export)
+            .arg("--dont-arrange")
+            .arg("-o")
+            .arg(&out)
+            .arg(&model);
         let done = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
         if !done.is_ok_and(|status| status.success()) {
             return Ok(None);
@@ -189,11 +239,18 @@ fn told_time(out: &PathBuf, process: Process) -> Option<f64> {
     match process {
         Process::Fdm => {
             let code = fs::read_to_string(out).ok()?;
-            let line = code.lines().find(|l| l.contains("estimated printing time (normal mode)"))?;
+            let line = code
+                .lines()
+                .find(|l| l.contains("estimated printing time (normal mode)"))?;
             Some(seconds_in(line.split_once('=')?.1))
         }
         Process::Sla | Process::Sls => {
-            let archive = Command::new("unzip").arg("-p").arg(out).arg("config.ini").output().ok()?;
+            let archive = Command::new("unzip")
+                .arg("-p")
+                .arg(out)
+                .arg("config.ini")
+                .output()
+                .ok()?;
             let text = String::from_utf8_lossy(&archive.stdout).into_owned();
             let line = text.lines().find(|l| l.starts_with("printTime"))?;
             line.split_once('=')?.1.trim().parse().ok()

@@ -6,7 +6,9 @@ use serde_json::{Value, json};
 use shellock::design::{Params, Settings, Thickness};
 use shellock::metric::MetricParams;
 use shellock::sizes::SizeChoice;
-use shellock::stress_test::{Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test};
+use shellock::stress_test::{
+    Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test,
+};
 use shellock::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface};
 use shellock_geom::check::into_solid;
 use shellock_mechanics::Material;
@@ -33,7 +35,9 @@ pub fn metres(text: &str) -> Result<f64, String> {
 /// A number above 0 times that of the first unit it ends in.
 fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     let text = text.trim().to_ascii_lowercase();
-    let (number, factor) = units.iter().find_map(|(unit, factor)| Some((text.strip_suffix(unit)?.trim(), factor)))?;
+    let (number, factor) = units
+        .iter()
+        .find_map(|(unit, factor)| Some((text.strip_suffix(unit)?.trim(), factor)))?;
     Some(positive(number)? * factor)
 }
 
@@ -61,7 +65,8 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
         )));
     }
     let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
-    let plan: Value = serde_json::from_slice(&read(&path)?).map_err(|e| broken(&format!("not a plan: {e}")))?;
+    let plan: Value =
+        serde_json::from_slice(&read(&path)?).map_err(|e| broken(&format!("not a plan: {e}")))?;
     let order = order_of(&plan).map_err(|f| match f {
         Failure::Wrong(what) => broken(&what),
         other => other,
@@ -98,17 +103,27 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
 
 /// What makes a plan no plan of this program's, or its kit incomplete.
 fn check_kit(kit: &Path, plan: &Value) -> Result<(), String> {
-    if plan.get("format").is_some_and(|f| f != "shellock-plan") || plan.get("version").is_some_and(|v| v != 1) {
+    if plan.get("format").is_some_and(|f| f != "shellock-plan") || plan.get("version").is_some_and(|v| v != 1)
+    {
         return Err("\"format\" and \"version\" are not \"shellock-plan\" and 1; build the kit again".into());
     }
     for piece in plan["pieces"].as_array().into_iter().flatten() {
-        let direction: Vec<f64> =
-            piece["installation_direction"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+        let direction: Vec<f64> = piece["installation_direction"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_f64)
+            .collect();
         if direction.len() != 3 || (direction.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() > 0.01 {
-            return Err(format!("the installation_direction of piece {} is no unit vector", piece["id"]));
+            return Err(format!(
+                "the installation_direction of piece {} is no unit vector",
+                piece["id"]
+            ));
         }
         if let Some(file) = piece["file"].as_str().filter(|file| !kit.join(file).is_file()) {
-            return Err(format!("names {file}, which is not there; the kit is not complete"));
+            return Err(format!(
+                "names {file}, which is not there; the kit is not complete"
+            ));
         }
     }
     Ok(())
@@ -118,29 +133,51 @@ fn check_kit(kit: &Path, plan: &Value) -> Result<(), String> {
 fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure> {
     let wrong = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
     let (loaded, _) = load(path)?;
-    let labels = loaded.face_labels().ok_or_else(|| wrong("its faces have no labels"))?;
-    let (solid, kept) =
-        into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody { path: path.to_owned(), source })?;
+    let labels = loaded
+        .face_labels()
+        .ok_or_else(|| wrong("its faces have no labels"))?;
+    let (solid, kept) = into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody {
+        path: path.to_owned(),
+        source,
+    })?;
     let patch = |&face: &u32| {
-        let label = u32::try_from(labels[face as usize]).ok().filter(|&label| (label as usize) < n_pieces);
-        label.map(PatchId).ok_or_else(|| wrong("a face has a label that is no piece of plan.json"))
+        let label = u32::try_from(labels[face as usize])
+            .ok()
+            .filter(|&label| (label as usize) < n_pieces);
+        label
+            .map(PatchId)
+            .ok_or_else(|| wrong("a face has a label that is no piece of plan.json"))
     };
     let patch_of_face: Vec<PatchId> = kept.iter().map(patch).collect::<Result<_, _>>()?;
     if (0..n_pieces as u32).any(|piece| !patch_of_face.contains(&PatchId(piece))) {
         return Err(wrong("a piece of plan.json has no face"));
     }
-    Ok(SegmentedSurface { mesh: solid.into_mesh(), patch_of_face, source_face: kept, n_patches: n_pieces })
+    Ok(SegmentedSurface {
+        mesh: solid.into_mesh(),
+        patch_of_face,
+        source_face: kept,
+        n_patches: n_pieces,
+    })
 }
 
 /// The kit's sizes, or what is wrong with them.
 fn params_of(plan_value: &Value, blows: &Blows) -> Result<StressParams, String> {
     let plan = plan_value;
     let mut params = Params::default();
-    params.thickness = Thickness::Mm(plan["shell_thickness"].as_f64().ok_or("\"shell_thickness\" is no number of mm")?);
+    params.thickness = Thickness::Mm(
+        plan["shell_thickness"]
+            .as_f64()
+            .ok_or("\"shell_thickness\" is no number of mm")?,
+    );
     let sizes = sizes_of(plan)?;
     params.connector.size = SizeChoice::Fixed(sizes.largest_mm());
     params.seed = plan["seed"].as_u64().unwrap_or_default();
-    let told: Vec<f64> = plan["up"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+    let told: Vec<f64> = plan["up"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_f64)
+        .collect();
     params.up = match (blows.up, &told[..]) {
         (Some(axis), _) => axis.unit(),
         (None, [x, y, z]) => [*x, *y, *z],
@@ -151,34 +188,68 @@ fn params_of(plan_value: &Value, blows: &Blows) -> Result<StressParams, String> 
         return Err(problems.join("; "));
     }
     let mut plan_params = Settings::resolve(&params).plan;
-    if let [x, y, z] =
-        plan["key"]["slide"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect::<Vec<_>>()[..]
+    if let [x, y, z] = plan["key"]["slide"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_f64)
+        .collect::<Vec<_>>()[..]
     {
-        plan_params.key = plan["key_piece"].as_u64().and_then(|key| u32::try_from(key).ok()).map(PatchId);
+        plan_params.key = plan["key_piece"]
+            .as_u64()
+            .and_then(|key| u32::try_from(key).ok())
+            .map(PatchId);
         plan_params.key_slide = Some(LatticeDirection::nearest(shellock_geom::Vec3::new(x, y, z)));
     }
     let built = || serde_json::from_value::<Material>(plan_value["strength"]["material"].clone()).ok();
     let (material, edge_share) = (blows.material.or_else(built).unwrap_or_default(), blows.edges);
-    let metric = MetricParams { material, edge_share, ..MetricParams::of_plan(&plan_params, &sizes) };
+    let metric = MetricParams {
+        material,
+        edge_share,
+        ..MetricParams::of_plan(&plan_params, &sizes)
+    };
     let punch_at = match blows.at {
         Place::Top => PunchAt::Top,
         Place::Middle => PunchAt::Middle,
     };
-    Ok(StressParams { punch_n: blows.punch, punch_at, drop_mm: 1000.0 * blows.drop, metric, sizes, plan: plan_params })
+    Ok(StressParams {
+        punch_n: blows.punch,
+        punch_at,
+        drop_mm: 1000.0 * blows.drop,
+        metric,
+        sizes,
+        plan: plan_params,
+    })
 }
 
 /// The connectors' sizes: one for all, or those of each pair.
 fn sizes_of(plan: &Value) -> Result<ConnectorSizes, String> {
-    let default_mm = plan["connector_size"].as_f64().ok_or("\"connector_size\" is no number of mm")?;
+    let default_mm = plan["connector_size"]
+        .as_f64()
+        .ok_or("\"connector_size\" is no number of mm")?;
     let pair = |entry: &Value| -> Option<([PatchId; 2], f64)> {
         let piece = |i: usize| u32::try_from(entry["pieces"][i].as_u64()?).ok().map(PatchId);
-        Some(([piece(0)?, piece(1)?], entry["size_mm"].as_f64().filter(|mm| (0.1..=20.0).contains(mm))?))
+        Some((
+            [piece(0)?, piece(1)?],
+            entry["size_mm"].as_f64().filter(|mm| (0.1..=20.0).contains(mm))?,
+        ))
     };
-    let pairs = plan["connector_sizes"].as_array().into_iter().flatten().map(pair).collect::<Option<Vec<_>>>();
-    let pairs = pairs.ok_or("\"connector_sizes\" must list \"pieces\", two numbers, and \"size_mm\", 0.1 to 20")?;
+    let pairs = plan["connector_sizes"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .map(pair)
+        .collect::<Option<Vec<_>>>();
+    let pairs =
+        pairs.ok_or("\"connector_sizes\" must list \"pieces\", two numbers, and \"size_mm\", 0.1 to 20")?;
     let n_pieces = plan["pieces"].as_array().map_or(0, Vec::len);
-    if let Some(([a, b], _)) = pairs.iter().find(|(pair, _)| pair.iter().any(|p| usize::from(*p) >= n_pieces)) {
-        return Err(format!("\"connector_sizes\" names pieces {a} and {b}, which are not both there"));
+    if let Some(([a, b], _)) = pairs
+        .iter()
+        .find(|(pair, _)| pair.iter().any(|p| usize::from(*p) >= n_pieces))
+    {
+        return Err(format!(
+            "\"connector_sizes\" names pieces {a} and {b}, which are not both there"
+        ));
     }
     if plan["connector_sizes"].as_array().is_some_and(Vec::is_empty) {
         return Err("\"connector_sizes\" is empty; a kit whose seams all have the same size has none".into());
@@ -194,11 +265,30 @@ fn print_table(params: &StressParams, tested: &StressReport) {
         params.drop_mm / 1000.0,
         tested.strength_mpa
     );
-    println!("design           test   force N  opening mm  between   walls MPa  connectors MPa  of strength  verdict");
-    for (name, Pair { punch, drop, score_mm, .. }) in tested.designs() {
+    println!(
+        "design           test   force N  opening mm  between   walls MPa  connectors MPa  of strength  verdict"
+    );
+    for (
+        name,
+        Pair {
+            punch,
+            drop,
+            score_mm,
+            ..
+        },
+    ) in tested.designs()
+    {
         for (test, o) in [("punch", punch), ("fall", drop)] {
-            let Outcome { force_n, opening_mm, wall_mpa, connector_mpa, .. } = o;
-            let between = o.between.map_or_else(String::new, |[a, b]| format!("{a} and {b}"));
+            let Outcome {
+                force_n,
+                opening_mm,
+                wall_mpa,
+                connector_mpa,
+                ..
+            } = o;
+            let between = o
+                .between
+                .map_or_else(String::new, |[a, b]| format!("{a} and {b}"));
             let percent = 100.0 * o.strength_share;
             let verdict = words(o.verdict);
             println!(
@@ -236,7 +326,10 @@ mod tests {
             (newtons("70N"), newtons("7.5 n"), newtons("0.07kN"), newtons("70")),
             (Ok(70.0), Ok(7.5), Ok(0.07 * 1000.0), Ok(70.0))
         );
-        assert_eq!((metres("2m"), metres("150 cm"), metres("2")), (Ok(2.0), Ok(1.5), Ok(2.0)));
+        assert_eq!(
+            (metres("2m"), metres("150 cm"), metres("2")),
+            (Ok(2.0), Ok(1.5), Ok(2.0))
+        );
         for wrong in ["", "N", "-3N", "infN", "3kg"] {
             assert!(newtons(wrong).is_err(), "{wrong}");
         }

@@ -5,7 +5,11 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn shellock(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_shellock")).current_dir(folder).args(args).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_shellock"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
 }
 
 fn code(o: &Output) -> i32 {
@@ -40,13 +44,29 @@ fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
     let job = |threads: &str, out: &str| {
-        let args =
-            ["demo", "--figure", "vase", "--size", "80", "--pieces", "6", "--threads", threads, "-o", out, "--json"];
+        let args = [
+            "demo",
+            "--figure",
+            "vase",
+            "--size",
+            "80",
+            "--pieces",
+            "6",
+            "--threads",
+            threads,
+            "-o",
+            out,
+            "--json",
+        ];
         shellock(dir.path(), &args)
     };
     let one = job("1", "one");
     let verdict: serde_json::Value = serde_json::from_slice(&one.stdout).unwrap();
-    assert_eq!((code(&one), &verdict["status"]), (0, &"verified".into()), "{verdict:#}");
+    assert_eq!(
+        (code(&one), &verdict["status"]),
+        (0, &"verified".into()),
+        "{verdict:#}"
+    );
     assert_eq!(code(&job("2", "two")), 0);
     let (a, b) = (content(&dir.path().join("one")), content(&dir.path().join("two")));
     for (x, y) in a.iter().zip(&b) {
@@ -54,11 +74,20 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
         assert!(x.1 == y.1, "{} differs between one and two threads", x.0);
     }
     assert_eq!(a.len(), b.len());
-    let plan: serde_json::Value = serde_json::from_slice(&fs::read(dir.path().join("one/plan.json")).unwrap()).unwrap();
-    assert_eq!(plan["installation_order"].as_array().unwrap().last(), Some(&plan["key_piece"]));
+    let plan: serde_json::Value =
+        serde_json::from_slice(&fs::read(dir.path().join("one/plan.json")).unwrap()).unwrap();
+    assert_eq!(
+        plan["installation_order"].as_array().unwrap().last(),
+        Some(&plan["key_piece"])
+    );
     assert!(plan["key"]["rails"].as_f64().unwrap() > 5.0, "{}", plan["key"]);
     for piece in plan["pieces"].as_array().unwrap() {
-        assert!(dir.path().join("one").join(piece["file"].as_str().unwrap()).is_file());
+        assert!(
+            dir.path()
+                .join("one")
+                .join(piece["file"].as_str().unwrap())
+                .is_file()
+        );
     }
     let files = [
         "assembly.3mf",
@@ -72,22 +101,49 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     for name in files {
         assert!(dir.path().join("one").join(name).is_file(), "{name}");
     }
-    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2, "something was left behind");
+    assert_eq!(
+        fs::read_dir(dir.path()).unwrap().count(),
+        2,
+        "something was left behind"
+    );
 
     let laid = plan["printing"]["laid"].as_array().unwrap();
-    assert_eq!(laid.len(), plan["pieces"].as_array().unwrap().len(), "every piece lies on a plate");
+    assert_eq!(
+        laid.len(),
+        plan["pieces"].as_array().unwrap().len(),
+        "every piece lies on a plate"
+    );
 
     // The kit can be verified again from its files, and a missing piece is noticed.
-    assert_eq!(code(&shellock(dir.path(), &["figure", "vase", "--size", "80", "-o", "vase.stl"])), 0);
+    assert_eq!(
+        code(&shellock(
+            dir.path(),
+            &["figure", "vase", "--size", "80", "-o", "vase.stl"]
+        )),
+        0
+    );
     assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 0);
-    let o = shellock(dir.path(), &["report", "one", "vase.stl", "--closed-form", "--json"]);
+    let o = shellock(
+        dir.path(),
+        &["report", "one", "vase.stl", "--closed-form", "--json"],
+    );
     let savings: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
     let written = fs::read(dir.path().join("one/savings.json")).unwrap();
-    assert_eq!(savings, serde_json::from_slice::<serde_json::Value>(&written).unwrap());
+    assert_eq!(
+        savings,
+        serde_json::from_slice::<serde_json::Value>(&written).unwrap()
+    );
     let ratio = savings["volume_ratio"].as_f64().unwrap();
-    assert!((ratio - plan["volume_ratio"].as_f64().unwrap()).abs() < 1e-5, "{savings:#}");
+    assert!(
+        (ratio - plan["volume_ratio"].as_f64().unwrap()).abs() < 1e-5,
+        "{savings:#}"
+    );
     assert_eq!(savings["print_time"]["sla"]["by"], "closed form");
-    fs::copy(dir.path().join("one/pieces/piece-01.stl"), dir.path().join("one/pieces/piece-00.stl")).unwrap();
+    fs::copy(
+        dir.path().join("one/pieces/piece-01.stl"),
+        dir.path().join("one/pieces/piece-00.stl"),
+    )
+    .unwrap();
     assert_eq!(code(&shellock(dir.path(), &["verify", "one", "vase.stl"])), 1);
 }
 
@@ -100,14 +156,29 @@ fn an_open_surface_is_refused_with_its_place() {
     fs::write(dir.path().join("open.obj"), open).unwrap();
     let o = shellock(dir.path(), &["build", "open.obj"]);
     assert_eq!(code(&o), 2);
-    assert!(errors(&o).contains("open.obj") && errors(&o).contains("1 hole (4 open edges)"), "{}", errors(&o));
+    assert!(
+        errors(&o).contains("open.obj") && errors(&o).contains("1 hole (4 open edges)"),
+        "{}",
+        errors(&o)
+    );
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
 }
 
 #[test]
 fn all_bad_parameters_are_told_at_once() {
     let dir = tempfile::tempdir().unwrap();
-    let o = shellock(dir.path(), &["demo", "--thickness", "99", "--clearance", "7", "--connector", "0"]);
+    let o = shellock(
+        dir.path(),
+        &[
+            "demo",
+            "--thickness",
+            "99",
+            "--clearance",
+            "7",
+            "--connector",
+            "0",
+        ],
+    );
     assert_eq!(code(&o), 2);
     for word in ["thickness", "clearance", "connector size"] {
         assert!(errors(&o).contains(word), "{}", errors(&o));
@@ -165,7 +236,10 @@ fn a_strangers_folder_is_never_replaced() {
     fs::write(dir.path().join("mine/thesis.txt"), "years of work").unwrap();
     let o = shellock(dir.path(), &["demo", "-o", "mine", "--force"]);
     assert_eq!(code(&o), 2);
-    assert_eq!(fs::read(dir.path().join("mine/thesis.txt")).unwrap(), b"years of work");
+    assert_eq!(
+        fs::read(dir.path().join("mine/thesis.txt")).unwrap(),
+        b"years of work"
+    );
 }
 
 #[test]
@@ -188,16 +262,26 @@ fn completions_and_manual_pages_name_every_command_and_option() {
     let dir = tempfile::tempdir().unwrap();
     let completions = shellock(dir.path(), &["completions", "bash"]);
     let text = String::from_utf8(completions.stdout).unwrap();
-    assert!(["build", "verify", "report", "--key-ribs", "--quiet"].iter().all(|word| text.contains(word)));
+    assert!(
+        ["build", "verify", "report", "--key-ribs", "--quiet"]
+            .iter()
+            .all(|word| text.contains(word))
+    );
     assert_eq!(code(&shellock(dir.path(), &["manual", "man"])), 0);
     let page = fs::read_to_string(dir.path().join("man/shellock-build.1")).unwrap();
-    assert!(page.contains("key\\-ribs") && dir.path().join("man/shellock.1").is_file(), "{page}");
+    assert!(
+        page.contains("key\\-ribs") && dir.path().join("man/shellock.1").is_file(),
+        "{page}"
+    );
 }
 
 #[test]
 fn refusals_are_json_where_asked_for_and_sizes_have_limits() {
     let dir = tempfile::tempdir().unwrap();
-    assert_eq!(code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])), 0);
+    assert_eq!(
+        code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])),
+        0
+    );
     for words in [
         &["inspect", "t.stl", "--size", "1e9", "--json"][..],
         &["inspect", "t.stl", "--size", "1", "--json"],
@@ -209,7 +293,9 @@ fn refusals_are_json_where_asked_for_and_sizes_have_limits() {
         let told: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
         assert!(told["error"].as_str().is_some_and(|e| !e.is_empty()), "{told}");
         assert!(
-            errors(&o).lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()),
+            errors(&o)
+                .lines()
+                .all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()),
             "{}",
             errors(&o)
         );
@@ -220,11 +306,19 @@ fn refusals_are_json_where_asked_for_and_sizes_have_limits() {
 #[test]
 fn output_that_nobody_takes_is_no_panic() {
     let dir = tempfile::tempdir().unwrap();
-    assert_eq!(code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])), 0);
+    assert_eq!(
+        code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])),
+        0
+    );
     for words in [&["inspect", "t.stl"][..], &["completions", "bash"]] {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_shellock"));
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let o = command.current_dir(dir.path()).args(words).stdout(full).output().unwrap();
+        let o = command
+            .current_dir(dir.path())
+            .args(words)
+            .stdout(full)
+            .output()
+            .unwrap();
         assert_eq!(code(&o), 4, "{}", errors(&o));
         assert!(!errors(&o).contains("panicked"), "{}", errors(&o));
     }
@@ -233,9 +327,15 @@ fn output_that_nobody_takes_is_no_panic() {
 #[test]
 fn progress_is_lines_or_events_or_nothing() {
     let dir = tempfile::tempdir().unwrap();
-    assert_eq!(code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])), 0);
+    assert_eq!(
+        code(&shellock(dir.path(), &["figure", "torus", "-o", "t.stl"])),
+        0
+    );
     let segment = |more: &str| {
-        let o = shellock(dir.path(), &["segment", "t.stl", "-o", "t.ply", "--pieces", "4", more]);
+        let o = shellock(
+            dir.path(),
+            &["segment", "t.stl", "-o", "t.ply", "--pieces", "4", more],
+        );
         assert_eq!(code(&o), 0, "{}", errors(&o));
         errors(&o)
     };
@@ -272,8 +372,14 @@ fn labelled_cube(label: [i32; 12]) -> String {
     }
     let sides = ["0 2 3 1", "4 5 7 6", "0 1 5 4", "2 6 7 3", "0 4 6 2", "1 3 7 5"];
     for (i, side) in sides.iter().enumerate() {
-        let [a, b, c, d] = side.split(' ').collect::<Vec<_>>()[..] else { unreachable!("sides have four corners") };
-        ply += &format!("3 {a} {b} {c} {}\n3 {a} {c} {d} {}\n", label[2 * i], label[2 * i + 1]);
+        let [a, b, c, d] = side.split(' ').collect::<Vec<_>>()[..] else {
+            unreachable!("sides have four corners")
+        };
+        ply += &format!(
+            "3 {a} {b} {c} {}\n3 {a} {c} {d} {}\n",
+            label[2 * i],
+            label[2 * i + 1]
+        );
     }
     ply
 }
@@ -312,9 +418,17 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     refused(&["segmentation.ply"]);
     fs::write(kit.join("segmentation.ply"), labelled_cube([0; 12])).unwrap();
     refused(&["segmentation.ply", "no face"]);
-    fs::write(kit.join("segmentation.ply"), labelled_cube([0, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0])).unwrap();
+    fs::write(
+        kit.join("segmentation.ply"),
+        labelled_cube([0, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0]),
+    )
+    .unwrap();
     refused(&["segmentation.ply", "label"]);
-    fs::write(kit.join("segmentation.ply"), labelled_cube([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0])).unwrap();
+    fs::write(
+        kit.join("segmentation.ply"),
+        labelled_cube([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0]),
+    )
+    .unwrap();
     fs::write(&plan, unsaid).unwrap();
     refused(&["plan.json", "shell_thickness"]);
     fs::write(&plan, thick).unwrap();
@@ -335,7 +449,11 @@ fn blows_that_are_none_are_refused() {
     ] {
         let o = shellock(dir.path(), &["test", "kit", option, value]);
         assert_eq!(code(&o), 2, "{option} {value}");
-        assert!(errors(&o).contains(option) && errors(&o).contains(value), "{}", errors(&o));
+        assert!(
+            errors(&o).contains(option) && errors(&o).contains(value),
+            "{}",
+            errors(&o)
+        );
     }
 }
 
@@ -350,14 +468,26 @@ fn a_test_says_how_it_ended_by_its_exit_code_and_leaves_figures_and_a_picture() 
     fs::write(kit.join("segmentation.ply"), lid).unwrap();
     let o = shellock(dir.path(), &["test", "kit", "--edges", "3", "--json"]);
     let told: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
-    let written: serde_json::Value = serde_json::from_slice(&fs::read(kit.join("stress.json")).unwrap()).unwrap();
+    let written: serde_json::Value =
+        serde_json::from_slice(&fs::read(kit.join("stress.json")).unwrap()).unwrap();
     assert_eq!(told, written);
     let verdicts = ["punch", "drop"].map(|test| written["report"]["kit"][test]["verdict"].clone());
-    assert_eq!(written["passed"], verdicts.iter().all(|v| v == "holds"), "{verdicts:?}");
+    assert_eq!(
+        written["passed"],
+        verdicts.iter().all(|v| v == "holds"),
+        "{verdicts:?}"
+    );
     assert_eq!(code(&o), i32::from(written["passed"] == false), "{}", errors(&o));
     let svg = fs::read_to_string(kit.join("stress.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
-    let mut names: Vec<_> = fs::read_dir(&kit).unwrap().flatten().map(|f| f.file_name()).collect();
+    let mut names: Vec<_> = fs::read_dir(&kit)
+        .unwrap()
+        .flatten()
+        .map(|f| f.file_name())
+        .collect();
     names.sort();
-    assert_eq!(names, ["plan.json", "segmentation.ply", "stress.json", "stress.svg"]);
+    assert_eq!(
+        names,
+        ["plan.json", "segmentation.ply", "stress.json", "stress.svg"]
+    );
 }

@@ -12,19 +12,34 @@ use shellock_geom::subdivide::halve_edges;
 use shellock_geom::{Solid, Topology, TriMesh, Vec3};
 
 fn shellock(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_shellock")).current_dir(folder).args(args).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_shellock"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
 }
 
 /// A ball of 512 triangles, 60 mm wide, around `center`.
 fn ball(center: Vec3) -> TriMesh {
     let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    let triangles = vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let triangles = vec![
+        [0, 2, 4],
+        [2, 1, 4],
+        [1, 3, 4],
+        [3, 0, 4],
+        [2, 0, 5],
+        [1, 2, 5],
+        [3, 1, 5],
+        [0, 3, 5],
+    ];
     let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
     for _ in 0..3 {
         solid = halve_edges(&solid, &Topology::new(&solid), |_, _| true).0;
     }
     let mut mesh = solid.into_mesh();
-    mesh.points.iter_mut().for_each(|p| *p = center + 30.0 * p.normalize());
+    mesh.points
+        .iter_mut()
+        .for_each(|p| *p = center + 30.0 * p.normalize());
     mesh
 }
 
@@ -53,8 +68,12 @@ fn ply(mesh: &TriMesh) -> Vec<u8> {
 
 fn obj(mesh: &TriMesh) -> String {
     let mut text = String::new();
-    mesh.points.iter().for_each(|p| writeln!(text, "v {} {} {}", p.x, p.y, p.z).unwrap());
-    mesh.triangles.iter().for_each(|[a, b, c]| writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap());
+    mesh.points
+        .iter()
+        .for_each(|p| writeln!(text, "v {} {} {}", p.x, p.y, p.z).unwrap());
+    mesh.triangles
+        .iter()
+        .for_each(|[a, b, c]| writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap());
     text
 }
 
@@ -62,7 +81,9 @@ fn ascii_stl(mesh: &TriMesh) -> String {
     let mut text = "solid ☠\n".to_owned();
     for face in 0..mesh.triangles.len() {
         text += "facet normal 0 0 0\nouter loop\n";
-        mesh.corners(face).iter().for_each(|p| writeln!(text, "vertex {} {} {}", p.x, p.y, p.z).unwrap());
+        mesh.corners(face)
+            .iter()
+            .for_each(|p| writeln!(text, "vertex {} {} {}", p.x, p.y, p.z).unwrap());
         text += "endloop\nendfacet\n";
     }
     text + "endsolid\n"
@@ -70,7 +91,9 @@ fn ascii_stl(mesh: &TriMesh) -> String {
 
 fn package(model: &str) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    archive.start_file("3D/3dmodel.model", zip::write::SimpleFileOptions::default()).unwrap();
+    archive
+        .start_file("3D/3dmodel.model", zip::write::SimpleFileOptions::default())
+        .unwrap();
     archive.write_all(model.as_bytes()).unwrap();
     archive.finish().unwrap().into_inner()
 }
@@ -80,10 +103,19 @@ fn three_mf(mesh: &TriMesh, more: &str, build: &str) -> String {
     let mut model = "<model unit=\"inch\"><resources><object id=\"1\"><mesh><vertices>".to_owned();
     let inch = 1.0 / 25.4;
     for p in &mesh.points {
-        write!(model, "<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>", inch * p.x, inch * p.y, inch * p.z).unwrap();
+        write!(
+            model,
+            "<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>",
+            inch * p.x,
+            inch * p.y,
+            inch * p.z
+        )
+        .unwrap();
     }
     model += "</vertices><triangles>";
-    mesh.triangles.iter().for_each(|[a, b, c]| write!(model, "<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"/>").unwrap());
+    mesh.triangles
+        .iter()
+        .for_each(|[a, b, c]| write!(model, "<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"/>").unwrap());
     model + "</triangles></mesh></object>" + more + "</resources><build>" + build + "</build></model>"
 }
 
@@ -110,7 +142,11 @@ fn odd_files() -> Vec<Twin> {
         change(&mut bytes);
         bytes
     };
-    let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_be_bytes).collect::<Vec<u8>>();
+    let utf16 = |text: &str| {
+        text.encode_utf16()
+            .flat_map(u16::to_be_bytes)
+            .collect::<Vec<u8>>()
+    };
     vec![
         ("zero.stl", Vec::new(), Refused(&["empty"])),
         ("good.stl", stl.clone(), Sound),
@@ -145,10 +181,16 @@ fn odd_surfaces() -> Vec<Twin> {
     let good = ball(Vec3::ZERO);
     let unwelded = TriMesh {
         points: (0..good.triangles.len()).flat_map(|f| good.corners(f)).collect(),
-        triangles: (0..good.triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
+        triangles: (0..good.triangles.len() as u32)
+            .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
+            .collect(),
     };
     let mut cracked = unwelded.clone();
-    cracked.points.iter_mut().enumerate().for_each(|(i, p)| p.x += 1e-5 * (i % 7) as f64);
+    cracked
+        .points
+        .iter_mut()
+        .enumerate()
+        .for_each(|(i, p)| p.x += 1e-5 * (i % 7) as f64);
     let divided = changed(|m| {
         let [a, b, c] = m.triangles[0];
         m.points.push(0.5 * (m.points[a as usize] + m.points[b as usize]));
@@ -161,28 +203,73 @@ fn odd_surfaces() -> Vec<Twin> {
         mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         mesh
     };
-    let soup = TriMesh { triangles: unwelded.triangles.iter().step_by(9).copied().collect(), ..unwelded.clone() };
+    let soup = TriMesh {
+        triangles: unwelded.triangles.iter().step_by(9).copied().collect(),
+        ..unwelded.clone()
+    };
     let speck = scaled(&good, 0.001, Vec3::splat(29.0));
     vec![
         ("unwelded.ply", ply(&unwelded), Sound),
         ("cracks.ply", ply(&cracked), Repaired(&["points-merged"])),
-        ("copies.ply", ply(&changed(|m| m.triangles.extend_from_within(..50))), Repaired(&["copies-removed"])),
+        (
+            "copies.ply",
+            ply(&changed(|m| m.triangles.extend_from_within(..50))),
+            Repaired(&["copies-removed"]),
+        ),
         (
             "turned.ply",
-            ply(&changed(|m| m.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1)))),
+            ply(&changed(|m| {
+                m.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1))
+            })),
             Repaired(&["triangles-turned"]),
         ),
-        ("everted.ply", ply(&everted(good.clone())), Repaired(&["body-turned"])),
-        ("one_missing.ply", ply(&changed(|m| m.triangles.truncate(511))), Repaired(&["holes-closed"])),
-        ("open.ply", ply(&changed(|m| m.triangles.truncate(300))), Refused(&["not closed", "1 hole", "near ("])),
+        (
+            "everted.ply",
+            ply(&everted(good.clone())),
+            Repaired(&["body-turned"]),
+        ),
+        (
+            "one_missing.ply",
+            ply(&changed(|m| m.triangles.truncate(511))),
+            Repaired(&["holes-closed"]),
+        ),
+        (
+            "open.ply",
+            ply(&changed(|m| m.triangles.truncate(300))),
+            Refused(&["not closed", "1 hole", "near ("]),
+        ),
         ("edge.ply", ply(&divided), Repaired(&["edges-joined"])),
-        ("cavity.ply", ply(&both(good.clone(), everted(inner.clone()))), Repaired(&["cavities-filled"])),
-        ("inner.ply", ply(&both(good.clone(), inner)), Repaired(&["cavities-filled"])),
-        ("specks.ply", ply(&both(good.clone(), speck)), Repaired(&["specks-removed"])),
-        ("overlap.ply", ply(&both(good.clone(), ball(Vec3::new(31.0, 7.0, 3.0)))), Repaired(&["parts-united"])),
-        ("apart.ply", ply(&both(good.clone(), ball(Vec3::X * 90.0))), Refused(&["2 separate bodies", "--largest"])),
+        (
+            "cavity.ply",
+            ply(&both(good.clone(), everted(inner.clone()))),
+            Repaired(&["cavities-filled"]),
+        ),
+        (
+            "inner.ply",
+            ply(&both(good.clone(), inner)),
+            Repaired(&["cavities-filled"]),
+        ),
+        (
+            "specks.ply",
+            ply(&both(good.clone(), speck)),
+            Repaired(&["specks-removed"]),
+        ),
+        (
+            "overlap.ply",
+            ply(&both(good.clone(), ball(Vec3::new(31.0, 7.0, 3.0)))),
+            Repaired(&["parts-united"]),
+        ),
+        (
+            "apart.ply",
+            ply(&both(good.clone(), ball(Vec3::X * 90.0))),
+            Refused(&["2 separate bodies", "--largest"]),
+        ),
         ("soup.ply", ply(&soup), Refused(&["do not hang together"])),
-        ("thin.ply", ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02))), Sound),
+        (
+            "thin.ply",
+            ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02))),
+            Sound,
+        ),
     ]
 }
 
@@ -194,7 +281,9 @@ fn every_file_ends_in_a_body_or_in_words_that_help() {
         let o = shellock(dir.path(), &["inspect", name, "--json"]);
         let (code, errors) = (o.status.code(), String::from_utf8_lossy(&o.stderr).into_owned());
         let told: Value = serde_json::from_slice(&o.stdout).unwrap_or_default();
-        let strict = shellock(dir.path(), &["inspect", name, "--no-repair"]).status.code();
+        let strict = shellock(dir.path(), &["inspect", name, "--no-repair"])
+            .status
+            .code();
         match outcome {
             Sound => assert_eq!(
                 (code, &told["repairs"], strict),
@@ -202,14 +291,24 @@ fn every_file_ends_in_a_body_or_in_words_that_help() {
                 "{name}: {errors}"
             ),
             Repaired(codes) => {
-                let done: Vec<&str> =
-                    told["repairs"].as_array().unwrap().iter().filter_map(|r| r["kind"].as_str()).collect();
-                assert_eq!((code, done, strict), (Some(0), codes.to_vec(), Some(2)), "{name}: {errors}");
+                let done: Vec<&str> = told["repairs"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .filter_map(|r| r["kind"].as_str())
+                    .collect();
+                assert_eq!(
+                    (code, done, strict),
+                    (Some(0), codes.to_vec(), Some(2)),
+                    "{name}: {errors}"
+                );
             }
             Refused(words) => {
                 assert_eq!((code, strict), (Some(2), Some(2)), "{name}: {errors}");
                 let why = told["error"].as_str().unwrap_or_default();
-                words.iter().for_each(|word| assert!(why.contains(word), "{name}: no \"{word}\" in {why}"));
+                words
+                    .iter()
+                    .for_each(|word| assert!(why.contains(word), "{name}: no \"{word}\" in {why}"));
             }
         }
     }
@@ -225,14 +324,22 @@ fn sizes_follow_units_and_thin_models_are_warned_of() {
     };
     let good = ball(Vec3::ZERO);
     assert!(
-        said("i.3mf", package(&three_mf(&good, "", "<item objectid=\"1\"/>")), &[]).contains("60.0 × 60.0 × 60.0 mm")
+        said(
+            "i.3mf",
+            package(&three_mf(&good, "", "<item objectid=\"1\"/>")),
+            &[]
+        )
+        .contains("60.0 × 60.0 × 60.0 mm")
     );
     let metres = ply(&scaled(&good, 1e-3, Vec3::ZERO));
     assert!(said("m.ply", metres.clone(), &[]).contains("60 mm with --unit m "));
     assert!(said("m.ply", metres, &["--unit", "m"]).contains("60.0 × 60.0 × 60.0 mm"));
     let thin = ply(&changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02)));
     let warned = said("thin.ply", thin, &[]);
-    assert!(warned.contains("warning: ") && warned.contains("thinner than two walls of 1.6 mm"), "{warned}");
+    assert!(
+        warned.contains("warning: ") && warned.contains("thinner than two walls of 1.6 mm"),
+        "{warned}"
+    );
     assert!(!said("thick.ply", ply(&good), &[]).contains("warning"));
 }
 
@@ -247,11 +354,27 @@ fn a_segmentation_written_as_paint_is_read_as_the_same_pieces() {
     fs::write(dir.path().join("ball.ply"), ply(&ball(Vec3::ZERO))).unwrap();
     run(&["segment", "ball.ply", "--pieces", "6", "-o", "painted.3mf"]);
     let told = run(&["inspect", "painted.3mf"]);
-    assert!(told.contains("divided by paint") && told.contains("the paint in the file divides it"), "{told}");
+    assert!(
+        told.contains("divided by paint") && told.contains("the paint in the file divides it"),
+        "{told}"
+    );
     let pieces = |args: &[&str]| -> Value {
         serde_json::from_str::<Value>(&run(&[args, &["--json", "-o", "again.ply"]].concat())).unwrap()["pieces"].clone()
     };
-    assert_eq!(pieces(&["segment", "painted.3mf"]), pieces(&["segment", "ball.ply", "--pieces", "6"]));
-    let o = shellock(dir.path(), &["segment", "painted.3mf", "--labels-from", "groups", "-o", "again.ply"]);
+    assert_eq!(
+        pieces(&["segment", "painted.3mf"]),
+        pieces(&["segment", "ball.ply", "--pieces", "6"])
+    );
+    let o = shellock(
+        dir.path(),
+        &[
+            "segment",
+            "painted.3mf",
+            "--labels-from",
+            "groups",
+            "-o",
+            "again.ply",
+        ],
+    );
     assert!(String::from_utf8_lossy(&o.stderr).contains("no groups divide it; what does: paint"));
 }

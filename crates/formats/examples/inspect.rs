@@ -30,13 +30,24 @@ fn verdict(path: &Path) -> String {
         Ok(loaded) => loaded,
         Err(error) => return format!("refused: {error}"),
     };
-    let labels = if loaded.face_labels().is_some() { ", labelled" } else { "" };
-    let read = format!("{}, {} triangles{labels}", loaded.format, loaded.mesh.triangles.len());
+    let labels = if loaded.face_labels().is_some() {
+        ", labelled"
+    } else {
+        ""
+    };
+    let read = format!(
+        "{}, {} triangles{labels}",
+        loaded.format,
+        loaded.mesh.triangles.len()
+    );
     match repair::mend(&loaded.mesh, repair::Mending::Repair) {
         Ok(repair::Mended { solid, repairs, .. }) => {
             let size = solid.mesh().bounds().size();
             let [x, y, z] = size.to_array();
-            let mut text = format!("{read}: one body of {x:.4} × {y:.4} × {z:.4}, volume {:.6}", solid.volume());
+            let mut text = format!(
+                "{read}: one body of {x:.4} × {y:.4} × {z:.4}, volume {:.6}",
+                solid.volume()
+            );
             repairs.iter().for_each(|repair| text += &format!("\n  {repair}"));
             text
         }

@@ -1,7 +1,9 @@
-//! Damages files at random and reads and mends what is left, for as many rounds as asked: `mutate ROUNDS SEED FILE…`.
+//! Damages files at random and reads and mends what is left, for as many rounds as asked: `mutate ROUNDS SEED
+//! FILE…`.
 //!
-//! The same arguments give the same damage; a panic names the round. Models within 3MF packages are damaged before they
-//! are packed again, so that checksums do not stop all of it. Coverage-guided fuzzing is in `fuzz/`.
+//! The same arguments give the same damage; a panic names the round. Models within 3MF packages are damaged
+//! before they are packed again, so that checksums do not stop all of it. Coverage-guided fuzzing is in
+//! `fuzz/`.
 
 use std::io::{Cursor, Read as _, Write as _};
 use std::path::Path;
@@ -24,8 +26,9 @@ fn main() {
         eprintln!("mutate ROUNDS SEED FILE…");
         return;
     };
-    let files: Vec<(String, Vec<u8>)> =
-        arguments.filter_map(|path| std::fs::read(&path).ok().map(|bytes| (path, bytes))).collect();
+    let files: Vec<(String, Vec<u8>)> = arguments
+        .filter_map(|path| std::fs::read(&path).ok().map(|bytes| (path, bytes)))
+        .collect();
     let (mut n_read, mut n_mended) = (0, 0);
     for round in 0..n_rounds {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -36,7 +39,9 @@ fn main() {
         let start = Instant::now();
         let outcome = std::panic::catch_unwind(|| {
             let _ = read_labels(&bytes);
-            let Ok(loaded) = read_mesh(&bytes, extension) else { return (0, 0) };
+            let Ok(loaded) = read_mesh(&bytes, extension) else {
+                return (0, 0);
+            };
             assert_eq!(loaded.file_face.len(), loaded.mesh.triangles.len());
             if loaded.mesh.triangles.len() > MOST_TRIANGLES {
                 return (1, 0);
@@ -48,7 +53,14 @@ fn main() {
             Err(_) => keep(&format!("round {round} panicked: {path}"), round, &bytes),
         }
         if start.elapsed() > SLOW {
-            keep(&format!("round {round} took {:.1} s: {path}", start.elapsed().as_secs_f64()), round, &bytes);
+            keep(
+                &format!(
+                    "round {round} took {:.1} s: {path}",
+                    start.elapsed().as_secs_f64()
+                ),
+                round,
+                &bytes,
+            );
         }
     }
     println!("{n_rounds} rounds: {n_read} read, {n_mended} of them mended to a body");
@@ -120,7 +132,9 @@ fn unpacked(bytes: &[u8]) -> Option<(String, Vec<u8>)> {
 
 fn packed(name: &str, model: &[u8]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    archive.start_file(name, zip::write::SimpleFileOptions::default()).expect("the name is a name");
+    archive
+        .start_file(name, zip::write::SimpleFileOptions::default())
+        .expect("the name is a name");
     archive.write_all(model).expect("memory takes all bytes");
     archive.finish().expect("memory takes all bytes").into_inner()
 }

@@ -28,7 +28,8 @@ pub(super) struct Occurrence {
 
 /// All places of parts with triangles below `roots`, in file order.
 ///
-/// Refuses parts that contain themselves, and more triangles or places than are made; the work is bounded by that.
+/// Refuses parts that contain themselves, and more triangles or places than are made; the work is bounded by
+/// that.
 pub(super) fn occurrences(
     parts: &[Part],
     roots: &[(usize, DAffine3)],
@@ -36,10 +37,16 @@ pub(super) fn occurrences(
 ) -> Result<Vec<Occurrence>, ReadError> {
     let sizes = sizes(parts, kind)?;
     let total = roots.iter().fold((0_u64, 0_u64), |sum, &(root, _)| {
-        (sum.0.saturating_add(sizes[root].0), sum.1.saturating_add(sizes[root].1))
+        (
+            sum.0.saturating_add(sizes[root].0),
+            sum.1.saturating_add(sizes[root].1),
+        )
     });
     if total.0 > MAX_OCCURRENCES || total.1 > MAX_TRIANGLES {
-        return Err(ReadError::TooManyCopies { what: "putting its parts together", limit: MAX_TRIANGLES });
+        return Err(ReadError::TooManyCopies {
+            what: "putting its parts together",
+            limit: MAX_TRIANGLES,
+        });
     }
     let mut found = Vec::new();
     let mut todo: Vec<(usize, DAffine3)> = roots.iter().rev().copied().collect();
@@ -47,7 +54,13 @@ pub(super) fn occurrences(
         if parts[part].n_triangles > 0 {
             found.push(Occurrence { part, placed });
         }
-        todo.extend(parts[part].children.iter().rev().map(|&(child, at)| (child, placed * at)));
+        todo.extend(
+            parts[part]
+                .children
+                .iter()
+                .rev()
+                .map(|&(child, at)| (child, placed * at)),
+        );
     }
     Ok(found)
 }
@@ -70,7 +83,10 @@ fn sizes(parts: &[Part], kind: &'static str) -> Result<Vec<(u64, u64)>, ReadErro
                 continue;
             }
             if next == 0 && std::mem::replace(&mut state[part], State::Open) == State::Open {
-                return Err(ReadError::Cycle { kind, id: parts[part].id.clone() });
+                return Err(ReadError::Cycle {
+                    kind,
+                    id: parts[part].id.clone(),
+                });
             }
             if let Some(&(child, _)) = parts[part].children.get(next) {
                 path.push((part, next + 1));
@@ -80,7 +96,10 @@ fn sizes(parts: &[Part], kind: &'static str) -> Result<Vec<(u64, u64)>, ReadErro
             state[part] = State::Done;
             let own = (1, parts[part].n_triangles as u64);
             sizes[part] = parts[part].children.iter().fold(own, |sum, &(child, _)| {
-                (sum.0.saturating_add(sizes[child].0), sum.1.saturating_add(sizes[child].1))
+                (
+                    sum.0.saturating_add(sizes[child].0),
+                    sum.1.saturating_add(sizes[child].1),
+                )
             });
         }
     }
@@ -93,13 +112,24 @@ mod tests {
     use glam::DVec3;
 
     fn part(n_triangles: usize, children: &[(usize, f64)]) -> Part {
-        let children = children.iter().map(|&(c, x)| (c, DAffine3::from_translation(DVec3::X * x))).collect();
-        Part { id: String::new(), n_triangles, children }
+        let children = children
+            .iter()
+            .map(|&(c, x)| (c, DAffine3::from_translation(DVec3::X * x)))
+            .collect();
+        Part {
+            id: String::new(),
+            n_triangles,
+            children,
+        }
     }
 
     #[test]
     fn moves_add_up_along_the_way_and_order_is_that_of_the_file() {
-        let parts = [part(2, &[]), part(0, &[(0, 1.0), (0, 10.0)]), part(1, &[(1, 100.0)])];
+        let parts = [
+            part(2, &[]),
+            part(0, &[(0, 1.0), (0, 10.0)]),
+            part(1, &[(1, 100.0)]),
+        ];
         let found = occurrences(&parts, &[(2, DAffine3::IDENTITY)], "object").unwrap();
         let places: Vec<_> = found.iter().map(|o| (o.part, o.placed.translation.x)).collect();
         assert_eq!(places, [(2, 0.0), (0, 101.0), (0, 110.0)]);
@@ -108,10 +138,20 @@ mod tests {
     #[test]
     fn cycles_and_multiplication_are_refused_without_unrolling_them() {
         let cycle = [part(1, &[(1, 0.0)]), part(0, &[(0, 0.0)])];
-        assert!(matches!(occurrences(&cycle, &[(0, DAffine3::IDENTITY)], "object"), Err(ReadError::Cycle { .. })));
+        assert!(matches!(
+            occurrences(&cycle, &[(0, DAffine3::IDENTITY)], "object"),
+            Err(ReadError::Cycle { .. })
+        ));
         // Ten times ten times …: 10³⁰ triangles.
-        let laughs: Vec<Part> =
-            (0..31).map(|i| if i == 0 { part(1, &[]) } else { part(0, &[(i - 1, 0.0); 10]) }).collect();
+        let laughs: Vec<Part> = (0..31)
+            .map(|i| {
+                if i == 0 {
+                    part(1, &[])
+                } else {
+                    part(0, &[(i - 1, 0.0); 10])
+                }
+            })
+            .collect();
         let refused = occurrences(&laughs, &[(30, DAffine3::IDENTITY)], "object");
         assert!(matches!(refused, Err(ReadError::TooManyCopies { .. })));
     }

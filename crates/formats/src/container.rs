@@ -10,12 +10,15 @@ use super::{ReadError, recognise, stl};
 
 /// Unpacked bytes that any file may have.
 const FREE_BYTES: u64 = 64 << 20;
-/// Beyond these, unpacked bytes for each packed one: text of meshes packs 4 to 20 times, deflate at most 1032 times.
+/// Beyond these, unpacked bytes for each packed one: text of meshes packs 4 to 20 times, deflate at most 1032
+/// times.
 const MAX_RATIO: u64 = 100;
 /// Unpacked bytes that no file may have.
 const MAX_BYTES: u64 = 2 << 30;
 /// Names of meshes within archives.
-const MESH_NAMES: [&[u8]; 8] = [b".stl", b".obj", b".ply", b".off", b".3mf", b".glb", b".gltf", b".gz"];
+const MESH_NAMES: [&[u8]; 8] = [
+    b".stl", b".obj", b".ply", b".off", b".3mf", b".glb", b".gltf", b".gz",
+];
 
 /// The mesh file itself, without the wrapping, and the name it has in a zip archive.
 pub(super) fn unpack(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<String>), ReadError> {
@@ -44,19 +47,34 @@ pub(super) fn limit(packed: usize) -> u64 {
 /// All that `source` yields, refused beyond `limit` bytes.
 pub(super) fn read_bounded(source: impl Read, limit: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
-    source.take(limit + 1).read_to_end(&mut bytes).map_err(|e| ReadError::Damaged { reason: e.to_string() })?;
-    if bytes.len() as u64 > limit { Err(ReadError::Bomb { limit_mb: limit >> 20 }) } else { Ok(bytes) }
+    source
+        .take(limit + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| ReadError::Damaged {
+            reason: e.to_string(),
+        })?;
+    if bytes.len() as u64 > limit {
+        Err(ReadError::Bomb {
+            limit_mb: limit >> 20,
+        })
+    } else {
+        Ok(bytes)
+    }
 }
 
 /// Opens a zip archive.
 pub(super) fn archive(bytes: &[u8]) -> Result<ZipArchive<Cursor<&[u8]>>, ReadError> {
-    ZipArchive::new(Cursor::new(bytes)).map_err(|e| ReadError::Damaged { reason: e.to_string() })
+    ZipArchive::new(Cursor::new(bytes)).map_err(|e| ReadError::Damaged {
+        reason: e.to_string(),
+    })
 }
 
 /// Whether a zip archive is a 3MF package; a damaged one is if it looks like one.
 fn is_3mf(bytes: &[u8]) -> bool {
     match archive(bytes) {
-        Ok(archive) => archive.file_names_raw().any(|name| name.to_ascii_lowercase().ends_with(b".model")),
+        Ok(archive) => archive
+            .file_names_raw()
+            .any(|name| name.to_ascii_lowercase().ends_with(b".model")),
         Err(_) => bytes.windows(13).any(|window| window == b"3dmodel.model"),
     }
 }
@@ -67,23 +85,48 @@ fn only_mesh(bytes: &[u8]) -> Result<(Vec<u8>, String), ReadError> {
         let name = name.to_ascii_lowercase();
         !name.starts_with(b"__macosx") && MESH_NAMES.iter().any(|end| name.ends_with(end))
     };
-    let meshes: Vec<usize> =
-        archive.file_names_raw().enumerate().filter(|(_, name)| is_mesh(name)).map(|(i, _)| i).collect();
-    let &[only] = &meshes[..] else { return Err(ReadError::Archive { n_models: meshes.len() }) };
-    let name = archive.file_names_raw().nth(only).map_or_else(String::new, |n| String::from_utf8_lossy(n).into_owned());
-    let file = archive.by_index(only).map_err(|e| ReadError::Damaged { reason: e.to_string() })?;
+    let meshes: Vec<usize> = archive
+        .file_names_raw()
+        .enumerate()
+        .filter(|(_, name)| is_mesh(name))
+        .map(|(i, _)| i)
+        .collect();
+    let &[only] = &meshes[..] else {
+        return Err(ReadError::Archive {
+            n_models: meshes.len(),
+        });
+    };
+    let name = archive
+        .file_names_raw()
+        .nth(only)
+        .map_or_else(String::new, |n| String::from_utf8_lossy(n).into_owned());
+    let file = archive.by_index(only).map_err(|e| ReadError::Damaged {
+        reason: e.to_string(),
+    })?;
     Ok((read_bounded(file, limit(bytes.len()))?, name))
 }
 
 /// The same text as UTF-8, where it looks like UTF-16.
 pub(super) fn as_utf8(bytes: Vec<u8>) -> Vec<u8> {
-    if recognise::is_utf16(&bytes) { utf8(&bytes) } else { bytes }
+    if recognise::is_utf16(&bytes) {
+        utf8(&bytes)
+    } else {
+        bytes
+    }
 }
 
 /// UTF-16 of either byte order as UTF-8; what is no character becomes "�".
 fn utf8(bytes: &[u8]) -> Vec<u8> {
-    let is_little_endian = !bytes.starts_with(b"\xFE\xFF") && (bytes.starts_with(b"\xFF\xFE") || bytes[0] != 0);
-    let join = if is_little_endian { u16::from_le_bytes } else { u16::from_be_bytes };
+    let is_little_endian =
+        !bytes.starts_with(b"\xFE\xFF") && (bytes.starts_with(b"\xFF\xFE") || bytes[0] != 0);
+    let join = if is_little_endian {
+        u16::from_le_bytes
+    } else {
+        u16::from_be_bytes
+    };
     let units = bytes.chunks_exact(2).map(|pair| join([pair[0], pair[1]]));
-    char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect::<String>().into_bytes()
+    char::decode_utf16(units)
+        .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
+        .collect::<String>()
+        .into_bytes()
 }

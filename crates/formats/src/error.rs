@@ -9,7 +9,9 @@ pub enum ReadError {
     #[error("the file is empty; export it again")]
     Empty,
     /// An archive without a model, or with several.
-    #[error("the file is a zip archive with {n_models} mesh files in it; unpack it and give the one you want")]
+    #[error(
+        "the file is a zip archive with {n_models} mesh files in it; unpack it and give the one you want"
+    )]
     Archive {
         /// Files in it whose names are those of meshes.
         n_models: usize,
@@ -21,7 +23,9 @@ pub enum ReadError {
         reason: String,
     },
     /// Unpacking would take more memory than an honest file needs.
-    #[error("unpacked, the file has more than {limit_mb} MB; it is broken or hostile: export a plain mesh file")]
+    #[error(
+        "unpacked, the file has more than {limit_mb} MB; it is broken or hostile: export a plain mesh file"
+    )]
     Bomb {
         /// The limit for a file of this size.
         limit_mb: u64,
@@ -57,7 +61,9 @@ pub enum ReadError {
         what: &'static str,
     },
     /// Neither the content nor the extension says what it is.
-    #[error("the content is neither STL, OBJ, PLY, OFF, 3MF nor glTF; export the model in one of these formats")]
+    #[error(
+        "the content is neither STL, OBJ, PLY, OFF, 3MF nor glTF; export the model in one of these formats"
+    )]
     UnknownFormat,
     /// A variant of a known format that is not read.
     #[error("{at}: {what} is not read; export the model as 3MF, binary STL or PLY")]
@@ -127,7 +133,9 @@ pub enum ReadError {
         room: u64,
     },
     /// A coordinate is NaN or infinite, or too large for a float.
-    #[error("{at}: a coordinate is not a finite number (NaN or infinite); repair the model where it was made")]
+    #[error(
+        "{at}: a coordinate is not a finite number (NaN or infinite); repair the model where it was made"
+    )]
     NotFinite {
         /// Where.
         at: Place,

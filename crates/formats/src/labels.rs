@@ -3,7 +3,8 @@
 use super::text::{Lines, whole, words};
 use super::{Place, ReadError, container};
 
-/// Reads one label ≥ 0 a line, in the order of the file's faces; blank lines are passed over and `3.0` counts as 3.
+/// Reads one label ≥ 0 a line, in the order of the file's faces; blank lines are passed over and `3.0` counts
+/// as 3.
 pub fn read_labels(bytes: &[u8]) -> Result<Vec<i64>, ReadError> {
     let (bytes, _) = container::unpack(bytes)?;
     let mut labels = Vec::new();
@@ -12,22 +13,35 @@ pub fn read_labels(bytes: &[u8]) -> Result<Vec<i64>, ReadError> {
             labels.push(label);
         }
     }
-    if labels.is_empty() { Err(ReadError::Empty) } else { Ok(labels) }
+    if labels.is_empty() {
+        Err(ReadError::Empty)
+    } else {
+        Ok(labels)
+    }
 }
 
 /// `labels` one a line, as [`read_labels`] reads them.
 pub fn write_labels(labels: &[u32]) -> Vec<u8> {
-    labels.iter().flat_map(|label| format!("{label}\n").into_bytes()).collect()
+    labels
+        .iter()
+        .flat_map(|label| format!("{label}\n").into_bytes())
+        .collect()
 }
 
 /// The label of a line, none where the line is blank.
 fn label(line: &[u8], at: Place) -> Result<Option<i64>, ReadError> {
     const EXPECTED: &str = "one whole number a line";
     let mut words = words(line);
-    let Some(first) = words.next() else { return Ok(None) };
+    let Some(first) = words.next() else {
+        return Ok(None);
+    };
     let label = whole(Some(first), at, EXPECTED)?;
     if words.next().is_some() {
         return Err(super::text::malformed(at, EXPECTED, line));
     }
-    if label < 0 { Err(ReadError::NegativeLabel { at, label }) } else { Ok(Some(label)) }
+    if label < 0 {
+        Err(ReadError::NegativeLabel { at, label })
+    } else {
+        Ok(Some(label))
+    }
 }

@@ -12,10 +12,10 @@
 //!
 //! Any of them may be packed by gzip, lie alone in a zip archive, be stored as UTF-16 or have a wrong name.
 //!
-//! Readers take what files in the wild hold and refuse the rest with a place: a line of a text, a byte of a file.
-//! They never panic and reserve no memory that the bytes at hand do not back. Coordinates are taken as they stand
-//! ([`Loaded::unit_mm`] says where the file has a unit) and points are not merged: that is [`shellock_geom::weld`]; whether the
-//! surface is a body is [`shellock_geom::check`].
+//! Readers take what files in the wild hold and refuse the rest with a place: a line of a text, a byte of a
+//! file. They never panic and reserve no memory that the bytes at hand do not back. Coordinates are taken as
+//! they stand ([`Loaded::unit_mm`] says where the file has a unit) and points are not merged: that is
+//! [`shellock_geom::weld`]; whether the surface is a body is [`shellock_geom::check`].
 
 mod assembly;
 mod container;
@@ -69,12 +69,16 @@ impl Loaded {
 
     /// One label for each triangle as `source` has them; `None` where the file has none.
     pub fn labels(&self, source: LabelSource) -> Option<&[i64]> {
-        self.labellings.iter().find(|l| l.source == source).map(|l| &l.labels[..])
+        self.labellings
+            .iter()
+            .find(|l| l.source == source)
+            .map(|l| &l.labels[..])
     }
 
     /// Labels that somebody gave on purpose: a property of the faces, or paint.
     pub fn face_labels(&self) -> Option<&[i64]> {
-        self.labels(LabelSource::Property).or_else(|| self.labels(LabelSource::Paint))
+        self.labels(LabelSource::Property)
+            .or_else(|| self.labels(LabelSource::Paint))
     }
 }
 
@@ -83,8 +87,8 @@ impl Loaded {
 pub struct Labelling {
     /// What of the file tells them apart.
     pub source: LabelSource,
-    /// As many as triangles. Those of [`LabelSource::Property`] stand in the file; others are numbered from 0 as they
-    /// first occur, paint by its colour.
+    /// As many as triangles. Those of [`LabelSource::Property`] stand in the file; others are numbered from 0
+    /// as they first occur, paint by its colour.
     pub labels: Vec<i64>,
 }
 
@@ -172,12 +176,17 @@ impl fmt::Display for Place {
     }
 }
 
-/// Reads a mesh; the content decides what it is, and `extension` ("stl", ".OBJ") only where the content leaves it open.
+/// Reads a mesh; the content decides what it is, and `extension` ("stl", ".OBJ") only where the content
+/// leaves it open.
 ///
-/// Guarantees: at least one triangle, all points finite, all indices in range. Not promised: anything about the surface.
+/// Guarantees: at least one triangle, all points finite, all indices in range. Not promised: anything about
+/// the surface.
 pub fn read_mesh(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
     let (bytes, name) = container::unpack(bytes)?;
-    let inner = name.as_deref().and_then(|n| n.rsplit_once('.')).map(|(_, extension)| extension);
+    let inner = name
+        .as_deref()
+        .and_then(|n| n.rsplit_once('.'))
+        .map(|(_, extension)| extension);
     let mut loaded = match recognise(&bytes, inner.or(extension))? {
         Format::StlBinary => stl::read_binary(&bytes),
         Format::StlAscii => stl::read_ascii(&bytes),
@@ -188,7 +197,9 @@ pub fn read_mesh(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadEr
         Format::Gltf => gltf::read_text(&bytes),
         Format::Glb => gltf::read_binary(&bytes),
     }?;
-    loaded.notes.extend(name.map(|name| format!("the archive's only mesh was read: {name}")));
+    loaded
+        .notes
+        .extend(name.map(|name| format!("the archive's only mesh was read: {name}")));
     Ok(loaded)
 }
 

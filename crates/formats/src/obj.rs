@@ -1,15 +1,19 @@
-//! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces; normals, texture, lines and curves are
-//! passed over.
+//! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces; normals, texture, lines and
+//! curves are passed over.
 
 use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, point, whole, without_comment, words};
 use super::{Format, LabelSource, Loaded, Place, ReadError};
 
 /// What divides the faces, as it stands in a statement.
-const DIVISIONS: [(&[u8], LabelSource); 3] =
-    [(b"usemtl", LabelSource::Material), (b"g", LabelSource::Group), (b"o", LabelSource::Object)];
+const DIVISIONS: [(&[u8], LabelSource); 3] = [
+    (b"usemtl", LabelSource::Material),
+    (b"g", LabelSource::Group),
+    (b"o", LabelSource::Object),
+];
 
-/// Reads an OBJ; faces may name points that come later, and count backwards from the last one with negative indices.
+/// Reads an OBJ; faces may name points that come later, and count backwards from the last one with negative
+/// indices.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(1);
     let mut lines = Lines::of(bytes);
@@ -38,7 +42,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
         }
     }
     let n_faces = polygons.n_faces();
-    let labels = DIVISIONS.iter().zip(divisions).filter_map(|((_, source), d)| Some((*source, d.labels(n_faces)?)));
+    let labels = DIVISIONS
+        .iter()
+        .zip(divisions)
+        .filter_map(|((_, source), d)| Some((*source, d.labels(n_faces)?)));
     polygons.finish(Format::Obj, labels.collect())
 }
 
@@ -68,7 +75,8 @@ impl<'a> Division<'a> {
     }
 }
 
-/// Fills `statement` with the words up to a line end without a backslash; the place is that of its first line.
+/// Fills `statement` with the words up to a line end without a backslash; the place is that of its first
+/// line.
 fn next_statement<'a>(lines: &mut Lines<'a>, statement: &mut Vec<&'a [u8]>) -> Option<Place> {
     statement.clear();
     let (at, mut line) = lines.next()?;
@@ -89,6 +97,10 @@ fn next_statement<'a>(lines: &mut Lines<'a>, statement: &mut Vec<&'a [u8]>) -> O
 /// The point of a corner `7`, `7/1`, `7//3`, `7/1/3` or `-1`, counted from 0.
 fn corner(polygons: &Polygons, word: &[u8], at: Place) -> Result<u32, ReadError> {
     let index = whole(word.split(|&b| b == b'/').next(), at, "the number of a point")?;
-    let from_0 = if index < 0 { index.saturating_add_unsigned(polygons.n_points() as u64) } else { index - 1 };
+    let from_0 = if index < 0 {
+        index.saturating_add_unsigned(polygons.n_points() as u64)
+    } else {
+        index - 1
+    };
     polygons.corner(from_0, at)
 }

@@ -1,4 +1,5 @@
-//! OFF: points and polygons as text, with the colours of faces. Normals and colours of points are passed over.
+//! OFF: points and polygons as text, with the colours of faces. Normals and colours of points are passed
+//! over.
 
 use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, malformed, point, whole, without_bom, without_comment, words};
@@ -17,13 +18,19 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
     polygons.reserve(n_points, n_faces);
     for _ in 0..n_points {
-        let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff { at: lines.place(), within: "the points" })?;
+        let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff {
+            at: lines.place(),
+            within: "the points",
+        })?;
         polygons.add_point(point(&mut words(line), at)?, at)?;
     }
     let mut corners = Vec::new();
     let (mut numbering, mut colors) = (Numbering::default(), Vec::with_capacity(n_faces));
     for _ in 0..n_faces {
-        let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff { at: lines.place(), within: "the faces" })?;
+        let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff {
+            at: lines.place(),
+            within: "the faces",
+        })?;
         let mut words = words(line);
         let n_corners = whole(words.next(), at, "the number of corners of a face")?;
         corners.clear();
@@ -37,14 +44,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     polygons.finish(Format::Off, vec![(LabelSource::Color, colors)])
 }
 
-/// The counts of points and faces, on the line of the first word or the next; what the bytes cannot back is refused.
+/// The counts of points and faces, on the line of the first word or the next; what the bytes cannot back is
+/// refused.
 fn read_counts(lines: &mut Lines) -> Result<(usize, usize), ReadError> {
-    let cut_off = |lines: &Lines| ReadError::CutOff { at: lines.place(), within: "the header" };
+    let cut_off = |lines: &Lines| ReadError::CutOff {
+        at: lines.place(),
+        within: "the header",
+    };
     let (mut at, mut line) = next_line(lines).ok_or_else(|| cut_off(lines))?;
     let first = words(line).next().unwrap_or_default().to_ascii_lowercase();
     if let Some(prefix) = first.strip_suffix(b"off") {
         if prefix.contains(&b'4') || prefix.contains(&b'n') && prefix != b"n" && !prefix.ends_with(b"cn") {
-            return Err(ReadError::Unsupported { what: "an OFF file of more than three dimensions", at });
+            return Err(ReadError::Unsupported {
+                what: "an OFF file of more than three dimensions",
+                at,
+            });
         }
         line = &line.trim_ascii_start()[first.len()..];
         if words(line).next().is_none() {
@@ -55,13 +69,25 @@ fn read_counts(lines: &mut Lines) -> Result<(usize, usize), ReadError> {
     let mut count = |what, expected, bytes_each| {
         let word = words.next();
         if word.is_some_and(|word| word.eq_ignore_ascii_case(b"binary")) {
-            return Err(ReadError::Unsupported { what: "a binary OFF file", at });
+            return Err(ReadError::Unsupported {
+                what: "a binary OFF file",
+                at,
+            });
         }
-        let promised =
-            u64::try_from(whole(word, at, expected)?).map_err(|_| malformed(at, expected, word.unwrap_or_default()))?;
+        let promised = u64::try_from(whole(word, at, expected)?)
+            .map_err(|_| malformed(at, expected, word.unwrap_or_default()))?;
         // The last line may lack its end.
         let room = (lines.rest().len() as u64 + 1) / bytes_each;
-        if promised > room { Err(ReadError::TooFewBytes { at, what, promised, room }) } else { Ok(promised as usize) }
+        if promised > room {
+            Err(ReadError::TooFewBytes {
+                at,
+                what,
+                promised,
+                room,
+            })
+        } else {
+            Ok(promised as usize)
+        }
     };
     let n_points = count("points", "the number of points", POINT_BYTES)?;
     let n_faces = count("faces", "the number of faces", FACE_BYTES)?;
@@ -70,5 +96,7 @@ fn read_counts(lines: &mut Lines) -> Result<(usize, usize), ReadError> {
 
 /// The next line that says something.
 fn next_line<'a>(lines: &mut Lines<'a>) -> Option<(Place, &'a [u8])> {
-    lines.map(|(at, line)| (at, without_comment(line))).find(|(_, line)| words(line).next().is_some())
+    lines
+        .map(|(at, line)| (at, without_comment(line)))
+        .find(|(_, line)| words(line).next().is_some())
 }

@@ -1,10 +1,11 @@
 //! The multi-material paint of slicers: within a triangle, a tree of splits whose leaves have colours.
 //!
-//! PrusaSlicer writes it to the attribute `slic3rpe:mmu_segmentation` of a 3MF's triangles, Bambu Studio and OrcaSlicer
-//! to `paint_color`, in the same code: hexadecimal digits, the last one first. A digit's lower two bits are the number
-//! of split sides. Where that is 0, the triangle is a leaf and the upper two bits are its colour; 3 stands for 3 plus
-//! the next digits up to one below F (Bambu Studio; others have 16 colours, which take one digit). Else the upper two
-//! bits are the special corner v₀ and the children follow, the last one first:
+//! PrusaSlicer writes it to the attribute `slic3rpe:mmu_segmentation` of a 3MF's triangles, Bambu Studio and
+//! OrcaSlicer to `paint_color`, in the same code: hexadecimal digits, the last one first. A digit's lower two
+//! bits are the number of split sides. Where that is 0, the triangle is a leaf and the upper two bits are its
+//! colour; 3 stands for 3 plus the next digits up to one below F (Bambu Studio; others have 16 colours, which
+//! take one digit). Else the upper two bits are the special corner v₀ and the children follow, the last one
+//! first:
 //!
 //! ```text
 //!   1 split side              2 split sides             3 split sides
@@ -56,23 +57,36 @@ pub(super) struct Painted {
     pub(super) source: Vec<u32>,
 }
 
-/// Splits the triangles of `mesh` as `paint` says (by triangle, ascending), and their neighbours so that edges match.
+/// Splits the triangles of `mesh` as `paint` says (by triangle, ascending), and their neighbours so that
+/// edges match.
 ///
 /// Triangles without paint have colour 0.
 pub(super) fn apply(mesh: &TriMesh, paint: &[(u32, &str)]) -> Result<Painted, ReadError> {
     if paint.is_empty() {
         let n = mesh.triangles.len();
-        return Ok(Painted { mesh: mesh.clone(), colors: vec![0; n], source: (0..n as u32).collect() });
+        return Ok(Painted {
+            mesh: mesh.clone(),
+            colors: vec![0; n],
+            source: (0..n as u32).collect(),
+        });
     }
     // Points in the same place are one here, so that neighbours meet where the file does not say so.
     let stands_for = first_equal(&mesh.points);
-    let mut splitter = Splitter { points: mesh.points.clone(), middle_of: BTreeMap::new(), leaves: Vec::new() };
+    let mut splitter = Splitter {
+        points: mesh.points.clone(),
+        middle_of: BTreeMap::new(),
+        leaves: Vec::new(),
+    };
     let mut next = paint.iter().peekable();
     for (face, triangle) in (0_u32..).zip(&mesh.triangles) {
         let triangle = triangle.map(|v| stands_for[v as usize]);
         match next.next_if(|(painted, _)| *painted == face) {
             Some((_, code)) => splitter.split(face, triangle, code)?,
-            None => splitter.leaves.push(Leaf { corners: triangle, color: 0, source: face }),
+            None => splitter.leaves.push(Leaf {
+                corners: triangle,
+                color: 0,
+                source: face,
+            }),
         }
     }
     splitter.conforming()
@@ -94,7 +108,10 @@ struct Splitter {
 impl Splitter {
     /// Adds the leaves of a painted triangle.
     fn split(&mut self, source: u32, triangle: [u32; 3], code: &str) -> Result<(), ReadError> {
-        let wrong = || ReadError::Paint { face: source, code: code.chars().take(40).collect() };
+        let wrong = || ReadError::Paint {
+            face: source,
+            code: code.chars().take(40).collect(),
+        };
         let mut digits = code.chars().rev().map(|c| c.to_digit(16));
         let mut digit = || digits.next().flatten().ok_or_else(wrong);
         // Triangles whose codes are still to come, the next one last, with their depths.
@@ -111,9 +128,16 @@ impl Splitter {
                         break;
                     }
                 }
-                self.leaves.push(Leaf { corners, color, source });
+                self.leaves.push(Leaf {
+                    corners,
+                    color,
+                    source,
+                });
                 if self.leaves.len() > MAX_TRIANGLES {
-                    return Err(ReadError::TooManyCopies { what: "its paint", limit: MAX_TRIANGLES as u64 });
+                    return Err(ReadError::TooManyCopies {
+                        what: "its paint",
+                        limit: MAX_TRIANGLES as u64,
+                    });
                 }
                 continue;
             }
@@ -121,9 +145,17 @@ impl Splitter {
                 return Err(wrong());
             }
             // The last child comes first in the code.
-            todo.extend(self.children(corners, n_split, upper as usize).into_iter().map(|c| (c, depth + 1)));
+            todo.extend(
+                self.children(corners, n_split, upper as usize)
+                    .into_iter()
+                    .map(|c| (c, depth + 1)),
+            );
         }
-        if digits.next().is_some() { Err(wrong()) } else { Ok(()) }
+        if digits.next().is_some() {
+            Err(wrong())
+        } else {
+            Ok(())
+        }
     }
 
     fn children(&mut self, corners: [u32; 3], n_split: u32, special: usize) -> Vec<[u32; 3]> {
@@ -155,29 +187,45 @@ impl Splitter {
     /// All leaves, divided where points of their neighbours lie on their sides.
     fn conforming(self) -> Result<Painted, ReadError> {
         let mut painted = Painted {
-            mesh: TriMesh { points: self.points, triangles: Vec::with_capacity(self.leaves.len()) },
+            mesh: TriMesh {
+                points: self.points,
+                triangles: Vec::with_capacity(self.leaves.len()),
+            },
             colors: Vec::with_capacity(self.leaves.len()),
             source: Vec::with_capacity(self.leaves.len()),
         };
         let mut on_sides = [Vec::new(), Vec::new(), Vec::new()];
-        for Leaf { corners: [a, b, c], color, source } in self.leaves {
+        for Leaf {
+            corners: [a, b, c],
+            color,
+            source,
+        } in self.leaves
+        {
             for (side, (from, to)) in on_sides.iter_mut().zip([(a, b), (b, c), (c, a)]) {
                 side.clear();
                 add_points_between(&self.middle_of, from, to, side);
             }
-            fill_triangle([a, b, c], [&on_sides[0], &on_sides[1], &on_sides[2]], &mut painted.mesh.triangles);
+            fill_triangle(
+                [a, b, c],
+                [&on_sides[0], &on_sides[1], &on_sides[2]],
+                &mut painted.mesh.triangles,
+            );
             painted.colors.resize(painted.mesh.triangles.len(), color);
             painted.source.resize(painted.mesh.triangles.len(), source);
             // Where many triangles share an edge, each takes over all its points.
             if painted.source.len() > MAX_TRIANGLES {
-                return Err(ReadError::TooManyCopies { what: "its paint", limit: MAX_TRIANGLES as u64 });
+                return Err(ReadError::TooManyCopies {
+                    what: "its paint",
+                    limit: MAX_TRIANGLES as u64,
+                });
             }
         }
         Ok(painted)
     }
 }
 
-/// Adds the points on the edge between two points, in order from `from` to `to`. The depth of paint bounds the recursion.
+/// Adds the points on the edge between two points, in order from `from` to `to`. The depth of paint bounds
+/// the recursion.
 fn add_points_between(middle_of: &BTreeMap<(u32, u32), u32>, from: u32, to: u32, found: &mut Vec<u32>) {
     if let Some(&middle) = middle_of.get(&(from.min(to), from.max(to))) {
         add_points_between(middle_of, from, middle, found);
@@ -198,15 +246,23 @@ mod tests {
             let code = whole_triangle_code(color);
             let paint: Vec<(u32, &str)> = if code.is_empty() { vec![] } else { vec![(2, &code)] };
             let painted = apply(&tetrahedron(), &paint).unwrap();
-            assert_eq!((painted.mesh, painted.colors), (tetrahedron(), vec![0, 0, color, 0]), "{code}");
+            assert_eq!(
+                (painted.mesh, painted.colors),
+                (tetrahedron(), vec![0, 0, color, 0]),
+                "{code}"
+            );
         }
         // As slicers write them.
-        assert_eq!([1, 2, 3, 16, 17, 18].map(whole_triangle_code), ["4", "8", "0C", "DC", "EC", "0FC"]);
+        assert_eq!(
+            [1, 2, 3, 16, 17, 18].map(whole_triangle_code),
+            ["4", "8", "0C", "DC", "EC", "0FC"]
+        );
     }
 
     #[test]
     fn split_triangles_stay_closed_and_keep_their_area_and_their_neighbours_follow() {
-        // Read from the end: three sides; one; two; three, its middle child again one; two, its first child again two.
+        // Read from the end: three sides; one; two; three, its middle child again one; two, its first child
+        // again two.
         for code in ["08403", "841", "4802", "8408493", "4086402"] {
             let painted = match apply(&tetrahedron(), &[(2, code)]) {
                 Ok(painted) => painted,
@@ -223,7 +279,10 @@ mod tests {
     #[test]
     fn children_have_the_places_that_slicers_give_them() {
         // The digits from the last: three sides split, then children 3, 2, 1, 0 with colours 0, 1, 2, 3.
-        let triangle = TriMesh { points: vec![Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0], triangles: vec![[0, 1, 2]] };
+        let triangle = TriMesh {
+            points: vec![Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0],
+            triangles: vec![[0, 1, 2]],
+        };
         let painted = apply(&triangle, &[(0, "0C8403")]).unwrap();
         let middle = |color: u32| {
             let face = painted.colors.iter().position(|&c| c == color).unwrap();
@@ -235,12 +294,20 @@ mod tests {
         assert_eq!(middle(0), Vec3::new(4.0, 4.0, 0.0));
         // One side split, opposite to corner 1: "5" is split 1, special 1; children 1 then 0.
         let painted = apply(&triangle, &[(0, "845")]).unwrap();
-        let of = |color: u32| painted.mesh.corners(painted.colors.iter().position(|&c| c == color).unwrap());
+        let of = |color: u32| {
+            painted
+                .mesh
+                .corners(painted.colors.iter().position(|&c| c == color).unwrap())
+        };
         assert_eq!(of(2), [Vec3::X * 4.0, Vec3::Y * 4.0, Vec3::Y * 2.0]);
         assert_eq!(of(1), [Vec3::Y * 2.0, Vec3::ZERO, Vec3::X * 4.0]);
         // Two sides split, the one opposite to corner 0 kept: children 2, 1, 0.
         let painted = apply(&triangle, &[(0, "0C842")]).unwrap();
-        let of = |color: u32| painted.mesh.corners(painted.colors.iter().position(|&c| c == color).unwrap());
+        let of = |color: u32| {
+            painted
+                .mesh
+                .corners(painted.colors.iter().position(|&c| c == color).unwrap())
+        };
         assert_eq!(of(3), [Vec3::ZERO, Vec3::X * 2.0, Vec3::Y * 2.0]);
         assert_eq!(of(2), [Vec3::X * 2.0, Vec3::X * 4.0, Vec3::Y * 2.0]);
         assert_eq!(of(1), [Vec3::X * 4.0, Vec3::Y * 4.0, Vec3::Y * 2.0]);
@@ -249,7 +316,13 @@ mod tests {
     #[test]
     fn codes_that_end_early_or_late_or_are_no_numbers_are_refused() {
         for code in ["3", "C", "FC", "44", "G", "0000003", "ü4", &"3".repeat(1000)] {
-            assert!(matches!(apply(&tetrahedron(), &[(1, code)]), Err(ReadError::Paint { face: 1, .. })), "{code}");
+            assert!(
+                matches!(
+                    apply(&tetrahedron(), &[(1, code)]),
+                    Err(ReadError::Paint { face: 1, .. })
+                ),
+                "{code}"
+            );
         }
     }
 }

@@ -17,7 +17,13 @@ pub(super) struct Polygons {
 impl Polygons {
     /// Nothing yet; the format counts its points from `first`.
     pub(super) fn counted_from(first: u32) -> Self {
-        Self { mesh: TriMesh::default(), file_face: Vec::new(), n_faces: 0, highest: None, first }
+        Self {
+            mesh: TriMesh::default(),
+            file_face: Vec::new(),
+            n_faces: 0,
+            highest: None,
+            first,
+        }
     }
 
     /// Reserves; the caller has checked that the bytes back these counts.
@@ -57,7 +63,10 @@ impl Polygons {
             return Err(ReadError::TooFewCorners { at, n_corners: 0 });
         };
         if rest.len() < 2 {
-            return Err(ReadError::TooFewCorners { at, n_corners: corners.len() });
+            return Err(ReadError::TooFewCorners {
+                at,
+                n_corners: corners.len(),
+            });
         }
         let highest = rest.iter().fold(*first, |a, &b| a.max(b));
         if self.highest.is_none_or(|(index, _)| highest > index) {
@@ -72,7 +81,11 @@ impl Polygons {
     }
 
     /// The mesh, with `labels` of the file's faces handed on to the triangles.
-    pub(super) fn finish(self, format: Format, labels: Vec<(LabelSource, Vec<i64>)>) -> Result<Loaded, ReadError> {
+    pub(super) fn finish(
+        self,
+        format: Format,
+        labels: Vec<(LabelSource, Vec<i64>)>,
+    ) -> Result<Loaded, ReadError> {
         let n_points = self.n_points();
         if self.mesh.triangles.is_empty() {
             return Err(ReadError::NoTriangles { format, n_points });
@@ -92,12 +105,24 @@ impl Polygons {
             .collect();
         labellings.sort_by_key(|l| l.source);
         let (mesh, file_face) = (self.mesh, self.file_face);
-        Ok(Loaded { mesh, labellings, file_face, format, unit_mm: None, notes: Vec::new() })
+        Ok(Loaded {
+            mesh,
+            labellings,
+            file_face,
+            format,
+            unit_mm: None,
+            notes: Vec::new(),
+        })
     }
 
     fn missing(&self, index: i64, at: Place) -> ReadError {
         let index = index.saturating_add(i64::from(self.first));
-        ReadError::MissingPoint { at, index, n_points: self.n_points(), first: self.first }
+        ReadError::MissingPoint {
+            at,
+            index,
+            n_points: self.n_points(),
+            first: self.first,
+        }
     }
 }
 

@@ -8,7 +8,10 @@ const SAMPLE_BYTES: usize = 1024;
 
 /// The format of `bytes`; `extension` decides only where the content fits none.
 pub(super) fn recognise(bytes: &[u8], extension: Option<&str>) -> Result<Format, ReadError> {
-    let extension = extension.unwrap_or_default().trim_start_matches('.').to_ascii_lowercase();
+    let extension = extension
+        .unwrap_or_default()
+        .trim_start_matches('.')
+        .to_ascii_lowercase();
     if without_bom(bytes).iter().all(u8::is_ascii_whitespace) {
         return Err(ReadError::Empty);
     }
@@ -29,7 +32,11 @@ pub(super) fn recognise(bytes: &[u8], extension: Option<&str>) -> Result<Format,
     match (by_first_word(bytes), extension.as_str()) {
         (Some(Format::StlAscii), _) if !is_text => Ok(Format::StlBinary),
         (Some(format), _) => Ok(format),
-        (None, "stl") => Ok(if is_text { Format::StlAscii } else { Format::StlBinary }),
+        (None, "stl") => Ok(if is_text {
+            Format::StlAscii
+        } else {
+            Format::StlBinary
+        }),
         (None, "obj") if is_text => Ok(Format::Obj),
         (None, "off") if is_text => Ok(Format::Off),
         (None, "gltf") if is_text => Ok(Format::Gltf),
@@ -58,8 +65,15 @@ fn no_model(bytes: &[u8]) -> Option<&'static str> {
         (b"g21", "G-code for a printer"),
     ];
     let bytes = without_bom(bytes).trim_ascii_start();
-    let begins = |start: &[u8]| bytes.get(..start.len()).is_some_and(|b| b.eq_ignore_ascii_case(start));
-    KINDS.iter().find(|(start, _)| begins(start)).map(|(_, what)| *what)
+    let begins = |start: &[u8]| {
+        bytes
+            .get(..start.len())
+            .is_some_and(|b| b.eq_ignore_ascii_case(start))
+    };
+    KINDS
+        .iter()
+        .find(|(start, _)| begins(start))
+        .map(|(_, what)| *what)
 }
 
 fn by_first_word(bytes: &[u8]) -> Option<Format> {
@@ -83,7 +97,10 @@ pub(super) fn is_utf16(bytes: &[u8]) -> bool {
     const CHARS: usize = 8;
     let by_pattern = |zero: usize| {
         bytes.len() >= 2 * CHARS
-            && bytes.chunks_exact(2).take(CHARS).all(|pair| pair[zero] == 0 && is_printed(pair[1 - zero]))
+            && bytes
+                .chunks_exact(2)
+                .take(CHARS)
+                .all(|pair| pair[zero] == 0 && is_printed(pair[1 - zero]))
     };
     bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") || by_pattern(0) || by_pattern(1)
 }

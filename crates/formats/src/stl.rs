@@ -14,16 +14,21 @@ const HEADER_TEXT: &[u8] = b"binary STL by shellock, millimetres";
 
 /// Whether the length is exactly what the count in a binary header asks for.
 pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
-    promised(bytes).is_some_and(|n| n > 0 && bytes.len() as u64 == HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * n)
+    promised(bytes)
+        .is_some_and(|n| n > 0 && bytes.len() as u64 == HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * n)
 }
 
 /// Reads a binary STL.
 ///
-/// Its count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is taken where
-/// it looks like triangles, and passed over where it does not. A count that is too high is a file cut off.
+/// Its count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is
+/// taken where it looks like triangles, and passed over where it does not. A count that is too high is a file
+/// cut off.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let Some(promised) = promised(bytes) else {
-        return Err(ReadError::CutOff { at: Place::Byte(bytes.len()), within: "the header" });
+        return Err(ReadError::CutOff {
+            at: Place::Byte(bytes.len()),
+            within: "the header",
+        });
     };
     let (body, mut notes) = (&bytes[HEADER_BYTES..], Vec::new());
     let n_triangles = count(body, promised, &mut notes)?;
@@ -50,13 +55,22 @@ pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
 fn count(body: &[u8], promised: u64, notes: &mut Vec<String>) -> Result<usize, ReadError> {
     let held = body.len() / TRIANGLE_BYTES;
     let is_unknown = promised == 0 || promised == u64::from(u32::MAX);
-    let wrong = |held: usize| format!("the header promises {promised} triangles, the file holds {held}; all are read");
+    let wrong = |held: usize| {
+        format!("the header promises {promised} triangles, the file holds {held}; all are read")
+    };
     if promised > held as u64 && !is_unknown {
         let at = Place::Byte(HEADER_BYTES - 4);
-        return Err(ReadError::TooFewBytes { at, what: "triangles", promised, room: held as u64 });
+        return Err(ReadError::TooFewBytes {
+            at,
+            what: "triangles",
+            promised,
+            room: held as u64,
+        });
     }
     let n_promised = if is_unknown { 0 } else { promised as usize };
-    let is_like_triangles = body[TRIANGLE_BYTES * n_promised..].chunks_exact(TRIANGLE_BYTES).all(is_like_a_triangle);
+    let is_like_triangles = body[TRIANGLE_BYTES * n_promised..]
+        .chunks_exact(TRIANGLE_BYTES)
+        .all(is_like_a_triangle);
     if n_promised < held && (is_unknown || (is_like_triangles && body.len().is_multiple_of(TRIANGLE_BYTES))) {
         notes.push(wrong(held));
         return Ok(held);
@@ -64,7 +78,9 @@ fn count(body: &[u8], promised: u64, notes: &mut Vec<String>) -> Result<usize, R
     let n_trailing = body.len() - TRIANGLE_BYTES * n_promised;
     // Up to a triangle's length is padding.
     if n_trailing >= TRIANGLE_BYTES {
-        notes.push(format!("{n_trailing} bytes after the last triangle are no triangles and were passed over"));
+        notes.push(format!(
+            "{n_trailing} bytes after the last triangle are no triangles and were passed over"
+        ));
     }
     Ok(n_promised)
 }
@@ -76,10 +92,11 @@ fn is_like_a_triangle(bytes: &[u8]) -> bool {
     (length_sq == 0.0 || (length_sq - 1.0).abs() < 0.1) && (3..12).all(|i| float(i).is_finite())
 }
 
-/// The colours in the last two bytes of triangles: 5 bits each of red, green and blue, and one that says whether they hold.
+/// The colours in the last two bytes of triangles: 5 bits each of red, green and blue, and one that says
+/// whether they hold.
 struct Colors {
-    /// What the highest bit is where a triangle has a colour of its own: set in most programs, not set in Magics,
-    /// whose headers have "COLOR=".
+    /// What the highest bit is where a triangle has a colour of its own: set in most programs, not set in
+    /// Magics, whose headers have "COLOR=".
     valid: u16,
     numbering: Numbering<Option<u16>>,
     labels: Vec<i64>,
@@ -88,7 +105,11 @@ struct Colors {
 impl Colors {
     fn of_header(header: &[u8]) -> Self {
         let is_magics = header.windows(6).any(|w| w == b"COLOR=");
-        Self { valid: u16::from(!is_magics), numbering: Numbering::default(), labels: Vec::new() }
+        Self {
+            valid: u16::from(!is_magics),
+            numbering: Numbering::default(),
+            labels: Vec::new(),
+        }
     }
 
     fn add(&mut self, bits: u16) {
@@ -97,7 +118,8 @@ impl Colors {
     }
 }
 
-/// Reads an ASCII STL of any number of solids; upper and lower case are the same, and a missing `endsolid` is forgiven.
+/// Reads an ASCII STL of any number of solids; upper and lower case are the same, and a missing `endsolid` is
+/// forgiven.
 pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
     let mut lines = Lines::of(bytes);
@@ -126,15 +148,29 @@ pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
         }
     }
     if in_facet {
-        return Err(ReadError::CutOff { at: lines.place(), within: "a facet" });
+        return Err(ReadError::CutOff {
+            at: lines.place(),
+            within: "a facet",
+        });
     }
     polygons.finish(Format::StlAscii, vec![(LabelSource::Object, solids)])
 }
 
 /// The keyword in lower case that `word` is; the word itself where it is none.
 fn keyword(word: &[u8]) -> &[u8] {
-    const ALL: [&[u8]; 8] = [b"vertex", b"facet", b"outer", b"endloop", b"endfacet", b"solid", b"endsolid", b"color"];
-    ALL.into_iter().find(|k| k.eq_ignore_ascii_case(word)).unwrap_or(word)
+    const ALL: [&[u8]; 8] = [
+        b"vertex",
+        b"facet",
+        b"outer",
+        b"endloop",
+        b"endfacet",
+        b"solid",
+        b"endsolid",
+        b"color",
+    ];
+    ALL.into_iter()
+        .find(|k| k.eq_ignore_ascii_case(word))
+        .unwrap_or(word)
 }
 
 /// A binary STL: normals computed (zero for degenerate triangles), coordinates rounded to `f32`.
@@ -149,7 +185,10 @@ pub fn write_stl_binary(mesh: &TriMesh) -> Vec<u8> {
     for face in 0..mesh.triangles.len() {
         let [a, b, c] = mesh.corners(face);
         for vector in [mesh.face_normal(face), a, b, c] {
-            vector.to_array().iter().for_each(|&x| bytes.extend_from_slice(&(x as f32).to_le_bytes()));
+            vector
+                .to_array()
+                .iter()
+                .for_each(|&x| bytes.extend_from_slice(&(x as f32).to_le_bytes()));
         }
         bytes.extend_from_slice(&[0; 2]);
     }
@@ -159,7 +198,9 @@ pub fn write_stl_binary(mesh: &TriMesh) -> Vec<u8> {
 /// The number of triangles that a binary header promises.
 fn promised(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
-    Some(u64::from(u32::from_le_bytes([count[0], count[1], count[2], count[3]])))
+    Some(u64::from(u32::from_le_bytes([
+        count[0], count[1], count[2], count[3],
+    ])))
 }
 
 fn float(bytes: &[u8]) -> f32 {

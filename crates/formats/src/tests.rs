@@ -18,7 +18,9 @@ fn ascii_stl(mesh: &TriMesh, name: &str) -> String {
     let mut text = format!("solid {name}\n");
     for face in 0..mesh.triangles.len() {
         text += "facet normal 0 0 0\n outer loop\n";
-        mesh.corners(face).iter().for_each(|p| writeln!(text, "  vertex {} {} {}", p.x, p.y, p.z).unwrap());
+        mesh.corners(face)
+            .iter()
+            .for_each(|p| writeln!(text, "  vertex {} {} {}", p.x, p.y, p.z).unwrap());
         text += " endloop\nendfacet\n";
     }
     text + "endsolid\n"
@@ -26,15 +28,23 @@ fn ascii_stl(mesh: &TriMesh, name: &str) -> String {
 
 fn obj(mesh: &TriMesh) -> String {
     let mut text = String::new();
-    mesh.points.iter().for_each(|p| writeln!(text, "v {} {} {}", p.x, p.y, p.z).unwrap());
-    mesh.triangles.iter().for_each(|[a, b, c]| writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap());
+    mesh.points
+        .iter()
+        .for_each(|p| writeln!(text, "v {} {} {}", p.x, p.y, p.z).unwrap());
+    mesh.triangles
+        .iter()
+        .for_each(|[a, b, c]| writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap());
     text
 }
 
 fn off(mesh: &TriMesh) -> String {
     let mut text = format!("OFF\n{} {} 0\n", mesh.points.len(), mesh.triangles.len());
-    mesh.points.iter().for_each(|p| writeln!(text, "{} {} {}", p.x, p.y, p.z).unwrap());
-    mesh.triangles.iter().for_each(|[a, b, c]| writeln!(text, "3 {a} {b} {c}").unwrap());
+    mesh.points
+        .iter()
+        .for_each(|p| writeln!(text, "{} {} {}", p.x, p.y, p.z).unwrap());
+    mesh.triangles
+        .iter()
+        .for_each(|[a, b, c]| writeln!(text, "3 {a} {b} {c}").unwrap());
     text
 }
 
@@ -57,11 +67,22 @@ fn every_format_gives_the_tetrahedron_back() {
         let loaded = read(bytes).unwrap();
         let file_face = vec![0, 1, 2, 3];
         let (mesh, labellings, notes) = (mesh.clone(), vec![], vec![]);
-        assert_eq!(loaded, Loaded { mesh, labellings, file_face, format, unit_mm: None, notes });
+        assert_eq!(
+            loaded,
+            Loaded {
+                mesh,
+                labellings,
+                file_face,
+                format,
+                unit_mm: None,
+                notes
+            }
+        );
     }
-    for (bytes, format) in
-        [(write_stl_binary(&mesh), Format::StlBinary), (ascii_stl(&mesh, "x").into_bytes(), Format::StlAscii)]
-    {
+    for (bytes, format) in [
+        (write_stl_binary(&mesh), Format::StlBinary),
+        (ascii_stl(&mesh, "x").into_bytes(), Format::StlAscii),
+    ] {
         let loaded = read_mesh(&bytes, Some("obj")).unwrap();
         assert_eq!((loaded.format, loaded.mesh.points.len()), (format, 12));
         assert_eq!(weld(&loaded.mesh).mesh.points.len(), 4);
@@ -92,11 +113,18 @@ fn wrong_counts_trailing_bytes_and_colours_of_stl() {
         let mut other = bytes.clone();
         other[80..84].copy_from_slice(&count.to_le_bytes());
         let loaded = stl(&other);
-        assert_eq!((loaded.mesh.triangles.len(), loaded.notes.len()), (4, 1), "{count}");
+        assert_eq!(
+            (loaded.mesh.triangles.len(), loaded.notes.len()),
+            (4, 1),
+            "{count}"
+        );
     }
     let mut trailing = bytes.clone();
     trailing.extend([b'x'; 70]);
-    assert_eq!((stl(&trailing).mesh.triangles.len(), stl(&trailing).notes.len()), (4, 1));
+    assert_eq!(
+        (stl(&trailing).mesh.triangles.len(), stl(&trailing).notes.len()),
+        (4, 1)
+    );
     // Colours: the highest bit says that there is one; in files of Magics that there is none.
     let mut colored = bytes;
     colored[84 + 48..84 + 50].copy_from_slice(&0x8003_u16.to_le_bytes());
@@ -107,7 +135,13 @@ fn wrong_counts_trailing_bytes_and_colours_of_stl() {
     assert_eq!(stl(&colored).labels(LabelSource::Color), Some(&[0, 0, 1, 2][..]));
     let text = ascii_stl(&tetrahedron(), "x");
     assert_eq!(read(&text).unwrap().labellings, []);
-    assert_eq!(read(text.clone() + &text).unwrap().labels(LabelSource::Object).unwrap()[3..5], [1, 2]);
+    assert_eq!(
+        read(text.clone() + &text)
+            .unwrap()
+            .labels(LabelSource::Object)
+            .unwrap()[3..5],
+        [1, 2]
+    );
 }
 
 #[test]
@@ -116,11 +150,17 @@ fn groups_materials_and_colours_divide_and_a_single_one_does_not() {
     let loaded = read(grouped).unwrap();
     assert_eq!(loaded.labels(LabelSource::Group), Some(&[-1, 0, 1, 0][..]));
     assert_eq!(loaded.labels(LabelSource::Material), Some(&[-1, 0, 0, 0][..]));
-    assert_eq!((loaded.labels(LabelSource::Object), loaded.face_labels()), (None, None));
+    assert_eq!(
+        (loaded.labels(LabelSource::Object), loaded.face_labels()),
+        (None, None)
+    );
     let colored = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
                    element face 3\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n\
                    property uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2 255 0 0\n3 0 1 3 0 0 255\n4 0 1 2 3 255 0 0\n";
-    assert_eq!(read(colored).unwrap().labels(LabelSource::Color), Some(&[0, 1, 0, 0][..]));
+    assert_eq!(
+        read(colored).unwrap().labels(LabelSource::Color),
+        Some(&[0, 1, 0, 0][..])
+    );
     let off = "OFF 3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 1 0 0\n3 0 2 1 0 1 0\n";
     assert_eq!(read(off).unwrap().labels(LabelSource::Color), Some(&[0, 1][..]));
 }
@@ -130,27 +170,55 @@ fn strips_of_ply_turn_every_other_triangle_and_begin_anew() {
     let text = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
                 element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
                 0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n9 0 1 2 3 3 -1 1 4 3\n";
-    assert_eq!(read(text).unwrap().mesh.triangles, [[0, 1, 2], [2, 1, 3], [1, 4, 3]]);
+    assert_eq!(
+        read(text).unwrap().mesh.triangles,
+        [[0, 1, 2], [2, 1, 3], [1, 4, 3]]
+    );
 }
 
 #[test]
 fn broken_stl_is_refused_with_its_place() {
     let bytes = write_stl_binary(&tetrahedron());
     let stl = |bytes: &[u8]| read_mesh(bytes, Some(".STL")).unwrap_err();
-    let too_few = ReadError::TooFewBytes { at: Place::Byte(80), what: "triangles", promised: 4, room: 3 };
+    let too_few = ReadError::TooFewBytes {
+        at: Place::Byte(80),
+        what: "triangles",
+        promised: 4,
+        room: 3,
+    };
     assert_eq!(stl(&bytes[..270]), too_few);
-    assert_eq!(stl(&bytes[..50]), ReadError::CutOff { at: Place::Byte(50), within: "the header" });
+    assert_eq!(
+        stl(&bytes[..50]),
+        ReadError::CutOff {
+            at: Place::Byte(50),
+            within: "the header"
+        }
+    );
     let mut nan = bytes;
     nan[84 + 50 + 24..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    assert_eq!(stl(&nan), ReadError::NotFinite { at: Place::Byte(84 + 50 + 24) });
+    assert_eq!(
+        stl(&nan),
+        ReadError::NotFinite {
+            at: Place::Byte(84 + 50 + 24)
+        }
+    );
 
     let text = ascii_stl(&tetrahedron(), "x");
-    assert!(matches!(read(&text[..text.len() - 20]), Err(ReadError::CutOff { .. })));
+    assert!(matches!(
+        read(&text[..text.len() - 20]),
+        Err(ReadError::CutOff { .. })
+    ));
     assert_eq!(
         message(text.replacen("vertex 0", "vertex O", 1)),
         "line 4: expected a number, found \"O\"; correct it there or export the file again"
     );
-    assert_eq!(read("solid\nendsolid"), Err(ReadError::NoTriangles { format: Format::StlAscii, n_points: 0 }));
+    assert_eq!(
+        read("solid\nendsolid"),
+        Err(ReadError::NoTriangles {
+            format: Format::StlAscii,
+            n_points: 0
+        })
+    );
 }
 
 #[test]
@@ -158,19 +226,39 @@ fn obj_quirks() {
     let text = "\u{FEFF}# BOM\r\nmtllib a.mtl\r\nv 0 0 0 1 0 0\r\nv 1 0 0\r\nv 1 1 0 # corner\r\nv 0 1 0\r\nvt 0 0\r\n\
                 f 1/1/1 2//1 \\\r\n  3/1 4\r\nl 1 2\r\nf -4 -3 -2\r\nf 5 1 2\r\nv 0 0 1";
     let loaded = read(text).unwrap();
-    assert_eq!(loaded.mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [4, 0, 1]]);
-    assert_eq!((loaded.file_face.clone(), loaded.n_file_faces()), (vec![0, 0, 1, 2], 3));
+    assert_eq!(
+        loaded.mesh.triangles,
+        [[0, 1, 2], [0, 2, 3], [0, 1, 2], [4, 0, 1]]
+    );
+    assert_eq!(
+        (loaded.file_face.clone(), loaded.n_file_faces()),
+        (vec![0, 0, 1, 2], 3)
+    );
     assert_eq!(
         message("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
         "line 4: a face uses point 4, but the file has 3 points, counted from 1; export the model again"
     );
     assert_eq!(
         read("v 0 0 0\nf 1 0 1").unwrap_err(),
-        ReadError::MissingPoint { at: Place::Line(2), index: 0, n_points: 1, first: 1 }
+        ReadError::MissingPoint {
+            at: Place::Line(2),
+            index: 0,
+            n_points: 1,
+            first: 1
+        }
     );
-    assert!(matches!(read("v 0 0 0\nf -2 1 1"), Err(ReadError::MissingPoint { .. })));
-    assert_eq!(read("v 0 0 -nan(ind)"), Err(ReadError::NotFinite { at: Place::Line(1) }));
-    assert_eq!(read("v 0 0 1e999"), Err(ReadError::NotFinite { at: Place::Line(1) }));
+    assert!(matches!(
+        read("v 0 0 0\nf -2 1 1"),
+        Err(ReadError::MissingPoint { .. })
+    ));
+    assert_eq!(
+        read("v 0 0 -nan(ind)"),
+        Err(ReadError::NotFinite { at: Place::Line(1) })
+    );
+    assert_eq!(
+        read("v 0 0 1e999"),
+        Err(ReadError::NotFinite { at: Place::Line(1) })
+    );
     assert!(message("v 0,5 0 0").contains("found \"0,5\""));
 }
 
@@ -180,8 +268,10 @@ fn what_a_file_is_wrapped_in_makes_no_difference() {
     let expected = read(&plain).unwrap().mesh;
     for (bom, is_big) in [("\u{FEFF}", true), ("\u{FEFF}", false), ("", true), ("", false)] {
         let text = format!("{bom}{plain}");
-        let bytes: Vec<u8> =
-            text.encode_utf16().flat_map(|c| if is_big { c.to_be_bytes() } else { c.to_le_bytes() }).collect();
+        let bytes: Vec<u8> = text
+            .encode_utf16()
+            .flat_map(|c| if is_big { c.to_be_bytes() } else { c.to_le_bytes() })
+            .collect();
         assert_eq!(read(bytes).unwrap().mesh, expected);
     }
     let packed = gzip(plain.as_bytes());
@@ -192,12 +282,23 @@ fn what_a_file_is_wrapped_in_makes_no_difference() {
     assert_eq!(read(zip_of(&[("model.obj.gz", &packed)])).unwrap().mesh, expected);
     // The extension within the archive counts.
     let bare = b"3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2";
-    assert_eq!(read_mesh(&zip_of(&[("x.OFF", bare)]), Some("zip")).unwrap().format, Format::Off);
+    assert_eq!(
+        read_mesh(&zip_of(&[("x.OFF", bare)]), Some("zip"))
+            .unwrap()
+            .format,
+        Format::Off
+    );
 
     let two = zip_of(&[("a.stl", b""), ("b.stl", b"")]);
     assert_eq!(read(two), Err(ReadError::Archive { n_models: 2 }));
-    assert!(matches!(read(b"PK\x03\x04something"), Err(ReadError::Damaged { .. })));
-    assert!(matches!(read(&packed[..packed.len() - 9]), Err(ReadError::Damaged { .. })));
+    assert!(matches!(
+        read(b"PK\x03\x04something"),
+        Err(ReadError::Damaged { .. })
+    ));
+    assert!(matches!(
+        read(&packed[..packed.len() - 9]),
+        Err(ReadError::Damaged { .. })
+    ));
     assert_eq!(read(" \r\n"), Err(ReadError::Empty));
     assert_eq!(read("hello"), Err(ReadError::UnknownFormat));
     for (text, what) in [
@@ -227,7 +328,9 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 fn zip_of(files: &[(&str, &[u8])]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in files {
-        archive.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        archive
+            .start_file(*name, zip::write::SimpleFileOptions::default())
+            .unwrap();
         std::io::Write::write_all(&mut archive, bytes).unwrap();
     }
     archive.finish().unwrap().into_inner()
@@ -272,7 +375,10 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
     assert_eq!(loaded.face_labels(), Some(&[5, 5, -1][..]));
     assert_eq!(loaded.file_face, [0, 0, 1]);
     assert_eq!(loaded.mesh.points[3], Vec3::new(0.0, 1.0, -2.0));
-    assert!(matches!(read(&binary[..binary.len() - 1]), Err(ReadError::CutOff { .. })));
+    assert!(matches!(
+        read(&binary[..binary.len() - 1]),
+        Err(ReadError::CutOff { .. })
+    ));
 }
 
 #[test]
@@ -290,20 +396,39 @@ fn counts_that_lie_reserve_nothing() {
             "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
         )
     };
-    assert!(matches!(read(ply("18446744073709551615")), Err(ReadError::TooFewBytes { room: 1, .. })));
-    assert!(matches!(read(ply("-1")), Err(ReadError::Malformed { at: Place::Line(3), .. })));
-    assert!(matches!(read("OFF 353535235358 6 0\n0 0 0\n"), Err(ReadError::TooFewBytes { what: "points", .. })));
+    assert!(matches!(
+        read(ply("18446744073709551615")),
+        Err(ReadError::TooFewBytes { room: 1, .. })
+    ));
+    assert!(matches!(
+        read(ply("-1")),
+        Err(ReadError::Malformed {
+            at: Place::Line(3),
+            ..
+        })
+    ));
+    assert!(matches!(
+        read("OFF 353535235358 6 0\n0 0 0\n"),
+        Err(ReadError::TooFewBytes { what: "points", .. })
+    ));
     let empty_rows = "ply\nformat ascii 1.0\nelement ghost 18446744073709551615\nend_header\n";
     assert!(matches!(read(empty_rows), Err(ReadError::NoTriangles { .. })));
 }
 
 #[test]
 fn off_quirks() {
-    let text = "# by hand\nCOFF 4 2 0 # counts\n\n0 0 0 255 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 9 9 9\n3 0 3 1\n";
+    let text =
+        "# by hand\nCOFF 4 2 0 # counts\n\n0 0 0 255 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 9 9 9\n3 0 3 1\n";
     let loaded = read(text).unwrap();
     assert_eq!(loaded.mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 1]]);
     assert_eq!(loaded.file_face, [0, 0, 1]);
-    assert!(matches!(read("OFF BINARY\n1 1 1"), Err(ReadError::Unsupported { at: Place::Line(1), .. })));
+    assert!(matches!(
+        read("OFF BINARY\n1 1 1"),
+        Err(ReadError::Unsupported {
+            at: Place::Line(1),
+            ..
+        })
+    ));
     assert!(matches!(read("4OFF\n1 1 1"), Err(ReadError::Unsupported { .. })));
     assert!(
         matches!(read_mesh(b"3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2", Some("off")), Ok(loaded) if loaded.format == Format::Off)
@@ -312,15 +437,33 @@ fn off_quirks() {
         read("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1    \n"),
         Err(ReadError::TooFewCorners { n_corners: 2, .. })
     ));
-    assert!(matches!(read("OFF 2 1 0\n0 0 0\n1 0 0 # long enough\n"), Err(ReadError::CutOff { .. })));
+    assert!(matches!(
+        read("OFF 2 1 0\n0 0 0\n1 0 0 # long enough\n"),
+        Err(ReadError::CutOff { .. })
+    ));
 }
 
 #[test]
 fn labels_are_whole_numbers_from_0() {
     assert_eq!(read_labels(b"3\r\n\r\n 0 \r\n12.0"), Ok(vec![3, 0, 12]));
-    assert_eq!(read_labels(b"1\n-1\n"), Err(ReadError::NegativeLabel { at: Place::Line(2), label: -1 }));
+    assert_eq!(
+        read_labels(b"1\n-1\n"),
+        Err(ReadError::NegativeLabel {
+            at: Place::Line(2),
+            label: -1
+        })
+    );
     for bad in ["1\nfoo\n", "1\n2.5\n", "1\n2 3\n", "1\n1e40\n", "1\nnan\n"] {
-        assert!(matches!(read_labels(bad.as_bytes()), Err(ReadError::Malformed { at: Place::Line(2), .. })), "{bad}");
+        assert!(
+            matches!(
+                read_labels(bad.as_bytes()),
+                Err(ReadError::Malformed {
+                    at: Place::Line(2),
+                    ..
+                })
+            ),
+            "{bad}"
+        );
     }
     assert_eq!(read_labels(b"\n \n"), Err(ReadError::Empty));
 }
@@ -349,10 +492,17 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
     let bytes = write_3mf(&objects);
     assert_eq!(bytes, write_3mf(&objects));
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
-    let names: Vec<_> = archive.file_names().map(|name| name.unwrap().into_owned()).collect();
+    let names: Vec<_> = archive
+        .file_names()
+        .map(|name| name.unwrap().into_owned())
+        .collect();
     assert_eq!(names, ["3D/3dmodel.model", "[Content_Types].xml", "_rels/.rels"]);
     let mut model = String::new();
-    archive.by_name("3D/3dmodel.model").unwrap().read_to_string(&mut model).unwrap();
+    archive
+        .by_name("3D/3dmodel.model")
+        .unwrap()
+        .read_to_string(&mut model)
+        .unwrap();
     for part in [
         "unit=\"millimeter\"",
         "<metadata name=\"Title\">",
@@ -364,13 +514,20 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
     ] {
         assert!(model.contains(part), "{part} in {model}");
     }
-    assert_eq!((model.matches("<vertex ").count(), model.matches("<item ").count()), (8, 2));
+    assert_eq!(
+        (model.matches("<vertex ").count(), model.matches("<item ").count()),
+        (8, 2)
+    );
 }
 
 /// A valid file of each format.
 fn valid_files() -> Vec<Vec<u8>> {
     let mesh = tetrahedron();
-    let mut files = vec![write_stl_binary(&mesh), write_ply(&mesh, Some(&[0, 1, 2, 3])), write_ply(&mesh, None)];
+    let mut files = vec![
+        write_stl_binary(&mesh),
+        write_ply(&mesh, Some(&[0, 1, 2, 3])),
+        write_ply(&mesh, None),
+    ];
     files.extend([ascii_stl(&mesh, "x"), obj(&mesh), off(&mesh)].map(String::into_bytes));
     files.push(write_painted_3mf("x", &mesh, &[0, 1, 2, 3]));
     files.push(
@@ -384,7 +541,14 @@ fn valid_files() -> Vec<Vec<u8>> {
 /// Everything that meets bytes from outside.
 fn read_all_ways(bytes: &[u8]) {
     let _ = read_labels(bytes);
-    for extension in [None, Some("stl"), Some("obj"), Some("ply"), Some("off"), Some("gltf")] {
+    for extension in [
+        None,
+        Some("stl"),
+        Some("obj"),
+        Some("ply"),
+        Some("off"),
+        Some("gltf"),
+    ] {
         if let Ok(loaded) = read_mesh(bytes, extension) {
             let _ = shellock_geom::check::into_solid(&loaded.mesh);
         }

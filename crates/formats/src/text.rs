@@ -14,7 +14,10 @@ pub(super) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     pub(super) fn of(bytes: &'a [u8]) -> Self {
-        Self { rest: without_bom(bytes), n_done: 0 }
+        Self {
+            rest: without_bom(bytes),
+            n_done: 0,
+        }
     }
 
     /// What follows the last line handed out.
@@ -35,9 +38,15 @@ impl<'a> Iterator for Lines<'a> {
         if self.rest.is_empty() {
             return None;
         }
-        let end = self.rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(self.rest.len());
+        let end = self
+            .rest
+            .iter()
+            .position(|&b| b == b'\n' || b == b'\r')
+            .unwrap_or(self.rest.len());
         let (line, after) = self.rest.split_at(end);
-        self.rest = after.strip_prefix(b"\r\n").unwrap_or_else(|| after.get(1..).unwrap_or_default());
+        self.rest = after
+            .strip_prefix(b"\r\n")
+            .unwrap_or_else(|| after.get(1..).unwrap_or_default());
         self.n_done += 1;
         Some((self.place(), line))
     }
@@ -50,7 +59,8 @@ pub(super) fn without_bom(bytes: &[u8]) -> &[u8] {
 
 /// The words of a line.
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+    line.split(u8::is_ascii_whitespace)
+        .filter(|word| !word.is_empty())
 }
 
 /// The part of a line before `#`.
@@ -66,7 +76,11 @@ pub(super) fn malformed(at: Place, expected: &'static str, found: &[u8]) -> Read
         .map(|c| if c.is_control() { ' ' } else { c })
         .collect();
     let ellipsis = if found.len() > shown.len() { "…" } else { "" };
-    ReadError::Malformed { at, expected, found: shown + ellipsis }
+    ReadError::Malformed {
+        at,
+        expected,
+        found: shown + ellipsis,
+    }
 }
 
 /// The next word as a finite coordinate.
@@ -76,7 +90,12 @@ pub(super) fn coordinate(word: Option<&[u8]>, at: Place) -> Result<f64, ReadErro
         Some(value) if value.is_finite() => Ok(value),
         Some(_) => Err(ReadError::NotFinite { at }),
         // C libraries write "1.#QNAN" and "-nan(ind)", which are no Rust floats.
-        None if word.contains(&b'#') || word.to_ascii_lowercase().windows(3).any(|w| w == b"nan" || w == b"inf") => {
+        None if word.contains(&b'#')
+            || word
+                .to_ascii_lowercase()
+                .windows(3)
+                .any(|w| w == b"nan" || w == b"inf") =>
+        {
             Err(ReadError::NotFinite { at })
         }
         None => Err(malformed(at, "a number", word)),
@@ -84,14 +103,23 @@ pub(super) fn coordinate(word: Option<&[u8]>, at: Place) -> Result<f64, ReadErro
 }
 
 /// Three coordinates from the next three words.
-pub(super) fn point<'a>(words: &mut impl Iterator<Item = &'a [u8]>, at: Place) -> Result<[f64; 3], ReadError> {
-    Ok([coordinate(words.next(), at)?, coordinate(words.next(), at)?, coordinate(words.next(), at)?])
+pub(super) fn point<'a>(
+    words: &mut impl Iterator<Item = &'a [u8]>,
+    at: Place,
+) -> Result<[f64; 3], ReadError> {
+    Ok([
+        coordinate(words.next(), at)?,
+        coordinate(words.next(), at)?,
+        coordinate(words.next(), at)?,
+    ])
 }
 
 /// The next word as a whole number; `3.0` is one.
 pub(super) fn whole(word: Option<&[u8]>, at: Place, expected: &'static str) -> Result<i64, ReadError> {
     let word = word.unwrap_or_default();
-    parse::<i64>(word).or_else(|| parse::<f64>(word).and_then(whole_of)).ok_or_else(|| malformed(at, expected, word))
+    parse::<i64>(word)
+        .or_else(|| parse::<f64>(word).and_then(whole_of))
+        .ok_or_else(|| malformed(at, expected, word))
 }
 
 /// `value` as an integer where it is one that a float holds exactly.

@@ -1,5 +1,5 @@
-//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing; clearances of two half
-//! shells of 26 000 triangles.
+//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing;
+//! clearances of two half shells of 26 000 triangles.
 
 use divan::{Bencher, black_box};
 use shellock_geom::band::Band;
@@ -17,12 +17,23 @@ fn main() {
 }
 
 fn ball() -> Solid {
-    let bounds = Aabb { min: Vec3::splat(-51.0), max: Vec3::splat(51.0) };
+    let bounds = Aabb {
+        min: Vec3::splat(-51.0),
+        max: Vec3::splat(51.0),
+    };
     Solid::new(dense(bounds, 1.0, |p| 50.0 - p.length())).expect("a ball is closed")
 }
 
 fn band(solid: &Solid) -> (Band, Vec<f32>) {
-    Band::along(&SignedDistance::new(solid), solid.mesh().bounds(), 0.8, 2.0, 7.0, 5.0).expect("small grid")
+    Band::along(
+        &SignedDistance::new(solid),
+        solid.mesh().bounds(),
+        0.8,
+        2.0,
+        7.0,
+        5.0,
+    )
+    .expect("small grid")
 }
 
 #[divan::bench]
@@ -42,7 +53,13 @@ fn nearest_100k(bencher: Bencher) {
                 * (46.0 + 8.0 * (t * 0.19).fract())
         })
         .collect();
-    bencher.bench(|| queries.iter().filter_map(|&q| bvh.nearest(q, 100.0)).map(|n| n.distance_sq).sum::<f64>());
+    bencher.bench(|| {
+        queries
+            .iter()
+            .filter_map(|&q| bvh.nearest(q, 100.0))
+            .map(|n| n.distance_sq)
+            .sum::<f64>()
+    });
 }
 
 #[divan::bench]
@@ -76,14 +93,22 @@ fn subtract_ball(bencher: Bencher) {
 fn remesh_octants(bencher: Bencher) {
     let ball = ball();
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
-    let labels: Vec<u32> = (0..ball.mesh().triangles.len()).map(|f| octant(ball.mesh().face_center(f))).collect();
-    let params = RemeshParams { target_edge_mm: 6.0, n_rounds: 6 };
+    let labels: Vec<u32> = (0..ball.mesh().triangles.len())
+        .map(|f| octant(ball.mesh().face_center(f)))
+        .collect();
+    let params = RemeshParams {
+        target_edge_mm: 6.0,
+        n_rounds: 6,
+    };
     bencher.bench(|| remesh(&params, black_box(ball.mesh()), &labels));
 }
 
 /// Half of a shell 2 mm thick, 0.05 mm off a wavy seam.
 fn half_shell(side: f64) -> Shape {
-    let bounds = Aabb { min: Vec3::splat(-42.0), max: Vec3::splat(42.0) };
+    let bounds = Aabb {
+        min: Vec3::splat(-42.0),
+        max: Vec3::splat(42.0),
+    };
     let seam = |p: Vec3| side * (p.z - 0.5 * (0.3 * p.x).sin()) - 0.05;
     let field = |p: Vec3| (40.0 - p.length()).min(p.length() - 38.0).min(seam(p));
     Shape::new(&Solid::new(dense(bounds, 1.07, field)).expect("half a shell is closed"))
@@ -98,6 +123,10 @@ fn gap_of_half_shells(bencher: Bencher) {
 #[divan::bench]
 fn gap_of_half_shells_drawn_apart(bencher: Bencher) {
     let (upper, lower) = (half_shell(1.0), half_shell(-1.0));
-    let motion = Translation { along: Vec3::new(1.0, 0.0, 1.0), from_mm: 0.0, far_mm: f64::INFINITY };
+    let motion = Translation {
+        along: Vec3::new(1.0, 0.0, 1.0),
+        from_mm: 0.0,
+        far_mm: f64::INFINITY,
+    };
     bencher.bench(|| swept_gap(black_box(&upper), &lower, &motion, Scope::Everything, 1.0));
 }

@@ -1,7 +1,8 @@
 //! A sparse band of grid nodes along a surface, the home of all sampled fields.
 //!
-//! A field is a `Vec<f32>` with one value a node. Memory and time follow the surface: only nodes within a given distance
-//! of it exist. Nodes are stored row by row (x fastest, then y, then z), in runs of consecutive x.
+//! A field is a `Vec<f32>` with one value a node. Memory and time follow the surface: only nodes within a
+//! given distance of it exist. Nodes are stored row by row (x fastest, then y, then z), in runs of
+//! consecutive x.
 
 use rayon::prelude::*;
 
@@ -46,9 +47,9 @@ pub struct GridTooFine {
 }
 
 impl Band {
-    /// The nodes with a signed distance in [−`outside_mm`, `inside_mm`] to the surface within `bounds`, and that distance
-    /// (positive inside) as a first field. Where a block of nodes lies deeper than `exact_mm`, its distances are
-    /// extrapolated from its middle to first order: deep nodes only need to exist.
+    /// The nodes with a signed distance in [−`outside_mm`, `inside_mm`] to the surface within `bounds`, and
+    /// that distance (positive inside) as a first field. Where a block of nodes lies deeper than `exact_mm`,
+    /// its distances are extrapolated from its middle to first order: deep nodes only need to exist.
     pub fn along(
         surface: &SignedDistance,
         bounds: Aabb,
@@ -60,9 +61,20 @@ impl Band {
         let room = bounds.grown(outside_mm + 2.0 * cell_mm);
         let dims = room.size().to_array().map(|s| (s / cell_mm).ceil() as usize + 1);
         if dims.iter().any(|&n| n > usize::from(u16::MAX) - 1) {
-            return Err(GridTooFine { cell_mm, size_mm: bounds.size().max_element() });
+            return Err(GridTooFine {
+                cell_mm,
+                size_mm: bounds.size().max_element(),
+            });
         }
-        let rule = BandRule { surface, origin: room.min, cell_mm, dims, outside_mm, inside_mm, exact_mm };
+        let rule = BandRule {
+            surface,
+            origin: room.min,
+            cell_mm,
+            dims,
+            outside_mm,
+            inside_mm,
+            exact_mm,
+        };
         let blocks = rule.blocks();
         let mut found: Vec<(u64, f32)> = blocks.par_iter().flat_map_iter(|&b| rule.nodes_of(b)).collect();
         found.par_sort_unstable_by_key(|n| n.0);
@@ -82,7 +94,11 @@ impl Band {
             if last == Some(key.wrapping_sub(1)) && i > 0 {
                 runs.last_mut().expect("a run was begun").len += 1;
             } else {
-                runs.push(Run { i0: i as u32, first: node as u32, len: 1 });
+                runs.push(Run {
+                    i0: i as u32,
+                    first: node as u32,
+                    len: 1,
+                });
                 row_start[row + 1] += 1;
             }
             coords.push([i as u16, (row % ny) as u16, (row / ny) as u16]);
@@ -91,13 +107,22 @@ impl Band {
         for r in 0..ny * nz {
             row_start[r + 1] += row_start[r];
         }
-        let mut band = Self { origin, cell_mm, dims, row_start, runs, coords, sides: Vec::new() };
+        let mut band = Self {
+            origin,
+            cell_mm,
+            dims,
+            row_start,
+            runs,
+            coords,
+            sides: Vec::new(),
+        };
         band.sides = band
             .coords
             .par_iter()
             .map(|&[i, j, k]| {
                 let [i, j, k] = [i, j, k].map(i64::from);
-                [(0, -1), (0, 1), (-1, 0), (1, 0)].map(|(dk, dj)| band.node_at([i, j + dj, k + dk]).unwrap_or(NONE))
+                [(0, -1), (0, 1), (-1, 0), (1, 0)]
+                    .map(|(dk, dj)| band.node_at([i, j + dj, k + dk]).unwrap_or(NONE))
             })
             .map(|[y0, y1, z0, z1]| [y0, y1, z0, z1])
             .collect();
@@ -144,7 +169,8 @@ impl Band {
         (offset < i64::from(run.len)).then_some(run.first + offset as u32)
     }
 
-    /// The neighbour of `node` one step of −1, 0 or 1 along each axis away, if the band has it without a detour out of it.
+    /// The neighbour of `node` one step of −1, 0 or 1 along each axis away, if the band has it without a
+    /// detour out of it.
     pub(crate) fn neighbour(&self, node: u32, [dx, dy, dz]: [i32; 3]) -> Option<u32> {
         let mut at = node;
         if dy != 0 {
@@ -174,11 +200,14 @@ impl Band {
 
     /// The up to six nodes next to `node` along the axes.
     pub fn face_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
-        let along_x = [-1, 1].into_iter().filter_map(move |dx| self.neighbour(node, [dx, 0, 0]));
+        let along_x = [-1, 1]
+            .into_iter()
+            .filter_map(move |dx| self.neighbour(node, [dx, 0, 0]));
         along_x.chain(self.sides[node as usize].into_iter().filter(|&n| n != NONE))
     }
 
-    /// Trilinear value of `field` at `p`; corners outside the band do not count. `None` where all eight are missing.
+    /// Trilinear value of `field` at `p`; corners outside the band do not count. `None` where all eight are
+    /// missing.
     pub fn sample(&self, field: &[f32], p: Vec3) -> Option<f64> {
         let q = (p - self.origin) / self.cell_mm;
         let base = q.floor();
@@ -187,7 +216,9 @@ impl Band {
         let (mut sum, mut weight) = (0.0, 0.0);
         for c in 0..8i64 {
             let [a, b, d] = [c & 1, c >> 1 & 1, c >> 2];
-            let Some(node) = self.node_at([i + a, j + b, k + d]) else { continue };
+            let Some(node) = self.node_at([i + a, j + b, k + d]) else {
+                continue;
+            };
             let share = |bit: i64, t: f64| if bit == 1 { t } else { 1.0 - t };
             // A corner with no weight still answers where all others are missing.
             let w = (share(a, t.x) * share(b, t.y) * share(d, t.z)).max(1e-9);
@@ -197,7 +228,8 @@ impl Band {
         (weight > 0.0).then(|| sum / weight)
     }
 
-    /// Gradient of the trilinear interpolant's central differences at `p`, a unit of `field` per mm; zero off the band.
+    /// Gradient of the trilinear interpolant's central differences at `p`, a unit of `field` per mm; zero off
+    /// the band.
     pub fn gradient(&self, field: &[f32], p: Vec3) -> Vec3 {
         let h = 0.5 * self.cell_mm;
         Vec3::from_array([Vec3::X, Vec3::Y, Vec3::Z].map(|axis| {
@@ -235,7 +267,10 @@ impl Band {
 
     /// The nodes in `b`, ascending.
     pub fn nodes_in(&self, b: Aabb) -> Vec<u32> {
-        (0..self.len() as u32).into_par_iter().filter(|&n| b.contains(self.position(n as usize))).collect()
+        (0..self.len() as u32)
+            .into_par_iter()
+            .filter(|&n| b.contains(self.position(n as usize)))
+            .collect()
     }
 }
 
@@ -270,14 +305,17 @@ impl BandRule<'_> {
 
     fn blocks(&self) -> Vec<[usize; 3]> {
         let n = self.dims.map(|d| d.div_ceil(COARSE));
-        let coarse: Vec<[usize; 3]> =
-            (0..n[0] * n[1] * n[2]).map(|b| [b % n[0], b / n[0] % n[1], b / n[0] / n[1]].map(|x| x * COARSE)).collect();
+        let coarse: Vec<[usize; 3]> = (0..n[0] * n[1] * n[2])
+            .map(|b| [b % n[0], b / n[0] % n[1], b / n[0] / n[1]].map(|x| x * COARSE))
+            .collect();
         coarse
             .par_iter()
             .filter(|&&b| self.reach(b, COARSE).is_some())
             .flat_map_iter(|&[i, j, k]| {
                 let steps = || (0..COARSE).step_by(FINE);
-                steps().flat_map(move |dk| steps().flat_map(move |dj| steps().map(move |di| [i + di, j + dj, k + dk])))
+                steps().flat_map(move |dk| {
+                    steps().flat_map(move |dj| steps().map(move |di| [i + di, j + dj, k + dk]))
+                })
             })
             .collect()
     }
@@ -285,7 +323,9 @@ impl BandRule<'_> {
     /// The block's nodes that belong, as (row-major key, signed distance).
     fn nodes_of(&self, corner: [usize; 3]) -> Vec<(u64, f32)> {
         let mut nodes = Vec::new();
-        let Some(middle) = self.reach(corner, FINE) else { return nodes };
+        let Some(middle) = self.reach(corner, FINE) else {
+            return nodes;
+        };
         let half = 0.5 * (FINE - 1) as f64 * self.cell_mm;
         let center = self.position(corner) + half;
         let is_deep = middle.signed_mm > self.exact_mm + half * 3f64.sqrt();
@@ -300,7 +340,9 @@ impl BandRule<'_> {
                     } else {
                         // Distance is 1-Lipschitz: the middle's answer bounds the search.
                         let bound = (middle.signed_mm.abs() + p.distance(center)) * (1.0 + 1e-9) + 1e-9;
-                        let Some(d) = self.surface.at(p, bound) else { continue };
+                        let Some(d) = self.surface.at(p, bound) else {
+                            continue;
+                        };
                         d.signed_mm
                     };
                     if signed_mm >= -self.outside_mm && signed_mm <= self.inside_mm {
@@ -320,7 +362,10 @@ pub(crate) mod tests {
 
     /// The band of the cube [0, 8]³ with h = 0.5, and its distance field.
     pub(crate) fn cube_band() -> (Band, Vec<f32>) {
-        let b = Aabb { min: Vec3::ZERO, max: Vec3::splat(8.0) };
+        let b = Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::splat(8.0),
+        };
         let solid = Solid::new(Volume::cuboid(b).to_mesh()).unwrap();
         Band::along(&SignedDistance::new(&solid), b, 0.5, 1.3, 2.6, 2.6).unwrap()
     }
@@ -328,9 +373,16 @@ pub(crate) mod tests {
     #[test]
     fn the_band_is_exactly_the_nodes_within_its_distances() {
         let (band, phi) = cube_band();
-        let b = Aabb { min: Vec3::ZERO, max: Vec3::splat(8.0) };
+        let b = Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::splat(8.0),
+        };
         let signed = |p: Vec3| {
-            if b.contains(p) { (p - b.min).min(b.max - p).min_element() } else { -b.distance_sq(p).sqrt() }
+            if b.contains(p) {
+                (p - b.min).min(b.max - p).min_element()
+            } else {
+                -b.distance_sq(p).sqrt()
+            }
         };
         let [nx, ny, nz] = band.dims.map(|n| n as i64);
         for (i, j, k) in (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k)))) {

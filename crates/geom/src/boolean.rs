@@ -1,7 +1,8 @@
 //! Mesh booleans. The only file that names the boolean library.
 //!
-//! A [`Volume`] is a possibly empty region of space bounded by a manifold mesh; unions, intersections and differences of
-//! volumes are volumes, always. The library promises the topology of its results; [`Volume::to_mesh`] hands them on.
+//! A [`Volume`] is a possibly empty region of space bounded by a manifold mesh; unions, intersections and
+//! differences of volumes are volumes, always. The library promises the topology of its results;
+//! [`Volume::to_mesh`] hands them on.
 
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -50,7 +51,9 @@ impl Volume {
         let made = Manifold::from_mesh_gl64(&as_gl(mesh));
         match made.status() {
             Error::NoError => Ok(Self(made)),
-            other => Err(NotAVolume { reason: format!("{other:?}") }),
+            other => Err(NotAVolume {
+                reason: format!("{other:?}"),
+            }),
         }
     }
 
@@ -58,17 +61,25 @@ impl Volume {
     pub fn hull(points: &[Vec3]) -> Self {
         let points: Vec<V> = points.iter().map(|&p| v(p)).collect();
         let hull = Manifold::hull(&points);
-        if hull.status() == Error::NoError && hull.volume() > 0.0 { Self(hull) } else { Self::empty() }
+        if hull.status() == Error::NoError && hull.volume() > 0.0 {
+            Self(hull)
+        } else {
+            Self::empty()
+        }
     }
 
-    /// The region swept by a polygon that moves through `rings`: one closed loft with flat caps. All rings have the same
-    /// number of points, in the same order; the loft must not fold back through itself. Empty for fewer than two rings.
+    /// The region swept by a polygon that moves through `rings`: one closed loft with flat caps. All rings
+    /// have the same number of points, in the same order; the loft must not fold back through itself. Empty
+    /// for fewer than two rings.
     pub fn loft(rings: &[Vec<Vec3>]) -> Self {
         if rings.len() < 2 || rings[0].len() < 3 {
             return Self::empty();
         }
         let n = rings[0].len() as u32;
-        let mut mesh = TriMesh { points: rings.concat(), triangles: Vec::new() };
+        let mut mesh = TriMesh {
+            points: rings.concat(),
+            triangles: Vec::new(),
+        };
         for ring in 0..rings.len() as u32 - 1 {
             for i in 0..n {
                 let (a, b) = (ring * n + i, ring * n + (i + 1) % n);
@@ -98,7 +109,10 @@ impl Volume {
             0 => Self::empty(),
             1 => parts.remove(0),
             _ => {
-                let leaves = parts.into_iter().map(|p| CsgNode::leaf(p.0.into_impl())).collect();
+                let leaves = parts
+                    .into_iter()
+                    .map(|p| CsgNode::leaf(p.0.into_impl()))
+                    .collect();
                 Self(Manifold::from_impl(CsgNode::op_n(OpType::Add, leaves).evaluate()))
             }
         }
@@ -155,7 +169,11 @@ impl Volume {
 
     /// Surface area, mm².
     pub fn area(&self) -> f64 {
-        if self.is_empty() { 0.0 } else { self.0.surface_area() }
+        if self.is_empty() {
+            0.0
+        } else {
+            self.0.surface_area()
+        }
     }
 
     /// Whether there is nothing.
@@ -179,10 +197,14 @@ impl Volume {
             return Aabb::EMPTY;
         }
         let b = self.0.bounding_box();
-        Aabb { min: Vec3::new(b.min.x, b.min.y, b.min.z), max: Vec3::new(b.max.x, b.max.y, b.max.z) }
+        Aabb {
+            min: Vec3::new(b.min.x, b.min.y, b.min.z),
+            max: Vec3::new(b.max.x, b.max.y, b.max.z),
+        }
     }
 
-    /// Connected boundary surfaces, largest volume first; a cavity comes out as a component of negative volume.
+    /// Connected boundary surfaces, largest volume first; a cavity comes out as a component of negative
+    /// volume.
     pub fn components(&self) -> Vec<Self> {
         let mut parts: Vec<Self> = self.0.decompose().into_iter().map(Self).collect();
         parts.sort_by(|a, b| b.volume().total_cmp(&a.volume()));
@@ -192,22 +214,39 @@ impl Volume {
     /// The region bounded by those connected boundary surfaces whose points `keep` accepts.
     pub fn retain(&self, keep: impl Fn(&mut dyn Iterator<Item = Vec3>) -> bool) -> Self {
         let mesh = self.to_mesh();
-        // The library's own decomposition copies all points for every part: gigabytes where a cut leaves many crumbs. It is
-        // asked only where parts share an edge, which a topology of half-edges cannot tell apart.
-        let Some(topology) = Topology::of_mesh(&mesh) else { return self.retain_decomposed(keep) };
+        // The library's own decomposition copies all points for every part: gigabytes where a cut leaves many
+        // crumbs. It is asked only where parts share an edge, which a topology of half-edges cannot tell
+        // apart.
+        let Some(topology) = Topology::of_mesh(&mesh) else {
+            return self.retain_decomposed(keep);
+        };
         let (component, n) = components(&topology, |_, _| true);
         let mut points: Vec<Vec<u32>> = vec![Vec::new(); n];
         let mut is_told = vec![false; mesh.points.len()];
         for (triangle, &c) in mesh.triangles.iter().zip(&component) {
-            let new = triangle.iter().filter(|v| !std::mem::replace(&mut is_told[**v as usize], true));
+            let new = triangle
+                .iter()
+                .filter(|v| !std::mem::replace(&mut is_told[**v as usize], true));
             points[c as usize].extend(new);
         }
-        let is_kept: Vec<bool> = points.iter().map(|p| keep(&mut p.iter().map(|&v| mesh.points[v as usize]))).collect();
+        let is_kept: Vec<bool> = points
+            .iter()
+            .map(|p| keep(&mut p.iter().map(|&v| mesh.points[v as usize])))
+            .collect();
         if is_kept.iter().all(|k| *k) {
             return self.clone();
         }
-        let kept = mesh.triangles.iter().zip(&component).filter(|(_, c)| is_kept[**c as usize]).map(|(t, _)| *t);
-        let part = TriMesh { triangles: kept.collect(), points: mesh.points }.without_unused_points();
+        let kept = mesh
+            .triangles
+            .iter()
+            .zip(&component)
+            .filter(|(_, c)| is_kept[**c as usize])
+            .map(|(t, _)| *t);
+        let part = TriMesh {
+            triangles: kept.collect(),
+            points: mesh.points,
+        }
+        .without_unused_points();
         Self::from_closed_mesh(&part).expect("a closed part of a manifold is a manifold")
     }
 
@@ -217,10 +256,19 @@ impl Volume {
         let is_kept = |part: &Manifold| {
             let gl = part.get_mesh_gl64(-1);
             let step = usize::try_from(gl.num_prop).expect("three properties a point");
-            keep(&mut gl.vert_properties.chunks_exact(step).map(|c| Vec3::new(c[0], c[1], c[2])))
+            keep(
+                &mut gl
+                    .vert_properties
+                    .chunks_exact(step)
+                    .map(|c| Vec3::new(c[0], c[1], c[2])),
+            )
         };
         let kept: Vec<Manifold> = parts.into_iter().filter(is_kept).collect();
-        if kept.len() == n_parts { self.clone() } else { Self(Manifold::compose(&kept)) }
+        if kept.len() == n_parts {
+            self.clone()
+        } else {
+            Self(Manifold::compose(&kept))
+        }
     }
 
     /// The boundary as a mesh; no points where empty.
@@ -231,11 +279,18 @@ impl Volume {
         let gl = self.0.get_mesh_gl64(-1);
         let step = usize::try_from(gl.num_prop).expect("three properties a point");
         TriMesh {
-            points: gl.vert_properties.chunks_exact(step).map(|c| Vec3::new(c[0], c[1], c[2])).collect(),
+            points: gl
+                .vert_properties
+                .chunks_exact(step)
+                .map(|c| Vec3::new(c[0], c[1], c[2]))
+                .collect(),
             triangles: gl
                 .tri_verts
                 .chunks_exact(3)
-                .map(|t| [t[0], t[1], t[2]].map(|i| u32::try_from(i).expect("the library counts points in 32 bits")))
+                .map(|t| {
+                    [t[0], t[1], t[2]]
+                        .map(|i| u32::try_from(i).expect("the library counts points in 32 bits"))
+                })
                 .collect(),
         }
     }
@@ -245,40 +300,52 @@ impl Volume {
     }
 }
 
-/// The boundary of all that a closed mesh winds around at least once: parts that overlap become one, what lies within is
-/// dissolved, and the result neither crosses itself nor has edges of more than two triangles.
+/// The boundary of all that a closed mesh winds around at least once: parts that overlap become one, what
+/// lies within is dissolved, and the result neither crosses itself nor has edges of more than two triangles.
 ///
-/// Cost follows the pairs of triangles that cross; it is exact arithmetic. Fails where the mesh is open or not oriented.
+/// Cost follows the pairs of triangles that cross; it is exact arithmetic. Fails where the mesh is open or
+/// not oriented.
 pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
     guarded(mesh, |mesh| {
         let soup = Manifold::from_mesh_gl64_robust(&as_gl(mesh));
-        let refused = |made: &Manifold| NotAVolume { reason: format!("{:?}", made.status()) };
+        let refused = |made: &Manifold| NotAVolume {
+            reason: format!("{:?}", made.status()),
+        };
         if soup.status() != Error::NoError {
             return Err(refused(&soup));
         }
         let rebuilt = soup.rebuild_solid(WindingRule::Positive);
-        if rebuilt.status() == Error::NoError { Ok(Volume(rebuilt).to_mesh()) } else { Err(refused(&rebuilt)) }
+        if rebuilt.status() == Error::NoError {
+            Ok(Volume(rebuilt).to_mesh())
+        } else {
+            Err(refused(&rebuilt))
+        }
     })
     .and_then(|(rebuilt, turn)| Ok(turn.back(rebuilt?)))
 }
 
-/// Whether triangles of a closed mesh cross or lie upon each other: exact, where crossing in an edge counts too.
+/// Whether triangles of a closed mesh cross or lie upon each other: exact, where crossing in an edge counts
+/// too.
 ///
 /// Fails where the library cannot tell.
 pub fn touches_itself(mesh: &TriMesh) -> Result<bool, NotAVolume> {
-    guarded(mesh, |mesh| Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections())
-        .map(|(touches, _)| touches)
+    guarded(mesh, |mesh| {
+        Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections()
+    })
+    .map(|(touches, _)| touches)
 }
 
 /// How many threads are within [`guarded`].
 static N_GUARDED: AtomicUsize = AtomicUsize::new(0);
 
-/// Whether a panic now may be one of the library's that becomes an error, so that a panic hook need not tell it.
+/// Whether a panic now may be one of the library's that becomes an error, so that a panic hook need not tell
+/// it.
 pub fn is_guarded() -> bool {
     N_GUARDED.load(Ordering::Relaxed) > 0
 }
 
-/// A rotation that rounds no coordinate: the axes are passed on by some places, then half a turn about z or none.
+/// A rotation that rounds no coordinate: the axes are passed on by some places, then half a turn about z or
+/// none.
 #[derive(Clone, Copy)]
 struct Turn {
     n_places: usize,
@@ -287,11 +354,17 @@ struct Turn {
 
 impl Turn {
     fn all() -> impl Iterator<Item = Self> {
-        [false, true].into_iter().flat_map(|is_half| (0..3).map(move |n_places| Self { n_places, is_half }))
+        [false, true]
+            .into_iter()
+            .flat_map(|is_half| (0..3).map(move |n_places| Self { n_places, is_half }))
     }
 
     fn half(self, p: Vec3) -> Vec3 {
-        if self.is_half { Vec3::new(-p.x, -p.y, p.z) } else { p }
+        if self.is_half {
+            Vec3::new(-p.x, -p.y, p.z)
+        } else {
+            p
+        }
     }
 
     fn forth(self, mut mesh: TriMesh) -> TriMesh {
@@ -315,17 +388,21 @@ impl Turn {
 
 /// What `work` makes of the mesh turned, and the turn.
 ///
-/// The library casts rays in a dozen directions, and panics where each of them meets an edge, as on meshes of whole
-/// numbers; turned they go elsewhere.
+/// The library casts rays in a dozen directions, and panics where each of them meets an edge, as on meshes of
+/// whole numbers; turned they go elsewhere.
 fn guarded<T>(mesh: &TriMesh, work: impl Fn(&TriMesh) -> T) -> Result<(T, Turn), NotAVolume> {
     N_GUARDED.fetch_add(1, Ordering::Relaxed);
     let tried = |turn: Turn| {
         let turned = turn.forth(mesh.clone());
-        panic::catch_unwind(AssertUnwindSafe(|| work(&turned))).ok().map(|made| (made, turn))
+        panic::catch_unwind(AssertUnwindSafe(|| work(&turned)))
+            .ok()
+            .map(|made| (made, turn))
     };
     let done = Turn::all().find_map(tried);
     N_GUARDED.fetch_sub(1, Ordering::Relaxed);
-    done.ok_or_else(|| NotAVolume { reason: "the exact union gave up".into() })
+    done.ok_or_else(|| NotAVolume {
+        reason: "the exact union gave up".into(),
+    })
 }
 
 fn as_gl(mesh: &TriMesh) -> MeshGL64 {
@@ -374,8 +451,15 @@ mod tests {
 
     #[test]
     fn a_loft_of_a_square_is_a_box() {
-        let ring = |x: f64| [(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)].map(|(y, z)| Vec3::new(x, y, z)).to_vec();
-        for rings in [[ring(0.0), ring(1.0), ring(3.0)], [ring(3.0), ring(1.0), ring(0.0)]] {
+        let ring = |x: f64| {
+            [(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)]
+                .map(|(y, z)| Vec3::new(x, y, z))
+                .to_vec()
+        };
+        for rings in [
+            [ring(0.0), ring(1.0), ring(3.0)],
+            [ring(3.0), ring(1.0), ring(0.0)],
+        ] {
             assert!((Volume::loft(&rings).volume() - 6.0).abs() < 1e-12);
         }
     }
@@ -385,11 +469,17 @@ mod tests {
         let slab = |x0: f64, x1: f64| {
             let corners: Vec<Vec3> = [x0, x1]
                 .into_iter()
-                .flat_map(|x| [(0.0, 0.0), (1.1, 0.1), (0.3, 0.9), (1.3, 1.2)].map(|(y, z)| Vec3::new(x, y, z)))
+                .flat_map(|x| {
+                    [(0.0, 0.0), (1.1, 0.1), (0.3, 0.9), (1.3, 1.2)].map(|(y, z)| Vec3::new(x, y, z))
+                })
                 .collect();
             Volume::hull(&corners)
         };
-        let joined = Volume::union_all((0..5).map(|i| slab(f64::from(i) * 0.7, f64::from(i + 1) * 0.7)).collect());
+        let joined = Volume::union_all(
+            (0..5)
+                .map(|i| slab(f64::from(i) * 0.7, f64::from(i + 1) * 0.7))
+                .collect(),
+        );
         assert_eq!(joined.components().len(), 1);
         assert!((joined.volume() - 5.0 * slab(0.0, 0.7).volume()).abs() < 1e-9);
     }

@@ -6,8 +6,8 @@ use crate::{Aabb, TriMesh, Vec3};
 const LEAF_SIZE: usize = 4;
 /// Bins of the surface-area heuristic; more gave under 1 % fewer visits.
 const N_BINS: usize = 16;
-/// Below this depth nodes are halved, so that no mesh makes a tree deeper than the 64 entries of a query's stack: halving
-/// 2³² triangles takes 32 levels more, less the levels that any split saves.
+/// Below this depth nodes are halved, so that no mesh makes a tree deeper than the 64 entries of a query's
+/// stack: halving 2³² triangles takes 32 levels more, less the levels that any split saves.
 const MAX_UNEVEN_DEPTH: u32 = 28;
 
 #[derive(Clone, Copy)]
@@ -77,24 +77,52 @@ impl TriangleBvh {
         let centers: Vec<Vec3> = boxes.iter().map(|b| b.center()).collect();
         let mut order: Vec<u32> = (0..u32::try_from(n).expect("faces are counted in 32 bits")).collect();
         let group = |f: u32| group_of_face.get(f as usize).copied().unwrap_or(0);
-        let mut nodes = vec![Node { bounds: Aabb::EMPTY, first: 0, count: 0, group: 0 }];
+        let mut nodes = vec![Node {
+            bounds: Aabb::EMPTY,
+            first: 0,
+            count: 0,
+            group: 0,
+        }];
         let mut todo = vec![(0usize, 0usize, n, 0u32)];
         while let Some((at, from, to, depth)) = todo.pop() {
             let range = &mut order[from..to];
             let bounds = range.iter().fold(Aabb::EMPTY, |b, &f| b.union(boxes[f as usize]));
             let shared = range.first().map_or(0, |&f| group(f));
-            let group = if range.iter().all(|&f| group(f) == shared) { shared } else { MIXED };
+            let group = if range.iter().all(|&f| group(f) == shared) {
+                shared
+            } else {
+                MIXED
+            };
             let split = if range.len() <= LEAF_SIZE {
                 None
             } else {
                 Some(partition(range, &boxes, &centers, depth > MAX_UNEVEN_DEPTH))
             };
             match split {
-                None => nodes[at] = Node { bounds, first: from as u32, count: (to - from) as u32, group },
+                None => {
+                    nodes[at] = Node {
+                        bounds,
+                        first: from as u32,
+                        count: (to - from) as u32,
+                        group,
+                    }
+                }
                 Some(middle) => {
                     let left = nodes.len();
-                    nodes[at] = Node { bounds, first: left as u32, count: 0, group };
-                    nodes.extend([Node { bounds, first: 0, count: 0, group: MIXED }; 2]);
+                    nodes[at] = Node {
+                        bounds,
+                        first: left as u32,
+                        count: 0,
+                        group,
+                    };
+                    nodes.extend(
+                        [Node {
+                            bounds,
+                            first: 0,
+                            count: 0,
+                            group: MIXED,
+                        }; 2],
+                    );
                     todo.push((left, from, from + middle, depth + 1));
                     todo.push((left + 1, from + middle, to, depth + 1));
                 }
@@ -108,8 +136,8 @@ impl TriangleBvh {
         }
     }
 
-    /// The nearest point within `√limit_sq` mm of `q`, if there is one. Ties go to the triangle found first, which
-    /// depends on the mesh alone.
+    /// The nearest point within `√limit_sq` mm of `q`, if there is one. Ties go to the triangle found first,
+    /// which depends on the mesh alone.
     pub fn nearest(&self, q: Vec3, limit_sq: f64) -> Option<Nearest> {
         let mut best: Option<Nearest> = None;
         let mut limit = limit_sq;
@@ -128,12 +156,18 @@ impl TriangleBvh {
                     let distance_sq = point.distance_squared(q);
                     if distance_sq < limit || (best.is_none() && distance_sq <= limit) {
                         limit = distance_sq;
-                        best = Some(Nearest { distance_sq, face: self.faces[i], point, feature });
+                        best = Some(Nearest {
+                            distance_sq,
+                            face: self.faces[i],
+                            point,
+                            feature,
+                        });
                     }
                 }
                 continue;
             }
-            let [a, b] = [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
+            let [a, b] =
+                [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
             let (closer, farther) = if a.1 <= b.1 { (a, b) } else { (b, a) };
             for child in [farther, closer] {
                 if child.1 <= limit {
@@ -145,8 +179,8 @@ impl TriangleBvh {
         best
     }
 
-    /// Squared distances, mm², from `q` to the groups that come within `√limit_sq` of it: (group, distance²), sorted by
-    /// group, each group once. `found` is cleared first and reused.
+    /// Squared distances, mm², from `q` to the groups that come within `√limit_sq` of it: (group, distance²),
+    /// sorted by group, each group once. `found` is cleared first and reused.
     pub fn nearest_by_group(&self, q: Vec3, limit_sq: f64, found: &mut Vec<(u32, f64)>) {
         found.clear();
         let mut stack = [(0u32, 0.0f64); 64];
@@ -156,7 +190,13 @@ impl TriangleBvh {
             top -= 1;
             let (at, near) = stack[top];
             let node = &self.nodes[at as usize];
-            if near > if node.group == MIXED { limit_sq } else { known(found, node.group) } {
+            if near
+                > if node.group == MIXED {
+                    limit_sq
+                } else {
+                    known(found, node.group)
+                }
+            {
                 continue;
             }
             if node.count > 0 {
@@ -170,7 +210,8 @@ impl TriangleBvh {
                 }
                 continue;
             }
-            let [a, b] = [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
+            let [a, b] =
+                [node.first, node.first + 1].map(|c| (c, self.nodes[c as usize].bounds.distance_sq(q)));
             let (closer, farther) = if a.1 <= b.1 { (a, b) } else { (b, a) };
             for child in [farther, closer] {
                 if child.1 <= limit_sq {
@@ -182,8 +223,8 @@ impl TriangleBvh {
         found.sort_unstable_by_key(|e| e.0);
     }
 
-    /// The first triangle that the ray from `origin` along the unit vector `direction` meets within `limit_mm`, and how
-    /// far that is, mm. Both sides count; triangles parallel to the ray do not.
+    /// The first triangle that the ray from `origin` along the unit vector `direction` meets within
+    /// `limit_mm`, and how far that is, mm. Both sides count; triangles parallel to the ray do not.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3, limit_mm: f64) -> Option<(u32, f64)> {
         let mut best: Option<(u32, f64)> = None;
         let mut limit = limit_mm;
@@ -223,7 +264,10 @@ fn ray_meets_box(b: Aabb, origin: Vec3, direction: Vec3, limit: f64) -> bool {
             }
             continue;
         }
-        let (p, q) = ((b.min[axis] - origin[axis]) / direction[axis], (b.max[axis] - origin[axis]) / direction[axis]);
+        let (p, q) = (
+            (b.min[axis] - origin[axis]) / direction[axis],
+            (b.max[axis] - origin[axis]) / direction[axis],
+        );
         (from, to) = (from.max(p.min(q)), to.min(p.max(q)));
     }
     // The slack covers rounding of the divisions, so that a flat box is not missed.
@@ -246,20 +290,30 @@ fn ray_meets_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Op
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0).then_some(t)
 }
 
-/// Splits `faces` in place where the surface-area heuristic is least; returns how many go left (never 0 or all).
+/// Splits `faces` in place where the surface-area heuristic is least; returns how many go left (never 0 or
+/// all).
 fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3], must_halve: bool) -> usize {
     let span = Aabb::around(faces.iter().map(|&f| centers[f as usize]));
     let size = span.size();
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else {
+        1 + usize::from(size.z > size.y)
+    };
     let width = size[axis];
     let half = faces.len() / 2;
-    let by_center = |a: &u32, b: &u32| centers[*a as usize][axis].total_cmp(&centers[*b as usize][axis]).then(a.cmp(b));
+    let by_center = |a: &u32, b: &u32| {
+        centers[*a as usize][axis]
+            .total_cmp(&centers[*b as usize][axis])
+            .then(a.cmp(b))
+    };
     if must_halve || width <= 0.0 || faces.len() < 16 {
         faces.select_nth_unstable_by(half, by_center);
         return half;
     }
-    let bin_of =
-        |f: u32| (((centers[f as usize][axis] - span.min[axis]) / width * N_BINS as f64) as usize).min(N_BINS - 1);
+    let bin_of = |f: u32| {
+        (((centers[f as usize][axis] - span.min[axis]) / width * N_BINS as f64) as usize).min(N_BINS - 1)
+    };
     let mut bins = [(Aabb::EMPTY, 0usize); N_BINS];
     for &f in faces.iter() {
         let bin = &mut bins[bin_of(f)];
@@ -270,7 +324,9 @@ fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3], must_halve: bo
         s.x * s.y + s.y * s.z + s.z * s.x
     };
     let cost_of = |part: &[(Aabb, usize)]| {
-        let (b, n) = part.iter().fold((Aabb::EMPTY, 0), |acc, x| (acc.0.union(x.0), acc.1 + x.1));
+        let (b, n) = part
+            .iter()
+            .fold((Aabb::EMPTY, 0), |acc, x| (acc.0.union(x.0), acc.1 + x.1));
         (half_area(b) * n as f64, n)
     };
     let best = (1..N_BINS)
@@ -321,7 +377,10 @@ pub fn nearest_on_triangle([a, b, c]: [Vec3; 3], q: Vec3) -> (Vec3, Feature) {
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Feature::Edge(1));
+        return (
+            b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))),
+            Feature::Edge(1),
+        );
     }
     let scale = 1.0 / (va + vb + vc);
     (a + ab * (vb * scale) + ac * (vc * scale), Feature::Face)
@@ -380,7 +439,9 @@ mod tests {
             let mut p = || Vec3::new(rng.random(), rng.random(), rng.random());
             let (origin, direction) = (p(), (p() - 0.5).normalize());
             let all = (0..400u32).filter_map(|f| {
-                ray_meets_triangle(mesh.corners(f as usize), origin, direction).map(|t| (f, t)).filter(|h| h.1 <= 0.7)
+                ray_meets_triangle(mesh.corners(f as usize), origin, direction)
+                    .map(|t| (f, t))
+                    .filter(|h| h.1 <= 0.7)
             });
             let expected = all.min_by(|a, b| a.1.total_cmp(&b.1));
             n_hits += usize::from(expected.is_some());

@@ -1,8 +1,9 @@
-//! Clearance: the least distance of two solids, at rest and over a whole translation, with its place and its sign.
+//! Clearance: the least distance of two solids, at rest and over a whole translation, with its place and its
+//! sign.
 //!
-//! Nothing is sampled. Over a translation the distance of two triangles is a convex function of the travel, so the least one
-//! is that of their shadows along the motion, or that at an end of the travels; two trees of boxes, one drawn out along the
-//! motion, leave few pairs to look at.
+//! Nothing is sampled. Over a translation the distance of two triangles is a convex function of the travel,
+//! so the least one is that of their shadows along the motion, or that at an end of the travels; two trees of
+//! boxes, one drawn out along the motion, leave few pairs to look at.
 //!
 //! ```text
 //!            far ┌ ─ ─ ┐
@@ -13,18 +14,19 @@
 //!                └─────┘  └───┘
 //! ```
 //!
-//! Where surfaces cross, the gap is negative: minus the *depth*, which is the greatest distance to the other's surface
-//! of a point that is inside the other and is
+//! Where surfaces cross, the gap is negative: minus the *depth*, which is the greatest distance to the
+//! other's surface of a point that is inside the other and is
 //! - a corner of either mesh, at any of the travels, or
 //! - a point on an edge of either mesh, at the first travel.
 //!
-//! Two faceted faces that overlap by a little and are about parallel overlap most at such a point. Limits: faces that
-//! cross at a large angle can be deeper inside by their middle than by their edges, and edges alone that cross on the way
-//! touch with a depth of 0. How far apart the solids would have to be moved is not asked.
+//! Two faceted faces that overlap by a little and are about parallel overlap most at such a point. Limits:
+//! faces that cross at a large angle can be deeper inside by their middle than by their edges, and edges
+//! alone that cross on the way touch with a depth of 0. How far apart the solids would have to be moved is
+//! not asked.
 //!
-//! Parts of a surface can be left out of account ([`Scope::WhatCounts`]): then distances are those of the parts that count, and
-//! points that count are looked at for their depth where parts that count cross; depths are measured to the other's whole
-//! surface.
+//! Parts of a surface can be left out of account ([`Scope::WhatCounts`]): then distances are those of the
+//! parts that count, and points that count are looked at for their depth where parts that count cross; depths
+//! are measured to the other's whole surface.
 
 mod depth;
 mod pair;
@@ -106,7 +108,8 @@ impl Shape {
         }
     }
 
-    /// The same solid, where only those triangles count for whose index `counts` holds: [`Scope::WhatCounts`].
+    /// The same solid, where only those triangles count for whose index `counts` holds:
+    /// [`Scope::WhatCounts`].
     #[must_use]
     pub fn counting(mut self, counts: impl Fn(usize) -> bool) -> Self {
         (0..self.counts.len()).for_each(|f| self.counts[f] = counts(f));
@@ -114,14 +117,20 @@ impl Shape {
     }
 }
 
-/// Where `a` and `b` come nearest, if that is within `within_mm`. Distances are exact but for rounding, depths to 0.1 µm.
+/// Where `a` and `b` come nearest, if that is within `within_mm`. Distances are exact but for rounding,
+/// depths to 0.1 µm.
 pub fn least_gap(a: &Shape, b: &Shape, scope: Scope, within_mm: f64) -> Option<Gap> {
-    let rest = Translation { along: Vec3::ZERO, from_mm: 0.0, far_mm: 0.0 };
+    let rest = Translation {
+        along: Vec3::ZERO,
+        from_mm: 0.0,
+        far_mm: 0.0,
+    };
     Some(Encounter::new([a, b], &rest, scope, within_mm).nearest()?.0)
 }
 
-/// Where `moving` comes nearest to `fixed` over all travels of `motion`, if that is within `within_mm`. Distances are exact
-/// but for rounding, depths to 0.1 µm. With only one travel, 0, the answer is that of [`least_gap`].
+/// Where `moving` comes nearest to `fixed` over all travels of `motion`, if that is within `within_mm`.
+/// Distances are exact but for rounding, depths to 0.1 µm. With only one travel, 0, the answer is that of
+/// [`least_gap`].
 pub fn swept_gap(
     moving: &Shape,
     fixed: &Shape,
@@ -130,7 +139,11 @@ pub fn swept_gap(
     within_mm: f64,
 ) -> Option<SweptGap> {
     let (gap, travel_mm) = Encounter::new([moving, fixed], motion, scope, within_mm).nearest()?;
-    Some(SweptGap { gap_mm: gap.gap_mm, travel_mm, at: gap.at })
+    Some(SweptGap {
+        gap_mm: gap.gap_mm,
+        travel_mm,
+        at: gap.at,
+    })
 }
 
 /// A triangle that something passes too near by.
@@ -142,8 +155,8 @@ pub struct Passed {
     pub by: Aabb,
 }
 
-/// The triangles of `fixed` that come within `within_mm` of one of `moving` over all travels of `motion`, ascending. The surfaces need
-/// not be closed; distances are exact but for rounding.
+/// The triangles of `fixed` that come within `within_mm` of one of `moving` over all travels of `motion`,
+/// ascending. The surfaces need not be closed; distances are exact but for rounding.
 pub fn faces_passed(moving: &TriMesh, fixed: &TriMesh, motion: &Translation, within_mm: f64) -> Vec<Passed> {
     let along = motion.along.normalize_or_zero();
     let axes = axes_along(along);
@@ -188,7 +201,17 @@ impl<'a> Encounter<'a> {
         let in_scope = |which: usize, f: usize| scope == Scope::Everything || shapes[which].counts[f];
         let trees = trees(&meshes, travels, limit_mm, in_scope);
         let [moving, fixed] = shapes;
-        Self { passage: Passage { moving, fixed, along, travels }, axes, limit_mm, trees }
+        Self {
+            passage: Passage {
+                moving,
+                fixed,
+                along,
+                travels,
+            },
+            axes,
+            limit_mm,
+            trees,
+        }
     }
 
     /// The least gap and the travel at which it is.
@@ -197,7 +220,10 @@ impl<'a> Encounter<'a> {
         let touches = approach.is_some_and(|a| a.distance_sq <= TOUCH_MM * TOUCH_MM);
         let deepest = self.deepest(touches);
         if deepest.depth_mm > TOUCH_MM {
-            return Some((gap_between(-deepest.depth_mm, deepest.point, deepest.surface), deepest.travel_mm));
+            return Some((
+                gap_between(-deepest.depth_mm, deepest.point, deepest.surface),
+                deepest.travel_mm,
+            ));
         }
         let [x, y, z] = self.axes;
         let approach = approach?;
@@ -217,7 +243,11 @@ impl<'a> Encounter<'a> {
             {
                 best = Some(found);
                 // Nothing is nearer than touching: no pair is looked at any more.
-                *limit_sq = if found.distance_sq <= TOUCH_MM * TOUCH_MM { -1.0 } else { found.distance_sq };
+                *limit_sq = if found.distance_sq <= TOUCH_MM * TOUCH_MM {
+                    -1.0
+                } else {
+                    found.distance_sq
+                };
             }
         });
         best
@@ -238,10 +268,18 @@ impl<'a> Encounter<'a> {
 
     /// The deepest point of either shape in the other.
     fn deepest(&self, touches: bool) -> Deepest {
-        let Passage { moving, fixed, along, travels } = self.passage;
+        let Passage {
+            moving,
+            fixed,
+            along,
+            travels,
+        } = self.passage;
         let start = travels[0] * along;
         let mut best = Deepest::default();
-        let moved = Aabb { min: moving.bounds.min + start, max: moving.bounds.max + start };
+        let moved = Aabb {
+            min: moving.bounds.min + start,
+            max: moving.bounds.max + start,
+        };
         if !touches && !moved.intersects(fixed.bounds) {
             return best;
         }
@@ -252,12 +290,24 @@ impl<'a> Encounter<'a> {
         // The other way round: what is at rest moves backwards past the moving shape.
         let mut flipped: Vec<(u32, u32)> = crossings.into_iter().map(|(a, b)| (b, a)).collect();
         flipped.sort_unstable();
-        let backwards = Passage { moving: fixed, fixed: moving, along: -along, travels };
-        let mut theirs = Deepest { depth_mm: best.depth_mm, ..Deepest::default() };
+        let backwards = Passage {
+            moving: fixed,
+            fixed: moving,
+            along: -along,
+            travels,
+        };
+        let mut theirs = Deepest {
+            depth_mm: best.depth_mm,
+            ..Deepest::default()
+        };
         backwards.deepen(&self.trees[1].faces, &flipped, &mut theirs);
         if theirs.depth_mm > best.depth_mm {
             let shift = theirs.travel_mm * along;
-            best = Deepest { point: theirs.point + shift, surface: theirs.surface + shift, ..theirs };
+            best = Deepest {
+                point: theirs.point + shift,
+                surface: theirs.surface + shift,
+                ..theirs
+            };
         }
         best
     }
@@ -266,10 +316,17 @@ impl<'a> Encounter<'a> {
 impl Tree {
     /// The triangles of `mesh` that are in scope and meet `room`.
     fn of(mesh: &TriMesh, room: Aabb, in_scope: impl Fn(usize) -> bool) -> Self {
-        let is_near = |&f: &u32| in_scope(f as usize) && Aabb::around(mesh.corners(f as usize)).intersects(room);
+        let is_near =
+            |&f: &u32| in_scope(f as usize) && Aabb::around(mesh.corners(f as usize)).intersects(room);
         let faces: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_near).collect();
         let triangles = faces.iter().map(|&f| mesh.triangles[f as usize]).collect();
-        Self { bvh: TriangleBvh::new(&TriMesh { points: mesh.points.clone(), triangles }), faces }
+        Self {
+            bvh: TriangleBvh::new(&TriMesh {
+                points: mesh.points.clone(),
+                triangles,
+            }),
+            faces,
+        }
     }
 }
 
@@ -284,32 +341,56 @@ fn axes_along(along: Vec3) -> [Vec3; 3] {
 
 fn turned(mesh: &TriMesh, axes: [Vec3; 3]) -> TriMesh {
     let seen = |p: Vec3| Vec3::from(axes.map(|axis| axis.dot(p)));
-    TriMesh { points: mesh.points.iter().map(|&p| seen(p)).collect(), triangles: mesh.triangles.clone() }
+    TriMesh {
+        points: mesh.points.iter().map(|&p| seen(p)).collect(),
+        triangles: mesh.triangles.clone(),
+    }
 }
 
-/// The triangles of a moving and a fixed mesh that `counts`, given which mesh and which triangle, and that can come within `limit_mm` of
-/// the other.
-fn trees(meshes: &[TriMesh; 2], travels: [f64; 2], limit_mm: f64, counts: impl Fn(usize, usize) -> bool) -> [Tree; 2] {
+/// The triangles of a moving and a fixed mesh that `counts`, given which mesh and which triangle, and that
+/// can come within `limit_mm` of the other.
+fn trees(
+    meshes: &[TriMesh; 2],
+    travels: [f64; 2],
+    limit_mm: f64,
+    counts: impl Fn(usize, usize) -> bool,
+) -> [Tree; 2] {
     let [a, b] = meshes.each_ref().map(TriMesh::bounds);
     let room_of_a = raised(b, [-travels[1], -travels[0]]).grown(limit_mm);
     let room_of_b = raised(a, travels).grown(limit_mm);
-    [Tree::of(&meshes[0], room_of_a, |f| counts(0, f)), Tree::of(&meshes[1], room_of_b, |f| counts(1, f))]
+    [
+        Tree::of(&meshes[0], room_of_a, |f| counts(0, f)),
+        Tree::of(&meshes[1], room_of_b, |f| counts(1, f)),
+    ]
 }
 
 /// The travels of `motion` that matter to two boxes, seen along it; 0 alone where it has no direction.
 fn travels_of(motion: &Translation, along: Vec3, bounds: [Aabb; 2]) -> [f64; 2] {
-    if along == Vec3::ZERO { [0.0; 2] } else { travels_that_matter(bounds, [motion.from_mm, motion.far_mm]) }
+    if along == Vec3::ZERO {
+        [0.0; 2]
+    } else {
+        travels_that_matter(bounds, [motion.from_mm, motion.far_mm])
+    }
 }
 
-/// The travels between which the least distance lies: before them and after them the boxes of both, seen along the motion,
-/// are past each other.
+/// The travels between which the least distance lies: before them and after them the boxes of both, seen
+/// along the motion, are past each other.
 fn travels_that_matter([moving, fixed]: [Aabb; 2], [from, far]: [f64; 2]) -> [f64; 2] {
     let (reached, passed) = (fixed.min.z - moving.max.z, fixed.max.z - moving.min.z);
     let far = if far.is_finite() { far } else { passed };
-    let from = if from.is_finite() { from.min(far) } else { reached.min(far) };
+    let from = if from.is_finite() {
+        from.min(far)
+    } else {
+        reached.min(far)
+    };
     [from.max(reached).min(far), far.min(passed).max(from)]
 }
 
 fn gap_between(gap_mm: f64, on_a: Vec3, on_b: Vec3) -> Gap {
-    Gap { gap_mm, at: 0.5 * (on_a + on_b), on_a, on_b }
+    Gap {
+        gap_mm,
+        at: 0.5 * (on_a + on_b),
+        on_a,
+        on_b,
+    }
 }

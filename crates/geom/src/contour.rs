@@ -1,9 +1,10 @@
 //! The zero surface of a function as a closed mesh of well-shaped triangles, for models made by code.
 //!
-//! Marching cubes whose triangles come from a face rule instead of a published table: on each face of a cell the surface
-//! cuts off the inside corners one by one, so neighbouring cells agree, and no triangle has a diagonal within a face. With
-//! one vertex for each crossed grid edge the result is manifold by construction [Lorensen1987, Montani1994]. Vertices are
-//! then spread out along the surface and pulled onto it by Newton steps, which the function must be smooth enough for.
+//! Marching cubes whose triangles come from a face rule instead of a published table: on each face of a cell
+//! the surface cuts off the inside corners one by one, so neighbouring cells agree, and no triangle has a
+//! diagonal within a face. With one vertex for each crossed grid edge the result is manifold by construction
+//! [Lorensen1987, Montani1994]. Vertices are then spread out along the surface and pulled onto it by Newton
+//! steps, which the function must be smooth enough for.
 //!
 //! The grid is dense: memory grows with the cube of the resolution. Features thinner than a cell are lost.
 
@@ -13,7 +14,8 @@ use crate::{Aabb, TriMesh, Vec3};
 
 /// Least distance of a first vertex from the ends of its grid edge, as a share of the edge.
 ///
-/// Vertices of neighbouring edges meet at grid points otherwise, and the slivers this leaves survive any smoothing.
+/// Vertices of neighbouring edges meet at grid points otherwise, and the slivers this leaves survive any
+/// smoothing.
 const EDGE_MARGIN: f64 = 0.2;
 
 /// Rounds of moving each vertex towards the mean of its neighbours and back onto the surface.
@@ -21,13 +23,14 @@ const EDGE_MARGIN: f64 = 0.2;
 /// After three rounds the least angle of a sphere is above 20°; further rounds change little.
 const N_SPREAD_ROUNDS: usize = 3;
 
-/// Longest Newton step, as a share of the cell: farther, the linear model is wrong or the vertex is beside a crease.
+/// Longest Newton step, as a share of the cell: farther, the linear model is wrong or the vertex is beside a
+/// crease.
 const MAX_STEP_CELLS: f64 = 0.5;
 
 /// The surface where `field` is 0, oriented from positive (inside) to negative, as a closed manifold mesh.
 ///
-/// `bounds` must contain the surface; where it does not, the solid ends at the grid's border. `field` is called about
-/// `(size / cell_mm)³` times, from several threads. Empty where the grid sees no positive value.
+/// `bounds` must contain the surface; where it does not, the solid ends at the grid's border. `field` is
+/// called about `(size / cell_mm)³` times, from several threads. Empty where the grid sees no positive value.
 pub fn contour(bounds: Aabb, cell_mm: f64, field: impl Fn(Vec3) -> f64 + Sync) -> TriMesh {
     let grid = Grid::sample(bounds, cell_mm, &field);
     let (points, vertex_of_edge) = grid.crossings();
@@ -54,22 +57,36 @@ const NO_VERTEX: u32 = u32::MAX;
 
 impl Grid {
     fn sample(bounds: Aabb, cell_mm: f64, field: &(impl Fn(Vec3) -> f64 + Sync)) -> Self {
-        let n = (bounds.size() / cell_mm).to_array().map(|cells| cells.ceil() as usize + 3);
+        let n = (bounds.size() / cell_mm)
+            .to_array()
+            .map(|cells| cells.ceil() as usize + 3);
         // One cell of air on all sides keeps the surface away from the border.
         let origin = bounds.min - cell_mm;
         let mut values = vec![0.0; n[0] * n[1] * n[2]];
-        values.par_chunks_mut(n[0] * n[1]).enumerate().for_each(|(k, layer)| {
-            for (at, value) in layer.iter_mut().enumerate() {
-                let [i, j] = [at % n[0], at / n[0]];
-                let border = [i, j, k].iter().zip(n).any(|(&x, n)| x == 0 || x + 1 == n);
-                let p = origin + cell_mm * Vec3::new(i as f64, j as f64, k as f64);
-                let raw = field(p);
-                // Values at the level would put several vertices on one grid point.
-                let nudged = if raw.abs() < 1e-9 * cell_mm { 1e-9 * cell_mm } else { raw };
-                *value = if border { nudged.min(-cell_mm) } else { nudged };
-            }
-        });
-        Self { origin, cell_mm, n, values }
+        values
+            .par_chunks_mut(n[0] * n[1])
+            .enumerate()
+            .for_each(|(k, layer)| {
+                for (at, value) in layer.iter_mut().enumerate() {
+                    let [i, j] = [at % n[0], at / n[0]];
+                    let border = [i, j, k].iter().zip(n).any(|(&x, n)| x == 0 || x + 1 == n);
+                    let p = origin + cell_mm * Vec3::new(i as f64, j as f64, k as f64);
+                    let raw = field(p);
+                    // Values at the level would put several vertices on one grid point.
+                    let nudged = if raw.abs() < 1e-9 * cell_mm {
+                        1e-9 * cell_mm
+                    } else {
+                        raw
+                    };
+                    *value = if border { nudged.min(-cell_mm) } else { nudged };
+                }
+            });
+        Self {
+            origin,
+            cell_mm,
+            n,
+            values,
+        }
     }
 
     fn strides(&self) -> [usize; 3] {
@@ -77,21 +94,29 @@ impl Grid {
     }
 
     fn point(&self, at: usize) -> Vec3 {
-        let [i, j, k] = [at % self.n[0], at / self.n[0] % self.n[1], at / (self.n[0] * self.n[1])];
+        let [i, j, k] = [
+            at % self.n[0],
+            at / self.n[0] % self.n[1],
+            at / (self.n[0] * self.n[1]),
+        ];
         self.origin + self.cell_mm * Vec3::new(i as f64, j as f64, k as f64)
     }
 
-    /// One vertex for each grid edge with a change of sign, and which it is: `3 · grid point + axis` → vertex.
+    /// One vertex for each grid edge with a change of sign, and which it is: `3 · grid point + axis` →
+    /// vertex.
     fn crossings(&self) -> (Vec<Vec3>, Vec<u32>) {
         let mut points = Vec::new();
         let mut vertex_of_edge = vec![NO_VERTEX; 3 * self.values.len()];
         for (at, &here) in self.values.iter().enumerate() {
             for (axis, stride) in self.strides().into_iter().enumerate() {
                 // Past the border this reads the next row, where all values are negative as here.
-                let Some(&there) = self.values.get(at + stride) else { continue };
+                let Some(&there) = self.values.get(at + stride) else {
+                    continue;
+                };
                 if (here > 0.0) != (there > 0.0) {
                     let share = (here / (here - there)).clamp(EDGE_MARGIN, 1.0 - EDGE_MARGIN);
-                    vertex_of_edge[3 * at + axis] = u32::try_from(points.len()).expect("fewer than 4 billion points");
+                    vertex_of_edge[3 * at + axis] =
+                        u32::try_from(points.len()).expect("fewer than 4 billion points");
                     points.push(self.point(at) + share * self.cell_mm * Vec3::AXES[axis]);
                 }
             }
@@ -110,7 +135,9 @@ impl Grid {
         let last_corner = corner_offset(7);
         let mut triangles = Vec::new();
         for cell in 0..self.values.len() - last_corner {
-            let case = (0..8).filter(|&c| self.values[cell + corner_offset(c)] > 0.0).fold(0, |bits, c| bits | 1 << c);
+            let case = (0..8)
+                .filter(|&c| self.values[cell + corner_offset(c)] > 0.0)
+                .fold(0, |bits, c| bits | 1 << c);
             triangles.extend(cases[case].iter().map(|t| t.map(|edge| vertex_at(cell, edge))));
         }
         triangles
@@ -143,7 +170,8 @@ fn share_face(a: usize, b: usize) -> bool {
 
 /// The triangles of one of the 256 sign patterns; bit `c` of `case` says that corner `c` is inside.
 fn triangles_of_case(case: usize) -> Vec<[usize; 3]> {
-    // On each face, one directed segment around each run of inside corners, which lie on its right seen from outside.
+    // On each face, one directed segment around each run of inside corners, which lie on its right seen from
+    // outside.
     let mut next = [None; 12];
     for axis in 0..3 {
         for side in 0..2 {
@@ -161,7 +189,8 @@ fn triangles_of_case(case: usize) -> Vec<[usize; 3]> {
             edge = following;
         }
         if !polygon.is_empty() {
-            triangles.extend(triangulate(&polygon).expect("every polygon of a cell has such a triangulation"));
+            triangles
+                .extend(triangulate(&polygon).expect("every polygon of a cell has such a triangulation"));
         }
     }
     triangles
@@ -183,14 +212,17 @@ fn face_segments(case: usize, axis: usize, side: usize) -> Vec<(usize, usize)> {
     for i in 0..4 {
         // A run of inside corners begins after edge i; it ends before the next outside corner.
         if !inside(i) && inside(i + 1) {
-            let end = (i + 1..i + 5).find(|&k| !inside(k + 1)).expect("corner i is outside");
+            let end = (i + 1..i + 5)
+                .find(|&k| !inside(k + 1))
+                .expect("corner i is outside");
             segments.push((edge(i), edge(end)));
         }
     }
     segments
 }
 
-/// Triangles of a polygon of cell edges without a diagonal that lies in a face; `None` where there is no such set.
+/// Triangles of a polygon of cell edges without a diagonal that lies in a face; `None` where there is no such
+/// set.
 fn triangulate(polygon: &[usize]) -> Option<Vec<[usize; 3]>> {
     let last = polygon.len() - 1;
     if last < 2 {
@@ -210,7 +242,8 @@ fn triangulate(polygon: &[usize]) -> Option<Vec<[usize; 3]>> {
 
 /// Moves each point towards the mean of its neighbours.
 fn spread(mesh: &mut TriMesh) {
-    // Each neighbour is met twice, once in each of the two triangles at the common edge: the mean is the same.
+    // Each neighbour is met twice, once in each of the two triangles at the common edge: the mean is the
+    // same.
     let mut sums = vec![(Vec3::ZERO, 0.0); mesh.points.len()];
     for &[a, b, c] in &mesh.triangles {
         for (at, [p, q]) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
@@ -242,13 +275,20 @@ mod tests {
     use super::*;
     use crate::Solid;
 
-    const BOX: Aabb = Aabb { min: Vec3::splat(-6.0), max: Vec3::splat(6.0) };
+    const BOX: Aabb = Aabb {
+        min: Vec3::splat(-6.0),
+        max: Vec3::splat(6.0),
+    };
 
     #[test]
     fn a_sphere_has_its_volume_and_no_slivers() {
         let ball = contour(BOX, 0.4, |p| 5.0 - p.length());
         assert!(ball.points.iter().all(|p| (p.length() - 5.0).abs() < 1e-6));
-        let least = ball.triangles.iter().map(|t| least_angle(t.map(|v| ball.points[v as usize]))).fold(4.0, f64::min);
+        let least = ball
+            .triangles
+            .iter()
+            .map(|t| least_angle(t.map(|v| ball.points[v as usize])))
+            .fold(4.0, f64::min);
         assert!(least.to_degrees() > 15.0, "least angle {}°", least.to_degrees());
         let exact = 4.0 / 3.0 * std::f64::consts::PI * 125.0;
         assert!((Solid::new(ball).unwrap().volume() / exact - 1.0).abs() < 0.01);
@@ -259,7 +299,9 @@ mod tests {
         // Every sign pattern occurs: a hash of the grid point decides.
         let noise = |p: Vec3| {
             let q = (p * 2.0).round().as_i64vec3();
-            let mix = ((q.x * 73_856_093) ^ (q.y * 19_349_663) ^ (q.z * 83_492_791)).wrapping_mul(2_654_435_761) >> 7;
+            let mix = ((q.x * 73_856_093) ^ (q.y * 19_349_663) ^ (q.z * 83_492_791))
+                .wrapping_mul(2_654_435_761)
+                >> 7;
             (mix & 1023) as f64 - 511.5
         };
         let grid = Grid::sample(BOX, 0.5, &noise);
@@ -269,6 +311,8 @@ mod tests {
     }
 
     fn least_angle(t: [Vec3; 3]) -> f64 {
-        (0..3).map(|i| (t[(i + 1) % 3] - t[i]).angle_between(t[(i + 2) % 3] - t[i])).fold(4.0, f64::min)
+        (0..3)
+            .map(|i| (t[(i + 1) % 3] - t[i]).angle_between(t[(i + 2) % 3] - t[i]))
+            .fold(4.0, f64::min)
     }
 }

@@ -1,9 +1,9 @@
 //! Fewer triangles for nearly the same surface.
 //!
 //! Edges collapse by quadric error [Garland and Heckbert 1997]. The quadric of a vertex sums, over the
-//! planes of all input triangles that it stands for, the squared distance times the triangle's share of a mean triangle.
-//! Divided by the sum of shares this is the mean square distance; beyond 30 shares the divisor stays the same, so
-//! that a bump in a wide plain is not averaged away.
+//! planes of all input triangles that it stands for, the squared distance times the triangle's share of a
+//! mean triangle. Divided by the sum of shares this is the mean square distance; beyond 30 shares the divisor
+//! stays the same, so that a bump in a wide plain is not averaged away.
 
 use glam::DMat3;
 use rayon::prelude::*;
@@ -11,11 +11,11 @@ use rayon::prelude::*;
 use crate::topology::{HalfEdge, Topology};
 use crate::{TriMesh, Vec3};
 
-/// Mean triangles over which a squared distance is averaged at most: no vertex is farther than √30 tolerances from the
-/// plane of a triangle of mean size that it stands for.
+/// Mean triangles over which a squared distance is averaged at most: no vertex is farther than √30 tolerances
+/// from the plane of a triangle of mean size that it stands for.
 const MOST_SHARES: f64 = 30.0;
-/// Pull towards the middle of the edge, against the weight of one mean triangle: settles where flat surroundings leave the
-/// place of the new vertex open.
+/// Pull towards the middle of the edge, against the weight of one mean triangle: settles where flat
+/// surroundings leave the place of the new vertex open.
 const PULL: f64 = 1e-3;
 /// Share of the squared edge length in the cost of a collapse, so that flat places lose short edges first.
 const SHORT_FIRST: f64 = 1e-5;
@@ -29,19 +29,25 @@ const MOST_ROUNDS: u32 = 20;
 const GONE: u32 = u32::MAX;
 /// A triangle's normal turns by less than 60° in one collapse.
 const LEAST_COS: f64 = 0.5;
-/// No collapse makes a triangle whose height is a smaller share of its longest edge than this, unless it was worse before.
+/// No collapse makes a triangle whose height is a smaller share of its longest edge than this, unless it was
+/// worse before.
 const LEAST_HEIGHT: f64 = 0.03;
 
-/// `mesh` with edges collapsed where the vertex that remains stays, in the mean, within the smaller `tolerance_mm` of both
-/// ends (mm, one a point; 0 keeps the point) of the planes of the triangles it stands for.
+/// `mesh` with edges collapsed where the vertex that remains stays, in the mean, within the smaller
+/// `tolerance_mm` of both ends (mm, one a point; 0 keeps the point) of the planes of the triangles it stands
+/// for.
 ///
-/// For closed manifold meshes, and closed manifold is what comes out; anything else comes back unchanged. In each of some
-/// rounds every vertex takes part in one collapse at most, the cheapest of its edges: no queue, and even triangles.
-/// Sequential, so that the same mesh gives the same bytes.
+/// For closed manifold meshes, and closed manifold is what comes out; anything else comes back unchanged. In
+/// each of some rounds every vertex takes part in one collapse at most, the cheapest of its edges: no queue,
+/// and even triangles. Sequential, so that the same mesh gives the same bytes.
 pub fn decimate(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
     assert_eq!(mesh.points.len(), tolerance_mm.len(), "one tolerance a point");
-    let Some(mut state) = Decimation::new(&mesh, tolerance_mm) else { return mesh };
-    let mut alive: Vec<u32> = (0..mesh.points.len() as u32).filter(|&v| tolerance_mm[v as usize] > 0.0).collect();
+    let Some(mut state) = Decimation::new(&mesh, tolerance_mm) else {
+        return mesh;
+    };
+    let mut alive: Vec<u32> = (0..mesh.points.len() as u32)
+        .filter(|&v| tolerance_mm[v as usize] > 0.0)
+        .collect();
     for round in 1..=MOST_ROUNDS {
         let share = EARLY_SHARES.get(round as usize - 1).copied().unwrap_or(1.0);
         let n_before = alive.len();
@@ -67,21 +73,37 @@ struct Quadric {
 }
 
 impl Quadric {
-    const ZERO: Self = Self { a: DMat3::ZERO, b: Vec3::ZERO, c: 0.0, shares: 0.0 };
+    const ZERO: Self = Self {
+        a: DMat3::ZERO,
+        b: Vec3::ZERO,
+        c: 0.0,
+        shares: 0.0,
+    };
 
     fn of_plane(normal: Vec3, through: Vec3, weight: f64) -> Self {
         let d = -normal.dot(through);
         let a = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
-        Self { a: a * weight, b: normal * (d * weight), c: d * d * weight, shares: weight }
+        Self {
+            a: a * weight,
+            b: normal * (d * weight),
+            c: d * d * weight,
+            shares: weight,
+        }
     }
 
     fn plus(self, other: Self) -> Self {
-        Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, shares: self.shares + other.shares }
+        Self {
+            a: self.a + other.a,
+            b: self.b + other.b,
+            c: self.c + other.c,
+            shares: self.shares + other.shares,
+        }
     }
 
     /// Mean square distance of `x` to the planes, mm².
     fn at(&self, x: Vec3) -> f64 {
-        (x.dot(self.a * x) + 2.0 * self.b.dot(x) + self.c).max(0.0) / self.shares.clamp(f64::MIN_POSITIVE, MOST_SHARES)
+        (x.dot(self.a * x) + 2.0 * self.b.dot(x) + self.c).max(0.0)
+            / self.shares.clamp(f64::MIN_POSITIVE, MOST_SHARES)
     }
 
     /// The minimum, drawn a little towards `middle`.
@@ -125,7 +147,11 @@ impl Decimation {
         let mut quadrics = vec![Quadric::ZERO; mesh.points.len()];
         for (face, corners) in mesh.triangles.iter().enumerate() {
             let weight = mesh.face_area(face) / mean_area;
-            let q = Quadric::of_plane(mesh.face_normal(face), mesh.points[corners[0] as usize] - middle, weight);
+            let q = Quadric::of_plane(
+                mesh.face_normal(face),
+                mesh.points[corners[0] as usize] - middle,
+                weight,
+            );
             for &v in corners {
                 quadrics[v as usize] = quadrics[v as usize].plus(q);
             }
@@ -174,8 +200,8 @@ impl Decimation {
         self.round[v as usize] != GONE
     }
 
-    /// Collapses the cheapest edge at `v` among those within `share` of the squared tolerance, if neither end took part
-    /// in a collapse of this round.
+    /// Collapses the cheapest edge at `v` among those within `share` of the squared tolerance, if neither end
+    /// took part in a collapse of this round.
     fn collapse_cheapest(&mut self, v: u32, round: u32, share: f64) {
         if self.round[v as usize] >= round {
             return;
@@ -192,7 +218,8 @@ impl Decimation {
         }
     }
 
-    /// Where the ends of `h` would meet and what that costs; `None` where the error exceeds `share` of what is tolerated.
+    /// Where the ends of `h` would meet and what that costs; `None` where the error exceeds `share` of what
+    /// is tolerated.
     fn placed(&self, h: HalfEdge, share: f64) -> Option<(Vec3, f64)> {
         let [u, v] = self.ends(h).map(|x| x as usize);
         let limit = self.tolerance[u].min(self.tolerance[v]);
@@ -210,12 +237,17 @@ impl Decimation {
     fn may_collapse(&self, h: HalfEdge, at: Vec3) -> bool {
         let [u, v] = self.ends(h);
         let sides = [h, self.opposite[h as usize]].map(|h| self.start[prev(h) as usize]);
-        let n_common =
-            self.around(u).map(|a| self.ends(a)[1]).filter(|&w| self.around(v).any(|b| self.ends(b)[1] == w)).count();
+        let n_common = self
+            .around(u)
+            .map(|a| self.ends(a)[1])
+            .filter(|&w| self.around(v).any(|b| self.ends(b)[1] == w))
+            .count();
         n_common == 2
             && sides[0] != sides[1]
             && sides.iter().all(|&w| self.around(w).nth(3).is_some())
-            && [(u, v), (v, u)].iter().all(|&(moved, gone)| self.keeps_shape(moved, gone, at))
+            && [(u, v), (v, u)]
+                .iter()
+                .all(|&(moved, gone)| self.keeps_shape(moved, gone, at))
     }
 
     fn keeps_shape(&self, moved: u32, gone: u32, at: Vec3) -> bool {
@@ -229,7 +261,10 @@ impl Decimation {
             let (before, after) = ((b - p).cross(c - p), (b - at).cross(c - at));
             let (old, new) = (before.length(), after.length());
             let height = |doubled_area: f64, p: Vec3| {
-                doubled_area / b.distance_squared(c).max(p.distance_squared(b)).max(p.distance_squared(c))
+                doubled_area
+                    / b.distance_squared(c)
+                        .max(p.distance_squared(b))
+                        .max(p.distance_squared(c))
             };
             before.dot(after) > LEAST_COS * old * new && height(new, at) >= LEAST_HEIGHT.min(height(old, p))
         })
@@ -243,7 +278,10 @@ impl Decimation {
             self.start[a as usize] = u;
         }
         for side in [h, self.opposite[h as usize]] {
-            let (a, b) = (self.opposite[Topology::next(side) as usize], self.opposite[prev(side) as usize]);
+            let (a, b) = (
+                self.opposite[Topology::next(side) as usize],
+                self.opposite[prev(side) as usize],
+            );
             self.opposite[a as usize] = b;
             self.opposite[b as usize] = a;
             self.is_dead[side as usize / 3] = true;
@@ -261,7 +299,12 @@ impl Decimation {
     fn finish(self) -> TriMesh {
         let mut name = vec![u32::MAX; self.points.len()];
         let mut mesh = TriMesh::default();
-        for (corners, _) in self.start.chunks_exact(3).zip(&self.is_dead).filter(|(_, dead)| !**dead) {
+        for (corners, _) in self
+            .start
+            .chunks_exact(3)
+            .zip(&self.is_dead)
+            .filter(|(_, dead)| !**dead)
+        {
             let triangle = [corners[0], corners[1], corners[2]].map(|v| {
                 let name = &mut name[v as usize];
                 if *name == u32::MAX {
@@ -283,7 +326,14 @@ mod tests {
     use crate::{Aabb, Solid};
 
     fn body(size: f64, distance: impl Fn(Vec3) -> f64 + Sync) -> TriMesh {
-        contour(Aabb { min: Vec3::splat(-size), max: Vec3::splat(size) }, size / 20.0, distance)
+        contour(
+            Aabb {
+                min: Vec3::splat(-size),
+                max: Vec3::splat(size),
+            },
+            size / 20.0,
+            distance,
+        )
     }
 
     #[test]
@@ -291,7 +341,12 @@ mod tests {
         let ball = body(11.0, |p| 10.0 - p.length());
         let n = ball.points.len();
         let few = decimate(ball.clone(), &vec![0.05; n]);
-        assert!(4 * few.triangles.len() < ball.triangles.len(), "{} of {}", few.triangles.len(), ball.triangles.len());
+        assert!(
+            4 * few.triangles.len() < ball.triangles.len(),
+            "{} of {}",
+            few.triangles.len(),
+            ball.triangles.len()
+        );
         let solid = Solid::new(few).expect("closed");
         for p in &solid.mesh().points {
             assert!((p.length() - 10.0).abs() < 0.12, "{}", p.length());
@@ -314,11 +369,19 @@ mod tests {
     #[test]
     fn points_without_tolerance_stay() {
         let ball = body(11.0, |p| 10.0 - p.length());
-        let tolerance: Vec<f64> = ball.points.iter().map(|p| if p.x > 0.0 { 0.0 } else { 0.1 }).collect();
+        let tolerance: Vec<f64> = ball
+            .points
+            .iter()
+            .map(|p| if p.x > 0.0 { 0.0 } else { 0.1 })
+            .collect();
         let few = decimate(ball.clone(), &tolerance);
         let right = |m: &TriMesh| {
-            let mut bits: Vec<[i64; 3]> =
-                m.points.iter().filter(|p| p.x > 0.0).map(|p| p.to_array().map(|x| (x * 1e9).round() as i64)).collect();
+            let mut bits: Vec<[i64; 3]> = m
+                .points
+                .iter()
+                .filter(|p| p.x > 0.0)
+                .map(|p| p.to_array().map(|x| (x * 1e9).round() as i64))
+                .collect();
             bits.sort_unstable();
             bits
         };
@@ -329,8 +392,14 @@ mod tests {
     #[test]
     fn a_tetrahedron_and_an_open_sheet_come_back() {
         let p = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].to_vec();
-        let tetrahedron = TriMesh { points: p.clone(), triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] };
-        let sheet = TriMesh { points: p, triangles: vec![[0, 2, 1]] };
+        let tetrahedron = TriMesh {
+            points: p.clone(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        };
+        let sheet = TriMesh {
+            points: p,
+            triangles: vec![[0, 2, 1]],
+        };
         assert_eq!(decimate(tetrahedron.clone(), &[9.0; 4]).triangles.len(), 4);
         assert_eq!(decimate(sheet.clone(), &[9.0; 4]), sheet);
     }

@@ -4,18 +4,23 @@ use crate::{TriMesh, Vec3};
 
 /// Largest cotangent used, that of an angle of 1.1°.
 ///
-/// A sliver's cotangents are unbounded and of either sign; clamped to [0, 50] the matrix stays an M-matrix, so that solutions obey
-/// the maximum principle, and its condition stays that of a decent mesh.
+/// A sliver's cotangents are unbounded and of either sign; clamped to [0, 50] the matrix stays an M-matrix,
+/// so that solutions obey the maximum principle, and its condition stays that of a decent mesh.
 const MAX_COTANGENT: f64 = 50.0;
 
-/// The weight of each edge of each triangle, half the cotangent of the angle across it: entry `c` belongs to the edge from corner
-/// `c` to corner `c + 1`. An edge's weight in the Laplacian is the sum over its two triangles. Degenerate triangles give 0.
+/// The weight of each edge of each triangle, half the cotangent of the angle across it: entry `c` belongs to
+/// the edge from corner `c` to corner `c + 1`. An edge's weight in the Laplacian is the sum over its two
+/// triangles. Degenerate triangles give 0.
 pub fn half_cotangents(corners: [Vec3; 3]) -> [f64; 3] {
     [0, 1, 2].map(|c| {
         let (from, to, across) = (corners[c], corners[(c + 1) % 3], corners[(c + 2) % 3]);
         let (u, v) = (from - across, to - across);
         let doubled_area = u.cross(v).length();
-        if doubled_area > 0.0 { 0.5 * (u.dot(v) / doubled_area).clamp(0.0, MAX_COTANGENT) } else { 0.0 }
+        if doubled_area > 0.0 {
+            0.5 * (u.dot(v) / doubled_area).clamp(0.0, MAX_COTANGENT)
+        } else {
+            0.0
+        }
     })
 }
 

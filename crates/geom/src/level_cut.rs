@@ -26,9 +26,9 @@ pub struct Cut {
     pub side: Vec<Side>,
 }
 
-/// Cuts the triangles of `mesh` for which `is_cut` holds along the zero line of `values` (one a point, linear on
-/// triangles). Zero counts as positive. Triangles that share a cut edge are subdivided with it, so a closed mesh stays
-/// closed.
+/// Cuts the triangles of `mesh` for which `is_cut` holds along the zero line of `values` (one a point, linear
+/// on triangles). Zero counts as positive. Triangles that share a cut edge are subdivided with it, so a
+/// closed mesh stays closed.
 pub fn cut_at_zero(mesh: &TriMesh, values: &[f64], is_cut: impl Fn(usize) -> bool) -> Cut {
     let positive = |v: u32| values[v as usize] >= 0.0;
     let mut points = mesh.points.clone();
@@ -46,7 +46,14 @@ pub fn cut_at_zero(mesh: &TriMesh, values: &[f64], is_cut: impl Fn(usize) -> boo
         }
         debug_assert!(face < mesh.triangles.len());
     }
-    let mut cut = Cut { mesh: TriMesh { points, triangles: Vec::new() }, source_face: Vec::new(), side: Vec::new() };
+    let mut cut = Cut {
+        mesh: TriMesh {
+            points,
+            triangles: Vec::new(),
+        },
+        source_face: Vec::new(),
+        side: Vec::new(),
+    };
     for (face, t) in mesh.triangles.iter().enumerate() {
         let split: [Option<u32>; 3] = std::array::from_fn(|e| {
             let (a, b) = (t[e], t[(e + 1) % 3]);
@@ -101,9 +108,20 @@ mod tests {
 
     #[test]
     fn cutting_keeps_the_surface_closed_and_its_area() {
-        let mesh = Volume::cuboid(Aabb { min: Vec3::ZERO, max: Vec3::splat(2.0) }).to_mesh();
-        let first =
-            cut_at_zero(&mesh, &mesh.points.iter().map(|p| p.x + 0.3 * p.y - 1.1).collect::<Vec<_>>(), |_| true);
+        let mesh = Volume::cuboid(Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::splat(2.0),
+        })
+        .to_mesh();
+        let first = cut_at_zero(
+            &mesh,
+            &mesh
+                .points
+                .iter()
+                .map(|p| p.x + 0.3 * p.y - 1.1)
+                .collect::<Vec<_>>(),
+            |_| true,
+        );
         let below: Vec<bool> = first.side.iter().map(|s| *s == Side::Negative).collect();
         let values: Vec<f64> = first.mesh.points.iter().map(|p| p.z + 0.2 * p.x - 0.9).collect();
         let second = cut_at_zero(&first.mesh, &values, |f| below[f]);

@@ -1,7 +1,8 @@
 //! Contouring of band fields into closed meshes.
 //!
-//! One vertex a crossed grid edge, and a triangulation that cuts positive corners apart on ambiguous faces and draws no
-//! diagonal inside a face of a cell: neighbouring cells then agree edge by edge, so every contour is a closed manifold.
+//! One vertex a crossed grid edge, and a triangulation that cuts positive corners apart on ambiguous faces
+//! and draws no diagonal inside a face of a cell: neighbouring cells then agree edge by edge, so every
+//! contour is a closed manifold.
 
 use std::sync::OnceLock;
 
@@ -13,13 +14,13 @@ use crate::{TriMesh, Vec3};
 pub enum OffBand {
     /// Outside the contoured region: the contour closes along the band's border.
     Outside,
-    /// On the same side as their neighbours in the band: cells that miss a corner are left out. Right only for a level set
-    /// that keeps inside the band.
+    /// On the same side as their neighbours in the band: cells that miss a corner are left out. Right only
+    /// for a level set that keeps inside the band.
     LikeNeighbours,
 }
 
-/// Crossings keep this share of an edge away from its nodes, so that no triangle collapses; the surface moves by at most
-/// as much of a cell.
+/// Crossings keep this share of an edge away from its nodes, so that no triangle collapses; the surface moves
+/// by at most as much of a cell.
 const LEAST_SHARE: f64 = 2e-3;
 
 /// No vertex yet, or no value.
@@ -27,8 +28,8 @@ const NONE: u32 = u32::MAX;
 
 /// The surface of the region where `field` is positive, oriented outwards (towards lower values).
 ///
-/// Closed where `off_band` is [`OffBand::Outside`], or where the level set keeps inside the band. Work and memory follow
-/// the band and two layers of its box.
+/// Closed where `off_band` is [`OffBand::Outside`], or where the level set keeps inside the band. Work and
+/// memory follow the band and two layers of its box.
 pub fn contour(band: &Band, field: &[f32], off_band: OffBand) -> TriMesh {
     contour_cutting(band, field, off_band, Corners::Positive)
 }
@@ -38,14 +39,19 @@ pub fn contour(band: &Band, field: &[f32], off_band: OffBand) -> TriMesh {
 pub enum Corners {
     /// Those inside.
     Positive,
-    /// Those outside: the contour of `f` then has the triangles of the contour of `−f`, turned over, so that two fields
-    /// that mean opposite sides of one surface agree on it.
+    /// Those outside: the contour of `f` then has the triangles of the contour of `−f`, turned over, so that
+    /// two fields that mean opposite sides of one surface agree on it.
     Negative,
 }
 
 /// [`contour`] that cuts `apart` the corners on one side of the surface.
 pub fn contour_cutting(band: &Band, field: &[f32], off_band: OffBand, apart: Corners) -> TriMesh {
-    let mut out = Contour { band, off_band, apart, mesh: TriMesh::default() };
+    let mut out = Contour {
+        band,
+        off_band,
+        apart,
+        mesh: TriMesh::default(),
+    };
     let mut low = Layer::read(band, field, -1);
     for k in -1..band.dims[2] as i64 {
         let mut high = Layer::read(band, field, k + 1);
@@ -90,8 +96,10 @@ impl Layer {
                 layer.values[at..at + n].copy_from_slice(&field[first..first + n]);
                 let is_positive = |v: &f32| *v > 0.0;
                 let values = &field[first..first + n];
-                if let (Some(a), Some(b)) = (values.iter().position(is_positive), values.iter().rposition(is_positive))
-                {
+                if let (Some(a), Some(b)) = (
+                    values.iter().position(is_positive),
+                    values.iter().rposition(is_positive),
+                ) {
                     let span = &mut layer.spans[j + 1];
                     *span = (span.0.min(x0 + a), span.1.max(x0 + b));
                 }
@@ -127,7 +135,9 @@ impl Contour<'_> {
         let width = low.width;
         for j in 0..low.spans.len() - 1 {
             let spans = [low.spans[j], low.spans[j + 1], high.spans[j], high.spans[j + 1]];
-            let (from, to) = spans.iter().fold((usize::MAX, 0), |s, t| (s.0.min(t.0), s.1.max(t.1)));
+            let (from, to) = spans
+                .iter()
+                .fold((usize::MAX, 0), |s, t| (s.0.min(t.0), s.1.max(t.1)));
             if from > to {
                 continue;
             }
@@ -136,7 +146,11 @@ impl Contour<'_> {
                 let mut corner = [0.0f32; 8];
                 for (c, value) in corner.iter_mut().enumerate() {
                     let there = at + (c & 1) + width * (c >> 1 & 1);
-                    *value = if c < 4 { low.value(there) } else { high.value(there) };
+                    *value = if c < 4 {
+                        low.value(there)
+                    } else {
+                        high.value(there)
+                    };
                 }
                 let missing = corner.contains(&f32::NEG_INFINITY);
                 if missing && self.off_band == OffBand::LikeNeighbours {
@@ -150,18 +164,35 @@ impl Contour<'_> {
         }
     }
 
-    fn cell(&mut self, [i, j]: [usize; 2], k: i64, corner: &[f32; 8], case: usize, low: &mut Layer, high: &mut Layer) {
+    fn cell(
+        &mut self,
+        [i, j]: [usize; 2],
+        k: i64,
+        corner: &[f32; 8],
+        case: usize,
+        low: &mut Layer,
+        high: &mut Layer,
+    ) {
         let is_turned = self.apart == Corners::Negative;
         let case = if is_turned { 255 - case } else { case };
         let first = self.mesh.triangles.len();
         for polygon in &table()[case] {
-            let ids: Vec<u32> = polygon.edges.iter().map(|&e| self.vertex([i, j], k, corner, e, low, high)).collect();
+            let ids: Vec<u32> = polygon
+                .edges
+                .iter()
+                .map(|&e| self.vertex([i, j], k, corner, e, low, high))
+                .collect();
             if polygon.fan {
-                self.mesh.triangles.extend((2..ids.len()).map(|n| [ids[0], ids[n - 1], ids[n]]));
+                self.mesh
+                    .triangles
+                    .extend((2..ids.len()).map(|n| [ids[0], ids[n - 1], ids[n]]));
             } else {
-                let center = ids.iter().map(|&v| self.mesh.points[v as usize]).sum::<Vec3>() / ids.len() as f64;
+                let center =
+                    ids.iter().map(|&v| self.mesh.points[v as usize]).sum::<Vec3>() / ids.len() as f64;
                 let hub = self.add(center);
-                self.mesh.triangles.extend((0..ids.len()).map(|n| [hub, ids[n], ids[(n + 1) % ids.len()]]));
+                self.mesh
+                    .triangles
+                    .extend((0..ids.len()).map(|n| [hub, ids[n], ids[(n + 1) % ids.len()]]));
             }
         }
         if is_turned {
@@ -187,20 +218,35 @@ impl Contour<'_> {
         let (a, b) = edge_ends(e);
         let axis = usize::from(e) / 4;
         let at = (j + (a >> 1 & 1)) * low.width + i + (a & 1);
-        let slot = if a < 4 { low.edge(axis, at) } else { high.edge(axis, at) };
+        let slot = if a < 4 {
+            low.edge(axis, at)
+        } else {
+            high.edge(axis, at)
+        };
         if *slot != NONE {
             return *slot;
         }
         // A node off the band counts as one cell below the level.
-        let value = |c: usize| if corner[c].is_finite() { f64::from(corner[c]) } else { -self.band.cell_mm };
+        let value = |c: usize| {
+            if corner[c].is_finite() {
+                f64::from(corner[c])
+            } else {
+                -self.band.cell_mm
+            }
+        };
         let (va, vb) = (value(a), value(b));
         let t = (va / (va - vb)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
-        let mut node =
-            [i as f64 - 1.0 + (a & 1) as f64, j as f64 - 1.0 + (a >> 1 & 1) as f64, k as f64 + (a >> 2) as f64];
+        let mut node = [
+            i as f64 - 1.0 + (a & 1) as f64,
+            j as f64 - 1.0 + (a >> 1 & 1) as f64,
+            k as f64 + (a >> 2) as f64,
+        ];
         node[axis] += t;
         *slot = u32::try_from(self.mesh.points.len()).expect("contours have fewer than 2³² points");
         let id = *slot;
-        self.mesh.points.push(self.band.origin + self.band.cell_mm * Vec3::from_array(node));
+        self.mesh
+            .points
+            .push(self.band.origin + self.band.cell_mm * Vec3::from_array(node));
         id
     }
 }
@@ -208,7 +254,8 @@ impl Contour<'_> {
 /// One polygon of a case, as cell edges in order.
 struct Polygon {
     edges: Vec<u8>,
-    /// Whether a fan from the first vertex draws no diagonal inside a face of the cell; otherwise a middle vertex is used.
+    /// Whether a fan from the first vertex draws no diagonal inside a face of the cell; otherwise a middle
+    /// vertex is used.
     fan: bool,
 }
 
@@ -221,7 +268,9 @@ fn edge_ends(e: u8) -> (usize, usize) {
 }
 
 fn edge_between(p: usize, q: usize) -> u8 {
-    (0..12u8).find(|&e| edge_ends(e) == (p.min(q), p.max(q))).expect("corners next to each other on a face")
+    (0..12u8)
+        .find(|&e| edge_ends(e) == (p.min(q), p.max(q)))
+        .expect("corners next to each other on a face")
 }
 
 /// Corners of the six faces, counter-clockwise seen from outside the cell.
@@ -230,7 +279,11 @@ fn faces() -> [[usize; 4]; 6] {
         let (axis, side) = (f / 2, f % 2);
         let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
         let around = [0, 1 << b, 1 << b | 1 << c, 1 << c].map(|x| x | side << axis);
-        if side == 1 { around } else { [around[0], around[3], around[2], around[1]] }
+        if side == 1 {
+            around
+        } else {
+            [around[0], around[3], around[2], around[1]]
+        }
     })
 }
 
@@ -242,7 +295,8 @@ fn table() -> &'static [Vec<Polygon>] {
 
 fn polygons_of(case: usize) -> Vec<Polygon> {
     let positive = |corner: usize| case >> corner & 1 == 1;
-    // On each face, each run of positive corners is cut off by one segment, from where the run ends to where it begins.
+    // On each face, each run of positive corners is cut off by one segment, from where the run ends to where
+    // it begins.
     let mut next = [u8::MAX; 12];
     for face in faces() {
         for start in 0..4 {
@@ -272,7 +326,8 @@ fn polygons_of(case: usize) -> Vec<Polygon> {
     polygons
 }
 
-/// Turns the polygon so that a fan from its first vertex draws no diagonal inside a face, where that is possible.
+/// Turns the polygon so that a fan from its first vertex draws no diagonal inside a face, where that is
+/// possible.
 fn triangulable(edges: Vec<u8>) -> Polygon {
     let n = edges.len();
     let on_one_face = |a: u8, b: u8| {
@@ -282,7 +337,10 @@ fn triangulable(edges: Vec<u8>) -> Polygon {
     for turn in 0..n {
         let turned: Vec<u8> = (0..n).map(|i| edges[(i + turn) % n]).collect();
         if (2..n - 1).all(|i| !on_one_face(turned[0], turned[i])) {
-            return Polygon { edges: turned, fan: true };
+            return Polygon {
+                edges: turned,
+                fan: true,
+            };
         }
     }
     Polygon { edges, fan: false }
@@ -301,7 +359,9 @@ mod tests {
         let noise: Vec<f32> = phi
             .iter()
             .map(|_| {
-                x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                x = x
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
                 (x >> 40) as f32 / (1u64 << 23) as f32 - 1.0
             })
             .collect();
@@ -323,7 +383,12 @@ mod tests {
         assert_eq!(a.points.len(), b.points.len());
         assert!(a.points.iter().zip(&b.points).all(|(a, b)| a.distance(*b) < 1e-9));
         assert_eq!(a.triangles.len(), b.triangles.len());
-        assert!(a.triangles.iter().zip(&b.triangles).all(|(a, b)| *a == [b[0], b[2], b[1]]));
+        assert!(
+            a.triangles
+                .iter()
+                .zip(&b.triangles)
+                .all(|(a, b)| *a == [b[0], b[2], b[1]])
+        );
     }
 
     #[test]
@@ -331,7 +396,8 @@ mod tests {
         let (band, phi) = cube_band();
         let inner: Vec<f32> = phi.iter().map(|d| d - 1.1).collect();
         let solid = Solid::new(contour(&band, &inner, OffBand::LikeNeighbours)).unwrap();
-        // The offset of a cube inwards is a cube; the grid cuts its 12 edges by up to half a cell each way: 12 · 5.8 · h² / 8.
+        // The offset of a cube inwards is a cube; the grid cuts its 12 edges by up to half a cell each way:
+        // 12 · 5.8 · h² / 8.
         assert!((5.8f64.powi(3) - solid.volume()).abs() < 12.0 * 5.8 * 0.25 / 8.0 * 2.0);
         assert!(solid.mesh().points.iter().all(|p| {
             let depth = p.min(Vec3::splat(8.0) - *p).min_element();

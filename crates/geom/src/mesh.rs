@@ -54,7 +54,11 @@ impl TriMesh {
             volume += part;
             moment += (a + b + c) * (0.25 * part);
         }
-        if volume > 0.0 { origin + moment / volume } else { origin }
+        if volume > 0.0 {
+            origin + moment / volume
+        } else {
+            origin
+        }
     }
 
     /// Signed volume, mm³: positive where a closed mesh is oriented outwards.
@@ -73,11 +77,20 @@ impl TriMesh {
     #[must_use]
     pub fn without_unused_points(mut self) -> Self {
         let mut name = vec![u32::MAX; self.points.len()];
-        self.triangles.iter().flatten().for_each(|&v| name[v as usize] = 0);
-        name.iter_mut().filter(|x| **x == 0).zip(0..).for_each(|(slot, n)| *slot = n);
+        self.triangles
+            .iter()
+            .flatten()
+            .for_each(|&v| name[v as usize] = 0);
+        name.iter_mut()
+            .filter(|x| **x == 0)
+            .zip(0..)
+            .for_each(|(slot, n)| *slot = n);
         let mut place = name.iter();
         self.points.retain(|_| place.next() != Some(&u32::MAX));
-        self.triangles.iter_mut().flatten().for_each(|v| *v = name[*v as usize]);
+        self.triangles
+            .iter_mut()
+            .flatten()
+            .for_each(|v| *v = name[*v as usize]);
         self
     }
 
@@ -98,21 +111,33 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that contains nothing.
-    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+    pub const EMPTY: Self = Self {
+        min: Vec3::INFINITY,
+        max: Vec3::NEG_INFINITY,
+    };
 
     /// The smallest box around `points`.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+        points.into_iter().fold(Self::EMPTY, |b, p| Self {
+            min: b.min.min(p),
+            max: b.max.max(p),
+        })
     }
 
     /// The box moved outwards by `by_mm` on all sides.
     pub fn grown(self, by_mm: f64) -> Self {
-        Self { min: self.min - by_mm, max: self.max + by_mm }
+        Self {
+            min: self.min - by_mm,
+            max: self.max + by_mm,
+        }
     }
 
     /// The smallest box around both.
     pub fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
     }
 
     /// Whether the closed boxes share a point.

@@ -1,16 +1,18 @@
 //! Even triangles of a chosen size on a labelled surface.
 //!
-//! Isotropic remeshing [Botsch and Kobbelt 2004]: long edges are split, short ones merged, edges turned where that is
-//! nearer to Delaunay, points moved to the middle of their neighbours and back onto the input. Before that, fine input
-//! is coarsened by merging edges into one of their ends, shortest first, so that the rounds work on few triangles.
+//! Isotropic remeshing [Botsch and Kobbelt 2004]: long edges are split, short ones merged, edges turned where
+//! that is nearer to Delaunay, points moved to the middle of their neighbours and back onto the input. Before
+//! that, fine input is coarsened by merging edges into one of their ends, shortest first, so that the rounds
+//! work on few triangles.
 //!
-//! Lines between labels (*seams*) are kept: points on them move along the input's own line by its arc length, and
-//! points where seams meet do not move. An edge that joins two seam points through the inside of a region (a *bridge*)
-//! is turned away or split: every triangle has a point inside its region, however narrow that is.
+//! Lines between labels (*seams*) are kept: points on them move along the input's own line by its arc length,
+//! and points where seams meet do not move. An edge that joins two seam points through the inside of a region
+//! (a *bridge*) is turned away or split: every triangle has a point inside its region, however narrow that
+//! is.
 //!
-//! Limits: the input's sharp edges are not features and get chamfered by up to an edge length unless a seam runs along
-//! them, what is thinner than an edge may stay finer than asked, because no triangle may face against the input, and
-//! corners much closer together than an edge keep thin triangles between them.
+//! Limits: the input's sharp edges are not features and get chamfered by up to an edge length unless a seam
+//! runs along them, what is thinner than an edge may stay finer than asked, because no triangle may face
+//! against the input, and corners much closer together than an edge keep thin triangles between them.
 
 mod seams;
 mod surface;
@@ -27,16 +29,18 @@ use crate::{HalfEdge, TriMesh, Vec3};
 const LONGEST: f64 = 4.0 / 3.0;
 /// Shorter edges are merged, in target lengths. [Botsch and Kobbelt 2004]
 const SHORTEST: f64 = 4.0 / 5.0;
-/// Coarsening leaves edges of this many target lengths to the rounds, which see the input and place points better.
+/// Coarsening leaves edges of this many target lengths to the rounds, which see the input and place points
+/// better.
 const COARSE: f64 = 0.6;
 /// No coarsening merge makes an edge of more target lengths.
 const COARSE_LONGEST: f64 = 1.1;
-/// Cosine between a triangle's normal and the input's at the nearest point (and, while coarsening, at its corners): at
-/// least this.
+/// Cosine between a triangle's normal and the input's at the nearest point (and, while coarsening, at its
+/// corners): at least this.
 const LEAST_COS: f64 = 0.2;
 /// No step makes a triangle whose height is a smaller share of its longest edge, unless it was worse before.
 const LEAST_HEIGHT: f64 = 0.05;
-/// A bridge is turned away if that leaves triangles with more than this share, or no worse ones; else it is split.
+/// A bridge is turned away if that leaves triangles with more than this share, or no worse ones; else it is
+/// split.
 const LEAST_TURNED_HEIGHT: f64 = 0.25;
 /// An edge is not turned if that takes the surface farther off than this, in target lengths.
 const MOST_OFF: f64 = 0.3;
@@ -54,8 +58,8 @@ const UNIT_TRIANGLE: f64 = 0.433;
 /// How [`remesh`] works.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RemeshParams {
-    /// Edge length wanted, mm, > 0. Most edges come out between 0.6 and 1.5 of it; raised where it would need more than
-    /// a million triangles.
+    /// Edge length wanted, mm, > 0. Most edges come out between 0.6 and 1.5 of it; raised where it would need
+    /// more than a million triangles.
     pub target_edge_mm: f64,
     /// Rounds of splitting, merging, turning and smoothing. The tests and the figures in these docs use 6.
     pub n_rounds: u32,
@@ -70,21 +74,28 @@ pub struct Remeshed {
     pub labels: Vec<u32>,
 }
 
-/// `mesh` with triangles of about `params.target_edge_mm`, labelled like the input (`labels`, one a triangle).
+/// `mesh` with triangles of about `params.target_edge_mm`, labelled like the input (`labels`, one a
+/// triangle).
 ///
-/// For closed, consistently oriented meshes; others, and targets that are no positive number, come back unchanged. Kept
-/// are: closedness, orientation and genus; each connected region and so each label; the seams, by pairs of labels, on
-/// the input's lines; and where three or more meet, the point. Points lie on the input but for rare ones where
-/// projecting them would turn a triangle over. Sequential and deterministic; about 0.5 s for 100 000 triangles.
+/// For closed, consistently oriented meshes; others, and targets that are no positive number, come back
+/// unchanged. Kept are: closedness, orientation and genus; each connected region and so each label; the
+/// seams, by pairs of labels, on the input's lines; and where three or more meet, the point. Points lie on
+/// the input but for rare ones where projecting them would turn a triangle over. Sequential and
+/// deterministic; about 0.5 s for 100 000 triangles.
 pub fn remesh(params: &RemeshParams, mesh: &TriMesh, labels: &[u32]) -> Remeshed {
     assert_eq!(mesh.triangles.len(), labels.len(), "one label a triangle");
-    let unchanged = || Remeshed { mesh: mesh.clone(), labels: labels.to_vec() };
+    let unchanged = || Remeshed {
+        mesh: mesh.clone(),
+        labels: labels.to_vec(),
+    };
     let least_mm = (mesh.area() / (UNIT_TRIANGLE * MOST_TRIANGLES)).sqrt();
     let target_mm = params.target_edge_mm.max(least_mm);
     if !(params.target_edge_mm > 0.0 && target_mm.is_finite()) {
         return unchanged();
     }
-    let Some(mut surface) = Surface::new(mesh, labels) else { return unchanged() };
+    let Some(mut surface) = Surface::new(mesh, labels) else {
+        return unchanged();
+    };
     let seams = find_seams(&mut surface);
     let mut work = Remesher::new(mesh, surface, seams, target_mm);
     work.coarsen();
@@ -124,7 +135,9 @@ impl Remesher {
     /// The input's point nearest to `p`, and its normal there.
     fn on_input(&self, p: Vec3) -> (Vec3, Vec3) {
         let nearest = self.input.nearest(p, f64::INFINITY);
-        nearest.map_or((p, Vec3::ZERO), |n| (n.point, self.input_normals[n.face as usize]))
+        nearest.map_or((p, Vec3::ZERO), |n| {
+            (n.point, self.input_normals[n.face as usize])
+        })
     }
 
     /// Whether triangle `corners` faces the way the input does where it is nearest.
@@ -132,36 +145,55 @@ impl Remesher {
         self.cosine(corners) >= LEAST_COS
     }
 
-    /// Between the normals of triangle `corners` and of the input where it is nearest; 1 if one of them has none.
+    /// Between the normals of triangle `corners` and of the input where it is nearest; 1 if one of them has
+    /// none.
     fn cosine(&self, [a, b, c]: [Vec3; 3]) -> f64 {
-        let normals = [(b - a).cross(c - a).normalize_or_zero(), self.on_input((a + b + c) / 3.0).1];
-        if normals.contains(&Vec3::ZERO) { 1.0 } else { normals[0].dot(normals[1]) }
+        let normals = [
+            (b - a).cross(c - a).normalize_or_zero(),
+            self.on_input((a + b + c) / 3.0).1,
+        ];
+        if normals.contains(&Vec3::ZERO) {
+            1.0
+        } else {
+            normals[0].dot(normals[1])
+        }
     }
 
     /// Whether all triangles at `v` stay sound if it moves to `at`, but for those that it shares with `gone`.
-    fn may_move(&self, v: u32, at: Vec3, gone: Option<u32>, faces_well: impl Fn(HalfEdge, [Vec3; 3]) -> bool) -> bool {
+    fn may_move(
+        &self,
+        v: u32,
+        at: Vec3,
+        gone: Option<u32>,
+        faces_well: impl Fn(HalfEdge, [Vec3; 3]) -> bool,
+    ) -> bool {
         self.surface.around(v).all(|h| {
             let [p, b, c] = self.surface.corners(h);
             let is_gone = gone.is_some_and(|g| self.surface.ends(h)[1] == g || self.surface.apex(h) == g);
             let moved = [at, b, c];
-            is_gone || (height_share(moved) >= LEAST_HEIGHT.min(height_share([p, b, c])) && faces_well(h, moved))
+            is_gone
+                || (height_share(moved) >= LEAST_HEIGHT.min(height_share([p, b, c])) && faces_well(h, moved))
         })
     }
 
-    /// Whether the triangle of `h` agrees with the input, or more than before, if its corners move to `moved`.
+    /// Whether the triangle of `h` agrees with the input, or more than before, if its corners move to
+    /// `moved`.
     fn may_face(&self, h: HalfEdge, moved: [Vec3; 3]) -> bool {
         let cosine = self.cosine(moved);
         cosine >= LEAST_COS || cosine >= self.cosine(self.surface.corners(h))
     }
 
-    /// Merges short edges, in passes in which each point takes part once at most: no queue, and even triangles.
+    /// Merges short edges, in passes in which each point takes part once at most: no queue, and even
+    /// triangles.
     ///
-    /// Directions are compared with the input's normals at the corners, which are points of the input all the while: a
-    /// search for the nearest point costs more than all else here.
+    /// Directions are compared with the input's normals at the corners, which are points of the input all the
+    /// while: a search for the nearest point costs more than all else here.
     fn coarsen(&mut self) {
         let normals = self.point_normals();
         let n_points = self.surface.points.len();
-        let mut alive: Vec<u32> = (0..n_points as u32).filter(|&v| self.surface.is_alive(v)).collect();
+        let mut alive: Vec<u32> = (0..n_points as u32)
+            .filter(|&v| self.surface.is_alive(v))
+            .collect();
         let mut pass_of = vec![0; n_points];
         let mut short = Vec::new();
         for pass in 1..=MOST_PASSES {
@@ -172,12 +204,16 @@ impl Remesher {
                 }
                 self.short_edges(v, COARSE * self.target_mm, &mut short);
                 short.retain(|&(_, h)| pass_of[self.surface.ends(h)[1] as usize] != pass);
-                let both_ways = short.iter().flat_map(|&(_, h)| [h, self.surface.opposite[h as usize]]);
+                let both_ways = short
+                    .iter()
+                    .flat_map(|&(_, h)| [h, self.surface.opposite[h as usize]]);
                 let found = both_ways.into_iter().find(|&h| {
                     self.may_merge(h, COARSE_LONGEST, |a, t| {
                         let normal = (t[1] - t[0]).cross(t[2] - t[0]);
                         let [b, c] = [self.surface.ends(a)[1], self.surface.apex(a)];
-                        [self.surface.ends(h)[0], b, c].iter().all(|&v| faces_along(normal, normals[v as usize]))
+                        [self.surface.ends(h)[0], b, c]
+                            .iter()
+                            .all(|&v| faces_along(normal, normals[v as usize]))
                     })
                 });
                 if let Some(h) = found {
@@ -222,7 +258,9 @@ impl Remesher {
             let length_sq = at.distance_squared(self.surface.points[self.surface.ends(a)[1] as usize]);
             length_sq <= longest_sq.max(self.surface.length_sq(a))
         };
-        self.surface.may_merge(h) && self.surface.around(v).all(is_short) && self.may_move(v, at, Some(u), faces_well)
+        self.surface.may_merge(h)
+            && self.surface.around(v).all(is_short)
+            && self.may_move(v, at, Some(u), faces_well)
     }
 
     /// Halves what is far longer than the target, as coarse input has it.
@@ -249,7 +287,8 @@ impl Remesher {
         }
     }
 
-    /// Splits `h` in the middle: of its stretch of the seam, or moved onto the input unless that spoils a triangle.
+    /// Splits `h` in the middle: of its stretch of the seam, or moved onto the input unless that spoils a
+    /// triangle.
     fn split(&mut self, h: HalfEdge) {
         let [u, v] = self.surface.ends(h).map(|v| self.surface.points[v as usize]);
         let middle = 0.5 * (u + v);
@@ -275,8 +314,12 @@ impl Remesher {
         let mut short = Vec::new();
         for v in 0..self.surface.points.len() as u32 {
             self.short_edges(v, SHORTEST * self.target_mm, &mut short);
-            let both_ways = short.iter().flat_map(|&(_, h)| [h, self.surface.opposite[h as usize]]);
-            let found = both_ways.into_iter().find(|&h| self.may_merge(h, LONGEST, |a, t| self.may_face(a, t)));
+            let both_ways = short
+                .iter()
+                .flat_map(|&(_, h)| [h, self.surface.opposite[h as usize]]);
+            let found = both_ways
+                .into_iter()
+                .find(|&h| self.may_merge(h, LONGEST, |a, t| self.may_face(a, t)));
             if let Some(h) = found {
                 self.surface.merge(h);
             }
@@ -308,13 +351,23 @@ impl Remesher {
         if distance_of_lines([u, v], [w, x]) > MOST_OFF * self.target_mm {
             return false;
         }
-        let makes_bridge = [h, s.opposite[h as usize]].iter().all(|&h| !s.is_inside(s.apex(h)));
-        let least_height = if s.is_bridge(h) { LEAST_TURNED_HEIGHT } else { LEAST_HEIGHT };
+        let makes_bridge = [h, s.opposite[h as usize]]
+            .iter()
+            .all(|&h| !s.is_inside(s.apex(h)));
+        let least_height = if s.is_bridge(h) {
+            LEAST_TURNED_HEIGHT
+        } else {
+            LEAST_HEIGHT
+        };
         if makes_bridge || !(s.is_bridge(h) || angles_exceed_pi([u, v], [w, x])) || !s.may_turn(h) {
             return false;
         }
-        let least_height = height_share([u, v, w]).min(height_share([v, u, x])).min(least_height);
-        turned.iter().all(|&t| height_share(t) > least_height && self.agrees(t))
+        let least_height = height_share([u, v, w])
+            .min(height_share([v, u, x]))
+            .min(least_height);
+        turned
+            .iter()
+            .all(|&t| height_share(t) > least_height && self.agrees(t))
     }
 
     /// Splits the bridges that could not be turned, and triangles whose three edges are all on seams.
@@ -337,17 +390,20 @@ impl Remesher {
         }
     }
 
-    /// Moves points to the middle of their neighbours: in the tangent plane and back onto the input, or along the seam.
-    /// Where the whole way spoils a triangle, half or a quarter of it may not.
+    /// Moves points to the middle of their neighbours: in the tangent plane and back onto the input, or along
+    /// the seam. Where the whole way spoils a triangle, half or a quarter of it may not.
     ///
-    /// Left are points inside regions where the cosine of a triangle's normal and the mean one is less than `least_cos`.
+    /// Left are points inside regions where the cosine of a triangle's normal and the mean one is less than
+    /// `least_cos`.
     fn smooth(&mut self, least_cos: f64) {
         for v in 0..self.surface.points.len() as u32 {
             if matches!(self.surface.place[v as usize], Place::Inside) && self.is_bent(v, least_cos) {
                 continue;
             }
             for share in [1.0, 0.5, 0.25] {
-                let Some((at, place)) = self.relaxed(v, share) else { break };
+                let Some((at, place)) = self.relaxed(v, share) else {
+                    break;
+                };
                 if self.may_move(v, at, None, |h, t| self.may_face(h, t)) {
                     self.surface.points[v as usize] = at;
                     self.surface.place[v as usize] = place;
@@ -362,8 +418,15 @@ impl Remesher {
             let [a, b, c] = self.surface.corners(h);
             (b - a).cross(c - a)
         };
-        let mean = self.surface.around(v).map(normal).sum::<Vec3>().normalize_or_zero();
-        self.surface.around(v).any(|h| normal(h).normalize_or_zero().dot(mean) < least_cos)
+        let mean = self
+            .surface
+            .around(v)
+            .map(normal)
+            .sum::<Vec3>()
+            .normalize_or_zero();
+        self.surface
+            .around(v)
+            .any(|h| normal(h).normalize_or_zero().dot(mean) < least_cos)
     }
 
     /// Where `v` is after this share of the way to the middle of its neighbours; `None` if it does not move.
@@ -401,8 +464,15 @@ fn faces_along(area_vector: Vec3, normal: Vec3) -> bool {
 
 /// Height over the longest edge as a share of it: 0.87 at most, 0 for a degenerate triangle.
 fn height_share([a, b, c]: [Vec3; 3]) -> f64 {
-    let longest_sq = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
-    if longest_sq > 0.0 { (b - a).cross(c - a).length() / longest_sq } else { 0.0 }
+    let longest_sq = a
+        .distance_squared(b)
+        .max(b.distance_squared(c))
+        .max(c.distance_squared(a));
+    if longest_sq > 0.0 {
+        (b - a).cross(c - a).length() / longest_sq
+    } else {
+        0.0
+    }
 }
 
 /// Distance of two lines, each through two points; 0 where they are parallel.
@@ -412,7 +482,8 @@ fn distance_of_lines([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f64 {
 
 /// Whether the angles at `apexes` over the edge `ends` sum to more than π: the edge is not Delaunay.
 fn angles_exceed_pi([u, v]: [Vec3; 2], apexes: [Vec3; 2]) -> bool {
-    let [(sin_w, cos_w), (sin_x, cos_x)] = apexes.map(|w| ((u - w).cross(v - w).length(), (u - w).dot(v - w)));
+    let [(sin_w, cos_w), (sin_x, cos_x)] =
+        apexes.map(|w| ((u - w).cross(v - w).length(), (u - w).dot(v - w)));
     let scale = (sin_w + cos_w.abs()) * (sin_x + cos_x.abs());
     sin_w * cos_x + sin_x * cos_w < -1e-9 * scale
 }

@@ -4,10 +4,11 @@ use std::collections::HashMap;
 
 use crate::{Solid, TriMesh, Vec3, Volume};
 
-/// Edges shorter than this collapse before rounding, mm. A 32-bit coordinate of 150 mm has steps of 1.5e-5 mm.
+/// Edges shorter than this collapse before rounding, mm. A 32-bit coordinate of 150 mm has steps of 1.5e-5
+/// mm.
 const SHORT_MM: f64 = 1e-4;
-/// Points that would fall together without being joined by an edge are moved inwards by this much, mm: far above the
-/// steps of the format, far below what any printer resolves.
+/// Points that would fall together without being joined by an edge are moved inwards by this much, mm: far
+/// above the steps of the format, far below what any printer resolves.
 const APART_MM: f64 = 2e-3;
 /// Rounds of collapsing and moving apart. On all test models three were enough.
 const MAX_ROUNDS: usize = 10;
@@ -31,8 +32,8 @@ pub enum NotPrintable {
     NotSolid(String),
 }
 
-/// The boundary of `volume` with coordinates that 32-bit floats hold exactly, and no two points at the same place: a
-/// program that merges equal points, as slicers do, sees the same manifold.
+/// The boundary of `volume` with coordinates that 32-bit floats hold exactly, and no two points at the same
+/// place: a program that merges equal points, as slicers do, sees the same manifold.
 ///
 /// Points move by at most a few µm, and only where the surface touches itself or has edges under 0.1 µm.
 pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
@@ -51,15 +52,27 @@ pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
         touching = coincident(&mesh);
     }
     if let Some(first) = touching.first() {
-        return Err(NotPrintable::Touches { count: touching.len(), at: mesh.points[first[0] as usize] });
+        return Err(NotPrintable::Touches {
+            count: touching.len(),
+            at: mesh.points[first[0] as usize],
+        });
     }
-    Solid::new(mesh).map(Solid::into_mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))
+    Solid::new(mesh)
+        .map(Solid::into_mesh)
+        .map_err(|e| NotPrintable::NotSolid(e.to_string()))
 }
 
-/// As [`printable`], but of the largest part of `volume` alone, as one closed surface: chips that hang on nothing go, and slivers of
-/// hollow, which also arise where a surface that touched itself is moved apart, are filled.
+/// As [`printable`], but of the largest part of `volume` alone, as one closed surface: chips that hang on
+/// nothing go, and slivers of hollow, which also arise where a surface that touched itself is moved apart,
+/// are filled.
 pub fn printable_body(volume: &Volume) -> Result<TriMesh, NotPrintable> {
-    let largest = |volume: &Volume| volume.components().into_iter().next().unwrap_or_else(Volume::empty);
+    let largest = |volume: &Volume| {
+        volume
+            .components()
+            .into_iter()
+            .next()
+            .unwrap_or_else(Volume::empty)
+    };
     let mut mesh = printable(&largest(volume))?;
     for _ in 0..MAX_ROUNDS {
         let again = Volume::from_closed_mesh(&mesh).map_err(|e| NotPrintable::NotSolid(e.to_string()))?;
@@ -75,19 +88,26 @@ fn rounded(mesh: &TriMesh) -> TriMesh {
     // Adding 0 turns −0 into 0, so equal points have equal bits.
     let round = |x: f64| f64::from(x as f32) + 0.0;
     TriMesh {
-        points: mesh.points.iter().map(|p| Vec3::new(round(p.x), round(p.y), round(p.z))).collect(),
+        points: mesh
+            .points
+            .iter()
+            .map(|p| Vec3::new(round(p.x), round(p.y), round(p.z)))
+            .collect(),
         triangles: mesh.triangles.clone(),
     }
 }
 
-/// The same mesh with points sorted by coordinates and triangles by their corners, the lowest first. The boolean library
-/// orders its output by numbers that it gives to meshes as they are made, which depends on how threads happen to run.
+/// The same mesh with points sorted by coordinates and triangles by their corners, the lowest first. The
+/// boolean library orders its output by numbers that it gives to meshes as they are made, which depends on
+/// how threads happen to run.
 fn in_canonical_order(mesh: &TriMesh) -> TriMesh {
     let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let key = |v: &u32| mesh.points[*v as usize].to_array();
     order.sort_by(|a, b| {
         let (a, b) = (key(a), key(b));
-        a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
+        a[0].total_cmp(&b[0])
+            .then(a[1].total_cmp(&b[1]))
+            .then(a[2].total_cmp(&b[2]))
     });
     let mut rank = vec![0u32; order.len()];
     for (new, &old) in order.iter().enumerate() {
@@ -108,24 +128,33 @@ fn in_canonical_order(mesh: &TriMesh) -> TriMesh {
         })
         .collect();
     triangles.sort_unstable();
-    TriMesh { points: order.iter().map(|&v| mesh.points[v as usize]).collect(), triangles }
+    TriMesh {
+        points: order.iter().map(|&v| mesh.points[v as usize]).collect(),
+        triangles,
+    }
 }
 
 /// Groups of different points at the same place, ordered by their first member.
 fn coincident(mesh: &TriMesh) -> Vec<Vec<u32>> {
     let mut at: HashMap<[u64; 3], Vec<u32>> = HashMap::with_capacity(mesh.points.len());
     for (v, p) in mesh.points.iter().enumerate() {
-        at.entry(p.to_array().map(f64::to_bits)).or_default().push(v as u32);
+        at.entry(p.to_array().map(f64::to_bits))
+            .or_default()
+            .push(v as u32);
     }
     let mut groups: Vec<Vec<u32>> = at.into_values().filter(|g| g.len() > 1).collect();
     groups.sort_unstable();
     groups
 }
 
-/// Moves every point of every group inwards, unless an edge joins it to its twin (then the edge is left to collapse).
+/// Moves every point of every group inwards, unless an edge joins it to its twin (then the edge is left to
+/// collapse).
 fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
-    let group_of: HashMap<u32, usize> =
-        groups.iter().enumerate().flat_map(|(g, members)| members.iter().map(move |&v| (v, g))).collect();
+    let group_of: HashMap<u32, usize> = groups
+        .iter()
+        .enumerate()
+        .flat_map(|(g, members)| members.iter().map(move |&v| (v, g)))
+        .collect();
     let mut normals: HashMap<u32, Vec3> = HashMap::new();
     let mut joined: HashMap<u32, bool> = HashMap::new();
     for (f, t) in mesh.triangles.iter().enumerate() {
@@ -153,9 +182,16 @@ mod tests {
 
     #[test]
     fn a_body_loses_its_chips_and_its_slivers_of_hollow() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let cuboid = |min: [f64; 3], max: [f64; 3]| {
+            Volume::cuboid(Aabb {
+                min: min.into(),
+                max: max.into(),
+            })
+        };
         let body = cuboid([0.0; 3], [9.0; 3]);
-        let hollow = body.subtract(&cuboid([4.0; 3], [4.01, 4.1, 5.0])).union(&cuboid([11.0; 3], [12.0; 3]));
+        let hollow = body
+            .subtract(&cuboid([4.0; 3], [4.01, 4.1, 5.0]))
+            .union(&cuboid([11.0; 3], [12.0; 3]));
         assert_eq!(hollow.components().len(), 3);
         let made = printable_body(&hollow).unwrap();
         assert_eq!((made.triangles.len(), made.signed_volume()), (12, body.volume()));
@@ -163,8 +199,14 @@ mod tests {
 
     #[test]
     fn boxes_that_touch_along_an_edge_come_apart() {
-        let a = Volume::cuboid(Aabb { min: Vec3::ZERO, max: Vec3::ONE });
-        let b = Volume::cuboid(Aabb { min: Vec3::new(1.0, 1.0, 0.0), max: Vec3::new(2.0, 2.0, 1.0) });
+        let a = Volume::cuboid(Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::ONE,
+        });
+        let b = Volume::cuboid(Aabb {
+            min: Vec3::new(1.0, 1.0, 0.0),
+            max: Vec3::new(2.0, 2.0, 1.0),
+        });
         let both = a.union(&b);
         let mesh = printable(&both).unwrap();
         assert!(coincident(&mesh).is_empty());
@@ -173,7 +215,10 @@ mod tests {
 
     #[test]
     fn coordinates_are_exactly_what_32_bits_hold() {
-        let v = Volume::cuboid(Aabb { min: Vec3::splat(0.1), max: Vec3::splat(140.3) });
+        let v = Volume::cuboid(Aabb {
+            min: Vec3::splat(0.1),
+            max: Vec3::splat(140.3),
+        });
         for p in &printable(&v).unwrap().points {
             assert!(p.to_array().iter().all(|&x| f64::from(x as f32) == x));
         }

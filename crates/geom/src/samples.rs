@@ -28,6 +28,8 @@ pub fn flipped(mut mesh: TriMesh) -> TriMesh {
 pub fn unwelded(mesh: &TriMesh) -> TriMesh {
     TriMesh {
         points: (0..mesh.triangles.len()).flat_map(|f| mesh.corners(f)).collect(),
-        triangles: (0..mesh.triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
+        triangles: (0..mesh.triangles.len() as u32)
+            .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
+            .collect(),
     }
 }

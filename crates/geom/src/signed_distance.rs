@@ -3,8 +3,8 @@
 use crate::bvh::{Feature, TriangleBvh};
 use crate::{Solid, Vec3};
 
-/// Answers distance queries to one solid. The sign comes from angle-weighted pseudo-normals, which decide correctly for
-/// every nearest point of a surface that does not cross itself. [Bærentzen and Aanæs 2005]
+/// Answers distance queries to one solid. The sign comes from angle-weighted pseudo-normals, which decide
+/// correctly for every nearest point of a surface that does not cross itself. [Bærentzen and Aanæs 2005]
 pub struct SignedDistance {
     bvh: TriangleBvh,
     triangles: Vec<[u32; 3]>,
@@ -35,7 +35,10 @@ impl SignedDistance {
         for (f, t) in mesh.triangles.iter().enumerate() {
             let corners = mesh.corners(f);
             for i in 0..3 {
-                let (a, b) = (corners[(i + 1) % 3] - corners[i], corners[(i + 2) % 3] - corners[i]);
+                let (a, b) = (
+                    corners[(i + 1) % 3] - corners[i],
+                    corners[(i + 2) % 3] - corners[i],
+                );
                 let angle = a.cross(b).length().atan2(a.dot(b));
                 vertex_normals[t[i] as usize] += angle * face_normals[f];
             }
@@ -94,7 +97,10 @@ mod tests {
 
     #[test]
     fn distances_to_a_box_are_exact_with_their_sign() {
-        let b = Aabb { min: Vec3::ZERO, max: Vec3::new(4.0, 3.0, 2.0) };
+        let b = Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::new(4.0, 3.0, 2.0),
+        };
         let solid = Solid::new(Volume::cuboid(b).to_mesh()).unwrap();
         let field = SignedDistance::new(&solid);
         for i in 0..1000 {
@@ -102,7 +108,10 @@ mod tests {
             let outside = b.distance_sq(p).sqrt();
             let inside = (p - b.min).min(b.max - p).min_element();
             let expected = if b.contains(p) { inside } else { -outside };
-            assert!((field.at(p, 100.0).unwrap().signed_mm - expected).abs() < 1e-12, "{p}");
+            assert!(
+                (field.at(p, 100.0).unwrap().signed_mm - expected).abs() < 1e-12,
+                "{p}"
+            );
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::{TriMesh, Vec3};
 
-/// A closed, consistently oriented triangle mesh of positive volume: each directed edge is used once and has its opposite.
+/// A closed, consistently oriented triangle mesh of positive volume: each directed edge is used once and has
+/// its opposite.
 ///
-/// The only way to get one is [`Solid::new`]; what needs a volume takes a `Solid`, so nobody checks again. Not promised:
-/// faces may cross, vertices may be pinched, and there may be several bodies.
+/// The only way to get one is [`Solid::new`]; what needs a volume takes a `Solid`, so nobody checks again.
+/// Not promised: faces may cross, vertices may be pinched, and there may be several bodies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid(TriMesh);
 
@@ -63,7 +64,11 @@ impl Solid {
         check_points(&mesh)?;
         check_edges(&mesh)?;
         let volume_mm3 = mesh.signed_volume();
-        if volume_mm3 > 0.0 { Ok(Self(mesh)) } else { Err(NotSolid::NoVolume { volume_mm3 }) }
+        if volume_mm3 > 0.0 {
+            Ok(Self(mesh))
+        } else {
+            Err(NotSolid::NoVolume { volume_mm3 })
+        }
     }
 
     /// The mesh, to read.
@@ -89,18 +94,26 @@ fn check_points(mesh: &TriMesh) -> Result<(), NotSolid> {
     let n_points = mesh.points.len();
     for (face, t) in mesh.triangles.iter().enumerate() {
         if let Some(&vertex) = t.iter().find(|&&v| v as usize >= n_points) {
-            return Err(NotSolid::MissingPoint { face, vertex, n_points });
+            return Err(NotSolid::MissingPoint {
+                face,
+                vertex,
+                n_points,
+            });
         }
     }
     let bad = || mesh.points.iter().enumerate().filter(|(_, p)| !p.is_finite());
     match bad().next() {
-        Some((vertex, _)) => Err(NotSolid::NotFinite { vertex, count: bad().count() }),
+        Some((vertex, _)) => Err(NotSolid::NotFinite {
+            vertex,
+            count: bad().count(),
+        }),
         None => Ok(()),
     }
 }
 
 fn check_edges(mesh: &TriMesh) -> Result<(), NotSolid> {
-    // Directed edges as (low, high, forwards) in sorted order: a closed manifold has each pair exactly once each way.
+    // Directed edges as (low, high, forwards) in sorted order: a closed manifold has each pair exactly once
+    // each way.
     let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(mesh.triangles.len() * 3);
     for &[a, b, c] in &mesh.triangles {
         for (from, to) in [(a, b), (b, c), (c, a)] {
@@ -145,7 +158,10 @@ mod tests {
         assert!(matches!(Solid::new(open), Err(NotSolid::Open { count: 3, .. })));
         let mut twice = tetrahedron();
         twice.triangles.push([0, 2, 1]);
-        assert!(matches!(Solid::new(twice), Err(NotSolid::SharedEdge { count: 3, .. })));
+        assert!(matches!(
+            Solid::new(twice),
+            Err(NotSolid::SharedEdge { count: 3, .. })
+        ));
         let mut inside_out = tetrahedron();
         inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         assert!(matches!(Solid::new(inside_out), Err(NotSolid::NoVolume { .. })));

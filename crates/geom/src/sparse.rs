@@ -1,7 +1,8 @@
 //! Sparse symmetric positive definite systems: factorised once, solved many times.
 //!
-//! The only file that names the sparse solver. The order of elimination is approximate minimum degree: on the Laplacian of
-//! a surface it costs a tenth of nested dissection, which pays only where one pattern is factorised often.
+//! The only file that names the sparse solver. The order of elimination is approximate minimum degree: on the
+//! Laplacian of a surface it costs a tenth of nested dissection, which pays only where one pattern is
+//! factorised often.
 
 use std::sync::Arc;
 
@@ -48,7 +49,8 @@ pub enum SparseError {
 }
 
 impl SparseSymmetric {
-    /// The `n × n` matrix with the sums of `entries` (row, column, value), each off-diagonal pair given once in any order.
+    /// The `n × n` matrix with the sums of `entries` (row, column, value), each off-diagonal pair given once
+    /// in any order.
     ///
     /// Entries at the same place add up in the order given, so the result is the same bits on every run.
     pub fn from_entries(n: usize, mut entries: Vec<(u32, u32, f64)>) -> Self {
@@ -58,7 +60,12 @@ impl SparseSymmetric {
             }
         }
         entries.par_sort_by_key(|e| (e.1, e.0));
-        let mut matrix = Self { n, column_start: vec![0; n + 1], row: Vec::new(), value: Vec::new() };
+        let mut matrix = Self {
+            n,
+            column_start: vec![0; n + 1],
+            row: Vec::new(),
+            value: Vec::new(),
+        };
         for same in entries.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             matrix.row.push(same[0].0);
             matrix.value.push(same.iter().map(|e| e.2).sum());
@@ -70,18 +77,28 @@ impl SparseSymmetric {
         matrix
     }
 
-    /// The zero matrix with `block` rows a node and places between all nodes of each cell, as a mesh's stiffness has them.
+    /// The zero matrix with `block` rows a node and places between all nodes of each cell, as a mesh's
+    /// stiffness has them.
     ///
     /// # Panics
     /// Where a cell names a node that is not below `n_nodes`.
     pub fn of_cells<const N: usize>(n_nodes: usize, block: usize, cells: &[[u32; N]]) -> Self {
-        let pairs = cells.iter().flat_map(|cell| cell.iter().flat_map(move |&i| cell.iter().map(move |&j| (j, i))));
-        let mut pairs: Vec<(u32, u32)> =
-            pairs.filter(|(j, i)| i <= j).chain((0..n_nodes as u32).map(|i| (i, i))).collect();
+        let pairs = cells
+            .iter()
+            .flat_map(|cell| cell.iter().flat_map(move |&i| cell.iter().map(move |&j| (j, i))));
+        let mut pairs: Vec<(u32, u32)> = pairs
+            .filter(|(j, i)| i <= j)
+            .chain((0..n_nodes as u32).map(|i| (i, i)))
+            .collect();
         pairs.par_sort_unstable();
         pairs.dedup();
         let (n, block_rows) = (n_nodes * block, block as u32);
-        let mut matrix = Self { n, column_start: vec![0], row: Vec::new(), value: Vec::new() };
+        let mut matrix = Self {
+            n,
+            column_start: vec![0],
+            row: Vec::new(),
+            value: Vec::new(),
+        };
         for column in pairs.chunk_by(|x, y| x.0 == y.0) {
             for c in 0..block_rows {
                 for &(j, i) in column {
@@ -103,14 +120,20 @@ impl SparseSymmetric {
     /// Row and column of each place, in the order of [`values_mut`](Self::values_mut).
     pub fn places(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         self.column_start.windows(2).zip(0..).flat_map(|(ends, column)| {
-            self.row[ends[0] as usize..ends[1] as usize].iter().map(move |&row| (row, column))
+            self.row[ends[0] as usize..ends[1] as usize]
+                .iter()
+                .map(move |&row| (row, column))
         })
     }
 
-    /// Where the values of a place of the matrix are in [`values_mut`](Self::values_mut); `None` where it has none.
+    /// Where the values of a place of the matrix are in [`values_mut`](Self::values_mut); `None` where it has
+    /// none.
     pub fn position(&self, row: u32, column: u32) -> Option<usize> {
         let (row, column) = (row.min(column), row.max(column) as usize);
-        let (start, end) = (self.column_start[column] as usize, self.column_start[column + 1] as usize);
+        let (start, end) = (
+            self.column_start[column] as usize,
+            self.column_start[column + 1] as usize,
+        );
         self.row[start..end].binary_search(&row).ok().map(|i| start + i)
     }
 
@@ -143,15 +166,15 @@ impl SparseSymmetric {
         y
     }
 
-    /// What remains of the last `n_kept` rows and columns when all others have been eliminated: the Schur complement, dense,
-    /// lower triangle by columns with zeros above.
+    /// What remains of the last `n_kept` rows and columns when all others have been eliminated: the Schur
+    /// complement, dense, lower triangle by columns with zeros above.
     ///
-    /// Costs one factorisation. The matrix need only be positive definite in the rows eliminated, and positive semidefinite
-    /// as a whole.
+    /// Costs one factorisation. The matrix need only be positive definite in the rows eliminated, and
+    /// positive semidefinite as a whole.
     pub fn schur_complement(mut self, n_kept: usize) -> Result<Vec<f64>, SparseError> {
         let (n, first_kept) = (self.n, self.n - n_kept.min(self.n));
-        // The kept rows are eliminated as well, last, and multiplied back together: springs on their diagonal make them
-        // definite, and are taken away at the end.
+        // The kept rows are eliminated as well, last, and multiplied back together: springs on their diagonal
+        // make them definite, and are taken away at the end.
         let mut spring = 0.0_f64;
         for column in first_kept..n {
             let last = self.column_start[column + 1] as usize - 1;
@@ -172,7 +195,10 @@ impl SparseSymmetric {
         let kept = first_kept as u32..n as u32;
         let order: Vec<u32> = order.iter().copied().chain(kept.clone()).collect();
         let place: Vec<u32> = place.iter().copied().chain(kept).collect();
-        let factor = Cholesky::ordered(&self, SymmetricOrdering::Custom(PermRef::new_checked(&order, &place, n)))?;
+        let factor = Cholesky::ordered(
+            &self,
+            SymmetricOrdering::Custom(PermRef::new_checked(&order, &place, n)),
+        )?;
 
         let l = factor.trailing(first_kept)?;
         let mut schur = Mat::<f64>::zeros(n_kept, n_kept);
@@ -207,29 +233,46 @@ impl EliminationOrder {
         symbolic(matrix.pattern(), SymmetricOrdering::Amd).map(|s| Self(Arc::new(s)))
     }
 
-    /// As [`new`](Self::new), for a matrix of dense blocks of `block` rows and columns, which stay together: the order is
-    /// sought on the blocks, in a fraction of the time.
+    /// As [`new`](Self::new), for a matrix of dense blocks of `block` rows and columns, which stay together:
+    /// the order is sought on the blocks, in a fraction of the time.
     ///
     /// # Panics
     /// Where the number of rows is not a multiple of `block`.
     pub fn of_blocks(matrix: &SparseSymmetric, block: usize) -> Result<Self, SparseError> {
-        assert!(matrix.n.is_multiple_of(block), "{} rows are not blocks of {block}", matrix.n);
+        assert!(
+            matrix.n.is_multiple_of(block),
+            "{} rows are not blocks of {block}",
+            matrix.n
+        );
         let (n, n_blocks) = (matrix.n, matrix.n / block);
         let (mut start, mut row) = (vec![0], Vec::new());
         for column in 0..n_blocks {
             let last = column * block + block - 1;
-            let rows = &matrix.row[matrix.column_start[last] as usize..matrix.column_start[last + 1] as usize];
-            row.extend(rows.chunk_by(|i, j| *i as usize / block == *j as usize / block).map(|b| b[0] / block as u32));
+            let rows =
+                &matrix.row[matrix.column_start[last] as usize..matrix.column_start[last + 1] as usize];
+            row.extend(
+                rows.chunk_by(|i, j| *i as usize / block == *j as usize / block)
+                    .map(|b| b[0] / block as u32),
+            );
             start.push(row.len() as u32);
         }
         let pattern = SymbolicSparseColMatRef::new_checked(n_blocks, n_blocks, &start, None, &row);
         let (mut order, mut place) = (vec![0; n_blocks], vec![0; n_blocks]);
         let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n_blocks, row.len()))
             .map_err(|_| SparseError::TooLarge { n })?;
-        amd::order(&mut order, &mut place, pattern, amd::Control::default(), MemStack::new(&mut memory))
-            .map_err(|_| SparseError::TooLarge { n })?;
+        amd::order(
+            &mut order,
+            &mut place,
+            pattern,
+            amd::Control::default(),
+            MemStack::new(&mut memory),
+        )
+        .map_err(|_| SparseError::TooLarge { n })?;
         let rows_of = |blocks: &[u32]| -> Vec<u32> {
-            blocks.iter().flat_map(|b| (0..block as u32).map(move |r| b * block as u32 + r)).collect()
+            blocks
+                .iter()
+                .flat_map(|b| (0..block as u32).map(move |r| b * block as u32 + r))
+                .collect()
         };
         let (order, place) = (rows_of(&order), rows_of(&place));
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&order, &place, n));
@@ -237,22 +280,28 @@ impl EliminationOrder {
     }
 }
 
-/// Columns that one thread works on: enough for dense products at full speed, and several panels in a front of a part.
+/// Columns that one thread works on: enough for dense products at full speed, and several panels in a front
+/// of a part.
 const PANEL: usize = 192;
 
-/// Eliminates the first `n_eliminated` rows and columns of the dense symmetric `n × n` matrix whose lower triangle `values`
-/// holds by columns, and leaves, in that triangle, the factor L of what is eliminated, `B L⁻ᵀ` below it, and the Schur complement.
+/// Eliminates the first `n_eliminated` rows and columns of the dense symmetric `n × n` matrix whose lower
+/// triangle `values` holds by columns, and leaves, in that triangle, the factor L of what is eliminated, `B
+/// L⁻ᵀ` below it, and the Schur complement.
 ///
-/// Only the eliminated block must be positive definite. The strict upper triangle of `values` is neither read nor of use
-/// afterwards.
+/// Only the eliminated block must be positive definite. The strict upper triangle of `values` is neither read
+/// nor of use afterwards.
 ///
 /// # Panics
 /// Where `values` has not `n²` entries or `n_eliminated` exceeds `n`.
 pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> Result<(), SparseError> {
     let matrix = MatMut::from_column_major_slice_mut(values, n, n);
     let (mut pivot, _, mut below, rest) = matrix.split_at_mut(n_eliminated, n_eliminated);
-    let mut memory = MemBuffer::try_new(cholesky_in_place_scratch::<f64>(n_eliminated, Par::Seq, Default::default()))
-        .map_err(|_| SparseError::TooLarge { n })?;
+    let mut memory = MemBuffer::try_new(cholesky_in_place_scratch::<f64>(
+        n_eliminated,
+        Par::Seq,
+        Default::default(),
+    ))
+    .map_err(|_| SparseError::TooLarge { n })?;
     cholesky_in_place(
         pivot.as_mut(),
         LltRegularization::default(),
@@ -268,12 +317,20 @@ pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> R
     for_panels(rest, 0, &|first, panel| {
         let n_rows = panel.nrows() - first;
         let (left, right) = (below.subrows(first, n_rows), below.subrows(first, panel.ncols()));
-        matmul(panel.subrows_mut(first, n_rows), Accum::Add, left, right.transpose(), -1.0, Par::Seq);
+        matmul(
+            panel.subrows_mut(first, n_rows),
+            Accum::Add,
+            left,
+            right.transpose(),
+            -1.0,
+            Par::Seq,
+        );
     });
     Ok(())
 }
 
-/// Calls `f` for panels of [`PANEL`] columns with the place of the first, several at once; the same panels on any number of threads.
+/// Calls `f` for panels of [`PANEL`] columns with the place of the first, several at once; the same panels on
+/// any number of threads.
 fn for_panels(columns: MatMut<'_, f64>, first: usize, f: &(impl Fn(usize, MatMut<'_, f64>) + Sync)) {
     let n_panels = columns.ncols().div_ceil(PANEL);
     if n_panels <= 1 {
@@ -281,7 +338,10 @@ fn for_panels(columns: MatMut<'_, f64>, first: usize, f: &(impl Fn(usize, MatMut
     }
     let half = n_panels / 2 * PANEL;
     let (left, right) = columns.split_at_col_mut(half);
-    rayon::join(|| for_panels(left, first, f), || for_panels(right, first + half, f));
+    rayon::join(
+        || for_panels(left, first, f),
+        || for_panels(right, first + half, f),
+    );
 }
 
 fn symbolic(
@@ -310,7 +370,10 @@ impl Cholesky {
     }
 
     fn ordered(matrix: &SparseSymmetric, order: SymmetricOrdering<'_, u32>) -> Result<Self, SparseError> {
-        Self::in_order(&EliminationOrder(Arc::new(symbolic(matrix.pattern(), order)?)), matrix)
+        Self::in_order(
+            &EliminationOrder(Arc::new(symbolic(matrix.pattern(), order)?)),
+            matrix,
+        )
     }
 
     /// Factorises `matrix`, which has the pattern that `order` was made for.
@@ -393,7 +456,9 @@ mod tests {
         let mut entries: Vec<(u32, u32, f64)> = (0..n).map(|i| (i, i, 2.0)).collect();
         entries.extend((1..n).map(|i| (i, i - 1, -1.0)));
         let mut x = vec![1.0; 2 * n as usize];
-        Cholesky::new(&SparseSymmetric::from_entries(n as usize, entries)).unwrap().solve_in_place(&mut x);
+        Cholesky::new(&SparseSymmetric::from_entries(n as usize, entries))
+            .unwrap()
+            .solve_in_place(&mut x);
         for i in 0..n as usize {
             let expected = 0.5 * (i + 1) as f64 * (n as usize - i) as f64;
             assert!((x[i] - expected).abs() < 1e-9 && x[i] == x[i + n as usize]);
@@ -403,11 +468,16 @@ mod tests {
     /// A chain of springs between fixed ends, its ends kept.
     fn chain() -> (Vec<(u32, u32, f64)>, Vec<f64>) {
         let n = 12_u32;
-        // Nodes 10 and 11 are the two free ends; the chain is 10 – 0 – 1 … 9 – 11 with springs of stiffness 2.
+        // Nodes 10 and 11 are the two free ends; the chain is 10 – 0 – 1 … 9 – 11 with springs of stiffness
+        // 2.
         let line: Vec<u32> = [10].into_iter().chain(0..10).chain([11]).collect();
         let mut entries: Vec<(u32, u32, f64)> = (0..n).map(|i| (i, i, 0.0)).collect();
         for pair in line.windows(2) {
-            entries.extend([(pair[0], pair[0], 2.0), (pair[1], pair[1], 2.0), (pair[0], pair[1], -2.0)]);
+            entries.extend([
+                (pair[0], pair[0], 2.0),
+                (pair[1], pair[1], 2.0),
+                (pair[0], pair[1], -2.0),
+            ]);
         }
         let mut dense = vec![0.0; 144];
         for &(i, j, v) in &entries {
@@ -419,7 +489,9 @@ mod tests {
     #[test]
     fn springs_in_a_row_condense_to_one_spring() {
         // 11 springs of stiffness 2 in a row are one of 2/11, and the whole is singular.
-        let schur = SparseSymmetric::from_entries(12, chain().0).schur_complement(2).unwrap();
+        let schur = SparseSymmetric::from_entries(12, chain().0)
+            .schur_complement(2)
+            .unwrap();
         for (have, want) in schur.iter().zip([2.0 / 11.0, -2.0 / 11.0, 0.0, 2.0 / 11.0]) {
             assert!((have - want).abs() < 1e-14, "{schur:?}");
         }
@@ -429,14 +501,19 @@ mod tests {
     fn dense_and_sparse_elimination_agree() {
         let (_, mut dense) = chain();
         eliminate_leading(&mut dense, 12, 10).unwrap();
-        for (at, want) in [(10 + 120, 2.0 / 11.0), (11 + 120, -2.0 / 11.0), (11 + 132, 2.0 / 11.0)] {
+        for (at, want) in [
+            (10 + 120, 2.0 / 11.0),
+            (11 + 120, -2.0 / 11.0),
+            (11 + 132, 2.0 / 11.0),
+        ] {
             assert!((dense[at] - want).abs() < 1e-14);
         }
     }
 
     #[test]
     fn blocks_of_a_mesh_are_solved_as_their_entries_are() {
-        // A strip of four triangles with two rows a node: one spring matrix in each cell, and one more on each row.
+        // A strip of four triangles with two rows a node: one spring matrix in each cell, and one more on
+        // each row.
         let cells = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]];
         let mut matrix = SparseSymmetric::of_cells(6, 2, &cells);
         let mut entries = Vec::new();
@@ -444,7 +521,11 @@ mod tests {
             for i in 0..6_u32 {
                 for j in 0..=i {
                     let [row, column] = [i, j].map(|at| cell[at as usize / 2] * 2 + at % 2);
-                    entries.push((row, column, if i == j { 5.0 } else { -1.0 / f64::from(1 + i + j) }));
+                    entries.push((
+                        row,
+                        column,
+                        if i == j { 5.0 } else { -1.0 / f64::from(1 + i + j) },
+                    ));
                 }
             }
         }
@@ -456,14 +537,24 @@ mod tests {
         assert!(matrix.position(0, 6).is_none() && matrix.n_places() == matrix.places().count());
         let (mut x, mut y) = (vec![1.0; 12], vec![1.0; 12]);
         let order = EliminationOrder::of_blocks(&matrix, 2).unwrap();
-        Cholesky::in_order(&order, &matrix).unwrap().solve_in_place(&mut x);
-        Cholesky::new(&SparseSymmetric::from_entries(12, entries)).unwrap().solve_in_place(&mut y);
-        assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-12), "{x:?} {y:?}");
+        Cholesky::in_order(&order, &matrix)
+            .unwrap()
+            .solve_in_place(&mut x);
+        Cholesky::new(&SparseSymmetric::from_entries(12, entries))
+            .unwrap()
+            .solve_in_place(&mut y);
+        assert!(
+            x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-12),
+            "{x:?} {y:?}"
+        );
     }
 
     #[test]
     fn an_indefinite_matrix_is_refused() {
         let matrix = SparseSymmetric::from_entries(2, vec![(0, 0, 1.0), (1, 1, 1.0), (0, 1, 2.0)]);
-        assert_eq!(Cholesky::new(&matrix).unwrap_err(), SparseError::NotPositiveDefinite { n: 2 });
+        assert_eq!(
+            Cholesky::new(&matrix).unwrap_err(),
+            SparseError::NotPositiveDefinite { n: 2 }
+        );
     }
 }

@@ -3,10 +3,16 @@
 use crate::topology::{Topology, ends};
 use crate::{Solid, TriMesh, Vec3};
 
-/// The surface of `solid` with the chosen edges halved, and the triangle of `solid` that each new triangle is a part of.
+/// The surface of `solid` with the chosen edges halved, and the triangle of `solid` that each new triangle is
+/// a part of.
 ///
-/// `wants_split` is asked once an edge, with its two end points; triangles between chosen edges are cut into 2 to 4 parts.
-pub fn halve_edges(solid: &Solid, topology: &Topology, wants_split: impl Fn(u32, u32) -> bool) -> (Solid, Vec<u32>) {
+/// `wants_split` is asked once an edge, with its two end points; triangles between chosen edges are cut into
+/// 2 to 4 parts.
+pub fn halve_edges(
+    solid: &Solid,
+    topology: &Topology,
+    wants_split: impl Fn(u32, u32) -> bool,
+) -> (Solid, Vec<u32>) {
     const NO_POINT: u32 = u32::MAX;
     let mesh = solid.mesh();
     let mut points = mesh.points.clone();
@@ -24,18 +30,26 @@ pub fn halve_edges(solid: &Solid, topology: &Topology, wants_split: impl Fn(u32,
     for (face, &t) in mesh.triangles.iter().enumerate() {
         let m = [0, 1, 2].map(|corner| middle[3 * face + corner]);
         let before = triangles.len();
-        cut_triangle(&points, t, m.map(|p| (p != NO_POINT).then_some(p)), &mut triangles);
+        cut_triangle(
+            &points,
+            t,
+            m.map(|p| (p != NO_POINT).then_some(p)),
+            &mut triangles,
+        );
         source_face.extend(std::iter::repeat_n(face as u32, triangles.len() - before));
     }
-    let refined = Solid::new(TriMesh { points, triangles }).expect("halving edges keeps a mesh closed and its volume");
+    let refined =
+        Solid::new(TriMesh { points, triangles }).expect("halving edges keeps a mesh closed and its volume");
     (refined, source_face)
 }
 
 /// Appends the parts of triangle `t` whose edge `c` has the middle `m[c]`.
 fn cut_triangle(points: &[Vec3], t: [u32; 3], m: [Option<u32>; 3], out: &mut Vec<[u32; 3]>) {
-    // Turned so that the case needs no mirror: with one middle it is on edge 0, with two they are on edges 0 and 1.
-    let turn =
-        (0..3).find(|&r| m[r].is_some() && (m[(r + 2) % 3].is_none() || m.iter().all(Option::is_some))).unwrap_or(0);
+    // Turned so that the case needs no mirror: with one middle it is on edge 0, with two they are on edges 0
+    // and 1.
+    let turn = (0..3)
+        .find(|&r| m[r].is_some() && (m[(r + 2) % 3].is_none() || m.iter().all(Option::is_some)))
+        .unwrap_or(0);
     let [a, b, c] = [0, 1, 2].map(|i| t[(i + turn) % 3]);
     match [0, 1, 2].map(|i| m[(i + turn) % 3]) {
         [Some(ab), Some(bc), Some(ca)] => out.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]),
@@ -54,11 +68,15 @@ fn cut_triangle(points: &[Vec3], t: [u32; 3], m: [Option<u32>; 3], out: &mut Vec
     }
 }
 
-/// Appends the parts of a triangle with further points on its sides: `on_sides[k]` in order from corner `k` on.
+/// Appends the parts of a triangle with further points on its sides: `on_sides[k]` in order from corner `k`
+/// on.
 ///
 /// Every point becomes a corner, no part has three points on one side, and the orientation stays; O(n log n).
 pub fn fill_triangle([a, b, c]: [u32; 3], on_sides: [&[u32]; 3], out: &mut Vec<[u32; 3]>) {
-    let fullest = (0..3).rev().max_by_key(|&k| on_sides[k].len()).unwrap_or_default();
+    let fullest = (0..3)
+        .rev()
+        .max_by_key(|&k| on_sides[k].len())
+        .unwrap_or_default();
     if on_sides[fullest].is_empty() {
         out.push([a, b, c]);
         return;
@@ -99,9 +117,19 @@ mod tests {
     #[test]
     fn a_triangle_with_points_on_its_sides_is_filled_without_gaps() {
         // Points 3 and 4 on side 0, 5 on side 1, 6, 7 and 8 on side 2.
-        let points: Vec<Vec3> = [(0, 0), (12, 0), (0, 12), (4, 0), (8, 0), (6, 6), (0, 9), (0, 6), (0, 3)]
-            .map(|(x, y)| Vec3::new(f64::from(x), f64::from(y), 0.0))
-            .to_vec();
+        let points: Vec<Vec3> = [
+            (0, 0),
+            (12, 0),
+            (0, 12),
+            (4, 0),
+            (8, 0),
+            (6, 6),
+            (0, 9),
+            (0, 6),
+            (0, 3),
+        ]
+        .map(|(x, y)| Vec3::new(f64::from(x), f64::from(y), 0.0))
+        .to_vec();
         let mut triangles = Vec::new();
         fill_triangle([0, 1, 2], [&[3, 4], &[5], &[6, 7, 8]], &mut triangles);
         // A polygon of nine corners.

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::band::Band;
 
-/// Interior samples between two nodes of a diagonal line. A diagonal step is up to √3 cells long, and a ridge between two
-/// nodes would be missed; along an axis the interpolant is linear, so nodes are enough.
+/// Interior samples between two nodes of a diagonal line. A diagonal step is up to √3 cells long, and a ridge
+/// between two nodes would be missed; along an axis the interpolant is linear, so nodes are enough.
 const SUB_STEPS: usize = 3;
 
 /// The lines of a band in each of the 13 lattice line directions, found when first used and then kept.
@@ -26,13 +26,16 @@ struct Lines {
 impl<'a> Sweeper<'a> {
     /// Nothing is computed yet.
     pub fn new(band: &'a Band) -> Self {
-        Self { band, lines: std::array::from_fn(|_| OnceLock::new()) }
+        Self {
+            band,
+            lines: std::array::from_fn(|_| OnceLock::new()),
+        }
     }
 
     /// `max over t ≥ 0 of field(x + t·step)` at every node x; `step` has components in {−1, 0, 1}, not all 0.
     ///
-    /// Off the band the field counts as −∞: a line may leave the band and come back. Between nodes the trilinear
-    /// interpolant is sampled at three inner points of each diagonal step.
+    /// Off the band the field counts as −∞: a line may leave the band and come back. Between nodes the
+    /// trilinear interpolant is sampled at three inner points of each diagonal step.
     pub fn max_ahead(&self, field: &[f32], step: [i32; 3]) -> Vec<f32> {
         let (line, forwards) = line_of(step);
         let lines = self.lines[line].get_or_init(|| Lines::new(self.band, positive(step)));
@@ -76,7 +79,13 @@ impl<'a> Sweeper<'a> {
         field
             .par_iter()
             .enumerate()
-            .map(|(node, &here)| if here < floor { here } else { self.best_towards(field, node as u32, step, &axes) })
+            .map(|(node, &here)| {
+                if here < floor {
+                    here
+                } else {
+                    self.best_towards(field, node as u32, step, &axes)
+                }
+            })
             .collect()
     }
 
@@ -116,7 +125,10 @@ fn positive(step: [i32; 3]) -> [i32; 3] {
 
 /// Which of the 13 lines `step` runs along, and whether it runs along the representative.
 fn line_of(step: [i32; 3]) -> (usize, bool) {
-    assert!(step.iter().any(|&s| s != 0) && step.iter().all(|s| s.abs() <= 1), "a lattice step, not {step:?}");
+    assert!(
+        step.iter().any(|&s| s != 0) && step.iter().all(|s| s.abs() <= 1),
+        "a lattice step, not {step:?}"
+    );
     let p = positive(step);
     // Base-3 digits of the representative exceed the middle (13) exactly for the 13 representatives.
     let code = (p[0] + 1) + 3 * (p[1] + 1) + 9 * (p[2] + 1);
@@ -124,7 +136,8 @@ fn line_of(step: [i32; 3]) -> (usize, bool) {
 }
 
 impl Lines {
-    /// Sorts by counting: storage order already ascends along z, then y, then x, so a stable sort by line suffices.
+    /// Sorts by counting: storage order already ascends along z, then y, then x, so a stable sort by line
+    /// suffices.
     fn new(band: &Band, step: [i32; 3]) -> Self {
         let [nx, ny, nz] = band.dims.map(|n| n as i64);
         let [sx, sy, sz] = step.map(i64::from);
@@ -140,7 +153,12 @@ impl Lines {
             };
             (b * (nx + ny + 2 * nz) + a) as u64
         };
-        let mut keyed: Vec<(u64, u32)> = band.coords.par_iter().enumerate().map(|(n, c)| (key(c), n as u32)).collect();
+        let mut keyed: Vec<(u64, u32)> = band
+            .coords
+            .par_iter()
+            .enumerate()
+            .map(|(n, c)| (key(c), n as u32))
+            .collect();
         // Keys with the node as second component: unstable sorting gives the stable order.
         keyed.par_sort_unstable();
         let mut start: Vec<u32> = Vec::new();
@@ -152,7 +170,10 @@ impl Lines {
             }
         }
         start.push(keyed.len() as u32);
-        Self { order: keyed.into_iter().map(|k| k.1).collect(), start }
+        Self {
+            order: keyed.into_iter().map(|k| k.1).collect(),
+            start,
+        }
     }
 }
 
@@ -162,14 +183,20 @@ mod tests {
     use crate::band::tests::cube_band;
 
     fn all_steps() -> impl Iterator<Item = [i32; 3]> {
-        (0..27).filter(|&c| c != 13).map(|c| [c / 9 - 1, c / 3 % 3 - 1, c % 3 - 1])
+        (0..27)
+            .filter(|&c| c != 13)
+            .map(|c| [c / 9 - 1, c / 3 % 3 - 1, c % 3 - 1])
     }
 
     #[test]
     fn sweeping_agrees_with_walking_every_line() {
         let (band, phi) = cube_band();
         // A field without symmetry.
-        let field: Vec<f32> = phi.iter().enumerate().map(|(n, x)| x + ((n * 7919) % 101) as f32 * 0.01).collect();
+        let field: Vec<f32> = phi
+            .iter()
+            .enumerate()
+            .map(|(n, x)| x + ((n * 7919) % 101) as f32 * 0.01)
+            .collect();
         let sweeper = Sweeper::new(&band);
         let reach = *band.dims.iter().max().unwrap() as i64;
         for step in all_steps() {

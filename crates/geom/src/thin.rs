@@ -6,9 +6,11 @@ use crate::bvh::TriangleBvh;
 use crate::topology::{Topology, components};
 use crate::{Solid, Vec3};
 
-/// Cosine of the greatest angle between two sides that make a wall; beyond 30° they make an edge, which always is thin.
+/// Cosine of the greatest angle between two sides that make a wall; beyond 30° they make an edge, which
+/// always is thin.
 const COS_WALL: f64 = 0.866_025_403_784_438_6;
-/// Where a ray starts below the surface, as a share of the thickness asked for: more than rounding, less than any wall.
+/// Where a ray starts below the surface, as a share of the thickness asked for: more than rounding, less than
+/// any wall.
 const START_SHARE: f64 = 1e-6;
 
 /// A connected part of the surface with another not far below it.
@@ -16,7 +18,8 @@ const START_SHARE: f64 = 1e-6;
 pub struct ThinPlace {
     /// Its area, mm²; both sides of a wall that goes around an edge count.
     pub area_mm2: f64,
-    /// Half of the area is thinner than this, mm: edges taper off to nothing, and the least thickness says little.
+    /// Half of the area is thinner than this, mm: edges taper off to nothing, and the least thickness says
+    /// little.
     pub thickness_mm: f64,
     /// Where it is so thick, mm.
     pub at: Vec3,
@@ -24,8 +27,9 @@ pub struct ThinPlace {
 
 /// The places where the solid is thinner than `below_mm`, the largest first.
 ///
-/// Thickness is measured from the middle of each triangle straight inwards, where a surface facing away within 30° is met;
-/// so triangles should be smaller than what is looked for. O(n log n), the same on any number of threads.
+/// Thickness is measured from the middle of each triangle straight inwards, where a surface facing away
+/// within 30° is met; so triangles should be smaller than what is looked for. O(n log n), the same on any
+/// number of threads.
 pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
     let mesh = solid.mesh();
     let bvh = TriangleBvh::new(mesh);
@@ -34,8 +38,11 @@ pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
         .into_par_iter()
         .map(|face| {
             let inwards = -mesh.face_normal(face);
-            let (other, distance) =
-                bvh.first_hit(mesh.face_center(face) + start * inwards, inwards, below_mm - start)?;
+            let (other, distance) = bvh.first_hit(
+                mesh.face_center(face) + start * inwards,
+                inwards,
+                below_mm - start,
+            )?;
             (mesh.face_normal(other as usize).dot(inwards) >= COS_WALL).then_some(distance + start)
         })
         .collect();
@@ -56,7 +63,11 @@ pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
                 below_mm2 += mesh.face_area(face);
                 2.0 * below_mm2 >= area_mm2
             });
-            median.map(|&(thickness_mm, face)| ThinPlace { area_mm2, thickness_mm, at: mesh.face_center(face) })
+            median.map(|&(thickness_mm, face)| ThinPlace {
+                area_mm2,
+                thickness_mm,
+                at: mesh.face_center(face),
+            })
         })
         .collect();
     places.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
@@ -70,12 +81,26 @@ mod tests {
 
     #[test]
     fn a_fin_on_a_block_is_found_with_its_thickness_and_both_sides() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
-        let mesh = cuboid([0.0; 3], [10.0; 3]).union(&cuboid([0.0, 4.0, 10.0], [10.0, 4.5, 20.0])).to_mesh();
+        let cuboid = |min: [f64; 3], max: [f64; 3]| {
+            Volume::cuboid(Aabb {
+                min: min.into(),
+                max: max.into(),
+            })
+        };
+        let mesh = cuboid([0.0; 3], [10.0; 3])
+            .union(&cuboid([0.0, 4.0, 10.0], [10.0, 4.5, 20.0]))
+            .to_mesh();
         let solid = Solid::new(mesh).unwrap();
         let places = thin_places(&solid, 1.0);
-        assert!((places.iter().map(|p| p.area_mm2).sum::<f64>() - 200.0).abs() < 1e-9, "{places:?}");
-        assert!(places.iter().all(|p| (p.thickness_mm - 0.5).abs() < 1e-9 && p.at.z > 10.0));
+        assert!(
+            (places.iter().map(|p| p.area_mm2).sum::<f64>() - 200.0).abs() < 1e-9,
+            "{places:?}"
+        );
+        assert!(
+            places
+                .iter()
+                .all(|p| (p.thickness_mm - 0.5).abs() < 1e-9 && p.at.z > 10.0)
+        );
         assert_eq!(thin_places(&solid, 0.4), []);
     }
 }

@@ -58,7 +58,11 @@ impl Topology {
 
     /// The next half-edge, counter-clockwise around the same triangle.
     pub fn next(half_edge: HalfEdge) -> HalfEdge {
-        if half_edge % 3 == 2 { half_edge - 2 } else { half_edge + 1 }
+        if half_edge % 3 == 2 {
+            half_edge - 2
+        } else {
+            half_edge + 1
+        }
     }
 }
 
@@ -69,7 +73,8 @@ pub fn ends(mesh: &TriMesh, half_edge: HalfEdge) -> (u32, u32) {
     (t[corner], t[(corner + 1) % 3])
 }
 
-/// The connected component of each triangle and their number, triangles joined across the edges where `joined` says so.
+/// The connected component of each triangle and their number, triangles joined across the edges where
+/// `joined` says so.
 ///
 /// Components are numbered by their lowest triangle.
 pub fn components(topology: &Topology, joined: impl Fn(u32, u32) -> bool) -> (Vec<u32>, usize) {

@@ -1,7 +1,8 @@
 //! Merging of equal points, so that triangles know their neighbours.
 //!
-//! Only points of exactly equal coordinates are merged (−0 equals 0): an STL writes each corner of a triangle anew, bit for
-//! bit. Points that merely lie close together stay apart; closing such cracks is repair, not reading.
+//! Only points of exactly equal coordinates are merged (−0 equals 0): an STL writes each corner of a triangle
+//! anew, bit for bit. Points that merely lie close together stay apart; closing such cracks is repair, not
+//! reading.
 
 use crate::check::inspect_edges;
 use crate::{TriMesh, Vec3};
@@ -17,7 +18,8 @@ pub struct Welded {
     pub n_collapsed: usize,
 }
 
-/// Merges points of equal coordinates, drops triangles that collapse thereby and points that no triangle uses.
+/// Merges points of equal coordinates, drops triangles that collapse thereby and points that no triangle
+/// uses.
 ///
 /// The result is the same on every run. O(n log n) at worst, near O(n) on real meshes.
 ///
@@ -29,15 +31,16 @@ pub fn weld(mesh: &TriMesh) -> Welded {
 
 /// The mesh with its own indexing where that is closed and manifold, else welded.
 ///
-/// Welding can break a mesh that is sound as indexed but touches itself: along a touching edge four triangles would meet.
-/// Unused points and triangles that name a point twice are dropped in any case. Where a triangle has two corners in the
-/// same place the file was rounded, not glued: its indexing is not trusted.
+/// Welding can break a mesh that is sound as indexed but touches itself: along a touching edge four triangles
+/// would meet. Unused points and triangles that name a point twice are dropped in any case. Where a triangle
+/// has two corners in the same place the file was rounded, not glued: its indexing is not trusted.
 ///
 /// # Panics
 /// Where a triangle names a missing point.
 pub fn close(mesh: &TriMesh) -> Welded {
     let as_indexed = reindex(mesh, &(0..mesh.points.len() as u32).collect::<Vec<_>>());
-    // In a closed mesh each point has at least two triangles: an STL, where it has one, need not be looked at further.
+    // In a closed mesh each point has at least two triangles: an STL, where it has one, need not be looked at
+    // further.
     let may_be_closed = 2 * as_indexed.mesh.points.len() <= 3 * as_indexed.mesh.triangles.len();
     let has_collapsed = || {
         (0..as_indexed.mesh.triangles.len()).any(|face| {
@@ -56,12 +59,16 @@ pub fn close(mesh: &TriMesh) -> Welded {
 pub fn first_equal(points: &[Vec3]) -> Vec<u32> {
     // Adding 0 turns −0 into 0 and changes nothing else, so equal coordinates have equal bits.
     let bits = |i: u32| points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
-    // Equal points get into the same bucket by a hash, and within the few points of a bucket sorting finds them. Buckets
-    // that a hostile file overfills cost a sort, not a square.
+    // Equal points get into the same bucket by a hash, and within the few points of a bucket sorting finds
+    // them. Buckets that a hostile file overfills cost a sort, not a square.
     let n_bits = points.len().next_power_of_two().ilog2().max(1);
-    let bucket_of: Vec<u32> = (0..points.len() as u32).map(|i| (hash(bits(i)) >> (64 - n_bits)) as u32).collect();
+    let bucket_of: Vec<u32> = (0..points.len() as u32)
+        .map(|i| (hash(bits(i)) >> (64 - n_bits)) as u32)
+        .collect();
     let mut begin = vec![0_u32; (1 << n_bits) + 1];
-    bucket_of.iter().for_each(|&bucket| begin[bucket as usize + 1] += 1);
+    bucket_of
+        .iter()
+        .for_each(|&bucket| begin[bucket as usize + 1] += 1);
     for bucket in 1..begin.len() {
         begin[bucket] += begin[bucket - 1];
     }
@@ -116,9 +123,15 @@ pub(crate) fn reindex(mesh: &TriMesh, stands_for: &[u32]) -> Welded {
         new_index[old] = points.len() as u32;
         points.push(mesh.points[old]);
     }
-    triangles.iter_mut().for_each(|t| *t = t.map(|v| new_index[v as usize]));
+    triangles
+        .iter_mut()
+        .for_each(|t| *t = t.map(|v| new_index[v as usize]));
     let n_collapsed = mesh.triangles.len() - triangles.len();
-    Welded { mesh: TriMesh { points, triangles }, kept_face, n_collapsed }
+    Welded {
+        mesh: TriMesh { points, triangles },
+        kept_face,
+        n_collapsed,
+    }
 }
 
 #[cfg(test)]
@@ -144,7 +157,10 @@ mod tests {
             triangles: vec![[1, 2, 3], [5, 4, 6], [1, 5, 6]],
         };
         let welded = weld(&mesh);
-        assert_eq!(welded.mesh.points, points(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0; 3]]));
+        assert_eq!(
+            welded.mesh.points,
+            points(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0; 3]])
+        );
         assert_eq!(welded.mesh.triangles, [[0, 1, 2], [0, 1, 3]]);
         assert_eq!((welded.kept_face, welded.n_collapsed), (vec![0, 1], 1));
     }

@@ -16,7 +16,10 @@ fn main() {
 fn torus() -> TriMesh {
     let [n, m] = CELLS;
     let point = |i: u32, j: u32| {
-        let (around, tube) = (TURN * f64::from(i) / f64::from(n), TURN * f64::from(j) / f64::from(m));
+        let (around, tube) = (
+            TURN * f64::from(i) / f64::from(n),
+            TURN * f64::from(j) / f64::from(m),
+        );
         let radius = 50.0 + 25.0 * tube.cos();
         Vec3::new(radius * around.cos(), radius * around.sin(), 25.0 * tube.sin())
     };
@@ -26,7 +29,10 @@ fn torus() -> TriMesh {
         let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
         [[a, b, c], [a, c, d]]
     });
-    TriMesh { points: cells().map(|(i, j)| point(i, j)).collect(), triangles: triangles.collect() }
+    TriMesh {
+        points: cells().map(|(i, j)| point(i, j)).collect(),
+        triangles: triangles.collect(),
+    }
 }
 
 /// A push on the lower tenth along each of [`N_CASES`] directions, held at the upper tenth.
@@ -35,8 +41,15 @@ fn cases(mesh: &TriMesh) -> Vec<LoadCase> {
         let angle = TURN * f64::from(k) / f64::from(N_CASES);
         let down = Vec3::new(angle.cos(), angle.sin(), 0.3 * (2.0 * angle).sin());
         let force = |p: &Vec3| if p.dot(down) > 60.0 { -down } else { Vec3::ZERO };
-        let held = (0..).zip(&mesh.points).filter(|(_, p)| p.dot(down) < -60.0).map(|(v, _)| v);
-        LoadCase { forces_n: mesh.points.iter().map(force).collect(), held: held.collect(), ..LoadCase::default() }
+        let held = (0..)
+            .zip(&mesh.points)
+            .filter(|(_, p)| p.dot(down) < -60.0)
+            .map(|(v, _)| v);
+        LoadCase {
+            forces_n: mesh.points.iter().map(force).collect(),
+            held: held.collect(),
+            ..LoadCase::default()
+        }
     };
     (0..N_CASES).map(case).collect()
 }
@@ -56,11 +69,18 @@ fn factorise(bencher: Bencher) {
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn factorise_and_solve_12_cases_with_stresses(bencher: Bencher) {
     let mesh = torus();
-    let (model, cases) =
-        (ShellModel::new(&mesh, &Material::SLA_RESIN).expect("a torus is a sound shell"), cases(&mesh));
+    let (model, cases) = (
+        ShellModel::new(&mesh, &Material::SLA_RESIN).expect("a torus is a sound shell"),
+        cases(&mesh),
+    );
     bencher.bench_local(|| {
-        let solver = model.at_thickness(black_box(2.0)).expect("a free shell has a factor");
+        let solver = model
+            .at_thickness(black_box(2.0))
+            .expect("a free shell has a factor");
         let displacements = solver.solve(&cases).expect("regions hold");
-        displacements.iter().map(|u| solver.stresses(u)).collect::<Vec<_>>()
+        displacements
+            .iter()
+            .map(|u| solver.stresses(u))
+            .collect::<Vec<_>>()
     });
 }

@@ -1,4 +1,5 @@
-//! The surface metric on a ball of eight octants with 180 stations: about what a remeshed model of twelve pieces has.
+//! The surface metric on a ball of eight octants with 180 stations: about what a remeshed model of twelve
+//! pieces has.
 
 use divan::{Bencher, black_box};
 use shellock_mechanics::{Joint, Meeting, Resistance, Side, SurfaceModel, SurfaceParams, sample};
@@ -20,7 +21,10 @@ fn build(bencher: Bencher) {
 fn resist(bencher: Bencher) {
     let (model, plan) = (model(), plan(0));
     let solution = model.resist(&plan, 0).expect("a ball is a sound assembly");
-    assert!(matches!(solution.resistance, Resistance::Holds(_)), "what comes apart is not worth timing");
+    assert!(
+        matches!(solution.resistance, Resistance::Holds(_)),
+        "what comes apart is not worth timing"
+    );
     bencher.bench_local(|| model.resist(black_box(&plan), 0));
 }
 
@@ -31,7 +35,8 @@ fn resist_100(bencher: Bencher) {
 }
 
 fn model() -> SurfaceModel {
-    SurfaceModel::new(&SurfaceParams::default(), &sample::ball(60.0, FREQUENCY)).expect("a ball is a sound assembly")
+    SurfaceModel::new(&SurfaceParams::default(), &sample::ball(60.0, FREQUENCY))
+        .expect("a ball is a sound assembly")
 }
 
 /// Pieces leave along their neighbours' walls, turned by a different angle on each seam and in each plan.
@@ -41,8 +46,18 @@ fn plan(number: u32) -> Vec<Meeting> {
         let angle = f64::from(1 + i / (FREQUENCY - 1)) * f64::from(7 + number);
         let leaves = (s.normal + s.across * angle.sin()).normalize();
         let is_fast = s.points.iter().any(|p| ball.part_of_point[*p as usize] == 0);
-        let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0, size_mm: 2.5 };
-        Meeting { wall: s.across, joint: Some(joint) }
+        let joint = Joint {
+            male: Side::A,
+            leaves,
+            is_fast,
+            pull_on_a: leaves,
+            weight: 1.0,
+            size_mm: 2.5,
+        };
+        Meeting {
+            wall: s.across,
+            joint: Some(joint),
+        }
     };
     (0..).zip(&ball.stations).map(joint).collect()
 }

@@ -23,15 +23,35 @@ fn resist(bencher: Bencher, order: &str) {
         .map(|s| {
             let leaves = (s.normal - s.across * 0.5).normalize();
             let is_fast = s.points.iter().any(|p| ball.part_of_point[*p as usize] == 0);
-            let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0, size_mm: 3.0 };
-            Meeting { wall: s.across, joint: Some(joint) }
+            let joint = Joint {
+                male: Side::A,
+                leaves,
+                is_fast,
+                pull_on_a: leaves,
+                weight: 1.0,
+                size_mm: 3.0,
+            };
+            Meeting {
+                wall: s.across,
+                joint: Some(joint),
+            }
         })
         .collect();
-    assert!(matches!(model.resist(&plan, 0), Ok(Resistance::Holds(_))), "what comes apart is not worth timing");
+    assert!(
+        matches!(model.resist(&plan, 0), Ok(Resistance::Holds(_))),
+        "what comes apart is not worth timing"
+    );
     bencher.bench_local(|| model.resist(black_box(&plan), 0));
 }
 
 fn params(order: &str) -> VolumeParams {
-    let order = if order == "linear" { Order::Linear } else { Order::Quadratic };
-    VolumeParams { order, ..VolumeParams::default() }
+    let order = if order == "linear" {
+        Order::Linear
+    } else {
+        Order::Quadratic
+    };
+    VolumeParams {
+        order,
+        ..VolumeParams::default()
+    }
 }

@@ -1,13 +1,16 @@
-//! The volume metric against CalculiX: two plates clamped at their far edges, joined along a straight seam, pulled apart.
+//! The volume metric against CalculiX: two plates clamped at their far edges, joined along a straight seam,
+//! pulled apart.
 //!
-//! `cargo run --release -p shellock-mechanics --example coupon [ANGLE]`: all rows, or those whose T is ANGLE (`-45`).
+//! `cargo run --release -p shellock-mechanics --example coupon [ANGLE]`: all rows, or those whose T is ANGLE
+//! (`-45`).
 //!
-//! The reference has the same geometry as one solid a side. `gmsh` meshes the cross-section (walls, fronts and feet cut at
-//! each other's outlines, six-node triangles), which is swept along the seam into fifteen-node wedges; where the sides touch,
-//! each has its own nodes at the same places. A closed contact is an `*EQUATION` between two nodes; its force is what
-//! CalculiX gives as RF there, less the node's share of the load. Analyses are linear: contacts that pull are opened and those
-//! that overlap closed, until CalculiX's own results show none of either. Loads along n and ŝ are symmetric
-//! about the middle of the seam, and half of the coupon is enough. Needs `gmsh` and `ccx`.
+//! The reference has the same geometry as one solid a side. `gmsh` meshes the cross-section (walls, fronts
+//! and feet cut at each other's outlines, six-node triangles), which is swept along the seam into
+//! fifteen-node wedges; where the sides touch, each has its own nodes at the same places. A closed contact is
+//! an `*EQUATION` between two nodes; its force is what CalculiX gives as RF there, less the node's share of
+//! the load. Analyses are linear: contacts that pull are opened and those that overlap closed, until
+//! CalculiX's own results show none of either. Loads along n and ŝ are symmetric about the middle of the
+//! seam, and half of the coupon is enough. Needs `gmsh` and `ccx`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -42,7 +45,8 @@ type Moved = [[Vec3; 2]; 2];
 enum Touch {
     /// On the lines that our stations stand for.
     Lines,
-    /// Along n on the whole common face, across the walls on their whole faces; along ŝ still at root and tip.
+    /// Along n on the whole common face, across the walls on their whole faces; along ŝ still at root and
+    /// tip.
     Faces,
 }
 
@@ -60,7 +64,10 @@ struct Case {
 }
 
 fn main() -> Any<()> {
-    let params = VolumeParams { force_n_per_mm: FORCE, ..VolumeParams::default() };
+    let params = VolumeParams {
+        force_n_per_mm: FORCE,
+        ..VolumeParams::default()
+    };
     let folder = tempfile::tempdir()?;
     println!(
         "| T | load on a | opening | lines | faces | tip of a | lines | faces | tip of b | lines | faces | off lines | \
@@ -69,28 +76,60 @@ fn main() -> Any<()> {
     println!("| --: | :-- |{}", " --: |".repeat(11));
     let mut meshes = String::new();
     let only: Option<f64> = std::env::args().nth(1).map(|word| word.parse()).transpose()?;
-    for case in cases().into_iter().filter(|c| only.is_none_or(|degrees| degrees == c.frame.degrees)) {
+    for case in cases()
+        .into_iter()
+        .filter(|c| only.is_none_or(|degrees| degrees == c.frame.degrees))
+    {
         let own = figures(&ours(&params, &case)?);
         let references = [Touch::Lines, Touch::Faces].map(|touch| {
             SIZES_MM.map(|near_mm| {
-                let reference = Reference { params: &params, case: &case, near_mm, touch };
-                reference.equilibrium(folder.path()).map(|(moved, n_runs)| (figures(&moved), n_runs))
+                let reference = Reference {
+                    params: &params,
+                    case: &case,
+                    near_mm,
+                    touch,
+                };
+                reference
+                    .equilibrium(folder.path())
+                    .map(|(moved, n_runs)| (figures(&moved), n_runs))
             })
         });
         let finest = [0, 1].map(|touch| &references[touch][0]);
         let text = |r: &Any<([f64; 3], usize)>, i: usize| {
-            r.as_ref().map_or_else(ToString::to_string, |r| format!("{:.3}", r.0[i]))
+            r.as_ref()
+                .map_or_else(ToString::to_string, |r| format!("{:.3}", r.0[i]))
         };
-        let columns: Vec<String> =
-            (0..3).map(|i| format!("{:.3} | {} | {}", own[i], text(finest[0], i), text(finest[1], i))).collect();
-        let off = finest.map(|r| r.as_ref().map_or(String::new(), |r| format!("{:+.1} %", worst(own, r.0))));
-        println!("| {} | {} | {} |", case.name, columns.join(" | "), off.join(" | "));
+        let columns: Vec<String> = (0..3)
+            .map(|i| format!("{:.3} | {} | {}", own[i], text(finest[0], i), text(finest[1], i)))
+            .collect();
+        let off = finest.map(|r| {
+            r.as_ref()
+                .map_or(String::new(), |r| format!("{:+.1} %", worst(own, r.0)))
+        });
+        println!(
+            "| {} | {} | {} |",
+            case.name,
+            columns.join(" | "),
+            off.join(" | ")
+        );
         let tips: Vec<String> = references.iter().flatten().map(|r| text(r, 1)).collect();
-        let runs: Vec<String> =
-            references.iter().flatten().map(|r| r.as_ref().map_or(String::new(), |r| r.1.to_string())).collect();
-        let _ = writeln!(meshes, "| {} | {} | {} |", case.name, tips.join(" | "), runs.join(", "));
+        let runs: Vec<String> = references
+            .iter()
+            .flatten()
+            .map(|r| r.as_ref().map_or(String::new(), |r| r.1.to_string()))
+            .collect();
+        let _ = writeln!(
+            meshes,
+            "| {} | {} | {} |",
+            case.name,
+            tips.join(" | "),
+            runs.join(", ")
+        );
     }
-    let sizes: Vec<String> = ["lines", "faces"].iter().flat_map(|t| SIZES_MM.map(|h| format!("{t}, {h} mm"))).collect();
+    let sizes: Vec<String> = ["lines", "faces"]
+        .iter()
+        .flat_map(|t| SIZES_MM.map(|h| format!("{t}, {h} mm")))
+        .collect();
     println!(
         "\n| T | load on a | tip of a: {} | runs |\n| --: | :-- |{}\n{meshes}",
         sizes.join(" | "),
@@ -105,9 +144,19 @@ fn cases() -> Vec<Case> {
     for degrees in [0.0_f64, -45.0, -90.0, 45.0] {
         let frame = Frame::new(degrees);
         let wall = if degrees > 0.0 { frame.n } else { Vec3::X };
-        let loads = [("+ŝ", frame.s), ("−ŝ", -frame.s), ("+n", frame.n), ("along", Vec3::Y)];
+        let loads = [
+            ("+ŝ", frame.s),
+            ("−ŝ", -frame.s),
+            ("+n", frame.n),
+            ("along", Vec3::Y),
+        ];
         for (load, pull) in loads.into_iter().take(if degrees == 0.0 { 4 } else { 2 }) {
-            cases.push(Case { frame: Frame::new(degrees), wall, pull, name: format!("{degrees}° | {load}") });
+            cases.push(Case {
+                frame: Frame::new(degrees),
+                wall,
+                pull,
+                name: format!("{degrees}° | {load}"),
+            });
         }
     }
     cases
@@ -122,8 +171,19 @@ fn figures(m: &Moved) -> [f64; 3] {
 /// The largest deviation, %. What stays closed is compared on the scale of what moves.
 fn worst(own: [f64; 3], theirs: [f64; 3]) -> f64 {
     let largest = theirs.iter().fold(0.0_f64, |m, v| m.max(*v));
-    let off = |i: usize| (own[i] - theirs[i]) / if theirs[i] < 0.05 * largest { largest } else { theirs[i] };
-    100.0 * (0..3).map(off).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+    let off = |i: usize| {
+        (own[i] - theirs[i])
+            / if theirs[i] < 0.05 * largest {
+                largest
+            } else {
+                theirs[i]
+            }
+    };
+    100.0
+        * (0..3)
+            .map(off)
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+            .unwrap_or(0.0)
 }
 
 /// The cross-section's axes: x across from a to b, z outwards.
@@ -136,7 +196,11 @@ struct Frame {
 impl Frame {
     fn new(degrees: f64) -> Self {
         let (sin, cos) = degrees.to_radians().sin_cos();
-        Self { degrees, s: Vec3::new(sin, 0.0, cos), n: Vec3::new(cos, 0.0, -sin) }
+        Self {
+            degrees,
+            s: Vec3::new(sin, 0.0, cos),
+            n: Vec3::new(cos, 0.0, -sin),
+        }
     }
 
     /// `x` along n, u and ŝ, as the reference has its axes.
@@ -147,8 +211,11 @@ impl Frame {
 
 fn ours(params: &VolumeParams, case: &Case) -> Any<Moved> {
     let plates = sample::plates(LENGTH, WIDTH, CELLS);
-    let clamped: Vec<u32> =
-        (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > WIDTH - 1e-9).map(|(i, _)| i).collect();
+    let clamped: Vec<u32> = (0..)
+        .zip(&plates.points)
+        .filter(|(_, p)| p.x.abs() > WIDTH - 1e-9)
+        .map(|(i, _)| i)
+        .collect();
     let model = VolumeModel::clamped(params, &plates, &clamped)?;
     let joint = Joint {
         male: Side::A,
@@ -158,17 +225,32 @@ fn ours(params: &VolumeParams, case: &Case) -> Any<Moved> {
         weight: 1.0,
         size_mm: SIZE_MM,
     };
-    let joints: Vec<Meeting> =
-        plates.stations.iter().map(|_| Meeting { wall: case.wall, joint: Some(joint) }).collect();
-    let held = model.equilibrium(&joints, None)?.map_err(|_| "the coupon comes apart")?;
+    let joints: Vec<Meeting> = plates
+        .stations
+        .iter()
+        .map(|_| Meeting {
+            wall: case.wall,
+            joint: Some(joint),
+        })
+        .collect();
+    let held = model
+        .equilibrium(&joints, None)?
+        .map_err(|_| "the coupon comes apart")?;
     Ok(held.displacement_mm[plates.stations.len() / 2].map(|side| side.map(|x| case.frame.local(x))))
 }
 
 fn run(command: &mut Command) -> Any<()> {
     let name = format!("{command:?}");
-    let status =
-        command.stdout(Stdio::null()).stderr(Stdio::null()).status().map_err(|_| format!("{name} not installed"))?;
-    if status.success() { Ok(()) } else { Err(format!("{name} failed").into()) }
+    let status = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .map_err(|_| format!("{name} not installed"))?;
+    if status.success() {
+        Ok(())
+    } else {
+        Err(format!("{name} failed").into())
+    }
 }
 
 /// One load case of the reference.
@@ -184,9 +266,23 @@ impl Reference<'_> {
     fn equilibrium(&self, folder: &Path) -> Any<(Moved, usize)> {
         std::fs::write(folder.join("section.geo"), self.geometry())?;
         run(Command::new("timeout")
-            .args(["60", "gmsh", "-2", "-order", "2", "-format", "inp", "-o", "section.inp", "section.geo"])
+            .args([
+                "60",
+                "gmsh",
+                "-2",
+                "-order",
+                "2",
+                "-format",
+                "inp",
+                "-o",
+                "section.inp",
+                "section.geo",
+            ])
             .current_dir(folder))?;
-        let section = Section::read(&std::fs::read_to_string(folder.join("section.inp"))?, &self.case.frame)?;
+        let section = Section::read(
+            &std::fs::read_to_string(folder.join("section.inp"))?,
+            &self.case.frame,
+        )?;
         let solid = Solid::swept(&section, self);
         let (contacts, probes) = (solid.contacts(&section, self), solid.probes(&section)?);
         let (model, load) = (solid.model(self), self.load_n_mm3());
@@ -194,18 +290,39 @@ impl Reference<'_> {
         let mut is_closed: Vec<bool> = contacts.iter().map(|c| c.is_tie).collect();
         let mut fewest_wrong = usize::MAX;
         for n_runs in 1..=MAX_RUNS {
-            std::fs::write(folder.join("coupon.inp"), model.clone() + &self.step(&contacts, &is_closed))?;
-            run(Command::new("timeout").args(["60", "ccx", "coupon"]).env("OMP_NUM_THREADS", "1").current_dir(folder))?;
+            std::fs::write(
+                folder.join("coupon.inp"),
+                model.clone() + &self.step(&contacts, &is_closed),
+            )?;
+            run(Command::new("timeout")
+                .args(["60", "ccx", "coupon"])
+                .env("OMP_NUM_THREADS", "1")
+                .current_dir(folder))?;
             let results = Results::read(&std::fs::read_to_string(folder.join("coupon.dat"))?)?;
-            let wrong = results.wrong(&contacts, &is_closed, |node| load[solid.side[node]] * solid.front_mm3[node])?;
+            let wrong = results.wrong(&contacts, &is_closed, |node| {
+                load[solid.side[node]] * solid.front_mm3[node]
+            })?;
             if wrong.is_empty() {
                 let at = |node: usize| results.displacement(node);
-                return Ok(([[at(probes[0][0])?, at(probes[0][1])?], [at(probes[1][0])?, at(probes[1][1])?]], n_runs));
+                return Ok((
+                    [
+                        [at(probes[0][0])?, at(probes[0][1])?],
+                        [at(probes[1][0])?, at(probes[1][1])?],
+                    ],
+                    n_runs,
+                ));
             }
             // All that are wrong at once, until that no longer helps; then the first half.
-            let n_changed = if wrong.len() < fewest_wrong { wrong.len() } else { wrong.len().div_ceil(2) };
+            let n_changed = if wrong.len() < fewest_wrong {
+                wrong.len()
+            } else {
+                wrong.len().div_ceil(2)
+            };
             fewest_wrong = fewest_wrong.min(wrong.len());
-            wrong.into_iter().take(n_changed).for_each(|i| is_closed[i] = !is_closed[i]);
+            wrong
+                .into_iter()
+                .take(n_changed)
+                .for_each(|i| is_closed[i] = !is_closed[i]);
         }
         Err("not settled".into())
     }
@@ -221,8 +338,8 @@ impl Reference<'_> {
         self.case.pull.y == 0.0
     }
 
-    /// The cross-section for gmsh, with n along x, ŝ along y and the inner edge at the origin. Walls are two layers, so
-    /// that there are nodes at mid-wall.
+    /// The cross-section for gmsh, with n along x, ŝ along y and the inner edge at the origin. Walls are two
+    /// layers, so that there are nodes at mid-wall.
     fn geometry(&self) -> String {
         let (d, half_wall) = (SIZE_MM, self.params.wall_mm / 2.0);
         let (h, pin) = (d / 2.0, 0.6 * d);
@@ -230,7 +347,11 @@ impl Reference<'_> {
             let centre = self.case.frame.n * (k * h / 2.0) + self.case.frame.s * (h / 2.0);
             let x = if k < 0.0 { -h } else { 0.0 };
             let has_foot = centre.z < 0.05 * d && centre.x * k > 0.0;
-            if has_foot { format!("Rectangle({id}) = {{{x}, 0, 0, {h}, {h}}};\n") } else { String::new() }
+            if has_foot {
+                format!("Rectangle({id}) = {{{x}, 0, 0, {h}, {h}}};\n")
+            } else {
+                String::new()
+            }
         };
         format!(
             "SetFactory(\"OpenCASCADE\");
@@ -266,7 +387,11 @@ Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGro
     /// Contacts as they are, loads and what to print.
     fn step(&self, contacts: &[Contact], is_closed: &[bool]) -> String {
         let mut deck = String::new();
-        for (contact, _) in contacts.iter().zip(is_closed).filter(|(_, is_closed)| **is_closed) {
+        for (contact, _) in contacts
+            .iter()
+            .zip(is_closed)
+            .filter(|(_, is_closed)| **is_closed)
+        {
             let ([a, b], opens) = (contact.nodes.map(|node| node + 1), contact.opens.to_array());
             // What depends is the node's motion along the axis nearest to the contact's.
             let mut axes = [0, 2];
@@ -275,7 +400,11 @@ Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.SaveGro
                 let (dof, factor) = (axis + 1, opens[axis]);
                 format!("{a}, {dof}, {factor:.12}, {b}, {dof}, {:.12}", -factor)
             };
-            let terms: Vec<String> = axes.iter().filter(|axis| opens[**axis].abs() > SAME).map(of_axis).collect();
+            let terms: Vec<String> = axes
+                .iter()
+                .filter(|axis| opens[**axis].abs() > SAME)
+                .map(of_axis)
+                .collect();
             let _ = writeln!(deck, "*EQUATION\n{}\n{}", 2 * terms.len(), terms.join(", "));
         }
         deck.push_str("*NSET, NSET=TOUCHING\n");
@@ -320,9 +449,15 @@ impl Section {
             }
             let words: Vec<&str> = line.split(',').map(str::trim).filter(|w| !w.is_empty()).collect();
             if keyword.starts_with("*NODE") && words.len() == 4 {
-                at.insert(words[0].parse()?, Vec3::new(words[1].parse()?, 0.0, words[2].parse()?));
+                at.insert(
+                    words[0].parse()?,
+                    Vec3::new(words[1].parse()?, 0.0, words[2].parse()?),
+                );
             } else if keyword.contains("CPS6") && words.len() == 7 {
-                let ids = words[1..].iter().map(|w| w.parse()).collect::<Result<Vec<usize>, _>>()?;
+                let ids = words[1..]
+                    .iter()
+                    .map(|w| w.parse())
+                    .collect::<Result<Vec<usize>, _>>()?;
                 found.push(ids.as_slice().try_into()?);
             }
         }
@@ -333,11 +468,16 @@ impl Section {
         }
     }
 
-    /// Gives each side its own nodes: above the inner face they are told apart by the seam's plane, below by the common
-    /// face.
+    /// Gives each side its own nodes: above the inner face they are told apart by the seam's plane, below by
+    /// the common face.
     fn split(at: &BTreeMap<usize, Vec3>, found: &[[usize; 6]], frame: &Frame) -> Self {
         let mut own = BTreeMap::new();
-        let mut section = Self { nodes: Vec::new(), triangles: Vec::new(), pairs: Vec::new(), is_corner: Vec::new() };
+        let mut section = Self {
+            nodes: Vec::new(),
+            triangles: Vec::new(),
+            pairs: Vec::new(),
+            is_corner: Vec::new(),
+        };
         for ids in found {
             let centre = ids[..3].iter().map(|id| at[id]).sum::<Vec3>() / 3.0;
             let middle = frame.n * centre.x + frame.s * centre.z;
@@ -351,7 +491,12 @@ impl Section {
                 })
             });
             nodes[..3].iter().for_each(|node| section.is_corner[*node] = true);
-            section.triangles.push(Triangle { nodes, side, is_wall, centre });
+            section.triangles.push(Triangle {
+                nodes,
+                side,
+                is_wall,
+                centre,
+            });
         }
         section.pairs = (own.iter().filter(|(key, _)| key.1 == 0))
             .filter_map(|(key, a)| Some([*a, *own.get(&(key.0, 1))?]))
@@ -373,7 +518,8 @@ struct Solid {
     y_of: Vec<f64>,
 }
 
-/// Two nodes at one place, of which the first may move from the second along `opens`, but not against it unless `is_tie`.
+/// Two nodes at one place, of which the first may move from the second along `opens`, but not against it
+/// unless `is_tie`.
 struct Contact {
     nodes: [usize; 2],
     opens: Vec3,
@@ -390,7 +536,9 @@ impl Solid {
             side: Vec::new(),
             front_mm3: Vec::new(),
             place: vec![BTreeMap::new(); 2 * n_layers + 1],
-            y_of: (0..=2 * n_layers).map(|half| half as f64 * layer_mm / 2.0).collect(),
+            y_of: (0..=2 * n_layers)
+                .map(|half| half as f64 * layer_mm / 2.0)
+                .collect(),
         };
         let (pin, h) = (0.6 * SIZE_MM, 0.5 * SIZE_MM);
         let [y0, y1] = reference.ends();
@@ -398,8 +546,10 @@ impl Solid {
             let has_connector = (y0..y1).contains(&solid.y_of[below + 1]);
             for triangle in section.triangles.iter().filter(|t| t.is_wall || has_connector) {
                 let Vec3 { x, z, .. } = triangle.centre;
-                let is_front =
-                    has_connector && (-pin..0.0).contains(&z) && x.abs() < h && (x > 0.0) == (triangle.side == 1);
+                let is_front = has_connector
+                    && (-pin..0.0).contains(&z)
+                    && x.abs() < h
+                    && (x > 0.0) == (triangle.side == 1);
                 solid.sweep(section, triangle, below, is_front.then_some(layer_mm));
             }
         }
@@ -423,16 +573,25 @@ impl Solid {
         let volume = loaded_mm.unwrap_or(0.0) * (q - p).cross(r - p).length() / 2.0;
         for (i, node) in nodes.into_iter().enumerate() {
             self.side[node] = triangle.side;
-            // Integrals of the shape functions over the wedge: corners, middles of the triangles' sides, middles in between.
+            // Integrals of the shape functions over the wedge: corners, middles of the triangles' sides,
+            // middles in between.
             self.front_mm3[node] += volume * [-1.0 / 9.0, -1.0 / 9.0, 1.0 / 6.0, 1.0 / 6.0, 2.0 / 9.0][i / 3];
         }
         self.wedges.push((nodes, loaded_mm.map(|_| triangle.side)));
     }
 
     fn node(&mut self, section: &Section, half: usize, at: usize) -> usize {
-        let (nodes, y, side, front) = (&mut self.nodes, self.y_of[half], &mut self.side, &mut self.front_mm3);
+        let (nodes, y, side, front) = (
+            &mut self.nodes,
+            self.y_of[half],
+            &mut self.side,
+            &mut self.front_mm3,
+        );
         *self.place[half].entry(at).or_insert_with(|| {
-            nodes.push(Vec3 { y, ..section.nodes[at] });
+            nodes.push(Vec3 {
+                y,
+                ..section.nodes[at]
+            });
             side.push(0);
             front.push(0.0);
             nodes.len() - 1
@@ -450,8 +609,16 @@ impl Solid {
                 continue;
             }
             for pair in &section.pairs {
-                let [Some(&a), Some(&b)] = pair.map(|p| nodes.get(&p)) else { continue };
-                let mut add = |opens, is_tie| contacts.push(Contact { nodes: [a, b], opens, is_tie });
+                let [Some(&a), Some(&b)] = pair.map(|p| nodes.get(&p)) else {
+                    continue;
+                };
+                let mut add = |opens, is_tie| {
+                    contacts.push(Contact {
+                        nodes: [a, b],
+                        opens,
+                        is_tie,
+                    })
+                };
                 let x = section.nodes[pair[0]];
                 let is_common = x.x.abs() < SAME && (-pin - SAME..SAME).contains(&x.z);
                 let is_end = is_common && (x.z.abs() < SAME || x.z < SAME - pin);
@@ -476,7 +643,11 @@ impl Solid {
     }
 
     fn probes(&self, section: &Section) -> Any<[[usize; 2]; 2]> {
-        let half = self.y_of.iter().position(|y| (y - LENGTH / 2.0).abs() < SAME).ok_or("no middle")?;
+        let half = self
+            .y_of
+            .iter()
+            .position(|y| (y - LENGTH / 2.0).abs() < SAME)
+            .ok_or("no middle")?;
         let at = |z: f64| {
             let is_there = |p: &&[usize; 2]| section.nodes[p[0]].distance(Vec3::Z * z) < SAME;
             let pair = section.pairs.iter().find(is_there).ok_or("no node to look at")?;
@@ -499,7 +670,10 @@ impl Solid {
                 let _ = writeln!(deck, "{id}, {}", words.join(", "));
             }
         }
-        let (e, nu) = (reference.params.material.youngs_modulus_mpa, reference.params.material.poissons_ratio);
+        let (e, nu) = (
+            reference.params.material.youngs_modulus_mpa,
+            reference.params.material.poissons_ratio,
+        );
         let _ = writeln!(
             deck,
             "*ELSET, ELSET=EALL\nFRONT0, FRONT1, REST\n*MATERIAL, NAME=M\n*ELASTIC\n{e}, {nu}\n*DENSITY\n1.
@@ -524,40 +698,62 @@ struct Results {
 
 impl Results {
     fn read(text: &str) -> Any<Self> {
-        let mut results = Self { moved: BTreeMap::new(), force: BTreeMap::new() };
+        let mut results = Self {
+            moved: BTreeMap::new(),
+            force: BTreeMap::new(),
+        };
         let mut is_force = false;
         for line in text.lines() {
             if line.contains("for set") {
                 is_force = line.contains("forces");
                 continue;
             }
-            let [node, x, y, z] = line.split_whitespace().collect::<Vec<_>>()[..] else { continue };
+            let [node, x, y, z] = line.split_whitespace().collect::<Vec<_>>()[..] else {
+                continue;
+            };
             let value = Vec3::new(x.parse()?, y.parse()?, z.parse()?);
-            if is_force { &mut results.force } else { &mut results.moved }.insert(node.parse::<usize>()? - 1, value);
+            if is_force {
+                &mut results.force
+            } else {
+                &mut results.moved
+            }
+            .insert(node.parse::<usize>()? - 1, value);
         }
         Ok(results)
     }
 
     fn displacement(&self, node: usize) -> Any<Vec3> {
-        self.moved.get(&node).copied().ok_or_else(|| format!("no displacement of node {node}").into())
+        self.moved
+            .get(&node)
+            .copied()
+            .ok_or_else(|| format!("no displacement of node {node}").into())
     }
 
     /// One-sided contacts that pull or overlap.
-    fn wrong(&self, contacts: &[Contact], is_closed: &[bool], body_load: impl Fn(usize) -> Vec3) -> Any<Vec<usize>> {
+    fn wrong(
+        &self,
+        contacts: &[Contact],
+        is_closed: &[bool],
+        body_load: impl Fn(usize) -> Vec3,
+    ) -> Any<Vec<usize>> {
         let mut values = Vec::new();
         for (i, contact) in contacts.iter().enumerate() {
             let [a, b] = contact.nodes;
             values.push(if is_closed[i] {
                 // What the node bears but for its share of the load is the contact.
-                (self.force.get(&a).copied().ok_or("no force at a contact")? - body_load(a)).dot(contact.opens)
+                (self.force.get(&a).copied().ok_or("no force at a contact")? - body_load(a))
+                    .dot(contact.opens)
             } else {
                 (self.displacement(a)? - self.displacement(b)?).dot(contact.opens)
             });
         }
         let largest = [false, true].map(|closed| {
-            (values.iter().zip(is_closed)).filter(|v| *v.1 == closed).fold(0.0_f64, |m, v| m.max(v.0.abs()))
+            (values.iter().zip(is_closed))
+                .filter(|v| *v.1 == closed)
+                .fold(0.0_f64, |m, v| m.max(v.0.abs()))
         });
-        let is_wrong = |i: &usize| !contacts[*i].is_tie && values[*i] < -NONE * largest[usize::from(is_closed[*i])];
+        let is_wrong =
+            |i: &usize| !contacts[*i].is_tie && values[*i] < -NONE * largest[usize::from(is_closed[*i])];
         Ok((0..contacts.len()).filter(is_wrong).collect())
     }
 }

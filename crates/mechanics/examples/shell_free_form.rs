@@ -1,9 +1,10 @@
 //! A free-form shell, held at its top and pushed at its bottom: the mesh, the case and our answer as JSON.
 //!
-//! `cargo run --release -p shellock-mechanics --example shell_free_form -- MODEL SIZE_MM EDGE_MM WALL_MM > case.json`
+//! `cargo run --release -p shellock-mechanics --example shell_free_form -- MODEL SIZE_MM EDGE_MM WALL_MM >
+//! case.json`
 //!
-//! MODEL is a mesh file, scaled to SIZE_MM along its longest side and remeshed to EDGE_MM. `scripts/shell_kratos.py
-//! case.json` solves the same with Kratos and compares.
+//! MODEL is a mesh file, scaled to SIZE_MM along its longest side and remeshed to EDGE_MM.
+//! `scripts/shell_kratos.py case.json` solves the same with Kratos and compares.
 
 use std::fmt::{Debug, Write as _};
 use std::io::Write as _;
@@ -22,22 +23,41 @@ const PUSH: Vec3 = Vec3::new(30.0, 20.0, 100.0);
 
 fn main() -> Any<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [file, size, edge, wall] = &args[..] else { return Err("MODEL SIZE_MM EDGE_MM WALL_MM".into()) };
+    let [file, size, edge, wall] = &args[..] else {
+        return Err("MODEL SIZE_MM EDGE_MM WALL_MM".into());
+    };
     let (mesh, wall_mm) = (model(file, size.parse()?, edge.parse()?)?, wall.parse()?);
     let material = Material::SLA_RESIN;
     let shell = ShellModel::new(&mesh, &material)?;
     let bounds = mesh.bounds();
     let height = |p: &Vec3| (p.y - bounds.min.y) / bounds.size().y;
-    let held: Vec<usize> = (0..mesh.points.len()).filter(|&v| height(&mesh.points[v]) > 1.0 - REGION).collect();
+    let held: Vec<usize> = (0..mesh.points.len())
+        .filter(|&v| height(&mesh.points[v]) > 1.0 - REGION)
+        .collect();
     let mut forces_n: Vec<Vec3> = (mesh.points.iter().zip(shell.areas_mm2()))
-        .map(|(p, area)| if height(p) < REGION { PUSH * *area } else { Vec3::ZERO })
+        .map(|(p, area)| {
+            if height(p) < REGION {
+                PUSH * *area
+            } else {
+                Vec3::ZERO
+            }
+        })
         .collect();
     let scale = PUSH.length() / forces_n.iter().sum::<Vec3>().length();
     forces_n.iter_mut().for_each(|f| *f *= scale);
 
-    let supports: Vec<Support> = held.iter().map(|&v| Support { point: v as u32, held: [true; 6] }).collect();
+    let supports: Vec<Support> = held
+        .iter()
+        .map(|&v| Support {
+            point: v as u32,
+            held: [true; 6],
+        })
+        .collect();
     let solver = shell.at_thickness_held(wall_mm, &supports)?;
-    let case = LoadCase { forces_n, ..LoadCase::default() };
+    let case = LoadCase {
+        forces_n,
+        ..LoadCase::default()
+    };
     let displacements = solver.solve(std::slice::from_ref(&case))?.swap_remove(0);
     let von_mises = |solver: &ShellSolver<'_>, u: &Displacements| -> Vec<f64> {
         solver.stresses(u).iter().map(|s| s.von_mises_mpa()).collect()
@@ -45,7 +65,10 @@ fn main() -> Any<()> {
     let clamped_mpa = von_mises(&solver, &displacements);
 
     let solver = shell.at_thickness(wall_mm)?;
-    let in_the_mean = LoadCase { held: held.iter().map(|&v| v as u32).collect(), ..case.clone() };
+    let in_the_mean = LoadCase {
+        held: held.iter().map(|&v| v as u32).collect(),
+        ..case.clone()
+    };
     let in_the_mean_mpa = von_mises(&solver, &solver.solve(&[in_the_mean])?[0]);
 
     let mut json = format!(
@@ -75,5 +98,13 @@ fn model(file: &str, size_mm: f64, edge_mm: f64) -> Any<TriMesh> {
     let scale = size_mm / mesh.bounds().size().max_element();
     mesh.points.iter_mut().for_each(|p| *p *= scale);
     let labels = vec![0; mesh.triangles.len()];
-    Ok(remesh(&RemeshParams { target_edge_mm: edge_mm, n_rounds: 6 }, &mesh, &labels).mesh)
+    Ok(remesh(
+        &RemeshParams {
+            target_edge_mm: edge_mm,
+            n_rounds: 6,
+        },
+        &mesh,
+        &labels,
+    )
+    .mesh)
 }

@@ -39,10 +39,12 @@ impl Side {
     }
 }
 
-/// Parts by their outer surface, triangulated coarsely enough for mechanics, and the stations of their seams. Lengths in mm.
+/// Parts by their outer surface, triangulated coarsely enough for mechanics, and the stations of their seams.
+/// Lengths in mm.
 #[derive(Clone, Debug, Default)]
 pub struct ShellAssembly {
-    /// Points of the outer surface; each is one part's own, so where parts touch there are several at one place.
+    /// Points of the outer surface; each is one part's own, so where parts touch there are several at one
+    /// place.
     pub points: Vec<Vec3>,
     /// Outward unit normal at each point; the same for all points at one place.
     pub normals: Vec<Vec3>,
@@ -76,8 +78,8 @@ pub struct Station {
 /// How a plan lets the two sides of one station move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meeting {
-    /// Unit normal of the walls' common face, perpendicular to the tangent, from side a into side b: a cannot go that way
-    /// without b.
+    /// Unit normal of the walls' common face, perpendicular to the tangent, from side a into side b: a cannot
+    /// go that way without b.
     pub wall: Vec3,
     /// The connector, where there is one.
     pub joint: Option<Joint>,
@@ -88,10 +90,11 @@ pub struct Meeting {
 pub struct Joint {
     /// The side with the pin.
     pub male: Side,
-    /// Unit vector perpendicular to the tangent along which the male may leave the female: ŝ. In the half space of the
-    /// outward normal, or across it; never into the surface.
+    /// Unit vector perpendicular to the tangent along which the male may leave the female: ŝ. In the half
+    /// space of the outward normal, or across it; never into the surface.
     pub leaves: Vec3,
-    /// Whether friction keeps the male from leaving and from sliding, too: on the key, which nothing else holds back.
+    /// Whether friction keeps the male from leaving and from sliding, too: on the key, which nothing else
+    /// holds back.
     pub is_fast: bool,
     /// Unit vector along which side a is pulled by the separation force; side b is pulled the other way.
     pub pull_on_a: Vec3,
@@ -103,7 +106,9 @@ pub struct Joint {
 
 /// Whether `opening_mm` lets the connector go that `meeting` has: the pin is out of its channel.
 pub(crate) fn is_lost(meeting: &Meeting, opening_mm: f64) -> bool {
-    let lost_mm = meeting.joint.map_or(f64::INFINITY, |joint| PIN_DEPTH * joint.size_mm);
+    let lost_mm = meeting
+        .joint
+        .map_or(f64::INFINITY, |joint| PIN_DEPTH * joint.size_mm);
     opening_mm.is_nan() || opening_mm >= lost_mm
 }
 
@@ -121,17 +126,25 @@ pub struct Opening {
 impl Opening {
     /// Rates the distances `opening_mm` at the stations.
     pub fn rated(meetings: &[Meeting], opening_mm: Vec<f64>) -> Self {
-        let rated = meetings.iter().zip(&opening_mm).map(|(m, d)| m.joint.map(|j| j.weight * d));
+        let rated = meetings
+            .iter()
+            .zip(&opening_mm)
+            .map(|(m, d)| m.joint.map(|j| j.weight * d));
         let mut worst: Option<(u32, f64)> = None;
         for (i, value) in (0..).zip(rated) {
             if let Some(value) = value.filter(|v| worst.is_none_or(|w| *v > w.1)) {
                 worst = Some((i, value));
             }
         }
-        Self { opening_mm, quality_mm: -worst.map_or(0.0, |w| w.1), worst: worst.map(|w| w.0) }
+        Self {
+            opening_mm,
+            quality_mm: -worst.map_or(0.0, |w| w.1),
+            worst: worst.map(|w| w.0),
+        }
     }
 
-    /// Whether that holds: unless a station has let its connector go. `parts` names those of a station that are free.
+    /// Whether that holds: unless a station has let its connector go. `parts` names those of a station that
+    /// are free.
     pub(crate) fn resistance<I: IntoIterator<Item = u32>>(
         self,
         meetings: &[Meeting],
@@ -141,7 +154,11 @@ impl Opening {
         let mut lost: Vec<u32> = lost.flat_map(parts).collect();
         lost.sort_unstable();
         lost.dedup();
-        if lost.is_empty() { Resistance::Holds(self) } else { Resistance::Separable(lost) }
+        if lost.is_empty() {
+            Resistance::Holds(self)
+        } else {
+            Resistance::Separable(lost)
+        }
     }
 }
 
@@ -169,9 +186,15 @@ mod tests {
                 weight,
                 size_mm: 3.0,
             };
-            Meeting { wall: Vec3::X, joint: weight.map(joint) }
+            Meeting {
+                wall: Vec3::X,
+                joint: weight.map(joint),
+            }
         };
-        let rated = Opening::rated(&[Some(1.0), Some(0.1), None, Some(0.5)].map(meeting), vec![2.0, 9.0, 50.0, 5.0]);
+        let rated = Opening::rated(
+            &[Some(1.0), Some(0.1), None, Some(0.5)].map(meeting),
+            vec![2.0, 9.0, 50.0, 5.0],
+        );
         assert_eq!((rated.quality_mm, rated.worst), (-2.5, Some(3)));
         let none = Opening::rated(&[meeting(None)], vec![1.0]);
         assert_eq!((none.quality_mm, none.worst), (0.0, None));

@@ -1,4 +1,5 @@
-//! Proportions of a connector of size D, as multiples of it: what is made, planned for and simulated is one shape.
+//! Proportions of a connector of size D, as multiples of it: what is made, planned for and simulated is one
+//! shape.
 //!
 //! ```text
 //!       female │ male         ↑ ŝ
@@ -10,7 +11,8 @@
 //!        └──────────┘
 //! ```
 
-/// How deep the pin of the male reaches into the channel of the female. [Yao et al. 2017, Sect. 4.2, gives D alone; chosen by eye]
+/// How deep the pin of the male reaches into the channel of the female. [Yao et al. 2017, Sect. 4.2, gives D
+/// alone; chosen by eye]
 pub const PIN_DEPTH: f64 = 0.6;
 /// Thickness of the pin across the seam.
 pub const PIN_WIDTH: f64 = 0.5;

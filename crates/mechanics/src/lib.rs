@@ -1,8 +1,9 @@
 //! Static mechanics of thin-walled parts that are joined along seams.
 //!
-//! [`ShellAssembly`] says what there is: parts, and the stations of the seams between them. [`Meeting`] says what a plan makes
-//! of each station. From both, the solvers compute how far the seams open under a uniform separation force or under forces
-//! from outside. This crate knows parts and stations, but neither patches nor plans.
+//! [`ShellAssembly`] says what there is: parts, and the stations of the seams between them. [`Meeting`] says
+//! what a plan makes of each station. From both, the solvers compute how far the seams open under a uniform
+//! separation force or under forces from outside. This crate knows parts and stations, but neither patches
+//! nor plans.
 
 pub mod assembly;
 pub mod connector;
@@ -15,6 +16,8 @@ pub mod volume;
 
 pub use assembly::{Joint, Meeting, Opening, Resistance, SIDES, ShellAssembly, Side, Station};
 pub use material::Material;
-pub use shell::{Displacements, FaceStress, LoadCase, ShellError, ShellModel, ShellSolver, ShellStress, Support};
+pub use shell::{
+    Displacements, FaceStress, LoadCase, ShellError, ShellModel, ShellSolver, ShellStress, Support,
+};
 pub use surface::{SurfaceModel, SurfaceParams, SurfaceSolution};
 pub use volume::{Loaded, StressLevel, VolumeError, VolumeModel, VolumeParams};

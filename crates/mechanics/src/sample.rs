@@ -4,12 +4,16 @@ use shellock_geom::Vec3;
 
 use crate::{ShellAssembly, Station};
 
-/// Two plates `length` (y) by `width` (x) mm, outer face up, side a at x < 0, joined along x = 0 by a station at each inner point.
+/// Two plates `length` (y) by `width` (x) mm, outer face up, side a at x < 0, joined along x = 0 by a station
+/// at each inner point.
 ///
 /// `cells` is how many squares each has along its length and across its width.
 pub fn plates(length_mm: f64, width_mm: f64, cells: [u32; 2]) -> ShellAssembly {
     let [n_along, n_across] = cells;
-    let mut assembly = ShellAssembly { n_parts: 2, ..ShellAssembly::default() };
+    let mut assembly = ShellAssembly {
+        n_parts: 2,
+        ..ShellAssembly::default()
+    };
     for part in 0..2 {
         let first = assembly.points.len() as u32;
         let x_of = |j: u32| {
@@ -48,7 +52,10 @@ pub fn plates(length_mm: f64, width_mm: f64, cells: [u32; 2]) -> ShellAssembly {
 
 /// A ball of eight octants, each of `frequency²` triangles, with stations along the twelve seams.
 pub fn ball(radius_mm: f64, frequency: u32) -> ShellAssembly {
-    let mut assembly = ShellAssembly { n_parts: 8, ..ShellAssembly::default() };
+    let mut assembly = ShellAssembly {
+        n_parts: 8,
+        ..ShellAssembly::default()
+    };
     let row_start = |i: u32| i * (2 * frequency + 3 - i) / 2;
     let n_own = row_start(frequency + 1);
     for part in 0..8_u32 {
@@ -64,19 +71,35 @@ pub fn ball(radius_mm: f64, frequency: u32) -> ShellAssembly {
         }
         let at = |i: u32, j: u32| part * n_own + row_start(i) + j;
         // An odd number of mirrorings turns triangles over.
-        let turned = |t: [u32; 3]| if part.count_ones() % 2 == 0 { t } else { [t[0], t[2], t[1]] };
+        let turned = |t: [u32; 3]| {
+            if part.count_ones() % 2 == 0 {
+                t
+            } else {
+                [t[0], t[2], t[1]]
+            }
+        };
         for i in 0..frequency {
             for j in 0..frequency - i {
-                assembly.triangles.push(turned([at(i, j), at(i + 1, j), at(i, j + 1)]));
+                assembly
+                    .triangles
+                    .push(turned([at(i, j), at(i + 1, j), at(i, j + 1)]));
                 if i + j + 1 < frequency {
-                    assembly.triangles.push(turned([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
+                    assembly
+                        .triangles
+                        .push(turned([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
                 }
             }
         }
     }
     for part in 0..8 {
         for axis in (0..3).filter(|axis| part & 1 << axis == 0) {
-            add_seam(&mut assembly, frequency, [part, part | 1 << axis], axis, |i, j| row_start(i) + j);
+            add_seam(
+                &mut assembly,
+                frequency,
+                [part, part | 1 << axis],
+                axis,
+                |i, j| row_start(i) + j,
+            );
         }
     }
     assembly
@@ -89,7 +112,13 @@ fn octant_axes(part: u32) -> [Vec3; 3] {
 }
 
 /// The seam where the weight of `axis` is zero.
-fn add_seam(assembly: &mut ShellAssembly, frequency: u32, parts: [u32; 2], axis: usize, own: impl Fn(u32, u32) -> u32) {
+fn add_seam(
+    assembly: &mut ShellAssembly,
+    frequency: u32,
+    parts: [u32; 2],
+    axis: usize,
+    own: impl Fn(u32, u32) -> u32,
+) {
     let n_own = assembly.points.len() as u32 / 8;
     let at = |part: u32, k: u32| {
         let rest = frequency - k;
@@ -107,6 +136,12 @@ fn add_seam(assembly: &mut ShellAssembly, frequency: u32, parts: [u32; 2], axis:
         if k > 1 {
             assembly.steps.push([n - 1, n]);
         }
-        assembly.stations.push(Station { points, tangent, normal, across, length_mm: chord.length() / 2.0 });
+        assembly.stations.push(Station {
+            points,
+            tangent,
+            normal,
+            across,
+            length_mm: chord.length() / 2.0,
+        });
     }
 }

@@ -1,5 +1,5 @@
-//! Thin shells as flat triangles with six degrees of freedom a node: displacements and stresses under several loads,
-//! for many thicknesses.
+//! Thin shells as flat triangles with six degrees of freedom a node: displacements and stresses under several
+//! loads, for many thicknesses.
 //!
 //! ```text
 //!   ShellModel::new(mesh, material)      elements and pattern, once a mesh:   K = H·K_m + H³·K_b
@@ -12,21 +12,21 @@
 //! **What holds.** It differs from case to case. Two ways, which answer different questions (figures in
 //! docs/shell.md):
 //!
-//! - *In the mean*, for all cases one factorisation: over the area of the case's region, the mean displacement and the
-//!   mean rotation of its nodes vanish. The reaction to that is a traction that varies linearly over the region, and
-//!   equilibrium alone says which: six numbers from six equations. So each case's loads are brought into equilibrium
-//!   first, the free shell is solved with the six supports of one node, which then carry nothing, and the rigid motion
-//!   is taken away last. The region itself bends under the traction: the 99th percentile of stress was 1.5 to 2.1
-//!   times that of a clamped region. With all nodes held so, it is inertia relief: a free body that its loads
-//!   accelerate.
-//! - *Clamped*, for each set of supports a factorisation (0.2 s for 5 000 points), but no assembly and no order of
-//!   elimination. The stress at the edge of what is clamped grows with every refinement.
+//! - *In the mean*, for all cases one factorisation: over the area of the case's region, the mean
+//!   displacement and the mean rotation of its nodes vanish. The reaction to that is a traction that varies
+//!   linearly over the region, and equilibrium alone says which: six numbers from six equations. So each
+//!   case's loads are brought into equilibrium first, the free shell is solved with the six supports of one
+//!   node, which then carry nothing, and the rigid motion is taken away last. The region itself bends under
+//!   the traction: the 99th percentile of stress was 1.5 to 2.1 times that of a clamped region. With all
+//!   nodes held so, it is inertia relief: a free body that its loads accelerate.
+//! - *Clamped*, for each set of supports a factorisation (0.2 s for 5 000 points), but no assembly and no
+//!   order of elimination. The stress at the edge of what is clamped grows with every refinement.
 //!
-//! Each connected part of the mesh is held by its own nodes. The element is described in `element`; docs/shell.md has
-//! benchmarks.
+//! Each connected part of the mesh is held by its own nodes. The element is described in `element`;
+//! docs/shell.md has benchmarks.
 //!
-//! Source: Sect. 4.3 of the paper, which does not say what element it uses. Limits: small displacements, a thickness
-//! that is the same everywhere and small beside the radii of curvature, no shear across the wall.
+//! Source: Sect. 4.3 of the paper, which does not say what element it uses. Limits: small displacements, a
+//! thickness that is the same everywhere and small beside the radii of curvature, no shear across the wall.
 
 mod element;
 mod region;
@@ -161,21 +161,25 @@ pub struct ShellModel {
 impl ShellModel {
     /// Computes the elements, adds them up and orders the elimination; 0.2 s for 5 000 points.
     ///
-    /// The mesh is the middle surface; it may be open, branch, or have several parts. Corners go counter-clockwise
-    /// seen from the outer face.
+    /// The mesh is the middle surface; it may be open, branch, or have several parts. Corners go
+    /// counter-clockwise seen from the outer face.
     pub fn new(mesh: &TriMesh, material: &Material) -> Result<Self, ShellError> {
         check(mesh, material)?;
         let n_nodes = mesh.points.len();
         let (e, nu) = (material.youngs_modulus_mpa, material.poissons_ratio);
         let elasticity = element::plane_stress(e, nu);
-        let elements: Vec<(Element, [Stiffness; 2])> =
-            (0..mesh.triangles.len()).into_par_iter().map(|t| Element::new(mesh.corners(t), &elasticity)).collect();
+        let elements: Vec<(Element, [Stiffness; 2])> = (0..mesh.triangles.len())
+            .into_par_iter()
+            .map(|t| Element::new(mesh.corners(t), &elasticity))
+            .collect();
 
         let pattern = SparseSymmetric::of_cells(n_nodes, DOFS, &mesh.triangles);
         let [membrane, bending] = assembled(&pattern, &mesh.triangles, &elements);
         let mut areas_mm2 = vec![0.0; n_nodes];
         for (t, corners) in mesh.triangles.iter().enumerate() {
-            corners.iter().for_each(|&v| areas_mm2[v as usize] += mesh.face_area(t) / 3.0);
+            corners
+                .iter()
+                .for_each(|&v| areas_mm2[v as usize] += mesh.face_area(t) / 3.0);
         }
         Ok(Self {
             order: EliminationOrder::of_blocks(&pattern, DOFS)?,
@@ -191,8 +195,8 @@ impl ShellModel {
         })
     }
 
-    /// A third of the area of the triangles around each point, mm²: what turns pressures into forces, areas into
-    /// masses.
+    /// A third of the area of the triangles around each point, mm²: what turns pressures into forces, areas
+    /// into masses.
     pub fn areas_mm2(&self) -> &[f64] {
         &self.areas_mm2
     }
@@ -207,14 +211,18 @@ impl ShellModel {
         parts
     }
 
-    /// Factorises the stiffness of the shell with thickness `thickness_mm`, in [0.001, 1000], which each load case
-    /// holds in the mean of nodes of its own.
+    /// Factorises the stiffness of the shell with thickness `thickness_mm`, in [0.001, 1000], which each load
+    /// case holds in the mean of nodes of its own.
     pub fn at_thickness(&self, thickness_mm: f64) -> Result<ShellSolver<'_>, ShellError> {
         ShellSolver::free(self, thickness_mm)
     }
 
     /// As [`at_thickness`](Self::at_thickness), where `supports` hold the shell in all cases.
-    pub fn at_thickness_held(&self, thickness_mm: f64, supports: &[Support]) -> Result<ShellSolver<'_>, ShellError> {
+    pub fn at_thickness_held(
+        &self,
+        thickness_mm: f64,
+        supports: &[Support],
+    ) -> Result<ShellSolver<'_>, ShellError> {
         ShellSolver::held(self, thickness_mm, supports)
     }
 }
@@ -233,7 +241,9 @@ fn assembled(
                 // Below each other in a column stand all rows of a node, down to the diagonal.
                 let n_rows = if i == j { c + 1 } else { DOFS };
                 let column = corners[j] * DOFS as u32 + c as u32;
-                let Some(first) = pattern.position(corners[i] * DOFS as u32, column) else { continue };
+                let Some(first) = pattern.position(corners[i] * DOFS as u32, column) else {
+                    continue;
+                };
                 for (sum, stiffness) in sums.iter_mut().zip(stiffnesses) {
                     for r in 0..n_rows {
                         sum[first + r] += stiffness[(DOFS * i + r, DOFS * j + c)];
@@ -246,10 +256,18 @@ fn assembled(
 }
 
 fn check(mesh: &TriMesh, material: &Material) -> Result<(), ShellError> {
-    let Material { youngs_modulus_mpa, poissons_ratio, .. } = *material;
-    let is_elastic = 0.0 < youngs_modulus_mpa && youngs_modulus_mpa <= 1e12 && (0.0..=0.49).contains(&poissons_ratio);
+    let Material {
+        youngs_modulus_mpa,
+        poissons_ratio,
+        ..
+    } = *material;
+    let is_elastic =
+        0.0 < youngs_modulus_mpa && youngs_modulus_mpa <= 1e12 && (0.0..=0.49).contains(&poissons_ratio);
     if !is_elastic {
-        return Err(ShellError::Material { youngs_modulus_mpa, poissons_ratio });
+        return Err(ShellError::Material {
+            youngs_modulus_mpa,
+            poissons_ratio,
+        });
     }
     if mesh.triangles.is_empty() {
         return Err(ShellError::Empty);
@@ -263,7 +281,10 @@ fn check(mesh: &TriMesh, material: &Material) -> Result<(), ShellError> {
             return Err(ShellError::MissingPoint(t as u32));
         }
         let [a, b, c] = mesh.corners(t);
-        let longest_sq = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        let longest_sq = (b - a)
+            .length_squared()
+            .max((c - b).length_squared())
+            .max((a - c).length_squared());
         let has_area = mesh.area_vector_doubled(t).length() > MIN_HEIGHT * longest_sq;
         if !has_area {
             return Err(ShellError::FlatTriangle(t as u32));

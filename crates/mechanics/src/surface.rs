@@ -1,6 +1,7 @@
 //! Surface-based metric: a projective-dynamics model of the shell (Sect. 5.2, Eq. 5).
 //!
-//! Parts are triangle meshes at mid-wall; along every seam both sides carry a narrow strip of triangles, the connectors:
+//! Parts are triangle meshes at mid-wall; along every seam both sides carry a narrow strip of triangles, the
+//! connectors:
 //!
 //! ```text
 //!   ───a────b   b────b───         b: seam points, two at one place; t: tips of the strips, ℓ below along −ŝ
@@ -8,22 +9,26 @@
 //!             t   (both strips)   slide along the seam, and nothing else; walls may part but not enter each other
 //! ```
 //!
-//! Strips are short and thick: each turns with the triangles at its seam point, and its own bending is the contact's.
+//! Strips are short and thick: each turns with the triangles at its seam point, and its own bending is the
+//! contact's.
 //!
-//! The energy is Eq. 5's without inertia: `Σ k/2 ‖A x − B p‖²` over edges (stretch), hinges (bending) and contacts
-//! (position), each `p` the nearest configuration in which the constraint has no energy. Loads move things by far less than
-//! a triangle, so projections are taken at the rest shape: an edge keeps its length, a hinge its angle, to first order.
+//! The energy is Eq. 5's without inertia: `Σ k/2 ‖A x − B p‖²` over edges (stretch), hinges (bending) and
+//! contacts (position), each `p` the nearest configuration in which the constraint has no energy. Loads move
+//! things by far less than a triangle, so projections are taken at the rest shape: an edge keeps its length,
+//! a hinge its angle, to first order.
 //!
-//! The static state is computed, not approached. One factorisation of the meshes serves all plans: it condenses each
-//! part onto the motions of its stations. What a plan adds, contacts between stations, is a small system in the forces
-//! of those that are closed. Newton's method solves it exactly in about six steps, each of which joins the parts two at
-//! a time: 5 to 8 ms in all for a plan with 170 stations. (With the motions as unknowns, four on either side of each
-//! station, ten steps took ten times as long. Local and global steps with one matrix, the paper's way, took 240 to 1000
-//! iterations for three digits, even with conjugate directions and the parts' rigid motions projected out, since plans
-//! that barely hold are soft where the matrix is stiff.)
+//! The static state is computed, not approached. One factorisation of the meshes serves all plans: it
+//! condenses each part onto the motions of its stations. What a plan adds, contacts between stations, is a
+//! small system in the forces of those that are closed. Newton's method solves it exactly in about six steps,
+//! each of which joins the parts two at a time: 5 to 8 ms in all for a plan with 170 stations. (With the
+//! motions as unknowns, four on either side of each station, ten steps took ten times as long. Local and
+//! global steps with one matrix, the paper's way, took 240 to 1000 iterations for three digits, even with
+//! conjugate directions and the parts' rigid motions projected out, since plans that barely hold are soft
+//! where the matrix is stiff.)
 //!
-//! Weights follow the material: `k = E h A/l²` for edges (a regular mesh then has Young's modulus E and Poisson's ratio
-//! 1/3), `k = B l²/A` for hinges with `B = E h³/12(1 − ν²)`, A the area of the triangles at the edge.
+//! Weights follow the material: `k = E h A/l²` for edges (a regular mesh then has Young's modulus E and
+//! Poisson's ratio 1/3), `k = B l²/A` for hinges with `B = E h³/12(1 − ν²)`, A the area of the triangles at
+//! the edge.
 
 mod contact;
 mod join;
@@ -45,7 +50,8 @@ use parts::{N_MOTIONS, Part, parts};
 pub struct SurfaceParams {
     /// Wall thickness H. (0, 10]; 2.
     pub wall_mm: f64,
-    /// Connector size D where walls meet without a connector, which has its own: their contact is as stiff. [1, 10]; 2.5.
+    /// Connector size D where walls meet without a connector, which has its own: their contact is as stiff.
+    /// [1, 10]; 2.5.
     pub connector_mm: f64,
     /// What parts are made of.
     pub material: Material,
@@ -79,7 +85,8 @@ impl SurfaceParams {
         0.5 * self.wall_mm + PIN_DEPTH * joint.size_mm
     }
 
-    /// Stiffness of a contact along that much seam, N/mm: that of a pin of size D, as deep as wide, bent like a cantilever.
+    /// Stiffness of a contact along that much seam, N/mm: that of a pin of size D, as deep as wide, bent like
+    /// a cantilever.
     fn contact_n_mm(&self, size_mm: f64, length_mm: f64) -> f64 {
         let (thickness, depth) = (PIN_WIDTH * size_mm, PIN_DEPTH * size_mm);
         3.0 * self.stiffness_ratios[2] * terms::bending(self, thickness) * length_mm / depth.powi(3)
@@ -119,7 +126,11 @@ impl SurfaceModel {
     ) -> Result<Self, SparseError> {
         let parts = parts(params, assembly, is_held)?;
         let (params, assembly) = (*params, assembly.clone());
-        Ok(Self { params, assembly, parts })
+        Ok(Self {
+            params,
+            assembly,
+            parts,
+        })
     }
 
     /// Motions of both sides of all stations, of which a plan's equilibrium consists.
@@ -127,8 +138,8 @@ impl SurfaceModel {
         2 * N_MOTIONS * self.assembly.stations.len()
     }
 
-    /// How well each plan, given by what it makes of every station, resists the separation force with part `held` fixed;
-    /// on all cores.
+    /// How well each plan, given by what it makes of every station, resists the separation force with part
+    /// `held` fixed; on all cores.
     pub fn resist_all(&self, plans: &[Vec<Meeting>], held: u32) -> Result<Vec<SurfaceSolution>, SparseError> {
         plans.par_iter().map(|plan| self.resist(plan, held)).collect()
     }
@@ -148,13 +159,15 @@ impl SurfaceModel {
     /// The separation force on side a of each station, N.
     fn pulls(&self, plan: &[Meeting]) -> Vec<Vec3> {
         let pull = |(m, s): (&Meeting, &Station)| {
-            m.joint.map_or(Vec3::ZERO, |j| self.params.force_n_per_mm * s.length_mm * j.pull_on_a)
+            m.joint.map_or(Vec3::ZERO, |j| {
+                self.params.force_n_per_mm * s.length_mm * j.pull_on_a
+            })
         };
         plan.iter().zip(&self.assembly.stations).map(pull).collect()
     }
 
-    /// The answer to given forces, N, on the tips of side a at each station and, the other way, of side b; with no part
-    /// fixed but the held points.
+    /// The answer to given forces, N, on the tips of side a at each station and, the other way, of side b;
+    /// with no part fixed but the held points.
     pub fn respond(&self, plan: &[Meeting], pulls: &[Vec3]) -> Result<SurfaceSolution, SparseError> {
         solve::solve(self, plan, &[], pulls)
     }

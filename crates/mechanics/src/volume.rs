@@ -1,14 +1,18 @@
-//! The volume-based metric (Sect. 5.1): walls and connectors as tetrahedra, linear elasticity, contact without friction.
+//! The volume-based metric (Sect. 5.1): walls and connectors as tetrahedra, linear elasticity, contact
+//! without friction.
 //!
-//! What no plan changes is done once, by [`VolumeModel::new`]: the wall of every part, its stiffness, and the condensation of that
-//! onto the points near the part's seams. What a plan adds, [`VolumeModel::resist`] hangs on those points: pins and channels
-//! (`connector`). A part's bars and wall condense to what contact sees of it, and contact is solved between these few
-//! unknowns (`contact`); rigid motions are kept apart, so that parts that come off are found exactly (`mechanism`).
+//! What no plan changes is done once, by [`VolumeModel::new`]: the wall of every part, its stiffness, and the
+//! condensation of that onto the points near the part's seams. What a plan adds, [`VolumeModel::resist`]
+//! hangs on those points: pins and channels (`connector`). A part's bars and wall condense to what contact
+//! sees of it, and contact is solved between these few unknowns (`contact`); rigid motions are kept apart, so
+//! that parts that come off are found exactly (`mechanism`).
 //!
-//! Deviations from the paper: contact is exact instead of by penalty, between pairs of nodes that start at one place;
-//! displacements are small. Limits: no friction, no gap; where a thin model's walls overlap, each is whole. The floor of the
-//! channel is one-sided, and so are the walls' faces, which touch at mid-wall; the channel's other faces hold in both directions.
+//! Deviations from the paper: contact is exact instead of by penalty, between pairs of nodes that start at
+//! one place; displacements are small. Limits: no friction, no gap; where a thin model's walls overlap, each
+//! is whole. The floor of the channel is one-sided, and so are the walls' faces, which touch at mid-wall; the
+//! channel's other faces hold in both directions.
 
+mod bars;
 mod connector;
 mod contact;
 mod element;
@@ -20,6 +24,7 @@ mod rows;
 mod stress;
 #[cfg(test)]
 mod tests;
+mod unknowns;
 mod wall;
 
 use rayon::prelude::*;
@@ -32,11 +37,13 @@ pub use stress::StressLevel;
 pub use wall::{MIN_VOLUME_SHARE, Wall};
 
 use crate::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};
-use connector::{Bar, Labels, Section, Sections, Spans};
+use bars::{Sections, Spans};
+use connector::{Bar, Section};
 use contact::{Equilibrium, Response};
 use front::Front;
 use part::Part;
 use rows::{ROWS, WALL};
+use unknowns::Labels;
 
 /// How the metric models walls and connectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,11 +52,13 @@ pub struct VolumeParams {
     pub wall_mm: f64,
     /// Layers of prisms across the wall. [1, 8]; 1, which is enough for quadratic elements.
     pub n_layers: usize,
-    /// Degree of the elements of walls. Quadratic: a plan costs the same, and linear ones are several times too stiff.
+    /// Degree of the elements of walls. Quadratic: a plan costs the same, and linear ones are several times
+    /// too stiff.
     pub order: Order,
     /// What parts are made of. The paper's resin.
     pub material: Material,
-    /// Separation force on each seam, N/mm. (0, 1000]; 0.01, the paper's 10 N/m. Openings are proportional to it.
+    /// Separation force on each seam, N/mm. (0, 1000]; 0.01, the paper's 10 N/m. Openings are proportional to
+    /// it.
     pub force_n_per_mm: f64,
     /// Pull or overlap at a contact that counts as none, relative to the largest. [10⁻¹², 10⁻²]; 10⁻⁶.
     pub tolerance: f64,
@@ -73,25 +82,47 @@ impl VolumeParams {
     pub fn problems(&self) -> Vec<String> {
         let m = &self.material;
         let checks = [
-            ("wall_mm", self.wall_mm, 0.0 < self.wall_mm && self.wall_mm <= 20.0, "(0, 20]"),
-            ("n_layers", self.n_layers as f64, (1..=8).contains(&self.n_layers), "[1, 8]"),
+            (
+                "wall_mm",
+                self.wall_mm,
+                0.0 < self.wall_mm && self.wall_mm <= 20.0,
+                "(0, 20]",
+            ),
+            (
+                "n_layers",
+                self.n_layers as f64,
+                (1..=8).contains(&self.n_layers),
+                "[1, 8]",
+            ),
             (
                 "force_n_per_mm",
                 self.force_n_per_mm,
                 0.0 < self.force_n_per_mm && self.force_n_per_mm <= 1e3,
                 "(0, 1000]",
             ),
-            ("tolerance", self.tolerance, (1e-12..=1e-2).contains(&self.tolerance), "[1e-12, 0.01]"),
+            (
+                "tolerance",
+                self.tolerance,
+                (1e-12..=1e-2).contains(&self.tolerance),
+                "[1e-12, 0.01]",
+            ),
             (
                 "youngs_modulus_mpa",
                 m.youngs_modulus_mpa,
                 0.0 < m.youngs_modulus_mpa && m.youngs_modulus_mpa <= 1e6,
                 "(0, 1e6]",
             ),
-            ("poissons_ratio", m.poissons_ratio, (0.0..=0.45).contains(&m.poissons_ratio), "[0, 0.45]"),
+            (
+                "poissons_ratio",
+                m.poissons_ratio,
+                (0.0..=0.45).contains(&m.poissons_ratio),
+                "[0, 0.45]",
+            ),
         ];
         let wrong = checks.into_iter().filter(|(_, _, is_right, _)| !is_right);
-        wrong.map(|(name, value, _, range)| format!("{name} is {value}: must be in {range}")).collect()
+        wrong
+            .map(|(name, value, _, range)| format!("{name} is {value}: must be in {range}"))
+            .collect()
     }
 }
 
@@ -137,7 +168,8 @@ pub enum VolumeError {
 /// Displacements at the joints in static equilibrium, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deflection {
-    /// At each station, of side a and side b, at the root and at the tip of the pin; zero where there is no joint.
+    /// At each station, of side a and side b, at the root and at the tip of the pin; zero where there is no
+    /// joint.
     pub displacement_mm: Vec<[[Vec3; 2]; 2]>,
 }
 
@@ -169,14 +201,18 @@ impl VolumeModel {
     }
 
     /// The same with the wall below the points `clamped` held in place.
-    pub fn clamped(params: &VolumeParams, assembly: &ShellAssembly, clamped: &[u32]) -> Result<Self, VolumeError> {
+    pub fn clamped(
+        params: &VolumeParams,
+        assembly: &ShellAssembly,
+        clamped: &[u32],
+    ) -> Result<Self, VolumeError> {
         let problems = params.problems();
         if !problems.is_empty() {
             return Err(VolumeError::Params(problems));
         }
         check(assembly, clamped)?;
-        let wall =
-            Wall::new(assembly, params.wall_mm, params.n_layers).map_err(|flat| VolumeError::FlatTriangle(flat.0))?;
+        let wall = Wall::new(assembly, params.wall_mm, params.n_layers)
+            .map_err(|flat| VolumeError::FlatTriangle(flat.0))?;
 
         let n_points = assembly.points.len();
         let mut is_clamped = vec![false; n_points];
@@ -194,10 +230,23 @@ impl VolumeModel {
         let parts: Vec<Part> = (0..assembly.n_parts as u32)
             .into_par_iter()
             .map(|part| {
-                let tets: Vec<[u32; 4]> = wall.tets.iter().copied().filter(|t| part_of(t[0]) == part).collect();
-                let kept = (0..wall.nodes.len() as u32).filter(|v| is_kept[*v as usize] && part_of(*v) == part);
+                let tets: Vec<[u32; 4]> = wall
+                    .tets
+                    .iter()
+                    .copied()
+                    .filter(|t| part_of(t[0]) == part)
+                    .collect();
+                let kept =
+                    (0..wall.nodes.len() as u32).filter(|v| is_kept[*v as usize] && part_of(*v) == part);
                 let clamp = |node: u32| is_clamped[node as usize % n_points];
-                Part::new(params.order, &params.material, &wall, &tets, kept.collect(), clamp)
+                Part::new(
+                    params.order,
+                    &params.material,
+                    &wall,
+                    &tets,
+                    kept.collect(),
+                    clamp,
+                )
             })
             .collect::<Result<_, _>>()?;
         let mut place_kept = vec![None; wall.nodes.len()];
@@ -206,7 +255,8 @@ impl VolumeModel {
                 place_kept[node as usize] = Some(place);
             }
         }
-        let below = |p: u32| assembly.points[p as usize] - assembly.normals[p as usize] * wall.depth_mm[p as usize];
+        let below =
+            |p: u32| assembly.points[p as usize] - assembly.normals[p as usize] * wall.depth_mm[p as usize];
         Ok(Self {
             params: *params,
             stations: assembly.stations.clone(),
@@ -232,8 +282,9 @@ impl VolumeModel {
         &self.wall
     }
 
-    /// How far the seams open when the stations are joined by `joints` and `fixed_part` is held in place, or which parts come
-    /// off. Opening is the larger of the distances between male and female at the root and at the tip of the pin.
+    /// How far the seams open when the stations are joined by `joints` and `fixed_part` is held in place, or
+    /// which parts come off. Opening is the larger of the distances between male and female at the root and
+    /// at the tip of the pin.
     ///
     /// May be called from several threads at once.
     pub fn resist(&self, plan: &[Meeting], fixed_part: u32) -> Result<Resistance, VolumeError> {
@@ -245,24 +296,30 @@ impl VolumeModel {
                 let widest = |[a, b]: &[[Vec3; 2]; 2]| a[0].distance(b[0]).max(a[1].distance(b[1]));
                 let openings = deflection.displacement_mm.iter().map(widest).collect();
                 Opening::rated(plan, openings).resistance(plan, |station| {
-                    self.station_parts[station].into_iter().filter(|part| *part != fixed_part)
+                    self.station_parts[station]
+                        .into_iter()
+                        .filter(|part| *part != fixed_part)
                 })
             }
             Err(parts) => Resistance::Separable(parts),
         })
     }
 
-    /// How parts move, with `fixed_part` held in place, or nothing but what is clamped; or the parts that come off.
+    /// How parts move, with `fixed_part` held in place, or nothing but what is clamped; or the parts that
+    /// come off.
     pub fn equilibrium(
         &self,
         plan: &[Meeting],
         fixed_part: Option<u32>,
     ) -> Result<Result<Deflection, Vec<u32>>, VolumeError> {
         if plan.len() != self.stations.len() {
-            return Err(VolumeError::Joints { joints: plan.len(), stations: self.stations.len() });
+            return Err(VolumeError::Joints {
+                joints: plan.len(),
+                stations: self.stations.len(),
+            });
         }
-        let sections = connector::sections(self, plan);
-        let bars = connector::bars(self, plan, &sections);
+        let sections = bars::sections(self, plan);
+        let bars = bars::bars(self, plan, &sections);
         let is_free = |i: usize| self.parts[i].rigid.is_some() && Some(i as u32) != fixed_part;
         let n_motions = 6 * (0..self.parts.len()).filter(|i| is_free(*i)).count();
         let mut responses = (0..self.parts.len())
@@ -279,20 +336,31 @@ impl VolumeModel {
         if !loose.is_empty() {
             return Ok(Err(loose));
         }
-        let equilibrium =
-            contact::solve(&responses, &laws, n_motions, self.params.tolerance)?.ok_or(VolumeError::Contact)?;
+        let equilibrium = contact::solve(&responses, &laws, n_motions, self.params.tolerance)?
+            .ok_or(VolumeError::Contact)?;
 
         Ok(Ok(self.deflection(&responses, &equilibrium, &sections)))
     }
 
     /// Displacements at the joints, from those along the rows.
-    fn deflection(&self, responses: &[Response], equilibrium: &Equilibrium, sections: &Sections) -> Deflection {
+    fn deflection(
+        &self,
+        responses: &[Response],
+        equilibrium: &Equilibrium,
+        sections: &Sections,
+    ) -> Deflection {
         let mut displacement_mm = vec![[[Vec3::ZERO; 2]; 2]; sections.len()];
         for (part, response) in (0..).zip(responses) {
             for (&row, moved) in response.rows.iter().zip(response.displacement_mm(equilibrium)) {
                 let (station, row) = (row / ROWS, row % ROWS);
-                let side = if self.station_parts[station][0] == part { Side::A } else { Side::B };
-                let Some(section) = &sections[station][side.index()] else { continue };
+                let side = if self.station_parts[station][0] == part {
+                    Side::A
+                } else {
+                    Side::B
+                };
+                let Some(section) = &sections[station][side.index()] else {
+                    continue;
+                };
                 for (own, direction, _) in section.rows() {
                     if own == row {
                         displacement_mm[station][side.index()][own / 3] += direction * moved;
@@ -314,7 +382,10 @@ impl VolumeModel {
         let labels = self.labels(part);
         let (own, spans, mut fronts) = self.bar_fronts(part, sections, bars, labels);
         if is_fixed {
-            fronts = fronts.iter().map(|front| front.without(|id| labels.is_wall(id))).collect();
+            fronts = fronts
+                .iter()
+                .map(|front| front.without(|id| labels.is_wall(id)))
+                .collect();
         }
         let mut fronts = connector::condensed(&fronts, &own, labels, &spans)?;
         if !is_fixed {
@@ -322,7 +393,13 @@ impl VolumeModel {
         }
         let wall = (!is_fixed).then_some(&self.parts[part as usize].stiffness);
         let all: Vec<&Front> = wall.into_iter().chain(&fronts).collect();
-        Ok(self.read(part, &Front::condensed(&all, |id| labels.is_inner(id))?, labels, plan, sections))
+        Ok(self.read(
+            part,
+            &Front::condensed(&all, |id| labels.is_inner(id))?,
+            labels,
+            plan,
+            sections,
+        ))
     }
 
     fn labels(&self, part: u32) -> Labels {
@@ -339,7 +416,7 @@ impl VolumeModel {
     ) -> (Vec<&'a Bar>, Spans, Vec<Front>) {
         let is_own = |bar: &&Bar| self.station_parts[bar.from][bar.side.index()] == part;
         let own: Vec<&Bar> = bars.iter().filter(is_own).collect();
-        let spans = connector::spans(&own, self.stations.len());
+        let spans = bars::spans(&own, self.stations.len());
         let front = |(i, bar): (usize, &&Bar)| {
             let carries = |station: usize| spans[station][bar.side.index()].is_some_and(|span| span[0] == i);
             bar.front(self, sections, carries, labels)
@@ -349,31 +426,59 @@ impl VolumeModel {
     }
 
     /// Compliance and drift from what is left of a part: its contact rows, and its load, if it has one.
-    fn read(&self, part: u32, left: &Front, labels: Labels, plan: &[Meeting], sections: &Sections) -> Response {
+    fn read(
+        &self,
+        part: u32,
+        left: &Front,
+        labels: Labels,
+        plan: &[Meeting],
+        sections: &Sections,
+    ) -> Response {
         let n = left.ids.len();
         let n_rows = left.ids.partition_point(|id| *id < labels.load());
         let rows: Vec<usize> = left.ids[..n_rows].iter().map(|id| labels.row_of(*id)).collect();
         let mut response = Response {
-            compliance: (0..n_rows).flat_map(|j| left.values[n * j..n * j + n_rows].iter().map(|v| -v)).collect(),
-            drift_mm: (0..n_rows).map(|j| if n_rows < n { -left.values[n_rows + n * j] } else { 0.0 }).collect(),
+            compliance: (0..n_rows)
+                .flat_map(|j| left.values[n * j..n * j + n_rows].iter().map(|v| -v))
+                .collect(),
+            drift_mm: (0..n_rows)
+                .map(|j| {
+                    if n_rows < n {
+                        -left.values[n_rows + n * j]
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
             rigid: vec![[0.0; 6]; n_rows],
             rows,
             ..Response::default()
         };
-        let Some(rigid) = self.parts[part as usize].rigid else { return response };
+        let Some(rigid) = self.parts[part as usize].rigid else {
+            return response;
+        };
         let mut see = |station: usize, row: usize, direction: Vec3, place: Vec3| {
-            let Ok(at) = response.rows.binary_search(&(station * ROWS + row)) else { return };
+            let Ok(at) = response.rows.binary_search(&(station * ROWS + row)) else {
+                return;
+            };
             let moved = rigid.at(place).map(|v| v.dot(direction));
             (0..6).for_each(|m| response.rigid[at][m] += moved[m]);
         };
         for (station, side) in self.sides_of_part(part) {
-            see(station, WALL, rows::off_the_wall(&plan[station], side), self.mid_wall(station, side));
+            see(
+                station,
+                WALL,
+                rows::off_the_wall(&plan[station], side),
+                self.mid_wall(station, side),
+            );
             for (row, direction, place) in sections[station][side.index()].iter().flat_map(Section::rows) {
                 see(station, row, direction, place);
             }
         }
         for (station, side) in self.sides_of_part(part) {
-            let Some(section) = &sections[station][side.index()] else { continue };
+            let Some(section) = &sections[station][side.index()] else {
+                continue;
+            };
             // Without its rows the station is in no bar, and has no connector.
             if response.rows.binary_search(&(station * ROWS)).is_ok() {
                 let (force, places) = section.load();
@@ -393,7 +498,9 @@ impl VolumeModel {
             (self.wall.tets[t], self.wall.corners(t))
         });
         let weights = connector::interpolation(tets, x).into_iter();
-        weights.filter_map(|(node, w)| Some((self.place_kept[node as usize]?, w))).collect()
+        weights
+            .filter_map(|(node, w)| Some((self.place_kept[node as usize]?, w)))
+            .collect()
     }
 }
 
@@ -402,9 +509,18 @@ fn check(assembly: &ShellAssembly, clamped: &[u32]) -> Result<(), VolumeError> {
     let has = |p: &u32| (*p as usize) < n;
     let problem = if assembly.normals.len() != n || assembly.part_of_point.len() != n {
         "points, normals and parts of points differ in number"
-    } else if !assembly.points.iter().chain(&assembly.normals).all(|p| p.is_finite()) {
+    } else if !assembly
+        .points
+        .iter()
+        .chain(&assembly.normals)
+        .all(|p| p.is_finite())
+    {
         "a point or normal is not finite"
-    } else if !assembly.part_of_point.iter().all(|p| (*p as usize) < assembly.n_parts) {
+    } else if !assembly
+        .part_of_point
+        .iter()
+        .all(|p| (*p as usize) < assembly.n_parts)
+    {
         "a point has a part that there is not"
     } else if !(assembly.triangles.iter().flatten().chain(clamped)).all(has) {
         "a triangle or clamp names a point that there is not"
@@ -415,7 +531,12 @@ fn check(assembly: &ShellAssembly, clamped: &[u32]) -> Result<(), VolumeError> {
         "a triangle has points of several parts"
     } else if !assembly.stations.iter().flat_map(|s| &s.points).all(has) {
         "a station names a point that there is not"
-    } else if !assembly.steps.iter().flatten().all(|s| (*s as usize) < assembly.stations.len()) {
+    } else if !assembly
+        .steps
+        .iter()
+        .flatten()
+        .all(|s| (*s as usize) < assembly.stations.len())
+    {
         "a step names a station that there is not"
     } else {
         return Ok(());
@@ -433,7 +554,9 @@ fn near_stations(assembly: &ShellAssembly, n_layers: usize) -> Vec<[Vec<u32>; 2]
     }
     let per_triangle = 3 * n_layers as u32;
     let below = |point: u32| {
-        let tets = about[point as usize].iter().flat_map(|t| t * per_triangle..(t + 1) * per_triangle);
+        let tets = about[point as usize]
+            .iter()
+            .flat_map(|t| t * per_triangle..(t + 1) * per_triangle);
         tets.collect()
     };
     assembly.stations.iter().map(|s| s.points.map(below)).collect()

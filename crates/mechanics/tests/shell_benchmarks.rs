@@ -12,17 +12,33 @@ use shellock_mechanics::{LoadCase, Material, ShellModel, Support};
 fn grid(cells: [usize; 2], place: impl Fn(f64, f64) -> Vec3) -> TriMesh {
     let [nu, nv] = cells;
     let points = (0..=nv).flat_map(|j| (0..=nu).map(move |i| (i, j)));
-    let points = points.map(|(i, j)| place(i as f64 / nu as f64, j as f64 / nv as f64)).collect();
+    let points = points
+        .map(|(i, j)| place(i as f64 / nu as f64, j as f64 / nv as f64))
+        .collect();
     let corner = |i: usize, j: usize| (j * (nu + 1) + i) as u32;
-    let triangles = (0..nv).flat_map(|j| (0..nu).map(move |i| (i, j))).flat_map(|(i, j)| {
-        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
-        if (i + j) % 2 == 0 { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] }
-    });
-    TriMesh { points, triangles: triangles.collect() }
+    let triangles = (0..nv)
+        .flat_map(|j| (0..nu).map(move |i| (i, j)))
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [
+                corner(i, j),
+                corner(i + 1, j),
+                corner(i + 1, j + 1),
+                corner(i, j + 1),
+            ];
+            if (i + j) % 2 == 0 {
+                [[a, b, d], [b, c, d]]
+            } else {
+                [[a, b, c], [a, c, d]]
+            }
+        });
+    TriMesh {
+        points,
+        triangles: triangles.collect(),
+    }
 }
 
-/// The degrees of freedom named in `dofs` (`xyz` displacements, `XYZ` rotations) are held at the points where `at`
-/// says so.
+/// The degrees of freedom named in `dofs` (`xyz` displacements, `XYZ` rotations) are held at the points where
+/// `at` says so.
 fn hold(mesh: &TriMesh, dofs: &str, at: impl Fn(Vec3) -> bool) -> Vec<Support> {
     let held = ['x', 'y', 'z', 'X', 'Y', 'Z'].map(|dof| dofs.contains(dof));
     let points = (0..).zip(&mesh.points).filter(|(_, p)| at(**p));
@@ -34,19 +50,34 @@ fn is_zero(x: f64) -> bool {
 }
 
 fn material(youngs_modulus_mpa: f64, poissons_ratio: f64) -> Material {
-    Material { youngs_modulus_mpa, poissons_ratio, ..Material::SLA_RESIN }
+    Material {
+        youngs_modulus_mpa,
+        poissons_ratio,
+        ..Material::SLA_RESIN
+    }
 }
 
 /// The displacements of `mesh` under `forces`.
-fn solve(mesh: &TriMesh, m: Material, thickness: f64, supports: &[Support], forces_n: Vec<Vec3>) -> Vec<Vec3> {
+fn solve(
+    mesh: &TriMesh,
+    m: Material,
+    thickness: f64,
+    supports: &[Support],
+    forces_n: Vec<Vec3>,
+) -> Vec<Vec3> {
     let model = ShellModel::new(mesh, &m).unwrap();
     let solver = model.at_thickness_held(thickness, supports).unwrap();
-    let case = LoadCase { forces_n, ..LoadCase::default() };
+    let case = LoadCase {
+        forces_n,
+        ..LoadCase::default()
+    };
     solver.solve(&[case]).unwrap().swap_remove(0).moves_mm
 }
 
 fn nearest(mesh: &TriMesh, p: Vec3) -> usize {
-    (0..mesh.points.len()).min_by(|&i, &j| mesh.points[i].distance(p).total_cmp(&mesh.points[j].distance(p))).unwrap()
+    (0..mesh.points.len())
+        .min_by(|&i, &j| mesh.points[i].distance(p).total_cmp(&mesh.points[j].distance(p)))
+        .unwrap()
 }
 
 fn point_load(mesh: &TriMesh, at: Vec3, force: Vec3) -> Vec<Vec3> {
@@ -86,7 +117,13 @@ fn cylinder(n: usize) -> f64 {
     ]
     .concat();
     let top = Vec3::new(300.0, 0.0, 300.0);
-    let moves = solve(&mesh, material(3e6, 0.3), 3.0, &supports, point_load(&mesh, top, Vec3::Z * -0.25));
+    let moves = solve(
+        &mesh,
+        material(3e6, 0.3),
+        3.0,
+        &supports,
+        point_load(&mesh, top, Vec3::Z * -0.25),
+    );
     -moves[nearest(&mesh, top)].z / 1.8248e-5
 }
 
@@ -111,13 +148,19 @@ fn hemisphere(n: usize) -> f64 {
 fn twisted_beam(n: usize) -> [f64; 2] {
     let mesh = grid([3 * n / 2, n / 4], |u, v| {
         let angle = FRAC_PI_2 * u;
-        Vec3::new(12.0 * u, 1.1 * (v - 0.5) * angle.cos(), 1.1 * (v - 0.5) * angle.sin())
+        Vec3::new(
+            12.0 * u,
+            1.1 * (v - 0.5) * angle.cos(),
+            1.1 * (v - 0.5) * angle.sin(),
+        )
     });
     let supports = hold(&mesh, "xyzXYZ", |p| is_zero(p.x));
     let tip = nearest(&mesh, Vec3::X * 12.0);
     [(Vec3::Z, 0.005_424), (Vec3::Y, 0.001_754)].map(|(direction, reference)| {
         let mut forces = vec![Vec3::ZERO; mesh.points.len()];
-        let at_tip: Vec<usize> = (0..mesh.points.len()).filter(|&v| is_zero(mesh.points[v].x - 12.0)).collect();
+        let at_tip: Vec<usize> = (0..mesh.points.len())
+            .filter(|&v| is_zero(mesh.points[v].x - 12.0))
+            .collect();
         for &v in &at_tip {
             let is_corner = is_zero(mesh.points[v].z.abs() - 0.55);
             forces[v] = direction * (if is_corner { 0.5 } else { 1.0 } / (at_tip.len() - 1) as f64);
@@ -126,8 +169,8 @@ fn twisted_beam(n: usize) -> [f64; 2] {
     })
 }
 
-/// A quarter of a clamped square plate, 100 mm by 100 mm by 1 mm, under pressure: deflection and stress in the middle
-/// [Timoshenko and Woinowsky-Krieger, table 35, with more digits].
+/// A quarter of a clamped square plate, 100 mm by 100 mm by 1 mm, under pressure: deflection and stress in
+/// the middle [Timoshenko and Woinowsky-Krieger, table 35, with more digits].
 fn clamped_plate(n: usize) -> [f64; 2] {
     const PRESSURE: f64 = 1e-3;
     let mesh = grid([n, n], |u, v| Vec3::new(50.0 * u, 50.0 * v, 0.0));
@@ -138,9 +181,19 @@ fn clamped_plate(n: usize) -> [f64; 2] {
     ]
     .concat();
     let model = ShellModel::new(&mesh, &material(2000.0, 0.3)).unwrap();
-    let forces_n = model.areas_mm2().iter().map(|a| Vec3::Z * (PRESSURE * a)).collect();
+    let forces_n = model
+        .areas_mm2()
+        .iter()
+        .map(|a| Vec3::Z * (PRESSURE * a))
+        .collect();
     let solver = model.at_thickness_held(1.0, &supports).unwrap();
-    let u = solver.solve(&[LoadCase { forces_n, ..LoadCase::default() }]).unwrap().remove(0);
+    let u = solver
+        .solve(&[LoadCase {
+            forces_n,
+            ..LoadCase::default()
+        }])
+        .unwrap()
+        .remove(0);
     let middle = nearest(&mesh, Vec3::new(50.0, 50.0, 0.0));
     let around: Vec<f64> = (solver.stresses(&u).iter().zip(&mesh.triangles))
         .filter(|(_, corners)| corners.contains(&(middle as u32)))
@@ -149,7 +202,10 @@ fn clamped_plate(n: usize) -> [f64; 2] {
     let flexural_rigidity = 2000.0 / (12.0 * (1.0 - 0.09));
     let deflection = 0.001_265_32 * PRESSURE * 1e8 / flexural_rigidity;
     let stress = 6.0 * 0.022_905 * PRESSURE * 1e4;
-    [u.moves_mm[middle].z / deflection, around.iter().sum::<f64>() / around.len() as f64 / stress]
+    [
+        u.moves_mm[middle].z / deflection,
+        around.iter().sum::<f64>() / around.len() as f64 / stress,
+    ]
 }
 
 /// Name, and ratio to the reference for n elements a quarter edge.

@@ -1,8 +1,9 @@
-//! The booklet: a cover, all pieces with their numbers, then one step a picture, like the sheets that come with
-//! furniture.
+//! The booklet: a cover, all pieces with their numbers, then one step a picture, like the sheets that come
+//! with furniture.
 //!
-//! What is there is grey, the new piece has its colour, and an arrow says where it goes. Each step is seen from where
-//! most of the new piece, of its place and of its way is seen (`view`); a note says so where the view changes.
+//! What is there is grey, the new piece has its colour, and an arrow says where it goes. Each step is seen
+//! from where most of the new piece, of its place and of its way is seen (`view`); a note says so where the
+//! view changes.
 
 mod view;
 
@@ -59,13 +60,25 @@ impl Drawn<'_> {
         let mesh = self.piece.mesh;
         let seen = (0..mesh.triangles.len()).filter(|&f| mesh.area_vector_doubled(f).dot(direction) < 0.0);
         let (triangles, normals) = seen.map(|f| (mesh.triangles[f], self.normals[f])).unzip();
-        Facing { mesh: TriMesh { points: mesh.points.clone(), triangles }, normals }
+        Facing {
+            mesh: TriMesh {
+                points: mesh.points.clone(),
+                triangles,
+            },
+            normals,
+        }
     }
 }
 
 impl Facing {
     fn painted(&self, color: Color, shift: Vec3) -> Painted<'_> {
-        Painted { mesh: &self.mesh, color, face_colors: None, shift, normals: Some(&self.normals) }
+        Painted {
+            mesh: &self.mesh,
+            color,
+            face_colors: None,
+            shift,
+            normals: Some(&self.normals),
+        }
     }
 }
 
@@ -74,15 +87,23 @@ fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2])
     let camera = Camera::front();
     let facing: Vec<Facing> = drawn.par_iter().map(|d| d.facing(camera.direction)).collect();
     let all = facing.iter().zip(drawn).zip(shifts);
-    let scene: Vec<Painted<'_>> = all.map(|((f, d), &shift)| f.painted(d.piece.color, shift)).collect();
+    let scene: Vec<Painted<'_>> = all
+        .map(|((f, d), &shift)| f.painted(d.piece.color, shift))
+        .collect();
     render(&scene, &camera, width, height)
 }
 
 impl Booklet<'_> {
     /// The booklet as a PDF file; the same for the same pieces.
     pub fn pdf(&self) -> Vec<u8> {
-        let mut drawn: Vec<Drawn<'_>> =
-            self.pieces.par_iter().map(|piece| Drawn { piece, normals: crease_normals(piece.mesh) }).collect();
+        let mut drawn: Vec<Drawn<'_>> = self
+            .pieces
+            .par_iter()
+            .map(|piece| Drawn {
+                piece,
+                normals: crease_normals(piece.mesh),
+            })
+            .collect();
         drawn.sort_by_key(|d| d.piece.order);
         let mut pages = vec![self.cover(&drawn)];
         pages.extend(pieces_pages(&drawn));
@@ -91,7 +112,11 @@ impl Booklet<'_> {
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
             let foot = format!("{}  –  {} of {n_pages}", self.title, i + 1);
             let style = small(FAINT);
-            page.text([PAGE_MM[0] - RIM_MM - width_mm(style, &foot), PAGE_MM[1] - 8.0], style, &foot);
+            page.text(
+                [PAGE_MM[0] - RIM_MM - width_mm(style, &foot), PAGE_MM[1] - 8.0],
+                style,
+                &foot,
+            );
         }
         document(&self.title, pages)
     }
@@ -99,10 +124,21 @@ impl Booklet<'_> {
     fn cover(&self, drawn: &[Drawn<'_>]) -> Page {
         let mut page = Page::new();
         page.text([RIM_MM, 30.0], bold(11.0, INK), &self.title);
-        let seen = format!("in these pictures it is seen from {}", side(-Camera::front().direction));
+        let seen = format!(
+            "in these pictures it is seen from {}",
+            side(-Camera::front().direction)
+        );
         let lines: Vec<&String> = self.lines.iter().chain([&seen]).collect();
         for (i, line) in lines.iter().enumerate() {
-            page.text([RIM_MM, 40.0 + 6.0 * i as f64], Style { size_mm: 4.2, is_bold: false, color: FAINT }, line);
+            page.text(
+                [RIM_MM, 40.0 + 6.0 * i as f64],
+                Style {
+                    size_mm: 4.2,
+                    is_bold: false,
+                    color: FAINT,
+                },
+                line,
+            );
         }
         let in_order: Vec<ReportPiece<'_>> = drawn.iter().map(|d| d.piece.clone()).collect();
         let (together, apart) = (vec![Vec3::ZERO; drawn.len()], exploded_shifts(&in_order));
@@ -110,7 +146,11 @@ impl Booklet<'_> {
         let height = 0.5 * (PAGE_MM[1] - RIM_MM - top);
         let width = PAGE_MM[0] - 2.0 * RIM_MM;
         for (i, shifts) in [together, apart].iter().enumerate() {
-            let picture = all_pieces(drawn, shifts, [width, height].map(|mm| (mm * OTHER_DENSITY) as usize));
+            let picture = all_pieces(
+                drawn,
+                shifts,
+                [width, height].map(|mm| (mm * OTHER_DENSITY) as usize),
+            );
             page.picture([RIM_MM, top + i as f64 * height], width, picture);
         }
         page
@@ -119,15 +159,24 @@ impl Booklet<'_> {
 
 /// All pieces by number, each from inside.
 fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
-    let middle = drawn.iter().fold(Aabb::EMPTY, |b, d| b.union(d.piece.mesh.bounds())).center();
-    let grid = if drawn.len() > PIECES[0] * PIECES[1] { MANY_PIECES } else { PIECES };
+    let middle = drawn
+        .iter()
+        .fold(Aabb::EMPTY, |b, d| b.union(d.piece.mesh.bounds()))
+        .center();
+    let grid = if drawn.len() > PIECES[0] * PIECES[1] {
+        MANY_PIECES
+    } else {
+        PIECES
+    };
     let cell = cell_mm(grid, 14.0);
     let picture_mm = (cell[1] - 14.0).min(cell[0] - 4.0);
     let n_pixels = (picture_mm * OTHER_DENSITY) as usize;
     let mut by_number: Vec<&Drawn<'_>> = drawn.iter().collect();
     by_number.sort_by_key(|d| d.piece.id);
-    let pictures: Vec<Image> =
-        by_number.par_iter().map(|d| from_inside(d.piece, &d.normals, middle, n_pixels)).collect();
+    let pictures: Vec<Image> = by_number
+        .par_iter()
+        .map(|d| from_inside(d.piece, &d.normals, middle, n_pixels))
+        .collect();
     let mut cells = by_number.into_iter().zip(pictures).peekable();
     let mut pages = Vec::new();
     while cells.peek().is_some() {
@@ -135,8 +184,18 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
         for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
             let [x, y] = corner_mm(i, grid, cell, 14.0);
             page.picture([x + 0.5 * (cell[0] - picture_mm), y + 12.0], picture_mm, picture);
-            numbered(&mut page, [x + 5.0, y + 6.0], 4.6, d.piece.color, &d.piece.id.to_string());
-            let step = format!("step {}{}", d.piece.order + 1, if d.piece.is_key { ", the key" } else { "" });
+            numbered(
+                &mut page,
+                [x + 5.0, y + 6.0],
+                4.6,
+                d.piece.color,
+                &d.piece.id.to_string(),
+            );
+            let step = format!(
+                "step {}{}",
+                d.piece.order + 1,
+                if d.piece.is_key { ", the key" } else { "" }
+            );
             page.text([x + 12.0, y + 7.4], small(FAINT), &step);
         }
         pages.push(page);
@@ -151,8 +210,10 @@ fn steps_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let cell = cell_mm(STEPS, 0.0);
     let picture_mm = [cell[0] - 4.0, cell[1] - 24.0];
     let size = picture_mm.map(|mm| (mm * STEP_DENSITY) as usize);
-    let step_pictures: Vec<(Image, Option<[[f64; 2]; 2]>)> =
-        (0..drawn.len()).into_par_iter().map(|i| step_picture(drawn, i, &sights[i], size)).collect();
+    let step_pictures: Vec<(Image, Option<[[f64; 2]; 2]>)> = (0..drawn.len())
+        .into_par_iter()
+        .map(|i| step_picture(drawn, i, &sights[i], size))
+        .collect();
     let together = vec![Vec3::ZERO; drawn.len()];
     let finished = (!drawn.is_empty()).then(|| (all_pieces(drawn, &together, size), None));
     let mut pages = Vec::new();
@@ -179,29 +240,58 @@ fn steps_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
 fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sights: &[Sight], i: usize) {
     page.text([x + 1.0, y + 11.0], bold(10.0, INK), &(i + 1).to_string());
     let left = x + 4.0 + width_mm(bold(10.0, INK), &(i + 1).to_string());
-    numbered(page, [left + 5.0, y + 7.2], 5.0, piece.color, &piece.id.to_string());
+    numbered(
+        page,
+        [left + 5.0, y + 7.2],
+        5.0,
+        piece.color,
+        &piece.id.to_string(),
+    );
     let what = match (i, piece.is_key) {
         (0, _) => "begin with this piece".to_owned(),
-        (_, true) => format!("the key, from {}: it locks all", view::side(-Vec3::from(piece.installation_direction))),
+        (_, true) => format!(
+            "the key, from {}: it locks all",
+            view::side(-Vec3::from(piece.installation_direction))
+        ),
         _ => format!("from {}", view::side(-Vec3::from(piece.installation_direction))),
     };
-    page.text([left + 13.0, y + 6.6], Style { size_mm: 4.0, is_bold: false, color: INK }, &what);
+    page.text(
+        [left + 13.0, y + 6.6],
+        Style {
+            size_mm: 4.0,
+            is_bold: false,
+            color: INK,
+        },
+        &what,
+    );
     let seen = format!("seen from {}", view::side(-sights[i].direction));
     let is_new = i > 0 && sights[i].direction != sights[i - 1].direction;
-    let (note, style) = if is_new { (format!("turn it: {seen}"), bold(3.2, ARROW)) } else { (seen, small(FAINT)) };
+    let (note, style) = if is_new {
+        (format!("turn it: {seen}"), bold(3.2, ARROW))
+    } else {
+        (seen, small(FAINT))
+    };
     page.text([left + 13.0, y + 11.4], style, &note);
 }
 
 fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
     page.text([x + 1.0, y + 6.6], bold(5.0, INK), "done");
     if let Some(key) = drawn.last() {
-        let how = format!("to take it apart, pull piece {} out first, against its arrow", key.piece.id);
+        let how = format!(
+            "to take it apart, pull piece {} out first, against its arrow",
+            key.piece.id
+        );
         page.text([x + 1.0, y + 11.4], small(FAINT), &how);
     }
 }
 
 /// What is there after step `i`, the new piece on its way, and that way in pixels.
-fn step_picture(drawn: &[Drawn<'_>], i: usize, sight: &Sight, size: [usize; 2]) -> (Image, Option<[[f64; 2]; 2]>) {
+fn step_picture(
+    drawn: &[Drawn<'_>],
+    i: usize,
+    sight: &Sight,
+    size: [usize; 2],
+) -> (Image, Option<[[f64; 2]; 2]>) {
     let new = &drawn[i];
     let back = -sight.travel_mm * Vec3::from(new.piece.installation_direction);
     let camera = sight.camera();
@@ -222,10 +312,17 @@ fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
     const HALF_SHAFT_MM: f64 = 1.5;
     let way = [to[0] - from[0], to[1] - from[1]];
     let far = way[0].hypot(way[1]);
-    let unit = if far > 1e-9 { way.map(|x| x / far) } else { [0.0, 1.0] };
+    let unit = if far > 1e-9 {
+        way.map(|x| x / far)
+    } else {
+        [0.0, 1.0]
+    };
     let length = (0.9 * far).max(SHORTEST_MM);
     let corner = |along: f64, aside: f64| {
-        [from[0] + along * unit[0] - aside * unit[1], from[1] + along * unit[1] + aside * unit[0]]
+        [
+            from[0] + along * unit[0] - aside * unit[1],
+            from[1] + along * unit[1] + aside * unit[0],
+        ]
     };
     let neck = length - HEAD_MM;
     vec![
@@ -243,13 +340,21 @@ fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
 fn numbered(page: &mut Page, middle: [f64; 2], radius_mm: f64, color: Color, number: &str) {
     page.disc(middle, radius_mm, color);
     let is_dark = color.iter().map(|&c| u32::from(c)).sum::<u32>() < 400;
-    page.text_amid(middle, bold(1.05 * radius_mm, if is_dark { WHITE } else { INK }), number);
+    page.text_amid(
+        middle,
+        bold(1.05 * radius_mm, if is_dark { WHITE } else { INK }),
+        number,
+    );
 }
 
 fn headed(title: &str, note: &str) -> Page {
     let mut page = Page::new();
     page.text([RIM_MM, RIM_MM + 6.0], bold(7.0, INK), title);
-    page.text([RIM_MM + 6.0 + width_mm(bold(7.0, INK), title), RIM_MM + 6.0], small(FAINT), note);
+    page.text(
+        [RIM_MM + 6.0 + width_mm(bold(7.0, INK), title), RIM_MM + 6.0],
+        small(FAINT),
+        note,
+    );
     page
 }
 
@@ -261,15 +366,26 @@ fn cell_mm(grid: [usize; 2], below_mm: f64) -> [f64; 2] {
 /// Upper left corner of the cell of the `i`-th thing.
 fn corner_mm(i: usize, grid: [usize; 2], cell: [f64; 2], below_mm: f64) -> [f64; 2] {
     let i = i % (grid[0] * grid[1]);
-    [RIM_MM + (i % grid[0]) as f64 * cell[0], RIM_MM + below_mm + (i / grid[0]) as f64 * cell[1]]
+    [
+        RIM_MM + (i % grid[0]) as f64 * cell[0],
+        RIM_MM + below_mm + (i / grid[0]) as f64 * cell[1],
+    ]
 }
 
 fn bold(size_mm: f64, color: Color) -> Style {
-    Style { size_mm, is_bold: true, color }
+    Style {
+        size_mm,
+        is_bold: true,
+        color,
+    }
 }
 
 fn small(color: Color) -> Style {
-    Style { size_mm: 3.2, is_bold: false, color }
+    Style {
+        size_mm: 3.2,
+        is_bold: false,
+        color,
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! From finished pieces to the printer and the workbench: printers, plates, print time, and the booklet.
 //!
-//! Nothing here changes a piece. Pieces come as meshes in assembled position and are only turned, moved and drawn.
+//! Nothing here changes a piece. Pieces come as meshes in assembled position and are only turned, moved and
+//! drawn.
 
 pub mod booklet;
 mod pdf;

@@ -1,4 +1,5 @@
-//! Pages of text, pictures and filled shapes as PDF 1.7. Lengths in mm, from the upper left corner of an A4 page.
+//! Pages of text, pictures and filled shapes as PDF 1.7. Lengths in mm, from the upper left corner of an A4
+//! page.
 //!
 //! Text is set in Helvetica, one of the fonts that every reader has; what it lacks becomes "?".
 
@@ -38,7 +39,10 @@ pub(crate) struct Page {
 
 impl Page {
     pub fn new() -> Self {
-        Self { content: Content::new(), pictures: Vec::new() }
+        Self {
+            content: Content::new(),
+            pictures: Vec::new(),
+        }
     }
 
     /// Text with the left end of its foot at `at`.
@@ -72,7 +76,9 @@ impl Page {
     pub fn polygon(&mut self, corners: &[[f64; 2]], color: Color, rim_mm: f64, rim: Color) {
         self.fill_color(color);
         let [r, g, b] = rim.map(|c| f32::from(c) / 255.0);
-        self.content.set_stroke_rgb(r, g, b).set_line_width((rim_mm * POINTS_PER_MM) as f32);
+        self.content
+            .set_stroke_rgb(r, g, b)
+            .set_line_width((rim_mm * POINTS_PER_MM) as f32);
         for (i, &corner) in corners.iter().enumerate() {
             let [x, y] = on_paper(corner);
             if i == 0 {
@@ -108,25 +114,45 @@ impl Page {
 /// The pages as a file; the same for the same pages.
 pub(crate) fn document(title: &str, pages: Vec<Page>) -> Vec<u8> {
     let (catalog, tree, information) = (Ref::new(1), Ref::new(2), Ref::new(3));
-    let fonts = [(Ref::new(4), &b"Plain"[..], &b"Helvetica"[..]), (Ref::new(5), b"Bold", b"Helvetica-Bold")];
+    let fonts = [
+        (Ref::new(4), &b"Plain"[..], &b"Helvetica"[..]),
+        (Ref::new(5), b"Bold", b"Helvetica-Bold"),
+    ];
     let mut next = 6;
     let mut new_ref = || {
         next += 1;
         Ref::new(next - 1)
     };
-    let ids: Vec<(Ref, Ref, Vec<Ref>)> =
-        pages.iter().map(|page| (new_ref(), new_ref(), page.pictures.iter().map(|_| new_ref()).collect())).collect();
+    let ids: Vec<(Ref, Ref, Vec<Ref>)> = pages
+        .iter()
+        .map(|page| {
+            (
+                new_ref(),
+                new_ref(),
+                page.pictures.iter().map(|_| new_ref()).collect(),
+            )
+        })
+        .collect();
     let mut pdf = Pdf::new();
     pdf.catalog(catalog).pages(tree);
-    pdf.document_info(information).title(TextStr(title)).producer(TextStr("shellock"));
-    pdf.pages(tree).kids(ids.iter().map(|id| id.0)).count(ids.len() as i32);
+    pdf.document_info(information)
+        .title(TextStr(title))
+        .producer(TextStr("shellock"));
+    pdf.pages(tree)
+        .kids(ids.iter().map(|id| id.0))
+        .count(ids.len() as i32);
     for (id, _, face) in fonts {
-        pdf.type1_font(id).base_font(Name(face)).encoding_predefined(Name(b"WinAnsiEncoding"));
+        pdf.type1_font(id)
+            .base_font(Name(face))
+            .encoding_predefined(Name(b"WinAnsiEncoding"));
     }
     let [right, top] = PAGE_MM.map(|mm| (mm * POINTS_PER_MM) as f32);
     for ((page_id, content_id, picture_ids), page) in ids.into_iter().zip(pages) {
         let mut written = pdf.page(page_id);
-        written.media_box(Rect::new(0.0, 0.0, right, top)).parent(tree).contents(content_id);
+        written
+            .media_box(Rect::new(0.0, 0.0, right, top))
+            .parent(tree)
+            .contents(content_id);
         let mut resources = written.resources();
         let mut named = resources.fonts();
         for (id, name, _) in fonts {
@@ -140,15 +166,22 @@ pub(crate) fn document(title: &str, pages: Vec<Page>) -> Vec<u8> {
         named.finish();
         resources.finish();
         written.finish();
-        pdf.stream(content_id, &compress_to_vec_zlib(&page.content.finish(), EFFORT)).filter(Filter::FlateDecode);
+        pdf.stream(content_id, &compress_to_vec_zlib(&page.content.finish(), EFFORT))
+            .filter(Filter::FlateDecode);
         let compressed: Vec<Vec<u8>> = page.pictures.par_iter().map(compressed).collect();
         for ((id, picture), bytes) in picture_ids.into_iter().zip(&page.pictures).zip(&compressed) {
             let mut written = pdf.image_xobject(id, bytes);
-            written.width(picture.width as i32).height(picture.height as i32).bits_per_component(8);
+            written
+                .width(picture.width as i32)
+                .height(picture.height as i32)
+                .bits_per_component(8);
             written.color_space().device_rgb();
             written.filter(Filter::FlateDecode);
             let mut parameters = written.decode_parms();
-            parameters.predictor(Predictor::PngOptimum).colors(3).columns(picture.width as i32);
+            parameters
+                .predictor(Predictor::PngOptimum)
+                .colors(3)
+                .columns(picture.width as i32);
         }
     }
     pdf.finish()
@@ -164,7 +197,11 @@ fn compressed(picture: &Image) -> Vec<u8> {
     for row in opaque.rgba.chunks_exact(4 * picture.width.max(1)) {
         bytes.push(UP);
         let row: Vec<u8> = row.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        bytes.extend(row.iter().zip(&above).map(|(here, above)| here.wrapping_sub(*above)));
+        bytes.extend(
+            row.iter()
+                .zip(&above)
+                .map(|(here, above)| here.wrapping_sub(*above)),
+        );
         above = row;
     }
     compress_to_vec_zlib(&bytes, EFFORT)
@@ -190,18 +227,25 @@ fn encoded(text: &str) -> Vec<u8> {
 
 /// Width of a line, mm.
 pub(crate) fn width_mm(style: Style, text: &str) -> f64 {
-    let width = |byte: u8| f64::from(WIDTHS.get(usize::from(byte.wrapping_sub(b' '))).copied().unwrap_or(556));
+    let width = |byte: u8| {
+        f64::from(
+            WIDTHS
+                .get(usize::from(byte.wrapping_sub(b' ')))
+                .copied()
+                .unwrap_or(556),
+        )
+    };
     let sum: f64 = encoded(text).into_iter().map(width).sum();
     sum / 1000.0 * style.size_mm * if style.is_bold { BOLD } else { 1.0 }
 }
 
 /// Widths of Helvetica's characters from the space to the tilde, thousandths of its size.
 const WIDTHS: [u16; 95] = [
-    278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556, 556, 556, 556, 556,
-    556, 556, 556, 278, 278, 584, 584, 584, 556, 1015, 667, 667, 722, 722, 667, 611, 778, 722, 278, 500, 667, 556, 833,
-    722, 778, 667, 778, 722, 667, 611, 722, 667, 944, 667, 667, 611, 278, 278, 278, 469, 556, 333, 556, 556, 500, 556,
-    556, 278, 556, 556, 222, 222, 500, 222, 833, 556, 556, 556, 556, 333, 500, 278, 556, 500, 722, 500, 500, 500, 334,
-    260, 334, 584,
+    278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556, 556, 556,
+    556, 556, 556, 556, 556, 278, 278, 584, 584, 584, 556, 1015, 667, 667, 722, 722, 667, 611, 778, 722, 278,
+    500, 667, 556, 833, 722, 778, 667, 778, 722, 667, 611, 722, 667, 944, 667, 667, 611, 278, 278, 278, 469,
+    556, 333, 556, 556, 500, 556, 556, 278, 556, 556, 222, 222, 500, 222, 833, 556, 556, 556, 556, 333, 500,
+    278, 556, 500, 722, 500, 500, 500, 334, 260, 334, 584,
 ];
 
 #[cfg(test)]
@@ -212,9 +256,21 @@ mod tests {
     fn pages_come_out_with_their_pictures_and_the_same_each_time() {
         let made = || {
             let mut page = Page::new();
-            let style = Style { size_mm: 5.0, is_bold: true, color: [0; 3] };
+            let style = Style {
+                size_mm: 5.0,
+                is_bold: true,
+                color: [0; 3],
+            };
             page.text([10.0, 20.0], style, "(piece) 7 \\ ☂ – ü");
-            page.picture([10.0, 30.0], 40.0, Image { width: 2, height: 3, rgba: vec![200; 24] });
+            page.picture(
+                [10.0, 30.0],
+                40.0,
+                Image {
+                    width: 2,
+                    height: 3,
+                    rgba: vec![200; 24],
+                },
+            );
             page.disc([50.0, 50.0], 5.0, [255, 0, 0]);
             document("a (title", vec![page, Page::new()])
         };
@@ -227,17 +283,29 @@ mod tests {
 
     #[test]
     fn rows_come_back_from_their_differences() {
-        let picture = Image { width: 2, height: 2, rgba: vec![9, 8, 7, 255, 1, 2, 3, 255, 4, 5, 6, 255, 0, 0, 0, 0] };
+        let picture = Image {
+            width: 2,
+            height: 2,
+            rgba: vec![9, 8, 7, 255, 1, 2, 3, 255, 4, 5, 6, 255, 0, 0, 0, 0],
+        };
         let rows = miniz_oxide::inflate::decompress_to_vec_zlib(&compressed(&picture)).unwrap();
         let (first, second) = rows.split_at(7);
         assert_eq!(first, [2, 9, 8, 7, 1, 2, 3]);
-        let back: Vec<u8> = second[1..].iter().zip(&first[1..]).map(|(d, above)| d.wrapping_add(*above)).collect();
+        let back: Vec<u8> = second[1..]
+            .iter()
+            .zip(&first[1..])
+            .map(|(d, above)| d.wrapping_add(*above))
+            .collect();
         assert_eq!(back, [4, 5, 6, 255, 255, 255]);
     }
 
     #[test]
     fn a_line_is_as_wide_as_its_letters() {
-        let style = Style { size_mm: 10.0, is_bold: false, color: [0; 3] };
+        let style = Style {
+            size_mm: 10.0,
+            is_bold: false,
+            color: [0; 3],
+        };
         assert!((width_mm(style, "007") - 3.0 * 5.56).abs() < 1e-9);
         assert!(width_mm(style, "wide") > width_mm(style, "lil"));
     }

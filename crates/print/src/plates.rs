@@ -1,7 +1,7 @@
 //! Pieces laid flat on the plates of a printer, as they are printed.
 //!
-//! Each piece is laid so that its outer skin needs the least support (`orient`), then plates are packed (`pack`).
-//! Plates lie side by side, so that one file can hold all of them.
+//! Each piece is laid so that its outer skin needs the least support (`orient`), then plates are packed
+//! (`pack`). Plates lie side by side, so that one file can hold all of them.
 
 mod orient;
 mod pack;
@@ -38,8 +38,8 @@ pub struct Laid {
     pub plate: usize,
     /// Where the x, y and z axes go.
     pub turned: [[f64; 3]; 3],
-    /// Where it is moved after that, mm: with its lowest point on z = 0, in the frame of its plate, whose corner is the
-    /// origin.
+    /// Where it is moved after that, mm: with its lowest point on z = 0, in the frame of its plate, whose
+    /// corner is the origin.
     pub moved_mm: [f64; 3],
     /// Width, depth and height as it lies, mm.
     pub size_mm: [f64; 3],
@@ -80,23 +80,41 @@ pub struct Plates {
 ///
 /// Some 5 ms for a piece of 20 000 triangles.
 pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
-    let poses: Vec<Option<Pose>> =
-        pieces.par_iter().map(|piece| orient::best(printer, piece, room_mm(printer))).collect();
+    let poses: Vec<Option<Pose>> = pieces
+        .par_iter()
+        .map(|piece| orient::best(printer, piece, room_mm(printer)))
+        .collect();
     let too_large = (0..pieces.len()).filter(|&i| poses[i].is_none()).collect();
-    let fitting: Vec<(usize, Pose)> = poses.into_iter().enumerate().filter_map(|(i, p)| Some((i, p?))).collect();
-    // High ones first save height, large ones first save plates; the better of both is taken. Equal ones stay in order.
+    let fitting: Vec<(usize, Pose)> = poses
+        .into_iter()
+        .enumerate()
+        .filter_map(|(i, p)| Some((i, p?)))
+        .collect();
+    // High ones first save height, large ones first save plates; the better of both is taken. Equal ones stay
+    // in order.
     let by = |measure: fn(&Pose) -> f64| {
         let mut order: Vec<usize> = (0..fitting.len()).collect();
         order.sort_by(|&a, &b| measure(&fitting[b].1).total_cmp(&measure(&fitting[a].1)));
         improved(printer, &fitting, order)
     };
     let (high, large) = (by(|pose| pose.bounds.size().z), by(Pose::footprint_mm2));
-    let fitting_spots = if high.cost(&fitting) < large.cost(&fitting) { high } else { large };
+    let fitting_spots = if high.cost(&fitting) < large.cost(&fitting) {
+        high
+    } else {
+        large
+    };
     let n_plates = fitting_spots.n_plates();
-    let mut laid: Vec<Laid> =
-        fitting_spots.0.iter().map(|(at, spot)| placed(fitting[*at].0, &fitting[*at].1, spot)).collect();
+    let mut laid: Vec<Laid> = fitting_spots
+        .0
+        .iter()
+        .map(|(at, spot)| placed(fitting[*at].0, &fitting[*at].1, spot))
+        .collect();
     laid.sort_by_key(|l| l.piece);
-    Plates { laid, n_plates, too_large }
+    Plates {
+        laid,
+        n_plates,
+        too_large,
+    }
 }
 
 /// Positions in a list of poses, each with its spot.
@@ -147,14 +165,26 @@ fn improved(printer: &Printer, poses: &[(usize, Pose)], mut order: Vec<usize>) -
 }
 
 fn packed(printer: &Printer, poses: &[(usize, Pose)], order: &[usize]) -> Packing {
-    let sides: Vec<[f64; 2]> = order.iter().map(|&at| [0, 1].map(|k| poses[at].1.bounds.size()[k] + GAP_MM)).collect();
+    let sides: Vec<[f64; 2]> = order
+        .iter()
+        .map(|&at| [0, 1].map(|k| poses[at].1.bounds.size()[k] + GAP_MM))
+        .collect();
     let [width, depth, _] = room_mm(printer);
-    Packing(order.iter().copied().zip(pack([width + GAP_MM, depth + GAP_MM], &sides)).collect())
+    Packing(
+        order
+            .iter()
+            .copied()
+            .zip(pack([width + GAP_MM, depth + GAP_MM], &sides))
+            .collect(),
+    )
 }
 
 /// Whether a piece of this shape could be made by `printer` in some pose.
 pub fn fits(printer: &Printer, mesh: &TriMesh) -> bool {
-    let piece = Printable { mesh, is_outer: vec![false; mesh.triangles.len()] };
+    let piece = Printable {
+        mesh,
+        is_outer: vec![false; mesh.triangles.len()],
+    };
     orient::best(printer, &piece, room_mm(printer)).is_some()
 }
 
@@ -170,9 +200,20 @@ pub fn fits_whole(printer: &Printer, bounds: Aabb) -> bool {
 
 /// The pose of a solid that needs the least support, on a plate as large as it takes.
 pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
-    let piece = Printable { mesh, is_outer: vec![true; mesh.triangles.len()] };
+    let piece = Printable {
+        mesh,
+        is_outer: vec![true; mesh.triangles.len()],
+    };
     let pose = orient::best(printer, &piece, [f64::INFINITY; 3])?;
-    Some(placed(0, &pose, &Spot { plate: 0, corner_mm: [0.0; 2], is_turned: false }))
+    Some(placed(
+        0,
+        &pose,
+        &Spot {
+            plate: 0,
+            corner_mm: [0.0; 2],
+            is_turned: false,
+        },
+    ))
 }
 
 /// Width, depth and height that pieces may take, mm.
@@ -182,7 +223,11 @@ fn room_mm(printer: &Printer) -> [f64; 3] {
 }
 
 fn placed(piece: usize, pose: &Pose, spot: &Spot) -> Laid {
-    let pose = if spot.is_turned { pose.quarter_turned() } else { pose.clone() };
+    let pose = if spot.is_turned {
+        pose.quarter_turned()
+    } else {
+        pose.clone()
+    };
     let corner = Vec3::new(spot.corner_mm[0] + EDGE_MM, spot.corner_mm[1] + EDGE_MM, 0.0);
     // Where the axes go: the columns of the rotation.
     let turned = [0, 1, 2].map(|axis| pose.axes.map(|row| row[axis]));

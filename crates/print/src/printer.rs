@@ -20,7 +20,10 @@ impl Process {
 
     /// The process called `name`.
     pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.iter().find(|(n, _)| n.eq_ignore_ascii_case(name)).map(|(_, p)| *p)
+        Self::ALL
+            .iter()
+            .find(|(n, _)| n.eq_ignore_ascii_case(name))
+            .map(|(_, p)| *p)
     }
 }
 
@@ -119,7 +122,13 @@ impl Printer {
             side("depth of the bed", depth),
             side("height of the printer", height),
             ParamProblem::unless_within("clearance of the printer", "mm", self.clearance_mm, 0.03, 0.6),
-            ParamProblem::unless_within("key clearance of the printer", "mm", self.key_clearance_mm, 0.03, 0.8),
+            ParamProblem::unless_within(
+                "key clearance of the printer",
+                "mm",
+                self.key_clearance_mm,
+                0.03,
+                0.8,
+            ),
             ParamProblem::unless_within("wall gap of the printer", "mm", self.wall_gap_mm, 0.0, 0.4),
             ParamProblem::unless_within("minimum wall of the printer", "mm", self.min_wall_mm, 0.1, 2.0),
             ParamProblem::unless_within("layer of the printer", "mm", self.layer_mm, 0.01, 1.0),
@@ -138,7 +147,11 @@ mod tests {
         assert!(presets.iter().all(|p| p.problems().is_empty()));
         let names: std::collections::BTreeSet<&str> = presets.iter().map(|p| p.name.as_str()).collect();
         assert_eq!(names.len(), presets.len());
-        let bad = Printer { bed_mm: [f64::NAN, 5.0, 1e9], layer_mm: 0.0, ..Printer::sla() };
+        let bad = Printer {
+            bed_mm: [f64::NAN, 5.0, 1e9],
+            layer_mm: 0.0,
+            ..Printer::sla()
+        };
         assert_eq!(bad.problems().len(), 4);
     }
 }

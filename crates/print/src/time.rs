@@ -1,10 +1,10 @@
 //! Print time by closed forms, where no slicer is at hand: good for ratios, not for clocks.
 //!
 //! Resin printers with a display take the same time for every layer, so height alone counts:
-//! `T = n (tilt + exposure + lift) + 13 Δ − 56 Δ/11`, with n layers, Δ the longer exposure of the first one, faded over
-//! ten. That is PrusaSlicer's own form; a print that was compared differs by 0.02 %. Filament: what is laid, walls and a
-//! share of what is inside and of supports, over what a nozzle of 0.4 mm lays in a second, and a pause a layer. Powder:
-//! height, as every layer is spread alike.
+//! `T = n (tilt + exposure + lift) + 13 Δ − 56 Δ/11`, with n layers, Δ the longer exposure of the first one,
+//! faded over ten. That is PrusaSlicer's own form; a print that was compared differs by 0.02 %. Filament:
+//! what is laid, walls and a share of what is inside and of supports, over what a nozzle of 0.4 mm lays in a
+//! second, and a pause a layer. Powder: height, as every layer is spread alike.
 
 use crate::printer::{Printer, Process};
 
@@ -19,7 +19,8 @@ const POWDER_S: f64 = 12.0;
 const FLOW_MM3_S: f64 = 5.0;
 /// Moving to the next layer, seconds.
 const LAYER_S: f64 = 1.5;
-/// Thickness of what is laid densely along every surface, mm; share of the rest, and of supports, that is filled.
+/// Thickness of what is laid densely along every surface, mm; share of the rest, and of supports, that is
+/// filled.
 const DENSE_MM: f64 = 1.0;
 const INFILL: f64 = 0.15;
 const SUPPORT: f64 = 0.12;
@@ -73,8 +74,18 @@ mod tests {
 
     #[test]
     fn resin_and_powder_ask_for_height_alone_and_filament_for_material() {
-        let load = Load { height_mm: 50.0, volume_mm3: 2e4, area_mm2: 8e3, support_mm3: 1e3 };
-        let twice = Load { volume_mm3: 4e4, area_mm2: 16e3, support_mm3: 2e3, ..load };
+        let load = Load {
+            height_mm: 50.0,
+            volume_mm3: 2e4,
+            area_mm2: 8e3,
+            support_mm3: 1e3,
+        };
+        let twice = Load {
+            volume_mm3: 4e4,
+            area_mm2: 16e3,
+            support_mm3: 2e3,
+            ..load
+        };
         for printer in [Printer::sla(), Printer::sls()] {
             assert_eq!(seconds(&printer, &load), seconds(&printer, &twice));
             assert_eq!(seconds(&printer, &load), seconds(&printer, &load.and(load)));
@@ -88,7 +99,13 @@ mod tests {
     #[test]
     fn the_longer_exposure_of_the_first_layers_is_that_of_ten_faded_ones() {
         let height_mm = 10.0;
-        let s = seconds(&Printer::sla(), &Load { height_mm, ..Load::default() });
+        let s = seconds(
+            &Printer::sla(),
+            &Load {
+                height_mm,
+                ..Load::default()
+            },
+        );
         assert!((s - (200.0 * 12.75 + 27.5 * (13.0 - 56.0 / 11.0))).abs() < 1e-9);
     }
 }

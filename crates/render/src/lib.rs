@@ -1,7 +1,7 @@
 //! What people look at: one page with the pieces, their order and the checks, and still pictures.
 //!
-//! The page is self-contained and needs no network. Its viewer (`viewer/` of the repository) knows meshes, arrows and points
-//! with labels; what they mean for shells is said here.
+//! The page is self-contained and needs no network. Its viewer (`viewer/` of the repository) knows meshes,
+//! arrows and points with labels; what they mean for shells is said here.
 
 mod page;
 pub mod palette;
@@ -102,8 +102,9 @@ pub struct ReportMove {
     pub piece: usize,
     /// The point that poses displace and turn about, mm, assembly space.
     pub about: [f64; 3],
-    /// Played evenly in time and with straight ways between them: displacement of `about` in mm, then a rotation vector in
-    /// radians, so that `x` goes to `about + t + R(w) (x - about)`. All zeros is the assembled pose.
+    /// Played evenly in time and with straight ways between them: displacement of `about` in mm, then a
+    /// rotation vector in radians, so that `x` goes to `about + t + R(w) (x - about)`. All zeros is the
+    /// assembled pose.
     pub poses: Vec<[f64; 6]>,
 }
 
@@ -115,10 +116,22 @@ const EXPLODE_ALONG: f64 = 0.12;
 
 /// Where each piece goes in the exploded view, mm: away from the middle, and a little back along its way in.
 pub fn exploded_shifts(pieces: &[ReportPiece<'_>]) -> Vec<Vec3> {
-    let all = pieces.iter().fold(Aabb::EMPTY, |b, piece| b.union(piece.mesh.bounds()));
+    let all = pieces
+        .iter()
+        .fold(Aabb::EMPTY, |b, piece| b.union(piece.mesh.bounds()));
     let shift = |piece: &ReportPiece<'_>| {
         let outwards = piece.mesh.bounds().center() - all.center();
-        EXPLODE_RADIAL * outwards - EXPLODE_ALONG * all.diagonal() * Vec3::from_array(piece.installation_direction)
+        EXPLODE_RADIAL * outwards
+            - EXPLODE_ALONG * all.diagonal() * Vec3::from_array(piece.installation_direction)
     };
-    pieces.iter().map(|p| if p.mesh.points.is_empty() { Vec3::ZERO } else { shift(p) }).collect()
+    pieces
+        .iter()
+        .map(|p| {
+            if p.mesh.points.is_empty() {
+                Vec3::ZERO
+            } else {
+                shift(p)
+            }
+        })
+        .collect()
 }

@@ -19,7 +19,8 @@ const DRAFT: f64 = 1.2e-3;
 
 /// The page as one text that needs nothing else; equal data give equal bytes.
 ///
-/// Positions are kept in 1/65 535 of each piece's box, some micrometres. About 11 bytes a triangle and 0.6 MB for the viewer.
+/// Positions are kept in 1/65 535 of each piece's box, some micrometres. About 11 bytes a triangle and 0.6 MB
+/// for the viewer.
 pub fn html(data: &ReportData<'_>) -> String {
     let mut arrays = Vec::new();
     let shifts = exploded_shifts(&data.pieces);
@@ -28,7 +29,9 @@ pub fn html(data: &ReportData<'_>) -> String {
     let header = Header {
         title: &data.title,
         meshes_title: "Pieces",
-        meshes: meshes.map(|((p, draft), shift)| MeshHeader::new(p, draft, shift, &mut arrays)).collect(),
+        meshes: meshes
+            .map(|((p, draft), shift)| MeshHeader::new(p, draft, shift, &mut arrays))
+            .collect(),
         facts: &data.facts,
         checks: &data.checks,
         notes: data.warnings.iter().map(|w| note(w, &data.pieces)).collect(),
@@ -53,9 +56,12 @@ pub fn html(data: &ReportData<'_>) -> String {
 
 /// The pieces as coarsely as they may be seen while they move.
 fn drafts(pieces: &[ReportPiece<'_>]) -> Vec<TriMesh> {
-    let all = pieces.iter().fold(Aabb::EMPTY, |b, piece| b.union(piece.mesh.bounds()));
+    let all = pieces
+        .iter()
+        .fold(Aabb::EMPTY, |b, piece| b.union(piece.mesh.bounds()));
     let tolerance_mm = DRAFT * all.diagonal();
-    let draft = |piece: &ReportPiece<'_>| decimate(piece.mesh.clone(), &vec![tolerance_mm; piece.mesh.points.len()]);
+    let draft =
+        |piece: &ReportPiece<'_>| decimate(piece.mesh.clone(), &vec![tolerance_mm; piece.mesh.points.len()]);
     pieces.par_iter().map(draft).collect()
 }
 
@@ -85,7 +91,10 @@ struct Figure<'a> {
 
 impl<'a> Figure<'a> {
     fn new((title, svg): &'a (String, String)) -> Self {
-        Self { title, source: format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg)) }
+        Self {
+            title,
+            source: format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg)),
+        }
     }
 }
 
@@ -143,9 +152,16 @@ fn note<'a>(warning: &'a Warning, pieces: &[ReportPiece<'_>]) -> Note<'a> {
         None => format!("piece {id}"),
     };
     let names: Vec<String> = warning.pieces.iter().map(named).collect();
-    let title =
-        if names.is_empty() { warning.code.clone() } else { format!("{} · {}", warning.code, names.join(", ")) };
-    Note { title, text: &warning.message, at: warning.at }
+    let title = if names.is_empty() {
+        warning.code.clone()
+    } else {
+        format!("{} · {}", warning.code, names.join(", "))
+    };
+    Note {
+        title,
+        text: &warning.message,
+        at: warning.at,
+    }
 }
 
 impl<'a> MeshHeader<'a> {
@@ -161,14 +177,21 @@ impl<'a> MeshHeader<'a> {
             facts: &piece.facts,
             points: append_points(piece.mesh, arrays),
             triangles: append_triangles(piece.mesh, arrays),
-            draft: Draft { points: append_points(draft, arrays), triangles: append_triangles(draft, arrays) },
+            draft: Draft {
+                points: append_points(draft, arrays),
+                triangles: append_triangles(draft, arrays),
+            },
         }
     }
 }
 
 fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
     let bounds = mesh.bounds();
-    let (min, size) = if mesh.points.is_empty() { (Vec3::ZERO, Vec3::ZERO) } else { (bounds.min, bounds.size()) };
+    let (min, size) = if mesh.points.is_empty() {
+        (Vec3::ZERO, Vec3::ZERO)
+    } else {
+        (bounds.min, bounds.size())
+    };
     align(arrays);
     let offset = arrays.len();
     // A flat box has one value along that axis.
@@ -178,7 +201,12 @@ fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
             arrays.extend((step.round() as u16).to_le_bytes());
         }
     }
-    PointArray { offset, count: mesh.points.len(), min: min.to_array(), max: (min + size).to_array() }
+    PointArray {
+        offset,
+        count: mesh.points.len(),
+        min: min.to_array(),
+        max: (min + size).to_array(),
+    }
 }
 
 fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
@@ -188,7 +216,11 @@ fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
     for &v in mesh.triangles.as_flattened() {
         arrays.extend(&v.to_le_bytes()[..bytes]);
     }
-    TriangleArray { offset, count: mesh.triangles.len(), bytes }
+    TriangleArray {
+        offset,
+        count: mesh.triangles.len(),
+        bytes,
+    }
 }
 
 /// Typed arrays begin at multiples of their element size.
@@ -197,7 +229,11 @@ fn align(arrays: &mut Vec<u8>) {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
 }
 
 /// Puts each value in place of `{{name}}`. What a value contains is never looked at again.
@@ -207,7 +243,13 @@ fn fill(template: &str, values: &[(&str, &str)]) -> String {
     while let Some((before, after)) = rest.split_once("{{") {
         let (name, after) = after.split_once("}}").expect("the template closes its braces");
         out.push_str(before);
-        out.push_str(values.iter().find(|v| v.0 == name).expect("the template names what there is").1);
+        out.push_str(
+            values
+                .iter()
+                .find(|v| v.0 == name)
+                .expect("the template names what there is")
+                .1,
+        );
         rest = after;
     }
     out + rest
@@ -225,7 +267,10 @@ mod tests {
     }
 
     fn page_with(motions: Vec<ReportMotion>) -> String {
-        let mesh = TriMesh { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
+        let mesh = TriMesh {
+            points: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            triangles: vec![[0, 1, 2]],
+        };
         let hostile = || (HOSTILE.to_owned(), HOSTILE.to_owned());
         let piece = ReportPiece {
             id: 0,
@@ -237,15 +282,28 @@ mod tests {
             is_key: true,
             facts: vec![hostile()],
         };
-        let warning = Warning { code: HOSTILE.into(), message: HOSTILE.into(), pieces: vec![PatchId(0)], at: None };
+        let warning = Warning {
+            code: HOSTILE.into(),
+            message: HOSTILE.into(),
+            pieces: vec![PatchId(0)],
+            at: None,
+        };
         html(&ReportData {
             title: HOSTILE.into(),
             facts: vec![hostile()],
             pieces: vec![piece],
-            checks: vec![ReportCheck { name: HOSTILE.into(), ok: true, figure: HOSTILE.into() }],
+            checks: vec![ReportCheck {
+                name: HOSTILE.into(),
+                ok: true,
+                figure: HOSTILE.into(),
+            }],
             warnings: &[warning],
             figures: vec![hostile()],
-            quantities: vec![ReportQuantity { name: HOSTILE.into(), unit: HOSTILE.into(), values: vec![None] }],
+            quantities: vec![ReportQuantity {
+                name: HOSTILE.into(),
+                unit: HOSTILE.into(),
+                values: vec![None],
+            }],
             motions,
         })
     }
@@ -270,8 +328,17 @@ mod tests {
     #[test]
     fn motions_are_told_in_the_words_of_any_scene() {
         let poses = vec![[0.0; 6], [0.1, 0.0, -0.2, 0.0, 0.01, 0.0]];
-        let moves = vec![ReportMove { piece: 0, about: [1.0, 2.0, 3.0], poses }];
-        let page = page_with(vec![ReportMotion { name: HOSTILE.into(), title: HOSTILE.into(), is_loop: true, moves }]);
+        let moves = vec![ReportMove {
+            piece: 0,
+            about: [1.0, 2.0, 3.0],
+            poses,
+        }];
+        let page = page_with(vec![ReportMotion {
+            name: HOSTILE.into(),
+            title: HOSTILE.into(),
+            is_loop: true,
+            moves,
+        }]);
         assert!(!page.contains("<script>alert"));
         let told = serde_json::json!([{
             "name": HOSTILE,
@@ -284,7 +351,10 @@ mod tests {
             }],
         }]);
         assert_eq!(header(&page)["motions"], told);
-        assert!(header(&self::page()).get("motions").is_none(), "a page without motions says nothing of them");
+        assert!(
+            header(&self::page()).get("motions").is_none(),
+            "a page without motions says nothing of them"
+        );
     }
 
     #[test]
@@ -296,6 +366,9 @@ mod tests {
     fn the_page_asks_for_nothing_from_outside() {
         assert!(!TEMPLATE.contains("http://") && !TEMPLATE.contains("https://"));
         assert!(TEMPLATE.contains("default-src 'none'"));
-        assert!(VIEWER.contains("Permission is hereby granted"), "three's notice goes with its code");
+        assert!(
+            VIEWER.contains("Permission is hereby granted"),
+            "three's notice goes with its code"
+        );
     }
 }

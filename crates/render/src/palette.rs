@@ -1,10 +1,17 @@
 //! Colours that tell pieces apart.
 
-/// Hues in OKLCH, degrees, in an order in which neighbours differ much: a cycle of well-known names, warm and cold in turn.
+/// Hues in OKLCH, degrees, in an order in which neighbours differ much: a cycle of well-known names, warm and
+/// cold in turn.
 const HUES: [f64; 10] = [255.0, 55.0, 150.0, 15.0, 300.0, 95.0, 200.0, 345.0, 125.0, 275.0];
 
 /// Lightness and chroma of each turn through the hues: soft first, then darker, lighter and paler.
-const TONES: [(f64, f64); 5] = [(0.70, 0.125), (0.56, 0.11), (0.82, 0.085), (0.64, 0.06), (0.47, 0.08)];
+const TONES: [(f64, f64); 5] = [
+    (0.70, 0.125),
+    (0.56, 0.11),
+    (0.82, 0.085),
+    (0.64, 0.06),
+    (0.47, 0.08),
+];
 
 /// sRGB of the piece that is installed at place `order`; the first 100 all differ, then they repeat.
 pub fn color(order: usize) -> [u8; 3] {
@@ -12,7 +19,11 @@ pub fn color(order: usize) -> [u8; 3] {
     let (lightness, chroma) = TONES[turn % TONES.len()];
     // The second half of the hundred takes the hues between.
     let between = if turn >= TONES.len() { 18.0 } else { 0.0 };
-    srgb_from_oklch(lightness, chroma, (HUES[order % HUES.len()] + between).to_radians())
+    srgb_from_oklch(
+        lightness,
+        chroma,
+        (HUES[order % HUES.len()] + between).to_radians(),
+    )
 }
 
 /// After Ottosson, "A perceptual color space for image processing", 2020; clipped to sRGB.
@@ -28,7 +39,11 @@ fn srgb_from_oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     ];
     linear.map(|light| {
         let light = light.clamp(0.0, 1.0);
-        let channel = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+        let channel = if light <= 0.003_130_8 {
+            12.92 * light
+        } else {
+            1.055 * light.powf(1.0 / 2.4) - 0.055
+        };
         (255.0 * channel).round() as u8
     })
 }
@@ -41,7 +56,11 @@ mod tests {
     fn a_hundred_colours_differ_and_the_first_ten_differ_much() {
         let all: std::collections::BTreeSet<_> = (0..100).map(color).collect();
         assert_eq!(all.len(), 100);
-        let apart = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| i32::from(a[k]).abs_diff(i32::from(b[k]))).sum::<u32>();
+        let apart = |a: [u8; 3], b: [u8; 3]| {
+            (0..3)
+                .map(|k| i32::from(a[k]).abs_diff(i32::from(b[k])))
+                .sum::<u32>()
+        };
         let pairs = (0..10).flat_map(|i| (0..i).map(move |j| (i, j)));
         let nearest = pairs.map(|(i, j)| apart(color(i), color(j))).min().unwrap();
         assert!(nearest > 30, "nearest pair differs by {nearest}");

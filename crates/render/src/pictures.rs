@@ -12,14 +12,15 @@ const LARGE: usize = 600;
 /// Pixels of the view of one piece along each side; three to a large view's two.
 const SMALL: usize = 400;
 
-/// Front and back of the assembly and of the exploded view, then every piece from inside in the order of installation,
-/// 1200 pixels wide on white.
+/// Front and back of the assembly and of the exploded view, then every piece from inside in the order of
+/// installation, 1200 pixels wide on white.
 pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
     let shifts = exploded_shifts(pieces);
     let normals: Vec<Vec<[Vec3; 3]>> = pieces.par_iter().map(|p| crease_normals(p.mesh)).collect();
     let scene = |share: f64| -> Vec<Painted<'_>> {
         let all = pieces.iter().zip(&shifts).zip(&normals);
-        all.map(|((p, &shift), normals)| painted(p, share * shift, normals)).collect()
+        all.map(|((p, &shift), normals)| painted(p, share * shift, normals))
+            .collect()
     };
     let (together, apart) = (scene(0.0), scene(1.0));
     let views = [
@@ -28,7 +29,10 @@ pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
         (&together, Camera::back()),
         (&apart, Camera::back()),
     ];
-    let large: Vec<Image> = views.iter().map(|(scene, camera)| render(scene, camera, LARGE, LARGE)).collect();
+    let large: Vec<Image> = views
+        .iter()
+        .map(|(scene, camera)| render(scene, camera, LARGE, LARGE))
+        .collect();
     let all = pieces.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
     let mut in_order: Vec<usize> = (0..pieces.len()).collect();
     in_order.sort_by_key(|&i| pieces[i].order);
@@ -38,16 +42,27 @@ pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
 }
 
 fn painted<'a>(piece: &ReportPiece<'a>, shift: Vec3, normals: &'a [[Vec3; 3]]) -> Painted<'a> {
-    Painted { mesh: piece.mesh, color: piece.color, shift, face_colors: None, normals: Some(normals) }
+    Painted {
+        mesh: piece.mesh,
+        color: piece.color,
+        shift,
+        face_colors: None,
+        normals: Some(normals),
+    }
 }
 
-/// A piece seen from `middle`, that of the assembly: its inner side with the connectors, `side` pixels wide and high.
-/// `normals` are its [`crease_normals`].
+/// A piece seen from `middle`, that of the assembly: its inner side with the connectors, `side` pixels wide
+/// and high. `normals` are its [`crease_normals`].
 pub fn from_inside(piece: &ReportPiece<'_>, normals: &[[Vec3; 3]], middle: Vec3, side: usize) -> Image {
     let outwards = (piece.mesh.bounds().center() - middle).normalize_or(Vec3::Y);
     // Straight up or down, "up" has no meaning in the picture.
     let up = if outwards.z.abs() > 0.9 { Vec3::Y } else { Vec3::Z };
-    render(&[painted(piece, Vec3::ZERO, normals)], &Camera::along(outwards, up), side, side)
+    render(
+        &[painted(piece, Vec3::ZERO, normals)],
+        &Camera::along(outwards, up),
+        side,
+        side,
+    )
 }
 
 /// One picture above the other, both from the left edge.

@@ -1,8 +1,8 @@
 //! Pictures without a window: a z-buffer renderer for the README, for reviews and for `pieces.png`.
 //!
-//! Orthographic, four samples a pixel, light from over the viewer's left shoulder. Normals are smooth within an angle and break
-//! at creases; dark lines mark where depth, mesh or normal jumps. Rows of pixels are drawn in bands on all cores, each band
-//! alone, so the picture does not depend on how many there are.
+//! Orthographic, four samples a pixel, light from over the viewer's left shoulder. Normals are smooth within
+//! an angle and break at creases; dark lines mark where depth, mesh or normal jumps. Rows of pixels are drawn
+//! in bands on all cores, each band alone, so the picture does not depend on how many there are.
 
 mod canvas;
 mod shade;
@@ -51,7 +51,11 @@ pub struct Camera {
 impl Camera {
     /// A camera that fits the scene into the picture.
     pub fn along(direction: Vec3, up: Vec3) -> Self {
-        Self { direction, up, frame: None }
+        Self {
+            direction,
+            up,
+            frame: None,
+        }
     }
 
     /// Three-quarter view of what stands on z = 0 and looks along −y, from its left and a little above.
@@ -84,22 +88,45 @@ impl View {
         let turned = |p: Vec3| Vec3::from_array(axes.map(|a| a.dot(p)));
         let extent = match camera.frame {
             Some(frame) => Aabb::around((0..8).map(|corner| {
-                let end = |axis: usize| if corner >> axis & 1 == 0 { frame.min[axis] } else { frame.max[axis] };
+                let end = |axis: usize| {
+                    if corner >> axis & 1 == 0 {
+                        frame.min[axis]
+                    } else {
+                        frame.max[axis]
+                    }
+                };
                 turned(Vec3::new(end(0), end(1), end(2)))
             })),
-            None => Aabb::around(scene.iter().flat_map(|s| s.mesh.points.iter().map(|&p| turned(p + s.shift)))),
+            None => Aabb::around(
+                scene
+                    .iter()
+                    .flat_map(|s| s.mesh.points.iter().map(|&p| turned(p + s.shift))),
+            ),
         };
         let size = extent.size().max(Vec3::splat(1e-9));
         let (width, height) = ((width * SAMPLES) as f64, (height * SAMPLES) as f64);
         let samples_per_mm = (1.0 - 2.0 * Self::MARGIN) * (width / size.x).min(height / size.y);
-        let center = if scene.is_empty() && camera.frame.is_none() { Vec3::ZERO } else { extent.center() };
-        Self { axes, center, samples_per_mm, middle: [0.5 * width, 0.5 * height] }
+        let center = if scene.is_empty() && camera.frame.is_none() {
+            Vec3::ZERO
+        } else {
+            extent.center()
+        };
+        Self {
+            axes,
+            center,
+            samples_per_mm,
+            middle: [0.5 * width, 0.5 * height],
+        }
     }
 
     fn project(&self, p: Vec3) -> [f32; 3] {
         let q = Vec3::from_array(self.axes.map(|a| a.dot(p))) - self.center;
         let q = q * self.samples_per_mm;
-        [(q.x + self.middle[0]) as f32, (q.y + self.middle[1]) as f32, q.z as f32]
+        [
+            (q.x + self.middle[0]) as f32,
+            (q.y + self.middle[1]) as f32,
+            q.z as f32,
+        ]
     }
 }
 
@@ -119,7 +146,11 @@ struct Facet {
 /// About half a second for 400 000 triangles at 1200 × 900 on two cores.
 pub fn render(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usize) -> Image {
     let view = View::new(scene, camera, width, height);
-    let facets: Vec<Facet> = scene.iter().enumerate().flat_map(|(i, painted)| facets(painted, i, &view)).collect();
+    let facets: Vec<Facet> = scene
+        .iter()
+        .enumerate()
+        .flat_map(|(i, painted)| facets(painted, i, &view))
+        .collect();
     let n_bands = height.div_ceil(BAND_ROWS);
     let bins = bins(&facets, n_bands);
     let rows: Vec<Vec<u8>> = (0..n_bands)
@@ -133,10 +164,15 @@ pub fn render(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usiz
             samples.resolve()
         })
         .collect();
-    Image { width, height, rgba: rows.concat() }
+    Image {
+        width,
+        height,
+        rgba: rows.concat(),
+    }
 }
 
-/// Where places come to lie in the picture that [`render`] makes of `scene`: pixels from its left and from its top.
+/// Where places come to lie in the picture that [`render`] makes of `scene`: pixels from its left and from
+/// its top.
 pub fn projection(
     scene: &[Painted<'_>],
     camera: &Camera,
@@ -151,8 +187,15 @@ pub fn projection(
 }
 
 fn facets<'a>(painted: &'a Painted<'_>, mesh: usize, view: &'a View) -> Vec<Facet> {
-    let points: Vec<[f32; 3]> = painted.mesh.points.par_iter().map(|&p| view.project(p + painted.shift)).collect();
-    let normals = painted.normals.map_or_else(|| Cow::Owned(crease_normals(painted.mesh)), Cow::Borrowed);
+    let points: Vec<[f32; 3]> = painted
+        .mesh
+        .points
+        .par_iter()
+        .map(|&p| view.project(p + painted.shift))
+        .collect();
+    let normals = painted
+        .normals
+        .map_or_else(|| Cow::Owned(crease_normals(painted.mesh)), Cow::Borrowed);
     let mesh = u16::try_from(mesh + 1).expect("a picture has fewer than 65 000 meshes");
     let in_view = |n: Vec3| view.axes.map(|a| a.dot(n) as f32);
     let triangles = &painted.mesh.triangles;
@@ -160,8 +203,16 @@ fn facets<'a>(painted: &'a Painted<'_>, mesh: usize, view: &'a View) -> Vec<Face
         .into_par_iter()
         .enumerate()
         .map(|(face, (t, n))| {
-            let color = painted.face_colors.map_or(painted.color, |colors| colors[face]).map(canvas::linear_from_srgb);
-            Facet { corners: t.map(|v| points[v as usize]), normals: n.map(in_view), mesh, color }
+            let color = painted
+                .face_colors
+                .map_or(painted.color, |colors| colors[face])
+                .map(canvas::linear_from_srgb);
+            Facet {
+                corners: t.map(|v| points[v as usize]),
+                normals: n.map(in_view),
+                mesh,
+                color,
+            }
         })
         .collect()
 }
@@ -174,7 +225,9 @@ fn bins(facets: &[Facet], n_bands: usize) -> Vec<Vec<u32>> {
         let [a, b, c] = facet.corners.map(|p| p[1]);
         let overlap = canvas::LINE_REACH as f32 + 1.0;
         let first = ((a.min(b).min(c) - overlap) / band_samples).floor().max(0.0);
-        let last = ((a.max(b).max(c) + overlap) / band_samples).floor().min(n_bands as f32 - 1.0);
+        let last = ((a.max(b).max(c) + overlap) / band_samples)
+            .floor()
+            .min(n_bands as f32 - 1.0);
         if last >= 0.0 {
             for bin in bins.iter_mut().take(last as usize + 1).skip(first as usize) {
                 bin.push(i as u32);
@@ -213,7 +266,12 @@ fn draw(band: &mut Band, facet: &Facet) {
             let mix = |k: usize, v: &[[f32; 3]; 3]| wa * v[0][k] + wb * v[1][k] + wc * v[2][k];
             let depth = mix(2, &facet.corners);
             let normal = || [0, 1, 2].map(|k| mix(k, &facet.normals));
-            band.put(x as usize, y, depth, || Sample { depth, normal: normal(), mesh: facet.mesh, color: facet.color });
+            band.put(x as usize, y, depth, || Sample {
+                depth,
+                normal: normal(),
+                mesh: facet.mesh,
+                color: facet.color,
+            });
         }
     }
 }
@@ -228,7 +286,10 @@ mod tests {
     use super::*;
 
     fn ball() -> TriMesh {
-        let bounds = Aabb { min: Vec3::splat(-10.0), max: Vec3::splat(10.0) };
+        let bounds = Aabb {
+            min: Vec3::splat(-10.0),
+            max: Vec3::splat(10.0),
+        };
         shellock_geom::contour::contour(bounds, 0.5, |p| 10.0 - p.length())
     }
 
@@ -244,7 +305,8 @@ mod tests {
         }];
         let image = render(&scene, &Camera::front(), 300, 200);
         let covered: f64 = image.rgba.chunks_exact(4).map(|p| f64::from(p[3]) / 255.0).sum();
-        // The ball fits the height but for the margin of 4 % on both sides; a line surrounds it by one sample and a bit.
+        // The ball fits the height but for the margin of 4 % on both sides; a line surrounds it by one sample
+        // and a bit.
         let radius = 0.92 * 100.0;
         let exact = std::f64::consts::PI * radius * radius;
         assert!((covered / exact - 1.0).abs() < 0.01, "{covered} of {exact}");
@@ -254,8 +316,17 @@ mod tests {
     #[test]
     fn places_are_told_where_they_are_drawn() {
         let mesh = ball();
-        let ball = Painted { mesh: &mesh, color: [9; 3], shift: Vec3::ZERO, face_colors: None, normals: None };
-        let far = Painted { shift: Vec3::new(90.0, -20.0, 40.0), ..ball };
+        let ball = Painted {
+            mesh: &mesh,
+            color: [9; 3],
+            shift: Vec3::ZERO,
+            face_colors: None,
+            normals: None,
+        };
+        let far = Painted {
+            shift: Vec3::new(90.0, -20.0, 40.0),
+            ..ball
+        };
         let camera = Camera::front();
         let at = projection(&[ball, far], &camera, 300, 200)(far.shift);
         let frame = Some(Aabb::around([Vec3::ZERO, far.shift]).grown(10.0));
@@ -266,17 +337,27 @@ mod tests {
             .map(|i| [(i % 300) as f64 + 0.5, (i / 300) as f64 + 0.5])
             .collect();
         let middle = [0, 1].map(|k| drawn.iter().map(|p| p[k]).sum::<f64>() / drawn.len() as f64);
-        assert!((0..2).all(|k| (middle[k] - framed[k]).abs() < 0.5), "{middle:?} {framed:?}");
+        assert!(
+            (0..2).all(|k| (middle[k] - framed[k]).abs() < 0.5),
+            "{middle:?} {framed:?}"
+        );
         assert!((0..2).all(|k| at[k] > 0.0 && at[k] < [300.0, 200.0][k]));
     }
 
     #[test]
     fn png_decodes_to_the_same_pixels() {
         let mesh = ball();
-        let scene =
-            [Painted { mesh: &mesh, color: [30, 120, 240], shift: Vec3::ZERO, face_colors: None, normals: None }];
+        let scene = [Painted {
+            mesh: &mesh,
+            color: [30, 120, 240],
+            shift: Vec3::ZERO,
+            face_colors: None,
+            normals: None,
+        }];
         let image = render(&scene, &Camera::back(), 64, 48);
-        let mut reader = png::Decoder::new(std::io::Cursor::new(image.png())).read_info().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(image.png()))
+            .read_info()
+            .unwrap();
         let mut rgba = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut rgba).unwrap();
         assert_eq!(rgba, image.rgba);
@@ -285,7 +366,13 @@ mod tests {
     #[test]
     fn the_nearer_mesh_hides_the_other_and_nothing_gives_nothing() {
         let mesh = ball();
-        let far = Painted { mesh: &mesh, color: [255, 0, 0], shift: Vec3::ZERO, face_colors: None, normals: None };
+        let far = Painted {
+            mesh: &mesh,
+            color: [255, 0, 0],
+            shift: Vec3::ZERO,
+            face_colors: None,
+            normals: None,
+        };
         let near = Painted {
             mesh: &mesh,
             color: [0, 0, 255],

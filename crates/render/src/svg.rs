@@ -15,7 +15,8 @@ pub fn end(svg: String) -> String {
     svg + "</svg>\n"
 }
 
-/// Words at the left end of their base line, unless `style` (attributes) says otherwise. They must need no escapes.
+/// Words at the left end of their base line, unless `style` (attributes) says otherwise. They must need no
+/// escapes.
 pub fn text(svg: &mut String, [x, y]: [f64; 2], style: &str, words: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" {style}>{words}</text>");

@@ -50,8 +50,14 @@ fn plan(bencher: Bencher) {
     let params = PlanParams::default();
     bencher.bench(|| {
         let ctx = Ctx::new(&|_| {}, &STOP);
-        let tables =
-            survey(&ctx, &params, &surface, &surface.seams(), &ConnectorSizes::default()).expect("not stopped");
+        let tables = survey(
+            &ctx,
+            &params,
+            &surface,
+            &surface.seams(),
+            &ConnectorSizes::default(),
+        )
+        .expect("not stopped");
         search(&ctx, &params, &tables, &PlanConstraints::default())
     });
 }
@@ -60,7 +66,8 @@ fn plan(bencher: Bencher) {
 fn grid_and_distances(bencher: Bencher) {
     let surface = surface();
     bencher.bench(|| {
-        let grid = ShellGrid::new(&BodyParams::default(), squirrel(), 5.4).expect("the squirrel has a cavity");
+        let grid =
+            ShellGrid::new(&BodyParams::default(), squirrel(), 5.4).expect("the squirrel has a cavity");
         PatchDistances::measure(&grid, &surface)
     });
 }

@@ -23,7 +23,11 @@ fn main() -> std::io::Result<()> {
         pictures.push(render(&scene, &Camera::front(), 480, 480));
         pictures.push(render(&scene, &Camera::back(), 480, 480));
         let n_faces = solid.mesh().triangles.len();
-        println!("{}: {n_faces} triangles, made in {made:.2?}, drawn in {:.2?}", figure.name(), begin.elapsed() - made);
+        println!(
+            "{}: {n_faces} triangles, made in {made:.2?}, drawn in {:.2?}",
+            figure.name(),
+            begin.elapsed() - made
+        );
     }
     std::fs::write(path, Image::sheet(&pictures, 4).on([255; 3]).png())
 }

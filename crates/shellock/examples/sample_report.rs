@@ -1,5 +1,5 @@
-//! Writes `report.html` and `pieces.png` of a squirrel in made-up pieces into the folder named first: to look at the report
-//! without running the pipeline. The pieces are bits of surface, not solids.
+//! Writes `report.html` and `pieces.png` of a squirrel in made-up pieces into the folder named first: to look
+//! at the report without running the pipeline. The pieces are bits of surface, not solids.
 
 use std::path::PathBuf;
 
@@ -7,26 +7,37 @@ use shellock::figure::{self, Figure};
 use shellock::{LatticeDirection, PatchId, Warning};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_render::{
-    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette, pieces_picture,
+    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette,
+    pieces_picture,
 };
 
 fn main() -> std::io::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".into()));
     let model = figure::make(Figure::Squirrel, 150.0, 2.0).into_mesh();
     let meshes = cut(&model);
-    let pieces: Vec<ReportPiece<'_>> =
-        meshes.iter().enumerate().map(|(i, mesh)| piece(i, mesh, meshes.len(), &model)).collect();
+    let pieces: Vec<ReportPiece<'_>> = meshes
+        .iter()
+        .enumerate()
+        .map(|(i, mesh)| piece(i, mesh, meshes.len(), &model))
+        .collect();
     let pair = |name: &str, value: &str| (name.to_owned(), value.to_owned());
-    let check = |name: &str, ok: bool, figure: &str| ReportCheck { name: name.into(), ok, figure: figure.into() };
+    let check = |name: &str, ok: bool, figure: &str| ReportCheck {
+        name: name.into(),
+        ok,
+        figure: figure.into(),
+    };
     let warning = Warning {
         code: "seam-without-connector".into(),
-        message: "12.4 mm of seam are too strongly curved for a connector; the pieces only touch there".into(),
+        message: "12.4 mm of seam are too strongly curved for a connector; the pieces only touch there"
+            .into(),
         pieces: vec![PatchId(1), PatchId(2)],
         at: Some([0.0, 40.0, 118.0]),
     };
     std::fs::write(folder.join("pieces.png"), pieces_picture(&pieces).png())?;
     let n = meshes.len();
-    let values = (0..n).map(|i| (i + 1 < n).then_some(0.2 + 0.05 * (3 * i % 7) as f64)).collect();
+    let values = (0..n)
+        .map(|i| (i + 1 < n).then_some(0.2 + 0.05 * (3 * i % 7) as f64))
+        .collect();
     let motions = vec![shake(&pieces), take_out(&pieces)];
     let data = ReportData {
         title: "Squirrel <sample>".into(),
@@ -45,7 +56,11 @@ fn main() -> std::io::Result<()> {
         ],
         warnings: &[warning],
         figures: Vec::new(),
-        quantities: vec![ReportQuantity { name: "play".into(), unit: "mm".into(), values }],
+        quantities: vec![ReportQuantity {
+            name: "play".into(),
+            unit: "mm".into(),
+            values,
+        }],
         motions,
     };
     std::fs::write(folder.join("report.html"), html(&data))
@@ -57,8 +72,11 @@ fn shake(pieces: &[ReportPiece<'_>]) -> ReportMotion {
         let [x, y, z] = piece.installation_direction.map(|d| 0.2 * sign * d);
         [x, y, z, 0.0, 0.004 * sign, 0.0]
     };
-    let to_and_fro =
-        |(i, piece)| ReportMove { piece: i, about: middle(piece), poses: vec![sway(piece, 1.0), sway(piece, -1.0)] };
+    let to_and_fro = |(i, piece)| ReportMove {
+        piece: i,
+        about: middle(piece),
+        poses: vec![sway(piece, 1.0), sway(piece, -1.0)],
+    };
     ReportMotion {
         name: "shake".into(),
         title: "How far the pieces rattle when the finished shell is shaken.".into(),
@@ -71,12 +89,20 @@ fn shake(pieces: &[ReportPiece<'_>]) -> ReportMotion {
 fn take_out(pieces: &[ReportPiece<'_>]) -> ReportMotion {
     let last = pieces.len() - 1;
     let [x, y, z] = pieces[last].installation_direction.map(|d| -60.0 * d);
-    let poses = vec![[0.0; 6], [x, y, z, 0.0, 0.0, 0.0], [1.5 * x, 1.5 * y, 1.5 * z, 0.0, 0.0, 0.4]];
+    let poses = vec![
+        [0.0; 6],
+        [x, y, z, 0.0, 0.0, 0.0],
+        [1.5 * x, 1.5 * y, 1.5 * z, 0.0, 0.0, 0.4],
+    ];
     ReportMotion {
         name: "take out the key".into(),
         title: "How the key comes out.".into(),
         is_loop: false,
-        moves: vec![ReportMove { piece: last, about: middle(&pieces[last]), poses }],
+        moves: vec![ReportMove {
+            piece: last,
+            about: middle(&pieces[last]),
+            poses,
+        }],
     }
 }
 
@@ -98,8 +124,11 @@ fn cut(model: &TriMesh) -> Vec<TriMesh> {
         [0.5, 0.4, 0.0],
     ];
     let sites = shares.map(|s| bounds.min + Vec3::from_array(s) * bounds.size());
-    let nearest =
-        |p: Vec3| (0..sites.len()).min_by(|&a, &b| p.distance(sites[a]).total_cmp(&p.distance(sites[b]))).unwrap();
+    let nearest = |p: Vec3| {
+        (0..sites.len())
+            .min_by(|&a, &b| p.distance(sites[a]).total_cmp(&p.distance(sites[b])))
+            .unwrap()
+    };
     let mut parts = vec![TriMesh::default(); sites.len()];
     let mut names = vec![std::collections::HashMap::new(); sites.len()];
     for (face, t) in model.triangles.iter().enumerate() {
@@ -129,7 +158,10 @@ fn piece<'a>(i: usize, mesh: &'a TriMesh, count: usize, model: &TriMesh) -> Repo
         is_key: i + 1 == count,
         facts: vec![
             ("Volume".into(), format!("{:.1} cm³", 0.002 * mesh.area())),
-            ("Direction".into(), format!("{:.2} {:.2} {:.2}", direction.x, direction.y, direction.z)),
+            (
+                "Direction".into(),
+                format!("{:.2} {:.2} {:.2}", direction.x, direction.y, direction.z),
+            ),
         ],
     }
 }

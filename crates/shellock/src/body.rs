@@ -1,7 +1,8 @@
 //! Shell bodies: the wall of the model, split into pieces that can leave (Sect. 4.1, Eq. 1).
 //!
-//! The wall `model − inner region` is split in the order of taking apart, key first, so the bodies are a partition of it but
-//! for the gap in the seams, and the outer triangles stay the model's own. Each cut is the zero level of a field
+//! The wall `model − inner region` is split in the order of taking apart, key first, so the bodies are a
+//! partition of it but for the gap in the seams, and the outer triangles stay the model's own. Each cut is
+//! the zero level of a field
 //!
 //! ```text
 //! φ_p = ½ (min_j d_j − d_p)                      nearer to patch p than to any patch j that remains
@@ -10,19 +11,22 @@
 //! g_p = min(max(φ_p, U), −V)                     p's side is positive
 //! ```
 //!
-//! so that along every line in direction s all remaining material comes before p: p leaves freely by construction.
-//! Fragments that a cut leaves on either side are given to the other one, which p then keeps out of the way of. Inside, the
-//! two sides of a cut keep a small gap that tapers to three tenths of it (15 µm a side) at the outer rim.
-//! Where outer patches hide each other a little, only the seam shifts. The first-installed piece is what is left.
+//! so that along every line in direction s all remaining material comes before p: p leaves freely by
+//! construction. Fragments that a cut leaves on either side are given to the other one, which p then keeps
+//! out of the way of. Inside, the two sides of a cut keep a small gap that tapers to three tenths of it (15
+//! µm a side) at the outer rim. Where outer patches hide each other a little, only the seam shifts. The
+//! first-installed piece is what is left.
 
+mod error;
 mod grid;
 mod separate;
 #[cfg(test)]
 mod tests;
 
+pub use error::BodyError;
 pub(crate) use grid::outward;
 pub use grid::{GridError, LocalField, PatchDistances, ShellGrid};
-pub use separate::{BodyError, ShellBodies, build};
+pub use separate::{ShellBodies, build};
 
 use crate::params::ParamProblem;
 
@@ -35,12 +39,13 @@ pub struct BodyParams {
     pub thickness_mm: f64,
     /// Spacing of the grid that fields live on. (0, thickness / 2]; `None` takes the thickness over 2.5.
     ///
-    /// At a third the inner surface is off by 0.003 mm on average; 0.8 mm for a 2 mm wall takes 0.6 of the time of that and
-    /// passes the same checks. The connectors' own shape does not depend on it.
+    /// At a third the inner surface is off by 0.003 mm on average; 0.8 mm for a 2 mm wall takes 0.6 of the
+    /// time of that and passes the same checks. The connectors' own shape does not depend on it.
     pub cell_mm: Option<f64>,
     /// Gap that each side of a seam leaves inside the wall. [0, 0.4]; 0.05.
     pub wall_gap_mm: f64,
-    /// The same along the seams of a key that slides on rails; [0, 0.4], `None` where it does not. Such a key is to be taken out by hand.
+    /// The same along the seams of a key that slides on rails; [0, 0.4], `None` where it does not. Such a key
+    /// is to be taken out by hand.
     pub key_gap_mm: Option<f64>,
     /// Depth over which that gap grows from three tenths at the outer rim. [0.05, 5]; 1.
     pub rim_mm: f64,
@@ -48,7 +53,13 @@ pub struct BodyParams {
 
 impl Default for BodyParams {
     fn default() -> Self {
-        Self { thickness_mm: 2.0, cell_mm: None, wall_gap_mm: 0.05, key_gap_mm: None, rim_mm: 1.0 }
+        Self {
+            thickness_mm: 2.0,
+            cell_mm: None,
+            wall_gap_mm: 0.05,
+            key_gap_mm: None,
+            rim_mm: 1.0,
+        }
     }
 }
 
@@ -65,7 +76,8 @@ impl BodyParams {
             ParamProblem::unless_within("thickness", "mm", self.thickness_mm, 0.8, 10.0),
             ParamProblem::unless_within("grid spacing", "mm", cell, 0.05, self.thickness_mm / 2.0),
             ParamProblem::unless_within("wall gap", "mm", self.wall_gap_mm, 0.0, 0.4),
-            self.key_gap_mm.and_then(|mm| ParamProblem::unless_within("gap of the key", "mm", mm, 0.0, 0.4)),
+            self.key_gap_mm
+                .and_then(|mm| ParamProblem::unless_within("gap of the key", "mm", mm, 0.0, 0.4)),
             ParamProblem::unless_within("rim", "mm", self.rim_mm, 0.05, 5.0),
         ]
         .into_iter()

@@ -1,7 +1,7 @@
 //! Connectors under the seams (Sect. 4.2): a pin on one piece, a channel around it on the other.
 //!
-//! Cross-section of a seam, seen along its tangent, for a piece that leaves straight outwards (left) and one that slides
-//! away sideways (right); M male, F female:
+//! Cross-section of a seam, seen along its tangent, for a piece that leaves straight outwards (left) and one
+//! that slides away sideways (right); M male, F female:
 //!
 //! ```text
 //!      outside                          outside
@@ -13,12 +13,12 @@
 //!      F└─────┘                            F└─────┴─┘─┘F
 //! ```
 //!
-//! A run of connectors is one profile swept along the seam; its shape changes smoothly with the angle between the
-//! separation direction and the surface. The socket is the swept pin grown by the clearance, so the pin can leave along
-//! the separation direction and along no other.
+//! A run of connectors is one profile swept along the seam; its shape changes smoothly with the angle between
+//! the separation direction and the surface. The socket is the swept pin grown by the clearance, so the pin
+//! can leave along the separation direction and along no other.
 //!
-//! Where a key slides along its seam no such profile holds. There its neighbour carries a straight tongue under the key's wall, and
-//! the key a groove around it (`connector::rail`).
+//! Where a key slides along its seam no such profile holds. There its neighbour carries a straight tongue
+//! under the key's wall, and the key a groove around it (`connector::rail`).
 
 mod frame;
 mod free;
@@ -37,7 +37,8 @@ use crate::sizes::SizeChoice;
 /// How connectors are made. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConnectorParams {
-    /// Connector size D, depth and width of the channel: one for all pairs of pieces, or one for each. 2.5 for all.
+    /// Connector size D, depth and width of the channel: one for all pairs of pieces, or one for each. 2.5
+    /// for all.
     ///
     /// Walls of channel and pin come out at about 0.45 D.
     pub size: SizeChoice,
@@ -45,13 +46,17 @@ pub struct ConnectorParams {
     ///
     /// Resin printers hold 0.05–0.15 mm a side, filament printers want 0.15–0.3.
     pub clearance_mm: f64,
-    /// The same between a key that slides on rails and its neighbours, so that it can be taken out by hand; no less than the other. [0.03, 0.8]; 0.15.
+    /// The same between a key that slides on rails and its neighbours, so that it can be taken out by hand;
+    /// no less than the other. [0.03, 0.8]; 0.15.
     pub key_clearance_mm: f64,
-    /// How far a bump on each rail presses into the key's groove before it snaps into its dimple. [0, 0.4]; 0, none.
+    /// How far a bump on each rail presses into the key's groove before it snaps into its dimple. [0, 0.4];
+    /// 0, none.
     ///
-    /// It keeps the key from creeping out, and must bend the groove's wall on the way: a tenth of its thickness for 0.1 mm.
+    /// It keeps the key from creeping out, and must bend the groove's wall on the way: a tenth of its
+    /// thickness for 0.1 mm.
     pub detent_mm: f64,
-    /// How far ribs of a key without rails press on the pieces around it: friction is all that holds such a key. [0, 0.3]; 0.08.
+    /// How far ribs of a key without rails press on the pieces around it: friction is all that holds such a
+    /// key. [0, 0.3]; 0.08.
     pub key_rib_mm: f64,
     /// Thinnest wall left standing. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
     pub min_wall_mm: f64,
@@ -73,10 +78,15 @@ impl Default for ConnectorParams {
 impl ConnectorParams {
     /// Gap of connectors, mm: of those of a key that slides on rails, or of all others.
     pub fn clearance_of(&self, is_sliding_key: bool) -> f64 {
-        if is_sliding_key { self.key_clearance_mm.max(self.clearance_mm) } else { self.clearance_mm }
+        if is_sliding_key {
+            self.key_clearance_mm.max(self.clearance_mm)
+        } else {
+            self.clearance_mm
+        }
     }
 
-    /// Room below the wall that connectors up to `size_mm` may take, mm: a channel under the steepest backward seam is as deep.
+    /// Room below the wall that connectors up to `size_mm` may take, mm: a channel under the steepest
+    /// backward seam is as deep.
     pub fn room_mm(&self, size_mm: f64) -> f64 {
         2.1 * size_mm + self.clearance_mm
     }
@@ -87,9 +97,19 @@ impl ConnectorParams {
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),
             ParamProblem::unless_within("key clearance", "mm", self.key_clearance_mm, 0.03, 0.8),
             ParamProblem::unless_within("detent", "mm", self.detent_mm, 0.0, 0.4),
-            ParamProblem::unless_within("press of the key's ribs (--key-ribs)", "mm", self.key_rib_mm, 0.0, 0.3),
+            ParamProblem::unless_within(
+                "press of the key's ribs (--key-ribs)",
+                "mm",
+                self.key_rib_mm,
+                0.0,
+                0.3,
+            ),
             ParamProblem::unless_within("minimum wall", "mm", self.min_wall_mm, 0.1, 2.0),
         ];
-        self.size.problems().into_iter().chain(others.into_iter().flatten()).collect()
+        self.size
+            .problems()
+            .into_iter()
+            .chain(others.into_iter().flatten())
+            .collect()
     }
 }

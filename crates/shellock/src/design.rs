@@ -1,7 +1,8 @@
 //! The whole job: from a closed mesh to interlocking pieces that were verified.
 //!
-//! Feedback goes one way: what a finished kit teaches becomes a constraint for the next plan of the same division; when plans run
-//! out, the division is revised at the pieces to blame, and planning starts afresh; when revisions run out, the next key is tried.
+//! Feedback goes one way: what a finished kit teaches becomes a constraint for the next plan of the same
+//! division; when plans run out, the division is revised at the pieces to blame, and planning starts afresh;
+//! when revisions run out, the next key is tried.
 //!
 //! ```text
 //!  Params ─► Settings ─► Candidate (a key) ─► Division (pieces) ─► plan ─► Kit ─► verdict ─► Design
@@ -38,13 +39,25 @@ pub use outcome::{Design, DesignError, DesignOutcome};
 pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
 
-/// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or the rounds
-/// are used up; then the best of them is returned, its failures told.
-pub fn design(ctx: &Ctx, params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<DesignOutcome, DesignError> {
+/// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or
+/// the rounds are used up; then the best of them is returned, its failures told.
+pub fn design(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    labels: Option<&[i64]>,
+) -> Result<DesignOutcome, DesignError> {
     let wall = Wall::decide(ctx, params, model)?;
     let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
     let stress = wall.strength.as_ref().map(StressMap::new);
-    let job = Job { params, model, labels, wall: &wall, stress, surface };
+    let job = Job {
+        params,
+        model,
+        labels,
+        wall: &wall,
+        stress,
+        surface,
+    };
     let mut best = Best::default();
     let places = candidate::places(ctx, &job)?;
     for (i, place) in places.iter().enumerate() {
@@ -77,7 +90,8 @@ pub struct Planned {
     pub warnings: Vec<Warning>,
 }
 
-/// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and connector sizes.
+/// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and
+/// connector sizes.
 pub fn plan(
     ctx: &Ctx,
     params: &Params,
@@ -87,22 +101,42 @@ pub fn plan(
     let wall = Wall::decide(ctx, params, model)?;
     let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
     let stress = wall.strength.as_ref().map(StressMap::new);
-    let job = Job { params, model, labels, wall: &wall, stress, surface };
+    let job = Job {
+        params,
+        model,
+        labels,
+        wall: &wall,
+        stress,
+        surface,
+    };
     let mut reason = "the key falls apart".to_owned();
     for (i, place) in candidate::places(ctx, &job)?.iter().enumerate() {
-        let Some(candidate) = Candidate::new(&job, i, place.as_ref()) else { continue };
+        let Some(candidate) = Candidate::new(&job, i, place.as_ref()) else {
+            continue;
+        };
         let mut n_joinings = candidate.budget.foreseen_joinings;
         let mut division = candidate.division(ctx, &job, candidate.surface.clone())?;
         while let Some(current) = division {
             let ctx = ctx.fork();
-            let Division { surface, settings, chosen, .. } = &current;
+            let Division {
+                surface,
+                settings,
+                chosen,
+                ..
+            } = &current;
             chosen.tell(&ctx);
             let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
             let none = PlanConstraints::default();
             division = match attempt::next_plan(&ctx, params, &current, &survey, &none, n_joinings > 0)? {
                 Next::Plan(found, holding) => {
                     let (turn, warnings) = (candidate.turn, ctx.into_warnings());
-                    return Ok(Ok(Planned { surface: current.surface, turn, found: *found, holding, warnings }));
+                    return Ok(Ok(Planned {
+                        surface: current.surface,
+                        turn,
+                        found: *found,
+                        holding,
+                        warnings,
+                    }));
                 }
                 Next::Joined(fewer) => {
                     n_joinings -= 1;
@@ -154,14 +188,27 @@ impl Wall {
             Ok(strength) => {
                 let settings = Settings::with_thickness(params, strength.thickness_mm);
                 let warnings = strength.warnings(&nominal.strength);
-                Ok(Self { settings, strength: Some(strength), warnings })
+                Ok(Self {
+                    settings,
+                    strength: Some(strength),
+                    warnings,
+                })
             }
             Err(StrengthError::Shell(e)) if params.thickness != Thickness::Auto => {
                 let message = format!(
                     "what the wall bears could not be computed ({e}); connectors are sized as if nothing pressed on them"
                 );
-                let warning = Warning { code: "strength-unknown".into(), message, pieces: Vec::new(), at: None };
-                Ok(Self { settings: nominal, strength: None, warnings: vec![warning] })
+                let warning = Warning {
+                    code: "strength-unknown".into(),
+                    message,
+                    pieces: Vec::new(),
+                    at: None,
+                };
+                Ok(Self {
+                    settings: nominal,
+                    strength: None,
+                    warnings: vec![warning],
+                })
             }
             Err(e) => Err(e.into()),
         }
@@ -182,14 +229,27 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
     let mut wall = WallGrid::new(&job.settings().body, &candidate.model);
     let mut kit = None;
     let Some(mut division) = candidate.division(ctx, job, candidate.surface.clone())? else {
-        let failure = Failure { reason: "the key falls apart".into(), ..Failure::default() };
+        let failure = Failure {
+            reason: "the key falls apart".into(),
+            ..Failure::default()
+        };
         return Ok(Explored { kit, failure });
     };
     loop {
-        wall.make_room(division.settings.connector.room_mm(division.chosen.sizes.largest_mm()));
+        wall.make_room(
+            division
+                .settings
+                .connector
+                .room_mm(division.chosen.sizes.largest_mm()),
+        );
         let n_pieces = division.surface.n_patches;
         match attempt::plans(ctx, job.params, &mut wall, &division, &mut budget, &mut kit)? {
-            Attempt::Passed => return Ok(Explored { kit, failure: Failure::default() }),
+            Attempt::Passed => {
+                return Ok(Explored {
+                    kit,
+                    failure: Failure::default(),
+                });
+            }
             Attempt::Joined(fewer) => {
                 budget.foreseen_joinings -= 1;
                 match candidate.division(ctx, job, fewer)? {
@@ -203,9 +263,17 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
             }
             Attempt::Failed(failure) => {
                 let next = revised(ctx, &division, &failure, kit.is_some(), &mut budget)?;
-                let next = next.map(|surface| candidate.division(ctx, job, surface)).transpose()?.flatten();
-                let Some(next) = next else { return Ok(Explored { kit, failure }) };
-                ctx.note(&format!("another segmentation: {} pieces instead of {n_pieces}", next.surface.n_patches));
+                let next = next
+                    .map(|surface| candidate.division(ctx, job, surface))
+                    .transpose()?
+                    .flatten();
+                let Some(next) = next else {
+                    return Ok(Explored { kit, failure });
+                };
+                ctx.note(&format!(
+                    "another segmentation: {} pieces instead of {n_pieces}",
+                    next.surface.n_patches
+                ));
                 division = next;
             }
         }

@@ -1,8 +1,8 @@
 //! Closed models made by code, for the demo, the tests and the measurements: nothing has to be downloaded.
 //!
-//! Each figure is a smooth union of ellipsoids, rounded cones and rings (module `form`), stands on z = 0 and looks along −y.
-//! All are drawn 150 units high or wide with nothing thinner than 9 units, so that at 150 mm there is room for a wall of 2 mm
-//! with connectors.
+//! Each figure is a smooth union of ellipsoids, rounded cones and rings (module `form`), stands on z = 0 and
+//! looks along −y. All are drawn 150 units high or wide with nothing thinner than 9 units, so that at 150 mm
+//! there is room for a wall of 2 mm with connectors.
 
 mod animals;
 mod form;
@@ -87,7 +87,8 @@ impl Figure {
 
 /// `figure` with its longest side `size_mm` long, standing on z = 0, with triangles of about `cell_mm`.
 ///
-/// The same bytes each time. At 150 mm a cell of 1.5 mm gives about 50 000 triangles; time grows with `(size / cell)³`.
+/// The same bytes each time. At 150 mm a cell of 1.5 mm gives about 50 000 triangles; time grows with `(size
+/// / cell)³`.
 ///
 /// # Panics
 ///
@@ -96,7 +97,8 @@ pub fn make(figure: Figure, size_mm: f64, cell_mm: f64) -> Solid {
     make_with_limbs(figure, size_mm, cell_mm).0
 }
 
-/// As [`make`], with the limb that each triangle is on: 0 is the trunk. All are 0 where a figure is not made of limbs.
+/// As [`make`], with the limb that each triangle is on: 0 is the trunk. All are 0 where a figure is not made
+/// of limbs.
 ///
 /// # Panics
 ///
@@ -109,7 +111,9 @@ pub fn make_with_limbs(figure: Figure, size_mm: f64, cell_mm: f64) -> (Solid, Ve
     let middle = |f: usize| mesh.corners(f).into_iter().sum::<Vec3>() / 3.0;
     let limbs = match sculpture.n_limbs() {
         1 => vec![0; mesh.triangles.len()],
-        _ => (0..mesh.triangles.len()).map(|f| sculpture.limb_at(middle(f))).collect(),
+        _ => (0..mesh.triangles.len())
+            .map(|f| sculpture.limb_at(middle(f)))
+            .collect(),
     };
     // Boxes of ellipsoids are not tight: scale by what came out.
     let made = mesh.bounds();
@@ -122,7 +126,10 @@ pub fn make_with_limbs(figure: Figure, size_mm: f64, cell_mm: f64) -> (Solid, Ve
             p.z = 0.0;
         }
     }
-    (Solid::new(mesh).expect("contours are closed; the cell is small against the figure"), limbs)
+    (
+        Solid::new(mesh).expect("contours are closed; the cell is small against the figure"),
+        limbs,
+    )
 }
 
 #[cfg(test)]
@@ -138,7 +145,10 @@ mod tests {
             assert!((mesh.bounds().size().max_element() - 150.0).abs() < 1e-9);
             assert_eq!(mesh.bounds().min.z, 0.0, "{figure:?}");
             let on_floor = |f: &usize| mesh.corners(*f).iter().all(|p| p.z == 0.0);
-            let flat_mm2: f64 = (0..mesh.triangles.len()).filter(on_floor).map(|f| mesh.face_area(f)).sum();
+            let flat_mm2: f64 = (0..mesh.triangles.len())
+                .filter(on_floor)
+                .map(|f| mesh.face_area(f))
+                .sum();
             assert!(flat_mm2 > 300.0, "{figure:?} stands on {flat_mm2} mm²");
             assert_eq!(Figure::named(figure.name()), Some(figure));
         }
@@ -150,13 +160,20 @@ mod tests {
             let (solid, limbs) = make_with_limbs(figure, 150.0, 3.0);
             assert_eq!(limbs.len(), solid.mesh().triangles.len());
             let names: std::collections::BTreeSet<u32> = limbs.iter().copied().collect();
-            assert_eq!(names.into_iter().collect::<Vec<_>>(), (0..n_limbs).collect::<Vec<_>>(), "{figure:?}");
+            assert_eq!(
+                names.into_iter().collect::<Vec<_>>(),
+                (0..n_limbs).collect::<Vec<_>>(),
+                "{figure:?}"
+            );
         }
     }
 
     #[test]
     fn the_same_figure_comes_out_each_time() {
-        assert_eq!(make(Figure::Squirrel, 150.0, 6.0), make(Figure::Squirrel, 150.0, 6.0));
+        assert_eq!(
+            make(Figure::Squirrel, 150.0, 6.0),
+            make(Figure::Squirrel, 150.0, 6.0)
+        );
     }
 
     fn n_components(mesh: &shellock_geom::TriMesh) -> usize {
@@ -174,6 +191,8 @@ mod tests {
                 parent[a as usize] = b;
             }
         }
-        (0..parent.len() as u32).filter(|&v| parent[v as usize] == v).count()
+        (0..parent.len() as u32)
+            .filter(|&v| parent[v as usize] == v)
+            .count()
     }
 }

@@ -1,7 +1,8 @@
 //! Where a key can be, and cutting it (Sect. 6.1): no hand of the user is needed.
 //!
-//! A key is what a half-infinite prism takes from the surface. The prism lies on a plane that the surface follows and is open towards
-//! the slide `s`, so it takes the rim along, and whatever is in it can leave along `s`: the way out is free by construction.
+//! A key is what a half-infinite prism takes from the surface. The prism lies on a plane that the surface
+//! follows and is open towards the slide `s`, so it takes the rim along, and whatever is in it can leave
+//! along `s`: the way out is free by construction.
 //!
 //! ```text
 //!        side               plane, seen from outside          section along s
@@ -12,9 +13,9 @@
 //!    └──────────┘                                          k                     ▒▒ ┘
 //! ```
 //!
-//! [`sites`] finds such prisms: planes by random sampling, 16 slides in each, places along the rim, three sizes. [`imprint`] gives what
-//! is inside to a patch of its own, with straight seams. Stages after that know 26 directions; [`Turn`] lays the model so that the
-//! slide is one of them.
+//! [`sites`] finds such prisms: planes by random sampling, 16 slides in each, places along the rim, three
+//! sizes. [`imprint`] gives what is inside to a patch of its own, with straight seams. Stages after that know
+//! 26 directions; [`Turn`] lays the model so that the slide is one of them.
 //!
 //! Where we leave the paper: there the user draws the key.
 
@@ -52,12 +53,19 @@ pub struct KeyParams {
 
 impl Default for KeyParams {
     fn default() -> Self {
-        Self { seed: 0, wall_mm: 2.0, size_mm: 2.5, piece_mm2: 4000.0, up: [0.0, 0.0, 1.0] }
+        Self {
+            seed: 0,
+            wall_mm: 2.0,
+            size_mm: 2.5,
+            piece_mm2: 4000.0,
+            up: [0.0, 0.0, 1.0],
+        }
     }
 }
 
 impl KeyParams {
-    /// How deep below the plane the key's rim reaches, mm: past its grooves, with room for the connectors of the seam there.
+    /// How deep below the plane the key's rim reaches, mm: past its grooves, with room for the connectors of
+    /// the seam there.
     pub fn depth_mm(&self) -> f64 {
         self.wall_mm + 2.2 * self.size_mm + 1.0
     }

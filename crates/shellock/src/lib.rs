@@ -1,7 +1,8 @@
-//! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that they hold.
+//! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that
+//! they hold.
 //!
-//! After Yao, Chen, Xu, Wang, "Modeling, Evaluation and Optimization of Interlocking Shell Pieces", Computer Graphics Forum 36(7),
-//! Pacific Graphics 2017. The stages, in the only direction that data flows:
+//! After Yao, Chen, Xu, Wang, "Modeling, Evaluation and Optimization of Interlocking Shell Pieces", Computer
+//! Graphics Forum 36(7), Pacific Graphics 2017. The stages, in the only direction that data flows:
 //! segmentation → key → sizes → plan → body → connector → piece → verify → certificate → report.
 
 pub mod body;
@@ -25,8 +26,8 @@ mod testing;
 pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, design};
 pub use seam::graph::{Contact, ContactGraph};
 pub use shellock_assembly::{
-    Cancelled, Ctx, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit, PressFitKind,
-    Warning, certificate, context, direction, ids, motion, params, play, push, verify,
+    Cancelled, Ctx, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit,
+    PressFitKind, Warning, certificate, context, direction, ids, motion, params, play, push, verify,
 };
 pub use sizes::ConnectorSizes;
 pub use surface::{Seam, SegmentedSurface};

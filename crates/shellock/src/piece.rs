@@ -1,8 +1,9 @@
 //! Finished pieces: bodies with their connectors, carved so that every path stays free, ready to print.
 //!
-//! Pieces are taken in the order of taking apart. From a piece's half connectors goes whatever lies in its own way out,
-//! and whatever a later piece, its bodies and its connectors, passes on its way out: the socket is what the pin sweeps. Where a joined piece
-//! still comes too near to another, that is taken off too. Last, its number is cut into the inner side of its wall.
+//! Pieces are taken in the order of taking apart. From a piece's half connectors goes whatever lies in its
+//! own way out, and whatever a later piece, its bodies and its connectors, passes on its way out: the socket
+//! is what the pin sweeps. Where a joined piece still comes too near to another, that is taken off too. Last,
+//! its number is cut into the inner side of its wall.
 
 mod carve;
 mod finish;

@@ -1,11 +1,12 @@
 //! Which piece goes in when and along which direction (Sect. 6).
 //!
-//! [`survey`] measures the segmented surface once: who occludes whom along the 26 directions, how good a connector each
-//! seam could carry, how flat each piece is. [`search`] then finds the plan and proves how good any other could be, again and
-//! again where later stages object. What a piece costs is one trait, [`PieceCosts`].
+//! [`survey`] measures the segmented surface once: who occludes whom along the 26 directions, how good a
+//! connector each seam could carry, how flat each piece is. [`search`] then finds the plan and proves how
+//! good any other could be, again and again where later stages object. What a piece costs is one trait,
+//! [`PieceCosts`].
 //!
-//! Where we leave the paper: a plan must also pass the cluster test ([`cluster`]), which the paper leaves to simulation;
-//! seams too short for a connector join nothing; and the key is never cut anew here, only chosen.
+//! Where we leave the paper: a plan must also pass the cluster test ([`cluster`]), which the paper leaves to
+//! simulation; seams too short for a connector join nothing; and the key is never cut anew here, only chosen.
 
 #[cfg(test)]
 mod bound_tests;

@@ -1,4 +1,5 @@
-//! Seams: where two patches meet, which pieces they make neighbours of, and the rules for connectors under them.
+//! Seams: where two patches meet, which pieces they make neighbours of, and the rules for connectors under
+//! them.
 
 pub mod graph;
 mod line;

@@ -1,8 +1,9 @@
 //! From a closed surface to patches: where the shell is cut (Sect. 4).
 //!
-//! Labels come from the user or from clustering; they are mended until every patch is a disk and no single piece holds others alone;
-//! then the seams are smoothed and the triangles cut along them. Deviation from the paper, which takes the labels as given: without
-//! mending most labelled models have no plan that locks (see [`crate::seam::graph`]).
+//! Labels come from the user or from clustering; they are mended until every patch is a disk and no single
+//! piece holds others alone; then the seams are smoothed and the triangles cut along them. Deviation from the
+//! paper, which takes the labels as given: without mending most labelled models have no plan that locks (see
+//! [`crate::seam::graph`]).
 
 mod auto;
 mod changes;
@@ -36,14 +37,16 @@ pub const MOST_PIECES: usize = 128;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationParams {
-    /// Patches that automatic segmentation begins with; mending adds some. [2, [`MOST_PIECES`]]; `None`: from the area, 10 for a 150 mm
-    /// figure.
+    /// Patches that automatic segmentation begins with; mending adds some. [2, [`MOST_PIECES`]]; `None`: from
+    /// the area, 10 for a 150 mm figure.
     pub n_pieces: Option<usize>,
     /// Seed of all random choices; 0.
     pub seed: u64,
-    /// Diffusion that smooths the seams, mm². [0, 100]; 7: rounds off what is narrower than its root, 2.6 mm, about a connector.
+    /// Diffusion that smooths the seams, mm². [0, 100]; 7: rounds off what is narrower than its root, 2.6 mm,
+    /// about a connector.
     pub smoothing_mm2: f64,
-    /// Shortest single seam stretch that counts as a contact. [0, 100]; 9: 3.5 connectors of 2.5 mm, as a run loses 1.5 at each end.
+    /// Shortest single seam stretch that counts as a contact. [0, 100]; 9: 3.5 connectors of 2.5 mm, as a run
+    /// loses 1.5 at each end.
     pub min_contact_mm: f64,
     /// Shortest such stretch where longer ones would take too many pieces. [0, [`min_contact_mm`]]; 9.
     ///
@@ -51,7 +54,8 @@ pub struct SegmentationParams {
     pub least_contact_mm: f64,
     /// Depth at which those stretches are measured, where connectors are. [0, 10]; 0, the outer surface.
     pub wall_mm: f64,
-    /// Smallest patch, mm². [1, 10 000]; 60: a smaller piece has no room for connectors on two sides. Smaller ones are merged.
+    /// Smallest patch, mm². [1, 10 000]; 60: a smaller piece has no room for connectors on two sides. Smaller
+    /// ones are merged.
     pub min_piece_mm2: f64,
     /// Edges longer than this are halved before patches are drawn. [0.5, 100]; 5: a tenth of a patch's width.
     pub max_edge_mm: f64,
@@ -80,7 +84,10 @@ impl SegmentationParams {
     pub fn problems(&self) -> Vec<String> {
         let mut found = Vec::new();
         if self.n_pieces.is_some_and(|n| !(2..=MOST_PIECES).contains(&n)) {
-            found.push(format!("pieces is {}, but must be from 2 to {MOST_PIECES}", self.n_pieces.unwrap_or_default()));
+            found.push(format!(
+                "pieces is {}, but must be from 2 to {MOST_PIECES}",
+                self.n_pieces.unwrap_or_default()
+            ));
         }
         for (name, value, low, high) in [
             ("smoothing_mm2", self.smoothing_mm2, 0.0, 100.0),
@@ -95,7 +102,10 @@ impl SegmentationParams {
             }
         }
         if self.max_splits > 500 {
-            found.push(format!("max_splits is {}, but must be at most 500", self.max_splits));
+            found.push(format!(
+                "max_splits is {}, but must be at most 500",
+                self.max_splits
+            ));
         }
         found
     }
@@ -118,7 +128,9 @@ pub enum SegmentationError {
         n_faces: usize,
     },
     /// Nothing to take apart.
-    #[error("all {n_faces} triangles have the label {label}: give at least two labels, or none for automatic patches")]
+    #[error(
+        "all {n_faces} triangles have the label {label}: give at least two labels, or none for automatic patches"
+    )]
     OneLabel {
         /// The label.
         label: i64,
@@ -186,7 +198,10 @@ impl FaceLabels {
         for (patch, &(_, c)) in order.iter().enumerate() {
             id[c as usize] = patch as u32;
         }
-        Self { patch_of_face: component.into_iter().map(|c| id[c as usize]).collect(), n_patches }
+        Self {
+            patch_of_face: component.into_iter().map(|c| id[c as usize]).collect(),
+            n_patches,
+        }
     }
 
     /// The patch of triangle `face`.
@@ -205,8 +220,14 @@ impl FaceLabels {
     }
 
     fn inherited(&self, source_face: &[u32]) -> Self {
-        let patch_of_face = source_face.iter().map(|&f| self.patch_of_face[f as usize]).collect();
-        Self { patch_of_face, n_patches: self.n_patches }
+        let patch_of_face = source_face
+            .iter()
+            .map(|&f| self.patch_of_face[f as usize])
+            .collect();
+        Self {
+            patch_of_face,
+            n_patches: self.n_patches,
+        }
     }
 }
 
@@ -221,13 +242,15 @@ const MAX_AUTOMATIC_TRIES: u64 = 4;
 /// Limits that contacts are held against in turn, from `min_contact_mm` down to `least_contact_mm`.
 const N_CONTACT_LIMITS: usize = 3;
 
-/// What is paid for a fault of the graph, for a label that lost its piece to another, and for each step to shorter contacts, in pieces
-/// that mending may add instead. A kit with a fault does not lock; the other two are a matter of taste.
+/// What is paid for a fault of the graph, for a label that lost its piece to another, and for each step to
+/// shorter contacts, in pieces that mending may add instead. A kit with a fault does not lock; the other two
+/// are a matter of taste.
 const FAULT_COST: f64 = 100.0;
 const LOST_LABEL_COST: f64 = 8.0;
 const SHORTER_COST: f64 = 2.0;
 
-/// The whole stage: labels (the user's, or automatic ones), mended, smoothed and cut; `source_face` names triangles of `solid`.
+/// The whole stage: labels (the user's, or automatic ones), mended, smoothed and cut; `source_face` names
+/// triangles of `solid`.
 ///
 /// Warns as [`tell`] does.
 pub fn segment(
@@ -248,7 +271,10 @@ pub fn segment(
         None => {
             let mut best: Option<(f64, SegmentedSurface)> = None;
             for attempt in 0..MAX_AUTOMATIC_TRIES {
-                let reseeded = SegmentationParams { seed: params.seed.wrapping_add(attempt << 32), ..params.clone() };
+                let reseeded = SegmentationParams {
+                    seed: params.seed.wrapping_add(attempt << 32),
+                    ..params.clone()
+                };
                 let labels = auto_labels(ctx, &reseeded, &fine)?;
                 let (cost, surface) = best_contacts(ctx, params, &fine, &labels, LabelOrigin::Automatic)?;
                 let enough = LabelOrigin::Automatic.good_cost(labels.n_patches());
@@ -262,12 +288,16 @@ pub fn segment(
             best.expect("there is at least one try").1
         }
     };
-    surface.source_face.iter_mut().for_each(|f| *f = source_face[*f as usize]);
+    surface
+        .source_face
+        .iter_mut()
+        .for_each(|f| *f = source_face[*f as usize]);
     tell(ctx, params, solid, labels, &surface)?;
     Ok(surface)
 }
 
-/// Whose patches are changed: a user wants to find the labels again, an automatic choice should have the number of pieces asked for.
+/// Whose patches are changed: a user wants to find the labels again, an automatic choice should have the
+/// number of pieces asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LabelOrigin {
     User,
@@ -299,20 +329,28 @@ impl LabelOrigin {
 
 /// The limits that contacts are held against in turn, mm.
 fn contact_limits(params: &SegmentationParams) -> Vec<f64> {
-    let (most, least) = (params.min_contact_mm, params.least_contact_mm.min(params.min_contact_mm));
+    let (most, least) = (
+        params.min_contact_mm,
+        params.least_contact_mm.min(params.min_contact_mm),
+    );
     let step = (most - least) / (N_CONTACT_LIMITS - 1) as f64;
     let mut limits: Vec<f64> = (0..N_CONTACT_LIMITS).map(|i| most - step * i as f64).collect();
     limits.dedup();
     limits
 }
 
-/// The limit that the contacts of `surface` keep, mm: the longest with which the fewest pieces hold others alone.
+/// The limit that the contacts of `surface` keep, mm: the longest with which the fewest pieces hold others
+/// alone.
 fn kept_limit_mm(params: &SegmentationParams, surface: &SegmentedSurface) -> f64 {
     let faults = |limit_mm: &f64| surface.contact_graph_below(params.wall_mm, *limit_mm).n_faults();
-    contact_limits(params).into_iter().min_by_key(faults).expect("there is at least one limit")
+    contact_limits(params)
+        .into_iter()
+        .min_by_key(faults)
+        .expect("there is at least one limit")
 }
 
-/// Mends `labels` for long contacts, and for shorter ones where those cost too much; the cheapest surface and its cost.
+/// Mends `labels` for long contacts, and for shorter ones where those cost too much; the cheapest surface and
+/// its cost.
 fn best_contacts(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -322,7 +360,10 @@ fn best_contacts(
 ) -> Result<(f64, SegmentedSurface), SegmentationError> {
     let mut best: Option<(f64, SegmentedSurface)> = None;
     for (i, limit_mm) in contact_limits(params).into_iter().enumerate() {
-        let limited = SegmentationParams { min_contact_mm: limit_mm, ..params.clone() };
+        let limited = SegmentationParams {
+            min_contact_mm: limit_mm,
+            ..params.clone()
+        };
         let (faults, surface) = held_twice(ctx, &limited, solid, labels.clone())?;
         let cost = FAULT_COST * faults as f64 + origin.cost(labels, &surface) + SHORTER_COST * i as f64;
         if best.as_ref().is_none_or(|b| cost < b.0) {
@@ -335,7 +376,8 @@ fn best_contacts(
     Ok(best.expect("there is at least one limit"))
 }
 
-/// Mends, smooths and cuts until the smooth seams hold every piece twice; the best round and its faults where none does.
+/// Mends, smooths and cuts until the smooth seams hold every piece twice; the best round and its faults where
+/// none does.
 fn held_twice(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -347,7 +389,9 @@ fn held_twice(
     for _ in 0..MAX_MEND_ROUNDS {
         labels = mend(ctx, &strict, solid, &labels)?;
         let surface = smooth_and_cut(ctx, params, solid, &labels)?;
-        let faults = surface.contact_graph_below(params.wall_mm, params.min_contact_mm).n_faults();
+        let faults = surface
+            .contact_graph_below(params.wall_mm, params.min_contact_mm)
+            .n_faults();
         if best.as_ref().is_none_or(|b| faults < b.0) {
             best = Some((faults, surface));
         }
@@ -359,20 +403,24 @@ fn held_twice(
     Ok(best.expect("there is at least one round"))
 }
 
-/// The same surface with `patch` divided in two, mended and smoothed again; `None` where it cannot be divided.
+/// The same surface with `patch` divided in two, mended and smoothed again; `None` where it cannot be
+/// divided.
 ///
-/// The feedback loop asks for this where no plan takes the piece out or holds it. Patches may be renumbered. Fails where the user stopped,
-/// or the seams cannot be smoothed.
+/// The feedback loop asks for this where no plan takes the piece out or holds it. Patches may be renumbered.
+/// Fails where the user stopped, or the seams cannot be smoothed.
 pub fn divide(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
     patch: PatchId,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
-    changed(ctx, params, surface, |solid, labels| split_piece(solid, labels, patch))
+    changed(ctx, params, surface, |solid, labels| {
+        split_piece(solid, labels, patch)
+    })
 }
 
-/// The same surface mended and smoothed again, as its patches are; `None` where a patch would vanish. Patches may be renumbered.
+/// The same surface mended and smoothed again, as its patches are; `None` where a patch would vanish. Patches
+/// may be renumbered.
 pub fn mended_again(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -381,8 +429,8 @@ pub fn mended_again(
     changed(ctx, params, surface, |_, labels| Some(labels.clone()))
 }
 
-/// The same surface with each of `patches` joined to the neighbour it has the longest seam with, mended and smoothed again; `None` where
-/// there would be one piece left, or nothing is joined.
+/// The same surface with each of `patches` joined to the neighbour it has the longest seam with, mended and
+/// smoothed again; `None` where there would be one piece left, or nothing is joined.
 ///
 /// The feedback loop asks for this where dividing did not help. Patches may be renumbered.
 pub fn unite(
@@ -395,7 +443,9 @@ pub fn unite(
     let mut number: Vec<u32> = (0..surface.n_patches as u32).collect();
     for &patch in patches {
         let touching = graph.contacts().iter().filter(|c| c.a == patch || c.b == patch);
-        let Some(longest) = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm)) else { return Ok(None) };
+        let Some(longest) = touching.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm)) else {
+            return Ok(None);
+        };
         let into = number[usize::from(if longest.a == patch { longest.b } else { longest.a })];
         let own = number[usize::from(patch)];
         number.iter_mut().filter(|k| **k == own).for_each(|k| *k = into);
@@ -418,22 +468,32 @@ fn changed(
     surface: &SegmentedSurface,
     change: impl Fn(&Solid, &FaceLabels) -> Option<FaceLabels>,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
-    let limited = SegmentationParams { min_contact_mm: kept_limit_mm(params, surface), ..params.clone() };
-    let Ok(solid) = Solid::new(surface.mesh.clone()) else { return Ok(None) };
+    let limited = SegmentationParams {
+        min_contact_mm: kept_limit_mm(params, surface),
+        ..params.clone()
+    };
+    let Ok(solid) = Solid::new(surface.mesh.clone()) else {
+        return Ok(None);
+    };
     let label: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
     let labels = FaceLabels::from_connected(&Topology::new(&solid), &label);
-    let Some(changed) = change(&solid, &labels) else { return Ok(None) };
+    let Some(changed) = change(&solid, &labels) else {
+        return Ok(None);
+    };
     let mended = mend(ctx, &limited, &solid, &changed)?;
     let mut next = match smooth_and_cut(ctx, params, &solid, &mended) {
         // Other pieces may do.
         Err(SegmentationError::PatchVanished { .. }) => return Ok(None),
         made => made?,
     };
-    next.source_face.iter_mut().for_each(|f| *f = surface.source_face[*f as usize]);
+    next.source_face
+        .iter_mut()
+        .for_each(|f| *f = surface.source_face[*f as usize]);
     Ok(Some(next))
 }
 
-/// Halves edges until none is longer than the limit, which grows with models far larger than 300 mm to bound their triangles.
+/// Halves edges until none is longer than the limit, which grows with models far larger than 300 mm to bound
+/// their triangles.
 fn halve_long_edges(params: &SegmentationParams, solid: &Solid) -> (Solid, Vec<u32>) {
     let limit_mm = params.max_edge_mm.max((solid.mesh().area() / 20_000.0).sqrt());
     let mut fine = solid.clone();
@@ -441,7 +501,11 @@ fn halve_long_edges(params: &SegmentationParams, solid: &Solid) -> (Solid, Vec<u
     loop {
         let mesh = fine.mesh();
         let is_long = |a: u32, b: u32| mesh.points[a as usize].distance(mesh.points[b as usize]) > limit_mm;
-        if !mesh.triangles.iter().any(|&[a, b, c]| is_long(a, b) || is_long(b, c) || is_long(c, a)) {
+        if !mesh
+            .triangles
+            .iter()
+            .any(|&[a, b, c]| is_long(a, b) || is_long(b, c) || is_long(c, a))
+        {
             return (fine, source_face);
         }
         let (next, parent) = halve_edges(&fine, &Topology::new(&fine), is_long);
@@ -451,7 +515,11 @@ fn halve_long_edges(params: &SegmentationParams, solid: &Solid) -> (Solid, Vec<u
 }
 
 /// Halves edges near seams so that curves have points enough to be smooth.
-fn halve_edges_near_seams(solid: &Solid, labels: &FaceLabels, limit_mm: f64) -> (Solid, FaceLabels, Vec<u32>) {
+fn halve_edges_near_seams(
+    solid: &Solid,
+    labels: &FaceLabels,
+    limit_mm: f64,
+) -> (Solid, FaceLabels, Vec<u32>) {
     /// Rings of triangles beside the seam that are refined; the smoothed seam stays within them.
     const N_RINGS: usize = 2;
     let (mut fine, mut fine_labels) = (solid.clone(), labels.clone());
@@ -465,7 +533,11 @@ fn halve_edges_near_seams(solid: &Solid, labels: &FaceLabels, limit_mm: f64) -> 
         }
         for _ in 0..N_RINGS {
             let before = is_near.clone();
-            for t in mesh.triangles.iter().filter(|t| t.iter().any(|&v| before[v as usize])) {
+            for t in mesh
+                .triangles
+                .iter()
+                .filter(|t| t.iter().any(|&v| before[v as usize]))
+            {
                 t.iter().for_each(|&v| is_near[v as usize] = true);
             }
         }
@@ -474,7 +546,11 @@ fn halve_edges_near_seams(solid: &Solid, labels: &FaceLabels, limit_mm: f64) -> 
                 && is_near[b as usize]
                 && mesh.points[a as usize].distance(mesh.points[b as usize]) > limit_mm
         };
-        if !mesh.triangles.iter().any(|&[a, b, c]| wants(a, b) || wants(b, c) || wants(c, a)) {
+        if !mesh
+            .triangles
+            .iter()
+            .any(|&[a, b, c]| wants(a, b) || wants(b, c) || wants(c, a))
+        {
             return (fine, fine_labels, source_face);
         }
         let (next, parent) = halve_edges(&fine, &topology, wants);

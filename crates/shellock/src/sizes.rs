@@ -1,15 +1,17 @@
-//! How large connectors are, pair by pair of pieces (Sect. 4.3): by the stress at their boundary, and by what fits.
+//! How large connectors are, pair by pair of pieces (Sect. 4.3): by the stress at their boundary, and by what
+//! fits.
 //!
 //! ```text
 //!   D = D_min + min(α max σ, 1) (D_max − D_min)                                      (Eq. 3)
 //! ```
 //!
-//! with σ the largest von Mises stress of any load case at a point of the boundary. The paper leaves α open. Here it is 1 over
-//! the material's strength: a boundary that is stressed to the limit gets D_max. A larger α saturates boundaries that are far
-//! from failing; a smaller one never reaches D_max, since walls are made so thick that no stress exceeds the strength.
+//! with σ the largest von Mises stress of any load case at a point of the boundary. The paper leaves α open.
+//! Here it is 1 over the material's strength: a boundary that is stressed to the limit gets D_max. A larger α
+//! saturates boundaries that are far from failing; a smaller one never reaches D_max, since walls are made so
+//! thick that no stress exceeds the strength.
 //!
-//! What fits comes first. A short seam gets no larger connectors than leave it a contact; and between the wall of a narrow limb
-//! and the one opposite must be room for a channel:
+//! What fits comes first. A short seam gets no larger connectors than leave it a contact; and between the
+//! wall of a narrow limb and the one opposite must be room for a channel:
 //!
 //! ```text
 //!   ═══════╤═══════  wall H       t: thickness of the model, along the normal
@@ -19,8 +21,9 @@
 //!   ═══════════════  wall H
 //! ```
 //!
-//! Limits: the plan is not known yet, so neither is the angle of a connector, and a channel that leans may be twice as deep;
-//! connectors on the wall opposite are not looked at. What does not fit after all is left out or carved, as with any size.
+//! Limits: the plan is not known yet, so neither is the angle of a connector, and a channel that leans may be
+//! twice as deep; connectors on the wall opposite are not looked at. What does not fit after all is left out
+//! or carved, as with any size.
 
 use shellock_mechanics::connector::CHANNEL_DEPTH;
 use std::collections::BTreeMap;
@@ -36,7 +39,8 @@ use crate::{Cancelled, Ctx, PatchId, Seam, SegmentedSurface, Warning};
 
 /// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
 pub(crate) const CONTACT_SIZES: f64 = 5.6;
-/// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides; below this nothing was left.
+/// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides;
+/// below this nothing was left.
 pub(crate) const LEAST_CONTACT_SIZES: f64 = 4.2;
 /// A closed seam has no ends that need gaps: only the run.
 const LOOP_SIZES: f64 = 2.5;
@@ -53,7 +57,8 @@ const TOLD_FROM_MM: f64 = 0.25;
 /// The greatest von Mises stress of all load cases at a place of the outer surface, MPa.
 pub type StressField<'a> = &'a (dyn Fn(Vec3) -> f64 + Sync);
 
-/// Depth of a channel below the wall where the piece leaves straight out, mm; `clearance_mm` between the pin and the floor.
+/// Depth of a channel below the wall where the piece leaves straight out, mm; `clearance_mm` between the pin
+/// and the floor.
 pub fn depth_mm(size_mm: f64, clearance_mm: f64) -> f64 {
     CHANNEL_DEPTH * size_mm + clearance_mm
 }
@@ -75,23 +80,35 @@ impl Default for ConnectorSizes {
 impl ConnectorSizes {
     /// The same size for all pairs.
     pub fn uniform(size_mm: f64) -> Self {
-        Self { default_mm: size_mm, by_pair: BTreeMap::new() }
+        Self {
+            default_mm: size_mm,
+            by_pair: BTreeMap::new(),
+        }
     }
 
     /// Sizes of their own for some pairs, named in either order; the last counts where one is named twice.
     pub fn with_pairs(default_mm: f64, sizes_mm: impl IntoIterator<Item = ([PatchId; 2], f64)>) -> Self {
         let sorted = |([a, b], size_mm): ([PatchId; 2], f64)| ([a.min(b), a.max(b)], size_mm);
-        Self { default_mm, by_pair: sizes_mm.into_iter().map(sorted).collect() }
+        Self {
+            default_mm,
+            by_pair: sizes_mm.into_iter().map(sorted).collect(),
+        }
     }
 
     /// Lets no pair with `piece` have a larger size than `most_mm`.
     pub fn cap(&mut self, piece: PatchId, most_mm: f64) {
-        self.by_pair.iter_mut().filter(|(pair, _)| pair.contains(&piece)).for_each(|(_, mm)| *mm = mm.min(most_mm));
+        self.by_pair
+            .iter_mut()
+            .filter(|(pair, _)| pair.contains(&piece))
+            .for_each(|(_, mm)| *mm = mm.min(most_mm));
     }
 
     /// The size between two pieces, in either order.
     pub fn of(&self, a: PatchId, b: PatchId) -> f64 {
-        self.by_pair.get(&[a.min(b), a.max(b)]).copied().unwrap_or(self.default_mm)
+        self.by_pair
+            .get(&[a.min(b), a.max(b)])
+            .copied()
+            .unwrap_or(self.default_mm)
     }
 
     /// The size of pairs without one of their own, such as those that meet on the inner surface only.
@@ -132,7 +149,11 @@ pub struct SizeRange {
 
 impl Default for SizeRange {
     fn default() -> Self {
-        Self { min_mm: 2.0, max_mm: 4.0, alpha_per_mpa: None }
+        Self {
+            min_mm: 2.0,
+            max_mm: 4.0,
+            alpha_per_mpa: None,
+        }
     }
 }
 
@@ -148,8 +169,9 @@ impl SizeChoice {
 
     /// The least size that a pair may get, mm.
     ///
-    /// Segmentation, which comes before any size, counts a seam as a contact that has room for this one: longer seams get
-    /// larger connectors, but a seam is a contact if there is any size with which it can be one.
+    /// Segmentation, which comes before any size, counts a seam as a contact that has room for this one:
+    /// longer seams get larger connectors, but a seam is a contact if there is any size with which it can be
+    /// one.
     pub fn smallest_mm(&self) -> f64 {
         match self {
             Self::Fixed(size_mm) => *size_mm,
@@ -171,10 +193,15 @@ impl SizeChoice {
         let size = |name, value, least| ParamProblem::unless_within(name, "mm", value, least, MM[1]);
         let problems = match *self {
             Self::Fixed(size_mm) => vec![size("connector size", size_mm, MM[0])],
-            Self::Auto(SizeRange { min_mm, max_mm, alpha_per_mpa }) => vec![
+            Self::Auto(SizeRange {
+                min_mm,
+                max_mm,
+                alpha_per_mpa,
+            }) => vec![
                 size("smallest connector size", min_mm, MM[0]),
                 size("largest connector size", max_mm, MM[0].max(min_mm)),
-                alpha_per_mpa.and_then(|a| ParamProblem::unless_within("α of connector sizes", "1/MPa", a, 0.0, 10.0)),
+                alpha_per_mpa
+                    .and_then(|a| ParamProblem::unless_within("α of connector sizes", "1/MPa", a, 0.0, 10.0)),
             ],
         };
         problems.into_iter().flatten().collect()
@@ -253,7 +280,8 @@ pub enum SizeLimit {
     Cavity,
 }
 
-/// Eq. 3: the size for a greatest stress of `stress_mpa`, mm in [D_min, D_max]. No number counts as no stress.
+/// Eq. 3: the size for a greatest stress of `stress_mpa`, mm in [D_min, D_max]. No number counts as no
+/// stress.
 pub fn size_for_stress_mm(range: &SizeRange, strength_mpa: f64, stress_mpa: f64) -> f64 {
     let alpha = range.alpha_per_mpa.unwrap_or(1.0 / strength_mpa);
     // `max` takes the number of a number and NaN.
@@ -273,7 +301,10 @@ pub fn choose(
 ) -> Result<ChosenSizes, Cancelled> {
     let range = match &params.choice {
         SizeChoice::Fixed(size_mm) => {
-            return Ok(ChosenSizes { sizes: ConnectorSizes::uniform(*size_mm), limited: Vec::new() });
+            return Ok(ChosenSizes {
+                sizes: ConnectorSizes::uniform(*size_mm),
+                limited: Vec::new(),
+            });
         }
         SizeChoice::Auto(range) => range,
     };
@@ -282,23 +313,44 @@ pub fn choose(
     for seam in surface.seams() {
         seams_of.entry([seam.a, seam.b]).or_default().push(seam);
     }
-    let cavity = Cavity { bvh: TriangleBvh::new(&surface.mesh), far_mm: surface.mesh.bounds().diagonal() };
+    let cavity = Cavity {
+        bvh: TriangleBvh::new(&surface.mesh),
+        far_mm: surface.mesh.bounds().diagonal(),
+    };
     let chosen: Vec<LimitedSize> = seams_of
         .into_par_iter()
         .map(|(pair, seams)| {
-            let stress =
-                |field: StressField<'_>| seams.iter().flat_map(|s| &s.points).map(|p| field(*p)).fold(0.0, f64::max);
+            let stress = |field: StressField<'_>| {
+                seams
+                    .iter()
+                    .flat_map(|s| &s.points)
+                    .map(|p| field(*p))
+                    .fold(0.0, f64::max)
+            };
             let wanted_mm = size_for_stress_mm(range, params.strength_mpa, stress_mpa.map_or(0.0, stress));
             let (seam_mm, at) = longest(&seams, params.wall_mm);
             let cavity_mm = cavity.size_that_fits_mm(params, &seams);
-            let limit = if seam_mm <= cavity_mm { SizeLimit::Seam } else { SizeLimit::Cavity };
+            let limit = if seam_mm <= cavity_mm {
+                SizeLimit::Seam
+            } else {
+                SizeLimit::Cavity
+            };
             let given_mm = wanted_mm.min(seam_mm).min(cavity_mm).max(range.min_mm);
-            LimitedSize { pair, at, wanted_mm, given_mm, limit }
+            LimitedSize {
+                pair,
+                at,
+                wanted_mm,
+                given_mm,
+                limit,
+            }
         })
         .collect();
     ctx.check()?;
     let sizes = ConnectorSizes::with_pairs(range.min_mm, chosen.iter().map(|c| (c.pair, c.given_mm)));
-    let limited = chosen.into_iter().filter(|c| c.wanted_mm - c.given_mm > TOLD_FROM_MM).collect();
+    let limited = chosen
+        .into_iter()
+        .filter(|c| c.wanted_mm - c.given_mm > TOLD_FROM_MM)
+        .collect();
     Ok(ChosenSizes { sizes, limited })
 }
 
@@ -307,7 +359,9 @@ fn longest(seams: &[Seam], wall_mm: f64) -> (f64, Vec3) {
     let size_mm = |s: &Seam| s.length_below(wall_mm) / if s.is_loop() { LOOP_SIZES } else { CONTACT_SIZES };
     let sized = seams.iter().map(|s| (size_mm(s), s));
     let longest = sized.reduce(|x, y| if y.0 > x.0 { y } else { x });
-    longest.map_or((0.0, Vec3::ZERO), |(size_mm, s)| (size_mm, s.points[s.points.len() / 2]))
+    longest.map_or((0.0, Vec3::ZERO), |(size_mm, s)| {
+        (size_mm, s.points[s.points.len() / 2])
+    })
 }
 
 /// The inside of the model, as rays see it.
@@ -317,15 +371,17 @@ struct Cavity {
 }
 
 impl Cavity {
-    /// The largest size for which there is room below [`ROOM_SHARE`] of `seams`, mm; ≤ 0 where there is no cavity, ∞ where nothing
-    /// can be measured.
+    /// The largest size for which there is room below [`ROOM_SHARE`] of `seams`, mm; ≤ 0 where there is no
+    /// cavity, ∞ where nothing can be measured.
     fn size_that_fits_mm(&self, params: &SizeParams, seams: &[Seam]) -> f64 {
         let mut fits: Vec<f64> = seams
             .iter()
             .flat_map(|seam| seam.resampled((seam.length() / STEP_MM).ceil().max(1.0) as usize))
             .filter_map(|(point, normal)| {
                 let inwards = -normal.try_normalize()?;
-                let (_, on_mm) = self.bvh.first_hit(point + BELOW_MM * inwards, inwards, self.far_mm)?;
+                let (_, on_mm) = self
+                    .bvh
+                    .first_hit(point + BELOW_MM * inwards, inwards, self.far_mm)?;
                 Some(size_within_mm(params, BELOW_MM + on_mm))
             })
             .collect();
@@ -335,37 +391,56 @@ impl Cavity {
     }
 }
 
-/// The largest size whose channel fits where the model is so thick, the clearance away from the wall opposite, mm; may be < 0.
+/// The largest size whose channel fits where the model is so thick, the clearance away from the wall
+/// opposite, mm; may be < 0.
 fn size_within_mm(params: &SizeParams, thickness_mm: f64) -> f64 {
     (thickness_mm - 2.0 * (params.wall_mm + params.clearance_mm)) / CHANNEL_DEPTH
 }
 
 impl ChosenSizes {
-    /// Warns with `connector-limited`: once for all seams that are too short, once for all cavities that are too narrow.
+    /// Warns with `connector-limited`: once for all seams that are too short, once for all cavities that are
+    /// too narrow.
     pub fn tell(&self, ctx: &Ctx<'_>) {
         for limit in [SizeLimit::Seam, SizeLimit::Cavity] {
             let limited: Vec<&LimitedSize> = self.limited.iter().filter(|l| l.limit == limit).collect();
             let lost_mm = |l: &LimitedSize| l.wanted_mm - l.given_mm;
             // Of equals the pair with the lower ids.
-            let worst = limited.iter().copied().reduce(|x, y| if lost_mm(y) > lost_mm(x) { y } else { x });
+            let worst = limited
+                .iter()
+                .copied()
+                .reduce(|x, y| if lost_mm(y) > lost_mm(x) { y } else { x });
             let Some(worst) = worst else { continue };
             let mut pieces: Vec<PatchId> = limited.iter().flat_map(|l| l.pair).collect();
             pieces.sort_unstable();
             pieces.dedup();
             let message = worst.message(limited.len() - 1);
-            ctx.warn(Warning { code: "connector-limited".into(), message, pieces, at: Some(worst.at.to_array()) });
+            ctx.warn(Warning {
+                code: "connector-limited".into(),
+                message,
+                pieces,
+                at: Some(worst.at.to_array()),
+            });
         }
     }
 }
 
 impl LimitedSize {
     fn message(&self, n_others: usize) -> String {
-        let Self { pair: [a, b], wanted_mm, given_mm, .. } = self;
+        let Self {
+            pair: [a, b],
+            wanted_mm,
+            given_mm,
+            ..
+        } = self;
         let (why, remedy) = match self.limit {
-            SizeLimit::Seam => ("their seam is too short for larger ones", "fewer pieces have longer seams"),
-            SizeLimit::Cavity => {
-                ("the cavity is too narrow for larger ones", "thinner walls or a larger model make room")
-            }
+            SizeLimit::Seam => (
+                "their seam is too short for larger ones",
+                "fewer pieces have longer seams",
+            ),
+            SizeLimit::Cavity => (
+                "the cavity is too narrow for larger ones",
+                "thinner walls or a larger model make room",
+            ),
         };
         let others = match n_others {
             0 => String::new(),

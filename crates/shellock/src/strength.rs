@@ -1,7 +1,7 @@
 //! How thick the wall must be so that a fall does not break it (Sect. 4.3, Eq. 2).
 //!
-//! The model falls in a few random orientations. In each, the region that meets the ground stops the model within Δt, while
-//! the region on top is held:
+//! The model falls in a few random orientations. In each, the region that meets the ground stops the model
+//! within Δt, while the region on top is held:
 //!
 //! ```text
 //!     ▒▒▒▒▒▒▒    top: holds in the mean (see `mechanics::shell`)
@@ -11,15 +11,18 @@
 //!     ░░░░░░░    bottom: f = m v / Δt upwards, spread by mass
 //! ```
 //!
-//! m is the mass of the whole shell, so the load grows with the thickness H, and σ falls like 1/H where the wall bends. The
-//! least H whose stress stays below the material's strength is found on a bracket that shrinks by interpolating log σ over log H.
+//! m is the mass of the whole shell, so the load grows with the thickness H, and σ falls like 1/H where the
+//! wall bends. The least H whose stress stays below the material's strength is found on a bracket that
+//! shrinks by interpolating log σ over log H.
 //!
-//! Two rules. Where the model is too thin to be hollow with that H it is solid, and no shell: these places do not count
-//! (`SolidRegion`). And the stress that counts in a case is the one that all but a small share of the other area stays below: the few
-//! worst triangles, in creases and at tips, tell more of the mesh than of the model, and their stress grows with every
-//! refinement. docs/strength.md has what the share and the mesh change.
+//! Two rules. Where the model is too thin to be hollow with that H it is solid, and no shell: these places do
+//! not count (`SolidRegion`). And the stress that counts in a case is the one that all but a small share of
+//! the other area stays below: the few worst triangles, in creases and at tips, tell more of the mesh than of
+//! the model, and their stress grows with every refinement. docs/strength.md has what the share and the mesh
+//! change.
 
 pub mod chart;
+mod falls;
 mod thin;
 
 use std::f64::consts::{PI, TAU};
@@ -38,12 +41,9 @@ use crate::impact::impact_n;
 use crate::params::ParamProblem;
 use crate::{Cancelled, Ctx, Warning};
 
+use falls::{Fallen, Falls};
 pub use thin::SolidRegion;
 
-/// Height of the regions that hold and that meet the ground, as a share of the model's height in that orientation.
-const ZONE_SHARE: f64 = 0.1;
-/// Least area of such a region, as a share of the surface: a tip's zone grows until it has as much.
-const LEAST_ZONE_AREA: f64 = 0.01;
 /// Least area of a solid place that is told, mm².
 const TOLD_SOLID_MM2: f64 = 50.0;
 /// Width of the bracket at which the search ends, mm.
@@ -52,7 +52,8 @@ const RESOLUTION_MM: f64 = 0.05;
 const MOST_WITHOUT_BRACKET: usize = 4;
 /// Thicknesses after which the search bisects.
 const MOST_INTERPOLATED: usize = 6;
-/// Wall of a model that no wall saves, if thicker ones hardly help, mm: what is printed where nothing is computed.
+/// Wall of a model that no wall saves, if thicker ones hardly help, mm: what is printed where nothing is
+/// computed.
 const USUAL_MM: f64 = 2.0;
 /// Stress over the least there is that no thicker wall is worth avoiding.
 const WORTH_MORE_WALL: f64 = 1.05;
@@ -60,14 +61,16 @@ const WORTH_MORE_WALL: f64 = 1.05;
 const COARSE_POINTS: f64 = 2000.0;
 /// Points of the mesh whose stress counts; docs/strength.md has what more of them change.
 const FINE_POINTS: f64 = 6000.0;
-/// Stress on the fine mesh over that on the coarse one, as far as nothing is known: it is 1.0 to 1.05 on most models.
+/// Stress on the fine mesh over that on the coarse one, as far as nothing is known: it is 1.0 to 1.05 on most
+/// models.
 const USUAL_RATIO: f64 = 1.025;
 /// Change of the two meshes' ratio, in its logarithm, at which the search ends.
 const RATIO_TOLERANCE: f64 = 0.01;
 /// Thicknesses looked at on the coarse mesh, and on the fine one, at most.
 const MOST_TRIED: usize = 30;
 const MOST_FINE: usize = 5;
-/// Least share of the surface with a cavity below: a model with less is as good as solid, and no wall to be computed.
+/// Least share of the surface with a cavity below: a model with less is as good as solid, and no wall to be
+/// computed.
 const LEAST_HOLLOW: f64 = 0.1;
 
 /// What a wall must bear. Lengths in mm.
@@ -81,10 +84,12 @@ pub struct StrengthParams {
     pub n_cases: usize,
     /// Seed of the orientations.
     pub seed: u64,
-    /// Thinnest wall to look at. [0.4, 5]; 1.6, four lines of an ordinary nozzle: a seam's two sides need two each.
+    /// Thinnest wall to look at. [0.4, 5]; 1.6, four lines of an ordinary nozzle: a seam's two sides need two
+    /// each.
     pub least_mm: f64,
-    /// Thickest wall to look at. [`least_mm`, 20]; 3. The paper looks up to 10 mm and finds 1.9 to 2.8; thicker walls leave a figure of 150 mm
-    /// little cavity, and where 3 mm do not bear the stress, 10 hardly do (docs/strength.md).
+    /// Thickest wall to look at. [`least_mm`, 20]; 3. The paper looks up to 10 mm and finds 1.9 to 2.8;
+    /// thicker walls leave a figure of 150 mm little cavity, and where 3 mm do not bear the stress, 10 hardly
+    /// do (docs/strength.md).
     pub most_mm: f64,
     /// Share of the hollow area whose stress may be above the one that counts. [0, 0.2]; 0.005.
     pub peak_share: f64,
@@ -113,7 +118,8 @@ impl StrengthParams {
     fn leaving_cavity(&self, falls: &Falls) -> Option<Self> {
         /// Rounds of bisection: to a hundredth of a millimetre.
         const ROUNDS: usize = 8;
-        let is_hollow = |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>() >= LEAST_HOLLOW * falls.mesh.area();
+        let is_hollow =
+            |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>() >= LEAST_HOLLOW * falls.mesh.area();
         if is_hollow(self.most_mm) {
             return Some(self.clone());
         }
@@ -123,9 +129,16 @@ impl StrengthParams {
         }
         for _ in 0..ROUNDS {
             let middle = 0.5 * (low + high);
-            if is_hollow(middle) { low = middle } else { high = middle }
+            if is_hollow(middle) {
+                low = middle
+            } else {
+                high = middle
+            }
         }
-        Some(Self { most_mm: low, ..self.clone() })
+        Some(Self {
+            most_mm: low,
+            ..self.clone()
+        })
     }
 
     /// Every value out of range.
@@ -180,10 +193,11 @@ pub struct Strength {
     pub thickness_mm: f64,
     /// The stress that counts with it, MPa.
     pub stress_mpa: f64,
-    /// Whether no wall in the limits bears its stress, by more than the search resolves; the thickness is then the least that hardly any thicker
-    /// one betters, and no less than 2 mm.
+    /// Whether no wall in the limits bears its stress, by more than the search resolves; the thickness is
+    /// then the least that hardly any thicker one betters, and no less than 2 mm.
     pub is_too_weak: bool,
-    /// All thicknesses that were looked at, ascending, with the fine mesh's stress as the coarse one lets expect it.
+    /// All thicknesses that were looked at, ascending, with the fine mesh's stress as the coarse one lets
+    /// expect it.
     pub tried: Vec<Tried>,
     /// The orientation that decides: number of the fall and the direction that is down then.
     pub deciding: (usize, Vec3),
@@ -207,14 +221,20 @@ impl Strength {
         self.deciding.1 = turn(self.deciding.1);
         self.at = turn(self.at);
         self.mesh.points.iter_mut().for_each(|p| *p = turn(*p));
-        self.solid.iter_mut().for_each(|r| r.at = turn(r.at.into()).to_array());
+        self.solid
+            .iter_mut()
+            .for_each(|r| r.at = turn(r.at.into()).to_array());
         self
     }
 
     /// Share of the surface with no cavity below, in [0, 1].
     pub fn solid_share(&self) -> f64 {
         let solid = |t: &usize| self.is_solid[*t];
-        (0..self.is_solid.len()).filter(solid).map(|t| self.mesh.face_area(t)).sum::<f64>() / self.mesh.area()
+        (0..self.is_solid.len())
+            .filter(solid)
+            .map(|t| self.mesh.face_area(t))
+            .sum::<f64>()
+            / self.mesh.area()
     }
 
     /// What the user should know: a wall that is too weak, and where the model is solid.
@@ -224,7 +244,11 @@ impl Strength {
             message: format!(
                 "a wall of {:.2} mm does not bear a fall from {} m: {:.0} MPa, and the material bears {:.0}; \
                  a wall up to {:.1} mm helps little",
-                self.thickness_mm, params.drop_m, self.stress_mpa, params.material.strength_mpa, params.most_mm
+                self.thickness_mm,
+                params.drop_m,
+                self.stress_mpa,
+                params.material.strength_mpa,
+                params.most_mm
             ),
             pieces: Vec::new(),
             at: Some(self.at.to_array()),
@@ -257,25 +281,34 @@ pub struct StressMap<'a> {
 impl<'a> StressMap<'a> {
     /// Of the analysis mesh's triangles.
     pub fn new(strength: &'a Strength) -> Self {
-        Self { bvh: TriangleBvh::new(&strength.mesh), largest_mpa: &strength.largest_mpa }
+        Self {
+            bvh: TriangleBvh::new(&strength.mesh),
+            largest_mpa: &strength.largest_mpa,
+        }
     }
 
     /// Of the triangle nearest to `place`, MPa.
     pub fn at(&self, place: Vec3) -> f64 {
-        self.bvh.nearest(place, f64::INFINITY).map_or(0.0, |nearest| self.largest_mpa[nearest.face as usize])
+        self.bvh
+            .nearest(place, f64::INFINITY)
+            .map_or(0.0, |nearest| self.largest_mpa[nearest.face as usize])
     }
 }
 
 /// Finds the thickness of the wall of `model` (mm).
 ///
-/// A coarse mesh shows how the stress depends on the thickness, a fine one by how much the coarse one is wrong: their ratio
-/// hardly depends on the thickness.
+/// A coarse mesh shows how the stress depends on the thickness, a fine one by how much the coarse one is
+/// wrong: their ratio hardly depends on the thickness.
 pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Result<Strength, StrengthError> {
     ctx.stage("thickness", 0)?;
     let falls = |points: f64| Falls::new(params, model, points);
     let (coarse, fine) = rayon::join(|| falls(COARSE_POINTS), || falls(FINE_POINTS));
     let (coarse, fine) = (coarse?, fine?);
-    let params = &params.leaving_cavity(&coarse).ok_or(StrengthError::NothingHollow { wall_mm: params.least_mm })?;
+    let params = &params
+        .leaving_cavity(&coarse)
+        .ok_or(StrengthError::NothingHollow {
+            wall_mm: params.least_mm,
+        })?;
     let strength_mpa = params.material.strength_mpa;
     let middle_mm = (params.least_mm * params.most_mm).sqrt();
     let mut tried = vec![coarse.worst(middle_mm)?.tried];
@@ -283,7 +316,10 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
     let mut exacts: Vec<Fallen> = Vec::new();
     for _ in 0..MOST_FINE {
         let estimate = estimate(ctx, params, &coarse, &mut tried, strength_mpa / ratio)?;
-        if exacts.iter().any(|e| e.tried.thickness_mm == estimate.thickness_mm) {
+        if exacts
+            .iter()
+            .any(|e| e.tried.thickness_mm == estimate.thickness_mm)
+        {
             break;
         }
         let exact = fine.worst(estimate.thickness_mm)?;
@@ -297,23 +333,35 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
             break;
         }
     }
-    // Where the two meshes disagree from thickness to thickness, the thinnest that bears its stress counts, or the last.
+    // Where the two meshes disagree from thickness to thickness, the thinnest that bears its stress counts,
+    // or the last.
     let bears = |e: &Fallen| e.tried.stress_mpa <= (1.0 + RATIO_TOLERANCE) * strength_mpa;
     let last = exacts.len() - 1;
-    let thinnest = |i: &usize, j: &usize| exacts[*i].tried.thickness_mm.total_cmp(&exacts[*j].tried.thickness_mm);
+    let thinnest = |i: &usize, j: &usize| {
+        exacts[*i]
+            .tried
+            .thickness_mm
+            .total_cmp(&exacts[*j].tried.thickness_mm)
+    };
     let at = if bears(&exacts[last]) {
         last
     } else {
-        (0..last).filter(|&i| bears(&exacts[i])).min_by(thinnest).unwrap_or(last)
+        (0..last)
+            .filter(|&i| bears(&exacts[i]))
+            .min_by(thinnest)
+            .unwrap_or(last)
     };
     let found = exacts.swap_remove(at);
     let is_too_weak = !bears(&found);
-    let corrected = |t: &Tried| Tried { stress_mpa: ratio * t.stress_mpa, ..*t };
+    let corrected = |t: &Tried| Tried {
+        stress_mpa: ratio * t.stress_mpa,
+        ..*t
+    };
     Ok(fine.strength(found, is_too_weak, tried.iter().map(corrected).collect()))
 }
 
-/// The thickness that the coarse mesh asks for where stresses above `limit_mpa` are too much, with its stress there; what was looked at on
-/// the way is added to `tried`.
+/// The thickness that the coarse mesh asks for where stresses above `limit_mpa` are too much, with its stress
+/// there; what was looked at on the way is added to `tried`.
 fn estimate(
     ctx: &Ctx<'_>,
     params: &StrengthParams,
@@ -345,16 +393,25 @@ fn insert(tried: &mut Vec<Tried>, new: Tried) {
     tried.insert(at, new);
 }
 
-/// The thinnest wall that bears its stress; where none does, the thinnest one that hardly any thicker one betters.
+/// The thinnest wall that bears its stress; where none does, the thinnest one that hardly any thicker one
+/// betters.
 fn choice(tried: &[Tried], limit_mpa: f64) -> Tried {
     let bearable_mpa = bearable_mpa(tried, limit_mpa);
-    tried.iter().find(|t| t.stress_mpa <= bearable_mpa).copied().unwrap_or(tried[0])
+    tried
+        .iter()
+        .find(|t| t.stress_mpa <= bearable_mpa)
+        .copied()
+        .unwrap_or(tried[0])
 }
 
 /// The limit, or where no wall stays below it a little more than the least stress.
 fn bearable_mpa(tried: &[Tried], limit_mpa: f64) -> f64 {
     let least_mpa = tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
-    if least_mpa <= limit_mpa { limit_mpa } else { WORTH_MORE_WALL * least_mpa }
+    if least_mpa <= limit_mpa {
+        limit_mpa
+    } else {
+        WORTH_MORE_WALL * least_mpa
+    }
 }
 
 /// The stress of a given thickness, mm.
@@ -368,11 +425,16 @@ pub fn stress(
     let shell = Falls::new(params, model, FINE_POINTS)?;
     let found = shell.worst(thickness_mm)?;
     let tried = found.tried;
-    Ok(shell.strength(found, tried.stress_mpa > params.material.strength_mpa, vec![tried]))
+    Ok(shell.strength(
+        found,
+        tried.stress_mpa > params.material.strength_mpa,
+        vec![tried],
+    ))
 }
 
-/// The thickness to look at next, if any: both ends of the range; where even the thickest wall is too weak a few between, since
-/// what is solid does not count; and in the bracket about the first that [`bearable_mpa`] allows, until that is narrow enough.
+/// The thickness to look at next, if any: both ends of the range; where even the thickest wall is too weak a
+/// few between, since what is solid does not count; and in the bracket about the first that [`bearable_mpa`]
+/// allows, until that is narrow enough.
 fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64> {
     let (thinnest, thickest) = (tried.first()?, tried.last()?);
     let is_bearable = tried.iter().any(|t| t.stress_mpa <= limit_mpa);
@@ -380,8 +442,12 @@ fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64>
         return Some(params.most_mm);
     }
     if !is_bearable && tried.len() < MOST_WITHOUT_BRACKET {
-        let gaps = tried.windows(2).map(|pair| [pair[0].thickness_mm, pair[1].thickness_mm]);
-        return gaps.max_by(|a, b| (a[1] / a[0]).total_cmp(&(b[1] / b[0]))).map(|[a, b]| (a * b).sqrt());
+        let gaps = tried
+            .windows(2)
+            .map(|pair| [pair[0].thickness_mm, pair[1].thickness_mm]);
+        return gaps
+            .max_by(|a, b| (a[1] / a[0]).total_cmp(&(b[1] / b[0])))
+            .map(|[a, b]| (a * b).sqrt());
     }
     let limit_mpa = bearable_mpa(tried, limit_mpa);
     let first = tried.iter().position(|t| t.stress_mpa <= limit_mpa)?;
@@ -399,168 +465,13 @@ fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64>
     let is_nearer_low = guess_mm - low.thickness_mm < 0.5 * width_mm;
     let moved_mm = guess_mm + RESOLUTION_MM / 3.0 * if is_nearer_low { 1.0 } else { -1.0 };
     // Where stresses do not follow a power of the thickness, interpolation alone would creep.
-    let margin_mm = if tried.len() < MOST_INTERPOLATED { RESOLUTION_MM / 3.0 } else { 0.3 * width_mm };
+    let margin_mm = if tried.len() < MOST_INTERPOLATED {
+        RESOLUTION_MM / 3.0
+    } else {
+        0.3 * width_mm
+    };
     let margin_mm = margin_mm.min(0.5 * width_mm);
     Some(moved_mm.clamp(low.thickness_mm + margin_mm, high.thickness_mm - margin_mm))
-}
-
-/// A shell and its falls.
-struct Falls {
-    mesh: TriMesh,
-    shell: ShellModel,
-    /// The load of each where a mm³ of material falls, N.
-    cases: Vec<LoadCase>,
-    down: Vec<Vec3>,
-    bvh: TriangleBvh,
-    peak_share: f64,
-    /// Of the model, mm³.
-    volume_mm3: f64,
-}
-
-impl Falls {
-    fn new(params: &StrengthParams, model: &Solid, n_points: f64) -> Result<Self, ShellError> {
-        let mesh = analysis_mesh(model.mesh(), params.refinement * n_points);
-        let shell = ShellModel::new(&mesh, &params.material)?;
-        let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
-        let down = even_directions(&mut rng, params.n_cases);
-        let density_t_mm3 = 1e-9 * params.material.density_g_cm3;
-        let force_n_mm3 = impact_n(density_t_mm3, 1e3 * params.drop_m);
-        let cases = down.iter().map(|down| fall(&mesh, shell.areas_mm2(), *down, force_n_mm3)).collect();
-        let (bvh, volume_mm3) = (TriangleBvh::new(&mesh), mesh.signed_volume());
-        Ok(Self { bvh, volume_mm3, mesh, shell, cases, down, peak_share: params.peak_share })
-    }
-
-    /// Stresses of all triangles in all falls, MPa.
-    fn stresses(&self, thickness_mm: f64) -> Result<Vec<Vec<f64>>, ShellError> {
-        let solver = self.shell.at_thickness(thickness_mm)?;
-        let material_mm3 = (thickness_mm * self.mesh.area()).min(self.volume_mm3);
-        let scaled = |case: &LoadCase| LoadCase {
-            forces_n: case.forces_n.iter().map(|f| material_mm3 * *f).collect(),
-            ..case.clone()
-        };
-        let moved = solver.solve(&self.cases.iter().map(scaled).collect::<Vec<_>>())?;
-        Ok(moved.iter().map(|u| solver.stresses(u).iter().map(|s| s.von_mises_mpa()).collect()).collect())
-    }
-
-    fn worst(&self, thickness_mm: f64) -> Result<Fallen, ShellError> {
-        let hollow_mm2 = self.hollow_areas(thickness_mm);
-        let stresses_mpa = self.stresses(thickness_mm)?;
-        let counts: Vec<(usize, f64)> =
-            stresses_mpa.par_iter().map(|of_case| counting(of_case, &hollow_mm2, self.peak_share)).collect();
-        let case = (0..counts.len()).max_by(|&i, &j| counts[i].1.total_cmp(&counts[j].1)).unwrap_or(0);
-        let (triangle, stress_mpa) = counts[case];
-        Ok(Fallen { tried: Tried { thickness_mm, stress_mpa }, case, triangle, hollow_mm2, stresses_mpa })
-    }
-
-    /// What there is to say of `worst`.
-    fn strength(self, worst: Fallen, is_too_weak: bool, tried: Vec<Tried>) -> Strength {
-        let Fallen { case, hollow_mm2, mut stresses_mpa, .. } = worst;
-        let largest = |t: usize| stresses_mpa.iter().map(|of_case| of_case[t]).fold(0.0, f64::max);
-        Strength {
-            largest_mpa: (0..self.mesh.triangles.len()).map(largest).collect(),
-            thickness_mm: worst.tried.thickness_mm,
-            stress_mpa: worst.tried.stress_mpa,
-            is_too_weak,
-            tried,
-            deciding: (case, self.down[case]),
-            at: self.mesh.face_center(worst.triangle),
-            deciding_mpa: stresses_mpa.swap_remove(case),
-            is_solid: hollow_mm2.iter().map(|a| *a == 0.0).collect(),
-            solid: thin::regions(&self.mesh, &hollow_mm2),
-            mesh: self.mesh,
-        }
-    }
-
-    /// The area of each triangle below which there is a cavity, and 0 of those where the model is solid, mm².
-    fn hollow_areas(&self, thickness_mm: f64) -> Vec<f64> {
-        let area = |t: usize| {
-            let is_solid = thin::is_solid(&self.mesh, &self.bvh, t, thickness_mm);
-            if is_solid { 0.0 } else { self.mesh.face_area(t) }
-        };
-        (0..self.mesh.triangles.len()).into_par_iter().map(area).collect()
-    }
-}
-
-/// All falls with one thickness.
-struct Fallen {
-    tried: Tried,
-    /// The fall that decides.
-    case: usize,
-    /// The triangle that has the stress that counts.
-    triangle: usize,
-    hollow_mm2: Vec<f64>,
-    /// Of each fall and triangle.
-    stresses_mpa: Vec<Vec<f64>>,
-}
-
-/// The triangle and the stress that all but `peak_share` of the area stays below or at; 0 where there is no area.
-fn counting(stress_mpa: &[f64], areas: &[f64], peak_share: f64) -> (usize, f64) {
-    let mut order: Vec<usize> = (0..areas.len()).filter(|&t| areas[t] > 0.0).collect();
-    order.sort_by(|&i, &j| stress_mpa[j].total_cmp(&stress_mpa[i]));
-    let mut left = peak_share * areas.iter().sum::<f64>();
-    let found = order.iter().find(|&&t| {
-        left -= areas[t];
-        left < 0.0
-    });
-    found.map_or((0, 0.0), |&t| (t, stress_mpa[t]))
-}
-
-/// Even triangles on about `n_points` points.
-fn analysis_mesh(mesh: &TriMesh, n_points: f64) -> TriMesh {
-    // One point for each √3/2 l² of a mesh of equilateral triangles.
-    let target_edge_mm = (mesh.area() / (n_points * 0.75f64.sqrt())).sqrt();
-    remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, mesh, &vec![0; mesh.triangles.len()]).mesh
-}
-
-/// Directions that are as even as few directions can be, turned at random: a spiral of equal areas.
-///
-/// Directions drawn one by one leave gaps and clusters, and the thickness depends on them: docs/strength.md.
-fn even_directions(rng: &mut ChaCha8Rng, n: usize) -> Vec<Vec3> {
-    let pole = on_sphere(rng);
-    let (x, y) = pole.any_orthonormal_pair();
-    let start: f64 = rng.random_range(0.0..TAU);
-    let on_spiral = |i: usize| {
-        let height = 1.0 - (2.0 * i as f64 + 1.0) / n as f64;
-        let angle = start + i as f64 * PI * (3.0 - 5.0f64.sqrt());
-        let radius = (1.0 - height * height).max(0.0).sqrt();
-        pole * height + x * (radius * angle.cos()) + y * (radius * angle.sin())
-    };
-    (0..n).map(on_spiral).collect()
-}
-
-/// A random direction, all alike.
-fn on_sphere(rng: &mut ChaCha8Rng) -> Vec3 {
-    loop {
-        let p = Vec3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
-        let length = p.length();
-        if (0.1..=1.0).contains(&length) {
-            return p / length;
-        }
-    }
-}
-
-/// The load of a fall along `down`: `total_n` on the bottom, spread by area, which is by mass.
-fn fall(mesh: &TriMesh, areas_mm2: &[f64], down: Vec3, total_n: f64) -> LoadCase {
-    let bottom = zone(mesh, areas_mm2, down);
-    let zone_mm2: f64 = bottom.iter().map(|&v| areas_mm2[v as usize]).sum();
-    let mut forces_n = vec![Vec3::ZERO; mesh.points.len()];
-    bottom.iter().for_each(|&v| forces_n[v as usize] = -down * (total_n * areas_mm2[v as usize] / zone_mm2));
-    LoadCase { forces_n, moments_n_mm: Vec::new(), held: zone(mesh, areas_mm2, -down) }
-}
-
-/// The points furthest along `way`: a [`ZONE_SHARE`] of the height, and no less than [`LEAST_ZONE_AREA`] of the surface.
-fn zone(mesh: &TriMesh, areas_mm2: &[f64], way: Vec3) -> Vec<u32> {
-    let mut order: Vec<(f64, u32)> = mesh.points.iter().map(|p| p.dot(way)).zip(0..).collect();
-    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let (Some(first), Some(last)) = (order.first(), order.last()) else { return Vec::new() };
-    let least_height = first.0 - ZONE_SHARE * (first.0 - last.0);
-    let mut missing_mm2 = LEAST_ZONE_AREA * areas_mm2.iter().sum::<f64>();
-    let belongs = |(height, v): &&(f64, u32)| {
-        let belongs = *height >= least_height || missing_mm2 > 0.0;
-        missing_mm2 -= areas_mm2[*v as usize];
-        belongs
-    };
-    order.iter().take_while(belongs).map(|(_, v)| *v).collect()
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
-//! What a punch on top and a fall do to the assembled pieces (Sect. 7, Fig. 15), and what they would do to worse ones.
+//! What a punch on top and a fall do to the assembled pieces (Sect. 7, Fig. 15), and what they would do to
+//! worse ones.
 //!
-//! The pieces are walls and connectors of tetrahedra with contact, as in the volume metric. Punch: the force presses on
-//! what faces upwards within [`PUNCH_RADIUS_MM`] of the top, or of the highest place in the middle; what stands on the
-//! table is held. Fall: the model lands on its feet and is stopped within 1/300 s (Sect. 4.3); the floor pushes with
-//! `M v / Δt` on what touches it, and inertia balances it.
+//! The pieces are walls and connectors of tetrahedra with contact, as in the volume metric. Punch: the force
+//! presses on what faces upwards within [`PUNCH_RADIUS_MM`] of the top, or of the highest place in the
+//! middle; what stands on the table is held. Fall: the model lands on its feet and is stopped within 1/300 s
+//! (Sect. 4.3); the floor pushes with `M v / Δt` on what touches it, and inertia balances it.
 //!
-//! Limits: static and linear; no friction but at the key, no clearance; the fall is upright; connectors are everywhere
-//! where the plan has room for them, carved or not.
+//! Limits: static and linear; no friction but at the key, no clearance; the fall is upright; connectors are
+//! everywhere where the plan has room for them, carved or not.
 
 mod chart;
 mod region;
@@ -16,7 +17,9 @@ mod tests;
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
-use shellock_mechanics::{Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams};
+use shellock_mechanics::{
+    Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams,
+};
 
 use crate::impact::impact_n;
 use crate::metric::{MetricParams, PlanModel};
@@ -42,18 +45,31 @@ fn limit_mm(connector_mm: f64) -> f64 {
 
 /// Size of the largest connectors, mm.
 fn largest_mm(meetings: &[Meeting]) -> f64 {
-    meetings.iter().filter_map(|m| m.joint).map(|joint| joint.size_mm).fold(0.0, f64::max)
+    meetings
+        .iter()
+        .filter_map(|m| m.joint)
+        .map(|joint| joint.size_mm)
+        .fold(0.0, f64::max)
 }
 
 /// Whether some connector has come out too far.
 fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
-    meetings.iter().zip(opening_mm).any(|(m, d)| m.joint.is_some_and(|joint| *d >= limit_mm(joint.size_mm)))
+    meetings
+        .iter()
+        .zip(opening_mm)
+        .any(|(m, d)| m.joint.is_some_and(|joint| *d >= limit_mm(joint.size_mm)))
 }
 
 /// The same with a connector half as large.
 fn with_half_the_size(meeting: &Meeting) -> Meeting {
-    let half = |joint: Joint| Joint { size_mm: joint.size_mm / 2.0, ..joint };
-    Meeting { joint: meeting.joint.map(half), ..*meeting }
+    let half = |joint: Joint| Joint {
+        size_mm: joint.size_mm / 2.0,
+        ..joint
+    };
+    Meeting {
+        joint: meeting.joint.map(half),
+        ..*meeting
+    }
 }
 
 /// Where the punch lands.
@@ -102,9 +118,14 @@ impl StressParams {
     pub fn problems(&self) -> Vec<String> {
         let mut problems = self.plan.problems();
         problems.extend(self.metric.problems().iter().map(ToString::to_string));
-        for (name, value) in [("the punch", self.punch_n), ("the height of the fall", self.drop_mm)] {
+        for (name, value) in [
+            ("the punch", self.punch_n),
+            ("the height of the fall", self.drop_mm),
+        ] {
             if !(value > 0.0 && value <= 1e5) {
-                problems.push(format!("{name} is {value}; it must be more than 0 and at most 100 000 N or mm"));
+                problems.push(format!(
+                    "{name} is {value}; it must be more than 0 and at most 100 000 N or mm"
+                ));
             }
         }
         problems
@@ -159,8 +180,8 @@ pub struct Pair {
     pub punch: Outcome,
     /// Fallen.
     pub drop: Outcome,
-    /// The plan's score, by the surface metric, mm (higher is better); `None` where pieces come apart in it, and for
-    /// half connectors, whose plan is the kit's.
+    /// The plan's score, by the surface metric, mm (higher is better); `None` where pieces come apart in it,
+    /// and for half connectors, whose plan is the kit's.
     pub score_mm: Option<f64>,
     /// Size of the largest connectors, mm.
     pub connector_mm: f64,
@@ -191,7 +212,9 @@ impl StressReport {
 
     /// Whether the kit holds in both tests.
     pub fn passed(&self) -> bool {
-        [&self.kit.punch, &self.kit.drop].iter().all(|o| o.verdict == Verdict::Holds)
+        [&self.kit.punch, &self.kit.drop]
+            .iter()
+            .all(|o| o.verdict == Verdict::Holds)
     }
 }
 
@@ -220,7 +243,8 @@ pub enum StressError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Tests the pieces of `surface` under `plan`, with connectors of half the size, and under a plan of half the score.
+/// Tests the pieces of `surface` under `plan`, with connectors of half the size, and under a plan of half the
+/// score.
 pub fn stress_test(
     ctx: &Ctx<'_>,
     params: &StressParams,
@@ -232,7 +256,10 @@ pub fn stress_test(
         return Err(StressError::Params(problems));
     }
     if plan.steps.len() != surface.n_patches {
-        return Err(StressError::Plan { steps: plan.steps.len(), patches: surface.n_patches });
+        return Err(StressError::Plan {
+            steps: plan.steps.len(),
+            patches: surface.n_patches,
+        });
     }
     ctx.stage("a plan of half the score", 0)?;
     let model = sound_model(ctx, params, surface)?;
@@ -248,7 +275,9 @@ pub fn stress_test(
     let bench = Bench::new(params, &model)?;
     let kit = bench.test(&meetings, score_mm)?;
     ctx.stage("stress test: half the score", 0)?;
-    let half_score = worse.map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm))).transpose()?;
+    let half_score = worse
+        .map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm)))
+        .transpose()?;
     ctx.stage("stress test: half connectors", 0)?;
     let half_connectors = bench.test(&meetings.iter().map(with_half_the_size).collect::<Vec<_>>(), None)?;
     Ok(StressReport {
@@ -260,16 +289,23 @@ pub fn stress_test(
     })
 }
 
-/// Lengths of the edges to try, as shares of what is asked for: where a coarse mesh folds so that no wall stands on it,
-/// a somewhat finer or coarser one mostly does not.
+/// Lengths of the edges to try, as shares of what is asked for: where a coarse mesh folds so that no wall
+/// stands on it, a somewhat finer or coarser one mostly does not.
 const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
 
 /// The model on the first mesh on which walls stand.
-fn sound_model(ctx: &Ctx<'_>, params: &StressParams, surface: &SegmentedSurface) -> Result<PlanModel, StressError> {
+fn sound_model(
+    ctx: &Ctx<'_>,
+    params: &StressParams,
+    surface: &SegmentedSurface,
+) -> Result<PlanModel, StressError> {
     let mut failure = None;
     for share in EDGE_SHARES {
         let model = PlanModel::new(
-            &MetricParams { edge_share: share * params.metric.edge_share, ..params.metric },
+            &MetricParams {
+                edge_share: share * params.metric.edge_share,
+                ..params.metric
+            },
             surface,
             &params.sizes,
         );
@@ -278,7 +314,9 @@ fn sound_model(ctx: &Ctx<'_>, params: &StressParams, surface: &SegmentedSurface)
             Err(e) => return Err(e.into()),
             Ok(_) => {
                 if share != 1.0 {
-                    ctx.note(&format!("the mesh folds; its edges are made {share} times as long as asked for"));
+                    ctx.note(&format!(
+                        "the mesh folds; its edges are made {share} times as long as asked for"
+                    ));
                 }
                 return Ok(model);
             }
@@ -289,7 +327,9 @@ fn sound_model(ctx: &Ctx<'_>, params: &StressParams, surface: &SegmentedSurface)
 
 /// Quality by the surface metric, mm; `None` where pieces come apart.
 fn score(model: &PlanModel, plan: &InstallationPlan) -> Result<Option<f64>, SparseError> {
-    let solved = model.surface_model()?.resist(&model.meetings(plan), plan.key().0)?;
+    let solved = model
+        .surface_model()?
+        .resist(&model.meetings(plan), plan.key().0)?;
     Ok(match solved.resistance {
         Resistance::Holds(opening) => Some(opening.quality_mm),
         Resistance::Separable(_) => None,
@@ -311,7 +351,9 @@ fn half_as_good(
     for plan in plans {
         ctx.check()?;
         let solved = solver.resist(&model.meetings(&plan), plan.key().0)?;
-        let Resistance::Holds(opening) = solved.resistance else { continue };
+        let Resistance::Holds(opening) = solved.resistance else {
+            continue;
+        };
         let distance = (opening.quality_mm / (2.0 * score_mm)).ln().abs();
         if best.as_ref().is_none_or(|b| distance < b.0) {
             best = Some((distance, plan, opening.quality_mm));
@@ -333,11 +375,20 @@ struct Bench<'a> {
 impl<'a> Bench<'a> {
     fn new(params: &'a StressParams, model: &'a PlanModel) -> Result<Self, VolumeError> {
         let (wall_mm, material) = (params.metric.wall_mm, params.metric.material);
-        let volume = VolumeParams { wall_mm, material, ..VolumeParams::default() };
+        let volume = VolumeParams {
+            wall_mm,
+            material,
+            ..VolumeParams::default()
+        };
         let held = lowest(&model.assembly, Vec3::from_array(params.plan.up));
         let standing = VolumeModel::clamped(&volume, &model.assembly, &held)?;
         let free = VolumeModel::new(&volume, &model.assembly)?;
-        Ok(Self { params, model, standing, free })
+        Ok(Self {
+            params,
+            model,
+            standing,
+            free,
+        })
     }
 
     fn test(&self, meetings: &[Meeting], score_mm: Option<f64>) -> Result<Pair, VolumeError> {
@@ -371,8 +422,8 @@ impl<'a> Bench<'a> {
             triangle_mpa: Vec::new(),
             imbalance: 0.0,
         });
-        let widest =
-            (0..loaded.opening_mm.len()).max_by(|a, b| loaded.opening_mm[*a].total_cmp(&loaded.opening_mm[*b]));
+        let widest = (0..loaded.opening_mm.len())
+            .max_by(|a, b| loaded.opening_mm[*a].total_cmp(&loaded.opening_mm[*b]));
         let opening_mm = widest.map_or(0.0, |i| loaded.opening_mm[i]);
         let strength_share = loaded.walls.robust_mpa.max(loaded.connectors.robust_mpa) / strength_mpa;
         let verdict = if !loaded.lost.is_empty() || opening_mm.is_infinite() {
@@ -388,7 +439,11 @@ impl<'a> Bench<'a> {
             verdict,
             force_n,
             opening_mm,
-            limit_mm: limit_mm(widest.and_then(|i| meetings[i].joint).map_or(largest_mm(meetings), |j| j.size_mm)),
+            limit_mm: limit_mm(
+                widest
+                    .and_then(|i| meetings[i].joint)
+                    .map_or(largest_mm(meetings), |j| j.size_mm),
+            ),
             between: widest.map(|i| self.model.pieces_at(i)),
             at: widest.map(|i| self.model.place_of(i).to_array()),
             n_lost: loaded.lost.len(),
@@ -401,7 +456,14 @@ impl<'a> Bench<'a> {
 
     /// Infinite at the stations of `parts`, which come off, and nothing elsewhere.
     fn openings_of(&self, parts: &[u32]) -> Vec<f64> {
-        let is_loose = |i: usize| self.model.pieces_at(i).iter().any(|piece| parts.contains(&piece.0));
-        (0..self.model.assembly.stations.len()).map(|i| if is_loose(i) { f64::INFINITY } else { 0.0 }).collect()
+        let is_loose = |i: usize| {
+            self.model
+                .pieces_at(i)
+                .iter()
+                .any(|piece| parts.contains(&piece.0))
+        };
+        (0..self.model.assembly.stations.len())
+            .map(|i| if is_loose(i) { f64::INFINITY } else { 0.0 })
+            .collect()
     }
 }

@@ -6,8 +6,8 @@ use crate::{IdVec, PatchId};
 
 /// The model's closed surface, cut along the seams so that each triangle belongs to one patch.
 ///
-/// Geometrically it is the model's surface: cutting only adds points on edges and triangles inside triangles. Every patch
-/// owns at least one triangle.
+/// Geometrically it is the model's surface: cutting only adds points on edges and triangles inside triangles.
+/// Every patch owns at least one triangle.
 #[derive(Clone, Debug)]
 pub struct SegmentedSurface {
     /// Closed, oriented outwards; two triangles of different patches meet in whole edges.
@@ -46,10 +46,15 @@ impl Seam {
 }
 
 impl Seam {
-    /// `n` + 1 points with their unnormalised normals at equal distances along the seam; none where it has no length.
+    /// `n` + 1 points with their unnormalised normals at equal distances along the seam; none where it has no
+    /// length.
     pub(crate) fn resampled(&self, n: usize) -> Vec<(Vec3, Vec3)> {
         let total = self.length();
-        if self.points.len() < 2 || self.normals.len() != self.points.len() || total <= 0.0 || !total.is_finite() {
+        if self.points.len() < 2
+            || self.normals.len() != self.points.len()
+            || total <= 0.0
+            || !total.is_finite()
+        {
             return Vec::new();
         }
         let mut out = Vec::with_capacity(n + 1);
@@ -62,16 +67,24 @@ impl Seam {
                 i += 1;
                 step = self.points[i].distance(self.points[i + 1]);
             }
-            let t = if step > 0.0 { ((target - before) / step).clamp(0.0, 1.0) } else { 0.0 };
-            out.push((self.points[i].lerp(self.points[i + 1], t), self.normals[i].lerp(self.normals[i + 1], t)));
+            let t = if step > 0.0 {
+                ((target - before) / step).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            out.push((
+                self.points[i].lerp(self.points[i + 1], t),
+                self.normals[i].lerp(self.normals[i + 1], t),
+            ));
         }
         out
     }
 
-    /// Points along the seam about `step_mm` apart on the outer surface, moved inwards by `depth_mm`: where a wall of that thickness has
-    /// its inner edge, up to the detail of the surface, which is smoothed away.
+    /// Points along the seam about `step_mm` apart on the outer surface, moved inwards by `depth_mm`: where a
+    /// wall of that thickness has its inner edge, up to the detail of the surface, which is smoothed away.
     pub(crate) fn below(&self, depth_mm: f64, step_mm: f64) -> Vec<Vec3> {
-        /// Rounds of averaging the normals with their neighbours: bumps narrower than some steps do not show inside.
+        /// Rounds of averaging the normals with their neighbours: bumps narrower than some steps do not show
+        /// inside.
         const ROUNDS: usize = 3;
         let n = (self.length() / step_mm).ceil().max(1.0) as usize;
         let stations = self.resampled(n);
@@ -82,17 +95,25 @@ impl Seam {
                 normals[i] = 0.5 * old[i] + 0.25 * (old[i - 1] + old[i + 1]);
             }
         }
-        stations.iter().zip(normals).map(|(s, n)| s.0 - depth_mm * n.normalize_or_zero()).collect()
+        stations
+            .iter()
+            .zip(normals)
+            .map(|(s, n)| s.0 - depth_mm * n.normalize_or_zero())
+            .collect()
     }
 
-    /// Length along the inner edge of a wall of `depth_mm`, mm: shorter than outside where the surface bulges, as round a limb.
+    /// Length along the inner edge of a wall of `depth_mm`, mm: shorter than outside where the surface
+    /// bulges, as round a limb.
     pub fn length_below(&self, depth_mm: f64) -> f64 {
         /// Coarse enough that bumps do not lengthen the line, mm.
         const STEP_MM: f64 = 2.0;
         if depth_mm <= 0.0 {
             return self.length();
         }
-        self.below(depth_mm, STEP_MM).windows(2).map(|w| w[0].distance(w[1])).sum()
+        self.below(depth_mm, STEP_MM)
+            .windows(2)
+            .map(|w| w[0].distance(w[1]))
+            .sum()
     }
 }
 
@@ -114,9 +135,16 @@ mod tests {
     #[test]
     fn a_seam_round_a_limb_is_shorter_inside_by_the_ratio_of_the_radii() {
         let angle = |i: i32| std::f64::consts::TAU * f64::from(i) / 60.0;
-        let normals: Vec<Vec3> = (0..=60).map(|i| Vec3::new(angle(i).cos(), angle(i).sin(), 0.0)).collect();
+        let normals: Vec<Vec3> = (0..=60)
+            .map(|i| Vec3::new(angle(i).cos(), angle(i).sin(), 0.0))
+            .collect();
         let points = normals.iter().map(|n| 7.0 * *n).collect();
-        let seam = Seam { a: PatchId(0), b: PatchId(1), points, normals };
+        let seam = Seam {
+            a: PatchId(0),
+            b: PatchId(1),
+            points,
+            normals,
+        };
         let ratio = seam.length_below(2.0) / seam.length_below(0.0);
         assert!((ratio - 5.0 / 7.0).abs() < 0.02, "{ratio}");
     }

@@ -14,24 +14,39 @@ use crate::{PatchId, Seam, SegmentedSurface};
 pub fn label(mesh: TriMesh, n_patches: usize, patch_at: impl Fn(Vec3) -> u32) -> SegmentedSurface {
     let n = mesh.triangles.len();
     let patch_of_face = (0..n).map(|f| PatchId(patch_at(mesh.face_center(f)))).collect();
-    SegmentedSurface { mesh, patch_of_face, source_face: (0..n as u32).collect(), n_patches }
+    SegmentedSurface {
+        mesh,
+        patch_of_face,
+        source_face: (0..n as u32).collect(),
+        n_patches,
+    }
 }
 
 /// Labels each triangle by the nearest of `n_patches` spread directions (random, then four rounds of Lloyd).
 pub fn voronoi(mesh: TriMesh, n_patches: usize, seed: u64) -> SegmentedSurface {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut sites: Vec<Vec3> =
-        (0..n_patches).map(|_| mesh.face_center(rng.random_range(0..mesh.triangles.len())).normalize()).collect();
+    let mut sites: Vec<Vec3> = (0..n_patches)
+        .map(|_| {
+            mesh.face_center(rng.random_range(0..mesh.triangles.len()))
+                .normalize()
+        })
+        .collect();
     let nearest = |sites: &[Vec3], p: Vec3| {
         let p = p.normalize();
-        (0..sites.len()).max_by(|&i, &j| sites[i].dot(p).total_cmp(&sites[j].dot(p))).unwrap()
+        (0..sites.len())
+            .max_by(|&i, &j| sites[i].dot(p).total_cmp(&sites[j].dot(p)))
+            .unwrap()
     };
     for _ in 0..4 {
         let mut sums = vec![Vec3::ZERO; n_patches];
         for f in 0..mesh.triangles.len() {
             sums[nearest(&sites, mesh.face_center(f))] += mesh.face_center(f) * mesh.face_area(f);
         }
-        sites = sums.into_iter().zip(sites).map(|(s, old)| s.try_normalize().unwrap_or(old)).collect();
+        sites = sums
+            .into_iter()
+            .zip(sites)
+            .map(|(s, old)| s.try_normalize().unwrap_or(old))
+            .collect();
     }
     label(mesh, n_patches, |p| nearest(&sites, p) as u32)
 }
@@ -58,7 +73,12 @@ pub fn seams(surface: &SegmentedSurface) -> Vec<Seam> {
         while let Some(line) = take_chain(&mut edges) {
             let points = line.iter().map(|&v| surface.mesh.points[v as usize]).collect();
             let normals = line.iter().map(|&v| normal[v as usize].normalize()).collect();
-            seams.push(Seam { a, b, points, normals });
+            seams.push(Seam {
+                a,
+                b,
+                points,
+                normals,
+            });
         }
     }
     seams
@@ -67,10 +87,17 @@ pub fn seams(surface: &SegmentedSurface) -> Vec<Seam> {
 /// Takes one chain of directed edges out of `edges`, started at an end where there is one.
 fn take_chain(edges: &mut BTreeSet<(u32, u32)>) -> Option<Vec<u32>> {
     let heads: BTreeSet<u32> = edges.iter().map(|e| e.1).collect();
-    let first = edges.iter().find(|e| !heads.contains(&e.0)).or_else(|| edges.iter().next()).copied()?;
+    let first = edges
+        .iter()
+        .find(|e| !heads.contains(&e.0))
+        .or_else(|| edges.iter().next())
+        .copied()?;
     edges.remove(&first);
     let mut line = vec![first.0, first.1];
-    while let Some(&next) = edges.range((line[line.len() - 1], 0)..=(line[line.len() - 1], u32::MAX)).next() {
+    while let Some(&next) = edges
+        .range((line[line.len() - 1], 0)..=(line[line.len() - 1], u32::MAX))
+        .next()
+    {
         edges.remove(&next);
         line.push(next.1);
     }

@@ -1,10 +1,11 @@
 //! Goldens: what the program wrote and said when it was last looked at, as digests.
 //!
-//! Kits are a function of input, options and seed, on any number of threads, so a change that is to change nothing must keep every
-//! byte. `cargo xtask golden` compares and `--update` writes anew; a test compares the figures that come with the program.
+//! Kits are a function of input, options and seed, on any number of threads, so a change that is to change
+//! nothing must keep every byte. `cargo xtask golden` compares and `--update` writes anew; a test compares
+//! the figures that come with the program.
 //!
-//! Limits: sine, cosine and the sums of the sparse solver depend on the processor's vector units and on the C library, so digests are
-//! compared only on a machine of the kind that they were made on ([`machine`]).
+//! Limits: sine, cosine and the sums of the sparse solver depend on the processor's vector units and on the C
+//! library, so digests are compared only on a machine of the kind that they were made on ([`machine`]).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -25,37 +26,91 @@ pub struct Case {
 
 /// Jobs on figures that come with the program, which tests run: each takes some seconds.
 pub const QUICK: [Case; 3] = [
-    Case { name: "vase", args: &["demo", "--figure", "vase", "--size", "60", "--pieces", "5"] },
+    Case {
+        name: "vase",
+        args: &["demo", "--figure", "vase", "--size", "60", "--pieces", "5"],
+    },
     Case {
         name: "dinosaur, a piece is the key, filament",
-        args: &["demo", "--figure", "dinosaur", "--size", "60", "--pieces", "3", "--key", "piece", "--printer", "fdm"],
+        args: &[
+            "demo",
+            "--figure",
+            "dinosaur",
+            "--size",
+            "60",
+            "--pieces",
+            "3",
+            "--key",
+            "piece",
+            "--printer",
+            "fdm",
+        ],
     },
-    Case { name: "vase, no plan", args: &["demo", "--figure", "vase", "--size", "40", "--pieces", "3", "--key", "40"] },
+    Case {
+        name: "vase, no plan",
+        args: &[
+            "demo", "--figure", "vase", "--size", "40", "--pieces", "3", "--key", "40",
+        ],
+    },
 ];
 
 /// More of them, which take up to a minute: pieces that rattle, keys and divisions in vain, labels.
 pub const FIGURES: [Case; 5] = [
     Case {
         name: "torus, a piece is the key",
-        args: &["demo", "--figure", "torus", "--size", "60", "--pieces", "3", "--key", "piece"],
+        args: &[
+            "demo", "--figure", "torus", "--size", "60", "--pieces", "3", "--key", "piece",
+        ],
     },
-    Case { name: "torus", args: &["demo", "--figure", "torus", "--size", "60", "--pieces", "2"] },
+    Case {
+        name: "torus",
+        args: &["demo", "--figure", "torus", "--size", "60", "--pieces", "2"],
+    },
     Case {
         name: "squirrel, filament",
-        args: &["demo", "--figure", "squirrel", "--size", "100", "--pieces", "4", "--printer", "fdm"],
+        args: &[
+            "demo",
+            "--figure",
+            "squirrel",
+            "--size",
+            "100",
+            "--pieces",
+            "4",
+            "--printer",
+            "fdm",
+        ],
     },
     Case {
         name: "arms, labels",
-        args: &["build", "figures/arms.stl", "--labels", "figures/arms.seg", "--size", "120"],
+        args: &[
+            "build",
+            "figures/arms.stl",
+            "--labels",
+            "figures/arms.seg",
+            "--size",
+            "120",
+        ],
     },
-    Case { name: "cat, failed", args: &["demo", "--figure", "cat", "--size", "40", "--pieces", "40"] },
+    Case {
+        name: "cat, failed",
+        args: &["demo", "--figure", "cat", "--size", "40", "--pieces", "40"],
+    },
 ];
 
 /// Jobs on models from elsewhere, in the folder `models`: each takes up to two minutes.
 pub const MODELS: [Case; 9] = [
-    Case { name: "teddy", args: &["build", "models/teddy_psb179.off", "--size", "150", "--up", "y"] },
-    Case { name: "koala", args: &["build", "models/koala.obj", "--size", "150", "--up", "y"] },
-    Case { name: "vase, two keys", args: &["build", "models/vase_amphora.obj", "--size", "150", "--up", "y"] },
+    Case {
+        name: "teddy",
+        args: &["build", "models/teddy_psb179.off", "--size", "150", "--up", "y"],
+    },
+    Case {
+        name: "koala",
+        args: &["build", "models/koala.obj", "--size", "150", "--up", "y"],
+    },
+    Case {
+        name: "vase, two keys",
+        args: &["build", "models/vase_amphora.obj", "--size", "150", "--up", "y"],
+    },
     Case {
         name: "octopus, labels, rounds",
         args: &[
@@ -71,20 +126,57 @@ pub const MODELS: [Case; 9] = [
     },
     Case {
         name: "hand, labels, rounds",
-        args: &["build", "models/hand_psb186.off", "--size", "180", "--labels", "models/hand_psb186.s8.seg"],
+        args: &[
+            "build",
+            "models/hand_psb186.off",
+            "--size",
+            "180",
+            "--labels",
+            "models/hand_psb186.s8.seg",
+        ],
     },
-    Case { name: "cat, a piece is the key", args: &["build", "models/cat.obj", "--size", "150", "--key", "piece"] },
+    Case {
+        name: "cat, a piece is the key",
+        args: &["build", "models/cat.obj", "--size", "150", "--key", "piece"],
+    },
     Case {
         name: "gargoyle, a piece is the key",
-        args: &["build", "models/gargoyle.obj", "--size", "150", "--up", "y", "--key", "piece"],
+        args: &[
+            "build",
+            "models/gargoyle.obj",
+            "--size",
+            "150",
+            "--up",
+            "y",
+            "--key",
+            "piece",
+        ],
     },
     Case {
         name: "teddy, filament",
-        args: &["build", "models/teddy_psb179.off", "--size", "150", "--up", "y", "--printer", "fdm"],
+        args: &[
+            "build",
+            "models/teddy_psb179.off",
+            "--size",
+            "150",
+            "--up",
+            "y",
+            "--printer",
+            "fdm",
+        ],
     },
     Case {
         name: "bunny, filament",
-        args: &["build", "models/bunny.obj", "--size", "150", "--up", "y", "--printer", "fdm"],
+        args: &[
+            "build",
+            "models/bunny.obj",
+            "--size",
+            "150",
+            "--up",
+            "y",
+            "--printer",
+            "fdm",
+        ],
     },
 ];
 
@@ -104,12 +196,18 @@ impl Ending {
     pub fn changes_since(&self, earlier: &Self) -> Vec<String> {
         let mut changes = Vec::new();
         if self.exit_code != earlier.exit_code {
-            changes.push(format!("exit code {} instead of {}", self.exit_code, earlier.exit_code));
+            changes.push(format!(
+                "exit code {} instead of {}",
+                self.exit_code, earlier.exit_code
+            ));
         }
         if self.said != earlier.said {
             changes.push("what it says".to_owned());
         }
-        let gone = earlier.files.keys().filter(|name| !self.files.contains_key(*name));
+        let gone = earlier
+            .files
+            .keys()
+            .filter(|name| !self.files.contains_key(*name));
         changes.extend(gone.map(|name| format!("{name} is missing")));
         for (name, digest) in &self.files {
             match earlier.files.get(name) {
@@ -155,7 +253,8 @@ pub fn of_figures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/figures.json")
 }
 
-/// What results may depend on besides input, options and seed: the processor's vector units and the C library.
+/// What results may depend on besides input, options and seed: the processor's vector units and the C
+/// library.
 pub fn machine() -> String {
     let mut words = vec![std::env::consts::OS, std::env::consts::ARCH];
     #[cfg(target_arch = "x86_64")]
@@ -168,11 +267,14 @@ pub fn machine() -> String {
         words.extend(has.into_iter().filter(|(_, has)| *has).map(|(name, _)| name));
     }
     let libc = Command::new("getconf").arg("GNU_LIBC_VERSION").output().ok();
-    let libc = libc.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned()).unwrap_or_default();
+    let libc = libc
+        .map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
+        .unwrap_or_default();
     format!("{} {libc}", words.join(" ")).trim().to_owned()
 }
 
-/// Runs `program` on a case, on so many threads, in a folder of its own; `models` is where models from elsewhere are.
+/// Runs `program` on a case, on so many threads, in a folder of its own; `models` is where models from
+/// elsewhere are.
 pub fn run(program: &Path, case: &Case, n_threads: usize, models: Option<&Path>) -> io::Result<Ending> {
     let folder = tempfile::tempdir()?;
     let at = folder.path();
@@ -190,19 +292,36 @@ pub fn run(program: &Path, case: &Case, n_threads: usize, models: Option<&Path>)
     let mut said = run.stdout;
     said.extend(run.stderr);
     let kit = at.join("kit");
-    let files = if kit.is_dir() { digests(&kit)? } else { BTreeMap::new() };
-    Ok(Ending { exit_code: run.status.code().unwrap_or(-1), said: digest(&said), files })
+    let files = if kit.is_dir() {
+        digests(&kit)?
+    } else {
+        BTreeMap::new()
+    };
+    Ok(Ending {
+        exit_code: run.status.code().unwrap_or(-1),
+        said: digest(&said),
+        files,
+    })
 }
 
 /// Figures with the labels of their limbs.
 fn figures(program: &Path, at: &Path) -> io::Result<()> {
     fs::create_dir(at.join("figures"))?;
-    let args = ["figure", "arms", "-o", "figures/arms.stl", "--labels", "figures/arms.seg"];
+    let args = [
+        "figure",
+        "arms",
+        "-o",
+        "figures/arms.stl",
+        "--labels",
+        "figures/arms.seg",
+    ];
     let made = Command::new(program).current_dir(at).args(args).output()?;
     if made.status.success() {
         Ok(())
     } else {
-        Err(io::Error::other(String::from_utf8_lossy(&made.stderr).into_owned()))
+        Err(io::Error::other(
+            String::from_utf8_lossy(&made.stderr).into_owned(),
+        ))
     }
 }
 
@@ -216,12 +335,19 @@ fn link(to: &Path, at: &Path) -> io::Result<()> {
     fs::create_dir(at)?;
     fs::read_dir(to)?.try_for_each(|entry| {
         let path = entry?.path();
-        if path.is_file() { fs::copy(&path, at.join(path.file_name().unwrap_or_default())).map(drop) } else { Ok(()) }
+        if path.is_file() {
+            fs::copy(&path, at.join(path.file_name().unwrap_or_default())).map(drop)
+        } else {
+            Ok(())
+        }
     })
 }
 
 fn digest(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    Sha256::digest(bytes)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }
 
 /// Digests of all files below a folder, by their path in it.
@@ -235,7 +361,11 @@ fn digests(folder: &Path) -> io::Result<BTreeMap<String, String>> {
                 folders.push(path);
                 continue;
             }
-            let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+            let name = path
+                .strip_prefix(folder)
+                .unwrap_or(&path)
+                .to_string_lossy()
+                .replace('\\', "/");
             found.insert(name, digest(&fs::read(&path)?));
         }
     }

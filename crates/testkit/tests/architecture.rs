@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use syn::visit::Visit;
 
-/// Modules of a crate; each may name those before it. `plan` stands before `body` because bodies are split along a plan.
+/// Modules of a crate; each may name those before it. `plan` stands before `body` because bodies are split
+/// along a plan.
 const DESIGN: [&str; 12] = [
     "seam",
     "strength",
@@ -21,8 +22,18 @@ const DESIGN: [&str; 12] = [
     "piece",
     "design",
 ];
-const ASSEMBLY: [&str; 10] =
-    ["ids", "context", "direction", "sequence", "press_fit", "push", "motion", "verify", "play", "certificate"];
+const ASSEMBLY: [&str; 10] = [
+    "ids",
+    "context",
+    "direction",
+    "sequence",
+    "press_fit",
+    "push",
+    "motion",
+    "verify",
+    "play",
+    "certificate",
+];
 
 /// Crates from the ground up, each with those that its product may name.
 const FLOORS: [(&str, &[&str]); 10] = [
@@ -34,7 +45,18 @@ const FLOORS: [(&str, &[&str]); 10] = [
     ("render", &["geom", "assembly"]),
     ("shellock", &["geom", "mechanics", "assembly", "render"]),
     ("print", &["geom", "mechanics", "assembly", "render"]),
-    ("cli", &["geom", "formats", "mechanics", "assembly", "render", "shellock", "print"]),
+    (
+        "cli",
+        &[
+            "geom",
+            "formats",
+            "mechanics",
+            "assembly",
+            "render",
+            "shellock",
+            "print",
+        ],
+    ),
     ("testkit", &["geom"]),
 ];
 
@@ -62,15 +84,22 @@ fn sources(krate: &str) -> Vec<PathBuf> {
 
 /// The module path of a file within its crate: `plan/contact/hold.rs` is `plan::contact::hold`.
 fn module(krate: &str, file: &Path) -> Vec<String> {
-    let inside = file.strip_prefix(crates().join(krate).join("src")).unwrap().with_extension("");
-    let mut path: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+    let inside = file
+        .strip_prefix(crates().join(krate).join("src"))
+        .unwrap()
+        .with_extension("");
+    let mut path: Vec<String> = inside
+        .iter()
+        .map(|part| part.to_string_lossy().into_owned())
+        .collect();
     if matches!(path.last().map(String::as_str), Some("lib" | "main" | "mod")) {
         path.pop();
     }
     path
 }
 
-/// Collects the paths that a file names, from the root of its crate; those of other crates begin with an empty word.
+/// Collects the paths that a file names, from the root of its crate; those of other crates begin with an
+/// empty word.
 struct Names {
     at: Vec<String>,
     found: BTreeSet<Vec<String>>,
@@ -95,7 +124,13 @@ impl Names {
     }
 
     fn tree(&mut self, before: &[String], tree: &syn::UseTree) {
-        let with = |word: &syn::Ident| before.iter().cloned().chain([word.to_string()]).collect::<Vec<_>>();
+        let with = |word: &syn::Ident| {
+            before
+                .iter()
+                .cloned()
+                .chain([word.to_string()])
+                .collect::<Vec<_>>()
+        };
         match tree {
             syn::UseTree::Path(path) => self.tree(&with(&path.ident), &path.tree),
             syn::UseTree::Name(name) => self.add(&with(&name.ident)),
@@ -132,19 +167,29 @@ impl<'a> Visit<'a> for Names {
 
 fn names(krate: &str, file: &Path) -> BTreeSet<Vec<String>> {
     let parsed = syn::parse_file(&fs::read_to_string(file).unwrap()).unwrap();
-    let mut names = Names { at: module(krate, file), found: BTreeSet::new() };
+    let mut names = Names {
+        at: module(krate, file),
+        found: BTreeSet::new(),
+    };
     names.visit_file(&parsed);
     names.found
 }
 
 /// Names of later modules in files of earlier ones.
 fn upward(krate: &str, order: &[&str]) -> Vec<String> {
-    let place = |path: &[String]| path.first().and_then(|first| order.iter().position(|m| m == first));
+    let place = |path: &[String]| {
+        path.first()
+            .and_then(|first| order.iter().position(|m| m == first))
+    };
     let mut found = Vec::new();
     for file in sources(krate) {
         let path = module(krate, &file);
-        let is_test = path.last().is_some_and(|name| name.ends_with("tests") || name == "kits" || name == "testing");
-        let Some(own) = place(&path).filter(|_| !is_test) else { continue };
+        let is_test = path
+            .last()
+            .is_some_and(|name| name.ends_with("tests") || name == "kits" || name == "testing");
+        let Some(own) = place(&path).filter(|_| !is_test) else {
+            continue;
+        };
         for name in names(krate, &file) {
             if place(&name).is_some_and(|named| named > own) {
                 found.push(format!("{} names {}", file.display(), name.join("::")));
@@ -162,11 +207,18 @@ fn modules_depend_only_on_earlier_modules() {
 
 #[test]
 fn grouped_and_relative_imports_are_seen() {
-    let text = "use crate::{plan::{self, Way}, body}; use super::super::report; fn f() { crate::verify::go() }";
-    let mut names = Names { at: vec!["plan".into(), "contact".into()], found: BTreeSet::new() };
+    let text =
+        "use crate::{plan::{self, Way}, body}; use super::super::report; fn f() { crate::verify::go() }";
+    let mut names = Names {
+        at: vec!["plan".into(), "contact".into()],
+        found: BTreeSet::new(),
+    };
     names.visit_file(&syn::parse_file(text).unwrap());
     let found: Vec<String> = names.found.iter().map(|name| name.join("::")).collect();
-    assert_eq!(found, ["body", "plan::Way", "plan::self", "report", "verify::go"].map(String::from));
+    assert_eq!(
+        found,
+        ["body", "plan::Way", "plan::self", "report", "verify::go"].map(String::from)
+    );
 }
 
 #[test]
@@ -175,9 +227,15 @@ fn crates_depend_only_on_lower_floors() {
     for (krate, lower) in FLOORS {
         let manifest = fs::read_to_string(crates().join(krate).join("Cargo.toml")).unwrap();
         let product = manifest.split("[dev-dependencies]").next().unwrap();
-        let named = product.lines().filter_map(|line| line.strip_suffix(".workspace = true"));
+        let named = product
+            .lines()
+            .filter_map(|line| line.strip_suffix(".workspace = true"));
         for name in named.filter(|name| name.starts_with("shellock")) {
-            let short = if name == "shellock" { name } else { &name["shellock-".len()..] };
+            let short = if name == "shellock" {
+                name
+            } else {
+                &name["shellock-".len()..]
+            };
             if !lower.contains(&short) {
                 found.push(format!("{krate} depends on {short}"));
             }
@@ -189,10 +247,25 @@ fn crates_depend_only_on_lower_floors() {
 #[test]
 fn library_crates_touch_no_file_clock_or_stdout() {
     let mut found = Vec::new();
-    for krate in ["geom", "formats", "mechanics", "assembly", "render", "shellock", "print"] {
+    for krate in [
+        "geom",
+        "formats",
+        "mechanics",
+        "assembly",
+        "render",
+        "shellock",
+        "print",
+    ] {
         for file in sources(krate) {
             let text = fs::read_to_string(&file).unwrap();
-            for forbidden in ["std::fs", "Instant::now", "SystemTime", "println!", "eprintln!", "std::env"] {
+            for forbidden in [
+                "std::fs",
+                "Instant::now",
+                "SystemTime",
+                "println!",
+                "eprintln!",
+                "std::env",
+            ] {
                 if text.contains(forbidden) {
                     found.push(format!("{} uses {forbidden}", file.display()));
                 }

@@ -77,15 +77,28 @@ pub fn scatter(labels: &Labels<'_>, x: &[f64], y: &[f64]) -> Result<String, Fail
         say(kendall(x, y)),
         x.len().min(y.len())
     );
-    let labels = Labels { title: &title, ..*labels };
-    svg(&labels, padded(x.iter().copied()), padded(y.iter().copied()), None, |plane| {
-        let dots = x.iter().zip(y).map(|(&x, &y)| Circle::new((x, y), 4, COLOURS[0].mix(0.6).filled()));
-        plane.draw_series(dots)?;
-        Ok(())
-    })
+    let labels = Labels {
+        title: &title,
+        ..*labels
+    };
+    svg(
+        &labels,
+        padded(x.iter().copied()),
+        padded(y.iter().copied()),
+        None,
+        |plane| {
+            let dots = x
+                .iter()
+                .zip(y)
+                .map(|(&x, &y)| Circle::new((x, y), 4, COLOURS[0].mix(0.6).filled()));
+            plane.draw_series(dots)?;
+            Ok(())
+        },
+    )
 }
 
-/// A line through the medians of each curve in a band from least to greatest; `optimum`, where known, as a dashed line.
+/// A line through the medians of each curve in a band from least to greatest; `optimum`, where known, as a
+/// dashed line.
 pub fn bands(
     labels: &Labels<'_>,
     curves: &[Curve<'_>],
@@ -93,7 +106,9 @@ pub fn bands(
     legend: Corner,
 ) -> Result<String, Failure> {
     let points = || curves.iter().flat_map(|c| &c.points);
-    let x = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.x), h.max(p.x)));
+    let x = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
+        (l.min(p.x), h.max(p.x))
+    });
     let y = padded(points().flat_map(|p| [p.low, p.high]).chain(optimum));
     svg(labels, widened(x.0, x.1), y, Some(legend.into()), |plane| {
         for (curve, colour) in curves.iter().zip(COLOURS.iter().cycle()) {
@@ -101,7 +116,12 @@ pub fn bands(
             let below = steps.iter().map(|p| (p.x, p.low));
             let outline: Vec<_> = below.chain(steps.iter().rev().map(|p| (p.x, p.high))).collect();
             plane.draw_series([Polygon::new(outline, colour.mix(0.18))])?;
-            draw_line(plane, curve.name, steps.iter().map(|p| (p.x, p.middle)).collect(), *colour)?;
+            draw_line(
+                plane,
+                curve.name,
+                steps.iter().map(|p| (p.x, p.middle)).collect(),
+                *colour,
+            )?;
         }
         if let Some(best) = optimum {
             let ends = [(x.0, best), (x.1, best)];
@@ -121,35 +141,50 @@ pub fn sorted_scores(labels: &Labels<'_>, columns: &[(&str, &[f64])]) -> Result<
         order.sort_by(|&i, &j| first[i].total_cmp(&first[j]));
         order
     });
-    svg(labels, widened(1.0, order.len() as f64), -PADDING..1.0 + PADDING, Some(Corner::LowerRight.into()), |plane| {
-        // The first, which all others are to follow, is drawn last and so on top.
-        for (i, (name, values)) in columns.iter().enumerate().rev() {
-            let values = normalised(values);
-            let line = order.iter().enumerate().filter_map(|(k, &row)| Some((k as f64 + 1.0, *values.get(row)?)));
-            draw_line(plane, name, line.collect(), COLOURS[i % COLOURS.len()])?;
-        }
-        Ok(())
-    })
+    svg(
+        labels,
+        widened(1.0, order.len() as f64),
+        -PADDING..1.0 + PADDING,
+        Some(Corner::LowerRight.into()),
+        |plane| {
+            // The first, which all others are to follow, is drawn last and so on top.
+            for (i, (name, values)) in columns.iter().enumerate().rev() {
+                let values = normalised(values);
+                let line = order
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(k, &row)| Some((k as f64 + 1.0, *values.get(row)?)));
+                draw_line(plane, name, line.collect(), COLOURS[i % COLOURS.len()])?;
+            }
+            Ok(())
+        },
+    )
 }
 
 /// One line an interval, in their order from above, with a dot where the value was reached.
 pub fn intervals(labels: &Labels<'_>, intervals: &[Interval]) -> Result<String, Failure> {
     let n = intervals.len() as f64;
     let most = intervals.iter().map(|i| i.high).fold(0.0, f64::max);
-    svg(labels, widened(0.0, (1.0 + PADDING) * most), 0.0..n.max(1.0), None, |plane| {
-        for (i, interval) in intervals.iter().enumerate() {
-            let y = n - i as f64 - 0.5;
-            let colour = COLOURS[0];
-            plane.draw_series([PathElement::new(
-                vec![(interval.low, y), (interval.high, y)],
-                colour.mix(0.4).stroke_width(3 * LINE_PX),
-            )])?;
-            plane.draw_series([Circle::new((interval.high, y), 6, colour.filled())])?;
-            let style = ("sans-serif", TEXT_PX - 1).into_font().color(&BLACK);
-            plane.draw_series([Text::new(interval.name.clone(), (0.0, y), style)])?;
-        }
-        Ok(())
-    })
+    svg(
+        labels,
+        widened(0.0, (1.0 + PADDING) * most),
+        0.0..n.max(1.0),
+        None,
+        |plane| {
+            for (i, interval) in intervals.iter().enumerate() {
+                let y = n - i as f64 - 0.5;
+                let colour = COLOURS[0];
+                plane.draw_series([PathElement::new(
+                    vec![(interval.low, y), (interval.high, y)],
+                    colour.mix(0.4).stroke_width(3 * LINE_PX),
+                )])?;
+                plane.draw_series([Circle::new((interval.high, y), 6, colour.filled())])?;
+                let style = ("sans-serif", TEXT_PX - 1).into_font().color(&BLACK);
+                plane.draw_series([Text::new(interval.name.clone(), (0.0, y), style)])?;
+            }
+            Ok(())
+        },
+    )
 }
 
 impl From<Corner> for SeriesLabelPosition {
@@ -164,7 +199,11 @@ impl From<Corner> for SeriesLabelPosition {
 /// What holds from one point to the next, as corners of a staircase.
 fn as_steps(points: &[BandPoint]) -> Vec<BandPoint> {
     let corner = |w: &[BandPoint]| [w[0], BandPoint { x: w[1].x, ..w[0] }];
-    points.windows(2).flat_map(corner).chain(points.last().copied()).collect()
+    points
+        .windows(2)
+        .flat_map(corner)
+        .chain(points.last().copied())
+        .collect()
 }
 
 fn draw_line(plane: &mut Plane<'_, '_>, name: &str, points: Vec<(f64, f64)>, colour: RGBColor) -> Drawn {
@@ -222,7 +261,10 @@ fn svg(
     })();
     match drawn {
         Ok(()) => Ok(text),
-        Err(e) => Err(Failure::Chart { title: labels.title.to_owned(), problem: e.to_string() }),
+        Err(e) => Err(Failure::Chart {
+            title: labels.title.to_owned(),
+            problem: e.to_string(),
+        }),
     }
 }
 
@@ -235,13 +277,19 @@ fn tick(value: &f64) -> String {
         _ => {
             let decimals = (2 - size.log10().floor() as i32).clamp(0, 5) as usize;
             let text = format!("{value:.decimals$}");
-            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+            if text.contains('.') {
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            } else {
+                text
+            }
         }
     }
 }
 
 fn padded(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+        (l.min(v), h.max(v))
+    });
     let padding = PADDING * (high - low);
     widened(low - padding, high + padding)
 }
@@ -259,7 +307,11 @@ fn widened(low: f64, high: f64) -> Range<f64> {
 mod tests {
     use super::*;
 
-    const LABELS: Labels<'_> = Labels { title: "agreement", x: "volume score, mm", y: "surface score, mm" };
+    const LABELS: Labels<'_> = Labels {
+        title: "agreement",
+        x: "volume score, mm",
+        y: "surface score, mm",
+    };
 
     #[test]
     fn a_scatter_has_a_dot_for_each_pair_and_says_how_the_ranks_agree() {
@@ -273,14 +325,35 @@ mod tests {
     #[test]
     fn every_curve_and_the_optimum_are_in_the_legend() {
         let points = vec![
-            BandPoint { x: 0.0, low: 1.0, middle: 2.0, high: 3.0 },
-            BandPoint { x: 1.0, low: 2.0, middle: 2.5, high: 3.0 },
+            BandPoint {
+                x: 0.0,
+                low: 1.0,
+                middle: 2.0,
+                high: 3.0,
+            },
+            BandPoint {
+                x: 1.0,
+                low: 2.0,
+                middle: 2.5,
+                high: 3.0,
+            },
         ];
-        let curves = ["full", "no pruning"].map(|name| Curve { name, points: points.clone() });
+        let curves = ["full", "no pruning"].map(|name| Curve {
+            name,
+            points: points.clone(),
+        });
         let text = bands(&LABELS, &curves, Some(4.0), Corner::LowerRight).unwrap();
-        assert!(["full", "no pruning", "proven optimum"].iter().all(|name| text.contains(name)));
+        assert!(
+            ["full", "no pruning", "proven optimum"]
+                .iter()
+                .all(|name| text.contains(name))
+        );
         assert_eq!(text.matches("<polygon").count(), 2);
-        assert!(!bands(&LABELS, &curves, None, Corner::UpperRight).unwrap().contains("proven optimum"));
+        assert!(
+            !bands(&LABELS, &curves, None, Corner::UpperRight)
+                .unwrap()
+                .contains("proven optimum")
+        );
     }
 
     #[test]

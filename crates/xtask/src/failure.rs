@@ -67,6 +67,10 @@ impl Failure {
     /// Refuses options that have `problems`.
     pub fn unless_right(problems: impl IntoIterator<Item = ParamProblem>) -> Result<(), Self> {
         let problems: Vec<String> = problems.into_iter().map(|p| p.to_string()).collect();
-        if problems.is_empty() { Ok(()) } else { Err(Self::Options(problems)) }
+        if problems.is_empty() {
+            Ok(())
+        } else {
+            Err(Self::Options(problems))
+        }
     }
 }

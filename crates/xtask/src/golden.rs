@@ -37,16 +37,37 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     let mut changes = Vec::new();
     let mut written = Vec::new();
     for cases in [golden::QUICK.as_slice(), &golden::FIGURES] {
-        written.extend(suite(options, &program, cases, None, &golden::of_figures(), &mut changes)?);
+        written.extend(suite(
+            options,
+            &program,
+            cases,
+            None,
+            &golden::of_figures(),
+            &mut changes,
+        )?);
     }
     written.dedup();
     if options.models.is_dir() {
         let models = Some(options.models.as_path());
-        written.extend(suite(options, &program, &golden::MODELS, models, &options.digests, &mut changes)?);
+        written.extend(suite(
+            options,
+            &program,
+            &golden::MODELS,
+            models,
+            &options.digests,
+            &mut changes,
+        )?);
     } else {
-        eprintln!("{} is no folder: no models from elsewhere", options.models.display());
+        eprintln!(
+            "{} is no folder: no models from elsewhere",
+            options.models.display()
+        );
     }
-    if changes.is_empty() { Ok(written) } else { Err(Failure::Changed(changes)) }
+    if changes.is_empty() {
+        Ok(written)
+    } else {
+        Err(Failure::Changed(changes))
+    }
 }
 
 /// Runs all cases that were asked for; `changes` collects what is other than in the file.
@@ -58,13 +79,25 @@ fn suite(
     file: &Path,
     changes: &mut Vec<String>,
 ) -> Result<Option<PathBuf>, Failure> {
-    let of_file = |source| Failure::File { path: file.to_owned(), source };
+    let of_file = |source| Failure::File {
+        path: file.to_owned(),
+        source,
+    };
     let mut goldens = Goldens::read(file).map_err(of_file)?;
     let machine = golden::machine();
     if !options.update && goldens.machine != machine {
-        eprintln!("{}: made on \"{}\", this is \"{machine}\"; compared all the same", file.display(), goldens.machine);
+        eprintln!(
+            "{}: made on \"{}\", this is \"{machine}\"; compared all the same",
+            file.display(),
+            goldens.machine
+        );
     }
-    let is_asked = |case: &&Case| options.only.as_ref().is_none_or(|words| case.name.contains(words.as_str()));
+    let is_asked = |case: &&Case| {
+        options
+            .only
+            .as_ref()
+            .is_none_or(|words| case.name.contains(words.as_str()))
+    };
     for case in cases.iter().filter(is_asked) {
         let ending = on_threads(options, program, case, models, changes)?;
         let before = goldens.endings.get(case.name);
@@ -72,8 +105,17 @@ fn suite(
             Some(before) => ending.changes_since(before),
             None => vec!["it was not run before".to_owned()],
         };
-        let word = if differences.is_empty() { "same".to_owned() } else { differences.join(", ") };
-        eprintln!("{}: exit code {}, {} files: {word}", case.name, ending.exit_code, ending.files.len());
+        let word = if differences.is_empty() {
+            "same".to_owned()
+        } else {
+            differences.join(", ")
+        };
+        eprintln!(
+            "{}: exit code {}, {} files: {word}",
+            case.name,
+            ending.exit_code,
+            ending.files.len()
+        );
         if !options.update && !differences.is_empty() {
             changes.push(format!("{}: {word}", case.name));
         }
@@ -97,7 +139,10 @@ fn on_threads(
 ) -> Result<Ending, Failure> {
     let mut first: Option<Ending> = None;
     for &n in &options.threads {
-        let failed = |e: std::io::Error| Failure::Program { program: case.name.to_owned(), problem: e.to_string() };
+        let failed = |e: std::io::Error| Failure::Program {
+            program: case.name.to_owned(),
+            problem: e.to_string(),
+        };
         let ending = golden::run(program, case, n, models).map_err(failed)?;
         if let Some(first) = &first {
             let differences = ending.changes_since(first);
@@ -112,7 +157,10 @@ fn on_threads(
 /// The program, built from what is here.
 fn built() -> Result<PathBuf, Failure> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let failed = |problem: String| Failure::Program { program: "cargo build".into(), problem };
+    let failed = |problem: String| Failure::Program {
+        program: "cargo build".into(),
+        problem,
+    };
     let status = Command::new(cargo)
         .args(["build", "--release", "--quiet", "--package", "shellock-cli"])
         .status()

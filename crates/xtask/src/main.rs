@@ -1,4 +1,5 @@
-//! Tools for working on Shellock that are no part of it: studies of its metrics and searches, as charts and tables.
+//! Tools for working on Shellock that are no part of it: studies of its metrics and searches, as charts and
+//! tables.
 //!
 //! `cargo xtask --help` lists them.
 

@@ -1,4 +1,5 @@
-//! How well the metrics agree on random plans of one model (Fig. 12), and how little their stiffness matters (Fig. 13).
+//! How well the metrics agree on random plans of one model (Fig. 12), and how little their stiffness matters
+//! (Fig. 13).
 
 mod column;
 mod outliers;
@@ -44,8 +45,8 @@ struct Subject {
     key: u32,
 }
 
-/// Every metric that is compared: all with the first, and those after the second with that, too. A new metric is one line
-/// here.
+/// Every metric that is compared: all with the first, and those after the second with that, too. A new metric
+/// is one line here.
 fn columns(subject: &Subject) -> Result<Vec<Column>, Failure> {
     let e_mpa = subject.model.params.material.youngs_modulus_mpa;
     Ok(vec![
@@ -78,11 +79,20 @@ pub fn run(options: &MetricsOptions, out: &std::path::Path) -> Result<Vec<PathBu
     let compared = agreement(&self::table(&columns).complete())?;
     let by_surface = agreement(&self::table(&columns[1..]).complete())?;
     // The same metric with other stiffnesses, compared with itself.
-    let surface = columns.iter().filter(|c| c.name.starts_with("surface")).chain(&stiffness);
+    let surface = columns
+        .iter()
+        .filter(|c| c.name.starts_with("surface"))
+        .chain(&stiffness);
     let sensitivity = agreement(&self::table(surface).complete())?;
     let mut whole: Vec<Sheet> = vec![("plans.csv".to_owned(), table.to_csv())];
-    whole.push(("report.md".to_owned(), report::markdown_of(&name, &subject, &columns, &stiffness, &linearity)));
-    whole.push(("stations.csv".to_owned(), outliers::stations(&subject, &columns[0], &columns[1]).to_csv()));
+    whole.push((
+        "report.md".to_owned(),
+        report::markdown_of(&name, &subject, &columns, &stiffness, &linearity),
+    ));
+    whole.push((
+        "stations.csv".to_owned(),
+        outliers::stations(&subject, &columns[0], &columns[1]).to_csv(),
+    ));
 
     let mut files = write_all(out, &name, &whole)?;
     files.extend(write_all(out, &format!("{name}/metrics"), &compared)?);
@@ -94,24 +104,44 @@ pub fn run(options: &MetricsOptions, out: &std::path::Path) -> Result<Vec<PathBu
 fn subject(options: &MetricsOptions) -> Result<Subject, Failure> {
     let path = &options.model.model;
     // Before the model is divided, which takes its time.
-    let metric = MetricParams { edge_share: options.edge_share, ..MetricParams::default() };
+    let metric = MetricParams {
+        edge_share: options.edge_share,
+        ..MetricParams::default()
+    };
     Failure::unless_right(metric.problems())?;
     let params = options.model.params();
     let solid = load(&options.model)?;
-    let Divided { surface, sizes, survey } = with_ctx(|ctx| divide(ctx, &params, &solid, path))?;
+    let Divided {
+        surface,
+        sizes,
+        survey,
+    } = with_ctx(|ctx| divide(ctx, &params, &solid, path))?;
     let plan_params = Settings::resolve(&params).plan;
     let plans = random_plans(&plan_params, &survey, options.plans);
     let Some(key) = plans.first().map(|p| p.key().0) else {
-        return Err(Failure::Model { path: path.clone(), problem: "no plan was found".to_owned() });
+        return Err(Failure::Model {
+            path: path.clone(),
+            problem: "no plan was found".to_owned(),
+        });
     };
-    let metric = MetricParams { edge_share: metric.edge_share, ..MetricParams::of_plan(&plan_params, &sizes) };
+    let metric = MetricParams {
+        edge_share: metric.edge_share,
+        ..MetricParams::of_plan(&plan_params, &sizes)
+    };
     Failure::unless_right(metric.problems())?;
     let model = PlanModel::new(&metric, &surface, &sizes);
     let meetings = plans.iter().map(|p| model.meetings(p)).collect();
-    Ok(Subject { model, survey, plans, meetings, key })
+    Ok(Subject {
+        model,
+        survey,
+        plans,
+        meetings,
+        key,
+    })
 }
 
-/// Openings are proportional to 1/E: the largest relative deviation from that with half and twice the stiffness.
+/// Openings are proportional to 1/E: the largest relative deviation from that with half and twice the
+/// stiffness.
 fn linearity(subject: &Subject, reference: &Column) -> Result<Option<f64>, Failure> {
     let e_mpa = subject.model.params.material.youngs_modulus_mpa;
     let n = subject.plans.len().min(N_LINEAR);
@@ -129,5 +159,10 @@ fn linearity(subject: &Subject, reference: &Column) -> Result<Option<f64>, Failu
 
 /// The qualities as a table.
 fn table<'a>(columns: impl IntoIterator<Item = &'a Column>) -> Table {
-    Table { columns: columns.into_iter().map(|c| (c.name.clone(), c.qualities())).collect() }
+    Table {
+        columns: columns
+            .into_iter()
+            .map(|c| (c.name.clone(), c.qualities()))
+            .collect(),
+    }
 }

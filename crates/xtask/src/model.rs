@@ -59,7 +59,9 @@ impl ModelOptions {
 
     /// The model's name in titles and folders.
     pub fn name(&self) -> String {
-        self.model.file_stem().map_or_else(|| "model".to_owned(), |s| s.to_string_lossy().into_owned())
+        self.model
+            .file_stem()
+            .map_or_else(|| "model".to_owned(), |s| s.to_string_lossy().into_owned())
     }
 }
 
@@ -92,20 +94,35 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 
 /// Reads the model and its labels.
 pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
-    Failure::unless_right(ParamProblem::unless_within("size", "mm", options.size, 10.0, 2000.0))?;
+    Failure::unless_right(ParamProblem::unless_within(
+        "size",
+        "mm",
+        options.size,
+        10.0,
+        2000.0,
+    ))?;
     let path = &options.model;
-    let fault = |problem: String| Failure::Model { path: path.clone(), problem };
+    let fault = |problem: String| Failure::Model {
+        path: path.clone(),
+        problem,
+    };
     let extension = path.extension().and_then(|e| e.to_str());
     let loaded = read_mesh(&read(path)?, extension).map_err(|e| fault(e.to_string()))?;
     let (solid, kept) = into_solid(&loaded.mesh).map_err(|e| fault(e.to_string()))?;
     let labels = options.labels.as_ref().map(|file| {
-        let fault = |problem: String| Failure::Model { path: file.clone(), problem };
+        let fault = |problem: String| Failure::Model {
+            path: file.clone(),
+            problem,
+        };
         let labels = read_labels(&read(file)?).map_err(|e| fault(e.to_string()))?;
         let (n_labels, n_faces) = (labels.len(), loaded.n_file_faces());
         if n_labels != n_faces {
             return Err(fault(format!("{n_labels} labels for a model of {n_faces} faces")));
         }
-        Ok(kept.iter().map(|&k| labels[loaded.file_face[k as usize] as usize]).collect())
+        Ok(kept
+            .iter()
+            .map(|&k| labels[loaded.file_face[k as usize] as usize])
+            .collect())
     });
     let mut mesh = solid.into_mesh();
     let scale = options.size / mesh.bounds().size().max_element();
@@ -114,7 +131,10 @@ pub fn load(options: &ModelOptions) -> Result<Model, Failure> {
     }
     mesh.points.iter_mut().for_each(|p| *p *= scale);
     let solid = Solid::new(mesh).map_err(|e| fault(e.to_string()))?;
-    Ok(Model { solid, labels: labels.transpose()? })
+    Ok(Model {
+        solid,
+        labels: labels.transpose()?,
+    })
 }
 
 /// Divides the model and surveys the pieces.
@@ -124,13 +144,22 @@ pub fn divide(ctx: &Ctx<'_>, params: &Params, model: &Model, path: &Path) -> Res
     if !problems.is_empty() {
         return Err(Failure::Options(problems));
     }
-    let fault = |problem: String| Failure::Model { path: path.to_owned(), problem };
+    let fault = |problem: String| Failure::Model {
+        path: path.to_owned(),
+        problem,
+    };
     let surface = segment(ctx, &settings.segmentation, &model.solid, model.labels.as_deref())
         .map_err(|e| fault(e.to_string()))?;
     let stopped = |_| fault("the study was stopped".into());
-    let sizes = sizes::choose(ctx, &settings.sizes, &surface, None).map_err(stopped)?.sizes;
+    let sizes = sizes::choose(ctx, &settings.sizes, &surface, None)
+        .map_err(stopped)?
+        .sizes;
     let survey = survey(ctx, &settings.plan, &surface, &surface.seams(), &sizes).map_err(stopped)?;
-    Ok(Divided { surface, sizes, survey })
+    Ok(Divided {
+        surface,
+        sizes,
+        survey,
+    })
 }
 
 /// Calls `work` with a context that tells stages on stderr and never stops.
@@ -145,5 +174,8 @@ pub fn with_ctx<T>(work: impl FnOnce(&Ctx<'_>) -> T) -> T {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    fs::read(path).map_err(|source| Failure::File { path: path.to_owned(), source })
+    fs::read(path).map_err(|source| Failure::File {
+        path: path.to_owned(),
+        source,
+    })
 }

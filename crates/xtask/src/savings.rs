@@ -20,8 +20,17 @@ pub struct Options {
     out: PathBuf,
 }
 
-const HEAD: [&str; 9] =
-    ["model", "pieces", "wall, mm", "material", "SLA time", "by", "FDM time", "by", "FDM, solid filled"];
+const HEAD: [&str; 9] = [
+    "model",
+    "pieces",
+    "wall, mm",
+    "material",
+    "SLA time",
+    "by",
+    "FDM time",
+    "by",
+    "FDM, solid filled",
+];
 
 const INTRODUCTION: &str = "# What kits save\n\n\
     Of finished kits, as `shellock report` tells it: material and print time of all pieces over those of the solid model (the paper's \
@@ -35,19 +44,33 @@ const INTRODUCTION: &str = "# What kits save\n\n\
 
 /// Writes the table; returns its file.
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
-    let rows = options.kits.iter().map(|kit| row(kit)).collect::<Result<Vec<_>, _>>()?;
+    let rows = options
+        .kits
+        .iter()
+        .map(|kit| row(kit))
+        .collect::<Result<Vec<_>, _>>()?;
     let text = format!("{INTRODUCTION}{}", markdown(&HEAD, &rows));
-    fs::write(&options.out, text).map_err(|source| Failure::File { path: options.out.clone(), source })?;
+    fs::write(&options.out, text).map_err(|source| Failure::File {
+        path: options.out.clone(),
+        source,
+    })?;
     Ok(vec![options.out.clone()])
 }
 
 fn row(kit: &Path) -> Result<Vec<String>, Failure> {
     let path = kit.join("savings.json");
-    let bytes = fs::read(&path).map_err(|source| Failure::File { path: path.clone(), source })?;
-    let told: Value =
-        serde_json::from_slice(&bytes).map_err(|e| Failure::Table { path: path.clone(), problem: e.to_string() })?;
-    cells(&told)
-        .ok_or_else(|| Failure::Table { path, problem: "a figure is missing; run `shellock report` again".into() })
+    let bytes = fs::read(&path).map_err(|source| Failure::File {
+        path: path.clone(),
+        source,
+    })?;
+    let told: Value = serde_json::from_slice(&bytes).map_err(|e| Failure::Table {
+        path: path.clone(),
+        problem: e.to_string(),
+    })?;
+    cells(&told).ok_or_else(|| Failure::Table {
+        path,
+        problem: "a figure is missing; run `shellock report` again".into(),
+    })
 }
 
 fn cells(told: &Value) -> Option<Vec<String>> {
@@ -63,7 +86,11 @@ fn cells(told: &Value) -> Option<Vec<String>> {
         cells.extend([percent(&time["ratio"])?, time["by"].as_str()?.to_owned()]);
     }
     let filled = &told["print_time"]["fdm"]["filled_ratio"];
-    cells.push(if filled.is_null() { "–".to_owned() } else { percent(filled)? });
+    cells.push(if filled.is_null() {
+        "–".to_owned()
+    } else {
+        percent(filled)?
+    });
     Some(cells)
 }
 
@@ -77,7 +104,10 @@ mod tests {
             "print_time": { "sla": { "ratio": 0.8, "by": "PrusaSlicer" }, "fdm": { "ratio": 1.2, "by": "closed form" } } }"#;
         let told: Value = serde_json::from_str(text).unwrap();
         let row = cells(&told).unwrap();
-        assert_eq!(row.join("|"), "cat.obj|9|1.60|19 %|80 %|PrusaSlicer|120 %|closed form|–");
+        assert_eq!(
+            row.join("|"),
+            "cat.obj|9|1.60|19 %|80 %|PrusaSlicer|120 %|closed form|–"
+        );
         assert_eq!(row.len(), HEAD.len());
         assert!(cells(&serde_json::json!({ "model": "cat.obj" })).is_none());
     }

@@ -56,7 +56,9 @@ pub fn run(options: &SearchOptions, out: &Path) -> Result<Vec<PathBuf>, Failure>
         for &n_pieces in &options.pieces {
             subjects.push(subject(ctx, options, &model, Some(n_pieces), options.model.seed)?);
         }
-        let Some(first) = subjects.first() else { return Ok(Vec::new()) };
+        let Some(first) = subjects.first() else {
+            return Ok(Vec::new());
+        };
         sheets.extend(of_techniques(ctx, options, &name, first)?);
         sheets.extend(of_sizes(ctx, options, &name, &subjects)?);
         sheets.extend(of_segmentations(ctx, options, &name, &model)?);
@@ -75,9 +77,15 @@ fn subject(
     params.seed = seed;
     params.n_pieces = n_pieces;
     let divided = divide(ctx, &params, model, &options.model.model)?;
-    let fault = |problem: String| Failure::Model { path: options.model.model.clone(), problem };
+    let fault = |problem: String| Failure::Model {
+        path: options.model.model.clone(),
+        problem,
+    };
     let name = format!("{} pieces", divided.surface.n_patches);
-    let mut params = PlanParams { seed: options.model.seed, ..Settings::resolve(&params).plan };
+    let mut params = PlanParams {
+        seed: options.model.seed,
+        ..Settings::resolve(&params).plan
+    };
     let best = loop {
         let ctx = ctx.fork();
         let outcome = search(&ctx, &params, &divided.survey, &PlanConstraints::default());
@@ -85,7 +93,11 @@ fn subject(
             PlanOutcome::Found(found) => found,
             PlanOutcome::Infeasible { reason, .. } => return Err(fault(format!("{name}: {reason}"))),
         };
-        if ctx.into_warnings().iter().any(|w| w.code == "occlusion-tolerance-raised") {
+        if ctx
+            .into_warnings()
+            .iter()
+            .any(|w| w.code == "occlusion-tolerance-raised")
+        {
             params.occlusion_tolerance = params.relaxed_tolerance;
         }
         // Once more with the key given, as the searches will be run.
@@ -93,8 +105,16 @@ fn subject(
             break best;
         }
     };
-    eprintln!("{name}: cost {:.4}, proven lower bound {:.4}", best.score.worst, best.lower_bound);
-    Ok(Subject { name, divided, params, best })
+    eprintln!(
+        "{name}: cost {:.4}, proven lower bound {:.4}",
+        best.score.worst, best.lower_bound
+    );
+    Ok(Subject {
+        name,
+        divided,
+        params,
+        best,
+    })
 }
 
 /// Fig. 14a: the four techniques on one segmentation.
@@ -106,15 +126,26 @@ fn of_techniques(
 ) -> Result<Vec<Sheet>, Failure> {
     let mut runs = Vec::new();
     for technique in Technique::ALL {
-        runs.push((name_of(technique).to_owned(), runs_of(ctx, options, subject, technique)?));
+        runs.push((
+            name_of(technique).to_owned(),
+            runs_of(ctx, options, subject, technique)?,
+        ));
     }
-    let title = format!("Search for plans of {model}, {}: median and range of {} seeds", subject.name, options.seeds);
+    let title = format!(
+        "Search for plans of {model}, {}: median and range of {} seeds",
+        subject.name, options.seeds
+    );
     let optimum = subject.best.is_optimal.then_some(subject.best.score.worst);
     convergence_sheets("techniques", &title, &runs, optimum)
 }
 
 /// Fig. 14b: both techniques on segmentations into more and more pieces.
-fn of_sizes(ctx: &Ctx<'_>, options: &SearchOptions, model: &str, subjects: &[Subject]) -> Result<Vec<Sheet>, Failure> {
+fn of_sizes(
+    ctx: &Ctx<'_>,
+    options: &SearchOptions,
+    model: &str,
+    subjects: &[Subject],
+) -> Result<Vec<Sheet>, Failure> {
     let mut runs = Vec::new();
     for subject in subjects {
         let (cost, bound) = (subject.best.score.worst, subject.best.lower_bound);
@@ -126,34 +157,72 @@ fn of_sizes(ctx: &Ctx<'_>, options: &SearchOptions, model: &str, subjects: &[Sub
         let name = format!("{}: {known}", subject.name);
         runs.push((name, runs_of(ctx, options, subject, Technique::Both)?));
     }
-    let title = format!("Search for plans of {model}: median and range of {} seeds", options.seeds);
+    let title = format!(
+        "Search for plans of {model}: median and range of {} seeds",
+        options.seeds
+    );
     convergence_sheets("sizes", &title, &runs, None)
 }
 
 /// Fig. 16: the best plan of each segmentation.
-fn of_segmentations(ctx: &Ctx<'_>, options: &SearchOptions, name: &str, model: &Model) -> Result<Vec<Sheet>, Failure> {
+fn of_segmentations(
+    ctx: &Ctx<'_>,
+    options: &SearchOptions,
+    name: &str,
+    model: &Model,
+) -> Result<Vec<Sheet>, Failure> {
     let (mut found, mut rows) = (Vec::new(), Vec::new());
-    let mut table = Table { columns: ["seed", "pieces", "cost", "lower bound"].map(|n| (n.into(), vec![])).into() };
+    let mut table = Table {
+        columns: ["seed", "pieces", "cost", "lower bound"]
+            .map(|n| (n.into(), vec![]))
+            .into(),
+    };
     for seed in (options.model.seed..).take(options.segmentations) {
         let subject = match subject(ctx, options, model, options.pieces.first().copied(), seed) {
             Ok(subject) => subject,
             Err(failure) => {
                 // No plan is an answer: it says that this segmentation does not do.
-                rows.push(vec![seed.to_string(), String::new(), failure.to_string(), String::new()]);
+                rows.push(vec![
+                    seed.to_string(),
+                    String::new(),
+                    failure.to_string(),
+                    String::new(),
+                ]);
                 continue;
             }
         };
         let (n_pieces, best) = (subject.divided.surface.n_patches, &subject.best);
         let (cost, bound) = (best.score.worst, best.lower_bound);
-        found.push(Interval { name: format!("{n_pieces} pieces, seed {seed}"), low: bound, high: cost });
-        table.columns.iter_mut().zip([seed as f64, n_pieces as f64, cost, bound]).for_each(|(c, v)| c.1.push(v));
-        rows.push(vec![seed.to_string(), n_pieces.to_string(), format!("{cost:.4}"), format!("{bound:.4}")]);
+        found.push(Interval {
+            name: format!("{n_pieces} pieces, seed {seed}"),
+            low: bound,
+            high: cost,
+        });
+        table
+            .columns
+            .iter_mut()
+            .zip([seed as f64, n_pieces as f64, cost, bound])
+            .for_each(|(c, v)| c.1.push(v));
+        rows.push(vec![
+            seed.to_string(),
+            n_pieces.to_string(),
+            format!("{cost:.4}"),
+            format!("{bound:.4}"),
+        ]);
     }
     found.sort_by(|x, y| x.high.total_cmp(&y.high));
     let title = format!("Best plans of {} segmentations of {name}", found.len());
-    let labels =
-        Labels { title: &title, x: "cost of the worst piece; the line reaches down to the proven bound", y: "" };
-    let head = ["segmentation seed", "pieces", "cost of the best plan", "proven lower bound"];
+    let labels = Labels {
+        title: &title,
+        x: "cost of the worst piece; the line reaches down to the proven bound",
+        y: "",
+    };
+    let head = [
+        "segmentation seed",
+        "pieces",
+        "cost of the best plan",
+        "proven lower bound",
+    ];
     Ok(vec![
         ("segmentations.svg".to_owned(), intervals(&labels, &found)?),
         ("segmentations.csv".to_owned(), table.to_csv()),
@@ -161,14 +230,34 @@ fn of_segmentations(ctx: &Ctx<'_>, options: &SearchOptions, name: &str, model: &
     ])
 }
 
-fn runs_of(ctx: &Ctx<'_>, options: &SearchOptions, subject: &Subject, technique: Technique) -> Result<Runs, Failure> {
+fn runs_of(
+    ctx: &Ctx<'_>,
+    options: &SearchOptions,
+    subject: &Subject,
+    technique: Technique,
+) -> Result<Runs, Failure> {
     eprintln!("{}, {}", subject.name, name_of(technique));
     let run = |seed: u64| {
-        let params = PlanParams { seed, ..subject.params.clone() };
-        let samples = convergence(ctx, &params, &subject.divided.survey, technique, options.evaluations);
+        let params = PlanParams {
+            seed,
+            ..subject.params.clone()
+        };
+        let samples = convergence(
+            ctx,
+            &params,
+            &subject.divided.survey,
+            technique,
+            options.evaluations,
+        );
         let problem = "the study was stopped".to_owned();
-        let samples = samples.map_err(|_| Failure::Model { path: options.model.model.clone(), problem })?;
-        Ok(samples.iter().map(|s| (s.n_evaluations as f64, s.best_cost)).collect())
+        let samples = samples.map_err(|_| Failure::Model {
+            path: options.model.model.clone(),
+            problem,
+        })?;
+        Ok(samples
+            .iter()
+            .map(|s| (s.n_evaluations as f64, s.best_cost))
+            .collect())
     };
     (options.model.seed..).take(options.seeds).map(run).collect()
 }
@@ -179,10 +268,18 @@ fn convergence_sheets(
     runs: &[(String, Runs)],
     optimum: Option<f64>,
 ) -> Result<Vec<Sheet>, Failure> {
-    let mut table = Table { columns: ["variant", "seed", "evaluations", "cost"].map(|n| (n.into(), vec![])).into() };
+    let mut table = Table {
+        columns: ["variant", "seed", "evaluations", "cost"]
+            .map(|n| (n.into(), vec![]))
+            .into(),
+    };
     let (mut curves, mut rows) = (Vec::new(), Vec::new());
     for (variant, (name, runs)) in runs.iter().enumerate() {
-        for (seed, &(evaluations, cost)) in runs.iter().enumerate().flat_map(|(i, r)| r.iter().map(move |p| (i, p))) {
+        for (seed, &(evaluations, cost)) in runs
+            .iter()
+            .enumerate()
+            .flat_map(|(i, r)| r.iter().map(move |p| (i, p)))
+        {
             let row = [variant as f64, seed as f64, evaluations, cost];
             table.columns.iter_mut().zip(row).for_each(|(c, v)| c.1.push(v));
         }
@@ -193,12 +290,21 @@ fn convergence_sheets(
         }
         curves.push(Curve { name, points });
     }
-    let labels =
-        Labels { title, x: "plans looked at and costs of pieces asked for", y: "cost of the best plan's worst piece" };
+    let labels = Labels {
+        title,
+        x: "plans looked at and costs of pieces asked for",
+        y: "cost of the best plan's worst piece",
+    };
     Ok(vec![
-        (format!("{file}.svg"), bands(&labels, &curves, optimum, Corner::UpperRight)?),
+        (
+            format!("{file}.svg"),
+            bands(&labels, &curves, optimum, Corner::UpperRight)?,
+        ),
         (format!("{file}.csv"), table.to_csv()),
-        (format!("{file}.md"), markdown(&["search", "median at the end", "least", "greatest"], &rows)),
+        (
+            format!("{file}.md"),
+            markdown(&["search", "median at the end", "least", "greatest"], &rows),
+        ),
     ])
 }
 

@@ -14,8 +14,8 @@ pub fn mean_ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Spearman's ρ in [−1, 1]: the correlation of the mean ranks. `None` where the lengths differ, or one side is constant,
-/// has fewer than two values or one that is not finite.
+/// Spearman's ρ in [−1, 1]: the correlation of the mean ranks. `None` where the lengths differ, or one side
+/// is constant, has fewer than two values or one that is not finite.
 pub fn spearman(a: &[f64], b: &[f64]) -> Option<f64> {
     are_comparable(a, b).then(|| pearson(&mean_ranks(a), &mean_ranks(b)))?
 }
@@ -30,8 +30,8 @@ fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     (aa > 0.0 && bb > 0.0).then(|| (product(a, mean_a, b, mean_b) / (aa * bb).sqrt()).clamp(-1.0, 1.0))
 }
 
-/// Kendall's τ-b in [−1, 1]: concordant less discordant pairs, over the geometric mean of the pairs untied in `a` and in
-/// `b`. `None` as for [`spearman`]. O(n²).
+/// Kendall's τ-b in [−1, 1]: concordant less discordant pairs, over the geometric mean of the pairs untied in
+/// `a` and in `b`. `None` as for [`spearman`]. O(n²).
 pub fn kendall(a: &[f64], b: &[f64]) -> Option<f64> {
     if !are_comparable(a, b) {
         return None;
@@ -58,8 +58,15 @@ fn are_comparable(a: &[f64], b: &[f64]) -> bool {
 
 /// The values moved and scaled into [0, 1], the least at 0; all 0.5 where they are equal.
 pub fn normalised(values: &[f64]) -> Vec<f64> {
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-    values.iter().map(|v| if high > low { (v - low) / (high - low) } else { 0.5 }).collect()
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| {
+            (l.min(v), h.max(v))
+        });
+    values
+        .iter()
+        .map(|v| if high > low { (v - low) / (high - low) } else { 0.5 })
+        .collect()
 }
 
 /// What several runs had reached at one moment.
@@ -75,20 +82,34 @@ pub struct BandPoint {
     pub high: f64,
 }
 
-/// The range of `runs`, each a step function given by its (x, value) in order of x, from where all have a value on.
+/// The range of `runs`, each a step function given by its (x, value) in order of x, from where all have a
+/// value on.
 pub fn band(runs: &[Vec<(f64, f64)>]) -> Vec<BandPoint> {
     let starts = runs.iter().map(|r| r.first().map_or(f64::INFINITY, |p| p.0));
     let start = starts.fold(f64::NEG_INFINITY, f64::max);
-    let mut moments: Vec<f64> = runs.iter().flatten().map(|p| p.0).filter(|&x| x >= start).collect();
+    let mut moments: Vec<f64> = runs
+        .iter()
+        .flatten()
+        .map(|p| p.0)
+        .filter(|&x| x >= start)
+        .collect();
     moments.sort_by(f64::total_cmp);
     moments.dedup();
     let at = |x: f64| {
-        let mut values: Vec<f64> =
-            runs.iter().filter_map(|r| r[..r.partition_point(|p| p.0 <= x)].last()).map(|p| p.1).collect();
+        let mut values: Vec<f64> = runs
+            .iter()
+            .filter_map(|r| r[..r.partition_point(|p| p.0 <= x)].last())
+            .map(|p| p.1)
+            .collect();
         values.sort_by(f64::total_cmp);
         let n = values.len();
         let middle = 0.5 * (values[(n - 1) / 2] + values[n / 2]);
-        BandPoint { x, low: values[0], middle, high: values[n - 1] }
+        BandPoint {
+            x,
+            low: values[0],
+            middle,
+            high: values[n - 1],
+        }
     };
     moments.into_iter().map(at).collect()
 }
@@ -120,7 +141,8 @@ mod tests {
 
     #[test]
     fn without_ties_spearman_is_the_sum_of_squared_rank_differences() {
-        // IQ against hours of television, a common classroom example: Σ d² = 194, ρ = 1 − 6 · 194 / (10 · 99).
+        // IQ against hours of television, a common classroom example: Σ d² = 194, ρ = 1 − 6 · 194 / (10 ·
+        // 99).
         let iq = [106.0, 100.0, 86.0, 101.0, 99.0, 103.0, 97.0, 113.0, 112.0, 110.0];
         let hours = [7.0, 27.0, 2.0, 50.0, 28.0, 29.0, 20.0, 12.0, 6.0, 17.0];
         assert_near(spearman(&iq, &hours), 1.0 - 6.0 * 194.0 / 990.0);
@@ -139,7 +161,11 @@ mod tests {
 
     #[test]
     fn what_has_no_order_has_no_correlation() {
-        for (a, b) in [(vec![], vec![]), (vec![1.0], vec![2.0]), (vec![1.0, 1.0], vec![1.0, 2.0])] {
+        for (a, b) in [
+            (vec![], vec![]),
+            (vec![1.0], vec![2.0]),
+            (vec![1.0, 1.0], vec![1.0, 2.0]),
+        ] {
             assert_eq!((spearman(&a, &b), kendall(&a, &b)), (None, None));
         }
         assert_eq!(spearman(&[1.0, f64::NAN], &[1.0, 2.0]), None);
@@ -148,9 +174,20 @@ mod tests {
 
     #[test]
     fn a_band_is_the_range_of_step_functions() {
-        let runs = [vec![(0.0, 1.0), (2.0, 5.0)], vec![(1.0, 2.0)], vec![(0.5, 0.0), (3.0, 4.0)]];
+        let runs = [
+            vec![(0.0, 1.0), (2.0, 5.0)],
+            vec![(1.0, 2.0)],
+            vec![(0.5, 0.0), (3.0, 4.0)],
+        ];
         let point = |x, low, middle, high| BandPoint { x, low, middle, high };
-        assert_eq!(band(&runs), [point(1.0, 0.0, 1.0, 2.0), point(2.0, 0.0, 2.0, 5.0), point(3.0, 2.0, 4.0, 5.0)]);
+        assert_eq!(
+            band(&runs),
+            [
+                point(1.0, 0.0, 1.0, 2.0),
+                point(2.0, 0.0, 2.0, 5.0),
+                point(3.0, 2.0, 4.0, 5.0)
+            ]
+        );
         assert_eq!(band(&[]), []);
         assert_eq!(band(&[vec![(0.0, 1.0)], vec![]]), []);
     }

@@ -32,13 +32,14 @@ enum Study {
     Search(SearchOptions),
     /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
     Strength(StrengthOptions),
-    /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a row for each
-    /// plan; the first column is the metric that the others are compared with
+    /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a
+    /// row for each plan; the first column is the metric that the others are compared with
     Scores {
         /// The CSV file
         file: PathBuf,
     },
-    /// How fast searches get better: CSV with the columns variant, seed, seconds and score, a row for each improvement
+    /// How fast searches get better: CSV with the columns variant, seed, seconds and score, a row for each
+    /// improvement
     Convergence {
         /// The CSV file
         file: PathBuf,
@@ -59,7 +60,10 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
         Study::Strength(strength) => strength::run(strength, &options.out),
         Study::Scores { file } => write_all(&options.out, &stem(file), &agreement(&read(file)?)?),
         Study::Convergence { file, optimum, names } => {
-            let runs = runs(&read(file)?).map_err(|problem| Failure::Table { path: file.clone(), problem })?;
+            let runs = runs(&read(file)?).map_err(|problem| Failure::Table {
+                path: file.clone(),
+                problem,
+            })?;
             write_all(&options.out, &stem(file), &[convergence(&runs, names, *optimum)?])
         }
     }
@@ -73,28 +77,61 @@ fn parts(column: &str) -> (&str, Option<&str>) {
 
 fn axis(column: &str) -> String {
     let (name, unit) = parts(column);
-    unit.map_or_else(|| format!("score by {name}"), |unit| format!("score by {name}, {unit}"))
+    unit.map_or_else(
+        || format!("score by {name}"),
+        |unit| format!("score by {name}, {unit}"),
+    )
 }
 
 /// A file to be written: its name in the study's folder, and the text.
 pub type Sheet = (String, String);
 
-/// Curves of all metrics over the plans, a scatter of each against the first, and the table of rank correlations.
+/// Curves of all metrics over the plans, a scatter of each against the first, and the table of rank
+/// correlations.
 pub fn agreement(scores: &Table) -> Result<Vec<Sheet>, Failure> {
-    let columns: Vec<(&str, &[f64])> = scores.columns.iter().map(|(n, v)| (n.as_str(), v.as_slice())).collect();
-    let Some(((first, reference), others)) = columns.split_first() else { return Ok(Vec::new()) };
+    let columns: Vec<(&str, &[f64])> = scores
+        .columns
+        .iter()
+        .map(|(n, v)| (n.as_str(), v.as_slice()))
+        .collect();
+    let Some(((first, reference), others)) = columns.split_first() else {
+        return Ok(Vec::new());
+    };
     let x = format!("plan number, sorted by {}", parts(first).0);
-    let labels = Labels { title: "Scores of the same plans", x: &x, y: "score, scaled to 0 … 1" };
+    let labels = Labels {
+        title: "Scores of the same plans",
+        x: &x,
+        y: "score, scaled to 0 … 1",
+    };
     let mut sheets = vec![("scores.svg".to_owned(), sorted_scores(&labels, &columns)?)];
     let mut rows = Vec::new();
     for (name, values) in others {
-        let (title, x, y) = (format!("{} and {}", parts(name).0, parts(first).0), axis(first), axis(name));
-        let labels = Labels { title: &title, x: &x, y: &y };
-        sheets.push((format!("{}.svg", file_name(parts(name).0)), scatter(&labels, reference, values)?));
+        let (title, x, y) = (
+            format!("{} and {}", parts(name).0, parts(first).0),
+            axis(first),
+            axis(name),
+        );
+        let labels = Labels {
+            title: &title,
+            x: &x,
+            y: &y,
+        };
+        sheets.push((
+            format!("{}.svg", file_name(parts(name).0)),
+            scatter(&labels, reference, values)?,
+        ));
         let say = |r: Option<f64>| r.map_or("undefined".to_owned(), |r| format!("{r:.3}"));
-        rows.push(vec![(*name).to_owned(), say(spearman(reference, values)), say(kendall(reference, values))]);
+        rows.push(vec![
+            (*name).to_owned(),
+            say(spearman(reference, values)),
+            say(kendall(reference, values)),
+        ]);
     }
-    let head = ["metric", &format!("Spearman ρ with {first}"), &format!("Kendall τ-b with {first}")];
+    let head = [
+        "metric",
+        &format!("Spearman ρ with {first}"),
+        &format!("Kendall τ-b with {first}"),
+    ];
     sheets.push(("correlations.md".to_owned(), markdown(&head, &rows)));
     sheets.push(("scores.csv".to_owned(), scores.to_csv()));
     Ok(sheets)
@@ -106,13 +143,21 @@ pub type Runs = BTreeMap<usize, Vec<Vec<(f64, f64)>>>;
 /// Sorts a table with the columns variant, seed, seconds and score into runs.
 fn runs(table: &Table) -> Result<Runs, String> {
     let column = |name: &str| table.column(name).ok_or(format!("there is no column \"{name}\""));
-    let (variants, seeds, seconds, scores) =
-        (column("variant")?, column("seed")?, column("seconds")?, column("score")?);
+    let (variants, seeds, seconds, scores) = (
+        column("variant")?,
+        column("seed")?,
+        column("seconds")?,
+        column("score")?,
+    );
     let mut by_seed: BTreeMap<(usize, u64), Vec<(f64, f64)>> = BTreeMap::new();
     for i in 0..variants.len() {
         let whole = |v: f64, what: &str| {
             let is_whole = v >= 0.0 && v.fract() == 0.0 && v < 1e15;
-            if is_whole { Ok(v as u64) } else { Err(format!("row {}: {what} {v} is no whole number ≥ 0", i + 1)) }
+            if is_whole {
+                Ok(v as u64)
+            } else {
+                Err(format!("row {}: {what} {v} is no whole number ≥ 0", i + 1))
+            }
         };
         let key = (whole(variants[i], "variant")? as usize, whole(seeds[i], "seed")?);
         by_seed.entry(key).or_default().push((seconds[i], scores[i]));
@@ -129,37 +174,65 @@ fn runs(table: &Table) -> Result<Runs, String> {
 pub fn convergence(runs: &Runs, names: &[String], optimum: Option<f64>) -> Result<Sheet, Failure> {
     let name = |i: &usize| names.get(*i).cloned().unwrap_or_else(|| format!("variant {i}"));
     let named: Vec<(String, _)> = runs.iter().map(|(i, runs)| (name(i), band(runs))).collect();
-    let curves: Vec<Curve<'_>> = named.iter().map(|(name, points)| Curve { name, points: points.clone() }).collect();
+    let curves: Vec<Curve<'_>> = named
+        .iter()
+        .map(|(name, points)| Curve {
+            name,
+            points: points.clone(),
+        })
+        .collect();
     let n_seeds = runs.values().map(Vec::len).max().unwrap_or(0);
     let title = format!("Best score so far: median and range of {n_seeds} seeds");
-    let labels = Labels { title: &title, x: "time, s", y: "score" };
-    Ok(("convergence.svg".to_owned(), bands(&labels, &curves, optimum, Corner::LowerRight)?))
+    let labels = Labels {
+        title: &title,
+        x: "time, s",
+        y: "score",
+    };
+    Ok((
+        "convergence.svg".to_owned(),
+        bands(&labels, &curves, optimum, Corner::LowerRight)?,
+    ))
 }
 
 fn read(path: &Path) -> Result<Table, Failure> {
-    let text = fs::read_to_string(path).map_err(|source| Failure::File { path: path.to_owned(), source })?;
-    Table::from_csv(&text).map_err(|problem| Failure::Table { path: path.to_owned(), problem })
+    let text = fs::read_to_string(path).map_err(|source| Failure::File {
+        path: path.to_owned(),
+        source,
+    })?;
+    Table::from_csv(&text).map_err(|problem| Failure::Table {
+        path: path.to_owned(),
+        problem,
+    })
 }
 
 /// Writes the sheets into a folder of `out`; returns the files.
 pub fn write_all(out: &Path, study: &str, sheets: &[Sheet]) -> Result<Vec<PathBuf>, Failure> {
     let folder = out.join(study);
-    fs::create_dir_all(&folder).map_err(|source| Failure::File { path: folder.clone(), source })?;
+    fs::create_dir_all(&folder).map_err(|source| Failure::File {
+        path: folder.clone(),
+        source,
+    })?;
     let write = |(name, text): &Sheet| {
         let path = folder.join(name);
-        fs::write(&path, text).map_err(|source| Failure::File { path: path.clone(), source })?;
+        fs::write(&path, text).map_err(|source| Failure::File {
+            path: path.clone(),
+            source,
+        })?;
         Ok(path)
     };
     sheets.iter().map(write).collect()
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem().map_or_else(|| "study".to_owned(), |s| s.to_string_lossy().into_owned())
+    path.file_stem()
+        .map_or_else(|| "study".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
 /// `name` with what does not belong into a file name replaced by `-`.
 fn file_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect()
+    name.chars()
+        .map(|c| if c.is_alphanumeric() { c } else { '-' })
+        .collect()
 }
 
 #[cfg(test)]
@@ -171,7 +244,16 @@ mod tests {
         let table = Table::from_csv("volume [mm],surface,data-driven\n1,2,3\n2,4,2\n3,8,1\n").unwrap();
         let sheets = agreement(&table).unwrap();
         let names: Vec<&str> = sheets.iter().map(|s| s.0.as_str()).collect();
-        assert_eq!(names, ["scores.svg", "surface.svg", "data-driven.svg", "correlations.md", "scores.csv"]);
+        assert_eq!(
+            names,
+            [
+                "scores.svg",
+                "surface.svg",
+                "data-driven.svg",
+                "correlations.md",
+                "scores.csv"
+            ]
+        );
         assert!(sheets[1].1.contains("score by volume, mm"));
         assert!(sheets[3].1.contains("| surface | 1.000 | 1.000 |"));
         assert!(sheets[3].1.contains("| data-driven | -1.000 | -1.000 |"));

@@ -8,23 +8,37 @@ pub struct Table {
 }
 
 impl Table {
-    /// Reads comma-separated numbers under one line of names; blank lines are passed over, an empty field is a value that
-    /// is missing.
+    /// Reads comma-separated numbers under one line of names; blank lines are passed over, an empty field is
+    /// a value that is missing.
     pub fn from_csv(text: &str) -> Result<Self, String> {
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
-        let (_, names) = lines.next().ok_or("the table is empty; the first line must name the columns")?;
-        let mut columns: Vec<(String, Vec<f64>)> =
-            names.split(',').map(|n| (n.trim().to_owned(), Vec::new())).collect();
+        let (_, names) = lines
+            .next()
+            .ok_or("the table is empty; the first line must name the columns")?;
+        let mut columns: Vec<(String, Vec<f64>)> = names
+            .split(',')
+            .map(|n| (n.trim().to_owned(), Vec::new()))
+            .collect();
         for (i, line) in lines {
             let fields: Vec<&str> = line.split(',').map(str::trim).collect();
             if fields.len() != columns.len() {
                 let n = columns.len();
-                return Err(format!("line {} has {} fields, but there are {n} columns", i + 1, fields.len()));
+                return Err(format!(
+                    "line {} has {} fields, but there are {n} columns",
+                    i + 1,
+                    fields.len()
+                ));
             }
             for (field, (name, values)) in fields.iter().zip(&mut columns) {
-                let value =
-                    if field.is_empty() { Some(f64::NAN) } else { field.parse().ok().filter(|v: &f64| v.is_finite()) };
-                values.push(value.ok_or(format!("line {}: \"{field}\" in column \"{name}\" is no number", i + 1))?);
+                let value = if field.is_empty() {
+                    Some(f64::NAN)
+                } else {
+                    field.parse().ok().filter(|v: &f64| v.is_finite())
+                };
+                values.push(value.ok_or(format!(
+                    "line {}: \"{field}\" in column \"{name}\" is no number",
+                    i + 1
+                ))?);
             }
         }
         Ok(Self { columns })
@@ -39,17 +53,34 @@ impl Table {
     pub fn to_csv(&self) -> String {
         let names: Vec<&str> = self.columns.iter().map(|c| c.0.as_str()).collect();
         let rows = self.rows().map(|row| {
-            row.map(|v| if v.is_nan() { String::new() } else { v.to_string() }).collect::<Vec<_>>().join(",")
+            row.map(|v| if v.is_nan() { String::new() } else { v.to_string() })
+                .collect::<Vec<_>>()
+                .join(",")
         });
-        std::iter::once(names.join(",")).chain(rows).map(|line| line + "\n").collect()
+        std::iter::once(names.join(","))
+            .chain(rows)
+            .map(|line| line + "\n")
+            .collect()
     }
 
     /// The rows in which nothing is missing.
     pub fn complete(&self) -> Self {
         let is_whole: Vec<bool> = self.rows().map(|mut row| row.all(f64::is_finite)).collect();
-        let kept =
-            |values: &[f64]| values.iter().zip(&is_whole).filter(|(_, whole)| **whole).map(|(v, _)| *v).collect();
-        Self { columns: self.columns.iter().map(|(name, values)| (name.clone(), kept(values))).collect() }
+        let kept = |values: &[f64]| {
+            values
+                .iter()
+                .zip(&is_whole)
+                .filter(|(_, whole)| **whole)
+                .map(|(v, _)| *v)
+                .collect()
+        };
+        Self {
+            columns: self
+                .columns
+                .iter()
+                .map(|(name, values)| (name.clone(), kept(values)))
+                .collect(),
+        }
     }
 
     fn rows(&self) -> impl Iterator<Item = impl Iterator<Item = f64>> {
@@ -62,7 +93,9 @@ impl Table {
 pub fn markdown(head: &[&str], rows: &[Vec<String>]) -> String {
     let line = |cells: Vec<&str>| format!("| {} |\n", cells.join(" | "));
     let rule = line(vec!["---"; head.len()]);
-    let body = rows.iter().map(|row| line(row.iter().map(String::as_str).collect()));
+    let body = rows
+        .iter()
+        .map(|row| line(row.iter().map(String::as_str).collect()));
     [line(head.to_vec()), rule].into_iter().chain(body).collect()
 }
 
@@ -72,7 +105,10 @@ mod tests {
 
     #[test]
     fn a_written_table_reads_the_same() {
-        let columns = vec![("volume".to_owned(), vec![-0.1, 1e-300]), ("surface".to_owned(), vec![1.0 / 3.0, 2.0])];
+        let columns = vec![
+            ("volume".to_owned(), vec![-0.1, 1e-300]),
+            ("surface".to_owned(), vec![1.0 / 3.0, 2.0]),
+        ];
         let table = Table { columns };
         assert_eq!(Table::from_csv(&table.to_csv()), Ok(table.clone()));
         assert_eq!(table.column("surface"), Some(&[1.0 / 3.0, 2.0][..]));
@@ -98,6 +134,9 @@ mod tests {
 
     #[test]
     fn markdown_has_a_rule_below_its_head() {
-        assert_eq!(markdown(&["a", "b"], &[vec!["1".into(), "2".into()]]), "| a | b |\n| --- | --- |\n| 1 | 2 |\n");
+        assert_eq!(
+            markdown(&["a", "b"], &[vec!["1".into(), "2".into()]]),
+            "| a | b |\n| --- | --- |\n| 1 | 2 |\n"
+        );
     }
 }

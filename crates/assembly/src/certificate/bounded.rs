@@ -31,10 +31,11 @@ pub struct Bounded {
     pub of_piece: Vec<[usize; 2]>,
     /// What is bounded.
     pub quantities: Vec<Quantity>,
-    /// A bearing, by its place in the certificate's list, and the quantities that say how far it goes: displacement and turn.
+    /// A bearing, by its place in the certificate's list, and the quantities that say how far it goes:
+    /// displacement and turn.
     pub rows: Vec<[usize; 3]>,
-    /// For each quantity and each of its axes: what bounds it against the axis, and along it, by places in [`Bounded::rows`]; the row after the
-    /// last is the key's slide.
+    /// For each quantity and each of its axes: what bounds it against the axis, and along it, by places in
+    /// [`Bounded::rows`]; the row after the last is the key's slide.
     pub multipliers: Vec<Vec<[Multipliers; 2]>>,
 }
 
@@ -48,13 +49,23 @@ pub(super) fn bounded(play: &KitPlay) -> (Vec<BearingPoint>, Vec<Bounded>) {
     let points = place.keys().map(|&i| {
         let b = &play.bearings[i];
         let [point, normal, across] = [b.point, b.normal, b.across()].map(|v| v.to_array());
-        BearingPoint { a: b.a, b: b.b, point, normal, across }
+        BearingPoint {
+            a: b.a,
+            b: b.b,
+            point,
+            normal,
+            across,
+        }
     });
     let claim = |proof: &crate::play::Proof| Bounded {
         free: proof.free.clone(),
         of_piece: proof.of_piece.clone(),
         quantities: proof.quantities.clone(),
-        rows: proof.rows.iter().map(|(bearing, [cell, turn])| [place[bearing], *cell, *turn]).collect(),
+        rows: proof
+            .rows
+            .iter()
+            .map(|(bearing, [cell, turn])| [place[bearing], *cell, *turn])
+            .collect(),
         multipliers: proof.multipliers.clone(),
     };
     (points.collect(), play.proofs.iter().map(claim).collect())

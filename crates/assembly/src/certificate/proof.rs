@@ -1,30 +1,32 @@
 //! Proofs that contacts allow no motion, which need no solver to be checked.
 //!
-//! The contacts of some free pieces allow the motions `x` with `A x ≤ 0` ([`crate::motion`]). A proof is a positive
-//! multiplier `μ` for some of them. With `D = diag(min(μ, 1))`, let
+//! The contacts of some free pieces allow the motions `x` with `A x ≤ 0` ([`crate::motion`]). A proof is a
+//! positive multiplier `μ` for some of them. With `D = diag(min(μ, 1))`, let
 //!
 //! ```text
 //!  residual ≥ |Aᵀμ|        how far the multipliers, as forces, are from equilibrium
 //!  hold     ≤ σ_min(D A)   by how much every unit motion closes or opens contacts, weighted
 //! ```
 //!
-//! *If `residual < hold`, then `x = 0` is the only solution of `A x ≤ 0`.* For such an `x`, all entries of `A x` are ≤ 0, so
-//! `−μᵀA x = Σ μᵢ |aᵢ x|`, and
+//! *If `residual < hold`, then `x = 0` is the only solution of `A x ≤ 0`.* For such an `x`, all entries of `A
+//! x` are ≤ 0, so `−μᵀA x = Σ μᵢ |aᵢ x|`, and
 //!
 //! ```text
 //!  hold |x| ≤ ‖D A x‖₂ ≤ ‖D A x‖₁ ≤ −μᵀA x ≤ |Aᵀμ| |x| ≤ residual |x|,
 //! ```
 //!
-//! which leaves `|x| = 0`. The conclusion is exact although `μ` is not: rounding only has to stay under `hold`. Weights end
-//! at 1 so that a few great forces do not drown the rest in the rounding of `(D A)ᵀ D A`.
+//! which leaves `|x| = 0`. The conclusion is exact although `μ` is not: rounding only has to stay under
+//! `hold`. Weights end at 1 so that a few great forces do not drown the rest in the rounding of `(D A)ᵀ D A`.
 //!
-//! With a piece that may leave, the multipliers are in equilibrium on it, too, and `hold` is the least singular value of the Schur complement
-//! that is left for the others: they then move by no more than `residual / hold` of the whole motion.
+//! With a piece that may leave, the multipliers are in equilibrium on it, too, and `hold` is the least
+//! singular value of the Schur complement that is left for the others: they then move by no more than
+//! `residual / hold` of the whole motion.
 //!
-//! Multipliers are found by giving each contact of a well-conditioned spanning set `S` the force 1 (a Cholesky factor of
-//! `A Aᵀ` with pivoting chooses it) and balancing `Aᵀ1_S` by the least-squares forces of all contacts. They exist exactly
-//! where nothing moves [Stiemke1915], and there are never more than `2 n` of them, for `n` unknowns. Because the
-//! multipliers of `S` are at least 1, `hold ≥ σ_min(A_S)`: the contacts that only balance may have forces near 0.
+//! Multipliers are found by giving each contact of a well-conditioned spanning set `S` the force 1 (a
+//! Cholesky factor of `A Aᵀ` with pivoting chooses it) and balancing `Aᵀ1_S` by the least-squares forces of
+//! all contacts. They exist exactly where nothing moves [Stiemke1915], and there are never more than `2 n` of
+//! them, for `n` unknowns. Because the multipliers of `S` are at least 1, `hold ≥ σ_min(A_S)`: the contacts
+//! that only balance may have forces near 0.
 
 use std::collections::BTreeMap;
 
@@ -40,10 +42,11 @@ use crate::verify::contact::Contact;
 const BALANCED: f64 = 1e-10;
 /// Forces below this share of the spanning contacts' carry nothing and are left out.
 const LEAST_FORCE: f64 = 1e-9;
-/// Squared part of a row outside the span of others below which it adds no rank. Rows are 1 to 2 long; a lock that
-/// rests on less is one of rounding.
+/// Squared part of a row outside the span of others below which it adds no rank. Rows are 1 to 2 long; a lock
+/// that rests on less is one of rounding.
 const DEPENDENT: f64 = 1e-9;
-/// A lock that rests on less is one of rounding: eigenvalues of 1 are known to about 1e-15, their roots to 3e-8.
+/// A lock that rests on less is one of rounding: eigenvalues of 1 are known to about 1e-15, their roots to
+/// 3e-8.
 const LEAST_HOLD: f64 = 1e-6;
 /// Added to a matrix that may be singular, as a share of its mean diagonal.
 const SINGULAR: f64 = 1e-13;
@@ -76,12 +79,25 @@ pub(super) struct Question<'a> {
 
 /// A proof that no piece moves but the one that may leave; `None` where there is none.
 pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Proof> {
-    let Question { n_pieces, held, leaves, length_mm, freedom } = *question;
-    let free: Vec<PatchId> = (0..n_pieces).map(PatchId::from).filter(|id| !held.contains(id)).collect();
+    let Question {
+        n_pieces,
+        held,
+        leaves,
+        length_mm,
+        freedom,
+    } = *question;
+    let free: Vec<PatchId> = (0..n_pieces)
+        .map(PatchId::from)
+        .filter(|id| !held.contains(id))
+        .collect();
     let system = System::new(contacts, &free, length_mm, freedom);
     let leaving = leaves.and_then(|(piece, way)| Some((free.binary_search(&piece).ok()?, way)));
     if free.len() == usize::from(leaving.is_some()) {
-        return Some(Proof { multipliers: Vec::new(), residual: 0.0, hold: 1.0 });
+        return Some(Proof {
+            multipliers: Vec::new(),
+            residual: 0.0,
+            hold: 1.0,
+        });
     }
     let spanning = spanning_rows(&system, leaving)?;
     let mut multipliers: BTreeMap<usize, f64> = spanning.into_iter().map(|row| (row, 1.0)).collect();
@@ -98,12 +114,18 @@ pub(super) fn prove(contacts: &[Contact], question: &Question<'_>) -> Option<Pro
     let gram = weighted_gram(&system, &multipliers, 1.0);
     let of_others = leaving.map_or_else(|| gram.clone(), |(piece, _)| without(&gram, &system, piece));
     let hold = SymmetricEigen::new(of_others).eigenvalues.min().max(0.0).sqrt();
-    let named = multipliers.into_iter().map(|(row, value)| (system.rows[row].contact, value));
-    (residual < hold && hold > LEAST_HOLD).then(|| Proof { multipliers: named.collect(), residual, hold })
+    let named = multipliers
+        .into_iter()
+        .map(|(row, value)| (system.rows[row].contact, value));
+    (residual < hold && hold > LEAST_HOLD).then(|| Proof {
+        multipliers: named.collect(),
+        residual,
+        hold,
+    })
 }
 
-/// What the Gram matrix is worth for the other pieces when the free piece at `leaving` moves as it likes: the Schur complement, by the
-/// pseudo-inverse of its block.
+/// What the Gram matrix is worth for the other pieces when the free piece at `leaving` moves as it likes: the
+/// Schur complement, by the pseudo-inverse of its block.
 fn without(gram: &DMatrix<f64>, system: &System, leaving: usize) -> DMatrix<f64> {
     /// Eigenvalues that are a smaller share of the greatest are the piece's own way out.
     const NO_HOLD: f64 = 1e-9;
@@ -116,15 +138,21 @@ fn without(gram: &DMatrix<f64>, system: &System, leaving: usize) -> DMatrix<f64>
     let least = NO_HOLD * eigen.eigenvalues.max();
     let across = block(&others, &own) * &eigen.eigenvectors;
     let mut rest = block(&others, &others);
-    for (k, &value) in eigen.eigenvalues.iter().enumerate().filter(|(_, value)| **value > least) {
+    for (k, &value) in eigen
+        .eigenvalues
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| **value > least)
+    {
         let column = across.column(k);
         rest -= column * column.transpose() / value;
     }
     rest
 }
 
-/// Rows of full rank, each the one with the largest part outside the span of those before it; the first of equals. Where a piece
-/// is leaving none is opened or closed by its way out, and they span all else that any do.
+/// Rows of full rank, each the one with the largest part outside the span of those before it; the first of
+/// equals. Where a piece is leaving none is opened or closed by its way out, and they span all else that any
+/// do.
 fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<usize>> {
     /// A row along which the way out goes by more, as a share, opens or closes with it.
     const TOUCHED: f64 = 1e-6;
@@ -137,13 +165,19 @@ fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<
     let n_chosen = system.n - basis.len();
     let outside = |row: &Row| -> f64 {
         let inside: f64 = basis.iter().map(|b| system.dot(row, b).powi(2)).sum();
-        if system.dot(row, &way_out).abs() > TOUCHED { 0.0 } else { system.dot_rows(row, row) - inside }
+        if system.dot(row, &way_out).abs() > TOUCHED {
+            0.0
+        } else {
+            system.dot_rows(row, row) - inside
+        }
     };
     let mut outside_sq: Vec<f64> = system.rows.iter().map(outside).collect();
     let mut chosen = Vec::new();
     for _ in 0..n_chosen {
         let first_of_most = |best: usize, i: usize| if outside_sq[i] > outside_sq[best] { i } else { best };
-        let next = (0..outside_sq.len()).reduce(first_of_most).filter(|&i| outside_sq[i] > DEPENDENT);
+        let next = (0..outside_sq.len())
+            .reduce(first_of_most)
+            .filter(|&i| outside_sq[i] > DEPENDENT);
         let Some(next) = next else {
             // What is left may be other ways of the piece that leaves; the hold tells.
             return leaving.map(|_| chosen);
@@ -152,7 +186,9 @@ fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<
         system.add(&system.rows[next], 1.0, &mut direction);
         // Twice is enough.
         for _ in 0..2 {
-            basis.iter().for_each(|b| direction.axpy(-b.dot(&direction), b, 1.0));
+            basis
+                .iter()
+                .for_each(|b| direction.axpy(-b.dot(&direction), b, 1.0));
         }
         let direction = direction.try_normalize(0.0)?;
         for (row, outside_sq) in system.rows.iter().zip(&mut outside_sq) {
@@ -168,17 +204,23 @@ fn spanning_rows(system: &System, leaving: Option<(usize, Vec3)>) -> Option<Vec<
 /// `Aᵀμ`.
 fn rest(system: &System, multipliers: &BTreeMap<usize, f64>) -> DVector<f64> {
     let mut rest = DVector::zeros(system.n);
-    multipliers.iter().for_each(|(&row, &value)| system.add(&system.rows[row], value, &mut rest));
+    multipliers
+        .iter()
+        .for_each(|(&row, &value)| system.add(&system.rows[row], value, &mut rest));
     rest
 }
 
 /// `(D A)ᵀ D A`, the weights being the multipliers up to `most`.
 fn weighted_gram(system: &System, multipliers: &BTreeMap<usize, f64>, most: f64) -> DMatrix<f64> {
-    system.gram(multipliers.iter().map(|(&row, value)| (&system.rows[row], value.min(most).powi(2))))
+    system.gram(
+        multipliers
+            .iter()
+            .map(|(&row, value)| (&system.rows[row], value.min(most).powi(2))),
+    )
 }
 
-/// Takes what is left of equilibrium out of the multipliers, by the change `δ` with the least `Σ (δ/μ)²`: small
-/// multipliers change little, and stay positive. `None` where one would not.
+/// Takes what is left of equilibrium out of the multipliers, by the change `δ` with the least `Σ (δ/μ)²`:
+/// small multipliers change little, and stay positive. `None` where one would not.
 fn correct(system: &System, multipliers: &mut BTreeMap<usize, f64>) -> Option<()> {
     let mut gram = weighted_gram(system, multipliers, f64::INFINITY);
     // A piece's way out is held by nothing, and nothing is to be taken out there.

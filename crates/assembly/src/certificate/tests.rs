@@ -12,14 +12,25 @@ use crate::motion::free_motion;
 use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, PIN, cuboid, grown, pinned_kit, pinned_lid};
 
 fn certified(kit: &Kit) -> Certificate {
-    let file = |id: PatchId| PieceFile { id, file: format!("{id}.stl"), sha256: String::new(), play: None };
+    let file = |id: PatchId| PieceFile {
+        id,
+        file: format!("{id}.stl"),
+        sha256: String::new(),
+        play: None,
+    };
     let files = kit.pieces.ids().map(file).collect();
     let (verdict, contacts) = kit.examined();
-    let evidence = Evidence { contacts: &contacts, verdict: &verdict, gaps: &KitGaps::default(), play: None };
+    let evidence = Evidence {
+        contacts: &contacts,
+        verdict: &verdict,
+        gaps: &KitGaps::default(),
+        play: None,
+    };
     certify(files, &kit.pieces, &kit.plan, &evidence, 2.0 * HALF_GAP_MM).expect("the plan is whole")
 }
 
-/// Who but the key can move while the first piece is held; empty where a lock is claimed, which is where nobody can.
+/// Who but the key can move while the first piece is held; empty where a lock is claimed, which is where
+/// nobody can.
 fn movers(kit: &Kit) -> Vec<u32> {
     let moving = kit.verdict().findings.into_iter().find_map(|f| match f {
         Finding::ClusterMoves { motions } => Some(motions.iter().map(|m| m.piece.0).collect()),
@@ -31,11 +42,24 @@ fn movers(kit: &Kit) -> Vec<u32> {
 }
 
 fn contact(a: u32, b: u32, point: Vec3, normal: Vec3) -> Contact {
-    Contact { a: PatchId(a), b: PatchId(b), point, normal, gap_mm: 0.1, area_mm2: 1.0 }
+    Contact {
+        a: PatchId(a),
+        b: PatchId(b),
+        point,
+        normal,
+        gap_mm: 0.1,
+        area_mm2: 1.0,
+    }
 }
 
 fn question(n_pieces: usize, length_mm: f64, freedom: Freedom) -> Question<'static> {
-    Question { n_pieces, held: &[PatchId(0)], leaves: None, length_mm, freedom }
+    Question {
+        n_pieces,
+        held: &[PatchId(0)],
+        leaves: None,
+        length_mm,
+        freedom,
+    }
 }
 
 fn is_locked(contacts: &[Contact], n_pieces: usize, freedom: Freedom) -> bool {
@@ -45,10 +69,22 @@ fn is_locked(contacts: &[Contact], n_pieces: usize, freedom: Freedom) -> bool {
 #[test]
 fn a_pinned_lid_is_certified_with_few_contacts_whose_proof_adds_up() {
     let certificate = certified(&pinned_kit(|_| {}));
-    let Claim::Locked { held, leaves, multipliers, residual, hold } = &certificate.claims[0] else { panic!() };
+    let Claim::Locked {
+        held,
+        leaves,
+        multipliers,
+        residual,
+        hold,
+    } = &certificate.claims[0]
+    else {
+        panic!()
+    };
     assert_eq!((&held[..], *leaves), (&[PatchId(0)][..], PatchId(2)));
     // At most twice the unknowns of the two that are free.
-    assert!(multipliers.len() <= 24 && certificate.contacts.len() <= 24, "{multipliers:?}");
+    assert!(
+        multipliers.len() <= 24 && certificate.contacts.len() <= 24,
+        "{multipliers:?}"
+    );
     assert!(*residual < 1e-9 && *hold > 1e-3, "{residual} {hold}");
     // In equilibrium on the lid and on the key, too.
     for piece in [PatchId(1), PatchId(2)] {
@@ -58,10 +94,12 @@ fn a_pinned_lid_is_certified_with_few_contacts_whose_proof_adds_up() {
             let sign = f64::from(c.a == piece) - f64::from(c.b == piece);
             (sign * Vec3::from(c.normal), sign * arm.cross(c.normal.into()))
         };
-        let sum = multipliers.iter().fold((Vec3::ZERO, Vec3::ZERO), |sum, &(i, value)| {
-            assert!(value > 0.0);
-            (sum.0 + value * wrench(i).0, sum.1 + value * wrench(i).1)
-        });
+        let sum = multipliers
+            .iter()
+            .fold((Vec3::ZERO, Vec3::ZERO), |sum, &(i, value)| {
+                assert!(value > 0.0);
+                (sum.0 + value * wrench(i).0, sum.1 + value * wrench(i).1)
+            });
         assert!(sum.0.length() + sum.1.length() < 1e-9, "{sum:?}");
     }
 }
@@ -69,7 +107,11 @@ fn a_pinned_lid_is_certified_with_few_contacts_whose_proof_adds_up() {
 #[test]
 fn walls_without_connectors_are_not_certified() {
     let slice = |from: f64| cuboid(ALL, ALL, [from, from + 9.9]);
-    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[slice(0.0), slice(10.0), slice(20.0)], &[Vec3::Z; 3]);
+    let kit = Kit::new(
+        cuboid(ALL, ALL, ALL),
+        &[slice(0.0), slice(10.0), slice(20.0)],
+        &[Vec3::Z; 3],
+    );
     assert_eq!(movers(&kit), [1]);
 }
 
@@ -84,31 +126,51 @@ fn a_lid_without_its_tongue_is_not_certified() {
 
 #[test]
 fn a_cap_that_touches_nothing_but_a_locked_lid_is_not_certified() {
-    // The cap's tongue slides into the lid from the side: without the lid, the cap would be apart from the rest.
-    let (stem, foot) = (([0.0, 10.0], [11.0, 19.0], [26.0, 31.0]), ([0.0, 10.0], [7.0, 23.0], [22.0, 26.0]));
+    // The cap's tongue slides into the lid from the side: without the lid, the cap would be apart from the
+    // rest.
+    let (stem, foot) = (
+        ([0.0, 10.0], [11.0, 19.0], [26.0, 31.0]),
+        ([0.0, 10.0], [7.0, 23.0], [22.0, 26.0]),
+    );
     let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([-5.0, p.0[1]], p.1, p.2);
     let [base, lid, pin] = pinned_lid(PIN);
     let lid = lid.subtract(&open(stem)).subtract(&open(foot));
     let top = cuboid([0.0, 10.0], ALL, [30.0 + 2.0 * HALF_GAP_MM, 36.0]);
-    let cap = Volume::union_all(vec![top, cuboid(stem.0, stem.1, stem.2), cuboid(foot.0, foot.1, foot.2)]);
+    let cap = Volume::union_all(vec![
+        top,
+        cuboid(stem.0, stem.1, stem.2),
+        cuboid(foot.0, foot.1, foot.2),
+    ]);
     let out = [Vec3::X, Vec3::X, Vec3::NEG_X, Vec3::Z];
-    assert_eq!(movers(&Kit::new(cuboid(ALL, ALL, ALL), &[base, lid, cap, pin], &out)), [2]);
+    assert_eq!(
+        movers(&Kit::new(cuboid(ALL, ALL, ALL), &[base, lid, cap, pin], &out)),
+        [2]
+    );
 }
 
 #[test]
 fn a_piece_that_alone_joins_another_to_the_rest_does_not_lock_it() {
-    // A bar that ends in a turned wheel: the wheel, piece 1, touches the bar alone, along a round axle and two flanks.
+    // A bar that ends in a turned wheel: the wheel, piece 1, touches the bar alone, along a round axle and
+    // two flanks.
     let mut contacts = Vec::new();
     for i in 0..24 {
         let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
         for x in [-0.3, 0.4] {
             contacts.push(contact(1, 0, Vec3::new(x, cos, sin), Vec3::new(0.0, -cos, -sin)));
-            contacts.push(contact(1, 0, Vec3::new(x, cos, sin), Vec3::new(x.signum(), 0.0, 0.0)));
+            contacts.push(contact(
+                1,
+                0,
+                Vec3::new(x, cos, sin),
+                Vec3::new(x.signum(), 0.0, 0.0),
+            ));
         }
     }
     assert!(!is_locked(&contacts, 2, Freedom::Rigid));
     let spin = free_motion(&contacts, 2, &[PatchId(0)], None, 1.0, Freedom::Rigid)[0];
-    assert!(spin.spin.x.abs() > 0.99 && spin.velocity.length() < 1e-6, "{spin:?}");
+    assert!(
+        spin.spin.x.abs() > 0.99 && spin.velocity.length() < 1e-6,
+        "{spin:?}"
+    );
 }
 
 #[test]
@@ -117,7 +179,11 @@ fn blocks_in_a_straight_groove_are_not_certified() {
     let tube = cuboid(ALL, ALL, ALL).subtract(&hole);
     let block = |from: f64, to: f64| cuboid([from, to], [10.0, 20.0], [10.0, 20.0]);
     let pieces = [tube, block(0.0, 9.9), block(20.0, 30.0), block(10.0, 19.9)];
-    let kit = Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::NEG_X, Vec3::X, Vec3::X]);
+    let kit = Kit::new(
+        cuboid(ALL, ALL, ALL),
+        &pieces,
+        &[Vec3::X, Vec3::NEG_X, Vec3::X, Vec3::X],
+    );
     assert!(!movers(&kit).is_empty());
 }
 
@@ -126,7 +192,13 @@ fn a_path_that_rubs_is_not_claimed() {
     let mut kit = pinned_kit(|_| {});
     let installs = |kit: &Kit| {
         let claims = certified(kit).claims.into_iter();
-        let piece = |claim| if let Claim::Installs { piece, .. } = claim { Some(piece.0) } else { None };
+        let piece = |claim| {
+            if let Claim::Installs { piece, .. } = claim {
+                Some(piece.0)
+            } else {
+                None
+            }
+        };
         claims.filter_map(piece).collect::<Vec<u32>>()
     };
     assert_eq!(installs(&kit), [1, 2]);
@@ -148,15 +220,18 @@ fn a_screw_is_not_certified_and_one_more_contact_locks_it() {
         contacts.push(contact(1, 0, point, velocity.cross(random).normalize()));
     }
     assert!(!is_locked(&contacts, 2, Freedom::Rigid));
-    assert!(is_locked(&contacts, 2, Freedom::Translations), "a screw does not slide out");
+    assert!(
+        is_locked(&contacts, 2, Freedom::Translations),
+        "a screw does not slide out"
+    );
     for normal in [Vec3::Z, Vec3::NEG_Z] {
         contacts.push(contact(1, 0, Vec3::new(0.0, 0.0, 0.5 * normal.z), normal));
     }
     assert!(is_locked(&contacts, 2, Freedom::Rigid));
 }
 
-/// Whether some subset of the pieces 1.. moves along one of `directions` past all others: brute force over the subsets of
-/// the directional blocking graphs.
+/// Whether some subset of the pieces 1.. moves along one of `directions` past all others: brute force over
+/// the subsets of the directional blocking graphs.
 fn a_subset_slides(contacts: &[Contact], n_pieces: u32, directions: &[Vec3]) -> bool {
     let subsets = 1u32..1 << (n_pieces - 1);
     let moves = |subset: u32, piece: PatchId| piece.0 > 0 && subset >> (piece.0 - 1) & 1 == 1;
@@ -170,11 +245,15 @@ fn a_subset_slides(contacts: &[Contact], n_pieces: u32, directions: &[Vec3]) -> 
     })
 }
 
-/// All directions in which something can begin to slide along faces with these normals, which have their opposites among
-/// them: the extreme rays of all cones that they cut out, and the normals.
+/// All directions in which something can begin to slide along faces with these normals, which have their
+/// opposites among them: the extreme rays of all cones that they cut out, and the normals.
 fn critical_directions(normals: &[Vec3]) -> Vec<Vec3> {
     let mut directions: Vec<Vec3> = normals.to_vec();
-    for d in normals.iter().flat_map(|a| normals.iter().map(|b| a.cross(*b))).filter_map(Vec3::try_normalize) {
+    for d in normals
+        .iter()
+        .flat_map(|a| normals.iter().map(|b| a.cross(*b)))
+        .filter_map(Vec3::try_normalize)
+    {
         if directions.iter().all(|known| known.distance_squared(d) > 1e-12) {
             directions.push(d);
         }
@@ -205,7 +284,10 @@ fn no_subset_slides_out_of_what_is_certified_and_one_piece_slides_where_it_is_no
         assert!(n_pieces > 2 || slides || locked, "round {round}: {contacts:?}");
         (n_locked, n_sliding) = (n_locked + u32::from(locked), n_sliding + u32::from(slides));
     }
-    assert!(n_locked > 12 && n_sliding > 12, "{n_locked} locked, {n_sliding} sliding");
+    assert!(
+        n_locked > 12 && n_sliding > 12,
+        "{n_locked} locked, {n_sliding} sliding"
+    );
 }
 
 #[test]
@@ -224,7 +306,11 @@ fn forty_pieces_are_proven_and_no_proof_names_more_contacts_than_twice_the_unkno
     }
     let question = question(40, 2.0, Freedom::Rigid);
     let proof = prove(&contacts, &question).expect("every piece is caged by the one before");
-    assert!(proof.multipliers.len() <= 2 * 39 * 6 && proof.residual < 1e-9 * proof.hold, "{}", proof.residual);
+    assert!(
+        proof.multipliers.len() <= 2 * 39 * 6 && proof.residual < 1e-9 * proof.hold,
+        "{}",
+        proof.residual
+    );
 }
 
 #[test]
@@ -247,9 +333,15 @@ fn gaps_of_a_row_add_up_when_all_may_move() {
         let mut objective = nalgebra::DVector::zeros(system.n);
         let at = system.n - 6;
         (0..3).for_each(|k| objective[at + k] = d[k]);
-        let gaps: Vec<f64> = system.rows.iter().map(|row| contacts[row.contact].gap_mm).collect();
+        let gaps: Vec<f64> = system
+            .rows
+            .iter()
+            .map(|row| contacts[row.contact].gap_mm)
+            .collect();
         let limits = crate::motion::Limits::new(&system, &gaps);
-        crate::motion::Corner::new(&limits).farthest(&objective).expect("it is caged")
+        crate::motion::Corner::new(&limits)
+            .farthest(&objective)
+            .expect("it is caged")
     };
     for d in [Vec3::X, Vec3::NEG_Y, Vec3::Z] {
         assert!((farthest(&[PatchId(2)], d) - 0.1).abs() < 1e-5);
@@ -262,7 +354,12 @@ fn a_plan_that_leaves_a_piece_out_is_not_certified() {
     let mut kit = pinned_kit(|_| {});
     kit.plan.steps.pop();
     let (verdict, gaps) = (Verification::default(), KitGaps::default());
-    let evidence = Evidence { contacts: &[], verdict: &verdict, gaps: &gaps, play: None };
+    let evidence = Evidence {
+        contacts: &[],
+        verdict: &verdict,
+        gaps: &gaps,
+        play: None,
+    };
     let claimed = |kit: &Kit| certify(Vec::new(), &kit.pieces, &kit.plan, &evidence, 0.1);
     assert_eq!(claimed(&kit), None);
 }

@@ -6,10 +6,11 @@ use super::system::{Row, System};
 
 /// By how much a contact may be violated, relative to the motion, when the search for contacts to add ends.
 const VIOLATION: f64 = 1e-6;
-/// A contact whose part outside the span of the active ones is a smaller share of it adds nothing but rounding.
+/// A contact whose part outside the span of the active ones is a smaller share of it adds nothing but
+/// rounding.
 const INDEPENDENT: f64 = 1e-9;
-/// Rounds for each unknown before the search ends undecided, which counts as a motion. A guard against endless rounds
-/// by rounding; how many real assemblies need has not been measured.
+/// Rounds for each unknown before the search ends undecided, which counts as a motion. A guard against
+/// endless rounds by rounding; how many real assemblies need has not been measured.
 const ROUNDS: usize = 30;
 
 /// Forces `μ ≥ 0` of contacts, and what of a load they leave.
@@ -21,7 +22,8 @@ pub(crate) struct Balance {
 }
 
 impl System {
-    /// The forces that leave least of `load`; ends as soon as the rest's components sum to no more than `enough`.
+    /// The forces that leave least of `load`; ends as soon as the rest's components sum to no more than
+    /// `enough`.
     pub fn balance(&self, load: &DVector<f64>, enough: f64) -> Balance {
         let mut active = Active::default();
         let mut rest = load.clone();
@@ -30,7 +32,9 @@ impl System {
             if rest.lp_norm(1) <= enough {
                 break;
             }
-            let Some(entering) = self.most_violated(&rest, &is_refused) else { break };
+            let Some(entering) = self.most_violated(&rest, &is_refused) else {
+                break;
+            };
             if !active.push(self, entering) {
                 is_refused[entering] = true;
                 continue;
@@ -46,7 +50,10 @@ impl System {
                 self.add(&self.rows[row], force, &mut rest);
             }
         }
-        Balance { forces: active.rows.into_iter().zip(active.forces).collect(), rest }
+        Balance {
+            forces: active.rows.into_iter().zip(active.forces).collect(),
+            rest,
+        }
     }
 
     /// The row along which `−rest` violates its contact most, per length of the row.
@@ -54,7 +61,9 @@ impl System {
         let limit = -VIOLATION * rest.norm();
         let violation = |row: &Row| self.dot(row, rest) / self.dot_rows(row, row).sqrt();
         let open = self.rows.iter().enumerate().filter(|(i, _)| !is_refused[*i]);
-        let worst = open.map(|(i, row)| (i, violation(row))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let worst = open
+            .map(|(i, row)| (i, violation(row)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
         (worst.1 < limit).then_some(worst.0)
     }
 }
@@ -72,7 +81,11 @@ impl Active {
     /// Adds a row with no force; `false`, and nothing is added, where it depends on the others.
     pub(super) fn push(&mut self, system: &System, entering: usize) -> bool {
         let row = &system.rows[entering];
-        let products: Vec<f64> = self.rows.iter().map(|&p| system.dot_rows(row, &system.rows[p])).collect();
+        let products: Vec<f64> = self
+            .rows
+            .iter()
+            .map(|&p| system.dot_rows(row, &system.rows[p]))
+            .collect();
         let mut line = self.forward(&products);
         let whole = system.dot_rows(row, row);
         let rest = whole - line.iter().map(|x| x * x).sum::<f64>();
@@ -86,22 +99,35 @@ impl Active {
         true
     }
 
-    /// Moves the forces to the least-squares solution, dropping rows whose force would become negative. Whether
-    /// `entering` was the first to go.
+    /// Moves the forces to the least-squares solution, dropping rows whose force would become negative.
+    /// Whether `entering` was the first to go.
     fn solve(&mut self, system: &System, base: &DVector<f64>, entering: usize) -> bool {
         let mut entering_left = false;
         let mut is_first = true;
         while !self.rows.is_empty() {
-            let against: Vec<f64> = self.rows.iter().map(|&p| -system.dot(&system.rows[p], base)).collect();
+            let against: Vec<f64> = self
+                .rows
+                .iter()
+                .map(|&p| -system.dot(&system.rows[p], base))
+                .collect();
             let target = self.backward(&self.forward(&against));
             let share = |i: usize| self.forces[i] / (self.forces[i] - target[i]);
-            let leaving = (0..target.len()).filter(|&i| target[i] <= 0.0).map(|i| (i, share(i)));
+            let leaving = (0..target.len())
+                .filter(|&i| target[i] <= 0.0)
+                .map(|i| (i, share(i)));
             let Some((leaving, share)) = leaving.min_by(|a, b| a.1.total_cmp(&b.1)) else {
                 self.forces = target;
                 break;
             };
-            let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
-            self.forces.iter_mut().zip(&target).for_each(|(force, to)| *force += share * (to - *force));
+            let share = if share.is_finite() {
+                share.clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            self.forces
+                .iter_mut()
+                .zip(&target)
+                .for_each(|(force, to)| *force += share * (to - *force));
             entering_left |= is_first && self.rows[leaving] == entering;
             is_first = false;
             self.remove(leaving);
@@ -125,7 +151,10 @@ impl Active {
         for i in (0..x.len()).rev() {
             x[i] /= self.lower[i][i];
             let known = x[i];
-            x[..i].iter_mut().zip(&self.lower[i]).for_each(|(x, l)| *x -= l * known);
+            x[..i]
+                .iter_mut()
+                .zip(&self.lower[i])
+                .for_each(|(x, l)| *x -= l * known);
         }
         x
     }

@@ -1,22 +1,25 @@
 //! How far pieces move within their gaps: the greatest `c · x` with `A x ≤ g`.
 //!
-//! The allowed motions are a polyhedron; a corner is where as many independent limits meet as there are unknowns. With
-//! `B` the rows of these limits and `λ = B⁻ᵀ c` their forces, the corner is the farthest one where all forces push:
-//! the simplex method, with the inverse of `B` at hand.
+//! The allowed motions are a polyhedron; a corner is where as many independent limits meet as there are
+//! unknowns. With `B` the rows of these limits and `λ = B⁻ᵀ c` their forces, the corner is the farthest one
+//! where all forces push: the simplex method, with the inverse of `B` at hand.
 //!
 //! Of many thousand contacts few ever end a motion, and only those are looked at in a step. So
-//! 1. *climb*: let go of the limit that pulls most, go along its edge to the next one that is looked at, until all push;
+//! 1. *climb*: let go of the limit that pulls most, go along its edge to the next one that is looked at,
+//!    until all push;
 //! 2. look at the contacts that the corner overdraws; where there are none, that is it;
-//! 3. *come back*: exchange a limit for the most overdrawn one such that all go on pushing (the dual method), until none
-//!    is overdrawn; again 1.
+//! 3. *come back*: exchange a limit for the most overdrawn one such that all go on pushing (the dual method),
+//!    until none is overdrawn; again 1.
 //!
-//! Each part ends: gaps are widened by some nanometres, each by its own, so that no more limits meet in a corner than it
-//! takes and every edge has a length; coming back does the like with the forces; and every round looks at more contacts.
+//! Each part ends: gaps are widened by some nanometres, each by its own, so that no more limits meet in a
+//! corner than it takes and every edge has a length; coming back does the like with the forces; and every
+//! round looks at more contacts.
 //!
-//! Bounds may come late: until a contact is looked at, no more than a lower end of its bound needs to be known.
+//! Bounds may come late: until a contact is looked at, no more than a lower end of its bound needs to be
+//! known.
 //!
-//! The next objective begins at the corner of the last one, so objectives that are alike should follow each other. Box
-//! limits [`FAR_MM`] away give the first corner.
+//! The next objective begins at the corner of the last one, so objectives that are alike should follow each
+//! other. Box limits [`FAR_MM`] away give the first corner.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +40,8 @@ const STRENGTHENED: f64 = 1e-6;
 /// Exchanges after which the inverse is computed anew, against rounding.
 const REFRESH: usize = 100;
 
-/// One inequality: `wrench` at the unknowns from `plus` on, less the same from `minus` on, stays below `bound_mm`.
+/// One inequality: `wrench` at the unknowns from `plus` on, less the same from `minus` on, stays below
+/// `bound_mm`.
 struct Limit {
     wrench: [f64; 6],
     plus: usize,
@@ -46,7 +50,8 @@ struct Limit {
 }
 
 impl Limit {
-    /// What the limit says of a motion. Motions are padded by [`PAD`] zeros, which stand for what does not move.
+    /// What the limit says of a motion. Motions are padded by [`PAD`] zeros, which stand for what does not
+    /// move.
     fn along(&self, motion: &[f64]) -> f64 {
         let (plus, minus) = (&motion[self.plus..][..6], &motion[self.minus..][..6]);
         (0..6).map(|k| self.wrench[k] * (plus[k] - minus[k])).sum()
@@ -86,9 +91,13 @@ pub(crate) struct Limits<'a> {
 pub(crate) type LateBound<'a> = dyn Fn(usize) -> f64 + Sync + 'a;
 
 impl<'a> Limits<'a> {
-    /// Contact rows stay below the bounds that `late_mm` tells when they are looked at, at least `gaps_mm` ≥ 0, one a row.
+    /// Contact rows stay below the bounds that `late_mm` tells when they are looked at, at least `gaps_mm` ≥
+    /// 0, one a row.
     pub fn late(system: &System, gaps_mm: &[f64], late_mm: &'a LateBound<'a>) -> Self {
-        Self { late: Some(late_mm), ..Self::new(system, gaps_mm) }
+        Self {
+            late: Some(late_mm),
+            ..Self::new(system, gaps_mm)
+        }
     }
 
     /// Contact rows stay below `gaps_mm`, one a row, ≥ 0.
@@ -102,11 +111,21 @@ impl<'a> Limits<'a> {
         };
         let side = |i: usize| {
             let sign = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
-            Limit { wrench: [sign, 0.0, 0.0, 0.0, 0.0, 0.0], plus: i / 2, minus: n, bound_mm: FAR_MM }
+            Limit {
+                wrench: [sign, 0.0, 0.0, 0.0, 0.0, 0.0],
+                plus: i / 2,
+                minus: n,
+                bound_mm: FAR_MM,
+            }
         };
         let contacts = system.rows.iter().zip(gaps_mm).enumerate().map(contact);
         let all = contacts.chain((0..2 * n).map(side)).collect();
-        Self { n, n_rows: system.rows.len(), all, late: None }
+        Self {
+            n,
+            n_rows: system.rows.len(),
+            all,
+            late: None,
+        }
     }
 }
 
@@ -141,14 +160,15 @@ impl<'a> Corner<'a> {
         self.ended(objective).map(|_| dot(objective.as_slice(), &self.x))
     }
 
-    /// Rows with the forces that show how far `objective · x` goes: they add up to the objective, but for rounding. `None` where it has
-    /// no end.
+    /// Rows with the forces that show how far `objective · x` goes: they add up to the objective, but for
+    /// rounding. `None` where it has no end.
     pub fn ended(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.go_farthest(objective.as_slice());
         self.ending(objective)
     }
 
-    /// As [`Corner::ended`], by the rows alone that were looked at before: no nearer an end, and sooner found.
+    /// As [`Corner::ended`], by the rows alone that were looked at before: no nearer an end, and sooner
+    /// found.
     pub fn ended_by_known(&mut self, objective: &DVector<f64>) -> Option<Vec<(usize, f64)>> {
         self.climb(objective.as_slice());
         self.come_back(objective.as_slice());
@@ -158,7 +178,10 @@ impl<'a> Corner<'a> {
 
     /// Rows that are looked at.
     pub fn looked_at(&self) -> impl Iterator<Item = usize> + '_ {
-        self.looked_at.iter().copied().filter(|&limit| limit < self.limits.n_rows)
+        self.looked_at
+            .iter()
+            .copied()
+            .filter(|&limit| limit < self.limits.n_rows)
     }
 
     /// The motion of the corner.
@@ -172,7 +195,11 @@ impl<'a> Corner<'a> {
         let least = STRENGTHENED * objective.norm();
         let pushing = || self.active.iter().copied().zip(forces.iter().copied());
         let has_end = pushing().all(|(limit, force)| limit < self.limits.n_rows || force <= least);
-        has_end.then(|| pushing().filter(|(limit, force)| *limit < self.limits.n_rows && *force > 0.0).collect())
+        has_end.then(|| {
+            pushing()
+                .filter(|(limit, force)| *limit < self.limits.n_rows && *force > 0.0)
+                .collect()
+        })
     }
 
     fn go_farthest(&mut self, objective: &[f64]) {
@@ -187,12 +214,15 @@ impl<'a> Corner<'a> {
     fn climb(&mut self, objective: &[f64]) {
         while let Some(leaving) = self.most_pulling(&self.forces(objective)) {
             let way: Vec<f64> = self.edges[leaving].iter().map(|x| -x).collect();
-            let Some(entering) = self.first_met(&way) else { break };
+            let Some(entering) = self.first_met(&way) else {
+                break;
+            };
             self.exchange(leaving, entering);
         }
     }
 
-    /// From a corner whose limits all push to the farthest one that all limits that are looked at allow, or one near it.
+    /// From a corner whose limits all push to the farthest one that all limits that are looked at allow, or
+    /// one near it.
     fn come_back(&mut self, objective: &[f64]) {
         let mut objective = objective.to_vec();
         let more = STRENGTHENED * dot(&objective, &objective).sqrt();
@@ -200,7 +230,9 @@ impl<'a> Corner<'a> {
             self.add_row(limit, more * scattered(i), &mut objective);
         }
         while let Some(entering) = self.most_overdrawn() {
-            let Some(leaving) = self.first_relieved(&self.forces(&objective), entering) else { break };
+            let Some(leaving) = self.first_relieved(&self.forces(&objective), entering) else {
+                break;
+            };
             self.exchange(leaving, entering);
         }
     }
@@ -215,7 +247,10 @@ impl<'a> Corner<'a> {
         let least = -FLAT * forces.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
         let pulling = (0..forces.len()).filter(|&i| forces[i] < least);
         let steepness = |i: usize| forces[i].powi(2) / dot(&self.edges[i], &self.edges[i]);
-        pulling.map(|i| (i, steepness(i))).max_by(|a, b| a.1.total_cmp(&b.1)).map(|p| p.0)
+        pulling
+            .map(|i| (i, steepness(i)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|p| p.0)
     }
 
     /// The limit that is met first along `way`: of those met at the same place, the one met most squarely.
@@ -223,8 +258,13 @@ impl<'a> Corner<'a> {
         let least_speed = FLAT * dot(way, way).sqrt();
         let met = self.looked_at.iter().map(|&i| (i, self.limits.all[i].along(way)));
         let met = met.filter(|&(_, speed)| speed > least_speed);
-        let met: Vec<(usize, f64, f64)> = met.map(|(i, speed)| (i, speed, self.room_mm(i).max(0.0))).collect();
-        let end = met.iter().map(|&(_, speed, room)| (room + OVERDRAWN_MM) / speed).fold(f64::INFINITY, f64::min);
+        let met: Vec<(usize, f64, f64)> = met
+            .map(|(i, speed)| (i, speed, self.room_mm(i).max(0.0)))
+            .collect();
+        let end = met
+            .iter()
+            .map(|&(_, speed, room)| (room + OVERDRAWN_MM) / speed)
+            .fold(f64::INFINITY, f64::min);
         let first = met.into_iter().filter(|&(_, speed, room)| room / speed <= end);
         first.max_by(|a, b| a.1.total_cmp(&b.1)).map(|m| m.0)
     }
@@ -236,7 +276,11 @@ impl<'a> Corner<'a> {
 
     /// Of what is looked at, the limit that the corner overdraws most.
     fn most_overdrawn(&self) -> Option<usize> {
-        let overdrawn = self.looked_at.iter().map(|&i| (i, self.room_mm(i))).filter(|o| o.1 < -OVERDRAWN_MM);
+        let overdrawn = self
+            .looked_at
+            .iter()
+            .map(|&i| (i, self.room_mm(i)))
+            .filter(|o| o.1 < -OVERDRAWN_MM);
         overdrawn.min_by(|a, b| a.1.total_cmp(&b.1)).map(|o| o.0)
     }
 
@@ -246,21 +290,32 @@ impl<'a> Corner<'a> {
         let least = FLAT * shares.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
         let relieved: Vec<usize> = (0..shares.len()).filter(|&i| shares[i] > least).collect();
         let slack = FLAT * forces.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
-        let end = relieved.iter().map(|&i| (forces[i].max(0.0) + slack) / shares[i]).fold(f64::INFINITY, f64::min);
-        let first = relieved.into_iter().filter(|&i| forces[i].max(0.0) / shares[i] <= end);
+        let end = relieved
+            .iter()
+            .map(|&i| (forces[i].max(0.0) + slack) / shares[i])
+            .fold(f64::INFINITY, f64::min);
+        let first = relieved
+            .into_iter()
+            .filter(|&i| forces[i].max(0.0) / shares[i] <= end);
         first.max_by(|&i, &k| shares[i].total_cmp(&shares[k]))
     }
 
     /// The limit's row as a sum of the active ones.
     fn shares(&self, limit: usize) -> Vec<f64> {
-        self.edges.iter().map(|edge| self.limits.all[limit].along(edge)).collect()
+        self.edges
+            .iter()
+            .map(|edge| self.limits.all[limit].along(edge))
+            .collect()
     }
 
     /// Adds `factor` times the limit's row to `sum`.
     fn add_row(&self, limit: usize, factor: f64, sum: &mut [f64]) {
         let limit = &self.limits.all[limit];
         for (from, sign) in [(limit.plus, factor), (limit.minus, -factor)] {
-            sum.iter_mut().skip(from).zip(limit.wrench).for_each(|(sum, w)| *sum += sign * w);
+            sum.iter_mut()
+                .skip(from)
+                .zip(limit.wrench)
+                .for_each(|(sum, w)| *sum += sign * w);
         }
     }
 
@@ -269,7 +324,12 @@ impl<'a> Corner<'a> {
         let shares = self.shares(entering);
         self.active[leaving] = entering;
         let way: Vec<f64> = self.edges[leaving].iter().map(|x| x / shares[leaving]).collect();
-        for (edge, &share) in self.edges.iter_mut().zip(&shares).filter(|(_, share)| **share != 0.0) {
+        for (edge, &share) in self
+            .edges
+            .iter_mut()
+            .zip(&shares)
+            .filter(|(_, share)| **share != 0.0)
+        {
             edge.iter_mut().zip(&way).for_each(|(x, w)| *x -= share * w);
         }
         self.edges[leaving] = way;
@@ -300,8 +360,8 @@ impl<'a> Corner<'a> {
         }
     }
 
-    /// Looks at the contact of each pair of pieces that the corner overdraws most: its neighbours would say the same.
-    /// Whether there is any that was not looked at before.
+    /// Looks at the contact of each pair of pieces that the corner overdraws most: its neighbours would say
+    /// the same. Whether there is any that was not looked at before.
     fn look_at_overdrawn(&mut self) -> bool {
         let mut overdrawn = BTreeMap::<(usize, usize), Vec<(f64, usize)>>::new();
         for i in (0..self.is_looked_at.len()).filter(|&i| !self.is_looked_at[i]) {

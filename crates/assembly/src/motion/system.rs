@@ -11,8 +11,8 @@ use crate::PatchId;
 /// Mean opening speed of the contacts that counts as none. The outside judge bounds the program's optimum
 /// by 1e-6, which ours is an upper bound of.
 const OPENING: f64 = 5e-7;
-/// Least over greatest eigenvalue of `AᵀA` below which pieces can slide without opening a contact; the outside
-/// judge has 1e-7.
+/// Least over greatest eigenvalue of `AᵀA` below which pieces can slide without opening a contact; the
+/// outside judge has 1e-7.
 const SLIDING: f64 = 1.5e-7;
 /// Part of the fastest component from which a piece counts as moving.
 const MOVES: f64 = 0.05;
@@ -45,12 +45,25 @@ impl System {
         let dof = if freedom == Freedom::Rigid { 6 } else { 3 };
         let column = |id: PatchId| free.binary_search(&id).ok().map(|i| i * dof);
         let rows = contacts.iter().enumerate().map(|(contact, c)| {
-            let spin = if freedom == Freedom::Rigid { c.point.cross(c.normal) / scale_mm } else { Vec3::ZERO };
+            let spin = if freedom == Freedom::Rigid {
+                c.point.cross(c.normal) / scale_mm
+            } else {
+                Vec3::ZERO
+            };
             let ([x, y, z], [u, v, w]) = (c.normal.to_array(), spin.to_array());
-            Row { contact, plus: column(c.a), minus: column(c.b), wrench: [x, y, z, u, v, w] }
+            Row {
+                contact,
+                plus: column(c.a),
+                minus: column(c.b),
+                wrench: [x, y, z, u, v, w],
+            }
         });
         let rows = rows.filter(|r| r.plus.is_some() || r.minus.is_some()).collect();
-        Self { dof, n: free.len() * dof, rows }
+        Self {
+            dof,
+            n: free.len() * dof,
+            rows,
+        }
     }
 
     /// Where the unknowns of the free piece at `position` begin.
@@ -60,7 +73,8 @@ impl System {
 
     /// `a · x`.
     pub fn dot(&self, row: &Row, x: &DVector<f64>) -> f64 {
-        let part = |at: Option<usize>| at.map_or(0.0, |at| (0..self.dof).map(|k| row.wrench[k] * x[at + k]).sum());
+        let part =
+            |at: Option<usize>| at.map_or(0.0, |at| (0..self.dof).map(|k| row.wrench[k] * x[at + k]).sum());
         part(row.plus) - part(row.minus)
     }
 
@@ -77,13 +91,18 @@ impl System {
     pub fn dot_rows(&self, a: &Row, b: &Row) -> f64 {
         let product: f64 = (0..self.dof).map(|k| a.wrench[k] * b.wrench[k]).sum();
         let meets = |x: Option<usize>, y: Option<usize>| f64::from(u8::from(x.is_some() && x == y));
-        product * (meets(a.plus, b.plus) + meets(a.minus, b.minus) - meets(a.plus, b.minus) - meets(a.minus, b.plus))
+        product
+            * (meets(a.plus, b.plus) + meets(a.minus, b.minus)
+                - meets(a.plus, b.minus)
+                - meets(a.minus, b.plus))
     }
 
     /// Mean of the rows, `Aᵀ1 / m`.
     fn mean(&self) -> DVector<f64> {
         let mut mean = DVector::zeros(self.n);
-        self.rows.iter().for_each(|row| self.add(row, 1.0 / self.rows.len() as f64, &mut mean));
+        self.rows
+            .iter()
+            .for_each(|row| self.add(row, 1.0 / self.rows.len() as f64, &mut mean));
         mean
     }
 
@@ -124,10 +143,22 @@ impl System {
         let scale = 1.0 / x.amax().max(f64::MIN_POSITIVE);
         let part = |at: usize| Vec3::new(x[at], x[at + 1], x[at + 2]) * scale;
         let twist = |(i, &piece): (usize, &PatchId)| {
-            let spin = if self.dof == 6 { part(i * self.dof + 3) } else { Vec3::ZERO };
-            Twist { piece, velocity: part(i * self.dof), spin }
+            let spin = if self.dof == 6 {
+                part(i * self.dof + 3)
+            } else {
+                Vec3::ZERO
+            };
+            Twist {
+                piece,
+                velocity: part(i * self.dof),
+                spin,
+            }
         };
         let speed = |t: &Twist| t.velocity.abs().max_element().max(t.spin.abs().max_element());
-        free.iter().enumerate().map(twist).filter(|t| speed(t) > MOVES).collect()
+        free.iter()
+            .enumerate()
+            .map(twist)
+            .filter(|t| speed(t) > MOVES)
+            .collect()
     }
 }

@@ -1,10 +1,11 @@
 //! How far a point can rise before a surface stops it, while it moves sideways by no more than a radius.
 //!
-//! Let the point start at height 0 on an axis, and let `S` be what of a closed surface hangs together, within the open
-//! cylinder of the radius about the axis, with a triangle above the point. Edges within the cylinder have triangles of `S`
-//! on both sides, so `S` is a cycle modulo the cylinder's wall: how often a ray upwards meets it is the same, modulo 2, for all
-//! places that a path within the cylinder joins without crossing `S`. Where the point meets it an odd number of
-//! times, and `S` ends at a height `g`, no such path leads above `g`.
+//! Let the point start at height 0 on an axis, and let `S` be what of a closed surface hangs together, within
+//! the open cylinder of the radius about the axis, with a triangle above the point. Edges within the cylinder
+//! have triangles of `S` on both sides, so `S` is a cycle modulo the cylinder's wall: how often a ray upwards
+//! meets it is the same, modulo 2, for all places that a path within the cylinder joins without crossing `S`.
+//! Where the point meets it an odd number of times, and `S` ends at a height `g`, no such path leads above
+//! `g`.
 //!
 //! ```text
 //!        |   ______   |  g: the highest place of S within the cylinder
@@ -13,7 +14,8 @@
 //!        |<--r->|     |
 //! ```
 //!
-//! Nothing else is asked of the surface: it may be rough, and neither a graph over the disc nor parallel to it.
+//! Nothing else is asked of the surface: it may be rough, and neither a graph over the disc nor parallel to
+//! it.
 
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Aabb, TriMesh, Vec3};
@@ -38,7 +40,16 @@ impl Region {
     /// Unit vectors towards the sides.
     fn sides(&self) -> [[f64; 2]; SIDES] {
         const H: f64 = std::f64::consts::FRAC_1_SQRT_2;
-        [[1.0, 0.0], [H, H], [0.0, 1.0], [-H, H], [-1.0, 0.0], [-H, -H], [0.0, -1.0], [H, -H]]
+        [
+            [1.0, 0.0],
+            [H, H],
+            [0.0, 1.0],
+            [-H, H],
+            [-1.0, 0.0],
+            [-H, -H],
+            [0.0, -1.0],
+            [H, -H],
+        ]
     }
 }
 
@@ -64,12 +75,18 @@ impl Axis {
     /// `normal` is a unit vector.
     pub fn new(origin: Vec3, normal: Vec3) -> Self {
         let u = normal.any_orthonormal_vector();
-        Self { origin, normal, across: [u, normal.cross(u)] }
+        Self {
+            origin,
+            normal,
+            across: [u, normal.cross(u)],
+        }
     }
 
     /// The directions in space of a region's sides.
     pub fn sides(&self) -> [Vec3; SIDES] {
-        Region::of_radius(0.0).sides().map(|[x, y]| self.across[0] * x + self.across[1] * y)
+        Region::of_radius(0.0)
+            .sides()
+            .map(|[x, y]| self.across[0] * x + self.across[1] * y)
     }
 
     /// Place across the axis, and height.
@@ -102,18 +119,30 @@ impl Surface {
         let mut beyond: Vec<(u32, u32)> = Vec::with_capacity(sides.len());
         for edge in sides.chunk_by(|x, y| x.0 == y.0) {
             for &(_, side) in edge {
-                beyond.extend(edge.iter().filter(|other| other.1 != side).map(|other| (side, other.1 / 3)));
+                beyond.extend(
+                    edge.iter()
+                        .filter(|other| other.1 != side)
+                        .map(|other| (side, other.1 / 3)),
+                );
             }
         }
         beyond.sort_unstable();
         let n_sides = 3 * mesh.triangles.len();
-        let start = (0..=n_sides as u32).map(|side| beyond.partition_point(|b| b.0 < side) as u32).collect();
+        let start = (0..=n_sides as u32)
+            .map(|side| beyond.partition_point(|b| b.0 < side) as u32)
+            .collect();
         let neighbours = beyond.into_iter().map(|b| b.1).collect();
-        Self { tree: TriangleBvh::new(mesh), bounds: mesh.bounds(), mesh: mesh.clone(), neighbours, start }
+        Self {
+            tree: TriangleBvh::new(mesh),
+            bounds: mesh.bounds(),
+            mesh: mesh.clone(),
+            neighbours,
+            start,
+        }
     }
 
-    /// The height of the barrier that hangs together with triangle `from`, above the origin, for sideways moves of up to `radius_mm`;
-    /// `None` where it ends above `most_mm` or is none.
+    /// The height of the barrier that hangs together with triangle `from`, above the origin, for sideways
+    /// moves of up to `radius_mm`; `None` where it ends above `most_mm` or is none.
     pub fn barrier_mm(&self, from: u32, axis: &Axis, region: &Region, most_mm: f64) -> Option<f64> {
         let (highest, n_above) = self.flood(from, axis, region, most_mm)?;
         (n_above % 2 == 1).then_some(highest)
@@ -131,7 +160,9 @@ impl Surface {
         while let Some(&face) = found.get(next) {
             next += 1;
             let corners = self.mesh.corners(face as usize).map(|p| axis.local(p));
-            let Some(clip) = clip(corners, region) else { continue };
+            let Some(clip) = clip(corners, region) else {
+                continue;
+            };
             highest = highest.max(clip.highest);
             n_above += usize::from(clip.on_axis.is_some_and(|height| height > 0.0));
             if highest >= most_mm || found.len() > MOST_TRIANGLES {
@@ -178,13 +209,21 @@ fn clip(t: [Vec3; 3], region: &Region) -> Option<Clip> {
         }
     }
     let mut edges = [false; 3];
-    polygon.iter().filter_map(|(_, edge)| *edge).for_each(|k| edges[k] = true);
+    polygon
+        .iter()
+        .filter_map(|(_, edge)| *edge)
+        .for_each(|k| edges[k] = true);
     let highest = polygon.iter().map(|(p, _)| p.z).fold(f64::NEG_INFINITY, f64::max);
     let on_axis = covers_axis(t).then(|| height_on_axis(t));
-    Some(Clip { highest, edges, on_axis })
+    Some(Clip {
+        highest,
+        edges,
+        on_axis,
+    })
 }
 
-/// Whether a ray along the axis passes the triangle: half-open, so that it passes one of two that share an edge.
+/// Whether a ray along the axis passes the triangle: half-open, so that it passes one of two that share an
+/// edge.
 fn covers_axis(t: [Vec3; 3]) -> bool {
     let mut is_inside = false;
     for k in 0..3 {
@@ -212,7 +251,10 @@ mod tests {
     use shellock_geom::Volume;
 
     fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb { min: min.into(), max: max.into() })
+        Volume::cuboid(Aabb {
+            min: min.into(),
+            max: max.into(),
+        })
     }
 
     /// The barrier of `roof` above the origin, which the point is `sideways` off from, for moves of `radius`.
@@ -228,7 +270,11 @@ mod tests {
         let roof = cuboid([-2.0, -2.0, 0.3], [2.0, 2.0, 8.0]);
         assert!((above(&roof, 0.0, 1.9).unwrap() - 0.3).abs() < 1e-12);
         assert!((above(&roof, 1.0, 0.99).unwrap() - 0.3).abs() < 1e-12);
-        assert_eq!(above(&roof, 1.0, 1.01), None, "beside it a point rises to the roof's top");
+        assert_eq!(
+            above(&roof, 1.0, 1.01),
+            None,
+            "beside it a point rises to the roof's top"
+        );
         let low = cuboid([-2.0, -2.0, 0.3], [2.0, 2.0, 4.0]);
         assert_eq!(above(&low, 1.0, 1.01), None, "and beside a low one over its top");
     }
@@ -244,15 +290,30 @@ mod tests {
     #[test]
     fn a_slope_is_as_high_as_its_highest_place_within_the_radius() {
         // 45 degrees, 0.5 above the origin.
-        let corners = [[-3.0, -3.0, -2.5], [3.0, -3.0, 3.5], [3.0, 3.0, 3.5], [-3.0, 3.0, -2.5]];
-        let mut mesh = TriMesh { points: corners.map(Vec3::from).to_vec(), triangles: vec![[0, 2, 1], [0, 3, 2]] };
+        let corners = [
+            [-3.0, -3.0, -2.5],
+            [3.0, -3.0, 3.5],
+            [3.0, 3.0, 3.5],
+            [-3.0, 3.0, -2.5],
+        ];
+        let mut mesh = TriMesh {
+            points: corners.map(Vec3::from).to_vec(),
+            triangles: vec![[0, 2, 1], [0, 3, 2]],
+        };
         mesh.points.push(Vec3::new(0.0, 0.0, 20.0));
-        mesh.triangles.extend([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]);
+        mesh.triangles
+            .extend([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]);
         let surface = Surface::new(&mesh);
         let from = surface.tree.first_hit(Vec3::ZERO, Vec3::Z, 10.0).unwrap().0;
         for radius in [0.1, 0.5, 1.0] {
-            let found =
-                surface.barrier_mm(from, &Axis::new(Vec3::ZERO, Vec3::Z), &Region::of_radius(radius), 5.0).unwrap();
+            let found = surface
+                .barrier_mm(
+                    from,
+                    &Axis::new(Vec3::ZERO, Vec3::Z),
+                    &Region::of_radius(radius),
+                    5.0,
+                )
+                .unwrap();
             assert!((found - (0.5 + radius)).abs() < 1e-9, "{radius}: {found}");
         }
     }
@@ -262,7 +323,15 @@ mod tests {
         let block = cuboid([-2.0, -2.0, -3.0], [2.0, 2.0, -1.0]);
         let surface = Surface::new(&block.to_mesh());
         let from = surface.tree.first_hit(Vec3::ZERO, Vec3::NEG_Z, 10.0).unwrap().0;
-        assert_eq!(surface.barrier_mm(from, &Axis::new(Vec3::ZERO, Vec3::Z), &Region::of_radius(0.5), 5.0), None);
+        assert_eq!(
+            surface.barrier_mm(
+                from,
+                &Axis::new(Vec3::ZERO, Vec3::Z),
+                &Region::of_radius(0.5),
+                5.0
+            ),
+            None
+        );
     }
 
     /// Points dropped at random paths: none that stays within the radius gets past a barrier.
@@ -276,18 +345,35 @@ mod tests {
             let [x, y]: [f64; 2] = std::array::from_fn(|_| rng.random_range(-1.5..1.5));
             let size = rng.random_range(0.1..0.4);
             let bump = cuboid([x, y, 0.5 - size], [x + size, y + size, 0.6]);
-            roof = if rng.random() { Volume::union_all(vec![roof, bump]) } else { roof.subtract(&bump) };
+            roof = if rng.random() {
+                Volume::union_all(vec![roof, bump])
+            } else {
+                roof.subtract(&bump)
+            };
         }
         let surface = Surface::new(&roof.to_mesh());
         let from = surface.tree.first_hit(Vec3::ZERO, Vec3::Z, 10.0).unwrap().0;
         let radius = 0.9;
-        let height =
-            surface.barrier_mm(from, &Axis::new(Vec3::ZERO, Vec3::Z), &Region::of_radius(radius), 2.0).unwrap();
+        let height = surface
+            .barrier_mm(
+                from,
+                &Axis::new(Vec3::ZERO, Vec3::Z),
+                &Region::of_radius(radius),
+                2.0,
+            )
+            .unwrap();
         let mut p = Vec3::ZERO;
         for _ in 0..20_000 {
-            let step = Vec3::new(rng.random_range(-0.2..0.2), rng.random_range(-0.2..0.2), rng.random_range(-0.1..0.2));
+            let step = Vec3::new(
+                rng.random_range(-0.2..0.2),
+                rng.random_range(-0.2..0.2),
+                rng.random_range(-0.1..0.2),
+            );
             let to = p + step;
-            let is_free = surface.tree.first_hit(p, step.normalize(), step.length()).is_none();
+            let is_free = surface
+                .tree
+                .first_hit(p, step.normalize(), step.length())
+                .is_none();
             if is_free && to.truncate().length() < radius && to.z > -0.5 {
                 p = to;
                 assert!(p.z <= height, "{p} is above {height}");

@@ -1,8 +1,10 @@
-//! Contacts with an area: places where a piece cannot rise past another while it moves sideways by no more than so much.
+//! Contacts with an area: places where a piece cannot rise past another while it moves sideways by no more
+//! than so much.
 //!
-//! A point `p` of piece `a` faces piece `b`; `n`, from `a` to `b`, is the opposite of the normal of the triangle of `b` that is
-//! nearest. How high the barrier of `b` above `p` is for sideways moves within a region is [`super::barrier`]'s question. The
-//! surface of `a` beside `p` must be no speck: it falls away by less than [`BED_DROP_MM`] over a half-disc of [`BED_MM`].
+//! A point `p` of piece `a` faces piece `b`; `n`, from `a` to `b`, is the opposite of the normal of the
+//! triangle of `b` that is nearest. How high the barrier of `b` above `p` is for sideways moves within a
+//! region is [`super::barrier`]'s question. The surface of `a` beside `p` must be no speck: it falls away by
+//! less than [`BED_DROP_MM`] over a half-disc of [`BED_MM`].
 
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3};
@@ -66,15 +68,26 @@ impl Surfaces {
         &self.0[piece].mesh
     }
 
-    /// Of the pieces that count, the place nearest to `p` within `reach_mm`: which piece, where, and the outward normal of the triangle there.
-    pub fn nearest(&self, p: Vec3, reach_mm: f64, counts: &dyn Fn(PatchId) -> bool) -> Option<(PatchId, Vec3, Vec3)> {
+    /// Of the pieces that count, the place nearest to `p` within `reach_mm`: which piece, where, and the
+    /// outward normal of the triangle there.
+    pub fn nearest(
+        &self,
+        p: Vec3,
+        reach_mm: f64,
+        counts: &dyn Fn(PatchId) -> bool,
+    ) -> Option<(PatchId, Vec3, Vec3)> {
         let mut best: Option<(f64, PatchId, Vec3, Vec3)> = None;
         for (id, surface) in self.0.iter().filter(|(id, _)| counts(*id)) {
             let limit_sq = best.map_or(reach_mm * reach_mm, |b| b.0);
             if surface.bounds.distance_sq(p) <= limit_sq
                 && let Some(near) = surface.tree.nearest(p, limit_sq)
             {
-                best = Some((near.distance_sq, id, near.point, surface.mesh.face_normal(near.face as usize)));
+                best = Some((
+                    near.distance_sq,
+                    id,
+                    near.point,
+                    surface.mesh.face_normal(near.face as usize),
+                ));
             }
         }
         best.map(|(_, id, point, normal)| (id, point, normal))
@@ -102,7 +115,8 @@ impl Surfaces {
         let is_beside = |a: &PatchId| *a != piece && self.0[*a].bounds.intersects(room);
         let own = self.on_piece(piece, &|_| true, reach_mm, FINE_SPACING_MM, seed);
         let of_others = self.0.ids().filter(is_beside);
-        let of_others = of_others.flat_map(|a| self.on_piece(a, &|b| b == piece, reach_mm, FINE_SPACING_MM, seed));
+        let of_others =
+            of_others.flat_map(|a| self.on_piece(a, &|b| b == piece, reach_mm, FINE_SPACING_MM, seed));
         own.into_iter().chain(of_others).collect()
     }
 
@@ -117,20 +131,30 @@ impl Surfaces {
     ) -> Vec<Bearing> {
         let own = &self.0[a].mesh;
         let room = own.bounds().grown(reach_mm);
-        let others: Vec<PatchId> =
-            self.0.ids().filter(|&b| b != a && counts(b) && self.0[b].bounds.intersects(room)).collect();
+        let others: Vec<PatchId> = self
+            .0
+            .ids()
+            .filter(|&b| b != a && counts(b) && self.0[b].bounds.intersects(room))
+            .collect();
         let is_near = |f: u32| {
             let corners = own.corners(f as usize);
             let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
             let far_mm = reach_mm + corners.iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
-            others.iter().any(|&b| self.0[b].tree.nearest(middle, far_mm * far_mm).is_some())
+            others
+                .iter()
+                .any(|&b| self.0[b].tree.nearest(middle, far_mm * far_mm).is_some())
         };
-        let faces: Vec<u32> = (0..own.triangles.len() as u32).into_par_iter().filter(|&f| is_near(f)).collect();
+        let faces: Vec<u32> = (0..own.triangles.len() as u32)
+            .into_par_iter()
+            .filter(|&f| is_near(f))
+            .collect();
         let near = TriMesh {
             points: own.points.clone(),
             triangles: faces.iter().map(|&f| own.triangles[f as usize]).collect(),
         };
-        let n = (near.area() / (spacing_mm * spacing_mm)).ceil().clamp(1.0, MOST_POINTS) as usize;
+        let n = (near.area() / (spacing_mm * spacing_mm))
+            .ceil()
+            .clamp(1.0, MOST_POINTS) as usize;
         let samples = sample::on_surface(&near, n, seed);
         let bearing = |s: &sample::Sample, b: PatchId| {
             let nearest = self.0[b].tree.nearest(s.point, reach_mm * reach_mm)?;
@@ -145,15 +169,23 @@ impl Surfaces {
                 face,
             })
         };
-        let of_sample = |s: &sample::Sample| others.iter().filter_map(|&b| bearing(s, b)).collect::<Vec<Bearing>>();
+        let of_sample = |s: &sample::Sample| {
+            others
+                .iter()
+                .filter_map(|&b| bearing(s, b))
+                .collect::<Vec<Bearing>>()
+        };
         samples.par_iter().flat_map_iter(of_sample).collect()
     }
 
-    /// How far the bearing's point rises while it moves sideways within `region`, mm; `None` where nothing stops it.
+    /// How far the bearing's point rises while it moves sideways within `region`, mm; `None` where nothing
+    /// stops it.
     pub fn rise_mm(&self, bearing: &Bearing, region: &Region) -> Option<f64> {
         let axis = bearing.axis();
         let above = &self.0[bearing.b];
-        let (from, _) = above.tree.first_hit(bearing.point, bearing.normal, MOST_RISE_MM)?;
+        let (from, _) = above
+            .tree
+            .first_hit(bearing.point, bearing.normal, MOST_RISE_MM)?;
         // From within the other piece its surface is seen from inside, and stops nothing.
         if above.mesh.face_normal(from as usize).dot(bearing.normal) >= 0.0 {
             return None;
@@ -169,7 +201,9 @@ impl Surfaces {
             for k in [SIDES - 1, 0, 1] {
                 half.far_mm[(side + k) % SIDES] = BEHIND_MM;
             }
-            self.0[bearing.a].highest_mm(bearing.face, &axis, &half, BED_DROP_MM).is_some()
+            self.0[bearing.a]
+                .highest_mm(bearing.face, &axis, &half, BED_DROP_MM)
+                .is_some()
         };
         (0..SIDES).any(is_bed)
     }

@@ -1,11 +1,13 @@
 //! Bounds of all that some pieces can do, found by iteration and proven by multipliers.
 //!
-//! An assumption says how far each of a few quantities goes. It says how far each bearing's point goes sideways, so how high its
-//! barrier is, so what the linear program over all bearings allows. Where that is within the assumption, no path from
-//! rest leaves it (docs/certificate.md). Else the assumption is widened to what was found and a little more, and tried again.
+//! An assumption says how far each of a few quantities goes. It says how far each bearing's point goes
+//! sideways, so how high its barrier is, so what the linear program over all bearings allows. Where that is
+//! within the assumption, no path from rest leaves it (docs/certificate.md). Else the assumption is widened
+//! to what was found and a little more, and tried again.
 //!
-//! Only few bearings end a motion, and only for these it matters how far they go: each round begins with the pieces' own turns
-//! and displacements and goes on to the cells of the bearings that end these, until no more are needed.
+//! Only few bearings end a motion, and only for these it matters how far they go: each round begins with the
+//! pieces' own turns and displacements and goes on to the cells of the bearings that end these, until no more
+//! are needed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
@@ -64,18 +66,21 @@ pub struct Proof {
     pub of_piece: Vec<[usize; 2]>,
     /// What is bounded.
     pub quantities: Vec<Quantity>,
-    /// The bearings that end motions, by their place in the list of all, each with the quantities of its cell and its turn.
+    /// The bearings that end motions, by their place in the list of all, each with the quantities of its cell
+    /// and its turn.
     pub rows: Vec<(usize, [usize; 2])>,
-    /// For each quantity and axis, against it and along it: rows with multipliers. The row after the last is the slide.
+    /// For each quantity and axis, against it and along it: rows with multipliers. The row after the last is
+    /// the slide.
     pub multipliers: Vec<Vec<[Multipliers; 2]>>,
 }
 
 /// What became of a question.
 pub(super) struct Answer {
-    /// How far each free piece goes where sideways moves and turns are taken as none: its displacement, mm, and its turn, rad; empty where
-    /// something has no end.
+    /// How far each free piece goes where sideways moves and turns are taken as none: its displacement, mm,
+    /// and its turn, rad; empty where something has no end.
     pub linear: Vec<[f64; 2]>,
-    /// Motions of the one free piece that go there: displacement of its centre, mm, and turn, rad; empty where several are free.
+    /// Motions of the one free piece that go there: displacement of its centre, mm, and turn, rad; empty
+    /// where several are free.
     pub swings: Vec<[f64; 6]>,
     /// The bearings that hold, of those that were asked in any round.
     pub asked: BTreeSet<usize>,
@@ -87,10 +92,18 @@ impl Answer {
     /// The same, where the bearings it was found of follow `n_before` others.
     pub fn after(self, n_before: usize) -> Self {
         let proof = self.proof.map(|proof| Proof {
-            rows: proof.rows.into_iter().map(|(bearing, quantities)| (n_before + bearing, quantities)).collect(),
+            rows: proof
+                .rows
+                .into_iter()
+                .map(|(bearing, quantities)| (n_before + bearing, quantities))
+                .collect(),
             ..proof
         });
-        Self { asked: self.asked.into_iter().map(|bearing| n_before + bearing).collect(), proof, ..self }
+        Self {
+            asked: self.asked.into_iter().map(|bearing| n_before + bearing).collect(),
+            proof,
+            ..self
+        }
     }
 }
 
@@ -125,7 +138,8 @@ pub(super) struct Problem<'a> {
     pub free: &'a [PatchId],
 }
 
-/// What one round found of a quantity: for each axis, against it and along it, the multipliers; or that it has no end.
+/// What one round found of a quantity: for each axis, against it and along it, the multipliers; or that it
+/// has no end.
 type Ends = Vec<[Option<Multipliers>; 2]>;
 
 /// What ends one way of a quantity, if anything does, and the motion that goes there.
@@ -149,22 +163,40 @@ impl Problem<'_> {
             Candidates::Some(some) => some.contains(&i),
         };
         let is_own = |i: usize| self.is_free(self.bearings[i].a) || self.is_free(self.bearings[i].b);
-        let own: Vec<usize> = (0..self.bearings.len()).filter(|&i| is_own(i) && is_candidate(i)).collect();
+        let own: Vec<usize> = (0..self.bearings.len())
+            .filter(|&i| is_own(i) && is_candidate(i))
+            .collect();
         let bearings: Vec<Bearing> = own.iter().map(|&i| self.bearings[i]).collect();
         let mut quantities = Quantities::new(self.free, self.centers, &bearings);
         let beds: Vec<OnceLock<bool>> = bearings.iter().map(|_| OnceLock::new()).collect();
-        let mut answer =
-            Answer { linear: Vec::new(), swings: Vec::new(), asked: BTreeSet::new(), proof: Err(Open::Rounds) };
-        let open = |answer: Answer, why: Open| Ok(Answer { proof: Err(why), ..answer });
+        let mut answer = Answer {
+            linear: Vec::new(),
+            swings: Vec::new(),
+            asked: BTreeSet::new(),
+            proof: Err(Open::Rounds),
+        };
+        let open = |answer: Answer, why: Open| {
+            Ok(Answer {
+                proof: Err(why),
+                ..answer
+            })
+        };
         for n_before in 0..ROUNDS {
             ctx.check()?;
             let round = Round::new(self, &bearings, &quantities, &beds);
-            let Some(Found { ends, motions }) = round.ends() else { return open(answer, Open::Far) };
+            let Some(Found { ends, motions }) = round.ends() else {
+                return open(answer, Open::Far);
+            };
             let guesses = round.guesses(&ends, &motions);
-            let found: BTreeMap<usize, Vec<[f64; 2]>> =
-                ends.iter().map(|(&q, ends)| (q, ends.iter().map(|e| round.values(q, e)).collect())).collect();
+            let found: BTreeMap<usize, Vec<[f64; 2]>> = ends
+                .iter()
+                .map(|(&q, ends)| (q, ends.iter().map(|e| round.values(q, e)).collect()))
+                .collect();
             let is_within = |(&q, found): (&usize, &Vec<[f64; 2]>)| {
-                found.iter().zip(&quantities.all[q].most).all(|(f, a)| f[0] <= a[0] && f[1] <= a[1])
+                found
+                    .iter()
+                    .zip(&quantities.all[q].most)
+                    .all(|(f, a)| f[0] <= a[0] && f[1] <= a[1])
             };
             if n_before == 0 {
                 answer.linear = quantities.linear(&found);
@@ -178,8 +210,11 @@ impl Problem<'_> {
             // What no bearing needed yet is assumed to go as far as in the motions that were found.
             for (q, found) in found.into_iter().chain(guesses) {
                 let quantity = &mut quantities.all[q];
-                let (most, least) =
-                    if quantity.at.is_some() { (MOST_SHIFT_MM, WIDER_MM) } else { (MOST_TURN, WIDER_RAD) };
+                let (most, least) = if quantity.at.is_some() {
+                    (MOST_SHIFT_MM, WIDER_MM)
+                } else {
+                    (MOST_TURN, WIDER_RAD)
+                };
                 for (assumed, found) in quantity.most.iter_mut().flatten().zip(found.iter().flatten()) {
                     if *found > *assumed {
                         *assumed = found * WIDER + least;
@@ -225,34 +260,69 @@ impl<'a> Round<'a> {
     ) -> Self {
         let centers = problem.centers;
         let center = problem.free.iter().map(|&p| centers[p]).sum::<Vec3>() / problem.free.len() as f64;
-        let errors_mm: Vec<f64> =
-            bearings.iter().zip(&quantities.places).map(|(b, p)| quantities.error_mm(b, p, centers)).collect();
-        let contact =
-            |a, b, point: Vec3, normal, gap_mm| Contact { a, b, point: point - center, normal, gap_mm, area_mm2: 0.0 };
-        let mut contacts: Vec<Contact> =
-            bearings.iter().map(|b| contact(b.a, b.b, b.point, b.normal, b.gap_mm)).collect();
+        let errors_mm: Vec<f64> = bearings
+            .iter()
+            .zip(&quantities.places)
+            .map(|(b, p)| quantities.error_mm(b, p, centers))
+            .collect();
+        let contact = |a, b, point: Vec3, normal, gap_mm| Contact {
+            a,
+            b,
+            point: point - center,
+            normal,
+            gap_mm,
+            area_mm2: 0.0,
+        };
+        let mut contacts: Vec<Contact> = bearings
+            .iter()
+            .map(|b| contact(b.a, b.b, b.point, b.normal, b.gap_mm))
+            .collect();
         let slide = problem.slide;
         if problem.is_free(slide.key) {
-            contacts.push(contact(slide.key, slide.seat, slide.at.into(), slide.along.into(), slide.most_mm));
+            contacts.push(contact(
+                slide.key,
+                slide.seat,
+                slide.at.into(),
+                slide.along.into(),
+                slide.most_mm,
+            ));
         }
         let system = System::new(&contacts, problem.free, LENGTH_MM, Freedom::Rigid);
         let told = system.rows.iter().map(|_| OnceLock::new()).collect();
-        Self { problem, bearings, quantities, beds, center, system, errors_mm, told }
+        Self {
+            problem,
+            bearings,
+            quantities,
+            beds,
+            center,
+            system,
+            errors_mm,
+            told,
+        }
     }
 
     /// The least that a row's bound can be.
     fn least_mm(&self, row: usize) -> f64 {
         let i = self.system.rows[row].contact;
-        self.bearings.get(i).map_or_else(|| self.slide_mm(), |b| b.gap_mm + self.errors_mm[i])
+        self.bearings
+            .get(i)
+            .map_or_else(|| self.slide_mm(), |b| b.gap_mm + self.errors_mm[i])
     }
 
     /// What bounds the slide, which is measured like the point of a bearing.
     fn slide_mm(&self) -> f64 {
         let (slide, q) = (self.problem.slide, self.quantities);
-        let of = |p: PatchId| q.of_piece.get(&p).map(|[w, u]| (q.all[*w].norm(), q.all[*u].norm()));
+        let of = |p: PatchId| {
+            q.of_piece
+                .get(&p)
+                .map(|[w, u]| (q.all[*w].norm(), q.all[*u].norm()))
+        };
         let at = Vec3::from(slide.at);
         let far = |p: PatchId| of(p).map_or(0.0, |(w, u)| u + w * at.distance(self.problem.centers[p]));
-        let (key, seat) = (of(slide.key).map_or(0.0, |k| k.0), of(slide.seat).map_or(0.0, |s| s.0));
+        let (key, seat) = (
+            of(slide.key).map_or(0.0, |k| k.0),
+            of(slide.seat).map_or(0.0, |s| s.0),
+        );
         slide.most_mm + 0.5 * seat * (far(slide.key) + far(slide.seat)) + 0.5 * (key + seat) * far(slide.key)
     }
 
@@ -265,27 +335,39 @@ impl<'a> Round<'a> {
     fn holding(&self) -> impl Iterator<Item = usize> + '_ {
         let is_held = |row: &usize| self.told[*row].get().is_some_and(|mm| mm.is_finite());
         let contact = |row: usize| self.system.rows[row].contact;
-        (0..self.told.len()).filter(is_held).map(contact).filter(|&i| i < self.bearings.len())
+        (0..self.told.len())
+            .filter(is_held)
+            .map(contact)
+            .filter(|&i| i < self.bearings.len())
     }
 
     fn measured_mm(&self, row: usize) -> f64 {
         let i = self.system.rows[row].contact;
-        let Some(b) = self.bearings.get(i) else { return self.slide_mm() };
+        let Some(b) = self.bearings.get(i) else {
+            return self.slide_mm();
+        };
         let surfaces = self.problem.surfaces;
         if !*self.beds[i].get_or_init(|| surfaces.has_bed(b)) {
             return f64::INFINITY;
         }
-        let region = self.quantities.region(b, &self.quantities.places[i], self.errors_mm[i]);
-        surfaces.rise_mm(b, &region).map_or(f64::INFINITY, |rise_mm| rise_mm + self.errors_mm[i])
+        let region = self
+            .quantities
+            .region(b, &self.quantities.places[i], self.errors_mm[i]);
+        surfaces
+            .rise_mm(b, &region)
+            .map_or(f64::INFINITY, |rise_mm| rise_mm + self.errors_mm[i])
     }
 
     /// What ends each quantity that matters, and the motions that go there; `None` where one has no end.
     fn ends(&self) -> Option<Found> {
-        let least: Vec<f64> = (0..self.system.rows.len()).map(|row| self.least_mm(row)).collect();
+        let least: Vec<f64> = (0..self.system.rows.len())
+            .map(|row| self.least_mm(row))
+            .collect();
         let late = |row: usize| self.bound_mm(row);
         let limits = Limits::late(&self.system, &least, &late);
         let start = Corner::new(&limits);
-        // One after the other where they are small, else one lane a way: each begins where its last one ended.
+        // One after the other where they are small, else one lane a way: each begins where its last one
+        // ended.
         let n_lanes = if self.problem.free.len() > 1 { WAYS } else { 1 };
         let mut lanes = vec![start; n_lanes];
         let mut ends: BTreeMap<usize, Ends> = BTreeMap::new();
@@ -297,7 +379,11 @@ impl<'a> Round<'a> {
                 ways.flat_map(|way| wanted.iter().map(move |&q| (q, way)))
                     .map(|(q, way)| (self.objective(q, way / 2, way % 2), self.is_of_piece(q)))
                     .map(|(towards, is_of_piece)| {
-                        let rows = if is_of_piece { corner.ended(&towards) } else { corner.ended_by_known(&towards) };
+                        let rows = if is_of_piece {
+                            corner.ended(&towards)
+                        } else {
+                            corner.ended_by_known(&towards)
+                        };
                         (rows, DVector::from_column_slice(corner.motion()))
                     })
                     .collect()
@@ -305,12 +391,16 @@ impl<'a> Round<'a> {
             let found: Vec<Vec<_>> = lanes.par_iter_mut().enumerate().map(of_lane).collect();
             let mut needed = BTreeSet::new();
             for (lane, found) in found.into_iter().enumerate() {
-                let asked = (lane..WAYS).step_by(n_lanes).flat_map(|way| wanted.iter().map(move |&q| (q, way)));
+                let asked = (lane..WAYS)
+                    .step_by(n_lanes)
+                    .flat_map(|way| wanted.iter().map(move |&q| (q, way)));
                 for ((q, way), (rows, motion)) in asked.zip(found) {
                     let rows = rows?;
                     motions.push(motion);
                     let contact = |row: usize| self.system.rows[row].contact;
-                    let places = rows.iter().filter_map(|(row, _)| self.quantities.places.get(contact(*row)));
+                    let places = rows
+                        .iter()
+                        .filter_map(|(row, _)| self.quantities.places.get(contact(*row)));
                     places.for_each(|place| needed.extend([place.cell, place.turn]));
                     let ends = ends.entry(q).or_insert_with(|| vec![[None, None]; 3]);
                     ends[way / 2][way % 2] = Some(rows);
@@ -319,7 +409,9 @@ impl<'a> Round<'a> {
             wanted = needed.into_iter().filter(|q| !ends.contains_key(q)).collect();
             // What one lane looked at, all know: the rest is bounded by known rows.
             let known: BTreeSet<usize> = lanes.iter().flat_map(Corner::looked_at).collect();
-            lanes.par_iter_mut().for_each(|corner| known.iter().for_each(|&row| corner.look_at(row)));
+            lanes
+                .par_iter_mut()
+                .for_each(|corner| known.iter().for_each(|&row| corner.look_at(row)));
         }
         Some(Found { ends, motions })
     }
@@ -329,14 +421,23 @@ impl<'a> Round<'a> {
         let all = 0..self.quantities.all.len();
         let unknown: Vec<usize> = all.filter(|q| !ends.contains_key(q)).collect();
         let farthest = |objective: DVector<f64>| motions.iter().map(|m| objective.dot(m)).fold(0.0, f64::max);
-        let guess =
-            |&q: &usize| (q, (0..3).map(|axis| [0, 1].map(|side| farthest(self.objective(q, axis, side)))).collect());
+        let guess = |&q: &usize| {
+            (
+                q,
+                (0..3)
+                    .map(|axis| [0, 1].map(|side| farthest(self.objective(q, axis, side))))
+                    .collect(),
+            )
+        };
         unknown.par_iter().map(guess).collect()
     }
 
     /// Whether the quantity is a piece's own: for these, all bearings are looked through.
     fn is_of_piece(&self, quantity: usize) -> bool {
-        self.quantities.of_piece.values().any(|of_piece| of_piece.contains(&quantity))
+        self.quantities
+            .of_piece
+            .values()
+            .any(|of_piece| of_piece.contains(&quantity))
     }
 
     /// How far a quantity goes along an axis (`side` 1) or against it (0), as a function of the unknowns.
@@ -354,7 +455,9 @@ impl<'a> Round<'a> {
         };
         let mut objective = DVector::zeros(self.system.n);
         for (piece, sign) in [(q.plus, 1.0), (q.minus, -1.0)] {
-            let Some(i) = piece.and_then(|p| self.problem.free.binary_search(&p).ok()) else { continue };
+            let Some(i) = piece.and_then(|p| self.problem.free.binary_search(&p).ok()) else {
+                continue;
+            };
             let at = self.system.column(i);
             for k in 0..3 {
                 objective[at + k] += sign * velocity[k];
@@ -366,28 +469,61 @@ impl<'a> Round<'a> {
 
     /// How far the multipliers show that a quantity goes, against an axis and along it.
     fn values(&self, quantity: usize, ends: &[Option<Multipliers>; 2]) -> [f64; 2] {
-        let least = if self.quantities.all[quantity].at.is_some() { ROUNDING } else { ROUNDING / LENGTH_MM };
+        let least = if self.quantities.all[quantity].at.is_some() {
+            ROUNDING
+        } else {
+            ROUNDING / LENGTH_MM
+        };
         ends.each_ref().map(|rows| {
-            let sum: f64 = rows.iter().flatten().map(|&(row, force)| force * self.bound_mm(row)).sum();
+            let sum: f64 = rows
+                .iter()
+                .flatten()
+                .map(|&(row, force)| force * self.bound_mm(row))
+                .sum();
             sum.max(0.0) * (1.0 + ROUNDING) + least
         })
     }
 
-    /// The proof that all quantities stay within what was `found`. A piece's own are bounded along more lines, by the rows that are known.
-    fn proof(&self, own: &[usize], mut ends: BTreeMap<usize, Ends>, found: BTreeMap<usize, Vec<[f64; 2]>>) -> Proof {
+    /// The proof that all quantities stay within what was `found`. A piece's own are bounded along more
+    /// lines, by the rows that are known.
+    fn proof(
+        &self,
+        own: &[usize],
+        mut ends: BTreeMap<usize, Ends>,
+        found: BTreeMap<usize, Vec<[f64; 2]>>,
+    ) -> Proof {
         let mut quantities: BTreeMap<usize, Quantity> = BTreeMap::new();
         for (&q, most) in &found {
-            quantities.insert(q, Quantity { most: most.clone(), ..self.quantities.all[q].clone() });
+            quantities.insert(
+                q,
+                Quantity {
+                    most: most.clone(),
+                    ..self.quantities.all[q].clone()
+                },
+            );
         }
         self.add_lines(&mut quantities, &mut ends);
-        let rows: BTreeSet<usize> = ends.values().flatten().flatten().flatten().flatten().map(|r| r.0).collect();
+        let rows: BTreeSet<usize> = ends
+            .values()
+            .flatten()
+            .flatten()
+            .flatten()
+            .flatten()
+            .map(|r| r.0)
+            .collect();
         let name_of: BTreeMap<usize, usize> = ends.keys().copied().zip(0..).collect();
         let contact = |row: usize| self.system.rows[row].contact;
-        let of_bearings: Vec<usize> = rows.into_iter().filter(|&row| contact(row) < self.bearings.len()).collect();
+        let of_bearings: Vec<usize> = rows
+            .into_iter()
+            .filter(|&row| contact(row) < self.bearings.len())
+            .collect();
         let place: BTreeMap<usize, usize> = of_bearings.iter().copied().zip(0..).collect();
         let renamed = |rows: Option<Multipliers>| -> Multipliers {
             let name = |row: usize| place.get(&row).copied().unwrap_or(of_bearings.len());
-            rows.into_iter().flatten().map(|(row, force)| (name(row), force)).collect()
+            rows.into_iter()
+                .flatten()
+                .map(|(row, force)| (name(row), force))
+                .collect()
         };
         let named = |row: &usize| {
             let p = &self.quantities.places[contact(*row)];
@@ -395,17 +531,39 @@ impl<'a> Round<'a> {
         };
         Proof {
             free: self.problem.free.to_vec(),
-            of_piece: self.quantities.of_piece.values().map(|of_piece| of_piece.map(|q| name_of[&q])).collect(),
+            of_piece: self
+                .quantities
+                .of_piece
+                .values()
+                .map(|of_piece| of_piece.map(|q| name_of[&q]))
+                .collect(),
             quantities: quantities.into_values().collect(),
             rows: of_bearings.iter().map(named).collect(),
-            multipliers: ends.into_values().map(|e| e.into_iter().map(|sides| sides.map(renamed)).collect()).collect(),
+            multipliers: ends
+                .into_values()
+                .map(|e| e.into_iter().map(|sides| sides.map(renamed)).collect())
+                .collect(),
         }
     }
 
-    /// Bounds the pieces' own quantities along the lattice's other lines, by rows that have a part in the proof already.
+    /// Bounds the pieces' own quantities along the lattice's other lines, by rows that have a part in the
+    /// proof already.
     fn add_lines(&self, quantities: &mut BTreeMap<usize, Quantity>, ends: &mut BTreeMap<usize, Ends>) {
-        let known: BTreeSet<usize> = ends.values().flatten().flatten().flatten().flatten().map(|r| r.0).collect();
-        let late = |row: usize| if known.contains(&row) { self.bound_mm(row) } else { f64::INFINITY };
+        let known: BTreeSet<usize> = ends
+            .values()
+            .flatten()
+            .flatten()
+            .flatten()
+            .flatten()
+            .map(|r| r.0)
+            .collect();
+        let late = |row: usize| {
+            if known.contains(&row) {
+                self.bound_mm(row)
+            } else {
+                f64::INFINITY
+            }
+        };
         let gaps: Vec<f64> = (0..self.system.rows.len()).map(late).collect();
         let limits = Limits::new(&self.system, &gaps);
         let mut corner = Corner::new(&limits);

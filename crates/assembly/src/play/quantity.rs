@@ -12,7 +12,8 @@ use crate::{IdVec, LatticeDirection, PatchId};
 
 /// Side of the cells that bearings of a pair are gathered in, mm.
 const CELL_MM: f64 = 2.5;
-/// A vector that goes no farther than 1 along any lattice direction is no longer than this: the inverse of `1/√(1 + (√2−1)² + (√3−√2)²)`.
+/// A vector that goes no farther than 1 along any lattice direction is no longer than this: the inverse of
+/// `1/√(1 + (√2−1)² + (√3−√2)²)`.
 const BETWEEN_LATTICE: f64 = 1.1281;
 /// Rounding of regions, mm.
 const ROUNDING_MM: f64 = 1e-6;
@@ -35,13 +36,23 @@ pub struct Quantity {
 impl Quantity {
     fn new(plus: Option<PatchId>, minus: Option<PatchId>, at: Option<Vec3>, axes: Vec<[f64; 3]>) -> Self {
         let most = vec![[0.0; 2]; axes.len()];
-        Self { plus, minus, at: at.map(|p| p.to_array()), axes, most }
+        Self {
+            plus,
+            minus,
+            at: at.map(|p| p.to_array()),
+            axes,
+            most,
+        }
     }
 
     /// No vector within the bounds is longer.
     pub fn norm(&self) -> f64 {
         let longest = |[low, high]: &[f64; 2]| low.max(*high);
-        let of_box = self.most[..3].iter().map(|m| longest(m).powi(2)).sum::<f64>().sqrt();
+        let of_box = self.most[..3]
+            .iter()
+            .map(|m| longest(m).powi(2))
+            .sum::<f64>()
+            .sqrt();
         if self.axes.len() < LINES {
             return of_box;
         }
@@ -67,7 +78,10 @@ const COORDINATES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
 /// The lattice's lines, but for the coordinate axes.
 pub(super) fn other_lines() -> impl Iterator<Item = Vec3> {
     let is_other = |d: &Vec3| COORDINATES.iter().all(|a| a.dot(*d).abs() < 0.99);
-    LatticeDirection::all().filter(|d| *d < d.opposite()).map(LatticeDirection::unit).filter(is_other)
+    LatticeDirection::all()
+        .filter(|d| *d < d.opposite())
+        .map(LatticeDirection::unit)
+        .filter(is_other)
 }
 
 /// Which quantities say how far a bearing's point goes.
@@ -101,27 +115,54 @@ impl Quantities {
     /// Of the pieces of `free` (in ascending order) and their `bearings`.
     pub fn new(free: &[PatchId], centers: &IdVec<PatchId, Vec3>, bearings: &[Bearing]) -> Self {
         let freed = |p: PatchId| Some(p).filter(|p| free.binary_search(p).is_ok());
-        let mut made = Self { all: Vec::new(), of_piece: BTreeMap::new(), places: Vec::with_capacity(bearings.len()) };
+        let mut made = Self {
+            all: Vec::new(),
+            of_piece: BTreeMap::new(),
+            places: Vec::with_capacity(bearings.len()),
+        };
         for &p in free {
-            let turn = made.add(Quantity::new(Some(p), None, None, COORDINATES.map(|d| d.to_array()).to_vec()));
-            let shift =
-                made.add(Quantity::new(Some(p), None, Some(centers[p]), COORDINATES.map(|d| d.to_array()).to_vec()));
+            let turn = made.add(Quantity::new(
+                Some(p),
+                None,
+                None,
+                COORDINATES.map(|d| d.to_array()).to_vec(),
+            ));
+            let shift = made.add(Quantity::new(
+                Some(p),
+                None,
+                Some(centers[p]),
+                COORDINATES.map(|d| d.to_array()).to_vec(),
+            ));
             made.of_piece.insert(p, [turn, shift]);
         }
-        let key = |b: &Bearing| (b.a.min(b.b), b.a.max(b.b), (b.point / CELL_MM).floor().to_array().map(|x| x as i64));
+        let key = |b: &Bearing| {
+            (
+                b.a.min(b.b),
+                b.a.max(b.b),
+                (b.point / CELL_MM).floor().to_array().map(|x| x as i64),
+            )
+        };
         let mut cells: BTreeMap<(PatchId, PatchId, [i64; 3]), Vec<usize>> = BTreeMap::new();
-        bearings.iter().enumerate().for_each(|(i, b)| cells.entry(key(b)).or_default().push(i));
+        bearings
+            .iter()
+            .enumerate()
+            .for_each(|(i, b)| cells.entry(key(b)).or_default().push(i));
         let mut of_cell = BTreeMap::new();
         let mut turns: BTreeMap<(PatchId, PatchId), usize> = BTreeMap::new();
         for (cell, list) in &cells {
             let (plus, minus) = (freed(cell.0), freed(cell.1));
-            turns.entry((cell.0, cell.1)).or_insert_with(|| match plus.xor(minus) {
-                Some(alone) => made.of_piece[&alone][0],
-                None => made.add(Quantity::new(plus, minus, None, principal([].into_iter()))),
-            });
+            turns
+                .entry((cell.0, cell.1))
+                .or_insert_with(|| match plus.xor(minus) {
+                    Some(alone) => made.of_piece[&alone][0],
+                    None => made.add(Quantity::new(plus, minus, None, principal([].into_iter()))),
+                });
             let middle = list.iter().map(|&i| bearings[i].point).sum::<Vec3>() / list.len() as f64;
             let axes = principal(list.iter().map(|&i| bearings[i].normal));
-            of_cell.insert(*cell, (made.add(Quantity::new(plus, minus, Some(middle), axes)), middle));
+            of_cell.insert(
+                *cell,
+                (made.add(Quantity::new(plus, minus, Some(middle), axes)), middle),
+            );
         }
         for b in bearings {
             let (cell, middle) = of_cell[&key(b)];
@@ -147,16 +188,34 @@ impl Quantities {
         };
         let of_a = of_a.filter(|_| of_b.is_some()).copied();
         let of_b = of_b.map(|q| q[0]);
-        Place { cell, cell_sign: sign, off: b.point - middle, turn, turn_sign, of_a, of_b }
+        Place {
+            cell,
+            cell_sign: sign,
+            off: b.point - middle,
+            turn,
+            turn_sign,
+            of_a,
+            of_b,
+        }
     }
 
     /// Displacement, mm, and turn, rad, of each free piece in what was `found`.
     pub fn linear(&self, found: &BTreeMap<usize, Vec<[f64; 2]>>) -> Vec<[f64; 2]> {
-        let norm = |q: usize| Quantity { most: found[&q].clone(), ..self.all[q].clone() }.norm();
-        self.of_piece.values().map(|&[turn, shift]| [norm(shift), norm(turn)]).collect()
+        let norm = |q: usize| {
+            Quantity {
+                most: found[&q].clone(),
+                ..self.all[q].clone()
+            }
+            .norm()
+        };
+        self.of_piece
+            .values()
+            .map(|&[turn, shift]| [norm(shift), norm(turn)])
+            .collect()
     }
 
-    /// How far the bearing's point, seen from `b`, can be from where the logarithms of poses say, mm: docs/certificate.md.
+    /// How far the bearing's point, seen from `b`, can be from where the logarithms of poses say, mm:
+    /// docs/certificate.md.
     pub fn error_mm(&self, b: &Bearing, p: &Place, centers: &IdVec<PatchId, Vec3>) -> f64 {
         let norm = |k: usize| self.all[k].norm();
         let turn = norm(p.turn);
@@ -174,17 +233,24 @@ impl Quantities {
     /// How far the point goes sideways, seen from `b`, where the error is so much.
     pub fn region(&self, b: &Bearing, p: &Place, error_mm: f64) -> Region {
         let (cell, turn) = (&self.all[p.cell], &self.all[p.turn]);
-        let far =
-            |t: Vec3| cell.along(t * p.cell_sign) + turn.along(p.off.cross(t) * p.turn_sign) + error_mm + ROUNDING_MM;
-        Region { far_mm: b.axis().sides().map(far) }
+        let far = |t: Vec3| {
+            cell.along(t * p.cell_sign) + turn.along(p.off.cross(t) * p.turn_sign) + error_mm + ROUNDING_MM
+        };
+        Region {
+            far_mm: b.axis().sides().map(far),
+        }
     }
 }
 
 /// Axes along which displacements are bounded best: those of the bearings' normals.
 fn principal(normals: impl Iterator<Item = Vec3>) -> Vec<[f64; 3]> {
-    let sum = normals.map(|n| Vector3::new(n.x, n.y, n.z)).fold(Matrix3::zeros(), |m, n| m + n * n.transpose());
+    let sum = normals
+        .map(|n| Vector3::new(n.x, n.y, n.z))
+        .fold(Matrix3::zeros(), |m, n| m + n * n.transpose());
     let vectors = SymmetricEigen::new(sum).eigenvectors;
-    (0..3).map(|k| [vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]]).collect()
+    (0..3)
+        .map(|k| [vectors[(0, k)], vectors[(1, k)], vectors[(2, k)]])
+        .collect()
 }
 
 #[cfg(test)]

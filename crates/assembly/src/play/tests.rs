@@ -11,7 +11,12 @@ use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, cuboid, pinned_kit};
 const CLEARANCE_MM: f64 = 2.0 * HALF_GAP_MM;
 
 fn measured(kit: &Kit, clearance_mm: f64) -> KitPlay {
-    let params = PlayParams { clearance_mm, slide_mm: SLIDE_MM, is_together: true, seed: 0 };
+    let params = PlayParams {
+        clearance_mm,
+        slide_mm: SLIDE_MM,
+        is_together: true,
+        seed: 0,
+    };
     let ctx = Ctx::quiet();
     let mut play = measure(&ctx, &params, &kit.pieces, &kit.plan).unwrap();
     look_for_ways_out(&ctx, clearance_mm, &kit.pieces, &mut play).unwrap();
@@ -24,14 +29,26 @@ fn caged(gap_mm: f64) -> Kit {
     let cage = cuboid(ALL, ALL, ALL).subtract(&cuboid(hollow, hollow, hollow));
     let inside = [10.0, 20.0];
     let key = cuboid([40.0, 41.0], ALL, ALL);
-    Kit::new(cuboid(ALL, ALL, ALL), &[cage, cuboid(inside, inside, inside), key], &[Vec3::X; 3])
+    Kit::new(
+        cuboid(ALL, ALL, ALL),
+        &[cage, cuboid(inside, inside, inside), key],
+        &[Vec3::X; 3],
+    )
 }
 
 /// A thin plate in a recess under two lips that reach over it by `lip_mm`, with `gap_mm` on all sides.
 fn under_lips(lip_mm: f64, gap_mm: f64) -> Kit {
     let plate = cuboid([5.0, 25.0], [5.0, 25.0], [20.0, 21.0]);
-    let recess = cuboid([5.0 - gap_mm, 25.0 + gap_mm], [5.0 - gap_mm, 25.0 + gap_mm], [20.0 - gap_mm, 21.0 + gap_mm]);
-    let mouth = cuboid([5.0 + lip_mm, 25.0 - lip_mm], [5.0 - gap_mm, 25.0 + gap_mm], [20.5, 40.0]);
+    let recess = cuboid(
+        [5.0 - gap_mm, 25.0 + gap_mm],
+        [5.0 - gap_mm, 25.0 + gap_mm],
+        [20.0 - gap_mm, 21.0 + gap_mm],
+    );
+    let mouth = cuboid(
+        [5.0 + lip_mm, 25.0 - lip_mm],
+        [5.0 - gap_mm, 25.0 + gap_mm],
+        [20.5, 40.0],
+    );
     let base = cuboid(ALL, ALL, ALL).subtract(&recess).subtract(&mouth);
     let key = cuboid([40.0, 41.0], ALL, ALL);
     Kit::new(cuboid(ALL, ALL, ALL), &[base, plate, key], &[Vec3::X; 3])
@@ -40,12 +57,20 @@ fn under_lips(lip_mm: f64, gap_mm: f64) -> Kit {
 #[test]
 fn a_cube_in_a_cage_is_proven_to_go_hardly_farther_than_its_gap() {
     let play = measured(&caged(0.1), 0.1);
-    let Some(cube) = play.alone[PatchId(1)].filter(|p| p.is_proven) else { panic!("{:?}", play.alone) };
+    let Some(cube) = play.alone[PatchId(1)].filter(|p| p.is_proven) else {
+        panic!("{:?}", play.alone)
+    };
     // Its centre can go 0.1 mm along each axis at once; it can turn until its edges meet the walls.
     let diagonal_mm = 0.1 * 3f64.sqrt();
-    assert!(cube.translation_mm >= diagonal_mm - 1e-3 && cube.translation_mm < 1.5 * diagonal_mm, "{cube:?}");
+    assert!(
+        cube.translation_mm >= diagonal_mm - 1e-3 && cube.translation_mm < 1.5 * diagonal_mm,
+        "{cube:?}"
+    );
     let about_an_axis = (0.2f64 / 10.0).to_degrees();
-    assert!(cube.rotation_deg > about_an_axis && cube.rotation_deg < 2.5 * about_an_axis, "{cube:?}");
+    assert!(
+        cube.rotation_deg > about_an_axis && cube.rotation_deg < 2.5 * about_an_axis,
+        "{cube:?}"
+    );
 }
 
 /// A random walk of the lid, each step with exact intersections, goes nowhere that the proof denies.
@@ -53,8 +78,15 @@ fn a_cube_in_a_cage_is_proven_to_go_hardly_farther_than_its_gap() {
 fn no_free_walk_leads_beyond_the_proven_play() {
     let kit = pinned_kit(|_| {});
     let play = measured(&kit, CLEARANCE_MM);
-    let Some(lid) = play.alone[PatchId(1)].filter(|p| p.is_proven) else { panic!("{:?}", play.alone) };
-    let solids: Vec<Volume> = kit.pieces.as_slice().iter().map(|m| Volume::from_closed_mesh(m).unwrap()).collect();
+    let Some(lid) = play.alone[PatchId(1)].filter(|p| p.is_proven) else {
+        panic!("{:?}", play.alone)
+    };
+    let solids: Vec<Volume> = kit
+        .pieces
+        .as_slice()
+        .iter()
+        .map(|m| Volume::from_closed_mesh(m).unwrap())
+        .collect();
     let center = kit.pieces[PatchId(1)].centroid();
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let (mut turn, mut shift, mut farthest) = (Quat::IDENTITY, Vec3::ZERO, [0.0f64; 2]);
@@ -62,15 +94,29 @@ fn no_free_walk_leads_beyond_the_proven_play() {
         let mut random = |size: f64| Vec3::from_array(std::array::from_fn(|_| rng.random_range(-size..size)));
         let (to_turn, to_shift) = (Quat::from_scaled_axis(random(0.003)) * turn, shift + random(0.04));
         let mut mesh = kit.pieces[PatchId(1)].clone();
-        mesh.points.iter_mut().for_each(|p| *p = center + to_shift + to_turn * (*p - center));
+        mesh.points
+            .iter_mut()
+            .for_each(|p| *p = center + to_shift + to_turn * (*p - center));
         let moved = Volume::from_closed_mesh(&mesh).unwrap();
-        if [0, 2].iter().all(|&other| moved.intersect(&solids[other]).volume() < 1e-6) {
+        if [0, 2]
+            .iter()
+            .all(|&other| moved.intersect(&solids[other]).volume() < 1e-6)
+        {
             (turn, shift) = (to_turn, to_shift);
-            farthest = [farthest[0].max(shift.length()), farthest[1].max(turn.to_scaled_axis().length().to_degrees())];
+            farthest = [
+                farthest[0].max(shift.length()),
+                farthest[1].max(turn.to_scaled_axis().length().to_degrees()),
+            ];
         }
     }
-    assert!(farthest[0] > 0.5 * CLEARANCE_MM && farthest[1] > 0.1, "the walk went nowhere: {farthest:?}");
-    assert!(farthest[0] <= lid.translation_mm && farthest[1] <= lid.rotation_deg, "{farthest:?} beyond {lid:?}");
+    assert!(
+        farthest[0] > 0.5 * CLEARANCE_MM && farthest[1] > 0.1,
+        "the walk went nowhere: {farthest:?}"
+    );
+    assert!(
+        farthest[0] <= lid.translation_mm && farthest[1] <= lid.rotation_deg,
+        "{farthest:?} beyond {lid:?}"
+    );
 }
 
 #[test]
@@ -78,20 +124,35 @@ fn the_play_of_all_together_is_no_less_than_that_of_each_alone() {
     // A cube in a cage, and a key that fills a shaft beside it.
     let (inside, shaft) = ([4.0, 12.0], [16.0, 26.0]);
     let wide = |[low, high]: [f64; 2]| [low - 0.1, high + 0.1];
-    let cage = cuboid(ALL, ALL, ALL).subtract(&cuboid(wide(inside), wide(inside), wide(inside))).subtract(&cuboid(
-        wide(shaft),
-        wide(shaft),
-        [9.9, 40.0],
-    ));
-    let pieces = [cage, cuboid(inside, inside, inside), cuboid(shaft, shaft, [10.0, 30.0])];
-    let play = measured(&Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z]), 0.1);
-    let Some(together) = &play.together else { panic!("not proven: {:?}", play.alone) };
+    let cage = cuboid(ALL, ALL, ALL)
+        .subtract(&cuboid(wide(inside), wide(inside), wide(inside)))
+        .subtract(&cuboid(wide(shaft), wide(shaft), [9.9, 40.0]));
+    let pieces = [
+        cage,
+        cuboid(inside, inside, inside),
+        cuboid(shaft, shaft, [10.0, 30.0]),
+    ];
+    let play = measured(
+        &Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z]),
+        0.1,
+    );
+    let Some(together) = &play.together else {
+        panic!("not proven: {:?}", play.alone)
+    };
     assert_eq!(together[PatchId(0)], None, "the cage touches both and is held");
     for id in [PatchId(1), PatchId(2)] {
-        let (Some(both), Some(alone)) = (together[id], play.alone[id]) else { panic!("{together:?}") };
-        assert!(both.is_proven && (both.translation_mm - alone.translation_mm).abs() < 0.02, "{both:?} {alone:?}");
+        let (Some(both), Some(alone)) = (together[id], play.alone[id]) else {
+            panic!("{together:?}")
+        };
+        assert!(
+            both.is_proven && (both.translation_mm - alone.translation_mm).abs() < 0.02,
+            "{both:?} {alone:?}"
+        );
     }
-    assert!(play.alone[PatchId(2)].is_some_and(|key| key.translation_mm > SLIDE_MM), "the key may slide");
+    assert!(
+        play.alone[PatchId(2)].is_some_and(|key| key.translation_mm > SLIDE_MM),
+        "the key may slide"
+    );
 }
 
 #[test]
@@ -99,15 +160,37 @@ fn what_nothing_holds_is_found_to_come_out() {
     // A block in a shaft that is open above, which is not the key.
     let (shaft, wide) = ([10.0, 20.0], [9.9, 20.1]);
     let base = cuboid(ALL, ALL, ALL).subtract(&cuboid(wide, wide, [19.9, 40.0]));
-    let pieces = [base, cuboid(shaft, shaft, [20.0, 30.0]), cuboid([40.0, 41.0], ALL, ALL)];
+    let pieces = [
+        base,
+        cuboid(shaft, shaft, [20.0, 30.0]),
+        cuboid([40.0, 41.0], ALL, ALL),
+    ];
     let kit = Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X; 3]);
     let play = measured(&kit, 0.1);
-    assert!(!play.alone[PatchId(1)].is_some_and(|p| p.is_proven), "{:?}", play.alone);
-    let (_, poses) = play.ways_out.iter().flatten().find(|way| way.0 == PatchId(1)).expect("it slides out upwards");
+    assert!(
+        !play.alone[PatchId(1)].is_some_and(|p| p.is_proven),
+        "{:?}",
+        play.alone
+    );
+    let (_, poses) = play
+        .ways_out
+        .iter()
+        .flatten()
+        .find(|way| way.0 == PatchId(1))
+        .expect("it slides out upwards");
     assert_eq!(poses[0], [0.0; 6]);
     assert!(poses[poses.len() - 1][2] > 9.0, "{:?}", poses.last());
     let (check, findings) = check_ways_out(&play, &kit.pieces).expect("it was looked for");
-    assert!(!check.ok && findings.iter().any(|f| matches!(f, Finding::ComesOut { piece: PatchId(1), .. })));
+    assert!(
+        !check.ok
+            && findings.iter().any(|f| matches!(
+                f,
+                Finding::ComesOut {
+                    piece: PatchId(1),
+                    ..
+                }
+            ))
+    );
 }
 
 #[test]
@@ -120,7 +203,11 @@ fn what_lies_under_wide_lips_is_proven_to_stay_and_under_narrow_ones_it_is_not()
     );
     // Shifted under one lip by 0.4 mm it is free of the other, which reaches over it by 0.3.
     let loose = measured(&under_lips(0.3, 0.4), 0.4);
-    assert!(!loose.alone[PatchId(1)].is_some_and(|p| p.is_proven), "{:?}", loose.alone);
+    assert!(
+        !loose.alone[PatchId(1)].is_some_and(|p| p.is_proven),
+        "{:?}",
+        loose.alone
+    );
 }
 
 #[test]
@@ -129,16 +216,29 @@ fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
     // Open in front alone; a drawer of 16 mm that must be pulled all its way.
     let cabinet = cuboid(ALL, ALL, ALL).subtract(&cuboid([10.0, 40.0], [9.9, 20.1], [9.9, 20.1]));
     let drawer = cuboid([14.0, 30.0], [10.0, 20.0], [10.0, 20.0]);
-    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[cabinet, drawer, key.clone()], &[Vec3::X; 3]);
+    let kit = Kit::new(
+        cuboid(ALL, ALL, ALL),
+        &[cabinet, drawer, key.clone()],
+        &[Vec3::X; 3],
+    );
     let play = measured(&kit, 0.1);
-    assert!(play.ways_out.iter().flatten().any(|way| way.0 == PatchId(1)), "{:?}", play.alone);
+    assert!(
+        play.ways_out.iter().flatten().any(|way| way.0 == PatchId(1)),
+        "{:?}",
+        play.alone
+    );
     // Nothing ends the ball's turns; still it is where it was.
     let ball = |radius_mm: f64| {
         let sphere = shellock_testkit::shapes::sphere(3, Vec3::splat(radius_mm));
-        Volume::from_closed_mesh(&sphere).unwrap().translate(Vec3::splat(15.0))
+        Volume::from_closed_mesh(&sphere)
+            .unwrap()
+            .translate(Vec3::splat(15.0))
     };
-    let socket =
-        cuboid(ALL, ALL, ALL).subtract(&ball(8.15)).subtract(&cuboid([14.0, 16.0], [14.0, 16.0], [15.0, 40.0]));
+    let socket = cuboid(ALL, ALL, ALL).subtract(&ball(8.15)).subtract(&cuboid(
+        [14.0, 16.0],
+        [14.0, 16.0],
+        [15.0, 40.0],
+    ));
     let kit = Kit::new(cuboid(ALL, ALL, ALL), &[socket, ball(8.0), key], &[Vec3::X; 3]);
     let play = measured(&kit, 0.1);
     assert!(play.unproven().any(|id| id == PatchId(1)));
@@ -152,9 +252,17 @@ fn a_speck_is_no_bearing() {
     let cage = cuboid(ALL, ALL, ALL).subtract(&cuboid(hollow, hollow, hollow));
     let needle = cuboid([19.9, 20.95], [15.0, 15.05], [15.0, 15.05]);
     let cube = Volume::union_all(vec![cuboid([10.0, 20.0], [10.0, 20.0], [10.0, 20.0]), needle]);
-    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[cage, cube, cuboid([40.0, 41.0], ALL, ALL)], &[Vec3::X; 3]);
+    let kit = Kit::new(
+        cuboid(ALL, ALL, ALL),
+        &[cage, cube, cuboid([40.0, 41.0], ALL, ALL)],
+        &[Vec3::X; 3],
+    );
     let play = measured(&kit, 0.1);
-    assert!(play.proofs.iter().all(|proof| proof.free != [PatchId(1)]), "{:?}", play.alone);
+    assert!(
+        play.proofs.iter().all(|proof| proof.free != [PatchId(1)]),
+        "{:?}",
+        play.alone
+    );
 }
 
 #[test]

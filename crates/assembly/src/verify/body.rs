@@ -6,10 +6,11 @@ use shellock_geom::{TriMesh, Vec3, Volume};
 use super::{Check, Finding};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Points nearer than this become one, mm: what readers of STL files do. At the size of prints it merges bitwise equal
-/// single-precision points and, near the origin, a few more.
+/// Points nearer than this become one, mm: what readers of STL files do. At the size of prints it merges
+/// bitwise equal single-precision points and, near the origin, a few more.
 const MERGE_MM: f64 = 1e-8;
-/// A component of less volume is a crumb that no slicer prints, mm³. Cavities come out negative and are no bodies.
+/// A component of less volume is a crumb that no slicer prints, mm³. Cavities come out negative and are no
+/// bodies.
 const CRUMB_MM3: f64 = 0.01;
 
 /// A piece as a reader of its file sees it.
@@ -37,20 +38,32 @@ pub fn read(ctx: &Ctx, pieces: &IdVec<PatchId, TriMesh>) -> Result<IdVec<PatchId
         ctx.check()?;
         Ok(read_piece(piece, &pieces[piece]))
     });
-    Ok(read.collect::<Result<Vec<Body>, Cancelled>>()?.into_iter().collect())
+    Ok(read
+        .collect::<Result<Vec<Body>, Cancelled>>()?
+        .into_iter()
+        .collect())
 }
 
 /// The verdict over all pieces.
 pub fn check(bodies: &IdVec<PatchId, Body>) -> (Vec<Check>, Vec<Finding>) {
-    let findings: Vec<Finding> = bodies.iter().flat_map(|(_, b)| b.defects.iter().cloned()).collect();
+    let findings: Vec<Finding> = bodies
+        .iter()
+        .flat_map(|(_, b)| b.defects.iter().cloned())
+        .collect();
     let check = |name: &str, concerns: fn(&Finding) -> bool| {
         let n = findings.iter().filter(|f| concerns(f)).count();
         Check::new(name, n == 0, format!("{n} of {} pieces fail", bodies.len()))
     };
     let checks = vec![
-        check("every piece closed, oriented", |f| matches!(f, Finding::NotClosed { .. })),
-        check("no edge shared by four faces", |f| matches!(f, Finding::SharedEdges { .. })),
-        check("every piece one connected body", |f| matches!(f, Finding::SeveralBodies { .. })),
+        check("every piece closed, oriented", |f| {
+            matches!(f, Finding::NotClosed { .. })
+        }),
+        check("no edge shared by four faces", |f| {
+            matches!(f, Finding::SharedEdges { .. })
+        }),
+        check("every piece one connected body", |f| {
+            matches!(f, Finding::SeveralBodies { .. })
+        }),
     ];
     (checks, findings)
 }
@@ -60,32 +73,56 @@ fn read_piece(piece: PatchId, mesh: &TriMesh) -> Body {
     let mesh = finite(mesh).map(merged).unwrap_or_default();
     let edges = edge_use(&mesh);
     if let Some((count, at)) = edges.shared {
-        defects.push(Finding::SharedEdges { piece, count, at: at.to_array() });
+        defects.push(Finding::SharedEdges {
+            piece,
+            count,
+            at: at.to_array(),
+        });
     }
     let is_closed = edges.n_unbalanced == 0 && mesh.signed_volume() > 0.0;
-    let volume = if is_closed { Volume::from_closed_mesh(&mesh).ok().filter(|v| !v.is_empty()) } else { None };
+    let volume = if is_closed {
+        Volume::from_closed_mesh(&mesh).ok().filter(|v| !v.is_empty())
+    } else {
+        None
+    };
     match &volume {
         None => defects.push(Finding::NotClosed { piece }),
         Some(volume) => {
-            let count = volume.components().iter().filter(|c| c.to_mesh().signed_volume() > CRUMB_MM3).count();
+            let count = volume
+                .components()
+                .iter()
+                .filter(|c| c.to_mesh().signed_volume() > CRUMB_MM3)
+                .count();
             if count != 1 {
                 defects.push(Finding::SeveralBodies { piece, count });
             }
         }
     }
-    Body { mesh, volume, defects }
+    Body {
+        mesh,
+        volume,
+        defects,
+    }
 }
 
 /// `mesh`, unless it names points that are not there or are not numbers.
 pub fn finite(mesh: &TriMesh) -> Option<&TriMesh> {
     let is_sound = mesh.points.iter().all(|p| p.is_finite())
-        && mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.points.len());
+        && mesh
+            .triangles
+            .iter()
+            .flatten()
+            .all(|&v| (v as usize) < mesh.points.len());
     is_sound.then_some(mesh)
 }
 
-/// `mesh` with equal points made one and triangles that collapse by it left out. Points keep their first order.
+/// `mesh` with equal points made one and triangles that collapse by it left out. Points keep their first
+/// order.
 pub fn merged(mesh: &TriMesh) -> TriMesh {
-    let cell = |p: Vec3| p.to_array().map(|x| (f64::from(x as f32) / MERGE_MM).round() as i64);
+    let cell = |p: Vec3| {
+        p.to_array()
+            .map(|x| (f64::from(x as f32) / MERGE_MM).round() as i64)
+    };
     let mut by_place: Vec<([i64; 3], u32)> = mesh.points.iter().map(|&p| cell(p)).zip(0..).collect();
     by_place.sort_unstable();
     let mut name = vec![0u32; mesh.points.len()];
@@ -97,14 +134,23 @@ pub fn merged(mesh: &TriMesh) -> TriMesh {
     let triangles = mesh.triangles.iter().map(|t| t.map(|v| name[v as usize]));
     let triangles: Vec<[u32; 3]> = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
     let mut is_used = vec![false; mesh.points.len()];
-    triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+    triangles
+        .iter()
+        .flatten()
+        .for_each(|&v| is_used[v as usize] = true);
     let mut rank = vec![0u32; mesh.points.len()];
     let mut points = Vec::new();
     for (v, &p) in mesh.points.iter().enumerate().filter(|(v, _)| is_used[*v]) {
         rank[v] = points.len() as u32;
         points.push(p);
     }
-    TriMesh { points, triangles: triangles.into_iter().map(|t| t.map(|v| rank[v as usize])).collect() }
+    TriMesh {
+        points,
+        triangles: triangles
+            .into_iter()
+            .map(|t| t.map(|v| rank[v as usize]))
+            .collect(),
+    }
 }
 
 fn edge_use(mesh: &TriMesh) -> EdgeUse {
@@ -113,7 +159,10 @@ fn edge_use(mesh: &TriMesh) -> EdgeUse {
         edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
     }
     edges.sort_unstable();
-    let mut found = EdgeUse { n_unbalanced: 0, shared: None };
+    let mut found = EdgeUse {
+        n_unbalanced: 0,
+        shared: None,
+    };
     for uses in edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
         let forwards = uses.iter().filter(|e| e.2).count();
         found.n_unbalanced += usize::from(2 * forwards != uses.len());
@@ -131,7 +180,10 @@ mod tests {
     use shellock_geom::Aabb;
 
     fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb { min: min.into(), max: max.into() })
+        Volume::cuboid(Aabb {
+            min: min.into(),
+            max: max.into(),
+        })
     }
 
     fn joined(parts: &[TriMesh]) -> TriMesh {
@@ -139,7 +191,8 @@ mod tests {
         for part in parts {
             let first = all.points.len() as u32;
             all.points.extend(&part.points);
-            all.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+            all.triangles
+                .extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
         }
         all
     }
@@ -157,15 +210,27 @@ mod tests {
         let mut nan = cube.clone();
         nan.points[0].x = f64::NAN;
         assert_eq!(found(&nan), [Finding::NotClosed { piece: PatchId(3) }]);
-        assert_eq!(found(&TriMesh::default()), [Finding::NotClosed { piece: PatchId(3) }]);
+        assert_eq!(
+            found(&TriMesh::default()),
+            [Finding::NotClosed { piece: PatchId(3) }]
+        );
 
         let apart = joined(&[cube.clone(), cuboid([5.0; 3], [6.0; 3]).to_mesh()]);
-        assert_eq!(found(&apart), [Finding::SeveralBodies { piece: PatchId(3), count: 2 }]);
+        assert_eq!(
+            found(&apart),
+            [Finding::SeveralBodies {
+                piece: PatchId(3),
+                count: 2
+            }]
+        );
 
         // Two cubes that touch along an edge: closed, but the edge has four faces.
         let touching = joined(&[cube, cuboid([2.0, 2.0, 0.0], [4.0, 4.0, 2.0]).to_mesh()]);
         let shared = found(&touching);
-        assert!(matches!(shared[0], Finding::SharedEdges { count: 1, at, .. } if at == [2.0, 2.0, 1.0]), "{shared:?}");
+        assert!(
+            matches!(shared[0], Finding::SharedEdges { count: 1, at, .. } if at == [2.0, 2.0, 1.0]),
+            "{shared:?}"
+        );
     }
 
     #[test]

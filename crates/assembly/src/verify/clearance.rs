@@ -1,8 +1,9 @@
-//! How far the finished pieces stay apart: each pair at rest, and each path over all of its travels. Nothing is sampled.
+//! How far the finished pieces stay apart: each pair at rest, and each path over all of its travels. Nothing
+//! is sampled.
 //!
-//! The outer rims of a seam's two sides are meant to meet, and may rub by some µm: that only shows. So each gap is asked
-//! twice, of everything and of what lies beneath the rim. The pieces are cut at the rim's depth for that, along lines
-//! that are straight on each triangle.
+//! The outer rims of a seam's two sides are meant to meet, and may rub by some µm: that only shows. So each
+//! gap is asked twice, of everything and of what lies beneath the rim. The pieces are cut at the rim's depth
+//! for that, along lines that are straight on each triangle.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -24,7 +25,8 @@ pub struct PieceShapes(IdVec<PatchId, Option<Shape>>);
 /// The least gap of two pieces and where it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NearestPlace {
-    /// Least distance, mm, to 0.1 µm; minus the depth where surfaces cross, as [`shellock_geom::clearance`] defines it.
+    /// Least distance, mm, to 0.1 µm; minus the depth where surfaces cross, as [`shellock_geom::clearance`]
+    /// defines it.
     pub gap_mm: f64,
     /// Travel of the moving piece there, mm; 0 at rest.
     pub travel_mm: f64,
@@ -67,7 +69,8 @@ pub struct KitGaps {
     pub paths: Vec<PathGap>,
 }
 
-/// All gaps of the finished `pieces` of `model`, installed as `plan` says. What is within `rim_mm` of the model's surface is rim.
+/// All gaps of the finished `pieces` of `model`, installed as `plan` says. What is within `rim_mm` of the
+/// model's surface is rim.
 pub fn kit_gaps(
     ctx: &Ctx,
     model: &Solid,
@@ -78,7 +81,10 @@ pub fn kit_gaps(
     ctx.stage("gaps", 0)?;
     let shapes = prepare(ctx, model, pieces, rim_mm)?;
     let (pairs, paths) = rayon::join(|| pair_gaps(ctx, &shapes), || path_gaps(ctx, &shapes, plan));
-    Ok(KitGaps { pairs: pairs?, paths: paths? })
+    Ok(KitGaps {
+        pairs: pairs?,
+        paths: paths?,
+    })
 }
 
 /// Prepares `pieces` of `model`. What is within `rim_mm` of the model's surface is rim.
@@ -93,35 +99,63 @@ pub fn prepare(
         ctx.check()?;
         Ok(shape(&outside, mesh, rim_mm))
     });
-    Ok(PieceShapes(shapes.collect::<Result<Vec<_>, Cancelled>>()?.into_iter().collect()))
+    Ok(PieceShapes(
+        shapes
+            .collect::<Result<Vec<_>, Cancelled>>()?
+            .into_iter()
+            .collect(),
+    ))
 }
 
 /// Every pair of pieces that comes within 1 mm, in order of their ids.
 pub fn pair_gaps(ctx: &Ctx, shapes: &PieceShapes) -> Result<Vec<PairGap>, Cancelled> {
     let ids: Vec<PatchId> = shapes.0.ids().collect();
-    let pairs = ids.iter().enumerate().flat_map(|(i, &a)| ids[i + 1..].iter().map(move |&b| (a, b)));
+    let pairs = ids
+        .iter()
+        .enumerate()
+        .flat_map(|(i, &a)| ids[i + 1..].iter().map(move |&b| (a, b)));
     among(ctx, pairs.collect(), |(a, b)| {
         let (shape_a, shape_b) = (shapes.0[a].as_ref()?, shapes.0[b].as_ref()?);
-        let of = |scope| least_gap(shape_a, shape_b, scope, WITHIN_MM).map(|g| place(g.gap_mm, 0.0, g.at.to_array()));
-        Some(PairGap { a, b, overall: of(Scope::Everything)?, beneath_rim: of(Scope::WhatCounts) })
+        let of = |scope| {
+            least_gap(shape_a, shape_b, scope, WITHIN_MM).map(|g| place(g.gap_mm, 0.0, g.at.to_array()))
+        };
+        Some(PairGap {
+            a,
+            b,
+            overall: of(Scope::Everything)?,
+            beneath_rim: of(Scope::WhatCounts),
+        })
     })
 }
 
-/// Every path of `plan`, against each earlier piece that it comes within 1 mm of, in order of installation. What the plan
-/// names and is not there is left out.
-pub fn path_gaps(ctx: &Ctx, shapes: &PieceShapes, plan: &InstallationPlan) -> Result<Vec<PathGap>, Cancelled> {
+/// Every path of `plan`, against each earlier piece that it comes within 1 mm of, in order of installation.
+/// What the plan names and is not there is left out.
+pub fn path_gaps(
+    ctx: &Ctx,
+    shapes: &PieceShapes,
+    plan: &InstallationPlan,
+) -> Result<Vec<PathGap>, Cancelled> {
     let steps = &plan.steps;
     let pairs = (0..steps.len()).flat_map(|i| (0..i).map(move |earlier| (i, earlier)));
     among(ctx, pairs.collect(), |(i, earlier)| {
         let (piece, against) = (steps[i].piece, steps[earlier].piece);
         let shape = |p: PatchId| shapes.0.as_slice().get(usize::from(p))?.as_ref();
         let (moving, fixed) = (shape(piece)?, shape(against)?);
-        let way_out = Translation { along: steps[i].separation.unit(), from_mm: 0.0, far_mm: f64::INFINITY };
+        let way_out = Translation {
+            along: steps[i].separation.unit(),
+            from_mm: 0.0,
+            far_mm: f64::INFINITY,
+        };
         let of = |scope| {
             let gap = swept_gap(moving, fixed, &way_out, scope, WITHIN_MM)?;
             Some(place(gap.gap_mm, gap.travel_mm, gap.at.to_array()))
         };
-        Some(PathGap { piece, against, overall: of(Scope::Everything)?, beneath_rim: of(Scope::WhatCounts) })
+        Some(PathGap {
+            piece,
+            against,
+            overall: of(Scope::Everything)?,
+            beneath_rim: of(Scope::WhatCounts),
+        })
     })
 }
 
@@ -143,7 +177,11 @@ fn among<P: Send, G: Send>(
 
 fn shape(outside: &TriangleBvh, mesh: &TriMesh, rim_mm: f64) -> Option<Shape> {
     let mesh = finite(mesh).map(merged)?;
-    let below_rim = |p| outside.nearest(p, rim_mm * rim_mm).map_or(1.0, |near| near.distance_sq.sqrt() - rim_mm);
+    let below_rim = |p| {
+        outside
+            .nearest(p, rim_mm * rim_mm)
+            .map_or(1.0, |near| near.distance_sq.sqrt() - rim_mm)
+    };
     let values: Vec<f64> = mesh.points.iter().map(|&p| below_rim(p)).collect();
     let cut = cut_at_zero(&mesh, &values, |_| true);
     let solid = Solid::new(cut.mesh).ok()?;
@@ -151,7 +189,11 @@ fn shape(outside: &TriangleBvh, mesh: &TriMesh, rim_mm: f64) -> Option<Shape> {
 }
 
 fn place(gap_mm: f64, travel_mm: f64, at: [f64; 3]) -> NearestPlace {
-    NearestPlace { gap_mm, travel_mm, at }
+    NearestPlace {
+        gap_mm,
+        travel_mm,
+        at,
+    }
 }
 
 #[cfg(test)]
@@ -162,7 +204,10 @@ mod tests {
     use shellock_geom::{Aabb, Vec3, Volume};
 
     fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb { min: min.into(), max: max.into() })
+        Volume::cuboid(Aabb {
+            min: min.into(),
+            max: max.into(),
+        })
     }
 
     /// A block that lies in a tray, flush with its rim, and touches the walls there alone. It leaves upwards.
@@ -173,10 +218,21 @@ mod tests {
         let block = cuboid([5.05, 5.04, 4.07], [14.9, 14.9, 10.0]).union(&collar);
         let ledge = cuboid([4.0, 7.0, 12.0], [5.08, 8.0, 13.0]);
         let steps = [Vec3::Z, Vec3::Z, Vec3::X].into_iter().zip(0..);
-        let steps =
-            steps.map(|(d, i)| InstallationStep { piece: PatchId(i), separation: LatticeDirection::nearest(d) });
-        let pieces = [model.subtract(&seat), block, ledge].iter().map(Volume::to_mesh).collect();
-        (Solid::new(model.to_mesh()).unwrap(), pieces, InstallationPlan { steps: steps.collect() })
+        let steps = steps.map(|(d, i)| InstallationStep {
+            piece: PatchId(i),
+            separation: LatticeDirection::nearest(d),
+        });
+        let pieces = [model.subtract(&seat), block, ledge]
+            .iter()
+            .map(Volume::to_mesh)
+            .collect();
+        (
+            Solid::new(model.to_mesh()).unwrap(),
+            pieces,
+            InstallationPlan {
+                steps: steps.collect(),
+            },
+        )
     }
 
     #[test]
@@ -187,9 +243,15 @@ mod tests {
         let pairs = pair_gaps(ctx, &shapes).unwrap();
         assert_eq!(pairs.len(), 1, "the ledge is 2 mm off");
         assert!(pairs[0].overall.gap_mm.abs() < 1e-4, "{pairs:?}");
-        assert!((pairs[0].beneath_rim.unwrap().gap_mm - 0.04).abs() < 1e-9, "{pairs:?}");
+        assert!(
+            (pairs[0].beneath_rim.unwrap().gap_mm - 0.04).abs() < 1e-9,
+            "{pairs:?}"
+        );
         let paths = path_gaps(ctx, &shapes, &plan).unwrap();
-        assert_eq!(paths[0].beneath_rim.map(|g| g.gap_mm), pairs[0].beneath_rim.map(|g| g.gap_mm));
+        assert_eq!(
+            paths[0].beneath_rim.map(|g| g.gap_mm),
+            pairs[0].beneath_rim.map(|g| g.gap_mm)
+        );
     }
 
     #[test]
@@ -199,7 +261,10 @@ mod tests {
         let ctx = &Ctx::quiet();
         let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
         let paths = path_gaps(ctx, &shapes, &plan).unwrap();
-        let met = paths.iter().find(|p| (p.piece, p.against) == (PatchId(1), PatchId(2))).unwrap();
+        let met = paths
+            .iter()
+            .find(|p| (p.piece, p.against) == (PatchId(1), PatchId(2)))
+            .unwrap();
         // The collar runs into the ledge by 0.08 mm on its way, the block beneath it by 0.03.
         assert!((met.overall.gap_mm + 0.08).abs() < 2e-4, "{met:?}");
         assert!((2.0..3.2).contains(&met.overall.travel_mm), "{met:?}");

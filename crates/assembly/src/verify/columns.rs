@@ -1,14 +1,14 @@
 //! Solids as the stretches in which parallel rays run inside them.
 //!
-//! A pixel grid lies across a ray direction `s`; through the centre of each pixel goes one ray, and a solid becomes a
-//! sorted list of intervals on each ray. Volumes of intersections under any translation along `s` then are sums of
-//! interval overlaps. The rows of the grid are turned so that they run along no axis: walls parallel to the rays are
-//! met in proportion to their area instead of all or not at all.
+//! A pixel grid lies across a ray direction `s`; through the centre of each pixel goes one ray, and a solid
+//! becomes a sorted list of intervals on each ray. Volumes of intersections under any translation along `s`
+//! then are sums of interval overlaps. The rows of the grid are turned so that they run along no axis: walls
+//! parallel to the rays are met in proportion to their area instead of all or not at all.
 
 use shellock_geom::{Aabb, Vec3};
 
-/// By how much pixel rows are turned about the rays, rad. Its tangent is no small fraction, so rows, columns and their
-/// diagonals are parallel to no wall of an axis-aligned model.
+/// By how much pixel rows are turned about the rays, rad. Its tangent is no small fraction, so rows, columns
+/// and their diagonals are parallel to no wall of an axis-aligned model.
 const ROW_ANGLE_RAD: f64 = 0.417;
 
 /// Axes of a pixel grid: `u` and `v` across the rays, `s` along them; right-handed.
@@ -46,7 +46,11 @@ impl Grid {
     pub fn covering(bounds: Aabb, pixel_mm: f64) -> Self {
         let size = bounds.size();
         let count = |length: f64| (length / pixel_mm).ceil() as usize + 1;
-        Self { origin: [bounds.min.x, bounds.min.y], pixel_mm, n: [count(size.x), count(size.y)] }
+        Self {
+            origin: [bounds.min.x, bounds.min.y],
+            pixel_mm,
+            n: [count(size.x), count(size.y)],
+        }
     }
 
     /// Area that one ray stands for, mm².
@@ -108,7 +112,9 @@ impl Columns {
 
     /// Length common to both, summed over all rays, mm; times the cell's area it is the common volume.
     pub fn common_length_mm(&self, other: &Self) -> f64 {
-        (0..self.n_rays()).map(|ray| common_mm(self.on_ray(ray), other.on_ray(ray))).sum()
+        (0..self.n_rays())
+            .map(|ray| common_mm(self.on_ray(ray), other.on_ray(ray)))
+            .sum()
     }
 
     /// Total length inside, mm.
@@ -143,7 +149,9 @@ impl Columns {
 }
 
 fn common_mm(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
-    a.iter().flat_map(|x| b.iter().map(|y| (x[1].min(y[1]) - x[0].max(y[0])).max(0.0))).sum()
+    a.iter()
+        .flat_map(|x| b.iter().map(|y| (x[1].min(y[1]) - x[0].max(y[0])).max(0.0)))
+        .sum()
 }
 
 /// Turns the crossings of one ray into intervals.
@@ -164,11 +172,15 @@ fn pair_up(crossings: &mut [(f64, bool)], intervals: &mut Vec<[f64; 2]>) {
     }
 }
 
-/// Whether `c` lies left of the line from `p` to `q`; for `q`, `p` exactly the contrary, so that a ray meets exactly
-/// one of two triangles that share an edge.
+/// Whether `c` lies left of the line from `p` to `q`; for `q`, `p` exactly the contrary, so that a ray meets
+/// exactly one of two triangles that share an edge.
 fn is_left(p: Vec3, q: Vec3, [x, y]: [f64; 2]) -> bool {
     let turn = |p: Vec3, q: Vec3| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
-    if (p.x, p.y) < (q.x, q.y) { turn(p, q) >= 0.0 } else { turn(q, p) < 0.0 }
+    if (p.x, p.y) < (q.x, q.y) {
+        turn(p, q) >= 0.0
+    } else {
+        turn(q, p) < 0.0
+    }
 }
 
 fn cross_triangle(grid: &Grid, [a, b, c]: [Vec3; 3], hits: &mut Vec<Hit>) {
@@ -194,7 +206,11 @@ fn cross_triangle(grid: &Grid, [a, b, c]: [Vec3; 3], hits: &mut Vec<Hit>) {
             if is_left(a, b, at) == leaves && is_left(b, c, at) == leaves && is_left(c, a, at) == leaves {
                 // Faces almost parallel to the ray have steep slopes; the corners bound the answer.
                 let depth = (a.z + slope_u * (x - a.x) + slope_v * (y - a.y)).clamp(low.z, high.z);
-                hits.push(Hit { pixel: (row * grid.n[0] + column) as u32, leaves, depth });
+                hits.push(Hit {
+                    pixel: (row * grid.n[0] + column) as u32,
+                    leaves,
+                    depth,
+                });
             }
         }
     }
@@ -207,21 +223,38 @@ mod tests {
 
     #[test]
     fn ray_lengths_add_up_to_volumes_of_solids_and_of_their_common_part() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let cuboid = |min: [f64; 3], max: [f64; 3]| {
+            Volume::cuboid(Aabb {
+                min: min.into(),
+                max: max.into(),
+            })
+        };
         let holed = cuboid([0.0; 3], [8.0; 3]).subtract(&cuboid([3.0, -1.0, 3.0], [5.0, 9.0, 5.0]));
         let other = cuboid([4.1; 3], [11.0, 7.3, 9.0]);
         for s in [Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::new(-1.0, 1.0, 1.0)] {
             let frame = Frame::along(s.normalize());
             let projected = |v: &Volume| -> (Vec<Vec3>, Vec<[u32; 3]>) {
                 let mesh = v.to_mesh();
-                (mesh.points.iter().map(|&p| frame.project(p)).collect(), mesh.triangles)
+                (
+                    mesh.points.iter().map(|&p| frame.project(p)).collect(),
+                    mesh.triangles,
+                )
             };
             let (p, q) = (projected(&holed), projected(&other));
             let grid = Grid::covering(Aabb::around(p.0.iter().copied()), 0.1);
-            let (p, q) = (Columns::of(&grid, &p.0, &p.1, Vec3::ZERO), Columns::of(&grid, &q.0, &q.1, Vec3::ZERO));
-            let (volume, common) = (p.length_mm() * grid.cell_mm2(), p.common_length_mm(&q) * grid.cell_mm2());
+            let (p, q) = (
+                Columns::of(&grid, &p.0, &p.1, Vec3::ZERO),
+                Columns::of(&grid, &q.0, &q.1, Vec3::ZERO),
+            );
+            let (volume, common) = (
+                p.length_mm() * grid.cell_mm2(),
+                p.common_length_mm(&q) * grid.cell_mm2(),
+            );
             assert!((volume - holed.volume()).abs() < 0.5, "{volume}");
-            assert!((common - holed.intersect(&other).volume()).abs() < 0.3, "{common}");
+            assert!(
+                (common - holed.intersect(&other).volume()).abs() < 0.3,
+                "{common}"
+            );
         }
     }
 }

@@ -21,12 +21,22 @@ const FACING: f64 = -0.9;
 const MOST_CONTACTS: usize = 20_000;
 
 /// All contacts, in order of `a`, then along its surface, then of `b`.
-pub fn find(ctx: &Ctx, bodies: &IdVec<PatchId, Body>, clearance_mm: f64, seed: u64) -> Result<Vec<Contact>, Cancelled> {
+pub fn find(
+    ctx: &Ctx,
+    bodies: &IdVec<PatchId, Body>,
+    clearance_mm: f64,
+    seed: u64,
+) -> Result<Vec<Contact>, Cancelled> {
     let reach_mm = clearance_mm + REACH_MM;
     let ids: Vec<PatchId> = bodies.ids().collect();
     let trees: Vec<(TriangleBvh, Aabb)> = ids
         .par_iter()
-        .map(|&id| (TriangleBvh::new(&bodies[id].mesh), bodies[id].mesh.bounds().grown(reach_mm)))
+        .map(|&id| {
+            (
+                TriangleBvh::new(&bodies[id].mesh),
+                bodies[id].mesh.bounds().grown(reach_mm),
+            )
+        })
         .collect();
     let found: Vec<Vec<Contact>> = ids
         .par_iter()
@@ -38,12 +48,22 @@ pub fn find(ctx: &Ctx, bodies: &IdVec<PatchId, Body>, clearance_mm: f64, seed: u
             let area_mm2 = mesh.area() / n as f64;
             let mut contacts = Vec::new();
             for s in samples {
-                for &b in ids.iter().filter(|&&b| b != a && trees[usize::from(b)].1.contains(s.point)) {
+                for &b in ids
+                    .iter()
+                    .filter(|&&b| b != a && trees[usize::from(b)].1.contains(s.point))
+                {
                     if let Some(near) = trees[usize::from(b)].0.nearest(s.point, reach_mm * reach_mm)
                         && s.normal.dot(bodies[b].mesh.face_normal(near.face as usize)) < FACING
                     {
                         let gap_mm = near.distance_sq.sqrt();
-                        contacts.push(Contact { a, b, point: s.point, normal: s.normal, gap_mm, area_mm2 });
+                        contacts.push(Contact {
+                            a,
+                            b,
+                            point: s.point,
+                            normal: s.normal,
+                            gap_mm,
+                            area_mm2,
+                        });
                     }
                 }
             }
@@ -52,6 +72,13 @@ pub fn find(ctx: &Ctx, bodies: &IdVec<PatchId, Body>, clearance_mm: f64, seed: u
         .collect::<Result<_, Cancelled>>()?;
     let all: Vec<Contact> = found.into_iter().flatten().collect();
     let keep_every = all.len().div_ceil(MOST_CONTACTS).max(1);
-    let standing_for_more = |c: Contact| Contact { area_mm2: c.area_mm2 * keep_every as f64, ..c };
-    Ok(all.into_iter().step_by(keep_every).map(standing_for_more).collect())
+    let standing_for_more = |c: Contact| Contact {
+        area_mm2: c.area_mm2 * keep_every as f64,
+        ..c
+    };
+    Ok(all
+        .into_iter()
+        .step_by(keep_every)
+        .map(standing_for_more)
+        .collect())
 }

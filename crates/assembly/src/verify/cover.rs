@@ -20,13 +20,17 @@ pub fn check(model: &Solid, bodies: &IdVec<PatchId, Body>, seed: u64) -> (Check,
     for body in bodies.as_slice() {
         let first = all.points.len() as u32;
         all.points.extend(&body.mesh.points);
-        all.triangles.extend(body.mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+        all.triangles
+            .extend(body.mesh.triangles.iter().map(|t| t.map(|v| v + first)));
     }
     let bvh = TriangleBvh::new(&all);
     let samples = sample::on_surface(model.mesh(), N_SAMPLES, seed);
     let distances: Vec<f64> = samples
         .par_iter()
-        .map(|s| bvh.nearest(s.point, f64::INFINITY).map_or(f64::INFINITY, |n| n.distance_sq.sqrt()))
+        .map(|s| {
+            bvh.nearest(s.point, f64::INFINITY)
+                .map_or(f64::INFINITY, |n| n.distance_sq.sqrt())
+        })
         .collect();
     let n_lost = distances.iter().filter(|&&d| d >= KEPT_MM).count();
     let fraction = n_lost as f64 / samples.len().max(1) as f64;
@@ -37,7 +41,13 @@ pub fn check(model: &Solid, bodies: &IdVec<PatchId, Body>, seed: u64) -> (Check,
         }
     }
     let ok = 1.0 - fraction > LEAST_KEPT && farthest_mm < WIDEST_HALF_GAP_MM;
-    let figure = format!("{:.3} % of the surface; farthest {farthest_mm:.3} mm", 100.0 * (1.0 - fraction));
-    let finding = (!ok).then_some(Finding::SurfaceLost { fraction, at: at.to_array() });
+    let figure = format!(
+        "{:.3} % of the surface; farthest {farthest_mm:.3} mm",
+        100.0 * (1.0 - fraction)
+    );
+    let finding = (!ok).then_some(Finding::SurfaceLost {
+        fraction,
+        at: at.to_array(),
+    });
     (Check::new("outer surface kept", ok, figure), finding)
 }

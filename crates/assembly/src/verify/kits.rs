@@ -11,7 +11,10 @@ use crate::{Ctx, IdVec, LatticeDirection, PatchId};
 pub const HALF_GAP_MM: f64 = 0.05;
 
 pub fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
-    Volume::cuboid(Aabb { min: Vec3::new(x[0], y[0], z[0]), max: Vec3::new(x[1], y[1], z[1]) })
+    Volume::cuboid(Aabb {
+        min: Vec3::new(x[0], y[0], z[0]),
+        max: Vec3::new(x[1], y[1], z[1]),
+    })
 }
 
 pub fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
@@ -37,7 +40,10 @@ impl Kit {
     pub fn new(model: Volume, pieces: &[Volume], directions: &[Vec3]) -> Self {
         let steps = directions.iter().enumerate();
         let steps = steps
-            .map(|(i, &d)| InstallationStep { piece: PatchId(i as u32), separation: LatticeDirection::nearest(d) })
+            .map(|(i, &d)| InstallationStep {
+                piece: PatchId(i as u32),
+                separation: LatticeDirection::nearest(d),
+            })
             .collect();
         Self {
             model: Solid::new(model.to_mesh()).unwrap(),
@@ -51,21 +57,35 @@ impl Kit {
     }
 
     pub fn examined(&self) -> (Verification, Vec<Contact>) {
-        let params = VerifyParams { clearance_mm: 2.0 * HALF_GAP_MM, seed: 0 };
-        let assembly = Assembly { model: &self.model, pieces: &self.pieces, plan: &self.plan, press_fits: &[] };
+        let params = VerifyParams {
+            clearance_mm: 2.0 * HALF_GAP_MM,
+            seed: 0,
+        };
+        let assembly = Assembly {
+            model: &self.model,
+            pieces: &self.pieces,
+            plan: &self.plan,
+            press_fits: &[],
+        };
         examine(&Ctx::quiet(), &params, &assembly).unwrap()
     }
 }
 
 pub const ALL: [f64; 2] = [0.0, 30.0];
 
-/// A cube in three parts: a base with a T-shaped groove that ends blind at x = 10, a lid whose T-shaped tongue slides in
-/// along −x, and a pin through both, pushed in along −z.
+/// A cube in three parts: a base with a T-shaped groove that ends blind at x = 10, a lid whose T-shaped
+/// tongue slides in along −x, and a pin through both, pushed in along −z.
 pub fn pinned_lid(pin: [[f64; 2]; 3]) -> [Volume; 3] {
-    let (stem, foot) = (([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]), ([10.0, 30.0], [7.0, 23.0], [5.0, 9.0]));
+    let (stem, foot) = (
+        ([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]),
+        ([10.0, 30.0], [7.0, 23.0], [5.0, 9.0]),
+    );
     let hole = grown(pin[0], pin[1], [pin[2][0], 40.0]);
     let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([p.0[0], 40.0], p.1, p.2);
-    let base = cuboid(ALL, ALL, [0.0, 15.0 - HALF_GAP_MM]).subtract(&open(stem)).subtract(&open(foot)).subtract(&hole);
+    let base = cuboid(ALL, ALL, [0.0, 15.0 - HALF_GAP_MM])
+        .subtract(&open(stem))
+        .subtract(&open(foot))
+        .subtract(&hole);
     let lid = Volume::union_all(vec![
         cuboid(ALL, ALL, [15.0 + HALF_GAP_MM, 30.0]),
         cuboid(stem.0, stem.1, stem.2),

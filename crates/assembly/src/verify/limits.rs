@@ -1,5 +1,5 @@
-//! The standard that finished kits are judged by, with its reasons. An outside judge with measurements of its own has the limits of the
-//! second column; ours are stricter by what the two may measure differently.
+//! The standard that finished kits are judged by, with its reasons. An outside judge with measurements of its
+//! own has the limits of the second column; ours are stricter by what the two may measure differently.
 //!
 //! | limit | outside | here | why |
 //! | --- | --- | --- | --- |
@@ -26,5 +26,6 @@ pub const RUB_MM: f64 = 0.027;
 /// Overlap with others that holds a piece that is pushed, mm³.
 pub const HOLD_MM3: f64 = 0.55;
 /// Travels, mm, at which doubt about a way is always resolved exactly: those that the outside judge tries.
-pub const TRAVELS_MM: [f64; 18] =
-    [0.05, 0.15, 0.3, 0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 28.0, 40.0, 60.0, 90.0];
+pub const TRAVELS_MM: [f64; 18] = [
+    0.05, 0.15, 0.3, 0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 28.0, 40.0, 60.0, 90.0,
+];

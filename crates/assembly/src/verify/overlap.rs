@@ -12,10 +12,11 @@ use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
 
 /// Most that a detent or a rib has in common with what it presses on, mm³: 2.8 × 0.6 × 0.4 mm, and rounding.
 const PRESSED_MM3: f64 = 0.8;
-/// Common volume worth a warning, mm³: a tenth of the limit. Joints cut without any gap reached 0.07 by rounding alone
-/// (140 mm sphere shell in ten parts).
+/// Common volume worth a warning, mm³: a tenth of the limit. Joints cut without any gap reached 0.07 by
+/// rounding alone (140 mm sphere shell in ten parts).
 const WARN_MM3: f64 = 0.05;
-/// Ray spacing across the model's box, as a share of its diagonal, and its bounds in mm. 0.25 mm on a 150 mm print.
+/// Ray spacing across the model's box, as a share of its diagonal, and its bounds in mm. 0.25 mm on a 150 mm
+/// print.
 const RAY_SPACING: f64 = 0.001;
 const RAY_SPACING_MM: (f64, f64) = (0.02, 0.3);
 /// Rays parallel to no face of a common model.
@@ -27,8 +28,10 @@ pub fn check_pairs(
     bodies: &IdVec<PatchId, Body>,
     press_fits: &[PressFit],
 ) -> Result<(Check, Vec<Finding>), Cancelled> {
-    let solid: Vec<(PatchId, &Volume)> =
-        bodies.iter().filter_map(|(id, b)| b.volume.as_ref().map(|v| (id, v))).collect();
+    let solid: Vec<(PatchId, &Volume)> = bodies
+        .iter()
+        .filter_map(|(id, b)| b.volume.as_ref().map(|v| (id, v)))
+        .collect();
     let bounds: Vec<Aabb> = solid.iter().map(|(_, v)| v.bounds()).collect();
     let pairs: Vec<(usize, usize)> = (0..solid.len())
         .flat_map(|a| (a + 1..solid.len()).map(move |b| (a, b)))
@@ -38,7 +41,10 @@ pub fn check_pairs(
         .par_iter()
         .map(|&(a, b)| {
             ctx.check()?;
-            let fits: Vec<_> = press_fits.iter().filter(|fit| [solid[a].0, solid[b].0].contains(&fit.piece)).collect();
+            let fits: Vec<_> = press_fits
+                .iter()
+                .filter(|fit| [solid[a].0, solid[b].0].contains(&fit.piece))
+                .collect();
             let common = shared(solid[a].1, solid[b].1, &fits);
             Ok((rounded(common.volume()), common.bounds().center()))
         })
@@ -50,12 +56,21 @@ pub fn check_pairs(
         if volume_mm3 > OVERLAP_MM3 {
             findings.push(Finding::Overlap { a, b, volume_mm3, at });
         } else if volume_mm3 > WARN_MM3 {
-            let message = format!("pieces {a} and {b} overlap by {volume_mm3:.3} mm³; sand the joint if it is tight");
-            ctx.warn(Warning { code: "small-overlap".into(), message, pieces: vec![a, b], at: Some(at) });
+            let message =
+                format!("pieces {a} and {b} overlap by {volume_mm3:.3} mm³; sand the joint if it is tight");
+            ctx.warn(Warning {
+                code: "small-overlap".into(),
+                message,
+                pieces: vec![a, b],
+                at: Some(at),
+            });
         }
     }
     let figure = format!("worst {worst:.4} mm³ in {} pairs", pairs.len());
-    Ok((Check::new("assembled pieces do not overlap", findings.is_empty(), figure), findings))
+    Ok((
+        Check::new("assembled pieces do not overlap", findings.is_empty(), figure),
+        findings,
+    ))
 }
 
 /// What both have, but for what presses on purpose: near its place, and no more than that takes.
@@ -69,7 +84,13 @@ fn shared(a: &Volume, b: &Volume, fits: &[&PressFit]) -> Volume {
         let is_near = |fit: &&&PressFit| fit.reaches(bounds.min) && fit.reaches(bounds.max);
         part.volume() <= PRESSED_MM3 && fits.iter().any(|fit| is_near(&fit))
     };
-    Volume::union_all(common.components().into_iter().filter(|part| !is_pressed(part)).collect())
+    Volume::union_all(
+        common
+            .components()
+            .into_iter()
+            .filter(|part| !is_pressed(part))
+            .collect(),
+    )
 }
 
 /// Volume of all pieces outside the model, measured along parallel rays.
@@ -88,7 +109,12 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
     let outside: Vec<f64> = ids
         .into_par_iter()
         .map(|id| {
-            let piece = Columns::of(&grid, &piece_points[usize::from(id)], &bodies[id].mesh.triangles, Vec3::ZERO);
+            let piece = Columns::of(
+                &grid,
+                &piece_points[usize::from(id)],
+                &bodies[id].mesh.triangles,
+                Vec3::ZERO,
+            );
             (piece.length_mm() - piece.common_length_mm(&whole)) * grid.cell_mm2()
         })
         .collect();
@@ -106,9 +132,20 @@ mod tests {
 
     #[test]
     fn a_press_fit_explains_what_it_takes_and_nothing_larger_or_elsewhere() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let cuboid = |min: [f64; 3], max: [f64; 3]| {
+            Volume::cuboid(Aabb {
+                min: min.into(),
+                max: max.into(),
+            })
+        };
         let piece = PatchId(1);
-        let fit = PressFit { kind: PressFitKind::Rib, piece, at: [0.0; 3], interference_mm: 0.2, travel_mm: 2.0 };
+        let fit = PressFit {
+            kind: PressFitKind::Rib,
+            piece,
+            at: [0.0; 3],
+            interference_mm: 0.2,
+            travel_mm: 2.0,
+        };
         let floor = cuboid([-9.0, -9.0, -9.0], [9.0, 9.0, 0.0]);
         let shared_with = |bump: Volume| shared(&floor, &bump, &[&fit]).volume();
         assert_eq!(shared_with(cuboid([-0.5, -0.5, -0.2], [0.5, 0.5, 3.0])), 0.0);

@@ -1,7 +1,8 @@
 //! Whether each piece but the key is held in every direction by the others.
 //!
-//! Each piece is pushed a small step in 66 directions and must run into the rest. Where its contacts face the push, they
-//! tell how much; elsewhere rays through the piece do, and an exact boolean decides near the limit.
+//! Each piece is pushed a small step in 66 directions and must run into the rest. Where its contacts face the
+//! push, they tell how much; elsewhere rays through the piece do, and an exact boolean decides near the
+//! limit.
 
 use std::cell::LazyCell;
 
@@ -18,10 +19,11 @@ use crate::{Cancelled, Ctx, IdVec, PatchId, push};
 /// Ray spacings, mm, each with the estimated overlap, mm³, from which a piece is held: at a depth of 0.9 mm
 /// some thirty rays meet it then. A margin against the sampling error, not a bound.
 const LEVELS: [(f64, f64); 2] = [(0.5, 6.0), (0.2, 1.2)];
-/// Estimated overlap below which a piece is called loose, mm³: on the strict side of the limit, whatever the error.
+/// Estimated overlap below which a piece is called loose, mm³: on the strict side of the limit, whatever the
+/// error.
 const SURELY_LOOSE_MM3: f64 = 0.1;
-/// Overlap told by contacts from which a piece is held, mm³: ten times the limit. Each contact counts with its area and the
-/// depth to which it is pushed, up to this many mm, which no wall is thinner than.
+/// Overlap told by contacts from which a piece is held, mm³: ten times the limit. Each contact counts with
+/// its area and the depth to which it is pushed, up to this many mm, which no wall is thinner than.
 const CONTACTS_HOLD_MM3: f64 = 5.5;
 const CONTACT_DEPTH_MM: f64 = 0.4;
 /// Most rays across the longer side of a piece's shadow; larger prints get wider spacings.
@@ -40,29 +42,46 @@ pub fn check(
     let step_mm = push::length_mm(clearance_mm);
     let directions = push::directions();
     let frame = Frame::along(RAYS.normalize());
-    let projected: Vec<Vec<Vec3>> =
-        bodies.iter().map(|(_, b)| b.mesh.points.iter().map(|&p| frame.project(p)).collect()).collect();
+    let projected: Vec<Vec<Vec3>> = bodies
+        .iter()
+        .map(|(_, b)| b.mesh.points.iter().map(|&p| frame.project(p)).collect())
+        .collect();
     let ids: Vec<PatchId> = bodies.ids().filter(|&id| id != key).collect();
     let loose: Vec<Option<Finding>> = ids
         .into_par_iter()
         .map(|piece| {
             ctx.check()?;
             let own: Vec<&Contact> = contacts.iter().filter(|c| c.a == piece).collect();
-            let doubtful: Vec<Vec3> =
-                directions.iter().copied().filter(|d| !contacts_hold(&own, *d * step_mm)).collect();
+            let doubtful: Vec<Vec3> = directions
+                .iter()
+                .copied()
+                .filter(|d| !contacts_hold(&own, *d * step_mm))
+                .collect();
             let free = free_directions(bodies, &projected, &frame, piece, step_mm, &doubtful);
-            Ok((!free.is_empty()).then_some(Finding::Loose { piece, directions: free }))
+            Ok((!free.is_empty()).then_some(Finding::Loose {
+                piece,
+                directions: free,
+            }))
         })
         .collect::<Result<_, Cancelled>>()?;
     let findings: Vec<Finding> = loose.into_iter().flatten().collect();
-    let figure = format!("{} pieces loose in some of {} directions", findings.len(), directions.len());
-    Ok((Check::new("every piece but the key is blocked", findings.is_empty(), figure), findings))
+    let figure = format!(
+        "{} pieces loose in some of {} directions",
+        findings.len(),
+        directions.len()
+    );
+    Ok((
+        Check::new("every piece but the key is blocked", findings.is_empty(), figure),
+        findings,
+    ))
 }
 
 /// Whether the contacts of a piece alone show that a push by `step` is held.
 fn contacts_hold(contacts: &[&Contact], step: Vec3) -> bool {
-    let overlap_mm3: f64 =
-        contacts.iter().map(|c| c.area_mm2 * (c.normal.dot(step) - c.gap_mm).clamp(0.0, CONTACT_DEPTH_MM)).sum();
+    let overlap_mm3: f64 = contacts
+        .iter()
+        .map(|c| c.area_mm2 * (c.normal.dot(step) - c.gap_mm).clamp(0.0, CONTACT_DEPTH_MM))
+        .sum();
     overlap_mm3 >= CONTACTS_HOLD_MM3
 }
 
@@ -74,7 +93,9 @@ fn free_directions(
     step_mm: f64,
     directions: &[Vec3],
 ) -> Vec<[f64; 3]> {
-    let Some(own) = &bodies[piece].volume else { return Vec::new() };
+    let Some(own) = &bodies[piece].volume else {
+        return Vec::new();
+    };
     let room = own.bounds().grown(step_mm);
     let others: Vec<(PatchId, &Volume)> = bodies
         .iter()
@@ -84,12 +105,24 @@ fn free_directions(
     let points = &projected[usize::from(piece)];
     let shadow = Aabb::around(points.iter().copied()).grown(step_mm);
     let levels = LEVELS.map(|(spacing_mm, surely_held_mm3)| {
-        let grid = Grid::covering(shadow, spacing_mm.max(shadow.size().truncate().max_element() / MOST_PIXELS));
+        let grid = Grid::covering(
+            shadow,
+            spacing_mm.max(shadow.size().truncate().max_element() / MOST_PIXELS),
+        );
         let columns = move |&(id, _): &(PatchId, &Volume)| {
-            Columns::of(&grid, &projected[usize::from(id)], &bodies[id].mesh.triangles, Vec3::ZERO)
+            Columns::of(
+                &grid,
+                &projected[usize::from(id)],
+                &bodies[id].mesh.triangles,
+                Vec3::ZERO,
+            )
         };
         let others = &others;
-        (grid, surely_held_mm3, LazyCell::new(move || others.iter().map(columns).collect::<Vec<Columns>>()))
+        (
+            grid,
+            surely_held_mm3,
+            LazyCell::new(move || others.iter().map(columns).collect::<Vec<Columns>>()),
+        )
     });
     let is_held = |direction: Vec3| {
         let step = direction * step_mm;
@@ -106,7 +139,11 @@ fn free_directions(
         }
         is_held_exactly(&own.translate(step), &others)
     };
-    directions.iter().filter(|&&d| !is_held(d)).map(|d| d.to_array()).collect()
+    directions
+        .iter()
+        .filter(|&&d| !is_held(d))
+        .map(|d| d.to_array())
+        .collect()
 }
 
 fn is_held_exactly(moved: &Volume, others: &[(PatchId, &Volume)]) -> bool {

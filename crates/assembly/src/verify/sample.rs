@@ -16,10 +16,11 @@ pub struct Sample {
     pub face: usize,
 }
 
-/// `n` points on `mesh`, one in each of `n` strata of equal area; a function of the mesh, `n` and `seed` alone.
+/// `n` points on `mesh`, one in each of `n` strata of equal area; a function of the mesh, `n` and `seed`
+/// alone.
 ///
-/// Strata follow the order of the faces, so every region of more than two strata's area is met. Empty for a mesh
-/// without area.
+/// Strata follow the order of the faces, so every region of more than two strata's area is met. Empty for a
+/// mesh without area.
 pub fn on_surface(mesh: &TriMesh, n: usize, seed: u64) -> Vec<Sample> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let areas: Vec<f64> = (0..mesh.triangles.len()).map(|f| mesh.face_area(f)).collect();
@@ -36,7 +37,11 @@ pub fn on_surface(mesh: &TriMesh, n: usize, seed: u64) -> Vec<Sample> {
             // The square root makes the density uniform over the triangle.
             let (toward_bc, along_bc) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
             let point = a + (b - a + (c - b) * along_bc) * toward_bc;
-            samples.push(Sample { point, normal: mesh.face_normal(face), face });
+            samples.push(Sample {
+                point,
+                normal: mesh.face_normal(face),
+                face,
+            });
             next = stratum * (samples.len() as f64 + rng.random::<f64>());
         }
     }
@@ -50,12 +55,19 @@ mod tests {
 
     #[test]
     fn each_face_of_a_box_gets_its_share_of_the_points() {
-        let mesh = Volume::cuboid(Aabb { min: Vec3::ZERO, max: Vec3::new(1.0, 2.0, 3.0) }).to_mesh();
+        let mesh = Volume::cuboid(Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::new(1.0, 2.0, 3.0),
+        })
+        .to_mesh();
         let samples = on_surface(&mesh, 2200, 5);
         assert!((samples.len() as i32 - 2200).abs() <= 1);
         for (normal, area) in [(Vec3::X, 6.0), (Vec3::Y, 3.0), (Vec3::Z, 2.0)] {
             let met = samples.iter().filter(|s| s.normal.dot(normal) > 0.9).count();
-            assert!((met as f64 - area * 100.0).abs() < 5.0, "{met} points on {area} mm²");
+            assert!(
+                (met as f64 - area * 100.0).abs() < 5.0,
+                "{met} points on {area} mm²"
+            );
         }
     }
 }

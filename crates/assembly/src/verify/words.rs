@@ -8,16 +8,31 @@ impl Display for Finding {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         match self {
             Self::PlanBroken { piece } => write!(f, "the plan does not name piece {piece} exactly once"),
-            Self::NotClosed { piece } => write!(f, "piece {piece} is not closed: it has holes, or is inside out"),
+            Self::NotClosed { piece } => {
+                write!(f, "piece {piece} is not closed: it has holes, or is inside out")
+            }
             Self::SharedEdges { piece, count, at } => {
-                write!(f, "{count} edges of piece {piece} have more than two triangles, first {}", At(at))
+                write!(
+                    f,
+                    "{count} edges of piece {piece} have more than two triangles, first {}",
+                    At(at)
+                )
             }
             Self::SeveralBodies { piece, count } => write!(f, "piece {piece} falls into {count} bodies"),
             Self::Overlap { a, b, volume_mm3, at } => {
                 write!(f, "pieces {a} and {b} overlap by {volume_mm3:.2} mm³ {}", At(at))
             }
-            Self::Outside { volume_mm3 } => write!(f, "{volume_mm3:.2} mm³ of the pieces lie outside the model"),
-            Self::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, at } => write!(
+            Self::Outside { volume_mm3 } => {
+                write!(f, "{volume_mm3:.2} mm³ of the pieces lie outside the model")
+            }
+            Self::PathRubs {
+                piece,
+                against,
+                travel_mm,
+                thickness_mm,
+                volume_mm3,
+                at,
+            } => write!(
                 f,
                 "on its way in, {travel_mm:.1} mm from its place, piece {piece} runs into piece {against} by {volume_mm3:.2} mm³, \
                  {thickness_mm:.3} mm thick, {}",
@@ -32,8 +47,15 @@ impl Display for Finding {
                     directions.len()
                 )
             }
-            Self::ClusterMoves { motions } => write!(f, "these pieces come apart from the rest: {}", named(motions)),
-            Self::PlayTooWide { piece, play, most: [most_mm, most_deg], at } => write!(
+            Self::ClusterMoves { motions } => {
+                write!(f, "these pieces come apart from the rest: {}", named(motions))
+            }
+            Self::PlayTooWide {
+                piece,
+                play,
+                most: [most_mm, most_deg],
+                at,
+            } => write!(
                 f,
                 "piece {piece} rattles by {:.1} mm and {:.1}°, where {most_mm:.1} mm and {most_deg:.1}° are allowed, {}: its seams are too short for \
                  the clearance; try fewer pieces, a larger model, labels that cut where it is wider, or a smaller --clearance if your printer \
@@ -84,9 +106,22 @@ mod tests {
     #[test]
     fn a_finding_names_its_pieces_and_its_place() {
         let at = [1.0, 2.25, -3.0];
-        let text = Finding::Overlap { a: PatchId(3), b: PatchId(7), volume_mm3: 0.625, at }.to_string();
+        let text = Finding::Overlap {
+            a: PatchId(3),
+            b: PatchId(7),
+            volume_mm3: 0.625,
+            at,
+        }
+        .to_string();
         assert_eq!(text, "pieces 3 and 7 overlap by 0.62 mm³ at (1.0, 2.2, -3.0) mm");
-        let text = Finding::Loose { piece: PatchId(4), directions: vec![[0.0, 0.0, 1.0]] }.to_string();
-        assert!(text.starts_with("piece 4 ") && text.contains("(0.00, 0.00, 1.00)"), "{text}");
+        let text = Finding::Loose {
+            piece: PatchId(4),
+            directions: vec![[0.0, 0.0, 1.0]],
+        }
+        .to_string();
+        assert!(
+            text.starts_with("piece 4 ") && text.contains("(0.00, 0.00, 1.00)"),
+            "{text}"
+        );
     }
 }

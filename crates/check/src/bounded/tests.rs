@@ -14,7 +14,8 @@ fn sign(i: usize) -> f64 {
     if i == 1 { 1.0 } else { -1.0 }
 }
 
-/// Four on each face of cube `a`, of half side `half_mm`, that face hollow `b`: in order of axis, side, and the two axes after it.
+/// Four on each face of cube `a`, of half side `half_mm`, that face hollow `b`: in order of axis, side, and
+/// the two axes after it.
 fn of_cube(a: usize, b: usize, half_mm: f64) -> Vec<Bearing> {
     let of = |i: usize| {
         let (axis, signs) = (i / 8, [i / 4 % 2, i / 2 % 2, i % 2].map(sign));
@@ -23,7 +24,13 @@ fn of_cube(a: usize, b: usize, half_mm: f64) -> Vec<Bearing> {
         (1..3).for_each(|k| point[(axis + k) % 3] = signs[k] * (half_mm - FROM_EDGE_MM));
         normal[axis] = signs[0];
         across[(axis + 1) % 3] = 1.0;
-        Bearing { a, b, point, normal, across }
+        Bearing {
+            a,
+            b,
+            point,
+            normal,
+            across,
+        }
     };
     (0..N).map(of).collect()
 }
@@ -33,7 +40,8 @@ fn shifted(first: usize, axis: usize, side: usize) -> Vec<(usize, f64)> {
     (0..4).map(|i| (first + 8 * axis + 4 * side + i, 0.25)).collect()
 }
 
-/// Those that end a turn about an axis: on two opposite faces the two that rise, by the second axis after the face's or by the first.
+/// Those that end a turn about an axis: on two opposite faces the two that rise, by the second axis after the
+/// face's or by the first.
 fn turned(first: usize, axis: usize, side: usize, half_mm: f64, by_second: bool) -> Vec<(usize, f64)> {
     let face = (axis + if by_second { 2 } else { 1 }) % 3;
     let rises = |i: &usize| {
@@ -63,12 +71,23 @@ impl Caged {
         let claim = Bounded {
             free: vec![1],
             of_piece: vec![[0, 1]],
-            quantities: vec![cube(Some(1), None, None, 0.024), cube(Some(1), None, Some([0.0; 3]), 0.12)],
+            quantities: vec![
+                cube(Some(1), None, None, 0.024),
+                cube(Some(1), None, Some([0.0; 3]), 0.12),
+            ],
             rows: (0..N).map(|i| [i, 1, 0]).collect(),
-            multipliers: vec![both(|k, s| turned(0, k, s, 5.0, false)), both(|k, s| shifted(0, k, s))],
+            multipliers: vec![
+                both(|k, s| turned(0, k, s, 5.0, false)),
+                both(|k, s| shifted(0, k, s)),
+            ],
         };
         let meshes = vec![hollow(8.0, 5.1), cuboid([-5.0; 3], [5.0; 3])];
-        Self { meshes, bearings: of_cube(1, 0, 5.0), claim, slide: None }
+        Self {
+            meshes,
+            bearings: of_cube(1, 0, 5.0),
+            claim,
+            slide: None,
+        }
     }
 
     /// The same as the key in a shaft that is open upwards, which it has left by up to 0.4 mm.
@@ -78,7 +97,13 @@ impl Caged {
         let mut around = cuboid([-8.0; 3], [8.0, 8.0, 60.0]).triangles;
         around.extend(shaft.into_iter().map(|[a, b, c]| [a, c, b]));
         caged.meshes[0] = Mesh::new(around);
-        caged.slide = Some(Slide { key: 1, seat: 0, at: [0.0; 3], along: [0.0, 0.0, 1.0], most_mm: 0.4 });
+        caged.slide = Some(Slide {
+            key: 1,
+            seat: 0,
+            at: [0.0; 3],
+            along: [0.0, 0.0, 1.0],
+            most_mm: 0.4,
+        });
         let claim = &mut caged.claim;
         claim.quantities[0] = cube(Some(1), None, None, 0.025);
         claim.quantities[1].most[2][1] = 0.42;
@@ -91,7 +116,13 @@ impl Caged {
     fn test(&self) -> Result<Play, String> {
         let bearings = located(&self.meshes, &self.bearings)?;
         let way_out = Some([0.0, 0.0, 1.0]);
-        let kit = Kit { meshes: &self.meshes, bearings: &bearings, slide: self.slide.as_ref(), key: 1, way_out };
+        let kit = Kit {
+            meshes: &self.meshes,
+            bearings: &bearings,
+            slide: self.slide.as_ref(),
+            key: 1,
+            way_out,
+        };
         test(&kit, &self.claim)
     }
 
@@ -116,7 +147,10 @@ fn a_bound_that_is_too_small_is_refused_also_where_another_needs_it() {
     let small = Caged::new().refused(|c| c.claim.quantities[1].most[2][0] = 0.105);
     assert!(small.starts_with("quantity 1 goes to 0.1"), "{small}");
     let large = Caged::new().refused(|c| c.claim.quantities[0].most = vec![[0.2; 2]; 3]);
-    assert!(large.starts_with("quantity"), "turned so far, errors are too great: {large}");
+    assert!(
+        large.starts_with("quantity"),
+        "turned so far, errors are too great: {large}"
+    );
 }
 
 #[test]
@@ -130,7 +164,11 @@ fn a_wider_hollow_is_refused() {
 /// The hollow with a pit of 2 mm in its wall along x, square, between the same two numbers along y and z.
 fn pitted([from, to]: [f64; 2]) -> Mesh {
     let square = |x: f64, [from, to]: [f64; 2]| [[x, from, from], [x, to, from], [x, to, to], [x, from, to]];
-    let rings = [square(5.1, [-5.1, 5.1]), square(5.1, [from, to]), square(7.1, [from, to])];
+    let rings = [
+        square(5.1, [-5.1, 5.1]),
+        square(5.1, [from, to]),
+        square(7.1, [from, to]),
+    ];
     let mut triangles = hollow(8.0, 5.1).triangles;
     triangles.retain(|t| t.iter().any(|p| p[0] != 5.1));
     for (ring, next) in rings.iter().zip(&rings[1..]) {
@@ -195,7 +233,8 @@ fn a_key_is_bounded_while_its_slide_is() {
     assert_eq!(play.slid_mm, Some(0.4));
     assert!((play.shift_mm - (2.0 * 0.12_f64.powi(2) + 0.42_f64.powi(2)).sqrt()).abs() < 1e-9);
     Caged::key().refused(|c| c.slide = None);
-    let slide = |change: fn(&mut Slide)| Caged::key().refused(|c| c.slide.as_mut().into_iter().for_each(change));
+    let slide =
+        |change: fn(&mut Slide)| Caged::key().refused(|c| c.slide.as_mut().into_iter().for_each(change));
     slide(|s| s.most_mm = 0.415);
     slide(|s| s.most_mm = 0.6);
     slide(|s| s.most_mm = -0.1);
@@ -226,11 +265,19 @@ fn nested() -> Caged {
         both(|k, s| turned(inner, k, 1 - s, 5.0, false)),
         both(|k, s| shifted(inner, k, 1 - s)),
     ];
-    let rows = (0..2 * N).map(|i| if i < N { [i, 1, 0] } else { [i, 5, 4] }).collect();
+    let rows = (0..2 * N)
+        .map(|i| if i < N { [i, 1, 0] } else { [i, 5, 4] })
+        .collect();
     Caged {
         meshes: vec![hollow(12.0, 8.1), hollow(8.0, 5.1), cuboid([-5.0; 3], [5.0; 3])],
         bearings: [of_cube(1, 0, 8.0), of_cube(2, 1, 5.0)].concat(),
-        claim: Bounded { free: vec![1, 2], of_piece: vec![[0, 1], [2, 3]], quantities, rows, multipliers },
+        claim: Bounded {
+            free: vec![1, 2],
+            of_piece: vec![[0, 1], [2, 3]],
+            quantities,
+            rows,
+            multipliers,
+        },
         slide: None,
     }
 }
@@ -259,8 +306,9 @@ fn errors_cover_what_is_left_of_poses_beside_their_logarithms() {
     let Caged { claim, bearings, .. } = nested();
     let noise = |i: usize| (0.37 + 7.77 * i as f64).sin();
     for i in 0..2000 {
-        let part =
-            |k: usize, most: f64| -> Vec3 { std::array::from_fn(|axis| most * noise(1 + 13 * i + 3 * k + axis)) };
+        let part = |k: usize, most: f64| -> Vec3 {
+            std::array::from_fn(|axis| most * noise(1 + 13 * i + 3 * k + axis))
+        };
         let [a, b] = [[part(0, 0.028), part(1, 0.13)], [part(2, 0.014), part(3, 0.12)]];
         let p = bearings[N + i % N].point;
         let seen = back(b, moved(a, p));
@@ -292,7 +340,8 @@ fn back([w, v]: [Vec3; 2], p: Vec3) -> Vec3 {
 fn divided(mesh: &Mesh, n: usize) -> Mesh {
     let mut triangles = Vec::new();
     for &[a, b, c] in &mesh.triangles {
-        // From the corners' weights, so that neighbours have the same points but for rounding that f32 takes away.
+        // From the corners' weights, so that neighbours have the same points but for rounding that f32 takes
+        // away.
         let at = |i: usize, k: usize| -> Vec3 {
             let weights = [n - i - k, i, k].map(|w| w as f64 / n as f64);
             std::array::from_fn(|axis| {

@@ -105,7 +105,9 @@ impl Header {
                     elements.push(element);
                 }
                 Some(b"property") => {
-                    let element = elements.last_mut().ok_or_else(|| malformed(at, "\"element\" first", line))?;
+                    let element = elements
+                        .last_mut()
+                        .ok_or_else(|| malformed(at, "\"element\" first", line))?;
                     element.properties.push(read_property(words, at)?);
                 }
                 Some(b"end_header") => {
@@ -115,7 +117,10 @@ impl Header {
                 Some(_) => return Err(malformed(at, "a line of a PLY header", line)),
             }
         }
-        Err(ReadError::CutOff { at: lines.place(), within: "the header" })
+        Err(ReadError::CutOff {
+            at: lines.place(),
+            within: "the header",
+        })
     }
 
     /// Refuses counts that `n_bytes` of values cannot back.
@@ -135,7 +140,12 @@ impl Header {
                     "face" => "faces",
                     _ => "other rows",
                 };
-                return Err(ReadError::TooFewBytes { at, what, promised, room: fit });
+                return Err(ReadError::TooFewBytes {
+                    at,
+                    what,
+                    promised,
+                    room: fit,
+                });
             }
             room = room.saturating_sub(promised * row_bytes);
         }
@@ -159,7 +169,11 @@ fn read_encoding(word: Option<&[u8]>, at: Place) -> Result<Encoding, ReadError> 
         b"ascii" => Ok(Encoding::Ascii),
         b"binary_little_endian" => Ok(Encoding::Binary { big_endian: false }),
         b"binary_big_endian" => Ok(Encoding::Binary { big_endian: true }),
-        other => Err(malformed(at, "\"ascii\", \"binary_little_endian\" or \"binary_big_endian\"", other)),
+        other => Err(malformed(
+            at,
+            "\"ascii\", \"binary_little_endian\" or \"binary_big_endian\"",
+            other,
+        )),
     }
 }
 
@@ -168,7 +182,12 @@ fn read_element<'a>(mut words: impl Iterator<Item = &'a [u8]>, at: Place) -> Res
     let count = words.next().unwrap_or_default();
     let parsed = std::str::from_utf8(count).ok().and_then(|text| text.parse().ok());
     let count = parsed.ok_or_else(|| malformed(at, "the name of an element and its count", count))?;
-    Ok(Element { name, count, properties: Vec::new(), at })
+    Ok(Element {
+        name,
+        count,
+        properties: Vec::new(),
+        at,
+    })
 }
 
 fn read_property<'a>(mut words: impl Iterator<Item = &'a [u8]>, at: Place) -> Result<Property, ReadError> {
@@ -178,11 +197,17 @@ fn read_property<'a>(mut words: impl Iterator<Item = &'a [u8]>, at: Place) -> Re
     };
     let first = words.next();
     let kind = if first == Some(b"list") {
-        Kind::List { count: scalar(words.next())?, item: scalar(words.next())? }
+        Kind::List {
+            count: scalar(words.next())?,
+            item: scalar(words.next())?,
+        }
     } else {
         Kind::Scalar(scalar(first)?)
     };
-    Ok(Property { name: name(words.next()), kind })
+    Ok(Property {
+        name: name(words.next()),
+        kind,
+    })
 }
 
 fn name(word: Option<&[u8]>) -> String {

@@ -1,7 +1,8 @@
-//! PLY: points, polygons or strips, and for each face a whole-number label or a colour. Everything else is skipped.
+//! PLY: points, polygons or strips, and for each face a whole-number label or a colour. Everything else is
+//! skipped.
 //!
-//! A file is a text header that declares elements (`vertex`, `face`, others) with their properties, then the values of
-//! all elements in order, as words or as bytes.
+//! A file is a text header that declares elements (`vertex`, `face`, others) with their properties, then the
+//! values of all elements in order, as words or as bytes.
 
 mod header;
 mod source;
@@ -44,7 +45,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let body_at = bytes.len() - lines.rest().len();
     match header.encoding {
         Encoding::Ascii => read_body(&header, Words::of(lines)),
-        Encoding::Binary { big_endian } => read_body(&header, Binary { bytes, at: body_at, big_endian }),
+        Encoding::Binary { big_endian } => read_body(
+            &header,
+            Binary {
+                bytes,
+                at: body_at,
+                big_endian,
+            },
+        ),
     }
 }
 
@@ -60,7 +68,10 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
             _ if element.properties.is_empty() => {}
             _ => {
                 for _ in 0..element.count {
-                    element.properties.iter().try_for_each(|p| skip(p.kind, &mut source))?;
+                    element
+                        .properties
+                        .iter()
+                        .try_for_each(|p| skip(p.kind, &mut source))?;
                 }
             }
         }
@@ -70,14 +81,29 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
     polygons.finish(Format::Ply, labels)
 }
 
-fn read_points(element: &Element, source: &mut impl Source, polygons: &mut Polygons) -> Result<(), ReadError> {
+fn read_points(
+    element: &Element,
+    source: &mut impl Source,
+    polygons: &mut Polygons,
+) -> Result<(), ReadError> {
     for name in ["x", "y", "z"] {
-        if !element.properties.iter().any(|p| p.name == name && matches!(p.kind, Kind::Scalar(_))) {
-            return Err(ReadError::Unsupported { what: "a PLY file whose points lack x, y or z", at: element.at });
+        if !element
+            .properties
+            .iter()
+            .any(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
+        {
+            return Err(ReadError::Unsupported {
+                what: "a PLY file whose points lack x, y or z",
+                at: element.at,
+            });
         }
     }
     let axis_of = |name: &str| ["x", "y", "z"].iter().position(|&axis| axis == name);
-    let columns: Vec<_> = element.properties.iter().map(|p| (p.kind, axis_of(&p.name))).collect();
+    let columns: Vec<_> = element
+        .properties
+        .iter()
+        .map(|p| (p.kind, axis_of(&p.name)))
+        .collect();
     polygons.reserve(element.count, 0);
     for _ in 0..element.count {
         let at = source.place();
@@ -105,7 +131,9 @@ fn read_faces(
         element.properties.iter().position(is_it)
     };
     let is_integer = |i: &usize| matches!(element.properties[*i].kind, Kind::Scalar(s) if s.is_integer());
-    let label_property = LABEL_NAMES.iter().find_map(|name| scalar_named(name).filter(is_integer));
+    let label_property = LABEL_NAMES
+        .iter()
+        .find_map(|name| scalar_named(name).filter(is_integer));
     let color_properties = COLOR_NAMES.map(scalar_named);
     let has_colors = color_properties[..3].iter().all(Option::is_some);
 
@@ -125,7 +153,10 @@ fn read_faces(
                 }
                 Kind::Scalar(scalar) if Some(i) == label_property => labels.push(whole(source, scalar)?),
                 Kind::Scalar(scalar) if has_colors && color_properties.contains(&Some(i)) => {
-                    let channel = color_properties.iter().position(|c| *c == Some(i)).unwrap_or_default();
+                    let channel = color_properties
+                        .iter()
+                        .position(|c| *c == Some(i))
+                        .unwrap_or_default();
                     color[channel] = source.next(scalar)?.to_bits();
                 }
                 kind => skip(kind, source)?,
@@ -144,13 +175,23 @@ fn read_faces(
 
 fn corners_property(element: &Element, lacking: &'static str) -> Result<usize, ReadError> {
     let is_corners = |name: &str| name == "vertex_indices" || name == "vertex_index";
-    let found = element.properties.iter().position(|p| is_corners(&p.name) && matches!(p.kind, Kind::List { .. }));
-    found.ok_or(ReadError::Unsupported { what: lacking, at: element.at })
+    let found = element
+        .properties
+        .iter()
+        .position(|p| is_corners(&p.name) && matches!(p.kind, Kind::List { .. }));
+    found.ok_or(ReadError::Unsupported {
+        what: lacking,
+        at: element.at,
+    })
 }
 
-/// Adds strips of triangles, as scans have them: each point makes a triangle with the two before it, turned every other
-/// time; −1 begins anew.
-fn read_strips(element: &Element, source: &mut impl Source, polygons: &mut Polygons) -> Result<(), ReadError> {
+/// Adds strips of triangles, as scans have them: each point makes a triangle with the two before it, turned
+/// every other time; −1 begins anew.
+fn read_strips(
+    element: &Element,
+    source: &mut impl Source,
+    polygons: &mut Polygons,
+) -> Result<(), ReadError> {
     let corners_property = corners_property(element, "a PLY file whose strips lack vertex_indices")?;
     for _ in 0..element.count {
         for (i, property) in element.properties.iter().enumerate() {
@@ -174,7 +215,11 @@ fn read_strips(element: &Element, source: &mut impl Source, polygons: &mut Polyg
                 let [a, b] = strip;
                 // Strips repeat a point to turn a corner: what has no area is no triangle of theirs.
                 if n_before >= 2 && a != b && b != corner && corner != a {
-                    let triangle = if n_before.is_multiple_of(2) { [a, b, corner] } else { [b, a, corner] };
+                    let triangle = if n_before.is_multiple_of(2) {
+                        [a, b, corner]
+                    } else {
+                        [b, a, corner]
+                    };
                     polygons.add_polygon(&triangle, at)?;
                 }
                 (strip, n_before) = ([b, corner], n_before + 1);
@@ -197,7 +242,11 @@ fn skip(kind: Kind, source: &mut impl Source) -> Result<(), ReadError> {
 fn whole(source: &mut impl Source, scalar: Scalar) -> Result<i64, ReadError> {
     let at = source.place();
     let value = source.next(scalar)?;
-    whole_of(value).ok_or_else(|| ReadError::Malformed { at, expected: "a whole number", found: value.to_string() })
+    whole_of(value).ok_or_else(|| ReadError::Malformed {
+        at,
+        expected: "a whole number",
+        found: value.to_string(),
+    })
 }
 
 /// A binary little-endian PLY with coordinates as `double` and, if given, one `label` for each triangle.
@@ -205,8 +254,15 @@ fn whole(source: &mut impl Source, scalar: Scalar) -> Result<i64, ReadError> {
 /// # Panics
 /// Where `face_labels` has another length than the triangles.
 pub fn write_ply(mesh: &TriMesh, face_labels: Option<&[i32]>) -> Vec<u8> {
-    assert!(face_labels.is_none_or(|labels| labels.len() == mesh.triangles.len()), "one label for each triangle");
-    let label_line = if face_labels.is_some() { "property int label\n" } else { "" };
+    assert!(
+        face_labels.is_none_or(|labels| labels.len() == mesh.triangles.len()),
+        "one label for each triangle"
+    );
+    let label_line = if face_labels.is_some() {
+        "property int label\n"
+    } else {
+        ""
+    };
     let header = format!(
         "ply\nformat binary_little_endian 1.0\ncomment written by shellock\n\
          element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
@@ -217,11 +273,16 @@ pub fn write_ply(mesh: &TriMesh, face_labels: Option<&[i32]>) -> Vec<u8> {
     let mut bytes = header.into_bytes();
     bytes.reserve(24 * mesh.points.len() + 17 * mesh.triangles.len());
     for point in &mesh.points {
-        point.to_array().iter().for_each(|x| bytes.extend_from_slice(&x.to_le_bytes()));
+        point
+            .to_array()
+            .iter()
+            .for_each(|x| bytes.extend_from_slice(&x.to_le_bytes()));
     }
     for (face, triangle) in mesh.triangles.iter().enumerate() {
         bytes.push(3);
-        triangle.iter().for_each(|corner| bytes.extend_from_slice(&corner.to_le_bytes()));
+        triangle
+            .iter()
+            .for_each(|corner| bytes.extend_from_slice(&corner.to_le_bytes()));
         if let Some(labels) = face_labels {
             bytes.extend_from_slice(&labels[face].to_le_bytes());
         }

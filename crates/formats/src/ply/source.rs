@@ -35,7 +35,10 @@ impl Source for Words<'_> {
                 return coordinate(Some(word), self.place());
             }
             let Some((_, line)) = self.lines.next() else {
-                return Err(ReadError::CutOff { at: self.lines.place(), within: CUT_OFF });
+                return Err(ReadError::CutOff {
+                    at: self.lines.place(),
+                    within: CUT_OFF,
+                });
             };
             self.line = line;
         }
@@ -56,7 +59,10 @@ pub(super) struct Binary<'a> {
 impl Binary<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], ReadError> {
         let Some(&chunk) = self.bytes[self.at..].first_chunk::<N>() else {
-            return Err(ReadError::CutOff { at: Place::Byte(self.bytes.len()), within: CUT_OFF });
+            return Err(ReadError::CutOff {
+                at: Place::Byte(self.bytes.len()),
+                within: CUT_OFF,
+            });
         };
         self.at += N;
         let mut chunk = chunk;

@@ -1,5 +1,5 @@
-//! 3MF: a zip archive of XML files (core specification 1.3, with materials, colours and parts in several files), and
-//! what slicers add to it: paint, extruders and volumes that are no part of the model.
+//! 3MF: a zip archive of XML files (core specification 1.3, with materials, colours and parts in several
+//! files), and what slicers add to it: paint, extruders and volumes that are no part of the model.
 
 mod model;
 mod settings;
@@ -48,19 +48,25 @@ struct Package<'a> {
 
 impl<'a> Package<'a> {
     fn open(bytes: &'a [u8]) -> Result<Self, ReadError> {
-        Ok(Self { archive: archive(bytes)?, bytes_left: limit(bytes.len()) })
+        Ok(Self {
+            archive: archive(bytes)?,
+            bytes_left: limit(bytes.len()),
+        })
     }
 
     /// The text of a part; `None` where there is none of that name.
     fn text(&mut self, name: &str) -> Result<Option<String>, ReadError> {
         let name = name.trim_start_matches('/');
         // Names in archives differ in case from those that refer to them, rarely.
-        let index = self
-            .archive
-            .index_for_name(name)
-            .or_else(|| self.archive.file_names_raw().position(|other| other.eq_ignore_ascii_case(name.as_bytes())));
+        let index = self.archive.index_for_name(name).or_else(|| {
+            self.archive
+                .file_names_raw()
+                .position(|other| other.eq_ignore_ascii_case(name.as_bytes()))
+        });
         let Some(index) = index else { return Ok(None) };
-        let file = self.archive.by_index(index).map_err(|e| ReadError::Damaged { reason: e.to_string() })?;
+        let file = self.archive.by_index(index).map_err(|e| ReadError::Damaged {
+            reason: e.to_string(),
+        })?;
         let bytes = read_bounded(file, self.bytes_left)?;
         self.bytes_left -= bytes.len() as u64;
         Ok(Some(xml::text(bytes)))
@@ -86,9 +92,17 @@ struct Body<'a> {
 
 /// Puts the parts of the build together.
 fn build(model: &Model, settings: &Settings, notes: &mut Vec<String>) -> Result<Loaded, ReadError> {
-    let index: BTreeMap<_, usize> = model.objects.iter().enumerate().map(|(i, o)| (o.key(), i)).collect();
+    let index: BTreeMap<_, usize> = model
+        .objects
+        .iter()
+        .enumerate()
+        .map(|(i, o)| (o.key(), i))
+        .collect();
     let find = |path: &str, id: u32| {
-        let missing = || ReadError::MissingPart { kind: "object", id: id.to_string() };
+        let missing = || ReadError::MissingPart {
+            kind: "object",
+            id: id.to_string(),
+        };
         index.get(&(path, id)).copied().ok_or_else(missing)
     };
     let mut bodies = Vec::new();
@@ -99,7 +113,11 @@ fn build(model: &Model, settings: &Settings, notes: &mut Vec<String>) -> Result<
         for component in &object.components {
             children.push((find(&component.path, component.id)?, component.placed));
         }
-        parts.push(Part { id: object.id.to_string(), n_triangles: body.painted.mesh.triangles.len(), children });
+        parts.push(Part {
+            id: object.id.to_string(),
+            n_triangles: body.painted.mesh.triangles.len(),
+            children,
+        });
         bodies.push(body);
     }
     let mut roots = Vec::new();
@@ -108,13 +126,23 @@ fn build(model: &Model, settings: &Settings, notes: &mut Vec<String>) -> Result<
     }
     if model.items.is_empty() {
         let mut is_child = vec![false; parts.len()];
-        parts.iter().flat_map(|p| &p.children).for_each(|&(child, _)| is_child[child] = true);
-        roots.extend((0..parts.len()).filter(|&i| !is_child[i]).map(|i| (i, DAffine3::IDENTITY)));
+        parts
+            .iter()
+            .flat_map(|p| &p.children)
+            .for_each(|&(child, _)| is_child[child] = true);
+        roots.extend(
+            (0..parts.len())
+                .filter(|&i| !is_child[i])
+                .map(|i| (i, DAffine3::IDENTITY)),
+        );
         notes.push("nothing is on the build plate; all objects were read".to_owned());
     }
     let found = occurrences(&parts, &roots, "object")?;
     if found.len() > 1 {
-        notes.push(format!("the file has {} objects or parts; all were read", found.len()));
+        notes.push(format!(
+            "the file has {} objects or parts; all were read",
+            found.len()
+        ));
     }
     flatten(model, &bodies, &found)
 }
@@ -132,7 +160,9 @@ fn body<'a>(object: &'a Object, settings: &Settings, notes: &mut Vec<String>) ->
     }
     if n_left_out > 0 {
         let id = object.id;
-        notes.push(format!("{n_left_out} triangles of object {id} are modifiers or supports of the slicer; left out"));
+        notes.push(format!(
+            "{n_left_out} triangles of object {id} are modifiers or supports of the slicer; left out"
+        ));
         let Painted { mesh, colors, source } = &mut painted;
         let is_kept: Vec<bool> = source.iter().map(|&s| extruder[s as usize].is_some()).collect();
         retain(&mut mesh.triangles, &is_kept);
@@ -158,10 +188,16 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
         let Body { object: of, painted } = &bodies[occurrence.part];
         let first = u32::try_from(mesh.points.len()).unwrap_or(u32::MAX);
         let placed = occurrence.placed;
-        mesh.points.extend(painted.mesh.points.iter().map(|&p| placed.transform_point3(p)));
+        mesh.points
+            .extend(painted.mesh.points.iter().map(|&p| placed.transform_point3(p)));
         let is_mirror = placed.matrix3.determinant() < 0.0;
         let mut last_source = None;
-        for ((triangle, &extruder), &source) in painted.mesh.triangles.iter().zip(&painted.colors).zip(&painted.source)
+        for ((triangle, &extruder), &source) in painted
+            .mesh
+            .triangles
+            .iter()
+            .zip(&painted.colors)
+            .zip(&painted.source)
         {
             let [a, b, c] = triangle.map(|v| v.saturating_add(first));
             mesh.triangles.push(if is_mirror { [a, c, b] } else { [a, b, c] });
@@ -170,7 +206,9 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
             }
             file_face.push(n_faces - 1);
             let (of_color, of_material) = match of.property(source) {
-                Some(property) if model.color_groups.contains_key(&property.group()) => (Some(property), None),
+                Some(property) if model.color_groups.contains_key(&property.group()) => {
+                    (Some(property), None)
+                }
                 other => (None, other),
             };
             let value = |p: Property| model.color_groups[&p.group()].get(p.index as usize).cloned();
@@ -181,11 +219,18 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
         }
     }
     if mesh.triangles.is_empty() {
-        return Err(ReadError::NoTriangles { format: Format::ThreeMf, n_points: mesh.points.len() });
+        return Err(ReadError::NoTriangles {
+            format: Format::ThreeMf,
+            n_points: mesh.points.len(),
+        });
     }
     if mesh.points.iter().any(|p| !p.is_finite()) {
         let reason = "moving an object takes its points out of all numbers".to_owned();
-        return Err(ReadError::Xml { part: USUAL_ROOT.to_owned(), at: super::Place::Byte(0), reason });
+        return Err(ReadError::Xml {
+            part: USUAL_ROOT.to_owned(),
+            at: super::Place::Byte(0),
+            reason,
+        });
     }
     let all = [
         (LabelSource::Paint, paint),
@@ -194,8 +239,17 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
         (LabelSource::Object, object),
     ];
     let labellings = all.into_iter().filter(|(_, labels)| divides(labels));
-    let labellings = labellings.map(|(source, labels)| Labelling { source, labels }).collect();
-    Ok(Loaded { mesh, labellings, file_face, format: Format::ThreeMf, unit_mm: None, notes: Vec::new() })
+    let labellings = labellings
+        .map(|(source, labels)| Labelling { source, labels })
+        .collect();
+    Ok(Loaded {
+        mesh,
+        labellings,
+        file_face,
+        format: Format::ThreeMf,
+        unit_mm: None,
+        notes: Vec::new(),
+    })
 }
 
 #[cfg(test)]

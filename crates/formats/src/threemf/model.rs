@@ -75,7 +75,10 @@ impl Object {
     }
 
     pub(super) fn paint_codes(&self) -> Vec<(u32, &str)> {
-        self.paint.iter().map(|(face, range)| (*face, &self.paint_text[range.clone()])).collect()
+        self.paint
+            .iter()
+            .map(|(face, range)| (*face, &self.paint_text[range.clone()]))
+            .collect()
     }
 
     /// The material or colour of a triangle.
@@ -102,7 +105,10 @@ impl Model {
         if model.items.is_empty() {
             model.items = off;
         } else if !off.is_empty() {
-            model.notes.push(format!("objects that the slicer is not to print: {}; left out", off.len()));
+            model.notes.push(format!(
+                "objects that the slicer is not to print: {}; left out",
+                off.len()
+            ));
         }
         Ok(model)
     }
@@ -110,11 +116,21 @@ impl Model {
     /// Reads the parts that components and items name, and those that they name.
     pub(super) fn read_other_parts(&mut self, package: &mut Package) -> Result<(), ReadError> {
         loop {
-            let named: BTreeSet<&String> =
-                self.objects.iter().flat_map(|o| &o.components).chain(&self.items).map(|c| &c.path).collect();
-            let Some(next) = named.into_iter().find(|path| !self.parts.contains(path)).cloned() else { return Ok(()) };
+            let named: BTreeSet<&String> = self
+                .objects
+                .iter()
+                .flat_map(|o| &o.components)
+                .chain(&self.items)
+                .map(|c| &c.path)
+                .collect();
+            let Some(next) = named.into_iter().find(|path| !self.parts.contains(path)).cloned() else {
+                return Ok(());
+            };
             if self.parts.len() == MAX_PARTS {
-                return Err(ReadError::TooManyCopies { what: "a package of so many files", limit: MAX_PARTS as u64 });
+                return Err(ReadError::TooManyCopies {
+                    what: "a package of so many files",
+                    limit: MAX_PARTS as u64,
+                });
             }
             let (items, unit_mm) = (std::mem::take(&mut self.items), self.unit_mm);
             self.read_part(&next, package)?;
@@ -124,11 +140,21 @@ impl Model {
     }
 
     fn read_part(&mut self, name: &str, package: &mut Package) -> Result<(), ReadError> {
-        let missing = || ReadError::MissingPart { kind: "the file", id: name.to_owned() };
+        let missing = || ReadError::MissingPart {
+            kind: "the file",
+            id: name.to_owned(),
+        };
         let text = package.text(name)?.ok_or_else(missing)?;
         self.parts.push(name.to_owned());
         let (elements, number) = (Elements::of(name, &text), self.parts.len() as u32 - 1);
-        PartReader { elements, name, number, model: self, ids: BTreeSet::new() }.read()
+        PartReader {
+            elements,
+            name,
+            number,
+            model: self,
+            ids: BTreeSet::new(),
+        }
+        .read()
     }
 }
 
@@ -153,7 +179,9 @@ impl PartReader<'_, '_> {
                 Next::End(name) => {
                     match &name[..] {
                         b"colorgroup" => {
-                            self.model.color_groups.extend(group.take().map(|(id, c)| ((self.number, id), c)));
+                            self.model
+                                .color_groups
+                                .extend(group.take().map(|(id, c)| ((self.number, id), c)));
                         }
                         b"object" => self.model.objects.extend(object.take()),
                         _ => {}
@@ -175,12 +203,21 @@ impl PartReader<'_, '_> {
                 (b"item", None, _) => {
                     let item = self.read_component(&element)?;
                     let is_off = self.string(&element, "printable")? == "0";
-                    if is_off { &mut self.model.switched_off } else { &mut self.model.items }.push(item);
+                    if is_off {
+                        &mut self.model.switched_off
+                    } else {
+                        &mut self.model.items
+                    }
+                    .push(item);
                 }
                 _ => {}
             }
         }
-        if has_model { self.check_corners() } else { Err(self.elements.error("there is no element \"model\"")) }
+        if has_model {
+            self.check_corners()
+        } else {
+            Err(self.elements.error("there is no element \"model\""))
+        }
     }
 
     fn read_unit(&mut self, element: &BytesStart) -> Result<(), ReadError> {
@@ -215,7 +252,13 @@ impl PartReader<'_, '_> {
 
     /// The object that begins; `None` for supports, which are no part of the model.
     fn read_object(&mut self, element: &BytesStart) -> Result<Option<Object>, ReadError> {
-        let (mut object, mut kind) = (Object { path: self.name.to_owned(), ..Object::default() }, String::new());
+        let (mut object, mut kind) = (
+            Object {
+                path: self.name.to_owned(),
+                ..Object::default()
+            },
+            String::new(),
+        );
         let (mut group, mut index) = (None, 0);
         self.elements.attributes(element, |name, value| {
             match name {
@@ -228,11 +271,19 @@ impl PartReader<'_, '_> {
             Ok(())
         })?;
         if !self.ids.insert(object.id) {
-            return Err(self.elements.error(format!("there are two objects {}", object.id)));
+            return Err(self
+                .elements
+                .error(format!("there are two objects {}", object.id)));
         }
-        object.whole = group.map(|group| Property { part: self.number, group, index });
+        object.whole = group.map(|group| Property {
+            part: self.number,
+            group,
+            index,
+        });
         if kind == "support" || kind == "solidsupport" {
-            self.model.notes.push(format!("object {} is a support; left out", object.id));
+            self.model
+                .notes
+                .push(format!("object {} is a support; left out", object.id));
             // It stays as an object without triangles, since the build may name it.
             self.model.objects.push(object);
             return Ok(None);
@@ -249,11 +300,16 @@ impl PartReader<'_, '_> {
             Ok(())
         })?;
         let point = Vec3::from_array(point);
-        if point.is_finite() { Ok(point) } else { Err(self.elements.error("a point lacks a finite x, y or z")) }
+        if point.is_finite() {
+            Ok(point)
+        } else {
+            Err(self.elements.error("a point lacks a finite x, y or z"))
+        }
     }
 
     fn read_triangle(&self, element: &BytesStart, object: &mut Object) -> Result<(), ReadError> {
-        let face = u32::try_from(object.mesh.triangles.len()).map_err(|_| self.elements.error("too many triangles"))?;
+        let face = u32::try_from(object.mesh.triangles.len())
+            .map_err(|_| self.elements.error("too many triangles"))?;
         let mut corners = [None; 3];
         let (mut group, mut index) = (None, None);
         self.elements.attributes(element, |name, value| {
@@ -280,13 +336,24 @@ impl PartReader<'_, '_> {
         object.paint.dedup_by_key(|(face, _)| *face);
         let group = group.or(object.whole.map(|whole| whole.group));
         if let (Some(group), Some(index)) = (group, index) {
-            object.properties.push((face, Property { part: self.number, group, index }));
+            object.properties.push((
+                face,
+                Property {
+                    part: self.number,
+                    group,
+                    index,
+                },
+            ));
         }
         Ok(())
     }
 
     fn read_component(&self, element: &BytesStart) -> Result<Component, ReadError> {
-        let mut component = Component { path: self.name.to_owned(), id: 0, placed: DAffine3::IDENTITY };
+        let mut component = Component {
+            path: self.name.to_owned(),
+            id: 0,
+            placed: DAffine3::IDENTITY,
+        };
         self.elements.attributes(element, |name, value| {
             match name {
                 "objectid" => component.id = number(name, value)?,
@@ -304,9 +371,16 @@ impl PartReader<'_, '_> {
     fn check_corners(&self) -> Result<(), ReadError> {
         for object in self.model.objects.iter().filter(|o| o.path == self.name) {
             let n_points = object.mesh.points.len();
-            if let Some(&corner) = object.mesh.triangles.as_flattened().iter().find(|&&v| v as usize >= n_points) {
+            if let Some(&corner) = object
+                .mesh
+                .triangles
+                .as_flattened()
+                .iter()
+                .find(|&&v| v as usize >= n_points)
+            {
                 let id = object.id;
-                let reason = format!("a triangle of object {id} uses point {corner}, but it has {n_points} points");
+                let reason =
+                    format!("a triangle of object {id} uses point {corner}, but it has {n_points} points");
                 return Err(self.elements.error(reason));
             }
         }

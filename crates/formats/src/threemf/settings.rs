@@ -6,7 +6,10 @@ use super::Package;
 use super::xml::{Elements, Next, number};
 
 /// Where PrusaSlicer and SuperSlicer, and where Bambu Studio and OrcaSlicer have it.
-pub(super) const FILES: [&str; 2] = ["Metadata/Slic3r_PE_model.config", "Metadata/model_settings.config"];
+pub(super) const FILES: [&str; 2] = [
+    "Metadata/Slic3r_PE_model.config",
+    "Metadata/model_settings.config",
+];
 /// Volumes that are material; all others change or hold up what is printed.
 const BODY_KINDS: [&str; 2] = ["ModelPart", "normal_part"];
 /// Volumes that have the same triangle at most; further ones are hostile and are passed over.
@@ -33,7 +36,9 @@ struct Volume {
 impl Settings {
     /// Adds what `name` holds; a file that cannot be read adds nothing, since models come without it as well.
     pub(super) fn read(&mut self, name: &str, package: &mut Package) {
-        let Ok(Some(text)) = package.text(name) else { return };
+        let Ok(Some(text)) = package.text(name) else {
+            return;
+        };
         let mut elements = Elements::of(name, &text);
         // The object that is open, its entry, and whether a part of it is open.
         let (mut object, mut entry, mut in_part) = (None, 0, false);
@@ -48,7 +53,11 @@ impl Settings {
                     // A range of the object's triangles.
                     b"volume" => {
                         let of = |name| attribute(&elements, &element, name);
-                        self.begin(object, (of("firstid").unwrap_or(0), of("lastid").unwrap_or(u32::MAX)), true);
+                        self.begin(
+                            object,
+                            (of("firstid").unwrap_or(0), of("lastid").unwrap_or(u32::MAX)),
+                            true,
+                        );
                         in_part = true;
                     }
                     // An object of its own, put into this one.
@@ -75,7 +84,12 @@ impl Settings {
     }
 
     fn begin(&mut self, object: Option<u32>, faces: (u32, u32), is_body: bool) {
-        self.volumes.extend(object.map(|object| Volume { object, faces, is_body, extruder: None }));
+        self.volumes.extend(object.map(|object| Volume {
+            object,
+            faces,
+            is_body,
+            extruder: None,
+        }));
     }
 
     fn set_extruder(&mut self, extruder: Option<u32>) {
@@ -103,8 +117,8 @@ impl Settings {
         }
     }
 
-    /// The extruder of each of `n_triangles` triangles of an object where they have no paint; `None` for what is no part
-    /// of the model.
+    /// The extruder of each of `n_triangles` triangles of an object where they have no paint; `None` for what
+    /// is no part of the model.
     pub(super) fn extruders(&self, object: u32, n_triangles: usize) -> Vec<Option<u32>> {
         let mut extruders = vec![Some(FIRST_EXTRUDER); n_triangles];
         let from = self.volumes.partition_point(|v| v.object < object);
@@ -114,10 +128,16 @@ impl Settings {
         for volume in self.volumes[from..].iter().take_while(|v| v.object == object) {
             let end = (volume.faces.1 as usize).saturating_add(1).min(n_triangles);
             let begin = (volume.faces.0 as usize).min(end);
-            let Some(left) = work_left.checked_sub(end - begin) else { break };
+            let Some(left) = work_left.checked_sub(end - begin) else {
+                break;
+            };
             work_left = left;
             for extruder in &mut extruders[begin..end] {
-                *extruder = if volume.is_body { volume.extruder.or(*extruder) } else { None };
+                *extruder = if volume.is_body {
+                    volume.extruder.or(*extruder)
+                } else {
+                    None
+                };
             }
         }
         extruders

@@ -14,7 +14,9 @@ const TETRAHEDRON: &str = r#"<mesh><vertices><vertex x="0" y="0" z="0"/><vertex 
 fn package(parts: &[(&str, &str)]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, text) in parts {
-        archive.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        archive
+            .start_file(*name, zip::write::SimpleFileOptions::default())
+            .unwrap();
         archive.write_all(text.as_bytes()).unwrap();
     }
     archive.finish().unwrap().into_inner()
@@ -38,12 +40,18 @@ fn units_components_and_transforms_put_parts_where_they_belong() {
         + r#"<object id="2"><components><component objectid="1"/><component objectid="1" transform="2 0 0 0 2 0 0 0 2 10 0 0"/></components></object>"#;
     let item = r#"<item objectid="2" transform="0 1 0 -1 0 0 0 0 1 0 0 100"/>"#;
     let loaded = read_model(&resources, item).unwrap();
-    assert_eq!((loaded.format, loaded.unit_mm, loaded.mesh.triangles.len()), (Format::ThreeMf, Some(25.4), 8));
+    assert_eq!(
+        (loaded.format, loaded.unit_mm, loaded.mesh.triangles.len()),
+        (Format::ThreeMf, Some(25.4), 8)
+    );
     // x to y, y to −x, then up.
     assert_eq!(loaded.mesh.points[1], Vec3::new(0.0, 1.0, 100.0));
     assert_eq!(loaded.mesh.points[5], Vec3::new(0.0, 12.0, 100.0));
     assert!((loaded.mesh.signed_volume() - 9.0 / 6.0).abs() < 1e-12);
-    assert_eq!(loaded.labels(LabelSource::Object), Some(&[0, 0, 0, 0, 1, 1, 1, 1][..]));
+    assert_eq!(
+        loaded.labels(LabelSource::Object),
+        Some(&[0, 0, 0, 0, 1, 1, 1, 1][..])
+    );
     assert_eq!(loaded.file_face, (0..8).collect::<Vec<_>>());
 }
 
@@ -61,25 +69,38 @@ fn parts_in_other_files_are_found_and_the_root_may_have_another_name() {
         r#"<object id="7"><components><component p:path="/3D/Objects/a.model" objectid="7"/></components></object>"#,
         r#"<item objectid="7"/>"#,
     );
-    let relations =
-        r#"<Relationships><Relationship Target="/else/where.model" Id="r" Type="http://x/3dmodel"/></Relationships>"#;
-    let bytes = package(&[("_rels/.rels", relations), ("else/where.model", &root), ("3D/Objects/a.model", &other)]);
+    let relations = r#"<Relationships><Relationship Target="/else/where.model" Id="r" Type="http://x/3dmodel"/></Relationships>"#;
+    let bytes = package(&[
+        ("_rels/.rels", relations),
+        ("else/where.model", &root),
+        ("3D/Objects/a.model", &other),
+    ]);
     assert_eq!(read_mesh(&bytes, None).unwrap().mesh.triangles.len(), 4);
     let alone = package(&[(USUAL_ROOT, &root)]);
-    let missing = ReadError::MissingPart { kind: "the file", id: "3D/Objects/a.model".into() };
+    let missing = ReadError::MissingPart {
+        kind: "the file",
+        id: "3D/Objects/a.model".into(),
+    };
     assert_eq!(read_mesh(&alone, None), Err(missing));
 }
 
 #[test]
 fn colours_and_materials_divide_and_supports_are_left_out() {
-    let painted = TETRAHEDRON.replace(r#"v1="0" v2="1" v3="3""#, r#"v1="0" v2="1" v3="3" pid="5" p1="1""#);
+    let painted = TETRAHEDRON.replace(
+        r#"v1="0" v2="1" v3="3""#,
+        r#"v1="0" v2="1" v3="3" pid="5" p1="1""#,
+    );
     let resources = format!(
         r##"<m:colorgroup id="5"><m:color color="#FF0000"/><m:color color="#00FF00"/></m:colorgroup>
         <object id="1" pid="5" pindex="0">{painted}</object><object id="2" type="support">{TETRAHEDRON}</object>"##
     );
     let loaded = read_model(&resources, r#"<item objectid="1"/><item objectid="2"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Color), Some(&[0, 1, 0, 0][..]));
-    assert!(loaded.notes.iter().any(|n| n.contains("support")), "{:?}", loaded.notes);
+    assert!(
+        loaded.notes.iter().any(|n| n.contains("support")),
+        "{:?}",
+        loaded.notes
+    );
     let materials = format!(r#"<basematerials id="5"/><object id="1" pid="5" pindex="0">{painted}</object>"#);
     let loaded = read_model(&materials, r#"<item objectid="1"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Material), Some(&[0, 1, 0, 0][..]));
@@ -88,9 +109,17 @@ fn colours_and_materials_divide_and_supports_are_left_out() {
 #[test]
 fn what_is_not_to_print_is_left_out_unless_nothing_else_is_there() {
     let resources = format!(r#"<object id="1">{TETRAHEDRON}</object><object id="2">{TETRAHEDRON}</object>"#);
-    let loaded = read_model(&resources, r#"<item objectid="1"/><item objectid="2" printable="0"/>"#).unwrap();
+    let loaded = read_model(
+        &resources,
+        r#"<item objectid="1"/><item objectid="2" printable="0"/>"#,
+    )
+    .unwrap();
     assert_eq!(loaded.mesh.triangles.len(), 4);
-    assert!(loaded.notes.iter().any(|n| n.contains("not to print")), "{:?}", loaded.notes);
+    assert!(
+        loaded.notes.iter().any(|n| n.contains("not to print")),
+        "{:?}",
+        loaded.notes
+    );
     let alone = read_model(&resources, r#"<item objectid="2" printable="0"/>"#).unwrap();
     assert_eq!(alone.mesh.triangles.len(), 4);
 }
@@ -99,38 +128,76 @@ fn what_is_not_to_print_is_left_out_unless_nothing_else_is_there() {
 fn paint_of_both_kinds_of_slicers_becomes_triangles_with_labels() {
     for attribute in ["slic3rpe:mmu_segmentation", "paint_color"] {
         // Three sides split; the corner at point 0 has colour 2, all else is unpainted.
-        let painted =
-            TETRAHEDRON.replace(r#"v1="0" v2="1" v3="3""#, &format!(r#"v1="0" v2="1" v3="3" {attribute}="80003""#));
-        let loaded = read_model(&format!("<object id=\"1\">{painted}</object>"), r#"<item objectid="1"/>"#).unwrap();
+        let painted = TETRAHEDRON.replace(
+            r#"v1="0" v2="1" v3="3""#,
+            &format!(r#"v1="0" v2="1" v3="3" {attribute}="80003""#),
+        );
+        let loaded = read_model(
+            &format!("<object id=\"1\">{painted}</object>"),
+            r#"<item objectid="1"/>"#,
+        )
+        .unwrap();
         let (solid, _) = into_solid(&loaded.mesh).unwrap();
         assert!((solid.volume() - 1.0 / 6.0).abs() < 1e-15);
         let labels = loaded.labels(LabelSource::Paint).unwrap();
         // Unpainted is what the first extruder prints.
         let area = |label: i64| -> f64 {
-            (0..labels.len()).filter(|&f| labels[f] == label).map(|f| loaded.mesh.face_area(f)).sum()
+            (0..labels.len())
+                .filter(|&f| labels[f] == label)
+                .map(|f| loaded.mesh.face_area(f))
+                .sum()
         };
         assert!((area(2) - 0.125).abs() < 1e-15 && (area(1) + area(2) - loaded.mesh.area()).abs() < 1e-12);
         assert_eq!((loaded.n_file_faces(), loaded.file_face.is_sorted()), (4, true));
         assert_eq!(loaded.face_labels(), Some(labels));
     }
     let wrong = TETRAHEDRON.replace(r#"v2="2" v3="3""#, r#"v2="2" v3="3" paint_color="3""#);
-    let refused = read_model(&format!("<object id=\"1\">{wrong}</object>"), r#"<item objectid="1"/>"#);
-    assert_eq!(refused, Err(ReadError::Paint { face: 2, code: "3".into() }));
+    let refused = read_model(
+        &format!("<object id=\"1\">{wrong}</object>"),
+        r#"<item objectid="1"/>"#,
+    );
+    assert_eq!(
+        refused,
+        Err(ReadError::Paint {
+            face: 2,
+            code: "3".into()
+        })
+    );
 }
 
 #[test]
 fn extruders_colour_what_is_unpainted_and_modifiers_are_left_out() {
-    let painted = TETRAHEDRON.replace(r#"v1="0" v2="1" v3="3""#, r#"v1="0" v2="1" v3="3" paint_color="8""#);
+    let painted = TETRAHEDRON.replace(
+        r#"v1="0" v2="1" v3="3""#,
+        r#"v1="0" v2="1" v3="3" paint_color="8""#,
+    );
     let twice = painted
         .replace("</vertices>", r#"<vertex x="9" y="9" z="9"/></vertices>"#)
-        .replace("</triangles>", r#"<triangle v1="0" v2="4" v3="1"/><triangle v1="0" v2="1" v3="4"/></triangles>"#);
+        .replace(
+            "</triangles>",
+            r#"<triangle v1="0" v2="4" v3="1"/><triangle v1="0" v2="1" v3="4"/></triangles>"#,
+        );
     let prusa = r#"<config><object id="1" instances_count="1"><metadata type="object" key="extruder" value="3"/>
         <volume firstid="0" lastid="3"><metadata type="volume" key="volume_type" value="ModelPart"/></volume>
         <volume firstid="4" lastid="5"><metadata type="volume" key="volume_type" value="ParameterModifier"/></volume></object></config>"#;
-    let root = model(&format!("<object id=\"1\">{twice}</object>"), r#"<item objectid="1"/>"#);
-    let loaded = read_mesh(&package(&[(USUAL_ROOT, &root), (settings::FILES[0], prusa)]), None).unwrap();
+    let root = model(
+        &format!("<object id=\"1\">{twice}</object>"),
+        r#"<item objectid="1"/>"#,
+    );
+    let loaded = read_mesh(
+        &package(&[(USUAL_ROOT, &root), (settings::FILES[0], prusa)]),
+        None,
+    )
+    .unwrap();
     assert_eq!(loaded.face_labels(), Some(&[3, 2, 3, 3][..]));
-    assert!(loaded.notes.iter().any(|n| n.starts_with("2 triangles of object 1")), "{:?}", loaded.notes);
+    assert!(
+        loaded
+            .notes
+            .iter()
+            .any(|n| n.starts_with("2 triangles of object 1")),
+        "{:?}",
+        loaded.notes
+    );
 
     let parts = format!(
         r#"{}{}<object id="3"><components><component objectid="1"/><component objectid="2"/></components></object>"#,
@@ -140,7 +207,11 @@ fn extruders_colour_what_is_unpainted_and_modifiers_are_left_out() {
     let bambu = r#"<config><object id="3"><metadata key="extruder" value="4"/><part id="1" subtype="normal_part"/>
         <part id="2" subtype="negative_part"/></object></config>"#;
     let root = model(&parts, r#"<item objectid="3"/>"#);
-    let loaded = read_mesh(&package(&[(USUAL_ROOT, &root), (settings::FILES[1], bambu)]), None).unwrap();
+    let loaded = read_mesh(
+        &package(&[(USUAL_ROOT, &root), (settings::FILES[1], bambu)]),
+        None,
+    )
+    .unwrap();
     assert_eq!((loaded.mesh.triangles.len(), loaded.labellings.len()), (4, 0));
 }
 
@@ -153,14 +224,21 @@ fn what_is_written_with_paint_is_read_with_the_same_labels() {
     let bytes = write_painted_3mf("a & b", &mesh, &[1, 2, 3, 16]);
     assert_eq!(bytes, write_painted_3mf("a & b", &mesh, &[1, 2, 3, 16]));
     let loaded = read_mesh(&bytes, None).unwrap();
-    assert_eq!((&loaded.mesh, loaded.face_labels()), (&mesh, Some(&[1, 2, 3, 16][..])));
+    assert_eq!(
+        (&loaded.mesh, loaded.face_labels()),
+        (&mesh, Some(&[1, 2, 3, 16][..]))
+    );
     assert_eq!(loaded.unit_mm, Some(1.0));
 }
 
 #[test]
 fn broken_packages_are_refused_with_a_reason() {
     let item = r#"<item objectid="1"/>"#;
-    let refused = |resources: &str, build: &str| read_model(resources, build).expect_err("it is broken").to_string();
+    let refused = |resources: &str, build: &str| {
+        read_model(resources, build)
+            .expect_err("it is broken")
+            .to_string()
+    };
     let broken = |from: &str, to: &str| refused(&tetrahedron(1).replace(from, to), item);
     assert!(broken(r#"v1="1""#, r#"v1="9""#).contains("uses point 9, but it has 4 points"));
     assert!(broken(r#"v1="1""#, r#"v1="-1""#).contains("v1 is \"-1\""));
@@ -178,7 +256,12 @@ fn broken_packages_are_refused_with_a_reason() {
     assert!(matches!(read_model(cycle, item), Err(ReadError::Cycle { .. })));
     assert!(matches!(read_model("", ""), Err(ReadError::NoTriangles { .. })));
     let unknown = package(&[(USUAL_ROOT, &model("", "").replace("inch", "mile"))]);
-    assert!(read_mesh(&unknown, None).unwrap_err().to_string().contains("unit"));
+    assert!(
+        read_mesh(&unknown, None)
+            .unwrap_err()
+            .to_string()
+            .contains("unit")
+    );
     let deep = "<a>".repeat(100);
     assert!(refused(&deep, "").contains("too deep"));
 }

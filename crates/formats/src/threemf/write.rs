@@ -37,24 +37,29 @@ const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
 "#;
 
-/// A 3MF model with one build item for each object, in millimetres; the same objects give the same bytes everywhere.
+/// A 3MF model with one build item for each object, in millimetres; the same objects give the same bytes
+/// everywhere.
 ///
 /// Coordinates are rounded to `f32`, as slicers read them. Slicers refuse objects without triangles.
 pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
     package(&model_xml(objects))
 }
 
-/// A 3MF of one body in millimetres whose triangles are painted: colour k, from 1 to 16, is the k-th extruder or filament.
+/// A 3MF of one body in millimetres whose triangles are painted: colour k, from 1 to 16, is the k-th extruder
+/// or filament.
 ///
-/// PrusaSlicer, Bambu Studio and OrcaSlicer show the paint, each reading its own attribute; there it can be changed, and
-/// [`super::super::read_mesh`] reads it back, points and all.
+/// PrusaSlicer, Bambu Studio and OrcaSlicer show the paint, each reading its own attribute; there it can be
+/// changed, and [`super::super::read_mesh`] reads it back, points and all.
 ///
 /// # Panics
 /// Where `colors` has another length than the triangles.
 pub fn write_painted_3mf(name: &str, mesh: &TriMesh, colors: &[u32]) -> Vec<u8> {
     assert_eq!(colors.len(), mesh.triangles.len(), "one colour for each triangle");
     let mut xml = head("Shellock segmentation", PAINT_NAMESPACE, PAINT_VERSION);
-    add(&mut xml, format_args!("<object id=\"1\" type=\"model\" name=\"{}\">\n", Escaped(name)));
+    add(
+        &mut xml,
+        format_args!("<object id=\"1\" type=\"model\" name=\"{}\">\n", Escaped(name)),
+    );
     add_mesh(&mut xml, mesh, Some(colors));
     xml.push_str("</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n");
     package(&xml)
@@ -69,12 +74,20 @@ fn package(model: &str) -> Vec<u8> {
         .unix_permissions(0o644)
         .system(System::Unix)
         .large_file(model.len() >= u32::MAX as usize);
-    let entries = [("3D/3dmodel.model", model), ("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS)];
+    let entries = [
+        ("3D/3dmodel.model", model),
+        ("[Content_Types].xml", CONTENT_TYPES),
+        ("_rels/.rels", RELATIONS),
+    ];
 
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (path, text) in entries {
-        archive.start_file(path, options).expect("fixed and distinct paths are accepted");
-        archive.write_all(text.as_bytes()).expect("memory takes all bytes");
+        archive
+            .start_file(path, options)
+            .expect("fixed and distinct paths are accepted");
+        archive
+            .write_all(text.as_bytes())
+            .expect("memory takes all bytes");
     }
     archive.finish().expect("memory takes all bytes").into_inner()
 }
@@ -96,9 +109,17 @@ fn model_xml(objects: &[NamedObject]) -> String {
     let mut xml = head(TITLE, "", "");
     if !objects.is_empty() {
         add(&mut xml, format_args!("<basematerials id=\"{MATERIALS_ID}\">\n"));
-        for NamedObject { name, color: [r, g, b], .. } in objects {
+        for NamedObject {
+            name,
+            color: [r, g, b],
+            ..
+        } in objects
+        {
             let name = Escaped(name);
-            add(&mut xml, format_args!("<base name=\"{name}\" displaycolor=\"#{r:02X}{g:02X}{b:02X}FF\"/>\n"));
+            add(
+                &mut xml,
+                format_args!("<base name=\"{name}\" displaycolor=\"#{r:02X}{g:02X}{b:02X}FF\"/>\n"),
+            );
         }
         xml.push_str("</basematerials>\n");
     }
@@ -106,7 +127,9 @@ fn model_xml(objects: &[NamedObject]) -> String {
         let (id, name) = (object_id(i), Escaped(object.name));
         add(
             &mut xml,
-            format_args!("<object id=\"{id}\" type=\"model\" name=\"{name}\" pid=\"{MATERIALS_ID}\" pindex=\"{i}\">\n"),
+            format_args!(
+                "<object id=\"{id}\" type=\"model\" name=\"{name}\" pid=\"{MATERIALS_ID}\" pindex=\"{i}\">\n"
+            ),
         );
         add_mesh(&mut xml, object.mesh, None);
         xml.push_str("</object>\n");
@@ -118,7 +141,10 @@ fn model_xml(objects: &[NamedObject]) -> String {
         if object.turned.is_some() || object.moved_mm != [0.0; 3] {
             let [[a, b, c], [d, e, f], [g, h, i]] = object.turned.unwrap_or(UNTURNED);
             let [x, y, z] = object.moved_mm;
-            add(&mut xml, format_args!(" transform=\"{a} {b} {c} {d} {e} {f} {g} {h} {i} {x} {y} {z}\""));
+            add(
+                &mut xml,
+                format_args!(" transform=\"{a} {b} {c} {d} {e} {f} {g} {h} {i} {x} {y} {z}\""),
+            );
         }
         xml.push_str("/>\n");
     }
@@ -133,7 +159,13 @@ fn add_mesh(xml: &mut String, mesh: &TriMesh, colors: Option<&[u32]>) {
         let [x, y, z] = exact.map(|x| x as f32);
         match colors {
             // Seams of patches come closer together than floats tell apart.
-            Some(_) => add(xml, format_args!("<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>\n", exact[0], exact[1], exact[2])),
+            Some(_) => add(
+                xml,
+                format_args!(
+                    "<vertex x=\"{}\" y=\"{}\" z=\"{}\"/>\n",
+                    exact[0], exact[1], exact[2]
+                ),
+            ),
             None => add(xml, format_args!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n")),
         }
     }
@@ -142,7 +174,10 @@ fn add_mesh(xml: &mut String, mesh: &TriMesh, colors: Option<&[u32]>) {
         add(xml, format_args!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\""));
         match colors.map(|colors| whole_triangle_code(colors[face])) {
             Some(code) if !code.is_empty() => {
-                add(xml, format_args!(" slic3rpe:mmu_segmentation=\"{code}\" paint_color=\"{code}\"/>\n"));
+                add(
+                    xml,
+                    format_args!(" slic3rpe:mmu_segmentation=\"{code}\" paint_color=\"{code}\"/>\n"),
+                );
             }
             _ => xml.push_str("/>\n"),
         }

@@ -34,7 +34,11 @@ impl<'a> Elements<'a> {
     pub(super) fn of(part: &'a str, text: &'a str) -> Self {
         let mut reader = Reader::from_str(text);
         reader.config_mut().expand_empty_elements = true;
-        Self { reader, part, depth: 0 }
+        Self {
+            reader,
+            part,
+            depth: 0,
+        }
     }
 
     /// The next begin or end; `None` at the end of the text.
@@ -60,7 +64,8 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// Hands each attribute of `element` to `take`, with the name as it stands there, and refuses two of the same name.
+    /// Hands each attribute of `element` to `take`, with the name as it stands there, and refuses two of the
+    /// same name.
     pub(super) fn attributes(
         &self,
         element: &BytesStart,
@@ -83,7 +88,11 @@ impl<'a> Elements<'a> {
     /// "part, byte: reason".
     pub(super) fn error(&self, reason: impl std::fmt::Display) -> ReadError {
         let at = Place::Byte(self.reader.buffer_position() as usize);
-        ReadError::Xml { part: self.part.to_owned(), at, reason: reason.to_string() }
+        ReadError::Xml {
+            part: self.part.to_owned(),
+            at,
+            reason: reason.to_string(),
+        }
     }
 }
 

@@ -170,8 +170,13 @@ impl fmt::Display for Several<'_> {
                 Coordinates(body.bounds.center()),
             )?;
             if body.signed_volume < 0.0 {
-                let inside = bodies[0].bounds.contains(body.bounds.min) && bodies[0].bounds.contains(body.bounds.max);
-                f.write_str(if i > 0 && inside { " (a cavity)" } else { " (inside out)" })?;
+                let inside =
+                    bodies[0].bounds.contains(body.bounds.min) && bodies[0].bounds.contains(body.bounds.max);
+                f.write_str(if i > 0 && inside {
+                    " (a cavity)"
+                } else {
+                    " (inside out)"
+                })?;
             }
         }
         if bodies.len() > N_LISTED {
@@ -186,7 +191,13 @@ pub(crate) struct Coordinates(pub(crate) Vec3);
 
 impl fmt::Display for Coordinates {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "({}, {}, {})", Short(self.0.x), Short(self.0.y), Short(self.0.z))
+        write!(
+            f,
+            "({}, {}, {})",
+            Short(self.0.x),
+            Short(self.0.y),
+            Short(self.0.z)
+        )
     }
 }
 
@@ -199,10 +210,19 @@ impl fmt::Display for Short {
         if size >= 1e9 || (size > 0.0 && size < 1e-6) {
             return write!(f, "{:.3e}", self.0);
         }
-        let decimals =
-            if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 9).max(i32::from(size < 1e4)) };
+        let decimals = if size == 0.0 {
+            0
+        } else {
+            (3 - size.log10().floor() as i32)
+                .clamp(0, 9)
+                .max(i32::from(size < 1e4))
+        };
         let text = format!("{:.*}", decimals as usize, self.0);
-        let trimmed = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        let trimmed = if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.')
+        } else {
+            &text
+        };
         f.write_str(trimmed)
     }
 }
@@ -216,6 +236,9 @@ fn copies(n_copies: usize) -> String {
     if n_copies == 0 {
         String::new()
     } else {
-        format!(" ({} there twice)", plural(n_copies, "triangle is", "triangles are"))
+        format!(
+            " ({} there twice)",
+            plural(n_copies, "triangle is", "triangles are")
+        )
     }
 }

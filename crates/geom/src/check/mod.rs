@@ -1,7 +1,7 @@
 //! Is it one body? What is wrong with a surface, counted and placed, in words for the person who made it.
 //!
-//! [`inspect`] counts, [`into_solid`] decides; [`crate::repair`] mends what it refuses. Not checked here: faces that cross
-//! each other, and thin walls.
+//! [`inspect`] counts, [`into_solid`] decides; [`crate::repair`] mends what it refuses. Not checked here:
+//! faces that cross each other, and thin walls.
 
 mod error;
 mod groups;
@@ -15,7 +15,8 @@ use crate::weld::{Welded, close};
 use crate::{Aabb, NotSolid, Solid, TriMesh, Vec3};
 use groups::Groups;
 
-/// Farther from the origin, file units, products of six lengths, as exact unions form them, leave the range of numbers.
+/// Farther from the origin, file units, products of six lengths, as exact unions form them, leave the range
+/// of numbers.
 const FARTHEST: f64 = 1e30;
 
 /// What a mesh is, as far as its triangles and their neighbours tell.
@@ -80,12 +81,17 @@ pub struct Body {
     pub signed_volume: f64,
 }
 
-/// Makes one body of a mesh as read: merges equal points where needed, and refuses what is not one closed surface.
+/// Makes one body of a mesh as read: merges equal points where needed, and refuses what is not one closed
+/// surface.
 ///
 /// Returns for each triangle of the solid its number in `mesh`, ascending. O(n log n).
 pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
     check_points(mesh)?;
-    let Welded { mesh, kept_face, n_collapsed } = close(mesh);
+    let Welded {
+        mesh,
+        kept_face,
+        n_collapsed,
+    } = close(mesh);
     if mesh.triangles.is_empty() {
         return Err(InputError::Empty);
     }
@@ -98,14 +104,25 @@ pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
 
 /// The first trouble of a mesh in the order in which a person would mend it.
 pub(crate) fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result<(), InputError> {
-    let Inspection { edges, pinched, bodies } = inspection;
+    let Inspection {
+        edges,
+        pinched,
+        bodies,
+    } = inspection;
     let at = |spots: &Spots| (spots.count, spots.first);
     // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
     if !edges.is_closed() && 100 * n_collapsed > n_faces {
-        return Err(InputError::Collapsed { count: n_collapsed, n_faces: n_faces + n_collapsed });
+        return Err(InputError::Collapsed {
+            count: n_collapsed,
+            n_faces: n_faces + n_collapsed,
+        });
     }
     if let (count @ 1.., at) = at(&edges.shared) {
-        return Err(InputError::Shared { count, at, n_copies: edges.n_copies });
+        return Err(InputError::Shared {
+            count,
+            at,
+            n_copies: edges.n_copies,
+        });
     }
     if let (count @ 1.., at) = at(&edges.turned) {
         return Err(InputError::Turned { count, at });
@@ -114,7 +131,11 @@ pub(crate) fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize
         if count > n_faces {
             return Err(InputError::Loose { count, n_faces, at });
         }
-        return Err(InputError::Open { count, n_holes: edges.n_holes, at });
+        return Err(InputError::Open {
+            count,
+            n_holes: edges.n_holes,
+            at,
+        });
     }
     if bodies.len() > 1 {
         return Err(InputError::Bodies(bodies.clone()));
@@ -133,7 +154,11 @@ pub(crate) fn check_points(mesh: &TriMesh) -> Result<(), InputError> {
     let n_points = mesh.points.len();
     for (face, triangle) in mesh.triangles.iter().enumerate() {
         if let Some(&vertex) = triangle.iter().find(|&&v| v as usize >= n_points) {
-            return Err(InputError::NotSolid(NotSolid::MissingPoint { face, vertex, n_points }));
+            return Err(InputError::NotSolid(NotSolid::MissingPoint {
+                face,
+                vertex,
+                n_points,
+            }));
         }
     }
     let count = |is_bad: fn(Vec3) -> bool| {
@@ -168,7 +193,9 @@ pub fn inspect(mesh: &TriMesh) -> Inspection {
 fn connected_faces(mesh: &TriMesh, sides: &[Side]) -> Groups {
     let mut faces = Groups::of(mesh.triangles.len());
     for edge in sides.chunk_by(Side::same_edge) {
-        edge[1..].iter().for_each(|side| faces.unite(edge[0].face(), side.face()));
+        edge[1..]
+            .iter()
+            .for_each(|side| faces.unite(edge[0].face(), side.face()));
     }
     faces
 }
@@ -191,7 +218,8 @@ pub(crate) fn fans(mesh: &TriMesh) -> Groups {
     connected_corners(mesh, &sides(mesh))
 }
 
-/// For each triangle the connected part it belongs to, and their number; parts are numbered by their first triangle.
+/// For each triangle the connected part it belongs to, and their number; parts are numbered by their first
+/// triangle.
 pub(crate) fn components(mesh: &TriMesh) -> (Vec<u32>, usize) {
     let mut faces = connected_faces(mesh, &sides(mesh));
     let mut number = vec![None; mesh.triangles.len()];
@@ -230,7 +258,12 @@ pub(crate) fn open_edges(mesh: &TriMesh) -> Vec<OpenEdge> {
         .map(|edge| {
             let (face, side) = (edge[0].face(), (edge[0].corner % 3) as u8);
             let triangle = mesh.triangles[face as usize];
-            OpenEdge { from: triangle[side as usize], to: triangle[(side as usize + 1) % 3], face, side }
+            OpenEdge {
+                from: triangle[side as usize],
+                to: triangle[(side as usize + 1) % 3],
+                face,
+                side,
+            }
         })
         .collect()
 }
@@ -256,7 +289,11 @@ impl Side {
     /// Which of the two corners of this side is at point `end`.
     fn corner_at(&self, mesh: &TriMesh, end: u32) -> u32 {
         let (face, k) = (self.corner / 3, self.corner % 3);
-        if mesh.triangles[face as usize][k as usize] == end { self.corner } else { 3 * face + (k + 1) % 3 }
+        if mesh.triangles[face as usize][k as usize] == end {
+            self.corner
+        } else {
+            3 * face + (k + 1) % 3
+        }
     }
 
     pub(crate) fn runs_up(&self, mesh: &TriMesh) -> bool {
@@ -279,20 +316,29 @@ pub(crate) fn sides(mesh: &TriMesh) -> Vec<Side> {
             })
         })
     };
-    // Sides of the same lower point are put next to each other by counting; the few of a point are sorted then, which
-    // is several times faster than sorting all.
+    // Sides of the same lower point are put next to each other by counting; the few of a point are sorted
+    // then, which is several times faster than sorting all.
     let mut begin = vec![0_u32; mesh.points.len() + 1];
     all().for_each(|side| begin[side.low as usize + 1] += 1);
     for point in 0..mesh.points.len() {
         begin[point + 1] += begin[point];
     }
     let mut next = begin.clone();
-    let mut sides = vec![Side { low: 0, high: 0, corner: 0 }; 3 * mesh.triangles.len()];
+    let mut sides = vec![
+        Side {
+            low: 0,
+            high: 0,
+            corner: 0
+        };
+        3 * mesh.triangles.len()
+    ];
     for side in all() {
         sides[next[side.low as usize] as usize] = side;
         next[side.low as usize] += 1;
     }
-    begin.windows(2).for_each(|range| sides[range[0] as usize..range[1] as usize].sort_unstable());
+    begin
+        .windows(2)
+        .for_each(|range| sides[range[0] as usize..range[1] as usize].sort_unstable());
     sides
 }
 
@@ -348,7 +394,11 @@ fn pinched(mesh: &TriMesh, corners: &mut Groups) -> Spots {
         is_pinched[point as usize] |= *fan_of[point as usize].get_or_insert(fan) != fan;
     }
     let mut spots = Spots::default();
-    mesh.points.iter().zip(is_pinched).filter(|(_, pinched)| *pinched).for_each(|(p, _)| spots.add(*p));
+    mesh.points
+        .iter()
+        .zip(is_pinched)
+        .filter(|(_, pinched)| *pinched)
+        .for_each(|(p, _)| spots.add(*p));
     spots
 }
 
@@ -364,7 +414,11 @@ fn bodies(mesh: &TriMesh, faces: &mut Groups) -> Vec<Body> {
         let corners = mesh.corners(face);
         if body_of[root] == NEW {
             body_of[root] = bodies.len() as u32;
-            bodies.push(Body { n_faces: 0, bounds: Aabb::EMPTY, signed_volume: 0.0 });
+            bodies.push(Body {
+                n_faces: 0,
+                bounds: Aabb::EMPTY,
+                signed_volume: 0.0,
+            });
             origins.push(corners[0]);
         }
         let body = &mut bodies[body_of[root] as usize];

@@ -3,9 +3,24 @@ use crate::samples::{both, flipped, unwelded};
 
 /// A cube of edge `size` with its least corner at `at`, outwards.
 fn cube(at: Vec3, size: f64) -> TriMesh {
-    let points = (0..8).map(|i| at + size * Vec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64)).collect();
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    TriMesh { points, triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
+    let points = (0..8)
+        .map(|i| at + size * Vec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64))
+        .collect();
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    TriMesh {
+        points,
+        triangles: quads
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
+    }
 }
 
 fn error(mesh: &TriMesh) -> InputError {
@@ -30,14 +45,26 @@ fn touching_along_an_edge_is_sound_as_indexed_and_broken_as_a_soup() {
     assert_eq!(crate::weld::close(&mesh).mesh, mesh);
     assert!(matches!(error(&mesh), InputError::Bodies(bodies) if bodies.len() == 2));
     let at = Vec3::new(1.0, 1.0, 0.5);
-    assert_eq!(error(&unwelded(&mesh)), InputError::Shared { count: 1, at, n_copies: 0 });
+    assert_eq!(
+        error(&unwelded(&mesh)),
+        InputError::Shared {
+            count: 1,
+            at,
+            n_copies: 0
+        }
+    );
 }
 
 #[test]
 fn bodies_are_counted_and_cavities_named() {
     let cavity = both(cube(Vec3::ZERO, 4.0), flipped(cube(Vec3::ONE, 1.0)));
-    let InputError::Bodies(bodies) = error(&cavity) else { panic!("two surfaces") };
-    assert_eq!(bodies.iter().map(|b| b.signed_volume).collect::<Vec<_>>(), [64.0, -1.0]);
+    let InputError::Bodies(bodies) = error(&cavity) else {
+        panic!("two surfaces")
+    };
+    assert_eq!(
+        bodies.iter().map(|b| b.signed_volume).collect::<Vec<_>>(),
+        [64.0, -1.0]
+    );
     let message = error(&cavity).to_string();
     assert_eq!(
         message,
@@ -53,8 +80,21 @@ fn a_hole_is_counted_with_its_edges() {
     mesh.triangles.truncate(10);
     mesh.triangles.remove(0);
     let message = error(&mesh).to_string();
-    assert!(matches!(error(&mesh), InputError::Open { count: 7, n_holes: 1, .. }), "{message}");
-    assert!(message.starts_with("the surface is not closed: 1 hole (7 open edges), first near ("), "{message}");
+    assert!(
+        matches!(
+            error(&mesh),
+            InputError::Open {
+                count: 7,
+                n_holes: 1,
+                ..
+            }
+        ),
+        "{message}"
+    );
+    assert!(
+        message.starts_with("the surface is not closed: 1 hole (7 open edges), first near ("),
+        "{message}"
+    );
 }
 
 #[test]
@@ -64,7 +104,14 @@ fn turned_doubled_and_inverted_triangles_are_told_apart() {
     assert!(matches!(error(&turned), InputError::Turned { count: 3, .. }));
     let mut doubled = cube(Vec3::ZERO, 1.0);
     doubled.triangles.push(doubled.triangles[5]);
-    assert!(matches!(error(&doubled), InputError::Shared { count: 3, n_copies: 1, .. }));
+    assert!(matches!(
+        error(&doubled),
+        InputError::Shared {
+            count: 3,
+            n_copies: 1,
+            ..
+        }
+    ));
     assert_eq!(error(&flipped(cube(Vec3::ZERO, 1.0))), InputError::InsideOut);
     assert_eq!(error(&TriMesh::default()), InputError::Empty);
 }
@@ -72,41 +119,85 @@ fn turned_doubled_and_inverted_triangles_are_told_apart() {
 #[test]
 fn a_triangle_with_two_sides_is_flat() {
     let points = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
-    assert_eq!(error(&TriMesh { points, triangles: vec![[0, 1, 2], [0, 2, 1]] }), InputError::Flat);
+    assert_eq!(
+        error(&TriMesh {
+            points,
+            triangles: vec![[0, 1, 2], [0, 2, 1]]
+        }),
+        InputError::Flat
+    );
 }
 
 #[test]
 fn a_pinched_point_is_found() {
-    // A torus of 3 × 3 quads that narrows to one point: all points of one meridian become one, then the two fans of the
-    // horn meet there.
+    // A torus of 3 × 3 quads that narrows to one point: all points of one meridian become one, then the two
+    // fans of the horn meet there.
     let (n, m) = (4_u32, 3_u32);
     let turn = |i: u32, n: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
     let mut points = vec![Vec3::new(3.0, 0.0, 0.0)];
     for i in 1..n {
         for j in 0..m {
             let r = 3.0 + turn(j, m).cos();
-            points.push(Vec3::new(r * turn(i, n).cos(), r * turn(i, n).sin(), turn(j, m).sin()));
+            points.push(Vec3::new(
+                r * turn(i, n).cos(),
+                r * turn(i, n).sin(),
+                turn(j, m).sin(),
+            ));
         }
     }
-    let at = |i: u32, j: u32| if i.is_multiple_of(n) { 0 } else { 1 + (i % n - 1) * m + j % m };
+    let at = |i: u32, j: u32| {
+        if i.is_multiple_of(n) {
+            0
+        } else {
+            1 + (i % n - 1) * m + j % m
+        }
+    };
     let quads = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
     let triangles = quads
-        .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]])
+        .flat_map(|(i, j)| {
+            [
+                [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+            ]
+        })
         .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
         .collect();
     let mesh = TriMesh { points, triangles };
-    assert_eq!(error(&mesh), InputError::Pinched { count: 1, at: mesh.points[0] });
+    assert_eq!(
+        error(&mesh),
+        InputError::Pinched {
+            count: 1,
+            at: mesh.points[0]
+        }
+    );
 }
 
 #[test]
 fn loose_and_rounded_meshes_get_their_own_words() {
     let mut cracked = unwelded(&cube(Vec3::ZERO, 1.0));
-    cracked.points.iter_mut().enumerate().for_each(|(i, p)| p.x += 1e-5 * i as f64);
-    assert!(matches!(error(&cracked), InputError::Loose { count: 36, n_faces: 12, .. }));
+    cracked
+        .points
+        .iter_mut()
+        .enumerate()
+        .for_each(|(i, p)| p.x += 1e-5 * i as f64);
+    assert!(matches!(
+        error(&cracked),
+        InputError::Loose {
+            count: 36,
+            n_faces: 12,
+            ..
+        }
+    ));
     let mut rounded = both(cube(Vec3::ZERO, 1.0), cube(Vec3::ONE, 3.0));
     rounded.points[0] = rounded.points[1];
     rounded.triangles.pop();
-    assert_eq!(error(&rounded), InputError::Collapsed { count: 2, n_faces: 23 });
+    assert_eq!(
+        error(&rounded),
+        InputError::Collapsed {
+            count: 2,
+            n_faces: 23
+        }
+    );
 }
 
 #[test]
@@ -118,5 +209,12 @@ fn wrong_numbers_are_refused() {
     assert_eq!(error(&mesh), InputError::TooFar { vertex: 3, count: 1 });
     let mut mesh = cube(Vec3::ZERO, 1.0);
     mesh.triangles[1][2] = 8;
-    assert!(matches!(error(&mesh), InputError::NotSolid(NotSolid::MissingPoint { face: 1, vertex: 8, n_points: 8 })));
+    assert!(matches!(
+        error(&mesh),
+        InputError::NotSolid(NotSolid::MissingPoint {
+            face: 1,
+            vertex: 8,
+            n_points: 8
+        })
+    ));
 }

@@ -44,22 +44,33 @@ struct Track {
 
 impl Track {
     fn part(self, from: f64, to: f64) -> Self {
-        let at =
-            |u: f64| (self.ends[0].lerp(self.ends[1], u), self.travels[0] + u * (self.travels[1] - self.travels[0]));
+        let at = |u: f64| {
+            (
+                self.ends[0].lerp(self.ends[1], u),
+                self.travels[0] + u * (self.travels[1] - self.travels[0]),
+            )
+        };
         let (p, q) = (at(from), at(to));
-        Self { ends: [p.0, q.0], travels: [p.1, q.1] }
+        Self {
+            ends: [p.0, q.0],
+            travels: [p.1, q.1],
+        }
     }
 }
 
 impl Passage<'_> {
-    /// Deepens `best` by what corners of the moving surface reach at any travel, and points of its edges at the first one.
+    /// Deepens `best` by what corners of the moving surface reach at any travel, and points of its edges at
+    /// the first one.
     ///
-    /// `crossings` are the pairs (moving, fixed) of triangles that touch at any travel, sorted; `near` are the moving
-    /// triangles that may be inside.
+    /// `crossings` are the pairs (moving, fixed) of triangles that touch at any travel, sorted; `near` are
+    /// the moving triangles that may be inside.
     pub fn deepen(&self, near: &[u32], crossings: &[(u32, u32)], best: &mut Deepest) {
         let mut tracks: Vec<(Pair, Track, &[Pair])> = Vec::new();
         for of_face in crossings.chunk_by(|x, y| x.0 == y.0) {
-            tracks.extend(self.tracks(of_face[0].0).map(|(name, track)| (name, track, of_face)));
+            tracks.extend(
+                self.tracks(of_face[0].0)
+                    .map(|(name, track)| (name, track, of_face)),
+            );
         }
         for face in self.swallowed(near, crossings) {
             tracks.extend(self.tracks(face).map(|(name, track)| (name, track, &[][..])));
@@ -74,16 +85,31 @@ impl Passage<'_> {
         }
     }
 
-    /// Paths of the three corners, named by the corner twice, and the edges at the first travel, named by their ends.
+    /// Paths of the three corners, named by the corner twice, and the edges at the first travel, named by
+    /// their ends.
     fn tracks(&self, face: u32) -> impl Iterator<Item = ((u32, u32), Track)> {
         let mesh = self.moving.solid.mesh();
         let t = mesh.triangles[face as usize];
         let [from, far] = self.travels;
         let at = move |v: u32, travel: f64| mesh.points[v as usize] + travel * self.along;
-        let paths = t.map(|v| ((v, v), Track { ends: [at(v, from), at(v, far)], travels: [from, far] }));
+        let paths = t.map(|v| {
+            (
+                (v, v),
+                Track {
+                    ends: [at(v, from), at(v, far)],
+                    travels: [from, far],
+                },
+            )
+        });
         let sides = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(v, w)| {
             let (v, w) = (v.min(w), v.max(w));
-            ((v, w), Track { ends: [at(v, from), at(w, from)], travels: [from; 2] })
+            (
+                (v, w),
+                Track {
+                    ends: [at(v, from), at(w, from)],
+                    travels: [from; 2],
+                },
+            )
         });
         paths.into_iter().filter(move |_| far > from).chain(sides)
     }
@@ -111,23 +137,34 @@ impl Passage<'_> {
             is_same
         });
         let ends = [(0.0, true, true), (1.0, true, true)];
-        let all: Vec<_> = ends[..1].iter().chain(&passed).chain(&ends[1..]).copied().collect();
+        let all: Vec<_> = ends[..1]
+            .iter()
+            .chain(&passed)
+            .chain(&ends[1..])
+            .copied()
+            .collect();
         // Beyond a place where the track only leaves, and before one where it only enters, it is outside.
-        let may_be_inside = |w: &&[(f64, bool, bool)]| w[0].1 && w[1].2 && (w[1].0 - w[0].0) * length_mm > TOUCH_MM;
-        all.windows(2).filter(may_be_inside).map(|w| track.part(w[0].0, w[1].0)).collect()
+        let may_be_inside =
+            |w: &&[(f64, bool, bool)]| w[0].1 && w[1].2 && (w[1].0 - w[0].0) * length_mm > TOUCH_MM;
+        all.windows(2)
+            .filter(may_be_inside)
+            .map(|w| track.part(w[0].0, w[1].0))
+            .collect()
     }
 
     /// Deepens `best` by the deepest point of `track`.
     ///
-    /// Branch and bound: no point is deeper than its distance to any one triangle, and that is a convex function, so it is
-    /// greatest at an end.
+    /// Branch and bound: no point is deeper than its distance to any one triangle, and that is a convex
+    /// function, so it is greatest at an end.
     fn dive(&self, track: Track, best: &mut Deepest) {
         let mesh = self.fixed.solid.mesh();
         let mut todo = vec![track];
         while let Some(track) = todo.pop() {
             let [p, q] = track.ends;
             let half_mm = 0.5 * p.distance(q);
-            let Some((depth_mm, face)) = self.probe(track.part(0.5, 0.5), best) else { continue };
+            let Some((depth_mm, face)) = self.probe(track.part(0.5, 0.5), best) else {
+                continue;
+            };
             let triangle = mesh.corners(face as usize);
             let [to_p, to_q] = [p, q].map(|x| nearest_on(triangle, x).distance(x));
             let bound_mm = to_p.max(to_q).min(depth_mm + half_mm);
@@ -145,8 +182,8 @@ impl Passage<'_> {
 
     /// Depth of a single point, negative outside, and the nearest triangle. Deepens `best`.
     ///
-    /// Sheets that lie within rounding of each other may cross, and then the normals there tell the wrong side. So what would
-    /// deepen `best`, which happens rarely, is asked of the whole surface.
+    /// Sheets that lie within rounding of each other may cross, and then the normals there tell the wrong
+    /// side. So what would deepen `best`, which happens rarely, is asked of the whole surface.
     fn probe(&self, point: Track, best: &mut Deepest) -> Option<(f64, u32)> {
         let x = point.ends[0];
         let near = self.fixed.distance.at(x, f64::INFINITY)?;
@@ -156,12 +193,17 @@ impl Passage<'_> {
         if near.signed_mm > TOUCH_MM && winding_number(self.fixed.solid.mesh(), x) < 0.5 {
             return Some((-near.signed_mm, near.face));
         }
-        *best = Deepest { depth_mm: near.signed_mm, travel_mm: point.travels[0], point: x, surface: near.point };
+        *best = Deepest {
+            depth_mm: near.signed_mm,
+            travel_mm: point.travels[0],
+            point: x,
+            surface: near.point,
+        };
         Some((near.signed_mm, near.face))
     }
 
-    /// Those triangles of `near` that are inside at every travel. Triangles that cross nothing and share points are all on
-    /// one side, so one point tells it of all.
+    /// Those triangles of `near` that are inside at every travel. Triangles that cross nothing and share
+    /// points are all on one side, so one point tells it of all.
     fn swallowed(&self, near: &[u32], crossings: &[(u32, u32)]) -> Vec<u32> {
         let mesh = self.moving.solid.mesh();
         let is_free = |f: &u32| crossings.binary_search_by_key(f, |c| c.0).is_err();
@@ -177,10 +219,17 @@ impl Passage<'_> {
         let mut answer = |v: u32| {
             *is_inside[v as usize].get_or_insert_with(|| {
                 let x = mesh.points[v as usize] + self.travels[0] * self.along;
-                bounds.contains(x) && self.fixed.distance.at(x, f64::INFINITY).is_some_and(|d| d.signed_mm > 0.0)
+                bounds.contains(x)
+                    && self
+                        .fixed
+                        .distance
+                        .at(x, f64::INFINITY)
+                        .is_some_and(|d| d.signed_mm > 0.0)
             })
         };
-        free.into_iter().filter(|&f| answer(led_by(&mut leader, mesh.triangles[f as usize][0]))).collect()
+        free.into_iter()
+            .filter(|&f| answer(led_by(&mut leader, mesh.triangles[f as usize][0])))
+            .collect()
     }
 }
 
@@ -193,7 +242,8 @@ fn led_by(leader: &mut [u32], mut v: u32) -> u32 {
     v
 }
 
-/// How often a closed surface winds around `q`: 1 inside, 0 outside. [Jacobson2013, eq. 5], after [VanOosterom1983].
+/// How often a closed surface winds around `q`: 1 inside, 0 outside. [Jacobson2013, eq. 5], after
+/// [VanOosterom1983].
 fn winding_number(mesh: &TriMesh, q: Vec3) -> f64 {
     let half_angles = (0..mesh.triangles.len()).map(|f| {
         let [a, b, c] = mesh.corners(f).map(|p| p - q);
@@ -211,43 +261,95 @@ mod tests {
 
     #[test]
     fn a_surface_winds_once_around_what_is_inside() {
-        let cube = Volume::cuboid(Aabb { min: Vec3::ZERO, max: Vec3::ONE }).to_mesh();
+        let cube = Volume::cuboid(Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::ONE,
+        })
+        .to_mesh();
         assert!((winding_number(&cube, Vec3::new(0.1, 0.7, 0.9)) - 1.0).abs() < 1e-12);
         assert!(winding_number(&cube, Vec3::new(1.1, 0.7, 0.9)).abs() < 1e-12);
     }
 
     #[test]
     fn a_flap_turned_inside_out_does_not_make_the_outside_deep() {
-        // The flap over the cube is as thin as rounding; what is above and below it is outside, whatever its normals say.
-        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        // The flap over the cube is as thin as rounding; what is above and below it is outside, whatever its
+        // normals say.
+        let cuboid = |min: [f64; 3], max: [f64; 3]| {
+            Volume::cuboid(Aabb {
+                min: min.into(),
+                max: max.into(),
+            })
+        };
         let mut mesh = cuboid([0.0; 3], [4.0; 3]).to_mesh();
         let flap = cuboid([1.0, 1.0, 4.5], [3.0, 3.0, 4.5 + 1e-7]).to_mesh();
         let first = mesh.points.len() as u32;
         mesh.points.extend(&flap.points);
-        mesh.triangles.extend(flap.triangles.iter().map(|t| [t[0] + first, t[2] + first, t[1] + first]));
+        mesh.triangles.extend(
+            flap.triangles
+                .iter()
+                .map(|t| [t[0] + first, t[2] + first, t[1] + first]),
+        );
         let fixed = Shape::new(&Solid::new(mesh).unwrap());
         let above = Vec3::new(2.0, 2.1, 4.9);
-        assert!(fixed.distance.at(above, 1.0).unwrap().signed_mm > 0.3, "normals alone are wrong here");
-        let passage = Passage { moving: &fixed, fixed: &fixed, along: Vec3::X, travels: [0.0, 1.0] };
+        assert!(
+            fixed.distance.at(above, 1.0).unwrap().signed_mm > 0.3,
+            "normals alone are wrong here"
+        );
+        let passage = Passage {
+            moving: &fixed,
+            fixed: &fixed,
+            along: Vec3::X,
+            travels: [0.0, 1.0],
+        };
         let mut best = Deepest::default();
-        passage.dive(Track { ends: [above - 0.7 * Vec3::Z, above], travels: [0.0; 2] }, &mut best);
+        passage.dive(
+            Track {
+                ends: [above - 0.7 * Vec3::Z, above],
+                travels: [0.0; 2],
+            },
+            &mut best,
+        );
         assert!(best.depth_mm < 1e-6, "{best:?}");
     }
 
     #[test]
     fn depth_along_a_track_is_that_of_dense_samples() {
         // An L: the deepest point of the diagonal is neither an end nor a middle.
-        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
+        let cuboid = |min: [f64; 3], max: [f64; 3]| {
+            Volume::cuboid(Aabb {
+                min: min.into(),
+                max: max.into(),
+            })
+        };
         let solid = cuboid([0.0; 3], [6.0, 2.0, 3.0]).union(&cuboid([0.0; 3], [2.0, 5.0, 3.0]));
         let fixed = Shape::new(&Solid::new(solid.to_mesh()).unwrap());
-        let passage = Passage { moving: &fixed, fixed: &fixed, along: Vec3::X, travels: [0.0, 1.0] };
+        let passage = Passage {
+            moving: &fixed,
+            fixed: &fixed,
+            along: Vec3::X,
+            travels: [0.0, 1.0],
+        };
         let ends = [Vec3::new(0.2, -1.0, 1.7), Vec3::new(1.9, 4.9, 0.8)];
-        let track = Track { ends, travels: [3.0, 4.0] };
+        let track = Track {
+            ends,
+            travels: [3.0, 4.0],
+        };
         let mut best = Deepest::default();
         passage.dive(track, &mut best);
-        let depth = |u: f64| fixed.distance.at(ends[0].lerp(ends[1], u), f64::INFINITY).unwrap().signed_mm;
-        let sampled = (0..=20_000).map(|i| depth(f64::from(i) / 20_000.0)).fold(0.0, f64::max);
-        assert!(best.depth_mm <= sampled + 4e-4 && sampled <= best.depth_mm + DEPTH_TOLERANCE_MM, "{best:?} {sampled}");
+        let depth = |u: f64| {
+            fixed
+                .distance
+                .at(ends[0].lerp(ends[1], u), f64::INFINITY)
+                .unwrap()
+                .signed_mm
+        };
+        let sampled = (0..=20_000)
+            .map(|i| depth(f64::from(i) / 20_000.0))
+            .fold(0.0, f64::max);
+        assert!(
+            best.depth_mm <= sampled + 4e-4 && sampled <= best.depth_mm + DEPTH_TOLERANCE_MM,
+            "{best:?} {sampled}"
+        );
         assert!((best.point - ends[0].lerp(ends[1], best.travel_mm - 3.0)).length() < 1e-12);
         assert!((best.surface.distance(best.point) - best.depth_mm).abs() < 1e-12);
     }

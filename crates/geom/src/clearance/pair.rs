@@ -17,28 +17,50 @@ pub(super) struct Approach {
 }
 
 impl Approach {
-    const NONE: Self = Self { distance_sq: f64::INFINITY, travel_mm: 0.0, on_a: Vec3::ZERO, on_b: Vec3::ZERO };
+    const NONE: Self = Self {
+        distance_sq: f64::INFINITY,
+        travel_mm: 0.0,
+        on_a: Vec3::ZERO,
+        on_b: Vec3::ZERO,
+    };
 
     fn between(on_a: Vec3, on_b: Vec3) -> Self {
-        Self { distance_sq: on_a.distance_squared(on_b), travel_mm: 0.0, on_a, on_b }
+        Self {
+            distance_sq: on_a.distance_squared(on_b),
+            travel_mm: 0.0,
+            on_a,
+            on_b,
+        }
     }
 
     fn nearer(self, other: Self) -> Self {
-        if other.distance_sq < self.distance_sq { other } else { self }
+        if other.distance_sq < self.distance_sq {
+            other
+        } else {
+            self
+        }
     }
 }
 
 /// Least distance of `a + t·z` to `b` over `t` in `[from, far]`, where it is at most `√limit_sq`.
 ///
-/// The distance is a convex function of `t`, and nowhere less than that of the two shadows along z. So any `t` at which the
-/// shadows' distance is attained is a least one; where it lies outside the travels, the nearer end of them is.
+/// The distance is a convex function of `t`, and nowhere less than that of the two shadows along z. So any
+/// `t` at which the shadows' distance is attained is a least one; where it lies outside the travels, the
+/// nearer end of them is.
 pub(super) fn swept(a: [Vec3; 3], b: [Vec3; 3], [from, far]: [f64; 2], limit_sq: f64) -> Option<Approach> {
-    let free = if from == far { None } else { Some(between_shadows(a, b)) };
+    let free = if from == far {
+        None
+    } else {
+        Some(between_shadows(a, b))
+    };
     let free_mm = free.map_or(from, |f| f.on_b.z - f.on_a.z);
     let travel_mm = free_mm.max(from).min(far);
     let best = match free {
         Some(free) if free.distance_sq > limit_sq => return None,
-        Some(free) if travel_mm == free_mm => Approach { on_a: free.on_a.with_z(free.on_b.z), ..free },
+        Some(free) if travel_mm == free_mm => Approach {
+            on_a: free.on_a.with_z(free.on_b.z),
+            ..free
+        },
         _ => at_rest(a.map(|p| p + travel_mm * Vec3::Z), b, limit_sq)?,
     };
     (best.distance_sq <= limit_sq).then_some(Approach { travel_mm, ..best })
@@ -47,7 +69,12 @@ pub(super) fn swept(a: [Vec3; 3], b: [Vec3; 3], [from, far]: [f64; 2], limit_sq:
 /// Least distance of the shadows along z, and one pair of points that has it.
 fn between_shadows(a: [Vec3; 3], b: [Vec3; 3]) -> Approach {
     let flat = |p: Vec3| p.with_z(0.0);
-    let touch = |on_a: Vec3, on_b: Vec3| Approach { distance_sq: 0.0, travel_mm: 0.0, on_a, on_b };
+    let touch = |on_a: Vec3, on_b: Vec3| Approach {
+        distance_sq: 0.0,
+        travel_mm: 0.0,
+        on_a,
+        on_b,
+    };
     for p in a {
         if let Some(z) = height_over(b, p) {
             return touch(p, p.with_z(z));
@@ -67,12 +94,18 @@ fn between_shadows(a: [Vec3; 3], b: [Vec3; 3]) -> Approach {
             for x in [p, q] {
                 let on_b = r.lerp(s, nearest_parameter(flat(r), flat(s), flat(x)));
                 let distance_sq = flat(x).distance_squared(flat(on_b));
-                best = best.nearer(Approach { distance_sq, ..Approach::between(x, on_b) });
+                best = best.nearer(Approach {
+                    distance_sq,
+                    ..Approach::between(x, on_b)
+                });
             }
             for y in [r, s] {
                 let on_a = p.lerp(q, nearest_parameter(flat(p), flat(q), flat(y)));
                 let distance_sq = flat(y).distance_squared(flat(on_a));
-                best = best.nearer(Approach { distance_sq, ..Approach::between(on_a, y) });
+                best = best.nearer(Approach {
+                    distance_sq,
+                    ..Approach::between(on_a, y)
+                });
             }
         }
     }
@@ -111,17 +144,23 @@ pub(super) fn at_rest(a: [Vec3; 3], b: [Vec3; 3], limit_sq: f64) -> Option<Appro
 
 /// The point of a triangle nearest to `q`; of its edges where it has no area.
 pub(super) fn nearest_on(t: [Vec3; 3], q: Vec3) -> Vec3 {
-    let longest_sq = edges(t).iter().map(|(p, q)| p.distance_squared(*q)).fold(0.0, f64::max);
+    let longest_sq = edges(t)
+        .iter()
+        .map(|(p, q)| p.distance_squared(*q))
+        .fold(0.0, f64::max);
     let doubled_area_sq = (t[1] - t[0]).cross(t[2] - t[0]).length_squared();
     if doubled_area_sq > FLAT * longest_sq * longest_sq {
         return nearest_on_triangle(t, q).0;
     }
     let on_edges = edges(t).map(|(a, b)| a.lerp(b, nearest_parameter(a, b, q)));
-    on_edges.into_iter().min_by(|x, y| x.distance_squared(q).total_cmp(&y.distance_squared(q))).unwrap_or(t[0])
+    on_edges
+        .into_iter()
+        .min_by(|x, y| x.distance_squared(q).total_cmp(&y.distance_squared(q)))
+        .unwrap_or(t[0])
 }
 
-/// Where the segment `pq` passes through triangle `t`: `u` in [0, 1] along it. A hair beyond the triangle's edges counts, so
-/// that no segment slips between two triangles; what lies in the triangle's plane does not.
+/// Where the segment `pq` passes through triangle `t`: `u` in [0, 1] along it. A hair beyond the triangle's
+/// edges counts, so that no segment slips between two triangles; what lies in the triangle's plane does not.
 pub(super) fn pierced_at(p: Vec3, q: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
     let n = (b - a).cross(c - a);
     let (above_p, above_q) = (n.dot(p - a), n.dot(q - a));
@@ -131,7 +170,9 @@ pub(super) fn pierced_at(p: Vec3, q: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> 
     let u = above_p / (above_p - above_q);
     let x = p.lerp(q, u);
     let least = -EDGE_SLACK * n.length_squared();
-    let is_within = [(a, b), (b, c), (c, a)].into_iter().all(|(r, s)| (s - r).cross(x - r).dot(n) >= least);
+    let is_within = [(a, b), (b, c), (c, a)]
+        .into_iter()
+        .all(|(r, s)| (s - r).cross(x - r).dot(n) >= least);
     (is_within && n != Vec3::ZERO).then_some(u)
 }
 
@@ -152,30 +193,47 @@ pub(super) fn swept_box(t: [Vec3; 3], [from, far]: [f64; 2]) -> Aabb {
 
 /// A box moved along z by all travels.
 pub(super) fn raised(b: Aabb, [from, far]: [f64; 2]) -> Aabb {
-    Aabb { min: b.min + from * Vec3::Z, max: b.max + far * Vec3::Z }
+    Aabb {
+        min: b.min + from * Vec3::Z,
+        max: b.max + far * Vec3::Z,
+    }
 }
 
 /// Squared distance of two boxes, mm².
 pub(super) fn box_distance_sq(a: Aabb, b: Aabb) -> f64 {
-    (b.min - a.max).max(a.min - b.max).max(Vec3::ZERO).length_squared()
+    (b.min - a.max)
+        .max(a.min - b.max)
+        .max(Vec3::ZERO)
+        .length_squared()
 }
 
 /// Squared distance of `a` to the plane of `b`: 0 where it crosses the plane or `b` has none.
 fn plane_gap_sq(a: [Vec3; 3], b: [Vec3; 3]) -> f64 {
     let n = (b[1] - b[0]).cross(b[2] - b[0]);
     let above = a.map(|p| n.dot(p - b[0]));
-    let (low, high) = (above[0].min(above[1]).min(above[2]), above[0].max(above[1]).max(above[2]));
+    let (low, high) = (
+        above[0].min(above[1]).min(above[2]),
+        above[0].max(above[1]).max(above[2]),
+    );
     let least = low.max(-high);
-    if least > 0.0 { least * least / n.length_squared() } else { 0.0 }
+    if least > 0.0 {
+        least * least / n.length_squared()
+    } else {
+        0.0
+    }
 }
 
-/// Height at which the vertical line through `p` meets triangle `t`; `None` beside it and for upright triangles.
+/// Height at which the vertical line through `p` meets triangle `t`; `None` beside it and for upright
+/// triangles.
 fn height_over([a, b, c]: [Vec3; 3], p: Vec3) -> Option<f64> {
     let cross = |u: Vec3, v: Vec3| u.x * v.y - u.y * v.x;
     let (wa, wb, wc) = (cross(b - p, c - p), cross(c - p, a - p), cross(a - p, b - p));
     let doubled_area = wa + wb + wc;
     let is_over = (wa >= 0.0 && wb >= 0.0 && wc >= 0.0) || (wa <= 0.0 && wb <= 0.0 && wc <= 0.0);
-    let longest_sq = edges([a, b, c]).iter().map(|(p, q)| (*p - *q).truncate().length_squared()).fold(0.0, f64::max);
+    let longest_sq = edges([a, b, c])
+        .iter()
+        .map(|(p, q)| (*p - *q).truncate().length_squared())
+        .fold(0.0, f64::max);
     (is_over && doubled_area * doubled_area > FLAT * longest_sq * longest_sq)
         .then(|| (wa * a.z + wb * b.z + wc * c.z) / doubled_area)
 }
@@ -185,16 +243,22 @@ fn flat_crossing(p: Vec3, q: Vec3, r: Vec3, s: Vec3) -> Option<(f64, f64)> {
     let cross = |u: Vec3, v: Vec3| u.x * v.y - u.y * v.x;
     let (p_side, q_side) = (cross(s - r, p - r), cross(s - r, q - r));
     let (r_side, s_side) = (cross(q - p, r - p), cross(q - p, s - p));
-    (p_side * q_side < 0.0 && r_side * s_side < 0.0).then(|| (p_side / (p_side - q_side), r_side / (r_side - s_side)))
+    (p_side * q_side < 0.0 && r_side * s_side < 0.0)
+        .then(|| (p_side / (p_side - q_side), r_side / (r_side - s_side)))
 }
 
 /// Parameter in [0, 1] of the point of `ab` nearest to `q`; 0 where the ends are one.
 fn nearest_parameter(a: Vec3, b: Vec3, q: Vec3) -> f64 {
     let (along, length_sq) = ((b - a).dot(q - a), (b - a).length_squared());
-    if length_sq > 0.0 { (along / length_sq).clamp(0.0, 1.0) } else { 0.0 }
+    if length_sq > 0.0 {
+        (along / length_sq).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
 }
 
-/// The nearest points of two segments where both lie between the ends; other cases are a corner's. [Ericson2005, 5.1.9]
+/// The nearest points of two segments where both lie between the ends; other cases are a corner's.
+/// [Ericson2005, 5.1.9]
 fn inner_approach(p: Vec3, q: Vec3, r: Vec3, s: Vec3) -> Option<(Vec3, Vec3)> {
     let (d, e, w) = (q - p, s - r, p - r);
     let (dd, ee, de, dw, ew) = (d.dot(d), e.dot(e), d.dot(e), d.dot(w), e.dot(w));

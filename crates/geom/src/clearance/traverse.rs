@@ -3,8 +3,9 @@
 use super::pair::{box_distance_sq, raised, swept_box};
 use crate::bvh::TriangleBvh;
 
-/// Calls `near(i, j, limit_sq)` for all triangles `i` of `a` (moved along z by all `travels`) and `j` of `b`, in the trees'
-/// own order, whose boxes come within `√limit_sq`; `near` may lower the limit. Nearer boxes come first.
+/// Calls `near(i, j, limit_sq)` for all triangles `i` of `a` (moved along z by all `travels`) and `j` of `b`,
+/// in the trees' own order, whose boxes come within `√limit_sq`; `near` may lower the limit. Nearer boxes
+/// come first.
 pub(super) fn for_near_pairs(
     a: &TriangleBvh,
     b: &TriangleBvh,
@@ -12,8 +13,12 @@ pub(super) fn for_near_pairs(
     limit_sq: &mut f64,
     mut near: impl FnMut(usize, usize, &mut f64),
 ) {
-    let apart =
-        |i: u32, j: u32| box_distance_sq(raised(a.nodes[i as usize].bounds, travels), b.nodes[j as usize].bounds);
+    let apart = |i: u32, j: u32| {
+        box_distance_sq(
+            raised(a.nodes[i as usize].bounds, travels),
+            b.nodes[j as usize].bounds,
+        )
+    };
     if a.faces.is_empty() || b.faces.is_empty() {
         return;
     }

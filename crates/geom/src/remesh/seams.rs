@@ -3,8 +3,8 @@
 use super::surface::{NO_SEAM, Place, Surface, prev};
 use crate::{HalfEdge, Topology, Vec3};
 
-/// A line of the input along which the same two labels meet, from corner to corner or closed in itself. A place on it
-/// is its distance from the start along the line, mm.
+/// A line of the input along which the same two labels meet, from corner to corner or closed in itself. A
+/// place on it is its distance from the start along the line, mm.
 pub(super) struct Seam {
     /// The label on the left of someone who walks along the line, outside up: the lower of both.
     pub left: u32,
@@ -23,19 +23,31 @@ impl Seam {
     /// The point at a place; beyond the ends of an open line its end, on a closed one another turn.
     pub fn point(&self, at_mm: f64) -> Vec3 {
         let at = self.wrapped(at_mm);
-        let i = self.at_mm.partition_point(|&a| a <= at).clamp(1, self.points.len() - 1);
+        let i = self
+            .at_mm
+            .partition_point(|&a| a <= at)
+            .clamp(1, self.points.len() - 1);
         let (from, to) = (self.at_mm[i - 1], self.at_mm[i]);
-        let share = if to > from { ((at - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
+        let share = if to > from {
+            ((at - from) / (to - from)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         self.points[i - 1].lerp(self.points[i], share)
     }
 
     /// The same place in `0 .. length`, where the line is closed.
     pub fn wrapped(&self, at_mm: f64) -> f64 {
-        if self.is_closed && self.length_mm() > 0.0 { at_mm.rem_euclid(self.length_mm()) } else { at_mm }
+        if self.is_closed && self.length_mm() > 0.0 {
+            at_mm.rem_euclid(self.length_mm())
+        } else {
+            at_mm
+        }
     }
 }
 
-/// Finds the seams of `surface` and enters them there: the seam of each half-edge and the place of each point.
+/// Finds the seams of `surface` and enters them there: the seam of each half-edge and the place of each
+/// point.
 pub(super) fn find_seams(surface: &mut Surface) -> Vec<Seam> {
     let n_half_edges = surface.start.len() as HalfEdge;
     for v in 0..surface.points.len() as u32 {
@@ -51,7 +63,8 @@ pub(super) fn find_seams(surface: &mut Surface) -> Vec<Seam> {
     let mut seams = Vec::new();
     for only_from_corners in [true, false] {
         for h in 0..n_half_edges {
-            let is_start = !only_from_corners || surface.place[surface.start[h as usize] as usize] == Place::Corner;
+            let is_start =
+                !only_from_corners || surface.place[surface.start[h as usize] as usize] == Place::Corner;
             if is_start && is_forwards(surface, h) && surface.seam[h as usize] == NO_SEAM {
                 let seam = walk(surface, h, seams.len() as u32);
                 seams.push(seam);
@@ -70,7 +83,12 @@ fn walk(surface: &mut Surface, first: HalfEdge, name: u32) -> Seam {
     let begin = surface.start[first as usize];
     let left = surface.label_of(first);
     let is_closed = surface.place[begin as usize] != Place::Corner;
-    let mut seam = Seam { left, is_closed, points: vec![surface.points[begin as usize]], at_mm: vec![0.0] };
+    let mut seam = Seam {
+        left,
+        is_closed,
+        points: vec![surface.points[begin as usize]],
+        at_mm: vec![0.0],
+    };
     let mut h = first;
     loop {
         let back = surface.opposite[h as usize];
@@ -83,9 +101,13 @@ fn walk(surface: &mut Surface, first: HalfEdge, name: u32) -> Seam {
         if to == begin || surface.place[to as usize] == Place::Corner {
             return seam;
         }
-        surface.place[to as usize] = Place::Seam { at_mm: seam.length_mm() };
+        surface.place[to as usize] = Place::Seam {
+            at_mm: seam.length_mm(),
+        };
         // Of the two border edges out of this point one has `left` on its left.
-        let onwards = surface.around(to).find(|&o| surface.label_of(o) == left && is_border(surface, o));
+        let onwards = surface
+            .around(to)
+            .find(|&o| surface.label_of(o) == left && is_border(surface, o));
         match onwards {
             Some(o) => h = o,
             None => return seam,
@@ -94,12 +116,21 @@ fn walk(surface: &mut Surface, first: HalfEdge, name: u32) -> Seam {
 }
 
 impl Surface {
-    /// Places of the ends of a seam's half-edge, start first, for someone who walks with the seam; `end > start`.
+    /// Places of the ends of a seam's half-edge, start first, for someone who walks with the seam; `end >
+    /// start`.
     pub fn span(&self, h: HalfEdge, seams: &[Seam]) -> [f64; 2] {
         let seam = &seams[self.seam[h as usize] as usize];
-        let h = if self.label_of(h) == seam.left { h } else { self.opposite[h as usize] };
+        let h = if self.label_of(h) == seam.left {
+            h
+        } else {
+            self.opposite[h as usize]
+        };
         let [from, to] = self.ends(h).map(|v| self.place[v as usize]);
-        let start = if let Place::Seam { at_mm } = from { at_mm } else { 0.0 };
+        let start = if let Place::Seam { at_mm } = from {
+            at_mm
+        } else {
+            0.0
+        };
         match to {
             Place::Seam { at_mm } if seam.is_closed && at_mm <= start => [start, at_mm + seam.length_mm()],
             Place::Seam { at_mm } => [start, at_mm],
@@ -107,17 +138,22 @@ impl Surface {
         }
     }
 
-    /// The seam through a point of kind [`Place::Seam`] and the place on it this share of the way to the middle between
-    /// the neighbours there.
+    /// The seam through a point of kind [`Place::Seam`] and the place on it this share of the way to the
+    /// middle between the neighbours there.
     pub fn relaxed_along(&self, v: u32, share: f64, seams: &[Seam]) -> Option<(u32, f64)> {
         let onwards = self.around(v).find(|&h| {
             let seam = self.seam[h as usize];
             seam != NO_SEAM && self.label_of(h) == seams[seam as usize].left
         })?;
-        let back = self.around(v).find(|&h| self.seam[h as usize] != NO_SEAM && h != onwards)?;
+        let back = self
+            .around(v)
+            .find(|&h| self.seam[h as usize] != NO_SEAM && h != onwards)?;
         let ([before, here], [at, after]) = (self.span(back, seams), self.span(onwards, seams));
         let name = self.seam[onwards as usize];
-        Some((name, seams[name as usize].wrapped(at + 0.5 * share * ((after - at) - (here - before)))))
+        Some((
+            name,
+            seams[name as usize].wrapped(at + 0.5 * share * ((after - at) - (here - before))),
+        ))
     }
 
     /// The triangle's third corner.
@@ -127,6 +163,8 @@ impl Surface {
 
     /// Whether the triangle of `h` has seams on both its other edges.
     pub fn is_between_seams(&self, h: HalfEdge) -> bool {
-        [Topology::next(h), prev(h)].iter().all(|&e| self.seam[e as usize] != NO_SEAM)
+        [Topology::next(h), prev(h)]
+            .iter()
+            .all(|&e| self.seam[e as usize] != NO_SEAM)
     }
 }

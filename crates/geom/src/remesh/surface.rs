@@ -38,7 +38,8 @@ pub(super) fn prev(h: HalfEdge) -> HalfEdge {
 }
 
 impl Surface {
-    /// `None` where `mesh` is not closed. Where fans of triangles meet in one point only, each gets a point of its own.
+    /// `None` where `mesh` is not closed. Where fans of triangles meet in one point only, each gets a point
+    /// of its own.
     pub fn new(mesh: &TriMesh, labels: &[u32]) -> Option<Self> {
         let topology = Topology::of_mesh(mesh)?;
         let n_half_edges = topology.n_half_edges();
@@ -57,7 +58,9 @@ impl Surface {
                 continue;
             }
             let v = surface.points.len() as u32;
-            surface.points.push(mesh.points[mesh.triangles[first as usize / 3][first as usize % 3] as usize]);
+            surface
+                .points
+                .push(mesh.points[mesh.triangles[first as usize / 3][first as usize % 3] as usize]);
             surface.out.push(first);
             let mut h = first;
             while surface.start[h as usize] == u32::MAX {
@@ -156,14 +159,18 @@ impl Surface {
         for (side, far) in [(h, v), (g, u)] {
             let (next, apex) = (Topology::next(side), self.apex(side));
             let beyond = self.opposite[next as usize];
-            let new =
-                self.add_triangle([m, far, apex], [along, self.seam[next as usize], NO_SEAM], self.label_of(side));
+            let new = self.add_triangle(
+                [m, far, apex],
+                [along, self.seam[next as usize], NO_SEAM],
+                self.label_of(side),
+            );
             self.join(new + 1, beyond);
             self.join(new + 2, next);
             self.start[next as usize] = m;
             self.seam[next as usize] = NO_SEAM;
         }
-        // The new triangles are the last two: the one beside h starts with m → v, the one beside g with m → u.
+        // The new triangles are the last two: the one beside h starts with m → v, the one beside g with m →
+        // u.
         let last = self.start.len() as HalfEdge;
         self.join(g, last - 6);
         self.join(h, last - 3);
@@ -201,9 +208,12 @@ impl Surface {
         let [v, w, u, x] = outer.map(|e| self.start[e as usize]);
         let [vw, wu, ux, xv] = outer.map(|e| (self.opposite[e as usize], self.seam[e as usize]));
         // (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v).
-        for (slot, start, (beyond, seam)) in
-            [(outer[0], w, wu), (outer[1], u, ux), (outer[2], x, xv), (outer[3], v, vw)]
-        {
+        for (slot, start, (beyond, seam)) in [
+            (outer[0], w, wu),
+            (outer[1], u, ux),
+            (outer[2], x, xv),
+            (outer[3], v, vw),
+        ] {
             self.start[slot as usize] = start;
             self.seam[slot as usize] = seam;
             self.join(slot, beyond);
@@ -234,8 +244,8 @@ impl Surface {
         self.out[v as usize] = HalfEdge::MAX;
     }
 
-    /// Whether merging the end of `h` into its start keeps the surface a manifold, the regions, the seams and the
-    /// corners.
+    /// Whether merging the end of `h` into its start keeps the surface a manifold, the regions, the seams and
+    /// the corners.
     pub fn may_merge(&self, h: HalfEdge) -> bool {
         let g = self.opposite[h as usize];
         let [u, v] = self.ends(h);
@@ -249,7 +259,10 @@ impl Surface {
         let makes_bridge = || {
             !self.is_inside(u)
                 && self.is_inside(v)
-                && self.around(v).map(|a| self.ends(a)[1]).any(|w| w != u && !sides.contains(&w) && !self.is_inside(w))
+                && self
+                    .around(v)
+                    .map(|a| self.ends(a)[1])
+                    .any(|w| w != u && !sides.contains(&w) && !self.is_inside(w))
         };
         moves
             && sides[0] != sides[1]
@@ -257,7 +270,11 @@ impl Surface {
             && !self.is_between_seams(g)
             && !makes_bridge()
             && sides.iter().all(|&w| self.around(w).nth(3).is_some())
-            && self.around(u).filter(|&a| self.are_neighbours(self.ends(a)[1], v)).count() == 2
+            && self
+                .around(u)
+                .filter(|&a| self.are_neighbours(self.ends(a)[1], v))
+                .count()
+                == 2
     }
 
     /// Whether turning `h` keeps the surface a manifold and the seams.
@@ -278,7 +295,12 @@ impl Surface {
     pub fn finish(&self) -> (TriMesh, Vec<u32>) {
         let mut name = vec![u32::MAX; self.points.len()];
         let (mut mesh, mut labels) = (TriMesh::default(), Vec::new());
-        for (face, corners) in self.start.chunks_exact(3).enumerate().filter(|(face, _)| !self.is_dead[*face]) {
+        for (face, corners) in self
+            .start
+            .chunks_exact(3)
+            .enumerate()
+            .filter(|(face, _)| !self.is_dead[*face])
+        {
             let triangle = [corners[0], corners[1], corners[2]].map(|v| {
                 let name = &mut name[v as usize];
                 if *name == u32::MAX {

@@ -11,8 +11,14 @@ fn torus(radius_mm: f64, tube_mm: f64, n_around: u32, n_across: u32) -> TriMesh 
     let mut mesh = TriMesh::default();
     for i in 0..n_around {
         for j in 0..n_across {
-            let (u, v) = (f64::from(i) / f64::from(n_around), f64::from(j) / f64::from(n_across));
-            let ((su, cu), (sv, cv)) = ((u * std::f64::consts::TAU).sin_cos(), (v * std::f64::consts::TAU).sin_cos());
+            let (u, v) = (
+                f64::from(i) / f64::from(n_around),
+                f64::from(j) / f64::from(n_across),
+            );
+            let ((su, cu), (sv, cv)) = (
+                (u * std::f64::consts::TAU).sin_cos(),
+                (v * std::f64::consts::TAU).sin_cos(),
+            );
             let r = radius_mm + tube_mm * cv;
             mesh.points.push(Vec3::new(r * cu, r * su, tube_mm * sv));
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
@@ -25,8 +31,16 @@ fn torus(radius_mm: f64, tube_mm: f64, n_around: u32, n_across: u32) -> TriMesh 
 /// An octahedron with each edge halved `n_splits` times, on the ellipsoid with half axes `radii_mm`.
 fn ellipsoid(n_splits: u32, radii_mm: Vec3) -> TriMesh {
     let mut points = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
-    let mut triangles: Vec<[u32; 3]> =
-        vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+    let mut triangles: Vec<[u32; 3]> = vec![
+        [0, 1, 2],
+        [1, 3, 2],
+        [3, 4, 2],
+        [4, 0, 2],
+        [1, 0, 5],
+        [3, 1, 5],
+        [4, 3, 5],
+        [0, 4, 5],
+    ];
     for _ in 0..n_splits {
         let mut middles = BTreeMap::new();
         let mut middle = |a: u32, b: u32| {
@@ -42,11 +56,16 @@ fn ellipsoid(n_splits: u32, radii_mm: Vec3) -> TriMesh {
         }
         triangles = finer;
     }
-    TriMesh { points: points.into_iter().map(|p| p * radii_mm).collect(), triangles }
+    TriMesh {
+        points: points.into_iter().map(|p| p * radii_mm).collect(),
+        triangles,
+    }
 }
 
 fn label(mesh: &TriMesh, at: impl Fn(Vec3) -> u32) -> Vec<u32> {
-    (0..mesh.triangles.len()).map(|f| at(mesh.face_center(f))).collect()
+    (0..mesh.triangles.len())
+        .map(|f| at(mesh.face_center(f)))
+        .collect()
 }
 
 fn octant(p: Vec3) -> u32 {
@@ -56,10 +75,20 @@ fn octant(p: Vec3) -> u32 {
 /// The label of the nearest of `n` sites spread over a ball.
 fn voronoi(n: u32, radius_mm: f64) -> impl Fn(Vec3) -> u32 {
     let site = move |i: u32| {
-        let (t, z) = (f64::from(i) * 2.399_963, 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(n));
+        let (t, z) = (
+            f64::from(i) * 2.399_963,
+            1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(n),
+        );
         radius_mm * Vec3::new((1.0 - z * z).sqrt() * t.cos(), (1.0 - z * z).sqrt() * t.sin(), z)
     };
-    move |p| (0..n).min_by(|&i, &j| p.distance_squared(site(i)).total_cmp(&p.distance_squared(site(j)))).unwrap_or(0)
+    move |p| {
+        (0..n)
+            .min_by(|&i, &j| {
+                p.distance_squared(site(i))
+                    .total_cmp(&p.distance_squared(site(j)))
+            })
+            .unwrap_or(0)
+    }
 }
 
 /// Each border edge: its labels, lower first, and its end points.
@@ -95,12 +124,22 @@ fn corners(mesh: &TriMesh, labels: &[u32]) -> BTreeSet<([u64; 3], Vec<u32>)> {
         });
     }
     let is_corner = around.iter().enumerate().filter(|(_, labels)| labels.len() > 2);
-    is_corner.map(|(v, l)| (mesh.points[v].to_array().map(f64::to_bits), l.iter().copied().collect())).collect()
+    is_corner
+        .map(|(v, l)| {
+            (
+                mesh.points[v].to_array().map(f64::to_bits),
+                l.iter().copied().collect(),
+            )
+        })
+        .collect()
 }
 
 /// Lengths of all edges in target lengths, sorted.
 fn edge_lengths(mesh: &TriMesh, target_mm: f64) -> Vec<f64> {
-    let sides = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+    let sides = mesh
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
     let mut lengths: Vec<f64> = sides
         .filter(|(a, b)| a < b)
         .map(|(a, b)| mesh.points[a as usize].distance(mesh.points[b as usize]) / target_mm)
@@ -119,13 +158,21 @@ fn even_share(mesh: &TriMesh, target_mm: f64) -> f64 {
 fn farthest_mm(from: &TriMesh, to: &TriMesh) -> f64 {
     let bvh = TriangleBvh::new(to);
     let centers = (0..from.triangles.len()).map(|f| from.face_center(f));
-    let distances = from.points.iter().copied().chain(centers).filter_map(|p| bvh.nearest(p, f64::INFINITY));
+    let distances = from
+        .points
+        .iter()
+        .copied()
+        .chain(centers)
+        .filter_map(|p| bvh.nearest(p, f64::INFINITY));
     distances.map(|n| n.distance_sq).fold(0.0, f64::max).sqrt()
 }
 
 fn n_bridged(mesh: &TriMesh, labels: &[u32]) -> usize {
     let on_border: BTreeSet<u32> = borders(mesh, labels).into_iter().flat_map(|b| b.1).collect();
-    mesh.triangles.iter().filter(|t| t.iter().all(|v| on_border.contains(v))).count()
+    mesh.triangles
+        .iter()
+        .filter(|t| t.iter().all(|v| on_border.contains(v)))
+        .count()
 }
 
 fn n_against(mesh: &TriMesh, input: &TriMesh) -> usize {
@@ -140,9 +187,13 @@ fn n_against(mesh: &TriMesh, input: &TriMesh) -> usize {
 /// How many connected regions each label has.
 fn n_regions(mesh: &TriMesh, labels: &[u32]) -> BTreeMap<u32, usize> {
     let topology = crate::Topology::of_mesh(mesh).unwrap();
-    let (component, n) = crate::topology::components(&topology, |a, b| labels[a as usize] == labels[b as usize]);
+    let (component, n) =
+        crate::topology::components(&topology, |a, b| labels[a as usize] == labels[b as usize]);
     let mut label_of = vec![0; n];
-    component.iter().zip(labels).for_each(|(&c, &l)| label_of[c as usize] = l);
+    component
+        .iter()
+        .zip(labels)
+        .for_each(|(&c, &l)| label_of[c as usize] = l);
     label_of.iter().fold(BTreeMap::new(), |mut counts, &l| {
         *counts.entry(l).or_insert(0) += 1;
         counts
@@ -163,7 +214,10 @@ fn assert_same_map(input: &TriMesh, labels: &[u32], out: &Remeshed) {
 }
 
 fn assert_near(a: f64, b: f64, share: f64) {
-    assert!((a - b).abs() <= share * b.abs(), "{a} is not within {share} of {b}");
+    assert!(
+        (a - b).abs() <= share * b.abs(),
+        "{a} is not within {share} of {b}"
+    );
 }
 
 const ROUNDS: u32 = 6;
@@ -172,11 +226,22 @@ const ROUNDS: u32 = 6;
 fn octants_of_a_ball_keep_their_map_size_and_shape() {
     let ball = ellipsoid(6, Vec3::splat(30.0));
     let labels = label(&ball, octant);
-    let out = remesh(&RemeshParams { target_edge_mm: 5.0, n_rounds: ROUNDS }, &ball, &labels);
+    let out = remesh(
+        &RemeshParams {
+            target_edge_mm: 5.0,
+            n_rounds: ROUNDS,
+        },
+        &ball,
+        &labels,
+    );
     assert_same_map(&ball, &labels, &out);
     assert_near(out.mesh.area(), ball.area(), 0.02);
     assert_near(out.mesh.signed_volume(), ball.signed_volume(), 0.03);
-    assert!(even_share(&out.mesh, 5.0) > 0.97, "{}", even_share(&out.mesh, 5.0));
+    assert!(
+        even_share(&out.mesh, 5.0) > 0.97,
+        "{}",
+        even_share(&out.mesh, 5.0)
+    );
     // The sagitta of a triangle with edges of 1.5 targets: 7.5² / 3 / (2 · 30).
     assert!(farthest_mm(&out.mesh, &ball) < 0.32 && farthest_mm(&ball, &out.mesh) < 0.32);
     let before = seam_lengths(&ball, &labels);
@@ -189,7 +254,14 @@ fn octants_of_a_ball_keep_their_map_size_and_shape() {
 fn seam_points_lie_on_the_seams_of_the_input() {
     let body = ellipsoid(6, Vec3::new(40.0, 30.0, 25.0));
     let labels = label(&body, voronoi(9, 30.0));
-    let out = remesh(&RemeshParams { target_edge_mm: 5.0, n_rounds: ROUNDS }, &body, &labels);
+    let out = remesh(
+        &RemeshParams {
+            target_edge_mm: 5.0,
+            n_rounds: ROUNDS,
+        },
+        &body,
+        &labels,
+    );
     assert_same_map(&body, &labels, &out);
     let lines = borders(&body, &labels);
     for (pair, ends) in borders(&out.mesh, &out.labels) {
@@ -209,26 +281,63 @@ fn seam_points_lie_on_the_seams_of_the_input() {
 fn a_torus_keeps_its_hole_and_loops() {
     let ring = torus(30.0, 10.0, 240, 80);
     // Two half tubes meet in closed seams without a corner; the four quarters of the other half have corners.
-    let labels = label(&ring, |p| if p.y > 0.0 { u32::from(p.z > 0.0) } else { 2 + octant(p) });
+    let labels = label(&ring, |p| {
+        if p.y > 0.0 {
+            u32::from(p.z > 0.0)
+        } else {
+            2 + octant(p)
+        }
+    });
     for target_edge_mm in [3.0, 5.0] {
-        let out = remesh(&RemeshParams { target_edge_mm, n_rounds: ROUNDS }, &ring, &labels);
+        let out = remesh(
+            &RemeshParams {
+                target_edge_mm,
+                n_rounds: ROUNDS,
+            },
+            &ring,
+            &labels,
+        );
         assert_same_map(&ring, &labels, &out);
         assert_near(out.mesh.signed_volume(), ring.signed_volume(), 0.06);
     }
     let halves = label(&ring, |p| u32::from(p.z > 0.0));
-    let out = remesh(&RemeshParams { target_edge_mm: 5.0, n_rounds: ROUNDS }, &ring, &halves);
+    let out = remesh(
+        &RemeshParams {
+            target_edge_mm: 5.0,
+            n_rounds: ROUNDS,
+        },
+        &ring,
+        &halves,
+    );
     assert_same_map(&ring, &halves, &out);
-    assert!(even_share(&out.mesh, 5.0) > 0.95, "{}", even_share(&out.mesh, 5.0));
+    assert!(
+        even_share(&out.mesh, 5.0) > 0.95,
+        "{}",
+        even_share(&out.mesh, 5.0)
+    );
 }
 
 #[test]
 fn regions_narrower_than_an_edge_stay_and_have_inside_points() {
     let ball = ellipsoid(6, Vec3::splat(30.0));
-    let strip = |p: Vec3| if p.z.abs() < 0.8 { 1 } else { 2 * u32::from(p.z > 0.0) };
+    let strip = |p: Vec3| {
+        if p.z.abs() < 0.8 {
+            1
+        } else {
+            2 * u32::from(p.z > 0.0)
+        }
+    };
     let island = |p: Vec3| u32::from(p.distance(Vec3::new(30.0, 0.3, 0.2)) < 1.0);
     for labels in [label(&ball, strip), label(&ball, island)] {
         for target_edge_mm in [4.0, 8.0, 40.0] {
-            let out = remesh(&RemeshParams { target_edge_mm, n_rounds: ROUNDS }, &ball, &labels);
+            let out = remesh(
+                &RemeshParams {
+                    target_edge_mm,
+                    n_rounds: ROUNDS,
+                },
+                &ball,
+                &labels,
+            );
             assert_same_map(&ball, &labels, &out);
         }
     }
@@ -240,11 +349,26 @@ fn points_that_only_touch_become_two() {
     let touching = one.points.iter().position(|p| p.x == 10.0).unwrap() as u32;
     let mut two = one.clone();
     // The ball mirrored in the plane x = 10 shares the point (10, 0, 0).
-    let name = |v: u32| if v == touching { v } else { v + one.points.len() as u32 };
-    two.points.extend(one.points.iter().map(|p| Vec3::new(20.0 - p.x, p.y, p.z)));
-    two.triangles.extend(one.triangles.iter().map(|&[a, b, c]| [name(a), name(c), name(b)]));
+    let name = |v: u32| {
+        if v == touching {
+            v
+        } else {
+            v + one.points.len() as u32
+        }
+    };
+    two.points
+        .extend(one.points.iter().map(|p| Vec3::new(20.0 - p.x, p.y, p.z)));
+    two.triangles
+        .extend(one.triangles.iter().map(|&[a, b, c]| [name(a), name(c), name(b)]));
     let labels = vec![0; two.triangles.len()];
-    let out = remesh(&RemeshParams { target_edge_mm: 3.0, n_rounds: ROUNDS }, &two, &labels);
+    let out = remesh(
+        &RemeshParams {
+            target_edge_mm: 3.0,
+            n_rounds: ROUNDS,
+        },
+        &two,
+        &labels,
+    );
     assert!(Solid::new(out.mesh.clone()).is_ok());
     assert_near(out.mesh.signed_volume(), two.signed_volume(), 0.05);
     assert_eq!(n_against(&out.mesh, &two), 0);
@@ -254,7 +378,10 @@ fn points_that_only_touch_become_two() {
 fn what_is_no_task_comes_back_unchanged() {
     let ball = ellipsoid(2, Vec3::splat(30.0));
     let labels = label(&ball, octant);
-    let params = |target_edge_mm| RemeshParams { target_edge_mm, n_rounds: ROUNDS };
+    let params = |target_edge_mm| RemeshParams {
+        target_edge_mm,
+        n_rounds: ROUNDS,
+    };
     for target_edge_mm in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let out = remesh(&params(target_edge_mm), &ball, &labels);
         assert_eq!((out.mesh, out.labels), (ball.clone(), labels.clone()));
@@ -262,18 +389,36 @@ fn what_is_no_task_comes_back_unchanged() {
     let mut open = ball.clone();
     open.triangles.pop();
     assert_eq!(remesh(&params(4.0), &open, &labels[1..]).mesh, open);
-    assert_eq!(remesh(&params(4.0), &TriMesh::default(), &[]).mesh, TriMesh::default());
+    assert_eq!(
+        remesh(&params(4.0), &TriMesh::default(), &[]).mesh,
+        TriMesh::default()
+    );
 }
-/// Twelve triangles with edges of up to 128 mm: creases stay where they are to a fraction of an edge, and no triangle is a needle.
+/// Twelve triangles with edges of up to 128 mm: creases stay where they are to a fraction of an edge, and no
+/// triangle is a needle.
 #[test]
 fn a_plate_of_twelve_triangles_keeps_its_shape() {
-    let plate = Volume::cuboid(crate::Aabb { min: Vec3::ZERO, max: Vec3::new(100.0, 80.0, 8.0) }).to_mesh();
-    let out = remesh(&RemeshParams { target_edge_mm: 2.1, n_rounds: 5 }, &plate, &[0; 12]);
+    let plate = Volume::cuboid(crate::Aabb {
+        min: Vec3::ZERO,
+        max: Vec3::new(100.0, 80.0, 8.0),
+    })
+    .to_mesh();
+    let out = remesh(
+        &RemeshParams {
+            target_edge_mm: 2.1,
+            n_rounds: 5,
+        },
+        &plate,
+        &[0; 12],
+    );
     assert_near(out.mesh.signed_volume(), plate.signed_volume(), 0.02);
     assert_near(out.mesh.area(), plate.area(), 0.03);
     let share = |f: usize| {
         let [a, b, c] = out.mesh.corners(f);
-        let longest_sq = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+        let longest_sq = a
+            .distance_squared(b)
+            .max(b.distance_squared(c))
+            .max(c.distance_squared(a));
         (b - a).cross(c - a).length() / longest_sq
     };
     let least = (0..out.mesh.triangles.len()).map(share).fold(1.0, f64::min);
@@ -284,7 +429,14 @@ fn a_plate_of_twelve_triangles_keeps_its_shape() {
 fn coarse_input_is_refined() {
     let octahedron = ellipsoid(0, Vec3::splat(30.0));
     let labels: Vec<u32> = (0..8).collect();
-    let out = remesh(&RemeshParams { target_edge_mm: 4.0, n_rounds: ROUNDS }, &octahedron, &labels);
+    let out = remesh(
+        &RemeshParams {
+            target_edge_mm: 4.0,
+            n_rounds: ROUNDS,
+        },
+        &octahedron,
+        &labels,
+    );
     assert_same_map(&octahedron, &labels, &out);
     assert_near(out.mesh.signed_volume(), octahedron.signed_volume(), 1e-9);
     assert_near(out.mesh.area(), octahedron.area(), 1e-9);

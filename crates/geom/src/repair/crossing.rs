@@ -10,13 +10,14 @@ use crate::{Aabb, TriMesh, Vec3};
 
 /// Triangles in a leaf of the boxes; 4 to 16 take about the same time.
 const LEAF: usize = 8;
-/// Pairs of boxes that are looked at for each leaf; more meet in the tip of a cone of twenty thousand triangles, and in
-/// hostile files, where not all crossings are found then.
+/// Pairs of boxes that are looked at for each leaf; more meet in the tip of a cone of twenty thousand
+/// triangles, and in hostile files, where not all crossings are found then.
 const MAX_PAIRS_OF_LEAF: usize = 100_000;
-/// Pairs of crossing triangles that are resolved: at 1 to 5 ms each, a minute or two. Meshes that ask for more are wrecks.
+/// Pairs of crossing triangles that are resolved: at 1 to 5 ms each, a minute or two. Meshes that ask for
+/// more are wrecks.
 const MAX_RESOLVED: usize = 20_000;
-/// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles that
-/// touch, or cross in less than that, do not count as crossing.
+/// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles
+/// that touch, or cross in less than that, do not count as crossing.
 const FLAT: f64 = 1e-10;
 
 /// Where a surface crosses itself.
@@ -28,13 +29,16 @@ pub struct Crossings {
     pub first: Vec3,
 }
 
-/// Pairs of triangles of which an edge of one goes through the other; those that touch or lie in a plane do not count.
+/// Pairs of triangles of which an edge of one goes through the other; those that touch or lie in a plane do
+/// not count.
 ///
 /// O(n log n) and by the pairs whose boxes meet; the same on any number of threads.
 pub fn crossings(mesh: &TriMesh) -> Crossings {
     let tree = Boxes::of(mesh);
-    let found: Vec<(usize, Option<u32>)> =
-        (0..tree.order.len().div_ceil(LEAF)).into_par_iter().map(|leaf| tree.crossings_of(mesh, leaf)).collect();
+    let found: Vec<(usize, Option<u32>)> = (0..tree.order.len().div_ceil(LEAF))
+        .into_par_iter()
+        .map(|leaf| tree.crossings_of(mesh, leaf))
+        .collect();
     let first = found.iter().filter_map(|(_, first)| *first).min();
     Crossings {
         count: found.iter().map(|(count, _)| count).sum(),
@@ -42,8 +46,8 @@ pub fn crossings(mesh: &TriMesh) -> Crossings {
     }
 }
 
-/// Makes one surface of what a surface encloses at least once, where it crosses itself, has edges of more than two
-/// triangles, or is several whose faces touch.
+/// Makes one surface of what a surface encloses at least once, where it crosses itself, has edges of more
+/// than two triangles, or is several whose faces touch.
 pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     let found = crossings(&draft.mesh);
     let shared = inspect_edges(&draft.mesh).shared;
@@ -53,10 +57,21 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
             None => return Ok(None),
         },
         (0, count) => (RepairKind::Parted, count, shared.first),
-        (count, _) => (RepairKind::United { before: 0.0, after: 0.0 }, count, found.first),
+        (count, _) => (
+            RepairKind::United {
+                before: 0.0,
+                after: 0.0,
+            },
+            count,
+            found.first,
+        ),
     };
     let refused = || match kind {
-        RepairKind::Parted => InputError::Shared { count, at, n_copies: 0 },
+        RepairKind::Parted => InputError::Shared {
+            count,
+            at,
+            n_copies: 0,
+        },
         _ => InputError::Crossing { count, at },
     };
     if found.count > MAX_RESOLVED {
@@ -66,10 +81,17 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     if mesh.triangles.is_empty() {
         return Err(refused());
     }
-    // The library keeps no account of single triangles here; the nearest is the one that a triangle is a part of.
+    // The library keeps no account of single triangles here; the nearest is the one that a triangle is a part
+    // of.
     let tree = TriangleBvh::new(&draft.mesh);
-    let nearest = |face: usize| tree.nearest(mesh.face_center(face), f64::INFINITY).map_or(0, |n| n.face);
-    let source = (0..mesh.triangles.len()).into_par_iter().map(|f| draft.source[nearest(f) as usize]).collect();
+    let nearest = |face: usize| {
+        tree.nearest(mesh.face_center(face), f64::INFINITY)
+            .map_or(0, |n| n.face)
+    };
+    let source = (0..mesh.triangles.len())
+        .into_par_iter()
+        .map(|f| draft.source[nearest(f) as usize])
+        .collect();
     let kind = match kind {
         RepairKind::United { .. } => {
             let [before, after] = [&draft.mesh, &mesh].map(TriMesh::signed_volume);
@@ -81,13 +103,15 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     Ok(Some(Repair { kind, count, at }))
 }
 
-/// How many bodies there are, and the middle of the second, where faces of several touch: [`crossings`] does not see that.
+/// How many bodies there are, and the middle of the second, where faces of several touch: [`crossings`] does
+/// not see that.
 fn touching(mesh: &TriMesh) -> Result<Option<(usize, Vec3)>, InputError> {
     /// Bodies that are compared two by two.
     const MAX_BODIES: usize = 1000;
     let bounds: Vec<Aabb> = inspect(mesh).bodies.iter().map(|body| body.bounds).collect();
     let n = bounds.len();
-    let are_near = (2..=MAX_BODIES).contains(&n) && (0..n).any(|i| (0..i).any(|j| bounds[i].intersects(bounds[j])));
+    let are_near =
+        (2..=MAX_BODIES).contains(&n) && (0..n).any(|i| (0..i).any(|j| bounds[i].intersects(bounds[j])));
     if !are_near {
         return Ok(None);
     }
@@ -113,11 +137,19 @@ impl Boxes {
         let scale = bounds.size().max_element().max(f64::MIN_POSITIVE).recip();
         let mut keys: Vec<(u64, u32)> = (0..mesh.triangles.len() as u32)
             .into_par_iter()
-            .map(|face| (curve_position((mesh.face_center(face as usize) - bounds.min) * scale), face))
+            .map(|face| {
+                (
+                    curve_position((mesh.face_center(face as usize) - bounds.min) * scale),
+                    face,
+                )
+            })
             .collect();
         keys.par_sort_unstable();
         let order: Vec<u32> = keys.into_iter().map(|(_, face)| face).collect();
-        let boxes: Vec<Aabb> = order.par_iter().map(|&f| Aabb::around(mesh.corners(f as usize))).collect();
+        let boxes: Vec<Aabb> = order
+            .par_iter()
+            .map(|&f| Aabb::around(mesh.corners(f as usize)))
+            .collect();
         let join = |boxes: &[Aabb]| boxes.iter().fold(Aabb::EMPTY, |b, &c| b.union(c));
         let mut levels: Vec<Vec<Aabb>> = vec![boxes.par_chunks(LEAF).map(join).collect()];
         while let Some(last) = levels.last().filter(|l| l.len() > 1) {
@@ -131,7 +163,8 @@ impl Boxes {
         leaf * LEAF..self.order.len().min((leaf + 1) * LEAF)
     }
 
-    /// How many triangles of this and later leaves cross those of `leaf`, and the first of `leaf` that is crossed.
+    /// How many triangles of this and later leaves cross those of `leaf`, and the first of `leaf` that is
+    /// crossed.
     fn crossings_of(&self, mesh: &TriMesh, leaf: usize) -> (usize, Option<u32>) {
         let own = self.places(leaf);
         let around = self.levels[0][leaf];
@@ -149,7 +182,10 @@ impl Boxes {
                 continue;
             }
             n_pairs += own.len() * self.places(at).len();
-            for other in self.places(at).filter(|&other| self.boxes[other].intersects(around)) {
+            for other in self
+                .places(at)
+                .filter(|&other| self.boxes[other].intersects(around))
+            {
                 // Within the leaf each pair once.
                 for place in own.clone().take_while(|&place| place < other) {
                     let faces = [place, other].map(|p| self.order[p]);

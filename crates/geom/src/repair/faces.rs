@@ -9,7 +9,11 @@ use crate::check::{Side, sides};
 /// Removes all but one of triangles with the same corners; those that face opposite ways cancel, two and two.
 pub(super) fn drop_copies(draft: &mut Draft) -> Option<Repair> {
     let triangles = &draft.mesh.triangles;
-    let mut order: Vec<([u32; 3], u32)> = triangles.iter().zip(0..).map(|(t, face)| (sorted(*t), face)).collect();
+    let mut order: Vec<([u32; 3], u32)> = triangles
+        .iter()
+        .zip(0..)
+        .map(|(t, face)| (sorted(*t), face))
+        .collect();
     order.sort_unstable();
     let mut is_kept = vec![true; triangles.len()];
     for group in order.chunk_by(|x, y| x.0 == y.0).filter(|group| group.len() > 1) {
@@ -33,7 +37,11 @@ pub(super) fn drop_copies(draft: &mut Draft) -> Option<Repair> {
     let at = draft.mesh.face_center(first);
     let count = is_kept.iter().filter(|kept| !**kept).count();
     draft.retain(&is_kept);
-    Some(Repair { kind: RepairKind::Copies, count, at })
+    Some(Repair {
+        kind: RepairKind::Copies,
+        count,
+        at,
+    })
 }
 
 fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
@@ -41,7 +49,8 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle
 }
 
-/// Turns triangles so that neighbours agree, as few as possible in each connected part; leaves one-sided parts alone.
+/// Turns triangles so that neighbours agree, as few as possible in each connected part; leaves one-sided
+/// parts alone.
 pub(super) fn turn(draft: &mut Draft) -> Option<Repair> {
     let mesh = &draft.mesh;
     let sides = sides(mesh);
@@ -66,9 +75,18 @@ pub(super) fn turn(draft: &mut Draft) -> Option<Repair> {
             turned.extend(to_turn(&across, &mut state, start));
         }
     }
-    let at = turned.iter().min().map_or(Vec3::ZERO, |&face| mesh.face_center(face as usize));
-    turned.iter().for_each(|&face| draft.mesh.triangles[face as usize].swap(1, 2));
-    (!turned.is_empty()).then_some(Repair { kind: RepairKind::Turned, count: turned.len(), at })
+    let at = turned
+        .iter()
+        .min()
+        .map_or(Vec3::ZERO, |&face| mesh.face_center(face as usize));
+    turned
+        .iter()
+        .for_each(|&face| draft.mesh.triangles[face as usize].swap(1, 2));
+    (!turned.is_empty()).then_some(Repair {
+        kind: RepairKind::Turned,
+        count: turned.len(),
+        at,
+    })
 }
 
 /// The triangles to turn of the part that `start` belongs to; none where the part is one-sided.
@@ -93,7 +111,12 @@ fn to_turn(across: &[Vec<(u32, bool)>], state: &mut [Option<bool>], start: u32) 
     if is_one_sided {
         return Vec::new();
     }
-    let n_turned = part.iter().filter(|&&face| state[face as usize] == Some(true)).count();
+    let n_turned = part
+        .iter()
+        .filter(|&&face| state[face as usize] == Some(true))
+        .count();
     let minority = 2 * n_turned <= part.len();
-    part.into_iter().filter(|&face| state[face as usize] == Some(minority)).collect()
+    part.into_iter()
+        .filter(|&face| state[face as usize] == Some(minority))
+        .collect()
 }

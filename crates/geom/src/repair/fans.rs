@@ -4,7 +4,8 @@ use super::{Draft, Repair, RepairKind};
 use crate::Vec3;
 use crate::check::fans;
 
-/// Gives each fan of triangles around a point a point of its own, in the same place. The surface stays where it is.
+/// Gives each fan of triangles around a point a point of its own, in the same place. The surface stays where
+/// it is.
 pub(super) fn part(draft: &mut Draft) -> Option<Repair> {
     let mut fan_of_corner = fans(&draft.mesh);
     let n_points = draft.mesh.points.len();
@@ -30,5 +31,9 @@ pub(super) fn part(draft: &mut Draft) -> Option<Repair> {
         is_pinched[point] = true;
     }
     let count = is_pinched.iter().filter(|pinched| **pinched).count();
-    (count > 0).then_some(Repair { kind: RepairKind::Parted, count, at })
+    (count > 0).then_some(Repair {
+        kind: RepairKind::Parted,
+        count,
+        at,
+    })
 }

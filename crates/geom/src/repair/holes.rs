@@ -17,18 +17,27 @@ pub(super) fn close(draft: &mut Draft) -> Option<Repair> {
     let (mut count, mut widest, mut at) = (0, 0.0_f64, Vec3::ZERO);
     let mut work = 0;
     for rim in rims.loops() {
-        let points: Vec<Vec3> = rim.points.iter().map(|&p| draft.mesh.points[p as usize]).collect();
+        let points: Vec<Vec3> = rim
+            .points
+            .iter()
+            .map(|&p| draft.mesh.points[p as usize])
+            .collect();
         let bounds = Aabb::around(points.iter().copied());
         let width = bounds.size().max_element();
         work += points.len().pow(3) / 6;
         let is_small = points.len() == 3 || (points.len() <= MAX_EDGES && width <= widest_allowed);
         // A triangle alone has a rim of three edges, too.
-        let is_alone =
-            points.len() == 3 && rim.points.iter().all(|p| draft.mesh.triangles[rim.face as usize].contains(p));
+        let is_alone = points.len() == 3
+            && rim
+                .points
+                .iter()
+                .all(|p| draft.mesh.triangles[rim.face as usize].contains(p));
         if !is_small || is_alone || work > MAX_WORK || !is_simple(&rim.points) {
             continue;
         }
-        let Some(cap) = cap(&rim.points, &points, |a, b| rims.has_edge(a, b)) else { continue };
+        let Some(cap) = cap(&rim.points, &points, |a, b| rims.has_edge(a, b)) else {
+            continue;
+        };
         caps.push((cap, draft.source[rim.face as usize]));
         if count == 0 {
             at = bounds.center();
@@ -39,7 +48,11 @@ pub(super) fn close(draft: &mut Draft) -> Option<Repair> {
         draft.mesh.triangles.extend(cap);
         draft.source.resize(draft.mesh.triangles.len(), source);
     }
-    (count > 0).then_some(Repair { kind: RepairKind::Closed { widest }, count, at })
+    (count > 0).then_some(Repair {
+        kind: RepairKind::Closed { widest },
+        count,
+        at,
+    })
 }
 
 fn is_simple(points: &[u32]) -> bool {
@@ -59,7 +72,8 @@ struct Rim {
 struct Rims<'a> {
     mesh: &'a TriMesh,
     sides: Vec<Side>,
-    /// For each corner the corner at which the neighbour's side along the same edge begins; none where the edge is open.
+    /// For each corner the corner at which the neighbour's side along the same edge begins; none where the
+    /// edge is open.
     opposite: Vec<Option<u32>>,
 }
 
@@ -75,19 +89,30 @@ impl<'a> Rims<'a> {
                 opposite[other.corner as usize] = Some(one.corner);
             }
         }
-        Self { mesh, sides, opposite }
+        Self {
+            mesh,
+            sides,
+            opposite,
+        }
     }
 
     fn has_edge(&self, a: u32, b: u32) -> bool {
-        self.sides.binary_search_by_key(&(a.min(b), a.max(b)), |s| (s.low, s.high)).is_ok()
+        self.sides
+            .binary_search_by_key(&(a.min(b), a.max(b)), |s| (s.low, s.high))
+            .is_ok()
     }
 
-    /// Walks around each hole. Open edges next to edges of three and more triangles may have no way on: no hole then.
+    /// Walks around each hole. Open edges next to edges of three and more triangles may have no way on: no
+    /// hole then.
     fn loops(&self) -> Vec<Rim> {
         let is_single = |edge: &[Side]| edge.len() == 1;
         let mut is_open = vec![false; self.opposite.len()];
-        let open: Vec<u32> =
-            self.sides.chunk_by(Side::same_edge).filter(|e| is_single(e)).map(|e| e[0].corner).collect();
+        let open: Vec<u32> = self
+            .sides
+            .chunk_by(Side::same_edge)
+            .filter(|e| is_single(e))
+            .map(|e| e[0].corner)
+            .collect();
         open.iter().for_each(|&corner| is_open[corner as usize] = true);
         let mut is_seen = vec![false; self.opposite.len()];
         let mut found = Vec::new();
@@ -103,7 +128,10 @@ impl<'a> Rims<'a> {
                 }
             }
             if at == start && points.len() >= 3 {
-                found.push(Rim { points, face: start / 3 });
+                found.push(Rim {
+                    points,
+                    face: start / 3,
+                });
             }
         }
         found
@@ -129,7 +157,8 @@ impl<'a> Rims<'a> {
     }
 }
 
-/// Triangles of least area that fill a polygon without using an edge that is there already; `None` where none do.
+/// Triangles of least area that fill a polygon without using an edge that is there already; `None` where none
+/// do.
 fn cap(names: &[u32], points: &[Vec3], has_edge: impl Fn(u32, u32) -> bool) -> Option<Vec<[u32; 3]>> {
     let n = names.len();
     // The least area of the polygon from i to j, and where its triangle on the edge i j has its third corner.

@@ -10,7 +10,8 @@ use crate::{TriMesh, Vec3};
 /// Pairs of an edge and a point that are looked at; hostile files have more, and stay open.
 const MAX_WORK: usize = 50_000_000;
 
-/// Divides triangles at the corners of others that lie on their open edges; keeps the draft where that closes nothing.
+/// Divides triangles at the corners of others that lie on their open edges; keeps the draft where that closes
+/// nothing.
 pub(super) fn join(draft: &mut Draft) -> Option<Repair> {
     let open = open_edges(&draft.mesh);
     if open.is_empty() {
@@ -36,7 +37,10 @@ pub(super) fn join(draft: &mut Draft) -> Option<Repair> {
     if count == 0 {
         return None;
     }
-    let mut joined = Draft { mesh: TriMesh::default(), source: Vec::new() };
+    let mut joined = Draft {
+        mesh: TriMesh::default(),
+        source: Vec::new(),
+    };
     joined.mesh.points.clone_from(&draft.mesh.points);
     for ((&triangle, &source), face) in draft.mesh.triangles.iter().zip(&draft.source).zip(0..) {
         let side = |k| on_side.get(&(face, k)).map_or(&[][..], Vec::as_slice);
@@ -47,7 +51,11 @@ pub(super) fn join(draft: &mut Draft) -> Option<Repair> {
         return None;
     }
     *draft = joined;
-    Some(Repair { kind: RepairKind::Joined, count, at })
+    Some(Repair {
+        kind: RepairKind::Joined,
+        count,
+        at,
+    })
 }
 
 /// The ends of open edges, sorted into cells as large as a typical edge.
@@ -68,9 +76,17 @@ impl Cells {
         if size <= 0.0 {
             return None;
         }
-        let mut cells = Self { size, content: BTreeMap::new(), all: Vec::new() };
+        let mut cells = Self {
+            size,
+            content: BTreeMap::new(),
+            all: Vec::new(),
+        };
         for &point in &all {
-            cells.content.entry(cells.cell(mesh.points[point as usize])).or_default().push(point);
+            cells
+                .content
+                .entry(cells.cell(mesh.points[point as usize]))
+                .or_default()
+                .push(point);
         }
         Some(Self { all, ..cells })
     }
@@ -86,16 +102,24 @@ impl Cells {
         let [from, to] = [edge.from, edge.to].map(|v| mesh.points[v as usize]);
         let (along, length) = (to - from, from.distance(to));
         let (low, high) = (self.cell(from.min(to) - within), self.cell(from.max(to) + within));
-        let extent: [i64; 3] = std::array::from_fn(|axis| high[axis].saturating_sub(low[axis]).saturating_add(1));
+        let extent: [i64; 3] =
+            std::array::from_fn(|axis| high[axis].saturating_sub(low[axis]).saturating_add(1));
         let n_cells = extent.iter().fold(1_i64, |n, &e| n.saturating_mul(e));
         let mut near: Vec<u32> = Vec::new();
         if n_cells > MAX_CELLS {
             near.extend(&self.all);
         } else {
             for i in 0..n_cells {
-                let step = [i % extent[0], i / extent[0] % extent[1], i / extent[0] / extent[1]];
+                let step = [
+                    i % extent[0],
+                    i / extent[0] % extent[1],
+                    i / extent[0] / extent[1],
+                ];
                 near.extend(
-                    self.content.get(&std::array::from_fn(|axis| low[axis] + step[axis])).into_iter().flatten(),
+                    self.content
+                        .get(&std::array::from_fn(|axis| low[axis] + step[axis]))
+                        .into_iter()
+                        .flatten(),
                 );
             }
         }
@@ -109,7 +133,8 @@ impl Cells {
         };
         let mut found: Vec<(f64, u32)> = near.into_iter().filter_map(place).collect();
         found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        // Where two lie in the same place along the edge, the surface is not divided but doubled: the first will do.
+        // Where two lie in the same place along the edge, the surface is not divided but doubled: the first
+        // will do.
         found.dedup_by(|later, earlier| (later.0 - earlier.0) * length <= within);
         found.into_iter().map(|(_, p)| p).collect()
     }

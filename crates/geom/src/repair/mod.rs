@@ -1,13 +1,14 @@
 //! Mending of surfaces without guessing: from a mesh as read to one solid body, with a word on every change.
 //!
-//! Mended is what has one right answer: points and triangles that stand there twice, triangles turned the wrong way,
-//! cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or smaller than a hundredth
-//! of the size, points where the surface pinches itself, specks, closed surfaces within others, parts that overlap, a
-//! surface that crosses itself. What would need a decision about the shape is refused with its place: larger holes,
-//! one-sided surfaces, several bodies apart from each other.
+//! Mended is what has one right answer: points and triangles that stand there twice, triangles turned the
+//! wrong way, cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or
+//! smaller than a hundredth of the size, points where the surface pinches itself, specks, closed surfaces
+//! within others, parts that overlap, a surface that crosses itself. What would need a decision about the
+//! shape is refused with its place: larger holes, one-sided surfaces, several bodies apart from each other.
 //!
-//! Each stage is a function from a draft to a draft and a [`Repair`] if it changed something. A mesh that is a solid as
-//! read, and does not cross itself, comes out as [`crate::check::into_solid`] makes it, bit by bit.
+//! Each stage is a function from a draft to a draft and a [`Repair`] if it changed something. A mesh that is
+//! a solid as read, and does not cross itself, comes out as [`crate::check::into_solid`] makes it, bit by
+//! bit.
 
 mod crossing;
 mod faces;
@@ -25,10 +26,12 @@ use crate::check::{InputError, check_points, inspect, inspect_edges, into_solid,
 use crate::weld::close;
 use crate::{Solid, TriMesh};
 
-/// Points nearer than this share of the model's diagonal are the same, where the surface is open between them: 2 µm on
-/// a model of 200 mm, a hundredth of what printers resolve, and ten times the steps of 32-bit coordinates.
+/// Points nearer than this share of the model's diagonal are the same, where the surface is open between
+/// them: 2 µm on a model of 200 mm, a hundredth of what printers resolve, and ten times the steps of 32-bit
+/// coordinates.
 const NEAR_SHARE: f64 = 1e-5;
-/// Holes smaller than this share of the model's diagonal are closed: 2 mm on a model of 200 mm, less than a wall.
+/// Holes smaller than this share of the model's diagonal are closed: 2 mm on a model of 200 mm, less than a
+/// wall.
 const HOLE_SHARE: f64 = 0.01;
 /// Bodies smaller than this share of the diagonal are specks, no parts of the model.
 const SPECK_SHARE: f64 = 0.01;
@@ -65,8 +68,8 @@ struct Draft {
 
 /// Makes one body of a mesh as read.
 ///
-/// Refuses what cannot be mended without guessing, by its state after what could be. O(n log n) but for overlaps, whose
-/// cost follows the pairs of triangles that cross.
+/// Refuses what cannot be mended without guessing, by its state after what could be. O(n log n) but for
+/// overlaps, whose cost follows the pairs of triangles that cross.
 pub fn mend(mesh: &TriMesh, mending: Mending) -> Result<Mended, InputError> {
     check_points(mesh)?;
     let as_read = into_solid(mesh);
@@ -74,32 +77,54 @@ pub fn mend(mesh: &TriMesh, mending: Mending) -> Result<Mended, InputError> {
     if let Ok((solid, source_face)) = as_read {
         let crossings = crossings(solid.mesh());
         if crossings.count == 0 {
-            return Ok(Mended { solid, source_face, repairs: Vec::new() });
+            return Ok(Mended {
+                solid,
+                source_face,
+                repairs: Vec::new(),
+            });
         }
         if mending == Mending::Refuse {
-            return Err(InputError::Crossing { count: crossings.count, at: crossings.first });
+            return Err(InputError::Crossing {
+                count: crossings.count,
+                at: crossings.first,
+            });
         }
-        let draft = Draft { mesh: solid.into_mesh(), source: source_face };
+        let draft = Draft {
+            mesh: solid.into_mesh(),
+            source: source_face,
+        };
         return finish(draft, Vec::new(), mending);
     }
     if mending == Mending::Refuse {
         as_read?;
     }
     let welded = close(mesh);
-    let mut draft = Draft { mesh: welded.mesh, source: welded.kept_face };
+    let mut draft = Draft {
+        mesh: welded.mesh,
+        source: welded.kept_face,
+    };
     if draft.mesh.triangles.is_empty() {
         return Err(InputError::Empty);
     }
     let n_collapsed = welded.n_collapsed;
     let mut repairs = Vec::new();
     // Cracks first, since they hide all else; holes last, since what closes them should not close a crack.
-    for stage in [near::merge, faces::drop_copies, junctions::join, faces::turn, holes::close] {
+    for stage in [
+        near::merge,
+        faces::drop_copies,
+        junctions::join,
+        faces::turn,
+        holes::close,
+    ] {
         repairs.extend(stage(&mut draft));
     }
     let mended = check_edges(&draft).and_then(|()| finish(draft, repairs, mending));
     // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
     match mended {
-        Err(_) if 100 * n_collapsed > n_faces => Err(InputError::Collapsed { count: n_collapsed, n_faces }),
+        Err(_) if 100 * n_collapsed > n_faces => Err(InputError::Collapsed {
+            count: n_collapsed,
+            n_faces,
+        }),
         mended => mended,
     }
 }
@@ -109,9 +134,16 @@ fn check_edges(draft: &Draft) -> Result<(), InputError> {
     let found = inspect(&draft.mesh);
     let turned = found.edges.turned;
     if turned.count > 0 {
-        return Err(InputError::OneSided { count: turned.count, at: turned.first });
+        return Err(InputError::OneSided {
+            count: turned.count,
+            at: turned.first,
+        });
     }
-    if found.edges.open.count > 0 { refuse(&found, draft.mesh.triangles.len(), 0) } else { Ok(()) }
+    if found.edges.open.count > 0 {
+        refuse(&found, draft.mesh.triangles.len(), 0)
+    } else {
+        Ok(())
+    }
 }
 
 /// From a closed surface to one body.
@@ -127,7 +159,11 @@ fn finish(mut draft: Draft, mut repairs: Vec<Repair>, mending: Mending) -> Resul
     }
     let (solid, kept) = into_solid(&draft.mesh)?;
     let source_face = kept.iter().map(|&face| draft.source[face as usize]).collect();
-    Ok(Mended { solid, source_face, repairs })
+    Ok(Mended {
+        solid,
+        source_face,
+        repairs,
+    })
 }
 
 impl Draft {

@@ -7,9 +7,11 @@ use crate::Vec3;
 use crate::check::open_edges;
 use crate::weld::reindex;
 
-/// Merges points on open edges within [`NEAR_SHARE`] of the diagonal; keeps the draft where that closes nothing.
+/// Merges points on open edges within [`NEAR_SHARE`] of the diagonal; keeps the draft where that closes
+/// nothing.
 ///
-/// A point goes to the first one near it that is not merged itself, so that rows of near points do not become one.
+/// A point goes to the first one near it that is not merged itself, so that rows of near points do not become
+/// one.
 pub(super) fn merge(draft: &mut Draft) -> Option<Repair> {
     let open = open_edges(&draft.mesh);
     if open.is_empty() {
@@ -25,8 +27,13 @@ pub(super) fn merge(draft: &mut Draft) -> Option<Repair> {
     let (mut count, mut at) = (0, Vec3::ZERO);
     for point in ends {
         let position = draft.mesh.points[point as usize];
-        let near = neighbours(cell(position, within)).filter_map(|c| standing.get(&c)).flatten();
-        let near = near.copied().filter(|&p| draft.mesh.points[p as usize].distance(position) <= within).min();
+        let near = neighbours(cell(position, within))
+            .filter_map(|c| standing.get(&c))
+            .flatten();
+        let near = near
+            .copied()
+            .filter(|&p| draft.mesh.points[p as usize].distance(position) <= within)
+            .min();
         match near {
             Some(other) => {
                 stands_for[point as usize] = other;
@@ -39,13 +46,24 @@ pub(super) fn merge(draft: &mut Draft) -> Option<Repair> {
         }
     }
     let merged = reindex(&draft.mesh, &stands_for);
-    let source = merged.kept_face.iter().map(|&face| draft.source[face as usize]).collect();
-    let merged = Draft { mesh: merged.mesh, source };
+    let source = merged
+        .kept_face
+        .iter()
+        .map(|&face| draft.source[face as usize])
+        .collect();
+    let merged = Draft {
+        mesh: merged.mesh,
+        source,
+    };
     if count == 0 || merged.mesh.triangles.is_empty() || merged.n_open() >= open.len() {
         return None;
     }
     *draft = merged;
-    Some(Repair { kind: RepairKind::Merged { within }, count, at })
+    Some(Repair {
+        kind: RepairKind::Merged { within },
+        count,
+        at,
+    })
 }
 
 fn cell(point: Vec3, size: f64) -> [i64; 3] {

@@ -88,10 +88,18 @@ impl fmt::Display for Repair {
         match self.kind {
             RepairKind::Merged { within } => {
                 let points = plural(n, "point was", "points were");
-                write!(f, "{points} merged with others within {} across cracks", Short(within))?;
+                write!(
+                    f,
+                    "{points} merged with others within {} across cracks",
+                    Short(within)
+                )?;
             }
             RepairKind::Copies => {
-                write!(f, "{} there twice and removed", plural(n, "triangle was", "triangles were"))?;
+                write!(
+                    f,
+                    "{} there twice and removed",
+                    plural(n, "triangle was", "triangles were")
+                )?;
             }
             RepairKind::Joined => {
                 write!(
@@ -101,21 +109,37 @@ impl fmt::Display for Repair {
                 )?;
             }
             RepairKind::Turned => {
-                write!(f, "{} the wrong way and turned", plural(n, "triangle faced", "triangles faced"))?;
+                write!(
+                    f,
+                    "{} the wrong way and turned",
+                    plural(n, "triangle faced", "triangles faced")
+                )?;
             }
             RepairKind::Closed { widest } => {
                 let holes = plural(n, "small hole was", "small holes were");
                 write!(f, "{holes} closed, up to {} wide", Short(widest))?;
             }
-            RepairKind::Everted => write!(f, "{} inside out and turned", plural(n, "body was", "bodies were"))?,
+            RepairKind::Everted => write!(
+                f,
+                "{} inside out and turned",
+                plural(n, "body was", "bodies were")
+            )?,
             RepairKind::Specks { longest } => {
                 let specks = plural(n, "speck was", "specks were");
                 write!(f, "{specks} left out, up to {} long", Short(longest))?;
             }
             RepairKind::United { before, after } => {
                 let pairs = plural(n, "pair of triangles", "pairs of triangles");
-                write!(f, "the surface crossed itself in {pairs}; overlapping parts were united, ")?;
-                write!(f, "and the enclosed volume went from {} to {}", Short(before), Short(after))?;
+                write!(
+                    f,
+                    "the surface crossed itself in {pairs}; overlapping parts were united, "
+                )?;
+                write!(
+                    f,
+                    "and the enclosed volume went from {} to {}",
+                    Short(before),
+                    Short(after)
+                )?;
             }
             RepairKind::Fused => write!(f, "{n} bodies, some of which touch with their faces, were united")?,
             RepairKind::Parted => {
@@ -125,9 +149,16 @@ impl fmt::Display for Repair {
             RepairKind::Filled { volume } => {
                 let cavities = plural(n, "closed surface", "closed surfaces");
                 let volume = Short(volume);
-                write!(f, "{cavities} inside the body, {volume} in volume, left out: pieces are hollow anyway")?;
+                write!(
+                    f,
+                    "{cavities} inside the body, {volume} in volume, left out: pieces are hollow anyway"
+                )?;
             }
-            RepairKind::LeftOut => write!(f, "{} left out", plural(n, "smaller body was", "smaller bodies were"))?,
+            RepairKind::LeftOut => write!(
+                f,
+                "{} left out",
+                plural(n, "smaller body was", "smaller bodies were")
+            )?,
         }
         write!(f, "; first near {}", Coordinates(self.at))
     }

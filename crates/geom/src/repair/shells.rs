@@ -4,7 +4,8 @@ use super::{Draft, Repair, RepairKind, SPECK_SHARE};
 use crate::check::components;
 use crate::{Aabb, TriMesh, Vec3};
 
-/// Solid angles that are summed to see what lies in what, a second's work; beyond that nothing is turned or left out.
+/// Solid angles that are summed to see what lies in what, a second's work; beyond that nothing is turned or
+/// left out.
 const MAX_WORK: usize = 20_000_000;
 
 /// Leaves out bodies that are much smaller than the largest.
@@ -12,8 +13,17 @@ pub(super) fn drop_specks(draft: &mut Draft) -> Option<Repair> {
     let shells = Shells::of(&draft.mesh);
     let size = |shell: &Shell| shell.bounds.diagonal();
     let largest = shells.all.iter().map(size).fold(0.0, f64::max);
-    let is_speck: Vec<bool> = shells.all.iter().map(|s| size(s) < SPECK_SHARE * largest).collect();
-    let longest = shells.all.iter().map(size).filter(|&d| d < SPECK_SHARE * largest).fold(0.0, f64::max);
+    let is_speck: Vec<bool> = shells
+        .all
+        .iter()
+        .map(|s| size(s) < SPECK_SHARE * largest)
+        .collect();
+    let longest = shells
+        .all
+        .iter()
+        .map(size)
+        .filter(|&d| d < SPECK_SHARE * largest)
+        .fold(0.0, f64::max);
     shells.leave_out(draft, &is_speck, RepairKind::Specks { longest })
 }
 
@@ -22,8 +32,9 @@ pub(super) fn turn_outwards(draft: &mut Draft) -> Option<Repair> {
     let shells = Shells::of(&draft.mesh);
     let within = shells.containers(&draft.mesh)?;
     let is_everted = |s: usize| within[s].is_empty() && shells.all[s].volume < 0.0;
-    let is_turned: Vec<bool> =
-        (0..shells.all.len()).map(|s| is_everted(s) || within[s].iter().any(|&outer| is_everted(outer))).collect();
+    let is_turned: Vec<bool> = (0..shells.all.len())
+        .map(|s| is_everted(s) || within[s].iter().any(|&outer| is_everted(outer)))
+        .collect();
     let first = is_turned.iter().position(|turned| *turned)?;
     for (triangle, &shell) in draft.mesh.triangles.iter_mut().zip(&shells.of_face) {
         if is_turned[shell as usize] {
@@ -31,7 +42,11 @@ pub(super) fn turn_outwards(draft: &mut Draft) -> Option<Repair> {
         }
     }
     let count = is_turned.iter().filter(|turned| **turned).count();
-    Some(Repair { kind: RepairKind::Everted, count, at: shells.all[first].bounds.center() })
+    Some(Repair {
+        kind: RepairKind::Everted,
+        count,
+        at: shells.all[first].bounds.center(),
+    })
 }
 
 /// Leaves out closed surfaces that lie within others, whichever way they face. Nothing may cross.
@@ -39,7 +54,11 @@ pub(super) fn turn_outwards(draft: &mut Draft) -> Option<Repair> {
 /// A cavity does not show from outside, and pieces are hollow anyway; a body within a body is not even there.
 pub(super) fn fill_cavities(draft: &mut Draft) -> Option<Repair> {
     let shells = Shells::of(&draft.mesh);
-    let is_inner: Vec<bool> = shells.containers(&draft.mesh)?.iter().map(|within| !within.is_empty()).collect();
+    let is_inner: Vec<bool> = shells
+        .containers(&draft.mesh)?
+        .iter()
+        .map(|within| !within.is_empty())
+        .collect();
     let inner = shells.all.iter().zip(&is_inner).filter(|(_, inner)| **inner);
     let volume = inner.map(|(shell, _)| shell.volume.abs()).sum();
     shells.leave_out(draft, &is_inner, RepairKind::Filled { volume })
@@ -48,7 +67,9 @@ pub(super) fn fill_cavities(draft: &mut Draft) -> Option<Repair> {
 /// Leaves out all but the body of the largest volume.
 pub(super) fn keep_largest(draft: &mut Draft) -> Option<Repair> {
     let shells = Shells::of(&draft.mesh);
-    let largest = (0..shells.all.len()).rev().max_by(|&s, &t| shells.all[s].volume.total_cmp(&shells.all[t].volume))?;
+    let largest = (0..shells.all.len())
+        .rev()
+        .max_by(|&s, &t| shells.all[s].volume.total_cmp(&shells.all[t].volume))?;
     let is_left_out: Vec<bool> = (0..shells.all.len()).map(|s| s != largest).collect();
     shells.leave_out(draft, &is_left_out, RepairKind::LeftOut)
 }
@@ -85,7 +106,10 @@ impl Shells {
             shell.bounds = shell.bounds.union(Aabb::around(corners));
             shell.n_faces += 1;
         }
-        Self { all: all.into_iter().flatten().collect(), of_face }
+        Self {
+            all: all.into_iter().flatten().collect(),
+            of_face,
+        }
     }
 
     /// For each shell those around it, judged by one of its corners; `None` where that is too much work.
@@ -102,16 +126,22 @@ impl Shells {
         if n.saturating_mul(n) > MAX_WORK {
             return None;
         }
-        let pairs: Vec<(usize, usize)> =
-            (0..n).flat_map(|s| (0..n).map(move |t| (s, t))).filter(|&(s, t)| may_hold(s, t)).collect();
+        let pairs: Vec<(usize, usize)> = (0..n)
+            .flat_map(|s| (0..n).map(move |t| (s, t)))
+            .filter(|&(s, t)| may_hold(s, t))
+            .collect();
         if pairs.iter().map(|&(_, t)| self.all[t].n_faces).sum::<usize>() > MAX_WORK {
             return None;
         }
         let mut faces = vec![Vec::new(); n];
-        (0..).zip(&self.of_face).for_each(|(face, &shell): (usize, _)| faces[shell as usize].push(face));
+        (0..)
+            .zip(&self.of_face)
+            .for_each(|(face, &shell): (usize, _)| faces[shell as usize].push(face));
         for (s, t) in pairs {
-            let winding: f64 =
-                faces[t].iter().map(|&face| solid_angle(mesh.corners(face), self.all[s].point)).sum::<f64>();
+            let winding: f64 = faces[t]
+                .iter()
+                .map(|&face| solid_angle(mesh.corners(face), self.all[s].point))
+                .sum::<f64>();
             if winding.abs() > std::f64::consts::TAU {
                 within[s].push(t);
             }
@@ -121,15 +151,23 @@ impl Shells {
 
     fn leave_out(&self, draft: &mut Draft, is_left_out: &[bool], kind: RepairKind) -> Option<Repair> {
         let first = is_left_out.iter().position(|out| *out)?;
-        let is_kept: Vec<bool> = self.of_face.iter().map(|&shell| !is_left_out[shell as usize]).collect();
+        let is_kept: Vec<bool> = self
+            .of_face
+            .iter()
+            .map(|&shell| !is_left_out[shell as usize])
+            .collect();
         draft.retain(&is_kept);
         let count = is_left_out.iter().filter(|out| **out).count();
-        Some(Repair { kind, count, at: self.all[first].bounds.center() })
+        Some(Repair {
+            kind,
+            count,
+            at: self.all[first].bounds.center(),
+        })
     }
 }
 
-/// Signed solid angle of a triangle seen from `q`, in steradians, in [−2π, 2π]; over a closed mesh they sum to ±4π at a
-/// point inside and 0 outside. [VanOosterom1983]
+/// Signed solid angle of a triangle seen from `q`, in steradians, in [−2π, 2π]; over a closed mesh they sum
+/// to ±4π at a point inside and 0 outside. [VanOosterom1983]
 fn solid_angle(corners: [Vec3; 3], q: Vec3) -> f64 {
     let [a, b, c] = corners.map(|p| p - q);
     let (la, lb, lc) = (a.length(), b.length(), c.length());

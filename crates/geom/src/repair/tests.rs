@@ -5,37 +5,65 @@ use crate::{Aabb, Vec3, Volume};
 /// A ball of 4 · 4ⁿ·2 triangles, outwards.
 fn ball(center: Vec3, radius: f64, n: u32) -> TriMesh {
     let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    let triangles = vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let triangles = vec![
+        [0, 2, 4],
+        [2, 1, 4],
+        [1, 3, 4],
+        [3, 0, 4],
+        [2, 0, 5],
+        [1, 2, 5],
+        [3, 1, 5],
+        [0, 3, 5],
+    ];
     let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
     for _ in 0..n {
         let topology = crate::Topology::new(&solid);
         solid = crate::subdivide::halve_edges(&solid, &topology, |_, _| true).0;
     }
     let mut mesh = solid.into_mesh();
-    mesh.points.iter_mut().for_each(|p| *p = center + radius * p.normalize());
+    mesh.points
+        .iter_mut()
+        .for_each(|p| *p = center + radius * p.normalize());
     mesh
 }
 
 fn cube(at: Vec3, size: f64) -> TriMesh {
-    Volume::cuboid(Aabb { min: at, max: at + size }).to_mesh()
+    Volume::cuboid(Aabb {
+        min: at,
+        max: at + size,
+    })
+    .to_mesh()
 }
 
 fn repaired(mesh: &TriMesh) -> Mended {
     mend(mesh, Mending::Repair).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Mends, and asserts what was done how often, that the volume is right, and that nothing is done without leave.
+/// Mends, and asserts what was done how often, that the volume is right, and that nothing is done without
+/// leave.
 fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Mended {
     let mended = repaired(mesh);
     let done: Vec<(&str, usize)> = mended.repairs.iter().map(|r| (r.kind.code(), r.count)).collect();
     assert_eq!(done, codes, "{:?}", mended.repairs);
-    assert!((mended.solid.volume() - volume).abs() < 1e-6 * volume, "{} is not {volume}", mended.solid.volume());
+    assert!(
+        (mended.solid.volume() - volume).abs() < 1e-6 * volume,
+        "{} is not {volume}",
+        mended.solid.volume()
+    );
     assert_eq!(mended.source_face.len(), mended.solid.mesh().triangles.len());
-    assert!(mended.source_face.iter().all(|&f| (f as usize) < mesh.triangles.len()));
+    assert!(
+        mended
+            .source_face
+            .iter()
+            .all(|&f| (f as usize) < mesh.triangles.len())
+    );
     assert!(mend(mesh, Mending::Refuse).is_err());
     // What was mended needs no mending.
     let again = repaired(mended.solid.mesh());
-    assert_eq!((again.repairs.len(), again.solid.mesh()), (0, mended.solid.mesh()));
+    assert_eq!(
+        (again.repairs.len(), again.solid.mesh()),
+        (0, mended.solid.mesh())
+    );
     mended
 }
 
@@ -58,15 +86,31 @@ fn a_sound_mesh_comes_out_bit_by_bit_with_leave_or_without() {
 #[test]
 fn cracks_are_closed_and_gaps_are_not() {
     let mut cracked = unwelded(&base());
-    let move_by =
-        |i: usize, by: f64| by * Vec3::new(((7 * i) % 11) as f64 - 5.0, ((5 * i) % 7) as f64 - 3.0, (i % 3) as f64);
-    cracked.points.iter_mut().enumerate().for_each(|(i, p)| *p += move_by(i, 1e-6));
+    let move_by = |i: usize, by: f64| {
+        by * Vec3::new(
+            ((7 * i) % 11) as f64 - 5.0,
+            ((5 * i) % 7) as f64 - 3.0,
+            (i % 3) as f64,
+        )
+    };
+    cracked
+        .points
+        .iter_mut()
+        .enumerate()
+        .for_each(|(i, p)| *p += move_by(i, 1e-6));
     let mended = repaired(&cracked);
     assert_eq!(mended.repairs[0].kind.code(), "points-merged");
     assert!((mended.solid.volume() / base().signed_volume() - 1.0).abs() < 1e-5);
     assert_eq!(mended.solid.mesh().points.len(), base().points.len());
-    cracked.points.iter_mut().enumerate().for_each(|(i, p)| *p += move_by(i, 1e-3));
-    assert!(matches!(mend(&cracked, Mending::Repair), Err(InputError::Loose { .. })));
+    cracked
+        .points
+        .iter_mut()
+        .enumerate()
+        .for_each(|(i, p)| *p += move_by(i, 1e-3));
+    assert!(matches!(
+        mend(&cracked, Mending::Repair),
+        Err(InputError::Loose { .. })
+    ));
 }
 
 #[test]
@@ -93,7 +137,11 @@ fn turned_triangles_are_turned_back_and_bodies_inside_out_too() {
     assert_mended(&flipped(base()), &[("body-turned", 1)], base().signed_volume());
     let mut most = flipped(base());
     most.triangles.iter_mut().step_by(3).for_each(|t| t.swap(0, 1));
-    assert_mended(&most, &[("triangles-turned", n), ("body-turned", 1)], base().signed_volume());
+    assert_mended(
+        &most,
+        &[("triangles-turned", n), ("body-turned", 1)],
+        base().signed_volume(),
+    );
 }
 
 #[test]
@@ -102,7 +150,9 @@ fn corners_on_edges_are_joined() {
     // Every twentieth triangle is divided on its first side, its neighbour is not.
     for face in (0..divided.triangles.len()).step_by(20) {
         let [a, b, c] = divided.triangles[face];
-        divided.points.push(0.6 * divided.points[a as usize] + 0.4 * divided.points[b as usize]);
+        divided
+            .points
+            .push(0.6 * divided.points[a as usize] + 0.4 * divided.points[b as usize]);
         let m = divided.points.len() as u32 - 1;
         divided.triangles[face] = [a, m, c];
         divided.triangles.push([m, b, c]);
@@ -128,8 +178,16 @@ fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_th
     assert_eq!(mended.repairs[0].kind.code(), "holes-closed");
     assert!((mended.solid.volume() / fine.signed_volume() - 1.0).abs() < 1e-5);
     let refused = mend(&around(&base(), 100), Mending::Repair).unwrap_err();
-    assert!(matches!(refused, InputError::Open { n_holes: 1, .. }), "{refused}");
-    assert!(refused.to_string().contains("1 hole (6 open edges), first near ("), "{refused}");
+    assert!(
+        matches!(refused, InputError::Open { n_holes: 1, .. }),
+        "{refused}"
+    );
+    assert!(
+        refused
+            .to_string()
+            .contains("1 hole (6 open edges), first near ("),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -141,14 +199,30 @@ fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() 
     );
     let edge = both(cube(Vec3::ZERO, 1.0), cube(Vec3::new(1.0, 1.0, 0.0), 1.0));
     let refused = mend(&unwelded(&edge), Mending::Repair).unwrap_err();
-    assert!(matches!(&refused, InputError::Bodies(b) if b.len() == 2), "{refused}");
-    assert!((mend(&unwelded(&edge), Mending::KeepLargest).unwrap().solid.volume() - 1.0).abs() < 1e-12);
+    assert!(
+        matches!(&refused, InputError::Bodies(b) if b.len() == 2),
+        "{refused}"
+    );
+    assert!(
+        (mend(&unwelded(&edge), Mending::KeepLargest)
+            .unwrap()
+            .solid
+            .volume()
+            - 1.0)
+            .abs()
+            < 1e-12
+    );
     // A point of the far side drawn to one of the near side.
     let mut pinched = base();
     let (near, far) = (pinched.triangles[0][0], pinched.triangles[300][0]);
     pinched.points[far as usize] = pinched.points[near as usize];
     let mended = repaired(&unwelded(&pinched));
-    assert!(mended.repairs.iter().any(|r| matches!(r.kind, RepairKind::Parted | RepairKind::United { .. })));
+    assert!(
+        mended
+            .repairs
+            .iter()
+            .any(|r| matches!(r.kind, RepairKind::Parted | RepairKind::United { .. }))
+    );
 }
 
 #[test]
@@ -158,9 +232,17 @@ fn specks_inner_bodies_and_cavities_are_left_out() {
     let specks = (0..20).fold(base(), |mesh, i| both(mesh, speck(i)));
     assert_mended(&specks, &[("specks-removed", 20)], volume);
     let inner = ball(Vec3::new(4.0, -2.0, 1.0), 3.0, 2);
-    assert_mended(&both(base(), flipped(inner.clone())), &[("cavities-filled", 1)], volume);
+    assert_mended(
+        &both(base(), flipped(inner.clone())),
+        &[("cavities-filled", 1)],
+        volume,
+    );
     assert_mended(&both(base(), inner.clone()), &[("cavities-filled", 1)], volume);
-    assert_mended(&both(flipped(base()), inner), &[("body-turned", 2), ("cavities-filled", 1)], volume);
+    assert_mended(
+        &both(flipped(base()), inner),
+        &[("body-turned", 2), ("cavities-filled", 1)],
+        volume,
+    );
 }
 
 #[test]
@@ -170,7 +252,14 @@ fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enoug
     let union = union[0].union(&union[1]).volume();
     let mended = repaired(&both(base(), other));
     assert!((mended.solid.volume() - union).abs() < 1e-6 * union);
-    assert!(matches!(mended.repairs[..], [Repair { kind: RepairKind::United { .. }, count: 1.., .. }]));
+    assert!(matches!(
+        mended.repairs[..],
+        [Repair {
+            kind: RepairKind::United { .. },
+            count: 1..,
+            ..
+        }]
+    ));
     // Each triangle lies on the one that it is a part of.
     let as_read = both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3));
     for (face, &source) in mended.source_face.iter().enumerate() {
@@ -181,7 +270,10 @@ fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enoug
     let apart = both(base(), ball(Vec3::new(40.0, 0.0, 0.0), 6.0, 2));
     assert!(matches!(mend(&apart, Mending::Repair), Err(InputError::Bodies(bodies)) if bodies.len() == 2));
     let largest = mend(&apart, Mending::KeepLargest).unwrap();
-    assert_eq!((largest.solid.mesh(), largest.repairs[0].kind), (&base(), RepairKind::LeftOut));
+    assert_eq!(
+        (largest.solid.mesh(), largest.repairs[0].kind),
+        (&base(), RepairKind::LeftOut)
+    );
 }
 
 #[test]
@@ -197,10 +289,20 @@ fn bodies_that_touch_with_faces_are_united() {
 fn a_surface_pushed_through_itself_is_found_and_resolved() {
     let mut pushed = base();
     // A cap of the ball goes through to beyond the other side.
-    pushed.points.iter_mut().filter(|p| p.z > 9.0).for_each(|p| *p += Vec3::new(0.37, -0.21, -19.0));
+    pushed
+        .points
+        .iter_mut()
+        .filter(|p| p.z > 9.0)
+        .for_each(|p| *p += Vec3::new(0.37, -0.21, -19.0));
     let found = crossings(&pushed);
     assert!(found.count > 10, "{found:?}");
-    assert_eq!(mend(&pushed, Mending::Refuse), Err(InputError::Crossing { count: found.count, at: found.first }));
+    assert_eq!(
+        mend(&pushed, Mending::Refuse),
+        Err(InputError::Crossing {
+            count: found.count,
+            at: found.first
+        })
+    );
     match mend(&pushed, Mending::Repair) {
         Ok(mended) => assert_eq!(crossings(mended.solid.mesh()).count, 0),
         Err(error) => assert!(matches!(error, InputError::Bodies(_)), "{error}"),
@@ -217,14 +319,22 @@ fn one_sided_surfaces_soups_and_flat_things_are_refused() {
     let mut points = Vec::new();
     for i in 0..n {
         for j in 0..m {
-            let (u, v) = (f64::from(i) / f64::from(n), std::f64::consts::TAU * f64::from(j) / f64::from(m));
+            let (u, v) = (
+                f64::from(i) / f64::from(n),
+                std::f64::consts::TAU * f64::from(j) / f64::from(m),
+            );
             let (s, c) = (std::f64::consts::TAU * u).sin_cos();
             let (s2, c2) = (std::f64::consts::PI * u).sin_cos();
             let r = 5.0 + c2 * v.sin() - s2 * (2.0 * v).sin();
-            points.push(Vec3::new(r * c, r * s, s2 * v.sin() + c2 * (2.0 * v).sin() + 0.1 * v));
+            points.push(Vec3::new(
+                r * c,
+                r * s,
+                s2 * v.sin() + c2 * (2.0 * v).sin() + 0.1 * v,
+            ));
         }
     }
-    let quads = (0..n).flat_map(|i| (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
+    let quads =
+        (0..n).flat_map(|i| (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
     let triangles = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     let refused = mend(&TriMesh { points, triangles }, Mending::Repair).unwrap_err();
     assert!(matches!(refused, InputError::OneSided { .. }), "{refused}");
@@ -235,8 +345,14 @@ fn one_sided_surfaces_soups_and_flat_things_are_refused() {
             .collect(),
         triangles: (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
     };
-    assert!(matches!(mend(&soup, Mending::Repair), Err(InputError::Loose { .. })));
-    let flat = TriMesh { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2], [0, 2, 1]] };
+    assert!(matches!(
+        mend(&soup, Mending::Repair),
+        Err(InputError::Loose { .. })
+    ));
+    let flat = TriMesh {
+        points: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        triangles: vec![[0, 1, 2], [0, 2, 1]],
+    };
     assert_eq!(mend(&flat, Mending::Repair), Err(InputError::Flat));
     assert_eq!(mend(&TriMesh::default(), Mending::Repair), Err(InputError::Empty));
 }
@@ -255,18 +371,45 @@ fn repairs_say_what_how_many_and_where() {
     let mut three = base();
     three.triangles.swap_remove(17);
     let text = repaired(&three).repairs[0].to_string();
-    assert!(text.starts_with("1 small hole was closed, up to ") && text.contains("; first near ("), "{text}");
+    assert!(
+        text.starts_with("1 small hole was closed, up to ") && text.contains("; first near ("),
+        "{text}"
+    );
 }
 
 /// Found by fuzzing: from some points all rays that the library casts along axes and diagonals meet edges.
 #[test]
 fn tetrahedra_on_whole_numbers_are_united() {
-    let points = [[4, 2, 2], [0, 2, 0], [0, 0, 2], [3, 1, 1], [1, 1, 1], [2, 3, 2], [1, 3, 1], [1, 1, 3]];
-    let points = points.map(|p: [i8; 3]| Vec3::from_array(p.map(f64::from))).to_vec();
-    let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 1, 2], [0, 3, 2], [4, 7, 6], [7, 5, 6], [5, 6, 4], [4, 7, 6]];
+    let points = [
+        [4, 2, 2],
+        [0, 2, 0],
+        [0, 0, 2],
+        [3, 1, 1],
+        [1, 1, 1],
+        [2, 3, 2],
+        [1, 3, 1],
+        [1, 1, 3],
+    ];
+    let points = points
+        .map(|p: [i8; 3]| Vec3::from_array(p.map(f64::from)))
+        .to_vec();
+    let triangles = vec![
+        [0, 2, 1],
+        [0, 1, 3],
+        [1, 1, 2],
+        [0, 3, 2],
+        [4, 7, 6],
+        [7, 5, 6],
+        [5, 6, 4],
+        [4, 7, 6],
+    ];
     let mended = repaired(&TriMesh { points, triangles });
     let bounds = mended.solid.mesh().bounds();
     assert_eq!((bounds.min, bounds.max), (Vec3::ZERO, Vec3::new(4.0, 3.0, 3.0)));
     // 2 and 2/3, of which 1/120 is common.
-    assert!((mended.solid.volume() - 319.0 / 120.0).abs() < 1e-12, "{}", mended.solid.volume());
+    assert!(
+        (mended.solid.volume() - 319.0 / 120.0).abs() < 1e-12,
+        "{}",
+        mended.solid.volume()
+    );
 }

@@ -1,30 +1,32 @@
-//! The flat triangle with six degrees of freedom a node: Felippa's optimal membrane and the discrete Kirchhoff plate.
+//! The flat triangle with six degrees of freedom a node: Felippa's optimal membrane and the discrete
+//! Kirchhoff plate.
 //!
-//! Both are written as strains that are linear in the 18 displacements u of the three nodes, at points of the triangle
-//! with weights: K = Σ w Bᵀ C B. Strains are (ε_x, ε_y, γ_xy) in the triangle's frame, x along the first edge, z along
-//! the normal.
+//! Both are written as strains that are linear in the 18 displacements u of the three nodes, at points of the
+//! triangle with weights: K = Σ w Bᵀ C B. Strains are (ε_x, ε_y, γ_xy) in the triangle's frame, x along the
+//! first edge, z along the normal.
 //!
-//! Membrane (C. Felippa, A study of optimal membrane triangles with drilling freedoms, 2003): the mean strains, in
-//! which drilling rotations bend the edges as in Allman's triangle, and, at the middles of the edges, the strains of
-//! bending in the plane, which the rotations relative to that of the whole triangle cause. Bending (J.-L. Batoz, K.-J.
-//! Bathe, L.-W. Ho, A study of three-node triangular plate bending elements, 1980): the slope β of the normal is
-//! linear and, along each edge, bulges so that no shear is left there; nodes in the middles of edges never appear.
+//! Membrane (C. Felippa, A study of optimal membrane triangles with drilling freedoms, 2003): the mean
+//! strains, in which drilling rotations bend the edges as in Allman's triangle, and, at the middles of the
+//! edges, the strains of bending in the plane, which the rotations relative to that of the whole triangle
+//! cause. Bending (J.-L. Batoz, K.-J. Bathe, L.-W. Ho, A study of three-node triangular plate bending
+//! elements, 1980): the slope β of the normal is linear and, along each edge, bulges so that no shear is left
+//! there; nodes in the middles of edges never appear.
 //!
-//! All strains of rigid motions are 0, and those of constant strain or curvature exact, whatever the two shares below
-//! are.
+//! All strains of rigid motions are 0, and those of constant strain or curvature exact, whatever the two
+//! shares below are.
 
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector3};
 use shellock_geom::Vec3;
 
-/// Rows: strains or curvatures. Columns: displacement and rotation of the first node, then of the second and the
-/// third.
+/// Rows: strains or curvatures. Columns: displacement and rotation of the first node, then of the second and
+/// the third.
 pub(super) type Strains = SMatrix<f64, 3, 18>;
 
 /// Stiffness between the nodes' displacements and rotations.
 pub(super) type Stiffness = SMatrix<f64, 18, 18>;
 
-/// Share of the drilling rotations in the mean strain, α_b: 3/2, that of Allman's triangle, the best in bending in the
-/// plane.
+/// Share of the drilling rotations in the mean strain, α_b: 3/2, that of Allman's triangle, the best in
+/// bending in the plane.
 const DRILLING_SHARE: f64 = 1.5;
 
 /// The edges by the nodes at their ends, each after the node opposite.
@@ -32,10 +34,10 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 /// Share of the stiffness in bending in the plane, β_0, which is what holds the drilling rotations.
 ///
-/// (1 − 4ν²) / 2, Felippa's, makes rectangles exact in the plane, but stops curved shells from bending without
-/// stretching: a hemisphere with 8 elements a quarter edge reaches 0.49 of its displacement, with this value 0.92.
-/// What it costs is 2 % too much in a beam two elements wide, 10 % in one a single element wide. At 0.001 the
-/// hemisphere reaches 0.96.
+/// (1 − 4ν²) / 2, Felippa's, makes rectangles exact in the plane, but stops curved shells from bending
+/// without stretching: a hemisphere with 8 elements a quarter edge reaches 0.49 of its displacement, with
+/// this value 0.92. What it costs is 2 % too much in a beam two elements wide, 10 % in one a single element
+/// wide. At 0.001 the hemisphere reaches 0.96.
 const IN_PLANE_BENDING_SHARE: f64 = 0.02;
 
 /// How a triangle's stresses follow from displacements.
@@ -65,12 +67,21 @@ impl Plane {
         let y_axis = normal.cross(x_axis);
         let center = (a + b + c) / 3.0;
         let corners = corners.map(|p| [(p - center).dot(x_axis), (p - center).dot(y_axis)]);
-        Self { x_axis, y_axis, normal, corners, area: 0.5 * doubled.length() }
+        Self {
+            x_axis,
+            y_axis,
+            normal,
+            corners,
+            area: 0.5 * doubled.length(),
+        }
     }
 
     /// From corner i to corner j.
     fn edge(&self, [i, j]: [usize; 2]) -> [f64; 2] {
-        [self.corners[j][0] - self.corners[i][0], self.corners[j][1] - self.corners[i][1]]
+        [
+            self.corners[j][0] - self.corners[i][0],
+            self.corners[j][1] - self.corners[i][1],
+        ]
     }
 
     /// Gradients of the barycentric coordinates, 1/mm.
@@ -116,7 +127,13 @@ impl Element {
             (middle[i], middle[j]) = (0.5, 0.5);
             of_bending += quadratic(&curvatures(&plane, middle), elasticity, plane.area / 36.0);
         }
-        (Self { membrane, curvature: curvatures(&plane, [1.0 / 3.0; 3]) }, [of_membrane, of_bending])
+        (
+            Self {
+                membrane,
+                curvature: curvatures(&plane, [1.0 / 3.0; 3]),
+            },
+            [of_membrane, of_bending],
+        )
     }
 }
 
@@ -124,8 +141,8 @@ fn quadratic(strains: &Strains, elasticity: &Matrix3<f64>, weight: f64) -> Stiff
     strains.tr_mul(&(elasticity * strains * weight))
 }
 
-/// Mean strains: those of the corners' displacements, and of the edges, which the drilling rotations bend outwards or
-/// inwards.
+/// Mean strains: those of the corners' displacements, and of the edges, which the drilling rotations bend
+/// outwards or inwards.
 fn mean_strains(plane: &Plane) -> Strains {
     let mut strains = Strains::zeros();
     for (i, g) in plane.gradients().into_iter().enumerate() {
@@ -142,9 +159,13 @@ fn mean_strains(plane: &Plane) -> Strains {
 
 /// Strains at the middles of the edges from the rotations of the corners relative to that of the triangle.
 fn in_plane_bending_strains(plane: &Plane) -> [Strains; 3] {
-    let whole = plane.gradients().into_iter().enumerate().fold(SVector::zeros(), |sum, (i, [x, y])| {
-        sum + Plane::form(&[(i, (plane.y_axis * x - plane.x_axis * y) * 0.5, Vec3::ZERO)])
-    });
+    let whole = plane
+        .gradients()
+        .into_iter()
+        .enumerate()
+        .fold(SVector::zeros(), |sum, (i, [x, y])| {
+            sum + Plane::form(&[(i, (plane.y_axis * x - plane.x_axis * y) * 0.5, Vec3::ZERO)])
+        });
     let relative = [0, 1, 2].map(|i| Plane::form(&[(i, Vec3::ZERO, plane.normal)]) - whole);
     let sum = relative[0] + relative[1] + relative[2];
     // From strains along the edges to those along the axes.
@@ -191,5 +212,9 @@ fn curvatures(plane: &Plane, at: [f64; 3]) -> Strains {
 
 /// Strain of a displacement along `direction` whose size has gradient `g`.
 fn outer(g: [f64; 2], direction: [f64; 2]) -> Vector3<f64> {
-    Vector3::new(g[0] * direction[0], g[1] * direction[1], g[0] * direction[1] + g[1] * direction[0])
+    Vector3::new(
+        g[0] * direction[0],
+        g[1] * direction[1],
+        g[0] * direction[1] + g[1] * direction[0],
+    )
 }

@@ -1,12 +1,13 @@
-//! Nodes that hold in the mean: the reaction that balances a load, and the rigid motion left in a displacement.
+//! Nodes that hold in the mean: the reaction that balances a load, and the rigid motion left in a
+//! displacement.
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
 use shellock_geom::{Aabb, Vec3};
 
 use super::DOFS;
 
-/// Least eigenvalue of a region's inertia over the greatest, with lengths in units of its size, below which it is a
-/// line.
+/// Least eigenvalue of a region's inertia over the greatest, with lengths in units of its size, below which
+/// it is a line.
 const MIN_INERTIA: f64 = 1e-10;
 
 /// Weighted nodes with the inertia of their rigid motions.
@@ -25,9 +26,16 @@ impl Region {
         let at = |&v: &u32| points[v as usize];
         let weights: Vec<f64> = nodes.iter().map(|&v| areas[v as usize]).collect();
         let total: f64 = weights.iter().sum();
-        let center = nodes.iter().zip(&weights).map(|(v, w)| at(v) * (w / total)).sum::<Vec3>();
-        let mean_sq =
-            nodes.iter().zip(&weights).map(|(v, w)| (at(v) - center).length_squared() * (w / total)).sum::<f64>();
+        let center = nodes
+            .iter()
+            .zip(&weights)
+            .map(|(v, w)| at(v) * (w / total))
+            .sum::<Vec3>();
+        let mean_sq = nodes
+            .iter()
+            .zip(&weights)
+            .map(|(v, w)| (at(v) - center).length_squared() * (w / total))
+            .sum::<f64>();
         let size = mean_sq.sqrt();
         if size == 0.0 {
             return None;
@@ -44,7 +52,13 @@ impl Region {
         let is_solid = eigenvalues.min() > MIN_INERTIA * eigenvalues.max();
         let weights = weights.into_iter().map(|w| w / total).collect();
         let inertia = inertia.cholesky().filter(|_| is_solid)?;
-        Some(Self { nodes, weights, center, size, inertia })
+        Some(Self {
+            nodes,
+            weights,
+            center,
+            size,
+            inertia,
+        })
     }
 
     fn arm(&self, point: Vec3) -> Vec3 {
@@ -74,9 +88,13 @@ impl Region {
 
     /// Moves `nodes` as a rigid body so that the region's mean displacement and rotation vanish.
     pub(super) fn settle(&self, nodes: &[u32], points: &[Vec3], displacements: &mut [f64]) {
-        let moved = self.nodes.iter().zip(&self.weights).fold(Vector6::zeros(), |sum, (&v, w)| {
-            sum + wrench(part(displacements, v, 0) * *w, self.arm(points[v as usize]))
-        });
+        let moved = self
+            .nodes
+            .iter()
+            .zip(&self.weights)
+            .fold(Vector6::zeros(), |sum, (&v, w)| {
+                sum + wrench(part(displacements, v, 0) * *w, self.arm(points[v as usize]))
+            });
         let motion = -self.inertia.solve(&moved);
         let turn = Vec3::new(motion[3], motion[4], motion[5]) / self.size;
         for &v in nodes {
@@ -86,7 +104,10 @@ impl Region {
     }
 
     fn moved(&self, motion: &Vector6<f64>, point: Vec3) -> Vec3 {
-        let (shift, turn) = (Vec3::new(motion[0], motion[1], motion[2]), Vec3::new(motion[3], motion[4], motion[5]));
+        let (shift, turn) = (
+            Vec3::new(motion[0], motion[1], motion[2]),
+            Vec3::new(motion[3], motion[4], motion[5]),
+        );
         shift + turn.cross(self.arm(point))
     }
 }
@@ -100,7 +121,11 @@ pub(super) fn holds(nodes: &[u32], points: &[Vec3], is_held: &[bool]) -> bool {
         let axes = [Vec3::X, Vec3::Y, Vec3::Z];
         let of_moves = axes.map(|axis| wrench(axis, arm));
         let of_turns = axes.map(|axis| Vector6::new(0.0, 0.0, 0.0, axis.x, axis.y, axis.z));
-        for (form, is_held) in of_moves.into_iter().chain(of_turns).zip(&is_held[v as usize * DOFS..]) {
+        for (form, is_held) in of_moves
+            .into_iter()
+            .chain(of_turns)
+            .zip(&is_held[v as usize * DOFS..])
+        {
             if *is_held {
                 stopped += form * form.transpose();
             }
@@ -120,7 +145,10 @@ fn part(values: &[f64], node: u32, first: usize) -> Vec3 {
 }
 
 fn add(values: &mut [f64], node: u32, first: usize, by: Vec3) {
-    for (value, by) in values[node as usize * DOFS + first..].iter_mut().zip(by.to_array()) {
+    for (value, by) in values[node as usize * DOFS + first..]
+        .iter_mut()
+        .zip(by.to_array())
+    {
         *value += by;
     }
 }

@@ -7,10 +7,12 @@ use shellock_geom::sparse::Cholesky;
 use super::region::{self, Region};
 use super::{DOFS, ShellError, ShellModel, THICKNESS_MM};
 
-/// Cases solved together: enough to read the factor once for several, few enough for two threads to share twelve.
+/// Cases solved together: enough to read the factor once for several, few enough for two threads to share
+/// twelve.
 const CASES_AT_ONCE: usize = 6;
 
-/// Resultant of the loads on a part that no node holds, over the sum of their sizes, above which they do not balance.
+/// Resultant of the loads on a part that no node holds, over the sum of their sizes, above which they do not
+/// balance.
 const MAX_UNBALANCE: f64 = 1e-6;
 
 /// Degrees of freedom of a node that do not move.
@@ -29,7 +31,8 @@ pub struct LoadCase {
     pub forces_n: Vec<Vec3>,
     /// Moment on each point, N·mm; empty where there are none.
     pub moments_n_mm: Vec<Vec3>,
-    /// Points that hold in the mean, by area. Empty where the solver's supports hold, or where the loads balance.
+    /// Points that hold in the mean, by area. Empty where the solver's supports hold, or where the loads
+    /// balance.
     pub held: Vec<u32>,
 }
 
@@ -57,17 +60,32 @@ impl<'a> ShellSolver<'a> {
     pub(super) fn free(model: &'a ShellModel, thickness_mm: f64) -> Result<Self, ShellError> {
         let free_parts = model.parts();
         // One node of each part, held in all six, is a support that is statically determinate.
-        let supports: Vec<Support> = free_parts.iter().map(|p| Support { point: p[0], held: [true; DOFS] }).collect();
-        Ok(Self { free_parts, ..Self::held(model, thickness_mm, &supports)? })
+        let supports: Vec<Support> = free_parts
+            .iter()
+            .map(|p| Support {
+                point: p[0],
+                held: [true; DOFS],
+            })
+            .collect();
+        Ok(Self {
+            free_parts,
+            ..Self::held(model, thickness_mm, &supports)?
+        })
     }
 
-    pub(super) fn held(model: &'a ShellModel, thickness_mm: f64, supports: &[Support]) -> Result<Self, ShellError> {
+    pub(super) fn held(
+        model: &'a ShellModel,
+        thickness_mm: f64,
+        supports: &[Support],
+    ) -> Result<Self, ShellError> {
         if !THICKNESS_MM.contains(&thickness_mm) {
             return Err(ShellError::Thickness(thickness_mm));
         }
         let mut is_held = vec![false; model.points.len() * DOFS];
         for support in supports {
-            let dofs = is_held.get_mut(support.point as usize * DOFS..).and_then(|d| d.get_mut(..DOFS));
+            let dofs = is_held
+                .get_mut(support.point as usize * DOFS..)
+                .and_then(|d| d.get_mut(..DOFS));
             let dofs = dofs.ok_or(ShellError::MissingSupport(support.point))?;
             dofs.iter_mut().zip(support.held).for_each(|(d, held)| *d |= held);
         }
@@ -82,14 +100,22 @@ impl<'a> ShellSolver<'a> {
             .pattern
             .places()
             .zip(model.membrane.iter().zip(&model.bending))
-            .map(|((row, column), (membrane, bending))| match is_held[row as usize] || is_held[column as usize] {
-                true => f64::from(row == column),
-                false => of_membrane * membrane + of_bending * bending,
+            .map(|((row, column), (membrane, bending))| {
+                match is_held[row as usize] || is_held[column as usize] {
+                    true => f64::from(row == column),
+                    false => of_membrane * membrane + of_bending * bending,
+                }
             })
             .collect();
         stiffness.values_mut().copy_from_slice(&values);
         let factor = Cholesky::in_order(&model.order, &stiffness)?;
-        Ok(Self { model, thickness_mm, factor, is_held, free_parts: Vec::new() })
+        Ok(Self {
+            model,
+            thickness_mm,
+            factor,
+            is_held,
+            free_parts: Vec::new(),
+        })
     }
 
     /// The displacements in each case, in the order of `cases`.
@@ -131,15 +157,25 @@ impl<'a> ShellSolver<'a> {
     /// Forces and moments of a case.
     fn loads(&self, at: usize, case: &LoadCase) -> Result<Vec<f64>, ShellError> {
         let want = self.model.points.len();
-        let n_moments = if case.moments_n_mm.is_empty() { want } else { case.moments_n_mm.len() };
-        if let Some(have) = [case.forces_n.len(), n_moments].into_iter().find(|have| *have != want) {
+        let n_moments = if case.moments_n_mm.is_empty() {
+            want
+        } else {
+            case.moments_n_mm.len()
+        };
+        if let Some(have) = [case.forces_n.len(), n_moments]
+            .into_iter()
+            .find(|have| *have != want)
+        {
             return Err(ShellError::LoadLength { case: at, have, want });
         }
         let mut loads = Vec::with_capacity(want * DOFS);
         for (v, force) in case.forces_n.iter().enumerate() {
             let moment = case.moments_n_mm.get(v).copied().unwrap_or(Vec3::ZERO);
             if !(force.is_finite() && moment.is_finite()) {
-                return Err(ShellError::LoadNotFinite { case: at, point: v as u32 });
+                return Err(ShellError::LoadNotFinite {
+                    case: at,
+                    point: v as u32,
+                });
             }
             loads.extend(force.to_array().into_iter().chain(moment.to_array()));
         }
@@ -160,19 +196,33 @@ impl<'a> ShellSolver<'a> {
         for nodes in &self.free_parts {
             let held: Vec<u32> = nodes.iter().copied().filter(|&v| holds[v as usize]).collect();
             let has_own = !held.is_empty();
-            let region = Region::new(if has_own { held } else { nodes.clone() }, &model.points, &model.areas_mm2)
-                .ok_or(ShellError::HeldOnLine { case: at })?;
+            let region = Region::new(
+                if has_own { held } else { nodes.clone() },
+                &model.points,
+                &model.areas_mm2,
+            )
+            .ok_or(ShellError::HeldOnLine { case: at })?;
             if !has_own {
-                let total: f64 = nodes.iter().map(|&v| region.resultant(&[v], &model.points, loads).norm()).sum();
+                let total: f64 = nodes
+                    .iter()
+                    .map(|&v| region.resultant(&[v], &model.points, loads).norm())
+                    .sum();
                 if region.resultant(nodes, &model.points, loads).norm() > MAX_UNBALANCE * total {
-                    return Err(ShellError::Unbalanced { case: at, point: nodes[0] });
+                    return Err(ShellError::Unbalanced {
+                        case: at,
+                        point: nodes[0],
+                    });
                 }
             }
             region.balance(nodes, &model.points, loads);
             regions.push(region);
         }
         // What pushes where a support holds goes straight into the support.
-        loads.iter_mut().zip(&self.is_held).filter(|(_, held)| **held).for_each(|(load, _)| *load = 0.0);
+        loads
+            .iter_mut()
+            .zip(&self.is_held)
+            .filter(|(_, held)| **held)
+            .for_each(|(load, _)| *load = 0.0);
         Ok(regions)
     }
 }

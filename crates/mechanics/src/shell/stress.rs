@@ -10,7 +10,8 @@ use super::solver::{Displacements, ShellSolver};
 pub struct FaceStress {
     /// Von Mises' equivalent stress, MPa. ≥ 0.
     pub von_mises_mpa: f64,
-    /// Principal stresses in the face, the greater first, MPa; positive in tension. The third, across the face, is 0.
+    /// Principal stresses in the face, the greater first, MPa; positive in tension. The third, across the
+    /// face, is 0.
     pub principal_mpa: [f64; 2],
 }
 
@@ -35,7 +36,10 @@ impl FaceStress {
     fn new(stress: Vector3<f64>) -> Self {
         let (mean, half, shear) = (0.5 * (stress.x + stress.y), 0.5 * (stress.x - stress.y), stress.z);
         let radius = half.hypot(shear);
-        Self { von_mises_mpa: mean.hypot(3.0_f64.sqrt() * radius), principal_mpa: [mean + radius, mean - radius] }
+        Self {
+            von_mises_mpa: mean.hypot(3.0_f64.sqrt() * radius),
+            principal_mpa: [mean + radius, mean - radius],
+        }
     }
 }
 

@@ -33,8 +33,8 @@ struct Joining {
     kept: Vec<u32>,
 }
 
-/// The closed contacts of a joining, ascending, and their matrix: the lower triangle by columns, with the right-hand
-/// side as the last row.
+/// The closed contacts of a joining, ascending, and their matrix: the lower triangle by columns, with the
+/// right-hand side as the last row.
 #[derive(Clone, Debug, Default)]
 struct Front {
     contacts: Vec<u32>,
@@ -52,25 +52,42 @@ pub(super) struct Joinings {
 }
 
 impl Joinings {
-    /// How bodies with these contacts (ascending) are joined, always the two that take the least work next; and the
-    /// order in which the contacts are eliminated. Joinings number them in that order.
+    /// How bodies with these contacts (ascending) are joined, always the two that take the least work next;
+    /// and the order in which the contacts are eliminated. Joinings number them in that order.
     pub fn new(bodies: Vec<Vec<u32>>, n_contacts: usize) -> (Self, Vec<u32>) {
         let mut n_touching = vec![0; n_contacts];
         bodies.iter().flatten().for_each(|&c| n_touching[c as usize] += 1);
         let mut joinings: Vec<Joining> = Vec::with_capacity(2 * bodies.len());
         let mut live: Vec<Joining> = Vec::with_capacity(bodies.len());
         for (i, body) in bodies.into_iter().enumerate() {
-            let (kept, eliminated): (Vec<u32>, Vec<u32>) = body.into_iter().partition(|&c| n_touching[c as usize] > 1);
-            live.push(Joining { bodies: vec![i], joined: vec![], eliminated, kept });
+            let (kept, eliminated): (Vec<u32>, Vec<u32>) =
+                body.into_iter().partition(|&c| n_touching[c as usize] > 1);
+            live.push(Joining {
+                bodies: vec![i],
+                joined: vec![],
+                eliminated,
+                kept,
+            });
         }
         while let Some([a, b]) = cheapest_pair(&live) {
             let (second, first) = (live.remove(b), live.remove(a));
-            let (eliminated, new): (Vec<u32>, Vec<u32>) =
-                second.kept.iter().partition(|c| first.kept.binary_search(c).is_ok());
-            let others = first.kept.iter().copied().filter(|c| eliminated.binary_search(c).is_err());
+            let (eliminated, new): (Vec<u32>, Vec<u32>) = second
+                .kept
+                .iter()
+                .partition(|c| first.kept.binary_search(c).is_ok());
+            let others = first
+                .kept
+                .iter()
+                .copied()
+                .filter(|c| eliminated.binary_search(c).is_err());
             let mut kept: Vec<u32> = others.chain(new).collect();
             kept.sort_unstable();
-            let mut joint = Joining { bodies: vec![], joined: vec![], eliminated, kept };
+            let mut joint = Joining {
+                bodies: vec![],
+                joined: vec![],
+                eliminated,
+                kept,
+            };
             for piece in [first, second] {
                 joint.take(piece, &mut joinings);
             }
@@ -88,18 +105,40 @@ impl Joinings {
             }
         }
         let fronts = vec![Front::default(); joinings.len()];
-        (Self { joinings, fronts, place: vec![0; n_contacts] }, order)
+        (
+            Self {
+                joinings,
+                fronts,
+                place: vec![0; n_contacts],
+            },
+            order,
+        )
     }
 
     /// The solution for the contacts that are closed, 0 for the others.
-    pub fn solve(&mut self, bodies: &[Body], is_closed: &[bool], side: &[f64]) -> Result<Vec<f64>, SparseError> {
+    pub fn solve(
+        &mut self,
+        bodies: &[Body],
+        is_closed: &[bool],
+        side: &[f64],
+    ) -> Result<Vec<f64>, SparseError> {
         for (i, joining) in self.joinings.iter().enumerate() {
             let (done, rest) = self.fronts.split_at_mut(i);
             let front = &mut rest[0];
             front.gather(joining, is_closed, side);
-            front.contacts.iter().enumerate().for_each(|(i, &c)| self.place[c as usize] = i);
-            joining.bodies.iter().for_each(|b| front.add_body(&bodies[*b], is_closed, &self.place));
-            joining.joined.iter().for_each(|j| front.add_joint(&done[*j], &self.place));
+            front
+                .contacts
+                .iter()
+                .enumerate()
+                .for_each(|(i, &c)| self.place[c as usize] = i);
+            joining
+                .bodies
+                .iter()
+                .for_each(|b| front.add_body(&bodies[*b], is_closed, &self.place));
+            joining
+                .joined
+                .iter()
+                .for_each(|j| front.add_joint(&done[*j], &self.place));
             if front.n_eliminated > 0 {
                 eliminate_leading(&mut front.values, front.contacts.len() + 1, front.n_eliminated)?;
             }
@@ -153,10 +192,15 @@ impl Joining {
 }
 
 impl Front {
-    /// Empties the front and takes the closed contacts of `joining`, with the 1 and the right-hand side of those that
-    /// it eliminates.
+    /// Empties the front and takes the closed contacts of `joining`, with the 1 and the right-hand side of
+    /// those that it eliminates.
     fn gather(&mut self, joining: &Joining, is_closed: &[bool], side: &[f64]) {
-        let closed = |of: &[u32]| of.iter().copied().filter(|&c| is_closed[c as usize]).collect::<Vec<u32>>();
+        let closed = |of: &[u32]| {
+            of.iter()
+                .copied()
+                .filter(|&c| is_closed[c as usize])
+                .collect::<Vec<u32>>()
+        };
         self.contacts = closed(&joining.eliminated);
         self.n_eliminated = self.contacts.len();
         self.contacts.extend(closed(&joining.kept));
@@ -183,13 +227,23 @@ impl Front {
     }
 
     fn add_joint(&mut self, joint: &Self, place: &[usize]) {
-        let (n, m, first) = (self.contacts.len() + 1, joint.contacts.len() + 1, joint.n_eliminated);
-        let mut rows: Vec<usize> = joint.contacts[first..].iter().map(|c| place[*c as usize]).collect();
+        let (n, m, first) = (
+            self.contacts.len() + 1,
+            joint.contacts.len() + 1,
+            joint.n_eliminated,
+        );
+        let mut rows: Vec<usize> = joint.contacts[first..]
+            .iter()
+            .map(|c| place[*c as usize])
+            .collect();
         rows.push(n - 1);
         for (j, &column) in rows[..rows.len() - 1].iter().enumerate() {
             let source = &joint.values[m * (first + j) + first + j..m * (first + j + 1)];
             let target = &mut self.values[n * column..n * (column + 1)];
-            rows[j..].iter().zip(source).for_each(|(row, value)| target[*row] += value);
+            rows[j..]
+                .iter()
+                .zip(source)
+                .for_each(|(row, value)| target[*row] += value);
         }
     }
 
@@ -239,7 +293,10 @@ mod tests {
             .map(|own| {
                 let contacts: Vec<u32> = (0..n).filter(|i| own.contains(&order[*i as usize])).collect();
                 let root = DMatrix::from_fn(contacts.len(), contacts.len(), wave);
-                Body { contacts, compliance: (&root * root.transpose()).as_slice().to_vec() }
+                Body {
+                    contacts,
+                    compliance: (&root * root.transpose()).as_slice().to_vec(),
+                }
             })
             .collect();
         let side: Vec<f64> = (0..n as usize).map(|i| wave(i, 2)).collect();
@@ -251,7 +308,11 @@ mod tests {
                 let m = body.contacts.len();
                 for (k, value) in body.compliance.iter().enumerate() {
                     let [row, column] = [k % m, k / m].map(|i| body.contacts[i] as usize);
-                    whole[(row, column)] += if is_closed[row] && is_closed[column] { *value } else { 0.0 };
+                    whole[(row, column)] += if is_closed[row] && is_closed[column] {
+                        *value
+                    } else {
+                        0.0
+                    };
                 }
             }
             let masked = DVector::from_fn(n as usize, |i, _| if is_closed[i] { side[i] } else { 0.0 });

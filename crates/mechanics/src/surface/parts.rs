@@ -1,8 +1,8 @@
 //! Each part as its seams feel it: the mesh condensed onto four motions of every station.
 //!
-//! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q K⁻¹ Qᵀ`:
-//! exact, whatever happens at the seams, and the same for all plans. A part that floats on springs `G` has its rigid
-//! motions `R` besides, and with them the compliance `C + R G⁻¹ Rᵀ`.
+//! With `Q` the gradients of those motions and `K` the stiffness of the part's mesh, the compliance is `C = Q
+//! K⁻¹ Qᵀ`: exact, whatever happens at the seams, and the same for all plans. A part that floats on springs
+//! `G` has its rigid motions `R` besides, and with them the compliance `C + R G⁻¹ Rᵀ`.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -19,19 +19,19 @@ pub(super) const N_MOTIONS: usize = 4;
 /// How side a of a station moves from side b, or what pulls them apart.
 pub(super) type Motions = [f64; N_MOTIONS];
 
-/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what the weakest
-/// joint of a plan that holds resists.
+/// Stiffness, in `E H`, that ties every point of a part that floats to its place: 10⁵ times less than what
+/// the weakest joint of a plan that holds resists.
 const GROUND_SHARE: f64 = 1e-8;
 
-/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate, so that they add
-/// nothing but rigid motions, and those next to nothing beside the ground's.
+/// Stiffness of the six supports of a part that floats, in `E H`. They are statically determinate, so that
+/// they add nothing but rigid motions, and those next to nothing beside the ground's.
 const SUPPORT_SHARE: f64 = 0.1;
 
 /// Length by which rotations are made comparable with shifts, mm: about a piece's radius.
 const RADIUS_MM: f64 = 30.0;
 
-/// Compliance that every motion has besides the mesh's, in those of a contact a mm long. Parts of a few triangles have
-/// fewer motions than their stations ask for.
+/// Compliance that every motion has besides the mesh's, in those of a contact a mm long. Parts of a few
+/// triangles have fewer motions than their stations ask for.
 const LEAST_COMPLIANCE: f64 = 1e-3;
 
 /// The gradient of a motion at the part's points.
@@ -42,8 +42,8 @@ type Gradient = Vec<(u32, Vec3)>;
 pub(super) struct Part {
     /// The stations at which it is a side, ascending.
     pub stations: Vec<u32>,
-    /// How side a moves from side b at each of them, in [`N_MOTIONS`], under forces that pull them apart: mm/N (1/N for
-    /// a turn, 1/N mm for two). What the other sides' parts add is not in it.
+    /// How side a moves from side b at each of them, in [`N_MOTIONS`], under forces that pull them apart:
+    /// mm/N (1/N for a turn, 1/N mm for two). What the other sides' parts add is not in it.
     pub compliance: DMatrix<f64>,
 }
 
@@ -53,20 +53,28 @@ pub(super) fn parts(
     assembly: &ShellAssembly,
     is_held: &[bool],
 ) -> Result<Vec<Part>, SparseError> {
-    let mid_wall = assembly.points.iter().zip(&assembly.normals).map(|(p, n)| *p - 0.5 * params.wall_mm * *n);
+    let mid_wall = assembly
+        .points
+        .iter()
+        .zip(&assembly.normals)
+        .map(|(p, n)| *p - 0.5 * params.wall_mm * *n);
     let points: Vec<Vec3> = mid_wall.collect();
     let mut terms: Vec<Vec<Term>> = vec![Vec::new(); assembly.n_parts];
     for term in patch_terms(params, assembly, &points) {
         terms[assembly.part_of_point[term.corners[0].0 as usize] as usize].push(term);
     }
     let mut triangles_at = vec![Vec::new(); points.len()];
-    assembly.triangles.iter().for_each(|t| t.iter().for_each(|&v| triangles_at[v as usize].push(*t)));
+    assembly
+        .triangles
+        .iter()
+        .for_each(|t| t.iter().for_each(|&v| triangles_at[v as usize].push(*t)));
     let mut motions: Vec<Vec<(u32, [Gradient; N_MOTIONS])>> = vec![Vec::new(); assembly.n_parts];
     for (i, station) in (0..).zip(&assembly.stations) {
         for (side, sign) in SIDES.into_iter().zip([1.0, -1.0]) {
             let point = station.points[side.index()];
             let root = Root::new(&points, point, triangles_at[point as usize].iter().copied());
-            let [t, n, across] = [station.tangent, station.normal, station.across].map(|g| root.shift(sign * g));
+            let [t, n, across] =
+                [station.tangent, station.normal, station.across].map(|g| root.shift(sign * g));
             let own = [t, n, across, root.turn(sign * station.tangent)];
             let of_part = &mut motions[assembly.part_of_point[point as usize] as usize];
             match of_part.last_mut() {
@@ -78,28 +86,42 @@ pub(super) fn parts(
     }
     let row = rows_by_part(assembly, is_held);
     let mut floats: Vec<Vec<u32>> = vec![Vec::new(); assembly.n_parts];
-    (0..).zip(&assembly.part_of_point).for_each(|(v, &part)| floats[part as usize].push(v));
-    floats.iter_mut().filter(|f| f.iter().any(|&v| is_held[v as usize])).for_each(Vec::clear);
+    (0..)
+        .zip(&assembly.part_of_point)
+        .for_each(|(v, &part)| floats[part as usize].push(v));
+    floats
+        .iter_mut()
+        .filter(|f| f.iter().any(|&v| is_held[v as usize]))
+        .for_each(Vec::clear);
     let all = terms.par_iter().zip(motions).zip(floats);
-    all.map(|((terms, motions), floats)| part(params, &row, &points, terms, motions, &floats)).collect()
+    all.map(|((terms, motions), floats)| part(params, &row, &points, terms, motions, &floats))
+        .collect()
 }
 
-/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one beside
-/// the two.
+/// Six supports that hold a body without straining it: three at its first point, two at the farthest one, one
+/// beside the two.
 fn supports(params: &SurfaceParams, points: &[Vec3], body: &[u32]) -> Vec<Term> {
     let at = |v: u32| points[v as usize];
     let farthest = |distance: &dyn Fn(u32) -> f64| {
-        body.iter().copied().max_by(|&x, &y| distance(x).total_cmp(&distance(y)).then(y.cmp(&x)))
+        body.iter()
+            .copied()
+            .max_by(|&x, &y| distance(x).total_cmp(&distance(y)).then(y.cmp(&x)))
     };
     let Some(&a) = body.first() else { return Vec::new() };
     let b = farthest(&|v| at(v).distance_squared(at(a))).unwrap_or(a);
     let along = (at(b) - at(a)).normalize_or(Vec3::X);
     let c = farthest(&|v| (at(v) - at(a)).reject_from_normalized(along).length_squared()).unwrap_or(a);
-    let aside = (at(c) - at(a)).reject_from_normalized(along).normalize_or(along.any_orthonormal_vector());
+    let aside = (at(c) - at(a))
+        .reject_from_normalized(along)
+        .normalize_or(along.any_orthonormal_vector());
     let up = along.cross(aside);
     let held = [(a, along), (a, aside), (a, up), (b, aside), (b, up), (c, up)];
     let stiffness = SUPPORT_SHARE * params.material.youngs_modulus_mpa * params.wall_mm;
-    held.map(|corner| Term { corners: vec![corner], stiffness }).to_vec()
+    held.map(|corner| Term {
+        corners: vec![corner],
+        stiffness,
+    })
+    .to_vec()
 }
 
 /// The row of each point's x within its part; `None` where it is held.
@@ -125,8 +147,15 @@ fn part(
     let (stations, gradients): (Vec<u32>, Vec<_>) = motions.into_iter().unzip();
     let gradients: Vec<Gradient> = gradients.into_iter().flatten().collect();
     let supports = supports(params, points, floats);
-    let corners = terms.iter().chain(&supports).flat_map(|t| &t.corners).chain(gradients.iter().flatten());
-    let n = corners.filter_map(|c| row[c.0 as usize]).max().map_or(0, |r| r as usize + 3);
+    let corners = terms
+        .iter()
+        .chain(&supports)
+        .flat_map(|t| &t.corners)
+        .chain(gradients.iter().flatten());
+    let n = corners
+        .filter_map(|c| row[c.0 as usize])
+        .max()
+        .map_or(0, |r| r as usize + 3);
     let factor = Cholesky::new(&mesh_stiffness(n, row, terms.iter().chain(&supports)))?;
     let m = gradients.len();
     let mut sides = vec![0.0; n * m];
@@ -146,17 +175,30 @@ fn part(
         let rigid = DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &gradients[i], j));
         compliance += &rigid * rigid.transpose() / ground;
     }
-    Ok(Part { stations, compliance: 0.5 * (&compliance + compliance.transpose()) })
+    Ok(Part {
+        stations,
+        compliance: 0.5 * (&compliance + compliance.transpose()),
+    })
 }
 
 /// What a motion's gradient sees of rigid motion `j`: a shift, or a turn about an axis through the origin.
 fn rigid_motion(points: &[Vec3], gradient: &[(u32, Vec3)], j: usize) -> f64 {
     let axis = Vec3::AXES[j % 3];
-    let moved = |v: u32| if j < 3 { axis } else { axis.cross(points[v as usize]) / RADIUS_MM };
+    let moved = |v: u32| {
+        if j < 3 {
+            axis
+        } else {
+            axis.cross(points[v as usize]) / RADIUS_MM
+        }
+    };
     gradient.iter().map(|&(v, g)| g.dot(moved(v))).sum()
 }
 
-fn mesh_stiffness<'a>(n: usize, row: &[Option<u32>], terms: impl Iterator<Item = &'a Term>) -> SparseSymmetric {
+fn mesh_stiffness<'a>(
+    n: usize,
+    row: &[Option<u32>],
+    terms: impl Iterator<Item = &'a Term>,
+) -> SparseSymmetric {
     // A point of no triangle, if there is one, has no stiffness of its own.
     let mut entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|r| (r, r, f64::MIN_POSITIVE)).collect();
     for term in terms {

@@ -16,7 +16,10 @@ pub(super) struct Term {
 
 impl Term {
     fn new(corners: impl IntoIterator<Item = (u32, Vec3)>, stiffness: f64) -> Self {
-        Self { corners: corners.into_iter().collect(), stiffness }
+        Self {
+            corners: corners.into_iter().collect(),
+            stiffness,
+        }
     }
 }
 
@@ -27,7 +30,13 @@ pub(super) fn bending(params: &SurfaceParams, thickness_mm: f64) -> f64 {
 }
 
 /// Resistance of an edge against stretch, with half of the area of the triangles beside it.
-fn edge(params: &SurfaceParams, points: &[Vec3], [i, j]: [usize; 2], thickness_mm: f64, area_mm2: f64) -> Option<Term> {
+fn edge(
+    params: &SurfaceParams,
+    points: &[Vec3],
+    [i, j]: [usize; 2],
+    thickness_mm: f64,
+    area_mm2: f64,
+) -> Option<Term> {
     let along = points[j] - points[i];
     let unit = along.try_normalize()?;
     let modulus = params.stiffness_ratios[0] * params.material.youngs_modulus_mpa;
@@ -35,7 +44,8 @@ fn edge(params: &SurfaceParams, points: &[Vec3], [i, j]: [usize; 2], thickness_m
     Some(Term::new([(i as u32, -unit), (j as u32, unit)], stiffness))
 }
 
-/// The dihedral angle at the edge `i j` between triangles `i j k` and `j i l`, with the given stiffness, N mm a radian.
+/// The dihedral angle at the edge `i j` between triangles `i j k` and `j i l`, with the given stiffness, N mm
+/// a radian.
 ///
 /// The gradient is that of the exact angle, so rigid motions cost nothing.
 pub(super) fn hinge(points: &[Vec3], [i, j, k, l]: [usize; 4], stiffness: f64) -> Option<Term> {
@@ -48,8 +58,10 @@ pub(super) fn hinge(points: &[Vec3], [i, j, k, l]: [usize; 4], stiffness: f64) -
         return None;
     }
     let (n1, n2) = (n1 / n1.length_squared(), n2 / n2.length_squared());
-    let (k_to, l_to) =
-        (|from: usize| (points[k] - points[from]).dot(unit), |from: usize| (points[l] - points[from]).dot(unit));
+    let (k_to, l_to) = (
+        |from: usize| (points[k] - points[from]).dot(unit),
+        |from: usize| (points[l] - points[from]).dot(unit),
+    );
     let corners = [
         (i as u32, k_to(j) * n1 + l_to(j) * n2),
         (j as u32, -k_to(i) * n1 - l_to(i) * n2),
@@ -77,19 +89,21 @@ pub(super) fn patch_terms(params: &SurfaceParams, assembly: &ShellAssembly, poin
         let area: f64 = same.iter().map(|e| e.2).sum();
         terms.extend(edge(params, points, ends, params.wall_mm, area));
         if let [x, y] = same {
-            let stiffness = plate * points[ends[0]].distance_squared(points[ends[1]]) / area.max(f64::MIN_POSITIVE);
+            let stiffness =
+                plate * points[ends[0]].distance_squared(points[ends[1]]) / area.max(f64::MIN_POSITIVE);
             terms.extend(hinge(points, [ends[0], ends[1], x.1, y.1], stiffness));
         }
     }
     terms
 }
 
-/// How a point of a rigid strip moves with the patch at its seam point: with the point, and about it as the mean of the
-/// triangles there turns.
+/// How a point of a rigid strip moves with the patch at its seam point: with the point, and about it as the
+/// mean of the triangles there turns.
 #[derive(Clone, Debug)]
 pub(super) struct Root {
     point: u32,
-    /// `r` and `n` of each corner: the rotation is `Σ −r (n · u) + n (r · u) / 2`, the latter within the surface.
+    /// `r` and `n` of each corner: the rotation is `Σ −r (n · u) + n (r · u) / 2`, the latter within the
+    /// surface.
     turns: Vec<(u32, [Vec3; 2])>,
 }
 
@@ -104,9 +118,12 @@ impl Root {
         let mut turns = Vec::new();
         for t in triangles {
             let (area_vector, share) = (doubled(t), doubled(t).length() / total);
-            let Some(n) = area_vector.try_normalize() else { continue };
+            let Some(n) = area_vector.try_normalize() else {
+                continue;
+            };
             for i in 0..3 {
-                // The gradient of a corner's hat function is n × opposite edge / doubled area; r = n × gradient.
+                // The gradient of a corner's hat function is n × opposite edge / doubled area; r = n ×
+                // gradient.
                 let opposite = points[t[(i + 2) % 3] as usize] - points[t[(i + 1) % 3] as usize];
                 let r = n.cross(n.cross(opposite)) / area_vector.length();
                 turns.push((t[i], [share * r, n]));

@@ -18,8 +18,21 @@ fn plates(params: &SurfaceParams) -> SurfaceModel {
 
 /// Joints of side a as the male, leaving along `leaves`, pulled along `pull`.
 fn joints(leaves: Vec3, pull: Vec3) -> Vec<Meeting> {
-    let joint = Joint { male: Side::A, leaves, is_fast: false, pull_on_a: pull, weight: 1.0, size_mm: 2.5 };
-    vec![Meeting { wall: Vec3::Y, joint: Some(joint) }; N - 1]
+    let joint = Joint {
+        male: Side::A,
+        leaves,
+        is_fast: false,
+        pull_on_a: pull,
+        weight: 1.0,
+        size_mm: 2.5,
+    };
+    vec![
+        Meeting {
+            wall: Vec3::Y,
+            joint: Some(joint)
+        };
+        N - 1
+    ]
 }
 
 fn pulled(model: &SurfaceModel, plan: &[Meeting]) -> SurfaceSolution {
@@ -27,7 +40,9 @@ fn pulled(model: &SurfaceModel, plan: &[Meeting]) -> SurfaceSolution {
 }
 
 fn opening(solution: &SurfaceSolution) -> f64 {
-    let Resistance::Holds(opening) = &solution.resistance else { panic!("held all round: {solution:?}") };
+    let Resistance::Holds(opening) = &solution.resistance else {
+        panic!("held all round: {solution:?}")
+    };
     -opening.quality_mm
 }
 
@@ -38,12 +53,20 @@ fn rigid_motions_cost_nothing_and_stretching_costs_about_as_much_as_in_a_plate()
     let points = assembly.points.clone();
     let terms = patch_terms(&params, &assembly, &points);
     let energy = |motion: &dyn Fn(Vec3) -> Vec3| -> f64 {
-        let stretched = |t: &Term| t.corners.iter().map(|&(p, g)| g.dot(motion(points[p as usize]))).sum::<f64>();
-        terms.iter().map(|t| 0.5 * t.stiffness * stretched(t).powi(2)).sum()
+        let stretched = |t: &Term| {
+            t.corners
+                .iter()
+                .map(|&(p, g)| g.dot(motion(points[p as usize])))
+                .sum::<f64>()
+        };
+        terms
+            .iter()
+            .map(|t| 0.5 * t.stiffness * stretched(t).powi(2))
+            .sum()
     };
     assert!(energy(&|p| Vec3::new(1.0, 2.0, 3.0) + Vec3::new(0.3, 0.2, -0.5).cross(p)) < 1e-15);
-    // Uniform stretch in x with ν = 1/3 across costs E ε² / 2 per volume: exactly so on equilateral triangles; these have
-    // right angles, the worst that a remeshed surface has.
+    // Uniform stretch in x with ν = 1/3 across costs E ε² / 2 per volume: exactly so on equilateral
+    // triangles; these have right angles, the worst that a remeshed surface has.
     let volume = 2.0 * 40.0 * 20.0 * 2.0;
     let expected = 0.5 * 2000.0 * volume;
     let found = energy(&|p| Vec3::new(p.x, -p.y / 3.0, 0.0));
@@ -56,7 +79,10 @@ fn a_joint_opens_along_its_direction_and_hardly_across_it() {
     let free = opening(&pulled(&model, &joints(Vec3::Z, Vec3::Z)));
     let pushed = opening(&pulled(&model, &joints(Vec3::Z, -Vec3::Z)));
     let across = opening(&pulled(&model, &joints(Vec3::Z, Vec3::Y)));
-    assert!(free > 10.0 * pushed && free > 10.0 * across, "{free} {pushed} {across}");
+    assert!(
+        free > 10.0 * pushed && free > 10.0 * across,
+        "{free} {pushed} {across}"
+    );
     let sideways = opening(&pulled(&model, &joints(-Vec3::Y, Vec3::Z)));
     assert!(free > 5.0 * sideways, "{free} {sideways}");
 }
@@ -81,12 +107,15 @@ fn a_plate_bent_to_a_cylinder_costs_its_bending_stiffness() {
     let found: f64 = terms.iter().map(|t| 0.5 * t.stiffness * bent(t).powi(2)).sum();
     let area_mm2 = 2.0 * (5.0 * (N - 1) as f64) * (5.0 * ROWS as f64);
     let expected = 0.5 * plate_stiffness(&params) * curvature.powi(2) * area_mm2;
-    assert!((found / expected - 1.0).abs() < 1e-9, "{found} N mm for {expected} N mm");
+    assert!(
+        (found / expected - 1.0).abs() < 1e-9,
+        "{found} N mm for {expected} N mm"
+    );
 }
 
-/// A plate of 95 × 20 mm beyond its clamp, pushed at its end: `F L³/3 D b`, by two theorems of minimum energy. It yields at
-/// least as a cylinder would, which bends at the edges across alone; and at most 5/4 of that, as separate rows of squares,
-/// whose diagonals then have half of the moment² at twice the stiffness.
+/// A plate of 95 × 20 mm beyond its clamp, pushed at its end: `F L³/3 D b`, by two theorems of minimum
+/// energy. It yields at least as a cylinder would, which bends at the edges across alone; and at most 5/4 of
+/// that, as separate rows of squares, whose diagonals then have half of the moment² at twice the stiffness.
 #[test]
 fn a_cantilever_bends_as_a_plate_strip_does_or_up_to_a_quarter_more() {
     const N_CELLS: usize = 20;
@@ -96,19 +125,28 @@ fn a_cantilever_bends_as_a_plate_strip_does_or_up_to_a_quarter_more() {
     let n = (N_CELLS + 1) * (ROWS + 1);
     let is_held = |v: usize| strip.points[v].x < -0.5 * 100.0 + 5.1;
     let mut stiffness = DMatrix::zeros(3 * n, 3 * n);
-    for term in patch_terms(&params, &strip, &strip.points).iter().filter(|t| (t.corners[0].0 as usize) < n) {
+    for term in patch_terms(&params, &strip, &strip.points)
+        .iter()
+        .filter(|t| (t.corners[0].0 as usize) < n)
+    {
         let mut gradient = DVector::zeros(3 * n);
         for &(v, g) in term.corners.iter().filter(|c| !is_held(c.0 as usize)) {
             (0..3).for_each(|x| gradient[3 * v as usize + x] += g[x]);
         }
         stiffness.ger(term.stiffness, &gradient, &gradient, 1.0);
     }
-    (0..3 * n).filter(|row| is_held(row / 3)).for_each(|row| stiffness[(row, row)] = 1.0);
+    (0..3 * n)
+        .filter(|row| is_held(row / 3))
+        .for_each(|row| stiffness[(row, row)] = 1.0);
     let end: Vec<usize> = (0..n).filter(|v| strip.points[*v].x > 49.9).collect();
     // The outer rows' ends bear half.
     let mut force = DVector::zeros(3 * n);
     for &v in &end {
-        let share = if [0.0, width_mm].contains(&strip.points[v].y.abs()) { 0.5 } else { 1.0 };
+        let share = if [0.0, width_mm].contains(&strip.points[v].y.abs()) {
+            0.5
+        } else {
+            1.0
+        };
         force[3 * v + 2] = force_n * share / ROWS as f64;
     }
     let deflection_mm = stiffness.cholesky().unwrap().solve(&force).dot(&force) / force_n;
@@ -120,33 +158,48 @@ fn a_cantilever_bends_as_a_plate_strip_does_or_up_to_a_quarter_more() {
     assert!((1.0..1.25).contains(&ratio), "{ratio} of {cylinder_mm} mm");
 }
 
-/// Pins pulled straight out: a wall across their way is the only thing in it, and only where it is on that side.
+/// Pins pulled straight out: a wall across their way is the only thing in it, and only where it is on that
+/// side.
 #[test]
 fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
     let model = plates(&SurfaceParams::default());
     let opened = |wall: Vec3| {
-        let plan: Vec<Meeting> = joints(Vec3::Z, Vec3::Z).into_iter().map(|m| Meeting { wall, ..m }).collect();
+        let plan: Vec<Meeting> = joints(Vec3::Z, Vec3::Z)
+            .into_iter()
+            .map(|m| Meeting { wall, ..m })
+            .collect();
         opening(&pulled(&model, &plan))
     };
     let (open, blocked) = (opened(-Vec3::Z), opened(Vec3::Z));
     assert!(open > 1e-3 && blocked < 0.1 * open, "{blocked} mm of {open} mm");
     // What nothing presses on bears nothing: as if the wall stood across another way.
-    assert!((opened(Vec3::Y) / open - 1.0).abs() < 1e-2, "{} mm, {open} mm", opened(Vec3::Y));
+    assert!(
+        (opened(Vec3::Y) / open - 1.0).abs() < 1e-2,
+        "{} mm, {open} mm",
+        opened(Vec3::Y)
+    );
 }
 
-/// Without friction a pin may leave and slide; with friction, as on the key, it does neither, and resists both ways alike.
+/// Without friction a pin may leave and slide; with friction, as on the key, it does neither, and resists
+/// both ways alike.
 #[test]
 fn friction_holds_a_pin_out_of_its_channel_and_along_it() {
     let model = plates(&SurfaceParams::default());
     let opened = |pull: Vec3, is_fast: bool| {
         let mut plan = joints(Vec3::Z, pull);
-        plan.iter_mut().filter_map(|m| m.joint.as_mut()).for_each(|joint| joint.is_fast = is_fast);
+        plan.iter_mut()
+            .filter_map(|m| m.joint.as_mut())
+            .for_each(|joint| joint.is_fast = is_fast);
         opening(&pulled(&model, &plan))
     };
     for along in [Vec3::Z, Vec3::X] {
         let [free, held] = [false, true].map(|is_fast| opened(along, is_fast));
         assert!(held < 0.2 * free, "{held} mm of {free} mm along {along}");
-        assert!((opened(-along, true) / held - 1.0).abs() < 0.01, "{} {held}", opened(-along, true));
+        assert!(
+            (opened(-along, true) / held - 1.0).abs() < 0.01,
+            "{} {held}",
+            opened(-along, true)
+        );
     }
     assert!(opened(Vec3::Z, false) > 5.0 * opened(-Vec3::Z, false));
 }
@@ -154,19 +207,37 @@ fn friction_holds_a_pin_out_of_its_channel_and_along_it() {
 #[test]
 fn openings_grow_with_the_force_and_fall_with_the_modulus() {
     let params = SurfaceParams::default();
-    let one = opening(&pulled(&plates(&params), &joints(Vec3::Z, Vec3::new(0.0, 0.6, 0.8))));
+    let one = opening(&pulled(
+        &plates(&params),
+        &joints(Vec3::Z, Vec3::new(0.0, 0.6, 0.8)),
+    ));
     let mut stiff = params;
     stiff.material.youngs_modulus_mpa *= 2.0;
     stiff.force_n_per_mm *= 3.0;
-    let other = opening(&pulled(&plates(&stiff), &joints(Vec3::Z, Vec3::new(0.0, 0.6, 0.8))));
+    let other = opening(&pulled(
+        &plates(&stiff),
+        &joints(Vec3::Z, Vec3::new(0.0, 0.6, 0.8)),
+    ));
     assert!((other / one - 1.5).abs() < 1e-6, "{one} {other}");
 }
 
 #[test]
 fn forces_are_in_balance_and_a_finer_tolerance_changes_nothing() {
     let plan = joints(Vec3::new(0.0, -0.6, 0.8), Vec3::new(0.3, 0.5, 0.8));
-    let coarse = pulled(&plates(&SurfaceParams { tolerance: 1e-3, ..SurfaceParams::default() }), &plan);
-    let fine = pulled(&plates(&SurfaceParams { tolerance: 5e-4, ..SurfaceParams::default() }), &plan);
+    let coarse = pulled(
+        &plates(&SurfaceParams {
+            tolerance: 1e-3,
+            ..SurfaceParams::default()
+        }),
+        &plan,
+    );
+    let fine = pulled(
+        &plates(&SurfaceParams {
+            tolerance: 5e-4,
+            ..SurfaceParams::default()
+        }),
+        &plan,
+    );
     assert!(coarse.error <= 1e-3 && fine.error <= 5e-4);
     assert!((opening(&coarse) / opening(&fine) - 1.0).abs() < 1e-3);
 }
@@ -186,12 +257,14 @@ fn stiffness(model: &SurfaceModel) -> DMatrix<f64> {
 
 /// Energy of the stations' motions, N mm.
 fn energy(model: &SurfaceModel, plan: &[Meeting], stiffness: &DMatrix<f64>, moved: &[Motions]) -> f64 {
-    let [all, force] = [moved, &forces(model, plan, &model.pulls(plan))].map(|m| DVector::from_vec(m.concat()));
+    let [all, force] =
+        [moved, &forces(model, plan, &model.pulls(plan))].map(|m| DVector::from_vec(m.concat()));
     let of_contact = |c: &Contact| {
         let gap = c.gradient.iter().zip(moved[c.station]).map(|(g, r)| g * r).sum();
         0.5 * c.pressed(gap).powi(2)
     };
-    0.5 * all.dot(&(stiffness * &all)) - all.dot(&force) + contacts(model, plan).iter().map(of_contact).sum::<f64>()
+    0.5 * all.dot(&(stiffness * &all)) - all.dot(&force)
+        + contacts(model, plan).iter().map(of_contact).sum::<f64>()
 }
 
 #[test]
@@ -219,15 +292,31 @@ fn a_part_that_is_free_alone_opens_its_own_seams_alone() {
     let plan: Vec<Meeting> = (ball.stations.iter())
         .map(|s| {
             let leaves = (s.normal - s.across * 0.5).normalize();
-            let joint = Joint { male: Side::A, leaves, is_fast: true, pull_on_a: leaves, weight: 1.0, size_mm: 2.5 };
-            Meeting { wall: s.across, joint: Some(joint) }
+            let joint = Joint {
+                male: Side::A,
+                leaves,
+                is_fast: true,
+                pull_on_a: leaves,
+                weight: 1.0,
+                size_mm: 2.5,
+            };
+            Meeting {
+                wall: s.across,
+                joint: Some(joint),
+            }
         })
         .collect();
     let solution = model.resist_alone(&plan, 3).unwrap();
     assert!(solution.error <= 1e-6);
-    let Resistance::Holds(opening) = &solution.resistance else { panic!("{solution:?}") };
+    let Resistance::Holds(opening) = &solution.resistance else {
+        panic!("{solution:?}")
+    };
     let is_own = |s: &Station| s.points.iter().any(|p| ball.part_of_point[*p as usize] == 3);
-    let (own, others): (Vec<_>, Vec<_>) = ball.stations.iter().zip(&opening.opening_mm).partition(|(s, _)| is_own(s));
+    let (own, others): (Vec<_>, Vec<_>) = ball
+        .stations
+        .iter()
+        .zip(&opening.opening_mm)
+        .partition(|(s, _)| is_own(s));
     let [own, others] = [own, others].map(|all| all.iter().map(|(_, d)| **d).fold(0.0, f64::max));
     assert!(others > 0.0 && others < 1e-2 * own, "{others} {own}");
 }
@@ -235,9 +324,14 @@ fn a_part_that_is_free_alone_opens_its_own_seams_alone() {
 #[test]
 fn plans_have_the_same_bits_on_any_number_of_threads() {
     let model = plates(&SurfaceParams::default());
-    let plans: Vec<_> = (0..40).map(|i| joints(Vec3::Z, Vec3::new(0.1, (i as f64).sin(), (i as f64).cos()))).collect();
+    let plans: Vec<_> = (0..40)
+        .map(|i| joints(Vec3::Z, Vec3::new(0.1, (i as f64).sin(), (i as f64).cos())))
+        .collect();
     let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| model.resist_all(&plans, 1)).unwrap()
     };
     assert_eq!(on(1), on(2));

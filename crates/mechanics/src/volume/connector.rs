@@ -8,29 +8,33 @@
 //!            │ pin  │      │                             foot:  0 ≤ s ≤ 0.5 D, where the front alone would hang on the
 //!            └──────┴──────┘                                    edge only, because ŝ lies across the wall
 //! ```
-//! A corner that lies in the wall of its own side, or in the face s = 0 where there is no foot, moves with the wall: by linear
-//! interpolation in the nearest tetrahedron, continued beyond it, which is exact for rigid motions. So no angle of ŝ needs
-//! another mesh, and bars may overlap the wall they belong to.
+//! A corner that lies in the wall of its own side, or in the face s = 0 where there is no foot, moves with
+//! the wall: by linear interpolation in the nearest tetrahedron, continued beyond it, which is exact for
+//! rigid motions. So no angle of ŝ needs another mesh, and bars may overlap the wall they belong to.
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 
 use super::VolumeModel;
+use super::bars::{Sections, Spans};
 use super::element::{EDGES, Order, gradients, lame, stiffness, volume_6};
 use super::front::Front;
 use super::rows::ROWS;
+use super::unknowns::{Labels, Owner};
 use crate::connector::{PIN_DEPTH, PIN_WIDTH};
-use crate::{Joint, Meeting, SIDES, Side};
+use crate::{Joint, Side};
 
-/// Corners this far outside the wall still count as inside, as a share of D: places on the inner surface are inside.
+/// Corners this far outside the wall still count as inside, as a share of D: places on the inner surface are
+/// inside.
 const SLACK: f64 = 0.05;
-/// Least volume of a tetrahedron of a bar, as a share of a straight one's; below, frames twist too far for a connector.
+/// Least volume of a tetrahedron of a bar, as a share of a straight one's; below, frames twist too far for a
+/// connector.
 const MIN_VOLUME_SHARE: f64 = 0.1;
 
 /// Places along s in a cross-section, and across it. Even ones are corners, odd ones lie halfway.
 const N_ALONG_S: usize = 5;
 const N_ACROSS: usize = 3;
-const N_SECTION: usize = N_ALONG_S * N_ACROSS;
+pub(super) const N_SECTION: usize = N_ALONG_S * N_ACROSS;
 /// Nodes of the bar between two stations: cross-sections at both and halfway.
 const N_BAR: usize = 3 * N_SECTION;
 
@@ -56,18 +60,27 @@ impl Section {
     /// Where the pairs are: at the root and at the tip, on the common face.
     const PAIRS: [usize; 2] = [1, 0];
 
-    /// The cross-section of `side` at a station joined by `joint`, or that far along from it: a section further on carries no force.
+    /// The cross-section of `side` at a station joined by `joint`, or that far along from it: a section
+    /// further on carries no force.
     pub fn new(model: &VolumeModel, station: usize, side: Side, joint: &Joint, along_mm: f64) -> Self {
         let (place, size) = (&model.stations[station], joint.size_mm);
-        let inland = if side == Side::A { -place.across } else { place.across };
-        let male_to_female = if joint.male == Side::A { place.across } else { -place.across };
+        let inland = if side == Side::A {
+            -place.across
+        } else {
+            place.across
+        };
+        let male_to_female = if joint.male == Side::A {
+            place.across
+        } else {
+            -place.across
+        };
         // n = −u × ŝ with u = v × N, v from male to female.
         let s = joint.leaves;
         let n = male_to_female * s.dot(place.normal) - place.normal * s.dot(male_to_female);
         let thick = n * (if joint.male == side { -PIN_WIDTH } else { PIN_WIDTH } * size);
         let edge = model.inner_edge[station][side.index()] + along_mm * place.tangent;
-        let at =
-            [-PIN_DEPTH, 0.0, PIN_WIDTH].map(|s_share| [0.0, 1.0].map(|k| edge + s * (s_share * size) + thick * k));
+        let at = [-PIN_DEPTH, 0.0, PIN_WIDTH]
+            .map(|s_share| [0.0, 1.0].map(|k| edge + s * (s_share * size) + thick * k));
 
         let is_inside = |x: Vec3| {
             let least = -SLACK * size;
@@ -94,53 +107,17 @@ impl Section {
 
     /// Directions in which contact acts on this side: row, direction, place.
     pub fn rows(&self) -> impl Iterator<Item = (usize, Vec3, Vec3)> {
-        Self::PAIRS
-            .into_iter()
-            .enumerate()
-            .flat_map(move |(pair, is)| (0..3).map(move |c| (3 * pair + c, self.frame[c] * self.sign, self.at[is][0])))
+        Self::PAIRS.into_iter().enumerate().flat_map(move |(pair, is)| {
+            (0..3).map(move |c| (3 * pair + c, self.frame[c] * self.sign, self.at[is][0]))
+        })
     }
 
     /// The separation force and the places on which it acts, a quarter each.
     pub fn load(&self) -> (Vec3, [Vec3; 4]) {
-        (self.force_n, [self.at[0][0], self.at[0][1], self.at[1][0], self.at[1][1]])
-    }
-}
-
-/// Labels of a part's unknowns: wall, contact rows, load, nodes of the sections, nodes halfway.
-#[derive(Clone, Copy)]
-pub(super) struct Labels {
-    n_wall: u32,
-    n_stations: u32,
-}
-
-impl Labels {
-    pub fn new(n_wall: usize, n_stations: usize) -> Self {
-        Self { n_wall: n_wall as u32, n_stations: n_stations as u32 }
-    }
-    pub fn is_wall(self, id: u32) -> bool {
-        id < self.n_wall
-    }
-    pub fn row(self, station: usize, row: usize) -> u32 {
-        self.n_wall + (station * ROWS + row) as u32
-    }
-    /// Whether `id` is neither a contact row nor the load.
-    pub fn is_inner(self, id: u32) -> bool {
-        self.is_wall(id) || id > self.load()
-    }
-    /// The contact row that `id` means.
-    pub fn row_of(self, id: u32) -> usize {
-        (id - self.n_wall) as usize
-    }
-    pub fn load(self) -> u32 {
-        self.n_wall + self.n_stations * ROWS as u32
-    }
-    fn section(self, station: usize, side: Side) -> u32 {
-        self.load() + 1 + ((2 * station + side.index()) * 3 * N_SECTION) as u32
-    }
-    /// The bar's cross-section halfway, and the one at its free end.
-    fn within(self, bar: usize) -> [u32; 2] {
-        let first = self.section(self.n_stations as usize, Side::A) + (2 * bar * 3 * N_SECTION) as u32;
-        [first, first + 3 * N_SECTION as u32]
+        (
+            self.force_n,
+            [self.at[0][0], self.at[0][1], self.at[1][0], self.at[1][1]],
+        )
     }
 }
 
@@ -148,7 +125,7 @@ impl Labels {
 #[derive(Debug)]
 pub(super) struct Bar {
     /// Number among the bars of all parts.
-    index: usize,
+    pub index: usize,
     pub side: Side,
     pub from: usize,
     pub to: Result<usize, Section>,
@@ -198,17 +175,24 @@ fn hold(sections: [&Section; 2], node: usize) -> Option<Hold> {
     if it % 2 + is % 2 + k % 2 == 0 {
         return end(true).cloned();
     }
-    Some([end(false)?, end(true)?].into_iter().flatten().map(|(node, w)| (*node, 0.5 * w)).collect())
+    Some(
+        [end(false)?, end(true)?]
+            .into_iter()
+            .flatten()
+            .map(|(node, w)| (*node, 0.5 * w))
+            .collect(),
+    )
 }
 
-/// Tetrahedra of the bar between two cross-sections that are not rigidly part of the wall, as nodes of its lattice; nothing
-/// where the sections are so far twisted that it would turn inside out.
-fn tets_between(sections: [&Section; 2]) -> Option<Vec<[usize; 4]>> {
+/// Tetrahedra of the bar between two cross-sections that are not rigidly part of the wall, as nodes of its
+/// lattice; nothing where the sections are so far twisted that it would turn inside out.
+pub(super) fn tets_between(sections: [&Section; 2]) -> Option<Vec<[usize; 4]>> {
     let has_foot = sections[0].has_foot && sections[1].has_foot;
     let mut tets = Vec::new();
     for cell in 0..1 + usize::from(has_foot) {
         let mut cell_tets = cell_tets(cell);
-        let along = corner(sections, lattice(2 * cell, 0, 0)).distance(corner(sections, lattice(2 * cell, 0, 2)));
+        let along =
+            corner(sections, lattice(2 * cell, 0, 0)).distance(corner(sections, lattice(2 * cell, 0, 2)));
         let section = sections[0].at[cell][0].distance(sections[0].at[cell + 1][0])
             * sections[0].at[cell][0].distance(sections[0].at[cell][1]);
         // Kuhn's tetrahedra: even permutations of the axes have one sign, odd ones the other.
@@ -216,7 +200,10 @@ fn tets_between(sections: [&Section; 2]) -> Option<Vec<[usize; 4]>> {
             .map(|(i, t)| volume_6(t.map(|node| corner(sections, node))) * if i < 3 { 1.0 } else { -1.0 })
             .collect();
         let sign = volumes[0].signum();
-        if volumes.iter().any(|v| v * sign < MIN_VOLUME_SHARE * along * section) {
+        if volumes
+            .iter()
+            .any(|v| v * sign < MIN_VOLUME_SHARE * along * section)
+        {
             return None;
         }
         for (i, tet) in cell_tets.iter_mut().enumerate() {
@@ -248,11 +235,19 @@ impl Bar {
         Some([of(self.from)?, to])
     }
 
-    /// The cross-sections at its ends, and what moves each node: its own unknown or the wall's, by the first of three.
-    pub fn movers<'a>(&'a self, sections: &'a Sections, labels: Labels) -> Option<([&'a Section; 2], Vec<Hold>)> {
+    /// The cross-sections at its ends, and what moves each node: its own unknown or the wall's, by the first
+    /// of three.
+    pub fn movers<'a>(
+        &'a self,
+        sections: &'a Sections,
+        labels: Labels,
+    ) -> Option<([&'a Section; 2], Vec<Hold>)> {
         let ends = self.ends(sections)?;
         let [halfway, end] = labels.within(self.index);
-        let to = self.to.as_ref().map_or(end, |station| labels.section(*station, self.side));
+        let to = self
+            .to
+            .as_ref()
+            .map_or(end, |station| labels.section(*station, self.side));
         let base = [labels.section(self.from, self.side), halfway, to];
         let mover = |node: usize| match hold(ends, node) {
             Some(hold) => hold.into_iter().map(|(kept, w)| (3 * kept, w)).collect(),
@@ -261,7 +256,8 @@ impl Bar {
         Some((ends, (0..N_BAR).map(mover).collect()))
     }
 
-    /// Stiffness, contact rows and load of the bar; `carries` says of which of its stations, so that each counts once.
+    /// Stiffness, contact rows and load of the bar; `carries` says of which of its stations, so that each
+    /// counts once.
     pub fn front(
         &self,
         model: &VolumeModel,
@@ -269,9 +265,14 @@ impl Bar {
         carries: impl Fn(usize) -> bool,
         labels: Labels,
     ) -> Front {
-        let Some((ends, movers)) = self.movers(sections, labels) else { return Front::default() };
-        let carried: Vec<(usize, usize)> =
-            self.stations().enumerate().filter(|(_, station)| carries(*station)).collect();
+        let Some((ends, movers)) = self.movers(sections, labels) else {
+            return Front::default();
+        };
+        let carried: Vec<(usize, usize)> = self
+            .stations()
+            .enumerate()
+            .filter(|(_, station)| carries(*station))
+            .collect();
         let mut sum = Accumulator::new(self.used_nodes(), &movers, labels, &carried);
         sum.add_stiffness(&self.lattice_stiffness(model, ends), &movers);
         for (i, station) in carried {
@@ -284,7 +285,12 @@ impl Bar {
     fn used_nodes(&self) -> Vec<usize> {
         let mut nodes: Vec<usize> = self.tets.iter().flat_map(|t| with_middles(*t)).collect();
         // Pairs and loads act on front corners, in elements or not.
-        nodes.extend([0, 2].into_iter().flat_map(|it| [0, 2].map(|is| [0, 2].map(|k| lattice(is, k, it)))).flatten());
+        nodes.extend(
+            [0, 2]
+                .into_iter()
+                .flat_map(|it| [0, 2].map(|is| [0, 2].map(|k| lattice(is, k, it))))
+                .flatten(),
+        );
         nodes.sort_unstable();
         nodes.dedup();
         nodes
@@ -296,17 +302,22 @@ impl Bar {
         let lame = lame(&model.params.material);
         for tet in &self.tets {
             let nodes = with_middles(*tet);
-            stiffness(Order::Quadratic, tet.map(|c| corner(sections, c)), lame, |a, b, k| {
-                for (i, k) in k.iter().enumerate() {
-                    for (j, k) in k.iter().enumerate() {
-                        let (row, column) = (3 * nodes[a] + i, 3 * nodes[b] + j);
-                        k_bar[row + N * column] += k;
-                        if a != b {
-                            k_bar[column + N * row] += k;
+            stiffness(
+                Order::Quadratic,
+                tet.map(|c| corner(sections, c)),
+                lame,
+                |a, b, k| {
+                    for (i, k) in k.iter().enumerate() {
+                        for (j, k) in k.iter().enumerate() {
+                            let (row, column) = (3 * nodes[a] + i, 3 * nodes[b] + j);
+                            k_bar[row + N * column] += k;
+                            if a != b {
+                                k_bar[column + N * row] += k;
+                            }
                         }
                     }
-                }
-            });
+                },
+            );
         }
         k_bar
     }
@@ -322,7 +333,8 @@ pub(super) fn with_middles(corners: [usize; 4]) -> [usize; 10] {
     nodes
 }
 
-/// The nearest of `tets` to `x` (largest least barycentric coordinate): its corners with their weights at `x`.
+/// The nearest of `tets` to `x` (largest least barycentric coordinate): its corners with their weights at
+/// `x`.
 pub(super) fn interpolation(tets: impl Iterator<Item = ([u32; 4], [Vec3; 4])>, x: Vec3) -> [(u32, f64); 4] {
     let mut best = ([(0, 0.0); 4], f64::NEG_INFINITY);
     for (nodes, corners) in tets {
@@ -344,8 +356,11 @@ struct Accumulator {
 
 impl Accumulator {
     fn new(used: Vec<usize>, movers: &[Hold], labels: Labels, carried: &[(usize, usize)]) -> Self {
-        let mut ids: Vec<u32> =
-            used.iter().flat_map(|&node| &movers[node]).flat_map(|(first, _)| *first..*first + 3).collect();
+        let mut ids: Vec<u32> = used
+            .iter()
+            .flat_map(|&node| &movers[node])
+            .flat_map(|(first, _)| *first..*first + 3)
+            .collect();
         for (_, station) in carried {
             ids.extend((0..ROWS).map(|row| labels.row(*station, row)));
             ids.push(labels.load());
@@ -353,7 +368,13 @@ impl Accumulator {
         ids.sort_unstable();
         ids.dedup();
         let n = ids.len();
-        Self { front: Front { ids, values: vec![0.0; n * n] }, used }
+        Self {
+            front: Front {
+                ids,
+                values: vec![0.0; n * n],
+            },
+            used,
+        }
     }
 
     fn place(&self, id: u32) -> usize {
@@ -365,7 +386,12 @@ impl Accumulator {
         const N: usize = 3 * N_BAR;
         let n = self.front.ids.len();
         let placed: Vec<Vec<(usize, f64)>> = (self.used.iter())
-            .map(|&node| movers[node].iter().map(|(first, w)| (self.place(*first), *w)).collect())
+            .map(|&node| {
+                movers[node]
+                    .iter()
+                    .map(|(first, w)| (self.place(*first), *w))
+                    .collect()
+            })
             .collect();
         let mut half = vec![0.0; n * N];
         for (&node, movers) in self.used.iter().zip(&placed) {
@@ -389,7 +415,8 @@ impl Accumulator {
         }
     }
 
-    /// Adds `value`, a vector, between unknown `id` and the node's motion; `id` comes after the wall, and before the nodes.
+    /// Adds `value`, a vector, between unknown `id` and the node's motion; `id` comes after the wall, and
+    /// before the nodes.
     fn couple(&mut self, id: u32, movers: &Hold, value: Vec3) {
         let (n, at) = (self.front.ids.len(), self.place(id));
         for (first, weight) in movers {
@@ -417,122 +444,8 @@ impl Accumulator {
     }
 }
 
-/// Both sides' cross-sections at each station, where it is joined.
-pub(super) type Sections = Vec<[Option<Section>; 2]>;
-
-/// All of them for a plan.
-pub(super) fn sections(model: &VolumeModel, plan: &[Meeting]) -> Sections {
-    use rayon::prelude::*;
-    (plan.par_iter().enumerate())
-        .map(|(i, m)| SIDES.map(|side| m.joint.as_ref().map(|joint| Section::new(model, i, side, joint, 0.0))))
-        .collect()
-}
-
-/// The bars of both sides. Every joint has two on either side: towards a neighbour that is joined alike the two share one;
-/// towards any other, and where the seam ends, it has its own, which ends halfway.
-pub(super) fn bars(model: &VolumeModel, plan: &[Meeting], sections: &Sections) -> Vec<Bar> {
-    let mut bars = Bars { model, plan, sections, all: Vec::new() };
-    let ways: Vec<[Way; 2]> = model.steps.iter().map(|step| ways(model, step.map(|s| s as usize))).collect();
-    let mut has_way = vec![[false; 2]; plan.len()];
-    ways.iter().flatten().for_each(|way| has_way[way.station][usize::from(way.is_forward)] = true);
-    for [from, to] in ways {
-        let to_ends = [from, to].map(|way| Way { is_forward: !way.is_forward, ..way });
-        let ends = |way: &Way| !std::mem::replace(&mut has_way[way.station][usize::from(way.is_forward)], true);
-        let is_end = to_ends.each_ref().map(ends);
-        if is_end[0] {
-            bars.push_own(&to_ends[0]);
-        }
-        if !bars.push_shared([from.station, to.station]) {
-            bars.push_own(&from);
-            bars.push_own(&to);
-        }
-        if is_end[1] {
-            bars.push_own(&to_ends[1]);
-        }
-    }
-    for (station, has_way) in has_way.into_iter().enumerate() {
-        let half_mm = 0.5 * model.stations[station].length_mm;
-        for is_forward in [false, true].into_iter().filter(|is_forward| !has_way[usize::from(*is_forward)]) {
-            bars.push_own(&Way { station, is_forward, half_mm });
-        }
-    }
-    bars.all
-}
-
-/// From a station along its tangent or against it, half as far as the next station.
-#[derive(Clone, Copy)]
-struct Way {
-    station: usize,
-    is_forward: bool,
-    half_mm: f64,
-}
-
-/// The ways from both ends of a step towards each other.
-fn ways(model: &VolumeModel, [from, to]: [usize; 2]) -> [Way; 2] {
-    let step = model.inner_edge[to][0] - model.inner_edge[from][0];
-    let way = |station: usize, step: Vec3| Way {
-        station,
-        is_forward: step.dot(model.stations[station].tangent) >= 0.0,
-        half_mm: 0.5 * step.length(),
-    };
-    [way(from, step), way(to, -step)]
-}
-
-/// Bars being listed.
-struct Bars<'a> {
-    model: &'a VolumeModel,
-    plan: &'a [Meeting],
-    sections: &'a Sections,
-    all: Vec<Bar>,
-}
-
-impl Bars<'_> {
-    /// The two bars between two stations, if both are joined and alike.
-    fn push_shared(&mut self, [from, to]: [usize; 2]) -> bool {
-        let males = [from, to].map(|s| self.plan[s].joint.map(|joint| joint.male));
-        let tets = SIDES.map(|side| {
-            let [first, second] = [from, to].map(|s| self.sections[s][side.index()].as_ref());
-            tets_between([first?, second?])
-        });
-        let ([Some(a), Some(b)], true) = (tets, males[0] == males[1]) else { return false };
-        for (side, tets) in SIDES.into_iter().zip([a, b]) {
-            self.all.push(Bar { index: self.all.len(), side, from, to: Ok(to), tets });
-        }
-        true
-    }
-
-    /// The two bars of one station alone, if it is joined.
-    fn push_own(&mut self, way: &Way) {
-        let from = way.station;
-        let Some(joint) = &self.plan[from].joint else { return };
-        let along_mm = if way.is_forward { way.half_mm } else { -way.half_mm };
-        for side in SIDES {
-            let end = Section::new(self.model, from, side, joint, along_mm);
-            let tets = self.sections[from][side.index()].as_ref().and_then(|section| tets_between([section, &end]));
-            if let Some(tets) = tets {
-                self.all.push(Bar { index: self.all.len(), side, from, to: Err(end), tets });
-            }
-        }
-    }
-}
-
-/// First and last of a part's bars at each section, station by station and side by side; the first carries what belongs to
-/// the station.
-pub(super) type Spans = Vec<[Option<[usize; 2]>; 2]>;
-
-pub(super) fn spans(bars: &[&Bar], n_stations: usize) -> Spans {
-    let mut spans = vec![[None; 2]; n_stations];
-    for (i, bar) in bars.iter().enumerate() {
-        for station in bar.stations() {
-            let span: &mut Option<[usize; 2]> = &mut spans[station][bar.side.index()];
-            *span = Some([span.map_or(i, |s| s[0]), i]);
-        }
-    }
-    spans
-}
-
-/// Adds up the fronts of a part's `bars` and eliminates their own unknowns; one front is left for each chain of bars that
-/// follow each other.
+/// Adds up the fronts of a part's `bars` and eliminates their own unknowns; one front is left for each chain
+/// of bars that follow each other.
 ///
 /// Halves are condensed first, then joined: what remains of each is short, however long the seam.
 pub(super) fn condensed(
@@ -551,7 +464,10 @@ pub(super) fn condensed(
             return Front::condensed(&[front], |id| is_inside(id, from, to));
         }
         let (left, right) = fronts.split_at(fronts.len() / 2);
-        let halves = [reduce(left, from, is_inside)?, reduce(right, from + left.len(), is_inside)?];
+        let halves = [
+            reduce(left, from, is_inside)?,
+            reduce(right, from + left.len(), is_inside)?,
+        ];
         Front::condensed(&[&halves[0], &halves[1]], |id| is_inside(id, from, to))
     }
     let is_inside = |id: u32, from: usize, to: usize| match labels.owner(id) {
@@ -561,31 +477,17 @@ pub(super) fn condensed(
         }
         Owner::Bar => true,
     };
-    let follows = |i: usize| bars[i - 1].stations().any(|s| bars[i].stations().any(|other| s == other));
-    let starts: Vec<usize> = (0..bars.len()).filter(|i| *i == 0 || !follows(*i)).chain([bars.len()]).collect();
-    starts.windows(2).map(|ends| reduce(&fronts[ends[0]..ends[1]], ends[0], &is_inside)).collect()
-}
-
-impl Labels {
-    fn owner(self, id: u32) -> Owner {
-        let first = self.section(0, Side::A);
-        if id < first {
-            Owner::Part
-        } else if id < self.within(0)[0] {
-            let at = (id - first) as usize / (3 * N_SECTION);
-            Owner::Section(at / 2, SIDES[at % 2])
-        } else {
-            Owner::Bar
-        }
-    }
-}
-
-/// To what an unknown belongs.
-enum Owner {
-    /// The wall, contact or the load.
-    Part,
-    /// A cross-section at a station.
-    Section(usize, Side),
-    /// The nodes halfway along a bar or at its free end.
-    Bar,
+    let follows = |i: usize| {
+        bars[i - 1]
+            .stations()
+            .any(|s| bars[i].stations().any(|other| s == other))
+    };
+    let starts: Vec<usize> = (0..bars.len())
+        .filter(|i| *i == 0 || !follows(*i))
+        .chain([bars.len()])
+        .collect();
+    starts
+        .windows(2)
+        .map(|ends| reduce(&fronts[ends[0]..ends[1]], ends[0], &is_inside))
+        .collect()
 }

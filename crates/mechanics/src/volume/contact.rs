@@ -1,7 +1,8 @@
 //! Static equilibrium of elastic parts that touch: who presses on whom, and how far all move.
 //!
-//! Unknowns are the forces λ at the contact rows and the rigid motions α of the free parts; F is the sum of the parts'
-//! compliances, B their rigid motions seen at the rows, d the displacement by the load alone, g the load's work on rigid motions:
+//! Unknowns are the forces λ at the contact rows and the rigid motions α of the free parts; F is the sum of
+//! the parts' compliances, B their rigid motions seen at the rows, d the displacement by the load alone, g
+//! the load's work on rigid motions:
 //! ```text
 //!     δ = F λ + B α + d      gap at the rows, male minus female; at walls, b minus a
 //!     0 = Bᵀ λ + g           equilibrium of every free part
@@ -12,10 +13,11 @@ use shellock_geom::sparse::{SparseError, eliminate_leading};
 
 use super::rows::Law;
 
-/// Compliance that every contact has of its own, as a share of the mean: keeps the system definite where two rows say the same.
+/// Compliance that every contact has of its own, as a share of the mean: keeps the system definite where two
+/// rows say the same.
 const CONTACT_COMPLIANCE: f64 = 1e-10;
-/// Stiffness of springs between free parts and the ground, as a share of what contact does: far below the accuracy
-/// of any opening, and enough to give each step of the active set one solution.
+/// Stiffness of springs between free parts and the ground, as a share of what contact does: far below the
+/// accuracy of any opening, and enough to give each step of the active set one solution.
 const GROUND_STIFFNESS: f64 = 1e-10;
 /// Rounds of the active set without improvement before it changes one row at a time, which always ends.
 const MAX_STALLED: usize = 4;
@@ -69,14 +71,19 @@ impl Response {
         }
         if let Some(first) = self.first_motion {
             for (moved, rigid) in moved.iter_mut().zip(&self.rigid) {
-                *moved += rigid.iter().zip(&equilibrium.motion[first..first + 6]).map(|(r, a)| r * a).sum::<f64>();
+                *moved += rigid
+                    .iter()
+                    .zip(&equilibrium.motion[first..first + 6])
+                    .map(|(r, a)| r * a)
+                    .sum::<f64>();
             }
         }
         moved
     }
 }
 
-/// A dense symmetric system `K x = b`, b its last column, and the solution of the rows eliminated from that of the others.
+/// A dense symmetric system `K x = b`, b its last column, and the solution of the rows eliminated from that
+/// of the others.
 struct Eliminated {
     values: Vec<f64>,
     n: usize,
@@ -122,13 +129,20 @@ pub(super) fn solve(
     let of = |law: Law| (0..laws.len()).filter(move |i| laws[*i] == law);
     let order: Vec<usize> = of(Law::Both).chain(of(Law::Push)).collect();
     let n_both = of(Law::Both).count();
-    let whole = Eliminated::new(system(parts, &order, laws.len(), n_motions), order.len() + n_motions + 1, n_both)?;
+    let whole = Eliminated::new(
+        system(parts, &order, laws.len(), n_motions),
+        order.len() + n_motions + 1,
+        n_both,
+    )?;
     let Some((pushes, motion)) = active_set(&whole, order.len() - n_both, n_motions, tolerance)? else {
         return Ok(None);
     };
     let rest: Vec<f64> = pushes.iter().chain(&motion).copied().collect();
     let mut force_n = vec![0.0; laws.len()];
-    for (&row, force) in order.iter().zip(whole.eliminated(&rest).into_iter().chain(pushes)) {
+    for (&row, force) in order
+        .iter()
+        .zip(whole.eliminated(&rest).into_iter().chain(pushes))
+    {
         force_n[row] = force;
     }
     Ok(Some(Equilibrium { force_n, motion }))
@@ -140,8 +154,11 @@ fn system(parts: &[Response], order: &[usize], n_rows: usize, n_motions: usize) 
     let mut values = vec![0.0; n * n];
     for part in parts {
         let place = part.row_place(n_rows);
-        let present: Vec<(usize, usize)> =
-            order.iter().enumerate().filter_map(|(i, row)| place[*row].map(|p| (i, p))).collect();
+        let present: Vec<(usize, usize)> = order
+            .iter()
+            .enumerate()
+            .filter_map(|(i, row)| place[*row].map(|p| (i, p)))
+            .collect();
         for (j, &(column, p)) in present.iter().enumerate() {
             for &(row, q) in &present[j..] {
                 values[row + n * column] += part.compliance[p.max(q) + part.rows.len() * p.min(q)];
@@ -191,19 +208,39 @@ fn active_set(
         let gaps: Vec<f64> = (0..n_pushes)
             .map(|i| {
                 let by_force: f64 = active.iter().map(|&j| whole.at(i, j) * pushes[j]).sum();
-                let by_motion: f64 = motion.iter().enumerate().map(|(m, a)| whole.at(i, n_pushes + m) * a).sum();
+                let by_motion: f64 = motion
+                    .iter()
+                    .enumerate()
+                    .map(|(m, a)| whole.at(i, n_pushes + m) * a)
+                    .sum();
                 by_force + by_motion - whole.at(i, b)
             })
             .collect();
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let (force_bound, gap_bound) = (-tolerance * largest(&pushes), -tolerance * largest(&gaps));
         let wrong: Vec<usize> = (0..n_pushes)
-            .filter(|&i| if is_active[i] { pushes[i] < force_bound } else { gaps[i] < gap_bound })
+            .filter(|&i| {
+                if is_active[i] {
+                    pushes[i] < force_bound
+                } else {
+                    gaps[i] < gap_bound
+                }
+            })
             .collect();
-        let Some(&last) = wrong.last() else { return Ok(Some((pushes, motion))) };
-        stalled = if wrong.len() < fewest_wrong { 0 } else { stalled + 1 };
+        let Some(&last) = wrong.last() else {
+            return Ok(Some((pushes, motion)));
+        };
+        stalled = if wrong.len() < fewest_wrong {
+            0
+        } else {
+            stalled + 1
+        };
         fewest_wrong = fewest_wrong.min(wrong.len());
-        for &i in if stalled > MAX_STALLED { std::slice::from_ref(&last) } else { &wrong[..] } {
+        for &i in if stalled > MAX_STALLED {
+            std::slice::from_ref(&last)
+        } else {
+            &wrong[..]
+        } {
             is_active[i] = !is_active[i];
         }
     }
@@ -217,10 +254,22 @@ fn with_active(
     n_pushes: usize,
     n_motions: usize,
 ) -> Result<(Vec<f64>, Vec<f64>), SparseError> {
-    let picked: Vec<usize> = active.iter().copied().chain(n_pushes..=n_pushes + n_motions).collect();
+    let picked: Vec<usize> = active
+        .iter()
+        .copied()
+        .chain(n_pushes..=n_pushes + n_motions)
+        .collect();
     let gather = |picked: &[usize], from: &Eliminated| {
         let n = picked.len();
-        (0..n * n).map(|at| if at % n >= at / n { from.at(picked[at % n], picked[at / n]) } else { 0.0 }).collect()
+        (0..n * n)
+            .map(|at| {
+                if at % n >= at / n {
+                    from.at(picked[at % n], picked[at / n])
+                } else {
+                    0.0
+                }
+            })
+            .collect()
     };
     let forces = Eliminated::new(gather(&picked, whole), picked.len(), active.len())?;
     // What is left for the motions is negative definite: contact resists them.
@@ -228,7 +277,11 @@ fn with_active(
     let mut coarse: Vec<f64> = gather(&(0..n).collect::<Vec<_>>(), &forces);
     // Where nothing is active yet, a single contact is the measure.
     let compliance: f64 = (0..n_pushes).map(|i| whole.at(i, i)).sum();
-    let contact_n_mm = if compliance > 0.0 { n_pushes as f64 / compliance } else { 0.0 };
+    let contact_n_mm = if compliance > 0.0 {
+        n_pushes as f64 / compliance
+    } else {
+        0.0
+    };
     let stiffest = (0..n_motions).fold(contact_n_mm, |m, i| m.max(-coarse[i * (n + 1)]));
     for column in 0..n_motions {
         for row in column..n_motions {

@@ -97,7 +97,8 @@ pub(super) fn stiffness(
     }
 }
 
-/// Von Mises stress at barycentric coordinates `l`, MPa; the first `order.n_nodes()` of `displacement_mm` are of use.
+/// Von Mises stress at barycentric coordinates `l`, MPa; the first `order.n_nodes()` of `displacement_mm` are
+/// of use.
 pub(super) fn von_mises_mpa(
     order: Order,
     corners: [Vec3; 4],
@@ -116,8 +117,9 @@ pub(super) fn von_mises_mpa(
         }
     }
     let trace = gradient[0][0] + gradient[1][1] + gradient[2][2];
-    let stress =
-        |i: usize, j: usize| mu * (gradient[i][j] + gradient[j][i]) + if i == j { lambda * trace } else { 0.0 };
+    let stress = |i: usize, j: usize| {
+        mu * (gradient[i][j] + gradient[j][i]) + if i == j { lambda * trace } else { 0.0 }
+    };
     let [x, y, z] = [0, 1, 2].map(|i| stress(i, i));
     let shear_sq = stress(0, 1).powi(2) + stress(1, 2).powi(2) + stress(2, 0).powi(2);
     (0.5 * ((x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2)) + 3.0 * shear_sq).sqrt()

@@ -10,7 +10,8 @@ pub(super) struct Front {
 }
 
 impl Front {
-    /// The sum of `fronts` with all unknowns eliminated that `is_eliminated` names; the others stay, in ascending order.
+    /// The sum of `fronts` with all unknowns eliminated that `is_eliminated` names; the others stay, in
+    /// ascending order.
     pub fn condensed(fronts: &[&Self], is_eliminated: impl Fn(u32) -> bool) -> Result<Self, SparseError> {
         let mut ids: Vec<u32> = fronts.iter().flat_map(|f| &f.ids).copied().collect();
         let key = |id: u32| (!is_eliminated(id), id);
@@ -20,14 +21,20 @@ impl Front {
         let n_eliminated = ids.partition_point(|&id| is_eliminated(id));
         let mut values = vec![0.0; n * n];
         for front in fronts {
-            let place: Vec<usize> =
-                front.ids.iter().map(|&id| ids.partition_point(|&other| key(other) < key(id))).collect();
+            let place: Vec<usize> = front
+                .ids
+                .iter()
+                .map(|&id| ids.partition_point(|&other| key(other) < key(id)))
+                .collect();
             let is_sorted = place.is_sorted();
             for (j, &column) in place.iter().enumerate() {
                 let source = &front.values[place.len() * j + j..place.len() * (j + 1)];
                 if is_sorted && place[place.len() - 1] - column == source.len() - 1 {
                     // One run of unknowns, as the wall's are.
-                    values[n * column + column..][..source.len()].iter_mut().zip(source).for_each(|(v, s)| *v += s);
+                    values[n * column + column..][..source.len()]
+                        .iter_mut()
+                        .zip(source)
+                        .for_each(|(v, s)| *v += s);
                     continue;
                 }
                 for (&row, s) in place[j..].iter().zip(source) {
@@ -41,7 +48,10 @@ impl Front {
         for column in n_eliminated..n {
             rest.extend_from_slice(&values[n * column + n_eliminated..n * (column + 1)]);
         }
-        Ok(Self { ids: ids.split_off(n_eliminated), values: rest })
+        Ok(Self {
+            ids: ids.split_off(n_eliminated),
+            values: rest,
+        })
     }
 
     /// Unknown `id` coupled to `others`, which are ascending and all before it.
@@ -51,7 +61,10 @@ impl Front {
         for (column, (_, value)) in others.iter().enumerate() {
             values[n - 1 + n * column] = *value;
         }
-        Self { ids: others.iter().map(|o| o.0).chain([id]).collect(), values }
+        Self {
+            ids: others.iter().map(|o| o.0).chain([id]).collect(),
+            values,
+        }
     }
 
     /// The front with some unknowns held at zero.
@@ -60,7 +73,10 @@ impl Front {
         let kept: Vec<usize> = (0..n).filter(|i| !is_held(self.ids[*i])).collect();
         Self {
             ids: kept.iter().map(|i| self.ids[*i]).collect(),
-            values: kept.iter().flat_map(|j| kept.iter().map(move |i| self.values[i + n * j])).collect(),
+            values: kept
+                .iter()
+                .flat_map(|j| kept.iter().map(move |i| self.values[i + n * j]))
+                .collect(),
         }
     }
 }

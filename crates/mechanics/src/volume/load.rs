@@ -1,11 +1,12 @@
 //! Forces from outside: how far the seams open, and how much walls and connectors are stressed.
 //!
-//! Each part with its connectors is one sparse system `K u = f + Jᵀ λ`, J its contact rows. A part that is free to move is held
-//! at six unknowns that suffice and bear nothing, since all forces on it balance in the end. Solved for each row and for the load,
-//! it gives the compliance and the drift that contact (`contact`) asks for; with the contact's forces, the stresses.
+//! Each part with its connectors is one sparse system `K u = f + Jᵀ λ`, J its contact rows. A part that is
+//! free to move is held at six unknowns that suffice and bear nothing, since all forces on it balance in the
+//! end. Solved for each row and for the load, it gives the compliance and the drift that contact (`contact`)
+//! asks for; with the contact's forces, the stresses.
 //!
-//! What is clamped bears the load. Where nothing is clamped, as in a fall, the forces accelerate the whole as a rigid body,
-//! and the inertia of the walls balances them (inertia relief). Connectors have no mass.
+//! What is clamped bears the load. Where nothing is clamped, as in a fall, the forces accelerate the whole as
+//! a rigid body, and the inertia of the walls balances them (inertia relief). Connectors have no mass.
 
 use std::collections::BTreeMap;
 
@@ -13,13 +14,15 @@ use rayon::prelude::*;
 use shellock_geom::Vec3;
 use shellock_geom::sparse::{Cholesky, SparseError, SparseSymmetric};
 
-use super::connector::{self, Bar, Labels, Sections};
+use super::bars::{self, Sections};
+use super::connector::{self, Bar};
 use super::contact::{self, Equilibrium, Response};
 use super::element::volume_6;
 use super::front::Front;
 use super::part::{Numbering, RigidModes, assemble};
 use super::rows::{self, ROWS, WALL};
 use super::stress::{Sample, StressLevel, samples};
+use super::unknowns::Labels;
 use super::{VolumeError, VolumeModel, mechanism};
 use crate::Meeting;
 use crate::assembly::is_lost;
@@ -30,8 +33,8 @@ const T_MM3_PER_G_CM3: f64 = 1e-9;
 /// What forces from outside do to an assembly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// How far each station opens, mm: the larger distance between male and female at the root and at the tip of the pin; where
-    /// there is no joint, how far the walls' faces part.
+    /// How far each station opens, mm: the larger distance between male and female at the root and at the tip
+    /// of the pin; where there is no joint, how far the walls' faces part.
     pub opening_mm: Vec<f64>,
     /// The joints (ascending) whose pins have left their channels.
     pub lost: Vec<u32>,
@@ -41,7 +44,8 @@ pub struct Loaded {
     pub connectors: StressLevel,
     /// The largest stress in the wall below each triangle, MPa.
     pub triangle_mpa: Vec<f64>,
-    /// Forces and torques on each part's six rigid motions that nothing balances, N, relative to the largest force: rounding.
+    /// Forces and torques on each part's six rigid motions that nothing balances, N, relative to the largest
+    /// force: rounding.
     pub imbalance: f64,
 }
 
@@ -62,18 +66,30 @@ impl VolumeModel {
         mass_t
     }
 
-    /// What `forces_n`, one at each point of the outer surface, do to the parts joined by `plan`; or the parts that come off.
+    /// What `forces_n`, one at each point of the outer surface, do to the parts joined by `plan`; or the
+    /// parts that come off.
     ///
-    /// What is clamped bears them; where nothing is, the walls' inertia does. The separation force does not act.
-    pub fn under_load(&self, plan: &[Meeting], forces_n: &[Vec3]) -> Result<Result<Loaded, Vec<u32>>, VolumeError> {
+    /// What is clamped bears them; where nothing is, the walls' inertia does. The separation force does not
+    /// act.
+    pub fn under_load(
+        &self,
+        plan: &[Meeting],
+        forces_n: &[Vec3],
+    ) -> Result<Result<Loaded, Vec<u32>>, VolumeError> {
         if plan.len() != self.stations.len() {
-            return Err(VolumeError::Joints { joints: plan.len(), stations: self.stations.len() });
+            return Err(VolumeError::Joints {
+                joints: plan.len(),
+                stations: self.stations.len(),
+            });
         }
         if forces_n.len() != self.part_of_point.len() || !forces_n.iter().all(|f| f.is_finite()) {
-            return Err(VolumeError::Forces { forces: forces_n.len(), points: self.part_of_point.len() });
+            return Err(VolumeError::Forces {
+                forces: forces_n.len(),
+                points: self.part_of_point.len(),
+            });
         }
-        let sections = connector::sections(self, plan);
-        let bars = connector::bars(self, plan, &sections);
+        let sections = bars::sections(self, plan);
+        let bars = bars::bars(self, plan, &sections);
         let loads_n = self.balanced(forces_n)?;
         let (mut bodies, mut responses): (Vec<Body>, Vec<Response>) = (0..self.parts.len() as u32)
             .into_par_iter()
@@ -81,19 +97,33 @@ impl VolumeModel {
             .collect::<Result<Vec<_>, _>>()?
             .into_iter()
             .unzip();
-        // Where all parts float, the first is where the others are seen from; its forces balance with the whole's.
-        let n_motions = number_motions(&mut responses, |i| self.parts[i].rigid.is_some() && (i > 0 || self.is_held()));
+        // Where all parts float, the first is where the others are seen from; its forces balance with the
+        // whole's.
+        let n_motions = number_motions(&mut responses, |i| {
+            self.parts[i].rigid.is_some() && (i > 0 || self.is_held())
+        });
         let laws = rows::laws(plan);
         let Some(equilibrium) = contact::solve(&responses, &laws, n_motions, self.params.tolerance)? else {
             let loose = mechanism::loose_parts(&responses, &laws, n_motions);
-            return if loose.is_empty() { Err(VolumeError::Contact) } else { Ok(Err(loose)) };
+            return if loose.is_empty() {
+                Err(VolumeError::Contact)
+            } else {
+                Ok(Err(loose))
+            };
         };
         bodies.par_iter_mut().for_each(|body| body.move_by(&equilibrium));
         let opening_mm = self.openings(plan, &responses, &equilibrium, &sections);
         let (triangle_mpa, walls) = self.wall_stress(&bodies);
-        let connectors: Vec<Sample> = bodies.par_iter().flat_map_iter(|b| b.bar_samples(self, &sections)).collect();
+        let connectors: Vec<Sample> = bodies
+            .par_iter()
+            .flat_map_iter(|b| b.bar_samples(self, &sections))
+            .collect();
         Ok(Ok(Loaded {
-            lost: (0..).zip(plan).filter(|(i, m)| is_lost(m, opening_mm[*i as usize])).map(|(i, _)| i).collect(),
+            lost: (0..)
+                .zip(plan)
+                .filter(|(i, m)| is_lost(m, opening_mm[*i as usize]))
+                .map(|(i, _)| i)
+                .collect(),
             walls,
             connectors: StressLevel::of(connectors),
             triangle_mpa,
@@ -125,10 +155,16 @@ impl VolumeModel {
                 (0..6).for_each(|b| inertia[(a, b)] += m * modes[a].dot(modes[b]));
             }
         }
-        let inverse = inertia.try_inverse().ok_or(SparseError::NotPositiveDefinite { n: 6 })?;
+        let inverse = inertia
+            .try_inverse()
+            .ok_or(SparseError::NotPositiveDefinite { n: 6 })?;
         let acceleration = inverse * work;
         for ((x, m), f) in nodes.iter().zip(&mass_t).zip(&mut loads_n) {
-            rigid.at(*x).iter().zip(acceleration.iter()).for_each(|(mode, a)| *f -= *mode * (m * a));
+            rigid
+                .at(*x)
+                .iter()
+                .zip(acceleration.iter())
+                .for_each(|(mode, a)| *f -= *mode * (m * a));
         }
         Ok(loads_n)
     }
@@ -158,13 +194,19 @@ impl VolumeModel {
 
     /// The largest stress below each triangle, and that of all walls.
     fn wall_stress(&self, bodies: &[Body]) -> (Vec<f64>, StressLevel) {
-        let samples: Vec<(u32, [Sample; 4])> = bodies.par_iter().flat_map_iter(|b| b.wall_samples(self)).collect();
+        let samples: Vec<(u32, [Sample; 4])> = bodies
+            .par_iter()
+            .flat_map_iter(|b| b.wall_samples(self))
+            .collect();
         let mut largest = vec![0.0_f64; self.wall.tets.len() / (3 * self.params.n_layers)];
         for (tet, corners) in &samples {
             let triangle = &mut largest[*tet as usize / (3 * self.params.n_layers)];
             *triangle = corners.iter().map(|s| s.stress_mpa).fold(*triangle, f64::max);
         }
-        (largest, StressLevel::of(samples.into_iter().flat_map(|s| s.1).collect()))
+        (
+            largest,
+            StressLevel::of(samples.into_iter().flat_map(|s| s.1).collect()),
+        )
     }
 }
 
@@ -178,13 +220,21 @@ fn number_motions(responses: &mut [Response], is_free: impl Fn(usize) -> bool) -
     n_motions
 }
 
-/// What contact and load leave of force on the rigid motions of the free parts, relative to the largest force.
+/// What contact and load leave of force on the rigid motions of the free parts, relative to the largest
+/// force.
 fn imbalance(responses: &[Response], equilibrium: &Equilibrium, forces_n: &[Vec3]) -> f64 {
-    let largest_n = forces_n.iter().map(|f| f.length()).fold(f64::MIN_POSITIVE, f64::max);
+    let largest_n = forces_n
+        .iter()
+        .map(|f| f.length())
+        .fold(f64::MIN_POSITIVE, f64::max);
     let mut worst = 0.0_f64;
     for response in responses.iter().filter(|r| r.first_motion.is_some()) {
         for m in 0..6 {
-            let by_contact = response.rows.iter().zip(&response.rigid).map(|(row, r)| equilibrium.force_n[*row] * r[m]);
+            let by_contact = response
+                .rows
+                .iter()
+                .zip(&response.rigid)
+                .map(|(row, r)| equilibrium.force_n[*row] * r[m]);
             worst = worst.max((by_contact.sum::<f64>() + response.rigid_load_n[m]).abs());
         }
     }
@@ -227,15 +277,23 @@ impl<'a> Body<'a> {
     ) -> Result<(Self, Response), SparseError> {
         let (order, material) = (model.params.order, &model.params.material);
         let n_points = model.part_of_point.len();
-        let is_own = |tet: &u32| model.part_of_point[model.wall.tets[*tet as usize][0] as usize % n_points] == part;
+        let is_own =
+            |tet: &u32| model.part_of_point[model.wall.tets[*tet as usize][0] as usize % n_points] == part;
         let tets: Vec<u32> = (0..model.wall.tets.len() as u32).filter(is_own).collect();
         let corners: Vec<[u32; 4]> = tets.iter().map(|tet| model.wall.tets[*tet as usize]).collect();
-        let numbering = Numbering::new(order, &corners, &[], &|node| model.is_clamped[node as usize % n_points]);
+        let numbering = Numbering::new(order, &corners, &[], &|node| {
+            model.is_clamped[node as usize % n_points]
+        });
         let mut entries = assemble(order, material, &model.wall, &corners, &numbering);
 
         let labels = model.labels(part);
         let (bars, _, mut fronts) = model.bar_fronts(part, sections, bars, labels);
-        let mut own: Vec<u32> = fronts.iter().flat_map(|f| &f.ids).copied().filter(|id| *id > labels.load()).collect();
+        let mut own: Vec<u32> = fronts
+            .iter()
+            .flat_map(|f| &f.ids)
+            .copied()
+            .filter(|id| *id > labels.load())
+            .collect();
         own.sort_unstable();
         own.dedup();
         fronts.extend(model.wall_fronts(part, plan, labels));
@@ -249,7 +307,19 @@ impl<'a> Body<'a> {
         let rows = BTreeMap::new();
         let (is_pinned, moved_mm) = (vec![false; n], Vec::new());
         let stiffness = Cholesky::new(&SparseSymmetric::from_entries(0, Vec::new()))?;
-        let mut body = Self { tets, numbering, bars, labels, own, kept, stiffness, is_pinned, rows, load_n, moved_mm };
+        let mut body = Self {
+            tets,
+            numbering,
+            bars,
+            labels,
+            own,
+            kept,
+            stiffness,
+            is_pinned,
+            rows,
+            load_n,
+            moved_mm,
+        };
         body.add_fronts(&fronts, &mut entries);
         if model.parts[part as usize].rigid.is_some() {
             body.pin(model);
@@ -271,10 +341,17 @@ impl<'a> Body<'a> {
     /// The unknown that a label means; none for contact rows and the load.
     fn unknown(&self, id: u32) -> Option<u32> {
         if self.labels.is_wall(id) {
-            let at = self.numbering.vertices.binary_search(&self.kept[id as usize / 3]).ok()?;
+            let at = self
+                .numbering
+                .vertices
+                .binary_search(&self.kept[id as usize / 3])
+                .ok()?;
             return self.numbering.first[at].map(|first| first + id % 3);
         }
-        self.own.binary_search(&id).ok().map(|at| (self.numbering.n + at) as u32)
+        self.own
+            .binary_search(&id)
+            .ok()
+            .map(|at| (self.numbering.n + at) as u32)
     }
 
     /// Adds stiffness to `entries`, and takes note of the rows.
@@ -303,9 +380,15 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Holds six unknowns of the wall that leave it no rigid motion: one after the other the one that moves farthest.
+    /// Holds six unknowns of the wall that leave it no rigid motion: one after the other the one that moves
+    /// farthest.
     fn pin(&mut self, model: &VolumeModel) {
-        let points: Vec<Vec3> = self.numbering.vertices.iter().map(|v| model.wall.nodes[*v as usize]).collect();
+        let points: Vec<Vec3> = self
+            .numbering
+            .vertices
+            .iter()
+            .map(|v| model.wall.nodes[*v as usize])
+            .collect();
         let rigid = RigidModes::new(&points);
         let mut left: Vec<(u32, nalgebra::SVector<f64, 6>)> = Vec::new();
         for (point, first) in points.iter().zip(&self.numbering.first) {
@@ -314,11 +397,16 @@ impl<'a> Body<'a> {
             left.extend((0..3).map(|c| (first + c as u32, modes.map(|m| m[c]).into())));
         }
         for _ in 0..6 {
-            let farthest = left.iter().max_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared()));
-            let Some(&(unknown, motion)) = farthest else { return };
+            let farthest = left
+                .iter()
+                .max_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared()));
+            let Some(&(unknown, motion)) = farthest else {
+                return;
+            };
             self.is_pinned[unknown as usize] = true;
             let along = motion.normalize();
-            left.iter_mut().for_each(|(_, motion)| *motion -= along * along.dot(motion));
+            left.iter_mut()
+                .for_each(|(_, motion)| *motion -= along * along.dot(motion));
         }
     }
 
@@ -333,7 +421,9 @@ impl<'a> Body<'a> {
         if let Some(last) = sides.chunks_exact_mut(n.max(1)).last() {
             last.copy_from_slice(&self.load_n);
         }
-        sides.chunks_exact_mut(n.max(1)).for_each(|side| self.release_pins(side));
+        sides
+            .chunks_exact_mut(n.max(1))
+            .for_each(|side| self.release_pins(side));
         self.stiffness.solve_in_place(&mut sides);
         let mut values = vec![0.0; m * m];
         for (j, side) in sides.chunks_exact(n.max(1)).enumerate() {
@@ -342,11 +432,17 @@ impl<'a> Body<'a> {
                 values[i.max(j) + m * i.min(j)] = -along;
             }
         }
-        Front { ids: self.rows.keys().copied().chain([self.labels.load()]).collect(), values }
+        Front {
+            ids: self.rows.keys().copied().chain([self.labels.load()]).collect(),
+            values,
+        }
     }
 
     fn release_pins(&self, side: &mut [f64]) {
-        side.iter_mut().zip(&self.is_pinned).filter(|(_, is_pinned)| **is_pinned).for_each(|(f, _)| *f = 0.0);
+        side.iter_mut()
+            .zip(&self.is_pinned)
+            .filter(|(_, is_pinned)| **is_pinned)
+            .for_each(|(f, _)| *f = 0.0);
     }
 
     /// Displaces it by the load and by what contact presses.
@@ -354,7 +450,8 @@ impl<'a> Body<'a> {
         let mut side = self.load_n.clone();
         for (id, row) in &self.rows {
             let force_n = equilibrium.force_n[self.labels.row_of(*id)];
-            row.iter().for_each(|(of, value)| side[*of as usize] += force_n * value);
+            row.iter()
+                .for_each(|(of, value)| side[*of as usize] += force_n * value);
         }
         self.release_pins(&mut side);
         self.stiffness.solve_in_place(&mut side);
@@ -371,21 +468,37 @@ impl<'a> Body<'a> {
         self.tets.iter().map(move |&tet| {
             let unknowns = self.numbering.of_tet(order, &model.wall.tets[tet as usize]);
             let moved = unknowns.map(|first| self.displacement_mm(first));
-            (tet, samples(order, model.wall.corners(tet as usize), &model.params.material, &moved))
+            (
+                tet,
+                samples(
+                    order,
+                    model.wall.corners(tet as usize),
+                    &model.params.material,
+                    &moved,
+                ),
+            )
         })
     }
 
     fn bar_samples(&self, model: &VolumeModel, sections: &Sections) -> Vec<Sample> {
         let mut all = Vec::new();
         for bar in &self.bars {
-            let Some((ends, movers)) = bar.movers(sections, self.labels) else { continue };
+            let Some((ends, movers)) = bar.movers(sections, self.labels) else {
+                continue;
+            };
             for tet in &bar.tets {
                 let moved = connector::with_middles(*tet).map(|node| {
-                    let by = |(first, weight): &(u32, f64)| self.displacement_mm(self.unknown(*first)) * *weight;
+                    let by =
+                        |(first, weight): &(u32, f64)| self.displacement_mm(self.unknown(*first)) * *weight;
                     movers[node].iter().map(by).sum()
                 });
                 let corners = tet.map(|node| connector::corner(ends, node));
-                all.extend(samples(super::Order::Quadratic, corners, &model.params.material, &moved));
+                all.extend(samples(
+                    super::Order::Quadratic,
+                    corners,
+                    &model.params.material,
+                    &moved,
+                ));
             }
         }
         all

@@ -5,19 +5,21 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::contact::Response;
 use super::rows::Law;
 
-/// Mean displacement along blocked directions, as a share of the motion, below which the motion is free. Frames are exact to
-/// rounding; a motion that is this nearly free would open seams ten thousand times further than the parts deform.
+/// Mean displacement along blocked directions, as a share of the motion, below which the motion is free.
+/// Frames are exact to rounding; a motion that is this nearly free would open seams ten thousand times
+/// further than the parts deform.
 const FREE: f64 = 1e-4;
 /// Depth, as a share of the probe, that is none whatever the motion.
 const ROUNDING: f64 = 1e-9;
 /// Rounds of a projection onto the cone of free motions, for each of its dimensions.
 const MAX_ROUNDS: usize = 50;
 
-/// The parts (ascending, by place in `parts`) that some rigid motion takes off: along n nothing moves, along ŝ nothing moves
-/// into the floor, and no wall into another.
+/// The parts (ascending, by place in `parts`) that some rigid motion takes off: along n nothing moves, along
+/// ŝ nothing moves into the floor, and no wall into another.
 ///
-/// The motions that keep all gaps along n are a linear space, found from its Gram matrix. In it, the pushes leave a cone, which
-/// holds more than rest if and only if one of the vectors ± eᵢ has a nearest point in it that is not rest.
+/// The motions that keep all gaps along n are a linear space, found from its Gram matrix. In it, the pushes
+/// leave a cone, which holds more than rest if and only if one of the vectors ± eᵢ has a nearest point in it
+/// that is not rest.
 pub(super) fn loose_parts(parts: &[Response], laws: &[Law], n_motions: usize) -> Vec<u32> {
     if n_motions == 0 {
         return Vec::new();
@@ -44,7 +46,11 @@ pub(super) fn loose_parts(parts: &[Response], laws: &[Law], n_motions: usize) ->
             *is_loose |= part.first_motion.is_some_and(moves);
         }
     }
-    (0..).zip(is_loose).filter(|(_, is_loose)| *is_loose).map(|(i, _)| i).collect()
+    (0..)
+        .zip(is_loose)
+        .filter(|(_, is_loose)| *is_loose)
+        .map(|(i, _)| i)
+        .collect()
 }
 
 /// What each row sees of the motions: first unknown and six coefficients, of both sides.
@@ -74,7 +80,12 @@ fn dense(seen: &Seen, n_motions: usize) -> DVector<f64> {
 /// An orthonormal basis, by columns, of the motions that rows of both signs do not see.
 fn free_space(seen: &[Seen], laws: &[Law], n_motions: usize) -> DMatrix<f64> {
     let mut gram = DMatrix::zeros(n_motions, n_motions);
-    for seen in seen.iter().zip(laws).filter(|(_, law)| **law == Law::Both).map(|(seen, _)| seen) {
+    for seen in seen
+        .iter()
+        .zip(laws)
+        .filter(|(_, law)| **law == Law::Both)
+        .map(|(seen, _)| seen)
+    {
         for (first, a) in seen {
             for (second, b) in seen {
                 for i in 0..6 {
@@ -88,18 +99,27 @@ fn free_space(seen: &[Seen], laws: &[Law], n_motions: usize) -> DMatrix<f64> {
     let n_rows = laws.iter().filter(|law| **law == Law::Both).count().max(1);
     let eigen = SymmetricEigen::new(gram);
     let is_free = |i: &usize| eigen.eigenvalues[*i] <= FREE * FREE * n_rows as f64;
-    let columns: Vec<DVector<f64>> =
-        (0..n_motions).filter(is_free).map(|i| eigen.eigenvectors.column(i).into_owned()).collect();
-    if columns.is_empty() { DMatrix::zeros(n_motions, 0) } else { DMatrix::from_columns(&columns) }
+    let columns: Vec<DVector<f64>> = (0..n_motions)
+        .filter(is_free)
+        .map(|i| eigen.eigenvectors.column(i).into_owned())
+        .collect();
+    if columns.is_empty() {
+        DMatrix::zeros(n_motions, 0)
+    } else {
+        DMatrix::from_columns(&columns)
+    }
 }
 
-/// The point nearest to `probe` with no negative product with any of `pushes` (Lawson and Hanson on the dual problem).
+/// The point nearest to `probe` with no negative product with any of `pushes` (Lawson and Hanson on the dual
+/// problem).
 fn nearest_in_cone(pushes: &[DVector<f64>], probe: DVector<f64>) -> DVector<f64> {
     let mut held: Vec<usize> = Vec::new();
     let mut weight: Vec<f64> = Vec::new();
     let mut nearest = probe.clone();
     for _round in 0..MAX_ROUNDS * probe.len() {
-        let deepest = (0..pushes.len()).map(|i| (i, pushes[i].dot(&nearest))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let deepest = (0..pushes.len())
+            .map(|i| (i, pushes[i].dot(&nearest)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((entering, depth)) = deepest else { break };
         if depth > -(FREE * nearest.norm()).max(ROUNDING) || held.contains(&entering) {
             break;
@@ -109,7 +129,9 @@ fn nearest_in_cone(pushes: &[DVector<f64>], probe: DVector<f64>) -> DVector<f64>
         while !held.is_empty() {
             let columns = DMatrix::from_columns(&held.iter().map(|i| pushes[*i].clone()).collect::<Vec<_>>());
             // Least squares by singular values: pushes may depend on each other.
-            let Ok(best) = columns.clone().svd(true, true).solve(&-&probe, 1e-12) else { return nearest };
+            let Ok(best) = columns.clone().svd(true, true).solve(&-&probe, 1e-12) else {
+                return nearest;
+            };
             let share = (weight.iter().zip(best.iter()).filter(|(_, b)| **b <= 0.0))
                 .map(|(w, b)| w / (w - b))
                 .fold(1.0_f64, f64::min);

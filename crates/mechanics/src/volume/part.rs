@@ -13,8 +13,8 @@ use crate::Material;
 pub(super) struct Part {
     /// Wall nodes near the seams, ascending; the unknowns of node `kept[i]` are `3 i .. 3 i + 3`.
     pub kept: Vec<u32>,
-    /// Stiffness between their unknowns, N/mm. Where the part is free to move, its rigid motions are held by springs that
-    /// act on nothing else, so that loads in equilibrium deform it as if they were not there.
+    /// Stiffness between their unknowns, N/mm. Where the part is free to move, its rigid motions are held by
+    /// springs that act on nothing else, so that loads in equilibrium deform it as if they were not there.
     pub stiffness: Front,
     /// Its rigid motions, unless it is clamped.
     pub rigid: Option<RigidModes>,
@@ -30,14 +30,25 @@ pub(super) struct RigidModes {
 impl RigidModes {
     pub fn new(points: &[Vec3]) -> Self {
         let center = points.iter().sum::<Vec3>() / points.len().max(1) as f64;
-        let radius_sq = points.iter().map(|p| p.distance_squared(center)).sum::<f64>() / points.len().max(1) as f64;
-        Self { center, radius_mm: radius_sq.sqrt().max(f64::MIN_POSITIVE) }
+        let radius_sq =
+            points.iter().map(|p| p.distance_squared(center)).sum::<f64>() / points.len().max(1) as f64;
+        Self {
+            center,
+            radius_mm: radius_sq.sqrt().max(f64::MIN_POSITIVE),
+        }
     }
 
     /// Displacement of `point` in each motion.
     pub fn at(&self, point: Vec3) -> [Vec3; 6] {
         let arm = (point - self.center) / self.radius_mm;
-        [Vec3::X, Vec3::Y, Vec3::Z, Vec3::X.cross(arm), Vec3::Y.cross(arm), Vec3::Z.cross(arm)]
+        [
+            Vec3::X,
+            Vec3::Y,
+            Vec3::Z,
+            Vec3::X.cross(arm),
+            Vec3::Y.cross(arm),
+            Vec3::Z.cross(arm),
+        ]
     }
 }
 
@@ -57,7 +68,10 @@ impl Numbering {
         vertices.dedup();
         let mut edges = Vec::new();
         if order == Order::Quadratic {
-            edges = tets.iter().flat_map(|t| EDGES.map(|[i, j]| sorted([t[i], t[j]]))).collect();
+            edges = tets
+                .iter()
+                .flat_map(|t| EDGES.map(|[i, j]| sorted([t[i], t[j]])))
+                .collect();
             edges.sort_unstable();
             edges.dedup();
         }
@@ -67,21 +81,42 @@ impl Numbering {
             Some(n - 3)
         };
         let mut first: Vec<Option<u32>> = (vertices.iter())
-            .map(|v| if is_clamped(*v) || kept.binary_search(v).is_ok() { None } else { next() })
+            .map(|v| {
+                if is_clamped(*v) || kept.binary_search(v).is_ok() {
+                    None
+                } else {
+                    next()
+                }
+            })
             .collect();
-        first.extend(edges.iter().map(|[a, b]| if is_clamped(*a) && is_clamped(*b) { None } else { next() }));
+        first.extend(edges.iter().map(|[a, b]| {
+            if is_clamped(*a) && is_clamped(*b) {
+                None
+            } else {
+                next()
+            }
+        }));
         for (v, first) in vertices.iter().zip(&mut first) {
             if kept.binary_search(v).is_ok() {
                 *first = next();
             }
         }
-        Self { vertices, edges, first, n: n as usize }
+        Self {
+            vertices,
+            edges,
+            first,
+            n: n as usize,
+        }
     }
 
     pub fn of_tet(&self, order: Order, tet: &[u32; 4]) -> [Option<u32>; 10] {
         let mut dofs = [None; 10];
         for i in 0..4 {
-            dofs[i] = self.vertices.binary_search(&tet[i]).ok().and_then(|at| self.first[at]);
+            dofs[i] = self
+                .vertices
+                .binary_search(&tet[i])
+                .ok()
+                .and_then(|at| self.first[at]);
         }
         if order == Order::Quadratic {
             for (node, [i, j]) in (4..).zip(EDGES) {
@@ -112,15 +147,24 @@ impl Part {
         let is_free = !numbering.vertices.iter().any(|v| is_clamped(*v));
         let rigid = is_free.then(|| RigidModes::new(&points));
         if kept.is_empty() {
-            return Ok(Self { kept, stiffness: Front::default(), rigid });
+            return Ok(Self {
+                kept,
+                stiffness: Front::default(),
+                rigid,
+            });
         }
         let entries = assemble(order, material, wall, tets, &numbering);
-        let mut values = SparseSymmetric::from_entries(numbering.n, entries).schur_complement(3 * kept.len())?;
+        let mut values =
+            SparseSymmetric::from_entries(numbering.n, entries).schur_complement(3 * kept.len())?;
         if let Some(rigid) = &rigid {
             hold_rigid_motions(&mut values, &points, rigid)?;
         }
         let ids = (0..3 * kept.len() as u32).collect();
-        Ok(Self { kept, stiffness: Front { ids, values }, rigid })
+        Ok(Self {
+            kept,
+            stiffness: Front { ids, values },
+            rigid,
+        })
     }
 }
 
@@ -137,7 +181,9 @@ pub(super) fn assemble(
     for tet in tets {
         let dofs = numbering.of_tet(order, tet);
         stiffness(order, tet.map(|v| wall.nodes[v as usize]), lame, |a, b, k| {
-            let (Some(p), Some(q)) = (dofs[a], dofs[b]) else { return };
+            let (Some(p), Some(q)) = (dofs[a], dofs[b]) else {
+                return;
+            };
             for (i, k) in (0..).zip(k) {
                 for j in if a == b { i..3 } else { 0..3 } {
                     entries.push((p + i as u32, q + j as u32, k[j]));

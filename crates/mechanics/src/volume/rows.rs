@@ -10,8 +10,8 @@
 use shellock_geom::Vec3;
 
 use super::VolumeModel;
-use super::connector::Labels;
 use super::front::Front;
+use super::unknowns::Labels;
 use crate::{Meeting, Side};
 
 /// Contact rows of a station.
@@ -44,9 +44,14 @@ pub(super) fn laws(plan: &[Meeting]) -> Vec<Law> {
     plan.iter().flat_map(of_station).collect()
 }
 
-/// Direction in which contact of the walls' faces acts on `side`: they part when b goes along `wall`, or a against it.
+/// Direction in which contact of the walls' faces acts on `side`: they part when b goes along `wall`, or a
+/// against it.
 pub(super) fn off_the_wall(meeting: &Meeting, side: Side) -> Vec3 {
-    if side == Side::A { -meeting.wall } else { meeting.wall }
+    if side == Side::A {
+        -meeting.wall
+    } else {
+        meeting.wall
+    }
 }
 
 impl VolumeModel {
@@ -62,16 +67,17 @@ impl VolumeModel {
         [point, point + self.params.n_layers * self.wall.depth_mm.len()]
     }
 
-    /// One small front for each station of `part`: its wall's motion at mid-wall, the mean of outer and inner surface,
-    /// coupled to the row.
+    /// One small front for each station of `part`: its wall's motion at mid-wall, the mean of outer and inner
+    /// surface, coupled to the row.
     pub(super) fn wall_fronts(&self, part: u32, plan: &[Meeting], labels: Labels) -> Vec<Front> {
         let sides = self.sides_of_part(part);
         let front = |(station, side): (usize, Side)| {
             let kept = self.faces(station, side).map(|node| self.place_kept[node]);
             let row = labels.row(station, WALL);
             let half = off_the_wall(&plan[station], side).to_array().map(|x| 0.5 * x);
-            let mut couplings: Vec<(u32, f64)> =
-                (kept.into_iter().flatten()).flat_map(|place| (3 * place..).zip(half)).collect();
+            let mut couplings: Vec<(u32, f64)> = (kept.into_iter().flatten())
+                .flat_map(|place| (3 * place..).zip(half))
+                .collect();
             couplings.sort_unstable_by_key(|c| c.0);
             (!couplings.is_empty()).then(|| Front::coupling(row, &couplings))
         };
@@ -82,7 +88,10 @@ impl VolumeModel {
     pub(super) fn sides_of_part(&self, part: u32) -> impl Iterator<Item = (usize, Side)> {
         let of_station = move |(station, parts): (usize, &[u32; 2])| {
             let parts = *parts;
-            crate::SIDES.into_iter().filter(move |side| parts[side.index()] == part).map(move |side| (station, side))
+            crate::SIDES
+                .into_iter()
+                .filter(move |side| parts[side.index()] == part)
+                .map(move |side| (station, side))
         };
         self.station_parts.iter().enumerate().flat_map(of_station)
     }

@@ -1,15 +1,17 @@
 //! Stresses in walls and connectors, and what of them to believe.
 //!
-//! Von Mises stress is sampled at the corners of the tetrahedra, where bending has its largest, each with a quarter of the
-//! volume. At re-entrant corners and under point forces elasticity has no largest stress: the finer the mesh, the higher. So the
-//! figure to hold against a material's strength is the one that all but [`PEAK_SHARE`] of the volume stay under.
+//! Von Mises stress is sampled at the corners of the tetrahedra, where bending has its largest, each with a
+//! quarter of the volume. At re-entrant corners and under point forces elasticity has no largest stress: the
+//! finer the mesh, the higher. So the figure to hold against a material's strength is the one that all but
+//! [`PEAK_SHARE`] of the volume stay under.
 
 use shellock_geom::Vec3;
 
 use super::element::{Order, lame, volume_6, von_mises_mpa};
 use crate::Material;
 
-/// Share of the volume whose stress is taken for a peak that the model makes, and that a ductile print evens out.
+/// Share of the volume whose stress is taken for a peak that the model makes, and that a ductile print evens
+/// out.
 pub const PEAK_SHARE: f64 = 0.005;
 
 /// How much some of the material is stressed, MPa (von Mises).
@@ -43,7 +45,11 @@ pub(super) fn samples(
         let mut l = [0.0; 4];
         l[i] = 1.0;
         let stress_mpa = von_mises_mpa(order, corners, lame(material), displacement_mm, l);
-        Sample { stress_mpa, volume_mm3, at: corners[i] }
+        Sample {
+            stress_mpa,
+            volume_mm3,
+            at: corners[i],
+        }
     })
 }
 
@@ -51,7 +57,9 @@ impl StressLevel {
     /// Of all samples; zero where there are none.
     pub(super) fn of(mut samples: Vec<Sample>) -> Self {
         samples.sort_by(|a, b| b.stress_mpa.total_cmp(&a.stress_mpa));
-        let Some(largest) = samples.first() else { return Self::default() };
+        let Some(largest) = samples.first() else {
+            return Self::default();
+        };
         let peak_mm3 = PEAK_SHARE * samples.iter().map(|s| s.volume_mm3).sum::<f64>();
         let mut above_mm3 = 0.0;
         let robust = samples.iter().find(|s| {
@@ -59,6 +67,10 @@ impl StressLevel {
             above_mm3 >= peak_mm3
         });
         let robust = robust.unwrap_or(largest);
-        Self { largest_mpa: largest.stress_mpa, robust_mpa: robust.stress_mpa, at: robust.at }
+        Self {
+            largest_mpa: largest.stress_mpa,
+            robust_mpa: robust.stress_mpa,
+            at: robust.at,
+        }
     }
 }

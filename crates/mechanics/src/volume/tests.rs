@@ -10,9 +10,22 @@ fn joined(assembly: &ShellAssembly, degrees: f64, fast: Option<u32>) -> Vec<Meet
     let (sin, cos) = degrees.to_radians().sin_cos();
     let joint = |s: &Station| {
         let leaves = s.normal * cos + s.across * sin;
-        let is_fast = s.points.iter().any(|p| Some(assembly.part_of_point[*p as usize]) == fast);
-        let joint = Joint { male: Side::A, leaves, is_fast, pull_on_a: leaves, weight: 1.0, size_mm: SIZE_MM };
-        Meeting { wall: s.across, joint: Some(joint) }
+        let is_fast = s
+            .points
+            .iter()
+            .any(|p| Some(assembly.part_of_point[*p as usize]) == fast);
+        let joint = Joint {
+            male: Side::A,
+            leaves,
+            is_fast,
+            pull_on_a: leaves,
+            weight: 1.0,
+            size_mm: SIZE_MM,
+        };
+        Meeting {
+            wall: s.across,
+            joint: Some(joint),
+        }
     };
     assembly.stations.iter().map(joint).collect()
 }
@@ -22,19 +35,24 @@ fn plates_on_a_straight_seam_come_apart() {
     let plates = sample::plates(30.0, 15.0, [10, 5]);
     let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
     for degrees in [-90.0, -45.0, 0.0, 45.0] {
-        assert_eq!(model.resist(&joined(&plates, degrees, None), 0).unwrap(), Resistance::Separable(vec![1]));
+        assert_eq!(
+            model.resist(&joined(&plates, degrees, None), 0).unwrap(),
+            Resistance::Separable(vec![1])
+        );
     }
 }
 
-/// Pins straight below a straight seam leave a plate two translations and a rotation. Walls across these hold it, each in its one
-/// direction, so that none of them may be missing or turned round.
+/// Pins straight below a straight seam leave a plate two translations and a rotation. Walls across these hold
+/// it, each in its one direction, so that none of them may be missing or turned round.
 #[test]
 fn walls_block_what_pins_leave_free_each_in_one_direction() {
     let plates = sample::plates(30.0, 15.0, [6, 3]);
     let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
     let with_walls = |walls: [Vec3; 5]| {
         let mut plan = joined(&plates, 0.0, None);
-        plan.iter_mut().zip(walls).for_each(|(meeting, wall)| meeting.wall = wall);
+        plan.iter_mut()
+            .zip(walls)
+            .for_each(|(meeting, wall)| meeting.wall = wall);
         model.resist(&plan, 0).unwrap()
     };
     // Both ends keep b from going down; in between, one station each keeps it from sliding to either side.
@@ -53,36 +71,66 @@ fn walls_block_what_pins_leave_free_each_in_one_direction() {
 fn walls_alone_hold_no_octant() {
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
-    let plan: Vec<Meeting> = ball.stations.iter().map(|s| Meeting { wall: s.across, joint: None }).collect();
-    assert_eq!(model.resist(&plan, 7).unwrap(), Resistance::Separable((0..7).collect()));
+    let plan: Vec<Meeting> = ball
+        .stations
+        .iter()
+        .map(|s| Meeting {
+            wall: s.across,
+            joint: None,
+        })
+        .collect();
+    assert_eq!(
+        model.resist(&plan, 7).unwrap(),
+        Resistance::Separable((0..7).collect())
+    );
 }
 
 /// Two clamped plates, the pins pulled straight out: a wall across their way is the only thing in it.
 #[test]
 fn a_wall_bears_what_presses_on_it_and_does_not_stick() {
     let plates = sample::plates(20.0, 20.0, [8, 8]);
-    let clamped: Vec<u32> = (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > 19.9).map(|(i, _)| i).collect();
+    let clamped: Vec<u32> = (0..)
+        .zip(&plates.points)
+        .filter(|(_, p)| p.x.abs() > 19.9)
+        .map(|(i, _)| i)
+        .collect();
     let model = VolumeModel::clamped(&VolumeParams::default(), &plates, &clamped).unwrap();
     let opening = |wall: Vec3| {
         let mut plan = joined(&plates, 0.0, None);
         plan.iter_mut().for_each(|meeting| meeting.wall = wall);
         let moved = model.equilibrium(&plan, None).unwrap().unwrap().displacement_mm;
-        moved.iter().map(|[a, b]| (a[0] - b[0]).z).fold(f64::NEG_INFINITY, f64::max)
+        moved
+            .iter()
+            .map(|[a, b]| (a[0] - b[0]).z)
+            .fold(f64::NEG_INFINITY, f64::max)
     };
     let open = opening(-Vec3::Z);
     assert!(open > 1e-3, "{open} mm");
-    assert!(opening(Vec3::Z).abs() < 0.02 * open, "{} mm of {open} mm", opening(Vec3::Z));
+    assert!(
+        opening(Vec3::Z).abs() < 0.02 * open,
+        "{} mm of {open} mm",
+        opening(Vec3::Z)
+    );
 }
 
-/// Along a great circle, half of the ball may turn against the other half: each of the three circles frees one rotation.
+/// Along a great circle, half of the ball may turn against the other half: each of the three circles frees
+/// one rotation.
 #[test]
 fn octants_turn_about_great_circles_unless_friction_holds_one_of_them() {
     let ball = sample::ball(20.0, 4);
     let sliding = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
-    assert_eq!(sliding.resist(&joined(&ball, 0.0, None), 7).unwrap(), Resistance::Separable((0..7).collect()));
+    assert_eq!(
+        sliding.resist(&joined(&ball, 0.0, None), 7).unwrap(),
+        Resistance::Separable((0..7).collect())
+    );
     let sticking = sliding.resist(&joined(&ball, 0.0, Some(7)), 7).unwrap();
-    let Resistance::Holds(opening) = sticking else { panic!("it comes apart") };
-    assert!(opening.quality_mm < -1e-6 && opening.quality_mm > -0.1, "{opening:?}");
+    let Resistance::Holds(opening) = sticking else {
+        panic!("it comes apart")
+    };
+    assert!(
+        opening.quality_mm < -1e-6 && opening.quality_mm > -0.1,
+        "{opening:?}"
+    );
 }
 
 /// Contact is exact: whoever touches may not enter the other, by as little as a millionth of what opens.
@@ -91,29 +139,55 @@ fn connectors_enter_each_other_nowhere_and_where_friction_holds_they_do_not_move
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let plan = joined(&ball, -30.0, Some(7));
-    let moved = model.equilibrium(&plan, Some(7)).unwrap().unwrap().displacement_mm;
-    let gaps_mm: Vec<[Vec3; 2]> = moved.iter().map(|[a, b]| [0, 1].map(|pair| a[pair] - b[pair])).collect();
-    let widest_mm = gaps_mm.iter().flatten().map(|gap| gap.length()).fold(0.0, f64::max);
+    let moved = model
+        .equilibrium(&plan, Some(7))
+        .unwrap()
+        .unwrap()
+        .displacement_mm;
+    let gaps_mm: Vec<[Vec3; 2]> = moved
+        .iter()
+        .map(|[a, b]| [0, 1].map(|pair| a[pair] - b[pair]))
+        .collect();
+    let widest_mm = gaps_mm
+        .iter()
+        .flatten()
+        .map(|gap| gap.length())
+        .fold(0.0, f64::max);
     for ((station, meeting), gaps) in ball.stations.iter().zip(&plan).zip(gaps_mm) {
         let joint = meeting.joint.unwrap();
         let n = station.tangent.cross(joint.leaves);
         for gap in gaps {
-            assert!(gap.dot(n).abs() < 1e-6 * widest_mm, "{gap} across the channel of {widest_mm} mm");
-            assert!(gap.dot(joint.leaves) > -1e-6 * widest_mm, "{gap} into the channel of {widest_mm} mm");
-            assert!(!joint.is_fast || gap.length() < 1e-6 * widest_mm, "{gap} in spite of friction of {widest_mm} mm");
+            assert!(
+                gap.dot(n).abs() < 1e-6 * widest_mm,
+                "{gap} across the channel of {widest_mm} mm"
+            );
+            assert!(
+                gap.dot(joint.leaves) > -1e-6 * widest_mm,
+                "{gap} into the channel of {widest_mm} mm"
+            );
+            assert!(
+                !joint.is_fast || gap.length() < 1e-6 * widest_mm,
+                "{gap} in spite of friction of {widest_mm} mm"
+            );
         }
     }
 }
 
-/// Root and tip lie along ŝ, so a connector that turns about n moves its tip along the seam by the depth of the pin more than
-/// its root: reading the root alone would miss it.
+/// Root and tip lie along ŝ, so a connector that turns about n moves its tip along the seam by the depth of
+/// the pin more than its root: reading the root alone would miss it.
 #[test]
 fn the_opening_is_that_of_the_tip_where_a_connector_turns() {
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let plan = joined(&ball, -30.0, Some(7));
-    let moved = model.equilibrium(&plan, Some(7)).unwrap().unwrap().displacement_mm;
-    let Resistance::Holds(opening) = model.resist(&plan, 7).unwrap() else { panic!("it comes apart") };
+    let moved = model
+        .equilibrium(&plan, Some(7))
+        .unwrap()
+        .unwrap()
+        .displacement_mm;
+    let Resistance::Holds(opening) = model.resist(&plan, 7).unwrap() else {
+        panic!("it comes apart")
+    };
     let [mut n_by_root, mut n_by_tip] = [0; 2];
     for ([a, b], opening_mm) in moved.iter().zip(&opening.opening_mm) {
         let [root_mm, tip_mm] = [0, 1].map(|pair| a[pair].distance(b[pair]));
@@ -124,7 +198,8 @@ fn the_opening_is_that_of_the_tip_where_a_connector_turns() {
     assert!(n_by_root > 0 && n_by_tip > 0, "{n_by_root} {n_by_tip}");
 }
 
-/// The row of the walls' faces is read off the nodes, rigid motions off the place: both must mean the point at mid-wall.
+/// The row of the walls' faces is read off the nodes, rigid motions off the place: both must mean the point
+/// at mid-wall.
 #[test]
 fn the_row_of_a_wall_sees_rigid_motions_as_its_point_at_mid_wall_does() {
     let ball = sample::ball(20.0, 4);
@@ -145,22 +220,39 @@ fn the_row_of_a_wall_sees_rigid_motions_as_its_point_at_mid_wall_does() {
                 let node = part.kept[id as usize / 3] as usize;
                 rigid.at(model.wall.nodes[node])[motion].to_array()[id as usize % 3]
             };
-            let seen: f64 = (0..n - 1).map(|i| front.values[n - 1 + n * i] * at_node(front.ids[i])).sum();
-            assert!((seen - rigid.at(place)[motion].dot(along)).abs() < 1e-9, "motion {motion} at station {station}");
+            let seen: f64 = (0..n - 1)
+                .map(|i| front.values[n - 1 + n * i] * at_node(front.ids[i]))
+                .sum();
+            assert!(
+                (seen - rigid.at(place)[motion].dot(along)).abs() < 1e-9,
+                "motion {motion} at station {station}"
+            );
         }
         n_seen += 1;
     }
     assert_eq!(n_seen, 9);
 }
 
-/// One plate alone, `[length, width]` mm, clamped at its far edge or not at all; its wall's stiffness on all points near the seam.
+/// One plate alone, `[length, width]` mm, clamped at its far edge or not at all; its wall's stiffness on all
+/// points near the seam.
 fn strip(order: Order, clamp: bool) -> (VolumeModel, ShellAssembly) {
     let plates = sample::plates(5.0, 40.0, [4, 20]);
     let is_far = |p: &shellock_geom::Vec3| p.x.abs() > 40.0 - 1e-9;
-    let clamped: Vec<u32> = (0..).zip(&plates.points).filter(|(_, p)| clamp && is_far(p)).map(|(i, _)| i).collect();
+    let clamped: Vec<u32> = (0..)
+        .zip(&plates.points)
+        .filter(|(_, p)| clamp && is_far(p))
+        .map(|(i, _)| i)
+        .collect();
     // Without lateral contraction the clamp does not stiffen the strip, and beam theory is right.
-    let material = Material { poissons_ratio: 0.0, ..Material::SLA_RESIN };
-    let params = VolumeParams { order, material, ..VolumeParams::default() };
+    let material = Material {
+        poissons_ratio: 0.0,
+        ..Material::SLA_RESIN
+    };
+    let params = VolumeParams {
+        order,
+        material,
+        ..VolumeParams::default()
+    };
     (VolumeModel::clamped(&params, &plates, &clamped).unwrap(), plates)
 }
 
@@ -170,29 +262,41 @@ fn tip_deflection(order: Order) -> (f64, f64) {
     let part = &model.parts[0];
     let n = part.stiffness.ids.len();
     // The load is one more row: what is left of its diagonal is minus the work it does.
-    let mut loaded = Front { ids: (0..=n as u32).collect(), values: vec![0.0; (n + 1) * (n + 1)] };
-    let end: Vec<usize> = (0..part.kept.len()).filter(|i| model.wall.nodes[part.kept[*i] as usize].x > -1e-9).collect();
+    let mut loaded = Front {
+        ids: (0..=n as u32).collect(),
+        values: vec![0.0; (n + 1) * (n + 1)],
+    };
+    let end: Vec<usize> = (0..part.kept.len())
+        .filter(|i| model.wall.nodes[part.kept[*i] as usize].x > -1e-9)
+        .collect();
     for &i in &end {
         loaded.values[n + (n + 1) * (3 * i + 2)] = 1.0 / end.len() as f64;
     }
     let left = Front::condensed(&[&part.stiffness, &loaded], |id| id < n as u32).unwrap();
     let (force, length, width, depth, e) = (1.0, 40.0_f64, 5.0, 2.0_f64, 2000.0);
-    (-left.values[0], force * length.powi(3) / (3.0 * e * width * depth.powi(3) / 12.0))
+    (
+        -left.values[0],
+        force * length.powi(3) / (3.0 * e * width * depth.powi(3) / 12.0),
+    )
 }
 
 #[test]
 fn a_cantilever_bends_as_a_beam_with_quadratic_elements_and_locks_with_linear_ones() {
     let (quadratic, beam) = tip_deflection(Order::Quadratic);
-    assert!((quadratic / beam - 1.0).abs() < 0.02, "{quadratic} mm, beam {beam} mm");
+    assert!(
+        (quadratic / beam - 1.0).abs() < 0.02,
+        "{quadratic} mm, beam {beam} mm"
+    );
     let (linear, _) = tip_deflection(Order::Linear);
     assert!(linear < 0.8 * beam, "{linear} mm, beam {beam} mm");
 }
 
-/// Under uniform strain, internal forces vanish away from the surface and balance as a whole: tested with the work, which is
-/// the strain energy density times the volume.
+/// Under uniform strain, internal forces vanish away from the surface and balance as a whole: tested with the
+/// work, which is the strain energy density times the volume.
 #[test]
 fn uniform_strain_has_its_exact_energy() {
-    let corners = [[0.1, 0.0, 0.2], [2.0, 0.3, 0.0], [0.4, 1.7, 0.1], [0.3, 0.2, 1.1]].map(shellock_geom::Vec3::from);
+    let corners =
+        [[0.1, 0.0, 0.2], [2.0, 0.3, 0.0], [0.4, 1.7, 0.1], [0.3, 0.2, 1.1]].map(shellock_geom::Vec3::from);
     let material = Material::SLA_RESIN;
     let (lambda, mu) = element::lame(&material);
     let gradient = [[0.3, 0.1, -0.2], [0.0, -0.4, 0.5], [0.2, 0.6, 0.7]];
@@ -207,10 +311,15 @@ fn uniform_strain_has_its_exact_energy() {
         let u: Vec<[f64; 3]> = places.into_iter().map(moved).collect();
         let mut energy = 0.0;
         element::stiffness(order, corners, (lambda, mu), |a, b, k| {
-            let work: f64 = (0..9).map(|at| u[a][at / 3] * k[at / 3][at % 3] * u[b][at % 3]).sum();
+            let work: f64 = (0..9)
+                .map(|at| u[a][at / 3] * k[at / 3][at % 3] * u[b][at % 3])
+                .sum();
             energy += work * if a == b { 1.0 } else { 2.0 };
         });
-        assert!((energy / expected - 1.0).abs() < 1e-9, "{order:?}: {energy} for {expected}");
+        assert!(
+            (energy / expected - 1.0).abs() < 1e-9,
+            "{order:?}: {energy} for {expected}"
+        );
     }
 }
 
@@ -222,41 +331,56 @@ fn uniaxial_strain_with_lateral_contraction_has_the_stress_of_a_bar() {
         let (lambda, mu) = element::lame(&material);
         let strain = [1.0, -nu, -nu];
         let stress = strain.map(|x| lambda * strain.iter().sum::<f64>() + 2.0 * mu * x);
-        assert!((stress[0] / e_mpa - 1.0).abs() < 1e-12 && stress[1].abs() < 1e-9 * e_mpa, "{stress:?}");
+        assert!(
+            (stress[0] / e_mpa - 1.0).abs() < 1e-12 && stress[1].abs() < 1e-9 * e_mpa,
+            "{stress:?}"
+        );
     }
 }
 
-/// In a channel whatever way it leans: n, ŝ and u are perpendicular to each other, and both sides see them the other way round.
+/// In a channel whatever way it leans: n, ŝ and u are perpendicular to each other, and both sides see them
+/// the other way round.
 #[test]
 fn contact_acts_along_three_perpendicular_directions_and_each_side_bears_its_share_of_the_force() {
     let ball = sample::ball(20.0, 4);
     let params = VolumeParams::default();
     let model = VolumeModel::new(&params, &ball).unwrap();
     for degrees in [-90.0, -30.0, 0.0, 45.0] {
-        for [a, b] in super::connector::sections(&model, &joined(&ball, degrees, None)).iter().zip(&ball.stations).map(
-            |(sides, station)| {
-                let sides = sides.each_ref().map(|s| s.as_ref().expect("every station is joined"));
+        for [a, b] in super::bars::sections(&model, &joined(&ball, degrees, None))
+            .iter()
+            .zip(&ball.stations)
+            .map(|(sides, station)| {
+                let sides = sides
+                    .each_ref()
+                    .map(|s| s.as_ref().expect("every station is joined"));
                 let force_n = params.force_n_per_mm * station.length_mm;
                 assert!((sides[0].load().0.length() - force_n).abs() < 1e-12);
                 assert!((sides[0].load().0 + sides[1].load().0).length() < 1e-12);
                 sides
-            },
-        ) {
+            })
+        {
             for pair in [0, 3] {
                 let along = |side: &super::connector::Section| -> Vec<Vec3> {
-                    side.rows().filter(|r| (pair..pair + 3).contains(&r.0)).map(|r| r.1).collect()
+                    side.rows()
+                        .filter(|r| (pair..pair + 3).contains(&r.0))
+                        .map(|r| r.1)
+                        .collect()
                 };
                 let (of_a, of_b) = (along(a), along(b));
                 for i in 0..3 {
                     assert!((of_a[i].length() - 1.0).abs() < 1e-9 && (of_a[i] + of_b[i]).length() < 1e-9);
-                    assert!(of_a[i].dot(of_a[(i + 1) % 3]).abs() < 1e-9, "{degrees}°: {of_a:?}");
+                    assert!(
+                        of_a[i].dot(of_a[(i + 1) % 3]).abs() < 1e-9,
+                        "{degrees}°: {of_a:?}"
+                    );
                 }
             }
         }
     }
 }
 
-/// Patch test: a free wall whose near nodes move uniformly bears on them with forces that balance, and rigid motions cost nothing.
+/// Patch test: a free wall whose near nodes move uniformly bears on them with forces that balance, and rigid
+/// motions cost nothing.
 #[test]
 fn rigid_motions_of_a_free_wall_are_held_by_its_springs_alone() {
     let (model, _) = strip(Order::Quadratic, false);
@@ -276,7 +400,10 @@ fn rigid_motions_of_a_free_wall_are_held_by_its_springs_alone() {
         let u: Vec<f64> = (0..n / 3).flat_map(|i| at(i)[m].to_array()).collect();
         for row in 0..n {
             let force: f64 = (0..n).map(|j| k[row.max(j) + n * row.min(j)] * u[j]).sum();
-            assert!((force - spring * u[row]).abs() < 1e-7 * spring, "motion {m}, row {row}: {force}");
+            assert!(
+                (force - spring * u[row]).abs() < 1e-7 * spring,
+                "motion {m}, row {row}: {force}"
+            );
         }
     }
 }
@@ -290,7 +417,9 @@ fn every_tetrahedron_of_a_ball_is_sound() {
         assert!(element::volume_6(corners) > 0.0);
         let normals = element::gradients(corners);
         for [i, j] in element::EDGES {
-            let dihedral = (-normals[i].normalize().dot(normals[j].normalize())).acos().to_degrees();
+            let dihedral = (-normals[i].normalize().dot(normals[j].normalize()))
+                .acos()
+                .to_degrees();
             assert!((15.0..165.0).contains(&dihedral), "{dihedral}° in {tet}");
         }
     }
@@ -299,7 +428,10 @@ fn every_tetrahedron_of_a_ball_is_sound() {
 /// A ball thinner than its wall: at the depth asked for, prisms would turn over at the centre.
 #[test]
 fn where_no_wall_fits_it_is_thinner_and_sound() {
-    let params = VolumeParams { wall_mm: 6.0, ..VolumeParams::default() };
+    let params = VolumeParams {
+        wall_mm: 6.0,
+        ..VolumeParams::default()
+    };
     let model = VolumeModel::new(&params, &sample::ball(5.0, 4)).unwrap();
     assert!(model.wall().n_thinned > 0);
     assert!((0..model.n_tets()).all(|t| element::volume_6(model.wall().corners(t)) > 0.0));
@@ -317,7 +449,15 @@ fn quality(params: &VolumeParams, degrees: f64) -> f64 {
 
 #[test]
 fn the_coarsest_and_the_finest_tolerance_agree_on_the_quality() {
-    let with = |tolerance| quality(&VolumeParams { tolerance, ..VolumeParams::default() }, -30.0);
+    let with = |tolerance| {
+        quality(
+            &VolumeParams {
+                tolerance,
+                ..VolumeParams::default()
+            },
+            -30.0,
+        )
+    };
     let (coarse, fine) = (with(1e-2), with(1e-12));
     assert!((coarse / fine - 1.0).abs() < 0.01, "{coarse} {fine}");
 }
@@ -326,10 +466,27 @@ fn the_coarsest_and_the_finest_tolerance_agree_on_the_quality() {
 fn openings_are_proportional_to_force_over_stiffness() {
     let params = VolumeParams::default();
     let q = quality(&params, 0.0);
-    let twice = VolumeParams { force_n_per_mm: 2.0 * params.force_n_per_mm, ..params };
+    let twice = VolumeParams {
+        force_n_per_mm: 2.0 * params.force_n_per_mm,
+        ..params
+    };
     assert!((quality(&twice, 0.0) / q - 2.0).abs() < 1e-6);
-    let stiff = Material { youngs_modulus_mpa: 8000.0, ..params.material };
-    assert!((quality(&VolumeParams { material: stiff, ..params }, 0.0) / q - 0.25).abs() < 1e-6);
+    let stiff = Material {
+        youngs_modulus_mpa: 8000.0,
+        ..params.material
+    };
+    assert!(
+        (quality(
+            &VolumeParams {
+                material: stiff,
+                ..params
+            },
+            0.0
+        ) / q
+            - 0.25)
+            .abs()
+            < 1e-6
+    );
 }
 
 #[test]
@@ -337,17 +494,51 @@ fn odd_input_is_refused() {
     let plates = sample::plates(10.0, 5.0, [4, 2]);
     let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
     assert_eq!(
-        model.resist(&[Meeting { wall: Vec3::X, joint: None }], 0),
-        Err(VolumeError::Joints { joints: 1, stations: 3 })
+        model.resist(
+            &[Meeting {
+                wall: Vec3::X,
+                joint: None
+            }],
+            0
+        ),
+        Err(VolumeError::Joints {
+            joints: 1,
+            stations: 3
+        })
     );
-    assert_eq!(model.resist(&[Meeting { wall: Vec3::X, joint: None }; 3], 2), Err(VolumeError::NoSuchPart(2)));
-    assert_eq!(model.resist(&[Meeting { wall: Vec3::X, joint: None }; 3], 0), Ok(Resistance::Separable(vec![1])));
-    let thick = VolumeParams { wall_mm: f64::NAN, n_layers: 0, ..VolumeParams::default() };
+    assert_eq!(
+        model.resist(
+            &[Meeting {
+                wall: Vec3::X,
+                joint: None
+            }; 3],
+            2
+        ),
+        Err(VolumeError::NoSuchPart(2))
+    );
+    assert_eq!(
+        model.resist(
+            &[Meeting {
+                wall: Vec3::X,
+                joint: None
+            }; 3],
+            0
+        ),
+        Ok(Resistance::Separable(vec![1]))
+    );
+    let thick = VolumeParams {
+        wall_mm: f64::NAN,
+        n_layers: 0,
+        ..VolumeParams::default()
+    };
     assert_eq!(thick.problems().len(), 2);
     assert!(VolumeModel::new(&thick, &plates).is_err());
     let mut flat = plates;
     flat.normals.fill(shellock_geom::Vec3::X);
-    assert_eq!(VolumeModel::new(&VolumeParams::default(), &flat).unwrap_err(), VolumeError::FlatTriangle(0));
+    assert_eq!(
+        VolumeModel::new(&VolumeParams::default(), &flat).unwrap_err(),
+        VolumeError::FlatTriangle(0)
+    );
 }
 
 #[test]
@@ -361,12 +552,15 @@ fn every_joint_has_connectors_of_its_seams_length_whatever_its_neighbours_are() 
             joint.male = joint.male.other();
         }
     }
-    let sections = super::connector::sections(&model, &plan);
-    let bars = super::connector::bars(&model, &plan, &sections);
+    let sections = super::bars::sections(&model, &plan);
+    let bars = super::bars::bars(&model, &plan, &sections);
     assert!(bars.iter().any(|bar| bar.to.is_ok()) && bars.iter().any(|bar| bar.to.is_err()));
     for (i, meeting) in plan.iter().enumerate() {
         for side in crate::SIDES {
-            let n_bars = bars.iter().filter(|bar| bar.side == side && bar.stations().any(|s| s == i)).count();
+            let n_bars = bars
+                .iter()
+                .filter(|bar| bar.side == side && bar.stations().any(|s| s == i))
+                .count();
             assert_eq!(n_bars, if meeting.joint.is_some() { 2 } else { 0 }, "station {i}");
         }
     }
@@ -378,7 +572,10 @@ fn a_joint_that_stands_alone_holds_no_octant() {
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let mut plan = joined(&ball, 0.0, None);
     let alone = ball.steps[0][0] as usize;
-    plan.iter_mut().enumerate().filter(|(i, _)| *i != alone).for_each(|(_, m)| m.joint = None);
+    plan.iter_mut()
+        .enumerate()
+        .filter(|(i, _)| *i != alone)
+        .for_each(|(_, m)| m.joint = None);
     assert!(matches!(model.resist(&plan, 7), Ok(Resistance::Separable(_))));
 }
 
@@ -386,19 +583,39 @@ fn a_joint_that_stands_alone_holds_no_octant() {
 fn pins_that_slide_out_of_their_channels_do_not_hold() {
     let ball = sample::ball(20.0, 4);
     let plan = joined(&ball, -0.7, Some(7));
-    let at = |force_n_per_mm| VolumeModel::new(&VolumeParams { force_n_per_mm, ..VolumeParams::default() }, &ball);
-    let Resistance::Holds(opening) = at(0.01).unwrap().resist(&plan, 7).unwrap() else { panic!("does not hold") };
+    let at = |force_n_per_mm| {
+        VolumeModel::new(
+            &VolumeParams {
+                force_n_per_mm,
+                ..VolumeParams::default()
+            },
+            &ball,
+        )
+    };
+    let Resistance::Holds(opening) = at(0.01).unwrap().resist(&plan, 7).unwrap() else {
+        panic!("does not hold")
+    };
     let widest_mm = opening.opening_mm.iter().copied().fold(0.0, f64::max);
     let lost_mm = 0.6 * SIZE_MM;
     let force = |share: f64| 0.01 * share * lost_mm / widest_mm;
-    assert!(matches!(at(force(0.99)).unwrap().resist(&plan, 7).unwrap(), Resistance::Holds(_)));
-    assert!(matches!(at(force(1.01)).unwrap().resist(&plan, 7).unwrap(), Resistance::Separable(_)));
+    assert!(matches!(
+        at(force(0.99)).unwrap().resist(&plan, 7).unwrap(),
+        Resistance::Holds(_)
+    ));
+    assert!(matches!(
+        at(force(1.01)).unwrap().resist(&plan, 7).unwrap(),
+        Resistance::Separable(_)
+    ));
 }
 
 /// Points of `assembly` whose height lies beyond `z`, upwards or downwards.
 fn beyond(assembly: &ShellAssembly, z: f64) -> Vec<u32> {
     let is_beyond = |p: &Vec3| if z > 0.0 { p.z > z } else { p.z < z };
-    (0..).zip(&assembly.points).filter(|(_, p)| is_beyond(p)).map(|(i, _)| i).collect()
+    (0..)
+        .zip(&assembly.points)
+        .filter(|(_, p)| is_beyond(p))
+        .map(|(i, _)| i)
+        .collect()
 }
 
 /// A ball pressed on its top with `force_n`, its bottom held if `is_held`.
@@ -409,9 +626,12 @@ fn pressed(force_n: f64, connector_mm: f64, is_held: bool) -> Loaded {
     let model = VolumeModel::clamped(&params, &ball, &held).unwrap();
     let top = beyond(&ball, 17.0);
     let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
-    top.iter().for_each(|&p| forces_n[p as usize] = -Vec3::Z * force_n / top.len() as f64);
+    top.iter()
+        .for_each(|&p| forces_n[p as usize] = -Vec3::Z * force_n / top.len() as f64);
     let mut plan = joined(&ball, -30.0, Some(7));
-    plan.iter_mut().filter_map(|m| m.joint.as_mut()).for_each(|joint| joint.size_mm = connector_mm);
+    plan.iter_mut()
+        .filter_map(|m| m.joint.as_mut())
+        .for_each(|joint| joint.size_mm = connector_mm);
     model.under_load(&plan, &forces_n).unwrap().unwrap()
 }
 
@@ -430,28 +650,46 @@ fn forces_on_every_part_of_a_pressed_ball_balance_and_all_grows_with_the_force()
 fn smaller_connectors_open_wider_and_are_stressed_more() {
     let (whole, half) = (pressed(10.0, 3.0, true), pressed(10.0, 1.5, true));
     let widest = |l: &Loaded| l.opening_mm.iter().copied().fold(0.0, f64::max);
-    assert!(widest(&half) > widest(&whole), "{} {}", widest(&half), widest(&whole));
+    assert!(
+        widest(&half) > widest(&whole),
+        "{} {}",
+        widest(&half),
+        widest(&whole)
+    );
     assert!(half.connectors.robust_mpa > whole.connectors.robust_mpa);
 }
 
 #[test]
 fn a_struck_ball_that_nothing_holds_is_balanced_by_its_inertia() {
     let struck = pressed(10.0, 3.0, false);
-    assert!(struck.imbalance < 1e-6 && struck.lost.is_empty(), "{}", struck.imbalance);
+    assert!(
+        struck.imbalance < 1e-6 && struck.lost.is_empty(),
+        "{}",
+        struck.imbalance
+    );
     // The reference part's forces are in no equation: they balance because inertia balances the whole.
     let ball = sample::ball(20.0, 4);
     let model = VolumeModel::new(&VolumeParams::default(), &ball).unwrap();
     let mut forces_n = vec![Vec3::ZERO; ball.points.len()];
     forces_n[5] = Vec3::new(1.0, -2.0, 3.0);
     let loads_n = model.balanced(&forces_n).unwrap();
-    let torque: Vec3 = loads_n.iter().zip(&model.wall().nodes).map(|(f, x)| x.cross(*f)).sum();
-    assert!(loads_n.iter().sum::<Vec3>().length() < 1e-9 && torque.length() < 1e-8, "{torque}");
+    let torque: Vec3 = loads_n
+        .iter()
+        .zip(&model.wall().nodes)
+        .map(|(f, x)| x.cross(*f))
+        .sum();
+    assert!(
+        loads_n.iter().sum::<Vec3>().length() < 1e-9 && torque.length() < 1e-8,
+        "{torque}"
+    );
 }
 
 #[test]
 fn a_balls_mass_is_its_walls_volume_times_density() {
     let ball = sample::ball(20.0, 8);
-    let mass_t = VolumeModel::new(&VolumeParams::default(), &ball).unwrap().mass_t();
+    let mass_t = VolumeModel::new(&VolumeParams::default(), &ball)
+        .unwrap()
+        .mass_t();
     let wall_mm3 = 4.0 / 3.0 * std::f64::consts::PI * (20.0_f64.powi(3) - 18.0_f64.powi(3));
     assert!((mass_t / (wall_mm3 * 1.15e-9) - 1.0).abs() < 0.05, "{mass_t} t");
 }
@@ -466,28 +704,49 @@ fn a_plate_pulled_at_its_outer_face_has_the_stress_of_a_bar() {
         .map(|(i, _)| i)
         .collect();
     let mut forces_n = vec![Vec3::ZERO; plates.points.len()];
-    end.iter().for_each(|&p| forces_n[p as usize] = Vec3::X * 10.0 / end.len() as f64);
-    let plan: Vec<Meeting> = plates.stations.iter().map(|s| Meeting { wall: -s.across, joint: None }).collect();
+    end.iter()
+        .for_each(|&p| forces_n[p as usize] = Vec3::X * 10.0 / end.len() as f64);
+    let plan: Vec<Meeting> = plates
+        .stations
+        .iter()
+        .map(|s| Meeting {
+            wall: -s.across,
+            joint: None,
+        })
+        .collect();
     let loaded = model.under_load(&plan, &forces_n).unwrap().unwrap();
     // Pulled at the outer face of 2 mm: N/A + M/W = (1 + 3) F / (b h), of which von Mises sees all.
     let expected_mpa = 4.0 * 10.0 / (5.0 * 2.0);
-    let middle = plates.triangles.iter().zip(&loaded.triangle_mpa).filter(|(t, _)| {
-        t.iter()
-            .all(|&p| (p as usize) < plates.points.len() / 2 && (-30.0..-10.0).contains(&plates.points[p as usize].x))
-    });
+    let middle = plates
+        .triangles
+        .iter()
+        .zip(&loaded.triangle_mpa)
+        .filter(|(t, _)| {
+            t.iter().all(|&p| {
+                (p as usize) < plates.points.len() / 2
+                    && (-30.0..-10.0).contains(&plates.points[p as usize].x)
+            })
+        });
     let largest_mpa = middle.map(|(_, mpa)| *mpa).fold(0.0, f64::max);
-    assert!((largest_mpa / expected_mpa - 1.0).abs() < 0.1, "{largest_mpa} MPa, a bar has {expected_mpa} MPa");
+    assert!(
+        (largest_mpa / expected_mpa - 1.0).abs() < 0.1,
+        "{largest_mpa} MPa, a bar has {expected_mpa} MPa"
+    );
 }
 
 /// Condensed onto the seams, and as one sparse system: two ways to the same compliance.
 #[test]
 fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
     let plates = sample::plates(20.0, 10.0, [5, 3]);
-    let clamped: Vec<u32> = (0..).zip(&plates.points).filter(|(_, p)| p.x.abs() > 9.9).map(|(i, _)| i).collect();
+    let clamped: Vec<u32> = (0..)
+        .zip(&plates.points)
+        .filter(|(_, p)| p.x.abs() > 9.9)
+        .map(|(i, _)| i)
+        .collect();
     let model = VolumeModel::clamped(&VolumeParams::default(), &plates, &clamped).unwrap();
     let plan = joined(&plates, 20.0, None);
-    let sections = super::connector::sections(&model, &plan);
-    let bars = super::connector::bars(&model, &plan, &sections);
+    let sections = super::bars::sections(&model, &plan);
+    let bars = super::bars::bars(&model, &plan, &sections);
     let loads_n = vec![Vec3::ZERO; model.wall.nodes.len()];
     for part in 0..2 {
         let condensed = model.response(part, false, &plan, &sections, &bars).unwrap();
@@ -497,7 +756,10 @@ fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
         let largest = condensed.compliance.iter().copied().fold(0.0, f64::max);
         for at in (0..n * n).filter(|at| at % n >= at / n) {
             let difference = condensed.compliance[at] - sparse.compliance[at];
-            assert!(difference.abs() < 1e-7 * largest, "{difference} of {largest} at {at}");
+            assert!(
+                difference.abs() < 1e-7 * largest,
+                "{difference} of {largest} at {at}"
+            );
         }
     }
 }
@@ -508,7 +770,10 @@ fn forces_that_are_none_are_refused() {
     let model = VolumeModel::new(&VolumeParams::default(), &plates).unwrap();
     let plan = joined(&plates, 0.0, None);
     let n = plates.points.len();
-    assert_eq!(model.under_load(&plan, &[]), Err(VolumeError::Forces { forces: 0, points: n }));
+    assert_eq!(
+        model.under_load(&plan, &[]),
+        Err(VolumeError::Forces { forces: 0, points: n })
+    );
     assert!(model.under_load(&plan, &vec![Vec3::splat(f64::NAN); n]).is_err());
     assert!(model.under_load(&[], &vec![Vec3::ZERO; n]).is_err());
 }

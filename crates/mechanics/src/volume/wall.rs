@@ -1,7 +1,8 @@
 //! The wall of all parts as tetrahedra: triangles of the outer surface, extruded inwards.
 //!
-//! A prism is cut into three tetrahedra along the diagonals that start at the lower-numbered point of each side, so that
-//! neighbours meet. Where a prism would fold over or become a sliver (tight concave places), the wall is made thinner there.
+//! A prism is cut into three tetrahedra along the diagonals that start at the lower-numbered point of each
+//! side, so that neighbours meet. Where a prism would fold over or become a sliver (tight concave places),
+//! the wall is made thinner there.
 
 use shellock_geom::Vec3;
 
@@ -10,18 +11,19 @@ use crate::ShellAssembly;
 
 /// Least volume of a tetrahedron, as a share of that in a straight prism on the same triangle.
 ///
-/// With it, an inner triangle has at least about a tenth of the outer one's area. Elements that are worse make the stiffness
-/// matrix ill-conditioned, and stiff beyond what the little material is worth.
+/// With it, an inner triangle has at least about a tenth of the outer one's area. Elements that are worse
+/// make the stiffness matrix ill-conditioned, and stiff beyond what the little material is worth.
 pub const MIN_VOLUME_SHARE: f64 = 0.1;
 
 /// Factor on the depth of a point whose prism is too bad.
 const THINNER: f64 = 0.8;
 
-/// Least depth, as a share of the wall's. What is bad with it at all three corners has a bad triangle outside.
+/// Least depth, as a share of the wall's. What is bad with it at all three corners has a bad triangle
+/// outside.
 const LEAST_DEPTH_SHARE: f64 = 0.03;
 
-/// Rounds of thinning: enough for the depths to fall from the wall's to the least, and then for the neighbours', which must
-/// not be many times deeper.
+/// Rounds of thinning: enough for the depths to fall from the wall's to the least, and then for the
+/// neighbours', which must not be many times deeper.
 const MAX_ROUNDS: usize = 64;
 
 /// Tetrahedra of all parts.
@@ -47,9 +49,16 @@ impl Wall {
         let least_mm = LEAST_DEPTH_SHARE * wall_mm;
         for round in 0..=MAX_ROUNDS {
             let bad = bad_triangles(assembly, &depth_mm, n_layers);
-            let is_hopeless =
-                |t: &&u32| assembly.triangles[**t as usize].iter().all(|&p| depth_mm[p as usize] <= least_mm);
-            let Some(&first) = bad.iter().find(is_hopeless).or(bad.first().filter(|_| round == MAX_ROUNDS)) else {
+            let is_hopeless = |t: &&u32| {
+                assembly.triangles[**t as usize]
+                    .iter()
+                    .all(|&p| depth_mm[p as usize] <= least_mm)
+            };
+            let Some(&first) = bad
+                .iter()
+                .find(is_hopeless)
+                .or(bad.first().filter(|_| round == MAX_ROUNDS))
+            else {
                 if bad.is_empty() {
                     break;
                 }
@@ -68,7 +77,9 @@ impl Wall {
         Ok(Self {
             nodes: nodes.collect(),
             tets: (assembly.triangles.iter())
-                .flat_map(|&t| (0..n_layers).flat_map(move |layer| prism(t, layer, assembly.points.len() as u32)))
+                .flat_map(|&t| {
+                    (0..n_layers).flat_map(move |layer| prism(t, layer, assembly.points.len() as u32))
+                })
                 .collect(),
             n_thinned: depth_mm.iter().filter(|d| **d < wall_mm).count(),
             depth_mm,
@@ -84,17 +95,23 @@ impl Wall {
 /// The three tetrahedra below triangle `t` in `layer`, of positive volume if the prism is sound.
 fn prism(t: [u32; 3], layer: usize, n_points: u32) -> [[u32; 4]; 3] {
     let lowest = (0..3).min_by_key(|i| t[*i]).unwrap_or(0);
-    let [a, b, c] = [t[lowest], t[(lowest + 1) % 3], t[(lowest + 2) % 3]].map(|p| p + layer as u32 * n_points);
+    let [a, b, c] =
+        [t[lowest], t[(lowest + 1) % 3], t[(lowest + 2) % 3]].map(|p| p + layer as u32 * n_points);
     let [d, e, f] = [a, b, c].map(|p| p + n_points);
     // Diagonals start at a, the lowest; the one of side bc at the lower of b and c.
-    if b < c { [[a, e, d, f], [a, b, e, f], [a, b, f, c]] } else { [[a, e, d, f], [a, b, e, c], [a, c, e, f]] }
+    if b < c {
+        [[a, e, d, f], [a, b, e, f], [a, b, f, c]]
+    } else {
+        [[a, e, d, f], [a, b, e, c], [a, c, e, f]]
+    }
 }
 
 fn bad_triangles(assembly: &ShellAssembly, depth_mm: &[f64], n_layers: usize) -> Vec<u32> {
     let n_points = assembly.points.len() as u32;
     let node = |id: u32| {
         let (layer, point) = (id / n_points, (id % n_points) as usize);
-        assembly.points[point] - assembly.normals[point] * (depth_mm[point] * f64::from(layer) / n_layers as f64)
+        assembly.points[point]
+            - assembly.normals[point] * (depth_mm[point] * f64::from(layer) / n_layers as f64)
     };
     let is_bad = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| assembly.points[i as usize]);
@@ -102,10 +119,15 @@ fn bad_triangles(assembly: &ShellAssembly, depth_mm: &[f64], n_layers: usize) ->
         let straight_6 = (b - a).cross(c - a).length() * depth / n_layers as f64;
         let mut tets = (0..n_layers).flat_map(|layer| prism(*t, layer, n_points));
         // A triangle of no area or of points that are no numbers is bad as well.
-        let is_sound = |tet: [u32; 4]| straight_6 > 0.0 && volume_6(tet.map(node)) > MIN_VOLUME_SHARE * straight_6;
+        let is_sound =
+            |tet: [u32; 4]| straight_6 > 0.0 && volume_6(tet.map(node)) > MIN_VOLUME_SHARE * straight_6;
         tets.any(|tet| !is_sound(tet))
     };
-    (0..).zip(&assembly.triangles).filter(|(_, t)| is_bad(t)).map(|(i, _)| i).collect()
+    (0..)
+        .zip(&assembly.triangles)
+        .filter(|(_, t)| is_bad(t))
+        .map(|(i, _)| i)
+        .collect()
 }
 
 /// Makes the wall thinner below bad triangles, alike on both sides of a seam.

@@ -3,7 +3,11 @@ use shellock_geom::{Aabb, TriMesh, Volume};
 use super::*;
 
 fn block(min: [f64; 3], max: [f64; 3]) -> TriMesh {
-    Volume::cuboid(Aabb { min: min.into(), max: max.into() }).to_mesh()
+    Volume::cuboid(Aabb {
+        min: min.into(),
+        max: max.into(),
+    })
+    .to_mesh()
 }
 
 fn piece(mesh: &TriMesh, order: usize, along: [f64; 3]) -> ReportPiece<'_> {
@@ -31,9 +35,15 @@ fn meshes() -> [TriMesh; 3] {
 #[test]
 fn what_comes_behind_a_wall_is_seen_from_behind_it() {
     let meshes = meshes();
-    let pieces = [piece(&meshes[0], 0, [0.0, 0.0, -1.0]), piece(&meshes[1], 1, [0.0, -1.0, 0.0])];
+    let pieces = [
+        piece(&meshes[0], 0, [0.0, 0.0, -1.0]),
+        piece(&meshes[1], 1, [0.0, -1.0, 0.0]),
+    ];
     let sights = sights(&[&pieces[0], &pieces[1]]);
-    assert!(sights[0].direction.y > 0.5, "the first step is seen from the front");
+    assert!(
+        sights[0].direction.y > 0.5,
+        "the first step is seen from the front"
+    );
     assert!(sights[1].direction.y < -0.3, "{:?}", sights[1]);
     let across = Vec3::Y.cross(sights[1].direction).length();
     assert!(across > 0.6, "the way is seen at an angle, not end on: {across}");
@@ -41,7 +51,11 @@ fn what_comes_behind_a_wall_is_seen_from_behind_it() {
 
 #[test]
 fn an_arrow_points_where_the_piece_goes_and_is_never_too_short() {
-    for (from, to) in [([10.0, 10.0], [40.0, 50.0]), ([3.0, 4.0], [3.0, 4.5]), ([1.0, 1.0], [1.0, 1.0])] {
+    for (from, to) in [
+        ([10.0, 10.0], [40.0, 50.0]),
+        ([3.0, 4.0], [3.0, 4.5]),
+        ([1.0, 1.0], [1.0, 1.0]),
+    ] {
         let corners = arrow([from, to]);
         let tip = corners[3];
         let length = (tip[0] - from[0]).hypot(tip[1] - from[1]);
@@ -58,19 +72,35 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
     let made = || {
         let along = [[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
         let pieces = (0..3).map(|i| piece(&meshes[i], i, along[i])).collect();
-        Booklet { title: "a wall".into(), lines: vec!["3 pieces".into()], pieces }.pdf()
+        Booklet {
+            title: "a wall".into(),
+            lines: vec!["3 pieces".into()],
+            pieces,
+        }
+        .pdf()
     };
     let bytes = made();
     let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
-    // Cover, pieces, one page of three steps and the end; two pictures on the cover, one a piece, one a step, one at
-    // the end.
-    assert_eq!((count(b"/Type /Page\n"), count(b"/Subtype /Image")), (3, 2 + 3 + 3 + 1));
+    // Cover, pieces, one page of three steps and the end; two pictures on the cover, one a piece, one a step,
+    // one at the end.
+    assert_eq!(
+        (count(b"/Type /Page\n"), count(b"/Subtype /Image")),
+        (3, 2 + 3 + 3 + 1)
+    );
     assert!(bytes == made());
 }
 
 #[test]
 fn no_pieces_make_a_booklet_without_steps() {
-    assert!(Booklet { title: String::new(), lines: Vec::new(), pieces: Vec::new() }.pdf().starts_with(b"%PDF"));
+    assert!(
+        Booklet {
+            title: String::new(),
+            lines: Vec::new(),
+            pieces: Vec::new()
+        }
+        .pdf()
+        .starts_with(b"%PDF")
+    );
 }
 
 #[test]

@@ -44,9 +44,17 @@ pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
     let mut made: Vec<Sight> = Vec::with_capacity(pieces.len());
     for (travel_mm, seen) in seen {
         let last = made.last().map_or(directions[0], |sight: &Sight| sight.direction);
-        let worth = |k: usize| seen[k] + preference(directions[k]) + if directions[k] == last { STAYING } else { 0.0 };
-        let best = (0..directions.len()).rev().max_by(|&a, &b| worth(a).total_cmp(&worth(b))).unwrap_or(0);
-        made.push(Sight { direction: directions[best], travel_mm });
+        let worth = |k: usize| {
+            seen[k] + preference(directions[k]) + if directions[k] == last { STAYING } else { 0.0 }
+        };
+        let best = (0..directions.len())
+            .rev()
+            .max_by(|&a, &b| worth(a).total_cmp(&worth(b)))
+            .unwrap_or(0);
+        made.push(Sight {
+            direction: directions[best],
+            travel_mm,
+        });
     }
     made
 }
@@ -54,7 +62,8 @@ pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
 /// Turning the thing in one's hands is worth this much of what is seen.
 const STAYING: f64 = 0.5;
 
-/// Directions of sight: the front view first, then eight around, from a little above, from high above and from below.
+/// Directions of sight: the front view first, then eight around, from a little above, from high above and
+/// from below.
 fn directions() -> Vec<Vec3> {
     let front = Camera::front().direction.normalize();
     let around = |k: u32, rise: f64| {
@@ -63,7 +72,10 @@ fn directions() -> Vec<Vec3> {
         Vec3::new(cos * flat.x - sin * flat.y, sin * flat.x + cos * flat.y, -rise).normalize()
     };
     let slope = -front.z / front.with_z(0.0).length();
-    [slope, 1.6, -0.5].iter().flat_map(|&rise| (0..8).map(move |k| around(k, rise))).collect()
+    [slope, 1.6, -0.5]
+        .iter()
+        .flat_map(|&rise| (0..8).map(move |k| around(k, rise)))
+        .collect()
 }
 
 /// What people prefer where they see the same: to look from a little above, and not from below.
@@ -95,15 +107,26 @@ struct Step<'a> {
 impl<'a> Step<'a> {
     fn new(piece: &ReportPiece<'_>, there: &'a [TriangleBvh], travel_mm: f64, diagonal_mm: f64) -> Self {
         let along = Vec3::from(piece.installation_direction);
-        Self { points: spread(piece.mesh), along, travel_mm, there, far_mm: 3.0 * diagonal_mm }
+        Self {
+            points: spread(piece.mesh),
+            along,
+            travel_mm,
+            there,
+            far_mm: 3.0 * diagonal_mm,
+        }
     }
 
     /// How much is seen along `direction`: of the piece, of its place and of its way.
     fn seen(&self, direction: Vec3) -> f64 {
         let back = -self.travel_mm * self.along;
-        let facing = self.points.iter().filter(|(_, normal)| normal.dot(direction) < 0.0);
+        let facing = self
+            .points
+            .iter()
+            .filter(|(_, normal)| normal.dot(direction) < 0.0);
         let share = |shift: Vec3| {
-            let free = facing.clone().filter(|(p, _)| self.is_free(*p + shift - OFF_MM * direction, -direction));
+            let free = facing
+                .clone()
+                .filter(|(p, _)| self.is_free(*p + shift - OFF_MM * direction, -direction));
             2.0 * free.count() as f64 / self.points.len().max(1) as f64
         };
         let sine = self.along.cross(direction).length();
@@ -112,7 +135,9 @@ impl<'a> Step<'a> {
 
     /// Whether a point is seen by somebody far away.
     fn is_free(&self, from: Vec3, towards: Vec3) -> bool {
-        self.there.iter().all(|tree| tree.first_hit(from, towards, self.far_mm).is_none())
+        self.there
+            .iter()
+            .all(|tree| tree.first_hit(from, towards, self.far_mm).is_none())
     }
 }
 
@@ -135,8 +160,14 @@ fn spread(mesh: &TriMesh) -> Vec<(Vec3, Vec3)> {
 /// Where something far along `towards` is, in words, for a thing that stands and looks along −y.
 pub(super) fn side(towards: Vec3) -> String {
     let d = towards.normalize_or_zero();
-    let words =
-        [(d.z, "above"), (-d.z, "below"), (-d.y, "the front"), (d.y, "behind"), (d.x, "its left"), (-d.x, "its right")];
+    let words = [
+        (d.z, "above"),
+        (-d.z, "below"),
+        (-d.y, "the front"),
+        (d.y, "behind"),
+        (d.x, "its left"),
+        (-d.x, "its right"),
+    ];
     let mut large: Vec<(f64, &str)> = words.into_iter().filter(|(share, _)| *share > 0.38).collect();
     large.sort_by(|a, b| b.0.total_cmp(&a.0));
     let names: Vec<&str> = large.into_iter().map(|(_, word)| word).collect();

@@ -1,8 +1,8 @@
 //! How a piece lies best on its plate.
 //!
-//! Tried are the facets of its convex hull, on which it rests by itself, and the 26 lattice directions, on which
-//! supports hold it. What counts is set by the process: marks of supports on the skin that is seen, supports at all,
-//! height, and whether it stands.
+//! Tried are the facets of its convex hull, on which it rests by itself, and the 26 lattice directions, on
+//! which supports hold it. What counts is set by the process: marks of supports on the skin that is seen,
+//! supports at all, height, and whether it stands.
 
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
@@ -17,7 +17,8 @@ const COS_RESTING: f64 = 0.999;
 /// Facets of the hull that are tried, largest first, and the angle below which two count as one: 8°.
 const N_FACETS: usize = 24;
 const COS_SAME: f64 = 0.99;
-/// A piece stands on what is so near to the plate, mm, if its centre of mass is above that by so much on all sides, mm.
+/// A piece stands on what is so near to the plate, mm, if its centre of mass is above that by so much on all
+/// sides, mm.
 const FOOT_MM: f64 = 0.3;
 const STANDING_MM: f64 = 1.0;
 /// Turns about the vertical that are tried within a quarter.
@@ -43,8 +44,15 @@ impl Pose {
     pub fn quarter_turned(&self) -> Self {
         let [x, y, z] = self.axes;
         let Aabb { min, max } = self.bounds;
-        let bounds = Aabb { min: Vec3::new(-max.y, min.x, min.z), max: Vec3::new(-min.y, max.x, max.z) };
-        Self { axes: [-y, x, z], bounds, support: self.support }
+        let bounds = Aabb {
+            min: Vec3::new(-max.y, min.x, min.z),
+            max: Vec3::new(-min.y, max.x, max.z),
+        };
+        Self {
+            axes: [-y, x, z],
+            bounds,
+            support: self.support,
+        }
     }
 }
 
@@ -61,8 +69,8 @@ pub(super) struct Support {
 
 /// What counts how much, in shares: of the area, of the diagonal.
 ///
-/// Skin goes before all. Supports inside a piece cost a resin printer hardly anything, and height is its time; a
-/// filament printer pays for supports with time and material.
+/// Skin goes before all. Supports inside a piece cost a resin printer hardly anything, and height is its
+/// time; a filament printer pays for supports with time and material.
 struct Weights {
     outer: f64,
     all: f64,
@@ -72,22 +80,42 @@ struct Weights {
 
 fn weights(process: Process) -> Weights {
     match process {
-        Process::Sla => Weights { outer: 6.0, all: 0.3, height: 1.0, falling: 0.0 },
-        Process::Fdm => Weights { outer: 6.0, all: 2.0, height: 0.3, falling: 1.5 },
-        Process::Sls => Weights { outer: 0.0, all: 0.0, height: 1.0, falling: 0.0 },
+        Process::Sla => Weights {
+            outer: 6.0,
+            all: 0.3,
+            height: 1.0,
+            falling: 0.0,
+        },
+        Process::Fdm => Weights {
+            outer: 6.0,
+            all: 2.0,
+            height: 0.3,
+            falling: 1.5,
+        },
+        Process::Sls => Weights {
+            outer: 0.0,
+            all: 0.0,
+            height: 1.0,
+            falling: 0.0,
+        },
     }
 }
 
-/// The best pose within `room_mm`, width, depth and height; `None` where the piece is too large in every pose that is
-/// tried.
+/// The best pose within `room_mm`, width, depth and height; `None` where the piece is too large in every pose
+/// that is tried.
 pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) -> Option<Pose> {
     let body = Body::of(piece)?;
     let weights = weights(printer.process);
-    let mut poses: Vec<(f64, Vec3, Support)> =
-        body.directions().into_iter().map(|up| body.judged(&weights, up)).collect();
+    let mut poses: Vec<(f64, Vec3, Support)> = body
+        .directions()
+        .into_iter()
+        .map(|up| body.judged(&weights, up))
+        .collect();
     // Stable: of equally good directions the first stays first.
     poses.sort_by(|a, b| a.0.total_cmp(&b.0));
-    poses.into_iter().find_map(|(_, up, support)| body.turned(up, support, room_mm))
+    poses
+        .into_iter()
+        .find_map(|(_, up, support)| body.turned(up, support, room_mm))
 }
 
 /// What of a piece decides how it lies.
@@ -121,15 +149,22 @@ impl Body {
         };
         let area_mm2 = mesh.area().max(f64::MIN_POSITIVE);
         let faces = (0..mesh.triangles.len()).map(face).collect();
-        Some(Self { center: center_of_mass(mesh), area_mm2, diagonal_mm: mesh.bounds().diagonal(), faces, hull })
+        Some(Self {
+            center: center_of_mass(mesh),
+            area_mm2,
+            diagonal_mm: mesh.bounds().diagonal(),
+            faces,
+            hull,
+        })
     }
 
     /// Directions that may point up.
     fn directions(&self) -> Vec<Vec3> {
         let mut facets: Vec<(f64, Vec3)> = Vec::new();
         let n = self.hull.triangles.len();
-        let mut by_area: Vec<(f64, Vec3)> =
-            (0..n).map(|f| (self.hull.face_area(f), self.hull.face_normal(f))).collect();
+        let mut by_area: Vec<(f64, Vec3)> = (0..n)
+            .map(|f| (self.hull.face_area(f), self.hull.face_normal(f)))
+            .collect();
         by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (area, normal) in by_area {
             match facets.iter_mut().find(|facet| facet.1.dot(normal) > COS_SAME) {
@@ -141,7 +176,10 @@ impl Body {
         let resting = facets.into_iter().take(N_FACETS).map(|facet| -facet.1);
         let step = |i: i32, place: i32| f64::from(i / place % 3 - 1);
         let lattice = (0..27).map(|i| Vec3::new(step(i, 1), step(i, 3), step(i, 9)));
-        resting.chain(lattice.filter_map(Vec3::try_normalize)).filter(|d| *d != Vec3::ZERO).collect()
+        resting
+            .chain(lattice.filter_map(Vec3::try_normalize))
+            .filter(|d| *d != Vec3::ZERO)
+            .collect()
     }
 
     /// The cost of a direction, and what it makes one support.
@@ -175,11 +213,20 @@ impl Body {
     /// Whether the centre of mass is above the foot.
     fn stands(&self, up: Vec3, lowest: f64) -> bool {
         let (x, y) = up.any_orthonormal_pair();
-        let foot: Vec<Vec3> = self.hull.points.iter().copied().filter(|p| p.dot(up) - lowest < FOOT_MM).collect();
+        let foot: Vec<Vec3> = self
+            .hull
+            .points
+            .iter()
+            .copied()
+            .filter(|p| p.dot(up) - lowest < FOOT_MM)
+            .collect();
         (0..24).all(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
             let towards = cos * x + sin * y;
-            let reach = foot.iter().map(|p| p.dot(towards)).fold(f64::NEG_INFINITY, f64::max);
+            let reach = foot
+                .iter()
+                .map(|p| p.dot(towards))
+                .fold(f64::NEG_INFINITY, f64::max);
             reach >= self.center.dot(towards) + STANDING_MM
         })
     }
@@ -190,15 +237,26 @@ impl Body {
         let poses = (0..N_YAWS).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_2 / f64::from(N_YAWS)).sin_cos();
             let axes = [cos * x + sin * y, cos * y - sin * x, up];
-            let bounds = Aabb::around(self.hull.points.iter().map(|p| Vec3::from_array(axes.map(|a| a.dot(*p)))));
-            Pose { axes, bounds, support }
+            let bounds = Aabb::around(
+                self.hull
+                    .points
+                    .iter()
+                    .map(|p| Vec3::from_array(axes.map(|a| a.dot(*p)))),
+            );
+            Pose {
+                axes,
+                bounds,
+                support,
+            }
         });
         let [width, depth, height] = room_mm;
         let has_room = |pose: &Pose| {
             let [a, b, c] = pose.bounds.size().to_array();
             c <= height && (a <= width && b <= depth || b <= width && a <= depth)
         };
-        poses.filter(has_room).min_by(|a, b| a.footprint_mm2().total_cmp(&b.footprint_mm2()))
+        poses
+            .filter(has_room)
+            .min_by(|a, b| a.footprint_mm2().total_cmp(&b.footprint_mm2()))
     }
 }
 
@@ -211,5 +269,9 @@ fn center_of_mass(mesh: &TriMesh) -> Vec3 {
         sum += sixfold * (a + b + c) / 4.0;
         volume += sixfold;
     }
-    if volume > 0.0 { origin + sum / volume } else { mesh.bounds().center() }
+    if volume > 0.0 {
+        origin + sum / volume
+    } else {
+        mesh.bounds().center()
+    }
 }

@@ -1,7 +1,7 @@
 //! Rectangles on as few plates as a greedy search needs.
 //!
-//! Each plate keeps its largest free rectangles; a new one goes as far to the front as it can, upright or turned by a
-//! quarter ("maximal rectangles, bottom left"; Jylänki, "A thousand ways to pack the bin", 2010).
+//! Each plate keeps its largest free rectangles; a new one goes as far to the front as it can, upright or
+//! turned by a quarter ("maximal rectangles, bottom left"; Jylänki, "A thousand ways to pack the bin", 2010).
 
 /// Rounding that must not keep a piece off a plate that it just fits, mm.
 const ROUNDING_MM: f64 = 1e-6;
@@ -36,21 +36,35 @@ impl Rect {
     }
 }
 
-/// Packs rectangles of these `sides`, each of which fits a plate of `plate` alone one way or the other, in their order.
+/// Packs rectangles of these `sides`, each of which fits a plate of `plate` alone one way or the other, in
+/// their order.
 pub(super) fn pack(plate: [f64; 2], sides: &[[f64; 2]]) -> Vec<Spot> {
     let mut plates: Vec<Vec<Rect>> = Vec::new();
     let mut spots = Vec::with_capacity(sides.len());
     for &size in sides {
-        let found = plates.iter().enumerate().find_map(|(i, free)| Some((i, best_of(free, size)?)));
+        let found = plates
+            .iter()
+            .enumerate()
+            .find_map(|(i, free)| Some((i, best_of(free, size)?)));
         let (i, (corner_mm, is_turned)) = found.unwrap_or_else(|| {
-            plates.push(vec![Rect { min: [0.0; 2], max: plate }]);
+            plates.push(vec![Rect {
+                min: [0.0; 2],
+                max: plate,
+            }]);
             let free = plates.last().expect("it was added just now");
             (plates.len() - 1, best_of(free, size).unwrap_or(([0.0; 2], false)))
         });
         let [a, b] = if is_turned { [size[1], size[0]] } else { size };
-        let taken = Rect { min: corner_mm, max: [corner_mm[0] + a, corner_mm[1] + b] };
+        let taken = Rect {
+            min: corner_mm,
+            max: [corner_mm[0] + a, corner_mm[1] + b],
+        };
         plates[i] = without(&plates[i], &taken);
-        spots.push(Spot { plate: i, corner_mm, is_turned });
+        spots.push(Spot {
+            plate: i,
+            corner_mm,
+            is_turned,
+        });
     }
     spots
 }
@@ -58,12 +72,17 @@ pub(super) fn pack(plate: [f64; 2], sides: &[[f64; 2]]) -> Vec<Spot> {
 /// The corner of the free rectangle in which the far edge stays nearest, and whether the sides change places.
 fn best_of(free: &[Rect], size: [f64; 2]) -> Option<([f64; 2], bool)> {
     let ways = [(size, false), ([size[1], size[0]], true)];
-    let tries = free.iter().flat_map(|rect| ways.map(|(size, is_turned)| (rect, size, is_turned)));
+    let tries = free
+        .iter()
+        .flat_map(|rect| ways.map(|(size, is_turned)| (rect, size, is_turned)));
     let fitting = tries.filter(|(rect, size, _)| (0..2).all(|k| size[k] <= rect.side(k) + ROUNDING_MM));
     let edges = |rect: &Rect, size: [f64; 2]| [rect.min[1] + size[1], rect.min[0] + size[0]];
     let best = fitting.min_by(|a, b| {
         let (a_edges, b_edges) = (edges(a.0, a.1), edges(b.0, b.1));
-        a_edges[0].total_cmp(&b_edges[0]).then(a_edges[1].total_cmp(&b_edges[1])).then(a.2.cmp(&b.2))
+        a_edges[0]
+            .total_cmp(&b_edges[0])
+            .then(a_edges[1].total_cmp(&b_edges[1]))
+            .then(a.2.cmp(&b.2))
     });
     best.map(|(rect, _, is_turned)| (rect.min, is_turned))
 }
@@ -84,9 +103,14 @@ fn without(free: &[Rect], taken: &Rect) -> Vec<Rect> {
     }
     let is_inside = |i: usize| {
         let others = left.iter().enumerate();
-        others.into_iter().any(|(j, other)| j != i && other.contains(&left[i]) && (*other != left[i] || j < i))
+        others
+            .into_iter()
+            .any(|(j, other)| j != i && other.contains(&left[i]) && (*other != left[i] || j < i))
     };
-    (0..left.len()).filter(|&i| !is_inside(i)).map(|i| left[i]).collect()
+    (0..left.len())
+        .filter(|&i| !is_inside(i))
+        .map(|i| left[i])
+        .collect()
 }
 
 #[cfg(test)]
@@ -94,25 +118,46 @@ mod tests {
     use super::*;
 
     fn taken(sides: [f64; 2], spot: &Spot) -> Rect {
-        let [a, b] = if spot.is_turned { [sides[1], sides[0]] } else { sides };
-        Rect { min: spot.corner_mm, max: [spot.corner_mm[0] + a, spot.corner_mm[1] + b] }
+        let [a, b] = if spot.is_turned {
+            [sides[1], sides[0]]
+        } else {
+            sides
+        };
+        Rect {
+            min: spot.corner_mm,
+            max: [spot.corner_mm[0] + a, spot.corner_mm[1] + b],
+        }
     }
 
     #[test]
     fn rectangles_never_overlap_and_stay_on_their_plates() {
-        let sides: Vec<[f64; 2]> =
-            (0..60).map(|i| [5.0 + f64::from(i * 37 % 50), 5.0 + f64::from(i * 53 % 80)]).collect();
+        let sides: Vec<[f64; 2]> = (0..60)
+            .map(|i| [5.0 + f64::from(i * 37 % 50), 5.0 + f64::from(i * 53 % 80)])
+            .collect();
         let spots = pack([100.0, 90.0], &sides);
         for (i, spot) in spots.iter().enumerate() {
             let mine = taken(sides[i], spot);
-            assert!(Rect { min: [0.0; 2], max: [100.0, 90.0] }.contains(&mine), "{i}");
+            assert!(
+                Rect {
+                    min: [0.0; 2],
+                    max: [100.0, 90.0]
+                }
+                .contains(&mine),
+                "{i}"
+            );
             for (j, other) in spots.iter().enumerate().take(i) {
-                assert!(spot.plate != other.plate || !mine.overlaps(&taken(sides[j], other)), "{i} and {j}");
+                assert!(
+                    spot.plate != other.plate || !mine.overlaps(&taken(sides[j], other)),
+                    "{i} and {j}"
+                );
             }
         }
         let area: f64 = sides.iter().map(|s| s[0] * s[1]).sum();
         let n_plates = spots.iter().map(|s| s.plate).max().unwrap() + 1;
-        assert!((n_plates as f64) < 1.0 + area / (0.75 * 9000.0), "{n_plates} plates for {area} mm²");
+        assert!(
+            (n_plates as f64) < 1.0 + area / (0.75 * 9000.0),
+            "{n_plates} plates for {area} mm²"
+        );
     }
 
     #[test]

@@ -3,20 +3,34 @@ use shellock_geom::Volume;
 use super::*;
 
 fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-    Volume::cuboid(Aabb { min: min.into(), max: max.into() })
+    Volume::cuboid(Aabb {
+        min: min.into(),
+        max: max.into(),
+    })
 }
 
 /// A bowl: half a hollow ball, its rim on z = 0, its skin above.
 fn bowl() -> TriMesh {
     let ball = |r: f64| {
-        let bounds = Aabb { min: Vec3::splat(-r), max: Vec3::splat(r) };
+        let bounds = Aabb {
+            min: Vec3::splat(-r),
+            max: Vec3::splat(r),
+        };
         Volume::from_closed_mesh(&shellock_geom::contour::contour(bounds, 1.0, |p| r - p.length())).unwrap()
     };
-    ball(20.0).subtract(&ball(18.0)).intersect(&cuboid([-30.0, -30.0, 0.0], [30.0; 3])).to_mesh()
+    ball(20.0)
+        .subtract(&ball(18.0))
+        .intersect(&cuboid([-30.0, -30.0, 0.0], [30.0; 3]))
+        .to_mesh()
 }
 
 fn printable(mesh: &TriMesh, is_outer: impl Fn(Vec3) -> bool) -> Printable<'_> {
-    Printable { mesh, is_outer: (0..mesh.triangles.len()).map(|f| is_outer(mesh.face_center(f))).collect() }
+    Printable {
+        mesh,
+        is_outer: (0..mesh.triangles.len())
+            .map(|f| is_outer(mesh.face_center(f)))
+            .collect(),
+    }
 }
 
 fn on_plate(laid: &Laid, mesh: &TriMesh) -> Aabb {
@@ -37,18 +51,35 @@ fn a_bowl_lies_with_no_support_on_its_skin() {
 #[test]
 fn pieces_are_only_moved_stand_on_the_plate_and_keep_their_distance() {
     let blocks: Vec<TriMesh> = (1..9)
-        .map(|i| cuboid([0.0; 3], [10.0 * f64::from(i), 30.0, 5.0]).translate(Vec3::new(70.0, -40.0, 9.0)).to_mesh())
+        .map(|i| {
+            cuboid([0.0; 3], [10.0 * f64::from(i), 30.0, 5.0])
+                .translate(Vec3::new(70.0, -40.0, 9.0))
+                .to_mesh()
+        })
         .collect();
     let pieces: Vec<Printable> = blocks.iter().map(|b| printable(b, |_| false)).collect();
-    let printer = Printer { bed_mm: [100.0, 80.0, 90.0], ..Printer::fdm() };
+    let printer = Printer {
+        bed_mm: [100.0, 80.0, 90.0],
+        ..Printer::fdm()
+    };
     let plates = lay(&printer, &pieces);
     assert_eq!((plates.laid.len(), plates.too_large.len()), (8, 0));
-    let boxes: Vec<Aabb> = plates.laid.iter().map(|l| on_plate(l, pieces[l.piece].mesh)).collect();
+    let boxes: Vec<Aabb> = plates
+        .laid
+        .iter()
+        .map(|l| on_plate(l, pieces[l.piece].mesh))
+        .collect();
     for (i, (laid, mine)) in plates.laid.iter().zip(&boxes).enumerate() {
-        assert!(mine.min.z.abs() < 1e-9 && mine.min.x > 3.9 && mine.max.x < 96.1 && mine.max.y < 76.1, "{mine:?}");
+        assert!(
+            mine.min.z.abs() < 1e-9 && mine.min.x > 3.9 && mine.max.x < 96.1 && mine.max.y < 76.1,
+            "{mine:?}"
+        );
         assert!((mine.size() - Vec3::from_array(laid.size_mm)).length() < 1e-9);
         let [x, y, z] = laid.turned.map(Vec3::from_array);
-        assert!((x.cross(y) - z).length() < 1e-12 && x.dot(y).abs() < 1e-12, "turned, not mirrored");
+        assert!(
+            (x.cross(y) - z).length() < 1e-12 && x.dot(y).abs() < 1e-12,
+            "turned, not mirrored"
+        );
         for (other, theirs) in plates.laid.iter().zip(&boxes).take(i) {
             assert!(
                 laid.plate != other.plate || !mine.grown(2.9).intersects(*theirs),
@@ -64,28 +95,47 @@ fn what_the_printer_cannot_make_is_told_and_what_fits_slantwise_is_made() {
     let rod = cuboid([0.0; 3], [280.0, 4.0, 4.0]).to_mesh();
     let long = cuboid([0.0; 3], [400.0, 4.0, 4.0]).to_mesh();
     // The diagonal of 212 × 212 mm is 300.
-    let plates = lay(&Printer::fdm(), &[printable(&rod, |_| false), printable(&long, |_| false)]);
-    assert_eq!((plates.too_large, plates.laid.len(), plates.n_plates), (vec![1], 1, 1));
-    assert!(fits_whole(&Printer::fdm(), Aabb { min: Vec3::ZERO, max: Vec3::new(240.0, 200.0, 210.0) }));
+    let plates = lay(
+        &Printer::fdm(),
+        &[printable(&rod, |_| false), printable(&long, |_| false)],
+    );
+    assert_eq!(
+        (plates.too_large, plates.laid.len(), plates.n_plates),
+        (vec![1], 1, 1)
+    );
+    assert!(fits_whole(
+        &Printer::fdm(),
+        Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::new(240.0, 200.0, 210.0)
+        }
+    ));
     assert!(!fits_whole(&Printer::fdm(), rod.bounds()));
 }
 
 #[test]
 fn nothing_needs_no_plate_and_a_flat_mesh_is_no_piece() {
     assert_eq!(lay(&Printer::sla(), &[]), Plates::default());
-    let flat = TriMesh { points: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
+    let flat = TriMesh {
+        points: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        triangles: vec![[0, 1, 2]],
+    };
     assert_eq!(lay(&Printer::sla(), &[printable(&flat, |_| true)]).too_large, [0]);
 }
 
 #[test]
 fn swaps_make_plates_no_worse_and_lose_no_piece() {
-    let printer = Printer { bed_mm: [100.0, 80.0, 100.0], ..Printer::sla() };
+    let printer = Printer {
+        bed_mm: [100.0, 80.0, 100.0],
+        ..Printer::sla()
+    };
     let room = room_mm(&printer);
     let mut n_better = 0;
     for seed in 0..6 {
         let side = |i: u32, factor: u32, range: u32| f64::from(10 + (i + 7 * seed) * factor % range);
-        let boxes: Vec<TriMesh> =
-            (0..12).map(|i| cuboid([0.0; 3], [side(i, 37, 50), side(i, 53, 40), side(i, 29, 20)]).to_mesh()).collect();
+        let boxes: Vec<TriMesh> = (0..12)
+            .map(|i| cuboid([0.0; 3], [side(i, 37, 50), side(i, 53, 40), side(i, 29, 20)]).to_mesh())
+            .collect();
         let poses: Vec<(usize, Pose)> = boxes
             .iter()
             .map(|mesh| orient::best(&printer, &printable(mesh, |_| false), room).unwrap())

@@ -29,12 +29,16 @@ impl Image {
         self
     }
 
-    /// Pictures side by side in rows of `columns`, each in a cell as large as the largest, in the middle of it.
+    /// Pictures side by side in rows of `columns`, each in a cell as large as the largest, in the middle of
+    /// it.
     pub fn sheet(pictures: &[Self], columns: usize) -> Self {
         let columns = columns.clamp(1, pictures.len().max(1));
         let cell_width = pictures.iter().map(|p| p.width).max().unwrap_or(0);
         let cell_height = pictures.iter().map(|p| p.height).max().unwrap_or(0);
-        let (width, height) = (columns * cell_width, pictures.len().div_ceil(columns) * cell_height);
+        let (width, height) = (
+            columns * cell_width,
+            pictures.len().div_ceil(columns) * cell_height,
+        );
         let mut rgba = vec![0; 4 * width * height];
         for (i, picture) in pictures.iter().enumerate() {
             let left = i % columns * cell_width + (cell_width - picture.width) / 2;
@@ -58,7 +62,9 @@ impl Image {
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header().expect("writing to memory cannot fail");
-        writer.write_image_data(&self.rgba).expect("there are four bytes a pixel");
+        writer
+            .write_image_data(&self.rgba)
+            .expect("there are four bytes a pixel");
         writer.finish().expect("writing to memory cannot fail");
         bytes
     }
@@ -77,9 +83,15 @@ pub(super) struct Sample {
     pub color: [f32; 3],
 }
 
-const NOTHING: Sample = Sample { depth: f32::NEG_INFINITY, normal: [0.0; 3], mesh: 0, color: [0.0; 3] };
+const NOTHING: Sample = Sample {
+    depth: f32::NEG_INFINITY,
+    normal: [0.0; 3],
+    mesh: 0,
+    color: [0.0; 3],
+};
 
-/// Some rows of samples, with [`LINE_REACH`] more on both sides so that lines at the border come out the same.
+/// Some rows of samples, with [`LINE_REACH`] more on both sides so that lines at the border come out the
+/// same.
 pub(super) struct Band {
     width: usize,
     /// First row that becomes pixels.
@@ -90,7 +102,12 @@ pub(super) struct Band {
 
 impl Band {
     pub fn new(width: usize, top: usize, n_rows: usize) -> Self {
-        Self { width, top, n_rows, samples: vec![NOTHING; width * (n_rows + 2 * LINE_REACH)] }
+        Self {
+            width,
+            top,
+            n_rows,
+            samples: vec![NOTHING; width * (n_rows + 2 * LINE_REACH)],
+        }
     }
 
     pub fn width(&self) -> usize {
@@ -145,15 +162,25 @@ impl Band {
         }
         let light = shade::lit(here.color, here.normal);
         let strength = self.line_at(x, y, here);
-        Some(std::array::from_fn(|k| light[k] * (1.0 - strength) + 0.012 * strength))
+        Some(std::array::from_fn(|k| {
+            light[k] * (1.0 - strength) + 0.012 * strength
+        }))
     }
 
     /// How dark the line through a sample is, in [0, 1]: 1 on silhouettes, less on creases.
     fn line_at(&self, x: usize, y: usize, here: Sample) -> f32 {
         let mut strength: f32 = 0.0;
         for (dx, dy) in [(LINE_REACH, 0), (0, LINE_REACH)] {
-            let before = if x >= dx { self.samples[(y - dy) * self.width + x - dx] } else { NOTHING };
-            let after = if x + dx < self.width { self.samples[(y + dy) * self.width + x + dx] } else { NOTHING };
+            let before = if x >= dx {
+                self.samples[(y - dy) * self.width + x - dx]
+            } else {
+                NOTHING
+            };
+            let after = if x + dx < self.width {
+                self.samples[(y + dy) * self.width + x + dx]
+            } else {
+                NOTHING
+            };
             strength = strength.max(shade::line_between(before, here, after));
         }
         strength
@@ -163,12 +190,20 @@ impl Band {
 /// Linear light of an 8-bit sRGB channel, in [0, 1].
 pub(super) fn linear_from_srgb(channel: u8) -> f32 {
     let c = f32::from(channel) / 255.0;
-    if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    if c <= 0.040_45 {
+        c / 12.92
+    } else {
+        ((c + 0.055) / 1.055).powf(2.4)
+    }
 }
 
 fn srgb_from_linear(light: f32) -> u8 {
     let l = light.clamp(0.0, 1.0);
-    let c = if l <= 0.003_130_8 { 12.92 * l } else { 1.055 * l.powf(1.0 / 2.4) - 0.055 };
+    let c = if l <= 0.003_130_8 {
+        12.92 * l
+    } else {
+        1.055 * l.powf(1.0 / 2.4) - 0.055
+    };
     (255.0 * c).round() as u8
 }
 
@@ -183,10 +218,17 @@ mod tests {
 
     #[test]
     fn a_sheet_centres_what_is_smaller() {
-        let dot = |side: usize, value: u8| Image { width: side, height: side, rgba: vec![value; 4 * side * side] };
+        let dot = |side: usize, value: u8| Image {
+            width: side,
+            height: side,
+            rgba: vec![value; 4 * side * side],
+        };
         let sheet = Image::sheet(&[dot(3, 1), dot(1, 2), dot(3, 3)], 2);
         assert_eq!((sheet.width, sheet.height), (6, 6));
         let at = |x: usize, y: usize| sheet.rgba[4 * (y * 6 + x)];
-        assert_eq!([at(0, 0), at(4, 1), at(3, 0), at(2, 5), at(5, 5)], [1, 2, 0, 3, 0]);
+        assert_eq!(
+            [at(0, 0), at(4, 1), at(3, 0), at(2, 5), at(5, 5)],
+            [1, 2, 0, 3, 0]
+        );
     }
 }

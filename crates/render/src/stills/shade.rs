@@ -14,18 +14,27 @@ const DEPTH_JUMP: f32 = 14.0;
 /// Cosine of the angle between normals two samples apart from which a crease begins to show: 35°.
 const CREASE_COS: f32 = 0.82;
 
-/// Unit normals at the corners of each triangle: the mean, by area, of the triangles around the corner that face about its way.
+/// Unit normals at the corners of each triangle: the mean, by area, of the triangles around the corner that
+/// face about its way.
 pub fn crease_normals(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
     let (first, faces) = faces_around_points(mesh);
-    let doubled: Vec<Vec3> = (0..mesh.triangles.len()).into_par_iter().map(|f| mesh.area_vector_doubled(f)).collect();
+    let doubled: Vec<Vec3> = (0..mesh.triangles.len())
+        .into_par_iter()
+        .map(|f| mesh.area_vector_doubled(f))
+        .collect();
     let units: Vec<Vec3> = doubled.par_iter().map(|n| n.normalize_or_zero()).collect();
     (0..mesh.triangles.len())
         .into_par_iter()
         .map(|face| {
             mesh.triangles[face].map(|v| {
                 let around = &faces[first[v as usize] as usize..first[v as usize + 1] as usize];
-                let alike = around.iter().filter(|&&f| units[f as usize].dot(units[face]) > SMOOTH_COS);
-                alike.map(|&f| doubled[f as usize]).sum::<Vec3>().normalize_or(units[face])
+                let alike = around
+                    .iter()
+                    .filter(|&&f| units[f as usize].dot(units[face]) > SMOOTH_COS);
+                alike
+                    .map(|&f| doubled[f as usize])
+                    .sum::<Vec3>()
+                    .normalize_or(units[face])
             })
         })
         .collect()
@@ -51,7 +60,8 @@ fn faces_around_points(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
 
 /// Linear light that a surface of a linear colour sends to the viewer.
 pub(super) fn lit(color: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
-    // Key light, fill light, and the half-way vector of the key light; x right, y down, z to the viewer; unit vectors.
+    // Key light, fill light, and the half-way vector of the key light; x right, y down, z to the viewer; unit
+    // vectors.
     const KEY: [f32; 3] = [-0.46, -0.60, 0.654];
     const FILL: [f32; 3] = [0.80, 0.10, 0.59];
     const HALF: [f32; 3] = [-0.253, -0.330, 0.909];

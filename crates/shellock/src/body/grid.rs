@@ -12,13 +12,13 @@ use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use super::BodyParams;
 use crate::{PatchId, SegmentedSurface};
 
-/// Values are cut off this far from the level, in cells: nothing farther than a few cells shapes a contour, and bounded
-/// fields interpolate without jumps.
+/// Values are cut off this far from the level, in cells: nothing farther than a few cells shapes a contour,
+/// and bounded fields interpolate without jumps.
 const CUTOFF_CELLS: f64 = 3.5;
 /// Width of the band outside the surface, in cells: the cuts must reach past the surface.
 const OUTSIDE_CELLS: f64 = 2.5;
-/// Root mean square distance by which the inner surface of the wall may be simplified, mm. No printer shows it; all that
-/// follows has a fifth of the triangles to deal with.
+/// Root mean square distance by which the inner surface of the wall may be simplified, mm. No printer shows
+/// it; all that follows has a fifth of the triangles to deal with.
 const INNER_TOLERANCE_MM: f64 = 0.05;
 
 /// Nodes near the model's surface and their depth below it. Depends on the model alone.
@@ -71,13 +71,24 @@ impl ShellGrid {
         let bounds = model.mesh().bounds();
         let (band, depth) = Band::along(&distance, bounds, cell, OUTSIDE_CELLS * cell, reach_mm, exact_mm)?;
         let thickness_mm = params.thickness_mm;
-        let (outer, cavity) = rayon::join(|| Volume::from_solid(model), || deeper_than(&band, &depth, thickness_mm));
+        let (outer, cavity) = rayon::join(
+            || Volume::from_solid(model),
+            || deeper_than(&band, &depth, thickness_mm),
+        );
         let cavity = cavity.map_err(|_| GridError::NoInside)?;
         if cavity.is_empty() {
             return Err(GridError::NoCavity { thickness_mm });
         }
-        let wall = outer.map_err(|e| GridError::Surface(e.to_string()))?.subtract(&cavity);
-        Ok(Self { band, depth, thickness_mm, reach_mm, wall })
+        let wall = outer
+            .map_err(|e| GridError::Surface(e.to_string()))?
+            .subtract(&cavity);
+        Ok(Self {
+            band,
+            depth,
+            thickness_mm,
+            reach_mm,
+            wall,
+        })
     }
 
     /// Greatest absolute value kept in fields, mm.
@@ -102,7 +113,8 @@ fn deeper_than(band: &Band, depth: &[f32], depth_mm: f64) -> Result<Volume, NotA
 /// A patch and its distance, mm.
 type Entry = (u32, f32);
 
-/// For each node of the wall, the distances to the patches near it: sparse, since most nodes see one patch alone.
+/// For each node of the wall, the distances to the patches near it: sparse, since most nodes see one patch
+/// alone.
 pub struct PatchDistances {
     /// Entries of node n are `start[n] .. start[n + 1]`.
     start: Vec<u32>,
@@ -110,7 +122,8 @@ pub struct PatchDistances {
 }
 
 impl PatchDistances {
-    /// Measures from every node of the wall to every patch that comes within twice the cutoff of its nearest one.
+    /// Measures from every node of the wall to every patch that comes within twice the cutoff of its nearest
+    /// one.
     pub fn measure(grid: &ShellGrid, surface: &SegmentedSurface) -> Self {
         let groups: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
         let bvh = TriangleBvh::with_groups(&surface.mesh, &groups);
@@ -121,7 +134,8 @@ impl PatchDistances {
         let parts: Vec<(Vec<u32>, Vec<Entry>)> = (0..n.div_ceil(chunk))
             .into_par_iter()
             .map(|c| {
-                let (mut counts, mut entries, mut found) = (Vec::with_capacity(chunk), Vec::new(), Vec::new());
+                let (mut counts, mut entries, mut found) =
+                    (Vec::with_capacity(chunk), Vec::new(), Vec::new());
                 for node in c * chunk..((c + 1) * chunk).min(n) {
                     if grid.is_below_wall(node) {
                         counts.push(0);
@@ -150,8 +164,8 @@ impl PatchDistances {
         Self { start, entries }
     }
 
-    /// `½ (min over remaining j ≠ p of d_j − d_p)` at every node, cut off at ±`cutoff`: positive nearer to `p`.
-    /// `remains[j]` says whether patch j is still there.
+    /// `½ (min over remaining j ≠ p of d_j − d_p)` at every node, cut off at ±`cutoff`: positive nearer to
+    /// `p`. `remains[j]` says whether patch j is still there.
     pub fn preference(&self, p: PatchId, remains: &[bool], cutoff: f32) -> Vec<f32> {
         (0..self.start.len() - 1)
             .into_par_iter()
@@ -166,7 +180,11 @@ impl PatchDistances {
                     }
                 }
                 // Far from both it does not matter: the node belongs to a piece that has left.
-                if own == f32::INFINITY { -cutoff } else { (0.5 * (others - own)).clamp(-cutoff, cutoff) }
+                if own == f32::INFINITY {
+                    -cutoff
+                } else {
+                    (0.5 * (others - own)).clamp(-cutoff, cutoff)
+                }
             })
             .collect()
     }
@@ -208,7 +226,10 @@ impl LonelyBlocks {
     }
 
     fn patch_at(&self, block: [u16; 3]) -> Option<u32> {
-        self.patch_of.binary_search_by_key(&block, |e| e.0).ok().map(|at| self.patch_of[at].1)
+        self.patch_of
+            .binary_search_by_key(&block, |e| e.0)
+            .ok()
+            .map(|at| self.patch_of[at].1)
     }
 }
 

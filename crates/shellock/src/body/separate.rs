@@ -10,8 +10,8 @@ use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_cutting};
 use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
-use super::BodyParams;
 use super::grid::{LocalField, PatchDistances, ShellGrid};
+use super::{BodyError, BodyParams};
 use crate::plan::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
 
@@ -19,13 +19,14 @@ use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, 
 const SKIN_CELLS: f64 = 1.5;
 /// What remains is grown by this many cells before it is swept, so that interpolation leaves no rub.
 const MARGIN_CELLS: f64 = 0.15;
-/// Share of the wall gap that is left at the rim. With a tenth of it the two sides of most seams crossed somewhere, by up to
-/// 0.1 mm, and paths rubbed there; half of that is left. At 15 µm a side the surface still counts as covered everywhere.
+/// Share of the wall gap that is left at the rim. With a tenth of it the two sides of most seams crossed
+/// somewhere, by up to 0.1 mm, and paths rubbed there; half of that is left. At 15 µm a side the surface
+/// still counts as covered everywhere.
 const RIM_LEAST: f64 = 0.3;
 /// What is nearer than this to the key's cut is its seam, mm.
 const KEY_REACH_MM: f32 = 1.5;
-/// Cutting tools are simplified by at most this share of the gap and this many mm where they cut, so that paths stay free,
-/// and by more where they end outside the wall, farther from it than so many cells.
+/// Cutting tools are simplified by at most this share of the gap and this many mm where they cut, so that
+/// paths stay free, and by more where they end outside the wall, farther from it than so many cells.
 const GAP_SHARE: f64 = 0.2;
 const CUT_TOLERANCE_MM: f64 = 0.02;
 const FREE_TOLERANCE_MM: f64 = 0.05;
@@ -35,10 +36,11 @@ const LIMIT_CELLS: f32 = 1.8;
 const LIMIT_SLOPE: f32 = 5.0;
 /// Width of a collar beyond the cut, in cells; one is enough for its contour to end where the cut is.
 const COLLAR_CELLS: usize = 3;
-/// A part was not separated by a cut where more of its points than this, and than 0.5 %, lie beyond a cell on each side.
+/// A part was not separated by a cut where more of its points than this, and than 0.5 %, lie beyond a cell on
+/// each side.
 const MOST_STRAY: usize = 10;
-/// Rounds of giving fragments to the other side of a cut; new ones can appear where p must keep out of the way of what it
-/// gave. A fragment that is given lies this far on the other side, in cells.
+/// Rounds of giving fragments to the other side of a cut; new ones can appear where p must keep out of the
+/// way of what it gave. A fragment that is given lies this far on the other side, in cells.
 const MOST_GIVINGS: usize = 3;
 const GIVEN_CELLS: f64 = 0.45;
 /// A piece that could take less than this share of its wall along is not made.
@@ -50,12 +52,14 @@ const CHIP_MM3: f64 = 0.5;
 pub struct ShellBodies {
     /// The body of each piece, one connected volume.
     pub bodies: IdVec<PatchId, Volume>,
-    /// The inner surface of the wall, each triangle with the piece behind it; `None` where there is no cavity.
+    /// The inner surface of the wall, each triangle with the piece behind it; `None` where there is no
+    /// cavity.
     pub inner: Option<SegmentedSurface>,
-    /// Where a piece may have no connectors: positive where bodies lie in its way out, or where it would lie in a later
-    /// piece's way. On the nodes around its patch.
+    /// Where a piece may have no connectors: positive where bodies lie in its way out, or where it would lie
+    /// in a later piece's way. On the nodes around its patch.
     pub barred: IdVec<PatchId, LocalField>,
-    /// Positive on each piece's own side of all cuts; with the wall's limits it is the body. On the nodes around its patch.
+    /// Positive on each piece's own side of all cuts; with the wall's limits it is the body. On the nodes
+    /// around its patch.
     pub side: IdVec<PatchId, LocalField>,
 }
 
@@ -79,19 +83,33 @@ pub fn build(
         let in_way = if fields.n_left() == 1 {
             inner.give_rest(p);
             side[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &fields.rest, rooms[p]));
-            cuts.push(Cut { piece: p, field: None });
+            cuts.push(Cut {
+                piece: p,
+                field: None,
+            });
             fields.in_later_ways.clone()
         } else {
             let g = fields.cut(p, step.separation);
             let kept = fields.kept_share(p, &g);
             if kept < LEAST_KEPT {
-                return Err(BodyError::Blocked { piece: p, separation: step.separation, kept });
+                return Err(BodyError::Blocked {
+                    piece: p,
+                    separation: step.separation,
+                    kept,
+                });
             }
             let local = || LocalField::cut_out(&grid.band, &g, rooms[p]);
             let ((), local) = rayon::join(|| inner.give(p, &g, &grid.band), local);
-            let own: Vec<f32> = g.par_iter().zip(&fields.rest).map(|(g, rest)| g.min(*rest)).collect();
+            let own: Vec<f32> = g
+                .par_iter()
+                .zip(&fields.rest)
+                .map(|(g, rest)| g.min(*rest))
+                .collect();
             side[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &own, rooms[p]));
-            cuts.push(Cut { piece: p, field: Some(local) });
+            cuts.push(Cut {
+                piece: p,
+                field: Some(local),
+            });
             fields.remove(p, step.separation, &g)
         };
         barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
@@ -100,10 +118,22 @@ pub fn build(
     ctx.stage("bodies", plan.steps.len())?;
     let key_cut = cuts[0].field.as_ref().filter(|_| params.key_gap_mm.is_some());
     let key_side = key_cut.map(|field| field.spread(&grid.band, -grid.cutoff_mm()));
-    let mut parts = split(&Splitter { ctx, params, grid, key_side }, grid.wall.clone(), &cuts)?;
+    let mut parts = split(
+        &Splitter {
+            ctx,
+            params,
+            grid,
+            key_side,
+        },
+        grid.wall.clone(),
+        &cuts,
+    )?;
     parts.sort_by_key(|(p, _)| *p);
     Ok(ShellBodies {
-        bodies: parts.into_iter().map(|(p, part)| whole_body(ctx, p, &part)).collect(),
+        bodies: parts
+            .into_iter()
+            .map(|(p, part)| whole_body(ctx, p, &part))
+            .collect(),
         inner: inner.finish(plan.steps.len()),
         barred: of_every_piece(barred),
         side: of_every_piece(side),
@@ -111,7 +141,10 @@ pub fn build(
 }
 
 fn of_every_piece(fields: Vec<Option<LocalField>>) -> IdVec<PatchId, LocalField> {
-    fields.into_iter().map(|f| f.expect("every piece of a plan is removed once")).collect()
+    fields
+        .into_iter()
+        .map(|f| f.expect("every piece of a plan is removed once"))
+        .collect()
 }
 
 /// A piece and the field of its cut, positive on its side; the first-installed piece has none.
@@ -128,8 +161,9 @@ struct Splitter<'a> {
     key_side: Option<Vec<f32>>,
 }
 
-/// Divides `wall` among the pieces of `cuts`, which stand in the order of taking apart: first into the earlier and the later
-/// half of them, then each half on its own. Every triangle so takes part in log n booleans, not in n.
+/// Divides `wall` among the pieces of `cuts`, which stand in the order of taking apart: first into the
+/// earlier and the later half of them, then each half on its own. Every triangle so takes part in log n
+/// booleans, not in n.
 fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId, Volume)>, Cancelled> {
     if let [only] = cuts {
         with.ctx.step()?;
@@ -151,22 +185,36 @@ impl Splitter<'_> {
     fn preference(&self, leaving: &[Cut]) -> Vec<f32> {
         let mut g = vec![-self.grid.cutoff_mm(); self.grid.band.len()];
         for cut in leaving {
-            cut.field.as_ref().expect("only the last piece has no cut").raise(&mut g);
+            cut.field
+                .as_ref()
+                .expect("only the last piece has no cut")
+                .raise(&mut g);
         }
         g
     }
 
     /// The part of `wall` where `sign · g` is positive, less the gap.
     ///
-    /// A collar along the cut, on the other side of it, is taken out of the wall; then the wall falls apart, and what lies
-    /// on the wanted side is kept. The collar has far fewer triangles than a whole side. Should it not separate the sides,
-    /// the whole side cuts.
+    /// A collar along the cut, on the other side of it, is taken out of the wall; then the wall falls apart,
+    /// and what lies on the wanted side is kept. The collar has far fewer triangles than a whole side. Should
+    /// it not separate the sides, the whole side cuts.
     fn side(&self, wall: &Volume, g: &[f32], sign: f32) -> Volume {
         // Both sides' collars see the same side of the cut, so that they have the same triangles there.
-        let apart = if sign > 0.0 { Corners::Positive } else { Corners::Negative };
-        let collar = contour_cutting(&self.grid.band, &self.collar_field(g, sign), OffBand::Outside, apart);
-        let collar = Volume::from_closed_mesh(&self.simplified(collar, g, sign)).expect("contours are manifold");
-        self.half(&wall.subtract(&collar), g, sign).unwrap_or_else(|| wall.intersect(&self.whole_side(g, sign)))
+        let apart = if sign > 0.0 {
+            Corners::Positive
+        } else {
+            Corners::Negative
+        };
+        let collar = contour_cutting(
+            &self.grid.band,
+            &self.collar_field(g, sign),
+            OffBand::Outside,
+            apart,
+        );
+        let collar =
+            Volume::from_closed_mesh(&self.simplified(collar, g, sign)).expect("contours are manifold");
+        self.half(&wall.subtract(&collar), g, sign)
+            .unwrap_or_else(|| wall.intersect(&self.whole_side(g, sign)))
     }
 
     /// The parts of `apart` on the wanted side; `None` where a part lies on both.
@@ -176,7 +224,10 @@ impl Splitter<'_> {
         let half = apart.retain(|points| {
             // Samples beside jumps of g may have the wrong sign; most have not.
             let (mut sum, mut n_points, mut n_beyond) = (0.0, 0, [0usize; 2]);
-            for h in points.filter_map(|p| self.grid.band.sample(g, p)).map(|g| f64::from(sign) * g) {
+            for h in points
+                .filter_map(|p| self.grid.band.sample(g, p))
+                .map(|g| f64::from(sign) * g)
+            {
                 sum += h;
                 n_points += 1;
                 n_beyond[0] += usize::from(h > cell);
@@ -191,23 +242,38 @@ impl Splitter<'_> {
 
     /// All of the wanted side, less the gap.
     fn whole_side(&self, g: &[f32], sign: f32) -> Volume {
-        let field: Vec<f32> =
-            (0..g.len()).into_par_iter().map(|n| (sign * g[n] - self.gap_mm(n)).min(self.limits(n))).collect();
+        let field: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| (sign * g[n] - self.gap_mm(n)).min(self.limits(n)))
+            .collect();
         // The same corners as the other side's collar cuts apart.
-        let apart = if sign > 0.0 { Corners::Negative } else { Corners::Positive };
+        let apart = if sign > 0.0 {
+            Corners::Negative
+        } else {
+            Corners::Positive
+        };
         let mesh = contour_cutting(&self.grid.band, &field, OffBand::Outside, apart);
         Volume::from_closed_mesh(&mesh).expect("contours are manifold")
     }
 
-    /// How far each side of a cut stays away from it, mm: less towards the outer rim, more along the key's seams where it has its own gap.
+    /// How far each side of a cut stays away from it, mm: less towards the outer rim, more along the key's
+    /// seams where it has its own gap.
     fn gap_mm(&self, n: usize) -> f32 {
-        let is_at_key = self.key_side.as_ref().is_some_and(|key| key[n].abs() < KEY_REACH_MM);
-        let gap = self.params.key_gap_mm.filter(|_| is_at_key).unwrap_or(self.params.wall_gap_mm) as f32;
+        let is_at_key = self
+            .key_side
+            .as_ref()
+            .is_some_and(|key| key[n].abs() < KEY_REACH_MM);
+        let gap = self
+            .params
+            .key_gap_mm
+            .filter(|_| is_at_key)
+            .unwrap_or(self.params.wall_gap_mm) as f32;
         gap * (self.grid.depth[n] / self.params.rim_mm as f32).clamp(RIM_LEAST as f32, 1.0)
     }
 
-    /// Positive where tools reach. Nothing is cut below the wall or far outside: cuts are unknown there. The limits are so
-    /// steep that within a cell of the wall they are above all values of the cut: both sides' collars must agree there.
+    /// Positive where tools reach. Nothing is cut below the wall or far outside: cuts are unknown there. The
+    /// limits are so steep that within a cell of the wall they are above all values of the cut: both sides'
+    /// collars must agree there.
     fn limits(&self, n: usize) -> f32 {
         let (depth, reach) = (self.grid.depth[n], LIMIT_CELLS * self.grid.band.cell_mm() as f32);
         (self.grid.thickness_mm as f32 + reach - depth).min(depth + reach) * LIMIT_SLOPE
@@ -215,23 +281,38 @@ impl Splitter<'_> {
 
     fn simplified(&self, collar: TriMesh, g: &[f32], sign: f32) -> TriMesh {
         let h = |p: Vec3| self.grid.band.sample(g, p).map_or(0.0, |g| f64::from(sign) * g);
-        let tolerance: Vec<f64> = collar.points.par_iter().map(|&p| self.tolerance_mm(p, h(p))).collect();
+        let tolerance: Vec<f64> = collar
+            .points
+            .par_iter()
+            .map(|&p| self.tolerance_mm(p, h(p)))
+            .collect();
         decimate(collar, &tolerance)
     }
 
-    /// Positive in the collar: from the gap's border on the side of `sign` to some cells on the other side of the cut.
+    /// Positive in the collar: from the gap's border on the side of `sign` to some cells on the other side of
+    /// the cut.
     fn collar_field(&self, g: &[f32], sign: f32) -> Vec<f32> {
         let (cell, cutoff) = (self.grid.band.cell_mm() as f32, self.grid.cutoff_mm());
         let is_own = |n: u32| sign * g[n as usize] > 0.0;
-        let mut field: Vec<f32> =
-            (0..g.len() as u32).into_par_iter().map(|n| if is_own(n) { cutoff } else { -cell }).collect();
+        let mut field: Vec<f32> = (0..g.len() as u32)
+            .into_par_iter()
+            .map(|n| if is_own(n) { cutoff } else { -cell })
+            .collect();
         let mut front: Vec<u32> = (0..g.len() as u32)
             .into_par_iter()
             .filter(|&n| is_own(n) && self.limits(n as usize) > 0.0)
-            .filter(|&n| self.grid.band.face_neighbours(n).any(|m| !is_own(m) && self.limits(m as usize) > 0.0))
+            .filter(|&n| {
+                self.grid
+                    .band
+                    .face_neighbours(n)
+                    .any(|m| !is_own(m) && self.limits(m as usize) > 0.0)
+            })
             .collect();
         for _ in 0..COLLAR_CELLS {
-            let beyond: Vec<u32> = front.iter().flat_map(|&n| self.grid.band.face_neighbours(n)).collect();
+            let beyond: Vec<u32> = front
+                .iter()
+                .flat_map(|&n| self.grid.band.face_neighbours(n))
+                .collect();
             front.clear();
             for n in beyond {
                 if field[n as usize] < 0.0 {
@@ -246,12 +327,16 @@ impl Splitter<'_> {
         field
     }
 
-    /// How much a collar may be simplified at `p`, mm, where `sign · g` is `h`: well within the gap where it cuts, freely
-    /// where it meets nothing that stays.
+    /// How much a collar may be simplified at `p`, mm, where `sign · g` is `h`: well within the gap where it
+    /// cuts, freely where it meets nothing that stays.
     fn tolerance_mm(&self, p: Vec3, h: f64) -> f64 {
         let cell = self.grid.band.cell_mm();
         let (params, reach) = (self.params, TIGHT_CELLS * cell);
-        let depth = self.grid.band.sample(&self.grid.depth, p).unwrap_or(f64::NEG_INFINITY);
+        let depth = self
+            .grid
+            .band
+            .sample(&self.grid.depth, p)
+            .unwrap_or(f64::NEG_INFINITY);
         if h < -0.4 * cell || depth < -reach || depth > params.thickness_mm + reach {
             return FREE_TOLERANCE_MM;
         }
@@ -260,33 +345,22 @@ impl Splitter<'_> {
     }
 }
 
-/// Why the wall cannot be split.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BodyError {
-    /// Most of a piece lies behind others on its way out, so that it would have to leave that behind.
-    #[error("piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)]
-    Blocked {
-        /// The piece.
-        piece: PatchId,
-        /// The direction in which it was to leave.
-        separation: LatticeDirection,
-        /// Share of its wall that is free, in [0, 1].
-        kept: f64,
-    },
-    /// The user asked to stop.
-    #[error(transparent)]
-    Cancelled(#[from] crate::Cancelled),
-}
-
 /// The largest connected part of `body`.
 fn whole_body(ctx: &Ctx, p: PatchId, body: &Volume) -> Volume {
     let parts = body.components();
     // Cavities come as parts of negative volume; a wall body has none unless the model has.
-    let dropped: f64 = parts.iter().skip(1).map(Volume::volume).filter(|v| *v > 0.0).sum();
+    let dropped: f64 = parts
+        .iter()
+        .skip(1)
+        .map(Volume::volume)
+        .filter(|v| *v > 0.0)
+        .sum();
     if dropped > CHIP_MM3 {
         ctx.warn(Warning {
             code: "body-in-parts".into(),
-            message: format!("piece {p}: fragments of {dropped:.1} mm³ were cut off from its body and dropped"),
+            message: format!(
+                "piece {p}: fragments of {dropped:.1} mm³ were cut off from its body and dropped"
+            ),
             pieces: vec![p],
             at: parts.get(1).map(|c| c.bounds().center().to_array()),
         });
@@ -347,16 +421,23 @@ impl<'a> Separation<'a> {
             .map(|n| (at(n, -phi[n]).min(-ahead_of_skin[n]) + margin).max(-cutoff))
             .collect();
         let behind_staying = self.sweeper.max_ahead(&staying, along);
-        let mut g: Vec<f32> =
-            (0..phi.len()).into_par_iter().map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n])).collect();
+        let mut g: Vec<f32> = (0..phi.len())
+            .into_par_iter()
+            .map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n]))
+            .collect();
         // What is given back stays, and p keeps out of its way too.
         for _ in 0..MOST_GIVINGS {
             if !self.give_fragments_back(&mut g) {
                 break;
             }
-            let staying: Vec<f32> = (0..g.len()).into_par_iter().map(|n| at(n, -g[n]).max(-cutoff)).collect();
+            let staying: Vec<f32> = (0..g.len())
+                .into_par_iter()
+                .map(|n| at(n, -g[n]).max(-cutoff))
+                .collect();
             let behind = self.sweeper.max_ahead(&staying, along);
-            g.par_iter_mut().zip(&behind).for_each(|(g, behind)| *g = g.min(-behind));
+            g.par_iter_mut()
+                .zip(&behind)
+                .for_each(|(g, behind)| *g = g.min(-behind));
         }
         g
     }
@@ -373,7 +454,8 @@ impl<'a> Separation<'a> {
         kept as f64 / own.max(1) as f64
     }
 
-    /// Gives each fragment of either side to the other side, which surrounds it. Returns whether there were any.
+    /// Gives each fragment of either side to the other side, which surrounds it. Returns whether there were
+    /// any.
     fn give_fragments_back(&self, g: &mut [f32]) -> bool {
         let away = GIVEN_CELLS as f32 * self.grid.band.cell_mm() as f32;
         let fragments = |side: f32| {
@@ -382,7 +464,10 @@ impl<'a> Separation<'a> {
         };
         let (gained, lost) = rayon::join(|| fragments(1.0), || fragments(-1.0));
         for (side, fragments) in [(1.0, &gained), (-1.0, &lost)] {
-            fragments.iter().flatten().for_each(|&n| g[n as usize] = -side * away);
+            fragments
+                .iter()
+                .flatten()
+                .for_each(|&n| g[n as usize] = -side * away);
         }
         !(gained.is_empty() && lost.is_empty())
     }
@@ -391,23 +476,35 @@ impl<'a> Separation<'a> {
     fn remove(&mut self, p: PatchId, separation: LatticeDirection, g: &[f32]) -> Vec<f32> {
         let cutoff = self.grid.cutoff_mm();
         let along = separation.step();
-        let body: Vec<f32> =
-            (0..g.len()).into_par_iter().map(|n| self.wall(n, 0.0).min(g[n]).min(self.rest[n]).max(-cutoff)).collect();
+        let body: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| self.wall(n, 0.0).min(g[n]).min(self.rest[n]).max(-cutoff))
+            .collect();
         self.remains[usize::from(p)] = false;
         self.rest.par_iter_mut().zip(g).for_each(|(r, g)| *r = r.min(-g));
-        let staying: Vec<f32> =
-            (0..g.len()).into_par_iter().map(|n| self.wall(n, 0.0).min(self.rest[n]).max(-cutoff)).collect();
+        let staying: Vec<f32> = (0..g.len())
+            .into_par_iter()
+            .map(|n| self.wall(n, 0.0).min(self.rest[n]).max(-cutoff))
+            .collect();
         let (behind_staying, ahead_of_p) = rayon::join(
             || self.sweeper.max_ahead(&staying, along),
             || self.sweeper.max_ahead(&body, along.map(|x| -x)),
         );
-        let in_way = behind_staying.iter().zip(&self.in_later_ways).map(|(a, b)| a.max(*b)).collect();
-        self.in_later_ways.par_iter_mut().zip(&ahead_of_p).for_each(|(w, a)| *w = w.max(*a));
+        let in_way = behind_staying
+            .iter()
+            .zip(&self.in_later_ways)
+            .map(|(a, b)| a.max(*b))
+            .collect();
+        self.in_later_ways
+            .par_iter_mut()
+            .zip(&ahead_of_p)
+            .for_each(|(w, a)| *w = w.max(*a));
         in_way
     }
 }
 
-/// Connected components of the nodes for which `is_member` holds, all but the largest; connected across cell edges.
+/// Connected components of the nodes for which `is_member` holds, all but the largest; connected across cell
+/// edges.
 fn minor_components(band: &Band, is_member: impl Fn(usize) -> bool + Sync) -> Vec<Vec<u32>> {
     let member: Vec<bool> = (0..band.len()).into_par_iter().map(&is_member).collect();
     let mut seen = vec![false; band.len()];
@@ -450,10 +547,22 @@ impl InnerSurface {
     /// Gives to `p` what lies on its side of the cut `g`.
     fn give(&mut self, p: PatchId, g: &[f32], band: &Band) {
         let mut is_open = vec![false; self.mesh.points.len()];
-        for (triangle, _) in self.mesh.triangles.iter().zip(&self.owner).filter(|(_, owner)| owner.is_none()) {
+        for (triangle, _) in self
+            .mesh
+            .triangles
+            .iter()
+            .zip(&self.owner)
+            .filter(|(_, owner)| owner.is_none())
+        {
             triangle.iter().for_each(|&v| is_open[v as usize] = true);
         }
-        let value = |(&x, open): (&Vec3, &bool)| if *open { band.sample(g, x).unwrap_or(-1.0) } else { -1.0 };
+        let value = |(&x, open): (&Vec3, &bool)| {
+            if *open {
+                band.sample(g, x).unwrap_or(-1.0)
+            } else {
+                -1.0
+            }
+        };
         let values: Vec<f64> = self.mesh.points.par_iter().zip(&is_open).map(value).collect();
         let cut = cut_at_zero(&self.mesh, &values, |face| self.owner[face].is_none());
         self.owner = cut
@@ -477,7 +586,11 @@ impl InnerSurface {
         let n = self.mesh.triangles.len();
         (n > 0).then(|| SegmentedSurface {
             mesh: self.mesh,
-            patch_of_face: self.owner.into_iter().map(|o| o.expect("the last piece took the rest")).collect(),
+            patch_of_face: self
+                .owner
+                .into_iter()
+                .map(|o| o.expect("the last piece took the rest"))
+                .collect(),
             source_face: (0..n as u32).collect(),
             n_patches,
         })

@@ -12,9 +12,17 @@ fn octants() -> (SegmentedSurface, InstallationPlan) {
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
     let steps = (0..8u32).map(|i| {
         let outwards = Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0));
-        InstallationStep { piece: (i as usize).into(), separation: LatticeDirection::nearest(outwards) }
+        InstallationStep {
+            piece: (i as usize).into(),
+            separation: LatticeDirection::nearest(outwards),
+        }
     });
-    (label(sphere(5, Vec3::splat(RADIUS_MM)), 8, octant), InstallationPlan { steps: steps.collect() })
+    (
+        label(sphere(5, Vec3::splat(RADIUS_MM)), 8, octant),
+        InstallationPlan {
+            steps: steps.collect(),
+        },
+    )
 }
 
 fn built(
@@ -26,19 +34,30 @@ fn built(
     let ctx = Ctx::quiet();
     let grid = ShellGrid::new(params, &model, 4.0).unwrap();
     let distances = PatchDistances::measure(&grid, surface);
-    let everywhere = Aabb { min: Vec3::splat(-50.0), max: Vec3::splat(50.0) };
+    let everywhere = Aabb {
+        min: Vec3::splat(-50.0),
+        max: Vec3::splat(50.0),
+    };
     let rooms = IdVec::from_fn(surface.n_patches, |_| everywhere);
     let bodies = build(&ctx, params, &grid, &distances, plan, &rooms);
     (grid, bodies)
 }
 
-/// Asserts that every piece leaves what was installed before it, along its direction, with less than `most_mm3` of overlap.
+/// Asserts that every piece leaves what was installed before it, along its direction, with less than
+/// `most_mm3` of overlap.
 fn assert_leave_freely(bodies: &IdVec<crate::PatchId, Volume>, plan: &InstallationPlan, most_mm3: f64) {
     for (at, step) in plan.steps.iter().enumerate().skip(1) {
         for travel_mm in [0.0, 0.3, 1.0, 3.0, 8.0] {
             let moved = bodies[step.piece].translate(travel_mm * step.separation.unit());
-            let overlap: f64 = plan.steps[..at].iter().map(|s| moved.intersect(&bodies[s.piece]).volume()).sum();
-            assert!(overlap < most_mm3, "piece {} after {travel_mm} mm: {overlap} mm³", step.piece);
+            let overlap: f64 = plan.steps[..at]
+                .iter()
+                .map(|s| moved.intersect(&bodies[s.piece]).volume())
+                .sum();
+            assert!(
+                overlap < most_mm3,
+                "piece {} after {travel_mm} mm: {overlap} mm³",
+                step.piece
+            );
         }
     }
 }
@@ -49,11 +68,15 @@ fn bodies_part_the_wall_and_leave_freely() {
     let (grid, built) = built(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     let total: f64 = bodies.as_slice().iter().map(Volume::volume).sum();
-    // Twelve seams of a quarter circle, two gaps of 0.05 mm wide over 2 mm less the taper over the first. Where a face was swept the
-    // field falls more slowly than a distance, so that the gap is wider: some times this in all.
+    // Twelve seams of a quarter circle, two gaps of 0.05 mm wide over 2 mm less the taper over the first.
+    // Where a face was swept the field falls more slowly than a distance, so that the gap is wider: some
+    // times this in all.
     let gaps = 12.0 * 0.5 * std::f64::consts::PI * (RADIUS_MM - 1.0) * 0.1 * 1.5;
     let lost = grid.wall.volume() - total;
-    assert!(lost > 0.5 * gaps && lost < 4.0 * gaps, "{lost} mm³ of gaps, {gaps} expected");
+    assert!(
+        lost > 0.5 * gaps && lost < 4.0 * gaps,
+        "{lost} mm³ of gaps, {gaps} expected"
+    );
     assert!(bodies.as_slice().iter().all(|b| b.components().len() == 1));
     assert_leave_freely(&bodies, &plan, 0.05);
 }
@@ -64,13 +87,16 @@ fn a_fragment_goes_to_what_surrounds_it_and_the_piece_keeps_out_of_its_way() {
     // An island of the key in the first-installed octant, too small to be more than a fragment.
     let island = Vec3::splat(-1.0).normalize();
     let is_island = |f: usize| surface.mesh.face_center(f).normalize().dot(island) > 0.97;
-    let faces: Vec<usize> = (0..surface.mesh.triangles.len()).filter(|&f| is_island(f)).collect();
+    let faces: Vec<usize> = (0..surface.mesh.triangles.len())
+        .filter(|&f| is_island(f))
+        .collect();
     faces.iter().for_each(|&f| surface.patch_of_face[f] = plan.key());
     assert!(faces.len() > 20);
     let (_, built) = built(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     assert!(bodies.as_slice().iter().all(|b| b.components().len() == 1));
-    // What surrounds the island has it: the first octant is as large as the others, but for what carving shifts.
+    // What surrounds the island has it: the first octant is as large as the others, but for what carving
+    // shifts.
     assert!(bodies[plan.steps[0].piece].volume() > 0.8 * bodies[plan.steps[3].piece].volume());
     assert_leave_freely(&bodies, &plan, 0.05);
 }
@@ -81,7 +107,9 @@ fn a_piece_that_would_leave_through_the_others_is_told() {
     let key = plan.steps.len() - 1;
     plan.steps[key].separation = plan.steps[key].separation.opposite();
     let (_, built) = built(&BodyParams::default(), &surface, &plan);
-    let Err(BodyError::Blocked { piece, kept, .. }) = built else { panic!("it was built") };
+    let Err(BodyError::Blocked { piece, kept, .. }) = built else {
+        panic!("it was built")
+    };
     assert_eq!(piece, plan.key());
     assert!(kept < 0.5);
 }
@@ -89,6 +117,12 @@ fn a_piece_that_would_leave_through_the_others_is_told() {
 #[test]
 fn a_wall_as_thick_as_the_model_has_no_cavity() {
     let model = Solid::new(sphere(3, Vec3::splat(3.0))).unwrap();
-    let params = BodyParams { thickness_mm: 4.0, ..BodyParams::default() };
-    assert!(matches!(ShellGrid::new(&params, &model, 4.0), Err(GridError::NoCavity { .. })));
+    let params = BodyParams {
+        thickness_mm: 4.0,
+        ..BodyParams::default()
+    };
+    assert!(matches!(
+        ShellGrid::new(&params, &model, 4.0),
+        Err(GridError::NoCavity { .. })
+    ));
 }

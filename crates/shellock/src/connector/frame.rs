@@ -7,9 +7,11 @@ use crate::body::{ShellGrid, outward};
 use crate::plan::InstallationPlan;
 use crate::{PatchId, Seam, SegmentedSurface};
 
-/// Distance between the points of a curve, mm: half the finest connector, so that smoothing keeps the seam's shape.
+/// Distance between the points of a curve, mm: half the finest connector, so that smoothing keeps the seam's
+/// shape.
 const STEP_MM: f64 = 1.0;
-/// Rounds of averaging with the neighbours. They take out the grid's ripple (period one to two cells) and little else.
+/// Rounds of averaging with the neighbours. They take out the grid's ripple (period one to two cells) and
+/// little else.
 const SMOOTHING_ROUNDS: usize = 6;
 /// How far from the seam the owner of each side is looked up, mm.
 const PROBE_MM: f64 = 0.8;
@@ -37,7 +39,11 @@ pub struct Curve {
 pub fn curves(grid: &ShellGrid, inner: &SegmentedSurface, plan: &InstallationPlan) -> Vec<Curve> {
     let groups: Vec<u32> = inner.patch_of_face.iter().map(|p| p.0).collect();
     let bvh = TriangleBvh::with_groups(&inner.mesh, &groups);
-    inner.seams().iter().filter_map(|seam| curve(grid, &bvh, seam, plan)).collect()
+    inner
+        .seams()
+        .iter()
+        .filter_map(|seam| curve(grid, &bvh, seam, plan))
+        .collect()
 }
 
 fn curve(grid: &ShellGrid, bvh: &TriangleBvh, seam: &Seam, plan: &InstallationPlan) -> Option<Curve> {
@@ -57,12 +63,24 @@ fn curve(grid: &ShellGrid, bvh: &TriangleBvh, seam: &Seam, plan: &InstallationPl
         return None;
     }
     let a_is_later = plan.position(seam.a) > plan.position(seam.b);
-    let (later, earlier) = if a_is_later { (seam.a, seam.b) } else { (seam.b, seam.a) };
+    let (later, earlier) = if a_is_later {
+        (seam.a, seam.b)
+    } else {
+        (seam.b, seam.a)
+    };
     let mut across: Vec<Vec3> = normals.iter().zip(&tangents).map(|(n, u)| n.cross(*u)).collect();
     if votes_for(bvh, &points, &across, later, earlier) < 0 {
         across.iter_mut().for_each(|v| *v = -*v);
     }
-    Some(Curve { later, earlier, points, tangents, normals, across, is_loop })
+    Some(Curve {
+        later,
+        earlier,
+        points,
+        tangents,
+        normals,
+        across,
+        is_loop,
+    })
 }
 
 /// How many more points have `earlier` on the side of `across` and `later` on the other than the reverse.
@@ -71,7 +89,9 @@ fn votes_for(bvh: &TriangleBvh, points: &[Vec3], across: &[Vec3], later: PatchId
     let mut nearer_to_later = |x: Vec3| {
         bvh.nearest_by_group(x, 9.0 * PROBE_MM * PROBE_MM, &mut found);
         let distance = |p: PatchId| found.iter().find(|e| e.0 == p.0).map_or(f64::INFINITY, |e| e.1);
-        distance(later).partial_cmp(&distance(earlier)).map_or(0, |o| -(o as i64))
+        distance(later)
+            .partial_cmp(&distance(earlier))
+            .map_or(0, |o| -(o as i64))
     };
     points
         .iter()
@@ -96,7 +116,11 @@ fn resampled(line: &[Vec3], step_mm: f64) -> Vec<Vec3> {
                 segment += 1;
             }
             let span = at[segment + 1] - at[segment];
-            let t = if span > 0.0 { ((s - at[segment]) / span).clamp(0.0, 1.0) } else { 0.0 };
+            let t = if span > 0.0 {
+                ((s - at[segment]) / span).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
             line[segment].lerp(line[segment + 1], t)
         })
         .collect()

@@ -7,19 +7,27 @@ use super::ConnectorParams;
 use crate::PatchId;
 use crate::body::{ShellBodies, ShellGrid};
 
-/// For a piece and a point: `None` in or above the wall, else whether connectors of the piece may be there: neither in its
-/// way out nor in a later piece's, by the clearance.
+/// For a piece and a point: `None` in or above the wall, else whether connectors of the piece may be there:
+/// neither in its way out nor in a later piece's, by the clearance.
 pub fn has_no_bar<'a>(
     params: &ConnectorParams,
     grid: &'a ShellGrid,
     shell: &ShellBodies,
 ) -> impl Fn(PatchId, Vec3) -> Option<bool> + use<'a> {
-    let barred: Vec<Vec<f32>> =
-        shell.barred.as_slice().par_iter().map(|b| b.spread(&grid.band, grid.cutoff_mm())).collect();
+    let barred: Vec<Vec<f32>> = shell
+        .barred
+        .as_slice()
+        .par_iter()
+        .map(|b| b.spread(&grid.band, grid.cutoff_mm()))
+        .collect();
     let clearance_mm = params.clearance_mm;
     move |piece, point| {
         let depth = grid.band.sample(&grid.depth, point)?;
         let is_below = depth >= grid.thickness_mm;
-        is_below.then(|| grid.band.sample(&barred[usize::from(piece)], point).is_some_and(|b| b + clearance_mm < 0.0))
+        is_below.then(|| {
+            grid.band
+                .sample(&barred[usize::from(piece)], point)
+                .is_some_and(|b| b + clearance_mm < 0.0)
+        })
     }
 }

@@ -22,13 +22,23 @@ pub struct Part {
 impl Part {
     /// The rectangle with all sides moved outwards.
     pub fn grown(self, by_mm: f64) -> Self {
-        Self { n0: self.n0 - by_mm, n1: self.n1 + by_mm, s0: self.s0 - by_mm, s1: self.s1 + by_mm }
+        Self {
+            n0: self.n0 - by_mm,
+            n1: self.n1 + by_mm,
+            s0: self.s0 - by_mm,
+            s1: self.s1 + by_mm,
+        }
     }
 
     /// Its four corners at a station.
     pub fn corners(self, at: &Station) -> [Vec3; 4] {
-        [(self.n0, self.s0), (self.n1, self.s0), (self.n1, self.s1), (self.n0, self.s1)]
-            .map(|(n, s)| at.point + n * at.n + s * at.s)
+        [
+            (self.n0, self.s0),
+            (self.n1, self.s0),
+            (self.n1, self.s1),
+            (self.n0, self.s1),
+        ]
+        .map(|(n, s)| at.point + n * at.n + s * at.s)
     }
 }
 
@@ -41,7 +51,8 @@ pub struct Section {
     pub female: [Option<Part>; 3],
 }
 
-/// Below this angle between ŝ and the surface normal, in radians, the pin is a tongue and needs a foot: at −40°.
+/// Below this angle between ŝ and the surface normal, in radians, the pin is a tongue and needs a foot: at
+/// −40°.
 const TONGUE_ANGLE: f64 = -0.698;
 /// How far parts reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.6;
@@ -62,7 +73,8 @@ impl Section {
         }
     }
 
-    /// A tongue of the male under the female's wall, and the female's groove around it; ŝ points out of the surface.
+    /// A tongue of the male under the female's wall, and the female's groove around it; ŝ points out of the
+    /// surface.
     ///
     /// ```text
     ///      M M M M│F F F F F F
@@ -76,27 +88,57 @@ impl Section {
         let (d, c) = (station.size_mm, station.clearance_mm);
         let (reach, thick, wall) = (0.5 * d, 0.45 * d, (0.5 * d - c).max(params.min_wall_mm));
         let floor = -2.0 * c - 2.0 * thick;
-        let lead = if part == RailPart::LeadIn { LEAD_IN_MM.min(0.3 * thick) } else { 0.0 };
+        let lead = if part == RailPart::LeadIn {
+            LEAD_IN_MM.min(0.3 * thick)
+        } else {
+            0.0
+        };
         let has_tongue = part != RailPart::Stop;
         let outer = reach + c + wall;
-        let tongue = Part { n0: -reach, n1: reach - lead, s0: -c - thick + lead, s1: -c - lead };
+        let tongue = Part {
+            n0: -reach,
+            n1: reach - lead,
+            s0: -c - thick + lead,
+            s1: -c - lead,
+        };
         Self {
             male: [
                 has_tongue.then_some(tongue),
-                has_tongue.then_some(Part { n0: -reach, n1: -c, s0: tongue.s0, s1: RAIL_ROOT_MM }),
+                has_tongue.then_some(Part {
+                    n0: -reach,
+                    n1: -c,
+                    s0: tongue.s0,
+                    s1: RAIL_ROOT_MM,
+                }),
             ],
             female: [
-                Some(Part { n0: LIP_GAP_MM, n1: outer, s0: floor, s1: -2.0 * c - thick }),
-                Some(Part { n0: reach + c, n1: outer, s0: floor, s1: RAIL_ROOT_MM }),
-                (!has_tongue).then_some(Part { n0: LIP_GAP_MM, n1: outer, s0: floor, s1: RAIL_ROOT_MM }),
+                Some(Part {
+                    n0: LIP_GAP_MM,
+                    n1: outer,
+                    s0: floor,
+                    s1: -2.0 * c - thick,
+                }),
+                Some(Part {
+                    n0: reach + c,
+                    n1: outer,
+                    s0: floor,
+                    s1: RAIL_ROOT_MM,
+                }),
+                (!has_tongue).then_some(Part {
+                    n0: LIP_GAP_MM,
+                    n1: outer,
+                    s0: floor,
+                    s1: RAIL_ROOT_MM,
+                }),
             ],
         }
     }
 
-    /// The cross-section for the angle `T` of a station: −90° a tongue under the female (forward connector), 0 a pin that
-    /// pulls straight out, up to 60° backward.
+    /// The cross-section for the angle `T` of a station: −90° a tongue under the female (forward connector),
+    /// 0 a pin that pulls straight out, up to 60° backward.
     ///
-    /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across the seam.
+    /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across
+    /// the seam.
     fn seam(station: &Station) -> Self {
         let (d, c) = (station.size_mm, station.clearance_mm);
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
@@ -108,18 +150,47 @@ impl Section {
         let pin_depth = (PIN_DEPTH * d + lean) * k;
         let top_male = d.min(pin_width * forward.min(1.48).tan() + ROOT_MM) * k;
         let is_tongue = station.theta < TONGUE_ANGLE;
-        let top_near = if is_tongue { 0.0 } else { (foot_width * backward.tan() + 0.5) * k };
+        let top_near = if is_tongue {
+            0.0
+        } else {
+            (foot_width * backward.tan() + 0.5) * k
+        };
         let (c_s, floor) = (c * k, -pin_depth - c * k - bottom * k);
         let far = -pin_width - c - wall;
         Self {
             male: [
-                Some(Part { n0: -pin_width, n1: -c, s0: -pin_depth, s1: top_male }),
-                is_tongue.then_some(Part { n0: -pin_width, n1: ROOT_MM, s0: 0.35, s1: top_male }),
+                Some(Part {
+                    n0: -pin_width,
+                    n1: -c,
+                    s0: -pin_depth,
+                    s1: top_male,
+                }),
+                is_tongue.then_some(Part {
+                    n0: -pin_width,
+                    n1: ROOT_MM,
+                    s0: 0.35,
+                    s1: top_male,
+                }),
             ],
             female: [
-                Some(Part { n0: far, n1: foot_width, s0: floor, s1: -pin_depth - c_s }),
-                Some(Part { n0: far, n1: -pin_width - c, s0: floor, s1: -lean * k - c_s }),
-                Some(Part { n0: 0.0, n1: foot_width, s0: floor, s1: top_near }),
+                Some(Part {
+                    n0: far,
+                    n1: foot_width,
+                    s0: floor,
+                    s1: -pin_depth - c_s,
+                }),
+                Some(Part {
+                    n0: far,
+                    n1: -pin_width - c,
+                    s0: floor,
+                    s1: -lean * k - c_s,
+                }),
+                Some(Part {
+                    n0: 0.0,
+                    n1: foot_width,
+                    s0: floor,
+                    s1: top_near,
+                }),
             ],
         }
     }
@@ -145,15 +216,25 @@ mod tests {
     }
 
     fn angles_and_sizes() -> impl Iterator<Item = (f64, f64)> {
-        [2.0, 2.5, 4.0].into_iter().flat_map(|d| (-90..=60).step_by(5).map(move |t| (f64::from(t), d)))
+        [2.0, 2.5, 4.0]
+            .into_iter()
+            .flat_map(|d| (-90..=60).step_by(5).map(move |t| (f64::from(t), d)))
     }
 
     #[test]
     fn a_straight_channel_is_as_deep_as_sizes_are_chosen_for() {
         let params = ConnectorParams::default();
         let section = Section::at(&params, &station(0.0, 3.0));
-        let floor = section.female.iter().flatten().map(|part| part.s0).fold(f64::INFINITY, f64::min);
-        assert!((-floor - crate::sizes::depth_mm(3.0, params.clearance_mm)).abs() < 1e-12, "{floor}");
+        let floor = section
+            .female
+            .iter()
+            .flatten()
+            .map(|part| part.s0)
+            .fold(f64::INFINITY, f64::min);
+        assert!(
+            (-floor - crate::sizes::depth_mm(3.0, params.clearance_mm)).abs() < 1e-12,
+            "{floor}"
+        );
     }
 
     #[test]
@@ -165,7 +246,10 @@ mod tests {
             for wall in section.female.iter().flatten() {
                 let gap_n = (wall.n0 - pin.n1).max(pin.n0 - wall.n1);
                 let gap_s = (wall.s0 - pin.s1).max(pin.s0 - wall.s1);
-                assert!(gap_n.max(gap_s) >= params.clearance_mm - 1e-12, "at {degrees}°: {wall:?}");
+                assert!(
+                    gap_n.max(gap_s) >= params.clearance_mm - 1e-12,
+                    "at {degrees}°: {wall:?}"
+                );
             }
         }
     }
@@ -174,7 +258,10 @@ mod tests {
     fn tongue_and_groove_of_a_rail_keep_the_keys_clearance_and_overlap_both_ways() {
         for (size_mm, key_clearance_mm) in [(2.0, 0.1), (2.5, 0.15), (4.0, 0.3)] {
             let params = ConnectorParams::default();
-            let station = Station { clearance_mm: key_clearance_mm, ..station(0.0, size_mm) };
+            let station = Station {
+                clearance_mm: key_clearance_mm,
+                ..station(0.0, size_mm)
+            };
             for part in [RailPart::Full, RailPart::LeadIn] {
                 let section = Section::rail(&params, &station, part);
                 let [tongue, root] = section.male.map(Option::unwrap);
@@ -190,7 +277,12 @@ mod tests {
                 // The key's wall lies above the tongue, its lip below: neither lets it out across.
                 assert!(tongue.s1 < 0.0 && tongue.n1 > 0.5 && lip.s1 < tongue.s0 && lip.n0 < 0.3 * tongue.n1);
             }
-            assert!(Section::rail(&params, &station, RailPart::Stop).male.iter().all(Option::is_none));
+            assert!(
+                Section::rail(&params, &station, RailPart::Stop)
+                    .male
+                    .iter()
+                    .all(Option::is_none)
+            );
         }
     }
 
@@ -200,7 +292,10 @@ mod tests {
         for (degrees, size_mm) in angles_and_sizes() {
             let section = Section::at(&params, &station(degrees, size_mm));
             for part in section.male.iter().chain(&section.female).flatten() {
-                assert!((part.n1 - part.n0).min(part.s1 - part.s0) >= params.min_wall_mm, "at {degrees}°: {part:?}");
+                assert!(
+                    (part.n1 - part.n0).min(part.s1 - part.s0) >= params.min_wall_mm,
+                    "at {degrees}°: {part:?}"
+                );
             }
         }
     }

@@ -1,8 +1,8 @@
 //! Rails for a key that slides along its seam (Sect. 6.1, Fig. 6).
 //!
-//! The neighbour has a straight tongue under the key's wall; the key has a groove around it. Everything of the key so lies within its
-//! own outline and leaves with it through the opening that its rim leaves. The tongue's tip is narrower, and the groove ends just
-//! beyond it, so the key stops where it belongs.
+//! The neighbour has a straight tongue under the key's wall; the key has a groove around it. Everything of
+//! the key so lies within its own outline and leaves with it through the opening that its rim leaves. The
+//! tongue's tip is narrower, and the groove ends just beyond it, so the key stops where it belongs.
 
 use shellock_geom::Vec3;
 
@@ -11,7 +11,8 @@ use super::frame::Curve;
 use super::run::{RailPart, Run, Shape, Station, has_room};
 use crate::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, end_gap_mm};
 
-/// The seam may leave a straight line by this much across, and the wall's inner side by this much up and down, in connector sizes.
+/// The seam may leave a straight line by this much across, and the wall's inner side by this much up and
+/// down, in connector sizes.
 const MOST_ASIDE_SIZES: f64 = 0.16;
 const MOST_UNEVEN_SIZES: f64 = 0.3;
 /// What passes over a tongue is no farther across from the seam than this, in connector sizes.
@@ -40,7 +41,8 @@ impl Axes {
     }
 }
 
-/// The rails under `curve`, one of `curves`, along which the key leaves on `slide`, and the length of seam that would do for one, mm.
+/// The rails under `curve`, one of `curves`, along which the key leaves on `slide`, and the length of seam
+/// that would do for one, mm.
 pub(super) fn rails(
     params: &ConnectorParams,
     curves: &[Curve],
@@ -54,11 +56,24 @@ pub(super) fn rails(
         let points = &curve.points[from..=to];
         usable_mm += points.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
         let mean = |of: &[Vec3]| of[from..=to].iter().sum::<Vec3>();
-        let Some(outwards) = mean(&curve.normals).reject_from_normalized(slide).try_normalize() else { continue };
+        let Some(outwards) = mean(&curve.normals).reject_from_normalized(slide).try_normalize() else {
+            continue;
+        };
         let across = slide.cross(outwards);
-        let to_key = if across.dot(mean(&curve.across)) < 0.0 { across } else { -across };
-        let axes = Axes { slide, to_key, outwards };
-        let all = curves.iter().filter(|c| c.later == curve.later).flat_map(|c| &c.points);
+        let to_key = if across.dot(mean(&curve.across)) < 0.0 {
+            across
+        } else {
+            -across
+        };
+        let axes = Axes {
+            slide,
+            to_key,
+            outwards,
+        };
+        let all = curves
+            .iter()
+            .filter(|c| c.later == curve.later)
+            .flat_map(|c| &c.points);
         let outline: Vec<Place> = all.map(|p| axes.place(p)).collect();
         let rail = straight(points, &outline, &axes, size_mm)
             .and_then(|line| rail(params, curve, &axes, line, size_mm, is_free));
@@ -74,7 +89,11 @@ fn along_slide(curve: &Curve, slide: Vec3, size_mm: f64) -> Vec<(usize, usize)> 
         arc_mm.push(arc_mm[arc_mm.len() - 1] + w[0].distance(w[1]));
     }
     let length_mm = arc_mm[arc_mm.len() - 1];
-    let end_mm = if curve.is_loop { 0.0 } else { end_gap_mm(size_mm, length_mm) };
+    let end_mm = if curve.is_loop {
+        0.0
+    } else {
+        end_gap_mm(size_mm, length_mm)
+    };
     let is_along = |i: usize| {
         let clear = arc_mm[i] >= end_mm && arc_mm[i] <= length_mm - end_mm;
         clear
@@ -93,8 +112,8 @@ fn along_slide(curve: &Curve, slide: Vec3, size_mm: f64) -> Vec<(usize, usize)> 
     found
 }
 
-/// Both ends of the longest straight line that the points follow: back, then front. It lies under the lowest of them and under whatever
-/// of the key's `outline` is behind its front, since all of that passes over it.
+/// Both ends of the longest straight line that the points follow: back, then front. It lies under the lowest
+/// of them and under whatever of the key's `outline` is behind its front, since all of that passes over it.
 fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Option<[Place; 2]> {
     let mut places: Vec<Place> = points.iter().map(|p| axes.place(p)).collect();
     places.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -108,17 +127,27 @@ fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Op
         let aside = |p: &Place| (p[1] - middle[1] - slope * (p[0] - middle[0])).abs();
         let front = rest[rest.len() - 1][0];
         let near_seam = |p: &&Place| (p[1] - middle_of(rest)).abs() < REACH_SIZES * size_mm;
-        let passing = outline.iter().filter(|p| p[0] <= front).filter(near_seam).map(|p| p[2]);
+        let passing = outline
+            .iter()
+            .filter(|p| p[0] <= front)
+            .filter(near_seam)
+            .map(|p| p[2]);
         let low = passing.fold(rest.iter().map(|p| p[2]).fold(f64::INFINITY, f64::min), f64::min);
         let high = rest.iter().map(|p| p[2]).fold(f64::NEG_INFINITY, f64::max);
         let uneven = |p: &Place| (p[2] - middle[2]).abs();
         let excess = |p: &Place| aside(p) / MOST_ASIDE_SIZES + uneven(p) / MOST_UNEVEN_SIZES;
-        if rest.iter().all(|p| aside(p) <= MOST_ASIDE_SIZES * size_mm) && high - low <= MOST_UNEVEN_SIZES * size_mm {
+        if rest.iter().all(|p| aside(p) <= MOST_ASIDE_SIZES * size_mm)
+            && high - low <= MOST_UNEVEN_SIZES * size_mm
+        {
             let at = |along: f64| [along, middle[1] + slope * (along - middle[0]), low];
             return Some([at(rest[0][0]), at(rest[rest.len() - 1][0])]);
         }
         // What bends away does so at an end.
-        rest = if excess(&rest[0]) > excess(&rest[rest.len() - 1]) { &rest[1..] } else { &rest[..rest.len() - 1] };
+        rest = if excess(&rest[0]) > excess(&rest[rest.len() - 1]) {
+            &rest[1..]
+        } else {
+            &rest[..rest.len() - 1]
+        };
     }
 }
 
@@ -168,8 +197,9 @@ fn rail(
         shape: Shape::Rail(part),
     };
     let arc = |i: usize| length_mm * i as f64 / N_PLACES as f64;
-    let free: Vec<bool> =
-        (0..=N_PLACES).map(|i| has_room(params, &station(arc(i), RailPart::Full), male, female, is_free)).collect();
+    let free: Vec<bool> = (0..=N_PLACES)
+        .map(|i| has_room(params, &station(arc(i), RailPart::Full), male, female, is_free))
+        .collect();
     let (from, to) = longest(&free)?;
     let stop_mm = clearance_mm + STOP_SIZES * size_mm;
     let (start, end) = (arc(from), arc(to));
@@ -177,13 +207,26 @@ fn rail(
         return None;
     }
     let tip = end - LEAD_IN_SIZES * size_mm;
-    let mut stations =
-        vec![station(start, RailPart::Full), station(tip, RailPart::Full), station(end, RailPart::LeadIn)];
-    if has_room(params, &station(end + stop_mm, RailPart::Stop), male, female, is_free) {
+    let mut stations = vec![
+        station(start, RailPart::Full),
+        station(tip, RailPart::Full),
+        station(end, RailPart::LeadIn),
+    ];
+    if has_room(
+        params,
+        &station(end + stop_mm, RailPart::Stop),
+        male,
+        female,
+        is_free,
+    ) {
         let stop = [end + clearance_mm, end + stop_mm];
         stations.extend(stop.map(|arc_mm| station(arc_mm, RailPart::Stop)));
     }
-    Some(Run { male, female, stations })
+    Some(Run {
+        male,
+        female,
+        stations,
+    })
 }
 
 /// The longest row of `true`, as an index range with both ends.
@@ -208,13 +251,20 @@ mod tests {
 
     #[test]
     fn a_line_with_a_bent_end_gives_the_straight_part_under_its_lowest_point() {
-        let axes = Axes { slide: Vec3::X, to_key: Vec3::Y, outwards: Vec3::Z };
+        let axes = Axes {
+            slide: Vec3::X,
+            to_key: Vec3::Y,
+            outwards: Vec3::Z,
+        };
         let points: Vec<Vec3> = (0..40)
             .map(f64::from)
             .map(|x| Vec3::new(x, 0.05 * x + (x - 30.0).max(0.0).powi(2), 0.1 * (x * 0.4).sin()))
             .collect();
         let [back, front] = straight(&points, &[], &axes, 2.5).unwrap();
-        assert!(back[0] < 3.0 && front[0] > 27.0 && front[0] < 33.0, "{back:?} {front:?}");
+        assert!(
+            back[0] < 3.0 && front[0] > 27.0 && front[0] < 33.0,
+            "{back:?} {front:?}"
+        );
         assert!((back[2] + 0.1).abs() < 0.02 && back[2] == front[2]);
         let slope = (front[1] - back[1]) / (front[0] - back[0]);
         assert!((slope - 0.05).abs() < 0.03, "{slope}");

@@ -29,7 +29,8 @@ pub struct Station {
     pub n: Vec3,
     /// ŝ: unit direction in which the male leaves the female.
     pub s: Vec3,
-    /// T: angle from the outward normal to ŝ, seen along the seam, positive towards the female; rad in [−π/2, π/2].
+    /// T: angle from the outward normal to ŝ, seen along the seam, positive towards the female; rad in [−π/2,
+    /// π/2].
     pub theta: f64,
     /// Length of ŝ across the seam, in (0, 1].
     pub depth: f64,
@@ -77,7 +78,10 @@ pub struct Run {
 impl Run {
     /// Length along the seam, mm.
     pub fn length(&self) -> f64 {
-        self.stations.windows(2).map(|w| w[0].point.distance(w[1].point)).sum()
+        self.stations
+            .windows(2)
+            .map(|w| w[0].point.distance(w[1].point))
+            .sum()
     }
 
     /// Whether it is a rail of the key.
@@ -111,9 +115,9 @@ pub struct Contact {
     pub at: Vec3,
 }
 
-/// The runs along all curves, and what each curve offered. `is_free(piece, point)` says whether `piece` may have material
-/// at a point below the wall; `None` where the point lies in or above the wall and does not count. `slide` is the key's direction where
-/// it slides on rails.
+/// The runs along all curves, and what each curve offered. `is_free(piece, point)` says whether `piece` may
+/// have material at a point below the wall; `None` where the point lies in or above the wall and does not
+/// count. `slide` is the key's direction where it slides on rails.
 pub fn runs(
     params: &ConnectorParams,
     sizes: &ConnectorSizes,
@@ -128,7 +132,10 @@ pub fn runs(
         let later_is_male = roles(curve, separation);
         let size_mm = sizes.of(curve.later, curve.earlier);
         let clearance_mm = params.clearance_of(slide.is_some() && curve.later == plan.key());
-        let at = |i: usize| Station { clearance_mm, ..station(curve, i, separation, later_is_male[i], size_mm) };
+        let at = |i: usize| Station {
+            clearance_mm,
+            ..station(curve, i, separation, later_is_male[i], size_mm)
+        };
         let stations: Vec<Station> = (0..curve.points.len()).map(at).collect();
         let mut allowed = allowed(size_mm, curve, &stations, &later_is_male);
         let step = |i: usize| stations[i].point.distance(stations[i + 1].point);
@@ -136,13 +143,20 @@ pub fn runs(
             later: curve.later,
             earlier: curve.earlier,
             length_mm: (0..stations.len() - 1).map(step).sum(),
-            usable_mm: (0..stations.len() - 1).filter(|&i| allowed[i] && allowed[i + 1]).map(step).sum(),
+            usable_mm: (0..stations.len() - 1)
+                .filter(|&i| allowed[i] && allowed[i + 1])
+                .map(step)
+                .sum(),
             at: curve.points[curve.points.len() / 2],
         });
         if let Some(slide) = slide.filter(|_| curve.later == plan.key()) {
             let (rails, usable_mm) = rails(params, curves, curve, slide, size_mm, is_free);
             runs.extend(rails);
-            contacts.iter_mut().last().into_iter().for_each(|c| c.usable_mm += usable_mm);
+            contacts
+                .iter_mut()
+                .last()
+                .into_iter()
+                .for_each(|c| c.usable_mm += usable_mm);
         }
         for i in 0..stations.len() {
             let (male, female) = sides(curve, later_is_male[i]);
@@ -152,7 +166,11 @@ pub fn runs(
             let run = thinned(&stations[from..=to]);
             let (male, female) = sides(curve, later_is_male[from]);
             if stations[to].arc_mm - stations[from].arc_mm >= SHORTEST_RUN_SIZES * size_mm {
-                runs.push(Run { male, female, stations: run });
+                runs.push(Run {
+                    male,
+                    female,
+                    stations: run,
+                });
             }
         }
     }
@@ -160,13 +178,20 @@ pub fn runs(
 }
 
 fn sides(curve: &Curve, later_is_male: bool) -> (PatchId, PatchId) {
-    if later_is_male { (curve.later, curve.earlier) } else { (curve.earlier, curve.later) }
+    if later_is_male {
+        (curve.later, curve.earlier)
+    } else {
+        (curve.earlier, curve.later)
+    }
 }
 
 /// Whether the later piece carries the pin at each point: where it leaves outwards.
 fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
     let outwards: Vec<f64> = curve.normals.iter().map(|n| n.dot(separation)).collect();
-    let mut role = outwards.iter().find(|o| o.abs() > ROLE_HYSTERESIS).is_none_or(|o| *o > 0.0);
+    let mut role = outwards
+        .iter()
+        .find(|o| o.abs() > ROLE_HYSTERESIS)
+        .is_none_or(|o| *o > 0.0);
     outwards
         .iter()
         .map(|&o| {
@@ -180,7 +205,11 @@ fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
 
 fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_mm: f64) -> Station {
     let (u, normal) = (curve.tangents[i], curve.normals[i]);
-    let (s, to_female) = if later_is_male { (separation, curve.across[i]) } else { (-separation, -curve.across[i]) };
+    let (s, to_female) = if later_is_male {
+        (separation, curve.across[i])
+    } else {
+        (-separation, -curve.across[i])
+    };
     let across = s - s.dot(u) * u;
     let depth = across.length();
     let flat = across.normalize_or_zero();

@@ -27,11 +27,13 @@ pub(super) struct Failure {
     pub blamed: Vec<PatchId>,
     /// Pieces that came out loose in the last kit.
     pub loose: Vec<PatchId>,
-    /// Pieces that rattle in the last kit, where nothing else is wrong with it; the loosest first, and without the key.
+    /// Pieces that rattle in the last kit, where nothing else is wrong with it; the loosest first, and
+    /// without the key.
     pub rattling: Vec<PatchId>,
 }
 
-/// Keeps a kit where it is the best so far: that with the fewest failures, then that rattles least, the earliest of several.
+/// Keeps a kit where it is the best so far: that with the fewest failures, then that rattles least, the
+/// earliest of several.
 pub(super) fn keep(best: &mut Option<Kit>, kit: Kit) {
     if best.as_ref().is_none_or(|b| kit.is_better_than(b)) {
         *best = Some(kit);
@@ -47,80 +49,168 @@ pub(super) fn plans(
     budget: &mut Budget,
     best: &mut Option<Kit>,
 ) -> Result<Attempt, DesignError> {
-    let Division { surface, settings, chosen, grip } = division;
-    let sizes = &chosen.sizes;
-    let survey = plan::survey(&ctx.fork(), &settings.plan, surface, &surface.seams(), sizes)?;
+    let Division {
+        surface,
+        settings,
+        chosen,
+        ..
+    } = division;
+    let survey = plan::survey(
+        &ctx.fork(),
+        &settings.plan,
+        surface,
+        &surface.seams(),
+        &chosen.sizes,
+    )?;
     let mut distances: Option<PatchDistances> = None;
-    let mut constraints = PlanConstraints::default();
-    let mut failure = Failure::default();
+    let mut learned = Learned::default();
     let most_kits = budget.kits_each.min(budget.kits);
-    let (mut n_kits, mut n_blocked) = (0, 0);
-    while n_kits < most_kits && n_blocked < BLOCKED_PLANS {
+    while learned.n_kits < most_kits && learned.n_blocked < BLOCKED_PLANS {
         // A kit that is given up takes its warnings with it.
         let kit_ctx = ctx.fork();
         chosen.tell(&kit_ctx);
         // The proof of a plan runs on one thread; the grid and distances in it are made beside it.
+        let may_join = budget.foreseen_joinings > 0;
         let (measured, next) = rayon::join(
             || {
                 let grid = wall.get()?;
                 distances.get_or_insert_with(|| PatchDistances::measure(grid, surface));
                 Ok::<(), GridError>(())
             },
-            || next_plan(&kit_ctx, params, division, &survey, &constraints, budget.foreseen_joinings > 0),
+            || {
+                next_plan(
+                    &kit_ctx,
+                    params,
+                    division,
+                    &survey,
+                    &learned.constraints,
+                    may_join,
+                )
+            },
         );
         measured?;
         let (found, holding) = match next? {
             Next::Plan(found, holding) => (*found, holding),
             Next::Joined(fewer) => return Ok(Attempt::Joined(fewer)),
-            Next::None(none) => {
-                let blamed = none.blamed.into_iter().chain(failure.blamed).collect();
-                return Ok(Attempt::Failed(Failure { blamed, loose: failure.loose, ..none }));
-            }
+            Next::None(failure) => return Ok(Attempt::Failed(learned.failure.after(failure))),
         };
         let (model, grid) = (wall.model, wall.get()?);
         let distances = distances.as_ref().expect("they were measured beside the plan");
-        let recipe = Recipe { params, settings, model, grid, distances, surface, sizes, grip: *grip, found, holding };
-        let kit = match make(kit_ctx, recipe) {
-            Err(DesignError::Body(BodyError::Blocked { piece, separation, kept })) => {
-                let lesson = Lesson::Blocked { piece, separation, kept };
-                ctx.note(&format!("another plan: {lesson}"));
-                failure.blamed.extend(lesson.blamed());
-                lesson.teach(&mut constraints);
-                n_blocked += 1;
+        let kit = match make(
+            kit_ctx,
+            Recipe {
+                params,
+                division,
+                model,
+                grid,
+                distances,
+                found,
+                holding,
+            },
+        ) {
+            Err(DesignError::Body(BodyError::Blocked {
+                piece,
+                separation,
+                kept,
+            })) => {
+                learned.give_up(
+                    ctx,
+                    Lesson::Blocked {
+                        piece,
+                        separation,
+                        kept,
+                    },
+                );
                 continue;
             }
             made => made?,
         };
-        n_kits += 1;
         budget.kits -= 1;
-        let learned = lessons(&kit);
-        let rattling = if kit.only_rattles() { Some(kit.rattling()) } else { None };
+        let ending = learned.learn(ctx, &kit, budget.kits_each);
         keep(best, kit);
-        if learned.is_empty() {
-            return Ok(Attempt::Passed);
+        if let Some(ending) = ending {
+            return Ok(ending);
         }
-        if let Some(rattling) = rattling {
-            // The plan was chosen to rattle least: other pieces are what helps.
-            return Ok(Attempt::Failed(Failure { reason: "pieces rattle".into(), rattling, ..Failure::default() }));
-        }
-        failure.blamed.extend(learned.iter().flat_map(Lesson::blamed));
-        failure.loose = learned.iter().flat_map(Lesson::loose).collect();
-        if n_kits < budget.kits_each {
-            learned.iter().for_each(|lesson| ctx.note(&format!("another plan: {lesson}")));
-        }
-        learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
     }
     let reason = "no kit passed its verification within the allowed rounds".into();
-    Ok(Attempt::Failed(Failure { reason, ..failure }))
+    Ok(Attempt::Failed(Failure {
+        reason,
+        ..learned.failure
+    }))
+}
+
+/// What the plans and kits of a division taught so far.
+#[derive(Default)]
+struct Learned {
+    constraints: PlanConstraints,
+    failure: Failure,
+    n_kits: usize,
+    n_blocked: usize,
+}
+
+impl Learned {
+    /// A plan was given up since a piece could not take its wall along.
+    fn give_up(&mut self, ctx: &Ctx, lesson: Lesson) {
+        ctx.note(&format!("another plan: {lesson}"));
+        self.failure.blamed.extend(lesson.blamed());
+        lesson.teach(&mut self.constraints);
+        self.n_blocked += 1;
+    }
+
+    /// A kit was made; how the attempt ends where no other plan can help.
+    fn learn(&mut self, ctx: &Ctx, kit: &Kit, most_kits: usize) -> Option<Attempt> {
+        self.n_kits += 1;
+        let lessons = lessons(kit);
+        if lessons.is_empty() {
+            return Some(Attempt::Passed);
+        }
+        if kit.only_rattles() {
+            // The plan was chosen to rattle least: other pieces are what helps.
+            let (reason, rattling) = ("pieces rattle".into(), kit.rattling());
+            return Some(Attempt::Failed(Failure {
+                reason,
+                rattling,
+                ..Failure::default()
+            }));
+        }
+        self.failure
+            .blamed
+            .extend(lessons.iter().flat_map(Lesson::blamed));
+        self.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
+        for lesson in &lessons {
+            if self.n_kits < most_kits {
+                ctx.note(&format!("another plan: {lesson}"));
+            }
+            lesson.teach(&mut self.constraints);
+        }
+        None
+    }
+}
+
+impl Failure {
+    /// The failure of a later plan, which is to blame first, with what was blamed before.
+    fn after(self, later: Self) -> Self {
+        let blamed = later.blamed.into_iter().chain(self.blamed).collect();
+        Self {
+            blamed,
+            loose: self.loose,
+            ..later
+        }
+    }
 }
 
 /// The pieces that are foreseen to rattle far more than they may, the loosest first.
 fn foreseen_to_rattle(found: &FoundPlan, holding: &Holding) -> Vec<PatchId> {
     /// Play is foreseen within about this factor.
     const SURELY: f64 = 1.4;
-    let excess = holding.foreseen_excess.iter().enumerate().map(|(i, excess)| (PatchId::from(i), *excess));
-    let mut wide: Vec<(PatchId, f64)> =
-        excess.filter(|(p, excess)| *excess > SURELY && *p != found.plan.key()).collect();
+    let excess = holding
+        .foreseen_excess
+        .iter()
+        .enumerate()
+        .map(|(i, excess)| (PatchId::from(i), *excess));
+    let mut wide: Vec<(PatchId, f64)> = excess
+        .filter(|(p, excess)| *excess > SURELY && *p != found.plan.key())
+        .collect();
     wide.sort_by(|a, b| b.1.total_cmp(&a.1));
     wide.into_iter().map(|w| w.0).collect()
 }
@@ -144,19 +234,40 @@ pub(super) fn next_plan(
     constraints: &PlanConstraints,
     may_join: bool,
 ) -> Result<Next, DesignError> {
-    let Division { surface, settings, chosen, .. } = division;
+    let Division {
+        surface,
+        settings,
+        chosen,
+        ..
+    } = division;
     let found = match plan::search(ctx, &settings.plan, survey, constraints)? {
         PlanOutcome::Found(found) => found,
-        PlanOutcome::Infeasible { reason, blockers, articulations } => {
-            let blamed = articulations.into_iter().chain(blockers.iter().map(|b| b.piece)).collect();
-            return Ok(Next::None(Failure { reason, blockers, blamed, ..Failure::default() }));
+        PlanOutcome::Infeasible {
+            reason,
+            blockers,
+            articulations,
+        } => {
+            let blamed = articulations
+                .into_iter()
+                .chain(blockers.iter().map(|b| b.piece))
+                .collect();
+            return Ok(Next::None(Failure {
+                reason,
+                blockers,
+                blamed,
+                ..Failure::default()
+            }));
         }
     };
     let (found, holding) = metric::choose(ctx, &settings.plan, surface, &chosen.sizes, *found)?;
     if settings.plan.key_slide.is_none() {
         warn_of_key(ctx, params, division, &found.plan);
     }
-    let rattling = if may_join { foreseen_to_rattle(&found, &holding) } else { Vec::new() };
+    let rattling = if may_join {
+        foreseen_to_rattle(&found, &holding)
+    } else {
+        Vec::new()
+    };
     Ok(match joined(ctx, &settings.segmentation, surface, &rattling)? {
         Some(fewer) => Next::Joined(fewer),
         None => Next::Plan(Box::new(found), holding),
@@ -169,6 +280,9 @@ fn warn_of_key(ctx: &Ctx, params: &Params, division: &Division, plan: &Installat
     let Some(last) = plan.steps.last() else { return };
     if let Some(found) = key::conditions(&division.surface, last.piece, last.separation.unit()) {
         let largest_mm = division.chosen.sizes.largest_mm();
-        found.problems(last.piece, largest_mm, may_be_cut).into_iter().for_each(|problem| ctx.warn(problem));
+        found
+            .problems(last.piece, largest_mm, may_be_cut)
+            .into_iter()
+            .for_each(|problem| ctx.warn(problem));
     }
 }

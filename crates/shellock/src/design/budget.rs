@@ -2,8 +2,8 @@
 
 use super::Rounds;
 
-/// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where the best does not do,
-/// others seldom do.
+/// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where
+/// the best does not do, others seldom do.
 pub(super) const KITS_OF_CUT_KEYS: [usize; 3] = [3, 2, 2];
 /// Kits made for one division and divisions revised, with a key that was cut.
 const KITS_WITH_CUT_KEY: usize = 2;
@@ -12,9 +12,11 @@ const REVISIONS_WITH_CUT_KEY: usize = 1;
 pub(super) const RATTLING_KEYS: usize = 2;
 /// How often pieces are joined because they rattle in a kit that was made and is sound else.
 const JOININGS_OF_RATTLING: usize = 2;
-/// How often pieces are joined because they are foreseen to rattle, which costs a search for a plan each time and no kit.
+/// How often pieces are joined because they are foreseen to rattle, which costs a search for a plan each time
+/// and no kit.
 const JOININGS_FORESEEN: usize = 5;
-/// Plans of one division that may be given up because a piece could not take its wall along; they cost seconds.
+/// Plans of one division that may be given up because a piece could not take its wall along; they cost
+/// seconds.
 pub(super) const BLOCKED_PLANS: usize = 8;
 
 /// What is left to one candidate for a key.

@@ -1,4 +1,5 @@
-//! Where the key can come from: cut out of the surface at one of the best places, or one of the pieces as it is.
+//! Where the key can come from: cut out of the surface at one of the best places, or one of the pieces as it
+//! is.
 
 use std::borrow::Cow;
 
@@ -30,14 +31,22 @@ pub(super) struct Candidate<'a> {
 
 /// Where a key can be: places to cut it, best first; at last, one of the pieces.
 pub(super) fn places(ctx: &Ctx, job: &Job<'_>) -> Result<Vec<Option<KeySite>>, DesignError> {
-    let sites =
-        if job.params.key == KeySource::Cut { key::sites(ctx, &key_params(job), &job.surface)? } else { Vec::new() };
-    Ok(sites.into_iter().take(KITS_OF_CUT_KEYS.len()).map(Some).chain([None]).collect())
+    let sites = if job.params.key == KeySource::Cut {
+        key::sites(ctx, &key_params(job), &job.surface)?
+    } else {
+        Vec::new()
+    };
+    Ok(sites
+        .into_iter()
+        .take(KITS_OF_CUT_KEYS.len())
+        .map(Some)
+        .chain([None])
+        .collect())
 }
 
 impl<'a> Candidate<'a> {
-    /// The `i`-th of the places. The model is turned so that a key that is cut slides along a lattice direction; `None` where rounding
-    /// leaves no solid.
+    /// The `i`-th of the places. The model is turned so that a key that is cut slides along a lattice
+    /// direction; `None` where rounding leaves no solid.
     pub fn new(job: &Job<'a>, i: usize, place: Option<&KeySite>) -> Option<Self> {
         let as_it_lies = Self {
             turn: Turn::default(),
@@ -46,10 +55,19 @@ impl<'a> Candidate<'a> {
             key: None,
             budget: Budget::of_piece(&job.params.rounds),
         };
-        let Some(site) = place else { return Some(as_it_lies) };
+        let Some(site) = place else {
+            return Some(as_it_lies);
+        };
         let (turn, along) = Turn::laying(site.prism.normal, site.prism.slide);
-        let key = Some(CutKey { site: turn.site(site, along), along });
-        let mut turned = Self { key, budget: Budget::of_cut_key(&job.params.rounds, i), ..as_it_lies };
+        let key = Some(CutKey {
+            site: turn.site(site, along),
+            along,
+        });
+        let mut turned = Self {
+            key,
+            budget: Budget::of_cut_key(&job.params.rounds, i),
+            ..as_it_lies
+        };
         if !turn.is_none() {
             turned.model = Cow::Owned(turn.solid(job.model).ok()?);
             turned.surface.mesh = turn.mesh(&turned.surface.mesh);
@@ -58,7 +76,8 @@ impl<'a> Candidate<'a> {
         Some(turned)
     }
 
-    /// What stages are given for these pieces, of which the key is cut anew; `None` where it does not come out as one piece.
+    /// What stages are given for these pieces, of which the key is cut anew; `None` where it does not come
+    /// out as one piece.
     pub fn division(
         &self,
         ctx: &Ctx,
@@ -68,15 +87,27 @@ impl<'a> Candidate<'a> {
         let Some(key) = &self.key else {
             let settings = job.settings().clone();
             let chosen = self.sizes(ctx, job, &settings, &surface)?;
-            return Ok(Some(Division { surface, settings, chosen, grip: None }));
+            return Ok(Some(Division {
+                surface,
+                settings,
+                chosen,
+                grip: None,
+            }));
         };
-        let Some((surface, patch)) = key.imprinted(ctx, job.settings(), &surface)? else { return Ok(None) };
+        let Some((surface, patch)) = key.imprinted(ctx, job.settings(), &surface)? else {
+            return Ok(None);
+        };
         let settings = job.settings().with_key(patch, key.along);
         let mut chosen = self.sizes(ctx, job, &settings, &surface)?;
         // Its rails have as much room as it was cut for.
         chosen.sizes.cap(patch, settings.connector.size.usual_mm());
         let grip = job.params.has_grip.then(|| key.grip(patch));
-        Ok(Some(Division { surface, settings, chosen, grip }))
+        Ok(Some(Division {
+            surface,
+            settings,
+            chosen,
+            grip,
+        }))
     }
 
     /// Connector sizes, by the stress in the model as it was given.
@@ -88,14 +119,18 @@ impl<'a> Candidate<'a> {
         surface: &SegmentedSurface,
     ) -> Result<sizes::ChosenSizes, DesignError> {
         let back = self.turn.inverse();
-        let stress_at = job.stress.as_ref().map(|map| move |place| map.at(back.apply(place)));
+        let stress_at = job
+            .stress
+            .as_ref()
+            .map(|map| move |place| map.at(back.apply(place)));
         let stress_mpa = stress_at.as_ref().map(|at| at as sizes::StressField);
         Ok(sizes::choose(&ctx.fork(), &settings.sizes, surface, stress_mpa)?)
     }
 }
 
 impl CutKey {
-    /// The surface with the key as a patch, and its id. Where the key leaves a piece hanging on another, the pieces are mended first.
+    /// The surface with the key as a patch, and its id. Where the key leaves a piece hanging on another, the
+    /// pieces are mended first.
     fn imprinted(
         &self,
         ctx: &Ctx,
@@ -103,8 +138,13 @@ impl CutKey {
         surface: &SegmentedSurface,
     ) -> Result<Option<(SegmentedSurface, PatchId)>, SegmentationError> {
         let params = &settings.segmentation;
-        let faults = |s: &SegmentedSurface| s.contact_graph_below(params.wall_mm, params.least_contact_mm).n_faults();
-        let Some(mut best) = key::imprint(surface, &self.site.prism) else { return Ok(None) };
+        let faults = |s: &SegmentedSurface| {
+            s.contact_graph_below(params.wall_mm, params.least_contact_mm)
+                .n_faults()
+        };
+        let Some(mut best) = key::imprint(surface, &self.site.prism) else {
+            return Ok(None);
+        };
         if faults(&best.0) > 0
             && let Some(mended) = segmentation::mended_again(&ctx.fork(), params, &best.0)?
             && let Some(again) = key::imprint(&mended, &self.site.prism)
@@ -120,8 +160,18 @@ impl CutKey {
         /// Of its length.
         const FROM_BACK: f64 = 0.65;
         let prism = self.site.prism;
-        let KeyPrism { origin, slide, normal, .. } = prism;
-        Grip { key, at: origin + FROM_BACK * prism.length_mm() * slide, slide, normal }
+        let KeyPrism {
+            origin,
+            slide,
+            normal,
+            ..
+        } = prism;
+        Grip {
+            key,
+            at: origin + FROM_BACK * prism.length_mm() * slide,
+            slide,
+            normal,
+        }
     }
 }
 

@@ -31,7 +31,12 @@ pub(super) struct WallGrid<'a> {
 
 impl<'a> WallGrid<'a> {
     pub fn new(params: &'a BodyParams, model: &'a Solid) -> Self {
-        Self { params, model, room_mm: 0.0, made: None }
+        Self {
+            params,
+            model,
+            room_mm: 0.0,
+            made: None,
+        }
     }
 
     /// Makes sure that there will be so much room.
@@ -51,9 +56,9 @@ impl<'a> WallGrid<'a> {
 
 /// Other pieces for those whose kits failed; `None` where the budget is used up or nothing can be changed.
 ///
-/// Pieces that only rattle are joined to neighbours. Else dividing comes first, as it keeps the user's labels. What came loose where seams
-/// are short would only get shorter ones: it is joined to a neighbour; so is what stood in the way of every plan until half of the
-/// revisions were gone.
+/// Pieces that only rattle are joined to neighbours. Else dividing comes first, as it keeps the user's
+/// labels. What came loose where seams are short would only get shorter ones: it is joined to a neighbour; so
+/// is what stood in the way of every plan until half of the revisions were gone.
 pub(super) fn revised(
     ctx: &Ctx,
     division: &Division,
@@ -61,12 +66,18 @@ pub(super) fn revised(
     has_kit: bool,
     budget: &mut Budget,
 ) -> Result<Option<SegmentedSurface>, DesignError> {
-    let Division { surface, settings, .. } = division;
+    let Division {
+        surface, settings, ..
+    } = division;
     let params = &settings.segmentation;
     let ctx = &ctx.fork();
     let rattles = !failure.rattling.is_empty();
     let is_hopeless = !has_kit && budget.is_half_gone();
-    let left = if rattles { &mut budget.joinings } else { &mut budget.revisions };
+    let left = if rattles {
+        &mut budget.joinings
+    } else {
+        &mut budget.revisions
+    };
     if *left == 0 || budget.kits == 0 {
         return Ok(None);
     }
@@ -74,7 +85,9 @@ pub(super) fn revised(
     Ok(if rattles {
         joined(ctx, params, surface, &failure.rattling)?
     } else if is_hopeless {
-        first(&failure.blamed, |p| segmentation::unite(ctx, params, surface, &[p]))?
+        first(&failure.blamed, |p| {
+            segmentation::unite(ctx, params, surface, &[p])
+        })?
     } else {
         divided(ctx, params, surface, failure)?
     })
@@ -106,7 +119,11 @@ pub(super) fn joined(
     /// Pieces joined at once; more would change what holds.
     const MOST_JOINED: usize = 2;
     let first = &pieces[..pieces.len().min(MOST_JOINED)];
-    if first.is_empty() { Ok(None) } else { segmentation::unite(ctx, params, surface, first) }
+    if first.is_empty() {
+        Ok(None)
+    } else {
+        segmentation::unite(ctx, params, surface, first)
+    }
 }
 
 /// The first change of a piece that can be made.

@@ -2,18 +2,20 @@
 
 use shellock_geom::{Aabb, Solid, TriMesh};
 
+use super::division::Division;
 use super::{DesignError, Params, Settings};
-use crate::body::{PatchDistances, ShellGrid};
+use crate::body::{PatchDistances, ShellBodies, ShellGrid};
 use crate::connector::{Contact, Run, has_no_bar};
 use crate::metric::Holding;
-use crate::piece::{FinishParams, Finished, Grip, Joint, PressFit, PressFitKind};
+use crate::piece::{FinishParams, Finished, Joint, PressFit, PressFitKind};
 use crate::plan::{FoundPlan, InstallationPlan, PlanProof};
 use crate::play::{self, KitPlay};
 use crate::sizes::CONTACT_SIZES;
 use crate::verify::{self, Finding, Verification};
 use crate::{ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece};
 
-/// Pieces that were made as planned, and what is known of them. All places are in the space of the model that they were made from.
+/// Pieces that were made as planned, and what is known of them. All places are in the space of the model that
+/// they were made from.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Kit {
@@ -50,12 +52,21 @@ pub struct Kit {
 impl Kit {
     /// Length of the rails that the key slides on, mm; 0 where it has none.
     pub fn rails_mm(&self) -> f64 {
-        self.joints.iter().filter(|j| j.is_rail).map(|j| j.length_mm).fold(0.0, |sum, mm| sum + mm)
+        self.joints
+            .iter()
+            .filter(|j| j.is_rail)
+            .map(|j| j.length_mm)
+            .fold(0.0, |sum, mm| sum + mm)
     }
 
     /// Names of the checks that it fails.
     pub fn failures(&self) -> Vec<String> {
-        self.verification.checks.iter().filter(|c| !c.ok).map(|c| c.name.clone()).collect()
+        self.verification
+            .checks
+            .iter()
+            .filter(|c| !c.ok)
+            .map(|c| c.name.clone())
+            .collect()
     }
 
     /// Whether the only thing wrong with it is that pieces rattle.
@@ -65,7 +76,8 @@ impl Kit {
         self.failures().len() == 1 && !findings.is_empty() && findings.iter().all(is_rattle)
     }
 
-    /// The pieces that rattle, the loosest first; the key, which is cut where there is room for it, is left out.
+    /// The pieces that rattle, the loosest first; the key, which is cut where there is room for it, is left
+    /// out.
     pub fn rattling(&self) -> Vec<PatchId> {
         let piece = |f: &Finding| match f {
             Finding::PlayTooWide { piece, .. } if *piece != self.plan.key() => Some(*piece),
@@ -77,7 +89,9 @@ impl Kit {
     /// Whether it has fewer failures, or as many and rattles less.
     pub fn is_better_than(&self, other: &Self) -> bool {
         let excess = |finding: &Finding| match finding {
-            Finding::PlayTooWide { play, most, .. } => (play.translation_mm / most[0]).max(play.rotation_deg / most[1]),
+            Finding::PlayTooWide { play, most, .. } => {
+                (play.translation_mm / most[0]).max(play.rotation_deg / most[1])
+            }
             _ => 0.0,
         };
         let rattles = |k: &Self| k.verification.findings.iter().map(excess).fold(0.0, f64::max);
@@ -89,47 +103,54 @@ impl Kit {
 /// What a kit is made of, each from an earlier stage.
 pub(super) struct Recipe<'a> {
     pub params: &'a Params,
-    pub settings: &'a Settings,
+    pub division: &'a Division,
     pub model: &'a Solid,
-    /// It must have room for connectors of the largest of `sizes`.
+    /// It must have room for the division's largest connectors.
     pub grid: &'a ShellGrid,
     pub distances: &'a PatchDistances,
-    pub surface: &'a SegmentedSurface,
-    pub sizes: &'a ConnectorSizes,
-    /// The notch that the key is to have.
-    pub grip: Option<Grip>,
     pub found: FoundPlan,
     pub holding: Holding,
 }
 
 /// Makes and verifies the kit of one plan; `ctx` has what was warned of on the way to the plan.
 pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError> {
-    let Recipe { params, settings, model, grid, distances, surface, sizes, grip, found, holding } = recipe;
-    let (proof, plan) = (found.proof(), found.plan);
-    let ctx_ref = &ctx;
+    let Recipe {
+        params,
+        division,
+        model,
+        grid,
+        distances,
+        found,
+        holding,
+    } = recipe;
+    let Division {
+        surface,
+        settings,
+        chosen,
+        grip,
+    } = division;
+    let (sizes, proof, plan) = (&chosen.sizes, found.proof(), found.plan);
     let rooms = rooms(settings, surface, sizes);
     // The wall, split along the plan.
-    let shell = body::build(ctx_ref, &settings.body, grid, distances, &plan, &rooms)?;
+    let shell = body::build(&ctx, &settings.body, grid, distances, &plan, &rooms)?;
     // Connectors under its seams.
-    let curves = shell.inner.as_ref().map_or(Vec::new(), |inner| connector::curves(grid, inner, &plan));
-    let is_free = has_no_bar(&settings.connector, grid, &shell);
-    let runs_for = |slide| connector::runs(&settings.connector, sizes, &plan, &curves, slide, &is_free);
-    let (runs, contacts) = match settings.plan.key.and(settings.plan.key_slide) {
-        Some(cut) => runs_for(Some(cut.unit())),
-        // A piece that is the key has rails where its seams happen to allow them.
-        None => {
-            let own = runs_for(plan.steps.last().map(|step| step.separation.unit()));
-            if own.0.iter().any(Run::is_rail) { own } else { runs_for(None) }
-        }
-    };
+    let (runs, contacts) = connectors(settings, sizes, grid, &shell, &plan);
     // Pieces, joined and carved.
-    let finish = FinishParams { connector: &settings.connector, relief: settings.relief(), grip, label: params.label };
-    let finished = piece::make(ctx_ref, &finish, grid, &shell, &plan, &runs, &rooms)?;
-    warn_of_press_fits(ctx_ref, &finished);
+    let (relief, label) = (settings.relief(), params.label);
+    let finish = FinishParams {
+        connector: &settings.connector,
+        relief,
+        grip: *grip,
+        label,
+    };
+    let finished = piece::make(&ctx, &finish, grid, &shell, &plan, &runs, &rooms)?;
+    warn_of_press_fits(&ctx, &finished);
     // The verdict, from the finished meshes alone.
-    let (verification, touching, play) = judged(ctx_ref, settings, model, &finished, &plan)?;
-    play::warning(&play).into_iter().for_each(|warning| ctx_ref.warn(warning));
-    warn_of_bare_seams(ctx_ref, sizes, &contacts, &finished.joints);
+    let (verification, touching, play) = judged(&ctx, settings, model, &finished, &plan)?;
+    play::warning(&play)
+        .into_iter()
+        .for_each(|warning| ctx.warn(warning));
+    warn_of_bare_seams(&ctx, sizes, &contacts, &finished.joints);
     Ok(Kit {
         surface: surface.clone(),
         sizes: sizes.clone(),
@@ -148,6 +169,34 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     })
 }
 
+/// Where connectors run, and what the seams offered.
+fn connectors(
+    settings: &Settings,
+    sizes: &ConnectorSizes,
+    grid: &ShellGrid,
+    shell: &ShellBodies,
+    plan: &InstallationPlan,
+) -> (Vec<Run>, Vec<Contact>) {
+    let curves = shell
+        .inner
+        .as_ref()
+        .map_or(Vec::new(), |inner| connector::curves(grid, inner, plan));
+    let is_free = has_no_bar(&settings.connector, grid, shell);
+    let runs_for = |slide| connector::runs(&settings.connector, sizes, plan, &curves, slide, &is_free);
+    match settings.plan.key.and(settings.plan.key_slide) {
+        Some(cut) => runs_for(Some(cut.unit())),
+        // A piece that is the key has rails where its seams happen to allow them.
+        None => {
+            let own = runs_for(plan.steps.last().map(|step| step.separation.unit()));
+            if own.0.iter().any(Run::is_rail) {
+                own
+            } else {
+                runs_for(None)
+            }
+        }
+    }
+}
+
 /// What the meshes are worth: the verdict with that on play, where they touch, and how far they move.
 fn judged(
     ctx: &Ctx,
@@ -156,15 +205,27 @@ fn judged(
     finished: &Finished,
     plan: &InstallationPlan,
 ) -> Result<(Verification, Vec<verify::contact::Contact>, KitPlay), DesignError> {
-    let assembly = verify::Assembly { model, pieces: &finished.meshes, plan, press_fits: &finished.press_fits };
+    let assembly = verify::Assembly {
+        model,
+        pieces: &finished.meshes,
+        plan,
+        press_fits: &finished.press_fits,
+    };
     let (mut verification, touching) = verify::examine(ctx, &settings.verify, &assembly)?;
     let mut measured = play::measure(ctx, &settings.play, &finished.meshes, plan)?;
     let size_mm = model.mesh().bounds().size().max_element();
-    verification.add(play::check(&measured, &finished.meshes, size_mm, settings.verify.clearance_mm));
+    verification.add(play::check(
+        &measured,
+        &finished.meshes,
+        size_mm,
+        settings.verify.clearance_mm,
+    ));
     if verification.passed() {
         // It is slow; what fails already is not given out.
         play::look_for_ways_out(ctx, settings.verify.clearance_mm, &finished.meshes, &mut measured)?;
-        play::check_ways_out(&measured, &finished.meshes).into_iter().for_each(|check| verification.add(check));
+        play::check_ways_out(&measured, &finished.meshes)
+            .into_iter()
+            .for_each(|check| verification.add(check));
     }
     Ok((verification, touching, measured))
 }

@@ -66,13 +66,22 @@ impl Lesson {
     pub fn teach(&self, constraints: &mut PlanConstraints) {
         match self {
             Self::WeakJoints(joints) => {
-                constraints.weak_joints.extend(joints.iter().map(|j| (j.later, j.earlier, j.separation)));
+                constraints
+                    .weak_joints
+                    .extend(joints.iter().map(|j| (j.later, j.earlier, j.separation)));
             }
-            Self::RubbingPath { piece, separation, against, .. } => {
+            Self::RubbingPath {
+                piece,
+                separation,
+                against,
+                ..
+            } => {
                 constraints.forbidden.insert((*piece, *separation));
                 *constraints.rubbed.entry((*piece, *against)).or_default() += 1;
             }
-            Self::Blocked { piece, separation, .. } => {
+            Self::Blocked {
+                piece, separation, ..
+            } => {
                 constraints.forbidden.insert((*piece, *separation));
             }
             Self::FailedPlan { plan, .. } => constraints.rejected.push(plan.clone()),
@@ -92,7 +101,11 @@ impl Lesson {
 impl Lesson {
     /// The pieces that came out loose.
     pub fn loose(&self) -> Vec<PatchId> {
-        if let Self::FailedPlan { loose, .. } = self { loose.clone() } else { Vec::new() }
+        if let Self::FailedPlan { loose, .. } = self {
+            loose.clone()
+        } else {
+            Vec::new()
+        }
     }
 }
 
@@ -101,23 +114,51 @@ impl std::fmt::Display for Lesson {
         match self {
             Self::WeakJoints(joints) => {
                 let line = |j: &WeakJoint| {
-                    let WeakJoint { later, earlier, length_mm, seam_mm, .. } = j;
+                    let WeakJoint {
+                        later,
+                        earlier,
+                        length_mm,
+                        seam_mm,
+                        ..
+                    } = j;
                     format!("{later} and {earlier} ({length_mm:.1} mm on {seam_mm:.0} mm of seam)")
                 };
                 let list: Vec<String> = joints.iter().map(line).collect();
-                write!(f, "connectors came out too short between pieces {}", list.join(", "))
+                write!(
+                    f,
+                    "connectors came out too short between pieces {}",
+                    list.join(", ")
+                )
             }
-            Self::RubbingPath { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => write!(
+            Self::RubbingPath {
+                piece,
+                against,
+                travel_mm,
+                thickness_mm,
+                volume_mm3,
+                ..
+            } => write!(
                 f,
                 "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
             ),
             Self::Blocked { piece, kept, .. } => {
-                write!(f, "piece {piece} could take only {:.0} % of its wall along", 100.0 * kept)
+                write!(
+                    f,
+                    "piece {piece} could take only {:.0} % of its wall along",
+                    100.0 * kept
+                )
             }
-            Self::FailedPlan { loose, .. } if loose.is_empty() => write!(f, "the kit failed its verification"),
+            Self::FailedPlan { loose, .. } if loose.is_empty() => {
+                write!(f, "the kit failed its verification")
+            }
             Self::FailedPlan { loose, .. } => {
                 let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
-                write!(f, "{} {} came out loose", if list.len() == 1 { "piece" } else { "pieces" }, list.join(", "))
+                write!(
+                    f,
+                    "{} {} came out loose",
+                    if list.len() == 1 { "piece" } else { "pieces" },
+                    list.join(", ")
+                )
             }
         }
     }
@@ -132,11 +173,27 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     let mut learned = Vec::new();
     for finding in &kit.verification.findings {
         match finding {
-            &Finding::PathRubs { piece, against, travel_mm, thickness_mm, volume_mm3, .. } => {
+            &Finding::PathRubs {
+                piece,
+                against,
+                travel_mm,
+                thickness_mm,
+                volume_mm3,
+                ..
+            } => {
                 let separation = kit.plan.separation(piece);
-                learned.push(Lesson::RubbingPath { piece, separation, against, travel_mm, thickness_mm, volume_mm3 });
+                learned.push(Lesson::RubbingPath {
+                    piece,
+                    separation,
+                    against,
+                    travel_mm,
+                    thickness_mm,
+                    volume_mm3,
+                });
             }
-            Finding::Loose { piece, .. } | Finding::PlayTooWide { piece, .. } | Finding::ComesOut { piece, .. } => {
+            Finding::Loose { piece, .. }
+            | Finding::PlayTooWide { piece, .. }
+            | Finding::ComesOut { piece, .. } => {
                 loose.push(*piece);
             }
             Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| m.piece)),
@@ -146,7 +203,10 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     loose.sort_unstable();
     loose.dedup();
     learned.extend(weak_joints(kit).filter(|_| !loose.is_empty()));
-    learned.push(Lesson::FailedPlan { plan: kit.plan.clone(), loose });
+    learned.push(Lesson::FailedPlan {
+        plan: kit.plan.clone(),
+        loose,
+    });
     learned
 }
 
@@ -154,20 +214,35 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
 fn weak_joints(kit: &Kit) -> Option<Lesson> {
     let mut lengths: BTreeMap<(PatchId, PatchId), [f64; 2]> = BTreeMap::new();
     let by_order = |a: PatchId, b: PatchId| {
-        if kit.plan.position(a) > kit.plan.position(b) { (a, b) } else { (b, a) }
+        if kit.plan.position(a) > kit.plan.position(b) {
+            (a, b)
+        } else {
+            (b, a)
+        }
     };
     for contact in &kit.contacts {
-        lengths.entry(by_order(contact.later, contact.earlier)).or_default()[1] += contact.length_mm;
+        lengths
+            .entry(by_order(contact.later, contact.earlier))
+            .or_default()[1] += contact.length_mm;
     }
     for joint in &kit.joints {
         lengths.entry(by_order(joint.male, joint.female)).or_default()[0] += joint.length_mm;
     }
-    let is_weak = |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * kit.sizes.of(a, b);
-    let weak = lengths.into_iter().filter(|(pair, [length_mm, _])| is_weak(*pair, *length_mm));
+    let is_weak =
+        |(a, b): (PatchId, PatchId), length_mm: f64| length_mm < SHORTEST_RUN_SIZES * kit.sizes.of(a, b);
+    let weak = lengths
+        .into_iter()
+        .filter(|(pair, [length_mm, _])| is_weak(*pair, *length_mm));
     let joints: Vec<WeakJoint> = weak
         .map(|((later, earlier), [length_mm, seam_mm])| {
             let separation = kit.plan.separation(later);
-            WeakJoint { later, earlier, separation, length_mm, seam_mm }
+            WeakJoint {
+                later,
+                earlier,
+                separation,
+                length_mm,
+                seam_mm,
+            }
         })
         .collect();
     (!joints.is_empty()).then_some(Lesson::WeakJoints(joints))

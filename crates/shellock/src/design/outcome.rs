@@ -16,7 +16,8 @@ use crate::strength::{Strength, StrengthError};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::{Cancelled, Ctx, Warning};
 
-/// A finished kit and the wall that it is made of. All places are in assembly space: the model as it was given, turned by `turn`.
+/// A finished kit and the wall that it is made of. All places are in assembly space: the model as it was
+/// given, turned by `turn`.
 #[non_exhaustive]
 pub struct Design {
     /// The pieces, their plan and the verdict on them.
@@ -65,15 +66,16 @@ struct Kept<'a> {
 }
 
 impl<'a> Best<'a> {
-    /// Whether a key at `place` need not be tried. A piece as it is rattles no less as the key than one that was cut.
+    /// Whether a key at `place` need not be tried. A piece as it is rattles no less as the key than one that
+    /// was cut.
     pub fn is_enough(&self, place: Option<&KeySite>) -> bool {
         let is_enough = |kit: &Kit| kit.verification.passed() || (place.is_none() && kit.only_rattles());
         let rattles = place.is_some() && self.n_rattling == RATTLING_KEYS;
         rattles || self.kit.as_ref().is_some_and(|kept| is_enough(&kept.kit))
     }
 
-    /// Keeps the kit of a candidate where it is better; says why it will not do. What goes wrong with a key that is cut need not with
-    /// another.
+    /// Keeps the kit of a candidate where it is better; says why it will not do. What goes wrong with a key
+    /// that is cut need not with another.
     pub fn add(
         &mut self,
         ctx: &Ctx,
@@ -85,7 +87,11 @@ impl<'a> Best<'a> {
             let Explored { kit, failure } = explored?;
             self.failure = failure;
             // Of equals a piece as it is.
-            let is_worse = |kit: &Kit| self.kit.as_ref().is_some_and(|b| b.kit.failures().len() < kit.failures().len());
+            let is_worse = |kit: &Kit| {
+                self.kit
+                    .as_ref()
+                    .is_some_and(|b| b.kit.failures().len() < kit.failures().len())
+            };
             if let Some(kit) = kit.filter(|kit| !is_worse(kit)) {
                 self.kit = Some(Kept { kit, candidate });
             }
@@ -95,7 +101,9 @@ impl<'a> Best<'a> {
         let reason = match explored {
             Err(DesignError::Cancelled(stop)) => return Err(stop.into()),
             Err(e) => format!("with {words} it cannot be made: {e}"),
-            Ok(Explored { kit: None, failure }) => format!("with {words} there is no plan: {}", failure.reason),
+            Ok(Explored { kit: None, failure }) => {
+                format!("with {words} there is no plan: {}", failure.reason)
+            }
             Ok(Explored { kit: Some(kit), .. }) => {
                 let failed = kit.failures();
                 // Where other pieces than the key rattle, another key changes little.
@@ -116,16 +124,32 @@ impl<'a> Best<'a> {
 
     /// The best kit with all that is known of it.
     pub fn finished(self, ctx: &Ctx, job: &Job<'_>) -> Result<DesignOutcome, DesignError> {
-        let Self { kit, mut reasons, failure: Failure { reason, blockers, .. }, .. } = self;
-        let Some(Kept { kit, candidate }) = kit else { return Ok(DesignOutcome::NoPlan { reason, blockers }) };
+        let Self {
+            kit,
+            mut reasons,
+            failure: Failure { reason, blockers, .. },
+            ..
+        } = self;
+        let Some(Kept { kit, candidate }) = kit else {
+            return Ok(DesignOutcome::NoPlan { reason, blockers });
+        };
         let Candidate { turn, model, key, .. } = candidate;
         let gaps = kit_gaps(ctx, &model, &kit.pieces, &kit.plan, job.settings().body.rim_mm)?;
         let ctx = ctx.fork();
-        segmentation::tell(&ctx, &job.settings().segmentation, &model, job.labels, &kit.surface)?;
+        segmentation::tell(
+            &ctx,
+            &job.settings().segmentation,
+            &model,
+            job.labels,
+            &kit.surface,
+        )?;
         let mut warnings = ctx.into_warnings();
         warnings.extend(kit.warnings.iter().cloned());
         let place = |at: [f64; 3]| turn.apply(Vec3::from(at)).to_array();
-        warnings.extend(job.wall.warnings.iter().map(|w| Warning { at: w.at.map(place), ..w.clone() }));
+        warnings.extend(job.wall.warnings.iter().map(|w| Warning {
+            at: w.at.map(place),
+            ..w.clone()
+        }));
         warnings.extend(crossing(&kit, &gaps));
         match &key {
             Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, &key.site)),
@@ -139,7 +163,14 @@ impl<'a> Best<'a> {
         }
         let strength = job.wall.strength.clone().map(|s| s.turned(|v| turn.apply(v)));
         let key = key.map(|k| k.site);
-        Ok(DesignOutcome::Made(Box::new(Design { kit, turn, key, strength, gaps, warnings })))
+        Ok(DesignOutcome::Made(Box::new(Design {
+            kit,
+            turn,
+            key,
+            strength,
+            gaps,
+            warnings,
+        })))
     }
 }
 
@@ -148,7 +179,10 @@ fn not_cut(kit: &Kit, reasons: &[String]) -> Warning {
     let key = kit.plan.key();
     Warning {
         code: "key-not-cut".into(),
-        message: format!("piece {key} is the key as it is, without rails: {}", reasons.join("; ")),
+        message: format!(
+            "piece {key} is the key as it is, without rails: {}",
+            reasons.join("; ")
+        ),
         pieces: vec![key],
         at: None,
     }
@@ -172,7 +206,10 @@ fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
 fn crossing(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
     /// Less is rounding, mm.
     const LEAST_MM: f64 = 0.02;
-    let deepest = gaps.paths.iter().min_by(|a, b| a.overall.gap_mm.total_cmp(&b.overall.gap_mm))?;
+    let deepest = gaps
+        .paths
+        .iter()
+        .min_by(|a, b| a.overall.gap_mm.total_cmp(&b.overall.gap_mm))?;
     let place = deepest.overall;
     let is_meant = deepest.piece == kit.plan.key() && !kit.press_fits.is_empty();
     (place.gap_mm < -LEAST_MM && !is_meant).then(|| Warning {

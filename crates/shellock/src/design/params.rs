@@ -6,7 +6,8 @@ use crate::PatchId;
 use crate::connector::ConnectorParams;
 use crate::piece::LabelParams;
 
-/// Everything that a user may set, each once; what stages are given follows from it, see [`Settings`](super::Settings).
+/// Everything that a user may set, each once; what stages are given follows from it, see
+/// [`Settings`](super::Settings).
 ///
 /// ```
 /// let mut params = shellock::Params::default();
@@ -18,7 +19,8 @@ use crate::piece::LabelParams;
 pub struct Params {
     /// Seed of all random choices: the same seed gives the same kit. 0.
     pub seed: u64,
-    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: from the area, 10 for a figure of 150 mm.
+    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: from the area, 10 for a figure of
+    /// 150 mm.
     pub n_pieces: Option<usize>,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
@@ -95,7 +97,8 @@ impl Default for Thickness {
 /// Where the key comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KeySource {
-    /// It is cut out of the surface where it slides best, see [`crate::key`]; where no such kit passes, as with `Flattest`.
+    /// It is cut out of the surface where it slides best, see [`crate::key`]; where no such kit passes, as
+    /// with `Flattest`.
     #[default]
     Cut,
     /// The flattest piece that works.
@@ -117,6 +120,10 @@ pub struct Rounds {
 
 impl Default for Rounds {
     fn default() -> Self {
-        Self { kits: 3, mendings: 4, kits_in_all: 8 }
+        Self {
+            kits: 3,
+            mendings: 4,
+            kits_in_all: 8,
+        }
     }
 }

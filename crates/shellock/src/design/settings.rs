@@ -12,8 +12,8 @@ use crate::strength::StrengthParams;
 use crate::verify::VerifyParams;
 use crate::{LatticeDirection, PatchId};
 
-/// The parameters of each stage. Nothing changes them on the way; a kit with a key that is cut has some of its own, see
-/// [`Self::with_key`].
+/// The parameters of each stage. Nothing changes them on the way; a kit with a key that is cut has some of
+/// its own, see `with_key`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
@@ -47,11 +47,19 @@ impl Settings {
 
     /// Those for a wall of this thickness, mm.
     pub fn with_thickness(params: &Params, thickness_mm: f64) -> Self {
-        let Params { seed, wall_gap_mm, cell_mm, .. } = *params;
+        let Params {
+            seed,
+            wall_gap_mm,
+            cell_mm,
+            ..
+        } = *params;
         let connector = params.connector.clone();
         let clearance_mm = connector.clearance_mm;
         let smallest_mm = connector.size.smallest_mm();
-        let verify = VerifyParams { clearance_mm: clearance_mm.max(2.0 * wall_gap_mm), seed };
+        let verify = VerifyParams {
+            clearance_mm: clearance_mm.max(2.0 * wall_gap_mm),
+            seed,
+        };
         Self {
             strength: strength(params),
             segmentation: SegmentationParams {
@@ -66,8 +74,17 @@ impl Settings {
                 clearance_mm,
                 strength_mpa: params.material.strength_mpa,
             },
-            plan: PlanParams { wall_mm: thickness_mm, clearance_mm, ..plan(params) },
-            body: BodyParams { thickness_mm, cell_mm, wall_gap_mm, ..BodyParams::default() },
+            plan: PlanParams {
+                wall_mm: thickness_mm,
+                clearance_mm,
+                ..plan(params)
+            },
+            body: BodyParams {
+                thickness_mm,
+                cell_mm,
+                wall_gap_mm,
+                ..BodyParams::default()
+            },
             connector,
             verify,
             play: PlayParams {
@@ -83,17 +100,29 @@ impl Settings {
     pub(super) fn with_key(&self, key: PatchId, slide: LatticeDirection) -> Self {
         let key_gap_mm = self.body.wall_gap_mm.max(0.5 * self.connector.key_clearance_mm);
         Self {
-            plan: PlanParams { key: Some(key), key_slide: Some(slide), ..self.plan.clone() },
-            body: BodyParams { key_gap_mm: Some(key_gap_mm), ..self.body.clone() },
+            plan: PlanParams {
+                key: Some(key),
+                key_slide: Some(slide),
+                ..self.plan.clone()
+            },
+            body: BodyParams {
+                key_gap_mm: Some(key_gap_mm),
+                ..self.body.clone()
+            },
             ..self.clone()
         }
     }
 
-    /// The least gaps that finished pieces keep beneath the rim: those of connectors and of walls, whichever is narrower.
+    /// The least gaps that finished pieces keep beneath the rim: those of connectors and of walls, whichever
+    /// is narrower.
     pub(super) fn relief(&self) -> Relief {
         let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.wall_gap_mm);
         let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
-        Relief { rim_mm: self.body.rim_mm, gap_mm, key_gap_mm: self.body.key_gap_mm.map_or(gap_mm, of_key) }
+        Relief {
+            rim_mm: self.body.rim_mm,
+            gap_mm,
+            key_gap_mm: self.body.key_gap_mm.map_or(gap_mm, of_key),
+        }
     }
 }
 
@@ -101,7 +130,12 @@ impl Settings {
 pub(super) fn problems(params: &Params) -> Vec<String> {
     let settings = Settings::resolve(params);
     let label = params.label.map_or_else(Vec::new, |l| l.problems());
-    let stages = [settings.body.problems(), settings.connector.problems(), settings.strength.problems(), label];
+    let stages = [
+        settings.body.problems(),
+        settings.connector.problems(),
+        settings.strength.problems(),
+        label,
+    ];
     let mut problems: Vec<String> = stages.into_iter().flatten().map(|p| p.to_string()).collect();
     problems.extend(segmentation(params).problems());
     problems.extend(plan(params).problems());
@@ -110,21 +144,42 @@ pub(super) fn problems(params: &Params) -> Vec<String> {
 
 /// What the user says of the division.
 fn segmentation(params: &Params) -> SegmentationParams {
-    SegmentationParams { n_pieces: params.n_pieces, seed: params.seed, ..SegmentationParams::default() }
+    SegmentationParams {
+        n_pieces: params.n_pieces,
+        seed: params.seed,
+        ..SegmentationParams::default()
+    }
 }
 
 /// What the user says of the plan.
 fn plan(params: &Params) -> PlanParams {
-    let Params { seed, up, proof_budget, .. } = *params;
-    let key = if let KeySource::Piece(id) = params.key { Some(id) } else { None };
-    PlanParams { seed, key, up, proof_budget, ..PlanParams::default() }
+    let Params {
+        seed,
+        up,
+        proof_budget,
+        ..
+    } = *params;
+    let key = if let KeySource::Piece(id) = params.key {
+        Some(id)
+    } else {
+        None
+    };
+    PlanParams {
+        seed,
+        key,
+        up,
+        proof_budget,
+        ..PlanParams::default()
+    }
 }
 
 /// What the wall must bear. Two lines stand on either side of a seam's pin.
 fn strength(params: &Params) -> StrengthParams {
     const LEAST_WALLS: f64 = 4.0;
     let usual = StrengthParams::default();
-    let least_mm = (LEAST_WALLS * params.connector.min_wall_mm).max(0.8).max(2.0 * params.cell_mm.unwrap_or(0.0));
+    let least_mm = (LEAST_WALLS * params.connector.min_wall_mm)
+        .max(0.8)
+        .max(2.0 * params.cell_mm.unwrap_or(0.0));
     let least_mm = least_mm.min(5.0);
     StrengthParams {
         material: params.material,

@@ -27,14 +27,28 @@ fn ids() -> impl Iterator<Item = PatchId> {
 }
 
 fn check(name: &str, ok: bool) -> Check {
-    Check { name: name.into(), ok, figure: String::new() }
+    Check {
+        name: name.into(),
+        ok,
+        figure: String::new(),
+    }
 }
 
 /// A kit of three pieces, the last of them the key, that has these checks and findings.
 fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
     let separation = LatticeDirection::nearest(Vec3::Z);
-    let plan = InstallationPlan { steps: ids().map(|piece| InstallationStep { piece, separation }).collect() };
-    let slide = Slide { key: plan.key(), seat: PatchId(0), at: [0.0; 3], along: [0.0, 0.0, 1.0], most_mm: 0.3 };
+    let plan = InstallationPlan {
+        steps: ids()
+            .map(|piece| InstallationStep { piece, separation })
+            .collect(),
+    };
+    let slide = Slide {
+        key: plan.key(),
+        seat: PatchId(0),
+        at: [0.0; 3],
+        along: [0.0, 0.0, 1.0],
+        most_mm: 0.3,
+    };
     let nothing = || ids().map(|_| None).collect::<IdVec<PatchId, Option<Play>>>();
     Kit {
         surface: testing::voronoi(testing::sphere(2, Vec3::splat(20.0)), N, 1),
@@ -47,7 +61,11 @@ fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
             optimal: true,
             least_cost: 1.0,
             key_lower_bound: 1.0,
-            proven_for: ProofScope { keys: Vec::new(), slides: KeyDirections::WithinPlane, n_lessons: 0 },
+            proven_for: ProofScope {
+                keys: Vec::new(),
+                slides: KeyDirections::WithinPlane,
+                n_lessons: 0,
+            },
             piece_costs: ids().map(|_| 1.0).collect(),
         },
         holding: Holding {
@@ -63,7 +81,10 @@ fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
         joints: Vec::new(),
         press_fits: Vec::new(),
         contacts: Vec::new(),
-        verification: Verification { checks: checks.iter().map(|&(name, ok)| check(name, ok)).collect(), findings },
+        verification: Verification {
+            checks: checks.iter().map(|&(name, ok)| check(name, ok)).collect(),
+            findings,
+        },
         touching: Vec::new(),
         play: KitPlay {
             slide,
@@ -75,7 +96,12 @@ fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
             together: None,
             proofs: Vec::new(),
         },
-        warnings: vec![Warning { code: "of-the-kit".into(), message: String::new(), pieces: Vec::new(), at: None }],
+        warnings: vec![Warning {
+            code: "of-the-kit".into(),
+            message: String::new(),
+            pieces: Vec::new(),
+            at: None,
+        }],
     }
 }
 
@@ -84,13 +110,28 @@ fn good() -> Kit {
 }
 
 fn rattling(piece: u32, translation_mm: f64) -> Kit {
-    let play = Play { translation_mm, rotation_deg: 0.0, is_proven: false };
-    let finding = Finding::PlayTooWide { piece: PatchId(piece), play, most: [1.0, 2.0], at: [0.0; 3] };
+    let play = Play {
+        translation_mm,
+        rotation_deg: 0.0,
+        is_proven: false,
+    };
+    let finding = Finding::PlayTooWide {
+        piece: PatchId(piece),
+        play,
+        most: [1.0, 2.0],
+        at: [0.0; 3],
+    };
     kit(&[("holds", true), ("sits", false)], vec![finding])
 }
 
 fn loose(piece: u32) -> Kit {
-    kit(&[("holds", false), ("sits", true)], vec![Finding::Loose { piece: PatchId(piece), directions: Vec::new() }])
+    kit(
+        &[("holds", false), ("sits", true)],
+        vec![Finding::Loose {
+            piece: PatchId(piece),
+            directions: Vec::new(),
+        }],
+    )
 }
 
 #[test]
@@ -102,7 +143,10 @@ fn a_stop_inside_of_a_stage_is_a_stop_of_the_job() {
         ChoiceError::Cancelled(Cancelled).into(),
         PieceError::Cancelled(Cancelled).into(),
     ];
-    assert!(stopped.iter().all(|e| matches!(e, DesignError::Cancelled(_))), "{stopped:?}");
+    assert!(
+        stopped.iter().all(|e| matches!(e, DesignError::Cancelled(_))),
+        "{stopped:?}"
+    );
 }
 
 #[test]
@@ -116,8 +160,16 @@ fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_chang
     assert!(matches!(divided(), Ok(Some(_))), "it can be divided");
     stop.store(true, Ordering::Relaxed);
     let united = segmentation::unite(&ctx, &params, &surface, &[PatchId(0)]);
-    let stopped = [divided(), united, segmentation::mended_again(&ctx, &params, &surface)];
-    assert!(stopped.iter().all(|s| matches!(s, Err(SegmentationError::Cancelled(_)))));
+    let stopped = [
+        divided(),
+        united,
+        segmentation::mended_again(&ctx, &params, &surface),
+    ];
+    assert!(
+        stopped
+            .iter()
+            .all(|s| matches!(s, Err(SegmentationError::Cancelled(_))))
+    );
 }
 
 #[test]
@@ -155,7 +207,9 @@ fn a_kit_that_passed_teaches_nothing_and_one_that_failed_never_comes_again() {
     assert_eq!(lessons(&good()), []);
     for failed in [loose(1), rattling(1, 3.0), kit(&[("closed", false)], Vec::new())] {
         let mut constraints = PlanConstraints::default();
-        lessons(&failed).iter().for_each(|lesson| lesson.teach(&mut constraints));
+        lessons(&failed)
+            .iter()
+            .for_each(|lesson| lesson.teach(&mut constraints));
         assert_eq!(constraints.rejected, [failed.plan]);
     }
 }
@@ -172,13 +226,19 @@ fn a_piece_that_rubs_takes_another_way_and_twice_another_turn() {
     };
     let failed = kit(&[("free", false)], vec![rubs]);
     let learned = lessons(&failed);
-    assert_eq!(learned.iter().flat_map(Lesson::blamed).collect::<Vec<_>>(), [PatchId(1)]);
+    assert_eq!(
+        learned.iter().flat_map(Lesson::blamed).collect::<Vec<_>>(),
+        [PatchId(1)]
+    );
     let mut constraints = PlanConstraints::default();
     for times in 1..=2 {
         learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
         assert_eq!(constraints.rubbed[&(PatchId(1), PatchId(0))], times);
     }
-    assert_eq!(constraints.forbidden, [(PatchId(1), failed.plan.separation(PatchId(1)))].into());
+    assert_eq!(
+        constraints.forbidden,
+        [(PatchId(1), failed.plan.separation(PatchId(1)))].into()
+    );
 }
 
 #[test]
@@ -196,12 +256,21 @@ fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_lo
     let mut constraints = PlanConstraints::default();
     learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
     let s = failed.plan.separation(PatchId(1));
-    assert!(constraints.is_weak(PatchId(1), PatchId(0), s) && !constraints.is_weak(PatchId(0), PatchId(1), s));
-    assert_eq!(learned.iter().flat_map(Lesson::loose).collect::<Vec<_>>(), [PatchId(1)]);
+    assert!(
+        constraints.is_weak(PatchId(1), PatchId(0), s) && !constraints.is_weak(PatchId(0), PatchId(1), s)
+    );
+    assert_eq!(
+        learned.iter().flat_map(Lesson::loose).collect::<Vec<_>>(),
+        [PatchId(1)]
+    );
     // Where nothing is loose, short joints hold.
     let mut rubs = kit(&[("closed", false)], Vec::new());
     rubs.contacts = vec![contact(1, 0)];
-    assert!(lessons(&rubs).iter().all(|lesson| !matches!(lesson, Lesson::WeakJoints(_))));
+    assert!(
+        lessons(&rubs)
+            .iter()
+            .all(|lesson| !matches!(lesson, Lesson::WeakJoints(_)))
+    );
 }
 
 #[test]
@@ -210,10 +279,25 @@ fn cut_keys_cost_less_than_a_piece_that_is_the_key() {
     let of_piece = Budget::of_piece(&rounds);
     for i in 0..budget::KITS_OF_CUT_KEYS.len() {
         let cut = Budget::of_cut_key(&rounds, i);
-        assert!(cut.kits < of_piece.kits && cut.kits_each < of_piece.kits_each && cut.revisions < of_piece.revisions);
+        assert!(
+            cut.kits < of_piece.kits
+                && cut.kits_each < of_piece.kits_each
+                && cut.revisions < of_piece.revisions
+        );
     }
-    let few = Budget::of_cut_key(&Rounds { kits: 1, mendings: 0, kits_in_all: 1 }, 0);
-    assert_eq!((few.kits_each, few.kits, few.revisions), (1, 1, 0), "the user's bounds are bounds");
+    let few = Budget::of_cut_key(
+        &Rounds {
+            kits: 1,
+            mendings: 0,
+            kits_in_all: 1,
+        },
+        0,
+    );
+    assert_eq!(
+        (few.kits_each, few.kits, few.revisions),
+        (1, 1, 0),
+        "the user's bounds are bounds"
+    );
     let half_gone = |gone| {
         let mut left = of_piece;
         left.revisions -= gone;
@@ -232,14 +316,34 @@ struct Ball {
 impl Ball {
     fn new() -> Self {
         let params = Params::default();
-        let told = Warning { code: "of-the-wall".into(), message: String::new(), pieces: Vec::new(), at: None };
-        let wall = Wall { settings: Settings::resolve(&params), strength: None, warnings: vec![told] };
-        Self { model: Solid::new(testing::sphere(2, Vec3::splat(20.0))).unwrap(), params, wall }
+        let told = Warning {
+            code: "of-the-wall".into(),
+            message: String::new(),
+            pieces: Vec::new(),
+            at: None,
+        };
+        let wall = Wall {
+            settings: Settings::resolve(&params),
+            strength: None,
+            warnings: vec![told],
+        };
+        Self {
+            model: Solid::new(testing::sphere(2, Vec3::splat(20.0))).unwrap(),
+            params,
+            wall,
+        }
     }
 
     fn job(&self) -> Job<'_> {
         let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
-        Job { params: &self.params, model: &self.model, labels: None, wall: &self.wall, stress: None, surface }
+        Job {
+            params: &self.params,
+            model: &self.model,
+            labels: None,
+            wall: &self.wall,
+            stress: None,
+            surface,
+        }
     }
 
     fn candidate(&self) -> Candidate<'_> {
@@ -253,12 +357,16 @@ impl Ball {
     }
 
     /// The outcome of kits that are made one after the other for these places.
-    fn outcome(&self, tried: Vec<(Option<KeySite>, Result<Explored, DesignError>)>) -> (Vec<bool>, Option<Design>) {
+    fn outcome(
+        &self,
+        tried: Vec<(Option<KeySite>, Result<Explored, DesignError>)>,
+    ) -> (Vec<bool>, Option<Design>) {
         let (ctx, mut best, mut needed) = (Ctx::quiet(), Best::default(), Vec::new());
         for (place, explored) in tried {
             needed.push(!best.is_enough(place.as_ref()));
             if needed[needed.len() - 1] {
-                best.add(&ctx, place.as_ref(), self.candidate(), explored).unwrap();
+                best.add(&ctx, place.as_ref(), self.candidate(), explored)
+                    .unwrap();
             }
         }
         match best.finished(&ctx, &self.job()).unwrap() {
@@ -277,11 +385,21 @@ fn site() -> KeySite {
         depth_mm: 5.0,
         corner_mm: 1.0,
     };
-    KeySite { prism, flat_share: 1.0, side_share: 1.0, rail_mm: 0.0, area_mm2: 100.0, score: 1.0 }
+    KeySite {
+        prism,
+        flat_share: 1.0,
+        side_share: 1.0,
+        rail_mm: 0.0,
+        area_mm2: 100.0,
+        score: 1.0,
+    }
 }
 
 fn made(kit: Kit) -> Result<Explored, DesignError> {
-    Ok(Explored { kit: Some(kit), failure: Failure::default() })
+    Ok(Explored {
+        kit: Some(kit),
+        failure: Failure::default(),
+    })
 }
 
 fn codes(design: &Design) -> Vec<&str> {
@@ -290,7 +408,8 @@ fn codes(design: &Design) -> Vec<&str> {
 
 #[test]
 fn a_kit_that_passes_ends_the_job() {
-    let (needed, design) = Ball::new().outcome(vec![(Some(site()), made(good())), (Some(site()), made(good()))]);
+    let (needed, design) =
+        Ball::new().outcome(vec![(Some(site()), made(good())), (Some(site()), made(good()))]);
     assert_eq!(needed, [true, false]);
     assert!(design.unwrap().kit.verification.passed());
 }
@@ -308,20 +427,41 @@ fn a_key_that_cannot_be_cut_is_a_reason_and_no_end() {
     let impossible = || (Some(site()), Err(DesignError::Choice(ChoiceError::NoPlan)));
     let (_, design) = Ball::new().outcome(vec![impossible(), (None, made(good()))]);
     let design = design.unwrap();
-    let told = design.warnings.iter().find(|w| w.code == "key-not-cut").expect("it is told");
+    let told = design
+        .warnings
+        .iter()
+        .find(|w| w.code == "key-not-cut")
+        .expect("it is told");
     assert!(told.message.contains("it cannot be made"), "{}", told.message);
-    assert!(Best::default().add(&Ctx::quiet(), Some(&site()), Ball::new().candidate(), Err(Cancelled.into())).is_err());
+    assert!(
+        Best::default()
+            .add(
+                &Ctx::quiet(),
+                Some(&site()),
+                Ball::new().candidate(),
+                Err(Cancelled.into())
+            )
+            .is_err()
+    );
 }
 
 #[test]
 fn of_kits_that_fail_alike_the_piece_as_it_is_stays_and_a_worse_one_does_not() {
     let ball = Ball::new();
     let with_key = |own: Kit, piece: Kit| {
-        ball.outcome(vec![(Some(site()), made(own)), (None, made(piece))]).1.expect("a kit was made")
+        ball.outcome(vec![(Some(site()), made(own)), (None, made(piece))])
+            .1
+            .expect("a kit was made")
     };
-    assert_eq!(with_key(loose(1), loose(0)).kit.verification.findings, loose(0).verification.findings);
+    assert_eq!(
+        with_key(loose(1), loose(0)).kit.verification.findings,
+        loose(0).verification.findings
+    );
     let worse = kit(&[("holds", false), ("closed", false)], Vec::new());
-    assert_eq!(with_key(loose(1), worse).kit.verification.findings, loose(1).verification.findings);
+    assert_eq!(
+        with_key(loose(1), worse).kit.verification.findings,
+        loose(1).verification.findings
+    );
 }
 
 #[test]
@@ -331,18 +471,31 @@ fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_given_out() {
     let (_, design) = Ball::new().outcome(vec![(Some(site()), made(other)), (None, made(good()))]);
     let design = design.unwrap();
     let all = codes(&design);
-    assert!(all.contains(&"of-the-kit") && all.contains(&"of-the-wall") && all.contains(&"key-not-cut"), "{all:?}");
+    assert!(
+        all.contains(&"of-the-kit") && all.contains(&"of-the-wall") && all.contains(&"key-not-cut"),
+        "{all:?}"
+    );
     assert!(!all.contains(&"of-another-kit"));
 }
 
 #[test]
 fn without_any_plan_the_answer_is_why() {
-    let failure = || Failure { reason: "all are in each other's way".into(), ..Failure::default() };
-    let none = || Ok(Explored { kit: None, failure: failure() });
+    let failure = || Failure {
+        reason: "all are in each other's way".into(),
+        ..Failure::default()
+    };
+    let none = || {
+        Ok(Explored {
+            kit: None,
+            failure: failure(),
+        })
+    };
     let ball = Ball::new();
     let (ctx, mut best) = (Ctx::quiet(), Best::default());
     best.add(&ctx, Some(&site()), ball.candidate(), none()).unwrap();
     best.add(&ctx, None, ball.candidate(), none()).unwrap();
-    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job()).unwrap() else { panic!("no kit") };
+    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job()).unwrap() else {
+        panic!("no kit")
+    };
     assert_eq!(reason, failure().reason);
 }

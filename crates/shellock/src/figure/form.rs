@@ -15,11 +15,20 @@ pub(super) enum Form {
         turn: DQuat,
     },
     /// The hull of two balls.
-    RoundCone { a: Vec3, b: Vec3, radius_a: f64, radius_b: f64 },
+    RoundCone {
+        a: Vec3,
+        b: Vec3,
+        radius_a: f64,
+        radius_b: f64,
+    },
     /// A tube of varying thickness: rounded cones from each (point, radius) to the next.
     Chain { stations: Vec<(Vec3, f64)> },
     /// A torus around the z axis through `center`.
-    Ring { center: Vec3, radius: f64, thickness: f64 },
+    Ring {
+        center: Vec3,
+        radius: f64,
+        thickness: f64,
+    },
 }
 
 /// Forms united one after the other, each with its own blend, and cut off below z = 0.
@@ -47,7 +56,12 @@ impl Sculpture {
     /// Adds a form; `blend` is the width, in units, over which it runs into what is there.
     pub fn add(&mut self, form: Form, blend: f64) -> &mut Self {
         let bounds = form.bounds();
-        self.parts.push(Part { form, blend, bounds, limb: self.limb });
+        self.parts.push(Part {
+            form,
+            blend,
+            bounds,
+            limb: self.limb,
+        });
         self
     }
 
@@ -59,7 +73,12 @@ impl Sculpture {
 
     /// Adds a tube through `stations` of (point, radius), bent smoothly.
     pub fn add_chain(&mut self, stations: &[(Vec3, f64)], blend: f64) -> &mut Self {
-        self.add(Form::Chain { stations: spline(stations) }, blend)
+        self.add(
+            Form::Chain {
+                stations: spline(stations),
+            },
+            blend,
+        )
     }
 
     /// What is added from now on is another limb.
@@ -76,7 +95,10 @@ impl Sculpture {
     /// The limb that a place of the surface is on: 0 is the trunk.
     pub fn limb_at(&self, p: Vec3) -> u32 {
         let value = |part: &Part| part.form.value(p, f64::NEG_INFINITY);
-        self.parts.iter().max_by(|a, b| value(a).total_cmp(&value(b))).map_or(0, |part| part.limb)
+        self.parts
+            .iter()
+            .max_by(|a, b| value(a).total_cmp(&value(b)))
+            .map_or(0, |part| part.limb)
     }
 
     /// Positive inside.
@@ -93,10 +115,16 @@ impl Sculpture {
 
     /// A box that contains the figure.
     pub fn bounds(&self) -> Aabb {
-        let all = self.parts.iter().fold(Aabb::EMPTY, |b, part| b.union(part.bounds));
+        let all = self
+            .parts
+            .iter()
+            .fold(Aabb::EMPTY, |b, part| b.union(part.bounds));
         let widest_blend = self.parts.iter().map(|part| part.blend).fold(0.0, f64::max);
         let grown = all.grown(0.25 * widest_blend);
-        Aabb { min: grown.min.with_z(0.0), max: grown.max }
+        Aabb {
+            min: grown.min.with_z(0.0),
+            max: grown.max,
+        }
     }
 }
 
@@ -115,8 +143,11 @@ pub(super) fn spline(stations: &[(Vec3, f64)]) -> Vec<(Vec3, f64)> {
         let [before, a, b, after] = [at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2)];
         for step in 1..=SPLINE_STEPS {
             let t = step as f64 / SPLINE_STEPS as f64;
-            let [rise, bend, twist] =
-                [b - before, 2.0 * before - 5.0 * a + 4.0 * b - after, 3.0 * (a - b) + after - before];
+            let [rise, bend, twist] = [
+                b - before,
+                2.0 * before - 5.0 * a + 4.0 * b - after,
+                3.0 * (a - b) + after - before,
+            ];
             let q = a + 0.5 * t * (rise + t * (bend + t * twist));
             curve.push((q.truncate(), q.w));
         }
@@ -124,7 +155,8 @@ pub(super) fn spline(stations: &[(Vec3, f64)]) -> Vec<(Vec3, f64)> {
     curve
 }
 
-/// The greater of both, raised by up to `width / 4` where they are equal; exact where they differ by `width` or more.
+/// The greater of both, raised by up to `width / 4` where they are equal; exact where they differ by `width`
+/// or more.
 fn smooth_max(a: f64, b: f64, width: f64) -> f64 {
     let overlap = (width - (a - b).abs()).max(0.0) / width.max(1e-9);
     a.max(b) + 0.25 * width * overlap * overlap
@@ -138,44 +170,87 @@ impl Form {
 
     /// An ellipsoid along the axes.
     pub fn ellipsoid(center: Vec3, half_axes: Vec3) -> Self {
-        Self::Ellipsoid { center, half_axes, turn: DQuat::IDENTITY }
+        Self::Ellipsoid {
+            center,
+            half_axes,
+            turn: DQuat::IDENTITY,
+        }
     }
 
     /// An ellipsoid turned about its centre, first about x, then y, then z, in degrees.
     pub fn turned_ellipsoid(center: Vec3, half_axes: Vec3, [x, y, z]: [f64; 3]) -> Self {
         let about = |axis: Vec3, degrees: f64| DQuat::from_axis_angle(axis, degrees.to_radians());
-        Self::Ellipsoid { center, half_axes, turn: about(Vec3::Z, z) * about(Vec3::Y, y) * about(Vec3::X, x) }
+        Self::Ellipsoid {
+            center,
+            half_axes,
+            turn: about(Vec3::Z, z) * about(Vec3::Y, y) * about(Vec3::X, x),
+        }
     }
 
     fn mirrored(&self) -> Self {
         let flip = |p: Vec3| p.with_x(-p.x);
         match *self {
-            Self::Ellipsoid { center, half_axes, turn } => Self::Ellipsoid {
+            Self::Ellipsoid {
+                center,
+                half_axes,
+                turn,
+            } => Self::Ellipsoid {
                 center: flip(center),
                 half_axes,
                 turn: DQuat::from_xyzw(turn.x, -turn.y, -turn.z, turn.w),
             },
-            Self::RoundCone { a, b, radius_a, radius_b } => {
-                Self::RoundCone { a: flip(a), b: flip(b), radius_a, radius_b }
-            }
-            Self::Chain { ref stations } => {
-                Self::Chain { stations: stations.iter().map(|&(p, radius)| (flip(p), radius)).collect() }
-            }
-            Self::Ring { center, radius, thickness } => Self::Ring { center: flip(center), radius, thickness },
+            Self::RoundCone {
+                a,
+                b,
+                radius_a,
+                radius_b,
+            } => Self::RoundCone {
+                a: flip(a),
+                b: flip(b),
+                radius_a,
+                radius_b,
+            },
+            Self::Chain { ref stations } => Self::Chain {
+                stations: stations.iter().map(|&(p, radius)| (flip(p), radius)).collect(),
+            },
+            Self::Ring {
+                center,
+                radius,
+                thickness,
+            } => Self::Ring {
+                center: flip(center),
+                radius,
+                thickness,
+            },
         }
     }
 
-    /// Positive inside; where it is below `floor` any value up to `floor` may come, which spares a chain most of its work.
+    /// Positive inside; where it is below `floor` any value up to `floor` may come, which spares a chain most
+    /// of its work.
     fn value(&self, p: Vec3, floor: f64) -> f64 {
         match *self {
-            Self::Ellipsoid { center, half_axes, turn } => {
+            Self::Ellipsoid {
+                center,
+                half_axes,
+                turn,
+            } => {
                 let q = turn.inverse() * (p - center);
                 let k = (q / half_axes).length();
-                // Distance to first order near the surface; the least half axis at the centre, where the formula is 0/0.
+                // Distance to first order near the surface; the least half axis at the centre, where the
+                // formula is 0/0.
                 let slope = (q / (half_axes * half_axes)).length();
-                if slope < 1e-9 { half_axes.min_element() } else { k * (1.0 - k) / slope }
+                if slope < 1e-9 {
+                    half_axes.min_element()
+                } else {
+                    k * (1.0 - k) / slope
+                }
             }
-            Self::RoundCone { a, b, radius_a, radius_b } => round_cone(p, a, b, radius_a, radius_b),
+            Self::RoundCone {
+                a,
+                b,
+                radius_a,
+                radius_b,
+            } => round_cone(p, a, b, radius_a, radius_b),
             Self::Chain { ref stations } => stations.windows(2).fold(floor, |value, w| {
                 let [(a, radius_a), (b, radius_b)] = [w[0], w[1]];
                 // No closer than the ball around both ends: spares most of the work.
@@ -185,7 +260,11 @@ impl Form {
                 }
                 value.max(round_cone(p, a, b, radius_a, radius_b))
             }),
-            Self::Ring { center, radius, thickness } => {
+            Self::Ring {
+                center,
+                radius,
+                thickness,
+            } => {
                 let q = p - center;
                 thickness - (q.truncate().length() - radius).hypot(q.z)
             }
@@ -193,20 +272,43 @@ impl Form {
     }
 
     fn bounds(&self) -> Aabb {
-        let around = |center: Vec3, reach: f64| Aabb { min: center - reach, max: center + reach };
+        let around = |center: Vec3, reach: f64| Aabb {
+            min: center - reach,
+            max: center + reach,
+        };
         match *self {
-            Self::Ellipsoid { center, half_axes, turn } => {
+            Self::Ellipsoid {
+                center,
+                half_axes,
+                turn,
+            } => {
                 let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| half_axes.dot(axis) * (turn * axis));
-                let reach = Vec3::from_array([0, 1, 2].map(|i| axes.iter().map(|a| a[i] * a[i]).sum::<f64>().sqrt()));
-                Aabb { min: center - reach, max: center + reach }
+                let reach =
+                    Vec3::from_array([0, 1, 2].map(|i| axes.iter().map(|a| a[i] * a[i]).sum::<f64>().sqrt()));
+                Aabb {
+                    min: center - reach,
+                    max: center + reach,
+                }
             }
-            Self::RoundCone { a, b, radius_a, radius_b } => around(a, radius_a).union(around(b, radius_b)),
-            Self::Chain { ref stations } => {
-                stations.iter().fold(Aabb::EMPTY, |b, &(p, radius)| b.union(around(p, radius)))
-            }
-            Self::Ring { center, radius, thickness } => {
+            Self::RoundCone {
+                a,
+                b,
+                radius_a,
+                radius_b,
+            } => around(a, radius_a).union(around(b, radius_b)),
+            Self::Chain { ref stations } => stations
+                .iter()
+                .fold(Aabb::EMPTY, |b, &(p, radius)| b.union(around(p, radius))),
+            Self::Ring {
+                center,
+                radius,
+                thickness,
+            } => {
                 let reach = Vec3::new(radius + thickness, radius + thickness, thickness);
-                Aabb { min: center - reach, max: center + reach }
+                Aabb {
+                    min: center - reach,
+                    max: center + reach,
+                }
             }
         }
     }
@@ -242,7 +344,11 @@ mod tests {
     fn a_round_cone_touches_both_balls_and_falls_by_one_a_unit() {
         let cone = |p| round_cone(p, Vec3::ZERO, Vec3::X * 10.0, 4.0, 2.0);
         assert!((cone(Vec3::X * -4.0)).abs() < 1e-12 && cone(Vec3::X * 12.0).abs() < 1e-12);
-        for p in [Vec3::new(3.0, 5.0, 1.0), Vec3::new(-2.0, 3.0, 0.0), Vec3::new(11.0, 1.0, -3.0)] {
+        for p in [
+            Vec3::new(3.0, 5.0, 1.0),
+            Vec3::new(-2.0, 3.0, 0.0),
+            Vec3::new(11.0, 1.0, -3.0),
+        ] {
             let slope = |axis: Vec3| (cone(p + 1e-5 * axis) - cone(p - 1e-5 * axis)) / 2e-5;
             let gradient = Vec3::new(slope(Vec3::X), slope(Vec3::Y), slope(Vec3::Z));
             assert!((gradient.length() - 1.0).abs() < 1e-6);
@@ -251,7 +357,11 @@ mod tests {
 
     #[test]
     fn a_mirrored_form_has_mirrored_values() {
-        let form = Form::turned_ellipsoid(Vec3::new(3.0, 1.0, 2.0), Vec3::new(1.0, 2.0, 3.0), [20.0, 30.0, 40.0]);
+        let form = Form::turned_ellipsoid(
+            Vec3::new(3.0, 1.0, 2.0),
+            Vec3::new(1.0, 2.0, 3.0),
+            [20.0, 30.0, 40.0],
+        );
         for p in [Vec3::new(3.5, 0.0, 1.0), Vec3::new(-1.0, 2.0, 3.0)] {
             assert!((form.value(p, -99.0) - form.mirrored().value(p.with_x(-p.x), -99.0)).abs() < 1e-12);
         }

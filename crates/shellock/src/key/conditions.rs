@@ -1,4 +1,5 @@
-//! What a key's shape must be so that it slides on rails [Yao2017, Sect. 4.2 and 6.1], for a piece that the user chose.
+//! What a key's shape must be so that it slides on rails [Yao2017, Sect. 4.2 and 6.1], for a piece that the
+//! user chose.
 
 use shellock_geom::Vec3;
 
@@ -9,7 +10,8 @@ use crate::{PatchId, SegmentedSurface, Warning};
 const LEAST_FLAT: f64 = 0.5;
 /// Least straight seam along the slide on one side, in connector sizes: shorter rails do not guide.
 const LEAST_STRAIGHT_SIZES: f64 = 3.0;
-/// A seam runs along the slide where |t·s| is above the first, and slides within the surface where |s·N| is below the second.
+/// A seam runs along the slide where |t·s| is above the first, and slides within the surface where |s·N| is
+/// below the second.
 const ALONG: f64 = 0.95;
 const MOST_OUTWARDS: f64 = 0.25;
 /// Planes tried, through places spread over the piece.
@@ -24,22 +26,31 @@ pub struct KeyConditions {
     pub flat_share: f64,
     /// The point that is farthest from that plane, and how far, mm.
     pub farthest: (Vec3, f64),
-    /// The longest straight stretch of its seams along the slide, mm, and its middle; where there is none, 0 and where the seam comes
-    /// nearest to it.
+    /// The longest straight stretch of its seams along the slide, mm, and its middle; where there is none, 0
+    /// and where the seam comes nearest to it.
     pub straight: (f64, Vec3),
 }
 
-/// Measures `key`, which slides out along the unit vector `slide`; `None` where the piece has no area or no seam.
+/// Measures `key`, which slides out along the unit vector `slide`; `None` where the piece has no area or no
+/// seam.
 pub fn conditions(surface: &SegmentedSurface, key: PatchId, slide: Vec3) -> Option<KeyConditions> {
     let (flat_share, farthest) = flatness(surface, key)?;
-    Some(KeyConditions { flat_share, farthest, straight: longest_straight(surface, key, slide)? })
+    Some(KeyConditions {
+        flat_share,
+        farthest,
+        straight: longest_straight(surface, key, slide)?,
+    })
 }
 
 impl KeyConditions {
-    /// What is broken, in words and with places. `connector_mm` is the size of its connectors; whether a key `may_be_cut`
-    /// instead, which was not tried.
+    /// What is broken, in words and with places. `connector_mm` is the size of its connectors; whether a key
+    /// `may_be_cut` instead, which was not tried.
     pub fn problems(&self, key: PatchId, connector_mm: f64, may_be_cut: bool) -> Vec<Warning> {
-        let or_cut = if may_be_cut { ", or let the key be cut (--key auto)" } else { "" };
+        let or_cut = if may_be_cut {
+            ", or let the key be cut (--key auto)"
+        } else {
+            ""
+        };
         let warning = |code: &str, at: Vec3, message: String| Warning {
             code: code.into(),
             message,
@@ -69,12 +80,20 @@ impl KeyConditions {
 }
 
 fn flatness(surface: &SegmentedSurface, key: PatchId) -> Option<(f64, (Vec3, f64))> {
-    let faces: Vec<usize> = (0..surface.patch_of_face.len()).filter(|&f| surface.patch_of_face[f] == key).collect();
-    let spots: Vec<Spot> =
-        Spot::sample(&surface.mesh, faces.iter().copied(), 1).into_iter().filter(|s| s.normal != Vec3::ZERO).collect();
+    let faces: Vec<usize> = (0..surface.patch_of_face.len())
+        .filter(|&f| surface.patch_of_face[f] == key)
+        .collect();
+    let spots: Vec<Spot> = Spot::sample(&surface.mesh, faces.iter().copied(), 1)
+        .into_iter()
+        .filter(|s| s.normal != Vec3::ZERO)
+        .collect();
     let total: f64 = spots.iter().map(|s| s.area).sum();
     let tolerance_mm = Plane::tolerance_mm(surface.mesh.bounds().size().max_element());
-    let through = |s: &Spot| Plane { at: s.center, normal: s.normal, tolerance_mm };
+    let through = |s: &Spot| Plane {
+        at: s.center,
+        normal: s.normal,
+        tolerance_mm,
+    };
     let step = spots.len().div_ceil(N_PLANES).max(1);
     let planes = spots.iter().step_by(step).map(|s| through(s).refined(&spots));
     let best = planes.max_by(|a, b| a.area_mm2(&spots).total_cmp(&b.area_mm2(&spots)))?;
@@ -102,7 +121,10 @@ fn longest_straight(surface: &SegmentedSurface, key: PatchId, slide: Vec3) -> Op
                 nearest = Some((along, start));
             }
             let aside = |q: Vec3| ((q - start) - (q - start).dot(slide) * slide).length();
-            let n = steps[from..].iter().take_while(|(_, q, along)| *along > ALONG && aside(*q) < STRAIGHT_MM).count();
+            let n = steps[from..]
+                .iter()
+                .take_while(|(_, q, along)| *along > ALONG && aside(*q) < STRAIGHT_MM)
+                .count();
             if n > 0 {
                 let end = steps[from + n - 1].1;
                 let length_mm = start.distance(end);
@@ -123,7 +145,11 @@ mod tests {
 
     /// A cube of 40 mm whose top is the key; its other faces alternate between two pieces.
     fn cube() -> SegmentedSurface {
-        let mesh = Volume::cuboid(Aabb { min: Vec3::ZERO, max: Vec3::splat(40.0) }).to_mesh();
+        let mesh = Volume::cuboid(Aabb {
+            min: Vec3::ZERO,
+            max: Vec3::splat(40.0),
+        })
+        .to_mesh();
         let label = |f: usize| {
             let n = mesh.face_normal(f);
             if n.z > 0.5 {
@@ -136,7 +162,12 @@ mod tests {
         };
         let patch_of_face = (0..mesh.triangles.len()).map(|f| PatchId(label(f))).collect();
         let source_face = (0..mesh.triangles.len() as u32).collect();
-        SegmentedSurface { mesh, patch_of_face, source_face, n_patches: 3 }
+        SegmentedSurface {
+            mesh,
+            patch_of_face,
+            source_face,
+            n_patches: 3,
+        }
     }
 
     #[test]
@@ -152,7 +183,10 @@ mod tests {
         let diagonal = Vec3::new(1.0, 1.0, 0.0).normalize();
         let found = conditions(&cube(), PatchId(0), diagonal).unwrap();
         let problems = found.problems(PatchId(0), 2.5, true);
-        assert_eq!(problems.iter().map(|p| p.code.as_str()).collect::<Vec<_>>(), ["key-not-straight"]);
+        assert_eq!(
+            problems.iter().map(|p| p.code.as_str()).collect::<Vec<_>>(),
+            ["key-not-straight"]
+        );
         assert!(problems[0].at.is_some_and(|at| (at[2] - 40.0).abs() < 1e-9));
     }
 

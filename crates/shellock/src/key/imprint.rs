@@ -14,11 +14,12 @@ const EDGE_MM: f64 = 1.2;
 const MOST_HALVINGS: usize = 6;
 /// No point lies nearer to the cut, mm, so that no triangle is a sliver.
 const LEAST_MM: f64 = 0.02;
-/// A fragment of a patch stays a patch where it has more than this share of an ordinary one; else it joins its longest neighbour.
+/// A fragment of a patch stays a patch where it has more than this share of an ordinary one; else it joins
+/// its longest neighbour.
 const FRAGMENT_SHARE: f64 = 0.08;
 
-/// The surface with what lies in `prism` as a patch of its own, and its id; `None` where that is nothing, or everything, or not
-/// nearly all of one patch.
+/// The surface with what lies in `prism` as a patch of its own, and its id; `None` where that is nothing, or
+/// everything, or not nearly all of one patch.
 ///
 /// Patches that the key cuts in two become two, or lose a small part to a neighbour. Ids change.
 pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(SegmentedSurface, PatchId)> {
@@ -34,7 +35,13 @@ pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(Segmente
         .source_face
         .iter()
         .zip(&cut.side)
-        .map(|(&f, side)| if *side == Side::Positive { key } else { patch_of_face[f as usize].0 })
+        .map(|(&f, side)| {
+            if *side == Side::Positive {
+                key
+            } else {
+                patch_of_face[f as usize].0
+            }
+        })
         .collect();
     let topology = Topology::of_mesh(&cut.mesh)?;
     let (label, n_patches) = without_fragments(&cut.mesh, &topology, label, key);
@@ -76,10 +83,16 @@ fn refined(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(TriMesh, Vec
         let is_long = |a: u32, b: u32| {
             let (a, b) = (a as usize, b as usize);
             let length = mesh.points[a].distance(mesh.points[b]);
-            // Inside, distances end at the corner radius, so the seam may be nearer than they say by no more than that.
-            length > EDGE_MM && inside[a].min(inside[b]) < prism.corner_mm && inside[a].max(inside[b]) > -length
+            // Inside, distances end at the corner radius, so the seam may be nearer than they say by no more
+            // than that.
+            length > EDGE_MM
+                && inside[a].min(inside[b]) < prism.corner_mm
+                && inside[a].max(inside[b]) > -length
         };
-        let any = mesh.triangles.iter().any(|&[a, b, c]| is_long(a, b) || is_long(b, c) || is_long(c, a));
+        let any = mesh
+            .triangles
+            .iter()
+            .any(|&[a, b, c]| is_long(a, b) || is_long(b, c) || is_long(c, a));
         if !any {
             break;
         }
@@ -91,9 +104,15 @@ fn refined(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(TriMesh, Vec
     Some((solid.into_mesh(), patch, source))
 }
 
-/// Labels such that every patch is connected: fragments that are small join the neighbour they have the longest border with, others
-/// become patches. Numbers follow the old ones; the second result is how many there are.
-fn without_fragments(mesh: &TriMesh, topology: &Topology, mut label: Vec<u32>, key: u32) -> (Vec<u32>, usize) {
+/// Labels such that every patch is connected: fragments that are small join the neighbour they have the
+/// longest border with, others become patches. Numbers follow the old ones; the second result is how many
+/// there are.
+fn without_fragments(
+    mesh: &TriMesh,
+    topology: &Topology,
+    mut label: Vec<u32>,
+    key: u32,
+) -> (Vec<u32>, usize) {
     let typical = mesh.area() / f64::from(key.max(1));
     loop {
         let (component, n) = components(topology, |f, g| label[f as usize] == label[g as usize]);
@@ -103,33 +122,62 @@ fn without_fragments(mesh: &TriMesh, topology: &Topology, mut label: Vec<u32>, k
             area[c as usize] += mesh.face_area(face);
             of[c as usize] = label[face];
         }
-        let largest = |c: usize| (0..n).filter(|&d| of[d] == of[c]).all(|d| area[d] < area[c] || d == c);
+        let largest = |c: usize| {
+            (0..n)
+                .filter(|&d| of[d] == of[c])
+                .all(|d| area[d] < area[c] || d == c)
+        };
         // Of the key only one part remains; a patch may fall into several large ones, or vanish.
-        let is_fragment = |c: usize| if of[c] == key { !largest(c) } else { area[c] < FRAGMENT_SHARE * typical };
-        let fragment = (0..n).filter(|&c| is_fragment(c)).min_by(|&c, &d| area[c].total_cmp(&area[d]));
+        let is_fragment = |c: usize| {
+            if of[c] == key {
+                !largest(c)
+            } else {
+                area[c] < FRAGMENT_SHARE * typical
+            }
+        };
+        let fragment = (0..n)
+            .filter(|&c| is_fragment(c))
+            .min_by(|&c, &d| area[c].total_cmp(&area[d]));
         let Some((fragment, into)) =
             fragment.and_then(|c| Some((c, neighbour(mesh, topology, &component, &of, c, key)?)))
         else {
             return numbered(&component, &of, n);
         };
-        component.iter().zip(&mut label).filter(|(c, _)| **c as usize == fragment).for_each(|(_, k)| *k = into);
+        component
+            .iter()
+            .zip(&mut label)
+            .filter(|(c, _)| **c as usize == fragment)
+            .for_each(|(_, k)| *k = into);
     }
 }
 
 /// The label of the component that `c` has the longest border with; the key only where there is no other.
-fn neighbour(mesh: &TriMesh, topology: &Topology, component: &[u32], of: &[u32], c: usize, key: u32) -> Option<u32> {
+fn neighbour(
+    mesh: &TriMesh,
+    topology: &Topology,
+    component: &[u32],
+    of: &[u32],
+    c: usize,
+    key: u32,
+) -> Option<u32> {
     let mut border: std::collections::BTreeMap<u32, f64> = std::collections::BTreeMap::new();
     for (face, _) in component.iter().enumerate().filter(|(_, d)| **d as usize == c) {
         for (side, &g) in topology.neighbours(face as u32).iter().enumerate() {
             let other = of[component[g as usize] as usize];
             if component[g as usize] as usize != c && other != of[c] {
                 let t = mesh.triangles[face];
-                let (a, b) = (mesh.points[t[side] as usize], mesh.points[t[(side + 1) % 3] as usize]);
+                let (a, b) = (
+                    mesh.points[t[side] as usize],
+                    mesh.points[t[(side + 1) % 3] as usize],
+                );
                 *border.entry(other).or_default() += a.distance(b);
             }
         }
     }
-    border.into_iter().max_by(|a, b| (a.0 != key).cmp(&(b.0 != key)).then(a.1.total_cmp(&b.1))).map(|(k, _)| k)
+    border
+        .into_iter()
+        .max_by(|a, b| (a.0 != key).cmp(&(b.0 != key)).then(a.1.total_cmp(&b.1)))
+        .map(|(k, _)| k)
 }
 
 /// Components numbered by their old label, then by their lowest face.
@@ -137,6 +185,9 @@ fn numbered(component: &[u32], of: &[u32], n: usize) -> (Vec<u32>, usize) {
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by_key(|&c| (of[c], c));
     let mut number = vec![0; n];
-    order.into_iter().enumerate().for_each(|(i, c)| number[c] = i as u32);
+    order
+        .into_iter()
+        .enumerate()
+        .for_each(|(i, c)| number[c] = i as u32);
     (component.iter().map(|&c| number[c as usize]).collect(), n)
 }

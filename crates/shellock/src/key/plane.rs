@@ -47,7 +47,8 @@ impl Plane {
 
     /// Whether the face lies on the plane and faces the same way.
     pub fn has(&self, s: &Spot) -> bool {
-        (s.center - self.at).dot(self.normal).abs() < self.tolerance_mm && s.normal.dot(self.normal) > INLIER_COSINE
+        (s.center - self.at).dot(self.normal).abs() < self.tolerance_mm
+            && s.normal.dot(self.normal) > INLIER_COSINE
     }
 
     /// Area of `spots` on it, mm².
@@ -58,9 +59,15 @@ impl Plane {
     /// The plane of least squares through those of `spots` that lie on this one, where more lie on it.
     pub fn refined(self, spots: &[Spot]) -> Self {
         let inliers: Vec<Spot> = spots.iter().copied().filter(|s| self.has(s)).collect();
-        let Some((at, normal)) = least_squares_plane(&inliers, self.normal) else { return self };
+        let Some((at, normal)) = least_squares_plane(&inliers, self.normal) else {
+            return self;
+        };
         let better = Self { at, normal, ..self };
-        if better.area_mm2(spots) > self.area_mm2(spots) { better } else { self }
+        if better.area_mm2(spots) > self.area_mm2(spots) {
+            better
+        } else {
+            self
+        }
     }
 }
 
@@ -80,5 +87,12 @@ fn least_squares_plane(spots: &[Spot], towards: Vec3) -> Option<(Vec3, Vec3)> {
     let eigen = spread.symmetric_eigen();
     let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
     let normal = Vec3::new(least[0], least[1], least[2]).try_normalize()?;
-    Some((center, if normal.dot(towards) < 0.0 { -normal } else { normal }))
+    Some((
+        center,
+        if normal.dot(towards) < 0.0 {
+            -normal
+        } else {
+            normal
+        },
+    ))
 }

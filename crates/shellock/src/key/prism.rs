@@ -2,10 +2,12 @@
 
 use shellock_geom::Vec3;
 
-/// How far each side leans away from the slide, as a tangent: 3°, so that the key is loose as soon as it moves.
+/// How far each side leans away from the slide, as a tangent: 3°, so that the key is loose as soon as it
+/// moves.
 const FLARE: f64 = 0.0524;
 
-/// A convex region, open towards `slide`: everything in it can leave along `slide` without meeting anything outside it.
+/// A convex region, open towards `slide`: everything in it can leave along `slide` without meeting anything
+/// outside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyPrism {
     /// A point of the plane, in the middle of the back edge.
@@ -44,11 +46,15 @@ impl KeyPrism {
         self.half_width_mm + FLARE * along_mm
     }
 
-    /// How far inside `p` lies, mm: positive inside, no farther than the corner radius, exact there; negative outside, exact but for the
-    /// cosine of the flare.
+    /// How far inside `p` lies, mm: positive inside, no farther than the corner radius, exact there; negative
+    /// outside, exact but for the cosine of the flare.
     pub fn inside_mm(&self, p: Vec3) -> f64 {
         let [along, across, below] = self.coordinates(p);
-        let inside = [along, self.half_width_at(along) - across.abs(), self.depth_mm - below];
+        let inside = [
+            along,
+            self.half_width_at(along) - across.abs(),
+            self.depth_mm - below,
+        ];
         let lacks = inside.map(|mm| (self.corner_mm - mm).max(0.0));
         self.corner_mm - Vec3::from(lacks).length()
     }

@@ -57,16 +57,21 @@ pub struct KeySite {
     pub score: f64,
 }
 
-/// The best places for a key on `surface`, best first; none where there is no room. Same answer on any number of threads.
+/// The best places for a key on `surface`, best first; none where there is no room. Same answer on any number
+/// of threads.
 pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Result<Vec<KeySite>, Cancelled> {
     ctx.stage("key", 0)?;
     let mesh = &surface.mesh;
-    let Some(topology) = Topology::of_mesh(mesh) else { return Ok(Vec::new()) };
+    let Some(topology) = Topology::of_mesh(mesh) else {
+        return Ok(Vec::new());
+    };
     let n_faces = mesh.triangles.len();
     let spots = Spot::sample(mesh, 0..n_faces, n_faces.div_ceil(MOST_SPOTS).max(1));
     let planes = planes(params, mesh, &spots);
-    let mut candidates: Vec<KeySite> =
-        planes.par_iter().flat_map_iter(|plane| on_plane(params, &spots, *plane)).collect();
+    let mut candidates: Vec<KeySite> = planes
+        .par_iter()
+        .flat_map_iter(|plane| on_plane(params, &spots, *plane))
+        .collect();
     ctx.check()?;
     let by_score = |a: &KeySite, b: &KeySite| b.score.total_cmp(&a.score);
     candidates.sort_by(by_score);
@@ -87,7 +92,8 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
     for (site, _) in candidates.iter().zip(is_sound).filter(|(_, ok)| *ok) {
         let overlaps = |other: &KeySite| {
             let near = 0.5 * other.prism.half_width_mm;
-            other.prism.origin.distance(site.prism.origin) < near && other.prism.slide.dot(site.prism.slide) > 0.9
+            other.prism.origin.distance(site.prism.origin) < near
+                && other.prism.slide.dot(site.prism.slide) > 0.9
         };
         if found.len() < MOST_SITES && !found.iter().any(overlaps) {
             found.push(*site);
@@ -115,14 +121,22 @@ fn planes(params: &KeyParams, mesh: &TriMesh, spots: &[Spot]) -> Vec<Plane> {
     for s in spots {
         passed += s.area;
         while drawn.len() < at.len() && at[drawn.len()] < passed {
-            drawn.push(Plane { at: s.center, normal: s.normal, tolerance_mm });
+            drawn.push(Plane {
+                at: s.center,
+                normal: s.normal,
+                tolerance_mm,
+            });
         }
     }
     let mut refined: Vec<(f64, Plane)> = drawn
         .into_par_iter()
         .filter(|p| p.normal != Vec3::ZERO)
         .map(|p| {
-            let near: Vec<Spot> = spots.iter().copied().filter(|s| s.center.distance(p.at) < reach_mm).collect();
+            let near: Vec<Spot> = spots
+                .iter()
+                .copied()
+                .filter(|s| s.center.distance(p.at) < reach_mm)
+                .collect();
             let plane = p.refined(&near);
             (plane.area_mm2(&near), plane)
         })
@@ -138,25 +152,40 @@ fn planes(params: &KeyParams, mesh: &TriMesh, spots: &[Spot]) -> Vec<Plane> {
     kept
 }
 
-/// The plane, exactly level or upright where it is nearly so: nobody wants a model turned by a tenth of a degree.
+/// The plane, exactly level or upright where it is nearly so: nobody wants a model turned by a tenth of a
+/// degree.
 fn snapped(p: Plane) -> Plane {
     /// Cosine of 2°.
     const NEARLY: f64 = 0.9994;
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|a| [a, -a]);
-    axes.into_iter().find(|a| a.dot(p.normal) > NEARLY).map_or(p, |normal| Plane { normal, ..p })
+    axes.into_iter()
+        .find(|a| a.dot(p.normal) > NEARLY)
+        .map_or(p, |normal| Plane { normal, ..p })
 }
 
 /// All prisms on one plane, scored.
 fn on_plane(params: &KeyParams, spots: &[Spot], plane: Plane) -> Vec<KeySite> {
     let edge_mm = piece_edge_mm(params);
     let n = plane.normal;
-    let reachable: Vec<Spot> =
-        spots.iter().copied().filter(|s| (plane.at - s.center).dot(n) <= params.depth_mm()).collect();
+    let reachable: Vec<Spot> = spots
+        .iter()
+        .copied()
+        .filter(|s| (plane.at - s.center).dot(n) <= params.depth_mm())
+        .collect();
     let near = |s: &&Spot| s.center.distance(plane.at) < 1.5 * edge_mm;
-    let inliers: Vec<Spot> = reachable.iter().filter(near).copied().filter(|s| plane.has(s)).collect();
-    // The first slide is the axis nearest to the plane, so that level and upright planes try lattice directions.
+    let inliers: Vec<Spot> = reachable
+        .iter()
+        .filter(near)
+        .copied()
+        .filter(|s| plane.has(s))
+        .collect();
+    // The first slide is the axis nearest to the plane, so that level and upright planes try lattice
+    // directions.
     let axes = [Vec3::X, Vec3::Y, Vec3::Z];
-    let first = axes.into_iter().min_by(|a, b| a.dot(n).abs().total_cmp(&b.dot(n).abs())).expect("three axes");
+    let first = axes
+        .into_iter()
+        .min_by(|a, b| a.dot(n).abs().total_cmp(&b.dot(n).abs()))
+        .expect("three axes");
     let first = first.reject_from_normalized(n).normalize();
     let mut found = Vec::new();
     for k in 0..N_SLIDES {
@@ -186,21 +215,40 @@ fn along(
     width_mm: f64,
 ) -> Vec<KeySite> {
     let across = plane.normal.cross(slide);
-    let flat: Vec<[f64; 2]> =
-        inliers.iter().map(|s| s.center - plane.at).map(|d| [d.dot(slide), d.dot(across)]).collect();
+    let flat: Vec<[f64; 2]> = inliers
+        .iter()
+        .map(|s| s.center - plane.at)
+        .map(|d| [d.dot(slide), d.dot(across)])
+        .collect();
     let range = |axis: usize| {
-        flat.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), c| (lo.min(c[axis]), hi.max(c[axis])))
+        flat.iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), c| {
+                (lo.min(c[axis]), hi.max(c[axis]))
+            })
     };
     let (least, most) = range(1);
     if least > most {
         return Vec::new();
     }
     let half = 0.5 * width_mm;
-    let (from, to) = if most - least > width_mm { (least + half, most - half) } else { (0.5 * (least + most), 0.0) };
-    let n_steps = if to > from { ((to - from) / (STEP_SHARE * width_mm)).ceil() as usize } else { 0 };
+    let (from, to) = if most - least > width_mm {
+        (least + half, most - half)
+    } else {
+        (0.5 * (least + most), 0.0)
+    };
+    let n_steps = if to > from {
+        ((to - from) / (STEP_SHARE * width_mm)).ceil() as usize
+    } else {
+        0
+    };
     (0..=n_steps)
         .filter_map(|i| {
-            let middle = from + if n_steps > 0 { (to - from) * i as f64 / n_steps as f64 } else { 0.0 };
+            let middle = from
+                + if n_steps > 0 {
+                    (to - from) * i as f64 / n_steps as f64
+                } else {
+                    0.0
+                };
             let in_strip = flat.iter().filter(|c| (c[1] - middle).abs() < half);
             let front = in_strip.map(|c| c[0]).fold(f64::NEG_INFINITY, f64::max);
             if !front.is_finite() {
@@ -219,7 +267,13 @@ fn along(
         .collect()
 }
 
-fn scored(params: &KeyParams, spots: &[Spot], plane: Plane, prism: KeyPrism, length_mm: f64) -> Option<KeySite> {
+fn scored(
+    params: &KeyParams,
+    spots: &[Spot],
+    plane: Plane,
+    prism: KeyPrism,
+    length_mm: f64,
+) -> Option<KeySite> {
     let (mut area, mut flat, mut facing) = (0.0, 0.0, Vec3::ZERO);
     let mut sides = [0.0; 2];
     for s in spots {
@@ -245,13 +299,24 @@ fn scored(params: &KeyParams, spots: &[Spot], plane: Plane, prism: KeyPrism, len
     let flat_share = flat / area;
     let up = Vec3::from(params.up).normalize_or_zero();
     let shown = 0.5 * (1.0 + (facing / area).dot(up));
-    let turned = if Turn::laying(prism.normal, prism.slide).0.is_none() { 0.0 } else { TURN_COST };
+    let turned = if Turn::laying(prism.normal, prism.slide).0.is_none() {
+        0.0
+    } else {
+        TURN_COST
+    };
     let score = flat_share * side_share.sqrt() * flat.sqrt() * (1.0 - VISIBLE_COST * shown) * (1.0 - turned);
-    Some(KeySite { prism, flat_share, side_share, rail_mm: 0.0, area_mm2: area, score })
+    Some(KeySite {
+        prism,
+        flat_share,
+        side_share,
+        rail_mm: 0.0,
+        area_mm2: area,
+        score,
+    })
 }
 
-/// Length of the longest straight rail under the worse side: all of the key behind its front passes over it, so it must lie below that,
-/// and yet reach up to the wall at the side.
+/// Length of the longest straight rail under the worse side: all of the key behind its front passes over it,
+/// so it must lie below that, and yet reach up to the wall at the side.
 fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPrism) -> f64 {
     const N_ALONG: usize = 24;
     /// Places beside the seam, up to so far inwards, in connector sizes.
@@ -282,7 +347,11 @@ fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPri
             let mut least = f64::INFINITY;
             for to in from..N_ALONG {
                 least = least.min(rows[to][0]);
-                let passing = rows[..=to].iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+                let passing = rows[..=to]
+                    .iter()
+                    .flatten()
+                    .copied()
+                    .fold(f64::NEG_INFINITY, f64::max);
                 if !passing.is_finite() || passing - least > UNEVEN_SIZES * params.size_mm {
                     break;
                 }
@@ -310,10 +379,9 @@ fn has_room(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, site: &KeySit
             let from = prism.origin + along * prism.slide + across * prism.across() - START_MM * prism.normal;
             let hit = bvh.first_hit(from, -prism.normal, f64::INFINITY);
             n_all += 1;
-            n_free +=
-                usize::from(hit.is_some_and(|(face, mm)| {
-                    mm > needed_mm && mesh.face_normal(face as usize).dot(prism.normal) < 0.0
-                }));
+            n_free += usize::from(hit.is_some_and(|(face, mm)| {
+                mm > needed_mm && mesh.face_normal(face as usize).dot(prism.normal) < 0.0
+            }));
         }
     }
     n_free as f64 >= LEAST_ROOM * f64::from(n_all)
@@ -321,7 +389,9 @@ fn has_room(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, site: &KeySit
 
 /// Whether what is inside the prism and what is not are one component each.
 fn parts_in_two(mesh: &TriMesh, topology: &Topology, prism: &KeyPrism) -> bool {
-    let inside: Vec<bool> = (0..mesh.triangles.len()).map(|f| prism.contains(mesh.face_center(f))).collect();
+    let inside: Vec<bool> = (0..mesh.triangles.len())
+        .map(|f| prism.contains(mesh.face_center(f)))
+        .collect();
     let (component, n) = components(topology, |f, g| inside[f as usize] == inside[g as usize]);
     let mut area = vec![0.0; n];
     let mut is_inside = vec![false; n];
@@ -330,7 +400,12 @@ fn parts_in_two(mesh: &TriMesh, topology: &Topology, prism: &KeyPrism) -> bool {
         is_inside[c as usize] = inside[face];
     }
     let is_one = |side: bool| {
-        let areas = || area.iter().zip(&is_inside).filter(|(_, s)| **s == side).map(|(a, _)| *a);
+        let areas = || {
+            area.iter()
+                .zip(&is_inside)
+                .filter(|(_, s)| **s == side)
+                .map(|(a, _)| *a)
+        };
         let (total, largest) = (areas().sum::<f64>(), areas().fold(0.0, f64::max));
         largest > 0.0 && total - largest < CRUMBS * largest
     };

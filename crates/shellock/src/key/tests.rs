@@ -16,7 +16,10 @@ fn footed_ball() -> SegmentedSurface {
 }
 
 fn params_of(surface: &SegmentedSurface) -> KeyParams {
-    KeyParams { piece_mm2: surface.mesh.area() / surface.n_patches as f64, ..KeyParams::default() }
+    KeyParams {
+        piece_mm2: surface.mesh.area() / surface.n_patches as f64,
+        ..KeyParams::default()
+    }
 }
 
 fn sites_of(surface: &SegmentedSurface) -> Vec<KeySite> {
@@ -24,13 +27,25 @@ fn sites_of(surface: &SegmentedSurface) -> Vec<KeySite> {
 }
 
 fn random_unit(rng: &mut ChaCha8Rng) -> Vec3 {
-    Vec3::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5).normalize()
+    Vec3::new(
+        rng.random::<f64>() - 0.5,
+        rng.random::<f64>() - 0.5,
+        rng.random::<f64>() - 0.5,
+    )
+    .normalize()
 }
 
 fn random_prism(rng: &mut ChaCha8Rng) -> KeyPrism {
     let normal = random_unit(rng);
     let slide = random_unit(rng).reject_from_normalized(normal).normalize();
-    KeyPrism { origin: Vec3::ZERO, slide, normal, half_width_mm: 10.0, depth_mm: 8.0, corner_mm: 2.0 }
+    KeyPrism {
+        origin: Vec3::ZERO,
+        slide,
+        normal,
+        half_width_mm: 10.0,
+        depth_mm: 8.0,
+        corner_mm: 2.0,
+    }
 }
 
 #[test]
@@ -103,13 +118,22 @@ fn the_imprint_takes_what_the_prism_holds_and_nothing_else() {
     assert!(Topology::of_mesh(&surface.mesh).is_some());
     assert!((surface.mesh.area() - ball.mesh.area()).abs() < 1e-6 * ball.mesh.area());
     let of_key = areas(&surface)[usize::from(key)];
-    assert!((of_key - site.area_mm2).abs() < 0.03 * site.area_mm2, "{of_key} {}", site.area_mm2);
+    assert!(
+        (of_key - site.area_mm2).abs() < 0.03 * site.area_mm2,
+        "{of_key} {}",
+        site.area_mm2
+    );
     for (face, &p) in surface.patch_of_face.iter().enumerate() {
         let inside = site.prism.inside_mm(surface.mesh.face_center(face));
         assert!(inside.abs() < 0.2 || (inside > 0.0) == (p == key), "{inside}");
     }
     assert_eq!(patch_in(&surface, &site.prism), Some(key));
-    assert!(surface.source_face.iter().all(|&f| (f as usize) < ball.mesh.triangles.len()));
+    assert!(
+        surface
+            .source_face
+            .iter()
+            .all(|&f| (f as usize) < ball.mesh.triangles.len())
+    );
 }
 
 #[test]
@@ -123,7 +147,10 @@ fn the_sides_of_an_imprinted_key_are_straight() {
             let [along, across, below] = site.prism.coordinates(*p);
             if along > 4.0 && below < 2.0 {
                 n_beside += 1;
-                assert!((across.abs() - site.prism.half_width_at(along)).abs() < 0.1, "{across} at {along}");
+                assert!(
+                    (across.abs() - site.prism.half_width_at(along)).abs() < 0.1,
+                    "{across} at {along}"
+                );
             }
         }
     }

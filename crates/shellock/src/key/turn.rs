@@ -20,8 +20,8 @@ impl Default for Turn {
 }
 
 impl Turn {
-    /// The smallest turn that takes `normal` to an axis and `slide`, perpendicular to it, to a lattice direction within that axis' plane;
-    /// and that direction.
+    /// The smallest turn that takes `normal` to an axis and `slide`, perpendicular to it, to a lattice
+    /// direction within that axis' plane; and that direction.
     pub fn laying(normal: Vec3, slide: Vec3) -> (Self, LatticeDirection) {
         let axis = [Vec3::X, Vec3::Y, Vec3::Z]
             .into_iter()
@@ -31,8 +31,9 @@ impl Turn {
         let tip = DMat3::from_quat(DQuat::from_rotation_arc(normal, axis));
         let tipped = tip * slide;
         let flat = LatticeDirection::all().filter(|s| s.unit().dot(axis).abs() < 0.5);
-        let direction =
-            flat.max_by(|a, b| a.unit().dot(tipped).total_cmp(&b.unit().dot(tipped))).expect("eight lie in the plane");
+        let direction = flat
+            .max_by(|a, b| a.unit().dot(tipped).total_cmp(&b.unit().dot(tipped)))
+            .expect("eight lie in the plane");
         let to = direction.unit();
         let angle = tipped.cross(to).dot(axis).atan2(tipped.dot(to));
         let whole = DMat3::from_axis_angle(axis, angle) * tip;
@@ -62,7 +63,10 @@ impl Turn {
 
     /// A mesh, turned.
     pub fn mesh(&self, mesh: &TriMesh) -> TriMesh {
-        TriMesh { points: mesh.points.iter().map(|&p| self.apply(p)).collect(), triangles: mesh.triangles.clone() }
+        TriMesh {
+            points: mesh.points.iter().map(|&p| self.apply(p)).collect(),
+            triangles: mesh.triangles.clone(),
+        }
     }
 
     /// A solid, turned; fails where rounding leaves no volume.
@@ -72,15 +76,31 @@ impl Turn {
 
     /// A prism, turned.
     pub fn prism(&self, prism: &KeyPrism) -> KeyPrism {
-        let KeyPrism { origin, slide, normal, .. } = *prism;
-        KeyPrism { origin: self.apply(origin), slide: self.apply(slide), normal: self.apply(normal), ..*prism }
+        let KeyPrism {
+            origin,
+            slide,
+            normal,
+            ..
+        } = *prism;
+        KeyPrism {
+            origin: self.apply(origin),
+            slide: self.apply(slide),
+            normal: self.apply(normal),
+            ..*prism
+        }
     }
 
     /// A site, turned; its slide then is exactly `along`.
     pub fn site(&self, site: &KeySite, along: LatticeDirection) -> KeySite {
-        let prism = KeyPrism { slide: along.unit(), ..self.prism(&site.prism) };
+        let prism = KeyPrism {
+            slide: along.unit(),
+            ..self.prism(&site.prism)
+        };
         let normal = prism.normal.reject_from_normalized(prism.slide).normalize();
-        KeySite { prism: KeyPrism { normal, ..prism }, ..*site }
+        KeySite {
+            prism: KeyPrism { normal, ..prism },
+            ..*site
+        }
     }
 
     /// The 3 × 3 matrix, row by row.

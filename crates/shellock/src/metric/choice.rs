@@ -1,4 +1,5 @@
-//! The plan that holds best among those that the search cannot tell apart, and what is weak about it (Sect. 6.2).
+//! The plan that holds best among those that the search cannot tell apart, and what is weak about it (Sect.
+//! 6.2).
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -12,11 +13,12 @@ use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
 /// Plans whose cost is within this share of the best one's are compared by simulation.
 ///
-/// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins hold), so it
-/// decides among plans of about the same cost only.
+/// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins
+/// hold), so it decides among plans of about the same cost only.
 const COST_SLACK: f64 = 0.05;
 
-/// Where pieces of all these would rattle too far, plans up to this share above the best one's cost are looked at, too.
+/// Where pieces of all these would rattle too far, plans up to this share above the best one's cost are
+/// looked at, too.
 const COST_SLACK_FOR_PLAY: f64 = 0.25;
 
 /// Plans whose widest play is within this share of the least are alike.
@@ -25,7 +27,8 @@ const PLAY_TIE: f64 = 0.05;
 /// Costs that differ by less than this share are the same but for rounding.
 const COST_TIE: f64 = 1e-9;
 
-/// Share of `s` along the seam, or towards the earlier piece, from which that is named as the reason why a seam is weak.
+/// Share of `s` along the seam, or towards the earlier piece, from which that is named as the reason why a
+/// seam is weak.
 const ALONG_SHARE: f64 = 0.7;
 const BACKWARD_SHARE: f64 = 0.5;
 
@@ -40,7 +43,8 @@ pub struct Holding {
     pub seams: Vec<SeamHolding>,
     /// Plans that were compared.
     pub n_compared: usize,
-    /// The play of each piece that was foreseen from the plan: displacement, mm, and turn, degrees; zeros for the key.
+    /// The play of each piece that was foreseen from the plan: displacement, mm, and turn, degrees; zeros for
+    /// the key.
     pub foreseen_play: Vec<[f64; 2]>,
     /// By how many times that is more than the piece may.
     pub foreseen_excess: Vec<f64>,
@@ -74,11 +78,12 @@ pub struct SeamHolding {
     pub reason: String,
 }
 
-/// Simulates the plans of the pool that cost about as little as the best one and are not foreseen to rattle; the chosen plan takes the
-/// place of `found`'s. Where all of these would, more costly ones are looked at, and those that rattle least are simulated.
+/// Simulates the plans of the pool that cost about as little as the best one and are not foreseen to rattle;
+/// the chosen plan takes the place of `found`'s. Where all of these would, more costly ones are looked at,
+/// and those that rattle least are simulated.
 ///
-/// Warns with `comes-apart` where none of them holds without friction, and with `piece-loose` of each piece that hardly
-/// anything holds by the estimate of the costs.
+/// Warns with `comes-apart` where none of them holds without friction, and with `piece-loose` of each piece
+/// that hardly anything holds by the estimate of the costs.
 pub fn choose(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -89,7 +94,10 @@ pub fn choose(
     ctx.stage("which plan holds best", 0)?;
     let model = PlanModel::new(&MetricParams::of_plan(params, sizes), surface, sizes);
     let plans = shortlist(&model, surface, params.clearance_mm, &found);
-    let meetings: Vec<Vec<Meeting>> = plans.iter().map(|&i| model.meetings(&found.pool[i].plan)).collect();
+    let meetings: Vec<Vec<Meeting>> = plans
+        .iter()
+        .map(|&i| model.meetings(&found.pool[i].plan))
+        .collect();
     let key = found.plan.key();
     ctx.check()?;
     let solved = model.surface_model()?.resist_all(&meetings, key.0)?;
@@ -99,16 +107,34 @@ pub fn choose(
     };
     // The earlier of equals, which costs less.
     let best = (0..plans.len()).reduce(|best, i| if quality(i) > quality(best) { i } else { best });
-    let Some(best) = best else { return Err(ChoiceError::NoPlan) };
+    let Some(best) = best else {
+        return Err(ChoiceError::NoPlan);
+    };
     let chosen = found.pool.remove(plans[best]);
-    let Foreseen { play: foreseen_play, excess: foreseen_excess } =
-        foreseen(&model, &chosen.plan, &meetings[best], size_mm(surface), params.clearance_mm);
+    let Foreseen {
+        play: foreseen_play,
+        excess: foreseen_excess,
+    } = foreseen(
+        &model,
+        &chosen.plan,
+        &meetings[best],
+        size_mm(surface),
+        params.clearance_mm,
+    );
     let holding = holding(&model, &chosen.plan, &meetings[best], &solved[best].resistance);
-    let holding = Holding { n_compared: plans.len(), foreseen_play, foreseen_excess, ..holding };
+    let holding = Holding {
+        n_compared: plans.len(),
+        foreseen_play,
+        foreseen_excess,
+        ..holding
+    };
     if !holding.loose.is_empty() {
         warn_of_parting(ctx, &holding.loose);
     }
-    chosen.loose.iter().for_each(|&piece| warn_of_loose(ctx, &model, piece));
+    chosen
+        .loose
+        .iter()
+        .for_each(|&piece| warn_of_loose(ctx, &model, piece));
     found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
     (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
     found.pool.insert(0, chosen);
@@ -116,7 +142,12 @@ pub fn choose(
 }
 
 /// The plans that are worth a simulation, by their places in the pool.
-fn shortlist(model: &PlanModel, surface: &SegmentedSurface, clearance_mm: f64, found: &FoundPlan) -> Vec<usize> {
+fn shortlist(
+    model: &PlanModel,
+    surface: &SegmentedSurface,
+    clearance_mm: f64,
+    found: &FoundPlan,
+) -> Vec<usize> {
     // How far the loosest piece goes beyond what is allowed; 1 for plans in which none does.
     let excess = |&i: &usize| {
         let plan = &found.pool[i].plan;
@@ -125,7 +156,9 @@ fn shortlist(model: &PlanModel, surface: &SegmentedSurface, clearance_mm: f64, f
     };
     let within = |slack: f64| -> Vec<(usize, f64)> {
         let limit = found.score.worst * (1.0 + slack);
-        let plans: Vec<usize> = (0..found.pool.len()).filter(|&i| found.pool[i].score.worst <= limit).collect();
+        let plans: Vec<usize> = (0..found.pool.len())
+            .filter(|&i| found.pool[i].score.worst <= limit)
+            .collect();
         plans.par_iter().map(|i| (*i, excess(i))).collect()
     };
     let least = |plans: &[(usize, f64)]| plans.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
@@ -146,7 +179,10 @@ fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePart]) {
     let names: Vec<String> = loose.iter().map(|part| part.piece.to_string()).collect();
     ctx.warn(Warning {
         code: "comes-apart".into(),
-        message: format!("in the simulation without friction these pieces can be pulled apart: {}", names.join(", ")),
+        message: format!(
+            "in the simulation without friction these pieces can be pulled apart: {}",
+            names.join(", ")
+        ),
         pieces: loose.iter().map(|part| part.piece).collect(),
         at: loose.first().map(|part| part.at),
     });
@@ -166,18 +202,34 @@ fn warn_of_loose(ctx: &Ctx<'_>, model: &PlanModel, piece: PatchId) {
 /// The point of `piece` that is nearest to the mean of its points, mm.
 fn middle_of(model: &PlanModel, piece: PatchId) -> Vec3 {
     let assembly = &model.assembly;
-    let own =
-        || assembly.points.iter().zip(&assembly.part_of_point).filter(|(_, part)| **part == piece.0).map(|x| *x.0);
+    let own = || {
+        assembly
+            .points
+            .iter()
+            .zip(&assembly.part_of_point)
+            .filter(|(_, part)| **part == piece.0)
+            .map(|x| *x.0)
+    };
     let mean = own().sum::<Vec3>() / own().count().max(1) as f64;
-    own().min_by(|x, y| x.distance_squared(mean).total_cmp(&y.distance_squared(mean))).unwrap_or(mean)
+    own()
+        .min_by(|x, y| x.distance_squared(mean).total_cmp(&y.distance_squared(mean)))
+        .unwrap_or(mean)
 }
 
 /// Puts the stations' openings together by pairs of pieces.
-fn holding(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], resistance: &Resistance) -> Holding {
+fn holding(
+    model: &PlanModel,
+    plan: &InstallationPlan,
+    meetings: &[Meeting],
+    resistance: &Resistance,
+) -> Holding {
     let (opening, loose) = match resistance {
         Resistance::Holds(opening) => (opening, Vec::new()),
         Resistance::Separable(parts) => {
-            let part = |&p: &u32| LoosePart { piece: PatchId(p), at: middle_of(model, PatchId(p)).to_array() };
+            let part = |&p: &u32| LoosePart {
+                piece: PatchId(p),
+                at: middle_of(model, PatchId(p)).to_array(),
+            };
             let loose = parts.iter().map(part).collect();
             return Holding {
                 quality_mm: None,
@@ -190,7 +242,11 @@ fn holding(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], res
         }
     };
     let mut seams = weakest_places(model, plan, meetings, opening);
-    seams.sort_by(|x, y| y.score_mm.total_cmp(&x.score_mm).then((x.later, x.earlier).cmp(&(y.later, y.earlier))));
+    seams.sort_by(|x, y| {
+        y.score_mm
+            .total_cmp(&x.score_mm)
+            .then((x.later, x.earlier).cmp(&(y.later, y.earlier)))
+    });
     Holding {
         quality_mm: Some(opening.quality_mm),
         loose,
@@ -218,19 +274,40 @@ fn weakest_places(
         }
     }
     let seam = |([a, b], (station, score_mm)): ([PatchId; 2], (usize, f64))| {
-        let (later, earlier) = if plan.position(a) > plan.position(b) { (a, b) } else { (b, a) };
+        let (later, earlier) = if plan.position(a) > plan.position(b) {
+            (a, b)
+        } else {
+            (b, a)
+        };
         let weight = meetings[station].joint.map_or(0.0, |j| j.weight);
         let at = model.place_of(station).to_array();
         let reason = reason(model, plan, station, [later, earlier]);
-        SeamHolding { later, earlier, score_mm, opening_mm: opening.opening_mm[station], weight, at, reason }
+        SeamHolding {
+            later,
+            earlier,
+            score_mm,
+            opening_mm: opening.opening_mm[station],
+            weight,
+            at,
+            reason,
+        }
     };
     worst.into_iter().map(seam).collect()
 }
 
-fn reason(model: &PlanModel, plan: &InstallationPlan, station: usize, [later, earlier]: [PatchId; 2]) -> String {
+fn reason(
+    model: &PlanModel,
+    plan: &InstallationPlan,
+    station: usize,
+    [later, earlier]: [PatchId; 2],
+) -> String {
     let s = plan.separation(later).unit();
     let frame = &model.assembly.stations[station];
-    let across = if later == model.pieces_at(station)[0] { frame.across } else { -frame.across };
+    let across = if later == model.pieces_at(station)[0] {
+        frame.across
+    } else {
+        -frame.across
+    };
     if s.dot(frame.tangent).abs() >= ALONG_SHARE {
         format!("the direction of piece {later} runs along the seam, so the connector is shallow")
     } else if s.dot(across) >= BACKWARD_SHARE {

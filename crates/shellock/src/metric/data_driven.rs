@@ -5,10 +5,10 @@
 //! ```
 //!
 //! with f over the directions in which the piece separates from its neighbours (translation) and over
-//! ± (x_i − x_a) × (x_b − x_a) for the ends x_a, x_b of the boundary (rotation). The study (docs/metrics.md) shows that the
-//! maximum hides interlocking: every boundary opens along its own direction, whatever holds the piece elsewhere.
-//! [`pieces_alone`] therefore simulates each piece with its neighbours held. It, too, depends only on the directions on the
-//! piece's own boundaries.
+//! ± (x_i − x_a) × (x_b − x_a) for the ends x_a, x_b of the boundary (rotation). The study (docs/metrics.md)
+//! shows that the maximum hides interlocking: every boundary opens along its own direction, whatever holds
+//! the piece elsewhere. [`pieces_alone`] therefore simulates each piece with its neighbours held. It, too,
+//! depends only on the directions on the piece's own boundaries.
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
@@ -37,7 +37,12 @@ fn piece(model: &PlanModel, tests: &LocalTests, plan: &[Meeting], k: PatchId) ->
     let mut worst = 0.0_f64;
     for place in &own {
         let turn = place.turn(model);
-        for f in pulls.iter().copied().chain([turn, -turn]).filter(|f| *f != Vec3::ZERO) {
+        for f in pulls
+            .iter()
+            .copied()
+            .chain([turn, -turn])
+            .filter(|f| *f != Vec3::ZERO)
+        {
             worst = worst.max(place.weight * place.opening_mm(tests, f));
         }
     }
@@ -61,11 +66,24 @@ fn places_of(model: &PlanModel, plan: &[Meeting], k: PatchId) -> Vec<Place> {
     let mut places = Vec::new();
     for (station, (s, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {
         let pieces = model.pieces_at(station);
-        let (Some(joint), true) = (meeting.joint, pieces.contains(&k)) else { continue };
+        let (Some(joint), true) = (meeting.joint, pieces.contains(&k)) else {
+            continue;
+        };
         let is_a = pieces[0] == k;
-        let frame = SeamFrame { tangent: s.tangent, normal: s.normal, across: s.across };
+        let frame = SeamFrame {
+            tangent: s.tangent,
+            normal: s.normal,
+            across: s.across,
+        };
         let pull = if is_a { joint.pull_on_a } else { -joint.pull_on_a };
-        places.push(Place { station, is_a, frame, pull_on_a: joint.pull_on_a, pull, weight: joint.weight });
+        places.push(Place {
+            station,
+            is_a,
+            frame,
+            pull_on_a: joint.pull_on_a,
+            pull,
+            weight: joint.weight,
+        });
     }
     places
 }
@@ -76,14 +94,18 @@ impl Place {
         tests.opening_mm(&self.frame, self.pull_on_a, if self.is_a { f } else { -f })
     }
 
-    /// Direction in which the place moves when the piece turns about the ends of its boundary; zero on a straight one.
+    /// Direction in which the place moves when the piece turns about the ends of its boundary; zero on a
+    /// straight one.
     fn turn(&self, model: &PlanModel) -> Vec3 {
         let [from, to] = model.seam_ends(self.station);
-        (model.place_of(self.station) - from).cross(to - from).normalize_or_zero()
+        (model.place_of(self.station) - from)
+            .cross(to - from)
+            .normalize_or_zero()
     }
 }
 
-/// `−max_k` of what piece k opens where all others are held, mm: higher is better. The key, which friction holds, is left out.
+/// `−max_k` of what piece k opens where all others are held, mm: higher is better. The key, which friction
+/// holds, is left out.
 ///
 /// `None` where some piece comes off even so.
 pub fn pieces_alone(
@@ -94,9 +116,14 @@ pub fn pieces_alone(
 ) -> Result<Option<f64>, SparseError> {
     let mut worst = 0.0_f64;
     for k in (0..model.assembly.n_parts as u32).filter(|k| *k != key.0) {
-        let Resistance::Holds(opening) = solver.resist_alone(plan, k)?.resistance else { return Ok(None) };
+        let Resistance::Holds(opening) = solver.resist_alone(plan, k)?.resistance else {
+            return Ok(None);
+        };
         let own = places_of(model, plan, PatchId(k));
-        worst = own.iter().map(|p| p.weight * opening.opening_mm[p.station]).fold(worst, f64::max);
+        worst = own
+            .iter()
+            .map(|p| p.weight * opening.opening_mm[p.station])
+            .fold(worst, f64::max);
     }
     Ok(Some(-worst))
 }

@@ -1,8 +1,8 @@
 //! The play of pieces, foreseen from a plan before anything is built.
 //!
-//! At a station the walls of two pieces are a clearance apart, and so are a pin and its channel on all sides but the one that the
-//! pin leaves by. Each is a limit on small motions of a piece while its neighbours rest; a linear program for a piece says
-//! how far it gets.
+//! At a station the walls of two pieces are a clearance apart, and so are a pin and its channel on all sides
+//! but the one that the pin leaves by. Each is a limit on small motions of a piece while its neighbours rest;
+//! a linear program for a piece says how far it gets.
 //!
 //! ```text
 //!   ───a──┐┌──b───   walls: at the outside and at the inside of the wall
@@ -11,7 +11,8 @@
 //!       └────┘
 //! ```
 //!
-//! Limits: rails and ribs are not known, so nothing is said of a key; pins are taken as long as their stations' seams.
+//! Limits: rails and ribs are not known, so nothing is said of a key; pins are taken as long as their
+//! stations' seams.
 
 use std::collections::BTreeMap;
 
@@ -31,8 +32,8 @@ const PIN_HALF: f64 = 0.25;
 const NEXT: f64 = 1.6;
 /// How far each piece but the key goes, and by how much that is more than it may: at most 1 where it is not.
 pub struct Foreseen {
-    /// Displacement of the middle of its surface, mm, and turn, degrees, no less than the greatest along the coordinate axes and no more than √3
-    /// of that; zeros for the key.
+    /// Displacement of the middle of its surface, mm, and turn, degrees, no less than the greatest along the
+    /// coordinate axes and no more than √3 of that; zeros for the key.
     pub play: Vec<[f64; 2]>,
     /// Of each piece, in the same order; 0 for the key.
     pub excess: Vec<f64>,
@@ -60,7 +61,12 @@ pub fn foreseen(
 }
 
 /// Displacement, mm, and turn, degrees, of each piece.
-fn plays(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
+fn plays(
+    model: &PlanModel,
+    plan: &InstallationPlan,
+    meetings: &[Meeting],
+    clearance_mm: f64,
+) -> Vec<[f64; 2]> {
     let mut contacts: Vec<Vec<Contact>> = vec![Vec::new(); model.assembly.n_parts];
     let ends = pin_ends(model, meetings);
     for (station, meeting) in meetings.iter().enumerate() {
@@ -73,7 +79,11 @@ fn plays(model: &PlanModel, plan: &InstallationPlan, meetings: &[Meeting], clear
     let key = plan.key();
     let of_piece = |(i, own): (usize, &Vec<Contact>)| {
         let piece = PatchId::from(i);
-        if piece == key { [0.0; 2] } else { farthest(piece, own, centers[i]) }
+        if piece == key {
+            [0.0; 2]
+        } else {
+            farthest(piece, own, centers[i])
+        }
     };
     contacts.iter().enumerate().map(of_piece).collect()
 }
@@ -84,7 +94,10 @@ type SeamName = ([PatchId; 2], [[u64; 3]; 2]);
 /// Whether the pin of each station ends there, against the seam's tangent and along it.
 fn pin_ends(model: &PlanModel, meetings: &[Meeting]) -> Vec<[bool; 2]> {
     let seam = |station: usize| -> SeamName {
-        (model.pieces_at(station), model.seam_ends(station).map(|p| p.to_array().map(f64::to_bits)))
+        (
+            model.pieces_at(station),
+            model.seam_ends(station).map(|p| p.to_array().map(f64::to_bits)),
+        )
     };
     let mut of_seam: BTreeMap<SeamName, Vec<usize>> = BTreeMap::new();
     (0..meetings.len()).for_each(|station| of_seam.entry(seam(station)).or_default().push(station));
@@ -92,7 +105,10 @@ fn pin_ends(model: &PlanModel, meetings: &[Meeting]) -> Vec<[bool; 2]> {
     let male = |station: usize| meetings[station].joint.as_ref().map(|joint| joint.male);
     for &one in of_seam.values().flatten() {
         let frame = &model.assembly.stations[one];
-        for &other in of_seam[&seam(one)].iter().filter(|&&other| male(other) == male(one)) {
+        for &other in of_seam[&seam(one)]
+            .iter()
+            .filter(|&&other| male(other) == male(one))
+        {
             let to = model.place_of(other) - model.place_of(one);
             let far_mm = NEXT * 0.5 * (frame.length_mm + model.assembly.stations[other].length_mm);
             if other != one && to.length() > 0.0 && to.length() <= far_mm {
@@ -114,9 +130,18 @@ fn at_station(
     let [a, b] = model.pieces_at(station);
     let frame = &model.assembly.stations[station];
     let below = |depth_mm: f64| model.place_of(station) - depth_mm * frame.normal;
-    let contact = |a, b, point, normal| Contact { a, b, point, normal, gap_mm: clearance_mm, area_mm2: 0.0 };
+    let contact = |a, b, point, normal| Contact {
+        a,
+        b,
+        point,
+        normal,
+        gap_mm: clearance_mm,
+        area_mm2: 0.0,
+    };
     let wall_mm = model.params.wall_mm;
-    let mut found: Vec<Contact> = [0.1, 0.9].map(|share| contact(a, b, below(share * wall_mm), meeting.wall)).to_vec();
+    let mut found: Vec<Contact> = [0.1, 0.9]
+        .map(|share| contact(a, b, below(share * wall_mm), meeting.wall))
+        .to_vec();
     if let Some(joint) = &meeting.joint {
         let (male, female) = if joint.male == Side::A { (a, b) } else { (b, a) };
         let across = joint.leaves.cross(frame.tangent).normalize_or_zero();
@@ -124,8 +149,13 @@ fn at_station(
             let (middle, half) = (below(depth_mm), PIN_HALF * joint.size_mm);
             found.push(contact(male, female, middle - half * joint.leaves, -joint.leaves));
             found.extend([across, -across].map(|side| contact(male, female, middle + half * side, side)));
-            let outwards = [-frame.tangent, frame.tangent].into_iter().zip(ends).filter(|(_, is_end)| *is_end);
-            found.extend(outwards.map(|(side, _)| contact(male, female, middle + 0.5 * frame.length_mm * side, side)));
+            let outwards = [-frame.tangent, frame.tangent]
+                .into_iter()
+                .zip(ends)
+                .filter(|(_, is_end)| *is_end);
+            found.extend(
+                outwards.map(|(side, _)| contact(male, female, middle + 0.5 * frame.length_mm * side, side)),
+            );
         }
     }
     found
@@ -141,5 +171,7 @@ fn centers(model: &PlanModel) -> Vec<Vec3> {
         let sum = &mut sums[assembly.part_of_point[t[0] as usize] as usize];
         *sum = (sum.0 + area * (a + b + c) / 3.0, sum.1 + area);
     }
-    sums.into_iter().map(|(moment, area)| if area > 0.0 { moment / area } else { moment }).collect()
+    sums.into_iter()
+        .map(|(moment, area)| if area > 0.0 { moment / area } else { moment })
+        .collect()
 }

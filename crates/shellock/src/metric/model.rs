@@ -5,7 +5,8 @@ use shellock_geom::sparse::SparseError;
 use shellock_geom::topology::ends;
 use shellock_geom::{Topology, TriMesh, Vec3};
 use shellock_mechanics::{
-    Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams, VolumeError, VolumeModel, VolumeParams,
+    Material, Meeting, ShellAssembly, Station, SurfaceModel, SurfaceParams, VolumeError, VolumeModel,
+    VolumeParams,
 };
 
 use crate::params::ParamProblem;
@@ -26,7 +27,8 @@ pub struct MetricParams {
     pub beta: f64,
     /// Length of triangle edges, in square roots of the area per thousand points. [0.2, 5]; 1.
     ///
-    /// 1 gives about 1000 points, on which a plan takes some milliseconds; see the study for what finer meshes change.
+    /// 1 gives about 1000 points, on which a plan takes some milliseconds; see the study for what finer
+    /// meshes change.
     pub edge_share: f64,
     /// What the pieces are printed of. E in [1, 10⁶] MPa, ν in [0, 0.45].
     pub material: Material,
@@ -36,7 +38,14 @@ pub struct MetricParams {
 
 impl Default for MetricParams {
     fn default() -> Self {
-        Self { wall_mm: 2.0, connector_mm: 2.5, beta: 0.1, edge_share: 1.0, material: Material::default(), rails: None }
+        Self {
+            wall_mm: 2.0,
+            connector_mm: 2.5,
+            beta: 0.1,
+            edge_share: 1.0,
+            material: Material::default(),
+            rails: None,
+        }
     }
 }
 
@@ -44,14 +53,28 @@ impl MetricParams {
     /// The same wall and floor as the plan's.
     pub fn of_plan(params: &PlanParams, sizes: &ConnectorSizes) -> Self {
         let defaults = Self::default();
-        let wall_mm = if params.wall_mm > 0.0 { params.wall_mm } else { defaults.wall_mm };
+        let wall_mm = if params.wall_mm > 0.0 {
+            params.wall_mm
+        } else {
+            defaults.wall_mm
+        };
         let rails = params.key.zip(params.key_slide);
-        Self { wall_mm, connector_mm: sizes.default_mm(), beta: params.beta, rails, ..defaults }
+        Self {
+            wall_mm,
+            connector_mm: sizes.default_mm(),
+            beta: params.beta,
+            rails,
+            ..defaults
+        }
     }
 
     /// Every value out of range: no model can be made of such.
     pub fn problems(&self) -> Vec<ParamProblem> {
-        let Material { youngs_modulus_mpa, poissons_ratio, .. } = self.material;
+        let Material {
+            youngs_modulus_mpa,
+            poissons_ratio,
+            ..
+        } = self.material;
         let checks = [
             ParamProblem::unless_within("wall thickness", "mm", self.wall_mm, 0.1, 10.0),
             ParamProblem::unless_within("connector size", "mm", self.connector_mm, 1.0, 10.0),
@@ -66,7 +89,12 @@ impl MetricParams {
     /// The surface metric's parameters with these sizes.
     pub fn surface(&self) -> SurfaceParams {
         let (wall_mm, connector_mm, material) = (self.wall_mm, self.connector_mm, self.material);
-        SurfaceParams { wall_mm, connector_mm, material, ..SurfaceParams::default() }
+        SurfaceParams {
+            wall_mm,
+            connector_mm,
+            material,
+            ..SurfaceParams::default()
+        }
     }
 }
 
@@ -102,25 +130,63 @@ impl PlanModel {
         let area_mm2 = surface.mesh.area();
         let target_edge_mm = params.edge_share * (area_mm2 / (POINTS_AT_ONE * 0.75f64.sqrt())).sqrt();
         let labels: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
-        let mut coarse = remesh(&RemeshParams { target_edge_mm, n_rounds: 5 }, &surface.mesh, &labels);
+        let mut coarse = remesh(
+            &RemeshParams {
+                target_edge_mm,
+                n_rounds: 5,
+            },
+            &surface.mesh,
+            &labels,
+        );
         split_short_seams(&mut coarse);
-        Self::of_mesh(params, &relaxed(coarse.mesh), &coarse.labels, surface.n_patches, sizes)
+        Self::of_mesh(
+            params,
+            &relaxed(coarse.mesh),
+            &coarse.labels,
+            surface.n_patches,
+            sizes,
+        )
     }
 
     /// The model of a closed mesh with these labels as it is.
-    fn of_mesh(params: &MetricParams, mesh: &TriMesh, labels: &[u32], n_parts: usize, sizes: &ConnectorSizes) -> Self {
-        let mut model = Self { assembly: parts(mesh, labels, n_parts), params: *params, seams: Vec::new() };
+    fn of_mesh(
+        params: &MetricParams,
+        mesh: &TriMesh,
+        labels: &[u32],
+        n_parts: usize,
+        sizes: &ConnectorSizes,
+    ) -> Self {
+        let mut model = Self {
+            assembly: parts(mesh, labels, n_parts),
+            params: *params,
+            seams: Vec::new(),
+        };
         let topology = Topology::of_mesh(mesh).expect("a remeshed surface is closed");
         let normals = point_normals(mesh);
         // The copy of a mesh point in a part: parts() numbers points by part, then by point.
         let copies = copies(mesh, labels);
-        let copy = |part: u32, v: u32| copies.binary_search(&(part, v)).expect("a seam point is of both parts") as u32;
-        for s in stretches(mesh, &topology, labels, &seam_half_edges(&topology, labels, 0..labels.len() as u32)) {
+        let copy = |part: u32, v: u32| {
+            copies
+                .binary_search(&(part, v))
+                .expect("a seam point is of both parts") as u32
+        };
+        for s in stretches(
+            mesh,
+            &topology,
+            labels,
+            &seam_half_edges(&topology, labels, 0..labels.len() as u32),
+        ) {
             let mut chain: Vec<u32> = vec![ends(mesh, s.half_edges[0]).0];
             chain.extend(s.half_edges.iter().map(|&h| ends(mesh, h).1));
             let points: Vec<(Vec3, Vec3, [u32; 2])> = chain
                 .iter()
-                .map(|&v| (mesh.points[v as usize], normals[v as usize], [copy(s.a, v), copy(s.b, v)]))
+                .map(|&v| {
+                    (
+                        mesh.points[v as usize],
+                        normals[v as usize],
+                        [copy(s.a, v), copy(s.b, v)],
+                    )
+                })
                 .collect();
             let [a, b] = [PatchId(s.a), PatchId(s.b)];
             model.add_seam([a, b], sizes.of(a, b), &points);
@@ -132,31 +198,68 @@ impl PlanModel {
     ///
     /// Lengths are those on the inner side of the wall, where connectors are.
     fn add_seam(&mut self, [a, b]: [PatchId; 2], size_mm: f64, points: &[(Vec3, Vec3, [u32; 2])]) {
-        /// Share of a station's stretch that must be far enough from the ends for a connector, against rounding.
+        /// Share of a station's stretch that must be far enough from the ends for a connector, against
+        /// rounding.
         const LEAST_SHARE: f64 = 1e-6;
         let n = points.len() - 1;
         let is_loop = points[0].2 == points[n].2;
         let inner = |i: usize| points[i].0 - self.params.wall_mm * points[i].1;
         let mut arc_mm = vec![0.0; n + 1];
         (0..n).for_each(|i| arc_mm[i + 1] = arc_mm[i] + inner(i).distance(inner(i + 1)));
-        let margin = if is_loop { 0.0 } else { end_gap_mm(size_mm, arc_mm[n]) };
-        let before_mm = |i: usize| if i > 0 { arc_mm[i - 1] } else { arc_mm[n - 1] - arc_mm[n] };
+        let margin = if is_loop {
+            0.0
+        } else {
+            end_gap_mm(size_mm, arc_mm[n])
+        };
+        let before_mm = |i: usize| {
+            if i > 0 {
+                arc_mm[i - 1]
+            } else {
+                arc_mm[n - 1] - arc_mm[n]
+            }
+        };
         let first = self.assembly.stations.len() as u32;
         for i in usize::from(!is_loop)..n {
             let (before, after) = (points[if i > 0 { i - 1 } else { n - 1 }], points[i + 1]);
             let (_, normal, copies) = points[i];
-            let tangent =
-                (after.0 - before.0).reject_from_normalized(normal).normalize_or(normal.any_orthonormal_vector());
+            let tangent = (after.0 - before.0)
+                .reject_from_normalized(normal)
+                .normalize_or(normal.any_orthonormal_vector());
             let across = tangent.cross(normal);
-            // A station stands for the seam up to halfway to the next ones, at the ends of open seams for all that is left.
+            // A station stands for the seam up to halfway to the next ones, at the ends of open seams for all
+            // that is left.
             let half = |from: f64, to: f64| 0.5 * (from + to);
-            let start = if is_loop || i > 1 { half(arc_mm[i], before_mm(i)) } else { 0.0 };
-            let end = if is_loop || i + 1 < n { half(arc_mm[i], arc_mm[i + 1]) } else { arc_mm[n] };
+            let start = if is_loop || i > 1 {
+                half(arc_mm[i], before_mm(i))
+            } else {
+                0.0
+            };
+            let end = if is_loop || i + 1 < n {
+                half(arc_mm[i], arc_mm[i + 1])
+            } else {
+                arc_mm[n]
+            };
             let joined_mm = end.min(arc_mm[n] - margin) - start.max(margin);
             let has_room = is_loop || joined_mm > LEAST_SHARE * (end - start);
-            let length_mm = if has_room && !is_loop { joined_mm } else { end - start };
-            self.assembly.stations.push(Station { points: copies, tangent, normal, across, length_mm });
-            self.seams.push(StationSeam { a, b, size_mm, has_room, ends: [points[0].0, points[n].0] });
+            let length_mm = if has_room && !is_loop {
+                joined_mm
+            } else {
+                end - start
+            };
+            self.assembly.stations.push(Station {
+                points: copies,
+                tangent,
+                normal,
+                across,
+                length_mm,
+            });
+            self.seams.push(StationSeam {
+                a,
+                b,
+                size_mm,
+                has_room,
+                ends: [points[0].0, points[n].0],
+            });
         }
         let last = self.assembly.stations.len() as u32;
         self.assembly.steps.extend((first + 1..last).map(|i| [i - 1, i]));
@@ -168,13 +271,24 @@ impl PlanModel {
     /// What `plan` makes of each station.
     pub fn meetings(&self, plan: &InstallationPlan) -> Vec<Meeting> {
         let mut position = vec![0; self.assembly.n_parts];
-        plan.steps.iter().enumerate().for_each(|(i, s)| position[usize::from(s.piece)] = i);
+        plan.steps
+            .iter()
+            .enumerate()
+            .for_each(|(i, s)| position[usize::from(s.piece)] = i);
         let meet = |(seam, station): (&StationSeam, &Station)| {
             let a_is_later = position[usize::from(seam.a)] > position[usize::from(seam.b)];
             let later = if a_is_later { seam.a } else { seam.b };
             let s = plan.steps[position[usize::from(later)]].separation;
             let on_rails = self.params.rails == Some((later, s));
-            let mut meeting = meeting(station, seam.size_mm, a_is_later, s.unit(), self.params.beta, false, on_rails);
+            let mut meeting = meeting(
+                station,
+                seam.size_mm,
+                a_is_later,
+                s.unit(),
+                self.params.beta,
+                false,
+                on_rails,
+            );
             meeting.joint = meeting.joint.filter(|_| seam.has_room);
             if let Some(joint) = &mut meeting.joint {
                 joint.is_fast = later == plan.key();
@@ -201,8 +315,14 @@ impl PlanModel {
 
     /// The volume metric's solver.
     pub fn volume_model(&self) -> Result<VolumeModel, VolumeError> {
-        let MetricParams { wall_mm, material, .. } = self.params;
-        let params = VolumeParams { wall_mm, material, ..VolumeParams::default() };
+        let MetricParams {
+            wall_mm, material, ..
+        } = self.params;
+        let params = VolumeParams {
+            wall_mm,
+            material,
+            ..VolumeParams::default()
+        };
         VolumeModel::new(&params, &self.assembly)
     }
 
@@ -212,7 +332,8 @@ impl PlanModel {
     }
 }
 
-/// Splits edges of seams that have fewer than three, the longest first: two stations are the least that hold a turn.
+/// Splits edges of seams that have fewer than three, the longest first: two stations are the least that hold
+/// a turn.
 fn split_short_seams(coarse: &mut Remeshed) {
     const LEAST_EDGES: usize = 3;
     let topology = Topology::of_mesh(&coarse.mesh).expect("a remeshed surface is closed");
@@ -221,7 +342,12 @@ fn split_short_seams(coarse: &mut Remeshed) {
     for s in stretches(&coarse.mesh, &topology, &coarse.labels, &seam) {
         if s.half_edges.len() < LEAST_EDGES {
             let n_parts = LEAST_EDGES.div_ceil(s.half_edges.len());
-            edges.extend(s.half_edges.iter().map(|&h| ends(&coarse.mesh, h)).map(|(u, v)| (u, v, n_parts)));
+            edges.extend(
+                s.half_edges
+                    .iter()
+                    .map(|&h| ends(&coarse.mesh, h))
+                    .map(|(u, v)| (u, v, n_parts)),
+            );
         }
     }
     for (u, v, n_parts) in edges {
@@ -240,7 +366,8 @@ fn split_short_seams(coarse: &mut Remeshed) {
 fn split_edge(coarse: &mut Remeshed, u: u32, v: u32, middle: u32) {
     for i in 0..coarse.mesh.triangles.len() {
         let triangle = coarse.mesh.triangles[i];
-        let Some(at) = (0..3).find(|&k| [(u, v), (v, u)].contains(&(triangle[k], triangle[(k + 1) % 3]))) else {
+        let Some(at) = (0..3).find(|&k| [(u, v), (v, u)].contains(&(triangle[k], triangle[(k + 1) % 3])))
+        else {
             continue;
         };
         let [x, y, z] = [0, 1, 2].map(|k| triangle[(at + k) % 3]);
@@ -252,8 +379,12 @@ fn split_edge(coarse: &mut Remeshed, u: u32, v: u32, middle: u32) {
 
 /// The parts' own points in order: by part, then by point of `mesh`.
 fn copies(mesh: &TriMesh, labels: &[u32]) -> Vec<(u32, u32)> {
-    let mut copies: Vec<(u32, u32)> =
-        mesh.triangles.iter().zip(labels).flat_map(|(t, &part)| t.map(|v| (part, v))).collect();
+    let mut copies: Vec<(u32, u32)> = mesh
+        .triangles
+        .iter()
+        .zip(labels)
+        .flat_map(|(t, &part)| t.map(|v| (part, v)))
+        .collect();
     copies.sort_unstable();
     copies.dedup();
     copies
@@ -267,7 +398,12 @@ fn parts(mesh: &TriMesh, labels: &[u32], n_parts: usize) -> ShellAssembly {
         points: copies.iter().map(|c| mesh.points[c.1 as usize]).collect(),
         normals: copies.iter().map(|c| normals[c.1 as usize]).collect(),
         part_of_point: copies.iter().map(|c| c.0).collect(),
-        triangles: mesh.triangles.iter().zip(labels).map(|(t, &part)| t.map(|v| copy(part, v))).collect(),
+        triangles: mesh
+            .triangles
+            .iter()
+            .zip(labels)
+            .map(|(t, &part)| t.map(|v| copy(part, v)))
+            .collect(),
         n_parts,
         ..ShellAssembly::default()
     }
@@ -276,7 +412,8 @@ fn parts(mesh: &TriMesh, labels: &[u32], n_parts: usize) -> ShellAssembly {
 /// Least cosine between a point's normal and those of its triangles, so that a wall stands on each.
 const LEAST_COSINE: f64 = 0.2;
 
-/// The mesh with points moved towards their neighbours where triangles fold so sharply that no wall stands on them.
+/// The mesh with points moved towards their neighbours where triangles fold so sharply that no wall stands on
+/// them.
 ///
 /// At ears and in ditches narrower than an edge a coarse mesh has a few such points in two thousand.
 fn relaxed(mut mesh: TriMesh) -> TriMesh {
@@ -286,15 +423,21 @@ fn relaxed(mut mesh: TriMesh) -> TriMesh {
         let normals = point_normals(&mesh);
         let is_folded = |face: &usize| {
             let across = mesh.area_vector_doubled(*face).normalize_or_zero();
-            mesh.triangles[*face].iter().any(|&v| normals[v as usize].dot(across) < LEAST_COSINE)
+            mesh.triangles[*face]
+                .iter()
+                .any(|&v| normals[v as usize].dot(across) < LEAST_COSINE)
         };
         let folded: Vec<usize> = (0..mesh.triangles.len()).filter(is_folded).collect();
         if folded.is_empty() {
             break;
         }
         let mut is_moved = vec![false; mesh.points.len()];
-        folded.iter().flat_map(|&f| mesh.triangles[f]).for_each(|v| is_moved[v as usize] = true);
-        // Of each point the sum of itself and its neighbours, which the triangles around name twice, and their number.
+        folded
+            .iter()
+            .flat_map(|&f| mesh.triangles[f])
+            .for_each(|v| is_moved[v as usize] = true);
+        // Of each point the sum of itself and its neighbours, which the triangles around name twice, and
+        // their number.
         let mut sums: Vec<(Vec3, f64)> = mesh.points.iter().map(|p| (2.0 * *p, 2.0)).collect();
         for t in &mesh.triangles {
             for (v, w) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
@@ -304,16 +447,22 @@ fn relaxed(mut mesh: TriMesh) -> TriMesh {
                 }
             }
         }
-        let places = mesh.points.iter_mut().zip(sums).zip(is_moved).filter(|(_, is_moved)| *is_moved);
+        let places = mesh
+            .points
+            .iter_mut()
+            .zip(sums)
+            .zip(is_moved)
+            .filter(|(_, is_moved)| *is_moved);
         places.for_each(|((p, sum), _)| *p = sum.0 / sum.1);
     }
     mesh
 }
 
-/// Outward unit normals: the mean of the triangles by area, turned until every triangle at the point is seen from outside.
+/// Outward unit normals: the mean of the triangles by area, turned until every triangle at the point is seen
+/// from outside.
 ///
-/// At ears and folds the mean may lie along a triangle, and no wall would stand on it. Where no direction sees all of a
-/// point's triangles, the last one tried is kept.
+/// At ears and folds the mean may lie along a triangle, and no wall would stand on it. Where no direction
+/// sees all of a point's triangles, the last one tried is kept.
 fn point_normals(mesh: &TriMesh) -> Vec<Vec3> {
     /// A turn adds the worst triangle's normal (the perceptron's rule, which ends where there is an answer).
     const MOST_TURNS: usize = 100;
@@ -329,8 +478,12 @@ fn point_normals(mesh: &TriMesh) -> Vec<Vec3> {
     let turned = |(mean, around): (Vec3, Vec<Vec3>)| {
         let mut normal = mean.normalize_or(Vec3::Z);
         for _ in 0..MOST_TURNS {
-            let worst = around.iter().min_by(|a, b| a.dot(normal).total_cmp(&b.dot(normal)));
-            let Some(worst) = worst.filter(|w| w.dot(normal) < 1.5 * LEAST_COSINE) else { break };
+            let worst = around
+                .iter()
+                .min_by(|a, b| a.dot(normal).total_cmp(&b.dot(normal)));
+            let Some(worst) = worst.filter(|w| w.dot(normal) < 1.5 * LEAST_COSINE) else {
+                break;
+            };
             normal = (normal + 0.2 * *worst).normalize_or(normal);
         }
         normal

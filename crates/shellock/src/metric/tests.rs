@@ -15,8 +15,13 @@ fn octants() -> PlanModel {
 }
 
 fn plan(directions: impl Fn(u32) -> Vec3) -> InstallationPlan {
-    let step = |i: u32| InstallationStep { piece: PatchId(i), separation: LatticeDirection::nearest(directions(i)) };
-    InstallationPlan { steps: (0..8).map(step).collect() }
+    let step = |i: u32| InstallationStep {
+        piece: PatchId(i),
+        separation: LatticeDirection::nearest(directions(i)),
+    };
+    InstallationPlan {
+        steps: (0..8).map(step).collect(),
+    }
 }
 
 fn outwards(i: u32) -> Vec3 {
@@ -29,8 +34,17 @@ fn every_parameter_out_of_its_range_is_named_and_the_defaults_are_within() {
     assert_eq!(right.problems(), []);
     let edges = |edge_share| MetricParams { edge_share, ..right };
     let wrong = [f64::NAN, f64::INFINITY, 0.0, -1.0, 0.19, 5.1].map(edges);
-    assert!(wrong.iter().all(|w| w.problems().iter().map(|p| p.name).eq(["edge share"])));
-    let mut all = MetricParams { wall_mm: 0.0, connector_mm: 0.9, beta: -0.1, ..edges(0.0) };
+    assert!(
+        wrong
+            .iter()
+            .all(|w| w.problems().iter().map(|p| p.name).eq(["edge share"]))
+    );
+    let mut all = MetricParams {
+        wall_mm: 0.0,
+        connector_mm: 0.9,
+        beta: -0.1,
+        ..edges(0.0)
+    };
     (all.material.youngs_modulus_mpa, all.material.poissons_ratio) = (f64::NAN, 0.5);
     assert_eq!(all.problems().len(), 6);
 }
@@ -42,7 +56,10 @@ fn stations_lie_on_both_pieces_in_right_handed_frames() {
     for (i, s) in model.assembly.stations.iter().enumerate() {
         let [a, b] = s.points.map(|p| p as usize);
         assert_eq!(model.assembly.points[a], model.assembly.points[b]);
-        assert_eq!([a, b].map(|p| PatchId(model.assembly.part_of_point[p])), model.pieces_at(i));
+        assert_eq!(
+            [a, b].map(|p| PatchId(model.assembly.part_of_point[p])),
+            model.pieces_at(i)
+        );
         assert!((s.tangent.cross(s.normal) - s.across).length() < 1e-9);
         // `across` leads from a to b: towards the middle of b's octant.
         let toward_b = outwards(model.pieces_at(i)[1].0) - outwards(model.pieces_at(i)[0].0);
@@ -53,9 +70,17 @@ fn stations_lie_on_both_pieces_in_right_handed_frames() {
 #[test]
 fn the_male_is_the_piece_that_moves_outwards_and_both_are_pulled_apart() {
     let model = octants();
-    let joints: Vec<_> = model.meetings(&plan(outwards)).into_iter().map(|m| m.joint).collect();
+    let joints: Vec<_> = model
+        .meetings(&plan(outwards))
+        .into_iter()
+        .map(|m| m.joint)
+        .collect();
     assert!(joints.iter().flatten().count() > 40);
-    for (i, joint) in joints.iter().enumerate().filter_map(|(i, j)| Some((i, j.as_ref()?))) {
+    for (i, joint) in joints
+        .iter()
+        .enumerate()
+        .filter_map(|(i, j)| Some((i, j.as_ref()?)))
+    {
         // Here the later piece has the higher id: side b, and it leaves outwards.
         assert_eq!(joint.male, Side::B);
         assert!(joint.leaves.dot(model.assembly.stations[i].tangent).abs() < 1e-9);
@@ -70,10 +95,19 @@ fn a_ball_whose_octants_all_leave_outwards_holds_and_one_whose_pieces_slide_off_
     let model = octants();
     let solver = model.surface_model().unwrap();
     let held = solver.resist(&model.meetings(&plan(outwards)), 7).unwrap();
-    let Resistance::Holds(opening) = &held.resistance else { panic!("{held:?}") };
-    assert!(opening.quality_mm < 0.0 && opening.quality_mm > -1.0, "{}", opening.quality_mm);
+    let Resistance::Holds(opening) = &held.resistance else {
+        panic!("{held:?}")
+    };
+    assert!(
+        opening.quality_mm < 0.0 && opening.quality_mm > -1.0,
+        "{}",
+        opening.quality_mm
+    );
     let up = solver.resist(&model.meetings(&plan(|_| Vec3::Z)), 7).unwrap();
-    assert!(matches!(up.resistance, Resistance::Separable(_)), "all along one direction: {up:?}");
+    assert!(
+        matches!(up.resistance, Resistance::Separable(_)),
+        "all along one direction: {up:?}"
+    );
 }
 
 #[test]
@@ -81,9 +115,17 @@ fn a_piece_opens_no_farther_with_its_neighbours_held_than_free() {
     let model = octants();
     let solver = model.surface_model().unwrap();
     let meetings = model.meetings(&plan(outwards));
-    let Resistance::Holds(all) = solver.resist(&meetings, 7).unwrap().resistance else { panic!("it holds") };
-    let alone = pieces_alone(&model, &solver, &meetings, PatchId(7)).unwrap().unwrap();
-    assert!(alone < 0.0 && alone >= all.quality_mm, "{alone} {}", all.quality_mm);
+    let Resistance::Holds(all) = solver.resist(&meetings, 7).unwrap().resistance else {
+        panic!("it holds")
+    };
+    let alone = pieces_alone(&model, &solver, &meetings, PatchId(7))
+        .unwrap()
+        .unwrap();
+    assert!(
+        alone < 0.0 && alone >= all.quality_mm,
+        "{alone} {}",
+        all.quality_mm
+    );
 }
 
 #[test]
@@ -96,7 +138,11 @@ fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction
     for (station, meeting) in model.assembly.stations.iter().zip(&meetings) {
         let Some(joint) = meeting.joint else { continue };
         let (tangent, normal, across) = (station.tangent, station.normal, station.across);
-        let frame = crate::plan::contact::SeamFrame { tangent, normal, across };
+        let frame = crate::plan::contact::SeamFrame {
+            tangent,
+            normal,
+            across,
+        };
         let own = tests.opening_mm(&frame, joint.pull_on_a, joint.pull_on_a);
         assert!(-quality >= joint.weight * own - 1e-12 && own > 0.0);
     }
@@ -105,10 +151,18 @@ fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction
 /// The plan that is chosen for `surface`, how it holds, and what is warned of at that.
 fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
     let ctx = Ctx::quiet();
-    let (params, sizes) = (PlanParams { n_plans: 40, ..PlanParams::default() }, ConnectorSizes::default());
+    let (params, sizes) = (
+        PlanParams {
+            n_plans: 40,
+            ..PlanParams::default()
+        },
+        ConnectorSizes::default(),
+    );
     let survey = survey(&ctx, &params, surface, &seams(surface), &sizes).unwrap();
     let outcome = search(&ctx, &params, &survey, &PlanConstraints::default()).unwrap();
-    let PlanOutcome::Found(found) = outcome else { panic!("{outcome:?}") };
+    let PlanOutcome::Found(found) = outcome else {
+        panic!("{outcome:?}")
+    };
     let ctx = ctx.fork();
     let (found, holding) = choose(&ctx, &params, surface, &sizes, *found).unwrap();
     (found, holding, ctx.into_warnings())
@@ -122,14 +176,21 @@ fn the_chosen_plan_leads_the_pool_and_the_others_follow_by_cost() {
     assert!(first.plan == found.plan && first.score == found.score);
     assert!(others.is_sorted_by(|x, y| x.score.worst <= y.score.worst * (1.0 + 1e-8)));
     assert!(found.pool.iter().all(|p| p.plan.key() == found.plan.key()));
-    let least = found.pool.iter().map(|p| p.score.worst).fold(f64::INFINITY, f64::min);
+    let least = found
+        .pool
+        .iter()
+        .map(|p| p.score.worst)
+        .fold(f64::INFINITY, f64::min);
     assert!(found.lower_bound <= least && found.score.worst <= 1.05 * least);
 }
 
 #[test]
 fn a_half_that_nothing_holds_is_told_with_its_place() {
     let (found, _, warnings) = chosen(&label(sphere(5, Vec3::splat(40.0)), 2, |p| u32::from(p.z > 0.0)));
-    let loose = warnings.iter().find(|w| w.code == "piece-loose").unwrap_or_else(|| panic!("{warnings:?}"));
+    let loose = warnings
+        .iter()
+        .find(|w| w.code == "piece-loose")
+        .unwrap_or_else(|| panic!("{warnings:?}"));
     let first = found.plan.steps[0].piece;
     assert_eq!(loose.pieces, [first]);
     assert_eq!(loose.at.unwrap()[2] > 0.0, first == PatchId(1));

@@ -6,8 +6,8 @@ use shellock_geom::{Aabb, Vec3, Volume};
 use crate::connector::{ConnectorParams, Part, Run, Section, Station};
 use crate::{LatticeDirection, PatchId};
 
-/// The socket is grown by this much less than the clearance, mm: the channel's section already keeps the clearance, and
-/// faces that would coincide stay apart.
+/// The socket is grown by this much less than the clearance, mm: the channel's section already keeps the
+/// clearance, and faces that would coincide stay apart.
 const SOCKET_SLACK_MM: f64 = 0.01;
 
 /// Which half of a run.
@@ -20,8 +20,8 @@ pub(super) enum Half {
 /// The corners of one convex cell of a run.
 type Cell = [Vec3; 8];
 
-/// The corners of each part of one half's section, station by station. With `grown_mm`, every part is larger by that on all
-/// sides, lengthwise at the run's ends.
+/// The corners of each part of one half's section, station by station. With `grown_mm`, every part is larger
+/// by that on all sides, lengthwise at the run's ends.
 fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Vec<Option<[Vec3; 4]>>> {
     let last = run.stations.len() - 1;
     run.stations
@@ -40,8 +40,14 @@ fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
             } else {
                 0.0
             };
-            let moved = Station { point: station.point + lengthwise * station.tangent, ..*station };
-            parts.into_iter().map(|part: Option<Part>| part.map(|p| p.grown(grown_mm).corners(&moved))).collect()
+            let moved = Station {
+                point: station.point + lengthwise * station.tangent,
+                ..*station
+            };
+            parts
+                .into_iter()
+                .map(|part: Option<Part>| part.map(|p| p.grown(grown_mm).corners(&moved)))
+                .collect()
         })
         .collect()
 }
@@ -83,7 +89,12 @@ pub(super) struct Wake {
 
 impl Wake {
     /// The wake of all half connectors of `piece`.
-    pub(super) fn of(params: &ConnectorParams, runs: &[Run], piece: PatchId, separation: LatticeDirection) -> Self {
+    pub(super) fn of(
+        params: &ConnectorParams,
+        runs: &[Run],
+        piece: PatchId,
+        separation: LatticeDirection,
+    ) -> Self {
         let cells = runs
             .iter()
             .flat_map(|run| {
@@ -94,7 +105,10 @@ impl Wake {
             })
             .map(|cell| (cell, Aabb::around(cell)))
             .collect();
-        Self { cells, along: separation.unit() }
+        Self {
+            cells,
+            along: separation.unit(),
+        }
     }
 
     /// The parts of the wake that can meet `room`, each cut to the distances at which it does.
@@ -103,8 +117,10 @@ impl Wake {
             .iter()
             .filter_map(|(cell, bounds)| {
                 let (from, to) = distances_that_meet(*bounds, self.along, room, far_mm)?;
-                let ends: Vec<Vec3> =
-                    [from, to].iter().flat_map(|t| cell.iter().map(move |c| *c + *t * self.along)).collect();
+                let ends: Vec<Vec3> = [from, to]
+                    .iter()
+                    .flat_map(|t| cell.iter().map(move |c| *c + *t * self.along))
+                    .collect();
                 Some(Volume::hull(&ends))
             })
             .collect()
@@ -115,7 +131,10 @@ impl Wake {
 pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm: f64) -> Option<(f64, f64)> {
     let (mut from, mut to) = (0.0f64, far_mm);
     for axis in 0..3 {
-        let (low, high) = (room.min[axis] - moving.max[axis], room.max[axis] - moving.min[axis]);
+        let (low, high) = (
+            room.min[axis] - moving.max[axis],
+            room.max[axis] - moving.min[axis],
+        );
         let speed = along[axis];
         if speed == 0.0 {
             if low > 0.0 || high < 0.0 {
@@ -133,8 +152,15 @@ pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm:
 /// `volume` less everything that `wakes` sweep through it.
 pub(super) fn carved(volume: &Volume, wakes: &[Wake], far_mm: f64) -> Volume {
     let room = volume.bounds();
-    let swept: Vec<Volume> = wakes.par_iter().flat_map_iter(|w| w.meeting(room, far_mm)).collect();
-    if swept.is_empty() { volume.clone() } else { volume.subtract(&Volume::union_all(swept)) }
+    let swept: Vec<Volume> = wakes
+        .par_iter()
+        .flat_map_iter(|w| w.meeting(room, far_mm))
+        .collect();
+    if swept.is_empty() {
+        volume.clone()
+    } else {
+        volume.subtract(&Volume::union_all(swept))
+    }
 }
 
 #[cfg(test)]
@@ -143,7 +169,10 @@ mod tests {
 
     #[test]
     fn a_box_meets_a_room_exactly_between_two_distances() {
-        let cube = |x: f64| Aabb { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 1.0, 1.0, 1.0) };
+        let cube = |x: f64| Aabb {
+            min: Vec3::new(x, 0.0, 0.0),
+            max: Vec3::new(x + 1.0, 1.0, 1.0),
+        };
         let (from, to) = distances_that_meet(cube(0.0), Vec3::X, cube(5.0), 100.0).unwrap();
         assert_eq!((from, to), (4.0, 6.0));
         assert_eq!(distances_that_meet(cube(0.0), -Vec3::X, cube(5.0), 100.0), None);

@@ -90,8 +90,8 @@ struct Halves {
     carved: [Volume; 2],
 }
 
-/// Carves every half connector in the order of taking apart and joins it to its body; takes off what is too near to others;
-/// a key gets its detents and its notch, every piece its number.
+/// Carves every half connector in the order of taking apart and joins it to its body; takes off what is too
+/// near to others; a key gets its detents and its notch, every piece its number.
 pub fn make(
     ctx: &Ctx,
     finish: &FinishParams<'_>,
@@ -102,21 +102,39 @@ pub fn make(
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<Finished, PieceError> {
     let params = finish.connector;
-    let far_mm = rooms.as_slice().iter().fold(Aabb::EMPTY, |b, r| b.union(*r)).diagonal();
+    let far_mm = rooms
+        .as_slice()
+        .iter()
+        .fold(Aabb::EMPTY, |b, r| b.union(*r))
+        .diagonal();
     let halves = carved_halves(ctx, params, grid, shell, plan, runs, far_mm)?;
     let joints: Vec<Joint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
-    let kept: Vec<Run> = runs.iter().zip(&joints).filter(|(_, j)| j.length_mm > 0.0).map(|(r, _)| r.clone()).collect();
+    let kept: Vec<Run> = runs
+        .iter()
+        .zip(&joints)
+        .filter(|(_, j)| j.length_mm > 0.0)
+        .map(|(r, _)| r.clone())
+        .collect();
     ctx.stage("pieces", plan.steps.len())?;
     let mut pieces = joined(shell, &joints, &halves);
     relieve(ctx, &finish.relief, grid, plan, &mut pieces)?;
     let (mut press_fits, mut changes) = detents(params, &kept);
-    changes.extend(finish.grip.as_ref().and_then(|grip| notch_or_warning(ctx, grip, shell)));
+    changes.extend(
+        finish
+            .grip
+            .as_ref()
+            .and_then(|grip| notch_or_warning(ctx, grip, shell)),
+    );
     if params.key_rib_mm > 0.0 && !kept.iter().any(Run::is_rail) {
         let (fits, added) = ribs_of_key(ctx, params.key_rib_mm, finish.relief.rim_mm, grid, plan, &pieces);
         press_fits.extend(fits);
         changes.extend(added);
     }
-    Ok(Finished { meshes: printed(ctx, finish, grid, &pieces, &changes)?, joints, press_fits })
+    Ok(Finished {
+        meshes: printed(ctx, finish, grid, &pieces, &changes)?,
+        joints,
+        press_fits,
+    })
 }
 
 /// Both halves of each run, carved in the order of taking apart.
@@ -130,7 +148,13 @@ fn carved_halves(
     far_mm: f64,
 ) -> Result<Vec<Halves>, Cancelled> {
     ctx.stage("connectors", plan.steps.len())?;
-    let mut halves = vec![Halves { raw: [0.0; 2], carved: [Volume::empty(), Volume::empty()] }; runs.len()];
+    let mut halves = vec![
+        Halves {
+            raw: [0.0; 2],
+            carved: [Volume::empty(), Volume::empty()]
+        };
+        runs.len()
+    ];
     let mut wakes: Vec<Wake> = Vec::new();
     for step in plan.removal() {
         let q = step.piece;
@@ -140,9 +164,14 @@ fn carved_halves(
                 male.into_iter().chain((runs[r].female == q).then_some((r, 1)))
             })
             .collect();
-        let whole: Vec<Volume> =
-            mine.par_iter().map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h])).collect();
-        let clearance_mm = mine.iter().map(|&(r, _)| runs[r].clearance_mm()).fold(params.clearance_mm, f64::max);
+        let whole: Vec<Volume> = mine
+            .par_iter()
+            .map(|&(r, h)| whole_half(params, &runs[r], [Half::Male, Half::Female][h]))
+            .collect();
+        let clearance_mm = mine
+            .iter()
+            .map(|&(r, _)| runs[r].clearance_mm())
+            .fold(params.clearance_mm, f64::max);
         let room = Room::of(clearance_mm, grid, shell, q);
         let made = |whole: &Volume| (whole.volume(), carved(&room.cut(whole), &wakes, far_mm));
         let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
@@ -186,22 +215,35 @@ struct Room<'a> {
 impl<'a> Room<'a> {
     fn of(clearance_mm: f64, grid: &'a ShellGrid, shell: &ShellBodies, q: PatchId) -> Self {
         let cutoff = grid.cutoff_mm();
-        let (barred, side) =
-            rayon::join(|| shell.barred[q].spread(&grid.band, cutoff), || shell.side[q].spread(&grid.band, -cutoff));
-        Self { grid, clearance_mm: clearance_mm as f32, barred, side }
+        let (barred, side) = rayon::join(
+            || shell.barred[q].spread(&grid.band, cutoff),
+            || shell.side[q].spread(&grid.band, -cutoff),
+        );
+        Self {
+            grid,
+            clearance_mm: clearance_mm as f32,
+            barred,
+            side,
+        }
     }
 
-    /// What of `whole` has room: below the wall, a root's depth into it, `clearance_mm` away from what is barred, and as far
-    /// off what other pieces have of the wall: below the wall by that, or so far on the piece's own side of the cuts.
+    /// What of `whole` has room: below the wall, a root's depth into it, `clearance_mm` away from what is
+    /// barred, and as far off what other pieces have of the wall: below the wall by that, or so far on the
+    /// piece's own side of the cuts.
     ///
-    /// A body's edge along the inner end of a seam is sharp. The one field of what bars the piece rounds it off by up to a third of a
-    /// cell, more than the clearance; two smooth ones, united after they are contoured, keep it. (Filling the angle in one field
-    /// instead takes the connectors of narrow cavities away.)
+    /// A body's edge along the inner end of a seam is sharp. The one field of what bars the piece rounds it
+    /// off by up to a third of a cell, more than the clearance; two smooth ones, united after they are
+    /// contoured, keep it. (Filling the angle in one field instead takes the connectors of narrow cavities
+    /// away.)
     fn cut(&self, whole: &Volume) -> Volume {
-        let (part, nodes) = self.grid.band.part_in(whole.bounds().grown(2.0 * self.grid.band.cell_mm()));
+        let (part, nodes) = self
+            .grid
+            .band
+            .part_in(whole.bounds().grown(2.0 * self.grid.band.cell_mm()));
         let region = |field: &dyn Fn(usize) -> f32| {
             let field: Vec<f32> = nodes.iter().map(|&n| field(n as usize)).collect();
-            Volume::from_closed_mesh(&contour(&part, &field, OffBand::Outside)).expect("contours are manifold")
+            Volume::from_closed_mesh(&contour(&part, &field, OffBand::Outside))
+                .expect("contours are manifold")
         };
         let thickness = self.grid.thickness_mm as f32;
         let (ceiling, floor) = (thickness - ROOT_MM as f32, thickness + self.clearance_mm);
@@ -216,10 +258,24 @@ impl<'a> Room<'a> {
 
 fn joint(run: &Run, halves: &Halves) -> Joint {
     let volume_mm3 = [halves.carved[0].volume(), halves.carved[1].volume()];
-    let kept = std::array::from_fn(|h| if halves.raw[h] > 0.0 { volume_mm3[h] / halves.raw[h] } else { 0.0 });
+    let kept = std::array::from_fn(|h| {
+        if halves.raw[h] > 0.0 {
+            volume_mm3[h] / halves.raw[h]
+        } else {
+            0.0
+        }
+    });
     let holds = kept.iter().all(|k| *k >= LEAST_KEPT);
     let length_mm = if holds { run.length() } else { 0.0 };
-    Joint { male: run.male, female: run.female, length_mm, volume_mm3, kept, at: run.middle(), is_rail: run.is_rail() }
+    Joint {
+        male: run.male,
+        female: run.female,
+        length_mm,
+        volume_mm3,
+        kept,
+        at: run.middle(),
+        is_rail: run.is_rail(),
+    }
 }
 
 /// The bodies with what hangs from them.
@@ -253,14 +309,21 @@ fn ribs_of_key(
     pieces: &IdVec<PatchId, Volume>,
 ) -> (Vec<PressFit>, Vec<Change>) {
     let key = plan.key();
-    let along = plan.removal().next().expect("a plan has a step for each piece").separation.unit();
+    let along = plan
+        .removal()
+        .next()
+        .expect("a plan has a step for each piece")
+        .separation
+        .unit();
     let mut others = TriMesh::default();
     let mut shapes = Some(Vec::new());
     for other in pieces.ids().filter(|&p| p != key) {
         let mesh = pieces[other].to_mesh();
         let first = others.points.len() as u32;
         others.points.extend(&mesh.points);
-        others.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+        others
+            .triangles
+            .extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
         // Where one cannot be measured no rib is known to fit.
         shapes = shapes.zip(Solid::new(mesh).ok()).map(|(mut shapes, solid)| {
             shapes.push(Shape::new(&solid));
@@ -271,7 +334,14 @@ fn ribs_of_key(
     let least_depth_mm = rim_mm + RIB_MARGIN_MM;
     let depth = |p: Vec3| grid.band.sample(&grid.depth, p).unwrap_or(f64::INFINITY);
     let made = shapes.map_or_else(Default::default, |shapes| {
-        let seat = Seat { key, mesh: &mesh, others: &others, shapes: &shapes, along, least_depth_mm };
+        let seat = Seat {
+            key,
+            mesh: &mesh,
+            others: &others,
+            shapes: &shapes,
+            along,
+            least_depth_mm,
+        };
         ribs(interference_mm, &seat, depth)
     });
     if made.0.is_empty() {
@@ -301,20 +371,37 @@ fn printed(
         .map(|&q| {
             let mut piece = pieces[q].clone();
             for change in changes.iter().filter(|c| c.piece == q) {
-                piece = if change.is_added { piece.union(&change.volume) } else { piece.subtract(&change.volume) };
+                piece = if change.is_added {
+                    piece.union(&change.volume)
+                } else {
+                    piece.subtract(&change.volume)
+                };
             }
-            let number = finish.label.as_ref().and_then(|params| label::cut(params, grid, q, &piece));
+            let number = finish
+                .label
+                .as_ref()
+                .and_then(|params| label::cut(params, grid, q, &piece));
             // A number is worth less than a piece that can be written.
             let numbered = number.and_then(|cut| printable_body(&piece.subtract(&cut)).ok());
             let has_number = numbered.is_some();
             let mesh = numbered.map_or_else(|| printable_body(&piece), Ok);
             ctx.step()?;
-            Ok((mesh.map_err(|reason| PieceError::NotPrintable { piece: q, reason })?, has_number))
+            Ok((
+                mesh.map_err(|reason| PieceError::NotPrintable { piece: q, reason })?,
+                has_number,
+            ))
         })
         .collect();
     let meshes = meshes.into_iter().collect::<Result<Vec<_>, _>>()?;
     if finish.label.is_some() {
-        warn_of_missing_numbers(ctx, ids.iter().zip(&meshes).filter(|(_, made)| !made.1).map(|(q, _)| *q).collect());
+        warn_of_missing_numbers(
+            ctx,
+            ids.iter()
+                .zip(&meshes)
+                .filter(|(_, made)| !made.1)
+                .map(|(q, _)| *q)
+                .collect(),
+        );
     }
     Ok(meshes.into_iter().map(|made| made.0).collect())
 }

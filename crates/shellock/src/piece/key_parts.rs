@@ -7,8 +7,8 @@ use crate::PatchId;
 use crate::connector::{ConnectorParams, Run, Section, Station};
 use crate::{PressFit, PressFitKind};
 
-/// Where on a rail the detent sits, mm from its back end, so that it presses on the last millimetres of the way alone; half its length
-/// at its foot and at its top.
+/// Where on a rail the detent sits, mm from its back end, so that it presses on the last millimetres of the
+/// way alone; half its length at its foot and at its top.
 const AT_MM: f64 = 1.3;
 const FOOT_MM: f64 = 0.9;
 const TOP_MM: f64 = 0.3;
@@ -50,14 +50,24 @@ pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<PressFit>,
     let (mut made, mut changes) = (Vec::new(), Vec::new());
     for run in runs.iter().filter(|r| params.detent_mm > 0.0 && r.is_rail()) {
         let station = &run.stations[0];
-        let Some(tongue) = Section::at(params, station).male[0] else { continue };
+        let Some(tongue) = Section::at(params, station).male[0] else {
+            continue;
+        };
         let top = tongue.n1 + station.clearance_mm + params.detent_mm;
         let inset = 0.15 * (tongue.s1 - tongue.s0);
         let (s0, s1) = (tongue.s0 + inset, tongue.s1 - inset);
         let bump = wedge(station, [tongue.n1 - ROOT_MM, top], [s0, s1], 0.0);
         let dimple = wedge(station, [tongue.n1 - ROOT_MM, top], [s0, s1], PLAY_MM);
-        changes.push(Change { piece: run.male, volume: bump, is_added: true });
-        changes.push(Change { piece: run.female, volume: dimple, is_added: false });
+        changes.push(Change {
+            piece: run.male,
+            volume: bump,
+            is_added: true,
+        });
+        changes.push(Change {
+            piece: run.female,
+            volume: dimple,
+            is_added: false,
+        });
         made.push(PressFit {
             kind: PressFitKind::Detent,
             piece: run.male,
@@ -89,11 +99,14 @@ pub(super) fn notch(grip: &Grip, body: &TriMesh) -> Option<Change> {
     let surface = TriangleBvh::new(body);
     let height = |along: f64, aside: f64| {
         let from = grip.at + along * grip.slide + aside * across + NOTCH_LOOK_MM * grip.normal;
-        surface.first_hit(from, -grip.normal, 2.0 * NOTCH_LOOK_MM).map(|(_, far_mm)| NOTCH_LOOK_MM - far_mm)
+        surface
+            .first_hit(from, -grip.normal, 2.0 * NOTCH_LOOK_MM)
+            .map(|(_, far_mm)| NOTCH_LOOK_MM - far_mm)
     };
     let places = (-2..=2).flat_map(|i| (-6..=6).map(move |j| [f64::from(i) / 2.0, f64::from(j) / 6.0]));
-    let heights: Option<Vec<f64>> =
-        places.map(|[along, aside]| height(along * NOTCH_HALF_MM, aside * 0.5 * NOTCH_WIDTH_MM)).collect();
+    let heights: Option<Vec<f64>> = places
+        .map(|[along, aside]| height(along * NOTCH_HALF_MM, aside * 0.5 * NOTCH_WIDTH_MM))
+        .collect();
     let heights = heights?;
     let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
@@ -102,14 +115,21 @@ pub(super) fn notch(grip: &Grip, body: &TriMesh) -> Option<Change> {
     }
     // Deepest in front, where the nail pushes; running out towards the back.
     let mut points = Vec::new();
-    for (along, height) in
-        [(NOTCH_HALF_MM, lowest - NOTCH_MM), (NOTCH_HALF_MM, highest + 1.0), (-NOTCH_HALF_MM, highest + 0.1)]
-    {
+    for (along, height) in [
+        (NOTCH_HALF_MM, lowest - NOTCH_MM),
+        (NOTCH_HALF_MM, highest + 1.0),
+        (-NOTCH_HALF_MM, highest + 0.1),
+    ] {
         for aside in [-0.5, 0.5] {
-            points.push(grip.at + along * grip.slide + aside * NOTCH_WIDTH_MM * across + height * grip.normal);
+            points
+                .push(grip.at + along * grip.slide + aside * NOTCH_WIDTH_MM * across + height * grip.normal);
         }
     }
-    Some(Change { piece: grip.key, volume: Volume::hull(&points), is_added: false })
+    Some(Change {
+        piece: grip.key,
+        volume: Volume::hull(&points),
+        is_added: false,
+    })
 }
 
 #[cfg(test)]
@@ -119,7 +139,10 @@ mod tests {
 
     #[test]
     fn a_bump_interferes_by_what_was_asked_for_and_not_in_its_dimple() {
-        let params = ConnectorParams { detent_mm: 0.25, ..ConnectorParams::default() };
+        let params = ConnectorParams {
+            detent_mm: 0.25,
+            ..ConnectorParams::default()
+        };
         let station = |arc_mm: f64| Station {
             point: arc_mm * Vec3::X,
             tangent: Vec3::X,
@@ -132,13 +155,19 @@ mod tests {
             clearance_mm: params.key_clearance_mm,
             shape: Shape::Rail(RailPart::Full),
         };
-        let run = Run { male: PatchId(1), female: PatchId(0), stations: vec![station(0.0), station(20.0)] };
+        let run = Run {
+            male: PatchId(1),
+            female: PatchId(0),
+            stations: vec![station(0.0), station(20.0)],
+        };
         let (made, changes) = detents(&params, &[run]);
         assert_eq!((made.len(), changes.len()), (1, 2));
         let hanger = Section::at(&params, &station(0.0)).female[1].unwrap();
         let (bump, dimple) = (&changes[0].volume, &changes[1].volume);
         assert!((bump.bounds().max.y - hanger.n0 - 0.25).abs() < 1e-9);
-        assert!(bump.subtract(dimple).volume() < 1e-6 && dimple.bounds().max.y < hanger.n1 - params.min_wall_mm);
+        assert!(
+            bump.subtract(dimple).volume() < 1e-6 && dimple.bounds().max.y < hanger.n1 - params.min_wall_mm
+        );
     }
 
     #[test]
@@ -151,20 +180,39 @@ mod tests {
             let mut mesh = TriMesh::default();
             for (x, y) in (-20..20).flat_map(|x| (-20..20).map(move |y| (x, y))) {
                 let first = mesh.points.len() as u32;
-                mesh.points.extend([at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]);
-                mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+                mesh.points
+                    .extend([at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]);
+                mesh.triangles
+                    .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
             }
             mesh
         };
-        let grip = Grip { key: PatchId(3), at: Vec3::new(0.1, 0.1, 0.3), slide: Vec3::X, normal: Vec3::Z };
+        let grip = Grip {
+            key: PatchId(3),
+            at: Vec3::new(0.1, 0.1, 0.3),
+            slide: Vec3::X,
+            normal: Vec3::Z,
+        };
         let cut = notch(&grip, &plate(0.0)).unwrap();
         assert!((cut.volume.bounds().min.z + NOTCH_MM).abs() < 1e-9 && !cut.is_added);
         assert!(notch(&grip, &plate(0.3)).is_none());
         // As coarse as a plane can be.
         let corners = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
-        let coarse = TriMesh { points: corners.into(), triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        let coarse = TriMesh {
+            points: corners.into(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
         assert!(notch(&grip, &coarse).is_some());
         // The notch reaches over the plate's edge.
-        assert!(notch(&Grip { at: Vec3::new(8.5, 0.0, 0.0), ..grip }, &coarse).is_none());
+        assert!(
+            notch(
+                &Grip {
+                    at: Vec3::new(8.5, 0.0, 0.0),
+                    ..grip
+                },
+                &coarse
+            )
+            .is_none()
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! The number of each piece, engraved on the inner side of its wall, where nobody sees it once the thing stands.
+//! The number of each piece, engraved on the inner side of its wall, where nobody sees it once the thing
+//! stands.
 //!
 //! ```text
 //!        ┌┐  ┌┐  ┌┐        strokes about as deep everywhere, whatever the wall's curvature
@@ -7,9 +8,9 @@
 //!   ────────────────────   outer side
 //! ```
 //!
-//! A place is good where rays from the cavity meet nothing but the inner side, close to a plane, and pass through the
-//! whole wall behind it: that keeps numbers off connectors, seams, notches and carved walls. The largest size that has
-//! a good place is taken, as near to the middle of the wall as it goes.
+//! A place is good where rays from the cavity meet nothing but the inner side, close to a plane, and pass
+//! through the whole wall behind it: that keeps numbers off connectors, seams, notches and carved walls. The
+//! largest size that has a good place is taken, as near to the middle of the wall as it goes.
 
 mod digits;
 
@@ -34,7 +35,11 @@ pub struct LabelParams {
 
 impl Default for LabelParams {
     fn default() -> Self {
-        Self { depth_mm: 0.4, stroke_mm: 0.8, least_wall_mm: 0.8 }
+        Self {
+            depth_mm: 0.4,
+            stroke_mm: 0.8,
+            least_wall_mm: 0.8,
+        }
     }
 }
 
@@ -107,12 +112,25 @@ impl Sheet {
 }
 
 impl<'a> Wall<'a> {
-    fn new(params: &'a LabelParams, mesh: TriMesh, thickness_mm: f64, depth: &'a dyn Fn(Vec3) -> Option<f64>) -> Self {
-        Self { params, bvh: TriangleBvh::new(&mesh), mesh, thickness_mm, depth }
+    fn new(
+        params: &'a LabelParams,
+        mesh: TriMesh,
+        thickness_mm: f64,
+        depth: &'a dyn Fn(Vec3) -> Option<f64>,
+    ) -> Self {
+        Self {
+            params,
+            bvh: TriangleBvh::new(&mesh),
+            mesh,
+            thickness_mm,
+            depth,
+        }
     }
 
     fn engraved(&self, number: u32) -> Option<Volume> {
-        let Self { params, thickness_mm, .. } = self;
+        let Self {
+            params, thickness_mm, ..
+        } = self;
         if thickness_mm * WHOLE_WALL - params.depth_mm < params.least_wall_mm {
             return None;
         }
@@ -120,7 +138,9 @@ impl<'a> Wall<'a> {
         HEIGHTS_MM.iter().find_map(|&height_mm| {
             let drawing = Drawing::of(number, height_mm);
             let tries = places.iter().flat_map(|place| TURNS.map(|turn| (place, turn)));
-            tries.into_iter().find_map(|(&place, turn)| self.cutter(&drawing, &self.sheet(place, turn, &drawing)?))
+            tries
+                .into_iter()
+                .find_map(|(&place, turn)| self.cutter(&drawing, &self.sheet(place, turn, &drawing)?))
         })
     }
 
@@ -129,9 +149,17 @@ impl<'a> Wall<'a> {
         let is_inner = |&f: &usize| self.is_inner(self.mesh.face_center(f)) && self.mesh.face_area(f) > 0.0;
         let faces: Vec<usize> = (0..self.mesh.triangles.len()).filter(is_inner).collect();
         let area: f64 = faces.iter().map(|&f| self.mesh.face_area(f)).sum();
-        let weighted: Vec3 = faces.iter().map(|&f| self.mesh.face_area(f) * self.mesh.face_center(f)).sum();
+        let weighted: Vec3 = faces
+            .iter()
+            .map(|&f| self.mesh.face_area(f) * self.mesh.face_center(f))
+            .sum();
         let middle = weighted / area.max(f64::MIN_POSITIVE);
-        let cell = |f: usize| (self.mesh.face_center(f) / SPACING_MM).floor().to_array().map(|x| x as i64);
+        let cell = |f: usize| {
+            (self.mesh.face_center(f) / SPACING_MM)
+                .floor()
+                .to_array()
+                .map(|x| x as i64)
+        };
         let mut by_cell: Vec<([i64; 3], usize)> = faces.into_iter().map(|f| (cell(f), f)).collect();
         by_cell.sort_unstable();
         by_cell.dedup_by_key(|entry| entry.0);
@@ -156,29 +184,43 @@ impl<'a> Wall<'a> {
         let (right, up) = (cos * right + sin * up, cos * up - sin * right);
         let size = drawing.size_mm();
         let corner = self.mesh.face_center(face) - 0.5 * size[0] * right - 0.5 * size[1] * up;
-        let sheet = Sheet { corner, right, up, normal };
+        let sheet = Sheet {
+            corner,
+            right,
+            up,
+            normal,
+        };
         let rim = RIM_MM + 0.5 * self.params.stroke_mm;
         let n = size.map(|side| ((side + 2.0 * rim) / LOOK_MM).ceil() as usize);
         let place = |axis: usize, i: usize| i as f64 / n[axis] as f64 * (size[axis] + 2.0 * rim) - rim;
         // The corners first: most places that are bad are so there.
         let ends = [[0, 0], [n[0], 0], [0, n[1]], [n[0], n[1]]];
         let all = (0..=n[0]).flat_map(|i| (0..=n[1]).map(move |j| [i, j]));
-        let mut looks = ends.into_iter().chain(all).map(|[i, j]| [place(0, i), place(1, j)]);
+        let mut looks = ends
+            .into_iter()
+            .chain(all)
+            .map(|[i, j]| [place(0, i), place(1, j)]);
         looks.all(|at| self.has_whole_wall(&sheet, at)).then_some(sheet)
     }
 
-    /// Whether the inner side lies below a place of the sheet, about parallel to it, with the whole wall behind it.
+    /// Whether the inner side lies below a place of the sheet, about parallel to it, with the whole wall
+    /// behind it.
     fn has_whole_wall(&self, sheet: &Sheet, at: [f64; 2]) -> bool {
-        let Some((face, height_mm)) = self.below(sheet, at) else { return false };
+        let Some((face, height_mm)) = self.below(sheet, at) else {
+            return false;
+        };
         let point = sheet.at(at) + height_mm * sheet.normal;
-        let is_flat = height_mm.abs() < UNEVEN_MM && self.mesh.face_normal(face).dot(sheet.normal) > COS_STEEP;
+        let is_flat =
+            height_mm.abs() < UNEVEN_MM && self.mesh.face_normal(face).dot(sheet.normal) > COS_STEEP;
         if !(is_flat && self.is_inner(point)) {
             return false;
         }
         /// Behind the surface that was met, mm.
         const PAST_MM: f64 = 1e-3;
         let wall_mm = WHOLE_WALL * self.thickness_mm;
-        self.bvh.first_hit(point - PAST_MM * sheet.normal, -sheet.normal, wall_mm - PAST_MM).is_none()
+        self.bvh
+            .first_hit(point - PAST_MM * sheet.normal, -sheet.normal, wall_mm - PAST_MM)
+            .is_none()
     }
 
     /// The first face below a place of the sheet, and its height over the sheet, mm.
@@ -200,7 +242,8 @@ impl<'a> Wall<'a> {
         Some(Volume::union_all(parts)).filter(|cut| !cut.is_empty())
     }
 
-    /// Adds blocks along a straight stroke between two places with their heights; in halves where the surface bends.
+    /// Adds blocks along a straight stroke between two places with their heights; in halves where the surface
+    /// bends.
     fn cut_along(&self, sheet: &Sheet, ends: [([f64; 2], f64); 2], parts: &mut Vec<Volume>) -> Option<()> {
         let [(a, height_a), (b, height_b)] = ends;
         let along = [b[0] - a[0], b[1] - a[1]];
@@ -216,9 +259,13 @@ impl<'a> Wall<'a> {
         let mut corners = Vec::new();
         for (end, height, out) in [(a, height_a, -half_mm), (b, height_b, half_mm)] {
             for aside in [-half_mm, half_mm] {
-                let at = [end[0] + out * unit[0] - aside * unit[1], end[1] + out * unit[1] + aside * unit[0]];
+                let at = [
+                    end[0] + out * unit[0] - aside * unit[1],
+                    end[1] + out * unit[1] + aside * unit[0],
+                ];
                 corners.extend(
-                    [-self.params.depth_mm, 0.5 * ABOVE_MM].map(|z| sheet.at(at) + (height + z) * sheet.normal),
+                    [-self.params.depth_mm, 0.5 * ABOVE_MM]
+                        .map(|z| sheet.at(at) + (height + z) * sheet.normal),
                 );
             }
         }

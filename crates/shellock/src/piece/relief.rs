@@ -1,9 +1,10 @@
 //! Relief: what of a piece comes too near to another one on its way out is taken off.
 //!
-//! Carving keeps the clearances wherever sampled fields are smooth. Where seams of three pieces meet, or a wall is crooked within a cell of
-//! the grid, they come out smaller in spots, and in the worst ones surfaces cross. So the exact gaps of the finished pieces
-//! beneath the rim are asked, and each triangle that a piece passes too near by is swollen by the clearance, drawn out against the
-//! piece's way, and cut from it. The rim stays: nobody shall see a difference.
+//! Carving keeps the clearances wherever sampled fields are smooth. Where seams of three pieces meet, or a
+//! wall is crooked within a cell of the grid, they come out smaller in spots, and in the worst ones surfaces
+//! cross. So the exact gaps of the finished pieces beneath the rim are asked, and each triangle that a piece
+//! passes too near by is swollen by the clearance, drawn out against the piece's way, and cut from it. The
+//! rim stays: nobody shall see a difference.
 
 use rayon::prelude::*;
 use shellock_geom::clearance::{Passed, Translation, faces_passed};
@@ -15,9 +16,11 @@ use crate::body::ShellGrid;
 use crate::plan::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Gaps smaller than wanted by up to this much stay, mm: sockets are half as much tighter by design, and what is cut must be worth it.
+/// Gaps smaller than wanted by up to this much stay, mm: sockets are half as much tighter by design, and what
+/// is cut must be worth it.
 const TOLERANCE_MM: f64 = 0.0195;
-/// What is cut keeps this much less than the gap wanted, mm: faces that would coincide with a socket's stay apart.
+/// What is cut keeps this much less than the gap wanted, mm: faces that would coincide with a socket's stay
+/// apart.
 const SHY_MM: f64 = 0.005;
 /// Rims nearer than the first are cut until they keep the second, mm: by design they are 0.03 mm apart.
 const RIM_LEAST_MM: f64 = 0.003;
@@ -55,7 +58,11 @@ pub(super) fn relieve(
     plan: &InstallationPlan,
     pieces: &mut IdVec<PatchId, Volume>,
 ) -> Result<(), Cancelled> {
-    let skins: Vec<Skin> = pieces.as_slice().par_iter().map(|piece| Skin::of(grid, piece, params.rim_mm)).collect();
+    let skins: Vec<Skin> = pieces
+        .as_slice()
+        .par_iter()
+        .map(|piece| Skin::of(grid, piece, params.rim_mm))
+        .collect();
     let skins: IdVec<PatchId, Skin> = skins.into_iter().collect();
     let order: Vec<_> = plan.removal().collect();
     let relieved: Vec<Option<Volume>> = (0..order.len())
@@ -80,17 +87,30 @@ pub(super) fn relieve(
     Ok(())
 }
 
-/// What must go of a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`, and that their rims do not touch.
+/// What must go of a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`, and that their
+/// rims do not touch.
 fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
     if distances_that_meet(piece.bounds.grown(gap_mm), along, earlier.bounds, f64::INFINITY).is_none() {
         return Vec::new();
     }
-    let way_out = Translation { along, from_mm: 0.0, far_mm: f64::INFINITY };
+    let way_out = Translation {
+        along,
+        from_mm: 0.0,
+        far_mm: f64::INFINITY,
+    };
     let of = |piece: &TriMesh, earlier: &TriMesh, least_mm: f64, gap_mm: f64| -> Vec<Volume> {
         let passed = faces_passed(piece, earlier, &way_out, least_mm);
-        flats(earlier, &passed).iter().filter_map(|flat| flat.drawn_out(along, gap_mm)).collect()
+        flats(earlier, &passed)
+            .iter()
+            .filter_map(|flat| flat.drawn_out(along, gap_mm))
+            .collect()
     };
-    let mut cuts = of(&piece.beneath, &earlier.beneath, gap_mm - TOLERANCE_MM, gap_mm - SHY_MM);
+    let mut cuts = of(
+        &piece.beneath,
+        &earlier.beneath,
+        gap_mm - TOLERANCE_MM,
+        gap_mm - SHY_MM,
+    );
     cuts.extend(of(&piece.whole, &earlier.whole, RIM_LEAST_MM, RIM_GAP_MM));
     cuts
 }
@@ -103,7 +123,8 @@ struct Flat {
     passed_by: Aabb,
 }
 
-/// The passed triangles of `mesh`, those of about one plane together: carving leaves many slivers, and each alone would be cut out.
+/// The passed triangles of `mesh`, those of about one plane together: carving leaves many slivers, and each
+/// alone would be cut out.
 fn flats(mesh: &TriMesh, passed: &[Passed]) -> Vec<Flat> {
     let mut flats: Vec<Flat> = Vec::new();
     for p in passed {
@@ -112,7 +133,9 @@ fn flats(mesh: &TriMesh, passed: &[Passed]) -> Vec<Flat> {
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let around = Aabb::around(corners);
         let takes = |flat: &&mut Flat| {
-            let is_in_plane = corners.iter().all(|q| (*q - flat.corners[0]).dot(flat.normal).abs() < FLAT_MM);
+            let is_in_plane = corners
+                .iter()
+                .all(|q| (*q - flat.corners[0]).dot(flat.normal).abs() < FLAT_MM);
             let is_parallel = normal == Vec3::ZERO || normal.dot(flat.normal) > FLAT_COS;
             is_in_plane && is_parallel && flat.around.union(around).diagonal() < FLAT_SIZE_MM
         };
@@ -139,16 +162,23 @@ impl Flat {
         let swollen = self.swollen(by_mm);
         let bounds = Aabb::around(swollen.iter().copied());
         let (from, to) = distances_that_meet(bounds, -along, self.passed_by, f64::INFINITY)?;
-        let ends = [from, to].into_iter().flat_map(|t| swollen.iter().map(move |p| *p - t * along));
+        let ends = [from, to]
+            .into_iter()
+            .flat_map(|t| swollen.iter().map(move |p| *p - t * along));
         Some(Volume::hull(&ends.collect::<Vec<_>>()))
     }
 
-    /// Corners whose hull holds all points within `by_mm`: a cube around each corner, one axis along the normal.
+    /// Corners whose hull holds all points within `by_mm`: a cube around each corner, one axis along the
+    /// normal.
     fn swollen(&self, by_mm: f64) -> Vec<Vec3> {
         let (u, v) = self.normal.any_orthonormal_pair();
-        let signs = (0..8u8).map(|bits| [0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { by_mm } else { -by_mm }));
+        let signs =
+            (0..8u8).map(|bits| [0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { by_mm } else { -by_mm }));
         let cube: Vec<Vec3> = signs.map(|[x, y, z]| x * u + y * v + z * self.normal).collect();
-        self.corners.iter().flat_map(|&p| cube.iter().map(move |&d| p + d)).collect()
+        self.corners
+            .iter()
+            .flat_map(|&p| cube.iter().map(move |&d| p + d))
+            .collect()
     }
 }
 
@@ -158,11 +188,25 @@ impl Skin {
         let depth = |p: &Vec3| grid.band.sample(&grid.depth, *p).unwrap_or(f64::INFINITY);
         // What is off the band lies far beneath; lines are cut between finite values.
         let rim_mm = (rim_mm - RIM_MARGIN_MM).max(0.0);
-        let values: Vec<f64> = whole.points.iter().map(|p| (depth(p) - rim_mm).min(10.0)).collect();
+        let values: Vec<f64> = whole
+            .points
+            .iter()
+            .map(|p| (depth(p) - rim_mm).min(10.0))
+            .collect();
         let cut = cut_at_zero(&whole, &values, |_| true);
         let sides = cut.mesh.triangles.iter().zip(&cut.side);
-        let triangles = sides.filter(|(_, side)| **side == Side::Positive).map(|(t, _)| *t).collect();
-        Self { bounds: whole.bounds(), beneath: TriMesh { points: cut.mesh.points, triangles }, whole }
+        let triangles = sides
+            .filter(|(_, side)| **side == Side::Positive)
+            .map(|(t, _)| *t)
+            .collect();
+        Self {
+            bounds: whole.bounds(),
+            beneath: TriMesh {
+                points: cut.mesh.points,
+                triangles,
+            },
+            whole,
+        }
     }
 }
 
@@ -172,10 +216,19 @@ mod tests {
 
     #[test]
     fn a_swollen_flat_holds_what_is_near_it_and_is_no_thicker_along_its_normal() {
-        let corners = [[0.0, 0.0, 1.0], [2.0, 0.3, 1.0], [0.4, 1.0, 1.0], [2.2, 1.4, 1.0]].map(Vec3::from_array);
-        let mesh = TriMesh { points: corners.to_vec(), triangles: vec![[0, 1, 2], [2, 1, 3]] };
-        let passed = [0, 1].map(|face| Passed { face, by: mesh.bounds() });
-        let [flat] = &flats(&mesh, &passed)[..] else { panic!("both triangles lie in one plane") };
+        let corners =
+            [[0.0, 0.0, 1.0], [2.0, 0.3, 1.0], [0.4, 1.0, 1.0], [2.2, 1.4, 1.0]].map(Vec3::from_array);
+        let mesh = TriMesh {
+            points: corners.to_vec(),
+            triangles: vec![[0, 1, 2], [2, 1, 3]],
+        };
+        let passed = [0, 1].map(|face| Passed {
+            face,
+            by: mesh.bounds(),
+        });
+        let [flat] = &flats(&mesh, &passed)[..] else {
+            panic!("both triangles lie in one plane")
+        };
         let solid = Volume::hull(&flat.swollen(0.1));
         let bounds = solid.bounds();
         assert!((bounds.min.z - 0.9).abs() < 1e-9 && (bounds.max.z - 1.1).abs() < 1e-9);
@@ -187,12 +240,21 @@ mod tests {
         }
     }
 
-    /// A block below an overhang that its way out touches by 0.03 mm: it leaves past it at the gap that was asked for.
+    /// A block below an overhang that its way out touches by 0.03 mm: it leaves past it at the gap that was
+    /// asked for.
     #[test]
     fn what_was_too_near_on_the_way_keeps_the_gap_afterwards_and_the_rest_stays() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| Volume::cuboid(Aabb { min: min.into(), max: max.into() });
-        let skin =
-            |volume: &Volume| Skin { whole: volume.to_mesh(), beneath: volume.to_mesh(), bounds: volume.bounds() };
+        let cuboid = |min: [f64; 3], max: [f64; 3]| {
+            Volume::cuboid(Aabb {
+                min: min.into(),
+                max: max.into(),
+            })
+        };
+        let skin = |volume: &Volume| Skin {
+            whole: volume.to_mesh(),
+            beneath: volume.to_mesh(),
+            bounds: volume.bounds(),
+        };
         let block = cuboid([0.0; 3], [4.0, 4.0, 4.0]);
         let wall = cuboid([-2.0, 0.0, 0.0], [-1.0, 4.0, 9.0]);
         let overhang = cuboid([3.97, 1.0, 6.0], [6.0, 3.0, 7.0]);
@@ -200,8 +262,20 @@ mod tests {
         let cut = cuts(&skin(&block), &skin(&overhang), Vec3::Z, 0.1);
         let free = block.subtract(&Volume::union_all(cut));
         assert!(cuts(&skin(&free), &skin(&overhang), Vec3::Z, 0.1).is_empty());
-        let way_out = Translation { along: Vec3::Z, from_mm: 0.0, far_mm: f64::INFINITY };
-        assert_eq!(faces_passed(&free.to_mesh(), &overhang.to_mesh(), &way_out, 0.1 - SHY_MM - 1e-6), []);
+        let way_out = Translation {
+            along: Vec3::Z,
+            from_mm: 0.0,
+            far_mm: f64::INFINITY,
+        };
+        assert_eq!(
+            faces_passed(
+                &free.to_mesh(),
+                &overhang.to_mesh(),
+                &way_out,
+                0.1 - SHY_MM - 1e-6
+            ),
+            []
+        );
         let lost = block.volume() - free.volume();
         assert!((0.9..1.1).contains(&(lost / (4.0 * 2.19 * 0.125))), "{lost}");
     }

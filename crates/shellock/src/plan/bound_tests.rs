@@ -19,7 +19,9 @@ struct PairCosts {
 
 impl PairCosts {
     fn made_up(n: usize, mut cost: impl FnMut() -> f64) -> Self {
-        Self { by_piece: (0..n).map(|_| (0..997).map(|_| cost()).collect()).collect() }
+        Self {
+            by_piece: (0..n).map(|_| (0..997).map(|_| cost()).collect()).collect(),
+        }
     }
 
     fn of_pair(&self, p: PatchId, x: (usize, usize), y: (usize, usize)) -> f64 {
@@ -30,19 +32,31 @@ impl PairCosts {
 
 /// What a seam can be for a piece in `role`, as numbers.
 fn states(role: Role, seam: SeamStates) -> Vec<usize> {
-    let own = role.separation().filter(|&s| seam.own & mask_of(s) != 0).map(LatticeDirection::index);
-    own.into_iter().chain(directions_in(seam.others).map(|s| LatticeDirection::COUNT + s.index())).collect()
+    let own = role
+        .separation()
+        .filter(|&s| seam.own & mask_of(s) != 0)
+        .map(LatticeDirection::index);
+    own.into_iter()
+        .chain(directions_in(seam.others).map(|s| LatticeDirection::COUNT + s.index()))
+        .collect()
 }
 
 impl PieceCosts for PairCosts {
     fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64 {
         let states: Vec<Vec<usize>> = around.seams.iter().map(|&x| states(role, x)).collect();
         let least = |i: usize, j: usize| {
-            let pairs = states[i].iter().flat_map(|&x| states[j].iter().map(move |&y| (x, y)));
+            let pairs = states[i]
+                .iter()
+                .flat_map(|&x| states[j].iter().map(move |&y| (x, y)));
             let pairs = pairs.filter(|(x, y)| i != j || x == y);
-            pairs.map(|(x, y)| self.of_pair(piece, (i, x), (j, y))).fold(f64::INFINITY, f64::min)
+            pairs
+                .map(|(x, y)| self.of_pair(piece, (i, x), (j, y)))
+                .fold(f64::INFINITY, f64::min)
         };
-        (0..states.len()).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|(i, j)| least(i, j)).fold(0.0, f64::max)
+        (0..states.len())
+            .flat_map(|i| (0..=i).map(move |j| (i, j)))
+            .map(|(i, j)| least(i, j))
+            .fold(0.0, f64::max)
     }
 }
 
@@ -61,10 +75,18 @@ fn thrown(n: usize, rng: &mut ChaCha8Rng) -> PlanSurvey {
             _ => f64::from(rng.random_range(0..4)),
         };
     }
-    for (p, q) in (0..n).flat_map(|p| (0..n).map(move |q| (p, q))).filter(|(p, q)| p != q) {
-        for s in LatticeDirection::all().filter(|_| rng.random_range(0..4) == 0).collect::<Vec<_>>() {
+    for (p, q) in (0..n)
+        .flat_map(|p| (0..n).map(move |q| (p, q)))
+        .filter(|(p, q)| p != q)
+    {
+        for s in LatticeDirection::all()
+            .filter(|_| rng.random_range(0..4) == 0)
+            .collect::<Vec<_>>()
+        {
             if survey.occlusion.share(p.into(), q.into(), s) == 0.0 {
-                survey.occlusion.occlude(p.into(), q.into(), s, rng.random_range(0.0..0.05));
+                survey
+                    .occlusion
+                    .occlude(p.into(), q.into(), s, rng.random_range(0.0..0.05));
             }
         }
     }
@@ -96,14 +118,25 @@ fn costs(survey: &PlanSurvey, constraints: &PlanConstraints, rng: &mut ChaCha8Rn
     match rng.random_range(0..if survey.n_pieces > 3 { 4 } else { 6 }) {
         0..=2 => Box::new(SeamCosts::new(survey, constraints)),
         3 => Box::new(BoundsAlone(SeamCosts::new(survey, constraints))),
-        4 => Box::new(PairCosts::made_up(survey.n_pieces, || f64::from(rng.random_range(0..n_levels)))),
-        _ => Box::new(PairCosts::made_up(survey.n_pieces, || 10f64.powf(rng.random_range(-9.0..9.0)))),
+        4 => Box::new(PairCosts::made_up(survey.n_pieces, || {
+            f64::from(rng.random_range(0..n_levels))
+        })),
+        _ => Box::new(PairCosts::made_up(survey.n_pieces, || {
+            10f64.powf(rng.random_range(-9.0..9.0))
+        })),
     }
 }
 
 /// Work allowed in all, and for the first questions by piece: small questions are what leaves answers open.
-const WORK: [(usize, usize); 7] =
-    [(1, 60), (10, 1), (30, 2), (100, 1), (1_000_000, 1), (1_000_000, 3), (1_000_000, 60)];
+const WORK: [(usize, usize); 7] = [
+    (1, 60),
+    (10, 1),
+    (30, 2),
+    (100, 1),
+    (1_000_000, 1),
+    (1_000_000, 3),
+    (1_000_000, 60),
+];
 
 #[test]
 fn whatever_the_work_the_bound_is_at_most_the_optimum_and_the_plan_costs_at_least_that() {
@@ -112,7 +145,12 @@ fn whatever_the_work_the_bound_is_at_most_the_optimum_and_the_plan_costs_at_leas
     for round in 0..N_ROUNDS {
         let n = [2, 3, 4, 3, 4, 4, 3, 5][round % 8];
         let (survey, constraints) = (thrown(n, &mut rng), lessons(n, &mut rng));
-        let space = Space::with_costs(&survey, &constraints, 0.03, costs(&survey, &constraints, &mut rng));
+        let space = Space::with_costs(
+            &survey,
+            &constraints,
+            0.03,
+            costs(&survey, &constraints, &mut rng),
+        );
         let keys = choices(&PlanParams::default(), &survey);
         let first = keys.iter().find(|k| !k.directions.is_empty()).unwrap();
         let keys: Vec<&KeyChoice> = keys.iter().filter(|k| k.is_as_good_as(first)).collect();
@@ -124,29 +162,61 @@ fn whatever_the_work_the_bound_is_at_most_the_optimum_and_the_plan_costs_at_leas
             let mut candidates: Vec<Candidate<'_>> = keys.iter().map(|k| Candidate::new(k, n)).collect();
             if round % 3 > 0 {
                 // As in the search, some plan is known.
-                let limits = DrawLimits { bound: f64::INFINITY, max_tries: 20 * n };
+                let limits = DrawLimits {
+                    bound: f64::INFINITY,
+                    max_tries: 20 * n,
+                };
                 let drawn = draw(&space, keys[0], super::search::stream(round as u64, 0), 3, limits);
-                drawn.plan.into_iter().for_each(|plan| candidates[0].pool.add(&space, space.score(&plan), plan));
+                drawn
+                    .plan
+                    .into_iter()
+                    .for_each(|plan| candidates[0].pool.add(&space, space.score(&plan), plan));
             }
-            on_ctx(|ctx| prove(ctx, &space, &mut candidates, &mut Budget { n_left, first_per_piece })).unwrap();
+            on_ctx(|ctx| {
+                prove(
+                    ctx,
+                    &space,
+                    &mut candidates,
+                    &mut Budget {
+                        n_left,
+                        first_per_piece,
+                    },
+                )
+            })
+            .unwrap();
             let (bound, cost) = (lower_bound(&candidates), least_cost(&candidates));
-            let name = format!("round {round}, work {n_left}/{first_per_piece}: {bound} ≤ {optimum} ≤ {cost}");
+            let name =
+                format!("round {round}, work {n_left}/{first_per_piece}: {bound} ≤ {optimum} ≤ {cost}");
             assert!(is_most(bound, optimum) && is_most(optimum, cost), "{name}");
             for (candidate, &least) in candidates.iter().zip(&least) {
-                assert!(is_most(candidate.lower_bound, least), "{name}, {:?}", candidate.key);
-                assert!(candidate.pool.plans().iter().all(|(_, plan)| space.allows(plan)), "{name}");
+                assert!(
+                    is_most(candidate.lower_bound, least),
+                    "{name}, {:?}",
+                    candidate.key
+                );
+                assert!(
+                    candidate.pool.plans().iter().all(|(_, plan)| space.allows(plan)),
+                    "{name}"
+                );
             }
             if n_left == 1_000_000 {
                 assert!(bound >= cost || is_most(cost, bound), "{name}");
             }
             n_open += usize::from(bound < cost);
         }
-        *(if optimum.is_finite() { &mut n_plans } else { &mut n_none }) += 1;
+        *(if optimum.is_finite() {
+            &mut n_plans
+        } else {
+            &mut n_none
+        }) += 1;
     }
     let n_least = N_ROUNDS / 10;
-    assert!(n_plans > n_least && n_none > n_least && n_open > n_least, "{n_plans}, {n_none}, {n_open}: all kinds");
+    assert!(
+        n_plans > n_least && n_none > n_least && n_open > n_least,
+        "{n_plans}, {n_none}, {n_open}: all kinds"
+    );
 }
 
-/// About half a second. Rounds 5 and 10 are the first to fail where a proof takes an open question of a bisection for an
-/// answer, and where narrowing strikes out what costs more than nine tenths of the limit.
+/// About half a second. Rounds 5 and 10 are the first to fail where a proof takes an open question of a
+/// bisection for an answer, and where narrowing strikes out what costs more than nine tenths of the limit.
 const N_ROUNDS: usize = 16;

@@ -1,12 +1,13 @@
 //! Does a plan lock? The cluster test: exact for ideal joints and translations, in microseconds.
 //!
-//! A joint between a later piece p and an earlier q lets p leave along `s_p`, and nothing else. So if a set of pieces moves
-//! along `d`, then along with x must move every y that x pushes or pulls: both ways for a joint across `d`, only "q takes p
-//! along" where `d = s_p`, only "p takes q along" where `d = −s_p`, and both ways for the key, which is held. The assembly
-//! locks exactly when for every `d` this digraph is strongly connected: then nothing can move without everything.
+//! A joint between a later piece p and an earlier q lets p leave along `s_p`, and nothing else. So if a set
+//! of pieces moves along `d`, then along with x must move every y that x pushes or pulls: both ways for a
+//! joint across `d`, only "q takes p along" where `d = s_p`, only "p takes q along" where `d = −s_p`, and
+//! both ways for the key, which is held. The assembly locks exactly when for every `d` this digraph is
+//! strongly connected: then nothing can move without everything.
 //!
-//! Reversing `d` reverses every arc, so one of ±d is enough. Along a `d` that is no piece's direction all joints hold both
-//! ways, and the graph is connected if it is along any other.
+//! Reversing `d` reverses every arc, so one of ±d is enough. Along a `d` that is no piece's direction all
+//! joints hold both ways, and the graph is connected if it is along any other.
 //!
 //! Limits: rotations, play and elasticity are left to later tests.
 
@@ -33,7 +34,8 @@ pub struct LoosePart {
     pub direction: LatticeDirection,
 }
 
-/// A part that comes loose with the key held; `None` where the plan locks. `n_pieces` ≤ [`PieceSet::MAX_PIECES`].
+/// A part that comes loose with the key held; `None` where the plan locks. `n_pieces` ≤
+/// [`PieceSet::MAX_PIECES`].
 pub fn loose_part(n_pieces: usize, joints: &[DirectedJoint], key: PatchId) -> Option<LoosePart> {
     loose_part_fused(n_pieces, joints, key, PieceSet::EMPTY)
 }
@@ -67,7 +69,9 @@ pub(super) fn loose_part_fused(
         // Only the key leaves: any direction tells whether everything hangs together.
         directions.extend(LatticeDirection::all().next());
     }
-    directions.into_iter().find_map(|d| loose_along(d, joints, key, &both_ways[..n_pieces], all))
+    directions
+        .into_iter()
+        .find_map(|d| loose_along(d, joints, key, &both_ways[..n_pieces], all))
 }
 
 /// The one of ±d with the lower index.
@@ -98,11 +102,17 @@ fn loose_along(
     }
     let without_key_along = all.minus(PieceSet::reached_from(key, &pulled_by));
     if !without_key_along.is_empty() {
-        return Some(LoosePart { pieces: without_key_along, direction: d });
+        return Some(LoosePart {
+            pieces: without_key_along,
+            direction: d,
+        });
     }
     // Where the key's own cluster leaves along d, the others leave it along −d.
     let left_behind = all.minus(PieceSet::reached_from(key, &pulls));
-    (!left_behind.is_empty()).then_some(LoosePart { pieces: left_behind, direction: d.opposite() })
+    (!left_behind.is_empty()).then_some(LoosePart {
+        pieces: left_behind,
+        direction: d.opposite(),
+    })
 }
 
 #[cfg(test)]
@@ -126,14 +136,23 @@ mod tests {
 
     fn random_joints(n: u32, rng: &mut ChaCha8Rng) -> Vec<DirectedJoint> {
         // Few directions, so that some plans lock and some do not.
-        let directions: Vec<LatticeDirection> =
-            (0..n).map(|_| LatticeDirection::all().nth([0, 4, 12, 13, 25][rng.random_range(0..5)]).unwrap()).collect();
+        let directions: Vec<LatticeDirection> = (0..n)
+            .map(|_| {
+                LatticeDirection::all()
+                    .nth([0, 4, 12, 13, 25][rng.random_range(0..5)])
+                    .unwrap()
+            })
+            .collect();
         let mut joints = Vec::new();
         for later in 0..n {
             for earlier in later + 1..n {
                 if rng.random_range(0.0..1.0) < 0.75 {
                     let separation = directions[later as usize];
-                    joints.push(DirectedJoint { later: PatchId(later), earlier: PatchId(earlier), separation });
+                    joints.push(DirectedJoint {
+                        later: PatchId(later),
+                        earlier: PatchId(earlier),
+                        separation,
+                    });
                 }
             }
         }
@@ -163,7 +182,10 @@ mod tests {
                 }
             }
         }
-        assert!((200..1800).contains(&n_locked), "{n_locked} of 2000 lock: the cases must be of both kinds");
+        assert!(
+            (200..1800).contains(&n_locked),
+            "{n_locked} of 2000 lock: the cases must be of both kinds"
+        );
     }
 
     #[test]

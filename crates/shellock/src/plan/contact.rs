@@ -1,8 +1,9 @@
-//! How good a connector each seam could carry, for either order of its two pieces and all 26 directions (Eq. 4).
+//! How good a connector each seam could carry, for either order of its two pieces and all 26 directions (Eq.
+//! 4).
 //!
-//! At a sample of the seam: `u` tangent, `N` outward normal made perpendicular to `u`, `v` perpendicular to both, from the
-//! later piece p to the earlier q; `s` the direction along which p leaves. The connector of the paper becomes shallow where
-//! `s` runs along the seam and leans backward where `s` points towards q:
+//! At a sample of the seam: `u` tangent, `N` outward normal made perpendicular to `u`, `v` perpendicular to
+//! both, from the later piece p to the earlier q; `s` the direction along which p leaves. The connector of
+//! the paper becomes shallow where `s` runs along the seam and leans backward where `s` points towards q:
 //!
 //! ```text
 //!        N, T = 0: pulls straight out          the male piece is p where s · N ≥ 0,
@@ -10,8 +11,8 @@
 //!      ───p───┼───q───▶ v
 //! ```
 //!
-//! Limits: seams lie on the outer surface, connectors on the inner one, where carving may shift the line; what else than the two pieces is
-//! in a connector's way shows only later.
+//! Limits: seams lie on the outer surface, connectors on the inner one, where carving may shift the line;
+//! what else than the two pieces is in a connector's way shows only later.
 
 mod bars;
 mod hold;
@@ -25,8 +26,8 @@ pub use hold::{HoldTable, Pushes};
 
 use super::PlanParams;
 use crate::seam::rules::{
-    COUNTED_RUN_SIZES, MAX_ALONG_SEAM, MAX_BACKWARD_RAD, MAX_OUT_OF_RAIL, ROLE_HYSTERESIS, SHORTEST_RUN_SIZES,
-    end_gap_mm,
+    COUNTED_RUN_SIZES, MAX_ALONG_SEAM, MAX_BACKWARD_RAD, MAX_OUT_OF_RAIL, ROLE_HYSTERESIS,
+    SHORTEST_RUN_SIZES, end_gap_mm,
 };
 use crate::{ConnectorSizes, LatticeDirection, PatchId, Seam, SegmentedSurface};
 
@@ -38,7 +39,8 @@ const SAMPLE_STEP_MM: f64 = 1.0;
 pub struct Joint {
     /// Weight `w` of Eq. 4, mean over the seams' length; in [β, 1 + β], lower is better.
     ///
-    /// The mean and not a high quantile: a seam around a piece has some stretch along any `s`, so quantiles are all near 1.
+    /// The mean and not a high quantile: a seam around a piece has some stretch along any `s`, so quantiles
+    /// are all near 1.
     pub weight: f64,
     /// Share of the seams' length on which a connector can be made, in [0, 1].
     pub usable: f64,
@@ -91,7 +93,8 @@ pub struct SeamFrame {
 impl SeamFrame {
     /// Whether a connector can be made where the later piece leaves along the unit vector `s`.
     pub fn carries(&self, s: Vec3) -> bool {
-        // s' is s without its part along the seam; where q is the male piece both s and v turn, so their product stays.
+        // s' is s without its part along the seam; where q is the male piece both s and v turn, so their
+        // product stays.
         let (outwards, towards_female) = (s.dot(self.normal).abs(), s.dot(self.across));
         s.dot(self.tangent).abs() <= MAX_ALONG_SEAM && towards_female.atan2(outwards) <= MAX_BACKWARD_RAD
     }
@@ -107,8 +110,9 @@ impl SeamFrame {
     }
 }
 
-/// How two pieces with connectors of `size_mm` meet at a station where the later one leaves along `s`; no connector where
-/// none can be made, unless `is_any_angle`; `is_on_rails` where the later one is the key and slides on rails.
+/// How two pieces with connectors of `size_mm` meet at a station where the later one leaves along `s`; no
+/// connector where none can be made, unless `is_any_angle`; `is_on_rails` where the later one is the key and
+/// slides on rails.
 pub(crate) fn meeting(
     station: &Station,
     size_mm: f64,
@@ -118,29 +122,64 @@ pub(crate) fn meeting(
     is_any_angle: bool,
     is_on_rails: bool,
 ) -> Meeting {
-    let across = if a_is_later { station.across } else { -station.across };
-    let frame = SeamFrame { tangent: station.tangent, normal: station.normal, across };
-    // Where s leads towards the earlier piece the face between the walls leans, so that it does not bar the way.
+    let across = if a_is_later {
+        station.across
+    } else {
+        -station.across
+    };
+    let frame = SeamFrame {
+        tangent: station.tangent,
+        normal: station.normal,
+        across,
+    };
+    // Where s leads towards the earlier piece the face between the walls leans, so that it does not bar the
+    // way.
     let in_section = s.reject_from_normalized(station.tangent).normalize_or_zero();
     let lean = in_section.dot(across).max(0.0);
     let face = (across - lean * in_section).normalize_or(across);
     let wall = if a_is_later { face } else { -face };
-    let (later, earlier) = if a_is_later { (Side::A, Side::B) } else { (Side::B, Side::A) };
+    let (later, earlier) = if a_is_later {
+        (Side::A, Side::B)
+    } else {
+        (Side::B, Side::A)
+    };
     let later_is_male = s.dot(station.normal) >= 0.0;
-    let (male, leaves) = if later_is_male { (later, in_section) } else { (earlier, -in_section) };
+    let (male, leaves) = if later_is_male {
+        (later, in_section)
+    } else {
+        (earlier, -in_section)
+    };
     let pull_on_a = if a_is_later { s } else { -s };
     let is_rail = is_on_rails && frame.carries_rail(s);
     // A rail holds across the seam; what leaves along it does so beside it.
-    let (male, leaves) = if is_rail { (earlier, station.normal) } else { (male, leaves) };
+    let (male, leaves) = if is_rail {
+        (earlier, station.normal)
+    } else {
+        (male, leaves)
+    };
     let weight = if is_rail { beta } else { frame.weight(s, beta) };
-    let joint = MechanicalJoint { male, leaves, is_fast: false, pull_on_a, weight, size_mm };
-    Meeting { wall, joint: (is_any_angle || is_rail || frame.carries(s)).then_some(joint) }
+    let joint = MechanicalJoint {
+        male,
+        leaves,
+        is_fast: false,
+        pull_on_a,
+        weight,
+        size_mm,
+    };
+    Meeting {
+        wall,
+        joint: (is_any_angle || is_rail || frame.carries(s)).then_some(joint),
+    }
 }
 
 impl Sample {
     /// The frame with the piece of the lower id as the later one where `side` is 1, else the other.
     fn frame(&self, side: f64) -> SeamFrame {
-        SeamFrame { tangent: self.tangent, normal: self.normal, across: side * self.across }
+        SeamFrame {
+            tangent: self.tangent,
+            normal: self.normal,
+            across: side * self.across,
+        }
     }
 }
 
@@ -150,7 +189,8 @@ impl Contact {
         &self.joints[usize::from(later != self.a)][s.index()]
     }
 
-    /// What the two hold each other by in that case; `None` where the joint does not hold and for contacts out of nothing.
+    /// What the two hold each other by in that case; `None` where the joint does not hold and for contacts
+    /// out of nothing.
     pub fn hold(&self, later: PatchId, s: LatticeDirection) -> Option<&Pushes> {
         if !self.joint(later, s).holds {
             return None;
@@ -163,10 +203,14 @@ impl Contact {
         if piece == self.a { self.b } else { self.a }
     }
 
-    /// Lets exactly the joints hold whose run is at least so many connector sizes long; not shorter than the survey's shortest of all.
+    /// Lets exactly the joints hold whose run is at least so many connector sizes long; not shorter than the
+    /// survey's shortest of all.
     pub fn count_runs_from(&mut self, shortest_sizes: f64) {
         let shortest_mm = shortest_sizes * self.size_mm;
-        self.joints.iter_mut().flatten().for_each(|j| j.holds = j.run_mm >= shortest_mm);
+        self.joints
+            .iter_mut()
+            .flatten()
+            .for_each(|j| j.holds = j.run_mm >= shortest_mm);
     }
 
     /// Whether any order and direction makes a joint that holds.
@@ -182,8 +226,16 @@ impl Contact {
         joint: impl Fn(PatchId, LatticeDirection) -> Joint,
         hold: HoldTable,
     ) -> Self {
-        let joints = [a, b].map(|p| std::array::from_fn(|i| joint(p, LatticeDirection::all().nth(i).unwrap())));
-        Self { a, b, length_mm: 20.0, size_mm: 2.5, joints, hold }
+        let joints =
+            [a, b].map(|p| std::array::from_fn(|i| joint(p, LatticeDirection::all().nth(i).unwrap())));
+        Self {
+            a,
+            b,
+            length_mm: 20.0,
+            size_mm: 2.5,
+            joints,
+            hold,
+        }
     }
 }
 
@@ -197,7 +249,13 @@ pub fn contacts(
     let edges = patch_border(surface);
     let bars = Bars::new(params, surface);
     let sampled = |seam: &Seam| {
-        let found = samples(params, sizes.of(seam.a, seam.b), seam, a_is_left(seam, &edges), bars.as_ref());
+        let found = samples(
+            params,
+            sizes.of(seam.a, seam.b),
+            seam,
+            a_is_left(seam, &edges),
+            bars.as_ref(),
+        );
         (seam.a, seam.b, found, seam.is_loop())
     };
     let mut sampled: Vec<(PatchId, PatchId, Vec<Sample>, bool)> = seams.par_iter().map(sampled).collect();
@@ -206,10 +264,17 @@ pub fn contacts(
         let (a, b, ..) = group.first()?;
         contact(params, sizes.of(*a, *b), group)
     };
-    sampled.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).filter_map(of_pair).collect()
+    sampled
+        .chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
+        .filter_map(of_pair)
+        .collect()
 }
 
-fn contact(params: &PlanParams, size_mm: f64, seams: &[(PatchId, PatchId, Vec<Sample>, bool)]) -> Option<Contact> {
+fn contact(
+    params: &PlanParams,
+    size_mm: f64,
+    seams: &[(PatchId, PatchId, Vec<Sample>, bool)],
+) -> Option<Contact> {
     let (a, b, ..) = seams.first()?;
     let length_mm = seams.iter().flat_map(|s| &s.2).map(|s| s.length_mm).sum();
     if length_mm <= 0.0 {
@@ -226,7 +291,14 @@ fn contact(params: &PlanParams, size_mm: f64, seams: &[(PatchId, PatchId, Vec<Sa
     let least_mm = SHORTEST_RUN_SIZES * size_mm;
     let holds = |order: usize, s: LatticeDirection| joints[order][s.index()].run_mm >= least_mm;
     let hold = HoldTable::new(params, size_mm, [*a, *b], &lines, holds);
-    Some(Contact { a: *a, b: *b, length_mm, size_mm, joints, hold })
+    Some(Contact {
+        a: *a,
+        b: *b,
+        length_mm,
+        size_mm,
+        joints,
+        hold,
+    })
 }
 
 /// Which piece of a pair is later, and how it leaves.
@@ -242,7 +314,11 @@ struct Way {
 impl Way {
     fn new(params: &PlanParams, pair: [PatchId; 2], side: f64, s: LatticeDirection) -> Self {
         let later = pair[usize::from(side < 0.0)];
-        Self { side, s, is_on_rails: params.slides_on_rails(later, s) }
+        Self {
+            side,
+            s,
+            is_on_rails: params.slides_on_rails(later, s),
+        }
     }
 
     /// Whether there is a rail at `x`. What would bar it has been looked at where the key was cut.
@@ -258,7 +334,11 @@ impl Way {
 
     /// Weight of Eq. 4 at `x`; a rail is as good as a connector can be.
     fn weight(&self, x: &Sample, beta: f64) -> f64 {
-        if self.has_rail(x) { beta } else { x.frame(self.side).weight(self.s.unit(), beta) }
+        if self.has_rail(x) {
+            beta
+        } else {
+            x.frame(self.side).weight(self.s.unit(), beta)
+        }
     }
 }
 
@@ -276,12 +356,18 @@ fn joint(params: &PlanParams, size_mm: f64, lines: &[(&[Sample], bool)], way: Wa
         run_mm = run_mm.max(longest_run_mm(samples, is_loop, way));
     }
     let holds = run_mm >= COUNTED_RUN_SIZES[0] * size_mm;
-    Joint { weight: weight / length_mm, usable: usable / length_mm, run_mm, holds }
+    Joint {
+        weight: weight / length_mm,
+        usable: usable / length_mm,
+        run_mm,
+        holds,
+    }
 }
 
 /// Length of the longest row of samples that carry connectors with the same male piece.
 fn longest_run_mm(samples: &[Sample], is_loop: bool, way: Way) -> f64 {
-    // A loop is walked twice, so that a run across its first point is seen whole; no run is longer than the loop.
+    // A loop is walked twice, so that a run across its first point is seen whole; no run is longer than the
+    // loop.
     let whole: f64 = samples.iter().map(|x| x.length_mm).sum();
     let rounds = if is_loop { 2 } else { 1 };
     let (mut longest, mut run) = (0.0_f64, 0.0_f64);
@@ -303,27 +389,54 @@ fn longest_run_mm(samples: &[Sample], is_loop: bool, way: Way) -> f64 {
     longest.min(whole)
 }
 
-/// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame; lengths are those on the inner side of the wall.
-fn samples(params: &PlanParams, size_mm: f64, seam: &Seam, a_is_left: bool, bars: Option<&Bars<'_>>) -> Vec<Sample> {
+/// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame; lengths are those on the inner side of
+/// the wall.
+fn samples(
+    params: &PlanParams,
+    size_mm: f64,
+    seam: &Seam,
+    a_is_left: bool,
+    bars: Option<&Bars<'_>>,
+) -> Vec<Sample> {
     let n = (seam.length() / SAMPLE_STEP_MM).ceil().max(1.0);
     let stations: Vec<(Vec3, Vec3)> = seam.resampled(n as usize);
     let inner = seam.below(params.wall_mm, seam.length() / n);
     let lengths: Vec<f64> = inner.windows(2).map(|w| w[0].distance(w[1])).collect();
     let total: f64 = lengths.iter().sum();
-    let margin = if seam.is_loop() { 0.0 } else { end_gap_mm(size_mm, total) };
+    let margin = if seam.is_loop() {
+        0.0
+    } else {
+        end_gap_mm(size_mm, total)
+    };
     let mut out = Vec::with_capacity(lengths.len());
     let mut before = 0.0;
     for (w, length_mm) in stations.windows(2).zip(lengths) {
         let middle = before + 0.5 * length_mm;
         before += length_mm;
-        let Some(tangent) = (w[1].0 - w[0].0).try_normalize() else { continue };
-        let Some(normal) = (w[0].1 + w[1].1).reject_from_normalized(tangent).try_normalize() else { continue };
+        let Some(tangent) = (w[1].0 - w[0].0).try_normalize() else {
+            continue;
+        };
+        let Some(normal) = (w[0].1 + w[1].1).reject_from_normalized(tangent).try_normalize() else {
+            continue;
+        };
         let has_room = middle >= margin && middle <= total - margin;
         // N × u points to the left, where the surface is seen from outside.
-        let across = if a_is_left { -normal.cross(tangent) } else { normal.cross(tangent) };
-        let barred = |bars: &Bars<'_>| bars.at([seam.a, seam.b], size_mm, 0.5 * (w[0].0 + w[1].0), normal, across);
+        let across = if a_is_left {
+            -normal.cross(tangent)
+        } else {
+            normal.cross(tangent)
+        };
+        let barred =
+            |bars: &Bars<'_>| bars.at([seam.a, seam.b], size_mm, 0.5 * (w[0].0 + w[1].0), normal, across);
         let barred = bars.filter(|_| has_room).map(barred).unwrap_or_default();
-        out.push(Sample { tangent, normal, across, length_mm, has_room, barred });
+        out.push(Sample {
+            tangent,
+            normal,
+            across,
+            length_mm,
+            has_room,
+            barred,
+        });
     }
     out
 }
@@ -336,7 +449,8 @@ struct BorderEdge {
     along: Vec3,
 }
 
-/// Whether the seam's lower patch lies to its left: the vote of nine places, each asking the nearest border edge.
+/// Whether the seam's lower patch lies to its left: the vote of nine places, each asking the nearest border
+/// edge.
 fn a_is_left(seam: &Seam, edges: &[BorderEdge]) -> bool {
     let pair = |e: &&BorderEdge| (e.left.min(e.right), e.left.max(e.right)) == (seam.a, seam.b);
     let start = edges.partition_point(|e| (e.left.min(e.right), e.left.max(e.right)) < (seam.a, seam.b));
@@ -347,9 +461,11 @@ fn a_is_left(seam: &Seam, edges: &[BorderEdge]) -> bool {
         let i = k * n_segments / n_segments.min(9);
         let (from, to) = (seam.points[i], seam.points[i + 1]);
         let middle = 0.5 * (from + to);
-        let nearest = of_pair
-            .iter()
-            .min_by(|x, y| x.middle.distance_squared(middle).total_cmp(&y.middle.distance_squared(middle)));
+        let nearest = of_pair.iter().min_by(|x, y| {
+            x.middle
+                .distance_squared(middle)
+                .total_cmp(&y.middle.distance_squared(middle))
+        });
         if let Some(e) = nearest {
             let same_way = e.along.normalize_or_zero().dot((to - from).normalize_or_zero());
             vote += if e.left == seam.a { same_way } else { -same_way };
@@ -384,7 +500,12 @@ fn patch_border(surface: &SegmentedSurface) -> Vec<BorderEdge> {
             && left != right
         {
             let (from, to) = (mesh.points[u as usize], mesh.points[v as usize]);
-            edges.push(BorderEdge { left, right, middle: 0.5 * (from + to), along: to - from });
+            edges.push(BorderEdge {
+                left,
+                right,
+                middle: 0.5 * (from + to),
+                along: to - from,
+            });
         }
     }
     edges.sort_by_key(|e| (e.left.min(e.right), e.left.max(e.right)));
@@ -398,7 +519,12 @@ mod tests {
 
     fn cap_contact(height: f64) -> Contact {
         let surface = label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > height));
-        let mut found = contacts(&PlanParams::default(), &surface, &seams(&surface), &ConnectorSizes::default());
+        let mut found = contacts(
+            &PlanParams::default(),
+            &surface,
+            &seams(&surface),
+            &ConnectorSizes::default(),
+        );
         assert_eq!(found.len(), 1);
         found.remove(0)
     }
@@ -422,7 +548,10 @@ mod tests {
         assert!(up.holds && up.usable > 0.99);
         assert!((up.run_mm - contact.length_mm).abs() < 1e-6);
         let down = contact.joint(cap, LatticeDirection::nearest(-Vec3::Z));
-        assert!((down.weight - 1.1).abs() < 0.02 && down.usable < 0.01 && !down.holds, "{down:?}");
+        assert!(
+            (down.weight - 1.1).abs() < 0.02 && down.usable < 0.01 && !down.holds,
+            "{down:?}"
+        );
         let side = contact.joint(cap, LatticeDirection::nearest(Vec3::X));
         // |s·u| = |sin φ| ≤ 0.9 on 71 % of the circle.
         assert!((side.usable - 0.713).abs() < 0.03, "{side:?}");
@@ -433,7 +562,10 @@ mod tests {
     fn round_a_thin_limb_the_far_wall_leaves_only_ways_along_it() {
         let surface = label(sphere(5, Vec3::new(7.0, 7.0, 60.0)), 2, |p| u32::from(p.z > 0.0));
         let share = |wall_mm: f64, s: Vec3| {
-            let params = PlanParams { wall_mm, ..PlanParams::default() };
+            let params = PlanParams {
+                wall_mm,
+                ..PlanParams::default()
+            };
             let contact = contacts(&params, &surface, &seams(&surface), &ConnectorSizes::default()).remove(0);
             contact.joint(contact.b, LatticeDirection::nearest(s)).usable
         };
@@ -445,7 +577,10 @@ mod tests {
     fn swapping_the_order_and_the_direction_leaves_the_joint_as_it_is() {
         let contact = cap_contact(20.0);
         for s in LatticeDirection::all() {
-            let (x, y) = (contact.joint(contact.b, s), contact.joint(contact.a, s.opposite()));
+            let (x, y) = (
+                contact.joint(contact.b, s),
+                contact.joint(contact.a, s.opposite()),
+            );
             assert!((x.weight - y.weight).abs() < 1e-12 && (x.usable - y.usable).abs() < 1e-12);
         }
     }
@@ -455,7 +590,9 @@ mod tests {
         let line = |length_mm: f64| Seam {
             a: PatchId(0),
             b: PatchId(1),
-            points: (0..=20).map(|i| Vec3::X * (length_mm * f64::from(i) / 20.0)).collect(),
+            points: (0..=20)
+                .map(|i| Vec3::X * (length_mm * f64::from(i) / 20.0))
+                .collect(),
             normals: vec![Vec3::Z; 21],
         };
         let params = PlanParams::default();

@@ -7,13 +7,23 @@ use crate::{LatticeDirection, PatchId};
 /// No plan can be, whatever is tried: the contacts do not hang together well enough.
 pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
     if !space.all().is_connected(&space.neighbours) {
-        let alone: Vec<String> =
-            (0..space.n).filter(|&p| space.neighbours[p].is_empty()).map(|p| p.to_string()).collect();
-        let who = if alone.is_empty() { "groups of pieces".into() } else { format!("pieces {}", alone.join(", ")) };
+        let alone: Vec<String> = (0..space.n)
+            .filter(|&p| space.neighbours[p].is_empty())
+            .map(|p| p.to_string())
+            .collect();
+        let who = if alone.is_empty() {
+            "groups of pieces".into()
+        } else {
+            format!("pieces {}", alone.join(", "))
+        };
         let reason = format!(
             "{who} share no seam with the others that is long enough for a connector; merge them with a neighbour or choose smaller connectors"
         );
-        return Some(PlanOutcome::Infeasible { reason, blockers: Vec::new(), articulations: Vec::new() });
+        return Some(PlanOutcome::Infeasible {
+            reason,
+            blockers: Vec::new(),
+            articulations: Vec::new(),
+        });
     }
     let articulations = space.articulations();
     if articulations.is_empty() {
@@ -24,7 +34,11 @@ pub(super) fn structural(space: &Space<'_>) -> Option<PlanOutcome> {
         "no plan locks, since all that joins some pieces to the others goes through piece {}; split it lengthwise",
         names.join(" or ")
     );
-    Some(PlanOutcome::Infeasible { reason, blockers: Vec::new(), articulations })
+    Some(PlanOutcome::Infeasible {
+        reason,
+        blockers: Vec::new(),
+        articulations,
+    })
 }
 
 /// The search got no further than `stuck`.
@@ -38,26 +52,47 @@ pub(super) fn stuck(space: &Space<'_>, stuck: PieceSet) -> PlanOutcome {
     }
     let names: Vec<String> = stuck.iter().map(|p| p.to_string()).collect();
     let reason = if n_free == 0 {
-        format!("none of the pieces {} can leave the others of them; split one that is blocked", names.join(", "))
+        format!(
+            "none of the pieces {} can leave the others of them; split one that is blocked",
+            names.join(", ")
+        )
     } else {
         // Paths are not what stops these: what they leave behind falls apart or comes loose.
         blockers.clear();
-        format!("paths are free, but no order and directions tried for pieces {} lock the assembly", names.join(", "))
+        format!(
+            "paths are free, but no order and directions tried for pieces {} lock the assembly",
+            names.join(", ")
+        )
     };
-    PlanOutcome::Infeasible { reason, blockers, articulations: Vec::new() }
+    PlanOutcome::Infeasible {
+        reason,
+        blockers,
+        articulations: Vec::new(),
+    }
 }
 
 /// Who is in the way of `piece` out of `rest` along the direction where the least of it is occluded.
 fn blockers_of(space: &Space<'_>, piece: PatchId, rest: PieceSet) -> Vec<Blocker> {
     let occlusion = &space.survey.occlusion;
-    let worst = |s: LatticeDirection| rest.iter().map(|q| occlusion.share(piece, q, s)).fold(0.0, f64::max);
+    let worst = |s: LatticeDirection| {
+        rest.iter()
+            .map(|q| occlusion.share(piece, q, s))
+            .fold(0.0, f64::max)
+    };
     if rest.is_empty() || LatticeDirection::all().any(|s| space.is_free(piece, s, rest)) {
         return Vec::new();
     }
-    let Some(best) = LatticeDirection::all().min_by(|&s, &t| worst(s).total_cmp(&worst(t))) else { return Vec::new() };
+    let Some(best) = LatticeDirection::all().min_by(|&s, &t| worst(s).total_cmp(&worst(t))) else {
+        return Vec::new();
+    };
     let blocker = |by: PatchId| {
         let at = occlusion.first_hit(piece, by, best)?.to_array();
-        Some(Blocker { piece, by, at, occluded: occlusion.share(piece, by, best) })
+        Some(Blocker {
+            piece,
+            by,
+            at,
+            occluded: occlusion.share(piece, by, best),
+        })
     };
     let mut found: Vec<Blocker> = rest.iter().filter_map(blocker).collect();
     found.sort_by(|x, y| y.occluded.total_cmp(&x.occluded).then(x.by.cmp(&y.by)));

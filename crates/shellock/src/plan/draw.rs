@@ -1,7 +1,8 @@
 //! One random plan, taken apart from the key on, with pruning and backtracking (Sect. 6.2).
 //!
-//! Prunings come in the order of their cost: what is left hangs together, the path is free, the piece costs no more than the
-//! bound, and what was taken off does not come loose from the rest (the cluster test, which the paper does not have).
+//! Prunings come in the order of their cost: what is left hangs together, the path is free, the piece costs
+//! no more than the bound, and what was taken off does not come loose from the rest (the cluster test, which
+//! the paper does not have).
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -57,7 +58,13 @@ struct Draw<'a> {
 }
 
 /// Draws plan number `index` with the given key.
-pub(super) fn draw(space: &Space<'_>, key: &KeyChoice, rng: ChaCha8Rng, index: usize, limits: DrawLimits) -> Drawn {
+pub(super) fn draw(
+    space: &Space<'_>,
+    key: &KeyChoice,
+    rng: ChaCha8Rng,
+    index: usize,
+    limits: DrawLimits,
+) -> Drawn {
     let mut draw = Draw {
         space,
         key,
@@ -74,7 +81,9 @@ pub(super) fn draw(space: &Space<'_>, key: &KeyChoice, rng: ChaCha8Rng, index: u
     let found = draw.descend(space.all(), PieceSet::one(key.piece));
     let plan = found.then(|| {
         draw.removed.reverse();
-        InstallationPlan { steps: std::mem::take(&mut draw.removed) }
+        InstallationPlan {
+            steps: std::mem::take(&mut draw.removed),
+        }
     });
     Drawn {
         plan,
@@ -86,7 +95,8 @@ pub(super) fn draw(space: &Space<'_>, key: &KeyChoice, rng: ChaCha8Rng, index: u
 }
 
 impl Draw<'_> {
-    /// Takes off all of `left`; `attached` holds the pieces that a later one joins. False with everything put back.
+    /// Takes off all of `left`; `attached` holds the pieces that a later one joins. False with everything put
+    /// back.
     fn descend(&mut self, left: PieceSet, attached: PieceSet) -> bool {
         if left.len() == 1 {
             return self.finish(left, attached);
@@ -167,7 +177,8 @@ impl Draw<'_> {
                 }
                 let cost = self.cost(step, rest);
                 if self.is_cheap(cost) {
-                    // Gumbel noise: the order is that of drawing without putting back, by weight exp(−cost / spread).
+                    // Gumbel noise: the order is that of drawing without putting back, by weight exp(−cost /
+                    // spread).
                     let u: f64 = self.rng.random_range(1e-12..1.0);
                     let noise = -(-u.ln()).ln();
                     candidates.push((cost - self.spread * noise, step));

@@ -1,19 +1,20 @@
 //! The best plan with any of the given keys, and the proof: bisection on the cost of the worst piece.
 //!
-//! Whether a plan exists whose pieces all cost at most T is a search of its own: [`domains`] strikes out what cannot be, the
-//! most disputed piece or seam that is still open is decided either way, and so on until all is decided, which [`sequence`]
-//! turns into an order. No answer within its budget leaves the question open; "none" is a proof, so T bounds all plans. Each
-//! key is asked on its own, with the best plan of all keys as the limit, and small questions before large ones, so that a key
-//! that is hard to prove keeps no other from being tried.
+//! Whether a plan exists whose pieces all cost at most T is a search of its own: [`domains`] strikes out what
+//! cannot be, the most disputed piece or seam that is still open is decided either way, and so on until all
+//! is decided, which [`sequence`] turns into an order. No answer within its budget leaves the question open;
+//! "none" is a proof, so T bounds all plans. Each key is asked on its own, with the best plan of all keys as
+//! the limit, and small questions before large ones, so that a key that is hard to prove keeps no other from
+//! being tried.
 //!
-//! Deviation: a depth-first search from the key backwards meets a contradiction between two far pieces only after every way
-//! to take off the others. Deciding disputed pieces first, in any place, meets it at once. The order is only kept as far as
-//! it must be, so orders that differ in pieces that do not touch are one.
+//! Deviation: a depth-first search from the key backwards meets a contradiction between two far pieces only
+//! after every way to take off the others. Deciding disputed pieces first, in any place, meets it at once.
+//! The order is only kept as far as it must be, so orders that differ in pieces that do not touch are one.
 //!
 //! Nothing here depends on threads or time but for the stop that [`Ctx::is_time_up`] asks for.
 //!
-//! Sources: the weights of conflicts are those of Boussemart et al. 2004, *Boosting systematic search by weighting
-//! constraints*.
+//! Sources: the weights of conflicts are those of Boussemart et al. 2004, *Boosting systematic search by
+//! weighting constraints*.
 
 mod domains;
 mod sequence;
@@ -33,10 +34,12 @@ use crate::{Cancelled, Ctx, PatchId};
 use domains::{Conflict, Domains, Propagator};
 use sequence::{Sequence, sequence};
 
-/// Share of the cost between two thresholds below which bisection stops and more work is spent on one question.
+/// Share of the cost between two thresholds below which bisection stops and more work is spent on one
+/// question.
 const FINEST_STEP: f64 = 0.002;
 
-/// Pieces revised for one question at first, per piece; four times as many each time that all questions were left open.
+/// Pieces revised for one question at first, per piece; four times as many each time that all questions were
+/// left open.
 const FIRST_BUDGET_PER_PIECE: usize = 60;
 
 /// Decisions before the first restart, and by how much they grow: weights learned in one run steer the next.
@@ -54,7 +57,10 @@ pub(super) struct Budget {
 impl Budget {
     /// At most `n` revisions.
     pub fn new(n: usize) -> Self {
-        Self { n_left: n, first_per_piece: FIRST_BUDGET_PER_PIECE }
+        Self {
+            n_left: n,
+            first_per_piece: FIRST_BUDGET_PER_PIECE,
+        }
     }
 }
 
@@ -79,7 +85,12 @@ pub(super) struct Candidate<'k> {
 impl<'k> Candidate<'k> {
     /// Nothing is known of the plans with `key`, for `n` pieces.
     pub fn new(key: &'k KeyChoice, n: usize) -> Self {
-        Self { key, pool: Pool::default(), lower_bound: 0.0, weights: vec![1.0; n] }
+        Self {
+            key,
+            pool: Pool::default(),
+            lower_bound: 0.0,
+            weights: vec![1.0; n],
+        }
     }
 
     fn add(&mut self, space: &Space<'_>, plan: InstallationPlan) {
@@ -92,17 +103,24 @@ impl<'k> Candidate<'k> {
 
 /// Cost of the best plan of all; infinite where none was found.
 pub(super) fn least_cost(candidates: &[Candidate<'_>]) -> f64 {
-    candidates.iter().map(|c| c.pool.least_cost()).fold(f64::INFINITY, f64::min)
+    candidates
+        .iter()
+        .map(|c| c.pool.least_cost())
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// No plan of any candidate costs less.
 pub(super) fn lower_bound(candidates: &[Candidate<'_>]) -> f64 {
-    candidates.iter().map(|c| c.lower_bound).fold(f64::INFINITY, f64::min)
+    candidates
+        .iter()
+        .map(|c| c.lower_bound)
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Proves a lower bound for each of `candidates` and adds better plans to their pools.
 ///
-/// A bound at or above the least cost of all closes a candidate: nothing with that key is better than what is known.
+/// A bound at or above the least cost of all closes a candidate: nothing with that key is better than what is
+/// known.
 pub(super) fn prove(
     ctx: &Ctx<'_>,
     space: &Space<'_>,
@@ -116,7 +134,11 @@ pub(super) fn prove(
             let mut is_answered = true;
             while is_answered && budget.n_left > 0 && candidates[i].lower_bound < least_cost(candidates) {
                 let upper = least_cost(candidates);
-                let limit = if upper.is_finite() { just_below(upper) } else { f64::MAX };
+                let limit = if upper.is_finite() {
+                    just_below(upper)
+                } else {
+                    f64::MAX
+                };
                 match ask(ctx, space, &mut candidates[i], limit, per_question, budget)? {
                     Answer::None => candidates[i].lower_bound = upper,
                     Answer::Plan(plan) => candidates[i].add(space, plan),
@@ -146,7 +168,9 @@ fn bisect(
     while high - lower_bound(candidates) > FINEST_STEP * high && budget.n_left > 0 {
         let middle = 0.5 * (lower_bound(candidates) + high);
         // One key that leaves the question open leaves it open for all.
-        let Some(i) = candidates.iter().position(|c| c.lower_bound < middle) else { break };
+        let Some(i) = candidates.iter().position(|c| c.lower_bound < middle) else {
+            break;
+        };
         match ask(ctx, space, &mut candidates[i], middle, per_question, budget)? {
             Answer::None => candidates[i].lower_bound = middle,
             Answer::Unknown => high = middle,
@@ -166,26 +190,46 @@ const FURTHER_LIMITS: [f64; 4] = [1.0, 1.0, 1.01, 1.03];
 const N_FURTHER: usize = 16;
 const FURTHER_BUDGET_PER_PIECE: usize = 60;
 
-/// Adds plans nearly as good as the best of `pool`, found by deciding in random order: with a lower mean, or only different.
+/// Adds plans nearly as good as the best of `pool`, found by deciding in random order: with a lower mean, or
+/// only different.
 pub(super) fn vary(ctx: &Ctx<'_>, space: &Space<'_>, key: &KeyChoice, pool: &mut Pool, rng: &mut ChaCha8Rng) {
     let least = pool.least_cost();
     let tries: Vec<(f64, Vec<f64>)> = (0..N_FURTHER)
         .map(|i| {
             let limit = just_above(FURTHER_LIMITS[i % FURTHER_LIMITS.len()] * least);
-            (limit, (0..space.n).map(|_| rng.random_range(1.0..100.0)).collect())
+            (
+                limit,
+                (0..space.n).map(|_| rng.random_range(1.0..100.0)).collect(),
+            )
         })
         .collect();
     let further = |(limit, mut weights): (f64, Vec<f64>)| {
         let n_revisions = FURTHER_BUDGET_PER_PIECE * space.n;
         let weights = &mut weights;
         let propagator = Propagator::new(space, key);
-        let mut probe =
-            Probe { ctx, propagator, limit, n_revisions, n_decisions: 0, run: 0, weights, is_time_up: false };
+        let mut probe = Probe {
+            ctx,
+            propagator,
+            limit,
+            n_revisions,
+            n_decisions: 0,
+            run: 0,
+            weights,
+            is_time_up: false,
+        };
         // Plans are many at such limits: striking out roles one by one would only cost time.
         let mut d = probe.propagator.all();
         let is_none = probe.narrows_to_nothing(&mut d, space.all());
-        let answer = if is_none { Answer::None } else { probe.with_restarts(&d) };
-        if let Answer::Plan(plan) = answer { Some((improve(space, key, plan.clone()), plan)) } else { None }
+        let answer = if is_none {
+            Answer::None
+        } else {
+            probe.with_restarts(&d)
+        };
+        if let Answer::Plan(plan) = answer {
+            Some((improve(space, key, plan.clone()), plan))
+        } else {
+            None
+        }
     };
     let found: Vec<_> = tries.into_par_iter().map(further).collect();
     for (improved, plan) in found.into_iter().flatten() {
@@ -205,7 +249,16 @@ fn ask(
 ) -> Result<Answer, Cancelled> {
     let (propagator, weights) = (Propagator::new(space, candidate.key), &mut candidate.weights);
     let n_revisions = n_revisions.min(budget.n_left);
-    let mut probe = Probe { ctx, propagator, limit, n_revisions, n_decisions: 0, run: 0, weights, is_time_up: false };
+    let mut probe = Probe {
+        ctx,
+        propagator,
+        limit,
+        n_revisions,
+        n_decisions: 0,
+        run: 0,
+        weights,
+        is_time_up: false,
+    };
     let answer = probe.proof();
     budget.n_left = budget.n_left.saturating_sub(probe.propagator.n_revisions.max(1));
     if probe.is_time_up {

@@ -1,5 +1,5 @@
-//! Local optimisation: other directions for the worst piece, then for its neighbours (Sect. 6.2), then for all others, which
-//! may lower the mean where the worst piece cannot be helped.
+//! Local optimisation: other directions for the worst piece, then for its neighbours (Sect. 6.2), then for
+//! all others, which may lower the mean where the worst piece cannot be helped.
 
 use super::key::KeyChoice;
 use super::local_cost::{Role, Surroundings, mask_of};
@@ -22,9 +22,15 @@ pub(super) struct Improved {
 ///
 /// Stops where no single change of direction helps.
 pub(super) fn improve(space: &Space<'_>, key: &KeyChoice, plan: InstallationPlan) -> Improved {
-    let mut best = Improved { score: space.score(&plan), plan, n_evaluations: 1 };
+    let mut best = Improved {
+        score: space.score(&plan),
+        plan,
+        n_evaluations: 1,
+    };
     for _ in 0..MAX_IMPROVEMENTS {
-        let is_improved = worst_first(space, &best.score).into_iter().any(|p| turn(space, key, &mut best, p));
+        let is_improved = worst_first(space, &best.score)
+            .into_iter()
+            .any(|p| turn(space, key, &mut best, p));
         if !is_improved {
             break;
         }
@@ -37,7 +43,8 @@ fn worst_first(space: &Space<'_>, score: &PlanScore) -> Vec<PatchId> {
     let mut by_cost: Vec<PatchId> = score.pieces.ids().collect();
     by_cost.sort_by(|&x, &y| score.pieces[y].total_cmp(&score.pieces[x]).then(x.cmp(&y)));
     let near: PieceSet = space.neighbours[usize::from(by_cost[0])].union(PieceSet::one(by_cost[0]));
-    let (mut first, others): (Vec<PatchId>, Vec<PatchId>) = by_cost.into_iter().partition(|&p| near.contains(p));
+    let (mut first, others): (Vec<PatchId>, Vec<PatchId>) =
+        by_cost.into_iter().partition(|&p| near.contains(p));
     first.extend(others);
     first
 }
@@ -70,7 +77,8 @@ fn turn(space: &Space<'_>, key: &KeyChoice, best: &mut Improved, piece: PatchId)
     is_improved
 }
 
-/// The score where `piece` leaves along `s`: only its own cost and those of its earlier neighbours change from `costs`.
+/// The score where `piece` leaves along `s`: only its own cost and those of its earlier neighbours change
+/// from `costs`.
 fn turned(
     space: &Space<'_>,
     around: &mut [(Role, Surroundings)],
@@ -95,7 +103,11 @@ fn turned(
         costs[q] = space.costs.bound(q, *role, near);
     }
     let (role, near) = &mut around[at];
-    *role = if let Role::Key(_) = role { Role::Key(s) } else { Role::Between(s) };
+    *role = if let Role::Key(_) = role {
+        Role::Key(s)
+    } else {
+        Role::Between(s)
+    };
     costs[piece] = space.costs.bound(piece, *role, near);
     PlanScore::of(costs)
 }

@@ -36,7 +36,10 @@ pub struct Flatness {
 
 impl Flatness {
     /// Of a piece without area.
-    pub const NONE: Self = Self { normal: Vec3::ZERO, share: 0.0 };
+    pub const NONE: Self = Self {
+        normal: Vec3::ZERO,
+        share: 0.0,
+    };
 
     /// Whether the piece makes a good key.
     pub fn is_flat(self) -> bool {
@@ -61,7 +64,8 @@ impl Flatness {
     }
 }
 
-/// The nearest plane of every piece by RANSAC over its faces, refined by least squares; a random stream per piece.
+/// The nearest plane of every piece by RANSAC over its faces, refined by least squares; a random stream per
+/// piece.
 pub fn flatness(params: &PlanParams, surface: &SegmentedSurface) -> IdVec<PatchId, Flatness> {
     let mut faces = vec![Vec::new(); surface.n_patches];
     for (face, &patch) in surface.patch_of_face.iter().enumerate() {
@@ -89,8 +93,14 @@ fn nearest_plane(spots: &[Spot], tolerance_mm: f64, rng: &mut ChaCha8Rng) -> Fla
     }
     let mut best = (0.0, None);
     for _ in 0..N_PLANES {
-        let Spot { center: at, normal, .. } = spots[rng.random_range(0..spots.len())];
-        let plane = Plane { at, normal, tolerance_mm };
+        let Spot {
+            center: at, normal, ..
+        } = spots[rng.random_range(0..spots.len())];
+        let plane = Plane {
+            at,
+            normal,
+            tolerance_mm,
+        };
         let found = plane.area_mm2(spots);
         if found > best.0 {
             best = (found, Some(plane));
@@ -98,7 +108,10 @@ fn nearest_plane(spots: &[Spot], tolerance_mm: f64, rng: &mut ChaCha8Rng) -> Fla
     }
     best.1.map_or(Flatness::NONE, |plane| {
         let plane = plane.refined(spots);
-        Flatness { normal: plane.normal, share: plane.area_mm2(spots) / total }
+        Flatness {
+            normal: plane.normal,
+            share: plane.area_mm2(spots) / total,
+        }
     })
 }
 
@@ -133,7 +146,8 @@ pub enum KeyDirections {
     OutOfPlane,
 }
 
-/// All choices, best first: flat pieces within their plane, then along other directions, then pieces that are not flat.
+/// All choices, best first: flat pieces within their plane, then along other directions, then pieces that are
+/// not flat.
 ///
 /// Pieces are ranked by share on the plane times the root of their area, hidden ones first.
 pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
@@ -142,14 +156,24 @@ pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
         let hidden = 0.5 * (1.0 - survey.mean_normal[p].dot(up));
         survey.flatness[p].share * survey.area_mm2[p].sqrt() * (1.0 - VISIBLE_COST * (1.0 - hidden))
     };
-    let mut pieces: Vec<PatchId> = survey.area_mm2.ids().filter(|&p| params.key.is_none_or(|k| k == p)).collect();
+    let mut pieces: Vec<PatchId> = survey
+        .area_mm2
+        .ids()
+        .filter(|&p| params.key.is_none_or(|k| k == p))
+        .collect();
     pieces.sort_by(|&x, &y| rank(y).total_cmp(&rank(x)).then(x.cmp(&y)));
     if let (Some(piece), Some(slide)) = (params.key, params.key_slide) {
         // A key that was cut as such: its rails are straight whatever else it is.
         let slides = KeyDirections::WithinPlane;
-        return vec![KeyChoice { piece, directions: vec![slide], slides, is_flat: true }];
+        return vec![KeyChoice {
+            piece,
+            directions: vec![slide],
+            slides,
+            is_flat: true,
+        }];
     }
-    let (flat, other): (Vec<PatchId>, Vec<PatchId>) = pieces.into_iter().partition(|&p| survey.flatness[p].is_flat());
+    let (flat, other): (Vec<PatchId>, Vec<PatchId>) =
+        pieces.into_iter().partition(|&p| survey.flatness[p].is_flat());
     let mut choices = Vec::new();
     for pieces in [flat, other] {
         for slides in [KeyDirections::WithinPlane, KeyDirections::OutOfPlane] {
@@ -158,9 +182,16 @@ pub fn choices(params: &PlanParams, survey: &PlanSurvey) -> Vec<KeyChoice> {
                 let in_plane = plane.in_plane();
                 let directions = match slides {
                     KeyDirections::WithinPlane => in_plane,
-                    KeyDirections::OutOfPlane => LatticeDirection::all().filter(|s| !in_plane.contains(s)).collect(),
+                    KeyDirections::OutOfPlane => LatticeDirection::all()
+                        .filter(|s| !in_plane.contains(s))
+                        .collect(),
                 };
-                choices.push(KeyChoice { piece, directions, slides, is_flat: plane.is_flat() });
+                choices.push(KeyChoice {
+                    piece,
+                    directions,
+                    slides,
+                    is_flat: plane.is_flat(),
+                });
             }
         }
     }

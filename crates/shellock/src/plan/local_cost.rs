@@ -1,15 +1,16 @@
 //! What a piece costs, as a function of what is known around it when it is taken off (Sect. 5.3).
 //!
-//! Pieces are taken off from the key on. When piece p leaves along `s_p`, the directions of its neighbours that left before
-//! are known, and those that stay were installed earlier and leave along nothing of their own against p:
+//! Pieces are taken off from the key on. When piece p leaves along `s_p`, the directions of its neighbours
+//! that left before are known, and those that stay were installed earlier and leave along nothing of their
+//! own against p:
 //!
 //! ```text
 //!        later neighbours r (gone)        p leaves along s_p        earlier neighbours q (still there)
 //!   seam p–r: piece r later, along s_r                          seam p–q: piece p later, along s_p
 //! ```
 //!
-//! So the cost of p depends on one [`SeamStates`] a seam, on its [`Role`], and on who remains in its way. The search asks for
-//! bounds while several states are still possible; where one is left, the bound is the cost.
+//! So the cost of p depends on one [`SeamStates`] a seam, on its [`Role`], and on who remains in its way. The
+//! search asks for bounds while several states are still possible; where one is left, the bound is the cost.
 
 use super::score::{ASKED_MM3, HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
 use super::{PieceSet, PlanConstraints, PlanSurvey};
@@ -82,20 +83,36 @@ impl RoleSet {
 
     /// The roles, directions first.
     pub fn iter(self) -> impl Iterator<Item = Role> {
-        let role = move |s| if self.is_key { Role::Key(s) } else { Role::Between(s) };
-        directions_in(self.separations).map(role).chain(self.may_be_first.then_some(Role::First))
+        let role = move |s| {
+            if self.is_key {
+                Role::Key(s)
+            } else {
+                Role::Between(s)
+            }
+        };
+        directions_in(self.separations)
+            .map(role)
+            .chain(self.may_be_first.then_some(Role::First))
     }
 
     /// The set with `role` alone.
     pub fn only(self, role: Role) -> Self {
         let separations = role.separation().map_or(0, mask_of);
-        Self { separations, may_be_first: role == Role::First, ..self }
+        Self {
+            separations,
+            may_be_first: role == Role::First,
+            ..self
+        }
     }
 
     /// The set without `role`.
     pub fn without(self, role: Role) -> Self {
         let separations = self.separations & !role.separation().map_or(0, mask_of);
-        Self { separations, may_be_first: self.may_be_first && role != Role::First, ..self }
+        Self {
+            separations,
+            may_be_first: self.may_be_first && role != Role::First,
+            ..self
+        }
     }
 }
 
@@ -119,14 +136,18 @@ pub struct Surroundings {
 
 /// The cost of each piece, from its surroundings. The bottleneck over all pieces is the cost of a plan.
 ///
-/// A metric of another kind (Eq. 6: a maximum over pairs of directions at the piece's seams) needs `bound` alone.
+/// A metric of another kind (Eq. 6: a maximum over pairs of directions at the piece's seams) needs `bound`
+/// alone.
 pub trait PieceCosts: Send + Sync {
-    /// A number that the cost of `piece` in `role` never falls below, whichever states are chosen of `around`.
+    /// A number that the cost of `piece` in `role` never falls below, whichever states are chosen of
+    /// `around`.
     ///
-    /// It is the cost where each seam has one state left. Infinite where a seam has none that goes with `role`.
+    /// It is the cost where each seam has one state left. Infinite where a seam has none that goes with
+    /// `role`.
     fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64;
 
-    /// Whether the piece is held by less than the verification asks for, by estimate; never where the costs know no hold.
+    /// Whether the piece is held by less than the verification asks for, by estimate; never where the costs
+    /// know no hold.
     fn is_loose(&self, _piece: PatchId, _role: Role, _around: &Surroundings) -> bool {
         false
     }
@@ -142,12 +163,26 @@ pub trait PieceCosts: Send + Sync {
             let whole = around.seams[i];
             let mut left = SeamStates::default();
             for s in directions_in(whole.own & roles.separations) {
-                around.seams[i] = SeamStates { own: mask_of(s), others: 0 };
-                let role = if roles.is_key { Role::Key(s) } else { Role::Between(s) };
-                left.own |= if self.bound(piece, role, around) <= limit { mask_of(s) } else { 0 };
+                around.seams[i] = SeamStates {
+                    own: mask_of(s),
+                    others: 0,
+                };
+                let role = if roles.is_key {
+                    Role::Key(s)
+                } else {
+                    Role::Between(s)
+                };
+                left.own |= if self.bound(piece, role, around) <= limit {
+                    mask_of(s)
+                } else {
+                    0
+                };
             }
             for s in directions_in(whole.others) {
-                around.seams[i] = SeamStates { own: 0, others: mask_of(s) };
+                around.seams[i] = SeamStates {
+                    own: 0,
+                    others: mask_of(s),
+                };
                 let is_possible = roles.iter().any(|role| self.bound(piece, role, around) <= limit);
                 left.others |= if is_possible { mask_of(s) } else { 0 };
             }
@@ -177,12 +212,14 @@ struct PieceTable {
     occluded: Vec<Vec<(PatchId, f64)>>,
 }
 
-/// The default cost: mean over the seams by length of Eq. 4's weight and of what cannot be used, the path, and missing hold.
+/// The default cost: mean over the seams by length of Eq. 4's weight and of what cannot be used, the path,
+/// and missing hold.
 pub struct SeamCosts {
     pieces: Vec<PieceTable>,
 }
 
-/// Slack of comparisons that subtract, in units of cost and in mm³; above rounding, so nothing possible is struck out.
+/// Slack of comparisons that subtract, in units of cost and in mm³; above rounding, so nothing possible is
+/// struck out.
 const COST_SLACK: f64 = 1e-9;
 const HOLD_SLACK_MM3: f32 = 1e-3;
 
@@ -190,7 +227,10 @@ impl SeamCosts {
     /// Tables for what `survey` and `constraints` say. Cost: 52 entries of 66 numbers a seam.
     pub fn new(survey: &PlanSurvey, constraints: &PlanConstraints) -> Self {
         let n = survey.n_pieces;
-        let mut pieces: Vec<PieceTable> = (0..n).map(PatchId::from).map(|p| PieceTable::new(survey, p)).collect();
+        let mut pieces: Vec<PieceTable> = (0..n)
+            .map(PatchId::from)
+            .map(|p| PieceTable::new(survey, p))
+            .collect();
         for contact in &survey.contacts {
             for p in [contact.a, contact.b] {
                 let q = contact.other(p);
@@ -212,11 +252,14 @@ impl SeamCosts {
                 table.seams.push(SeamTable { cost_mm, hold });
             }
         }
-        pieces.iter_mut().for_each(|t| t.length_mm = t.length_mm.max(f64::MIN_POSITIVE));
+        pieces
+            .iter_mut()
+            .for_each(|t| t.length_mm = t.length_mm.max(f64::MIN_POSITIVE));
         Self { pieces }
     }
 
-    /// Estimated overlap, mm³, with which `piece` resists the push that it resists least; an upper bound while seams are open.
+    /// Estimated overlap, mm³, with which `piece` resists the push that it resists least; an upper bound
+    /// while seams are open.
     pub fn hold_mm3(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64 {
         if let Role::Key(_) = role {
             return f64::INFINITY;
@@ -237,11 +280,15 @@ fn add(sum: &mut Hold, held: &Hold) {
 }
 
 fn raise(most: &mut Hold, held: &Hold) {
-    most.iter_mut().zip(held).for_each(|(most, &mm3)| *most = if mm3 > *most { mm3 } else { *most });
+    most.iter_mut()
+        .zip(held)
+        .for_each(|(most, &mm3)| *most = if mm3 > *most { mm3 } else { *most });
 }
 
 fn least(held: &Hold) -> f32 {
-    held.iter().copied().fold(f32::INFINITY, |x, y| if y < x { y } else { x })
+    held.iter()
+        .copied()
+        .fold(f32::INFINITY, |x, y| if y < x { y } else { x })
 }
 
 /// What a piece costs that is held by `hold_mm3` alone.
@@ -252,7 +299,9 @@ fn loose_cost(hold_mm3: f64) -> f64 {
 impl SeamTable {
     /// The least cost times length of what `others` allow; infinite where they allow nothing.
     fn least_of_others(&self, others: DirectionMask) -> f64 {
-        directions_in(others).map(|s| self.cost_mm[1][s.index()]).fold(f64::INFINITY, f64::min)
+        directions_in(others)
+            .map(|s| self.cost_mm[1][s.index()])
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn most_of_others(&self, others: DirectionMask) -> Hold {
@@ -278,7 +327,9 @@ impl SeamTable {
         let own = role.separation().filter(|&s| states.own & mask_of(s) != 0);
         match (own, states.others) {
             (Some(s), 0) => Some(&self.hold[0][s.index()]),
-            (None, others) if others.is_power_of_two() => Some(&self.hold[1][others.trailing_zeros() as usize]),
+            (None, others) if others.is_power_of_two() => {
+                Some(&self.hold[1][others.trailing_zeros() as usize])
+            }
             _ => None,
         }
     }
@@ -299,15 +350,27 @@ impl PieceTable {
             inward_cost(survey, p, s)
         });
         let others = || (0..survey.n_pieces).map(PatchId::from).filter(|&q| q != p);
-        let of = |s| others().map(|q| (q, occluded_cost(survey, p, s, q))).filter(|x| x.1 > 0.0).collect();
+        let of = |s| {
+            others()
+                .map(|q| (q, occluded_cost(survey, p, s, q)))
+                .filter(|x| x.1 > 0.0)
+                .collect()
+        };
         let occluded = LatticeDirection::all().map(of).collect();
-        Self { seams: Vec::new(), length_mm: 0.0, inward, occluded }
+        Self {
+            seams: Vec::new(),
+            length_mm: 0.0,
+            inward,
+            occluded,
+        }
     }
 
     /// Cost of the way out of `remaining`.
     fn path_cost(&self, role: Role, remaining: PieceSet) -> f64 {
         let occluded = |s: LatticeDirection| {
-            let in_way = self.occluded[s.index()].iter().filter(|x| remaining.contains(x.0));
+            let in_way = self.occluded[s.index()]
+                .iter()
+                .filter(|x| remaining.contains(x.0));
             in_way.map(|x| x.1).sum::<f64>()
         };
         match role {
@@ -323,7 +386,9 @@ impl PieceCosts for SeamCosts {
     fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64 {
         let table = &self.pieces[usize::from(piece)];
         let seams = table.seams.iter().zip(&around.seams);
-        let cost_mm: f64 = seams.map(|(seam, &states)| seam.least_cost_mm(role, states)).sum();
+        let cost_mm: f64 = seams
+            .map(|(seam, &states)| seam.least_cost_mm(role, states))
+            .sum();
         let path = table.path_cost(role, around.remaining);
         cost_mm / table.length_mm + path + loose_cost(self.hold_mm3(piece, role, around))
     }
@@ -335,12 +400,14 @@ impl PieceCosts for SeamCosts {
     fn narrow(&self, piece: PatchId, roles: &mut RoleSet, around: &mut Surroundings, limit: f64) {
         let table = &self.pieces[usize::from(piece)];
         let seams = || table.seams.iter().zip(&around.seams);
-        let of_others: Vec<(f64, Hold)> =
-            seams().map(|(t, x)| (t.least_of_others(x.others), t.most_of_others(x.others))).collect();
+        let of_others: Vec<(f64, Hold)> = seams()
+            .map(|(t, x)| (t.least_of_others(x.others), t.most_of_others(x.others)))
+            .collect();
         let mut left = vec![SeamStates::default(); around.seams.len()];
         for role in roles.iter() {
             let path = table.path_cost(role, around.remaining);
-            let with_own = |((t, &x), others): ((&SeamTable, &SeamStates), &(f64, Hold))| t.with_own(role, x, others.0);
+            let with_own =
+                |((t, &x), others): ((&SeamTable, &SeamStates), &(f64, Hold))| t.with_own(role, x, others.0);
             let least_mm: Vec<f64> = seams().zip(&of_others).map(with_own).collect();
             let cost_mm: f64 = least_mm.iter().sum();
             let base = cost_mm / table.length_mm + path;
@@ -349,9 +416,16 @@ impl PieceCosts for SeamCosts {
                 continue;
             }
             let is_held = matches!(role, Role::Key(_));
-            let mut choice = Choice { cost_mm, least_mm, hold: [0.0; N_PUSHES], most: Vec::with_capacity(left.len()) };
+            let mut choice = Choice {
+                cost_mm,
+                least_mm,
+                hold: [0.0; N_PUSHES],
+                most: Vec::with_capacity(left.len()),
+            };
             if !is_held {
-                seams().zip(&of_others).for_each(|((seam, &states), (_, most))| choice.hold(seam, role, states, most));
+                seams()
+                    .zip(&of_others)
+                    .for_each(|((seam, &states), (_, most))| choice.hold(seam, role, states, most));
                 if base + loose_cost(f64::from(least(&choice.hold))) > limit {
                     *roles = roles.without(role);
                     continue;
@@ -389,8 +463,12 @@ impl Choice {
         self.most.push(most);
     }
 
-    /// Keeps the states of seam `i` that go with the best of all other seams; `needed` hold, mm³, where any is.
-    #[expect(clippy::too_many_arguments, reason = "one innermost step, with what its loops have at hand")]
+    /// Keeps the states of seam `i` that go with the best of all other seams; `needed` hold, mm³, where any
+    /// is.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one innermost step, with what its loops have at hand"
+    )]
     fn support(
         &self,
         i: usize,

@@ -1,9 +1,9 @@
-//! The local test set of the data-driven metric (Sect. 5.3): how far a straight seam opens, for 8 connector orientations
-//! and 26 directions of the testing force.
+//! The local test set of the data-driven metric (Sect. 5.3): how far a straight seam opens, for 8 connector
+//! orientations and 26 directions of the testing force.
 //!
-//! Two half-planes that meet in a seam, held at their outer ring, are simulated with the surface metric's solver; the middle
-//! of the seam is measured. Between the simulated cases `d` is piecewise linear: in the connector's angle, and in the force
-//! over the triangles that the 26 directions make of the sphere.
+//! Two half-planes that meet in a seam, held at their outer ring, are simulated with the surface metric's
+//! solver; the middle of the seam is measured. Between the simulated cases `d` is piecewise linear: in the
+//! connector's angle, and in the force over the triangles that the 26 directions make of the sphere.
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
@@ -16,7 +16,8 @@ use crate::LatticeDirection;
 /// Orientations of connectors about the seam.
 pub const N_ORIENTATIONS: usize = 8;
 
-/// Squares along the seam and beside it, and their size, mm: the neighbourhood is about as large as a piece's half.
+/// Squares along the seam and beside it, and their size, mm: the neighbourhood is about as large as a piece's
+/// half.
 const ALONG: usize = 8;
 const BESIDE: usize = 4;
 const EDGE_MM: f64 = 5.0;
@@ -37,9 +38,19 @@ impl LocalTests {
         let mut opening_mm = [[0.0; LatticeDirection::COUNT]; N_ORIENTATIONS];
         for (k, openings) in opening_mm.iter_mut().enumerate() {
             let (sin, cos) = angle_of(k).sin_cos();
-            // Side a is the later piece; a connector is made at any angle, good or bad: the weight w is for that.
-            let at =
-                |s: &Station| meeting(s, params.connector_mm, true, cos * s.normal + sin * s.across, 0.0, true, false);
+            // Side a is the later piece; a connector is made at any angle, good or bad: the weight w is for
+            // that.
+            let at = |s: &Station| {
+                meeting(
+                    s,
+                    params.connector_mm,
+                    true,
+                    cos * s.normal + sin * s.across,
+                    0.0,
+                    true,
+                    false,
+                )
+            };
             let plan: Vec<_> = assembly.stations.iter().map(at).collect();
             for (f, opening) in LatticeDirection::all().zip(openings) {
                 let force = |s: &Station| params.force_n_per_mm * s.length_mm * in_world(s, f.unit());
@@ -53,15 +64,24 @@ impl LocalTests {
         Ok(Self { opening_mm })
     }
 
-    /// `d(u, v, s, f)`: the opening where the later piece leaves along `s` and is pulled by `f`, both unit vectors, mm.
+    /// `d(u, v, s, f)`: the opening where the later piece leaves along `s` and is pulled by `f`, both unit
+    /// vectors, mm.
     pub fn opening_mm(&self, frame: &SeamFrame, s: Vec3, f: Vec3) -> f64 {
-        let angle = s.dot(frame.across).atan2(s.dot(frame.normal)).rem_euclid(std::f64::consts::TAU);
+        let angle = s
+            .dot(frame.across)
+            .atan2(s.dot(frame.normal))
+            .rem_euclid(std::f64::consts::TAU);
         let at = angle / std::f64::consts::TAU * N_ORIENTATIONS as f64;
         let (low, share) = (at.floor() as usize % N_ORIENTATIONS, at.fract());
         let high = (low + 1) % N_ORIENTATIONS;
         let f = Vec3::new(f.dot(frame.tangent), f.dot(frame.normal), f.dot(frame.across));
         let corners = corners_of(f);
-        let in_case = |k: usize| corners.iter().map(|&(d, w)| w * self.opening_mm[k][d.index()]).sum::<f64>();
+        let in_case = |k: usize| {
+            corners
+                .iter()
+                .map(|&(d, w)| w * self.opening_mm[k][d.index()])
+                .sum::<f64>()
+        };
         (1.0 - share) * in_case(low) + share * in_case(high)
     }
 }
@@ -75,7 +95,8 @@ fn in_world(station: &Station, f: Vec3) -> Vec3 {
     f.x * station.tangent + f.y * station.normal + f.z * station.across
 }
 
-/// The three lattice directions around `f` with weights that sum to 1: an axis, a face diagonal and a space diagonal.
+/// The three lattice directions around `f` with weights that sum to 1: an axis, a face diagonal and a space
+/// diagonal.
 fn corners_of(f: Vec3) -> [(LatticeDirection, f64); 3] {
     let mut axes = [0, 1, 2];
     axes.sort_by(|&x, &y| f[y].abs().total_cmp(&f[x].abs()));
@@ -93,7 +114,11 @@ fn corners_of(f: Vec3) -> [(LatticeDirection, f64); 3] {
 mod tests {
     use super::*;
 
-    const FRAME: SeamFrame = SeamFrame { tangent: Vec3::X, normal: Vec3::Y, across: Vec3::Z };
+    const FRAME: SeamFrame = SeamFrame {
+        tangent: Vec3::X,
+        normal: Vec3::Y,
+        across: Vec3::Z,
+    };
 
     #[test]
     fn simulated_cases_come_back_and_between_them_openings_are_between() {
@@ -124,9 +149,13 @@ mod tests {
             let f = Vec3::new(x, y, 0.7 - x * y).normalize();
             let corners = corners_of(f);
             assert!(
-                corners.iter().all(|c| c.1 >= 0.0) && (corners.iter().map(|c| c.1).sum::<f64>() - 1.0).abs() < 1e-12
+                corners.iter().all(|c| c.1 >= 0.0)
+                    && (corners.iter().map(|c| c.1).sum::<f64>() - 1.0).abs() < 1e-12
             );
-            let steps = corners.iter().map(|(d, w)| *w * Vec3::from_array(d.step().map(f64::from))).sum::<Vec3>();
+            let steps = corners
+                .iter()
+                .map(|(d, w)| *w * Vec3::from_array(d.step().map(f64::from)))
+                .sum::<Vec3>();
             assert!((steps.normalize() - f).length() < 1e-9);
         }
     }

@@ -1,14 +1,15 @@
 //! Which outer patches are in each other's way (Sect. 6.2).
 //!
-//! An orthographic camera looks along each of the 13 lines of the lattice. Every pixel keeps the list of *all* surface
-//! points on its ray, sorted by depth, so that one picture answers for both ends of the line and for all pairs:
+//! An orthographic camera looks along each of the 13 lines of the lattice. Every pixel keeps the list of
+//! *all* surface points on its ray, sorted by depth, so that one picture answers for both ends of the line
+//! and for all pairs:
 //!
 //! ```text
 //!   ray ──•p───────•q──•q────────•p──▶ s        p has q ahead of it at its first point, q has p ahead at both
 //! ```
 //!
-//! The area of p with q ahead is positive along s exactly where the area of q with p ahead is along −s; the two amounts
-//! differ where one patch crosses a ray more often than the other.
+//! The area of p with q ahead is positive along s exactly where the area of q with p ahead is along −s; the
+//! two amounts differ where one patch crosses a ray more often than the other.
 //!
 //! Limits: features thinner than a pixel may be missed; only outer patches are seen, walls are carved later.
 
@@ -71,14 +72,16 @@ struct Camera {
 }
 
 impl Occlusion {
-    /// Looks at `surface` along all lines. Cost: 13 rasterisations of the mesh, whatever the number of patches.
+    /// Looks at `surface` along all lines. Cost: 13 rasterisations of the mesh, whatever the number of
+    /// patches.
     pub fn measure(surface: &SegmentedSurface) -> Self {
         let n = surface.n_patches;
         let half = LatticeDirection::COUNT / 2;
         // Direction i and its opposite 25 − i share a picture.
         let lines: Vec<LatticeDirection> = LatticeDirection::all().take(half).collect();
         let pictures: Vec<[Table; 2]> = lines.par_iter().map(|&s| look_along(surface, s)).collect();
-        let (forwards, backwards): (Vec<Table>, Vec<Table>) = pictures.into_iter().map(|[f, b]| (f, b)).unzip();
+        let (forwards, backwards): (Vec<Table>, Vec<Table>) =
+            pictures.into_iter().map(|[f, b]| (f, b)).unzip();
         let tables = forwards.into_iter().chain(backwards.into_iter().rev()).collect();
         Self { n, tables }
     }
@@ -86,8 +89,15 @@ impl Occlusion {
     /// A table without any occlusion where every patch shows 1 mm²; for made-up cases.
     #[cfg(test)]
     pub fn none(n: usize) -> Self {
-        let table = Table { total_mm2: vec![1.0; n], occluded_mm2: vec![0.0; n * n], first_hit: vec![None; n * n] };
-        Self { n, tables: vec![table; LatticeDirection::COUNT] }
+        let table = Table {
+            total_mm2: vec![1.0; n],
+            occluded_mm2: vec![0.0; n * n],
+            first_hit: vec![None; n * n],
+        };
+        Self {
+            n,
+            tables: vec![table; LatticeDirection::COUNT],
+        }
     }
 
     /// Says that q hides this share of p along s.
@@ -118,7 +128,11 @@ impl Occlusion {
     /// Share of `p` that has `q` ahead of it along `s`, in [0, 1]; 0 where `p` is not seen at all.
     pub fn share(&self, p: PatchId, q: PatchId, s: LatticeDirection) -> f64 {
         let total = self.total_mm2(p, s);
-        if total > 0.0 { self.occluded_mm2(p, q, s) / total } else { 0.0 }
+        if total > 0.0 {
+            self.occluded_mm2(p, q, s) / total
+        } else {
+            0.0
+        }
     }
 
     /// The point of `p` that hits `q` first on its way along `s`, mm; `None` where nothing is in the way.
@@ -145,9 +159,21 @@ impl Camera {
         }
         let longest = surface.mesh.bounds().size().max_element();
         // A point-like or empty surface still gets a picture: one pixel.
-        let pixel_mm = if longest > 0.0 && longest.is_finite() { longest / PIXELS_ACROSS } else { 1.0 };
+        let pixel_mm = if longest > 0.0 && longest.is_finite() {
+            longest / PIXELS_ACROSS
+        } else {
+            1.0
+        };
         let count = |k: usize| ((high[k] - low[k]).max(0.0) / pixel_mm).ceil() as usize + 2;
-        Self { right, up, depth, origin_mm: low, pixel_mm, width: count(0), height: count(1) }
+        Self {
+            right,
+            up,
+            depth,
+            origin_mm: low,
+            pixel_mm,
+            width: count(0),
+            height: count(1),
+        }
     }
 
     fn project(&self, p: Vec3) -> Vec3 {
@@ -200,7 +226,11 @@ fn rasterise(surface: &SegmentedSurface, camera: &Camera) -> Vec<Fragment> {
                 let wc = 1.0 - wa - wb;
                 if wa >= 0.0 && wb >= 0.0 && wc >= 0.0 {
                     let depth_mm = wa * a.z + wb * b.z + wc * c.z;
-                    fragments.push(Fragment { pixel: (y * camera.width + x) as u32, patch: patch.0, depth_mm });
+                    fragments.push(Fragment {
+                        pixel: (y * camera.width + x) as u32,
+                        patch: patch.0,
+                        depth_mm,
+                    });
                 }
             }
         }
@@ -240,8 +270,17 @@ struct Tally {
 
 impl Tally {
     fn new(n: usize) -> Self {
-        let table = Table { total_mm2: vec![0.0; n], occluded_mm2: vec![0.0; n * n], first_hit: vec![None; n * n] };
-        Self { n, tables: [table.clone(), table], counted_by: vec![0; n], n_fragments: 0 }
+        let table = Table {
+            total_mm2: vec![0.0; n],
+            occluded_mm2: vec![0.0; n * n],
+            first_hit: vec![None; n * n],
+        };
+        Self {
+            n,
+            tables: [table.clone(), table],
+            counted_by: vec![0; n],
+            n_fragments: 0,
+        }
     }
 
     /// Adds one ray's fragments, nearest first along the line.
@@ -253,7 +292,13 @@ impl Tally {
     }
 
     /// Counts the patches of `ahead`, nearest first, as in the way of `f`.
-    fn count<'a>(&mut self, side: usize, f: Fragment, ahead: impl Iterator<Item = &'a Fragment>, camera: &Camera) {
+    fn count<'a>(
+        &mut self,
+        side: usize,
+        f: Fragment,
+        ahead: impl Iterator<Item = &'a Fragment>,
+        camera: &Camera,
+    ) {
         let pixel_mm2 = camera.pixel_mm * camera.pixel_mm;
         let table = &mut self.tables[side];
         table.total_mm2[f.patch as usize] += pixel_mm2;

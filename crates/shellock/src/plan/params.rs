@@ -11,7 +11,8 @@ use crate::{LatticeDirection, PatchId};
 pub struct PlanParams {
     /// Seed of all random streams of the stage; the same seed gives the same plan on any number of threads.
     pub seed: u64,
-    /// Wall thickness: seams are as long as on the inner side of the wall, where connectors are. [0, 10]; 0, the outer surface.
+    /// Wall thickness: seams are as long as on the inner side of the wall, where connectors are. [0, 10]; 0,
+    /// the outer surface.
     pub wall_mm: f64,
     /// Gap between mating faces. [0.03, 0.6]; 0.12. What a push must cross before it is resisted.
     pub clearance_mm: f64,
@@ -19,15 +20,18 @@ pub struct PlanParams {
     ///
     /// Keeps a perfect connector from costing nothing at all.
     pub beta: f64,
-    /// Share of a piece that another may occlude while it still counts as free. [0, 0.2]; 0.01. Carving absorbs it.
+    /// Share of a piece that another may occlude while it still counts as free. [0, 0.2]; 0.01. Carving
+    /// absorbs it.
     pub occlusion_tolerance: f64,
-    /// The tolerance tried, with a warning, where the first gives no plan. [`occlusion_tolerance`, 0.2]; 0.03.
+    /// The tolerance tried, with a warning, where the first gives no plan. [`occlusion_tolerance`, 0.2];
+    /// 0.03.
     ///
     /// [`occlusion_tolerance`]: Self::occlusion_tolerance
     pub relaxed_tolerance: f64,
     /// The piece to be the key; the flattest that works where `None`.
     pub key: Option<PatchId>,
-    /// The only direction `key` may leave along, with rails under its sides; any of the 26, without rails, where `None`.
+    /// The only direction `key` may leave along, with rails under its sides; any of the 26, without rails,
+    /// where `None`.
     pub key_slide: Option<LatticeDirection>,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
@@ -35,9 +39,11 @@ pub struct PlanParams {
     pub n_plans: usize,
     /// Pieces that the random search may take off in all before it gives up. [1, 10⁸]; 200 000.
     ///
-    /// A bound on hopeless cases, for each of the two tolerances; where plans exist the search ends long before.
+    /// A bound on hopeless cases, for each of the two tolerances; where plans exist the search ends long
+    /// before.
     pub max_tries: usize,
-    /// Work that the exact search may do: pieces revised. [0, 10⁹]; 100 000. Without any only the trivial bound 0 is proven.
+    /// Work that the exact search may do: pieces revised. [0, 10⁹]; 100 000. Without any only the trivial
+    /// bound 0 is proven.
     pub proof_budget: usize,
 }
 
@@ -78,7 +84,12 @@ impl PlanParams {
         range("clearance_mm", self.clearance_mm, 0.03, 0.6);
         range("beta", self.beta, 0.0, 1.0);
         range("occlusion_tolerance", self.occlusion_tolerance, 0.0, 0.2);
-        range("relaxed_tolerance", self.relaxed_tolerance, self.occlusion_tolerance, 0.2);
+        range(
+            "relaxed_tolerance",
+            self.relaxed_tolerance,
+            self.occlusion_tolerance,
+            0.2,
+        );
         range("n_plans", self.n_plans as f64, 1.0, 1e5);
         range("proof_budget", self.proof_budget as f64, 0.0, 1e9);
         range("max_tries", self.max_tries as f64, 1.0, 1e8);
@@ -96,7 +107,12 @@ mod tests {
     #[test]
     fn defaults_are_in_range_and_every_fault_is_named() {
         assert_eq!(PlanParams::default().problems(), Vec::<String>::new());
-        let bad = PlanParams { beta: -1.0, n_plans: 0, up: [0.0; 3], ..PlanParams::default() };
+        let bad = PlanParams {
+            beta: -1.0,
+            n_plans: 0,
+            up: [0.0; 3],
+            ..PlanParams::default()
+        };
         assert_eq!(bad.problems().len(), 3);
     }
 }

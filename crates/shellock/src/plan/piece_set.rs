@@ -16,7 +16,11 @@ impl PieceSet {
     /// The pieces 0 … n − 1; `n` ≤ [`Self::MAX_PIECES`].
     pub fn first(n: usize) -> Self {
         assert!(n <= Self::MAX_PIECES, "callers refuse more pieces");
-        if n == Self::MAX_PIECES { Self(u128::MAX) } else { Self((1 << n) - 1) }
+        if n == Self::MAX_PIECES {
+            Self(u128::MAX)
+        } else {
+            Self((1 << n) - 1)
+        }
     }
 
     /// The set of `piece` alone.
@@ -83,9 +87,12 @@ impl PieceSet {
         self.is_joined_within(self, neighbours)
     }
 
-    /// Whether the pieces of the set hang together by themselves and the other pieces of `bridges`; true for the empty set.
+    /// Whether the pieces of the set hang together by themselves and the other pieces of `bridges`; true for
+    /// the empty set.
     pub fn is_joined_within(self, bridges: Self, neighbours: &[Self]) -> bool {
-        let Some(start) = self.iter().next() else { return true };
+        let Some(start) = self.iter().next() else {
+            return true;
+        };
         let mut seen = Self::one(start);
         let mut front = seen;
         while front.0 != 0 {
@@ -101,7 +108,9 @@ impl PieceSet {
 
 impl FromIterator<PatchId> for PieceSet {
     fn from_iter<I: IntoIterator<Item = PatchId>>(pieces: I) -> Self {
-        pieces.into_iter().fold(Self::EMPTY, |set, p| set.union(Self::one(p)))
+        pieces
+            .into_iter()
+            .fold(Self::EMPTY, |set, p| set.union(Self::one(p)))
     }
 }
 
@@ -120,14 +129,31 @@ mod tests {
     #[test]
     fn as_many_pieces_may_be_asked_for_as_can_be_planned() {
         assert_eq!(crate::segmentation::MOST_PIECES, PieceSet::MAX_PIECES);
-        let asked = |n| crate::segmentation::SegmentationParams { n_pieces: Some(n), ..Default::default() }.problems();
-        assert_eq!((asked(PieceSet::MAX_PIECES).len(), asked(PieceSet::MAX_PIECES + 1).len()), (0, 1));
+        let asked = |n| {
+            crate::segmentation::SegmentationParams {
+                n_pieces: Some(n),
+                ..Default::default()
+            }
+            .problems()
+        };
+        assert_eq!(
+            (
+                asked(PieceSet::MAX_PIECES).len(),
+                asked(PieceSet::MAX_PIECES + 1).len()
+            ),
+            (0, 1)
+        );
     }
 
     #[test]
     fn a_path_without_its_middle_is_not_connected() {
-        let arcs = [[1].as_slice(), &[0, 2], &[1]].map(|a| a.iter().map(|&i| PatchId(i)).collect::<PieceSet>());
+        let arcs =
+            [[1].as_slice(), &[0, 2], &[1]].map(|a| a.iter().map(|&i| PatchId(i)).collect::<PieceSet>());
         assert!(PieceSet::first(3).is_connected(&arcs));
-        assert!(!PieceSet::first(3).minus(PieceSet::one(PatchId(1))).is_connected(&arcs));
+        assert!(
+            !PieceSet::first(3)
+                .minus(PieceSet::one(PatchId(1)))
+                .is_connected(&arcs)
+        );
     }
 }

@@ -18,14 +18,18 @@ pub(super) struct Pool {
 }
 
 impl Pool {
-    /// Takes in a plan that keeps all conditions, unless one with the same relations was met before that costs no more.
+    /// Takes in a plan that keeps all conditions, unless one with the same relations was met before that
+    /// costs no more.
     ///
-    /// Where pieces that do not touch are in each other's way, their order changes the cost, but not what is joined.
+    /// Where pieces that do not touch are in each other's way, their order changes the cost, but not what is
+    /// joined.
     pub fn add(&mut self, space: &Space<'_>, score: PlanScore, plan: InstallationPlan) {
         let relations = space.relations(&plan);
         match self.seen.get(&relations) {
             Some(&least) if rounded(least) <= rounded(score.worst) => return,
-            Some(_) => self.plans.retain(|(_, other)| space.relations(other) != relations),
+            Some(_) => self
+                .plans
+                .retain(|(_, other)| space.relations(other) != relations),
             None => {}
         }
         self.seen.insert(relations, score.worst);

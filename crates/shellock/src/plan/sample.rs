@@ -24,7 +24,10 @@ pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<I
         for key in choices(params, &counted) {
             let mut plans: Vec<InstallationPlan> = Vec::new();
             for i in 0..DRAWS_PER_PLAN * n {
-                let limits = DrawLimits { bound: f64::INFINITY, max_tries: TRIES_PER_PIECE * space.n };
+                let limits = DrawLimits {
+                    bound: f64::INFINITY,
+                    max_tries: TRIES_PER_PIECE * space.n,
+                };
                 let drawn = draw(&space, &key, stream(params.seed, i), WIDEST, limits);
                 plans.extend(drawn.plan.filter(|p| !plans.contains(p)));
                 let is_hopeless = plans.is_empty() && i >= n;

@@ -1,10 +1,11 @@
 //! How good a plan is, before anything is built.
 //!
-//! A stand-in for the paper's metrics (Sect. 5), which need simulated connectors: like them it is a bottleneck over the
-//! pieces, and like Eq. 6 the cost of a piece depends only on the directions along its own boundaries. The metrics of a
-//! later stage may rank the same plans anew; [`score`] is the one place to change. Pieces that the verification would find
-//! loose cost more than anything else: see [`contact`](super::contact). The cost of a plan is the pure bottleneck, so that
-//! bounds can be proved; the mean decides among plans with the same bottleneck.
+//! A stand-in for the paper's metrics (Sect. 5), which need simulated connectors: like them it is a
+//! bottleneck over the pieces, and like Eq. 6 the cost of a piece depends only on the directions along its
+//! own boundaries. The metrics of a later stage may rank the same plans anew; [`score`] is the one place to
+//! change. Pieces that the verification would find loose cost more than anything else: see
+//! [`contact`](super::contact). The cost of a plan is the pure bottleneck, so that bounds can be proved; the
+//! mean decides among plans with the same bottleneck.
 
 use super::space::Space;
 use super::{InstallationPlan, PlanConstraints, PlanSurvey};
@@ -20,7 +21,8 @@ const INWARD_COST: f64 = 0.25;
 
 /// What a hundredth of a piece costs that others occlude on its way, in units of Eq. 4's weight.
 ///
-/// Carving must absorb it: three of four paths that rubbed in finished kits of four models had some, most free paths have none.
+/// Carving must absorb it: three of four paths that rubbed in finished kits of four models had some, most
+/// free paths have none.
 const OCCLUDED_COST: f64 = 0.3;
 
 /// Hold that the verification asks for, mm³.
@@ -45,7 +47,8 @@ pub struct PlanScore {
     pub pieces: IdVec<PatchId, f64>,
 }
 
-/// Difference of costs, as share of them, below which rounding decides. A share, since metrics may have any unit.
+/// Difference of costs, as share of them, below which rounding decides. A share, since metrics may have any
+/// unit.
 const COST_TIE: f64 = 1e-9;
 
 /// The greatest cost that is less than `cost` by more than rounding.
@@ -58,7 +61,8 @@ pub(super) fn just_above(cost: f64) -> f64 {
     cost * (1.0 + COST_TIE)
 }
 
-/// `cost` to 30 binary digits, a step just finer than what rounding decides: being equal to them is an equivalence.
+/// `cost` to 30 binary digits, a step just finer than what rounding decides: being equal to them is an
+/// equivalence.
 pub(super) fn rounded(cost: f64) -> f64 {
     const DROPPED: u32 = 52 - 30;
     let half = 1 << (DROPPED - 1);
@@ -80,8 +84,8 @@ impl PlanScore {
     }
 }
 
-/// Costs of `plan` by [`SeamCosts`](super::SeamCosts): of each piece the mean over its seams, by length, of Eq. 4's weight
-/// and of what cannot be used, its way, and what it lacks in hold.
+/// Costs of `plan` by [`SeamCosts`](super::SeamCosts): of each piece the mean over its seams, by length, of
+/// Eq. 4's weight and of what cannot be used, its way, and what it lacks in hold.
 pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &InstallationPlan) -> PlanScore {
     // No tolerance is asked for: costs do not depend on what may pass.
     Space::new(survey, constraints, 0.0).score(plan)
@@ -109,7 +113,12 @@ pub(super) fn inward_cost(survey: &PlanSurvey, piece: PatchId, s: crate::Lattice
 }
 
 /// Cost of what the earlier piece `q` occludes of `piece` on its way along `s`.
-pub(super) fn occluded_cost(survey: &PlanSurvey, piece: PatchId, s: crate::LatticeDirection, q: PatchId) -> f64 {
+pub(super) fn occluded_cost(
+    survey: &PlanSurvey,
+    piece: PatchId,
+    s: crate::LatticeDirection,
+    q: PatchId,
+) -> f64 {
     OCCLUDED_COST * 100.0 * survey.occlusion.share(piece, q, s)
 }
 
@@ -126,12 +135,22 @@ mod tests {
     fn a_hemisphere_that_leaves_along_its_axis_beats_every_other_direction() {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0));
         let ctx = crate::Ctx::quiet();
-        let survey =
-            survey(&ctx, &PlanParams::default(), &surface, &seams(&surface), &crate::ConnectorSizes::default())
-                .unwrap();
+        let survey = survey(
+            &ctx,
+            &PlanParams::default(),
+            &surface,
+            &seams(&surface),
+            &crate::ConnectorSizes::default(),
+        )
+        .unwrap();
         let up = LatticeDirection::nearest(Vec3::Z);
         let value = |separation| {
-            let steps = [0, 1].map(|p| InstallationStep { piece: PatchId(p), separation }).to_vec();
+            let steps = [0, 1]
+                .map(|p| InstallationStep {
+                    piece: PatchId(p),
+                    separation,
+                })
+                .to_vec();
             score(&survey, &PlanConstraints::default(), &InstallationPlan { steps }).worst
         };
         for s in LatticeDirection::all().filter(|&s| s != up) {
@@ -143,11 +162,21 @@ mod tests {
     fn hold_of_plate(s: Vec3, is_weak: bool) -> f64 {
         let surface = label(sphere(4, Vec3::splat(50.0)), 2, |p| u32::from(p.z < 0.0));
         let ctx = crate::Ctx::quiet();
-        let survey =
-            survey(&ctx, &PlanParams::default(), &surface, &seams(&surface), &crate::ConnectorSizes::default())
-                .unwrap();
+        let survey = survey(
+            &ctx,
+            &PlanParams::default(),
+            &surface,
+            &seams(&surface),
+            &crate::ConnectorSizes::default(),
+        )
+        .unwrap();
         let separation = LatticeDirection::nearest(s);
-        let steps = [0, 1].map(|p| InstallationStep { piece: PatchId(p), separation }).to_vec();
+        let steps = [0, 1]
+            .map(|p| InstallationStep {
+                piece: PatchId(p),
+                separation,
+            })
+            .to_vec();
         let mut constraints = PlanConstraints::default();
         if is_weak {
             constraints.weaken(PatchId(0), PatchId(1));

@@ -1,13 +1,14 @@
 //! The search for the best plan (Sect. 6.2): drawn at random, improved, then proven.
 //!
-//! Keys are tried in order of preference, until one has any plan. For it plans are drawn from the last piece to the first;
-//! all keys as good as it (equally flat, sliding the same way) are left to the exact search. Every draw has its own random stream, batches are of fixed size, and no clock is read, so the answer does not
-//! depend on the threads. The cluster test prunes every step: what comes loose with the remaining pieces as one block can
-//! never lock. The cheapest plans of a batch are improved one direction at a time. At last [`exact`](super::exact) looks for
-//! better ones with any of the keys and proves how good any can be.
+//! Keys are tried in order of preference, until one has any plan. For it plans are drawn from the last piece
+//! to the first; all keys as good as it (equally flat, sliding the same way) are left to the exact search.
+//! Every draw has its own random stream, batches are of fixed size, and no clock is read, so the answer does
+//! not depend on the threads. The cluster test prunes every step: what comes loose with the remaining pieces
+//! as one block can never lock. The cheapest plans of a batch are improved one direction at a time. At last
+//! [`exact`](super::exact) looks for better ones with any of the keys and proves how good any can be.
 //!
-//! Deviation: the paper prunes by the best score so far, which would let threads influence each other; here the bound is
-//! that of the batches before.
+//! Deviation: the paper prunes by the best score so far, which would let threads influence each other; here
+//! the bound is that of the batches before.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -22,8 +23,8 @@ use super::pool::{MOST_PLANS, Pool};
 use super::score::just_below;
 use super::space::Space;
 use super::{
-    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey, ProofScope,
-    RankedPlan, diagnose,
+    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey,
+    ProofScope, RankedPlan, diagnose,
 };
 use crate::seam::rules::COUNTED_RUN_SIZES;
 use crate::{Cancelled, Ctx, PatchId, Warning};
@@ -34,14 +35,15 @@ const BATCH: usize = 32;
 /// Batches without any plan after which a key is given up.
 const MAX_EMPTY_BATCHES: usize = 2;
 
-/// Batches in a row that found nothing better, after which a full pool is left to the exact search: so many, and one more
-/// for each ten pieces.
+/// Batches in a row that found nothing better, after which a full pool is left to the exact search: so many,
+/// and one more for each ten pieces.
 ///
 /// That search proves the optimum of a figure in 12 pieces in less time than eight batches take.
 const LEAST_STALE_BATCHES: usize = 2;
 const PIECES_PER_STALE_BATCH: usize = 10;
 
-/// Tries of one draw, per piece: enough to undo some wrong turns near the end; wrong beginnings need a new draw.
+/// Tries of one draw, per piece: enough to undo some wrong turns near the end; wrong beginnings need a new
+/// draw.
 const TRIES_PER_PIECE: usize = 20;
 
 /// Plans of a batch that are improved: the cheapest ones drawn.
@@ -55,16 +57,19 @@ pub type MakeCosts<'a> = &'a dyn Fn(&PlanSurvey, &PlanConstraints) -> Box<dyn Pi
 
 /// The best plan found for `survey` under `constraints` by the default costs, or why there is none.
 ///
-/// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised` and `short-joints`.
-/// Not promised: that none exists where none was found (but where the reason is the contacts', none does).
-/// How good the plan is among those with keys as good as its own is proven, see [`FoundPlan::lower_bound`].
+/// Short joints count only where there is no plan without them. Warns with `occlusion-tolerance-raised` and
+/// `short-joints`. Not promised: that none exists where none was found (but where the reason is the
+/// contacts', none does). How good the plan is among those with keys as good as its own is proven, see
+/// [`FoundPlan::lower_bound`].
 pub fn search(
     ctx: &Ctx<'_>,
     params: &PlanParams,
     survey: &PlanSurvey,
     constraints: &PlanConstraints,
 ) -> Result<PlanOutcome, Cancelled> {
-    search_with(ctx, params, survey, constraints, &|s, c| Box::new(SeamCosts::new(s, c)))
+    search_with(ctx, params, survey, constraints, &|s, c| {
+        Box::new(SeamCosts::new(s, c))
+    })
 }
 
 /// As [`search`], with other costs.
@@ -77,7 +82,11 @@ pub fn search_with(
 ) -> Result<PlanOutcome, Cancelled> {
     ctx.stage("search for a plan", 0)?;
     if let Some(reason) = out_of_range(survey.n_pieces, params.key) {
-        return Ok(PlanOutcome::Infeasible { reason, blockers: Vec::new(), articulations: Vec::new() });
+        return Ok(PlanOutcome::Infeasible {
+            reason,
+            blockers: Vec::new(),
+            articulations: Vec::new(),
+        });
     }
     let keys = choices(params, survey);
     let mut first_answer = None;
@@ -87,7 +96,11 @@ pub fn search_with(
         let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys, costs)?;
         if let PlanOutcome::Found(_) = outcome {
             if i > 0 {
-                let least_mm = survey.contacts.iter().map(|c| sizes * c.size_mm).fold(f64::INFINITY, f64::min);
+                let least_mm = survey
+                    .contacts
+                    .iter()
+                    .map(|c| sizes * c.size_mm)
+                    .fold(f64::INFINITY, f64::min);
                 warn_of_short_joints(ctx, least_mm);
             }
             return Ok(outcome);
@@ -138,11 +151,15 @@ fn warn_of_short_joints(ctx: &Ctx<'_>, shortest_mm: f64) {
 fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
     match n_pieces {
         0 | 1 => Some("one piece has nothing to interlock with; segment into at least two".into()),
-        n if n > PieceSet::MAX_PIECES => {
-            Some(format!("{n} pieces are more than the {} that can be planned; segment coarser", PieceSet::MAX_PIECES))
-        }
+        n if n > PieceSet::MAX_PIECES => Some(format!(
+            "{n} pieces are more than the {} that can be planned; segment coarser",
+            PieceSet::MAX_PIECES
+        )),
         n => key.filter(|&k| usize::from(k) >= n).map(|k| {
-            format!("piece {k} is to be the key, but there are only pieces 0 to {}; choose one of them", n - 1)
+            format!(
+                "piece {k} is to be the key, but there are only pieces 0 to {}; choose one of them",
+                n - 1
+            )
         }),
     }
 }
@@ -159,7 +176,8 @@ fn warn_of_tolerance(ctx: &Ctx<'_>, tolerance: f64) {
     });
 }
 
-/// The best plan with a key as good as the first that has any; else the least that was left where the search got stuck.
+/// The best plan with a key as good as the first that has any; else the least that was left where the search
+/// got stuck.
 fn with_any_key<'k>(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -179,7 +197,10 @@ fn with_any_key<'k>(
                 let equals = keys.iter().filter(|k| k.is_as_good_as(key));
                 let candidate = |k: &&'k KeyChoice| Candidate::new(k, space.n);
                 let mut candidates: Vec<Candidate<'k>> = equals.map(candidate).collect();
-                candidates.iter_mut().filter(|c| c.key == key).for_each(|c| c.pool = std::mem::take(&mut pool));
+                candidates
+                    .iter_mut()
+                    .filter(|c| c.key == key)
+                    .for_each(|c| c.pool = std::mem::take(&mut pool));
                 return proven(ctx, params, space, candidates, tries_left).map(Ok);
             }
             Some(left) if left.len() < stuck.len() => stuck = left,
@@ -201,14 +222,28 @@ fn proven<'k>(
     let (least_cost, lower_bound) = (least_cost(&candidates), lower_bound(&candidates));
     let keys: Vec<PatchId> = candidates.iter().map(|c| c.key.piece).collect();
     // Of equals the key that is liked best.
-    let best = candidates.iter().position(|c| c.pool.least_cost() == least_cost).expect("a plan was drawn");
-    let Candidate { key, mut pool, lower_bound: key_bound, .. } = candidates.swap_remove(best);
+    let best = candidates
+        .iter()
+        .position(|c| c.pool.least_cost() == least_cost)
+        .expect("a plan was drawn");
+    let Candidate {
+        key,
+        mut pool,
+        lower_bound: key_bound,
+        ..
+    } = candidates.swap_remove(best);
     if pool.len() < MOST_PLANS {
         // The exact search gave this key its best plan, but not the others that metrics choose from.
         draw_plans(ctx, params, space, key, &mut tries_left, &mut pool)?;
     }
     if params.proof_budget > 0 {
-        vary(ctx, space, key, &mut pool, &mut stream(params.seed, usize::MAX >> 1));
+        vary(
+            ctx,
+            space,
+            key,
+            &mut pool,
+            &mut stream(params.seed, usize::MAX >> 1),
+        );
         ctx.check()?;
     }
     let ranked = |(score, plan): &(PlanScore, InstallationPlan)| RankedPlan {
@@ -223,7 +258,11 @@ fn proven<'k>(
         is_optimal,
         lower_bound: if is_optimal { score.worst } else { lower_bound },
         key_lower_bound: key_bound.min(score.worst),
-        scope: ProofScope { keys, slides: key.slides, n_lessons: space.constraints.n_lessons() },
+        scope: ProofScope {
+            keys,
+            slides: key.slides,
+            n_lessons: space.constraints.n_lessons(),
+        },
         plan,
         score,
         pool: pool.plans().iter().map(ranked).collect(),
@@ -245,7 +284,10 @@ fn draw_plans(
     for batch in 0..params.n_plans.div_ceil(BATCH) * 2 {
         ctx.check()?;
         let best_before = pool.least_cost();
-        let limits = DrawLimits { bound: bound_of(pool), max_tries: TRIES_PER_PIECE * space.n };
+        let limits = DrawLimits {
+            bound: bound_of(pool),
+            max_tries: TRIES_PER_PIECE * space.n,
+        };
         let drawn: Vec<Drawn> = (batch * BATCH..(batch + 1) * BATCH)
             .into_par_iter()
             .map(|i| draw(space, key, stream(params.seed, i), i, limits))
@@ -264,13 +306,31 @@ fn draw_plans(
         plans.sort_by(|x, y| x.0.worst.total_cmp(&y.0.worst));
         plans.dedup_by(|x, y| x.1 == y.1);
         let cheapest: Vec<&InstallationPlan> = plans.iter().take(N_IMPROVED).map(|x| &x.1).collect();
-        let improved: Vec<Improved> = cheapest.into_par_iter().map(|plan| improve(space, key, plan.clone())).collect();
-        improved.into_iter().for_each(|x| pool.add(space, x.score, x.plan));
-        plans.into_iter().for_each(|(score, plan)| pool.add(space, score, plan));
-        n_stale = if pool.least_cost() < best_before { 0 } else { n_stale + 1 };
+        let improved: Vec<Improved> = cheapest
+            .into_par_iter()
+            .map(|plan| improve(space, key, plan.clone()))
+            .collect();
+        improved
+            .into_iter()
+            .for_each(|x| pool.add(space, x.score, x.plan));
+        plans
+            .into_iter()
+            .for_each(|(score, plan)| pool.add(space, score, plan));
+        n_stale = if pool.least_cost() < best_before {
+            0
+        } else {
+            n_stale + 1
+        };
         let gives_up = pool.len() == 0 && batch + 1 >= MAX_EMPTY_BATCHES;
-        let is_stale = pool.len() == MOST_PLANS && n_stale >= LEAST_STALE_BATCHES + space.n / PIECES_PER_STALE_BATCH;
-        if is_exhausted || gives_up || is_stale || n_drawn >= params.n_plans || *tries_left == 0 || ctx.is_time_up() {
+        let is_stale =
+            pool.len() == MOST_PLANS && n_stale >= LEAST_STALE_BATCHES + space.n / PIECES_PER_STALE_BATCH;
+        if is_exhausted
+            || gives_up
+            || is_stale
+            || n_drawn >= params.n_plans
+            || *tries_left == 0
+            || ctx.is_time_up()
+        {
             break;
         }
     }
@@ -279,7 +339,11 @@ fn draw_plans(
 
 /// What plans may cost beyond those in the pool: nothing more than the best one, once there are enough.
 fn bound_of(pool: &Pool) -> f64 {
-    if pool.len() < MOST_PLANS { f64::INFINITY } else { pool.least_cost() }
+    if pool.len() < MOST_PLANS {
+        f64::INFINITY
+    } else {
+        pool.least_cost()
+    }
 }
 
 /// The random stream of draw number `i`.

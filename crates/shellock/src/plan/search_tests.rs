@@ -24,7 +24,11 @@ fn searched(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstrai
 }
 
 /// The plan found, `None` where there is none.
-fn plan_of(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> Option<InstallationPlan> {
+fn plan_of(
+    params: &PlanParams,
+    survey: &PlanSurvey,
+    constraints: &PlanConstraints,
+) -> Option<InstallationPlan> {
     match searched(params, survey, constraints) {
         PlanOutcome::Found(found) => Some(found.plan),
         PlanOutcome::Infeasible { .. } => None,
@@ -32,11 +36,20 @@ fn plan_of(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstrain
 }
 
 fn surveyed(surface: &crate::SegmentedSurface) -> PlanSurvey {
-    on_ctx(|ctx| survey(ctx, &PlanParams::default(), surface, &seams(surface), &crate::ConnectorSizes::default()))
-        .unwrap()
+    on_ctx(|ctx| {
+        survey(
+            ctx,
+            &PlanParams::default(),
+            surface,
+            &seams(surface),
+            &crate::ConnectorSizes::default(),
+        )
+    })
+    .unwrap()
 }
 
-/// A survey out of nothing: random contacts, joints, and few free directions; each contact holds each push by up to so much.
+/// A survey out of nothing: random contacts, joints, and few free directions; each contact holds each push by
+/// up to so much.
 pub fn made_up(
     n: usize,
     edges: &[(u32, u32)],
@@ -61,7 +74,12 @@ pub fn made_up(
             let mut tables = [(); 2].map(|()| [(); LatticeDirection::COUNT].map(|()| random_joint(rng)));
             tables[0].reverse();
             let hold = HoldTable::made_up(|| rng.random_range(0.0..most_hold_mm3));
-            Contact::made_up(PatchId(a), PatchId(b), move |p, s| tables[usize::from(p.0 != a)][s.index()], hold)
+            Contact::made_up(
+                PatchId(a),
+                PatchId(b),
+                move |p, s| tables[usize::from(p.0 != a)][s.index()],
+                hold,
+            )
         })
         .collect();
     PlanSurvey {
@@ -70,7 +88,10 @@ pub fn made_up(
         contacts,
         mean_normal: IdVec::from_fn(n, |_: PatchId| Vec3::new(0.1, 0.2, 0.3)),
         area_mm2: IdVec::from_fn(n, |p: PatchId| 100.0 + f64::from(p.0)),
-        flatness: IdVec::from_fn(n, |p: PatchId| Flatness { normal: Vec3::Z, share: f64::from(p.0 % 2) }),
+        flatness: IdVec::from_fn(n, |p: PatchId| Flatness {
+            normal: Vec3::Z,
+            share: f64::from(p.0 % 2),
+        }),
         beta: 0.1,
     }
 }
@@ -87,10 +108,19 @@ fn random_joint(rng: &mut ChaCha8Rng) -> Joint {
 
 /// All allowed plans with a key among `keys`, by trying every order and direction; the best cost.
 pub fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
-    fn extend(space: &Space<'_>, removal: &mut Vec<InstallationStep>, keys: &[KeyChoice], best: &mut Option<f64>) {
-        let left = removal.iter().fold(space.all(), |l, s| l.minus(PieceSet::one(s.piece)));
+    fn extend(
+        space: &Space<'_>,
+        removal: &mut Vec<InstallationStep>,
+        keys: &[KeyChoice],
+        best: &mut Option<f64>,
+    ) {
+        let left = removal
+            .iter()
+            .fold(space.all(), |l, s| l.minus(PieceSet::one(s.piece)));
         if left.is_empty() {
-            let plan = InstallationPlan { steps: removal.iter().rev().copied().collect() };
+            let plan = InstallationPlan {
+                steps: removal.iter().rev().copied().collect(),
+            };
             if space.allows(&plan) {
                 let cost = space.score(&plan).worst;
                 *best = Some(best.map_or(cost, |b: f64| b.min(cost)));
@@ -122,7 +152,8 @@ pub fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
 
 /// The choices as good as that which `plan` was made with.
 fn equals_of(keys: &[KeyChoice], plan: &InstallationPlan) -> Vec<KeyChoice> {
-    let is_choice = |k: &&KeyChoice| k.piece == plan.key() && k.directions.contains(&plan.separation(plan.key()));
+    let is_choice =
+        |k: &&KeyChoice| k.piece == plan.key() && k.directions.contains(&plan.separation(plan.key()));
     let own = keys.iter().find(is_choice).unwrap();
     keys.iter().filter(|k| k.is_as_good_as(own)).cloned().collect()
 }
@@ -131,7 +162,10 @@ fn equals_of(keys: &[KeyChoice], plan: &InstallationPlan) -> Vec<KeyChoice> {
 fn proven(space: &Space<'_>, keys: &[KeyChoice], n_revisions: usize) -> (f64, Vec<Pool>) {
     let mut candidates: Vec<Candidate<'_>> = keys.iter().map(|k| Candidate::new(k, space.n)).collect();
     on_ctx(|ctx| prove(ctx, space, &mut candidates, &mut Budget::new(n_revisions))).unwrap();
-    (lower_bound(&candidates), candidates.into_iter().map(|c| c.pool).collect())
+    (
+        lower_bound(&candidates),
+        candidates.into_iter().map(|c| c.pool).collect(),
+    )
 }
 
 #[test]
@@ -141,8 +175,13 @@ fn small_cases_are_found_iff_they_exist_and_with_the_best_cost_of_all_keys_as_go
     let (mut n_found, mut n_none) = (0, 0);
     for round in 0..60 {
         let n = 3 + round % 3;
-        let all: Vec<(u32, u32)> = (0..n as u32).flat_map(|a| (a + 1..n as u32).map(move |b| (a, b))).collect();
-        let edges: Vec<(u32, u32)> = all.into_iter().filter(|_| rng.random_range(0.0..1.0) < 0.85).collect();
+        let all: Vec<(u32, u32)> = (0..n as u32)
+            .flat_map(|a| (a + 1..n as u32).map(move |b| (a, b)))
+            .collect();
+        let edges: Vec<(u32, u32)> = all
+            .into_iter()
+            .filter(|_| rng.random_range(0.0..1.0) < 0.85)
+            .collect();
         let survey = made_up(n, &edges, if n == 5 { 0.55 } else { 0.6 }, 1.5, &mut rng);
         let constraints = PlanConstraints::default();
         let space = Space::new(&survey, &constraints, params.relaxed_tolerance);
@@ -158,12 +197,18 @@ fn small_cases_are_found_iff_they_exist_and_with_the_best_cost_of_all_keys_as_go
                 assert!(found.scope.keys == equals.iter().map(|k| k.piece).collect::<Vec<_>>());
                 let best = brute_force(&space, &equals).unwrap();
                 let cost = found.score.worst;
-                assert!(found.is_optimal && (cost - best).abs() <= 1e-9, "round {round}: {cost} is not {best}");
+                assert!(
+                    found.is_optimal && (cost - best).abs() <= 1e-9,
+                    "round {round}: {cost} is not {best}"
+                );
                 n_found += 1;
             }
         }
     }
-    assert!(n_found >= 10 && n_none >= 10, "{n_found} found, {n_none} not: the cases must be of both kinds");
+    assert!(
+        n_found >= 10 && n_none >= 10,
+        "{n_found} found, {n_none} not: the cases must be of both kinds"
+    );
 }
 
 #[test]
@@ -188,18 +233,28 @@ fn where_one_piece_joins_two_parts_no_plan_locks() {
 fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
     let survey = surveyed(&voronoi(sphere(5, Vec3::new(50.0, 55.0, 70.0)), 10, 1));
     let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| searched(&PlanParams::default(), &survey, &PlanConstraints::default()))
     };
-    let PlanOutcome::Found(found) = on(1) else { panic!("ten cells of a ball have a plan") };
+    let PlanOutcome::Found(found) = on(1) else {
+        panic!("ten cells of a ball have a plan")
+    };
     assert_eq!(on(2), PlanOutcome::Found(found.clone()));
     let constraints = PlanConstraints::default();
     let space = Space::new(&survey, &constraints, 0.03);
     // The pool: different plans, all allowed, best first, told with their costs.
-    let relations: std::collections::BTreeSet<_> = found.pool.iter().map(|r| space.relations(&r.plan)).collect();
+    let relations: std::collections::BTreeSet<_> =
+        found.pool.iter().map(|r| space.relations(&r.plan)).collect();
     assert_eq!(relations.len(), found.pool.len());
     assert!(found.pool.len() > 50 && found.pool[0].plan == found.plan);
-    assert!(found.pool.is_sorted_by(|x, y| x.score.worst <= y.score.worst + 1e-8));
+    assert!(
+        found
+            .pool
+            .is_sorted_by(|x, y| x.score.worst <= y.score.worst + 1e-8)
+    );
     for ranked in &found.pool {
         assert!(space.allows(&ranked.plan));
         assert_eq!(ranked.score.worst, space.score(&ranked.plan).worst);
@@ -209,24 +264,43 @@ fn a_ball_in_ten_pieces_gets_the_same_locking_plan_on_one_and_two_threads() {
 #[test]
 fn what_earlier_rounds_forbid_is_kept_to() {
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
-    let params = PlanParams { n_plans: 40, ..PlanParams::default() };
+    let params = PlanParams {
+        n_plans: 40,
+        ..PlanParams::default()
+    };
     let mut constraints = PlanConstraints::default();
     for _ in 0..4 {
         let plan = plan_of(&params, &survey, &constraints).expect("enough is left");
         assert!(!constraints.rejected.contains(&plan));
-        assert!(plan.steps[1..].iter().all(|s| !constraints.forbidden.contains(&(s.piece, s.separation))));
-        constraints.forbidden.insert((plan.steps[3].piece, plan.steps[3].separation));
+        assert!(
+            plan.steps[1..]
+                .iter()
+                .all(|s| !constraints.forbidden.contains(&(s.piece, s.separation)))
+        );
+        constraints
+            .forbidden
+            .insert((plan.steps[3].piece, plan.steps[3].separation));
         constraints.rejected.push(plan);
     }
     // Contacts that hold nothing: with all of one piece's contacts weak, it hangs on nothing.
-    survey.contacts.iter().filter(|c| c.a == PatchId(0)).for_each(|c| constraints.weaken(c.a, c.b));
-    assert!(matches!(searched(&params, &survey, &constraints), PlanOutcome::Infeasible { .. }));
+    survey
+        .contacts
+        .iter()
+        .filter(|c| c.a == PatchId(0))
+        .for_each(|c| constraints.weaken(c.a, c.b));
+    assert!(matches!(
+        searched(&params, &survey, &constraints),
+        PlanOutcome::Infeasible { .. }
+    ));
 }
 
 #[test]
 fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
-    let params = PlanParams { n_plans: 40, ..PlanParams::default() };
+    let params = PlanParams {
+        n_plans: 40,
+        ..PlanParams::default()
+    };
     let mut constraints = PlanConstraints::default();
     let plan = plan_of(&params, &survey, &constraints).expect("a ball has a plan");
     let (earlier, later) = (plan.steps[2].piece, plan.steps[5].piece);
@@ -240,11 +314,16 @@ fn a_piece_that_rubbed_twice_against_another_goes_in_before_it() {
 #[test]
 fn a_short_joint_counts_only_in_another_direction() {
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
-    let params = PlanParams { n_plans: 40, ..PlanParams::default() };
+    let params = PlanParams {
+        n_plans: 40,
+        ..PlanParams::default()
+    };
     let mut constraints = PlanConstraints::default();
     let plan = plan_of(&params, &survey, &constraints).expect("a ball has a plan");
     let (later, earlier) = (plan.steps[3], plan.steps[0].piece);
-    constraints.weak_joints.insert((later.piece, earlier, later.separation));
+    constraints
+        .weak_joints
+        .insert((later.piece, earlier, later.separation));
     assert!(constraints.is_weak(later.piece, earlier, later.separation));
     assert!(!constraints.is_weak(later.piece, earlier, later.separation.opposite()));
     assert!(!constraints.is_weak(earlier, later.piece, later.separation));
@@ -253,15 +332,21 @@ fn a_short_joint_counts_only_in_another_direction() {
 #[test]
 fn who_is_blocked_all_round_is_named_with_the_place() {
     // A pea in its pod cannot be had with free paths: make every direction of every piece blocked.
-    let mut survey =
-        surveyed(&label(sphere(4, Vec3::splat(50.0)), 4, |p| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0)));
+    let mut survey = surveyed(&label(sphere(4, Vec3::splat(50.0)), 4, |p| {
+        u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0)
+    }));
     for s in LatticeDirection::all() {
-        for (p, q) in (0..4).flat_map(|p| (0..4).map(move |q| (PatchId(p), PatchId(q)))).filter(|(p, q)| p != q) {
+        for (p, q) in (0..4)
+            .flat_map(|p| (0..4).map(move |q| (PatchId(p), PatchId(q))))
+            .filter(|(p, q)| p != q)
+        {
             survey.occlusion.block(p, q, s);
         }
     }
     let outcome = searched(&PlanParams::default(), &survey, &PlanConstraints::default());
-    let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else { panic!("nothing can leave") };
+    let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else {
+        panic!("nothing can leave")
+    };
     assert!(!blockers.is_empty(), "{reason}");
 }
 
@@ -281,10 +366,18 @@ fn one_piece_and_too_many_are_refused_in_words() {
 fn a_key_that_is_no_piece_is_named_and_not_blamed_on_the_pieces() {
     let survey = surveyed(&label(sphere(2, Vec3::splat(50.0)), 2, |p| u32::from(p.z > 0.0)));
     for key in [2, u32::MAX] {
-        let params = PlanParams { key: Some(PatchId(key)), ..PlanParams::default() };
+        let params = PlanParams {
+            key: Some(PatchId(key)),
+            ..PlanParams::default()
+        };
         let outcome = searched(&params, &survey, &PlanConstraints::default());
-        let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else { panic!("there is no piece {key}") };
-        assert!(reason.contains(&format!("piece {key} ")) && blockers.is_empty(), "{reason}");
+        let PlanOutcome::Infeasible { reason, blockers, .. } = outcome else {
+            panic!("there is no piece {key}")
+        };
+        assert!(
+            reason.contains(&format!("piece {key} ")) && blockers.is_empty(),
+            "{reason}"
+        );
     }
 }
 
@@ -304,16 +397,28 @@ fn the_exact_search_agrees_with_brute_force_and_no_budget_makes_its_bound_wrong(
     let (mut n_plans, mut n_none) = (0, 0);
     for round in 0..60 {
         let n = 3 + round % 3;
-        let all: Vec<(u32, u32)> = (0..n as u32).flat_map(|a| (a + 1..n as u32).map(move |b| (a, b))).collect();
-        let edges: Vec<(u32, u32)> = all.into_iter().filter(|_| rng.random_range(0.0..1.0) < 0.85).collect();
+        let all: Vec<(u32, u32)> = (0..n as u32)
+            .flat_map(|a| (a + 1..n as u32).map(move |b| (a, b)))
+            .collect();
+        let edges: Vec<(u32, u32)> = all
+            .into_iter()
+            .filter(|_| rng.random_range(0.0..1.0) < 0.85)
+            .collect();
         let survey = made_up(n, &edges, if n == 5 { 0.55 } else { 0.6 }, 1.5, &mut rng);
         let space = Space::new(&survey, &constraints, 0.03);
-        for key in choices(&PlanParams::default(), &survey).iter().filter(|k| !k.directions.is_empty()).take(2) {
+        for key in choices(&PlanParams::default(), &survey)
+            .iter()
+            .filter(|k| !k.directions.is_empty())
+            .take(2)
+        {
             let best = brute_force(&space, std::slice::from_ref(key));
             for n_revisions in [1, 30, 1_000_000] {
                 let (bound, pools) = proven(&space, std::slice::from_ref(key), n_revisions);
                 let pool = &pools[0];
-                assert!(bound <= best.unwrap_or(f64::INFINITY) + 1e-8, "round {round}: {bound} > {best:?}");
+                assert!(
+                    bound <= best.unwrap_or(f64::INFINITY) + 1e-8,
+                    "round {round}: {bound} > {best:?}"
+                );
                 assert!(pool.plans().iter().all(|(_, plan)| space.allows(plan)));
                 if n_revisions == 1_000_000 {
                     assert!(bound == pool.least_cost());
@@ -323,7 +428,10 @@ fn the_exact_search_agrees_with_brute_force_and_no_budget_makes_its_bound_wrong(
             *(if best.is_some() { &mut n_plans } else { &mut n_none }) += 1;
         }
     }
-    assert!(n_plans >= 20 && n_none >= 20, "{n_plans} with a plan, {n_none} without: the cases must be of both kinds");
+    assert!(
+        n_plans >= 20 && n_none >= 20,
+        "{n_plans} with a plan, {n_none} without: the cases must be of both kinds"
+    );
 }
 
 #[test]
@@ -331,7 +439,11 @@ fn a_spent_budget_leaves_a_plan_and_a_bound_below_the_optimum() {
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1));
     let constraints = PlanConstraints::default();
     let found = |proof_budget| {
-        let params = PlanParams { n_plans: 40, proof_budget, ..PlanParams::default() };
+        let params = PlanParams {
+            n_plans: 40,
+            proof_budget,
+            ..PlanParams::default()
+        };
         match searched(&params, &survey, &constraints) {
             PlanOutcome::Found(found) => found,
             PlanOutcome::Infeasible { reason, .. } => panic!("{reason}"),
@@ -357,12 +469,17 @@ impl PieceCosts for BoundsAlone {
 #[test]
 fn a_metric_that_gives_bounds_alone_finds_the_same_optimum() {
     let survey = surveyed(&voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 6, 2));
-    let params = PlanParams { n_plans: 20, ..PlanParams::default() };
+    let params = PlanParams {
+        n_plans: 20,
+        ..PlanParams::default()
+    };
     let constraints = PlanConstraints::default();
     let make: MakeCosts<'_> = &|s, c| Box::new(BoundsAlone(SeamCosts::new(s, c)));
     let plain = searched(&params, &survey, &constraints);
     let other = on_ctx(|ctx| search_with(ctx, &params, &survey, &constraints, make)).unwrap();
-    let (PlanOutcome::Found(plain), PlanOutcome::Found(other)) = (plain, other) else { panic!("a ball has a plan") };
+    let (PlanOutcome::Found(plain), PlanOutcome::Found(other)) = (plain, other) else {
+        panic!("a ball has a plan")
+    };
     assert!(plain.is_optimal && other.is_optimal && plain.score.worst == other.score.worst);
 }
 
@@ -371,28 +488,54 @@ fn a_bound_is_at_most_the_cost_of_every_state_it_leaves_open_and_narrowing_keeps
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let edges = [(0, 1), (0, 2), (1, 2), (2, 3), (0, 3)];
     let surveys = [1.5, 30.0].map(|hold_mm3| made_up(4, &edges, 0.9, hold_mm3, &mut rng));
-    let costs = surveys.each_ref().map(|survey| SeamCosts::new(survey, &PlanConstraints::default()));
+    let costs = surveys
+        .each_ref()
+        .map(|survey| SeamCosts::new(survey, &PlanConstraints::default()));
     let (piece, n_seams) = (PatchId(0), 3);
     for round in 0..600 {
         // Loosely held, and so well that the seams alone cost.
         let costs = &costs[round % 2];
         let mut mask = || rng.random_range(1..=ALL_DIRECTIONS) & rng.random_range(1..=ALL_DIRECTIONS);
-        let s = LatticeDirection::all().nth(mask() as usize % LatticeDirection::COUNT).unwrap();
-        let seams: Vec<SeamStates> =
-            (0..n_seams).map(|_| SeamStates { own: mask() | mask_of(s), others: mask() }).collect();
-        let open = Surroundings { seams, remaining: PieceSet::EMPTY };
+        let s = LatticeDirection::all()
+            .nth(mask() as usize % LatticeDirection::COUNT)
+            .unwrap();
+        let seams: Vec<SeamStates> = (0..n_seams)
+            .map(|_| SeamStates {
+                own: mask() | mask_of(s),
+                others: mask(),
+            })
+            .collect();
+        let open = Surroundings {
+            seams,
+            remaining: PieceSet::EMPTY,
+        };
         let choose = |(i, x): (usize, &SeamStates)| match directions_in(x.others).nth(i + 1) {
-            Some(t) => SeamStates { own: 0, others: mask_of(t) },
-            None => SeamStates { own: mask_of(s), others: 0 },
+            Some(t) => SeamStates {
+                own: 0,
+                others: mask_of(t),
+            },
+            None => SeamStates {
+                own: mask_of(s),
+                others: 0,
+            },
         };
         let seams = open.seams.iter().enumerate().map(choose).collect();
-        let chosen = Surroundings { seams, remaining: PieceSet::first(4) };
+        let chosen = Surroundings {
+            seams,
+            remaining: PieceSet::first(4),
+        };
         let mut open = open;
         // Where all other seams are decided, the limit leaves the last one no room at all.
-        (0..round % 4).take(2).for_each(|i| open.seams[i] = chosen.seams[i]);
+        (0..round % 4)
+            .take(2)
+            .for_each(|i| open.seams[i] = chosen.seams[i]);
         let cost = costs.bound(piece, Role::Between(s), &chosen);
         assert!(costs.bound(piece, Role::Between(s), &open) <= cost);
-        let mut roles = RoleSet { separations: ALL_DIRECTIONS, may_be_first: true, is_key: false };
+        let mut roles = RoleSet {
+            separations: ALL_DIRECTIONS,
+            may_be_first: true,
+            is_key: false,
+        };
         let mut left = open.clone();
         costs.narrow(piece, &mut roles, &mut left, cost);
         assert!(roles.separations & mask_of(s) != 0);

@@ -9,8 +9,8 @@ use crate::{LatticeDirection, PatchId};
 /// Per piece and direction.
 type ByDirection<T> = Vec<[T; LatticeDirection::COUNT]>;
 
-/// How often a piece may rub against an earlier one before another order is asked for: the seam between the two is then at fault, not
-/// the direction.
+/// How often a piece may rub against an earlier one before another order is asked for: the seam between the
+/// two is then at fault, not the direction.
 pub(super) const MOST_RUBS: usize = 2;
 
 /// What the search asks, in bits. Holds at most [`PieceSet::MAX_PIECES`] pieces.
@@ -42,7 +42,12 @@ pub(super) struct Relations {
 impl<'a> Space<'a> {
     /// The space with the default costs.
     pub fn new(survey: &'a PlanSurvey, constraints: &'a PlanConstraints, tolerance: f64) -> Self {
-        Self::with_costs(survey, constraints, tolerance, Box::new(SeamCosts::new(survey, constraints)))
+        Self::with_costs(
+            survey,
+            constraints,
+            tolerance,
+            Box::new(SeamCosts::new(survey, constraints)),
+        )
     }
 
     pub fn with_costs(
@@ -55,7 +60,12 @@ impl<'a> Space<'a> {
         let ids = || (0..n).map(PatchId::from);
         let blocks = ids()
             .map(|p| {
-                let rubs = |q| constraints.rubbed.get(&(p, q)).is_some_and(|&times| times >= MOST_RUBS);
+                let rubs = |q| {
+                    constraints
+                        .rubbed
+                        .get(&(p, q))
+                        .is_some_and(|&times| times >= MOST_RUBS)
+                };
                 let is_blocked = |q, s| survey.occlusion.share(p, q, s) > tolerance || rubs(q);
                 let blockers = |s| ids().filter(|&q| q != p && is_blocked(q, s)).collect();
                 by_direction(blockers)
@@ -67,7 +77,9 @@ impl<'a> Space<'a> {
         for (i, c) in survey.contacts.iter().enumerate() {
             for (p, q) in [(c.a, c.b), (c.b, c.a)] {
                 contacts_of[usize::from(p)].push(i);
-                for s in LatticeDirection::all().filter(|&s| c.joint(p, s).holds && !constraints.is_weak(p, q, s)) {
+                for s in
+                    LatticeDirection::all().filter(|&s| c.joint(p, s).holds && !constraints.is_weak(p, q, s))
+                {
                     let set = &mut joins[usize::from(p)][s.index()];
                     *set = set.union(PieceSet::one(q));
                 }
@@ -76,7 +88,16 @@ impl<'a> Space<'a> {
                 }
             }
         }
-        Self { survey, constraints, n, blocks, joins, neighbours, contacts_of, costs }
+        Self {
+            survey,
+            constraints,
+            n,
+            blocks,
+            joins,
+            neighbours,
+            contacts_of,
+            costs,
+        }
     }
 
     pub fn all(&self) -> PieceSet {
@@ -85,7 +106,8 @@ impl<'a> Space<'a> {
 
     /// Whether `p` may leave `rest` along `s`.
     pub fn is_free(&self, p: PatchId, s: LatticeDirection, rest: PieceSet) -> bool {
-        self.blocks[usize::from(p)][s.index()].and(rest).is_empty() && !self.constraints.forbidden.contains(&(p, s))
+        self.blocks[usize::from(p)][s.index()].and(rest).is_empty()
+            && !self.constraints.forbidden.contains(&(p, s))
     }
 
     /// The pieces of `rest` that `p` joins if it leaves them along `s`.
@@ -94,12 +116,21 @@ impl<'a> Space<'a> {
     }
 
     /// The joints of `p`, installed after all of `rest`.
-    pub fn joints(&self, p: PatchId, s: LatticeDirection, rest: PieceSet) -> impl Iterator<Item = DirectedJoint> {
-        self.joined(p, s, rest).iter().map(move |earlier| DirectedJoint { later: p, earlier, separation: s })
+    pub fn joints(
+        &self,
+        p: PatchId,
+        s: LatticeDirection,
+        rest: PieceSet,
+    ) -> impl Iterator<Item = DirectedJoint> {
+        self.joined(p, s, rest).iter().map(move |earlier| DirectedJoint {
+            later: p,
+            earlier,
+            separation: s,
+        })
     }
 
-    /// Whether `plan` keeps every condition: paths free, each piece joined to an earlier and a later one, what is still
-    /// to be installed connected, locked, and not rejected before.
+    /// Whether `plan` keeps every condition: paths free, each piece joined to an earlier and a later one,
+    /// what is still to be installed connected, locked, and not rejected before.
     pub fn allows(&self, plan: &InstallationPlan) -> bool {
         let mut rest = self.all();
         let mut attached = PieceSet::one(plan.key());
@@ -124,7 +155,8 @@ impl<'a> Space<'a> {
 
     /// Whether an earlier round turned down a plan with the same relations.
     pub fn is_rejected(&self, plan: &InstallationPlan) -> bool {
-        let is_same = |r: &InstallationPlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
+        let is_same =
+            |r: &InstallationPlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
         self.constraints.rejected.iter().any(is_same)
     }
 
@@ -136,15 +168,23 @@ impl<'a> Space<'a> {
             position[usize::from(step.piece)] = i;
             separations[usize::from(step.piece)] = (i > 0).then_some(step.separation);
         }
-        let is_a_later =
-            self.survey.contacts.iter().map(|c| position[usize::from(c.a)] > position[usize::from(c.b)]).collect();
-        Relations { separations, is_a_later }
+        let is_a_later = self
+            .survey
+            .contacts
+            .iter()
+            .map(|c| position[usize::from(c.a)] > position[usize::from(c.b)])
+            .collect();
+        Relations {
+            separations,
+            is_a_later,
+        }
     }
 
     /// Costs of `plan`; lower is better.
     pub fn score(&self, plan: &InstallationPlan) -> PlanScore {
         let around = self.surroundings(plan);
-        let cost = |(p, (role, around)): (usize, &(Role, Surroundings))| self.costs.bound(p.into(), *role, around);
+        let cost =
+            |(p, (role, around)): (usize, &(Role, Surroundings))| self.costs.bound(p.into(), *role, around);
         PlanScore::of(around.iter().enumerate().map(cost).collect())
     }
 
@@ -171,7 +211,8 @@ impl<'a> Space<'a> {
         found
     }
 
-    /// Role and surroundings of the piece of `step` that leaves `rest`; `separations` of those that left before.
+    /// Role and surroundings of the piece of `step` that leaves `rest`; `separations` of those that left
+    /// before.
     pub fn leaving(
         &self,
         step: InstallationStep,
@@ -187,18 +228,32 @@ impl<'a> Space<'a> {
         let seam = |&i: &usize| {
             let q = self.survey.contacts[i].other(p);
             match separations[usize::from(q)] {
-                Some(s) => SeamStates { own: 0, others: mask_of(s) },
-                None => SeamStates { own: mask_of(step.separation), others: 0 },
+                Some(s) => SeamStates {
+                    own: 0,
+                    others: mask_of(s),
+                },
+                None => SeamStates {
+                    own: mask_of(step.separation),
+                    others: 0,
+                },
             }
         };
         let seams = self.contacts_of[usize::from(p)].iter().map(seam).collect();
-        (role, Surroundings { seams, remaining: rest })
+        (
+            role,
+            Surroundings {
+                seams,
+                remaining: rest,
+            },
+        )
     }
 
     /// Directions that `p` may ever take, as bits.
     pub fn allowed(&self, p: PatchId) -> u32 {
         let is_allowed = |s: &LatticeDirection| !self.constraints.forbidden.contains(&(p, *s));
-        LatticeDirection::all().filter(is_allowed).fold(0, |mask, s| mask | mask_of(s))
+        LatticeDirection::all()
+            .filter(is_allowed)
+            .fold(0, |mask, s| mask | mask_of(s))
     }
 
     /// Who keeps `p` from leaving along `s` by staying.

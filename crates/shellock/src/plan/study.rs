@@ -51,10 +51,11 @@ pub struct Sample {
     pub best_cost: f64,
 }
 
-/// The best cost of plans with the first key that has any, each time it falls and at the end of `n_evaluations`.
+/// The best cost of plans with the first key that has any, each time it falls and at the end of
+/// `n_evaluations`.
 ///
-/// All draws are alike here (none greedy), so the curves show what the techniques do. Empty where no key has a plan. The
-/// same for a seed on any number of threads.
+/// All draws are alike here (none greedy), so the curves show what the techniques do. Empty where no key has
+/// a plan. The same for a seed on any number of threads.
 pub fn convergence(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -70,30 +71,44 @@ pub fn convergence(
         let mut batch = 0;
         while n_done < n_evaluations && (n_plans > 0 || batch < MOST_EMPTY_BATCHES) {
             ctx.check()?;
-            let limits =
-                DrawLimits { bound: if technique.prunes() { best } else { f64::INFINITY }, max_tries: 20 * space.n };
+            let limits = DrawLimits {
+                bound: if technique.prunes() { best } else { f64::INFINITY },
+                max_tries: 20 * space.n,
+            };
             let one = |i: usize| {
                 // The last of the spreads is uniform.
                 let drawn = draw(&space, &key, stream(params.seed, i), UNIFORM, limits);
                 let done = |plan: InstallationPlan| finished(&space, &key, technique, plan);
                 (drawn.n_evaluations, drawn.plan.map(done))
             };
-            let found: Vec<(usize, Option<(usize, PlanScore)>)> =
-                (batch * BATCH..(batch + 1) * BATCH).into_par_iter().map(one).collect();
+            let found: Vec<(usize, Option<(usize, PlanScore)>)> = (batch * BATCH..(batch + 1) * BATCH)
+                .into_par_iter()
+                .map(one)
+                .collect();
             for (n_asked, plan) in found {
                 n_done += n_asked.max(1);
-                let Some((n_looked_at, score)) = plan else { continue };
+                let Some((n_looked_at, score)) = plan else {
+                    continue;
+                };
                 n_done += n_looked_at;
                 n_plans += 1;
                 if score.worst < best {
                     best = score.worst;
-                    samples.push(Sample { n_evaluations: n_done, n_plans, best_cost: best });
+                    samples.push(Sample {
+                        n_evaluations: n_done,
+                        n_plans,
+                        best_cost: best,
+                    });
                 }
             }
             batch += 1;
         }
         if n_plans > 0 {
-            samples.push(Sample { n_evaluations: n_done, n_plans, best_cost: best });
+            samples.push(Sample {
+                n_evaluations: n_done,
+                n_plans,
+                best_cost: best,
+            });
             return Ok(samples);
         }
     }
@@ -133,15 +148,28 @@ mod tests {
     #[test]
     fn every_technique_gets_better_with_work_and_none_beats_the_proven_bound() {
         let ctx = Ctx::quiet();
-        let params = PlanParams { n_plans: 40, ..PlanParams::default() };
+        let params = PlanParams {
+            n_plans: 40,
+            ..PlanParams::default()
+        };
         let surface = voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1);
-        let survey = survey(&ctx, &params, &surface, &seams(&surface), &crate::ConnectorSizes::default()).unwrap();
-        let PlanOutcome::Found(found) = search(&ctx, &params, &survey, &PlanConstraints::default()).unwrap() else {
+        let survey = survey(
+            &ctx,
+            &params,
+            &surface,
+            &seams(&surface),
+            &crate::ConnectorSizes::default(),
+        )
+        .unwrap();
+        let PlanOutcome::Found(found) = search(&ctx, &params, &survey, &PlanConstraints::default()).unwrap()
+        else {
             panic!("a ball has a plan")
         };
         let curves = Technique::ALL.map(|t| convergence(&ctx, &params, &survey, t, 20_000).unwrap());
         for curve in &curves {
-            assert!(curve.is_sorted_by(|x, y| x.n_evaluations <= y.n_evaluations && x.best_cost >= y.best_cost));
+            assert!(
+                curve.is_sorted_by(|x, y| x.n_evaluations <= y.n_evaluations && x.best_cost >= y.best_cost)
+            );
             assert!(curve.last().unwrap().best_cost >= found.lower_bound - 1e-9);
         }
         // The first plan is the same for both, and one of them improves it.

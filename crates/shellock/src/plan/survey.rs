@@ -27,7 +27,8 @@ pub struct PlanSurvey {
     pub beta: f64,
 }
 
-/// Measures `surface`, to be joined by connectors of `sizes`. With more than [`PieceSet::MAX_PIECES`] pieces only their number, which the search refuses.
+/// Measures `surface`, to be joined by connectors of `sizes`. With more than [`PieceSet::MAX_PIECES`] pieces
+/// only their number, which the search refuses.
 pub fn survey(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -71,5 +72,8 @@ fn mean_normals(surface: &SegmentedSurface, area_mm2: &IdVec<PatchId, f64>) -> I
     for (face, &patch) in surface.patch_of_face.iter().enumerate() {
         sums[usize::from(patch)] += 0.5 * surface.mesh.area_vector_doubled(face);
     }
-    sums.into_iter().zip(area_mm2.as_slice()).map(|(v, &a)| if a > 0.0 { v / a } else { Vec3::ZERO }).collect()
+    sums.into_iter()
+        .zip(area_mm2.as_slice())
+        .map(|(v, &a)| if a > 0.0 { v / a } else { Vec3::ZERO })
+        .collect()
 }

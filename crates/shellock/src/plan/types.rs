@@ -12,12 +12,13 @@ use crate::{IdVec, InstallationPlan, LatticeDirection, PatchId};
 /// What earlier rounds taught: the search must respect all of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PlanConstraints {
-    /// A later piece, an earlier one and the direction of the later one with which their connectors came out too small to hold: they
-    /// touch, but join nothing. Along other directions they may.
+    /// A later piece, an earlier one and the direction of the later one with which their connectors came out
+    /// too small to hold: they touch, but join nothing. Along other directions they may.
     pub weak_joints: BTreeSet<(PatchId, PatchId, LatticeDirection)>,
     /// Directions that a piece must not take, because its path rubbed.
     pub forbidden: BTreeSet<(PatchId, LatticeDirection)>,
-    /// How often a piece rubbed against an earlier one; twice, along two directions, and it must go in before it.
+    /// How often a piece rubbed against an earlier one; twice, along two directions, and it must go in before
+    /// it.
     pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason that none of the above says.
     pub rejected: Vec<InstallationPlan>,
@@ -26,7 +27,12 @@ pub struct PlanConstraints {
 impl PlanConstraints {
     /// How many things there are that restrict plans.
     pub fn n_lessons(&self) -> usize {
-        let Self { weak_joints, forbidden, rubbed, rejected } = self;
+        let Self {
+            weak_joints,
+            forbidden,
+            rubbed,
+            rejected,
+        } = self;
         let n_orders = rubbed.values().filter(|&&n| n >= MOST_RUBS).count();
         weak_joints.len() + forbidden.len() + n_orders + rejected.len()
     }
@@ -34,7 +40,8 @@ impl PlanConstraints {
     /// The two join nothing any more, whatever goes in later and along which direction.
     #[cfg(test)]
     pub fn weaken(&mut self, a: PatchId, b: PatchId) {
-        self.weak_joints.extend(LatticeDirection::all().flat_map(|s| [(a, b, s), (b, a, s)]));
+        self.weak_joints
+            .extend(LatticeDirection::all().flat_map(|s| [(a, b, s), (b, a, s)]));
     }
 
     /// Whether nothing joins the two where `later` leaves along `s`.
@@ -76,13 +83,15 @@ pub struct FoundPlan {
     pub score: PlanScore,
     /// Proven: no allowed plan within `scope` costs less.
     pub lower_bound: f64,
-    /// The same for plans within `scope` that have this plan's key: at least as much, since one key is less to search.
+    /// The same for plans within `scope` that have this plan's key: at least as much, since one key is less
+    /// to search.
     pub key_lower_bound: f64,
     /// Whether the plan's own cost was proven to be the least within `scope`.
     pub is_optimal: bool,
     /// For which plans that holds.
     pub scope: ProofScope,
-    /// Up to 100 plans with the same key and different relations between pieces: `plan`, then the others, cheapest first.
+    /// Up to 100 plans with the same key and different relations between pieces: `plan`, then the others,
+    /// cheapest first.
     pub pool: Vec<RankedPlan>,
 }
 
@@ -110,7 +119,8 @@ pub struct PlanProof {
     pub gap: f64,
     /// Whether the cost was proven to be the least.
     pub optimal: bool,
-    /// Cost of the cheapest plan that is known; less than `cost` where a plan that costs a little more was chosen.
+    /// Cost of the cheapest plan that is known; less than `cost` where a plan that costs a little more was
+    /// chosen.
     pub least_cost: f64,
     /// See [`FoundPlan::key_lower_bound`].
     pub key_lower_bound: f64,
@@ -140,7 +150,11 @@ impl FoundPlan {
 
     /// How much cheaper another plan may be, as share of this one's cost, in [0, 1].
     pub fn gap(&self) -> f64 {
-        if self.score.worst > 0.0 { 1.0 - self.lower_bound / self.score.worst } else { 0.0 }
+        if self.score.worst > 0.0 {
+            1.0 - self.lower_bound / self.score.worst
+        } else {
+            0.0
+        }
     }
 }
 

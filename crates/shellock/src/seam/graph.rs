@@ -1,7 +1,7 @@
 //! Which pieces hold each other, and whether the whole hangs together twice.
 //!
-//! A plan can lock all pieces only if this graph is 2-connected: if one piece separates a set S from the key, every joint between S
-//! and the rest slides along that piece's direction, and S leaves as one cluster.
+//! A plan can lock all pieces only if this graph is 2-connected: if one piece separates a set S from the key,
+//! every joint between S and the rest slides along that piece's direction, and S leaves as one cluster.
 
 use crate::PatchId;
 
@@ -33,7 +33,10 @@ impl ContactGraph {
         min_contact_mm: f64,
         stretches: impl IntoIterator<Item = (PatchId, PatchId, f64)>,
     ) -> Self {
-        let mut stretches: Vec<_> = stretches.into_iter().map(|(a, b, l)| (a.min(b), a.max(b), l)).collect();
+        let mut stretches: Vec<_> = stretches
+            .into_iter()
+            .map(|(a, b, l)| (a.min(b), a.max(b), l))
+            .collect();
         stretches.sort_by_key(|s| (s.0, s.1));
         let contacts = stretches
             .chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
@@ -44,7 +47,11 @@ impl ContactGraph {
                 longest_mm: same.iter().map(|s| s.2).fold(0.0, f64::max),
             })
             .collect();
-        Self { n_patches, min_contact_mm, contacts }
+        Self {
+            n_patches,
+            min_contact_mm,
+            contacts,
+        }
     }
 
     /// How many patches there are.
@@ -99,9 +106,11 @@ impl ContactGraph {
         self.parts().len() <= 1 && self.articulation_pieces().is_empty()
     }
 
-    /// How far from 2-connected: parts too many, three times, and those that come of taking each single piece away; 0 where it is.
+    /// How far from 2-connected: parts too many, three times, and those that come of taking each single piece
+    /// away; 0 where it is.
     pub fn n_faults(&self) -> usize {
-        let hanging = (0..self.n_patches).map(|p| self.parts_without(PatchId::from(p)).len().saturating_sub(1));
+        let hanging =
+            (0..self.n_patches).map(|p| self.parts_without(PatchId::from(p)).len().saturating_sub(1));
         3 * self.parts().len().saturating_sub(1) + hanging.sum::<usize>()
     }
 
@@ -148,7 +157,10 @@ mod tests {
     #[test]
     fn many_short_stretches_hold_nothing() {
         let g = graph(2, &[(0, 1, 8.0), (1, 0, 8.0)]);
-        assert_eq!((g.contacts()[0].total_mm, g.contacts()[0].longest_mm), (16.0, 8.0));
+        assert_eq!(
+            (g.contacts()[0].total_mm, g.contacts()[0].longest_mm),
+            (16.0, 8.0)
+        );
         assert!(g.neighbours(PatchId(0)).is_empty() && !g.is_two_connected());
     }
 }

@@ -5,8 +5,8 @@ use shellock_geom::{HalfEdge, Topology, TriMesh, Vec3};
 
 use crate::{ContactGraph, PatchId, Seam, SegmentedSurface};
 
-/// A chain of half-edges, each in a triangle of patch `a` with a triangle of patch `b` > `a` across, from triple point to triple point
-/// or around a loop.
+/// A chain of half-edges, each in a triangle of patch `a` with a triangle of patch `b` > `a` across, from
+/// triple point to triple point or around a loop.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Stretch {
     pub a: u32,
@@ -26,16 +26,29 @@ impl Stretch {
 }
 
 /// The half-edges of `faces` that separate a patch from one with a higher id, in order.
-pub(crate) fn seam_half_edges(topology: &Topology, labels: &[u32], faces: impl Iterator<Item = u32>) -> Vec<HalfEdge> {
+pub(crate) fn seam_half_edges(
+    topology: &Topology,
+    labels: &[u32],
+    faces: impl Iterator<Item = u32>,
+) -> Vec<HalfEdge> {
     faces
         .flat_map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
         .filter(|&h| labels[h as usize / 3] < labels[topology.opposite(h) as usize / 3])
         .collect()
 }
 
-/// Chains all seam half-edges of a labelled closed mesh. They start in order of their first half-edge: open stretches, then loops.
-pub(crate) fn stretches(mesh: &TriMesh, topology: &Topology, labels: &[u32], seam: &[HalfEdge]) -> Vec<Stretch> {
-    let mut touched: Vec<u32> = seam.iter().flat_map(|&h| <[u32; 2]>::from(ends(mesh, h))).collect();
+/// Chains all seam half-edges of a labelled closed mesh. They start in order of their first half-edge: open
+/// stretches, then loops.
+pub(crate) fn stretches(
+    mesh: &TriMesh,
+    topology: &Topology,
+    labels: &[u32],
+    seam: &[HalfEdge],
+) -> Vec<Stretch> {
+    let mut touched: Vec<u32> = seam
+        .iter()
+        .flat_map(|&h| <[u32; 2]>::from(ends(mesh, h)))
+        .collect();
     touched.sort_unstable();
     // Two seam edges at a point: the seam goes on; any other number: it ends there.
     let goes_on = |v: u32| touched.partition_point(|&x| x <= v) - touched.partition_point(|&x| x < v) == 2;
@@ -61,10 +74,16 @@ pub(crate) fn stretches(mesh: &TriMesh, topology: &Topology, labels: &[u32], sea
             h = following(h);
         }
         if !half_edges.is_empty() {
-            found.push(Stretch { a: sides(start).0, b: sides(start).1, half_edges });
+            found.push(Stretch {
+                a: sides(start).0,
+                b: sides(start).1,
+                half_edges,
+            });
         }
     };
-    seam.iter().filter(|&&h| !goes_on(ends(mesh, h).0)).for_each(|&h| walk(h));
+    seam.iter()
+        .filter(|&&h| !goes_on(ends(mesh, h).0))
+        .for_each(|&h| walk(h));
     seam.iter().for_each(|&h| walk(h));
     found
 }
@@ -111,7 +130,10 @@ impl SegmentedSurface {
     /// # Panics
     /// As [`Self::seams`].
     pub fn contact_graph_below(&self, wall_mm: f64, min_contact_mm: f64) -> ContactGraph {
-        let lengths = self.seams().into_iter().map(|s| (s.a, s.b, s.length_below(wall_mm)));
+        let lengths = self
+            .seams()
+            .into_iter()
+            .map(|s| (s.a, s.b, s.length_below(wall_mm)));
         ContactGraph::from_stretches(self.n_patches, min_contact_mm, lengths)
     }
 }

@@ -1,8 +1,9 @@
 //! Patches of similar size without a user: k-means on the surface.
 //!
-//! Triangles are first merged into a few thousand cells; seeds are spread over the cells, patches grow from them in the geodesic metric
-//! with creases, and each seed moves to the middle of its patch, as in Lloyd's algorithm. Patches that stay too large grow slower in the
-//! next round. In the end the triangles themselves are won from the final seeds.
+//! Triangles are first merged into a few thousand cells; seeds are spread over the cells, patches grow from
+//! them in the geodesic metric with creases, and each seed moves to the middle of its patch, as in Lloyd's
+//! algorithm. Patches that stay too large grow slower in the next round. In the end the triangles themselves
+//! are won from the final seeds.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,27 +29,43 @@ const CONVEX_RADII: f64 = 0.04;
 /// A seed's node and the slowness of its patch.
 type Seed = (u32, f64);
 
-/// About `n_pieces` connected patches of similar area, seams rather in concave creases; the same for the same seed.
+/// About `n_pieces` connected patches of similar area, seams rather in concave creases; the same for the same
+/// seed.
 ///
-/// Each patch is connected; disks only after [`super::mend`]. Fails where the model has fewer triangles than patches are wanted; 0.2 s
-/// for 60 000 triangles.
-pub fn auto_labels(ctx: &Ctx, params: &SegmentationParams, solid: &Solid) -> Result<FaceLabels, SegmentationError> {
+/// Each patch is connected; disks only after [`super::mend`]. Fails where the model has fewer triangles than
+/// patches are wanted; 0.2 s for 60 000 triangles.
+pub fn auto_labels(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    solid: &Solid,
+) -> Result<FaceLabels, SegmentationError> {
     let mesh = solid.mesh();
     let n_pieces = params.n_pieces.unwrap_or_else(|| default_n_pieces(mesh.area()));
     if n_pieces > mesh.triangles.len() {
-        return Err(SegmentationError::TooManyPieces { n_pieces, n_faces: mesh.triangles.len() });
+        return Err(SegmentationError::TooManyPieces {
+            n_pieces,
+            n_faces: mesh.triangles.len(),
+        });
     }
     ctx.check()?;
     let topology = Topology::new(solid);
     let radius_mm = (mesh.area() / n_pieces as f64 / std::f64::consts::PI).sqrt();
-    let cost = CreaseCost { concave_mm: CONCAVE_RADII * radius_mm, convex_mm: CONVEX_RADII * radius_mm };
+    let cost = CreaseCost {
+        concave_mm: CONCAVE_RADII * radius_mm,
+        convex_mm: CONVEX_RADII * radius_mm,
+    };
     let (cell, n_cells) = cells(mesh, &topology, N_CELLS.max(20 * n_pieces));
     let graph = DualGraph::of_cells(mesh, &topology, &cell, n_cells, cost);
     ctx.check()?;
-    let starts: Vec<(f64, Vec<Seed>)> =
-        (0..N_STARTS).into_par_iter().map(|start| cluster(&graph, n_pieces, stream(params.seed, start))).collect();
+    let starts: Vec<(f64, Vec<Seed>)> = (0..N_STARTS)
+        .into_par_iter()
+        .map(|start| cluster(&graph, n_pieces, stream(params.seed, start)))
+        .collect();
     ctx.check()?;
-    let (_, seeds) = starts.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there is at least one start");
+    let (_, seeds) = starts
+        .into_iter()
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .expect("there is at least one start");
 
     let faces = DualGraph::of_faces(mesh, &topology, cost);
     let mut face_of_cell = vec![(f64::INFINITY, 0); n_cells];
@@ -58,15 +75,19 @@ pub fn auto_labels(ctx: &Ctx, params: &SegmentationParams, solid: &Solid) -> Res
             face_of_cell[c as usize] = (d, face as u32);
         }
     }
-    let face_seeds: Vec<Seed> = seeds.iter().map(|&(c, slowness)| (face_of_cell[c as usize].1, slowness)).collect();
+    let face_seeds: Vec<Seed> = seeds
+        .iter()
+        .map(|&(c, slowness)| (face_of_cell[c as usize].1, slowness))
+        .collect();
     let (_, mut owner) = faces.grow(&face_seeds, |_| true);
-    // Only bodies without a seed stay unreached: they go to the first patch, and the labels' check splits them off again.
+    // Only bodies without a seed stay unreached: they go to the first patch, and the labels' check splits
+    // them off again.
     owner.iter_mut().filter(|o| **o == u32::MAX).for_each(|o| *o = 0);
     Ok(FaceLabels::from_connected(&topology, &owner))
 }
 
-/// How many pieces a surface of `area_mm2` gets: 10 for a 150 mm figure, as the paper's 9 to 13, growing as the figure's height does
-/// to the power of two thirds.
+/// How many pieces a surface of `area_mm2` gets: 10 for a 150 mm figure, as the paper's 9 to 13, growing as
+/// the figure's height does to the power of two thirds.
 fn default_n_pieces(area_mm2: f64) -> usize {
     (10.0 * (area_mm2 / 45_000.0).cbrt()).round().clamp(6.0, 24.0) as usize
 }
@@ -100,7 +121,12 @@ fn cells(mesh: &TriMesh, topology: &Topology, n_wanted: usize) -> (Vec<u32>, usi
             if area >= enough_mm2 {
                 break;
             }
-            queue.extend(topology.neighbours(face).into_iter().filter(|&f| cell[f as usize] == u32::MAX));
+            queue.extend(
+                topology
+                    .neighbours(face)
+                    .into_iter()
+                    .filter(|&f| cell[f as usize] == u32::MAX),
+            );
         }
         n_cells += 1;
     }
@@ -123,7 +149,10 @@ fn cluster(graph: &DualGraph, n_pieces: usize, mut rng: impl Rng) -> (f64, Vec<S
                 spread_mm4 += graph.area[node] * distance[node].powi(2);
             }
         }
-        let areas: Vec<f64> = members.iter().map(|m| m.iter().map(|&n| graph.area[n as usize]).sum()).collect();
+        let areas: Vec<f64> = members
+            .iter()
+            .map(|m| m.iter().map(|&n| graph.area[n as usize]).sum())
+            .collect();
         let unevenness = areas.iter().map(|a| (a / mean_mm2 - 1.0).powi(2)).sum::<f64>() / n_pieces as f64;
         let badness = spread_mm4 / (mean_mm2 * mean_mm2 * n_pieces as f64) + 0.2 * unevenness;
         if badness < best.0 {
@@ -137,15 +166,20 @@ fn cluster(graph: &DualGraph, n_pieces: usize, mut rng: impl Rng) -> (f64, Vec<S
     best
 }
 
-/// `n` nodes far from each other: each next one drawn by area times the fourth power of its distance from those before.
+/// `n` nodes far from each other: each next one drawn by area times the fourth power of its distance from
+/// those before.
 fn spread(graph: &DualGraph, n: usize, rng: &mut impl Rng) -> Vec<Seed> {
     let mut seeds = vec![(draw(&graph.area, rng), 1.0)];
     while seeds.len() < n {
         let (distance, _) = graph.grow(&seeds, |_| true);
-        let farthest =
-            distance.iter().filter(|d| d.is_finite()).fold(0.0, |m: f64, &d| m.max(d)).max(f64::MIN_POSITIVE);
-        let weight: Vec<f64> =
-            (0..graph.len()).map(|i| graph.area[i] * (distance[i].min(farthest) / farthest).powi(4)).collect();
+        let farthest = distance
+            .iter()
+            .filter(|d| d.is_finite())
+            .fold(0.0, |m: f64, &d| m.max(d))
+            .max(f64::MIN_POSITIVE);
+        let weight: Vec<f64> = (0..graph.len())
+            .map(|i| graph.area[i] * (distance[i].min(farthest) / farthest).powi(4))
+            .collect();
         seeds.push((draw(&weight, rng), 1.0));
     }
     seeds
@@ -163,16 +197,24 @@ fn draw(weight: &[f64], rng: &mut impl Rng) -> u32 {
     weight.len() as u32 - 1
 }
 
-/// The one among the present seed and some members that is nearest to all members: least sum of squared distances.
+/// The one among the present seed and some members that is nearest to all members: least sum of squared
+/// distances.
 fn middle(graph: &DualGraph, members: &[u32], seed: u32, owner: &[u32], k: u32, rng: &mut impl Rng) -> u32 {
     if members.is_empty() {
         return seed;
     }
     let mut best = (f64::INFINITY, seed);
     for i in 0..=N_CANDIDATES {
-        let candidate = if i == 0 { seed } else { members[rng.random_range(0..members.len())] };
+        let candidate = if i == 0 {
+            seed
+        } else {
+            members[rng.random_range(0..members.len())]
+        };
         let (distance, _) = graph.grow(&[(candidate, 1.0)], |n| owner[n as usize] == k);
-        let cost: f64 = members.iter().map(|&n| graph.area[n as usize] * distance[n as usize].powi(2)).sum();
+        let cost: f64 = members
+            .iter()
+            .map(|&n| graph.area[n as usize] * distance[n as usize].powi(2))
+            .sum();
         if cost < best.0 {
             best = (cost, candidate);
         }

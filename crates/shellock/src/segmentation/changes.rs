@@ -5,7 +5,8 @@ use shellock_geom::Solid;
 use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, user_labels};
 use crate::{Ctx, PatchId, SegmentedSurface, Warning};
 
-/// A label lies in a piece, or a piece in a label, with more than this share of its area; smoothing moves less.
+/// A label lies in a piece, or a piece in a label, with more than this share of its area; smoothing moves
+/// less.
 const MAIN_SHARE: f64 = 0.5;
 
 /// Which labels lie in which pieces.
@@ -17,7 +18,8 @@ pub(super) struct Changes {
 }
 
 impl Changes {
-    /// From `labels` of a mesh to the pieces of `surface`, whose triangles name those of the mesh as their sources.
+    /// From `labels` of a mesh to the pieces of `surface`, whose triangles name those of the mesh as their
+    /// sources.
     pub fn between(labels: &FaceLabels, surface: &SegmentedSurface) -> Self {
         let (n_labels, n_pieces) = (labels.n_patches(), surface.n_patches);
         let mut common = vec![vec![0.0; n_pieces]; n_labels];
@@ -26,22 +28,40 @@ impl Changes {
             common[label][usize::from(*piece)] += surface.mesh.face_area(face);
         }
         let of_label: Vec<f64> = common.iter().map(|row| row.iter().sum()).collect();
-        let of_piece: Vec<f64> = (0..n_pieces).map(|p| common.iter().map(|row| row[p]).sum()).collect();
+        let of_piece: Vec<f64> = (0..n_pieces)
+            .map(|p| common.iter().map(|row| row[p]).sum())
+            .collect();
         let is_own = |label: usize, piece: usize| common[label][piece] > MAIN_SHARE * of_piece[piece];
         let is_within = |label: usize, piece: usize| common[label][piece] > MAIN_SHARE * of_label[label];
-        let own = |label| (0..n_pieces).filter(move |&p| is_own(label, p)).map(PatchId::from).collect();
-        let within = |piece| (0..n_labels).filter(move |&l| is_within(l, piece) || is_own(l, piece)).collect();
-        Self { pieces_of: (0..n_labels).map(own).collect(), labels_of: (0..n_pieces).map(within).collect() }
+        let own = |label| {
+            (0..n_pieces)
+                .filter(move |&p| is_own(label, p))
+                .map(PatchId::from)
+                .collect()
+        };
+        let within = |piece| {
+            (0..n_labels)
+                .filter(move |&l| is_within(l, piece) || is_own(l, piece))
+                .collect()
+        };
+        Self {
+            pieces_of: (0..n_labels).map(own).collect(),
+            labels_of: (0..n_pieces).map(within).collect(),
+        }
     }
 
     /// How many labels share a piece with another and gave it their name.
     pub fn n_lost(&self) -> usize {
-        self.labels_of.iter().map(|labels| labels.len().saturating_sub(1)).sum()
+        self.labels_of
+            .iter()
+            .map(|labels| labels.len().saturating_sub(1))
+            .sum()
     }
 }
 
-/// Warns of what the user should know about `surface`: labels that were cleaned (see [`user_labels`]), divided (`piece-split`) or joined
-/// (`piece-joined`), contacts shorter than wanted (`short-contacts`) and pieces that still hold others alone (`weak-graph`).
+/// Warns of what the user should know about `surface`: labels that were cleaned (see [`user_labels`]),
+/// divided (`piece-split`) or joined (`piece-joined`), contacts shorter than wanted (`short-contacts`) and
+/// pieces that still hold others alone (`weak-graph`).
 pub fn tell(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -68,7 +88,12 @@ pub fn tell(
             pieces_in_words(&pieces),
             if pieces.len() == 1 { "s" } else { "" }
         );
-        ctx.warn(Warning { code: "weak-graph".into(), message, pieces, at: None });
+        ctx.warn(Warning {
+            code: "weak-graph".into(),
+            message,
+            pieces,
+            at: None,
+        });
     }
     Ok(())
 }
@@ -79,40 +104,70 @@ fn names(solid: &Solid, given: &[i64], cleaned: &FaceLabels) -> Vec<i64> {
     for (face, label) in given.iter().enumerate() {
         *area[usize::from(cleaned.patch(face))].entry(*label).or_default() += solid.mesh().face_area(face);
     }
-    let most = |of: &std::collections::BTreeMap<i64, f64>| of.iter().max_by(|x, y| x.1.total_cmp(y.1)).map(|x| *x.0);
+    let most =
+        |of: &std::collections::BTreeMap<i64, f64>| of.iter().max_by(|x, y| x.1.total_cmp(y.1)).map(|x| *x.0);
     area.iter().map(|of| most(of).unwrap_or_default()).collect()
 }
 
 fn tell_divided(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedSurface) {
-    let divided: Vec<usize> = (0..names.len()).filter(|&l| changes.pieces_of[l].len() > 1).collect();
+    let divided: Vec<usize> = (0..names.len())
+        .filter(|&l| changes.pieces_of[l].len() > 1)
+        .collect();
     let Some(&first) = divided.first() else { return };
-    let line = |&l: &usize| format!("label {} into {}", names[l], pieces_in_words(&changes.pieces_of[l]));
+    let line = |&l: &usize| {
+        format!(
+            "label {} into {}",
+            names[l],
+            pieces_in_words(&changes.pieces_of[l])
+        )
+    };
     let message = format!(
         "divided: {}. A piece that alone holds others lets them slide off together, and one that runs around a limb or has holes cannot be put on",
         divided.iter().map(line).collect::<Vec<_>>().join(", ")
     );
-    let pieces: Vec<PatchId> = divided.iter().flat_map(|&l| changes.pieces_of[l].clone()).collect();
+    let pieces: Vec<PatchId> = divided
+        .iter()
+        .flat_map(|&l| changes.pieces_of[l].clone())
+        .collect();
     let at = middle(surface, changes.pieces_of[first][0]);
-    ctx.warn(Warning { code: "piece-split".into(), message, pieces, at });
+    ctx.warn(Warning {
+        code: "piece-split".into(),
+        message,
+        pieces,
+        at,
+    });
 }
 
 fn tell_joined(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedSurface) {
-    for (piece, labels) in changes.labels_of.iter().enumerate().filter(|(_, labels)| labels.len() > 1) {
+    for (piece, labels) in changes
+        .labels_of
+        .iter()
+        .enumerate()
+        .filter(|(_, labels)| labels.len() > 1)
+    {
         let piece = PatchId::from(piece);
         let labels: Vec<String> = labels.iter().map(|&l| names[l].to_string()).collect();
         let message = format!(
             "labels {} are one piece, {piece}: the seams between them or around them are too short to hold two pieces",
             labels.join(", ")
         );
-        ctx.warn(Warning { code: "piece-joined".into(), message, pieces: vec![piece], at: middle(surface, piece) });
+        ctx.warn(Warning {
+            code: "piece-joined".into(),
+            message,
+            pieces: vec![piece],
+            at: middle(surface, piece),
+        });
     }
 }
 
 /// Which seams are shorter than wanted but had to count.
 fn tell_short(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface, limit_mm: f64) {
     let graph = surface.contact_graph_below(params.wall_mm, limit_mm);
-    let short: Vec<_> =
-        graph.contacts().iter().filter(|c| graph.counts(c) && c.longest_mm < params.min_contact_mm).collect();
+    let short: Vec<_> = graph
+        .contacts()
+        .iter()
+        .filter(|c| graph.counts(c) && c.longest_mm < params.min_contact_mm)
+        .collect();
     let mut pieces: Vec<PatchId> = short.iter().flat_map(|c| [c.a, c.b]).collect();
     pieces.sort_unstable();
     pieces.dedup();
@@ -121,12 +176,21 @@ fn tell_short(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface
         pieces_in_words(&pieces),
         params.min_contact_mm
     );
-    ctx.warn(Warning { code: "short-contacts".into(), message, pieces, at: None });
+    ctx.warn(Warning {
+        code: "short-contacts".into(),
+        message,
+        pieces,
+        at: None,
+    });
 }
 
 fn pieces_in_words(pieces: &[PatchId]) -> String {
     let all: Vec<String> = pieces.iter().map(ToString::to_string).collect();
-    format!("piece{} {}", if all.len() == 1 { "" } else { "s" }, all.join(", "))
+    format!(
+        "piece{} {}",
+        if all.len() == 1 { "" } else { "s" },
+        all.join(", ")
+    )
 }
 
 /// The middle of a triangle of `piece`, mm.

@@ -14,8 +14,9 @@ use shellock_geom::{Solid, Topology, TriMesh, Vec3};
 
 /// Least distance of a cut from an edge's ends, in edge lengths.
 ///
-/// Nearer ties are moved here: it shifts a seam by a fiftieth of an edge at most, keeps slivers measurable, and every triangle keeps its
-/// combinatorial case, so that the result is closed and patches stay connected by construction.
+/// Nearer ties are moved here: it shifts a seam by a fiftieth of an edge at most, keeps slivers measurable,
+/// and every triangle keeps its combinatorial case, so that the result is closed and patches stay connected
+/// by construction.
 const MIN_CUT: f64 = 0.02;
 /// Least barycentric coordinate of a triple point, for the same reason.
 const MIN_INSIDE: f64 = 0.05;
@@ -43,12 +44,23 @@ pub(super) fn cut_along_ties(solid: &Solid, soft: &[f64], owner: &[u32]) -> Cut 
         }
         let (lead_at_a, lead_at_b) = (value(i, a) - value(j, a), value(j, b) - value(i, b));
         // A point that changed its owner as part of an island may not lead.
-        let s = if lead_at_a > 0.0 && lead_at_b > 0.0 { lead_at_a / (lead_at_a + lead_at_b) } else { 0.5 };
+        let s = if lead_at_a > 0.0 && lead_at_b > 0.0 {
+            lead_at_a / (lead_at_a + lead_at_b)
+        } else {
+            0.5
+        };
         tie[h as usize] = points.len() as u32;
         tie[topology.opposite(h) as usize] = points.len() as u32;
         points.push(mesh.points[a as usize].lerp(mesh.points[b as usize], s.clamp(MIN_CUT, 1.0 - MIN_CUT)));
     }
-    let mut cut = Cut { mesh: TriMesh { points, triangles: Vec::new() }, owner: Vec::new(), source_face: Vec::new() };
+    let mut cut = Cut {
+        mesh: TriMesh {
+            points,
+            triangles: Vec::new(),
+        },
+        owner: Vec::new(),
+        source_face: Vec::new(),
+    };
     for (face, &t) in mesh.triangles.iter().enumerate() {
         let x = [0, 1, 2].map(|corner| tie[3 * face + corner]);
         let k = t.map(|v| owner[v as usize]);
@@ -56,7 +68,8 @@ pub(super) fn cut_along_ties(solid: &Solid, soft: &[f64], owner: &[u32]) -> Cut 
             0 => cut.push(face, k[0], t),
             2 => cut.cut_in_two(face, t, k, x),
             _ => {
-                let lead = |from: usize, to: usize| [0, 1, 2].map(|c| value(k[from], t[c]) - value(k[to], t[c]));
+                let lead =
+                    |from: usize, to: usize| [0, 1, 2].map(|c| value(k[from], t[c]) - value(k[to], t[c]));
                 let inside = triple_point(Vec3::from(lead(0, 1)), Vec3::from(lead(0, 2)));
                 cut.cut_in_three(face, t, k, x, inside);
             }
@@ -65,12 +78,16 @@ pub(super) fn cut_along_ties(solid: &Solid, soft: &[f64], owner: &[u32]) -> Cut 
     cut
 }
 
-/// Barycentric coordinates of the point where two linear functions, given by their values at the corners, vanish; the middle where
-/// that is not well inside.
+/// Barycentric coordinates of the point where two linear functions, given by their values at the corners,
+/// vanish; the middle where that is not well inside.
 fn triple_point(lead_1: Vec3, lead_2: Vec3) -> Vec3 {
     let w = lead_1.cross(lead_2);
     let w = w / w.element_sum();
-    if w.is_finite() && w.min_element() >= MIN_INSIDE { w } else { Vec3::splat(1.0 / 3.0) }
+    if w.is_finite() && w.min_element() >= MIN_INSIDE {
+        w
+    } else {
+        Vec3::splat(1.0 / 3.0)
+    }
 }
 
 impl Cut {
@@ -83,12 +100,15 @@ impl Cut {
     /// One corner has another owner than the two others.
     fn cut_in_two(&mut self, face: usize, t: [u32; 3], k: [u32; 3], x: [u32; 3]) {
         // The lone corner a lies across the edge without a tie.
-        let lone = (0..3).find(|&c| x[(c + 1) % 3] == NO_POINT).expect("one of three edges has no tie");
+        let lone = (0..3)
+            .find(|&c| x[(c + 1) % 3] == NO_POINT)
+            .expect("one of three edges has no tie");
         let [a, b, c] = [0, 1, 2].map(|i| t[(lone + i) % 3]);
         let (ab, ca) = (x[lone], x[(lone + 2) % 3]);
         let others = k[(lone + 1) % 3];
         self.push(face, k[lone], [a, ab, ca]);
-        let length = |p: u32, q: u32| self.mesh.points[p as usize].distance_squared(self.mesh.points[q as usize]);
+        let length =
+            |p: u32, q: u32| self.mesh.points[p as usize].distance_squared(self.mesh.points[q as usize]);
         if length(ab, c) <= length(b, ca) {
             self.push(face, others, [ab, b, c]);
             self.push(face, others, [ab, c, ca]);

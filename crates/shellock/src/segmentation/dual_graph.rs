@@ -1,4 +1,5 @@
-//! Triangles, or cells of many triangles, as nodes of a graph whose paths are the geodesics that patches grow along.
+//! Triangles, or cells of many triangles, as nodes of a graph whose paths are the geodesics that patches grow
+//! along.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -15,7 +16,8 @@ pub(crate) struct DualGraph {
     pub area: Vec<f64>,
 }
 
-/// What crossing a crease costs, in mm of detour a radian of turning: seams then rather lie in creases than patches reach over them.
+/// What crossing a crease costs, in mm of detour a radian of turning: seams then rather lie in creases than
+/// patches reach over them.
 ///
 /// The turning is not squared, so the cost of a fold does not depend on how finely it is triangulated.
 #[derive(Clone, Copy)]
@@ -26,12 +28,21 @@ pub(crate) struct CreaseCost {
 
 impl CreaseCost {
     /// Distances only.
-    pub const NONE: Self = Self { concave_mm: 0.0, convex_mm: 0.0 };
+    pub const NONE: Self = Self {
+        concave_mm: 0.0,
+        convex_mm: 0.0,
+    };
 
     fn length(self, (c1, n1): (Vec3, Vec3), (c2, n2): (Vec3, Vec3)) -> f64 {
         let turning_rad = n1.dot(n2).clamp(-1.0, 1.0).acos();
         let is_concave = (n2 - n1).dot(c2 - c1) < 0.0;
-        c1.distance(c2) + turning_rad * if is_concave { self.concave_mm } else { self.convex_mm }
+        c1.distance(c2)
+            + turning_rad
+                * if is_concave {
+                    self.concave_mm
+                } else {
+                    self.convex_mm
+                }
     }
 }
 
@@ -43,7 +54,13 @@ impl DualGraph {
     }
 
     /// One node for each of `n_cells` connected sets of triangles.
-    pub fn of_cells(mesh: &TriMesh, topology: &Topology, cell: &[u32], n_cells: usize, cost: CreaseCost) -> Self {
+    pub fn of_cells(
+        mesh: &TriMesh,
+        topology: &Topology,
+        cell: &[u32],
+        n_cells: usize,
+        cost: CreaseCost,
+    ) -> Self {
         let mut area = vec![0.0; n_cells];
         let mut center = vec![Vec3::ZERO; n_cells];
         let mut normal = vec![Vec3::ZERO; n_cells];
@@ -59,7 +76,11 @@ impl DualGraph {
             }
         }
         for c in 0..n_cells {
-            center[c] = if area[c] > 0.0 { center[c] / area[c] } else { center[c] };
+            center[c] = if area[c] > 0.0 {
+                center[c] / area[c]
+            } else {
+                center[c]
+            };
             normal[c] = normal[c].normalize_or_zero();
         }
         let mut pairs: Vec<(u32, u32)> = (0..topology.n_half_edges() as u32)
@@ -76,8 +97,16 @@ impl DualGraph {
             start[c + 1] += start[c];
         }
         let node = |c: u32| (center[c as usize], normal[c as usize]);
-        let arcs = pairs.iter().map(|&(a, b)| (b, cost.length(node(a), node(b)))).collect();
-        Self { start, arcs, center, area }
+        let arcs = pairs
+            .iter()
+            .map(|&(a, b)| (b, cost.length(node(a), node(b))))
+            .collect();
+        Self {
+            start,
+            arcs,
+            center,
+            area,
+        }
     }
 
     /// How many nodes there are.
@@ -90,10 +119,12 @@ impl DualGraph {
         &self.arcs[self.start[node as usize] as usize..self.start[node as usize + 1] as usize]
     }
 
-    /// Distance from the nearest source and that source's index, for each node that can be reached through `allowed` nodes.
+    /// Distance from the nearest source and that source's index, for each node that can be reached through
+    /// `allowed` nodes.
     ///
-    /// Distances from source i are multiplied by `sources[i].1` > 0. What a source wins is connected, as a front only advances through
-    /// nodes it has won. Unreached nodes have infinite distance and index `u32::MAX`.
+    /// Distances from source i are multiplied by `sources[i].1` > 0. What a source wins is connected, as a
+    /// front only advances through nodes it has won. Unreached nodes have infinite distance and index
+    /// `u32::MAX`.
     pub fn grow(&self, sources: &[(u32, f64)], allowed: impl Fn(u32) -> bool) -> (Vec<f64>, Vec<u32>) {
         let mut distance = vec![f64::INFINITY; self.len()];
         let mut owner = vec![u32::MAX; self.len()];

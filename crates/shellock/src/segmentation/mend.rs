@@ -1,8 +1,9 @@
 //! Makes all patches disks and their contacts 2-connected, by dividing the patches that stand in the way.
 //!
-//! A piece that alone holds others is divided through its seam with them, so that two pieces hold them; a ring around a limb is divided
-//! lengthwise, as it could hardly be put on otherwise. See [`crate::seam::graph`] for why. Where no division helps, because the seam is
-//! too short for two contacts, what hangs on a piece is joined to it.
+//! A piece that alone holds others is divided through its seam with them, so that two pieces hold them; a
+//! ring around a limb is divided lengthwise, as it could hardly be put on otherwise. See
+//! [`crate::seam::graph`] for why. Where no division helps, because the seam is too short for two contacts,
+//! what hangs on a piece is joined to it.
 
 use shellock_geom::{HalfEdge, Solid, Topology};
 
@@ -12,20 +13,24 @@ use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::seam::seam_half_edges;
 use crate::{ContactGraph, Ctx, PatchId};
 
-/// How much longer a seam along triangle edges is than the smooth one: 4/π for random directions on a square grid.
+/// How much longer a seam along triangle edges is than the smooth one: 4/π for random directions on a square
+/// grid.
 const ZIGZAG: f64 = 1.27;
 
 /// How much larger than the smallest piece a half must be, as smoothing takes from narrow patches.
 const SPLIT_RESERVE: f64 = 2.0;
 
-/// Divisions in a row that may leave as many faults as before: a handle or a patch with several holes needs some before one helps.
+/// Divisions in a row that may leave as many faults as before: a handle or a patch with several holes needs
+/// some before one helps.
 const MAX_IDLE_DIVISIONS: usize = 3;
 
-/// The labels with patches divided until each is a disk and no piece alone holds others, or until `max_splits` or `min_piece_mm2`
-/// forbid more. Pieces that touch nothing long enough join a neighbour, and so do those that hang on one piece by a seam too short for
-/// two contacts. Old patches keep their numbers unless some are joined.
+/// The labels with patches divided until each is a disk and no piece alone holds others, or until
+/// `max_splits` or `min_piece_mm2` forbid more. Pieces that touch nothing long enough join a neighbour, and
+/// so do those that hang on one piece by a seam too short for two contacts. Old patches keep their numbers
+/// unless some are joined.
 ///
-/// The result may still fall short; ask [`SegmentedSurface::contact_graph`](crate::SegmentedSurface::contact_graph).
+/// The result may still fall short; ask
+/// [`SegmentedSurface::contact_graph`](crate::SegmentedSurface::contact_graph).
 pub fn mend(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -35,7 +40,12 @@ pub fn mend(
     let topology = Topology::new(solid);
     let faces = DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE);
     let min_piece_mm2 = SPLIT_RESERVE * params.min_piece_mm2;
-    let divider = Divider { mesh: solid.mesh(), topology: &topology, faces: &faces, min_piece_mm2 };
+    let divider = Divider {
+        mesh: solid.mesh(),
+        topology: &topology,
+        faces: &faces,
+        min_piece_mm2,
+    };
     let mut work = Work {
         divider,
         label: labels.as_slice().to_vec(),
@@ -50,7 +60,9 @@ pub fn mend(
         let graph = work.graph(&seam);
         if let Some((loose, into)) = weakest_link(&work, &graph) {
             work.join(loose, into);
-        } else if !work.divide_worst(&seam, &graph, n_idle < MAX_IDLE_DIVISIONS) && !work.join_hanging(&seam, &graph) {
+        } else if !work.divide_worst(&seam, &graph, n_idle < MAX_IDLE_DIVISIONS)
+            && !work.join_hanging(&seam, &graph)
+        {
             break;
         }
         let n_faults = work.n_faults();
@@ -71,7 +83,8 @@ struct Work<'a> {
     min_contact_mm: f64,
 }
 
-/// Where the graph falls apart: the piece of the smaller part with the longest contact to the rest, and the piece it has that with.
+/// Where the graph falls apart: the piece of the smaller part with the longest contact to the rest, and the
+/// piece it has that with.
 fn weakest_link(work: &Work, graph: &ContactGraph) -> Option<(u32, u32)> {
     let parts = graph.parts();
     if parts.len() < 2 || graph.n_patches() <= 2 {
@@ -80,15 +93,25 @@ fn weakest_link(work: &Work, graph: &ContactGraph) -> Option<(u32, u32)> {
     let areas = work.areas();
     let area = |part: &[PatchId]| part.iter().map(|p| areas[p.0 as usize]).sum::<f64>();
     let smallest = parts.iter().min_by(|p, q| area(p).total_cmp(&area(q)))?;
-    let crossing = graph.contacts().iter().filter(|c| smallest.contains(&c.a) != smallest.contains(&c.b));
+    let crossing = graph
+        .contacts()
+        .iter()
+        .filter(|c| smallest.contains(&c.a) != smallest.contains(&c.b));
     let longest = crossing.max_by(|c, d| c.total_mm.total_cmp(&d.total_mm))?;
-    let (inner, outer) = if smallest.contains(&longest.a) { (longest.a, longest.b) } else { (longest.b, longest.a) };
+    let (inner, outer) = if smallest.contains(&longest.a) {
+        (longest.a, longest.b)
+    } else {
+        (longest.b, longest.a)
+    };
     Some((inner.0, outer.0))
 }
 
 impl Work<'_> {
     fn labels(&self) -> FaceLabels {
-        FaceLabels { patch_of_face: self.label.clone(), n_patches: self.n_patches }
+        FaceLabels {
+            patch_of_face: self.label.clone(),
+            n_patches: self.n_patches,
+        }
     }
 
     fn seam(&self) -> Vec<HalfEdge> {
@@ -96,19 +119,36 @@ impl Work<'_> {
     }
 
     fn graph(&self, seam: &[HalfEdge]) -> ContactGraph {
-        raw_contact_graph(&self.divider, &self.label, self.n_patches, seam, self.min_contact_mm)
+        raw_contact_graph(
+            &self.divider,
+            &self.label,
+            self.n_patches,
+            seam,
+            self.min_contact_mm,
+        )
     }
 
     fn areas(&self) -> Vec<f64> {
         let mut areas = vec![0.0; self.n_patches];
-        self.label.iter().enumerate().for_each(|(f, &k)| areas[k as usize] += self.divider.faces.area[f]);
+        self.label
+            .iter()
+            .enumerate()
+            .for_each(|(f, &k)| areas[k as usize] += self.divider.faces.area[f]);
         areas
     }
 
     /// By how much each patch differs from a disk.
     fn holes(&self) -> Vec<usize> {
-        let euler = euler_characteristics(self.divider.mesh, self.divider.topology, &self.label, self.n_patches);
-        euler.into_iter().map(|characteristic| (1 - characteristic).unsigned_abs() as usize).collect()
+        let euler = euler_characteristics(
+            self.divider.mesh,
+            self.divider.topology,
+            &self.label,
+            self.n_patches,
+        );
+        euler
+            .into_iter()
+            .map(|characteristic| (1 - characteristic).unsigned_abs() as usize)
+            .collect()
     }
 
     /// Faults of the graph and of all patches.
@@ -116,18 +156,22 @@ impl Work<'_> {
         self.graph(&self.seam()).n_faults() + self.holes().iter().sum::<usize>()
     }
 
-    /// Divides the patch with most faults whose division leaves fewer of them, or, `may_idle`, a patch that is no disk in any way;
-    /// false where there is none.
+    /// Divides the patch with most faults whose division leaves fewer of them, or, `may_idle`, a patch that
+    /// is no disk in any way; false where there is none.
     fn divide_worst(&mut self, seam: &[HalfEdge], graph: &ContactGraph, may_idle: bool) -> bool {
         let holes = self.holes();
         let hanging = |k: usize| graph.parts_without(PatchId::from(k)).len().saturating_sub(1);
-        let mut faulty: Vec<(usize, u32)> = (0..self.n_patches).map(|k| (holes[k] + hanging(k), k as u32)).collect();
+        let mut faulty: Vec<(usize, u32)> = (0..self.n_patches)
+            .map(|k| (holes[k] + hanging(k), k as u32))
+            .collect();
         faulty.retain(|&(faults, _)| faults > 0);
         faulty.sort_by_key(|&(faults, k)| (std::cmp::Reverse(faults), k));
         let mut idle = None;
         for (_, patch) in faulty {
             let n_before = graph.n_faults() + holes[patch as usize];
-            let Some(division) = self.best_division(seam, graph, patch) else { continue };
+            let Some(division) = self.best_division(seam, graph, patch) else {
+                continue;
+            };
             if division.n_faults < n_before as f64 {
                 self.apply(&division);
                 return true;
@@ -143,7 +187,10 @@ impl Work<'_> {
     }
 
     fn apply(&mut self, division: &Division) {
-        division.moved.iter().for_each(|&f| self.label[f as usize] = self.n_patches as u32);
+        division
+            .moved
+            .iter()
+            .for_each(|&f| self.label[f as usize] = self.n_patches as u32);
         self.n_patches += 1;
     }
 
@@ -153,7 +200,10 @@ impl Work<'_> {
         let parts = graph.parts_without(PatchId(patch));
         // A part that no counted contact ties to this patch cannot be reached by dividing it.
         let pairs: Vec<[u32; 2]> = if parts.len() > 1 {
-            parts.iter().filter_map(|s| self.far_points(seam, patch, s)).collect()
+            parts
+                .iter()
+                .filter_map(|s| self.far_points(seam, patch, s))
+                .collect()
         } else {
             Vec::new()
         };
@@ -163,12 +213,20 @@ impl Work<'_> {
             // Numbers grew, so an old seam edge may now have its higher number on its own side.
             let all = seam.iter().chain(inner).map(|&h| {
                 let o = divider.topology.opposite(h);
-                if label[h as usize / 3] < label[o as usize / 3] { h } else { o }
+                if label[h as usize / 3] < label[o as usize / 3] {
+                    h
+                } else {
+                    o
+                }
             });
             let seams: Vec<HalfEdge> = all.collect();
             let after = raw_contact_graph(divider, label, n + 1, &seams, min_contact_mm);
             // A half that nothing holds would be joined again, and so on without end.
-            if after.parts().len() > n_parts { f64::INFINITY } else { after.n_faults() as f64 }
+            if after.parts().len() > n_parts {
+                f64::INFINITY
+            } else {
+                after.n_faults() as f64
+            }
         };
         divider.best(&mut self.label, n, patch, &pairs, faults)
     }
@@ -179,21 +237,27 @@ impl Work<'_> {
             .iter()
             .flat_map(|&h| [h, self.divider.topology.opposite(h)])
             .filter(|&h| self.label[h as usize / 3] == patch)
-            .filter(|&h| part.contains(&PatchId(self.label[self.divider.topology.opposite(h) as usize / 3])))
+            .filter(|&h| {
+                part.contains(&PatchId(
+                    self.label[self.divider.topology.opposite(h) as usize / 3],
+                ))
+            })
             .map(|h| h / 3)
             .collect();
         let center = |f: u32| self.divider.faces.center[f as usize];
         let farthest = |from: u32| {
             beside.iter().copied().max_by(|&f, &g| {
-                center(f).distance_squared(center(from)).total_cmp(&center(g).distance_squared(center(from)))
+                center(f)
+                    .distance_squared(center(from))
+                    .total_cmp(&center(g).distance_squared(center(from)))
             })
         };
         let one = farthest(*beside.first()?)?;
         Some([one, farthest(one)?])
     }
 
-    /// Joins a piece that hangs on another to it, or one to the piece it holds alone: of the pairs that leave the fewest faults the one
-    /// with the smallest piece. False where none leaves fewer.
+    /// Joins a piece that hangs on another to it, or one to the piece it holds alone: of the pairs that leave
+    /// the fewest faults the one with the smallest piece. False where none leaves fewer.
     fn join_hanging(&mut self, seam: &[HalfEdge], graph: &ContactGraph) -> bool {
         if self.n_patches <= 2 {
             return false;
@@ -207,7 +271,11 @@ impl Work<'_> {
                 continue;
             }
             let (a, b) = (contact.a.0, contact.b.0);
-            let (small, large) = if areas[a as usize] <= areas[b as usize] { (a, b) } else { (b, a) };
+            let (small, large) = if areas[a as usize] <= areas[b as usize] {
+                (a, b)
+            } else {
+                (b, a)
+            };
             let n_faults = self.faults_if_joined(seam, small, large);
             let area = areas[small as usize];
             if n_faults < n_before && best.is_none_or(|x| (n_faults, area) < (x.0, x.1)) {
@@ -223,16 +291,28 @@ impl Work<'_> {
     fn faults_if_joined(&self, seam: &[HalfEdge], small: u32, large: u32) -> usize {
         let last = self.n_patches as u32 - 1;
         let number = |k: u32| if k == small { large } else { k };
-        let number = |k: u32| if number(k) == last && small != last { small } else { number(k) };
+        let number = |k: u32| {
+            if number(k) == last && small != last {
+                small
+            } else {
+                number(k)
+            }
+        };
         let label: Vec<u32> = self.label.iter().map(|&k| number(k)).collect();
         let side = |h: HalfEdge| label[h as usize / 3];
         let oriented = seam.iter().map(|&h| (h, self.divider.topology.opposite(h)));
-        let seam: Vec<HalfEdge> =
-            oriented.filter(|&(h, o)| side(h) != side(o)).map(|(h, o)| if side(h) < side(o) { h } else { o }).collect();
+        let seam: Vec<HalfEdge> = oriented
+            .filter(|&(h, o)| side(h) != side(o))
+            .map(|(h, o)| if side(h) < side(o) { h } else { o })
+            .collect();
         let n = self.n_patches - 1;
         let graph = raw_contact_graph(&self.divider, &label, n, &seam, self.min_contact_mm);
         let euler = euler_characteristics(self.divider.mesh, self.divider.topology, &label, n);
-        graph.n_faults() + euler.into_iter().map(|x| (1 - x).unsigned_abs() as usize).sum::<usize>()
+        graph.n_faults()
+            + euler
+                .into_iter()
+                .map(|x| (1 - x).unsigned_abs() as usize)
+                .sum::<usize>()
     }
 
     /// Gives `loose` to `into`; the last number takes the one that became free.
@@ -243,7 +323,10 @@ impl Work<'_> {
                 *k = into;
             }
         }
-        self.label.iter_mut().filter(|k| **k == last).for_each(|k| *k = loose);
+        self.label
+            .iter_mut()
+            .filter(|k| **k == last)
+            .for_each(|k| *k = loose);
         self.n_patches -= 1;
     }
 }

@@ -1,7 +1,7 @@
 //! Smooth seams: labels diffuse a little, and the seam is where two of them tie.
 //!
-//! Soft labels `u_k = (M + t L)⁻¹ M 1_k` with lumped mass M, cotangent Laplacian L and t = `smoothing_mm2`: one implicit step of heat
-//! flow, which by the maximum principle keeps all u in [0, 1] and their sum at 1.
+//! Soft labels `u_k = (M + t L)⁻¹ M 1_k` with lumped mass M, cotangent Laplacian L and t = `smoothing_mm2`:
+//! one implicit step of heat flow, which by the maximum principle keeps all u in [0, 1] and their sum at 1.
 
 use shellock_geom::laplacian::{half_cotangents, lumped_mass};
 use shellock_geom::sparse::{Cholesky, SparseSymmetric};
@@ -11,16 +11,19 @@ use super::cut::cut_along_ties;
 use super::{FaceLabels, SegmentationError, SegmentationParams, halve_edges_near_seams};
 use crate::{Ctx, PatchId, SegmentedSurface};
 
-/// Longest edge near a seam, in roots of the diffusion: the soft labels bend on that scale and are taken as linear in triangles.
+/// Longest edge near a seam, in roots of the diffusion: the soft labels bend on that scale and are taken as
+/// linear in triangles.
 const MAX_SEAM_EDGE: f64 = 1.0;
 /// A patch may keep no less than this share of its area; otherwise its own diffusion is lowered.
 const MIN_KEPT_SHARE: f64 = 0.5;
 /// How often a patch's diffusion is divided by 8 before it is switched off.
 const MAX_TRIES: usize = 4;
 
-/// The surface cut along smooth seams: closed, on the model's surface, each patch connected; `source_face` names triangles of `solid`.
+/// The surface cut along smooth seams: closed, on the model's surface, each patch connected; `source_face`
+/// names triangles of `solid`.
 ///
-/// 0.2 s for 60 000 triangles and 10 patches. Fails where a patch is so small that no point of the mesh is its own.
+/// 0.2 s for 60 000 triangles and 10 patches. Fails where a patch is so small that no point of the mesh is
+/// its own.
 pub fn smooth_and_cut(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -30,7 +33,8 @@ pub fn smooth_and_cut(
     let max_edge_mm = (MAX_SEAM_EDGE * params.smoothing_mm2.sqrt()).clamp(0.5, params.max_edge_mm.max(0.5));
     let (fine, labels, source_face) = halve_edges_near_seams(solid, labels, max_edge_mm);
     let mesh = fine.mesh();
-    // Ties and sums follow the order of first triangles, so that other ids for the same patches give the same seams.
+    // Ties and sums follow the order of first triangles, so that other ids for the same patches give the same
+    // seams.
     let (ids, label) = by_first_face(&labels);
     let areas = areas(mesh, &label, ids.len());
     let mass = lumped_mass(mesh);
@@ -40,11 +44,19 @@ pub fn smooth_and_cut(
         let soft = soft_labels(mesh, &mass, &label, &diffusion_mm2)?;
         let owner = connected_owners(mesh, &mass, &soft, ids.len());
         let mut kept_mm2 = vec![0.0; ids.len()];
-        owner.iter().zip(&mass).for_each(|(&k, m)| kept_mm2[k as usize] += m);
-        let shrunk: Vec<usize> = (0..ids.len()).filter(|&k| kept_mm2[k] < MIN_KEPT_SHARE * areas[k]).collect();
+        owner
+            .iter()
+            .zip(&mass)
+            .for_each(|(&k, m)| kept_mm2[k as usize] += m);
+        let shrunk: Vec<usize> = (0..ids.len())
+            .filter(|&k| kept_mm2[k] < MIN_KEPT_SHARE * areas[k])
+            .collect();
         if shrunk.is_empty() || attempt == MAX_TRIES {
             if let Some(k) = kept_mm2.iter().position(|&a| a == 0.0) {
-                return Err(SegmentationError::PatchVanished { patch: PatchId(ids[k]), area_mm2: areas[k] });
+                return Err(SegmentationError::PatchVanished {
+                    patch: PatchId(ids[k]),
+                    area_mm2: areas[k],
+                });
             }
             let cut = cut_along_ties(&fine, &soft, &owner);
             return Ok(SegmentedSurface {
@@ -55,7 +67,11 @@ pub fn smooth_and_cut(
             });
         }
         for k in shrunk {
-            diffusion_mm2[k] = if attempt + 1 == MAX_TRIES { 0.0 } else { diffusion_mm2[k] / 8.0 };
+            diffusion_mm2[k] = if attempt + 1 == MAX_TRIES {
+                0.0
+            } else {
+                diffusion_mm2[k] / 8.0
+            };
         }
     }
     unreachable!("the last attempt returns")
@@ -78,7 +94,10 @@ fn by_first_face(labels: &FaceLabels) -> (Vec<u32>, Vec<u32>) {
 
 fn areas(mesh: &TriMesh, label: &[u32], n_patches: usize) -> Vec<f64> {
     let mut areas = vec![0.0; n_patches];
-    label.iter().enumerate().for_each(|(face, &k)| areas[k as usize] += mesh.face_area(face));
+    label
+        .iter()
+        .enumerate()
+        .for_each(|(face, &k)| areas[k as usize] += mesh.face_area(face));
     areas
 }
 
@@ -91,7 +110,8 @@ fn soft_labels(
 ) -> Result<Vec<f64>, SegmentationError> {
     let n_points = mesh.points.len();
     let floor = mass.iter().sum::<f64>() / n_points as f64 * 1e-9;
-    // A point without area, or without triangles, would make the matrix singular; with this it just keeps its label.
+    // A point without area, or without triangles, would make the matrix singular; with this it just keeps its
+    // label.
     let mut diagonal: Vec<f64> = mass.iter().map(|m| m.max(floor)).collect();
     let mut entries = Vec::with_capacity(3 * mesh.triangles.len() + n_points);
     let mut soft = vec![0.0; n_points * diffusion_mm2.len()];
@@ -112,13 +132,19 @@ fn soft_labels(
     Ok(soft)
 }
 
-/// The patch that each point belongs to most, such that each patch's points are connected along edges: islands join what surrounds them.
+/// The patch that each point belongs to most, such that each patch's points are connected along edges:
+/// islands join what surrounds them.
 fn connected_owners(mesh: &TriMesh, mass: &[f64], soft: &[f64], n_patches: usize) -> Vec<u32> {
     let n_points = mesh.points.len();
     let mut owner: Vec<u32> = (0..n_points)
         .map(|v| {
-            (0..n_patches).fold(0, |best, k| if soft[k * n_points + v] > soft[best * n_points + v] { k } else { best })
-                as u32
+            (0..n_patches).fold(0, |best, k| {
+                if soft[k * n_points + v] > soft[best * n_points + v] {
+                    k
+                } else {
+                    best
+                }
+            }) as u32
         })
         .collect();
     let island = islands(mesh, mass, &owner, n_patches);
@@ -131,7 +157,8 @@ fn connected_owners(mesh: &TriMesh, mass: &[f64], soft: &[f64], n_patches: usize
     edges.sort_unstable();
     let mut is_open = island;
     loop {
-        // One ring of the islands a round, each point as the first of its neighbours that has an owner already.
+        // One ring of the islands a round, each point as the first of its neighbours that has an owner
+        // already.
         let mut won: Vec<(u32, u32)> = edges
             .iter()
             .filter(|&&(a, b)| is_open[a as usize] && !is_open[b as usize])
@@ -177,5 +204,7 @@ fn islands(mesh: &TriMesh, mass: &[f64], owner: &[u32], n_patches: usize) -> Vec
             *best = v;
         }
     }
-    (0..owner.len() as u32).map(|v| main[owner[v as usize] as usize] != root(&mut parent, v)).collect()
+    (0..owner.len() as u32)
+        .map(|v| main[owner[v as usize] as usize] != root(&mut parent, v))
+        .collect()
 }

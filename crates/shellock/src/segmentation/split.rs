@@ -1,8 +1,9 @@
 //! Divides one patch into two connected halves.
 //!
-//! Candidates are planes through the patch's middle, along and across its principal axes, and geodesic Voronoi cells of two far points.
-//! A plane that contains a limb's axis cuts it lengthwise; a plane through several holes of a body makes disks of it at once. The
-//! candidate with the fewest faults of topology, then of shape, wins.
+//! Candidates are planes through the patch's middle, along and across its principal axes, and geodesic
+//! Voronoi cells of two far points. A plane that contains a limb's axis cuts it lengthwise; a plane through
+//! several holes of a body makes disks of it at once. The candidate with the fewest faults of topology, then
+//! of shape, wins.
 
 use nalgebra::{Matrix3, SymmetricEigen};
 use shellock_geom::topology::ends;
@@ -20,7 +21,8 @@ const UNEVENNESS: f64 = 1.5;
 /// What the new seam weighs, in roots of the patch's area: 1 for a square cut along its side.
 const SEAM_LENGTH: f64 = 0.3;
 
-/// Most parts around a patch for which seams through two of them at once are tried, as their number grows with the square.
+/// Most parts around a patch for which seams through two of them at once are tried, as their number grows
+/// with the square.
 const MOST_PAIRED: usize = 10;
 
 /// A labelled mesh whose patches can be divided.
@@ -39,21 +41,34 @@ pub(super) struct Division {
     pub moved: Vec<u32>,
 }
 
-/// Divides `patch` into two connected halves of similar area by a short seam, mostly across its longest direction; the new half
-/// gets the number `labels.n_patches()`. `None` where the patch is one triangle, or is not there.
+/// Divides `patch` into two connected halves of similar area by a short seam, mostly across its longest
+/// direction; the new half gets the number `labels.n_patches()`. `None` where the patch is one triangle, or
+/// is not there.
 pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
     let topology = Topology::new(solid);
     let faces = DualGraph::of_faces(solid.mesh(), &topology, super::dual_graph::CreaseCost::NONE);
-    let divider = Divider { mesh: solid.mesh(), topology: &topology, faces: &faces, min_piece_mm2: 0.0 };
+    let divider = Divider {
+        mesh: solid.mesh(),
+        topology: &topology,
+        faces: &faces,
+        min_piece_mm2: 0.0,
+    };
     let mut label = labels.as_slice().to_vec();
     let division = divider.best(&mut label, labels.n_patches(), patch.0, &[], |_, _| 0.0)?;
-    division.moved.iter().for_each(|&f| label[f as usize] = labels.n_patches() as u32);
-    Some(FaceLabels { patch_of_face: label, n_patches: labels.n_patches() + 1 })
+    division
+        .moved
+        .iter()
+        .for_each(|&f| label[f as usize] = labels.n_patches() as u32);
+    Some(FaceLabels {
+        patch_of_face: label,
+        n_patches: labels.n_patches() + 1,
+    })
 }
 
 impl Divider<'_> {
-    /// The cheapest division of `patch`; `label` is the same afterwards. `pairs` are far points that Voronoi halves are tried with, and
-    /// `faults` counts what else is wrong with a labelling, given with the seams inside the patch; infinite forbids it.
+    /// The cheapest division of `patch`; `label` is the same afterwards. `pairs` are far points that Voronoi
+    /// halves are tried with, and `faults` counts what else is wrong with a labelling, given with the seams
+    /// inside the patch; infinite forbids it.
     pub fn best(
         &self,
         label: &mut [u32],
@@ -62,18 +77,26 @@ impl Divider<'_> {
         pairs: &[[u32; 2]],
         faults: impl Fn(&[u32], &[HalfEdge]) -> f64,
     ) -> Option<Division> {
-        let members: Vec<u32> = (0..label.len() as u32).filter(|&f| label[f as usize] == patch).collect();
+        let members: Vec<u32> = (0..label.len() as u32)
+            .filter(|&f| label[f as usize] == patch)
+            .collect();
         if members.len() < 2 {
             return None;
         }
         let area_of = |faces: &[u32]| faces.iter().map(|&f| self.faces.area[f as usize]).sum::<f64>();
         let area = area_of(&members);
         let mut best: Option<Division> = None;
-        let candidates = self.plane_halves(&members).chain(self.voronoi_halves(label, &members, pairs));
+        let candidates = self
+            .plane_halves(&members)
+            .chain(self.voronoi_halves(label, &members, pairs));
         for moved in candidates.collect::<Vec<_>>() {
             moved.iter().for_each(|&f| label[f as usize] = n_patches as u32);
             self.join_islands(label, &members, [patch, n_patches as u32]);
-            let moved: Vec<u32> = members.iter().copied().filter(|&f| label[f as usize] != patch).collect();
+            let moved: Vec<u32> = members
+                .iter()
+                .copied()
+                .filter(|&f| label[f as usize] != patch)
+                .collect();
             let moved_mm2 = area_of(&moved);
             let is_division = !moved.is_empty() && moved.len() < members.len();
             if is_division && moved_mm2.min(area - moved_mm2) >= self.min_piece_mm2 {
@@ -86,7 +109,11 @@ impl Divider<'_> {
                     + UNEVENNESS * ((area - 2.0 * moved_mm2) / area).powi(2)
                     + SEAM_LENGTH * length / area.sqrt();
                 if cost.is_finite() && best.as_ref().is_none_or(|b| cost < b.cost) {
-                    best = Some(Division { cost, n_faults, moved });
+                    best = Some(Division {
+                        cost,
+                        n_faults,
+                        moved,
+                    });
                 }
             }
             members.iter().for_each(|&f| label[f as usize] = patch);
@@ -106,7 +133,8 @@ impl Divider<'_> {
         self.mesh.points[a as usize].distance(self.mesh.points[b as usize])
     }
 
-    /// Triangles on the positive side of planes through the middle, normal to the 13 lattice directions of the principal frame.
+    /// Triangles on the positive side of planes through the middle, normal to the 13 lattice directions of
+    /// the principal frame.
     fn plane_halves(&self, members: &[u32]) -> impl Iterator<Item = Vec<u32>> {
         let area: f64 = members.iter().map(|&f| self.faces.area[f as usize]).sum();
         let weighted = |f: u32| self.faces.center[f as usize] * self.faces.area[f as usize];
@@ -117,31 +145,49 @@ impl Divider<'_> {
             spread += d * d.transpose() * self.faces.area[f as usize];
         }
         let axes = SymmetricEigen::new(spread).eigenvectors;
-        LatticeDirection::all().take(LatticeDirection::COUNT / 2).map(move |d| {
-            let normal = axes * nalgebra::Vector3::from(d.unit().to_array());
-            let normal = Vec3::new(normal.x, normal.y, normal.z);
-            let is_in_front = |f: &u32| (self.faces.center[*f as usize] - middle).dot(normal) > 0.0;
-            members.iter().copied().filter(is_in_front).collect()
-        })
+        LatticeDirection::all()
+            .take(LatticeDirection::COUNT / 2)
+            .map(move |d| {
+                let normal = axes * nalgebra::Vector3::from(d.unit().to_array());
+                let normal = Vec3::new(normal.x, normal.y, normal.z);
+                let is_in_front = |f: &u32| (self.faces.center[*f as usize] - middle).dot(normal) > 0.0;
+                members.iter().copied().filter(is_in_front).collect()
+            })
     }
 
-    /// What is nearer to the second point of each pair; also of the two ends of the patch. For every two pairs also what is nearer to one
-    /// point of each than to the others: a seam through two limbs at once.
+    /// What is nearer to the second point of each pair; also of the two ends of the patch. For every two
+    /// pairs also what is nearer to one point of each than to the others: a seam through two limbs at once.
     fn voronoi_halves(&self, label: &[u32], members: &[u32], pairs: &[[u32; 2]]) -> Vec<Vec<u32>> {
         let patch = label[members[0] as usize];
         let inside = |f: u32| label[f as usize] == patch;
         let farthest_from = |f: u32| {
             let (distance, _) = self.faces.grow(&[(f, 1.0)], inside);
-            let farther = |a: u32, b: u32| if distance[b as usize] > distance[a as usize] { b } else { a };
-            members.iter().copied().filter(|&m| distance[m as usize].is_finite()).fold(f, farther)
+            let farther = |a: u32, b: u32| {
+                if distance[b as usize] > distance[a as usize] {
+                    b
+                } else {
+                    a
+                }
+            };
+            members
+                .iter()
+                .copied()
+                .filter(|&m| distance[m as usize].is_finite())
+                .fold(f, farther)
         };
         let end = farthest_from(members[0]);
         let ends = [end, farthest_from(end)];
         let mut sources: Vec<Vec<u32>> = pairs.iter().chain([&ends]).map(|p| p.to_vec()).collect();
         // With two parts in all, the rest and what hangs, one seam is all there is to go through.
-        for (i, p) in pairs.iter().enumerate().filter(|_| (3..=MOST_PAIRED).contains(&pairs.len())) {
+        for (i, p) in pairs
+            .iter()
+            .enumerate()
+            .filter(|_| (3..=MOST_PAIRED).contains(&pairs.len()))
+        {
             sources.extend(
-                pairs[..i].iter().flat_map(|q| [[q[0], p[0], q[1], p[1]], [q[0], p[1], q[1], p[0]]].map(Vec::from)),
+                pairs[..i]
+                    .iter()
+                    .flat_map(|q| [[q[0], p[0], q[1], p[1]], [q[0], p[1], q[1], p[0]]].map(Vec::from)),
             );
         }
         let nearer_to_second = |sources: Vec<u32>| {
@@ -151,7 +197,11 @@ impl Divider<'_> {
             let is_second = |f: &u32| (n_first..sources.len()).contains(&(owner[*f as usize] as usize));
             members.iter().copied().filter(is_second).collect()
         };
-        sources.into_iter().filter(|s| s[0] != s[s.len() / 2]).map(nearer_to_second).collect()
+        sources
+            .into_iter()
+            .filter(|s| s[0] != s[s.len() / 2])
+            .map(nearer_to_second)
+            .collect()
     }
 
     /// Makes both halves connected: what is not in the largest part of its half joins the other one.
@@ -179,18 +229,26 @@ impl Divider<'_> {
             }
             let main = (0..parts.len()).fold(0, |best, i| if parts[i].0 > parts[best].0 { i } else { best });
             for (i, (_, part)) in parts.iter().enumerate() {
-                part.iter().for_each(|&f| label[f as usize] = if i == main { own } else { other });
+                part.iter()
+                    .for_each(|&f| label[f as usize] = if i == main { own } else { other });
             }
         }
     }
 }
 
-/// Corners − edges + triangles of each patch, its border included: 1 for a disk, 0 for a ring, 2 for a closed surface.
-pub(super) fn euler_characteristics(mesh: &TriMesh, topology: &Topology, label: &[u32], n_patches: usize) -> Vec<i64> {
+/// Corners − edges + triangles of each patch, its border included: 1 for a disk, 0 for a ring, 2 for a closed
+/// surface.
+pub(super) fn euler_characteristics(
+    mesh: &TriMesh,
+    topology: &Topology,
+    label: &[u32],
+    n_patches: usize,
+) -> Vec<i64> {
     const UNSEEN: u32 = u32::MAX;
     const MIXED: u32 = u32::MAX - 1;
     let mut of_point = vec![UNSEEN; mesh.points.len()];
-    // Twice the characteristic: 2 F − (3 F + B) + 2 (inner corners + B), as each of B border edges has one border corner.
+    // Twice the characteristic: 2 F − (3 F + B) + 2 (inner corners + B), as each of B border edges has one
+    // border corner.
     let mut doubled = vec![0i64; n_patches];
     for (face, t) in mesh.triangles.iter().enumerate() {
         let k = label[face];
@@ -203,7 +261,10 @@ pub(super) fn euler_characteristics(mesh: &TriMesh, topology: &Topology, label: 
             }
         }
     }
-    of_point.iter().filter(|&&k| k < MIXED).for_each(|&k| doubled[k as usize] += 2);
+    of_point
+        .iter()
+        .filter(|&&k| k < MIXED)
+        .for_each(|&k| doubled[k as usize] += 2);
     doubled.into_iter().map(|d| d / 2).collect()
 }
 
@@ -216,6 +277,8 @@ pub(super) fn raw_contact_graph(
     min_contact_mm: f64,
 ) -> ContactGraph {
     let found = stretches(divider.mesh, divider.topology, label, seam);
-    let lengths = found.iter().map(|s| (PatchId(s.a), PatchId(s.b), s.length(divider.mesh)));
+    let lengths = found
+        .iter()
+        .map(|s| (PatchId(s.a), PatchId(s.b), s.length(divider.mesh)));
     ContactGraph::from_stretches(n_patches, min_contact_mm, lengths)
 }

@@ -14,17 +14,40 @@ fn with_warnings<T>(run: impl FnOnce(&Ctx) -> T) -> (T, Vec<crate::Warning>) {
 
 /// A sphere of `radius_mm` with four arms, star-shaped around its centre.
 fn limbed() -> Solid {
-    let arms = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::new(0.1, 0.2, 1.0).normalize()];
-    let radius = |d: Vec3| 30.0 + arms.iter().map(|a| 60.0 * (-40.0 * (1.0 - a.dot(d))).exp()).sum::<f64>();
+    let arms = [
+        Vec3::X,
+        Vec3::NEG_X,
+        Vec3::Y,
+        Vec3::new(0.1, 0.2, 1.0).normalize(),
+    ];
+    let radius = |d: Vec3| {
+        30.0 + arms
+            .iter()
+            .map(|a| 60.0 * (-40.0 * (1.0 - a.dot(d))).exp())
+            .sum::<f64>()
+    };
     let sphere = octasphere(5);
     let points = sphere.points.iter().map(|&p| p * radius(p)).collect();
-    Solid::new(TriMesh { points, triangles: sphere.triangles }).unwrap()
+    Solid::new(TriMesh {
+        points,
+        triangles: sphere.triangles,
+    })
+    .unwrap()
 }
 
 /// The unit octahedron, each triangle divided into four `levels` times and pushed onto the unit sphere.
 fn octasphere(levels: usize) -> TriMesh {
     let points = vec![Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-    let triangles = vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let triangles = vec![
+        [0, 2, 4],
+        [2, 1, 4],
+        [1, 3, 4],
+        [3, 0, 4],
+        [2, 0, 5],
+        [1, 2, 5],
+        [3, 1, 5],
+        [0, 3, 5],
+    ];
     let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
     for _ in 0..levels {
         let (finer, _) = halve_edges(&solid, &Topology::new(&solid), |_, _| true);
@@ -73,7 +96,10 @@ fn automatic_patches_cover_the_closed_surface_and_hold_each_other_twice() {
     for (face, &source) in surface.source_face.iter().enumerate() {
         let normal = solid.mesh().face_normal(source as usize);
         let offset = surface.mesh.face_center(face) - solid.mesh().face_center(source as usize);
-        assert!(offset.dot(normal).abs() < 1e-9, "triangle {face} does not lie in its source");
+        assert!(
+            offset.dot(normal).abs() < 1e-9,
+            "triangle {face} does not lie in its source"
+        );
     }
 }
 
@@ -100,8 +126,13 @@ fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
 /// Segments the arms' labels with limits between which a seam half round an arm lies.
 fn segment_thin_arms(least_contact_mm: f64) -> (SegmentationParams, SegmentedSurface, Vec<crate::Warning>) {
     let solid = limbed();
-    let params = SegmentationParams { min_contact_mm: 45.0, least_contact_mm, ..Default::default() };
-    let (surface, warnings) = with_warnings(|ctx| segment(ctx, &params, &solid, Some(&arm_labels(&solid))).unwrap());
+    let params = SegmentationParams {
+        min_contact_mm: 45.0,
+        least_contact_mm,
+        ..Default::default()
+    };
+    let (surface, warnings) =
+        with_warnings(|ctx| segment(ctx, &params, &solid, Some(&arm_labels(&solid))).unwrap());
     (params, surface, warnings)
 }
 
@@ -110,7 +141,11 @@ fn arms_too_thin_for_two_contacts_join_their_neighbour_and_the_user_is_told_wher
     let (params, surface, warnings) = segment_thin_arms(45.0);
     assert!(surface.n_patches < 5);
     assert!(surface.contact_graph(params.min_contact_mm).is_two_connected());
-    assert!(warnings.iter().any(|w| w.code == "piece-joined" && w.at.is_some()));
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.code == "piece-joined" && w.at.is_some())
+    );
     assert_patches_are_connected(&surface);
 }
 
@@ -131,12 +166,23 @@ fn other_numbers_for_the_same_patches_give_the_same_seams() {
         let labels = user_labels(ctx, &params, &solid, &arm_labels(&solid)).unwrap();
         let n = labels.n_patches() as u32;
         let turned = labels.as_slice().iter().map(|k| (k + 2) % n).collect();
-        let turned = FaceLabels { patch_of_face: turned, n_patches: labels.n_patches() };
-        (smooth_and_cut(ctx, &params, &solid, &labels).unwrap(), smooth_and_cut(ctx, &params, &solid, &turned).unwrap())
+        let turned = FaceLabels {
+            patch_of_face: turned,
+            n_patches: labels.n_patches(),
+        };
+        (
+            smooth_and_cut(ctx, &params, &solid, &labels).unwrap(),
+            smooth_and_cut(ctx, &params, &solid, &turned).unwrap(),
+        )
     });
     assert_eq!(one.mesh, two.mesh);
     let n = one.n_patches as u32;
-    assert!(one.patch_of_face.iter().zip(&two.patch_of_face).all(|(p, q)| (p.0 + 2) % n == q.0));
+    assert!(
+        one.patch_of_face
+            .iter()
+            .zip(&two.patch_of_face)
+            .all(|(p, q)| (p.0 + 2) % n == q.0)
+    );
 }
 
 #[test]
@@ -157,14 +203,34 @@ fn seams_run_from_triple_point_to_triple_point_or_around() {
 #[test]
 fn a_box_of_twelve_triangles_keeps_its_six_sides() {
     let corner = |i: usize| Vec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64) * 60.0;
-    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let solid = Solid::new(TriMesh { points: (0..8).map(corner).collect(), triangles }).unwrap();
+    let sides = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = sides
+        .iter()
+        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+        .collect();
+    let solid = Solid::new(TriMesh {
+        points: (0..8).map(corner).collect(),
+        triangles,
+    })
+    .unwrap();
     let (fine, source) = halve_long_edges(&SegmentationParams::default(), &solid);
     let labels: Vec<i64> = source.iter().map(|f| i64::from(f / 2)).collect();
     let surface = with_ctx(|ctx| segment(ctx, &SegmentationParams::default(), &fine, Some(&labels))).unwrap();
     assert_eq!(surface.n_patches, 6);
-    assert!(surface.areas().as_slice().iter().all(|a| (a - 3600.0).abs() < 36.0));
+    assert!(
+        surface
+            .areas()
+            .as_slice()
+            .iter()
+            .all(|a| (a - 3600.0).abs() < 36.0)
+    );
 }
 
 #[test]
@@ -183,18 +249,34 @@ fn both_halves_of_a_split_piece_are_connected_and_similar() {
     let (one, two) = (area(&halves, 0), area(&halves, whole.n_patches()));
     assert!((one + two - area(&whole, 0)).abs() < 1e-9 && one.min(two) > 0.6 * one.max(two));
     let topology = Topology::new(&solid);
-    assert_eq!(FaceLabels::from_connected(&topology, halves.as_slice()).n_patches(), halves.n_patches());
+    assert_eq!(
+        FaceLabels::from_connected(&topology, halves.as_slice()).n_patches(),
+        halves.n_patches()
+    );
 }
 
 #[test]
 fn labels_that_mean_no_patches_are_refused() {
     let solid = limbed();
     let n_faces = solid.mesh().triangles.len();
-    let run = |labels: &[i64]| with_ctx(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, labels));
-    assert_eq!(run(&[1, 2]), Err(SegmentationError::LabelCount { n_labels: 2, n_faces }));
-    assert_eq!(run(&vec![4; n_faces]), Err(SegmentationError::OneLabel { label: 4, n_faces }));
+    let run =
+        |labels: &[i64]| with_ctx(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, labels));
+    assert_eq!(
+        run(&[1, 2]),
+        Err(SegmentationError::LabelCount { n_labels: 2, n_faces })
+    );
+    assert_eq!(
+        run(&vec![4; n_faces]),
+        Err(SegmentationError::OneLabel { label: 4, n_faces })
+    );
     let all: Vec<i64> = (0..n_faces as i64).collect();
-    assert_eq!(run(&all), Err(SegmentationError::TooManyLabels { n_labels: n_faces, n_faces }));
+    assert_eq!(
+        run(&all),
+        Err(SegmentationError::TooManyLabels {
+            n_labels: n_faces,
+            n_faces
+        })
+    );
 }
 
 #[test]
@@ -210,12 +292,19 @@ fn islands_join_what_surrounds_them_and_far_parts_become_pieces() {
     assert_eq!(patches.n_patches(), 5);
     let codes: Vec<&str> = warnings.iter().map(|w| w.code.as_str()).collect();
     assert_eq!(codes, ["label-split", "label-island"]);
-    assert!(warnings[1].message.starts_with("2 islands") && warnings[1].at.is_some(), "{warnings:?}");
+    assert!(
+        warnings[1].message.starts_with("2 islands") && warnings[1].at.is_some(),
+        "{warnings:?}"
+    );
 }
 
 #[test]
 fn default_parameters_have_no_problems_and_all_problems_are_listed() {
     assert!(SegmentationParams::default().problems().is_empty());
-    let bad = SegmentationParams { n_pieces: Some(1), smoothing_mm2: f64::NAN, ..Default::default() };
+    let bad = SegmentationParams {
+        n_pieces: Some(1),
+        smoothing_mm2: f64::NAN,
+        ..Default::default()
+    };
     assert_eq!(bad.problems().len(), 2);
 }

@@ -11,13 +11,16 @@ use crate::{Ctx, PatchId, Warning};
 const MIN_FACES: usize = 3;
 /// Most patches that ids and planning are made for.
 const MAX_LABELS: usize = 1000;
-/// A part apart from the rest of its label is an island below this share of the label's area, and a piece of its own above.
+/// A part apart from the rest of its label is an island below this share of the label's area, and a piece of
+/// its own above.
 const ISLAND_SHARE: f64 = 0.1;
 
-/// Patches from one label a triangle: numbered without gaps in order of the labels, each connected and large enough.
+/// Patches from one label a triangle: numbered without gaps in order of the labels, each connected and large
+/// enough.
 ///
-/// Parts of a label far apart become pieces of their own (`label-split`), islands (`label-island`, one warning for all) and
-/// patches that are too small (`label-merged`) join the neighbour with the longest common seam.
+/// Parts of a label far apart become pieces of their own (`label-split`), islands (`label-island`, one
+/// warning for all) and patches that are too small (`label-merged`) join the neighbour with the longest
+/// common seam.
 pub fn user_labels(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -26,25 +29,41 @@ pub fn user_labels(
 ) -> Result<FaceLabels, SegmentationError> {
     let n_faces = solid.mesh().triangles.len();
     if labels.len() != n_faces {
-        return Err(SegmentationError::LabelCount { n_labels: labels.len(), n_faces });
+        return Err(SegmentationError::LabelCount {
+            n_labels: labels.len(),
+            n_faces,
+        });
     }
-    let names: Vec<i64> = labels.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
+    let names: Vec<i64> = labels
+        .iter()
+        .copied()
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect();
     if let &[label] = &names[..] {
         return Err(SegmentationError::OneLabel { label, n_faces });
     }
     if names.len() * MIN_FACES > n_faces || names.len() > MAX_LABELS {
-        return Err(SegmentationError::TooManyLabels { n_labels: names.len(), n_faces });
+        return Err(SegmentationError::TooManyLabels {
+            n_labels: names.len(),
+            n_faces,
+        });
     }
     ctx.check()?;
     let topology = Topology::new(solid);
-    let label: Vec<u32> = labels.iter().map(|l| names.partition_point(|n| n < l) as u32).collect();
+    let label: Vec<u32> = labels
+        .iter()
+        .map(|l| names.partition_point(|n| n < l) as u32)
+        .collect();
     let mut parts = Parts::new(solid.mesh(), &topology, &label);
     parts.merge_islands(ctx, params, &names);
     parts.merge_small(ctx, params, &names);
     // Parts are numbered by label already, so the patches follow the order of the labels.
     let cleaned = FaceLabels::from_connected(&topology, &parts.part_of_face);
     if cleaned.n_patches() < 2 {
-        return Err(SegmentationError::AllTooSmall { min_piece_mm2: params.min_piece_mm2 });
+        return Err(SegmentationError::AllTooSmall {
+            min_piece_mm2: params.min_piece_mm2,
+        });
     }
     Ok(cleaned)
 }
@@ -70,15 +89,26 @@ impl<'a> Parts<'a> {
             area[p as usize] += mesh.face_area(face);
             n_faces[p as usize] += 1;
         }
-        Self { mesh, topology, part_of_face: parts.patch_of_face, label, area, n_faces }
+        Self {
+            mesh,
+            topology,
+            part_of_face: parts.patch_of_face,
+            label,
+            area,
+            n_faces,
+        }
     }
 
     fn merge_islands(&mut self, ctx: &Ctx, params: &SegmentationParams, names: &[i64]) {
         let (mut n_islands, mut islands_mm2, mut largest) = (0, 0.0, None);
         for label in 0..names.len() as u32 {
-            let mut same: Vec<usize> = (0..self.label.len()).filter(|&p| self.label[p] == label).collect();
+            let mut same: Vec<usize> = (0..self.label.len())
+                .filter(|&p| self.label[p] == label)
+                .collect();
             same.sort_by(|&p, &q| self.area[q].total_cmp(&self.area[p]));
-            let Some((&main, others)) = same.split_first() else { continue };
+            let Some((&main, others)) = same.split_first() else {
+                continue;
+            };
             let island_mm2 = params.min_piece_mm2.max(ISLAND_SHARE * self.area[main]);
             for &part in others {
                 let area = self.area[part];
@@ -90,8 +120,9 @@ impl<'a> Parts<'a> {
                     }
                     self.merge(part);
                 } else {
-                    let message =
-                        format!("label {name} has parts that do not touch: {area:.0} mm² become a piece of their own");
+                    let message = format!(
+                        "label {name} has parts that do not touch: {area:.0} mm² become a piece of their own"
+                    );
                     self.warn(ctx, "label-split", part, message);
                 }
             }
@@ -104,7 +135,12 @@ impl<'a> Parts<'a> {
                      the largest has {area:.1} mm² of label {name}"
                 ),
             };
-            ctx.warn(Warning { code: "label-island".into(), message, pieces: Vec::new(), at });
+            ctx.warn(Warning {
+                code: "label-island".into(),
+                message,
+                pieces: Vec::new(),
+                at,
+            });
         }
     }
 
@@ -112,9 +148,11 @@ impl<'a> Parts<'a> {
         let is_small = |parts: &Self, p: usize| {
             parts.n_faces[p] > 0 && (parts.area[p] < params.min_piece_mm2 || parts.n_faces[p] < MIN_FACES)
         };
-        // Each merge leaves one part fewer, so this ends; the smallest goes first and may make its neighbour large enough.
-        while let Some(part) =
-            (0..self.area.len()).filter(|&p| is_small(self, p)).min_by(|&p, &q| self.area[p].total_cmp(&self.area[q]))
+        // Each merge leaves one part fewer, so this ends; the smallest goes first and may make its neighbour
+        // large enough.
+        while let Some(part) = (0..self.area.len())
+            .filter(|&p| is_small(self, p))
+            .min_by(|&p, &q| self.area[p].total_cmp(&self.area[q]))
         {
             let name = names[self.label[part] as usize];
             let message = format!(
@@ -145,7 +183,10 @@ impl<'a> Parts<'a> {
             }
         }
         let Some(into) = into else { return false };
-        self.part_of_face.iter_mut().filter(|p| **p as usize == part).for_each(|p| *p = into as u32);
+        self.part_of_face
+            .iter_mut()
+            .filter(|p| **p as usize == part)
+            .for_each(|p| *p = into as u32);
         self.area[into] += std::mem::take(&mut self.area[part]);
         self.n_faces[into] += std::mem::take(&mut self.n_faces[part]);
         true
@@ -153,7 +194,12 @@ impl<'a> Parts<'a> {
 
     fn warn(&self, ctx: &Ctx, code: &str, part: usize, message: String) {
         let at = self.place_of(part);
-        ctx.warn(Warning { code: code.into(), message, pieces: Vec::<PatchId>::new(), at });
+        ctx.warn(Warning {
+            code: code.into(),
+            message,
+            pieces: Vec::<PatchId>::new(),
+            at,
+        });
     }
 
     fn place_of(&self, part: usize) -> Option<[f64; 3]> {

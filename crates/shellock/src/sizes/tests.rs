@@ -4,7 +4,11 @@ use super::*;
 use crate::testing::{label, sphere};
 
 const PARAMS: SizeParams = SizeParams {
-    choice: SizeChoice::Auto(SizeRange { min_mm: 2.0, max_mm: 4.0, alpha_per_mpa: None }),
+    choice: SizeChoice::Auto(SizeRange {
+        min_mm: 2.0,
+        max_mm: 4.0,
+        alpha_per_mpa: None,
+    }),
     wall_mm: 2.0,
     clearance_mm: 0.1,
     strength_mpa: 42.0,
@@ -36,24 +40,42 @@ fn equation_3_gives_the_least_size_without_stress_and_the_largest_from_the_stren
     assert_eq!([0.0, -1.0, f64::NAN].map(size), [2.0; 3]);
     assert_eq!([42.0, 43.0, f64::INFINITY].map(size), [4.0; 3]);
     assert!((size(21.0) - 3.0).abs() < 1e-12);
-    let steep = SizeRange { alpha_per_mpa: Some(0.1), ..range };
+    let steep = SizeRange {
+        alpha_per_mpa: Some(0.1),
+        ..range
+    };
     assert!((size_for_stress_mm(&steep, 42.0, 5.0) - 3.0).abs() < 1e-12);
 }
 
 #[test]
 fn pairs_are_unordered_and_others_get_the_default() {
     let sizes = ConnectorSizes::with_pairs(2.0, [([B, A], 3.0), ([B, PatchId(2)], 2.5)]);
-    assert_eq!([sizes.of(A, B), sizes.of(B, A), sizes.of(A, PatchId(2))], [3.0, 3.0, 2.0]);
+    assert_eq!(
+        [sizes.of(A, B), sizes.of(B, A), sizes.of(A, PatchId(2))],
+        [3.0, 3.0, 2.0]
+    );
     assert_eq!((sizes.default_mm(), sizes.largest_mm()), (2.0, 3.0));
-    assert_eq!(sizes.pairs().collect::<Vec<_>>(), [([A, B], 3.0), ([B, PatchId(2)], 2.5)]);
+    assert_eq!(
+        sizes.pairs().collect::<Vec<_>>(),
+        [([A, B], 3.0), ([B, PatchId(2)], 2.5)]
+    );
     assert_eq!(ConnectorSizes::uniform(2.5).largest_mm(), 2.5);
 }
 
 #[test]
 fn a_fixed_size_is_that_of_all_pairs_whatever_the_stress() {
-    let params = SizeParams { choice: SizeChoice::Fixed(2.5), ..PARAMS };
+    let params = SizeParams {
+        choice: SizeChoice::Fixed(2.5),
+        ..PARAMS
+    };
     let (found, warnings) = chosen(&halves(Vec3::new(5.0, 5.0, 30.0)), &params, Some(&|_| 40.0));
-    assert_eq!(found, ChosenSizes { sizes: ConnectorSizes::default(), limited: Vec::new() });
+    assert_eq!(
+        found,
+        ChosenSizes {
+            sizes: ConnectorSizes::default(),
+            limited: Vec::new()
+        }
+    );
     assert!(warnings.is_empty());
 }
 
@@ -65,13 +87,23 @@ fn where_all_fits_the_greatest_stress_of_a_seam_alone_decides() {
     // A peak at one place of the seam; what lies off the seam does not count.
     let field = |p: Vec3| if p.z.abs() > 10.0 { 42.0 } else { 21.0 * p.x / 40.0 };
     let (some, warnings) = chosen(&surface, &PARAMS, Some(&field));
-    assert!((some.sizes.of(A, B) - 3.0).abs() < 0.01 && warnings.is_empty(), "{some:?}");
+    assert!(
+        (some.sizes.of(A, B) - 3.0).abs() < 0.01 && warnings.is_empty(),
+        "{some:?}"
+    );
 }
 
 #[test]
 fn in_a_narrow_limb_the_channel_stays_off_the_wall_opposite() {
-    // A limb 10.4 mm thick: 6.4 mm of cavity, less two clearances, is 6.2 mm = 1.05 D for D = 5.9; 7.4 mm leaves 3.05.
-    let thick = |radius_mm: f64| chosen(&halves(Vec3::new(radius_mm, radius_mm, 60.0)), &PARAMS, Some(&|_| 42.0));
+    // A limb 10.4 mm thick: 6.4 mm of cavity, less two clearances, is 6.2 mm = 1.05 D for D = 5.9; 7.4 mm
+    // leaves 3.05.
+    let thick = |radius_mm: f64| {
+        chosen(
+            &halves(Vec3::new(radius_mm, radius_mm, 60.0)),
+            &PARAMS,
+            Some(&|_| 42.0),
+        )
+    };
     let (wide, warnings) = thick(5.2);
     assert!(wide.sizes.of(A, B) == 4.0 && warnings.is_empty(), "{wide:?}");
     let (narrow, warnings) = thick(3.7);
@@ -79,7 +111,10 @@ fn in_a_narrow_limb_the_channel_stays_off_the_wall_opposite() {
     assert!((size_mm - 3.2 / 1.05).abs() < 0.1, "{size_mm}");
     assert!(depth_mm(size_mm, 0.1) + 0.1 <= 7.4 - 4.0 + 1e-9);
     assert_eq!(warnings.len(), 1);
-    assert_eq!((warnings[0].code.as_str(), warnings[0].pieces.as_slice()), ("connector-limited", [A, B].as_slice()));
+    assert_eq!(
+        (warnings[0].code.as_str(), warnings[0].pieces.as_slice()),
+        ("connector-limited", [A, B].as_slice())
+    );
     assert!(
         warnings[0].message.contains("3.0 mm") && warnings[0].message.contains("4.0 mm"),
         "{}",
@@ -92,25 +127,47 @@ fn in_a_narrow_limb_the_channel_stays_off_the_wall_opposite() {
 
 #[test]
 fn a_short_seam_gets_the_largest_size_with_which_it_is_a_contact() {
-    let params = SizeParams { wall_mm: 0.5, ..PARAMS };
+    let params = SizeParams {
+        wall_mm: 0.5,
+        ..PARAMS
+    };
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
     let octants = |radius_mm: f64| label(sphere(4, Vec3::splat(radius_mm)), 8, octant);
     let (found, warnings) = chosen(&octants(12.0), &params, Some(&|_| 42.0));
     // Seams are quarters of circles; inside the wall their radius is 11.5 mm.
     let expected_mm = std::f64::consts::FRAC_PI_2 * 11.5 / CONTACT_SIZES;
     for (pair, size_mm) in found.sizes.pairs() {
-        assert!((size_mm - expected_mm).abs() < 0.05, "{pair:?} {size_mm} {expected_mm}");
+        assert!(
+            (size_mm - expected_mm).abs() < 0.05,
+            "{pair:?} {size_mm} {expected_mm}"
+        );
     }
     // All twelve are short, and one warning says so.
-    assert_eq!((found.limited.len(), warnings.len(), warnings[0].pieces.len()), (12, 1, 8));
-    assert!(warnings[0].message.contains("11 other pairs"), "{}", warnings[0].message);
+    assert_eq!(
+        (found.limited.len(), warnings.len(), warnings[0].pieces.len()),
+        (12, 1, 8)
+    );
+    assert!(
+        warnings[0].message.contains("11 other pairs"),
+        "{}",
+        warnings[0].message
+    );
     let (least, _) = chosen(&octants(6.0), &params, Some(&|_| 42.0));
-    assert!(least.sizes.pairs().all(|(_, size_mm)| size_mm == 2.0), "{least:?}");
+    assert!(
+        least.sizes.pairs().all(|(_, size_mm)| size_mm == 2.0),
+        "{least:?}"
+    );
 }
 
 #[test]
 fn a_wish_that_is_missed_by_little_is_not_told() {
-    let at = |stress_mpa: f64| chosen(&halves(Vec3::new(3.7, 3.7, 60.0)), &PARAMS, Some(&move |_| stress_mpa));
+    let at = |stress_mpa: f64| {
+        chosen(
+            &halves(Vec3::new(3.7, 3.7, 60.0)),
+            &PARAMS,
+            Some(&move |_| stress_mpa),
+        )
+    };
     // 23 MPa ask for 3.1 mm where 3.05 fit.
     let (found, warnings) = at(23.0);
     assert!(found.sizes.of(A, B) < 3.09 && warnings.is_empty(), "{found:?}");
@@ -123,19 +180,32 @@ fn choices_are_read_and_written_alike_and_every_fault_is_named() {
         assert_eq!(text.parse::<SizeChoice>().unwrap().to_string(), text);
     }
     assert_eq!("large".parse::<SizeChoice>(), Err(NoSize));
-    assert!(SizeChoice::default().problems().is_empty() && "auto".parse::<SizeChoice>().unwrap().problems().is_empty());
+    assert!(
+        SizeChoice::default().problems().is_empty()
+            && "auto".parse::<SizeChoice>().unwrap().problems().is_empty()
+    );
     assert_eq!(SizeChoice::Fixed(f64::NAN).problems().len(), 1);
-    let bad = SizeRange { min_mm: 1.0, max_mm: 0.5, alpha_per_mpa: Some(-1.0) };
+    let bad = SizeRange {
+        min_mm: 1.0,
+        max_mm: 0.5,
+        alpha_per_mpa: Some(-1.0),
+    };
     assert_eq!(SizeChoice::Auto(bad).problems().len(), 3);
 }
 
 #[test]
 fn an_empty_surface_has_no_sizes() {
     let surface = SegmentedSurface {
-        mesh: TriMesh { points: Vec::new(), triangles: Vec::new() },
+        mesh: TriMesh {
+            points: Vec::new(),
+            triangles: Vec::new(),
+        },
         patch_of_face: Vec::new(),
         source_face: Vec::new(),
         n_patches: 0,
     };
-    assert_eq!(chosen(&surface, &PARAMS, Some(&|_| 1.0)).0.sizes.pairs().count(), 0);
+    assert_eq!(
+        chosen(&surface, &PARAMS, Some(&|_| 1.0)).0.sizes.pairs().count(),
+        0
+    );
 }

@@ -1,5 +1,5 @@
-//! What the falls do to the wall (Fig. 7): the stress of the fall that decides, the stress along the seams with the connectors
-//! that it asks for, and how the stress depends on the thickness.
+//! What the falls do to the wall (Fig. 7): the stress of the fall that decides, the stress along the seams
+//! with the connectors that it asks for, and how the stress depends on the thickness.
 
 use std::fmt::Write;
 
@@ -18,8 +18,15 @@ const VIEW_PX: usize = 420;
 const CHART_PX: f64 = 440.0;
 /// Pixels of a row: a title, two views, a line of words.
 const ROW_PX: f64 = VIEW_PX as f64 + 60.0;
-/// Colours from no stress to the strength, evenly apart, sRGB: they grow lighter, so that they are told apart in grey.
-const SCALE: [[u8; 3]; 5] = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+/// Colours from no stress to the strength, evenly apart, sRGB: they grow lighter, so that they are told apart
+/// in grey.
+const SCALE: [[u8; 3]; 5] = [
+    [68, 1, 84],
+    [59, 82, 139],
+    [33, 145, 140],
+    [94, 201, 98],
+    [253, 231, 37],
+];
 /// Above the strength.
 const TOO_MUCH: [u8; 3] = [214, 39, 40];
 /// Where the model is solid.
@@ -40,7 +47,8 @@ pub struct SeamStress {
     pub size_mm: f64,
 }
 
-/// An SVG text with embedded pictures, about 1300 × 960 pixels. `stand` turns the model so that it stands on z = 0.
+/// An SVG text with embedded pictures, about 1300 × 960 pixels. `stand` turns the model so that it stands on
+/// z = 0.
 pub fn strength_chart(
     strength: &Strength,
     strength_mpa: f64,
@@ -52,19 +60,54 @@ pub fn strength_chart(
         triangles: mesh.triangles.clone(),
     };
     let model = turned(&strength.mesh);
-    let paint = |(mpa, is_solid): (&f64, &bool)| if *is_solid { SOLID } else { color(mpa / strength_mpa) };
-    let stress: Vec<[u8; 3]> = strength.deciding_mpa.iter().zip(&strength.is_solid).map(paint).collect();
-    let field = [Painted { mesh: &model, color: PALE, face_colors: Some(&stress), shift: Vec3::ZERO, normals: None }];
+    let paint = |(mpa, is_solid): (&f64, &bool)| {
+        if *is_solid {
+            SOLID
+        } else {
+            color(mpa / strength_mpa)
+        }
+    };
+    let stress: Vec<[u8; 3]> = strength
+        .deciding_mpa
+        .iter()
+        .zip(&strength.is_solid)
+        .map(paint)
+        .collect();
+    let field = [Painted {
+        mesh: &model,
+        color: PALE,
+        face_colors: Some(&stress),
+        shift: Vec3::ZERO,
+        normals: None,
+    }];
     let (tubes, tube_colors) = tubes(seams, strength_mpa);
     let tubes = turned(&tubes);
     let along = [
-        Painted { mesh: &model, color: PALE, face_colors: None, shift: Vec3::ZERO, normals: None },
-        Painted { mesh: &tubes, color: PALE, face_colors: Some(&tube_colors), shift: Vec3::ZERO, normals: None },
+        Painted {
+            mesh: &model,
+            color: PALE,
+            face_colors: None,
+            shift: Vec3::ZERO,
+            normals: None,
+        },
+        Painted {
+            mesh: &tubes,
+            color: PALE,
+            face_colors: Some(&tube_colors),
+            shift: Vec3::ZERO,
+            normals: None,
+        },
     ];
-    let views =
-        [(&field[..], Camera::front()), (&field, Camera::back()), (&along, Camera::front()), (&along, Camera::back())];
-    let pictures: Vec<Vec<u8>> =
-        views.par_iter().map(|(scene, camera)| render(scene, camera, VIEW_PX, VIEW_PX).on([255; 3]).png()).collect();
+    let views = [
+        (&field[..], Camera::front()),
+        (&field, Camera::back()),
+        (&along, Camera::front()),
+        (&along, Camera::back()),
+    ];
+    let pictures: Vec<Vec<u8>> = views
+        .par_iter()
+        .map(|(scene, camera)| render(scene, camera, VIEW_PX, VIEW_PX).on([255; 3]).png())
+        .collect();
     page(strength, strength_mpa, seams, &pictures)
 }
 
@@ -76,7 +119,9 @@ fn color(share: f64) -> [u8; 3] {
     let place = share.max(0.0) * (SCALE.len() - 1) as f64;
     let i = (place as usize).min(SCALE.len() - 2);
     let t = place - i as f64;
-    std::array::from_fn(|k| (f64::from(SCALE[i][k]) * (1.0 - t) + f64::from(SCALE[i + 1][k]) * t).round() as u8)
+    std::array::from_fn(|k| {
+        (f64::from(SCALE[i][k]) * (1.0 - t) + f64::from(SCALE[i + 1][k]) * t).round() as u8
+    })
 }
 
 /// A tube about each seam, open at its ends, and the colours of its triangles.
@@ -85,18 +130,22 @@ fn tubes(seams: &[SeamStress], strength_mpa: f64) -> (TriMesh, Vec<[u8; 3]>) {
     let mut colors = Vec::new();
     for seam in seams {
         for (ends, mpa) in seam.points.windows(2).zip(seam.stress_mpa.windows(2)) {
-            let Some(along) = (ends[1] - ends[0]).try_normalize() else { continue };
+            let Some(along) = (ends[1] - ends[0]).try_normalize() else {
+                continue;
+            };
             let (x, y) = along.any_orthonormal_pair();
             let first = mesh.points.len() as u32;
             for end in ends {
                 mesh.points.extend((0..TUBE_SIDES).map(|side| {
-                    let (sin, cos) = (std::f64::consts::TAU * f64::from(side) / f64::from(TUBE_SIDES)).sin_cos();
+                    let (sin, cos) =
+                        (std::f64::consts::TAU * f64::from(side) / f64::from(TUBE_SIDES)).sin_cos();
                     *end + 0.5 * seam.size_mm * (cos * x + sin * y)
                 }));
             }
             for side in 0..TUBE_SIDES {
                 let [a, b] = [first + side, first + (side + 1) % TUBE_SIDES];
-                mesh.triangles.extend([[a, b, b + TUBE_SIDES], [a, b + TUBE_SIDES, a + TUBE_SIDES]]);
+                mesh.triangles
+                    .extend([[a, b, b + TUBE_SIDES], [a, b + TUBE_SIDES, a + TUBE_SIDES]]);
             }
             colors.resize(mesh.triangles.len(), color(mpa[0].max(mpa[1]) / strength_mpa));
         }
@@ -109,10 +158,19 @@ fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: 
     let (width, height) = (2.0 * view + CHART_PX, 2.0 * ROW_PX);
     let mut svg = begin(width, height);
     let sizes = seams.iter().map(|s| s.size_mm);
-    let (least, most) = (sizes.clone().fold(f64::INFINITY, f64::min), sizes.fold(0.0, f64::max));
+    let (least, most) = (
+        sizes.clone().fold(f64::INFINITY, f64::min),
+        sizes.fold(0.0, f64::max),
+    );
     let rows = [
-        format!("Von Mises stress in fall {} of the wall of {:.2} mm", strength.deciding.0 + 1, strength.thickness_mm),
-        format!("Largest stress of all falls along the seams; connectors {least:.1} to {most:.1} mm, drawn as thick"),
+        format!(
+            "Von Mises stress in fall {} of the wall of {:.2} mm",
+            strength.deciding.0 + 1,
+            strength.thickness_mm
+        ),
+        format!(
+            "Largest stress of all falls along the seams; connectors {least:.1} to {most:.1} mm, drawn as thick"
+        ),
     ];
     for (row, title) in rows.iter().enumerate() {
         let top = row as f64 * ROW_PX;
@@ -128,7 +186,12 @@ fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: 
         }
     }
     legend(&mut svg, [2.0 * view + 40.0, 60.0], strength_mpa);
-    curve(&mut svg, [2.0 * view + 70.0, ROW_PX + 60.0], strength, strength_mpa);
+    curve(
+        &mut svg,
+        [2.0 * view + 70.0, ROW_PX + 60.0],
+        strength,
+        strength_mpa,
+    );
     end(svg)
 }
 
@@ -138,7 +201,12 @@ fn legend(svg: &mut String, [x, y]: [f64; 2], strength_mpa: f64) {
     const STEP_PX: f64 = 4.0;
     for step in 0..STEPS {
         let share = (f64::from(step) + 0.5) / f64::from(STEPS);
-        swatch(svg, [x, y + f64::from(STEPS - 1 - step) * STEP_PX], [24.0, STEP_PX + 0.5], color(share));
+        swatch(
+            svg,
+            [x, y + f64::from(STEPS - 1 - step) * STEP_PX],
+            [24.0, STEP_PX + 0.5],
+            color(share),
+        );
     }
     let (bottom, height) = (y + f64::from(STEPS) * STEP_PX, f64::from(STEPS) * STEP_PX);
     for quarter in 0..=4 {
@@ -146,8 +214,12 @@ fn legend(svg: &mut String, [x, y]: [f64; 2], strength_mpa: f64) {
         let words = format!("{:.0} MPa", share * strength_mpa);
         text(svg, [x + 34.0, bottom - share * height + 5.0], "", &words);
     }
-    for (i, (paint, words)) in
-        [(TOO_MUCH, "more than the material bears"), (SOLID, "solid: too thin for a cavity")].iter().enumerate()
+    for (i, (paint, words)) in [
+        (TOO_MUCH, "more than the material bears"),
+        (SOLID, "solid: too thin for a cavity"),
+    ]
+    .iter()
+    .enumerate()
     {
         let top = bottom + 24.0 + 26.0 * i as f64;
         swatch(svg, [x, top], [24.0, 16.0], *paint);
@@ -158,7 +230,12 @@ fn legend(svg: &mut String, [x, y]: [f64; 2], strength_mpa: f64) {
 /// Stress over thickness, as far as it was looked at; the strength as a line, the chosen thickness as a dot.
 fn curve(svg: &mut String, [x, y]: [f64; 2], strength: &Strength, strength_mpa: f64) {
     const SIZE: [f64; 2] = [330.0, 290.0];
-    text(svg, [x - 40.0, y - 36.0], "font-weight=\"bold\"", "Stress and thickness");
+    text(
+        svg,
+        [x - 40.0, y - 36.0],
+        "font-weight=\"bold\"",
+        "Stress and thickness",
+    );
     let last_mm = strength.tried.iter().map(|t| t.thickness_mm).fold(1.0, f64::max);
     let last_mm = (last_mm / 2.0).ceil() * 2.0;
     let stresses = strength.tried.iter().map(|t| t.stress_mpa);
@@ -168,20 +245,54 @@ fn curve(svg: &mut String, [x, y]: [f64; 2], strength: &Strength, strength_mpa: 
         let share = f64::from(i) / 4.0;
         let ([_, line], [tick, _]) = (at(0.0, share * top_mpa), at(share * last_mm, 0.0));
         let _ = writeln!(svg, "<path d=\"M{x} {line:.1}h{}\" stroke=\"#ddd\"/>", SIZE[0]);
-        text(svg, [x - 8.0, line + 5.0], "text-anchor=\"end\"", &format!("{:.0}", share * top_mpa));
-        text(svg, [tick, y + SIZE[1] + 20.0], "text-anchor=\"middle\"", &format!("{:.1}", share * last_mm));
+        text(
+            svg,
+            [x - 8.0, line + 5.0],
+            "text-anchor=\"end\"",
+            &format!("{:.0}", share * top_mpa),
+        );
+        text(
+            svg,
+            [tick, y + SIZE[1] + 20.0],
+            "text-anchor=\"middle\"",
+            &format!("{:.1}", share * last_mm),
+        );
     }
-    text(svg, [x + SIZE[0] / 2.0, y + SIZE[1] + 42.0], "text-anchor=\"middle\"", "thickness, mm");
+    text(
+        svg,
+        [x + SIZE[0] / 2.0, y + SIZE[1] + 42.0],
+        "text-anchor=\"middle\"",
+        "thickness, mm",
+    );
     text(svg, [x - 8.0, y - 12.0], "text-anchor=\"end\"", "MPa");
     let [_, limit] = at(0.0, strength_mpa);
-    let _ = writeln!(svg, "<path d=\"M{x} {limit:.1}h{}\" stroke=\"#d62728\" stroke-dasharray=\"6 4\"/>", SIZE[0]);
-    text(svg, [x + 6.0, limit - 6.0], "fill=\"#d62728\"", "the material\u{2019}s strength");
-    let points: Vec<[f64; 2]> = strength.tried.iter().map(|t| at(t.thickness_mm, t.stress_mpa)).collect();
+    let _ = writeln!(
+        svg,
+        "<path d=\"M{x} {limit:.1}h{}\" stroke=\"#d62728\" stroke-dasharray=\"6 4\"/>",
+        SIZE[0]
+    );
+    text(
+        svg,
+        [x + 6.0, limit - 6.0],
+        "fill=\"#d62728\"",
+        "the material\u{2019}s strength",
+    );
+    let points: Vec<[f64; 2]> = strength
+        .tried
+        .iter()
+        .map(|t| at(t.thickness_mm, t.stress_mpa))
+        .collect();
     let path: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-    let _ =
-        writeln!(svg, "<polyline points=\"{}\" fill=\"none\" stroke=\"#3b528b\" stroke-width=\"2\"/>", path.join(" "));
+    let _ = writeln!(
+        svg,
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"#3b528b\" stroke-width=\"2\"/>",
+        path.join(" ")
+    );
     for [cx, cy] in points {
-        let _ = writeln!(svg, "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"3\" fill=\"#3b528b\"/>");
+        let _ = writeln!(
+            svg,
+            "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"3\" fill=\"#3b528b\"/>"
+        );
     }
     let [cx, cy] = at(strength.thickness_mm, strength.stress_mpa);
     let _ = writeln!(
@@ -206,9 +317,17 @@ mod tests {
 
     #[test]
     fn colours_are_the_scale_at_its_ends_grow_lighter_and_warn_above() {
-        assert_eq!((color(-1.0), color(0.0), color(1.0), color(1.001)), (SCALE[0], SCALE[0], SCALE[4], TOO_MUCH));
+        assert_eq!(
+            (color(-1.0), color(0.0), color(1.0), color(1.001)),
+            (SCALE[0], SCALE[0], SCALE[4], TOO_MUCH)
+        );
         let light = |share: f64| {
-            color(share).map(f64::from).iter().zip([0.2126, 0.7152, 0.0722]).map(|(c, w)| c * w).sum::<f64>()
+            color(share)
+                .map(f64::from)
+                .iter()
+                .zip([0.2126, 0.7152, 0.0722])
+                .map(|(c, w)| c * w)
+                .sum::<f64>()
         };
         assert!((1..=20).all(|i| light(f64::from(i) / 20.0) > light(f64::from(i - 1) / 20.0)));
     }
@@ -216,9 +335,17 @@ mod tests {
     #[test]
     fn a_tube_keeps_its_distance_from_the_seam_and_takes_the_greater_stress() {
         let points = vec![Vec3::ZERO, Vec3::new(0.0, 0.0, 5.0), Vec3::new(0.0, 0.0, 9.0)];
-        let seam = SeamStress { points, stress_mpa: vec![0.0, 42.0, 21.0], size_mm: 3.0 };
+        let seam = SeamStress {
+            points,
+            stress_mpa: vec![0.0, 42.0, 21.0],
+            size_mm: 3.0,
+        };
         let (mesh, colors) = tubes(&[seam], 42.0);
-        assert!(mesh.points.iter().all(|p| (p.truncate().length() - 1.5).abs() < 1e-12));
+        assert!(
+            mesh.points
+                .iter()
+                .all(|p| (p.truncate().length() - 1.5).abs() < 1e-12)
+        );
         assert_eq!(colors, vec![SCALE[4]; 4 * TUBE_SIDES as usize]);
     }
 }

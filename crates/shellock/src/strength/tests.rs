@@ -8,7 +8,13 @@ fn ball(radius_mm: f64) -> Solid {
 }
 
 fn quick(drop_m: f64) -> StrengthParams {
-    StrengthParams { drop_m, n_cases: 3, refinement: 0.1, least_mm: 0.5, ..StrengthParams::default() }
+    StrengthParams {
+        drop_m,
+        n_cases: 3,
+        refinement: 0.1,
+        least_mm: 0.5,
+        ..StrengthParams::default()
+    }
 }
 
 fn found(params: &StrengthParams, model: &Solid) -> Strength {
@@ -21,19 +27,37 @@ fn the_wall_found_is_stressed_to_the_strength_and_no_thinner_one_bears_it() {
     let mut params = quick(1.275);
     params.refinement = 0.3;
     for wall_mm in [0.9, 1.7, 2.6] {
-        let limit_mpa = stress(&Ctx::quiet(), &params, &model, wall_mm).unwrap().stress_mpa;
+        let limit_mpa = stress(&Ctx::quiet(), &params, &model, wall_mm)
+            .unwrap()
+            .stress_mpa;
         params.material.strength_mpa = limit_mpa;
         let strength = found(&params, &model);
-        assert!((strength.stress_mpa / limit_mpa - 1.0).abs() < 0.02, "{wall_mm}: {limit_mpa} {:?}", strength.tried);
-        let thinner = strength.tried.iter().rfind(|t| t.thickness_mm < strength.thickness_mm).unwrap();
-        assert!(thinner.stress_mpa > 0.99 * limit_mpa, "{wall_mm}: {limit_mpa} {:?}", strength.tried);
+        assert!(
+            (strength.stress_mpa / limit_mpa - 1.0).abs() < 0.02,
+            "{wall_mm}: {limit_mpa} {:?}",
+            strength.tried
+        );
+        let thinner = strength
+            .tried
+            .iter()
+            .rfind(|t| t.thickness_mm < strength.thickness_mm)
+            .unwrap();
+        assert!(
+            thinner.stress_mpa > 0.99 * limit_mpa,
+            "{wall_mm}: {limit_mpa} {:?}",
+            strength.tried
+        );
         assert!(strength.thickness_mm - thinner.thickness_mm <= RESOLUTION_MM);
     }
 }
 
 #[test]
 fn stress_is_proportional_to_the_speed() {
-    let at = |drop_m| stress(&Ctx::quiet(), &quick(drop_m), &ball(60.0), 2.0).unwrap().stress_mpa;
+    let at = |drop_m| {
+        stress(&Ctx::quiet(), &quick(drop_m), &ball(60.0), 2.0)
+            .unwrap()
+            .stress_mpa
+    };
     assert!((at(4.0) / at(1.0) - 2.0).abs() < 1e-9);
 }
 
@@ -57,7 +81,11 @@ fn what_no_wall_bears_is_told_and_gets_no_wall_that_does_not_help() {
     let mut params = quick(1.275);
     params.material.strength_mpa = 0.01;
     let strength = found(&params, &ball(60.0));
-    let least = strength.tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
+    let least = strength
+        .tried
+        .iter()
+        .map(|t| t.stress_mpa)
+        .fold(f64::INFINITY, f64::min);
     assert!(strength.is_too_weak && strength.stress_mpa <= WORTH_MORE_WALL * least * 1.01);
     assert!(strength.thickness_mm >= USUAL_MM);
     assert_eq!(strength.warnings(&params)[0].code, "wall-too-weak");
@@ -90,9 +118,15 @@ fn a_plate_ends_with_a_wall_that_leaves_a_cavity_or_with_a_sentence() {
     let params = quick(1.275);
     for half_mm in [3.0, 4.0, 5.0] {
         let strength = found(&params, &plate(half_mm));
-        assert!(strength.thickness_mm < half_mm && strength.solid_share() < 1.0 - LEAST_HOLLOW + 0.05, "{half_mm}");
+        assert!(
+            strength.thickness_mm < half_mm && strength.solid_share() < 1.0 - LEAST_HOLLOW + 0.05,
+            "{half_mm}"
+        );
     }
-    let params = StrengthParams { least_mm: 1.6, ..params };
+    let params = StrengthParams {
+        least_mm: 1.6,
+        ..params
+    };
     let refused = thickness(&Ctx::quiet(), &params, &plate(1.2));
     assert!(matches!(refused, Err(StrengthError::NothingHollow { .. })));
 }

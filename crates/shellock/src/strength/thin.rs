@@ -1,14 +1,15 @@
 //! Where a model is too thin to be hollow.
 //!
-//! Below a point of the surface there is a cavity if the point H below it is as far from the whole surface: else the wall
-//! of the other side, or of a near bend, meets this one, and the piece is solid there.
+//! Below a point of the surface there is a cavity if the point H below it is as far from the whole surface:
+//! else the wall of the other side, or of a near bend, meets this one, and the piece is solid there.
 
 use serde::Serialize;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::topology::components;
 use shellock_geom::{Topology, TriMesh, Vec3};
 
-/// Share of H that the point below must be away from the surface; flat faces of a coarse mesh lie a little inside it.
+/// Share of H that the point below must be away from the surface; flat faces of a coarse mesh lie a little
+/// inside it.
 const LEAST_SHARE: f64 = 0.9;
 
 /// A connected part of the surface with no cavity below.
@@ -28,7 +29,9 @@ pub(super) fn is_solid(mesh: &TriMesh, bvh: &TriangleBvh, t: usize, thickness_mm
 
 /// The connected regions of triangles with no hollow area, the largest first.
 pub(super) fn regions(mesh: &TriMesh, hollow_mm2: &[f64]) -> Vec<SolidRegion> {
-    let Some(topology) = Topology::of_mesh(mesh) else { return Vec::new() };
+    let Some(topology) = Topology::of_mesh(mesh) else {
+        return Vec::new();
+    };
     let is_solid = |t: u32| hollow_mm2[t as usize] == 0.0;
     let (region_of_face, n_regions) = components(&topology, |a, b| is_solid(a) == is_solid(b));
     let mut sums = vec![(0.0, Vec3::ZERO); n_regions];
@@ -39,5 +42,10 @@ pub(super) fn regions(mesh: &TriMesh, hollow_mm2: &[f64]) -> Vec<SolidRegion> {
     }
     sums.retain(|(area_mm2, _)| *area_mm2 > 0.0);
     sums.sort_by(|a, b| b.0.total_cmp(&a.0));
-    sums.into_iter().map(|(area_mm2, moment)| SolidRegion { area_mm2, at: (moment / area_mm2).to_array() }).collect()
+    sums.into_iter()
+        .map(|(area_mm2, moment)| SolidRegion {
+            area_mm2,
+            at: (moment / area_mm2).to_array(),
+        })
+        .collect()
 }

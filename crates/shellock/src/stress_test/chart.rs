@@ -26,49 +26,97 @@ struct Row {
 /// A name and its bars for each of the two tests.
 type Groups = [(String, Vec<Row>); 2];
 
-/// Two panels side by side: the widest opening, and the stress as a share of the strength; in each the designs under
-/// the punch, then in the fall. A line marks the limit of each bar. The verdict of the test stands at its opening.
+/// Two panels side by side: the widest opening, and the stress as a share of the strength; in each the
+/// designs under the punch, then in the fall. A line marks the limit of each bar. The verdict of the test
+/// stands at its opening.
 pub fn chart(report: &StressReport) -> String {
-    let (width, height) = (2.0 * PANEL_PX, ROW_PX * (2.0 * report.designs().len() as f64 + 6.0));
+    let (width, height) = (
+        2.0 * PANEL_PX,
+        ROW_PX * (2.0 * report.designs().len() as f64 + 6.0),
+    );
     let mut svg = begin(width, height);
     panel(&mut svg, 0.0, "widest opening, mm", &groups(report, opening));
-    panel(&mut svg, PANEL_PX, "stress, % of the strength", &groups(report, stress));
+    panel(
+        &mut svg,
+        PANEL_PX,
+        "stress, % of the strength",
+        &groups(report, stress),
+    );
     let note = "Black line: below it the kit holds. Connectors of half the size may open half as far.";
     text(&mut svg, [NAME_PX, height - 0.6 * ROW_PX], "fill=\"#555\"", note);
     end(svg)
 }
 
 fn opening(design: &'static str, outcome: &Outcome) -> Row {
-    let Outcome { opening_mm: value, limit_mm: limit, .. } = *outcome;
-    let figure = if value.is_finite() { format!("{value:.2}") } else { "without end".to_owned() };
+    let Outcome {
+        opening_mm: value,
+        limit_mm: limit,
+        ..
+    } = *outcome;
+    let figure = if value.is_finite() {
+        format!("{value:.2}")
+    } else {
+        "without end".to_owned()
+    };
     let (color, word) = style(outcome.verdict);
-    Row { design, value, limit, label: format!("{figure} · {word}"), color }
+    Row {
+        design,
+        value,
+        limit,
+        label: format!("{figure} · {word}"),
+        color,
+    }
 }
 
 fn stress(design: &'static str, outcome: &Outcome) -> Row {
     let (value, limit) = (100.0 * outcome.strength_share, 100.0);
-    let (color, _) = style(if value > limit { Verdict::Yields } else { Verdict::Holds });
-    Row { design, value, limit, label: format!("{value:.0}"), color }
+    let (color, _) = style(if value > limit {
+        Verdict::Yields
+    } else {
+        Verdict::Holds
+    });
+    Row {
+        design,
+        value,
+        limit,
+        label: format!("{value:.0}"),
+        color,
+    }
 }
 
 /// The bars of both tests.
 fn groups(report: &StressReport, row: fn(&'static str, &Outcome) -> Row) -> Groups {
     let rows = |of: fn(&Pair) -> &Outcome| -> Vec<Row> {
-        report.designs().into_iter().map(|(design, pair)| row(design, of(pair))).collect()
+        report
+            .designs()
+            .into_iter()
+            .map(|(design, pair)| row(design, of(pair)))
+            .collect()
     };
     let (punch_n, impact_n) = (report.kit.punch.force_n, report.kit.drop.force_n);
     [
         (format!("punched with {punch_n:.0} N"), rows(|pair| &pair.punch)),
-        (format!("fallen, stopped with {impact_n:.0} N"), rows(|pair| &pair.drop)),
+        (
+            format!("fallen, stopped with {impact_n:.0} N"),
+            rows(|pair| &pair.drop),
+        ),
     ]
 }
 
 /// A title, and for each test its name and its bars.
 fn panel(svg: &mut String, x: f64, title: &str, groups: &Groups) {
-    let values = groups.iter().flat_map(|(_, rows)| rows).flat_map(|row| [row.value, row.limit]);
+    let values = groups
+        .iter()
+        .flat_map(|(_, rows)| rows)
+        .flat_map(|row| [row.value, row.limit]);
     let largest = values.filter(|v| v.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
     let left = x + NAME_PX;
-    text(svg, [left, ROW_PX], "font-weight=\"bold\" font-size=\"16\"", title);
+    text(
+        svg,
+        [left, ROW_PX],
+        "font-weight=\"bold\" font-size=\"16\"",
+        title,
+    );
     let mut y = 1.3 * ROW_PX;
     for (test, rows) in groups {
         text(svg, [left, y + 0.7 * ROW_PX], "fill=\"#555\"", test);
@@ -83,7 +131,11 @@ fn panel(svg: &mut String, x: f64, title: &str, groups: &Groups) {
 
 /// Name, bar, limit and figure. What is not finite gets the longest bar.
 fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, row: &Row) {
-    let length = if row.value.is_finite() { row.value * px_per_unit } else { LONGEST_PX };
+    let length = if row.value.is_finite() {
+        row.value * px_per_unit
+    } else {
+        LONGEST_PX
+    };
     let (limit, thick) = (row.limit * px_per_unit, 0.8 * ROW_PX);
     let (at, bottom, baseline) = (left + limit, y + thick, y + 0.6 * ROW_PX);
     text(svg, [left - 8.0, baseline], "text-anchor=\"end\"", row.design);
@@ -95,7 +147,11 @@ fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, row: &Row) {
         row.color
     );
     // The figure stands behind the bar, and behind the limit where that would cross it.
-    let after = if (0.0..LABEL_PX).contains(&(limit - length)) { limit } else { length };
+    let after = if (0.0..LABEL_PX).contains(&(limit - length)) {
+        limit
+    } else {
+        length
+    };
     text(svg, [left + after + 8.0, baseline], "", &row.label);
 }
 

@@ -10,14 +10,26 @@ fn octants() -> SegmentedSurface {
 
 /// Every octant leaves outwards.
 fn outwards() -> InstallationPlan {
-    let direction = |i: u32| Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0));
-    let step = |i: u32| InstallationStep { piece: PatchId(i), separation: LatticeDirection::nearest(direction(i)) };
-    InstallationPlan { steps: (0..8).map(step).collect() }
+    let direction =
+        |i: u32| Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0));
+    let step = |i: u32| InstallationStep {
+        piece: PatchId(i),
+        separation: LatticeDirection::nearest(direction(i)),
+    };
+    InstallationPlan {
+        steps: (0..8).map(step).collect(),
+    }
 }
 
 /// A coarse mesh: what is tested here holds on any.
 fn coarse() -> StressParams {
-    StressParams { metric: MetricParams { edge_share: 2.5, ..MetricParams::default() }, ..StressParams::default() }
+    StressParams {
+        metric: MetricParams {
+            edge_share: 2.5,
+            ..MetricParams::default()
+        },
+        ..StressParams::default()
+    }
 }
 
 #[test]
@@ -33,7 +45,11 @@ fn forces_are_spread_over_what_they_hit_and_add_up() {
     assert_eq!(highest_in_the_middle(a, Vec3::Z, PUNCH_RADIUS_MM), Some(top));
     let forces_n = spread(a, &hit, -70.0 * Vec3::Z);
     assert!((forces_n.iter().sum::<Vec3>() + 70.0 * Vec3::Z).length() < 1e-9);
-    assert!((0..).zip(&forces_n).all(|(i, f)| hit.contains(&i) || *f == Vec3::ZERO));
+    assert!(
+        (0..)
+            .zip(&forces_n)
+            .all(|(i, f)| hit.contains(&i) || *f == Vec3::ZERO)
+    );
 }
 
 #[test]
@@ -55,7 +71,10 @@ fn half_connectors_fare_worse_than_whole_ones_and_the_report_says_so() {
 fn a_stronger_material_bears_what_a_weaker_one_does_not() {
     // So light a touch opens nothing; the verdict is the material's alone.
     let with_strength = |strength_mpa: f64| {
-        let mut params = StressParams { punch_n: 1.0, ..coarse() };
+        let mut params = StressParams {
+            punch_n: 1.0,
+            ..coarse()
+        };
         params.metric.material.strength_mpa = strength_mpa;
         let model = PlanModel::new(&params.metric, &octants(), &params.sizes);
         let bench = Bench::new(&params, &model).unwrap();
@@ -75,6 +94,10 @@ fn what_does_not_belong_together_is_refused() {
     plan.steps.pop();
     let refused = stress_test(&ctx, &coarse(), &octants(), &plan);
     assert_eq!(refused, Err(StressError::Plan { steps: 7, patches: 8 }));
-    let params = StressParams { punch_n: f64::NAN, drop_mm: -1.0, ..coarse() };
+    let params = StressParams {
+        punch_n: f64::NAN,
+        drop_mm: -1.0,
+        ..coarse()
+    };
     assert_eq!(params.problems().len(), 2);
 }

@@ -41,7 +41,9 @@ impl Score {
 
     fn of_surface(solution: Result<SurfaceSolution, SparseError>, subject: &Subject) -> Self {
         match solution {
-            Ok(solution) if solution.error <= subject.model.params.surface().tolerance => Self::of(solution.resistance),
+            Ok(solution) if solution.error <= subject.model.params.surface().tolerance => {
+                Self::of(solution.resistance)
+            }
             Ok(solution) => Self::unsolved(&format!("{:.1e} of the force is left", solution.error)),
             Err(e) => Self::unsolved(&e.to_string()),
         }
@@ -55,7 +57,11 @@ impl Score {
 
     /// What opens, where the plan was simulated as a whole and holds.
     pub fn opening(&self) -> Option<&Opening> {
-        if let Self::Holds(opening) = self { Some(opening) } else { None }
+        if let Self::Holds(opening) = self {
+            Some(opening)
+        } else {
+            None
+        }
     }
 
     /// Not a number where there is none; higher is better.
@@ -119,21 +125,39 @@ impl Column {
         let scores: Vec<Score> = (0..n).into_par_iter().map(told).collect();
         let together = start.elapsed().as_secs_f64() / n.max(1) as f64;
         let alone = alone.get(alone.len() / 2).copied().unwrap_or(0.0);
-        Ok(Self { name: name.to_owned(), scores, times: Times { setup, alone, together } })
+        Ok(Self {
+            name: name.to_owned(),
+            scores,
+            times: Times {
+                setup,
+                alone,
+                together,
+            },
+        })
     }
 
     /// The volume metric on the first `n` plans.
-    pub fn by_volume(name: &str, subject: &Subject, youngs_modulus_mpa: f64, n: usize) -> Result<Self, Failure> {
+    pub fn by_volume(
+        name: &str,
+        subject: &Subject,
+        youngs_modulus_mpa: f64,
+        n: usize,
+    ) -> Result<Self, Failure> {
         let volume = || volume_model(subject, youngs_modulus_mpa).map_err(|e| failed(name, &e));
-        Self::new(name, n, volume, |volume, i| match volume.resist(&subject.meetings[i], subject.key) {
-            Ok(resistance) => Score::of(resistance),
-            Err(e) => Score::unsolved(&e.to_string()),
+        Self::new(name, n, volume, |volume, i| {
+            match volume.resist(&subject.meetings[i], subject.key) {
+                Ok(resistance) => Score::of(resistance),
+                Err(e) => Score::unsolved(&e.to_string()),
+            }
         })
     }
 
     /// The surface metric with these factors on stretch, bending and position.
     pub fn by_surface(name: &str, subject: &Subject, stiffness_ratios: [f64; 3]) -> Result<Self, Failure> {
-        let params = SurfaceParams { stiffness_ratios, ..subject.model.params.surface() };
+        let params = SurfaceParams {
+            stiffness_ratios,
+            ..subject.model.params.surface()
+        };
         let surface = || SurfaceModel::new(&params, &subject.model.assembly).map_err(|e| failed(name, &e));
         Self::new(name, subject.plans.len(), surface, |surface, i| {
             Score::of_surface(surface.resist(&subject.meetings[i], subject.key), subject)
@@ -143,12 +167,20 @@ impl Column {
     /// Each piece alone, its neighbours held.
     pub fn by_pieces_alone(name: &str, subject: &Subject) -> Result<Self, Failure> {
         let surface = || subject.model.surface_model().map_err(|e| failed(name, &e));
-        Self::new(name, subject.plans.len(), surface, |surface, i| {
-            match pieces_alone(&subject.model, surface, &subject.meetings[i], PatchId(subject.key)) {
+        Self::new(
+            name,
+            subject.plans.len(),
+            surface,
+            |surface, i| match pieces_alone(
+                &subject.model,
+                surface,
+                &subject.meetings[i],
+                PatchId(subject.key),
+            ) {
                 Ok(quality_mm) => quality_mm.map_or(Score::Separable, Score::Rated),
                 Err(e) => Score::unsolved(&e.to_string()),
-            }
-        })
+            },
+        )
     }
 
     /// Eq. 6 as published.
@@ -189,5 +221,8 @@ fn volume_model(subject: &Subject, youngs_modulus_mpa: f64) -> Result<VolumeMode
 }
 
 fn failed(metric: &str, problem: &dyn std::fmt::Display) -> Failure {
-    Failure::Metric { metric: metric.to_owned(), problem: problem.to_string() }
+    Failure::Metric {
+        metric: metric.to_owned(),
+        problem: problem.to_string(),
+    }
 }

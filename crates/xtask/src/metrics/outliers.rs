@@ -38,9 +38,17 @@ pub fn outliers(subject: &Subject, first: &Column, second: &Column) -> Vec<Outli
             let at = station as usize;
             let weight = subject.meetings[*plan][at].joint.map_or(0.0, |j| j.weight);
             let pieces = subject.model.pieces_at(at).map(|p| p.0);
-            Deciding { station, pieces, weighted_mm: openings.map(|o| weight * o.opening_mm[at]) }
+            Deciding {
+                station,
+                pieces,
+                weighted_mm: openings.map(|o| weight * o.opening_mm[at]),
+            }
         });
-        Outlier { plan: *plan, ranks: [ranks[0][i], ranks[1][i]], deciding: deciding.collect() }
+        Outlier {
+            plan: *plan,
+            ranks: [ranks[0][i], ranks[1][i]],
+            deciding: deciding.collect(),
+        }
     };
     let mut outliers: Vec<Outlier> = both.iter().enumerate().map(outlier).collect();
     let difference = |o: &Outlier| (o.ranks[0] - o.ranks[1]).abs();
@@ -51,15 +59,29 @@ pub fn outliers(subject: &Subject, first: &Column, second: &Column) -> Vec<Outli
 /// Weight, frame and openings at every joint of the plans that hold by both metrics.
 pub fn stations(subject: &Subject, first: &Column, second: &Column) -> Table {
     let mut table = Table::default();
-    let names =
-        ["plan", "station", "a", "b", "length", "weight", "male", "fast", "leaves N", "leaves v", "first", "second"];
+    let names = [
+        "plan", "station", "a", "b", "length", "weight", "male", "fast", "leaves N", "leaves v", "first",
+        "second",
+    ];
     table.columns.extend(names.map(|n| (n.to_owned(), Vec::new())));
     for (plan, (a, b)) in first.scores.iter().zip(&second.scores).enumerate() {
-        let (Some(a), Some(b)) = (a.opening(), b.opening()) else { continue };
-        for (i, (station, meeting)) in subject.model.assembly.stations.iter().zip(&subject.meetings[plan]).enumerate() {
+        let (Some(a), Some(b)) = (a.opening(), b.opening()) else {
+            continue;
+        };
+        for (i, (station, meeting)) in subject
+            .model
+            .assembly
+            .stations
+            .iter()
+            .zip(&subject.meetings[plan])
+            .enumerate()
+        {
             let Some(joint) = meeting.joint else { continue };
             let pieces = subject.model.pieces_at(i).map(|p| f64::from(p.0));
-            let (male, fast) = (f64::from(u8::from(joint.male == Side::B)), f64::from(u8::from(joint.is_fast)));
+            let (male, fast) = (
+                f64::from(u8::from(joint.male == Side::B)),
+                f64::from(u8::from(joint.is_fast)),
+            );
             let leaves = [station.normal, station.across].map(|v| joint.leaves.dot(v));
             let row = [
                 plan as f64,

@@ -28,7 +28,11 @@ pub fn markdown_of(
         model.assembly.triangles.len(),
     );
     let (reference, others) = columns.split_first().expect("there is a first metric");
-    text += &format!("## Rank correlations with {}\n\n{}\n", reference.name, correlations(reference, others));
+    text += &format!(
+        "## Rank correlations with {}\n\n{}\n",
+        reference.name,
+        correlations(reference, others)
+    );
     if let Some(surface) = columns.get(1) {
         text += &format!(
             "## Rank correlations with {}\n\n{}\n",
@@ -41,12 +45,18 @@ pub fn markdown_of(
     }
     for other in others.iter().filter(|c| c.knows_separable()) {
         let head = ["", &format!("{} holds", other.name), "separable", "unsolved"];
-        text += &format!("## Who is separable\n\n{}\n", markdown(&head, &verdicts(reference, other)));
+        text += &format!(
+            "## Who is separable\n\n{}\n",
+            markdown(&head, &verdicts(reference, other))
+        );
     }
     text += &format!("## Wall times\n\n{}\n", times(columns.iter().chain(stiffness)));
     if let Some(surface) = columns.get(1) {
         let told = outliers(subject, reference, surface);
-        text += &format!("## Plans whose ranks differ most\n\n{}\n", worst(&told[..told.len().min(N_OUTLIERS)]));
+        text += &format!(
+            "## Plans whose ranks differ most\n\n{}\n",
+            worst(&told[..told.len().min(N_OUTLIERS)])
+        );
     }
     text
 }
@@ -56,10 +66,18 @@ fn correlations<'a>(reference: &Column, others: impl IntoIterator<Item = &'a Col
     let row = |other: &Column| {
         let pairs = reference.qualities().into_iter().zip(other.qualities());
         let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
-        vec![other.name.clone(), a.len().to_string(), say(spearman(&a, &b)), say(kendall(&a, &b))]
+        vec![
+            other.name.clone(),
+            a.len().to_string(),
+            say(spearman(&a, &b)),
+            say(kendall(&a, &b)),
+        ]
     };
     let rows: Vec<Vec<String>> = others.into_iter().map(row).collect();
-    markdown(&["metric", "plans that hold by both", "Spearman ρ", "Kendall τ-b"], &rows)
+    markdown(
+        &["metric", "plans that hold by both", "Spearman ρ", "Kendall τ-b"],
+        &rows,
+    )
 }
 
 /// How often each pair of verdicts was given: rows by the reference, columns by the other.
@@ -74,7 +92,10 @@ fn verdicts(reference: &Column, other: &Column) -> Vec<Vec<String>> {
         n[verdict(a)][verdict(b)] += 1;
     }
     let said = ["holds", "separable", "unsolved"].map(|v| format!("{} {v}", reference.name));
-    said.into_iter().zip(n).map(|(v, n)| std::iter::once(v).chain(n.map(|n| n.to_string())).collect()).collect()
+    said.into_iter()
+        .zip(n)
+        .map(|(v, n)| std::iter::once(v).chain(n.map(|n| n.to_string())).collect())
+        .collect()
 }
 
 fn times<'a>(columns: impl Iterator<Item = &'a Column>) -> String {
@@ -83,19 +104,38 @@ fn times<'a>(columns: impl Iterator<Item = &'a Column>) -> String {
         std::iter::once(c.name.clone()).chain(seconds).collect()
     };
     let rows: Vec<Vec<String>> = columns.map(row).collect();
-    markdown(&["metric", "once, s", "a plan, one by one, s", "a plan, side by side, s"], &rows)
+    markdown(
+        &[
+            "metric",
+            "once, s",
+            "a plan, one by one, s",
+            "a plan, side by side, s",
+        ],
+        &rows,
+    )
 }
 
 fn worst(outliers: &[Outlier]) -> String {
     let row = |o: &Outlier| {
-        let mut row = vec![o.plan.to_string(), format!("{:.0}, {:.0}", o.ranks[0], o.ranks[1])];
+        let mut row = vec![
+            o.plan.to_string(),
+            format!("{:.0}, {:.0}", o.ranks[0], o.ranks[1]),
+        ];
         row.extend(o.deciding.iter().map(|d| {
             let [v, s] = d.weighted_mm.map(|w| format!("{w:.2e}"));
-            format!("{} of pieces {}–{}: {v}, {s}", d.station, d.pieces[0], d.pieces[1])
+            format!(
+                "{} of pieces {}–{}: {v}, {s}",
+                d.station, d.pieces[0], d.pieces[1]
+            )
         }));
         row
     };
     let rows: Vec<Vec<String>> = outliers.iter().map(row).collect();
-    let head = ["plan", "ranks", "station decisive by the first: w d by both, mm", "by the second: w d by both, mm"];
+    let head = [
+        "plan",
+        "ranks",
+        "station decisive by the first: w d by both, mm",
+        "by the second: w d by both, mm",
+    ];
     markdown(&head, &rows)
 }

@@ -21,7 +21,15 @@ const ZERO: &[Point] = &[
     [0.15, 0.0],
 ];
 const ONE: &[Point] = &[[0.1, 0.72], [0.38, 1.0], [0.38, 0.0]];
-const TWO: &[Point] = &[[0.0, 0.82], [0.15, 1.0], [0.45, 1.0], [0.6, 0.85], [0.6, 0.65], [0.0, 0.0], [0.6, 0.0]];
+const TWO: &[Point] = &[
+    [0.0, 0.82],
+    [0.15, 1.0],
+    [0.45, 1.0],
+    [0.6, 0.85],
+    [0.6, 0.65],
+    [0.0, 0.0],
+    [0.6, 0.0],
+];
 const THREE: &[Point] = &[
     [0.0, 1.0],
     [0.6, 1.0],
@@ -101,7 +109,11 @@ pub(super) struct Drawing {
 impl Drawing {
     /// `number` in digits of `height_mm`, underlined where it would be another number upside down.
     pub fn of(number: u32, height_mm: f64) -> Self {
-        let digits: Vec<usize> = number.to_string().bytes().map(|b| usize::from(b - b'0')).collect();
+        let digits: Vec<usize> = number
+            .to_string()
+            .bytes()
+            .map(|b| usize::from(b - b'0'))
+            .collect();
         let mut strokes: Vec<Vec<Point>> = Vec::new();
         let base = if is_ambiguous(&digits) { -UNDERLINE } else { 0.0 };
         let mut left = 0.0;
@@ -112,7 +124,11 @@ impl Drawing {
         if base > 0.0 {
             strokes.push(vec![[0.0, 0.0], [left - ADVANCE + WIDTH, 0.0]]);
         }
-        strokes.iter_mut().flatten().flatten().for_each(|x| *x *= height_mm);
+        strokes
+            .iter_mut()
+            .flatten()
+            .flatten()
+            .for_each(|x| *x *= height_mm);
         Self { strokes }
     }
 
@@ -146,7 +162,9 @@ mod tests {
     fn what_reads_otherwise_upside_down_is_underlined() {
         let is_underlined = |n: u32| Drawing::of(n, 5.0).strokes.len() > n.to_string().len();
         let all: Vec<u32> = (0..128).filter(|&n| is_underlined(n)).collect();
-        let expected = [6, 9, 16, 18, 19, 61, 66, 68, 81, 86, 89, 91, 98, 99, 106, 108, 109, 116, 118, 119];
+        let expected = [
+            6, 9, 16, 18, 19, 61, 66, 68, 81, 86, 89, 91, 98, 99, 106, 108, 109, 116, 118, 119,
+        ];
         assert_eq!(all, expected);
     }
 

@@ -1,7 +1,7 @@
 //! Which connectors of a pair would have the other piece's wall in their way.
 //!
-//! Below the wall, half a connector deep, each piece has its half. The later piece's half must not meet the earlier piece on its way out;
-//! nor may the later piece's far wall sweep over the earlier piece's half:
+//! Below the wall, half a connector deep, each piece has its half. The later piece's half must not meet the
+//! earlier piece on its way out; nor may the later piece's far wall sweep over the earlier piece's half:
 //!
 //! ```text
 //!   ─────a──────┬──────b─────        a later, leaving along s: barred where
@@ -10,8 +10,8 @@
 //!   ─────a─────────────b─────        as b's channel reaches to x_a if a has the pin, from x_a along −s a
 //! ```
 //!
-//! Round thin limbs, where the far wall is near, this leaves little more than the limb's axis. Limits: only the two pieces of the seam are
-//! looked at, as the order of the others is not known yet.
+//! Round thin limbs, where the far wall is near, this leaves little more than the limb's axis. Limits: only
+//! the two pieces of the seam are looked at, as the order of the others is not known yet.
 
 use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
@@ -22,7 +22,8 @@ use crate::{LatticeDirection, PatchId, SegmentedSurface};
 /// Where a half connector is looked at, in connector sizes: below the wall and beside the seam.
 const DEPTH_SIZES: f64 = 0.5;
 const BESIDE_SIZES: f64 = 0.5;
-/// The wall above the connector is no obstacle: what the ray meets within this multiple of the distance to a flat one.
+/// The wall above the connector is no obstacle: what the ray meets within this multiple of the distance to a
+/// flat one.
 const LOCAL_WALL: f64 = 1.3;
 /// Least cosine between a ray and the surface normal at which the ray leaves through the wall above.
 const LEAVES_ABOVE: f64 = 0.3;
@@ -60,25 +61,36 @@ impl<'a> Bars<'a> {
         })
     }
 
-    /// What bars a connector of `size_mm` between `a` and `b` below `point` of the outer surface; `across` leads from a to b.
+    /// What bars a connector of `size_mm` between `a` and `b` below `point` of the outer surface; `across`
+    /// leads from a to b.
     pub fn at(&self, [a, b]: [PatchId; 2], size_mm: f64, point: Vec3, normal: Vec3, across: Vec3) -> Barred {
         let height_mm = self.wall_mm + DEPTH_SIZES * size_mm;
         let below = point - height_mm * normal;
         let beside = BESIDE_SIZES * size_mm * across;
         let (in_a, in_b) = (below - beside, below + beside);
-        let seen =
-            |origin: Vec3| LatticeDirection::all().map(|s| self.met(origin, normal, height_mm, s, [a, b])).collect();
+        let seen = |origin: Vec3| {
+            LatticeDirection::all()
+                .map(|s| self.met(origin, normal, height_mm, s, [a, b]))
+                .collect()
+        };
         let (from_a, from_b): (Vec<[bool; 2]>, Vec<[bool; 2]>) = (seen(in_a), seen(in_b));
         let mut barred = 0;
         for s in LatticeDirection::all() {
             let (on, back) = (s.index(), s.opposite().index());
             let later_is_male = s.unit().dot(normal) >= 0.0;
-            // By order: what the later and the earlier piece's side see, and which of the two patches they are.
-            for (order, (later, earlier, own, other)) in
-                [(&from_a, &from_b, 0, 1), (&from_b, &from_a, 1, 0)].into_iter().enumerate()
+            // By order: what the later and the earlier piece's side see, and which of the two patches they
+            // are.
+            for (order, (later, earlier, own, other)) in [(&from_a, &from_b, 0, 1), (&from_b, &from_a, 1, 0)]
+                .into_iter()
+                .enumerate()
             {
-                // The channel reaches under the male's wall, so one of the halves is on the other's side as well.
-                let channel = if later_is_male { later[back][own] } else { earlier[on][other] };
+                // The channel reaches under the male's wall, so one of the halves is on the other's side as
+                // well.
+                let channel = if later_is_male {
+                    later[back][own]
+                } else {
+                    earlier[on][other]
+                };
                 if later[on][other] || earlier[back][own] || channel {
                     barred |= 1 << (order * LatticeDirection::COUNT + on);
                 }
@@ -87,14 +99,29 @@ impl<'a> Bars<'a> {
         Barred(barred)
     }
 
-    /// Which of two patches the ray from `origin`, so far below the surface, along `s` meets, the wall right above not counted.
-    fn met(&self, origin: Vec3, normal: Vec3, height_mm: f64, s: LatticeDirection, patches: [PatchId; 2]) -> [bool; 2] {
+    /// Which of two patches the ray from `origin`, so far below the surface, along `s` meets, the wall right
+    /// above not counted.
+    fn met(
+        &self,
+        origin: Vec3,
+        normal: Vec3,
+        height_mm: f64,
+        s: LatticeDirection,
+        patches: [PatchId; 2],
+    ) -> [bool; 2] {
         let along = s.unit();
         let up = along.dot(normal);
-        let mut travel_mm = if up > LEAVES_ABOVE { LOCAL_WALL * height_mm / up } else { 0.0 };
+        let mut travel_mm = if up > LEAVES_ABOVE {
+            LOCAL_WALL * height_mm / up
+        } else {
+            0.0
+        };
         let mut met = [false; 2];
         for _ in 0..MOST_WALLS {
-            let Some((face, on_mm)) = self.bvh.first_hit(origin + travel_mm * along, along, self.far_mm) else { break };
+            let Some((face, on_mm)) = self.bvh.first_hit(origin + travel_mm * along, along, self.far_mm)
+            else {
+                break;
+            };
             let patch = self.surface.patch_of_face[face as usize];
             met = [met[0] || patch == patches[0], met[1] || patch == patches[1]];
             travel_mm += on_mm + PAST_WALL_MM;

@@ -1,8 +1,9 @@
 //! How firmly a contact resists the pushes of the verification, estimated before anything is built.
 //!
-//! The finished kit is judged by pushing every piece a small step in 66 directions; a push must run into the other pieces.
-//! Here the overlap is estimated from the seam samples that carry connectors. In the cross-section of a connector, with ŝ
-//! the direction in which the male leaves and `n` perpendicular to it, a motion `m` of the male meets
+//! The finished kit is judged by pushing every piece a small step in 66 directions; a push must run into the
+//! other pieces. Here the overlap is estimated from the seam samples that carry connectors. In the
+//! cross-section of a connector, with ŝ the direction in which the male leaves and `n` perpendicular to it, a
+//! motion `m` of the male meets
 //!
 //! ```text
 //!   along ±n:  a side of the channel   (|m·n| − c) · pin depth
@@ -10,7 +11,8 @@
 //!   along +ŝ:  nothing
 //! ```
 //!
-//! (a rail under a seam along s holds along ±N alone), and the walls where the later piece is pushed at the earlier one across a seam that does not lean.
+//! (a rail under a seam along s holds along ±N alone), and the walls where the later piece is pushed at the
+//! earlier one across a seam that does not lean.
 //!
 //! Limits: carving and bars shorten runs, which one factor stands for; ends of runs resist nothing here.
 
@@ -23,14 +25,17 @@ use crate::plan::PlanParams;
 use crate::push::{self, N_PUSHES};
 use crate::{LatticeDirection, PatchId};
 
-/// Gap between walls, mm, and height of the wall that counts: half of the usual 2 mm, since walls are rounded and carved.
+/// Gap between walls, mm, and height of the wall that counts: half of the usual 2 mm, since walls are rounded
+/// and carved.
 const WALL_GAP_MM: f64 = 0.1;
 const WALL_HEIGHT_MM: f64 = 1.0;
 
-/// Share of the estimate that is counted: carving takes 10 to 30 % of the joints, and their ends are cut short.
+/// Share of the estimate that is counted: carving takes 10 to 30 % of the joints, and their ends are cut
+/// short.
 const LEFT_SHARE: f64 = 0.6;
 
-/// What one order and direction of a contact holds, mm³ by push: when the later piece is pushed, and the earlier one.
+/// What one order and direction of a contact holds, mm³ by push: when the later piece is pushed, and the
+/// earlier one.
 pub type Pushes = [[f32; N_PUSHES]; 2];
 
 /// Estimates for both orders and all directions.
@@ -38,7 +43,8 @@ pub type Pushes = [[f32; N_PUSHES]; 2];
 pub struct HoldTable(Vec<Pushes>);
 
 impl HoldTable {
-    /// The table of a contact between `pair` with these seams and connectors of `size_mm`; `holds(order, s)` is whether its runs are long enough there.
+    /// The table of a contact between `pair` with these seams and connectors of `size_mm`; `holds(order, s)`
+    /// is whether its runs are long enough there.
     pub(super) fn new(
         params: &PlanParams,
         size_mm: f64,
@@ -47,8 +53,10 @@ impl HoldTable {
         holds: impl Fn(usize, LatticeDirection) -> bool + Sync,
     ) -> Self {
         let pushes = push::directions();
-        let cases: Vec<(usize, LatticeDirection)> =
-            [0, 1].into_iter().flat_map(|order| LatticeDirection::all().map(move |s| (order, s))).collect();
+        let cases: Vec<(usize, LatticeDirection)> = [0, 1]
+            .into_iter()
+            .flat_map(|order| LatticeDirection::all().map(move |s| (order, s)))
+            .collect();
         let table = cases.into_par_iter().map(|(order, s)| {
             let mut held = [[0.0; N_PUSHES]; 2];
             let side = if order == 0 { 1.0 } else { -1.0 };
@@ -66,10 +74,15 @@ impl HoldTable {
     /// A table out of nothing; `held` gives mm³.
     #[cfg(test)]
     pub fn made_up(mut held: impl FnMut() -> f32) -> Self {
-        Self((0..2 * LatticeDirection::COUNT).map(|_| [[(); N_PUSHES]; 2].map(|x| x.map(|()| held()))).collect())
+        Self(
+            (0..2 * LatticeDirection::COUNT)
+                .map(|_| [[(); N_PUSHES]; 2].map(|x| x.map(|()| held())))
+                .collect(),
+        )
     }
 
-    /// What the contact holds; `order` is 0 where the piece with the lower id is later. `None` where nothing was measured.
+    /// What the contact holds; `order` is 0 where the piece with the lower id is later. `None` where nothing
+    /// was measured.
     pub fn pushes(&self, order: usize, s: LatticeDirection) -> Option<&Pushes> {
         self.0.get(order * LatticeDirection::COUNT + s.index())
     }
@@ -101,7 +114,11 @@ fn add(
             let floor = (-male.dot(leaves) - gap).max(0.0) * width;
             let on_rail = || (later.dot(x.normal).abs() - gap).max(0.0) * width;
             let sides = if way.has_rail(x) { on_rail() } else { sides + floor };
-            let walls = if is_forward { (later.dot(across) - WALL_GAP_MM).max(0.0) * WALL_HEIGHT_MM } else { 0.0 };
+            let walls = if is_forward {
+                (later.dot(across) - WALL_GAP_MM).max(0.0) * WALL_HEIGHT_MM
+            } else {
+                0.0
+            };
             *held += LEFT_SHARE * (sides + walls) * x.length_mm;
         }
     }

@@ -1,16 +1,18 @@
 //! What is still possible under a limit on the cost of each piece, and its propagation.
 //!
-//! Unknown are the role of each piece (its direction, or being the first) and which piece of each seam is later. A plan is
-//! also an order, of which only what must be is kept: who leaves before whom, closed under transitivity, so that orders
-//! which differ in pieces that do not touch are never told apart. Revising a piece strikes out what cannot be:
+//! Unknown are the role of each piece (its direction, or being the first) and which piece of each seam is
+//! later. A plan is also an order, of which only what must be is kept: who leaves before whom, closed under
+//! transitivity, so that orders which differ in pieces that do not touch are never told apart. Revising a
+//! piece strikes out what cannot be:
 //!
 //! 1. order and seams agree: who leaves first of two neighbours is the later installed one;
 //! 2. no direction runs into a piece that leaves afterwards;
 //! 3. each piece but the key hangs on a later one, each but the first on an earlier one;
 //! 4. the cost stays under the limit with the best of all other seams ([`PieceCosts::narrow`]).
 //!
-//! When nothing more changes, two relaxed tests of the whole follow: what must still be there when a piece leaves hangs
-//! together by pieces that may be there, and the assembly locks (the cluster test) if all that is open turns out well.
+//! When nothing more changes, two relaxed tests of the whole follow: what must still be there when a piece
+//! leaves hangs together by pieces that may be there, and the assembly locks (the cluster test) if all that
+//! is open turns out well.
 //!
 //! [`PieceCosts::narrow`]: crate::plan::PieceCosts::narrow
 
@@ -48,7 +50,8 @@ pub(super) struct Propagator<'a> {
     pub n_revisions: usize,
     /// Pieces to revise.
     dirty: PieceSet,
-    /// Pieces whose cost is to be asked for again. A longer list of who remains alone is no reason: it changes little.
+    /// Pieces whose cost is to be asked for again. A longer list of who remains alone is no reason: it
+    /// changes little.
     is_cost_open: PieceSet,
 }
 
@@ -57,11 +60,20 @@ impl<'a> Propagator<'a> {
         let holding = space.survey.contacts.iter().map(|c| {
             [(c.a, c.b), (c.b, c.a)].map(|(p, q)| {
                 let holds = |s: &LatticeDirection| space.joined(p, *s, PieceSet::one(q)).contains(q);
-                LatticeDirection::all().filter(holds).fold(0, |mask, s| mask | mask_of(s))
+                LatticeDirection::all()
+                    .filter(holds)
+                    .fold(0, |mask, s| mask | mask_of(s))
             })
         });
         let holding = holding.collect();
-        Self { space, key, holding, n_revisions: 0, dirty: PieceSet::EMPTY, is_cost_open: PieceSet::EMPTY }
+        Self {
+            space,
+            key,
+            holding,
+            n_revisions: 0,
+            dirty: PieceSet::EMPTY,
+            is_cost_open: PieceSet::EMPTY,
+        }
     }
 
     /// All that can be with this key.
@@ -71,14 +83,23 @@ impl<'a> Propagator<'a> {
         let role = |p: PatchId| {
             let is_key = p == key;
             let separations = self.space.allowed(p) & if is_key { of_key } else { ALL_DIRECTIONS };
-            RoleSet { separations, may_be_first: !is_key, is_key }
+            RoleSet {
+                separations,
+                may_be_first: !is_key,
+                is_key,
+            }
         };
         let alone = PieceSet::one(key);
         let (mut before, mut after) = (vec![alone; n], vec![PieceSet::EMPTY; n]);
         before[usize::from(key)] = PieceSet::EMPTY;
         after[usize::from(key)] = self.space.all().minus(alone);
         let seams = vec![[ALL_DIRECTIONS; 2]; self.space.survey.contacts.len()];
-        Domains { roles: (0..n).map(|p| role(p.into())).collect(), seams, before, after }
+        Domains {
+            roles: (0..n).map(|p| role(p.into())).collect(),
+            seams,
+            before,
+            after,
+        }
     }
 
     /// Strikes out what cannot be, beginning with `changed`.
@@ -112,14 +133,21 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// Sides of contact `i` in `Domains::seams`: that with `p` later, that with the other later, and the other.
+    /// Sides of contact `i` in `Domains::seams`: that with `p` later, that with the other later, and the
+    /// other.
     fn sides(&self, i: usize, p: PatchId) -> (usize, usize, PatchId) {
         let c = &self.space.survey.contacts[i];
         let own = usize::from(p != c.a);
         (own, 1 - own, c.other(p))
     }
 
-    fn set_seam(&mut self, d: &mut Domains, i: usize, states: [DirectionMask; 2], by: PatchId) -> Result<(), Conflict> {
+    fn set_seam(
+        &mut self,
+        d: &mut Domains,
+        i: usize,
+        states: [DirectionMask; 2],
+        by: PatchId,
+    ) -> Result<(), Conflict> {
         if d.seams[i] != states {
             d.seams[i] = states;
             let c = &self.space.survey.contacts[i];
@@ -127,7 +155,11 @@ impl<'a> Propagator<'a> {
             self.dirty = self.dirty.union(pair);
             self.is_cost_open = self.is_cost_open.union(pair);
         }
-        if states == [0; 2] { Err(Conflict(by)) } else { Ok(()) }
+        if states == [0; 2] {
+            Err(Conflict(by))
+        } else {
+            Ok(())
+        }
     }
 
     fn set_roles(&mut self, d: &mut Domains, p: PatchId, roles: RoleSet) -> Result<(), Conflict> {
@@ -136,7 +168,11 @@ impl<'a> Propagator<'a> {
             self.dirty = self.dirty.union(PieceSet::one(p));
             self.is_cost_open = self.is_cost_open.union(PieceSet::one(p));
         }
-        if roles.is_empty() { Err(Conflict(p)) } else { Ok(()) }
+        if roles.is_empty() {
+            Err(Conflict(p))
+        } else {
+            Ok(())
+        }
     }
 
     /// `x` leaves before `y`.
@@ -196,7 +232,8 @@ impl<'a> Propagator<'a> {
         Ok(())
     }
 
-    /// Keeps directions that no piece blocks which leaves afterwards; who blocks all that are left leaves before.
+    /// Keeps directions that no piece blocks which leaves afterwards; who blocks all that are left leaves
+    /// before.
     fn leave_freely(&mut self, d: &mut Domains, p: PatchId) -> Result<(), Conflict> {
         let at = usize::from(p);
         let mut roles = d.roles[at];
@@ -253,7 +290,11 @@ impl<'a> Propagator<'a> {
         let before = self.surroundings(d, p);
         let mut around = before.clone();
         space.costs.narrow(p, &mut roles, &mut around, limit);
-        for ((&i, x), was) in space.contacts_of[usize::from(p)].iter().zip(&around.seams).zip(&before.seams) {
+        for ((&i, x), was) in space.contacts_of[usize::from(p)]
+            .iter()
+            .zip(&around.seams)
+            .zip(&before.seams)
+        {
             if x != was {
                 let (own, others, _) = self.sides(i, p);
                 let mut states = [0; 2];
@@ -268,16 +309,24 @@ impl<'a> Propagator<'a> {
     pub fn surroundings(&self, d: &Domains, p: PatchId) -> Surroundings {
         let seam = |&i: &usize| {
             let (own, others, _) = self.sides(i, p);
-            SeamStates { own: d.seams[i][own], others: d.seams[i][others] }
+            SeamStates {
+                own: d.seams[i][own],
+                others: d.seams[i][others],
+            }
         };
         let seams = self.space.contacts_of[usize::from(p)].iter().map(seam).collect();
-        Surroundings { seams, remaining: d.after[usize::from(p)] }
+        Surroundings {
+            seams,
+            remaining: d.after[usize::from(p)],
+        }
     }
 
     /// Exactly one piece is the first.
     fn one_first(&mut self, d: &mut Domains) -> Result<(), Conflict> {
         let may: Vec<usize> = (0..self.space.n).filter(|&p| d.roles[p].may_be_first).collect();
-        let Some(&p) = may.first() else { return Err(Conflict(self.key.piece)) };
+        let Some(&p) = may.first() else {
+            return Err(Conflict(self.key.piece));
+        };
         if may.len() == 1 && d.roles[p].separations != 0 {
             self.set_roles(d, p.into(), d.roles[p].only(Role::First))?;
         }
@@ -288,7 +337,11 @@ impl<'a> Propagator<'a> {
     fn rests_hang_together(&self, d: &Domains) -> Result<(), Conflict> {
         for p in (0..self.space.n).map(PatchId::from) {
             let surely = d.after[usize::from(p)];
-            let may = self.space.all().minus(d.before[usize::from(p)]).minus(PieceSet::one(p));
+            let may = self
+                .space
+                .all()
+                .minus(d.before[usize::from(p)])
+                .minus(PieceSet::one(p));
             if surely.len() > 1 && !surely.is_joined_within(may, &self.space.neighbours) {
                 return Err(Conflict(p));
             }

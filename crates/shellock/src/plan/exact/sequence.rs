@@ -33,17 +33,36 @@ struct Sequencer<'a> {
 pub(super) fn sequence(space: &Space<'_>, d: &Domains, limit: f64) -> Sequence {
     let separation = |p: usize| {
         let outwards = LatticeDirection::nearest(space.survey.mean_normal[PatchId::from(p)]);
-        d.roles[p].iter().next().and_then(|role| role.separation()).unwrap_or(outwards)
+        d.roles[p]
+            .iter()
+            .next()
+            .and_then(|role| role.separation())
+            .unwrap_or(outwards)
     };
     let separations = (0..space.n).map(separation).collect();
-    let mut s = Sequencer { space, d, limit, separations, removed: Vec::new(), dead: HashSet::new() };
+    let mut s = Sequencer {
+        space,
+        d,
+        limit,
+        separations,
+        removed: Vec::new(),
+        dead: HashSet::new(),
+    };
     if !s.descend(space.all()) {
-        return if s.dead.len() < MOST_SETS { Sequence::None } else { Sequence::Unknown };
+        return if s.dead.len() < MOST_SETS {
+            Sequence::None
+        } else {
+            Sequence::Unknown
+        };
     }
     s.removed.reverse();
     let plan = InstallationPlan { steps: s.removed };
     // Relations are the same for all orders, so one that is turned down speaks for all.
-    if space.allows(&plan) { Sequence::Plan(plan) } else { Sequence::None }
+    if space.allows(&plan) {
+        Sequence::Plan(plan)
+    } else {
+        Sequence::None
+    }
 }
 
 impl Sequencer<'_> {
@@ -57,7 +76,10 @@ impl Sequencer<'_> {
         for p in left.iter() {
             let rest = left.minus(PieceSet::one(p));
             if self.may_leave(p, rest) {
-                self.removed.push(InstallationStep { piece: p, separation: self.separations[usize::from(p)] });
+                self.removed.push(InstallationStep {
+                    piece: p,
+                    separation: self.separations[usize::from(p)],
+                });
                 if self.descend(rest) {
                     return true;
                 }
@@ -69,7 +91,10 @@ impl Sequencer<'_> {
     }
 
     fn may_leave(&self, p: PatchId, rest: PieceSet) -> bool {
-        let step = InstallationStep { piece: p, separation: self.separations[usize::from(p)] };
+        let step = InstallationStep {
+            piece: p,
+            separation: self.separations[usize::from(p)],
+        };
         if !self.d.before[usize::from(p)].and(rest).is_empty()
             || !rest.is_connected(&self.space.neighbours)
             || (!rest.is_empty() && !self.space.is_free(p, step.separation, rest))

@@ -1,0 +1,167 @@
+//! Which stations of a model are joined by one bar.
+
+use shellock_geom::Vec3;
+
+use super::VolumeModel;
+use super::connector::{Bar, Section, tets_between};
+use crate::{Meeting, SIDES};
+
+/// Both sides' cross-sections at each station, where it is joined.
+pub(super) type Sections = Vec<[Option<Section>; 2]>;
+
+/// All of them for a plan.
+pub(super) fn sections(model: &VolumeModel, plan: &[Meeting]) -> Sections {
+    use rayon::prelude::*;
+    (plan.par_iter().enumerate())
+        .map(|(i, m)| {
+            SIDES.map(|side| {
+                m.joint
+                    .as_ref()
+                    .map(|joint| Section::new(model, i, side, joint, 0.0))
+            })
+        })
+        .collect()
+}
+
+/// The bars of both sides. Every joint has two on either side: towards a neighbour that is joined alike the
+/// two share one; towards any other, and where the seam ends, it has its own, which ends halfway.
+pub(super) fn bars(model: &VolumeModel, plan: &[Meeting], sections: &Sections) -> Vec<Bar> {
+    let mut bars = Bars {
+        model,
+        plan,
+        sections,
+        all: Vec::new(),
+    };
+    let ways: Vec<[Way; 2]> = model
+        .steps
+        .iter()
+        .map(|step| ways(model, step.map(|s| s as usize)))
+        .collect();
+    let mut has_way = vec![[false; 2]; plan.len()];
+    ways.iter()
+        .flatten()
+        .for_each(|way| has_way[way.station][usize::from(way.is_forward)] = true);
+    for [from, to] in ways {
+        let to_ends = [from, to].map(|way| Way {
+            is_forward: !way.is_forward,
+            ..way
+        });
+        let ends =
+            |way: &Way| !std::mem::replace(&mut has_way[way.station][usize::from(way.is_forward)], true);
+        let is_end = to_ends.each_ref().map(ends);
+        if is_end[0] {
+            bars.push_own(&to_ends[0]);
+        }
+        if !bars.push_shared([from.station, to.station]) {
+            bars.push_own(&from);
+            bars.push_own(&to);
+        }
+        if is_end[1] {
+            bars.push_own(&to_ends[1]);
+        }
+    }
+    for (station, has_way) in has_way.into_iter().enumerate() {
+        let half_mm = 0.5 * model.stations[station].length_mm;
+        for is_forward in [false, true]
+            .into_iter()
+            .filter(|is_forward| !has_way[usize::from(*is_forward)])
+        {
+            bars.push_own(&Way {
+                station,
+                is_forward,
+                half_mm,
+            });
+        }
+    }
+    bars.all
+}
+
+/// From a station along its tangent or against it, half as far as the next station.
+#[derive(Clone, Copy)]
+struct Way {
+    station: usize,
+    is_forward: bool,
+    half_mm: f64,
+}
+
+/// The ways from both ends of a step towards each other.
+fn ways(model: &VolumeModel, [from, to]: [usize; 2]) -> [Way; 2] {
+    let step = model.inner_edge[to][0] - model.inner_edge[from][0];
+    let way = |station: usize, step: Vec3| Way {
+        station,
+        is_forward: step.dot(model.stations[station].tangent) >= 0.0,
+        half_mm: 0.5 * step.length(),
+    };
+    [way(from, step), way(to, -step)]
+}
+
+/// Bars being listed.
+struct Bars<'a> {
+    model: &'a VolumeModel,
+    plan: &'a [Meeting],
+    sections: &'a Sections,
+    all: Vec<Bar>,
+}
+
+impl Bars<'_> {
+    /// The two bars between two stations, if both are joined and alike.
+    fn push_shared(&mut self, [from, to]: [usize; 2]) -> bool {
+        let males = [from, to].map(|s| self.plan[s].joint.map(|joint| joint.male));
+        let tets = SIDES.map(|side| {
+            let [first, second] = [from, to].map(|s| self.sections[s][side.index()].as_ref());
+            tets_between([first?, second?])
+        });
+        let ([Some(a), Some(b)], true) = (tets, males[0] == males[1]) else {
+            return false;
+        };
+        for (side, tets) in SIDES.into_iter().zip([a, b]) {
+            self.all.push(Bar {
+                index: self.all.len(),
+                side,
+                from,
+                to: Ok(to),
+                tets,
+            });
+        }
+        true
+    }
+
+    /// The two bars of one station alone, if it is joined.
+    fn push_own(&mut self, way: &Way) {
+        let from = way.station;
+        let Some(joint) = &self.plan[from].joint else {
+            return;
+        };
+        let along_mm = if way.is_forward { way.half_mm } else { -way.half_mm };
+        for side in SIDES {
+            let end = Section::new(self.model, from, side, joint, along_mm);
+            let tets = self.sections[from][side.index()]
+                .as_ref()
+                .and_then(|section| tets_between([section, &end]));
+            if let Some(tets) = tets {
+                self.all.push(Bar {
+                    index: self.all.len(),
+                    side,
+                    from,
+                    to: Err(end),
+                    tets,
+                });
+            }
+        }
+    }
+}
+
+/// First and last of a part's bars at each section, station by station and side by side; the first carries
+/// what belongs to the station.
+pub(super) type Spans = Vec<[Option<[usize; 2]>; 2]>;
+
+pub(super) fn spans(bars: &[&Bar], n_stations: usize) -> Spans {
+    let mut spans = vec![[None; 2]; n_stations];
+    for (i, bar) in bars.iter().enumerate() {
+        for station in bar.stations() {
+            let span: &mut Option<[usize; 2]> = &mut spans[station][bar.side.index()];
+            *span = Some([span.map_or(i, |s| s[0]), i]);
+        }
+    }
+    spans
+}

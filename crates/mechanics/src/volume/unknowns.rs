@@ -1,0 +1,68 @@
+//! How the unknowns of a part are numbered.
+
+use super::connector::N_SECTION;
+use super::rows::ROWS;
+use crate::{SIDES, Side};
+
+/// Labels of a part's unknowns: wall, contact rows, load, nodes of the sections, nodes halfway.
+#[derive(Clone, Copy)]
+pub(super) struct Labels {
+    n_wall: u32,
+    n_stations: u32,
+}
+
+impl Labels {
+    pub fn new(n_wall: usize, n_stations: usize) -> Self {
+        Self {
+            n_wall: n_wall as u32,
+            n_stations: n_stations as u32,
+        }
+    }
+    pub fn is_wall(self, id: u32) -> bool {
+        id < self.n_wall
+    }
+    pub fn row(self, station: usize, row: usize) -> u32 {
+        self.n_wall + (station * ROWS + row) as u32
+    }
+    /// Whether `id` is neither a contact row nor the load.
+    pub fn is_inner(self, id: u32) -> bool {
+        self.is_wall(id) || id > self.load()
+    }
+    /// The contact row that `id` means.
+    pub fn row_of(self, id: u32) -> usize {
+        (id - self.n_wall) as usize
+    }
+    pub fn load(self) -> u32 {
+        self.n_wall + self.n_stations * ROWS as u32
+    }
+    pub fn section(self, station: usize, side: Side) -> u32 {
+        self.load() + 1 + ((2 * station + side.index()) * 3 * N_SECTION) as u32
+    }
+    /// The bar's cross-section halfway, and the one at its free end.
+    pub fn within(self, bar: usize) -> [u32; 2] {
+        let first = self.section(self.n_stations as usize, Side::A) + (2 * bar * 3 * N_SECTION) as u32;
+        [first, first + 3 * N_SECTION as u32]
+    }
+
+    pub fn owner(self, id: u32) -> Owner {
+        let first = self.section(0, Side::A);
+        if id < first {
+            Owner::Part
+        } else if id < self.within(0)[0] {
+            let at = (id - first) as usize / (3 * N_SECTION);
+            Owner::Section(at / 2, SIDES[at % 2])
+        } else {
+            Owner::Bar
+        }
+    }
+}
+
+/// To what an unknown belongs.
+pub(super) enum Owner {
+    /// The wall, contact or the load.
+    Part,
+    /// A cross-section at a station.
+    Section(usize, Side),
+    /// The nodes halfway along a bar or at its free end.
+    Bar,
+}
