@@ -1,7 +1,6 @@
 //! Curves along the seams on the inner surface, with a smooth frame at every point.
 
 use shellock_geom::Vec3;
-use shellock_geom::bvh::TriangleBvh;
 
 use crate::body::{ShellGrid, outward};
 use crate::plan::InstallationPlan;
@@ -13,8 +12,6 @@ const STEP_MM: f64 = 1.0;
 /// Rounds of averaging with the neighbours. They take out the grid's ripple (period one to two cells) and
 /// little else.
 const SMOOTHING_ROUNDS: usize = 6;
-/// How far from the seam the owner of each side is looked up, mm.
-const PROBE_MM: f64 = 0.8;
 
 /// A seam on the inner surface between two pieces.
 #[derive(Clone, Debug)]
@@ -37,16 +34,14 @@ pub struct Curve {
 
 /// One curve for each seam of the inner surface that is long enough to have points of its own.
 pub fn curves(grid: &ShellGrid, inner: &SegmentedSurface, plan: &InstallationPlan) -> Vec<Curve> {
-    let groups: Vec<u32> = inner.patch_of_face.iter().map(|p| p.0).collect();
-    let bvh = TriangleBvh::with_groups(&inner.mesh, &groups);
     inner
         .seams()
         .iter()
-        .filter_map(|seam| curve(grid, &bvh, seam, plan))
+        .filter_map(|seam| curve(grid, seam, plan))
         .collect()
 }
 
-fn curve(grid: &ShellGrid, bvh: &TriangleBvh, seam: &Seam, plan: &InstallationPlan) -> Option<Curve> {
+fn curve(grid: &ShellGrid, seam: &Seam, plan: &InstallationPlan) -> Option<Curve> {
     if seam.length() < 4.0 * STEP_MM {
         return None;
     }
@@ -68,10 +63,13 @@ fn curve(grid: &ShellGrid, bvh: &TriangleBvh, seam: &Seam, plan: &InstallationPl
     } else {
         (seam.b, seam.a)
     };
-    let mut across: Vec<Vec3> = normals.iter().zip(&tangents).map(|(n, u)| n.cross(*u)).collect();
-    if votes_for(bvh, &points, &across, later, earlier) < 0 {
-        across.iter_mut().for_each(|v| *v = -*v);
-    }
+    // N × u points to the left, where patch a lies.
+    let side = if a_is_later { -1.0 } else { 1.0 };
+    let across = normals
+        .iter()
+        .zip(&tangents)
+        .map(|(n, u)| side * n.cross(*u))
+        .collect();
     Some(Curve {
         later,
         earlier,
@@ -81,23 +79,6 @@ fn curve(grid: &ShellGrid, bvh: &TriangleBvh, seam: &Seam, plan: &InstallationPl
         across,
         is_loop,
     })
-}
-
-/// How many more points have `earlier` on the side of `across` and `later` on the other than the reverse.
-fn votes_for(bvh: &TriangleBvh, points: &[Vec3], across: &[Vec3], later: PatchId, earlier: PatchId) -> i64 {
-    let mut found = Vec::new();
-    let mut nearer_to_later = |x: Vec3| {
-        bvh.nearest_by_group(x, 9.0 * PROBE_MM * PROBE_MM, &mut found);
-        let distance = |p: PatchId| found.iter().find(|e| e.0 == p.0).map_or(f64::INFINITY, |e| e.1);
-        distance(later)
-            .partial_cmp(&distance(earlier))
-            .map_or(0, |o| -(o as i64))
-    };
-    points
-        .iter()
-        .zip(across)
-        .map(|(&x, &v)| nearer_to_later(x - PROBE_MM * v) - nearer_to_later(x + PROBE_MM * v))
-        .sum()
 }
 
 /// The polyline again with points at equal distances of about `step_mm` along it, ends kept.

@@ -246,16 +246,9 @@ pub fn contacts(
     seams: &[Seam],
     sizes: &ConnectorSizes,
 ) -> Vec<Contact> {
-    let edges = patch_border(surface);
     let bars = Bars::new(params, surface);
     let sampled = |seam: &Seam| {
-        let found = samples(
-            params,
-            sizes.of(seam.a, seam.b),
-            seam,
-            a_is_left(seam, &edges),
-            bars.as_ref(),
-        );
+        let found = samples(params, sizes.of(seam.a, seam.b), seam, bars.as_ref());
         (seam.a, seam.b, found, seam.is_loop())
     };
     let mut sampled: Vec<(PatchId, PatchId, Vec<Sample>, bool)> = seams.par_iter().map(sampled).collect();
@@ -391,13 +384,7 @@ fn longest_run_mm(samples: &[Sample], is_loop: bool, way: Way) -> f64 {
 
 /// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame; lengths are those on the inner side of
 /// the wall.
-fn samples(
-    params: &PlanParams,
-    size_mm: f64,
-    seam: &Seam,
-    a_is_left: bool,
-    bars: Option<&Bars<'_>>,
-) -> Vec<Sample> {
+fn samples(params: &PlanParams, size_mm: f64, seam: &Seam, bars: Option<&Bars<'_>>) -> Vec<Sample> {
     let n = (seam.length() / SAMPLE_STEP_MM).ceil().max(1.0);
     let stations: Vec<(Vec3, Vec3)> = seam.resampled(n as usize);
     let inner = seam.below(params.wall_mm, seam.length() / n);
@@ -420,12 +407,8 @@ fn samples(
             continue;
         };
         let has_room = middle >= margin && middle <= total - margin;
-        // N × u points to the left, where the surface is seen from outside.
-        let across = if a_is_left {
-            -normal.cross(tangent)
-        } else {
-            normal.cross(tangent)
-        };
+        // N × u points to the left, where the surface is seen from outside; there lies patch a.
+        let across = -normal.cross(tangent);
         let barred =
             |bars: &Bars<'_>| bars.at([seam.a, seam.b], size_mm, 0.5 * (w[0].0 + w[1].0), normal, across);
         let barred = bars.filter(|_| has_room).map(barred).unwrap_or_default();
@@ -439,77 +422,6 @@ fn samples(
         });
     }
     out
-}
-
-/// A triangle edge between two patches; `left` and `right` as seen from outside.
-struct BorderEdge {
-    left: PatchId,
-    right: PatchId,
-    middle: Vec3,
-    along: Vec3,
-}
-
-/// Whether the seam's lower patch lies to its left: the vote of nine places, each asking the nearest border
-/// edge.
-fn a_is_left(seam: &Seam, edges: &[BorderEdge]) -> bool {
-    let pair = |e: &&BorderEdge| (e.left.min(e.right), e.left.max(e.right)) == (seam.a, seam.b);
-    let start = edges.partition_point(|e| (e.left.min(e.right), e.left.max(e.right)) < (seam.a, seam.b));
-    let of_pair: Vec<&BorderEdge> = edges[start..].iter().take_while(pair).collect();
-    let n_segments = seam.points.len().saturating_sub(1);
-    let mut vote = 0.0;
-    for k in 0..n_segments.min(9) {
-        let i = k * n_segments / n_segments.min(9);
-        let (from, to) = (seam.points[i], seam.points[i + 1]);
-        let middle = 0.5 * (from + to);
-        let nearest = of_pair.iter().min_by(|x, y| {
-            x.middle
-                .distance_squared(middle)
-                .total_cmp(&y.middle.distance_squared(middle))
-        });
-        if let Some(e) = nearest {
-            let same_way = e.along.normalize_or_zero().dot((to - from).normalize_or_zero());
-            vote += if e.left == seam.a { same_way } else { -same_way };
-        }
-    }
-    vote >= 0.0
-}
-
-/// All edges between patches, sorted by pair.
-fn patch_border(surface: &SegmentedSurface) -> Vec<BorderEdge> {
-    let mesh = &surface.mesh;
-    // Only edges between two points that several patches share can be border: a small part of a fine mesh.
-    let mut first = vec![None; mesh.points.len()];
-    let mut is_shared = vec![false; mesh.points.len()];
-    for (t, &patch) in mesh.triangles.iter().zip(&surface.patch_of_face) {
-        for &v in t {
-            is_shared[v as usize] |= *first[v as usize].get_or_insert(patch) != patch;
-        }
-    }
-    let mut directed = Vec::new();
-    for (t, &patch) in mesh.triangles.iter().zip(&surface.patch_of_face) {
-        for (u, v) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-            if is_shared[u as usize] && is_shared[v as usize] {
-                directed.push((u.min(v), u.max(v), u > v, patch));
-            }
-        }
-    }
-    directed.sort_unstable();
-    let mut edges = Vec::new();
-    for pair in directed.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-        if let &[(u, v, false, left), (_, _, true, right)] = pair
-            && left != right
-        {
-            let (from, to) = (mesh.points[u as usize], mesh.points[v as usize]);
-            edges.push(BorderEdge {
-                left,
-                right,
-                middle: 0.5 * (from + to),
-                along: to - from,
-            });
-        }
-    }
-    edges.sort_by_key(|e| (e.left.min(e.right), e.left.max(e.right)));
-    edges
 }
 
 #[cfg(test)]
@@ -597,7 +509,7 @@ mod tests {
         };
         let params = PlanParams::default();
         let up = |length_mm: f64, size_mm: f64| {
-            let samples = samples(&params, size_mm, &line(length_mm), true, None);
+            let samples = samples(&params, size_mm, &line(length_mm), None);
             let pair = [PatchId(0), PatchId(1)];
             joint(
                 &params,
