@@ -1,9 +1,10 @@
 //! What is claimed of a finished kit, each claim with what a stranger needs to check it.
 //!
-//! A verdict ([`crate::verify`]) asks for trust in the program that made it. A certificate does not: it names
-//! the files by their hashes, and what is hard to find (which contacts hold the pieces, and with what forces)
-//! is written down, so that checking takes arithmetic only. The package `shellock-check` does that without
-//! any of this code. The format, the derivation and what is *not* proven are told in docs/certificate.md.
+//! A verdict ([`mod@crate::verify`]) asks for trust in the program that made it. A certificate does not: it
+//! names the files by their hashes, and what is hard to find (which contacts hold the pieces, and with what
+//! forces) is written down, so that checking takes arithmetic only. The package `shellock-check` does that
+//! without any of this code. The format, the derivation and what is *not* proven are told in
+//! docs/notes/certificate.md.
 //!
 //! Coordinates are mm in assembly space. Motions are twists about [`Certificate::center`].
 

@@ -1,9 +1,32 @@
 //! Is this an assembly that locks? Pieces as closed meshes, the order in which they are put together and the
 //! direction of each go in; a verdict, the play of the pieces and a certificate of both come out.
 //!
-//! Nothing here knows how the pieces were made. [`verify`] judges at rest and on the ways out, [`motion`]
+//! Nothing here knows how the pieces were made. [`mod@verify`] judges at rest and on the ways out, [`motion`]
 //! holds contacts as inequalities, [`play`] bounds motions of any size, [`certificate`] writes the proofs
-//! down.
+//! down. [`verify()`] does it all.
+//!
+//! A block that nothing keeps from being lifted out of its tray is no lock:
+//!
+//! ```
+//! use shellock_assembly::{Assembly, Ctx, InstallationPlan, LatticeDirection, VerifyParams, verify};
+//! use shellock_geom::{Aabb, Vec3, Volume};
+//!
+//! let cuboid = |min, max| {
+//!     Volume::cuboid(Aabb { min: Vec3::from_array(min), max: Vec3::from_array(max) })
+//! };
+//! let hollow = cuboid([4.9, 4.9, 4.9], [25.1, 25.1, 20.0]);
+//! let tray = cuboid([0.0; 3], [30.0, 30.0, 10.0]).subtract(&hollow);
+//! let block = cuboid([5.0; 3], [25.0, 25.0, 10.0]);
+//! let knob = cuboid([10.0, 10.0, 10.1], [20.0, 20.0, 20.0]);
+//! let pieces = [tray, block, knob].iter().map(Volume::to_mesh).collect();
+//! let up = LatticeDirection::nearest(Vec3::Z);
+//! let plan = InstallationPlan::new([(0.into(), up), (1.into(), up), (2.into(), up)]);
+//! let assembly = Assembly { model: None, pieces: &pieces, plan: &plan, press_fits: &[] };
+//! let params = VerifyParams { clearance_mm: 0.1, seed: 0 };
+//! let verdict = verify(&Ctx::quiet(), &params, &assembly)?;
+//! assert!(!verdict.verification.passed());
+//! # Ok::<(), shellock_assembly::Cancelled>(())
+//! ```
 
 pub mod certificate;
 pub mod context;
@@ -15,6 +38,7 @@ pub mod play;
 pub mod press_fit;
 pub mod push;
 pub mod sequence;
+mod verdict;
 pub mod verify;
 
 pub use context::{Cancelled, Ctx, Warning};
@@ -22,3 +46,5 @@ pub use direction::LatticeDirection;
 pub use ids::{IdVec, PatchId};
 pub use press_fit::{PressFit, PressFitKind};
 pub use sequence::{InstallationPlan, InstallationStep};
+pub use verdict::{Verdict, verify};
+pub use verify::{Assembly, VerifyParams};

@@ -45,7 +45,7 @@ pub struct Contact {
 /// How far a piece may rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in
 /// proportion to the clearance; displacements also to the size of the model, but no less than for 75 mm;
 /// turns of pieces with a diagonal under 60 mm, whose rims move less, in inverse proportion to that, up to
-/// twice. docs/certificate.md has the evidence.
+/// twice. docs/notes/certificate.md has the evidence.
 pub fn most_play(size_mm: f64, clearance_mm: f64, piece_mm: f64) -> [f64; 2] {
     const AT_MM: f64 = 150.0;
     const AT_CLEARANCE_MM: f64 = 0.12;

@@ -3,8 +3,8 @@
 //! The lock of [`crate::certificate`] is one of faces that touch. Printed faces are a clearance apart, and
 //! what has room can be turned past a short connector. Here the clearance counts: contacts are taken with an
 //! area, and a linear program over all of them bounds what pieces can do on any path from rest, first each
-//! piece while all others are held, then all together with one held. docs/certificate.md has the theorem; the
-//! proofs go into the certificate.
+//! piece while all others are held, then all together with one held. docs/notes/certificate.md has the
+//! theorem; the proofs go into the certificate.
 //!
 //! ```text
 //!  surfaces ─► bearings ─► bounds ─► KitPlay

@@ -23,6 +23,14 @@ pub struct InstallationPlan {
 }
 
 impl InstallationPlan {
+    /// Pieces, first to last, each with the direction along which it separates.
+    pub fn new(steps: impl IntoIterator<Item = (PatchId, LatticeDirection)>) -> Self {
+        let step = |(piece, separation)| InstallationStep { piece, separation };
+        Self {
+            steps: steps.into_iter().map(step).collect(),
+        }
+    }
+
     /// The piece installed last, the only one that can be taken out.
     pub fn key(&self) -> PatchId {
         self.steps[self.steps.len() - 1].piece

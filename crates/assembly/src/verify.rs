@@ -26,7 +26,7 @@ mod thin;
 mod words;
 
 use serde::{Deserialize, Serialize};
-use shellock_geom::{Solid, TriMesh};
+use shellock_geom::{Aabb, Solid, TriMesh};
 
 use crate::InstallationPlan;
 use crate::PressFit;
@@ -248,14 +248,27 @@ impl Verification {
 /// A finished kit.
 #[derive(Clone, Copy, Debug)]
 pub struct Assembly<'a> {
-    /// What the pieces are made of.
-    pub model: &'a Solid,
+    /// What the pieces are to look like together; `None` where nothing is asked of their outside.
+    pub model: Option<&'a Solid>,
     /// The pieces, as they will be written.
     pub pieces: &'a IdVec<PatchId, TriMesh>,
     /// Their order and directions.
     pub plan: &'a InstallationPlan,
     /// Where the key presses on purpose: what is shared there is no overlap.
     pub press_fits: &'a [PressFit],
+}
+
+impl Assembly<'_> {
+    /// The box of the model, or of all pieces.
+    pub fn bounds(&self) -> Aabb {
+        let of_pieces = || {
+            self.pieces
+                .as_slice()
+                .iter()
+                .fold(Aabb::EMPTY, |all, mesh| all.union(mesh.bounds()))
+        };
+        self.model.map_or_else(of_pieces, |model| model.mesh().bounds())
+    }
 }
 
 /// Judges the finished pieces of a model and their plan; every ending but a stop is an answer. Also the
@@ -285,12 +298,14 @@ pub fn examine(
     verdict.findings.extend(findings);
 
     verdict.add(overlap::check_pairs(ctx, &bodies, press_fits)?);
-    verdict.add(overlap::check_outside(model, &bodies));
-    verdict.add(cover::check(model, &bodies, params.seed));
+    if let Some(model) = model {
+        verdict.add(overlap::check_outside(model, &bodies));
+        verdict.add(cover::check(model, &bodies, params.seed));
+    }
     if !is_plan {
         return Ok((verdict, Vec::new()));
     }
-    let length_mm = model.mesh().bounds().diagonal();
+    let length_mm = assembly.bounds().diagonal();
     verdict.add(path::check(ctx, &bodies, &plan.steps, length_mm)?);
     let contacts = contact::find(ctx, &bodies, params.clearance_mm, params.seed)?;
     verdict.add(probe::check(

@@ -4,7 +4,7 @@
 //! What is bounded is linear in the `ξ`, and so are the rows, which say how far a bearing's point rises. As
 //! long as all bounds hold, each point stays within its prism, so below its barrier, so each row is at most a
 //! number. If from the rows the multipliers give bounds that are below those told, nothing that moves on a
-//! path from rest is ever at one of these (docs/certificate.md).
+//! path from rest is ever at one of these (docs/notes/certificate.md).
 
 use serde::Deserialize;
 

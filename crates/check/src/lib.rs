@@ -2,7 +2,7 @@
 //!
 //! Everything is recomputed from `certificate.json`, `plan.json` and the pieces' STL files; nothing is
 //! believed but the choice of contacts and multipliers, and those only as far as they stand the test. What
-//! each claim means and why its test is enough: docs/certificate.md.
+//! each claim means and why its test is enough: docs/notes/certificate.md.
 
 mod barrier;
 mod bearing;

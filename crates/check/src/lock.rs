@@ -3,7 +3,7 @@
 //! A motion gives each piece that is not held a velocity `v` and a spin `w`. A contact with normal `n` at
 //! `p`, from `a` to `b`, allows it where `n · (v_a − v_b) + (p × n) · (w_a − w_b) ≤ 0`: one row of `A x ≤ 0`.
 //! With multipliers `μ > 0`, over all columns, such an `x` has `‖D A x‖ ≤ |Aᵀμ| |x|`, where `D = diag(min(μ,
-//! 1))` (docs/certificate.md).
+//! 1))` (docs/notes/certificate.md).
 //!
 //! Let `x = (x_o, x_k)`, the key's unknowns last, `B = D A_o`, `C = D A_k`. An orthonormal basis `Q` of the
 //! columns of `C` but for those that are nearly sums of others has `C = Q R + E`, where `E` is what is left

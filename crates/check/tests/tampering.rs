@@ -101,7 +101,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
         seed: 0,
     };
     let assembly = Assembly {
-        model: &model,
+        model: Some(&model),
         pieces: &pieces,
         plan: &plan,
         press_fits: &[],
@@ -120,7 +120,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
             play: None,
         })
         .collect();
-    let gaps = kit_gaps(&Ctx::new(&report, &stop), &model, &pieces, &plan, RIM_MM).unwrap();
+    let gaps = kit_gaps(&Ctx::new(&report, &stop), Some(&model), &pieces, &plan, RIM_MM).unwrap();
     let ctx = Ctx::new(&report, &stop);
     let params = PlayParams {
         clearance_mm: CLEARANCE_MM,

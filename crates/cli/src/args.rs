@@ -73,9 +73,11 @@ pub enum Command {
         #[command(flatten)]
         options: Options,
     },
-    /// Check a finished kit again from its files
+    /// Check a finished kit again from its files, or an assembly of your own
     Verify {
-        /// Folder of the kit
+        /// Folder of the kit; or of closed meshes in assembled position, mm, with an assembly.json such as
+        /// {"clearance": 0.1, "pieces": [{"file": "base.stl"}, {"file": "lid.stl", "pulled_out_along": [0, 0,
+        /// 1]}]}, first to last as they are put together
         kit: PathBuf,
         /// The model it was made from [default: the file named in its plan.json]
         model: Option<PathBuf>,

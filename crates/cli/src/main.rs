@@ -8,6 +8,7 @@ mod input;
 mod inspect;
 mod manual;
 mod output;
+mod own_assembly;
 mod page;
 mod paint;
 mod printing;
@@ -140,6 +141,9 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Demo { figure, options, out } => build::demo(session, &figure, &options, out),
         Command::Segment { model, options, out } => stages::segment(session, &model, &options, &out),
         Command::Plan { model, options } => stages::plan(session, &model, &options),
+        Command::Verify { kit, .. } if kit.join(own_assembly::ASSEMBLY).is_file() => {
+            own_assembly::verify(session, &kit)
+        }
         Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
         Command::Test { kit, blows } => stress::test(session, &kit, &blows),
         Command::Report {

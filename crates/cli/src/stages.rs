@@ -4,15 +4,12 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use serde_json::{Value, json};
-use shellock::body::BodyParams;
-use shellock::certificate::{Evidence, OtherFile, PieceFile, certify};
+use shellock::certificate::{OtherFile, PieceFile};
 use shellock::design::{self, DesignError, Planned, Settings};
 use shellock::piece::PressFit;
 use shellock::plan::{InstallationPlan, InstallationStep};
-use shellock::play::{KitPlay, PlayParams};
-use shellock::verify::clearance::kit_gaps;
-use shellock::verify::{Assembly, Finding, Verification, VerifyParams};
-use shellock::{Ctx, IdVec, LatticeDirection, PatchId, play, segmentation};
+use shellock::verify::{Assembly, VerifyParams};
+use shellock::{Ctx, IdVec, LatticeDirection, PatchId, segmentation};
 use shellock_formats::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -209,35 +206,14 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let ctx = Ctx::new(&report, &session.stop);
     let press_fits = press_fits_of(&plan).map_err(|what| broken(&what))?;
     let assembly = Assembly {
-        model: &solid,
+        model: Some(&solid),
         pieces: &pieces,
         plan: &order,
         press_fits: &press_fits,
     };
-    let (mut verdict, contacts) = shellock::verify::examine(&ctx, &params, &assembly)?;
-    let is_plan = verdict.checks.first().is_some_and(|check| check.ok);
-    // Barriers are those of closed surfaces.
-    let is_open = |f: &Finding| matches!(f, Finding::NotClosed { .. } | Finding::SharedEdges { .. });
-    let is_sound = is_plan && !verdict.findings.iter().any(is_open);
-    let measured = if is_sound {
-        Some(played(&ctx, &params, &assembly, &mut verdict)?)
-    } else {
-        None
-    };
-    let rim_mm = BodyParams::default().rim_mm;
-    let gaps = kit_gaps(&ctx, &solid, &pieces, &order, rim_mm)?;
-    let claimed = certify(
-        files,
-        &pieces,
-        &order,
-        &Evidence {
-            contacts: &contacts,
-            verdict: &verdict,
-            gaps: &gaps,
-            play: measured.as_ref(),
-        },
-        params.clearance_mm,
-    );
+    let verdict = shellock::verify(&ctx, &params, &assembly).inspect_err(|_| display.finish())?;
+    let claimed = verdict.certificate(files, &params, &assembly);
+    let verdict = verdict.verification;
     display.finish();
     if let Some(claimed) = claimed {
         let claimed = claimed
@@ -255,34 +231,6 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
         print_verdict(&verdict);
     }
     Ok(code)
-}
-
-/// How far pieces move, which the verdict then tells.
-fn played(
-    ctx: &Ctx,
-    params: &VerifyParams,
-    kit: &Assembly<'_>,
-    verdict: &mut Verification,
-) -> Result<KitPlay, Failure> {
-    let VerifyParams { clearance_mm, seed } = *params;
-    let mut measured = play::measure(
-        ctx,
-        &PlayParams {
-            clearance_mm,
-            slide_mm: play::SLIDE_MM,
-            is_together: false,
-            seed,
-        },
-        kit.pieces,
-        kit.plan,
-    )?;
-    let size_mm = kit.model.mesh().bounds().size().max_element();
-    verdict.add(play::check(&measured, kit.pieces, size_mm, clearance_mm));
-    play::look_for_ways_out(ctx, clearance_mm, kit.pieces, &mut measured)?;
-    play::check_ways_out(&measured, kit.pieces)
-        .into_iter()
-        .for_each(|check| verdict.add(check));
-    Ok(measured)
 }
 
 /// The places where the key presses on purpose. A plan without any names none.

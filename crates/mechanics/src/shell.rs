@@ -10,7 +10,7 @@
 //! ```
 //!
 //! **What holds.** It differs from case to case. Two ways, which answer different questions (figures in
-//! docs/shell.md):
+//! docs/notes/shell.md):
 //!
 //! - *In the mean*, for all cases one factorisation: over the area of the case's region, the mean
 //!   displacement and the mean rotation of its nodes vanish. The reaction to that is a traction that varies
@@ -23,7 +23,7 @@
 //!   order of elimination. The stress at the edge of what is clamped grows with every refinement.
 //!
 //! Each connected part of the mesh is held by its own nodes. The element is described in `element`;
-//! docs/shell.md has benchmarks.
+//! docs/notes/shell.md has benchmarks.
 //!
 //! Source: Sect. 4.3 of the paper, which does not say what element it uses. Limits: small displacements, a
 //! thickness that is the same everywhere and small beside the radii of curvature, no shear across the wall.

@@ -1,7 +1,7 @@
 //! Published benchmarks of shell elements: ours against their references.
 //!
 //! `cargo test --release -p shellock-mechanics --test shell_benchmarks -- --nocapture` prints the table of
-//! docs/shell.md. Quantities have the units of the sources, which are consistent.
+//! docs/notes/shell.md. Quantities have the units of the sources, which are consistent.
 
 use std::f64::consts::FRAC_PI_2;
 

@@ -27,7 +27,7 @@ pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, desi
 pub use seam::graph::{Contact, ContactGraph};
 pub use shellock_assembly::{
     Cancelled, Ctx, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit,
-    PressFitKind, Warning, certificate, context, direction, ids, motion, params, play, push, verify,
+    PressFitKind, Verdict, Warning, certificate, context, direction, ids, motion, params, play, push, verify,
 };
 pub use sizes::ConnectorSizes;
 pub use surface::{Seam, SegmentedSurface};

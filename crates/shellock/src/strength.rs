@@ -18,8 +18,8 @@
 //! Two rules. Where the model is too thin to be hollow with that H it is solid, and no shell: these places do
 //! not count (`SolidRegion`). And the stress that counts in a case is the one that all but a small share of
 //! the other area stays below: the few worst triangles, in creases and at tips, tell more of the mesh than of
-//! the model, and their stress grows with every refinement. docs/strength.md has what the share and the mesh
-//! change.
+//! the model, and their stress grows with every refinement. docs/notes/strength.md has what the share and the
+//! mesh change.
 
 pub mod chart;
 mod falls;
@@ -59,7 +59,7 @@ const USUAL_MM: f64 = 2.0;
 const WORTH_MORE_WALL: f64 = 1.05;
 /// Points of the mesh that shows how the stress depends on the thickness.
 const COARSE_POINTS: f64 = 2000.0;
-/// Points of the mesh whose stress counts; docs/strength.md has what more of them change.
+/// Points of the mesh whose stress counts; docs/notes/strength.md has what more of them change.
 const FINE_POINTS: f64 = 6000.0;
 /// Stress on the fine mesh over that on the coarse one, as far as nothing is known: it is 1.0 to 1.05 on most
 /// models.
@@ -89,7 +89,7 @@ pub struct StrengthParams {
     pub least_mm: f64,
     /// Thickest wall to look at. [`least_mm`, 20]; 3. The paper looks up to 10 mm and finds 1.9 to 2.8;
     /// thicker walls leave a figure of 150 mm little cavity, and where 3 mm do not bear the stress, 10 hardly
-    /// do (docs/strength.md).
+    /// do (docs/notes/strength.md).
     pub most_mm: f64,
     /// Share of the hollow area whose stress may be above the one that counts. [0, 0.2]; 0.005.
     pub peak_share: f64,

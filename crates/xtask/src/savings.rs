@@ -16,7 +16,7 @@ pub struct Options {
     #[arg(required = true)]
     kits: Vec<PathBuf>,
     /// Where to write: a Markdown file
-    #[arg(short, long, value_name = "FILE", default_value = "docs/savings.md")]
+    #[arg(short, long, value_name = "FILE", default_value = "docs/guide/savings.md")]
     out: PathBuf,
 }
 

@@ -22,7 +22,7 @@ pub struct BearingPoint {
     pub across: [f64; 3],
 }
 
-/// That some pieces stay within bounds, with the proof. docs/certificate.md has the theorem.
+/// That some pieces stay within bounds, with the proof. docs/notes/certificate.md has the theorem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounded {
     /// Who moves, in ascending order; all others are held.

@@ -2,8 +2,8 @@
 //!
 //! An assumption says how far each of a few quantities goes. It says how far each bearing's point goes
 //! sideways, so how high its barrier is, so what the linear program over all bearings allows. Where that is
-//! within the assumption, no path from rest leaves it (docs/certificate.md). Else the assumption is widened
-//! to what was found and a little more, and tried again.
+//! within the assumption, no path from rest leaves it (docs/notes/certificate.md). Else the assumption is
+//! widened to what was found and a little more, and tried again.
 //!
 //! Only few bearings end a motion, and only for these it matters how far they go: each round begins with the
 //! pieces' own turns and displacements and goes on to the cells of the bearings that end these, until no more

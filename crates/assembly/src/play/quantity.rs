@@ -215,7 +215,7 @@ impl Quantities {
     }
 
     /// How far the bearing's point, seen from `b`, can be from where the logarithms of poses say, mm:
-    /// docs/certificate.md.
+    /// docs/notes/certificate.md.
     pub fn error_mm(&self, b: &Bearing, p: &Place, centers: &IdVec<PatchId, Vec3>) -> f64 {
         let norm = |k: usize| self.all[k].norm();
         let turn = norm(p.turn);

@@ -70,10 +70,10 @@ pub struct KitGaps {
 }
 
 /// All gaps of the finished `pieces` of `model`, installed as `plan` says. What is within `rim_mm` of the
-/// model's surface is rim.
+/// model's surface is rim; nothing is where there is no model.
 pub fn kit_gaps(
     ctx: &Ctx,
-    model: &Solid,
+    model: Option<&Solid>,
     pieces: &IdVec<PatchId, TriMesh>,
     plan: &InstallationPlan,
     rim_mm: f64,
@@ -90,14 +90,14 @@ pub fn kit_gaps(
 /// Prepares `pieces` of `model`. What is within `rim_mm` of the model's surface is rim.
 pub fn prepare(
     ctx: &Ctx,
-    model: &Solid,
+    model: Option<&Solid>,
     pieces: &IdVec<PatchId, TriMesh>,
     rim_mm: f64,
 ) -> Result<PieceShapes, Cancelled> {
-    let outside = TriangleBvh::new(model.mesh());
+    let outside = model.map(|model| TriangleBvh::new(model.mesh()));
     let shapes = pieces.as_slice().par_iter().map(|mesh| {
         ctx.check()?;
-        Ok(shape(&outside, mesh, rim_mm))
+        Ok(shape(outside.as_ref(), mesh, rim_mm))
     });
     Ok(PieceShapes(
         shapes
@@ -175,11 +175,11 @@ fn among<P: Send, G: Send>(
     Ok(gaps.into_iter().flatten().collect())
 }
 
-fn shape(outside: &TriangleBvh, mesh: &TriMesh, rim_mm: f64) -> Option<Shape> {
+fn shape(outside: Option<&TriangleBvh>, mesh: &TriMesh, rim_mm: f64) -> Option<Shape> {
     let mesh = finite(mesh).map(merged)?;
     let below_rim = |p| {
         outside
-            .nearest(p, rim_mm * rim_mm)
+            .and_then(|outside| outside.nearest(p, rim_mm * rim_mm))
             .map_or(1.0, |near| near.distance_sq.sqrt() - rim_mm)
     };
     let values: Vec<f64> = mesh.points.iter().map(|&p| below_rim(p)).collect();
@@ -239,7 +239,7 @@ mod tests {
     fn gaps_beneath_the_rim_are_those_of_the_walls() {
         let (model, pieces, plan) = kit();
         let ctx = &Ctx::quiet();
-        let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+        let shapes = prepare(ctx, Some(&model), &pieces, 1.0).unwrap();
         let pairs = pair_gaps(ctx, &shapes).unwrap();
         assert_eq!(pairs.len(), 1, "the ledge is 2 mm off");
         assert!(pairs[0].overall.gap_mm.abs() < 1e-4, "{pairs:?}");
@@ -259,7 +259,7 @@ mod tests {
         let (model, pieces, mut plan) = kit();
         plan.steps.swap(1, 2);
         let ctx = &Ctx::quiet();
-        let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+        let shapes = prepare(ctx, Some(&model), &pieces, 1.0).unwrap();
         let paths = path_gaps(ctx, &shapes, &plan).unwrap();
         let met = paths
             .iter()
@@ -277,7 +277,7 @@ mod tests {
         pieces[PatchId(2)].points[0].x = f64::NAN;
         plan.steps[2].piece = PatchId(77);
         let ctx = &Ctx::quiet();
-        let shapes = prepare(ctx, &model, &pieces, 1.0).unwrap();
+        let shapes = prepare(ctx, Some(&model), &pieces, 1.0).unwrap();
         assert_eq!(pair_gaps(ctx, &shapes).unwrap(), []);
         assert_eq!(path_gaps(ctx, &shapes, &plan).unwrap(), []);
     }

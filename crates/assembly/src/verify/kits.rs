@@ -62,7 +62,7 @@ impl Kit {
             seed: 0,
         };
         let assembly = Assembly {
-            model: &self.model,
+            model: Some(&self.model),
             pieces: &self.pieces,
             plan: &self.plan,
             press_fits: &[],

@@ -206,7 +206,7 @@ fn judged(
     plan: &InstallationPlan,
 ) -> Result<(Verification, Vec<verify::contact::Contact>, KitPlay), DesignError> {
     let assembly = verify::Assembly {
-        model,
+        model: Some(model),
         pieces: &finished.meshes,
         plan,
         press_fits: &finished.press_fits,

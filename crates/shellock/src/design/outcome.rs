@@ -134,7 +134,13 @@ impl<'a> Best<'a> {
             return Ok(DesignOutcome::NoPlan { reason, blockers });
         };
         let Candidate { turn, model, key, .. } = candidate;
-        let gaps = kit_gaps(ctx, &model, &kit.pieces, &kit.plan, job.settings().body.rim_mm)?;
+        let gaps = kit_gaps(
+            ctx,
+            Some(&model),
+            &kit.pieces,
+            &kit.plan,
+            job.settings().body.rim_mm,
+        )?;
         let ctx = ctx.fork();
         segmentation::tell(
             &ctx,

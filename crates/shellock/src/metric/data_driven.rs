@@ -5,10 +5,10 @@
 //! ```
 //!
 //! with f over the directions in which the piece separates from its neighbours (translation) and over
-//! ± (x_i − x_a) × (x_b − x_a) for the ends x_a, x_b of the boundary (rotation). The study (docs/metrics.md)
-//! shows that the maximum hides interlocking: every boundary opens along its own direction, whatever holds
-//! the piece elsewhere. [`pieces_alone`] therefore simulates each piece with its neighbours held. It, too,
-//! depends only on the directions on the piece's own boundaries.
+//! ± (x_i − x_a) × (x_b − x_a) for the ends x_a, x_b of the boundary (rotation). The study
+//! (docs/notes/metrics.md) shows that the maximum hides interlocking: every boundary opens along its own
+//! direction, whatever holds the piece elsewhere. [`pieces_alone`] therefore simulates each piece with its
+//! neighbours held. It, too, depends only on the directions on the piece's own boundaries.
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;

@@ -159,7 +159,8 @@ fn analysis_mesh(mesh: &TriMesh, n_points: f64) -> TriMesh {
 
 /// Directions that are as even as few directions can be, turned at random: a spiral of equal areas.
 ///
-/// Directions drawn one by one leave gaps and clusters, and the thickness depends on them: docs/strength.md.
+/// Directions drawn one by one leave gaps and clusters, and the thickness depends on them:
+/// docs/notes/strength.md.
 fn even_directions(rng: &mut ChaCha8Rng, n: usize) -> Vec<Vec3> {
     let pole = on_sphere(rng);
     let (x, y) = pole.any_orthonormal_pair();

@@ -1,0 +1,104 @@
+//! Everything that is known of an assembly's lock, in one call.
+
+use crate::certificate::{Certificate, Evidence, PieceFile, certify};
+use crate::play::{self, KitPlay, PlayParams};
+use crate::verify::clearance::{KitGaps, kit_gaps};
+use crate::verify::contact::Contact;
+use crate::verify::{Assembly, Finding, Verification, VerifyParams, examine};
+use crate::{Cancelled, Ctx};
+
+/// A verdict with what it rests on.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Verdict {
+    /// The checks and what failed.
+    pub verification: Verification,
+    /// Where pieces touch.
+    pub contacts: Vec<Contact>,
+    /// How far they move; `None` where a piece is open or the plan is broken.
+    pub play: Option<KitPlay>,
+    /// How near they come, at rest and on their ways; nothing is rim where there is no model.
+    pub gaps: KitGaps,
+}
+
+/// How much of the wall beneath the outer surface is rim, where gaps are told apart, mm.
+const RIM_MM: f64 = 1.0;
+
+/// Judges an assembly: closed pieces, no overlap, free ways in, nothing but the last piece moves, play within
+/// its limits, and no way out by hand for pieces without a proof.
+///
+/// A function of its arguments alone, on any number of threads; fails only where the user stopped. A kit of
+/// 13 pieces takes 5 s of processor time, and 2 to 4 s more for each piece whose play is not proven.
+pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Result<Verdict, Cancelled> {
+    let (mut verification, contacts) = examine(ctx, params, assembly)?;
+    let is_plan = verification.checks.first().is_some_and(|check| check.ok);
+    // Barriers are those of closed surfaces.
+    let is_open = |f: &Finding| matches!(f, Finding::NotClosed { .. } | Finding::SharedEdges { .. });
+    let is_sound = is_plan && !verification.findings.iter().any(is_open);
+    let play = if is_sound {
+        Some(played(ctx, params, assembly, &mut verification)?)
+    } else {
+        None
+    };
+    let gaps = kit_gaps(ctx, assembly.model, assembly.pieces, assembly.plan, RIM_MM)?;
+    Ok(Verdict {
+        verification,
+        contacts,
+        play,
+        gaps,
+    })
+}
+
+/// How far pieces move, which the verdict then says.
+fn played(
+    ctx: &Ctx,
+    params: &VerifyParams,
+    assembly: &Assembly<'_>,
+    verification: &mut Verification,
+) -> Result<KitPlay, Cancelled> {
+    let VerifyParams { clearance_mm, seed } = *params;
+    let play_params = PlayParams {
+        clearance_mm,
+        slide_mm: play::SLIDE_MM,
+        is_together: false,
+        seed,
+    };
+    let mut measured = play::measure(ctx, &play_params, assembly.pieces, assembly.plan)?;
+    let size_mm = assembly.bounds().size().max_element();
+    verification.add(play::check(&measured, assembly.pieces, size_mm, clearance_mm));
+    play::look_for_ways_out(ctx, clearance_mm, assembly.pieces, &mut measured)?;
+    let ways_out = play::check_ways_out(&measured, assembly.pieces);
+    ways_out.into_iter().for_each(|check| verification.add(check));
+    Ok(measured)
+}
+
+impl Verdict {
+    /// What can be proven of the assembly, whose pieces are in `files`; `None` where the plan does not name
+    /// every piece once.
+    pub fn certificate(
+        &self,
+        files: Vec<PieceFile>,
+        params: &VerifyParams,
+        assembly: &Assembly<'_>,
+    ) -> Option<Certificate> {
+        let Self {
+            verification,
+            contacts,
+            play,
+            gaps,
+        } = self;
+        let evidence = Evidence {
+            contacts,
+            verdict: verification,
+            gaps,
+            play: play.as_ref(),
+        };
+        certify(
+            files,
+            assembly.pieces,
+            assembly.plan,
+            &evidence,
+            params.clearance_mm,
+        )
+    }
+}

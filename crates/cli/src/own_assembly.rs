@@ -1,0 +1,147 @@
+//! `verify` for anybody's assembly: a folder of meshes and `assembly.json`, which says how they go together.
+
+use std::path::{Component, Path};
+
+use serde::Deserialize;
+use serde_json::json;
+use shellock::certificate::PieceFile;
+use shellock::context::Progress;
+use shellock::verify::{Assembly, VerifyParams};
+use shellock::{Ctx, InstallationPlan, LatticeDirection, PatchId, Verdict};
+use shellock_geom::Vec3;
+use shellock_geom::weld::weld;
+
+use crate::Session;
+use crate::build::print_verdict;
+use crate::failure::Failure;
+use crate::input::{load, read, sha256};
+use crate::output::{CERTIFICATE, certificate_bytes};
+use crate::progress::Display;
+use crate::stages::write;
+
+/// The file that says how the pieces go together.
+pub const ASSEMBLY: &str = "assembly.json";
+
+/// What `assembly.json` says.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AssemblyFile {
+    /// Gap between mating faces, mm.
+    clearance: f64,
+    /// First to last as they are put together; the last is the key.
+    pieces: Vec<PieceEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PieceEntry {
+    /// A mesh in the folder, in assembled position, mm.
+    file: String,
+    /// The way along which it is pulled out again; the first piece needs none.
+    #[serde(default)]
+    pulled_out_along: Option<[f64; 3]>,
+}
+
+/// `shellock verify FOLDER`, where the folder has an `assembly.json`.
+pub fn verify(session: &Session, folder: &Path) -> Result<u8, Failure> {
+    let path = folder.join(ASSEMBLY);
+    let wrong = |what: String| Failure::Wrong(format!("{}: {what}", path.display()));
+    let told: AssemblyFile = serde_json::from_slice(&read(&path)?).map_err(|e| wrong(e.to_string()))?;
+    if !(0.0..=1.0).contains(&told.clearance) {
+        return Err(wrong(format!(
+            "a clearance of {} mm is none; 0 to 1 mm are",
+            told.clearance
+        )));
+    }
+    if told.pieces.len() < 2 {
+        return Err(wrong("an assembly has at least two pieces".into()));
+    }
+    let plan = plan(&told.pieces).map_err(wrong)?;
+    let (mut files, mut meshes) = (Vec::new(), Vec::new());
+    for (i, PieceEntry { file, .. }) in told.pieces.iter().enumerate() {
+        if !Path::new(file)
+            .components()
+            .all(|c| matches!(c, Component::Normal(_)))
+        {
+            return Err(wrong(format!("\"{file}\" is no file within the folder")));
+        }
+        let (loaded, bytes) = load(&folder.join(file))?;
+        let (file, sha256) = (file.clone(), sha256(&bytes));
+        files.push(PieceFile {
+            id: i.into(),
+            file,
+            sha256,
+            play: None,
+        });
+        meshes.push(weld(&loaded.mesh).mesh);
+    }
+    let pieces = meshes.into_iter().collect();
+    let assembly = Assembly {
+        model: None,
+        pieces: &pieces,
+        plan: &plan,
+        press_fits: &[],
+    };
+    let params = VerifyParams {
+        clearance_mm: told.clearance,
+        seed: 0,
+    };
+    let display = Display::new(session.shown);
+    let report = |p: Progress<'_>| display.show(p);
+    let ctx = Ctx::new(&report, &session.stop);
+    let verdict = shellock::verify(&ctx, &params, &assembly).inspect_err(|_| display.finish())?;
+    display.finish();
+    if let Some(claimed) = verdict.certificate(files, &params, &assembly) {
+        write(&folder.join(CERTIFICATE), &certificate_bytes(&claimed))?;
+    }
+    Ok(print(session, &verdict))
+}
+
+/// The order and directions, or what is wrong with them.
+fn plan(pieces: &[PieceEntry]) -> Result<InstallationPlan, String> {
+    /// Directions are one of 26; what is off by more than this, degrees, is another.
+    const MOST_OFF_DEG: f64 = 1.0;
+    let step = |(i, piece): (usize, &PieceEntry)| {
+        let name = &piece.file;
+        let along = match piece.pulled_out_along {
+            Some(along) => Vec3::from_array(along),
+            None if i == 0 => Vec3::Z,
+            None => {
+                return Err(format!(
+                    "{name} needs \"pulled_out_along\": the way it is taken out again"
+                ));
+            }
+        };
+        let unit = along
+            .try_normalize()
+            .ok_or_else(|| format!("the way of {name} has no direction"))?;
+        let nearest = LatticeDirection::nearest(unit);
+        if nearest.unit().dot(unit) < MOST_OFF_DEG.to_radians().cos() {
+            return Err(format!(
+                "the way of {name} is not along an axis or a diagonal of the axes; turn all pieces so that it is"
+            ));
+        }
+        Ok((PatchId::from(i), nearest))
+    };
+    pieces
+        .iter()
+        .enumerate()
+        .map(step)
+        .collect::<Result<Vec<_>, _>>()
+        .map(InstallationPlan::new)
+}
+
+/// Prints the verdict; the exit code.
+fn print(session: &Session, verdict: &Verdict) -> u8 {
+    let found = &verdict.verification;
+    let code = u8::from(!found.passed());
+    if session.is_json {
+        let value = json!({
+            "passed": found.passed(), "checks": found.checks, "findings": found.findings, "exit_code": code,
+        });
+        println!("{value}");
+    } else {
+        print_verdict(found);
+    }
+    code
+}

@@ -1,0 +1,96 @@
+//! `verify` on assemblies that nobody here made.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use shellock_formats::write_stl_binary;
+use shellock_geom::{Aabb, Vec3, Volume};
+
+fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
+    let corner = |k: usize| Vec3::new(x[k], y[k], z[k]);
+    Volume::cuboid(Aabb {
+        min: corner(0),
+        max: corner(1),
+    })
+}
+
+/// A rail, a slider on it that goes along x, and a pin through both from above that reaches down to `pin_z`.
+fn write_pieces(folder: &Path, pin_z: f64) {
+    let (all, foot) = ([0.0, 30.0], [5.0, 9.0]);
+    let groove = cuboid([-1.0, 31.0], [6.9, 23.1], [4.9, 9.1]);
+    let neck = cuboid([-1.0, 31.0], [10.9, 19.1], [8.0, 20.0]);
+    let hole = cuboid([11.9, 18.1], [12.9, 17.1], [pin_z - 0.1, 40.0]);
+    let rail = cuboid(all, all, [0.0, 14.95])
+        .subtract(&groove)
+        .subtract(&neck)
+        .subtract(&hole);
+    let slider = Volume::union_all(vec![
+        cuboid(all, all, [15.05, 25.0]),
+        cuboid(all, [11.0, 19.0], [8.0, 16.0]),
+        cuboid(all, [7.0, 23.0], foot),
+    ])
+    .subtract(&hole);
+    let pin = cuboid([12.0, 18.0], [13.0, 17.0], [pin_z, 25.0]);
+    for (name, piece) in [("rail.stl", rail), ("slider.stl", slider), ("pin.stl", pin)] {
+        fs::write(folder.join(name), write_stl_binary(&piece.to_mesh())).unwrap();
+    }
+}
+
+const ASSEMBLY: &str = r#"{"clearance": 0.1, "pieces": [
+    {"file": "rail.stl"},
+    {"file": "slider.stl", "pulled_out_along": [1, 0, 0]},
+    {"file": "pin.stl", "pulled_out_along": [0, 0, 1]}]}"#;
+
+fn verify(folder: &Path, assembly: &str) -> Output {
+    fs::write(folder.join("assembly.json"), assembly).unwrap();
+    Command::new(env!("CARGO_BIN_EXE_shellock"))
+        .arg("verify")
+        .arg(folder)
+        .arg("--json")
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn boxes_that_lock_pass_and_boxes_that_do_not_fail() {
+    let dir = tempfile::tempdir().unwrap();
+    write_pieces(dir.path(), 1.0);
+    let o = verify(dir.path(), ASSEMBLY);
+    let said = String::from_utf8_lossy(&o.stdout);
+    assert_eq!(o.status.code(), Some(0), "{said}");
+    let certificate = fs::read(dir.path().join("certificate.json")).unwrap();
+    let certificate: serde_json::Value = serde_json::from_slice(&certificate).unwrap();
+    assert_eq!(certificate["key"], 2);
+    assert!(
+        certificate["claims"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|c| c["claim"] == "locked")
+    );
+    // A pin that ends above the rail holds nothing.
+    write_pieces(dir.path(), 16.0);
+    let o = verify(dir.path(), ASSEMBLY);
+    assert_eq!(o.status.code(), Some(1));
+}
+
+#[test]
+fn what_is_wrong_with_an_assembly_is_said_with_its_name() {
+    let dir = tempfile::tempdir().unwrap();
+    write_pieces(dir.path(), 1.0);
+    for (change, words) in [
+        (("\"pulled_out_along\": [0, 0, 1]", "\"way\": [0, 0, 1]"), "way"),
+        ((", \"pulled_out_along\": [0, 0, 1]", ""), "pin.stl needs"),
+        (("[0, 0, 1]", "[0, 0, 0]"), "has no direction"),
+        (("[0, 0, 1]", "[0, 0.3, 1]"), "turn all pieces"),
+        (("0.1", "7"), "a clearance of 7 mm"),
+        (("rail.stl", "../rail.stl"), "no file within the folder"),
+        (("rail.stl", "gone.stl"), "gone.stl"),
+    ] {
+        let o = verify(dir.path(), &ASSEMBLY.replace(change.0, change.1));
+        let said = String::from_utf8_lossy(&o.stdout);
+        assert_eq!(o.status.code(), Some(2), "{said}");
+        assert!(said.contains(words), "{said}");
+    }
+}

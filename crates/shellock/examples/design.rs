@@ -1,0 +1,27 @@
+//! A mesh in, pieces out: `cargo run --release -p shellock --example design MODEL.stl [FOLDER]`.
+
+use std::{env, error, fs};
+
+use shellock::{Ctx, DesignOutcome, Params, design};
+use shellock_formats::{read_mesh, write_stl_binary};
+use shellock_geom::repair::{Mending, mend};
+
+fn main() -> Result<(), Box<dyn error::Error>> {
+    let mut args = env::args().skip(1);
+    let file = args
+        .next()
+        .ok_or("name a model: an STL, OBJ, PLY, OFF, 3MF or glTF, in mm")?;
+    let folder = args.next().unwrap_or_else(|| ".".into());
+    let solid = mend(&read_mesh(&fs::read(file)?, None)?.mesh, Mending::Repair)?.solid;
+    match design(&Ctx::quiet(), &Params::default(), &solid, None)? {
+        DesignOutcome::Made(made) => {
+            for (piece, mesh) in made.kit.pieces.iter() {
+                fs::write(format!("{folder}/piece-{piece}.stl"), write_stl_binary(mesh))?;
+            }
+            let (n, passed) = (made.kit.pieces.len(), made.kit.verification.passed());
+            println!("{n} pieces; all checks hold: {passed}");
+        }
+        DesignOutcome::NoPlan { reason, .. } => println!("no plan: {reason}"),
+    }
+    Ok(())
+}
