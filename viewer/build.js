@@ -1,4 +1,4 @@
-// Bundles the viewer into dist/, which is committed: Rust embeds it, so building Shellock needs no node.
+// Bundles the viewer into the crate that embeds it (crates/render/viewer), which is committed: Rust embeds it, so building Shellock needs no node.
 import { readFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import * as esbuild from "esbuild";
@@ -6,13 +6,13 @@ import * as esbuild from "esbuild";
 const here = new URL("./", import.meta.url);
 const path = (name) => fileURLToPath(new URL(name, here));
 
-/** The files of dist/ and their texts. */
+/** The bundled files and their texts. */
 export async function bundle() {
   // Pages carry the bundle on their own, so three's whole notice goes with it.
   const notice = await readFile(path("node_modules/three/LICENSE"), "utf8");
   const result = await esbuild.build({
     entryPoints: [path("src/viewer.js"), path("src/viewer.css")],
-    outdir: path("dist"),
+    outdir: path("../crates/render/viewer"),
     banner: { js: `/*! three.js\n${notice.trim()}\n*/` },
     bundle: true,
     minify: true,
@@ -25,7 +25,7 @@ export async function bundle() {
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
   const { mkdir, writeFile } = await import("node:fs/promises");
-  await mkdir(path("dist"), { recursive: true });
+  await mkdir(path("../crates/render/viewer"), { recursive: true });
   for (const file of await bundle()) {
     await writeFile(file.path, file.text);
     console.log(`${file.path}: ${(file.contents.length / 1024).toFixed(0)} kB`);

@@ -117,7 +117,7 @@ export async function samplePage({ motions, script = CLICKS } = {}) {
     quantities: [{ name: "size <i>", unit: "mm", values: [10, null] }, { name: "nothing", unit: "", values: [null, null] }],
     motions,
   };
-  const dist = (name) => readFile(new URL(`../dist/${name}`, import.meta.url), "utf8");
+  const dist = (name) => readFile(new URL(`../../crates/render/viewer/${name}`, import.meta.url), "utf8");
   return `<!doctype html><meta charset="utf-8"><title>t</title><style>${await dist("viewer.css")}</style>
 <main id="view"><div id="stage"></div><div id="tools"></div></main><aside id="panel"></aside>
 <script type="application/json" id="header">${JSON.stringify(header).replaceAll("<", "\\u003c")}</script>

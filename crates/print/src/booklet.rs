@@ -112,26 +112,26 @@ impl Booklet<'_> {
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
             let foot = format!("{}  –  {} of {n_pages}", self.title, i + 1);
             let style = small(FAINT);
-            page.text(
-                [PAGE_MM[0] - RIM_MM - width_mm(style, &foot), PAGE_MM[1] - 8.0],
-                style,
-                &foot,
-            );
+            let room_mm = PAGE_MM[0] - 2.0 * RIM_MM;
+            let left = PAGE_MM[0] - RIM_MM - width_mm(style, &foot).min(room_mm);
+            page.text_within([left, PAGE_MM[1] - 8.0], room_mm, style, &foot);
         }
         document(&self.title, pages)
     }
 
     fn cover(&self, drawn: &[Drawn<'_>]) -> Page {
         let mut page = Page::new();
-        page.text([RIM_MM, 30.0], bold(11.0, INK), &self.title);
+        let room_mm = PAGE_MM[0] - 2.0 * RIM_MM;
+        page.text_within([RIM_MM, 30.0], room_mm, bold(11.0, INK), &self.title);
         let seen = format!(
             "in these pictures it is seen from {}",
             side(-Camera::front().direction)
         );
         let lines: Vec<&String> = self.lines.iter().chain([&seen]).collect();
         for (i, line) in lines.iter().enumerate() {
-            page.text(
+            page.text_within(
                 [RIM_MM, 40.0 + 6.0 * i as f64],
+                room_mm,
                 Style {
                     size_mm: 4.2,
                     is_bold: false,
@@ -255,8 +255,10 @@ fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sigh
         ),
         _ => format!("from {}", view::side(-Vec3::from(piece.installation_direction))),
     };
-    page.text(
+    let room_mm = x + cell_mm(STEPS, 0.0)[0] - 2.0 - (left + 13.0);
+    page.text_within(
         [left + 13.0, y + 6.6],
+        room_mm,
         Style {
             size_mm: 4.0,
             is_bold: false,
@@ -271,7 +273,7 @@ fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sigh
     } else {
         (seen, small(FAINT))
     };
-    page.text([left + 13.0, y + 11.4], style, &note);
+    page.text_within([left + 13.0, y + 11.4], room_mm, style, &note);
 }
 
 fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
@@ -281,7 +283,8 @@ fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
             "to take it apart, pull piece {} out first, against its arrow",
             key.piece.id
         );
-        page.text([x + 1.0, y + 11.4], small(FAINT), &how);
+        let room_mm = cell_mm(STEPS, 0.0)[0] - 3.0;
+        page.text_within([x + 1.0, y + 11.4], room_mm, small(FAINT), &how);
     }
 }
 

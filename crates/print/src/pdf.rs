@@ -55,6 +55,12 @@ impl Page {
         self.content.show(Str(&encoded(text))).end_text();
     }
 
+    /// The same, smaller or shortened where it would be wider than `room_mm`.
+    pub fn text_within(&mut self, at: [f64; 2], room_mm: f64, style: Style, text: &str) {
+        let (style, text) = fitted(style, text, room_mm);
+        self.text(at, style, &text);
+    }
+
     /// Text in the middle of `at`, in both directions.
     pub fn text_amid(&mut self, at: [f64; 2], style: Style, text: &str) {
         let left = at[0] - 0.5 * width_mm(style, text);
@@ -225,6 +231,23 @@ fn encoded(text: &str) -> Vec<u8> {
     text.chars().map(byte).collect()
 }
 
+/// A text that is no wider than `room_mm`: smaller, down to six tenths, then shortened.
+fn fitted(style: Style, text: &str, room_mm: f64) -> (Style, String) {
+    const SMALLEST: f64 = 0.6;
+    let shrunk = room_mm / width_mm(style, text).max(f64::MIN_POSITIVE);
+    let style = Style {
+        size_mm: style.size_mm * shrunk.clamp(SMALLEST, 1.0),
+        ..style
+    };
+    let mut n_kept = text.chars().count();
+    let mut text = text.to_owned();
+    while n_kept > 0 && width_mm(style, &text) > room_mm + 1e-9 {
+        n_kept -= 1;
+        text = text.chars().take(n_kept).collect::<String>() + "...";
+    }
+    (style, text)
+}
+
 /// Width of a line, mm.
 pub(crate) fn width_mm(style: Style, text: &str) -> f64 {
     let width = |byte: u8| {
@@ -251,6 +274,23 @@ const WIDTHS: [u16; 95] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_text_that_is_fitted_is_no_wider_than_its_room_and_short_ones_stay_as_they_are() {
+        let style = Style {
+            size_mm: 4.0,
+            is_bold: false,
+            color: [0; 3],
+        };
+        let long = "the key, from below, behind and its left: it locks all";
+        for room_mm in [200.0, 60.0, 30.0, 8.0] {
+            let (fit, text) = fitted(style, long, room_mm);
+            assert!(width_mm(fit, &text) <= room_mm + 1e-6, "{text} in {room_mm} mm");
+            assert!(fit.size_mm >= 0.6 * style.size_mm - 1e-9);
+        }
+        assert_eq!(fitted(style, "done", 60.0).1, "done");
+        assert!(fitted(style, long, 8.0).1.ends_with("..."));
+    }
 
     #[test]
     fn pages_come_out_with_their_pictures_and_the_same_each_time() {

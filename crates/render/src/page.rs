@@ -11,8 +11,8 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use super::{ReportCheck, ReportData, ReportMotion, ReportPiece, ReportQuantity, exploded_shifts};
 
 const TEMPLATE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("../../../viewer/dist/viewer.css");
-const VIEWER: &str = include_str!("../../../viewer/dist/viewer.js");
+const STYLE: &str = include_str!("../viewer/viewer.css");
+const VIEWER: &str = include_str!("../viewer/viewer.js");
 
 /// What moves is drawn within this share of the pieces' diagonal where a machine is slow: 0.3 mm on 240 mm.
 const DRAFT: f64 = 1.2e-3;
