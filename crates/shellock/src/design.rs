@@ -31,6 +31,7 @@ use crate::strength::{Strength, StrengthError, StressMap};
 use crate::{Ctx, SegmentedSurface, Warning, segmentation, strength};
 use attempt::{Attempt, Failure, Next};
 use budget::Budget;
+pub use budget::Effort;
 use candidate::Candidate;
 use division::{Division, WallGrid, revised};
 pub use kit::Kit;
@@ -221,6 +222,7 @@ struct Explored {
     kit: Option<Kit>,
     /// Why there is none, for people, and who is in whose way.
     failure: Failure,
+    effort: Effort,
 }
 
 /// Kits of one candidate until one passes or its budget is used up.
@@ -233,9 +235,14 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
             reason: "the key falls apart".into(),
             ..Failure::default()
         };
-        return Ok(Explored { kit, failure });
+        return Ok(Explored {
+            kit,
+            failure,
+            effort: budget.spent,
+        });
     };
     loop {
+        budget.spent.segmentations += 1;
         wall.make_room(
             division
                 .settings
@@ -248,6 +255,7 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                 return Ok(Explored {
                     kit,
                     failure: Failure::default(),
+                    effort: budget.spent,
                 });
             }
             Attempt::Joined(fewer) => {
@@ -268,7 +276,11 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                     .transpose()?
                     .flatten();
                 let Some(next) = next else {
-                    return Ok(Explored { kit, failure });
+                    return Ok(Explored {
+                        kit,
+                        failure,
+                        effort: budget.spent,
+                    });
                 };
                 ctx.note(&format!(
                     "another segmentation: {} pieces instead of {n_pieces}",

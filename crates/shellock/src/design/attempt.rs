@@ -71,6 +71,7 @@ pub(super) fn plans(
         chosen.tell(&kit_ctx);
         // The proof of a plan runs on one thread; the grid and distances in it are made beside it.
         let may_join = budget.foreseen_joinings > 0;
+        budget.spent.plans += 1;
         let (measured, next) = rayon::join(
             || {
                 let grid = wall.get()?;
@@ -126,6 +127,7 @@ pub(super) fn plans(
             made => made?,
         };
         budget.kits -= 1;
+        budget.spent.kits += 1;
         let ending = learned.learn(ctx, &kit, budget.kits_each);
         keep(best, kit);
         if let Some(ending) = ending {

@@ -1,5 +1,7 @@
 //! What a job may cost: one table for all its bounds.
 
+use serde::{Deserialize, Serialize};
+
 use super::Rounds;
 
 /// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where
@@ -19,6 +21,28 @@ const JOININGS_FORESEEN: usize = 5;
 /// seconds.
 pub(super) const BLOCKED_PLANS: usize = 8;
 
+/// What a job has cost so far, in work and not in time: the same on any machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Effort {
+    /// Places for a key that were tried; a piece as the key counts as one.
+    pub keys: usize,
+    /// Divisions into pieces.
+    pub segmentations: usize,
+    /// Plans that were searched for.
+    pub plans: usize,
+    /// Kits that were made and judged.
+    pub kits: usize,
+}
+
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, other: Self) {
+        self.keys += other.keys;
+        self.segmentations += other.segmentations;
+        self.plans += other.plans;
+        self.kits += other.kits;
+    }
+}
+
 /// What is left to one candidate for a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Budget {
@@ -33,6 +57,8 @@ pub(super) struct Budget {
     pub joinings: usize,
     /// How often pieces that are foreseen to rattle may still be joined.
     pub foreseen_joinings: usize,
+    /// What it has cost.
+    pub spent: Effort,
 }
 
 impl Budget {
@@ -58,6 +84,10 @@ impl Budget {
             revisions_at_first: revisions,
             joinings: JOININGS_OF_RATTLING,
             foreseen_joinings: JOININGS_FORESEEN,
+            spent: Effort {
+                keys: 1,
+                ..Effort::default()
+            },
         }
     }
 

@@ -5,7 +5,7 @@ use shellock_geom::Vec3;
 use super::attempt::Failure;
 use super::budget::RATTLING_KEYS;
 use super::candidate::{self, Candidate};
-use super::{Explored, Job, KeySource, Kit};
+use super::{Effort, Explored, Job, KeySource, Kit};
 use crate::body::{BodyError, GridError};
 use crate::key::{KeySite, Turn};
 use crate::metric::ChoiceError;
@@ -30,6 +30,8 @@ pub struct Design {
     pub strength: Option<Strength>,
     /// How near pieces come, at rest and on their way.
     pub gaps: KitGaps,
+    /// What it took to find it.
+    pub effort: Effort,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
 }
@@ -57,6 +59,7 @@ pub(super) struct Best<'a> {
     n_rattling: usize,
     /// Why there is no plan where a piece is the key.
     failure: Failure,
+    effort: Effort,
 }
 
 /// A kit and what it was made for.
@@ -83,8 +86,11 @@ impl<'a> Best<'a> {
         candidate: Candidate<'a>,
         explored: Result<Explored, DesignError>,
     ) -> Result<(), DesignError> {
+        if let Ok(explored) = &explored {
+            self.effort += explored.effort;
+        }
         let Some(site) = place else {
-            let Explored { kit, failure } = explored?;
+            let Explored { kit, failure, .. } = explored?;
             self.failure = failure;
             // Of equals a piece as it is.
             let is_worse = |kit: &Kit| {
@@ -101,7 +107,9 @@ impl<'a> Best<'a> {
         let reason = match explored {
             Err(DesignError::Cancelled(stop)) => return Err(stop.into()),
             Err(e) => format!("with {words} it cannot be made: {e}"),
-            Ok(Explored { kit: None, failure }) => {
+            Ok(Explored {
+                kit: None, failure, ..
+            }) => {
                 format!("with {words} there is no plan: {}", failure.reason)
             }
             Ok(Explored { kit: Some(kit), .. }) => {
@@ -124,6 +132,7 @@ impl<'a> Best<'a> {
 
     /// The best kit with all that is known of it.
     pub fn finished(self, ctx: &Ctx, job: &Job<'_>) -> Result<DesignOutcome, DesignError> {
+        let effort = self.effort;
         let Self {
             kit,
             mut reasons,
@@ -175,6 +184,7 @@ impl<'a> Best<'a> {
             key,
             strength,
             gaps,
+            effort,
             warnings,
         })))
     }

@@ -399,6 +399,11 @@ fn made(kit: Kit) -> Result<Explored, DesignError> {
     Ok(Explored {
         kit: Some(kit),
         failure: Failure::default(),
+        effort: Effort {
+            keys: 1,
+            kits: 1,
+            ..Effort::default()
+        },
     })
 }
 
@@ -411,7 +416,13 @@ fn a_kit_that_passes_ends_the_job() {
     let (needed, design) =
         Ball::new().outcome(vec![(Some(site()), made(good())), (Some(site()), made(good()))]);
     assert_eq!(needed, [true, false]);
-    assert!(design.unwrap().kit.verification.passed());
+    let design = design.unwrap();
+    assert!(design.kit.verification.passed());
+    assert_eq!(
+        (design.effort.keys, design.effort.kits),
+        (1, 1),
+        "only what was tried counts"
+    );
 }
 
 #[test]
@@ -488,6 +499,11 @@ fn without_any_plan_the_answer_is_why() {
         Ok(Explored {
             kit: None,
             failure: failure(),
+            effort: Effort {
+                keys: 1,
+                kits: 1,
+                ..Effort::default()
+            },
         })
     };
     let ball = Ball::new();
