@@ -203,21 +203,7 @@ pub fn files(
         },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
     };
-    let told = Told {
-        program: env!("CARGO_PKG_VERSION"),
-        source: Source {
-            file: &model.name,
-            sha256: &model.sha256,
-            transform: model.transform,
-            repairs: &model.repairs,
-        },
-        warnings,
-        volume_ratio: summary.volume_ratio,
-        connector_share: summary.connector_share,
-        thin_shares: &thin,
-        printing: printing.entry(),
-    };
-    let plan = PlanFile::of(settings, design, &told);
+    let plan = plan_file(model, settings, design, warnings, &summary, &thin, printing);
     let mut files = vec![(PLAN.to_owned(), plan.to_bytes())];
     let meshes = design
         .kit
@@ -269,6 +255,32 @@ pub fn files(
     files.push(("pieces.png".into(), picture));
     files.extend(booklet.map(|bytes| ("instructions.pdf".to_owned(), bytes)));
     (files, summary)
+}
+
+fn plan_file(
+    model: &Model,
+    settings: &Settings,
+    design: &Design,
+    warnings: &[Warning],
+    summary: &Summary,
+    thin: &[f64],
+    printing: &Printing,
+) -> PlanFile {
+    let told = Told {
+        program: env!("CARGO_PKG_VERSION"),
+        source: Source {
+            file: &model.name,
+            sha256: &model.sha256,
+            transform: model.transform,
+            repairs: &model.repairs,
+        },
+        warnings,
+        volume_ratio: summary.volume_ratio,
+        connector_share: summary.connector_share,
+        thin_shares: thin,
+        printing: printing.entry(),
+    };
+    PlanFile::of(settings, design, &told)
 }
 
 /// All pieces in place, named and coloured; on the plate they stand as the model was given.
