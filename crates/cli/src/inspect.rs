@@ -2,19 +2,19 @@
 
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use shellock::strength::StrengthParams;
 use shellock_formats::Loaded;
 use shellock_geom::check::inspect as inspection;
 use shellock_geom::repair::mend;
 use shellock_geom::thin::{ThinPlace, thin_places};
 use shellock_geom::weld::weld;
+use shellock_kit::plan_file::RepairEntry;
 
 use crate::Session;
 use crate::args::{Options, Thickness};
 use crate::failure::Failure;
 use crate::input::{Model, load, mending, model_of};
-use crate::output::repairs_json;
 
 /// Thin places that are told one by one.
 const N_TOLD: usize = 3;
@@ -58,9 +58,9 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
     });
     if session.is_json {
         let is_sound = mend(&loaded.mesh, mending(true, false)).is_ok();
-        let (repairs, notes): (Vec<Value>, &[String]) = model.as_ref().map_or_else(
+        let (repairs, notes): (Vec<RepairEntry>, &[String]) = model.as_ref().map_or_else(
             |_| (Vec::new(), &[][..]),
-            |m| (repairs_json(&m.repairs), &m.notes),
+            |m| (m.repairs.iter().map(RepairEntry::of).collect(), &m.notes),
         );
         let error = model.as_ref().err().map(ToString::to_string);
         let value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),

@@ -1,22 +1,18 @@
 //! A finished kit as files.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use serde_json::{Value, json};
 use shellock::certificate::{Certificate, Evidence, OtherFile, PieceFile, certify};
 use shellock::design::{Design, Settings};
-use shellock::key::KeySite;
 use shellock::strength::chart::{SeamStress, strength_chart};
-use shellock::strength::{Strength, StrengthParams, StressMap};
-use shellock::verify::clearance::PathGap;
+use shellock::strength::{Strength, StressMap};
 use shellock::verify::thin_share;
 use shellock::{PatchId, Warning};
 use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
-use shellock_geom::repair::{Repair, RepairKind};
 use shellock_geom::{TriMesh, Vec3};
+use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
 use shellock_render::palette;
 
 use crate::args::{Axis, Options};
@@ -26,12 +22,14 @@ use crate::page;
 use crate::paint::painted;
 use crate::printing::Printing;
 
+/// The plan's name within a kit.
+pub const PLAN: &str = "plan.json";
 /// The certificate's name within a kit.
 pub const CERTIFICATE: &str = "certificate.json";
 
 /// What commands write into a kit besides pieces and plates.
 const KIT_FILES: [&str; 13] = [
-    "plan.json",
+    PLAN,
     CERTIFICATE,
     "assembly.3mf",
     "plates.3mf",
@@ -69,7 +67,7 @@ impl Destination {
     /// Refuses a folder with content, unless it holds an earlier kit and `force` is set.
     pub fn new(folder: PathBuf, force: bool) -> Result<Self, Failure> {
         let has_content = fs::read_dir(&folder).is_ok_and(|mut d| d.next().is_some());
-        let is_kit = folder.join("plan.json").is_file();
+        let is_kit = folder.join(PLAN).is_file();
         let refuse = |why: &str| Err(Failure::Wrong(format!("{} {why}", folder.display())));
         if folder.exists() && !folder.is_dir() {
             return refuse("is a file; choose a folder with -o");
@@ -131,7 +129,7 @@ impl Destination {
         if self.folder.exists() {
             // The earlier kit steps aside until the new one stands.
             let aside = temporary.path().join("earlier");
-            let is_kit = self.folder.join("plan.json").is_file();
+            let is_kit = self.folder.join(PLAN).is_file();
             if self.may_replace && is_kit {
                 fs::rename(&self.folder, &aside).map_err(Failure::unwritable(&self.folder))?;
             } else {
@@ -205,11 +203,8 @@ pub fn files(
         },
         thin_share: thin.iter().copied().fold(0.0, f64::max),
     };
-    let mut plan = plan_json(model, settings, design, warnings, &summary, &thin);
-    plan["printing"] = printing.json();
-    let mut text = serde_json::to_string_pretty(&plan).expect("numbers and strings can be written");
-    text.push('\n');
-    let mut files = vec![("plan.json".to_owned(), text.into_bytes())];
+    let plan = plan_file(model, settings, design, warnings, &summary, &thin, printing);
+    let mut files = vec![(PLAN.to_owned(), plan.to_bytes())];
     let meshes = design
         .kit
         .pieces
@@ -262,6 +257,32 @@ pub fn files(
     (files, summary)
 }
 
+fn plan_file(
+    model: &Model,
+    settings: &Settings,
+    design: &Design,
+    warnings: &[Warning],
+    summary: &Summary,
+    thin: &[f64],
+    printing: &Printing,
+) -> PlanFile {
+    let told = Told {
+        program: env!("CARGO_PKG_VERSION"),
+        source: Source {
+            file: &model.name,
+            sha256: &model.sha256,
+            transform: model.transform,
+            repairs: &model.repairs,
+        },
+        warnings,
+        volume_ratio: summary.volume_ratio,
+        connector_share: summary.connector_share,
+        thin_shares: thin,
+        printing: printing.entry(),
+    };
+    PlanFile::of(settings, design, &told)
+}
+
 /// All pieces in place, named and coloured; on the plate they stand as the model was given.
 fn assembly(design: &Design) -> Vec<u8> {
     let turned = (!design.turn.is_none()).then(|| design.turn.rows());
@@ -280,10 +301,6 @@ fn assembly(design: &Design) -> Vec<u8> {
         })
         .collect();
     write_3mf(&objects)
-}
-
-fn piece_file(p: PatchId) -> String {
-    format!("pieces/piece-{:02}.stl", p.0)
 }
 
 /// What is claimed of the kit whose pieces are these files, in order of their ids; `others` are certified as
@@ -334,144 +351,6 @@ pub fn certificate_bytes(certificate: &Certificate) -> Vec<u8> {
     bytes
 }
 
-/// How far a piece moves while no other does, and `together` with others where that is proven.
-fn rattle_json(design: &Design, piece: PatchId) -> Option<Value> {
-    let mut value = json!(design.kit.play.alone[piece]?);
-    if let Some(together) = &design.kit.play.together {
-        value["together"] = json!(together[piece]);
-    }
-    Some(value)
-}
-
-fn plan_json(
-    model: &Model,
-    settings: &Settings,
-    design: &Design,
-    warnings: &[Warning],
-    summary: &Summary,
-    thin: &[f64],
-) -> Value {
-    let plan = &design.kit.plan;
-    let pieces: Vec<Value> = design
-        .kit
-        .pieces
-        .iter()
-        .map(|(p, mesh)| {
-            let neighbours: BTreeSet<PatchId> = design
-                .kit
-                .contacts
-                .iter()
-                .filter_map(|c| if c.later == p { Some(c.earlier) } else { (c.earlier == p).then_some(c.later) })
-                .collect();
-            json!({
-                "id": p, "file": piece_file(p), "neighbors": neighbours, "volume_mm3": mesh.signed_volume(),
-                "installation_direction": (-plan.separation(p).unit() + 0.0).to_array(),
-                "n_triangles": mesh.triangles.len(), "thin_share": thin[p.0 as usize], "rattle": rattle_json(design, p),
-            })
-        })
-        .collect();
-    let joints: Vec<Value> = design
-        .kit
-        .joints
-        .iter()
-        .map(|j| {
-            json!({ "male": j.male, "female": j.female, "length_mm": j.length_mm, "volume_mm3": j.volume_mm3,
-                    "kept": j.kept, "at": j.at.to_array() })
-        })
-        .collect();
-    let contacts: Vec<Value> = design
-        .kit
-        .contacts
-        .iter()
-        .map(|c| {
-            json!({ "later": c.later, "earlier": c.earlier, "length_mm": c.length_mm, "usable_mm": c.usable_mm,
-                    "at": c.at.to_array() })
-        })
-        .collect();
-    let mut value = json!({
-        "format": "shellock-plan", "version": 1, "units": "mm", "program": env!("CARGO_PKG_VERSION"),
-        "input": { "file": model.name, "sha256": model.sha256, "transform": transform(model, design),
-                   "largest_only": model.repairs.iter().any(|r| r.kind == RepairKind::LeftOut),
-                   "repairs": repairs_json(&model.repairs) },
-        "seed": settings.plan.seed,
-        "shell_thickness": design.kit.thickness_mm,
-        "strength": design.strength.as_ref().map(|s| strength_json(s, settings)),
-        "clearance": settings.connector.clearance_mm.max(2.0 * settings.body.wall_gap_mm),
-        // The largest, where pairs have sizes of their own.
-        "connector_size": design.kit.sizes.largest_mm(),
-        "wall_gap": settings.body.wall_gap_mm,
-        "up": design.turn.apply(Vec3::from(settings.plan.up)).to_array(),
-        "min_wall": settings.connector.min_wall_mm,
-        "key_piece": plan.key(),
-        "key": design.key.as_ref().map(|k| key_json(design, k)),
-        "press_fits": design.kit.press_fits,
-        "installation_order": plan.steps.iter().map(|s| s.piece).collect::<Vec<_>>(),
-        "plan": design.kit.proof,
-        "holding": design.kit.holding,
-        "volume_ratio": summary.volume_ratio,
-        "connector_share": summary.connector_share,
-        "pieces": pieces, "joints": joints, "contacts": contacts,
-        "gaps": gaps_json(design),
-        "verification": { "passed": design.kit.verification.passed(), "checks": design.kit.verification.checks,
-                          "findings": design.kit.verification.findings },
-        "warnings": warnings,
-    });
-    // Only where pairs have sizes of their own; `connector_size` is then the largest.
-    let sizes: Vec<Value> = design
-        .kit
-        .sizes
-        .pairs()
-        .map(|(pair, size_mm)| json!({ "pieces": pair, "size_mm": size_mm }))
-        .collect();
-    if !sizes.is_empty() {
-        value["connector_sizes"] = sizes.into();
-    }
-    value
-}
-
-/// What was changed to make one body, in file units.
-pub fn repairs_json(repairs: &[Repair]) -> Vec<Value> {
-    let one = |r: &Repair| json!({ "kind": r.kind.code(), "count": r.count, "at": r.at.to_array(), "message": r.to_string() });
-    repairs.iter().map(one).collect()
-}
-
-/// Assembly from file coordinates, 4 × 4, row-major: the model's own, then turned for the key.
-fn transform(model: &Model, design: &Design) -> [f64; 16] {
-    let column = |c: usize| Vec3::new(model.transform[c], model.transform[4 + c], model.transform[8 + c]);
-    let turned = [0, 1, 2, 3].map(|c| design.turn.apply(column(c)) + 0.0);
-    let mut all = [0.0; 16];
-    for (c, v) in turned.iter().enumerate() {
-        (all[c], all[4 + c], all[8 + c]) = (v.x, v.y, v.z);
-    }
-    all[15] = 1.0;
-    all
-}
-
-/// How near pieces come, at rest and on their way, mm: the least of all and beneath the rim, which is meant
-/// to touch.
-fn gaps_json(design: &Design) -> Value {
-    let least = |gaps: &mut dyn Iterator<Item = f64>| gaps.min_by(f64::total_cmp);
-    let (pairs, paths) = (&design.gaps.pairs, &design.gaps.paths);
-    let key = design.kit.plan.key();
-    let beneath = |p: &PathGap| p.beneath_rim.map(|place| place.gap_mm);
-    json!({
-        "at_rest_mm": least(&mut pairs.iter().map(|p| p.overall.gap_mm)),
-        "at_rest_beneath_rim_mm": least(&mut pairs.iter().filter_map(|p| p.beneath_rim.map(|place| place.gap_mm))),
-        "on_the_way_mm": least(&mut paths.iter().map(|p| p.overall.gap_mm)),
-        "on_the_way_beneath_rim_mm": least(&mut paths.iter().filter_map(beneath)),
-        "key_on_the_way_beneath_rim_mm": least(&mut paths.iter().filter(|p| p.piece == key).filter_map(beneath)),
-    })
-}
-
-/// How the key was cut.
-fn key_json(design: &Design, key: &KeySite) -> Value {
-    json!({
-        "rails": design.kit.rails_mm(), "area_mm2": key.area_mm2, "flat_share": key.flat_share, "side_share": key.side_share,
-        "slide": key.prism.slide.to_array(), "plane_normal": key.prism.normal.to_array(),
-        "turned_degrees": design.turn.angle().to_degrees(),
-    })
-}
-
 /// The sizes of the connectors that were made, mm, as in "2.5" or "2.0–3.4".
 pub fn connector_sizes(design: &Design) -> String {
     if design.kit.sizes.pairs().next().is_none() {
@@ -492,21 +371,6 @@ pub fn connector_sizes(design: &Design) -> String {
     } else {
         format!("{least}–{most}")
     }
-}
-
-fn strength_json(strength: &Strength, settings: &Settings) -> Value {
-    let StrengthParams {
-        material,
-        drop_m,
-        n_cases,
-        ..
-    } = &settings.strength;
-    json!({
-        "material": material, "drop_m": drop_m, "n_falls": n_cases,
-        "stress_mpa": strength.stress_mpa, "is_too_weak": strength.is_too_weak, "at": strength.at.to_array(),
-        "deciding_fall": strength.deciding.0 + 1, "down": strength.deciding.1.to_array(),
-        "tried": strength.tried, "solid": strength.solid,
-    })
 }
 
 /// The model's stress, and that along its seams.

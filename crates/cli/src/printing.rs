@@ -1,12 +1,12 @@
 //! A kit on the plates of a printer: files, figures, and what does not fit.
 
 use rayon::prelude::*;
-use serde_json::{Value, json};
 use shellock::design::{DesignError, Settings};
 use shellock::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Solid, TriMesh};
+use shellock_kit::plan_file::PrintingEntry;
 use shellock_print::plates::{Laid, Plates, Printable, fits, fits_whole, lay, lay_alone};
 use shellock_print::time::{Load, seconds};
 use shellock_print::{Printer, Process};
@@ -106,25 +106,8 @@ impl Printing {
     }
 
     /// For plan.json.
-    pub fn json(&self) -> Value {
-        let laid: Vec<Value> = self
-            .plates
-            .laid
-            .iter()
-            .map(|l| {
-                json!({ "piece": l.piece, "plate": l.plate + 1, "size": l.size_mm, "turned": l.turned, "moved": l.moved_mm,
-                        "support_mm2": l.support_mm2, "outer_support_mm2": l.outer_support_mm2 })
-            })
-            .collect();
-        let process = Process::ALL
-            .iter()
-            .find(|(_, p)| *p == self.printer.process)
-            .map(|(name, _)| *name);
-        json!({
-            "printer": self.printer.name, "process": process, "bed": self.printer.bed_mm, "layer": self.printer.layer_mm,
-            "plates": self.plates.n_plates, "laid": laid, "too_large": self.plates.too_large,
-            "time": { "by": "closed form", "pieces_s": self.seconds[0], "solid_s": self.seconds[1], "ratio": self.time_ratio() },
-        })
+    pub fn entry(&self) -> PrintingEntry {
+        PrintingEntry::of(&self.printer, &self.plates, self.seconds)
     }
 
     /// All plates side by side, and each alone where there are several. `place` is where a piece stands in

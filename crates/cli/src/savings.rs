@@ -15,9 +15,8 @@ use shellock_print::{Printer, Process};
 
 use crate::Session;
 use crate::failure::Failure;
-use crate::input::read;
 use crate::printing::Printing;
-use crate::stages::{Kit, model_of, pieces_of, write};
+use crate::stages::{Kit, model_of, pieces_of, plan_of, write};
 
 /// The file's name within a kit.
 const SAVINGS: &str = "savings.json";
@@ -37,23 +36,13 @@ const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 
 /// `shellock report`.
 pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<u8, Failure> {
-    let path = kit.join("plan.json");
-    let broken = |what: String| Failure::Wrong(format!("{}: {what}", path.display()));
-    let named = |f: Failure| match f {
-        Failure::Wrong(what) => broken(what),
-        other => other,
-    };
-    let plan: Value =
-        serde_json::from_slice(&read(&path)?).map_err(|e| broken(format!("not a plan: {e}")))?;
-    let Kit { pieces, order, .. } = pieces_of(kit, &plan).map_err(named)?;
-    let solid = model_of(&plan, model).map_err(named)?;
+    let plan = plan_of(kit)?;
+    let Kit { pieces, order, .. } = pieces_of(kit, &plan)?;
+    let solid = model_of(kit, &plan, model)?;
     let slicer = if closed_form { None } else { Slicer::find()? };
     let mut times = serde_json::Map::new();
     for printer in [Printer::sla(), Printer::fdm()] {
-        let bed_mm: Option<Vec<f64>> = plan["printing"]["bed"]
-            .as_array()
-            .map(|b| b.iter().filter_map(Value::as_f64).collect());
-        let bed_mm = bed_mm.and_then(|b| b.try_into().ok()).unwrap_or(printer.bed_mm);
+        let bed_mm = plan.printing.as_ref().map_or(printer.bed_mm, |p| p.bed);
         let printer = Printer { bed_mm, ..printer };
         let printing = Printing::of(&printer, pieces.as_slice(), solid.mesh(), &solid);
         let place = |i: usize| order.position(shellock::PatchId(i as u32));
@@ -83,7 +72,7 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
     }
     let volume: f64 = pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
     let told = json!({
-        "model": plan["input"]["file"], "pieces": pieces.len(), "wall_mm": plan["shell_thickness"],
+        "model": plan.input.as_ref().map(|input| &input.file), "pieces": pieces.len(), "wall_mm": plan.shell_thickness,
         "volume_ratio": volume / solid.volume(), "print_time": times,
     });
     let mut text = serde_json::to_string_pretty(&told).expect("numbers and strings can be written");

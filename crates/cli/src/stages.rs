@@ -1,25 +1,26 @@
 //! Each stage alone, from what an earlier one wrote.
 
+use std::fmt;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use serde_json::{Value, json};
 use shellock::certificate::{OtherFile, PieceFile};
 use shellock::design::{self, DesignError, Planned, Settings};
-use shellock::piece::PressFit;
-use shellock::plan::{InstallationPlan, InstallationStep};
+use shellock::plan::InstallationPlan;
 use shellock::verify::{Assembly, VerifyParams};
-use shellock::{Ctx, IdVec, LatticeDirection, PatchId, segmentation};
+use shellock::{Ctx, IdVec, PatchId, segmentation};
 use shellock_formats::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
+use shellock_kit::PlanFile;
 
 use crate::Session;
 use crate::args::Options;
 use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
-use crate::output::{CERTIFICATE, certificate_bytes};
+use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
 use crate::progress::{Display, PlanClock};
 
@@ -185,31 +186,22 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
 
 /// `shellock verify`.
 pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8, Failure> {
-    let path = kit.join("plan.json");
-    let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
-    let text = read(&path)?;
-    let plan: Value = serde_json::from_slice(&text).map_err(|e| broken(&format!("not a plan: {e}")))?;
-    let Kit { files, pieces, order } = pieces_of(kit, &plan).map_err(|f| match f {
-        Failure::Wrong(what) => broken(&what),
-        other => other,
-    })?;
-    let solid = model_of(&plan, model).map_err(|f| match f {
-        Failure::Wrong(what) => broken(&what),
-        other => other,
-    })?;
+    let plan = plan_of(kit)?;
+    let Kit { files, pieces, order } = pieces_of(kit, &plan)?;
+    let solid = model_of(kit, &plan, model)?;
+    let press_fits = plan.checked_press_fits().map_err(broken(kit))?;
     let params = VerifyParams {
-        clearance_mm: plan["clearance"].as_f64().unwrap_or_default(),
-        seed: plan["seed"].as_u64().unwrap_or_default(),
+        clearance_mm: plan.clearance,
+        seed: plan.seed,
     };
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let press_fits = press_fits_of(&plan).map_err(|what| broken(&what))?;
     let assembly = Assembly {
         model: Some(&solid),
         pieces: &pieces,
         plan: &order,
-        press_fits: &press_fits,
+        press_fits,
     };
     let verdict = shellock::verify(&ctx, &params, &assembly).inspect_err(|_| display.finish())?;
     let claimed = verdict.certificate(files, &params, &assembly);
@@ -217,7 +209,7 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     display.finish();
     if let Some(claimed) = claimed {
         let claimed = claimed
-            .with_press_fits(press_fits)
+            .with_press_fits(press_fits.to_vec())
             .with_files(certified_files(kit));
         write(&kit.join(CERTIFICATE), &certificate_bytes(&claimed))?;
     }
@@ -233,25 +225,6 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     Ok(code)
 }
 
-/// The places where the key presses on purpose. A plan without any names none.
-fn press_fits_of(plan: &Value) -> Result<Vec<PressFit>, String> {
-    let fits = if plan["press_fits"].is_null() {
-        Value::Array(Vec::new())
-    } else {
-        plan["press_fits"].clone()
-    };
-    let fits: Vec<PressFit> = serde_json::from_value(fits).map_err(|e| format!("press_fits: {e}"))?;
-    let range_mm = 0.0..=PressFit::MOST_INTERFERENCE_MM;
-    match fits.iter().find(|fit| !range_mm.contains(&fit.interference_mm)) {
-        Some(fit) => Err(format!(
-            "a press fit of {} mm is none; up to {} mm are",
-            fit.interference_mm,
-            PressFit::MOST_INTERFERENCE_MM
-        )),
-        None => Ok(fits),
-    }
-}
-
 /// Files besides the pieces, as the earlier certificate names and hashes them, if there is one: what they
 /// hold is not verified again.
 fn certified_files(kit: &Path) -> Vec<OtherFile> {
@@ -263,35 +236,42 @@ fn certified_files(kit: &Path) -> Vec<OtherFile> {
         .unwrap_or_default()
 }
 
+/// What the kit's plan.json says.
+pub fn plan_of(kit: &Path) -> Result<PlanFile, Failure> {
+    PlanFile::read(&read(&kit.join(PLAN))?).map_err(broken(kit))
+}
+
+/// Says which kit's plan.json is to blame.
+pub fn broken<E: fmt::Display>(kit: &Path) -> impl Fn(E) -> Failure {
+    let path = kit.join(PLAN);
+    move |what| Failure::Wrong(format!("{}: {what}", path.display()))
+}
+
 /// The solid that a kit was made from, in assembly space: that in the file `model`, or in the one that the
 /// plan names.
-pub fn model_of(plan: &Value, model: Option<&Path>) -> Result<Solid, Failure> {
-    let named = plan["input"]["file"].as_str().unwrap_or_default();
-    let model_path = model.map_or_else(|| PathBuf::from(named), Path::to_owned);
+pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Solid, Failure> {
+    let Some(input) = &plan.input else {
+        return Err(broken(kit)(
+            "it does not say from which model it was made (\"input\")",
+        ));
+    };
+    let model_path = model.map_or_else(|| PathBuf::from(&input.file), Path::to_owned);
     if model.is_none() && !model_path.exists() {
-        return Err(Failure::Wrong(format!(
-            "there is no file {named} here, from which it was made; name the model after the kit"
+        return Err(broken(kit)(format!(
+            "there is no file {} here, from which it was made; name the model after the kit",
+            input.file
         )));
     }
     let (loaded, _) = load(&model_path)?;
-    let largest = plan["input"]["largest_only"].as_bool().unwrap_or_default();
-    let solid = input::mended(&model_path, &loaded, input::mending(false, largest))?.solid;
-    let t: Vec<f64> = plan["input"]["transform"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_f64)
-        .collect();
-    if t.len() != 16 {
-        return Err(Failure::Wrong("input.transform is not 16 numbers".into()));
-    }
+    let solid = input::mended(&model_path, &loaded, input::mending(false, input.largest_only))?.solid;
+    let t = input.transform;
     let mut mesh = solid.into_mesh();
     for p in &mut mesh.points {
         *p = Vec3::from_array(std::array::from_fn(|r| {
             t[4 * r] * p.x + t[4 * r + 1] * p.y + t[4 * r + 2] * p.z + t[4 * r + 3]
         }));
     }
-    Solid::new(mesh).map_err(|e| Failure::Wrong(format!("with its transform the model is no solid: {e}")))
+    Solid::new(mesh).map_err(|e| broken(kit)(format!("with its transform the model is no solid: {e}")))
 }
 
 /// What a plan file names.
@@ -302,25 +282,24 @@ pub struct Kit {
 }
 
 /// The files, their meshes and the order that a plan file names.
-pub fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
-    let order = order_of(plan)?;
+pub fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Kit, Failure> {
+    let order = plan.order().map_err(broken(kit))?;
     let (mut files, mut meshes) = (Vec::new(), Vec::new());
-    for (i, piece) in plan["pieces"].as_array().into_iter().flatten().enumerate() {
-        let file = piece["file"]
-            .as_str()
-            .ok_or_else(|| Failure::Wrong(format!("piece {i} names no file")))?;
-        if !Path::new(file)
-            .components()
-            .all(|c| matches!(c, Component::Normal(_)))
-        {
-            return Err(Failure::Wrong(format!(
-                "piece {i} names \"{file}\", which is no file within the kit"
+    for piece in &plan.pieces {
+        let (id, broken) = (piece.id, broken(kit));
+        let Some(file) = &piece.file else {
+            return Err(broken(format!("piece {id} names no file")));
+        };
+        let is_normal = |c: Component<'_>| matches!(c, Component::Normal(_));
+        if !Path::new(file).components().all(is_normal) {
+            return Err(broken(format!(
+                "piece {id} names \"{file}\", which is no file within the kit"
             )));
         }
         let (loaded, bytes) = load(&kit.join(file))?;
         files.push(PieceFile {
-            id: i.into(),
-            file: file.to_owned(),
+            id,
+            file: file.clone(),
             sha256: sha256(&bytes),
             play: None,
         });
@@ -331,53 +310,6 @@ pub fn pieces_of(kit: &Path, plan: &Value) -> Result<Kit, Failure> {
         pieces: meshes.into_iter().collect(),
         order,
     })
-}
-
-/// The order and the directions that a plan file names.
-pub fn order_of(plan: &Value) -> Result<InstallationPlan, Failure> {
-    let wrong = |what: String| Failure::Wrong(what);
-    let list = plan["pieces"]
-        .as_array()
-        .ok_or_else(|| wrong("there is no list of pieces".into()))?;
-    let mut directions = Vec::new();
-    for (i, piece) in list.iter().enumerate() {
-        if piece["id"].as_u64() != Some(i as u64) {
-            return Err(wrong(format!("piece number {i} does not have the id {i}")));
-        }
-        let d: Vec<f64> = piece["installation_direction"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .filter_map(Value::as_f64)
-            .collect();
-        let [x, y, z] = d[..] else {
-            return Err(wrong(format!("piece {i} has no installation direction")));
-        };
-        directions.push(LatticeDirection::nearest(-Vec3::new(x, y, z)));
-    }
-    let order = plan["installation_order"]
-        .as_array()
-        .ok_or_else(|| wrong("there is no installation order".into()))?;
-    let mut is_named = vec![false; directions.len()];
-    let steps = order
-        .iter()
-        .map(|id| {
-            let piece = id.as_u64().filter(|&i| i < directions.len() as u64);
-            let piece = piece
-                .ok_or_else(|| wrong(format!("the installation order names {id}, which is no piece")))?;
-            if std::mem::replace(&mut is_named[piece as usize], true) {
-                return Err(wrong(format!("the installation order names piece {id} twice")));
-            }
-            Ok(InstallationStep {
-                piece: PatchId(piece as u32),
-                separation: directions[piece as usize],
-            })
-        })
-        .collect::<Result<Vec<_>, Failure>>()?;
-    match is_named.iter().position(|is_named| !is_named) {
-        Some(piece) => Err(wrong(format!("the installation order leaves out piece {piece}"))),
-        None => Ok(InstallationPlan { steps }),
-    }
 }
 
 /// Whether both are the same name in the same folder.
@@ -423,24 +355,4 @@ pub fn figure(name: &str, out: &Path, size_mm: f64, labels: Option<&Path>) -> Re
         out.display()
     );
     Ok(0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn press_fits_are_read_strictly_and_none_is_deeper_than_any_is_made() {
-        let fit = |interference_mm: f64| json!({ "kind": "rib", "piece": 3, "at": [0.0, 0.0, 0.0], "interference_mm": interference_mm, "travel_mm": 2.0 });
-        let n_read = |fits: Value| press_fits_of(&json!({ "press_fits": fits })).map(|fits| fits.len());
-        assert_eq!(n_read(Value::Null), Ok(0));
-        assert_eq!(n_read(json!([fit(0.08)])), Ok(1));
-        assert!(
-            n_read(json!([fit(0.08), fit(0.5)]))
-                .unwrap_err()
-                .contains("0.5 mm")
-        );
-        assert!(n_read(json!([fit(-0.1)])).is_err() && n_read(json!([3])).is_err());
-    }
 }

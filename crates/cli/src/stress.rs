@@ -2,23 +2,26 @@
 
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use shellock::design::{Params, Settings, Thickness};
 use shellock::metric::MetricParams;
 use shellock::sizes::SizeChoice;
 use shellock::stress_test::{
     Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test,
 };
-use shellock::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface};
+use shellock::{Ctx, LatticeDirection, PatchId, SegmentedSurface};
+use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
+use shellock_kit::{PlanFile, PlanFileError};
 use shellock_mechanics::Material;
 
 use crate::Session;
 use crate::args::{Axis, Blows, Place};
 use crate::failure::Failure;
-use crate::input::{load, read};
+use crate::input::load;
+use crate::output::PLAN;
 use crate::progress::Display;
-use crate::stages::{order_of, write};
+use crate::stages::{broken, plan_of, write};
 
 /// A force in N: "70N", "0.07 kN" or "70".
 pub fn newtons(text: &str) -> Result<f64, String> {
@@ -57,23 +60,17 @@ pub fn material(name: &str) -> Result<Material, String> {
 
 /// `shellock test`.
 pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure> {
-    let path = kit.join("plan.json");
-    if !path.exists() {
+    if !kit.join(PLAN).exists() {
         return Err(Failure::Wrong(format!(
             "{}: there is no kit here, for it has no plan.json; `shellock build` makes one",
             kit.display()
         )));
     }
-    let broken = |what: &str| Failure::Wrong(format!("{}: {what}", path.display()));
-    let plan: Value =
-        serde_json::from_slice(&read(&path)?).map_err(|e| broken(&format!("not a plan: {e}")))?;
-    let order = order_of(&plan).map_err(|f| match f {
-        Failure::Wrong(what) => broken(&what),
-        other => other,
-    })?;
-    check_kit(kit, &plan).map_err(|what| broken(&what))?;
+    let plan = plan_of(kit)?;
+    let order = plan.order().map_err(broken(kit))?;
+    check_kit(kit, &plan)?;
     let surface = surface_of(&kit.join("segmentation.ply"), order.steps.len())?;
-    let params = params_of(&plan, blows).map_err(|what| broken(&what))?;
+    let params = params_of(&plan, blows).map_err(broken(kit))?;
 
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
@@ -88,7 +85,7 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
         "material": params.metric.material, "connector_size": params.sizes.largest_mm(), "up": params.plan.up,
         "passed": tested.passed(), "report": tested,
     });
-    let mut text = serde_json::to_string_pretty(&value).map_err(|e| broken(&e.to_string()))?;
+    let mut text = serde_json::to_string_pretty(&value).expect("numbers and strings can be written");
     text.push('\n');
     write(&kit.join("stress.json"), text.as_bytes())?;
     write(&kit.join("stress.svg"), chart(&tested).as_bytes())?;
@@ -101,32 +98,16 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
     Ok(code)
 }
 
-/// What makes a plan no plan of this program's, or its kit incomplete.
-fn check_kit(kit: &Path, plan: &Value) -> Result<(), String> {
-    if plan.get("format").is_some_and(|f| f != "shellock-plan") || plan.get("version").is_some_and(|v| v != 1)
-    {
-        return Err("\"format\" and \"version\" are not \"shellock-plan\" and 1; build the kit again".into());
+/// Whether the plan's directions are some, and its kit is complete.
+fn check_kit(kit: &Path, plan: &PlanFile) -> Result<(), Failure> {
+    plan.check_directions().map_err(broken(kit))?;
+    let mut files = plan.pieces.iter().filter_map(|piece| piece.file.as_ref());
+    match files.find(|file| !kit.join(file).is_file()) {
+        Some(file) => Err(broken(kit)(format!(
+            "names {file}, which is not there; the kit is not complete"
+        ))),
+        None => Ok(()),
     }
-    for piece in plan["pieces"].as_array().into_iter().flatten() {
-        let direction: Vec<f64> = piece["installation_direction"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .filter_map(Value::as_f64)
-            .collect();
-        if direction.len() != 3 || (direction.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() > 0.01 {
-            return Err(format!(
-                "the installation_direction of piece {} is no unit vector",
-                piece["id"]
-            ));
-        }
-        if let Some(file) = piece["file"].as_str().filter(|file| !kit.join(file).is_file()) {
-            return Err(format!(
-                "names {file}, which is not there; the kit is not complete"
-            ));
-        }
-    }
-    Ok(())
 }
 
 /// The surface with its patches that `build` wrote.
@@ -161,47 +142,25 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
 }
 
 /// The kit's sizes, or what is wrong with them.
-fn params_of(plan_value: &Value, blows: &Blows) -> Result<StressParams, String> {
-    let plan = plan_value;
+fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
+    let told = |e: PlanFileError| e.to_string();
+    let sizes = plan.sizes().map_err(told)?;
     let mut params = Params::default();
-    params.thickness = Thickness::Mm(
-        plan["shell_thickness"]
-            .as_f64()
-            .ok_or("\"shell_thickness\" is no number of mm")?,
-    );
-    let sizes = sizes_of(plan)?;
+    params.thickness = Thickness::Mm(plan.thickness_mm().map_err(told)?);
     params.connector.size = SizeChoice::Fixed(sizes.largest_mm());
-    params.seed = plan["seed"].as_u64().unwrap_or_default();
-    let told: Vec<f64> = plan["up"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_f64)
-        .collect();
-    params.up = match (blows.up, &told[..]) {
-        (Some(axis), _) => axis.unit(),
-        (None, [x, y, z]) => [*x, *y, *z],
-        _ => Axis::Z.unit(),
-    };
+    params.seed = plan.seed;
+    let up = blows.up.map(Axis::unit).or(plan.up);
+    params.up = up.unwrap_or_else(|| Axis::Z.unit());
     let problems = params.problems();
     if !problems.is_empty() {
         return Err(problems.join("; "));
     }
     let mut plan_params = Settings::resolve(&params).plan;
-    if let [x, y, z] = plan["key"]["slide"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_f64)
-        .collect::<Vec<_>>()[..]
-    {
-        plan_params.key = plan["key_piece"]
-            .as_u64()
-            .and_then(|key| u32::try_from(key).ok())
-            .map(PatchId);
-        plan_params.key_slide = Some(LatticeDirection::nearest(shellock_geom::Vec3::new(x, y, z)));
+    if let Some(key) = &plan.key {
+        plan_params.key = plan.key_piece;
+        plan_params.key_slide = Some(LatticeDirection::nearest(Vec3::from(key.slide)));
     }
-    let built = || serde_json::from_value::<Material>(plan_value["strength"]["material"].clone()).ok();
+    let built = || plan.strength.as_ref().and_then(|s| s.material);
     let (material, edge_share) = (blows.material.or_else(built).unwrap_or_default(), blows.edges);
     let metric = MetricParams {
         material,
@@ -220,41 +179,6 @@ fn params_of(plan_value: &Value, blows: &Blows) -> Result<StressParams, String> 
         sizes,
         plan: plan_params,
     })
-}
-
-/// The connectors' sizes: one for all, or those of each pair.
-fn sizes_of(plan: &Value) -> Result<ConnectorSizes, String> {
-    let default_mm = plan["connector_size"]
-        .as_f64()
-        .ok_or("\"connector_size\" is no number of mm")?;
-    let pair = |entry: &Value| -> Option<([PatchId; 2], f64)> {
-        let piece = |i: usize| u32::try_from(entry["pieces"][i].as_u64()?).ok().map(PatchId);
-        Some((
-            [piece(0)?, piece(1)?],
-            entry["size_mm"].as_f64().filter(|mm| (0.1..=20.0).contains(mm))?,
-        ))
-    };
-    let pairs = plan["connector_sizes"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .map(pair)
-        .collect::<Option<Vec<_>>>();
-    let pairs =
-        pairs.ok_or("\"connector_sizes\" must list \"pieces\", two numbers, and \"size_mm\", 0.1 to 20")?;
-    let n_pieces = plan["pieces"].as_array().map_or(0, Vec::len);
-    if let Some(([a, b], _)) = pairs
-        .iter()
-        .find(|(pair, _)| pair.iter().any(|p| usize::from(*p) >= n_pieces))
-    {
-        return Err(format!(
-            "\"connector_sizes\" names pieces {a} and {b}, which are not both there"
-        ));
-    }
-    if plan["connector_sizes"].as_array().is_some_and(Vec::is_empty) {
-        return Err("\"connector_sizes\" is empty; a kit whose seams all have the same size has none".into());
-    }
-    Ok(ConnectorSizes::with_pairs(default_mm, pairs))
 }
 
 fn print_table(params: &StressParams, tested: &StressReport) {

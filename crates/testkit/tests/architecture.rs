@@ -36,7 +36,7 @@ const ASSEMBLY: [&str; 10] = [
 ];
 
 /// Crates from the ground up, each with those that its product may name.
-const FLOORS: [(&str, &[&str]); 10] = [
+const FLOORS: [(&str, &[&str]); 11] = [
     ("geom", &[]),
     ("formats", &["geom"]),
     ("check", &[]),
@@ -45,6 +45,7 @@ const FLOORS: [(&str, &[&str]); 10] = [
     ("render", &["geom", "assembly"]),
     ("shellock", &["geom", "mechanics", "assembly", "render"]),
     ("print", &["geom", "mechanics", "assembly", "render"]),
+    ("kit", &["geom", "assembly", "shellock", "print"]),
     (
         "cli",
         &[
@@ -55,6 +56,7 @@ const FLOORS: [(&str, &[&str]); 10] = [
             "render",
             "shellock",
             "print",
+            "kit",
         ],
     ),
     ("testkit", &["geom"]),
@@ -255,6 +257,7 @@ fn library_crates_touch_no_file_clock_or_stdout() {
         "render",
         "shellock",
         "print",
+        "kit",
     ] {
         for file in sources(krate) {
             let text = fs::read_to_string(&file).unwrap();

@@ -1,0 +1,119 @@
+//! What others work with, once it is known that the file's parts agree.
+
+use std::ops::RangeInclusive;
+
+use shellock::ConnectorSizes;
+use shellock_assembly::{InstallationPlan, InstallationStep, LatticeDirection, PressFit};
+use shellock_geom::Vec3;
+
+use super::{PlanFile, PlanFileError};
+
+/// Sizes D of connectors that pairs can have, mm.
+const SIZES_MM: RangeInclusive<f64> = 0.1..=20.0;
+/// How much the square of a unit vector's length may differ from 1: files have been rounded by hand.
+const UNIT_SLACK: f64 = 0.01;
+
+fn wrong(what: String) -> PlanFileError {
+    PlanFileError::Contradiction(what)
+}
+
+impl PlanFile {
+    /// The order and the directions, if every piece stands at the place of its id and is installed once.
+    pub fn order(&self) -> Result<InstallationPlan, PlanFileError> {
+        let mut directions = Vec::new();
+        for (i, piece) in self.pieces.iter().enumerate() {
+            if usize::from(piece.id) != i {
+                return Err(wrong(format!("piece number {i} does not have the id {i}")));
+            }
+            directions.push(LatticeDirection::nearest(-Vec3::from(
+                piece.installation_direction,
+            )));
+        }
+        let mut is_named = vec![false; directions.len()];
+        let mut steps = Vec::new();
+        for &piece in &self.installation_order {
+            let Some(is_named) = is_named.get_mut(usize::from(piece)) else {
+                return Err(wrong(format!(
+                    "the installation order names {piece}, which is no piece"
+                )));
+            };
+            if std::mem::replace(is_named, true) {
+                return Err(wrong(format!("the installation order names piece {piece} twice")));
+            }
+            steps.push(InstallationStep {
+                piece,
+                separation: directions[usize::from(piece)],
+            });
+        }
+        match is_named.iter().position(|is_named| !is_named) {
+            Some(piece) => Err(wrong(format!("the installation order leaves out piece {piece}"))),
+            None => Ok(InstallationPlan { steps }),
+        }
+    }
+
+    /// Whether the direction of every piece is a unit vector.
+    pub fn check_directions(&self) -> Result<(), PlanFileError> {
+        let is_unit = |d: [f64; 3]| (Vec3::from(d).length_squared() - 1.0).abs() <= UNIT_SLACK;
+        match self.pieces.iter().find(|p| !is_unit(p.installation_direction)) {
+            Some(piece) => Err(wrong(format!(
+                "the installation_direction of piece {} is no unit vector",
+                piece.id
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The places where the key presses on purpose, if none presses deeper than any is made.
+    pub fn checked_press_fits(&self) -> Result<&[PressFit], PlanFileError> {
+        let range_mm = 0.0..=PressFit::MOST_INTERFERENCE_MM;
+        match self
+            .press_fits
+            .iter()
+            .find(|fit| !range_mm.contains(&fit.interference_mm))
+        {
+            Some(fit) => Err(wrong(format!(
+                "a press fit of {} mm is none; up to {} mm are",
+                fit.interference_mm,
+                PressFit::MOST_INTERFERENCE_MM
+            ))),
+            None => Ok(&self.press_fits),
+        }
+    }
+
+    /// Thickness of the walls, mm.
+    pub fn thickness_mm(&self) -> Result<f64, PlanFileError> {
+        self.shell_thickness
+            .ok_or_else(|| PlanFileError::missing("shell_thickness"))
+    }
+
+    /// The connectors' sizes: one for all, or those of each pair.
+    pub fn sizes(&self) -> Result<ConnectorSizes, PlanFileError> {
+        let default_mm = self
+            .connector_size
+            .ok_or_else(|| PlanFileError::missing("connector_size"))?;
+        let Some(sizes) = &self.connector_sizes else {
+            return Ok(ConnectorSizes::uniform(default_mm));
+        };
+        if sizes.is_empty() {
+            return Err(wrong(
+                "\"connector_sizes\" is empty; a kit whose seams all have the same size has none".into(),
+            ));
+        }
+        for size in sizes {
+            let [a, b] = size.pieces;
+            if !SIZES_MM.contains(&size.size_mm) {
+                return Err(wrong(format!(
+                    "\"connector_sizes\" says {} mm between pieces {a} and {b}; 0.1 to 20 mm can be made",
+                    size.size_mm
+                )));
+            }
+            if size.pieces.iter().any(|p| usize::from(*p) >= self.pieces.len()) {
+                return Err(wrong(format!(
+                    "\"connector_sizes\" names pieces {a} and {b}, which are not both there"
+                )));
+            }
+        }
+        let pairs = sizes.iter().map(|size| (size.pieces, size.size_mm));
+        Ok(ConnectorSizes::with_pairs(default_mm, pairs))
+    }
+}

@@ -1,0 +1,112 @@
+//! What is wrong with a plan file, in sentences.
+
+/// Why a file is no plan, or a plan not enough.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanFileError {
+    /// It is no JSON.
+    #[error("not a plan: {0}")]
+    NotJson(#[source] serde_json::Error),
+    /// It is JSON, but a list, a number or a text.
+    #[error("not a plan: it holds no object, which begins with {{")]
+    NotAnObject,
+    /// It says that it is something else.
+    #[error("\"format\" and \"version\" are not \"shellock-plan\" and 1; build the kit again")]
+    OtherFormat,
+    /// A field is not there.
+    #[error("{}", missing(field))]
+    Missing {
+        /// Its path, such as `pieces[0].id`.
+        field: String,
+    },
+    /// A field is of the wrong kind.
+    #[error("\"{field}\" {problem}")]
+    Mistyped {
+        /// Its path, such as `pieces[0].id`.
+        field: String,
+        /// What it is and what it should be.
+        problem: String,
+    },
+    /// All fields are what they should be, but they do not go together.
+    #[error("{0}")]
+    Contradiction(String),
+}
+
+impl PlanFileError {
+    /// What serde says of the field at `path`, in a maker's words.
+    pub(super) fn of_field(path: &str, said: &str) -> Self {
+        let field = |name: &str| match path {
+            "." | "" => name.to_owned(),
+            _ => format!("{path}.{name}"),
+        };
+        let name = said
+            .strip_prefix("missing field `")
+            .and_then(|rest| rest.strip_suffix('`'));
+        match name {
+            Some(name) => Self::Missing { field: field(name) },
+            None => Self::Mistyped {
+                field: path.to_owned(),
+                problem: problem(said),
+            },
+        }
+    }
+
+    /// A field that is not there.
+    pub(super) fn missing(field: &str) -> Self {
+        Self::Missing {
+            field: field.to_owned(),
+        }
+    }
+}
+
+fn missing(field: &str) -> String {
+    match field {
+        "pieces" => "there is no list of pieces (\"pieces\")".to_owned(),
+        "installation_order" => "there is no installation order (\"installation_order\")".to_owned(),
+        _ => format!("\"{field}\" is missing"),
+    }
+}
+
+/// "invalid type: string "a", expected f64" as `is the text "a" where a number belongs`.
+fn problem(said: &str) -> String {
+    let other = || format!("is not what a plan has there: {said}");
+    let Some((found, wanted)) = said.rsplit_once(", expected ") else {
+        return other();
+    };
+    if let Some(length) = found.strip_prefix("invalid length ") {
+        return format!("has {length} entries where {} belongs", wanted_words(wanted));
+    }
+    let found = ["invalid type: ", "invalid value: "]
+        .iter()
+        .find_map(|start| found.strip_prefix(start));
+    found.map_or_else(other, |found| {
+        format!("is {} where {} belongs", found_words(found), wanted_words(wanted))
+    })
+}
+
+fn found_words(found: &str) -> String {
+    match found {
+        "map" => "an object".to_owned(),
+        "sequence" => "a list".to_owned(),
+        "null" => "null".to_owned(),
+        _ => match found.split_once('`') {
+            Some((_, number)) => number.trim_end_matches('`').to_owned(),
+            None => found.replacen("string", "the text", 1),
+        },
+    }
+}
+
+fn wanted_words(wanted: &str) -> String {
+    match wanted {
+        "f64" => "a number".to_owned(),
+        "u32" | "u64" | "usize" => "a whole number, 0 or more,".to_owned(),
+        "a string" => "text".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        "fewer elements in array" => "a shorter list".to_owned(),
+        _ if wanted.starts_with("struct ") => "an object".to_owned(),
+        _ => match wanted.strip_prefix("an array of length ") {
+            Some(n) => format!("a list of {n}"),
+            None => wanted.to_owned(),
+        },
+    }
+}
