@@ -15,6 +15,7 @@ mod tests;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
+use shellock::design::Effort;
 use shellock::metric::Holding;
 use shellock::plan::PlanProof;
 use shellock_assembly::{PatchId, PressFit, Warning};
@@ -95,6 +96,8 @@ pub struct PlanFile {
     pub contacts: Vec<ContactEntry>,
     /// How near pieces come.
     pub gaps: Option<GapsEntry>,
+    /// What it took to find the kit, in work: the same on any machine and number of threads.
+    pub effort: Option<Effort>,
     /// The verdict on the finished pieces.
     pub verification: Option<VerdictEntry>,
     /// What the user should know.

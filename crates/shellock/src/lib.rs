@@ -1,9 +1,27 @@
-//! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that
-//! they hold.
+//! From a closed mesh to interlocking, printable shell pieces, the plan to install them and the proof that they
+//! hold.
 //!
 //! After Yao, Chen, Xu, Wang, "Modeling, Evaluation and Optimization of Interlocking Shell Pieces", Computer
-//! Graphics Forum 36(7), Pacific Graphics 2017. The stages, in the only direction that data flows:
-//! segmentation → key → sizes → plan → body → connector → piece → verify → certificate → report.
+//! Graphics Forum 36(7), Pacific Graphics 2017.
+//!
+//! ```no_run
+//! use shellock::{Ctx, DesignOutcome, Params, design, figure};
+//!
+//! let squirrel = figure::make(figure::Figure::Squirrel, 150.0, 1.5);
+//! let mut params = Params::default();
+//! params.n_pieces = Some(8);
+//! if let DesignOutcome::Made(made) = design(&Ctx::quiet(), &params, &squirrel, None)? {
+//!     println!("{} pieces, the key is {}", made.kit.pieces.len(), made.kit.plan.key());
+//! }
+//! # Ok::<(), shellock::DesignError>(())
+//! ```
+//!
+//! [`mod@design`] is the whole job. Its stages, in the only direction that data flows, each a module with its
+//! parameters and a plain function: [`strength`] (how thick the wall) → [`segmentation`] (which pieces) →
+//! [`key`] (where the last one slides out) → [`sizes`] (of connectors) → [`plan`] (order and directions) and
+//! [`metric`] (which plan holds best) → [`body`] (the wall, split) → [`connector`] (what is under its seams) →
+//! [`piece`] (finished meshes) → [`mod@verify`], [`play`] and [`certificate`], which know nothing of the stages
+//! before and judge anybody's assembly.
 
 pub mod body;
 pub mod connector;

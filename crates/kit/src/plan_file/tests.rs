@@ -35,6 +35,7 @@ const WHOLE: &str = r#"{
     "joints": [{ "male": 0, "female": 1, "length_mm": 20.5, "volume_mm3": [1.5, 2.5], "kept": [1.0, 0.9],
         "at": [0.0, 0.0, 0.0] }],
     "contacts": [{ "later": 1, "earlier": 0, "length_mm": 80.5, "usable_mm": 60.5, "at": [0.0, 0.0, 0.0] }],
+    "effort": { "keys": 1, "segmentations": 2, "plans": 3, "kits": 1 },
     "gaps": { "at_rest_mm": 0.1, "at_rest_beneath_rim_mm": 0.12, "on_the_way_mm": 0.05,
         "on_the_way_beneath_rim_mm": null, "key_on_the_way_beneath_rim_mm": 0.1 },
     "verification": { "passed": false, "checks": [{ "name": "pieces are closed", "ok": false, "figure": "1 is not" }],
