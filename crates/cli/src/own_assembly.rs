@@ -65,7 +65,16 @@ pub fn verify(session: &Session, folder: &Path) -> Result<u8, Failure> {
         {
             return Err(wrong(format!("\"{file}\" is no file within the folder")));
         }
+        if file.eq_ignore_ascii_case(CERTIFICATE) || told.pieces[..i].iter().any(|other| other.file == *file)
+        {
+            return Err(wrong(format!(
+                "\"{file}\" cannot be a piece: each piece has a file of its own"
+            )));
+        }
         let (loaded, bytes) = load(&folder.join(file))?;
+        if loaded.unit_mm.is_some_and(|mm| mm != 1.0) {
+            return Err(wrong(format!("{file} is not in mm: save all pieces in mm")));
+        }
         let (file, sha256) = (file.clone(), sha256(&bytes));
         files.push(PieceFile {
             id: i.into(),

@@ -190,6 +190,8 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
     let Kit { files, pieces, order } = pieces_of(kit, &plan)?;
     let solid = model_of(kit, &plan, model)?;
     let press_fits = plan.checked_press_fits().map_err(broken(kit))?;
+    plan.check_directions().map_err(broken(kit))?;
+    plan.check_clearance().map_err(broken(kit))?;
     let params = VerifyParams {
         clearance_mm: plan.clearance,
         seed: plan.seed,

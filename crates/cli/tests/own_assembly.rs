@@ -87,6 +87,8 @@ fn what_is_wrong_with_an_assembly_is_said_with_its_name() {
         (("0.1", "7"), "a clearance of 7 mm"),
         (("rail.stl", "../rail.stl"), "no file within the folder"),
         (("rail.stl", "gone.stl"), "gone.stl"),
+        (("rail.stl", "pin.stl"), "a file of its own"),
+        (("rail.stl", "certificate.json"), "a file of its own"),
     ] {
         let o = verify(dir.path(), &ASSEMBLY.replace(change.0, change.1));
         let said = String::from_utf8_lossy(&o.stdout);

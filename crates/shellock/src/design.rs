@@ -76,146 +76,6 @@ pub fn design(
     best.finished(ctx, &job)
 }
 
-/// The plan that [`design`] would make first.
-#[non_exhaustive]
-pub struct Planned {
-    /// The pieces, in the space of the model as it was given, turned by `turn`.
-    pub surface: SegmentedSurface,
-    /// How the model was turned.
-    pub turn: Turn,
-    /// The plan and how good it is.
-    pub found: FoundPlan,
-    /// How it holds by simulation.
-    pub holding: Holding,
-    /// What was warned of on the way.
-    pub warnings: Vec<Warning>,
-}
-
-/// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and
-/// connector sizes.
-pub fn plan(
-    ctx: &Ctx,
-    params: &Params,
-    model: &Solid,
-    labels: Option<&[i64]>,
-) -> Result<Result<Planned, String>, DesignError> {
-    let wall = Wall::decide(ctx, params, model)?;
-    let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
-    let stress = wall.strength.as_ref().map(StressMap::new);
-    let job = Job {
-        params,
-        model,
-        labels,
-        wall: &wall,
-        stress,
-        surface,
-    };
-    let mut reason = "the key falls apart".to_owned();
-    for (i, place) in candidate::places(ctx, &job)?.iter().enumerate() {
-        let Some(candidate) = Candidate::new(&job, i, place.as_ref()) else {
-            continue;
-        };
-        let mut n_joinings = candidate.budget.foreseen_joinings;
-        let mut division = candidate.division(ctx, &job, candidate.surface.clone())?;
-        while let Some(current) = division {
-            let ctx = ctx.fork();
-            let Division {
-                surface,
-                settings,
-                chosen,
-                ..
-            } = &current;
-            chosen.tell(&ctx);
-            let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
-            let none = PlanConstraints::default();
-            division = match attempt::next_plan(&ctx, params, &current, &survey, &none, n_joinings > 0)? {
-                Next::Plan(found, holding) => {
-                    let (turn, warnings) = (candidate.turn, ctx.into_warnings());
-                    return Ok(Ok(Planned {
-                        surface: current.surface,
-                        turn,
-                        found: *found,
-                        holding,
-                        warnings,
-                    }));
-                }
-                Next::Joined(fewer) => {
-                    n_joinings -= 1;
-                    candidate.division(&ctx, &job, fewer)?
-                }
-                Next::None(failure) => {
-                    reason = failure.reason;
-                    None
-                }
-            };
-        }
-    }
-    Ok(Err(reason))
-}
-
-/// What all kits of a job have in common.
-struct Job<'a> {
-    params: &'a Params,
-    /// As it was given, with its labels.
-    model: &'a Solid,
-    labels: Option<&'a [i64]>,
-    wall: &'a Wall,
-    stress: Option<StressMap<'a>>,
-    surface: SegmentedSurface,
-}
-
-impl Job<'_> {
-    fn settings(&self) -> &Settings {
-        &self.wall.settings
-    }
-}
-
-/// The wall's thickness in what stages are given, what it bears, and what to tell of it.
-struct Wall {
-    settings: Settings,
-    strength: Option<Strength>,
-    warnings: Vec<Warning>,
-}
-
-impl Wall {
-    fn decide(ctx: &Ctx, params: &Params, model: &Solid) -> Result<Self, DesignError> {
-        let nominal = Settings::resolve(params);
-        let ctx = &ctx.fork();
-        let found = match params.thickness {
-            Thickness::Mm(mm) => strength::stress(ctx, &nominal.strength, model, mm),
-            Thickness::Auto => strength::thickness(ctx, &nominal.strength, model),
-        };
-        match found {
-            Ok(strength) => {
-                let settings = Settings::with_thickness(params, strength.thickness_mm);
-                let warnings = strength.warnings(&nominal.strength);
-                Ok(Self {
-                    settings,
-                    strength: Some(strength),
-                    warnings,
-                })
-            }
-            Err(StrengthError::Shell(e)) if params.thickness != Thickness::Auto => {
-                let message = format!(
-                    "what the wall bears could not be computed ({e}); connectors are sized as if nothing pressed on them"
-                );
-                let warning = Warning {
-                    code: "strength-unknown".into(),
-                    message,
-                    pieces: Vec::new(),
-                    at: None,
-                };
-                Ok(Self {
-                    settings: nominal,
-                    strength: None,
-                    warnings: vec![warning],
-                })
-            }
-            Err(e) => Err(e.into()),
-        }
-    }
-}
-
 /// What came of one candidate.
 struct Explored {
     /// The best of its kits.
@@ -288,6 +148,156 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                 ));
                 division = next;
             }
+        }
+    }
+}
+
+/// The plan that [`design`] would make first.
+#[non_exhaustive]
+pub struct Planned {
+    /// The pieces, in the space of the model as it was given, turned by `turn`.
+    pub surface: SegmentedSurface,
+    /// How the model was turned.
+    pub turn: Turn,
+    /// The plan and how good it is.
+    pub found: FoundPlan,
+    /// How it holds by simulation.
+    pub holding: Holding,
+    /// What was warned of on the way.
+    pub warnings: Vec<Warning>,
+}
+
+/// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and
+/// connector sizes. Where pieces have no plan it goes on with the next key, while [`design`] divides them anew
+/// first.
+pub fn plan(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    labels: Option<&[i64]>,
+) -> Result<Result<Planned, String>, DesignError> {
+    let wall = Wall::decide(ctx, params, model)?;
+    let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
+    let stress = wall.strength.as_ref().map(StressMap::new);
+    let job = Job {
+        params,
+        model,
+        labels,
+        wall: &wall,
+        stress,
+        surface,
+    };
+    let mut reason = String::new();
+    for (i, place) in candidate::places(ctx, &job)?.iter().enumerate() {
+        let Some(candidate) = Candidate::new(&job, i, place.as_ref()) else {
+            continue;
+        };
+        let mut n_joinings = candidate.budget.foreseen_joinings;
+        let mut division = candidate.division(ctx, &job, candidate.surface.clone())?;
+        while let Some(current) = division {
+            let ctx = ctx.fork();
+            let Division {
+                surface,
+                settings,
+                chosen,
+                ..
+            } = &current;
+            chosen.tell(&ctx);
+            let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
+            let none = PlanConstraints::default();
+            division = match attempt::next_plan(&ctx, params, &current, &survey, &none, n_joinings > 0)? {
+                Next::Plan(found, holding) => {
+                    let (turn, warnings) = (
+                        candidate.turn,
+                        [ctx.into_warnings(), wall.warnings.clone()].concat(),
+                    );
+                    return Ok(Ok(Planned {
+                        surface: current.surface,
+                        turn,
+                        found: *found,
+                        holding,
+                        warnings,
+                    }));
+                }
+                Next::Joined(fewer) => {
+                    n_joinings -= 1;
+                    match candidate.division(&ctx, &job, fewer)? {
+                        Some(next) => Some(next),
+                        None => {
+                            n_joinings = 0;
+                            Some(current)
+                        }
+                    }
+                }
+                Next::None(failure) => {
+                    reason = failure.reason;
+                    None
+                }
+            };
+        }
+    }
+    Ok(Err(reason))
+}
+
+/// What all kits of a job have in common.
+struct Job<'a> {
+    params: &'a Params,
+    /// As it was given, with its labels.
+    model: &'a Solid,
+    labels: Option<&'a [i64]>,
+    wall: &'a Wall,
+    stress: Option<StressMap<'a>>,
+    surface: SegmentedSurface,
+}
+
+impl Job<'_> {
+    fn settings(&self) -> &Settings {
+        &self.wall.settings
+    }
+}
+
+/// The wall's thickness in what stages are given, what it bears, and what to tell of it.
+struct Wall {
+    settings: Settings,
+    strength: Option<Strength>,
+    warnings: Vec<Warning>,
+}
+
+impl Wall {
+    fn decide(ctx: &Ctx, params: &Params, model: &Solid) -> Result<Self, DesignError> {
+        let nominal = Settings::resolve(params);
+        let ctx = &ctx.fork();
+        let found = match params.thickness {
+            Thickness::Mm(mm) => strength::stress(ctx, &nominal.strength, model, mm),
+            Thickness::Auto => strength::thickness(ctx, &nominal.strength, model),
+        };
+        match found {
+            Ok(strength) => {
+                let settings = Settings::with_thickness(params, strength.thickness_mm);
+                let warnings = strength.warnings(&nominal.strength);
+                Ok(Self {
+                    settings,
+                    strength: Some(strength),
+                    warnings,
+                })
+            }
+            Err(StrengthError::Shell(e)) if params.thickness != Thickness::Auto => {
+                let message = format!(
+                    "what the wall bears could not be computed ({e}); connectors are sized as if nothing pressed on them"
+                );
+                let warning = Warning {
+                    code: "strength-unknown".into(),
+                    message,
+                    pieces: Vec::new(),
+                    at: None,
+                };
+                Ok(Self {
+                    settings: nominal,
+                    strength: None,
+                    warnings: vec![warning],
+                })
+            }
+            Err(e) => Err(e.into()),
         }
     }
 }

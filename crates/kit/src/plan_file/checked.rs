@@ -63,6 +63,18 @@ impl PlanFile {
         }
     }
 
+    /// Whether faces are so far apart that they can hold each other: farther, and everything touches.
+    pub fn check_clearance(&self) -> Result<(), PlanFileError> {
+        const MOST_MM: f64 = 1.0;
+        if (0.0..=MOST_MM).contains(&self.clearance) {
+            return Ok(());
+        }
+        Err(wrong(format!(
+            "a clearance of {} mm is none; 0 to {MOST_MM} mm are",
+            self.clearance
+        )))
+    }
+
     /// The places where the key presses on purpose, if none presses deeper than any is made.
     pub fn checked_press_fits(&self) -> Result<&[PressFit], PlanFileError> {
         let range_mm = 0.0..=PressFit::MOST_INTERFERENCE_MM;

@@ -196,6 +196,16 @@ fn kits_of_earlier_versions_are_read() {
 }
 
 #[test]
+fn faces_that_are_far_apart_hold_nothing() {
+    let mut plan = read(&whole()).unwrap();
+    assert!(plan.check_clearance().is_ok());
+    for clearance in [1000.0, -0.1, f64::NAN] {
+        plan.clearance = clearance;
+        assert!(plan.check_clearance().is_err(), "{clearance}");
+    }
+}
+
+#[test]
 fn orders_name_every_piece_once() {
     let order = |ids: &[u32]| {
         let mut plan = read(&whole()).unwrap();

@@ -90,7 +90,14 @@ impl<'a> Best<'a> {
             self.effort += explored.effort;
         }
         let Some(site) = place else {
-            let Explored { kit, failure, .. } = explored?;
+            let Explored { kit, failure, .. } = match explored {
+                Err(e) if self.kit.is_some() && !matches!(e, DesignError::Cancelled(_)) => {
+                    // A kit with a key that was cut is there, if it fails.
+                    ctx.note(&format!("with a piece as the key it cannot be made: {e}"));
+                    return Ok(());
+                }
+                explored => explored?,
+            };
             self.failure = failure;
             // Of equals a piece as it is.
             let is_worse = |kit: &Kit| {

@@ -457,6 +457,18 @@ fn a_key_that_cannot_be_cut_is_a_reason_and_no_end() {
 }
 
 #[test]
+fn a_piece_that_cannot_be_the_key_throws_no_kit_away() {
+    let impossible = || Err(DesignError::Choice(ChoiceError::NoPlan));
+    let (_, design) = Ball::new().outcome(vec![(Some(site()), made(loose(1))), (None, impossible())]);
+    assert_eq!(
+        design.unwrap().kit.verification.findings,
+        loose(1).verification.findings
+    );
+    let alone = Best::default().add(&Ctx::quiet(), None, Ball::new().candidate(), impossible());
+    assert!(alone.is_err(), "without any kit the job cannot be done");
+}
+
+#[test]
 fn of_kits_that_fail_alike_the_piece_as_it_is_stays_and_a_worse_one_does_not() {
     let ball = Ball::new();
     let with_key = |own: Kit, piece: Kit| {

@@ -17,6 +17,7 @@
 use std::collections::BTreeMap;
 
 use shellock_geom::{Aabb, Vec3};
+use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
 use shellock_mechanics::{Meeting, Side};
 
 use super::PlanModel;
@@ -24,10 +25,6 @@ use crate::PatchId;
 use crate::motion::{Contact, farthest, most_play};
 use crate::plan::InstallationPlan;
 
-/// Share of the connector size that a pin is deep.
-const PIN_DEPTH: f64 = 0.6;
-/// Half of a pin's thickness, as a share of the connector size.
-const PIN_HALF: f64 = 0.25;
 /// A pin goes on to a station that is no farther than this many times their mean length.
 const NEXT: f64 = 1.6;
 /// How far each piece but the key goes, and by how much that is more than it may: at most 1 where it is not.
@@ -146,7 +143,7 @@ fn at_station(
         let (male, female) = if joint.male == Side::A { (a, b) } else { (b, a) };
         let across = joint.leaves.cross(frame.tangent).normalize_or_zero();
         for depth_mm in [wall_mm + 0.1 * joint.size_mm, wall_mm + PIN_DEPTH * joint.size_mm] {
-            let (middle, half) = (below(depth_mm), PIN_HALF * joint.size_mm);
+            let (middle, half) = (below(depth_mm), 0.5 * PIN_WIDTH * joint.size_mm);
             found.push(contact(male, female, middle - half * joint.leaves, -joint.leaves));
             found.extend([across, -across].map(|side| contact(male, female, middle + half * side, side)));
             let outwards = [-frame.tangent, frame.tangent]
