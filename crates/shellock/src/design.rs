@@ -49,16 +49,7 @@ pub fn design(
     labels: Option<&[i64]>,
 ) -> Result<DesignOutcome, DesignError> {
     let wall = Wall::decide(ctx, params, model)?;
-    let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
-    let stress = wall.strength.as_ref().map(StressMap::new);
-    let job = Job {
-        params,
-        model,
-        labels,
-        wall: &wall,
-        stress,
-        surface,
-    };
+    let job = Job::new(ctx, params, model, labels, &wall)?;
     let mut best = Best::default();
     let places = candidate::places(ctx, &job)?;
     for (i, place) in places.iter().enumerate() {
@@ -177,16 +168,7 @@ pub fn plan(
     labels: Option<&[i64]>,
 ) -> Result<Result<Planned, String>, DesignError> {
     let wall = Wall::decide(ctx, params, model)?;
-    let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
-    let stress = wall.strength.as_ref().map(StressMap::new);
-    let job = Job {
-        params,
-        model,
-        labels,
-        wall: &wall,
-        stress,
-        surface,
-    };
+    let job = Job::new(ctx, params, model, labels, &wall)?;
     let mut reason = String::new();
     for (i, place) in candidate::places(ctx, &job)?.iter().enumerate() {
         let Some(candidate) = Candidate::new(&job, i, place.as_ref()) else {
@@ -250,7 +232,27 @@ struct Job<'a> {
     surface: SegmentedSurface,
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    /// Divides the model.
+    fn new(
+        ctx: &Ctx,
+        params: &'a Params,
+        model: &'a Solid,
+        labels: Option<&'a [i64]>,
+        wall: &'a Wall,
+    ) -> Result<Self, DesignError> {
+        let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
+        let stress = wall.strength.as_ref().map(StressMap::new);
+        Ok(Self {
+            params,
+            model,
+            labels,
+            wall,
+            stress,
+            surface,
+        })
+    }
+
     fn settings(&self) -> &Settings {
         &self.wall.settings
     }
