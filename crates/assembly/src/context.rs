@@ -3,27 +3,12 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use serde::{Deserialize, Serialize};
-
-use crate::PatchId;
+use crate::Warning;
 
 /// The user asked to stop; nothing was kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped by the user")]
 pub struct Cancelled;
-
-/// Something the user should know that did not stop the job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Warning {
-    /// Stable name for machines, for example `"seam-without-connector"`.
-    pub code: String,
-    /// For people: what, where, what to do.
-    pub message: String,
-    /// The pieces it concerns.
-    pub pieces: Vec<PatchId>,
-    /// Where, mm in assembly space.
-    pub at: Option<[f64; 3]>,
-}
 
 /// How far the job is.
 #[derive(Clone, Debug, PartialEq)]

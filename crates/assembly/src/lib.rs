@@ -40,11 +40,13 @@ pub mod push;
 pub mod sequence;
 mod verdict;
 pub mod verify;
+pub mod warning;
 
-pub use context::{Cancelled, Ctx, Warning};
+pub use context::{Cancelled, Ctx};
 pub use direction::LatticeDirection;
 pub use ids::{IdVec, PatchId};
 pub use press_fit::{PressFit, PressFitKind};
 pub use sequence::{InstallationPlan, InstallationStep};
 pub use verdict::{Verdict, verify};
 pub use verify::{Assembly, VerifyParams};
+pub use warning::{Cause, Warning};

@@ -32,7 +32,8 @@ use shellock_geom::{TriMesh, Vec3};
 use crate::InstallationPlan;
 use crate::motion::most_play;
 use crate::verify::{Check, Finding, Play};
-use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
+use crate::warning::EstimatedPlay;
+use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 pub use bearing::Bearing;
 use bearing::Surfaces;
 use bound::{Answer, Candidates, Problem};
@@ -355,25 +356,16 @@ pub fn warning(play: &KitPlay) -> Option<Warning> {
     let open: Vec<(PatchId, Play)> = open
         .filter(|(id, play)| !play.is_proven && !comes_out(*id))
         .collect();
-    let line = |(id, play): &(PatchId, Play)| {
-        format!(
-            "{id} (about {:.1} mm, {:.1}°)",
-            play.translation_mm, play.rotation_deg
-        )
-    };
-    let list: Vec<String> = open.iter().map(line).collect();
     let is_searched = play.ways_out.is_some() && open.iter().any(|o| o.0 != play.slide.key);
-    let search = if is_searched {
-        "; no way to take out one that is not the key was found"
-    } else {
-        ""
+    let figure = |o: &(PatchId, Play)| EstimatedPlay {
+        translation_mm: o.1.translation_mm,
+        rotation_deg: o.1.rotation_deg,
     };
     (!open.is_empty()).then(|| Warning {
-        code: "not-proven".into(),
-        message: format!(
-            "how far these pieces can be moved within the clearance is estimated, not proven: {}{search}",
-            list.join(", ")
-        ),
+        cause: Cause::NotProven {
+            figures: open.iter().map(figure).collect(),
+            is_searched,
+        },
         pieces: open.iter().map(|o| o.0).collect(),
         at: None,
     })

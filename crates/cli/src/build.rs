@@ -318,7 +318,7 @@ pub fn print_warnings(warnings: &[Warning]) {
         let place = w.at.map_or_else(String::new, |[x, y, z]| {
             format!(" [at ({x:.1}, {y:.1}, {z:.1}) mm]")
         });
-        println!("warning: {}{place}", w.message);
+        println!("warning: {w}{place}");
     }
 }
 

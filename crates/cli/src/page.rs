@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use shellock::design::{Design, Kit, Settings};
 use shellock::verify::{Finding, Play};
-use shellock::{IdVec, PatchId, Warning};
+use shellock::{Cause, IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_print::booklet::Booklet;
@@ -38,10 +38,7 @@ pub fn report(
     let failed = design.kit.verification.findings.iter().map(failure);
     let warnings: Vec<Warning> = failed
         .chain(warnings.iter().cloned())
-        .map(|w| Warning {
-            at: w.at.map(|at| stand(Vec3::from_array(at)).to_array()),
-            ..w
-        })
+        .map(|w| w.turned(|at| stand(Vec3::from_array(at)).to_array()))
         .collect();
     let plan = &design.kit.plan;
     let pieces: Vec<ReportPiece> = design
@@ -149,10 +146,10 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
 
 /// What failed, for the list of warnings.
 fn failure(finding: &Finding) -> Warning {
-    let message = format!("do not print this kit: {finding}");
     Warning {
-        code: "failed".into(),
-        message,
+        cause: Cause::Failed {
+            finding: finding.to_string(),
+        },
         pieces: Vec::new(),
         at: finding.place(),
     }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use shellock::design::{DesignError, Settings};
-use shellock::{Ctx, PatchId, SegmentedSurface, Warning, segmentation};
+use shellock::{Cause, Ctx, PatchId, SegmentedSurface, Warning, segmentation};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Solid, TriMesh};
@@ -67,17 +67,10 @@ impl Printing {
     /// Says which pieces the printer cannot make.
     pub fn warnings(&self) -> Option<Warning> {
         let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| PatchId(i as u32)).collect();
-        let names: Vec<String> = pieces.iter().map(ToString::to_string).collect();
-        let (names, printer) = (names.join(", "), described(&self.printer));
-        let what = match pieces.len() {
-            1 => format!("piece {names} does not fit the printer {printer}; it is"),
-            _ => format!("pieces {names} do not fit the printer {printer}; they are"),
-        };
-        let message =
-            format!("{what} left out of plates.3mf: choose more pieces (--pieces) or another printer");
         (!pieces.is_empty()).then(|| Warning {
-            code: "piece-too-large".into(),
-            message,
+            cause: Cause::PieceTooLarge {
+                printer: described(&self.printer),
+            },
             pieces,
             at: None,
         })

@@ -96,7 +96,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         println!("{value}");
     } else {
         notes.iter().for_each(|n| println!("note: {n}"));
-        warnings.iter().for_each(|w| println!("warning: {}", w.message));
+        warnings.iter().for_each(|w| println!("warning: {w}"));
         println!("{} pieces, written to {}", surface.n_patches, out.display());
     }
     Ok(0)

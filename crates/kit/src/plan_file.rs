@@ -18,7 +18,8 @@ use serde_json::Value;
 use shellock::design::Effort;
 use shellock::metric::Holding;
 use shellock::plan::PlanProof;
-use shellock_assembly::{PatchId, PressFit, Warning};
+use shellock_assembly::warning::WarningEntry;
+use shellock_assembly::{PatchId, PressFit};
 
 pub use entries::{
     ContactEntry, GapsEntry, InputEntry, JointEntry, KeyEntry, LaidEntry, PairSizeEntry, PieceEntry,
@@ -102,7 +103,7 @@ pub struct PlanFile {
     pub verification: Option<VerdictEntry>,
     /// What the user should know.
     #[serde(default)]
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<WarningEntry>,
     /// The pieces on the plates of a printer.
     pub printing: Option<PrintingEntry>,
 }

@@ -73,7 +73,7 @@ struct Header<'a> {
     meshes: Vec<MeshHeader<'a>>,
     facts: &'a [(String, String)],
     checks: &'a [ReportCheck],
-    notes: Vec<Note<'a>>,
+    notes: Vec<Note>,
     figures: Vec<Figure<'a>>,
     /// One value a mesh.
     quantities: &'a [ReportQuantity],
@@ -140,26 +140,26 @@ struct TriangleArray {
 
 /// A point with a label, or a label alone.
 #[derive(Serialize)]
-struct Note<'a> {
+struct Note {
     title: String,
-    text: &'a str,
+    text: String,
     at: Option<[f64; 3]>,
 }
 
-fn note<'a>(warning: &'a Warning, pieces: &[ReportPiece<'_>]) -> Note<'a> {
+fn note(warning: &Warning, pieces: &[ReportPiece<'_>]) -> Note {
     let named = |id: &PatchId| match pieces.iter().find(|p| p.id == id.0) {
         Some(piece) => piece.name.clone(),
         None => format!("piece {id}"),
     };
     let names: Vec<String> = warning.pieces.iter().map(named).collect();
     let title = if names.is_empty() {
-        warning.code.clone()
+        warning.code().to_owned()
     } else {
-        format!("{} · {}", warning.code, names.join(", "))
+        format!("{} · {}", warning.code(), names.join(", "))
     };
     Note {
         title,
-        text: &warning.message,
+        text: warning.to_string(),
         at: warning.at,
     }
 }
@@ -257,6 +257,8 @@ fn fill(template: &str, values: &[(&str, &str)]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use shellock_assembly::Cause;
+
     use super::*;
     use crate::ReportMove;
 
@@ -283,8 +285,9 @@ mod tests {
             facts: vec![hostile()],
         };
         let warning = Warning {
-            code: HOSTILE.into(),
-            message: HOSTILE.into(),
+            cause: Cause::Failed {
+                finding: HOSTILE.into(),
+            },
             pieces: vec![PatchId(0)],
             at: None,
         };

@@ -27,9 +27,7 @@ fn main() -> std::io::Result<()> {
         figure: figure.into(),
     };
     let warning = Warning {
-        code: "seam-without-connector".into(),
-        message: "12.4 mm of seam are too strongly curved for a connector; the pieces only touch there"
-            .into(),
+        cause: shellock::Cause::SeamWithoutConnector { length_mm: 12.4 },
         pieces: vec![PatchId(1), PatchId(2)],
         at: Some([0.0, 40.0, 118.0]),
     };

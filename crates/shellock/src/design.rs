@@ -28,7 +28,7 @@ use crate::key::Turn;
 use crate::metric::Holding;
 use crate::plan::{FoundPlan, PlanConstraints, survey};
 use crate::strength::{Strength, StrengthError, StressMap};
-use crate::{Ctx, SegmentedSurface, Warning, segmentation, strength};
+use crate::{Cause, Ctx, SegmentedSurface, Warning, segmentation, strength};
 use attempt::{Attempt, Failure, Next};
 use budget::Budget;
 pub use budget::Effort;
@@ -284,12 +284,8 @@ impl Wall {
                 })
             }
             Err(StrengthError::Shell(e)) if params.thickness != Thickness::Auto => {
-                let message = format!(
-                    "what the wall bears could not be computed ({e}); connectors are sized as if nothing pressed on them"
-                );
                 let warning = Warning {
-                    code: "strength-unknown".into(),
-                    message,
+                    cause: Cause::StrengthUnknown { error: e.to_string() },
                     pieces: Vec::new(),
                     at: None,
                 };

@@ -44,8 +44,9 @@ mod testing;
 pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, design};
 pub use seam::graph::{Contact, ContactGraph};
 pub use shellock_assembly::{
-    Cancelled, Ctx, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit,
+    Cancelled, Cause, Ctx, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit,
     PressFitKind, Verdict, Warning, certificate, context, direction, ids, motion, params, play, push, verify,
+    warning,
 };
 pub use sizes::ConnectorSizes;
 pub use surface::{Seam, SegmentedSurface};

@@ -35,7 +35,8 @@ use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
 
 use crate::params::ParamProblem;
-use crate::{Cancelled, Ctx, PatchId, Seam, SegmentedSurface, Warning};
+use crate::warning::SizeLimit;
+use crate::{Cancelled, Cause, Ctx, PatchId, Seam, SegmentedSurface, Warning};
 
 /// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
 pub(crate) const CONTACT_SIZES: f64 = 5.6;
@@ -271,15 +272,6 @@ pub struct LimitedSize {
     pub limit: SizeLimit,
 }
 
-/// What keeps connectors small.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SizeLimit {
-    /// The seam is too short.
-    Seam,
-    /// The cavity is too narrow.
-    Cavity,
-}
-
 /// Eq. 3: the size for a greatest stress of `stress_mpa`, mm in [D_min, D_max]. No number counts as no
 /// stress.
 pub fn size_for_stress_mm(range: &SizeRange, strength_mpa: f64, stress_mpa: f64) -> f64 {
@@ -413,43 +405,18 @@ impl ChosenSizes {
             let mut pieces: Vec<PatchId> = limited.iter().flat_map(|l| l.pair).collect();
             pieces.sort_unstable();
             pieces.dedup();
-            let message = worst.message(limited.len() - 1);
             ctx.warn(Warning {
-                code: "connector-limited".into(),
-                message,
+                cause: Cause::ConnectorLimited {
+                    pair: worst.pair,
+                    by: worst.limit,
+                    wanted_mm: worst.wanted_mm,
+                    given_mm: worst.given_mm,
+                    n_others: limited.len() - 1,
+                },
                 pieces,
                 at: Some(worst.at.to_array()),
             });
         }
-    }
-}
-
-impl LimitedSize {
-    fn message(&self, n_others: usize) -> String {
-        let Self {
-            pair: [a, b],
-            wanted_mm,
-            given_mm,
-            ..
-        } = self;
-        let (why, remedy) = match self.limit {
-            SizeLimit::Seam => (
-                "their seam is too short for larger ones",
-                "fewer pieces have longer seams",
-            ),
-            SizeLimit::Cavity => (
-                "the cavity is too narrow for larger ones",
-                "thinner walls or a larger model make room",
-            ),
-        };
-        let others = match n_others {
-            0 => String::new(),
-            1 => ", and so for one other pair".to_owned(),
-            n => format!(", and so for {n} other pairs"),
-        };
-        format!(
-            "connectors between pieces {a} and {b} are {given_mm:.1} mm where the stress asks for {wanted_mm:.1} mm, because {why}{others}; {remedy}"
-        )
     }
 }
 

@@ -39,7 +39,7 @@ use shellock_mechanics::{LoadCase, ShellError, ShellModel};
 
 use crate::impact::impact_n;
 use crate::params::ParamProblem;
-use crate::{Cancelled, Ctx, Warning};
+use crate::{Cancelled, Cause, Ctx, Warning};
 
 use falls::{Fallen, Falls};
 pub use thin::SolidRegion;
@@ -240,31 +240,25 @@ impl Strength {
     /// What the user should know: a wall that is too weak, and where the model is solid.
     pub fn warnings(&self, params: &StrengthParams) -> Vec<Warning> {
         let weak = self.is_too_weak.then(|| Warning {
-            code: "wall-too-weak".into(),
-            message: format!(
-                "a wall of {:.2} mm does not bear a fall from {} m: {:.0} MPa, and the material bears {:.0}; \
-                 a wall up to {:.1} mm helps little",
-                self.thickness_mm,
-                params.drop_m,
-                self.stress_mpa,
-                params.material.strength_mpa,
-                params.most_mm
-            ),
+            cause: Cause::WallTooWeak {
+                thickness_mm: self.thickness_mm,
+                drop_m: params.drop_m,
+                stress_mpa: self.stress_mpa,
+                strength_mpa: params.material.strength_mpa,
+                most_mm: params.most_mm,
+            },
             pieces: Vec::new(),
             at: Some(self.at.to_array()),
         });
         let total_mm2: f64 = self.solid.iter().map(|r| r.area_mm2).sum();
-        let percent = 100.0 * total_mm2 / self.mesh.area();
         let large = self.solid.first().filter(|r| r.area_mm2 >= TOLD_SOLID_MM2);
         let solid = large.map(|largest| Warning {
-            code: "too-thin-to-hollow".into(),
-            message: format!(
-                "{} place(s) ({percent:.1} % of the surface) have no cavity between two walls of {:.2} mm, as they are thin or at \
-                 a sharp edge: they are solid and have no connectors; the largest has {:.0} mm²",
-                self.solid.len(),
-                self.thickness_mm,
-                largest.area_mm2
-            ),
+            cause: Cause::TooThinToHollow {
+                n_places: self.solid.len(),
+                share: total_mm2 / self.mesh.area(),
+                thickness_mm: self.thickness_mm,
+                largest_mm2: largest.area_mm2,
+            },
             pieces: Vec::new(),
             at: Some(largest.at),
         });

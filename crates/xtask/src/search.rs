@@ -96,7 +96,7 @@ fn subject(
         if ctx
             .into_warnings()
             .iter()
-            .any(|w| w.code == "occlusion-tolerance-raised")
+            .any(|w| w.code() == "occlusion-tolerance-raised")
         {
             params.occlusion_tolerance = params.relaxed_tolerance;
         }

@@ -8,7 +8,7 @@ use super::columns::{Columns, Frame, Grid};
 use super::limits::{OUTSIDE_SHARE, OVERLAP_MM3};
 use super::{Check, Finding, rounded};
 use crate::PressFit;
-use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
+use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
 /// Most that a detent or a rib has in common with what it presses on, mm³: 2.8 × 0.6 × 0.4 mm, and rounding.
 const PRESSED_MM3: f64 = 0.8;
@@ -56,11 +56,8 @@ pub fn check_pairs(
         if volume_mm3 > OVERLAP_MM3 {
             findings.push(Finding::Overlap { a, b, volume_mm3, at });
         } else if volume_mm3 > WARN_MM3 {
-            let message =
-                format!("pieces {a} and {b} overlap by {volume_mm3:.3} mm³; sand the joint if it is tight");
             ctx.warn(Warning {
-                code: "small-overlap".into(),
-                message,
+                cause: Cause::SmallOverlap { volume_mm3 },
                 pieces: vec![a, b],
                 at: Some(at),
             });

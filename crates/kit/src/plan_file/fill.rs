@@ -96,7 +96,7 @@ impl PlanFile {
                 checks: kit.verification.checks.clone(),
                 findings: Some(kit.verification.findings.clone()),
             }),
-            warnings: told.warnings.to_vec(),
+            warnings: told.warnings.iter().cloned().map(Into::into).collect(),
             printing: Some(told.printing.clone()),
         }
     }

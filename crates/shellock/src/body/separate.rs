@@ -13,7 +13,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use super::grid::{LocalField, PatchDistances, ShellGrid};
 use super::{BodyError, BodyParams};
 use crate::plan::InstallationPlan;
-use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
+use crate::{Cancelled, Cause, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
 
 /// Outer skin of a piece that other pieces' paths must not take from it, in cells. [geometry notes: 1.5]
 const SKIN_CELLS: f64 = 1.5;
@@ -357,10 +357,7 @@ fn whole_body(ctx: &Ctx, p: PatchId, body: &Volume) -> Volume {
         .sum();
     if dropped > CHIP_MM3 {
         ctx.warn(Warning {
-            code: "body-in-parts".into(),
-            message: format!(
-                "piece {p}: fragments of {dropped:.1} mm³ were cut off from its body and dropped"
-            ),
+            cause: Cause::BodyInParts { dropped_mm3: dropped },
             pieces: vec![p],
             at: parts.get(1).map(|c| c.bounds().center().to_array()),
         });

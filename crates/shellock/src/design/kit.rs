@@ -12,7 +12,7 @@ use crate::plan::{FoundPlan, InstallationPlan, PlanProof};
 use crate::play::{self, KitPlay};
 use crate::sizes::CONTACT_SIZES;
 use crate::verify::{self, Finding, Verification};
-use crate::{ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece};
+use crate::{Cause, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece};
 
 /// Pieces that were made as planned, and what is known of them. All places are in the space of the model that
 /// they were made from.
@@ -235,24 +235,21 @@ fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
     let of = |kind: PressFitKind| finished.press_fits.iter().filter(move |f| f.kind == kind);
     for d in of(PressFitKind::Detent) {
         ctx.warn(Warning {
-            code: "detent".into(),
-            message: format!(
-                "on the last {:.1} mm of its way the key is pressed past a bump of piece {} that is {:.2} mm too high for its \
-                 groove, on purpose: it clicks; the proofs of free paths are without it",
-                d.travel_mm, d.piece, d.interference_mm
-            ),
+            cause: Cause::Detent {
+                interference_mm: d.interference_mm,
+                travel_mm: d.travel_mm,
+            },
             pieces: vec![d.piece],
             at: Some(d.at),
         });
     }
     if let Some(rib) = of(PressFitKind::Rib).next() {
         ctx.warn(Warning {
-            code: "key-ribs".into(),
-            message: format!(
-                "the key has no rails: {} ribs on its sides press by {:.2} mm on the last {:.1} mm of its way, on purpose, so that it \
-                 stays in; file them down if it is too tight; the proofs of free paths are without them",
-                of(PressFitKind::Rib).count(), rib.interference_mm, rib.travel_mm
-            ),
+            cause: Cause::KeyRibs {
+                n: of(PressFitKind::Rib).count(),
+                interference_mm: rib.interference_mm,
+                travel_mm: rib.travel_mm,
+            },
             pieces: vec![rib.piece],
             at: Some(rib.at),
         });
@@ -267,11 +264,9 @@ fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[Contact], j
         let joins = |j: &&Joint| pair.contains(&j.male) && pair.contains(&j.female);
         if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
             ctx.warn(Warning {
-                code: "seam-without-connector".into(),
-                message: format!(
-                    "the seam of {:.0} mm between pieces {} and {} has no connector; other seams hold these pieces",
-                    contact.length_mm, contact.later, contact.earlier
-                ),
+                cause: Cause::SeamWithoutConnector {
+                    length_mm: contact.length_mm,
+                },
                 pieces: pair.to_vec(),
                 at: Some(contact.at.to_array()),
             });

@@ -14,7 +14,7 @@ use crate::plan::Blocker;
 use crate::segmentation::{self, SegmentationError};
 use crate::strength::{Strength, StrengthError};
 use crate::verify::clearance::{KitGaps, kit_gaps};
-use crate::{Cancelled, Ctx, Warning};
+use crate::{Cancelled, Cause, Ctx, Warning};
 
 /// A finished kit and the wall that it is made of. All places are in assembly space: the model as it was
 /// given, turned by `turn`.
@@ -168,10 +168,7 @@ impl<'a> Best<'a> {
         let mut warnings = ctx.into_warnings();
         warnings.extend(kit.warnings.iter().cloned());
         let place = |at: [f64; 3]| turn.apply(Vec3::from(at)).to_array();
-        warnings.extend(job.wall.warnings.iter().map(|w| Warning {
-            at: w.at.map(place),
-            ..w.clone()
-        }));
+        warnings.extend(job.wall.warnings.iter().map(|w| w.clone().turned(place)));
         warnings.extend(crossing(&kit, &gaps));
         match &key {
             Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, &key.site)),
@@ -179,7 +176,7 @@ impl<'a> Best<'a> {
                 if reasons.is_empty() {
                     reasons.push("nowhere is the surface flat, free and thick enough to cut one".into());
                 }
-                warnings.push(not_cut(&kit, &reasons));
+                warnings.push(not_cut(&kit, reasons));
             }
             _ => {}
         }
@@ -198,14 +195,10 @@ impl<'a> Best<'a> {
 }
 
 /// Says why a piece as it is became the key.
-fn not_cut(kit: &Kit, reasons: &[String]) -> Warning {
+fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
     let key = kit.plan.key();
     Warning {
-        code: "key-not-cut".into(),
-        message: format!(
-            "piece {key} is the key as it is, without rails: {}",
-            reasons.join("; ")
-        ),
+        cause: Cause::KeyNotCut { reasons },
         pieces: vec![key],
         at: None,
     }
@@ -215,11 +208,7 @@ fn not_cut(kit: &Kit, reasons: &[String]) -> Warning {
 fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
     let key = kit.plan.key();
     Warning {
-        code: "key-without-rails".into(),
-        message: format!(
-            "piece {key} is the key, but nothing straight runs under its sides: it slides along its plane without rails and is held by \
-             its other connectors"
-        ),
+        cause: Cause::KeyWithoutRails,
         pieces: vec![key],
         at: Some(site.prism.origin.to_array()),
     }
@@ -236,11 +225,10 @@ fn crossing(kit: &Kit, gaps: &KitGaps) -> Option<Warning> {
     let place = deepest.overall;
     let is_meant = deepest.piece == kit.plan.key() && !kit.press_fits.is_empty();
     (place.gap_mm < -LEAST_MM && !is_meant).then(|| Warning {
-        code: "surfaces-cross".into(),
-        message: format!(
-            "pieces {} and {} cross by {:.2} mm after {:.1} mm of the way of the first; it will rub there: sand it a little",
-            deepest.piece, deepest.against, -place.gap_mm, place.travel_mm
-        ),
+        cause: Cause::SurfacesCross {
+            by_mm: -place.gap_mm,
+            after_mm: place.travel_mm,
+        },
         pieces: vec![deepest.piece, deepest.against],
         at: Some(place.at),
     })

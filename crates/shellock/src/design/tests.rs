@@ -18,7 +18,7 @@ use crate::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanProof
 use crate::play::{KitPlay, Slide};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::verify::{Check, Finding, Play, Verification};
-use crate::{Cancelled, ConnectorSizes, IdVec, LatticeDirection, PatchId, testing};
+use crate::{Cancelled, Cause, ConnectorSizes, IdVec, LatticeDirection, PatchId, testing};
 
 const N: usize = 3;
 
@@ -97,8 +97,7 @@ fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
             proofs: Vec::new(),
         },
         warnings: vec![Warning {
-            code: "of-the-kit".into(),
-            message: String::new(),
+            cause: Cause::KeyWithoutGrip,
             pieces: Vec::new(),
             at: None,
         }],
@@ -317,8 +316,7 @@ impl Ball {
     fn new() -> Self {
         let params = Params::default();
         let told = Warning {
-            code: "of-the-wall".into(),
-            message: String::new(),
+            cause: Cause::StrengthUnknown { error: String::new() },
             pieces: Vec::new(),
             at: None,
         };
@@ -408,7 +406,7 @@ fn made(kit: Kit) -> Result<Explored, DesignError> {
 }
 
 fn codes(design: &Design) -> Vec<&str> {
-    design.warnings.iter().map(|w| w.code.as_str()).collect()
+    design.warnings.iter().map(|w| w.code()).collect()
 }
 
 #[test]
@@ -441,9 +439,13 @@ fn a_key_that_cannot_be_cut_is_a_reason_and_no_end() {
     let told = design
         .warnings
         .iter()
-        .find(|w| w.code == "key-not-cut")
+        .find(|w| w.code() == "key-not-cut")
         .expect("it is told");
-    assert!(told.message.contains("it cannot be made"), "{}", told.message);
+    assert!(
+        told.to_string().contains("it cannot be made"),
+        "{}",
+        told.to_string()
+    );
     assert!(
         Best::default()
             .add(
@@ -490,15 +492,17 @@ fn of_kits_that_fail_alike_the_piece_as_it_is_stays_and_a_worse_one_does_not() {
 #[test]
 fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_given_out() {
     let mut other = loose(1);
-    other.warnings[0].code = "of-another-kit".into();
+    other.warnings[0].cause = Cause::KeyWithoutRibs;
     let (_, design) = Ball::new().outcome(vec![(Some(site()), made(other)), (None, made(good()))]);
     let design = design.unwrap();
     let all = codes(&design);
     assert!(
-        all.contains(&"of-the-kit") && all.contains(&"of-the-wall") && all.contains(&"key-not-cut"),
+        all.contains(&"key-without-grip")
+            && all.contains(&"strength-unknown")
+            && all.contains(&"key-not-cut"),
         "{all:?}"
     );
-    assert!(!all.contains(&"of-another-kit"));
+    assert!(!all.contains(&"key-without-ribs"));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use shellock_geom::Vec3;
 
 use super::plane::{Plane, Spot};
-use crate::{PatchId, SegmentedSurface, Warning};
+use crate::{Cause, PatchId, SegmentedSurface, Warning};
 
 /// Least share of a key on its plane.
 const LEAST_FLAT: f64 = 0.5;
@@ -46,34 +46,36 @@ impl KeyConditions {
     /// What is broken, in words and with places. `connector_mm` is the size of its connectors; whether a key
     /// `may_be_cut` instead, which was not tried.
     pub fn problems(&self, key: PatchId, connector_mm: f64, may_be_cut: bool) -> Vec<Warning> {
-        let or_cut = if may_be_cut {
-            ", or let the key be cut (--key auto)"
-        } else {
-            ""
-        };
-        let warning = |code: &str, at: Vec3, message: String| Warning {
-            code: code.into(),
-            message,
+        let warning = |at: Vec3, cause: Cause| Warning {
+            cause,
             pieces: vec![key],
             at: Some(at.to_array()),
         };
         let mut found = Vec::new();
         if self.flat_share < LEAST_FLAT {
             let (at, off_mm) = self.farthest;
-            found.push(warning("key-not-flat", at, format!(
-                "the key, piece {key}, is curved, so it may sit loosely: {:.0} % of it lies in a plane ({:.0} % would do), and it is {off_mm:.1} mm \
-                 off at the farthest; give it a flatter place{or_cut}",
-                100.0 * self.flat_share,
-                100.0 * LEAST_FLAT
-            )));
+            let flat_share = self.flat_share;
+            found.push(warning(
+                at,
+                Cause::KeyNotFlat {
+                    flat_share,
+                    least_share: LEAST_FLAT,
+                    off_mm,
+                    may_be_cut,
+                },
+            ));
         }
         let (straight_mm, at) = self.straight;
         let least_mm = LEAST_STRAIGHT_SIZES * connector_mm;
         if straight_mm < least_mm {
-            found.push(warning("key-not-straight", at, format!(
-                "no side of the key, piece {key}, is straight along its way out for the {least_mm:.0} mm that rails need (longest: \
-                 {straight_mm:.1} mm), so friction alone holds it; draw straight seams along its way out{or_cut}"
-            )));
+            found.push(warning(
+                at,
+                Cause::KeyNotStraight {
+                    straight_mm,
+                    least_mm,
+                    may_be_cut,
+                },
+            ));
         }
         found
     }
@@ -184,7 +186,7 @@ mod tests {
         let found = conditions(&cube(), PatchId(0), diagonal).unwrap();
         let problems = found.problems(PatchId(0), 2.5, true);
         assert_eq!(
-            problems.iter().map(|p| p.code.as_str()).collect::<Vec<_>>(),
+            problems.iter().map(|p| p.code()).collect::<Vec<_>>(),
             ["key-not-straight"]
         );
         assert!(problems[0].at.is_some_and(|at| (at[2] - 40.0).abs() < 1e-9));

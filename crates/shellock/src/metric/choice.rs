@@ -9,7 +9,7 @@ use shellock_mechanics::{Meeting, Opening, Resistance};
 
 use super::{Foreseen, MetricParams, PlanModel, foreseen};
 use crate::plan::{FoundPlan, InstallationPlan, PlanParams};
-use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
+use crate::{Cancelled, Cause, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
 /// Plans whose cost is within this share of the best one's are compared by simulation.
 ///
@@ -176,13 +176,8 @@ fn size_mm(surface: &SegmentedSurface) -> f64 {
 }
 
 fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePart]) {
-    let names: Vec<String> = loose.iter().map(|part| part.piece.to_string()).collect();
     ctx.warn(Warning {
-        code: "comes-apart".into(),
-        message: format!(
-            "in the simulation without friction these pieces can be pulled apart: {}",
-            names.join(", ")
-        ),
+        cause: Cause::ComesApart,
         pieces: loose.iter().map(|part| part.piece).collect(),
         at: loose.first().map(|part| part.at),
     });
@@ -190,10 +185,7 @@ fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePart]) {
 
 fn warn_of_loose(ctx: &Ctx<'_>, model: &PlanModel, piece: PatchId) {
     ctx.warn(Warning {
-        code: "piece-loose".into(),
-        message: format!(
-            "some push moves piece {piece} and hardly any connector stops it; make more pieces, or divide the model otherwise"
-        ),
+        cause: Cause::PieceLoose,
         pieces: vec![piece],
         at: Some(middle_of(model, piece).to_array()),
     });

@@ -189,7 +189,7 @@ fn a_half_that_nothing_holds_is_told_with_its_place() {
     let (found, _, warnings) = chosen(&label(sphere(5, Vec3::splat(40.0)), 2, |p| u32::from(p.z > 0.0)));
     let loose = warnings
         .iter()
-        .find(|w| w.code == "piece-loose")
+        .find(|w| w.code() == "piece-loose")
         .unwrap_or_else(|| panic!("{warnings:?}"));
     let first = found.plan.steps[0].piece;
     assert_eq!(loose.pieces, [first]);

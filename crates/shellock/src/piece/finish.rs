@@ -16,7 +16,7 @@ use crate::PressFit;
 use crate::body::{ShellBodies, ShellGrid};
 use crate::connector::{ConnectorParams, Run};
 use crate::plan::InstallationPlan;
-use crate::{Cancelled, Ctx, IdVec, PatchId, Warning};
+use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
 /// How far connectors reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.4;
@@ -190,11 +190,7 @@ fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Chang
     let cut = notch(grip, &shell.bodies[grip.key].to_mesh());
     if cut.is_none() {
         ctx.warn(Warning {
-            code: "key-without-grip".into(),
-            message: format!(
-                "piece {} has no notch to pull it out by: its surface has no even place of 12 × 3 mm in the middle",
-                grip.key
-            ),
+            cause: Cause::KeyWithoutGrip,
             pieces: vec![grip.key],
             at: Some(grip.at.to_array()),
         });
@@ -346,10 +342,7 @@ fn ribs_of_key(
     });
     if made.0.is_empty() {
         ctx.warn(Warning {
-            code: "key-without-ribs".into(),
-            message: format!(
-                "the key, piece {key}, has no rails, and no side on which ribs could stand: nothing but tight walls keeps it in"
-            ),
+            cause: Cause::KeyWithoutRibs,
             pieces: vec![key],
             at: None,
         });
@@ -411,14 +404,8 @@ fn warn_of_missing_numbers(ctx: &Ctx, pieces: Vec<PatchId>) {
     if pieces.is_empty() {
         return;
     }
-    let names: Vec<String> = pieces.iter().map(ToString::to_string).collect();
     ctx.warn(Warning {
-        code: "piece-without-number".into(),
-        message: format!(
-            "no number is engraved on piece {}: the inner side has no even place of the wall's full thickness that is large \
-             enough; tell these pieces by their pictures",
-            names.join(", ")
-        ),
+        cause: Cause::PieceWithoutNumber,
         pieces,
         at: None,
     });

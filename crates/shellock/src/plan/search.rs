@@ -27,7 +27,7 @@ use super::{
     ProofScope, RankedPlan, diagnose,
 };
 use crate::seam::rules::COUNTED_RUN_SIZES;
-use crate::{Cancelled, Ctx, PatchId, Warning};
+use crate::{Cancelled, Cause, Ctx, PatchId, Warning};
 
 /// Draws that run side by side before anybody looks at the results.
 const BATCH: usize = 32;
@@ -139,10 +139,7 @@ fn with_any_tolerance(
 
 fn warn_of_short_joints(ctx: &Ctx<'_>, shortest_mm: f64) {
     ctx.warn(Warning {
-        code: "short-joints".into(),
-        message: format!(
-            "no plan locks with long joints alone, so joints from {shortest_mm:.1} mm on count too; they hold less firmly"
-        ),
+        cause: Cause::ShortJoints { from_mm: shortest_mm },
         pieces: Vec::new(),
         at: None,
     });
@@ -166,11 +163,7 @@ fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
 
 fn warn_of_tolerance(ctx: &Ctx<'_>, tolerance: f64) {
     ctx.warn(Warning {
-        code: "occlusion-tolerance-raised".into(),
-        message: format!(
-            "no plan leaves all paths free; pieces may now overlap by {} % on their way, which carving must absorb",
-            tolerance * 100.0
-        ),
+        cause: Cause::OcclusionToleranceRaised { share: tolerance },
         pieces: Vec::new(),
         at: None,
     });

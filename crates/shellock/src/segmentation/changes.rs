@@ -3,7 +3,7 @@
 use shellock_geom::Solid;
 
 use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, user_labels};
-use crate::{Ctx, PatchId, SegmentedSurface, Warning};
+use crate::{Cause, Ctx, PatchId, SegmentedSurface, Warning};
 
 /// A label lies in a piece, or a piece in a label, with more than this share of its area; smoothing moves
 /// less.
@@ -83,14 +83,8 @@ pub fn tell(
     let graph = surface.contact_graph_below(params.wall_mm, limit_mm);
     if graph.n_faults() > 0 {
         let pieces = graph.articulation_pieces();
-        let message = format!(
-            "{} alone hold{} others, which may come loose: give other labels, smaller connectors or a larger size",
-            pieces_in_words(&pieces),
-            if pieces.len() == 1 { "s" } else { "" }
-        );
         ctx.warn(Warning {
-            code: "weak-graph".into(),
-            message,
+            cause: Cause::WeakGraph,
             pieces,
             at: None,
         });
@@ -114,25 +108,17 @@ fn tell_divided(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &Segmented
         .filter(|&l| changes.pieces_of[l].len() > 1)
         .collect();
     let Some(&first) = divided.first() else { return };
-    let line = |&l: &usize| {
-        format!(
-            "label {} into {}",
-            names[l],
-            pieces_in_words(&changes.pieces_of[l])
-        )
-    };
-    let message = format!(
-        "divided: {}. A piece that alone holds others lets them slide off together, and one that runs around a limb or has holes cannot be put on",
-        divided.iter().map(line).collect::<Vec<_>>().join(", ")
-    );
+    let into = divided
+        .iter()
+        .map(|&l| (names[l], changes.pieces_of[l].clone()))
+        .collect();
     let pieces: Vec<PatchId> = divided
         .iter()
         .flat_map(|&l| changes.pieces_of[l].clone())
         .collect();
     let at = middle(surface, changes.pieces_of[first][0]);
     ctx.warn(Warning {
-        code: "piece-split".into(),
-        message,
+        cause: Cause::LabelsDivided { into },
         pieces,
         at,
     });
@@ -146,14 +132,10 @@ fn tell_joined(ctx: &Ctx, changes: &Changes, names: &[i64], surface: &SegmentedS
         .filter(|(_, labels)| labels.len() > 1)
     {
         let piece = PatchId::from(piece);
-        let labels: Vec<String> = labels.iter().map(|&l| names[l].to_string()).collect();
-        let message = format!(
-            "labels {} are one piece, {piece}: the seams between them or around them are too short to hold two pieces",
-            labels.join(", ")
-        );
         ctx.warn(Warning {
-            code: "piece-joined".into(),
-            message,
+            cause: Cause::LabelsJoined {
+                labels: labels.iter().map(|&l| names[l]).collect(),
+            },
             pieces: vec![piece],
             at: middle(surface, piece),
         });
@@ -171,26 +153,14 @@ fn tell_short(ctx: &Ctx, params: &SegmentationParams, surface: &SegmentedSurface
     let mut pieces: Vec<PatchId> = short.iter().flat_map(|c| [c.a, c.b]).collect();
     pieces.sort_unstable();
     pieces.dedup();
-    let message = format!(
-        "{} have seams of {limit_mm:.0} to {:.0} mm that must hold, so their joints are short; a larger size or smaller connectors make them firmer",
-        pieces_in_words(&pieces),
-        params.min_contact_mm
-    );
     ctx.warn(Warning {
-        code: "short-contacts".into(),
-        message,
+        cause: Cause::ShortContacts {
+            from_mm: limit_mm,
+            to_mm: params.min_contact_mm,
+        },
         pieces,
         at: None,
     });
-}
-
-fn pieces_in_words(pieces: &[PatchId]) -> String {
-    let all: Vec<String> = pieces.iter().map(ToString::to_string).collect();
-    format!(
-        "piece{} {}",
-        if all.len() == 1 { "" } else { "s" },
-        all.join(", ")
-    )
 }
 
 /// The middle of a triangle of `piece`, mm.

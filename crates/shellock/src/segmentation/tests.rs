@@ -119,7 +119,11 @@ fn arms_that_hang_on_one_body_are_held_twice_after_mending() {
     let (surface, warnings) = with_warnings(|ctx| segment(ctx, &params, &solid, Some(&labels)).unwrap());
     assert!(surface.n_patches > 5);
     assert!(surface.contact_graph(params.min_contact_mm).is_two_connected());
-    assert!(warnings.iter().any(|w| w.code == "piece-split" && w.at.is_some()));
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.code() == "piece-split" && w.at.is_some())
+    );
     assert_patches_are_connected(&surface);
 }
 
@@ -144,7 +148,7 @@ fn arms_too_thin_for_two_contacts_join_their_neighbour_and_the_user_is_told_wher
     assert!(
         warnings
             .iter()
-            .any(|w| w.code == "piece-joined" && w.at.is_some())
+            .any(|w| w.code() == "piece-joined" && w.at.is_some())
     );
     assert_patches_are_connected(&surface);
 }
@@ -154,7 +158,7 @@ fn shorter_contacts_count_before_labels_are_joined_and_the_user_is_told() {
     let (params, surface, warnings) = segment_thin_arms(15.0);
     assert!(surface.n_patches > 5);
     assert!(surface.contact_graph(params.least_contact_mm).is_two_connected());
-    let codes: Vec<&str> = warnings.iter().map(|w| w.code.as_str()).collect();
+    let codes: Vec<&str> = warnings.iter().map(|w| w.code()).collect();
     assert_eq!(codes, ["piece-split", "short-contacts"]);
 }
 
@@ -290,10 +294,10 @@ fn islands_join_what_surrounds_them_and_far_parts_become_pieces() {
     let (patches, warnings) =
         with_warnings(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, &labels).unwrap());
     assert_eq!(patches.n_patches(), 5);
-    let codes: Vec<&str> = warnings.iter().map(|w| w.code.as_str()).collect();
+    let codes: Vec<&str> = warnings.iter().map(|w| w.code()).collect();
     assert_eq!(codes, ["label-split", "label-island"]);
     assert!(
-        warnings[1].message.starts_with("2 islands") && warnings[1].at.is_some(),
+        warnings[1].to_string().starts_with("2 islands") && warnings[1].at.is_some(),
         "{warnings:?}"
     );
 }

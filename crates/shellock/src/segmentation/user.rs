@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use shellock_geom::{Solid, Topology, TriMesh};
 
 use super::{FaceLabels, SegmentationError, SegmentationParams};
-use crate::{Ctx, PatchId, Warning};
+use crate::{Cause, Ctx, PatchId, Warning};
 
 /// Fewest triangles of a patch on average, and of each patch.
 const MIN_FACES: usize = 3;
@@ -120,24 +120,26 @@ impl<'a> Parts<'a> {
                     }
                     self.merge(part);
                 } else {
-                    let message = format!(
-                        "label {name} has parts that do not touch: {area:.0} mm² become a piece of their own"
+                    let area_mm2 = area;
+                    self.warn(
+                        ctx,
+                        part,
+                        Cause::LabelSplit {
+                            label: name,
+                            area_mm2,
+                        },
                     );
-                    self.warn(ctx, "label-split", part, message);
                 }
             }
         }
         if let Some((area, name, at)) = largest {
-            let message = match n_islands {
-                1 => format!("{area:.1} mm² of label {name} lie apart and join the patch around them"),
-                n => format!(
-                    "{n} islands of labels, {islands_mm2:.1} mm² in all, lie apart and join the patches around them; \
-                     the largest has {area:.1} mm² of label {name}"
-                ),
-            };
             ctx.warn(Warning {
-                code: "label-island".into(),
-                message,
+                cause: Cause::LabelIslands {
+                    n: n_islands,
+                    area_mm2: islands_mm2,
+                    largest_mm2: area,
+                    largest_label: name,
+                },
                 pieces: Vec::new(),
                 at,
             });
@@ -155,11 +157,13 @@ impl<'a> Parts<'a> {
             .min_by(|&p, &q| self.area[p].total_cmp(&self.area[q]))
         {
             let name = names[self.label[part] as usize];
-            let message = format!(
-                "label {name} has only {:.1} mm² in {} triangles and joins its neighbour; pieces need {} mm²",
-                self.area[part], self.n_faces[part], params.min_piece_mm2
-            );
-            self.warn(ctx, "label-merged", part, message);
+            let cause = Cause::LabelMerged {
+                label: name,
+                area_mm2: self.area[part],
+                n_triangles: self.n_faces[part],
+                least_mm2: params.min_piece_mm2,
+            };
+            self.warn(ctx, part, cause);
             if !self.merge(part) {
                 break;
             }
@@ -192,11 +196,10 @@ impl<'a> Parts<'a> {
         true
     }
 
-    fn warn(&self, ctx: &Ctx, code: &str, part: usize, message: String) {
+    fn warn(&self, ctx: &Ctx, part: usize, cause: Cause) {
         let at = self.place_of(part);
         ctx.warn(Warning {
-            code: code.into(),
-            message,
+            cause,
             pieces: Vec::<PatchId>::new(),
             at,
         });

@@ -112,13 +112,13 @@ fn in_a_narrow_limb_the_channel_stays_off_the_wall_opposite() {
     assert!(depth_mm(size_mm, 0.1) + 0.1 <= 7.4 - 4.0 + 1e-9);
     assert_eq!(warnings.len(), 1);
     assert_eq!(
-        (warnings[0].code.as_str(), warnings[0].pieces.as_slice()),
+        (warnings[0].code(), warnings[0].pieces.as_slice()),
         ("connector-limited", [A, B].as_slice())
     );
     assert!(
-        warnings[0].message.contains("3.0 mm") && warnings[0].message.contains("4.0 mm"),
+        warnings[0].to_string().contains("3.0 mm") && warnings[0].to_string().contains("4.0 mm"),
         "{}",
-        warnings[0].message
+        warnings[0].to_string()
     );
     assert!(Vec3::from_array(warnings[0].at.unwrap()).z.abs() < 1.0);
     // Where nothing fits the least size is left.
@@ -148,9 +148,9 @@ fn a_short_seam_gets_the_largest_size_with_which_it_is_a_contact() {
         (12, 1, 8)
     );
     assert!(
-        warnings[0].message.contains("11 other pairs"),
+        warnings[0].to_string().contains("11 other pairs"),
         "{}",
-        warnings[0].message
+        warnings[0].to_string()
     );
     let (least, _) = chosen(&octants(6.0), &params, Some(&|_| 42.0));
     assert!(

@@ -88,7 +88,7 @@ fn what_no_wall_bears_is_told_and_gets_no_wall_that_does_not_help() {
         .fold(f64::INFINITY, f64::min);
     assert!(strength.is_too_weak && strength.stress_mpa <= WORTH_MORE_WALL * least * 1.01);
     assert!(strength.thickness_mm >= USUAL_MM);
-    assert_eq!(strength.warnings(&params)[0].code, "wall-too-weak");
+    assert_eq!(strength.warnings(&params)[0].code(), "wall-too-weak");
 }
 
 #[test]
