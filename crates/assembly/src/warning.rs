@@ -199,6 +199,7 @@ impl Warning {
     }
 
     /// The code and the sentence of each cause, in one table.
+    #[expect(clippy::too_many_lines, reason = "a table, one row for each cause")]
     fn told(&self) -> (&'static str, String) {
         let (first, second) = (self.id(0), self.id(1));
         match &self.cause {

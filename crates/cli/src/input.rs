@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 use shellock_formats::{LabelSource, Loaded, read_labels, read_mesh};
-use shellock_geom::repair::{Mended, Mending, Repair, mend};
+use shellock_geom::repair::{Repair, RepairMode, Repaired, repair};
 use shellock_geom::{Aabb, Solid, Vec3};
 
 use crate::Session;
@@ -83,17 +83,17 @@ pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
 }
 
 /// What may be done to a surface that is no body.
-pub fn mending(no_repair: bool, largest: bool) -> Mending {
+pub fn repair_mode(no_repair: bool, largest: bool) -> RepairMode {
     match (no_repair, largest) {
-        (true, _) => Mending::Refuse,
-        (false, true) => Mending::KeepLargest,
-        (false, false) => Mending::Repair,
+        (true, _) => RepairMode::Refuse,
+        (false, true) => RepairMode::KeepLargest,
+        (false, false) => RepairMode::Repair,
     }
 }
 
 /// The body in what was read from `path`.
-pub fn mended(path: &Path, loaded: &Loaded, mending: Mending) -> Result<Mended, Failure> {
-    mend(&loaded.mesh, mending).map_err(|source| Failure::NotOneBody {
+pub fn repaired(path: &Path, loaded: &Loaded, mode: RepairMode) -> Result<Repaired, Failure> {
+    repair(&loaded.mesh, mode).map_err(|source| Failure::NotOneBody {
         path: path.to_owned(),
         source,
     })
@@ -109,11 +109,11 @@ pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model,
 
 /// The model in what was read from `path`.
 pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -> Result<Model, Failure> {
-    let Mended {
+    let Repaired {
         solid,
         source_face,
         repairs,
-    } = mended(path, loaded, mending(options.no_repair, options.largest))?;
+    } = repaired(path, loaded, repair_mode(options.no_repair, options.largest))?;
     let file_face: Vec<u32> = source_face
         .iter()
         .map(|&k| loaded.file_face[k as usize])

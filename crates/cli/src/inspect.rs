@@ -6,7 +6,7 @@ use serde_json::json;
 use shellock::strength::StrengthParams;
 use shellock_formats::Loaded;
 use shellock_geom::check::inspect as inspection;
-use shellock_geom::repair::mend;
+use shellock_geom::repair::repair;
 use shellock_geom::thin::{ThinPlace, thin_places};
 use shellock_geom::weld::weld;
 use shellock_kit::plan_file::RepairEntry;
@@ -14,7 +14,7 @@ use shellock_kit::plan_file::RepairEntry;
 use crate::Session;
 use crate::args::{Options, Thickness};
 use crate::failure::Failure;
-use crate::input::{Model, load, mending, model_of};
+use crate::input::{Model, load, model_of, repair_mode};
 
 /// Thin places that are told one by one.
 const N_TOLD: usize = 3;
@@ -57,7 +57,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
         (model, thin)
     });
     if session.is_json {
-        let is_sound = mend(&loaded.mesh, mending(true, false)).is_ok();
+        let is_sound = repair(&loaded.mesh, repair_mode(true, false)).is_ok();
         let (repairs, notes): (Vec<RepairEntry>, &[String]) = model.as_ref().map_or_else(
             |_| (Vec::new(), &[][..]),
             |m| (m.repairs.iter().map(RepairEntry::of).collect(), &m.notes),

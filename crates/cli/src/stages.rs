@@ -265,7 +265,12 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
         )));
     }
     let (loaded, _) = load(&model_path)?;
-    let solid = input::mended(&model_path, &loaded, input::mending(false, input.largest_only))?.solid;
+    let solid = input::repaired(
+        &model_path,
+        &loaded,
+        input::repair_mode(false, input.largest_only),
+    )?
+    .solid;
     let t = input.transform;
     let mut mesh = solid.into_mesh();
     for p in &mut mesh.points {

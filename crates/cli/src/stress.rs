@@ -7,7 +7,7 @@ use shellock::design::{Params, Settings, Thickness};
 use shellock::metric::MetricParams;
 use shellock::sizes::SizeChoice;
 use shellock::stress_test::{
-    Outcome, Pair, PunchAt, StressParams, StressReport, Verdict, chart, stress_test,
+    Outcome, Pair, PunchAt, StressParams, StressReport, StressVerdict, chart, stress_test,
 };
 use shellock::{Ctx, LatticeDirection, PatchId, SegmentedSurface};
 use shellock_geom::Vec3;
@@ -231,12 +231,12 @@ fn print_table(params: &StressParams, tested: &StressReport) {
     }
 }
 
-fn words(verdict: Verdict) -> &'static str {
+fn words(verdict: StressVerdict) -> &'static str {
     match verdict {
-        Verdict::Holds => "holds",
-        Verdict::Opens => "OPENS",
-        Verdict::Yields => "YIELDS",
-        Verdict::ComesApart => "COMES APART",
+        StressVerdict::Holds => "holds",
+        StressVerdict::Opens => "OPENS",
+        StressVerdict::Yields => "YIELDS",
+        StressVerdict::ComesApart => "COMES APART",
     }
 }
 

@@ -40,8 +40,8 @@ fn verdict(path: &Path) -> String {
         loaded.format,
         loaded.mesh.triangles.len()
     );
-    match repair::mend(&loaded.mesh, repair::Mending::Repair) {
-        Ok(repair::Mended { solid, repairs, .. }) => {
+    match repair::repair(&loaded.mesh, repair::RepairMode::Repair) {
+        Ok(repair::Repaired { solid, repairs, .. }) => {
             let size = solid.mesh().bounds().size();
             let [x, y, z] = size.to_array();
             let mut text = format!(

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shellock_formats::{read_labels, read_mesh};
-use shellock_geom::repair::{Mending, mend};
+use shellock_geom::repair::{RepairMode, repair};
 
 /// Larger meshes take longer and find nothing more.
 const MOST_TRIANGLES: usize = 3000;
@@ -46,10 +46,13 @@ fn main() {
             if loaded.mesh.triangles.len() > MOST_TRIANGLES {
                 return (1, 0);
             }
-            (1, u32::from(mend(&loaded.mesh, Mending::KeepLargest).is_ok()))
+            (
+                1,
+                u32::from(repair(&loaded.mesh, RepairMode::KeepLargest).is_ok()),
+            )
         });
         match outcome {
-            Ok((read, mended)) => (n_read, n_mended) = (n_read + read, n_mended + mended),
+            Ok((read, repaired)) => (n_read, n_mended) = (n_read + read, n_mended + repaired),
             Err(_) => keep(&format!("round {round} panicked: {path}"), round, &bytes),
         }
         if start.elapsed() > SLOW {
@@ -63,7 +66,7 @@ fn main() {
             );
         }
     }
-    println!("{n_rounds} rounds: {n_read} read, {n_mended} of them mended to a body");
+    println!("{n_rounds} rounds: {n_read} read, {n_mended} of them repaired to a body");
 }
 
 /// Tells of a file and writes it, to be looked at.

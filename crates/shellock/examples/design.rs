@@ -4,7 +4,7 @@ use std::{env, error, fs};
 
 use shellock::{Ctx, DesignOutcome, Params, design};
 use shellock_formats::{read_mesh, write_stl_binary};
-use shellock_geom::repair::{Mending, mend};
+use shellock_geom::repair::{RepairMode, repair};
 
 fn main() -> Result<(), Box<dyn error::Error>> {
     let mut args = env::args().skip(1);
@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
         .next()
         .ok_or("name a model: an STL, OBJ, PLY, OFF, 3MF or glTF, in mm")?;
     let folder = args.next().unwrap_or_else(|| ".".into());
-    let solid = mend(&read_mesh(&fs::read(file)?, None)?.mesh, Mending::Repair)?.solid;
+    let solid = repair(&read_mesh(&fs::read(file)?, None)?.mesh, RepairMode::Repair)?.solid;
     match design(&Ctx::quiet(), &Params::default(), &solid, None)? {
         DesignOutcome::Made(made) => {
             for (piece, mesh) in made.kit.pieces.iter() {

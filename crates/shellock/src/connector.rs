@@ -27,9 +27,9 @@ mod rail;
 mod run;
 
 pub use frame::{Curve, curves};
-pub use free::has_no_bar;
+pub use free::is_unobstructed;
 pub use profile::{Part, Section};
-pub use run::{Contact, RailPart, Run, Shape, Station, runs};
+pub use run::{RailPart, Run, RunShape, RunStation, SeamRoom, runs};
 
 use crate::params::ParamProblem;
 use crate::sizes::SizeChoice;

@@ -12,7 +12,7 @@ mod model;
 #[cfg(test)]
 mod tests;
 
-pub use choice::{ChoiceError, Holding, LoosePart, SeamHolding, choose};
+pub use choice::{ChoiceError, Holding, LoosePiece, SeamHolding, choose};
 pub use data_driven::{data_driven, pieces_alone};
 pub use foreseen::{Foreseen, foreseen};
 pub use model::{MetricParams, PlanModel};

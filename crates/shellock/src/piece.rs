@@ -13,7 +13,7 @@ mod relief;
 mod ribs;
 
 pub use crate::{PressFit, PressFitKind};
-pub use finish::{FinishParams, Finished, Joint, PieceError, make};
+pub use finish::{FinishParams, Finished, FinishedJoint, PieceError, make};
 pub use key_parts::Grip;
 pub use label::LabelParams;
 pub use relief::Relief;

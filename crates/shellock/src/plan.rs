@@ -11,11 +11,11 @@
 #[cfg(test)]
 mod bound_tests;
 pub mod cluster;
-pub mod contact;
 mod diagnose;
 mod draw;
 mod exact;
 mod improve;
+pub mod interface;
 pub mod key;
 pub mod local_cost;
 pub mod local_tests;

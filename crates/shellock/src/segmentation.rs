@@ -1,15 +1,15 @@
 //! From a closed surface to patches: where the shell is cut (Sect. 4).
 //!
-//! Labels come from the user or from clustering; they are mended until every patch is a disk and no single
+//! Labels come from the user or from clustering; they are refined until every patch is a disk and no single
 //! piece holds others alone; then the seams are smoothed and the triangles cut along them. Deviation from the
-//! paper, which takes the labels as given: without mending most labelled models have no plan that locks (see
+//! paper, which takes the labels as given: without refining most labelled models have no plan that locks (see
 //! [`crate::seam::graph`]).
 
 mod auto;
 mod changes;
 mod cut;
 mod dual_graph;
-mod mend;
+mod refine;
 mod smooth;
 mod split;
 mod user;
@@ -21,7 +21,7 @@ use shellock_geom::{Solid, Topology};
 
 pub use auto::auto_labels;
 pub use changes::tell;
-pub use mend::mend;
+pub use refine::refine;
 pub use smooth::smooth_and_cut;
 pub use split::split_piece;
 pub use user::user_labels;
@@ -37,7 +37,7 @@ pub const MOST_PIECES: usize = 128;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationParams {
-    /// Patches that automatic segmentation begins with; mending adds some. [2, [`MOST_PIECES`]]; `None`: from
+    /// Patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]]; `None`: from
     /// the area, 10 for a 150 mm figure.
     pub n_pieces: Option<usize>,
     /// Seed of all random choices; 0.
@@ -59,7 +59,7 @@ pub struct SegmentationParams {
     pub min_piece_mm2: f64,
     /// Edges longer than this are halved before patches are drawn. [0.5, 100]; 5: a tenth of a patch's width.
     pub max_edge_mm: f64,
-    /// Most pieces that mending may add. [0, 500]; 40.
+    /// Most pieces that refining may add. [0, 500]; 40.
     pub max_splits: usize,
 }
 
@@ -231,7 +231,7 @@ impl FaceLabels {
     }
 }
 
-/// How often mending is repeated with a stricter limit when smoothing shortened a contact below the limit.
+/// How often refining is repeated with a stricter limit when smoothing shortened a contact below the limit.
 const MAX_MEND_ROUNDS: usize = 4;
 /// How much stricter each repetition is.
 const STRICTER: f64 = 1.15;
@@ -243,13 +243,13 @@ const MAX_AUTOMATIC_TRIES: u64 = 4;
 const N_CONTACT_LIMITS: usize = 3;
 
 /// What is paid for a fault of the graph, for a label that lost its piece to another, and for each step to
-/// shorter contacts, in pieces that mending may add instead. A kit with a fault does not lock; the other two
+/// shorter contacts, in pieces that refining may add instead. A kit with a fault does not lock; the other two
 /// are a matter of taste.
 const FAULT_COST: f64 = 100.0;
 const LOST_LABEL_COST: f64 = 8.0;
 const SHORTER_COST: f64 = 2.0;
 
-/// The whole stage: labels (the user's, or automatic ones), mended, smoothed and cut; `source_face` names
+/// The whole stage: labels (the user's, or automatic ones), refined, smoothed and cut; `source_face` names
 /// triangles of `solid`.
 ///
 /// Warns as [`tell`] does.
@@ -387,7 +387,7 @@ fn held_twice(
     let mut strict = params.clone();
     let mut best: Option<(usize, SegmentedSurface)> = None;
     for _ in 0..MAX_MEND_ROUNDS {
-        labels = mend(ctx, &strict, solid, &labels)?;
+        labels = refine(ctx, &strict, solid, &labels)?;
         let surface = smooth_and_cut(ctx, params, solid, &labels)?;
         let faults = surface
             .contact_graph_below(params.wall_mm, params.min_contact_mm)
@@ -403,7 +403,7 @@ fn held_twice(
     Ok(best.expect("there is at least one round"))
 }
 
-/// The same surface with `patch` divided in two, mended and smoothed again; `None` where it cannot be
+/// The same surface with `patch` divided in two, refined and smoothed again; `None` where it cannot be
 /// divided.
 ///
 /// The feedback loop asks for this where no plan takes the piece out or holds it. Patches may be renumbered.
@@ -419,9 +419,9 @@ pub fn divide(
     })
 }
 
-/// The same surface mended and smoothed again, as its patches are; `None` where a patch would vanish. Patches
+/// The same surface refined and smoothed again, as its patches are; `None` where a patch would vanish. Patches
 /// may be renumbered.
-pub fn mended_again(
+pub fn refined_again(
     ctx: &Ctx,
     params: &SegmentationParams,
     surface: &SegmentedSurface,
@@ -429,7 +429,7 @@ pub fn mended_again(
     changed(ctx, params, surface, |_, labels| Some(labels.clone()))
 }
 
-/// The same surface with each of `patches` joined to the neighbour it has the longest seam with, mended and
+/// The same surface with each of `patches` joined to the neighbour it has the longest seam with, refined and
 /// smoothed again; `None` where there would be one piece left, or nothing is joined.
 ///
 /// The feedback loop asks for this where dividing did not help. Patches may be renumbered.
@@ -480,8 +480,8 @@ fn changed(
     let Some(changed) = change(&solid, &labels) else {
         return Ok(None);
     };
-    let mended = mend(ctx, &limited, &solid, &changed)?;
-    let mut next = match smooth_and_cut(ctx, params, &solid, &mended) {
+    let refined = refine(ctx, &limited, &solid, &changed)?;
+    let mut next = match smooth_and_cut(ctx, params, &solid, &refined) {
         // Other pieces may do.
         Err(SegmentationError::PatchVanished { .. }) => return Ok(None),
         made => made?,

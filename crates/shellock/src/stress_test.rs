@@ -135,7 +135,7 @@ impl StressParams {
 /// How a test ends, from best to worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum StressVerdict {
     /// Seams stay closed, and the material bears it.
     Holds,
     /// A seam opens by [0.3, 0.6) connector sizes.
@@ -150,7 +150,7 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// How it ends.
-    pub verdict: Verdict,
+    pub verdict: StressVerdict,
     /// Force on the model, N.
     pub force_n: f64,
     /// The widest opening, mm; infinite (`null`) where nothing stops some piece.
@@ -214,7 +214,7 @@ impl StressReport {
     pub fn passed(&self) -> bool {
         [&self.kit.punch, &self.kit.drop]
             .iter()
-            .all(|o| o.verdict == Verdict::Holds)
+            .all(|o| o.verdict == StressVerdict::Holds)
     }
 }
 
@@ -427,13 +427,13 @@ impl<'a> Bench<'a> {
         let opening_mm = widest.map_or(0.0, |i| loaded.opening_mm[i]);
         let strength_share = loaded.walls.robust_mpa.max(loaded.connectors.robust_mpa) / strength_mpa;
         let verdict = if !loaded.lost.is_empty() || opening_mm.is_infinite() {
-            Verdict::ComesApart
+            StressVerdict::ComesApart
         } else if strength_share > 1.0 {
-            Verdict::Yields
+            StressVerdict::Yields
         } else if is_open(&loaded.opening_mm, meetings) {
-            Verdict::Opens
+            StressVerdict::Opens
         } else {
-            Verdict::Holds
+            StressVerdict::Holds
         };
         Outcome {
             verdict,

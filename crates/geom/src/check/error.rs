@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Body;
+use super::ClosedPart;
 use crate::{NotSolid, Vec3};
 
 /// Why a mesh is not one solid body: what, how many, where (file units), and what to do.
@@ -74,7 +74,7 @@ pub enum InputError {
     },
     /// More than one closed surface; the largest first.
     #[error("{}", Several(.0))]
-    Bodies(Vec<Body>),
+    Bodies(Vec<ClosedPart>),
     /// More open edges than triangles: a soup, or cracks everywhere.
     #[error(
         "the triangles do not hang together: {} on {}, first near {}; \
@@ -152,7 +152,7 @@ pub enum InputError {
 /// How many bodies a message lists.
 const N_LISTED: usize = 3;
 
-struct Several<'a>(&'a [Body]);
+struct Several<'a>(&'a [ClosedPart]);
 
 impl fmt::Display for Several<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -27,7 +27,7 @@ pub struct Inspection {
     /// Points where several fans of triangles touch.
     pub pinched: Spots,
     /// Groups of triangles connected over edges, the one of the largest box first.
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<ClosedPart>,
 }
 
 /// Edges that are no plain seam between two triangles.
@@ -72,7 +72,7 @@ impl Spots {
 
 /// Triangles connected over edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Body {
+pub struct ClosedPart {
     /// How many triangles.
     pub n_faces: usize,
     /// The box around them, file units.
@@ -402,11 +402,11 @@ fn pinched(mesh: &TriMesh, corners: &mut Groups) -> Spots {
     spots
 }
 
-fn bodies(mesh: &TriMesh, faces: &mut Groups) -> Vec<Body> {
+fn bodies(mesh: &TriMesh, faces: &mut Groups) -> Vec<ClosedPart> {
     /// A group that has no body yet.
     const NEW: u32 = u32::MAX;
     let mut body_of = vec![NEW; mesh.triangles.len()];
-    let mut bodies: Vec<Body> = Vec::new();
+    let mut bodies: Vec<ClosedPart> = Vec::new();
     // A local origin keeps the volume exact far away from 0.
     let mut origins = Vec::new();
     for face in 0..mesh.triangles.len() {
@@ -414,7 +414,7 @@ fn bodies(mesh: &TriMesh, faces: &mut Groups) -> Vec<Body> {
         let corners = mesh.corners(face);
         if body_of[root] == NEW {
             body_of[root] = bodies.len() as u32;
-            bodies.push(Body {
+            bodies.push(ClosedPart {
                 n_faces: 0,
                 bounds: Aabb::EMPTY,
                 signed_volume: 0.0,

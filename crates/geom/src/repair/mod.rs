@@ -1,6 +1,6 @@
-//! Mending of surfaces without guessing: from a mesh as read to one solid body, with a word on every change.
+//! Repair of surfaces without guessing: from a mesh as read to one solid body, with a word on every change.
 //!
-//! Mended is what has one right answer: points and triangles that stand there twice, triangles turned the
+//! Repaired is what has one right answer: points and triangles that stand there twice, triangles turned the
 //! wrong way, cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or
 //! smaller than a hundredth of the size, points where the surface pinches itself, specks, closed surfaces
 //! within others, parts that overlap, a surface that crosses itself. What would need a decision about the
@@ -38,7 +38,7 @@ const SPECK_SHARE: f64 = 0.01;
 
 /// What may be done to a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mending {
+pub enum RepairMode {
     /// Nothing: what needs repair is refused.
     Refuse,
     /// What has one right answer.
@@ -49,7 +49,7 @@ pub enum Mending {
 
 /// A body that can be made, and what was done to it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mended {
+pub struct Repaired {
     /// The body.
     pub solid: Solid,
     /// For each triangle the one of the mesh as read that it is or lies nearest to.
@@ -68,22 +68,22 @@ struct Draft {
 
 /// Makes one body of a mesh as read.
 ///
-/// Refuses what cannot be mended without guessing, by its state after what could be. O(n log n) but for
+/// Refuses what cannot be repaired without guessing, by its state after what could be. O(n log n) but for
 /// overlaps, whose cost follows the pairs of triangles that cross.
-pub fn mend(mesh: &TriMesh, mending: Mending) -> Result<Mended, InputError> {
+pub fn repair(mesh: &TriMesh, mode: RepairMode) -> Result<Repaired, InputError> {
     check_points(mesh)?;
     let as_read = into_solid(mesh);
     let n_faces = mesh.triangles.len();
     if let Ok((solid, source_face)) = as_read {
         let crossings = crossings(solid.mesh());
         if crossings.count == 0 {
-            return Ok(Mended {
+            return Ok(Repaired {
                 solid,
                 source_face,
                 repairs: Vec::new(),
             });
         }
-        if mending == Mending::Refuse {
+        if mode == RepairMode::Refuse {
             return Err(InputError::Crossing {
                 count: crossings.count,
                 at: crossings.first,
@@ -93,9 +93,9 @@ pub fn mend(mesh: &TriMesh, mending: Mending) -> Result<Mended, InputError> {
             mesh: solid.into_mesh(),
             source: source_face,
         };
-        return finish(draft, Vec::new(), mending);
+        return finish(draft, Vec::new(), mode);
     }
-    if mending == Mending::Refuse {
+    if mode == RepairMode::Refuse {
         as_read?;
     }
     let welded = close(mesh);
@@ -118,14 +118,14 @@ pub fn mend(mesh: &TriMesh, mending: Mending) -> Result<Mended, InputError> {
     ] {
         repairs.extend(stage(&mut draft));
     }
-    let mended = check_edges(&draft).and_then(|()| finish(draft, repairs, mending));
+    let repaired = check_edges(&draft).and_then(|()| finish(draft, repairs, mode));
     // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
-    match mended {
+    match repaired {
         Err(_) if 100 * n_collapsed > n_faces => Err(InputError::Collapsed {
             count: n_collapsed,
             n_faces,
         }),
-        mended => mended,
+        repaired => repaired,
     }
 }
 
@@ -147,19 +147,19 @@ fn check_edges(draft: &Draft) -> Result<(), InputError> {
 }
 
 /// From a closed surface to one body.
-fn finish(mut draft: Draft, mut repairs: Vec<Repair>, mending: Mending) -> Result<Mended, InputError> {
+fn finish(mut draft: Draft, mut repairs: Vec<Repair>, mode: RepairMode) -> Result<Repaired, InputError> {
     repairs.extend(shells::drop_specks(&mut draft));
     repairs.extend(shells::turn_outwards(&mut draft));
     repairs.extend(crossing::resolve(&mut draft)?);
     repairs.extend(fans::part(&mut draft));
     repairs.extend(shells::drop_specks(&mut draft));
     repairs.extend(shells::fill_cavities(&mut draft));
-    if mending == Mending::KeepLargest {
+    if mode == RepairMode::KeepLargest {
         repairs.extend(shells::keep_largest(&mut draft));
     }
     let (solid, kept) = into_solid(&draft.mesh)?;
     let source_face = kept.iter().map(|&face| draft.source[face as usize]).collect();
-    Ok(Mended {
+    Ok(Repaired {
         solid,
         source_face,
         repairs,

@@ -1,4 +1,4 @@
-//! What was mended, in words.
+//! What was repaired, in words.
 
 use std::fmt;
 

@@ -35,36 +35,40 @@ fn cube(at: Vec3, size: f64) -> TriMesh {
     .to_mesh()
 }
 
-fn repaired(mesh: &TriMesh) -> Mended {
-    mend(mesh, Mending::Repair).unwrap_or_else(|e| panic!("{e}"))
+fn mended(mesh: &TriMesh) -> Repaired {
+    repair(mesh, RepairMode::Repair).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Mends, and asserts what was done how often, that the volume is right, and that nothing is done without
 /// leave.
-fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Mended {
-    let mended = repaired(mesh);
-    let done: Vec<(&str, usize)> = mended.repairs.iter().map(|r| (r.kind.code(), r.count)).collect();
-    assert_eq!(done, codes, "{:?}", mended.repairs);
+fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Repaired {
+    let repaired = mended(mesh);
+    let done: Vec<(&str, usize)> = repaired
+        .repairs
+        .iter()
+        .map(|r| (r.kind.code(), r.count))
+        .collect();
+    assert_eq!(done, codes, "{:?}", repaired.repairs);
     assert!(
-        (mended.solid.volume() - volume).abs() < 1e-6 * volume,
+        (repaired.solid.volume() - volume).abs() < 1e-6 * volume,
         "{} is not {volume}",
-        mended.solid.volume()
+        repaired.solid.volume()
     );
-    assert_eq!(mended.source_face.len(), mended.solid.mesh().triangles.len());
+    assert_eq!(repaired.source_face.len(), repaired.solid.mesh().triangles.len());
     assert!(
-        mended
+        repaired
             .source_face
             .iter()
             .all(|&f| (f as usize) < mesh.triangles.len())
     );
-    assert!(mend(mesh, Mending::Refuse).is_err());
-    // What was mended needs no mending.
-    let again = repaired(mended.solid.mesh());
+    assert!(repair(mesh, RepairMode::Refuse).is_err());
+    // What was repaired needs no mending.
+    let again = mended(repaired.solid.mesh());
     assert_eq!(
         (again.repairs.len(), again.solid.mesh()),
-        (0, mended.solid.mesh())
+        (0, repaired.solid.mesh())
     );
-    mended
+    repaired
 }
 
 fn base() -> TriMesh {
@@ -75,10 +79,10 @@ fn base() -> TriMesh {
 fn a_sound_mesh_comes_out_bit_by_bit_with_leave_or_without() {
     for mesh in [base(), unwelded(&base())] {
         let (solid, kept) = into_solid(&mesh).unwrap();
-        for mending in [Mending::Refuse, Mending::Repair, Mending::KeepLargest] {
-            let mended = mend(&mesh, mending).unwrap();
-            assert_eq!((&mended.solid, &mended.source_face), (&solid, &kept));
-            assert_eq!(mended.repairs, []);
+        for mending in [RepairMode::Refuse, RepairMode::Repair, RepairMode::KeepLargest] {
+            let repaired = repair(&mesh, mending).unwrap();
+            assert_eq!((&repaired.solid, &repaired.source_face), (&solid, &kept));
+            assert_eq!(repaired.repairs, []);
         }
     }
 }
@@ -98,17 +102,17 @@ fn cracks_are_closed_and_gaps_are_not() {
         .iter_mut()
         .enumerate()
         .for_each(|(i, p)| *p += move_by(i, 1e-6));
-    let mended = repaired(&cracked);
-    assert_eq!(mended.repairs[0].kind.code(), "points-merged");
-    assert!((mended.solid.volume() / base().signed_volume() - 1.0).abs() < 1e-5);
-    assert_eq!(mended.solid.mesh().points.len(), base().points.len());
+    let repaired = mended(&cracked);
+    assert_eq!(repaired.repairs[0].kind.code(), "points-merged");
+    assert!((repaired.solid.volume() / base().signed_volume() - 1.0).abs() < 1e-5);
+    assert_eq!(repaired.solid.mesh().points.len(), base().points.len());
     cracked
         .points
         .iter_mut()
         .enumerate()
         .for_each(|(i, p)| *p += move_by(i, 1e-3));
     assert!(matches!(
-        mend(&cracked, Mending::Repair),
+        repair(&cracked, RepairMode::Repair),
         Err(InputError::Loose { .. })
     ));
 }
@@ -117,8 +121,8 @@ fn cracks_are_closed_and_gaps_are_not() {
 fn copies_are_removed_and_those_back_to_back_cancel() {
     let mut doubled = base();
     doubled.triangles.extend_from_within(..50);
-    let mended = assert_mended(&doubled, &[("copies-removed", 50)], base().signed_volume());
-    assert_eq!(mended.solid.mesh(), &base());
+    let repaired = assert_mended(&doubled, &[("copies-removed", 50)], base().signed_volume());
+    assert_eq!(repaired.solid.mesh(), &base());
     // A flap that hangs on an edge: two triangles back to back.
     let mut flap = base();
     let [a, b, _] = flap.triangles[7];
@@ -165,8 +169,8 @@ fn corners_on_edges_are_joined() {
 fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_their_place() {
     let mut three = base();
     three.triangles.swap_remove(17);
-    let mended = assert_mended(&three, &[("holes-closed", 1)], base().signed_volume());
-    assert!(mended.repairs[0].at.distance(Vec3::new(3.0, -2.0, 1.0)) > 9.0);
+    let repaired = assert_mended(&three, &[("holes-closed", 1)], base().signed_volume());
+    assert!(repaired.repairs[0].at.distance(Vec3::new(3.0, -2.0, 1.0)) > 9.0);
     // All triangles around a point: a hole of five or six edges.
     let around = |mesh: &TriMesh, n: usize| {
         let mut holed = mesh.clone();
@@ -174,10 +178,10 @@ fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_th
         holed
     };
     let fine = ball(Vec3::ZERO, 10.0, 6);
-    let mended = repaired(&around(&fine, 0));
-    assert_eq!(mended.repairs[0].kind.code(), "holes-closed");
-    assert!((mended.solid.volume() / fine.signed_volume() - 1.0).abs() < 1e-5);
-    let refused = mend(&around(&base(), 100), Mending::Repair).unwrap_err();
+    let repaired = mended(&around(&fine, 0));
+    assert_eq!(repaired.repairs[0].kind.code(), "holes-closed");
+    assert!((repaired.solid.volume() / fine.signed_volume() - 1.0).abs() < 1e-5);
+    let refused = repair(&around(&base(), 100), RepairMode::Repair).unwrap_err();
     assert!(
         matches!(refused, InputError::Open { n_holes: 1, .. }),
         "{refused}"
@@ -195,16 +199,16 @@ fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() 
     // Two cones that meet in their tips, joined by a belt: one body with one pinched point.
     let hourglass = both(cube(Vec3::ZERO, 1.0), cube(Vec3::ONE, 1.0));
     assert!(
-        matches!(mend(&crate::weld::weld(&hourglass).mesh, Mending::Repair), Err(InputError::Bodies(b)) if b.len() == 2)
+        matches!(repair(&crate::weld::weld(&hourglass).mesh, RepairMode::Repair), Err(InputError::Bodies(b)) if b.len() == 2)
     );
     let edge = both(cube(Vec3::ZERO, 1.0), cube(Vec3::new(1.0, 1.0, 0.0), 1.0));
-    let refused = mend(&unwelded(&edge), Mending::Repair).unwrap_err();
+    let refused = repair(&unwelded(&edge), RepairMode::Repair).unwrap_err();
     assert!(
         matches!(&refused, InputError::Bodies(b) if b.len() == 2),
         "{refused}"
     );
     assert!(
-        (mend(&unwelded(&edge), Mending::KeepLargest)
+        (repair(&unwelded(&edge), RepairMode::KeepLargest)
             .unwrap()
             .solid
             .volume()
@@ -216,9 +220,9 @@ fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() 
     let mut pinched = base();
     let (near, far) = (pinched.triangles[0][0], pinched.triangles[300][0]);
     pinched.points[far as usize] = pinched.points[near as usize];
-    let mended = repaired(&unwelded(&pinched));
+    let repaired = mended(&unwelded(&pinched));
     assert!(
-        mended
+        repaired
             .repairs
             .iter()
             .any(|r| matches!(r.kind, RepairKind::Parted | RepairKind::United { .. }))
@@ -250,10 +254,10 @@ fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enoug
     let other = ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3);
     let union = [base(), other.clone()].map(|m| Volume::from_closed_mesh(&m).unwrap());
     let union = union[0].union(&union[1]).volume();
-    let mended = repaired(&both(base(), other));
-    assert!((mended.solid.volume() - union).abs() < 1e-6 * union);
+    let repaired = mended(&both(base(), other));
+    assert!((repaired.solid.volume() - union).abs() < 1e-6 * union);
     assert!(matches!(
-        mended.repairs[..],
+        repaired.repairs[..],
         [Repair {
             kind: RepairKind::United { .. },
             count: 1..,
@@ -262,14 +266,16 @@ fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enoug
     ));
     // Each triangle lies on the one that it is a part of.
     let as_read = both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3));
-    for (face, &source) in mended.source_face.iter().enumerate() {
+    for (face, &source) in repaired.source_face.iter().enumerate() {
         let [a, _, _] = as_read.corners(source as usize);
-        let away = (mended.solid.mesh().face_center(face) - a).dot(as_read.face_normal(source as usize));
+        let away = (repaired.solid.mesh().face_center(face) - a).dot(as_read.face_normal(source as usize));
         assert!(away.abs() < 1e-9, "{away}");
     }
     let apart = both(base(), ball(Vec3::new(40.0, 0.0, 0.0), 6.0, 2));
-    assert!(matches!(mend(&apart, Mending::Repair), Err(InputError::Bodies(bodies)) if bodies.len() == 2));
-    let largest = mend(&apart, Mending::KeepLargest).unwrap();
+    assert!(
+        matches!(repair(&apart, RepairMode::Repair), Err(InputError::Bodies(bodies)) if bodies.len() == 2)
+    );
+    let largest = repair(&apart, RepairMode::KeepLargest).unwrap();
     assert_eq!(
         (largest.solid.mesh(), largest.repairs[0].kind),
         (&base(), RepairKind::LeftOut)
@@ -297,14 +303,14 @@ fn a_surface_pushed_through_itself_is_found_and_resolved() {
     let found = crossings(&pushed);
     assert!(found.count > 10, "{found:?}");
     assert_eq!(
-        mend(&pushed, Mending::Refuse),
+        repair(&pushed, RepairMode::Refuse),
         Err(InputError::Crossing {
             count: found.count,
             at: found.first
         })
     );
-    match mend(&pushed, Mending::Repair) {
-        Ok(mended) => assert_eq!(crossings(mended.solid.mesh()).count, 0),
+    match repair(&pushed, RepairMode::Repair) {
+        Ok(repaired) => assert_eq!(crossings(repaired.solid.mesh()).count, 0),
         Err(error) => assert!(matches!(error, InputError::Bodies(_)), "{error}"),
     }
     assert_eq!(crossings(&base()).count, 0);
@@ -336,7 +342,7 @@ fn one_sided_surfaces_soups_and_flat_things_are_refused() {
     let quads =
         (0..n).flat_map(|i| (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
     let triangles = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let refused = mend(&TriMesh { points, triangles }, Mending::Repair).unwrap_err();
+    let refused = repair(&TriMesh { points, triangles }, RepairMode::Repair).unwrap_err();
     assert!(matches!(refused, InputError::OneSided { .. }), "{refused}");
 
     let soup = TriMesh {
@@ -346,15 +352,18 @@ fn one_sided_surfaces_soups_and_flat_things_are_refused() {
         triangles: (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
     };
     assert!(matches!(
-        mend(&soup, Mending::Repair),
+        repair(&soup, RepairMode::Repair),
         Err(InputError::Loose { .. })
     ));
     let flat = TriMesh {
         points: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
         triangles: vec![[0, 1, 2], [0, 2, 1]],
     };
-    assert_eq!(mend(&flat, Mending::Repair), Err(InputError::Flat));
-    assert_eq!(mend(&TriMesh::default(), Mending::Repair), Err(InputError::Empty));
+    assert_eq!(repair(&flat, RepairMode::Repair), Err(InputError::Flat));
+    assert_eq!(
+        repair(&TriMesh::default(), RepairMode::Repair),
+        Err(InputError::Empty)
+    );
 }
 
 #[test]
@@ -362,7 +371,7 @@ fn coordinates_rounded_too_coarsely_are_told_as_such() {
     let mut rounded = both(cube(Vec3::ZERO, 1.0), cube(Vec3::splat(2.0), 3.0));
     rounded.points[0] = rounded.points[1];
     rounded.triangles.pop();
-    let refused = mend(&rounded, Mending::Repair).unwrap_err();
+    let refused = repair(&rounded, RepairMode::Repair).unwrap_err();
     assert!(matches!(refused, InputError::Collapsed { .. }), "{refused}");
 }
 
@@ -370,7 +379,7 @@ fn coordinates_rounded_too_coarsely_are_told_as_such() {
 fn repairs_say_what_how_many_and_where() {
     let mut three = base();
     three.triangles.swap_remove(17);
-    let text = repaired(&three).repairs[0].to_string();
+    let text = mended(&three).repairs[0].to_string();
     assert!(
         text.starts_with("1 small hole was closed, up to ") && text.contains("; first near ("),
         "{text}"
@@ -403,13 +412,13 @@ fn tetrahedra_on_whole_numbers_are_united() {
         [5, 6, 4],
         [4, 7, 6],
     ];
-    let mended = repaired(&TriMesh { points, triangles });
-    let bounds = mended.solid.mesh().bounds();
+    let repaired = mended(&TriMesh { points, triangles });
+    let bounds = repaired.solid.mesh().bounds();
     assert_eq!((bounds.min, bounds.max), (Vec3::ZERO, Vec3::new(4.0, 3.0, 3.0)));
     // 2 and 2/3, of which 1/120 is common.
     assert!(
-        (mended.solid.volume() - 319.0 / 120.0).abs() < 1e-12,
+        (repaired.solid.volume() - 319.0 / 120.0).abs() < 1e-12,
         "{}",
-        mended.solid.volume()
+        repaired.solid.volume()
     );
 }

@@ -57,7 +57,7 @@ pub struct ShellBodies {
     pub inner: Option<SegmentedSurface>,
     /// Where a piece may have no connectors: positive where bodies lie in its way out, or where it would lie
     /// in a later piece's way. On the nodes around its patch.
-    pub barred: IdVec<PatchId, LocalField>,
+    pub blocked: IdVec<PatchId, LocalField>,
     /// Positive on each piece's own side of all cuts; with the wall's limits it is the body. On the nodes
     /// around its patch.
     pub side: IdVec<PatchId, LocalField>,
@@ -76,8 +76,8 @@ pub fn build(
     let mut fields = Separation::new(grid, distances, plan.steps.len());
     let mut inner = InnerSurface::new(grid);
     let mut cuts: Vec<Cut> = Vec::new();
-    let mut barred: Vec<Option<LocalField>> = vec![None; plan.steps.len()];
-    let mut side = barred.clone();
+    let mut blocked: Vec<Option<LocalField>> = vec![None; plan.steps.len()];
+    let mut side = blocked.clone();
     for step in plan.removal() {
         let p = step.piece;
         let in_way = if fields.n_left() == 1 {
@@ -112,7 +112,7 @@ pub fn build(
             });
             fields.remove(p, step.separation, &g)
         };
-        barred[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
+        blocked[usize::from(p)] = Some(LocalField::cut_out(&grid.band, &in_way, rooms[p]));
         ctx.step()?;
     }
     ctx.stage("bodies", plan.steps.len())?;
@@ -135,7 +135,7 @@ pub fn build(
             .map(|(p, part)| whole_body(ctx, p, &part))
             .collect(),
         inner: inner.finish(plan.steps.len()),
-        barred: of_every_piece(barred),
+        blocked: of_every_piece(blocked),
         side: of_every_piece(side),
     })
 }

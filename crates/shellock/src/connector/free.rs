@@ -9,13 +9,13 @@ use crate::body::{ShellBodies, ShellGrid};
 
 /// For a piece and a point: `None` in or above the wall, else whether connectors of the piece may be there:
 /// neither in its way out nor in a later piece's, by the clearance.
-pub fn has_no_bar<'a>(
+pub fn is_unobstructed<'a>(
     params: &ConnectorParams,
     grid: &'a ShellGrid,
     shell: &ShellBodies,
 ) -> impl Fn(PatchId, Vec3) -> Option<bool> + use<'a> {
-    let barred: Vec<Vec<f32>> = shell
-        .barred
+    let blocked: Vec<Vec<f32>> = shell
+        .blocked
         .as_slice()
         .par_iter()
         .map(|b| b.spread(&grid.band, grid.cutoff_mm()))
@@ -26,7 +26,7 @@ pub fn has_no_bar<'a>(
         let is_below = depth >= grid.thickness_mm;
         is_below.then(|| {
             grid.band
-                .sample(&barred[usize::from(piece)], point)
+                .sample(&blocked[usize::from(piece)], point)
                 .is_some_and(|b| b + clearance_mm < 0.0)
         })
     }

@@ -4,7 +4,7 @@ use shellock_geom::Vec3;
 use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, PIN_DEPTH, PIN_WIDTH};
 
 use super::run::RailPart;
-use super::{ConnectorParams, Shape, Station};
+use super::{ConnectorParams, RunShape, RunStation};
 
 /// A rectangle of the cross-section: from `n0` to `n1` along the frame's `n`, from `s0` to `s1` along ŝ, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ impl Part {
     }
 
     /// Its four corners at a station.
-    pub fn corners(self, at: &Station) -> [Vec3; 4] {
+    pub fn corners(self, at: &RunStation) -> [Vec3; 4] {
         [
             (self.n0, self.s0),
             (self.n1, self.s0),
@@ -66,10 +66,10 @@ const RAIL_ROOT_MM: f64 = 1.2;
 
 impl Section {
     /// The cross-section at a station.
-    pub fn at(params: &ConnectorParams, station: &Station) -> Self {
+    pub fn at(params: &ConnectorParams, station: &RunStation) -> Self {
         match station.shape {
-            Shape::Seam => Self::seam(station),
-            Shape::Rail(part) => Self::rail(params, station, part),
+            RunShape::Seam => Self::seam(station),
+            RunShape::Rail(part) => Self::rail(params, station, part),
         }
     }
 
@@ -84,7 +84,7 @@ impl Section {
     ///              ┌────┘F│
     ///              └──────┘          lip
     /// ```
-    fn rail(params: &ConnectorParams, station: &Station, part: RailPart) -> Self {
+    fn rail(params: &ConnectorParams, station: &RunStation, part: RailPart) -> Self {
         let (d, c) = (station.size_mm, station.clearance_mm);
         let (reach, thick, wall) = (0.5 * d, 0.45 * d, (0.5 * d - c).max(params.min_wall_mm));
         let floor = -2.0 * c - 2.0 * thick;
@@ -139,7 +139,7 @@ impl Section {
     ///
     /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across
     /// the seam.
-    fn seam(station: &Station) -> Self {
+    fn seam(station: &RunStation) -> Self {
         let (d, c) = (station.size_mm, station.clearance_mm);
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
         // Stretch along ŝ; ŝ leans against the seam by the angle whose cosine is `depth`.
@@ -200,8 +200,8 @@ impl Section {
 mod tests {
     use super::*;
 
-    fn station(theta_degrees: f64, size_mm: f64) -> Station {
-        Station {
+    fn station(theta_degrees: f64, size_mm: f64) -> RunStation {
+        RunStation {
             point: Vec3::ZERO,
             tangent: Vec3::X,
             n: Vec3::Y,
@@ -211,7 +211,7 @@ mod tests {
             arc_mm: 0.0,
             size_mm,
             clearance_mm: ConnectorParams::default().clearance_mm,
-            shape: Shape::Seam,
+            shape: RunShape::Seam,
         }
     }
 
@@ -258,7 +258,7 @@ mod tests {
     fn tongue_and_groove_of_a_rail_keep_the_keys_clearance_and_overlap_both_ways() {
         for (size_mm, key_clearance_mm) in [(2.0, 0.1), (2.5, 0.15), (4.0, 0.3)] {
             let params = ConnectorParams::default();
-            let station = Station {
+            let station = RunStation {
                 clearance_mm: key_clearance_mm,
                 ..station(0.0, size_mm)
             };

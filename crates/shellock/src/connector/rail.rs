@@ -8,7 +8,7 @@ use shellock_geom::Vec3;
 
 use super::ConnectorParams;
 use super::frame::Curve;
-use super::run::{RailPart, Run, Shape, Station, has_room};
+use super::run::{RailPart, Run, RunShape, RunStation, has_room};
 use crate::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, end_gap_mm};
 
 /// The seam may leave a straight line by this much across, and the wall's inner side by this much up and
@@ -184,7 +184,7 @@ fn rail(
     let n = axes.outwards.cross(tangent);
     let n = if n.dot(axes.to_key) < 0.0 { -n } else { n };
     let length_mm = point(front).distance(point(back));
-    let station = |arc_mm: f64, part: RailPart| Station {
+    let station = |arc_mm: f64, part: RailPart| RunStation {
         point: point(back) + arc_mm * tangent,
         tangent,
         n,
@@ -194,7 +194,7 @@ fn rail(
         arc_mm,
         size_mm,
         clearance_mm,
-        shape: Shape::Rail(part),
+        shape: RunShape::Rail(part),
     };
     let arc = |i: usize| length_mm * i as f64 / N_PLACES as f64;
     let free: Vec<bool> = (0..=N_PLACES)

@@ -20,7 +20,7 @@ const LEAST_FREE: f64 = 0.6;
 
 /// A place on a run, with the frame of its cross-section.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Station {
+pub struct RunStation {
     /// On the edge between the wall and the inner surface.
     pub point: Vec3,
     /// Unit tangent `u` of the seam.
@@ -41,12 +41,12 @@ pub struct Station {
     /// Gap between the two halves, mm.
     pub clearance_mm: f64,
     /// What the section looks like.
-    pub shape: Shape,
+    pub shape: RunShape,
 }
 
 /// The kinds of sections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+pub enum RunShape {
     /// Pin and channel of a seam that is left across.
     Seam,
     /// Tongue and groove of a seam that a key slides along; `n` leads to the key, ŝ out of the surface.
@@ -72,7 +72,7 @@ pub struct Run {
     /// The piece with the channel.
     pub female: PatchId,
     /// Sections to sweep through, in order; two or more.
-    pub stations: Vec<Station>,
+    pub stations: Vec<RunStation>,
 }
 
 impl Run {
@@ -86,7 +86,7 @@ impl Run {
 
     /// Whether it is a rail of the key.
     pub fn is_rail(&self) -> bool {
-        self.stations[0].shape != Shape::Seam
+        self.stations[0].shape != RunShape::Seam
     }
 
     /// Gap between its two halves, mm.
@@ -102,7 +102,7 @@ impl Run {
 
 /// What a seam between two pieces offers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contact {
+pub struct SeamRoom {
     /// The piece installed later.
     pub later: PatchId,
     /// The piece installed earlier.
@@ -125,21 +125,21 @@ pub fn runs(
     curves: &[Curve],
     slide: Option<Vec3>,
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
-) -> (Vec<Run>, Vec<Contact>) {
+) -> (Vec<Run>, Vec<SeamRoom>) {
     let (mut runs, mut contacts) = (Vec::new(), Vec::new());
     for curve in curves {
         let separation = plan.separation(curve.later).unit();
         let later_is_male = roles(curve, separation);
         let size_mm = sizes.of(curve.later, curve.earlier);
         let clearance_mm = params.clearance_of(slide.is_some() && curve.later == plan.key());
-        let at = |i: usize| Station {
+        let at = |i: usize| RunStation {
             clearance_mm,
             ..station(curve, i, separation, later_is_male[i], size_mm)
         };
-        let stations: Vec<Station> = (0..curve.points.len()).map(at).collect();
+        let stations: Vec<RunStation> = (0..curve.points.len()).map(at).collect();
         let mut allowed = allowed(size_mm, curve, &stations, &later_is_male);
         let step = |i: usize| stations[i].point.distance(stations[i + 1].point);
-        contacts.push(Contact {
+        contacts.push(SeamRoom {
             later: curve.later,
             earlier: curve.earlier,
             length_mm: (0..stations.len() - 1).map(step).sum(),
@@ -203,7 +203,7 @@ fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
         .collect()
 }
 
-fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_mm: f64) -> Station {
+fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_mm: f64) -> RunStation {
     let (u, normal) = (curve.tangents[i], curve.normals[i]);
     let (s, to_female) = if later_is_male {
         (separation, curve.across[i])
@@ -216,7 +216,7 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_
     let theta = flat.dot(to_female).atan2(flat.dot(normal));
     let n = (theta.cos() * to_female - theta.sin() * normal).normalize_or_zero();
     let arc_mm = curve.points[..=i].windows(2).map(|w| w[0].distance(w[1])).sum();
-    Station {
+    RunStation {
         point: curve.points[i],
         tangent: u,
         n,
@@ -226,12 +226,12 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_
         arc_mm,
         size_mm,
         clearance_mm: 0.0,
-        shape: Shape::Seam,
+        shape: RunShape::Seam,
     }
 }
 
 /// Where ends, roles, angles and turns allow a connector.
-fn allowed(size_mm: f64, curve: &Curve, stations: &[Station], later_is_male: &[bool]) -> Vec<bool> {
+fn allowed(size_mm: f64, curve: &Curve, stations: &[RunStation], later_is_male: &[bool]) -> Vec<bool> {
     let n = stations.len();
     let length = stations[n - 1].arc_mm;
     let end = end_gap_mm(size_mm, length);
@@ -253,7 +253,7 @@ fn allowed(size_mm: f64, curve: &Curve, stations: &[Station], later_is_male: &[b
 /// Whether both halves keep most of their section.
 pub(super) fn has_room(
     params: &ConnectorParams,
-    station: &Station,
+    station: &RunStation,
     male: PatchId,
     female: PatchId,
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,
@@ -294,7 +294,7 @@ fn stretches(allowed: &[bool], role: &[bool]) -> Vec<(usize, usize)> {
 }
 
 /// The fewest stations whose cells follow the run within the sag and turn limits.
-fn thinned(stations: &[Station]) -> Vec<Station> {
+fn thinned(stations: &[RunStation]) -> Vec<RunStation> {
     let mut kept = vec![stations[0]];
     let mut from = 0;
     for to in 2..stations.len() {

@@ -67,13 +67,13 @@ impl Budget {
         Self {
             kits_each: rounds.kits.min(KITS_WITH_CUT_KEY),
             kits: rounds.kits_in_all.min(KITS_OF_CUT_KEYS[i]),
-            ..Self::with(rounds, rounds.mendings.min(REVISIONS_WITH_CUT_KEY))
+            ..Self::with(rounds, rounds.refinements.min(REVISIONS_WITH_CUT_KEY))
         }
     }
 
     /// Of a key that is one of the pieces.
     pub fn of_piece(rounds: &Rounds) -> Self {
-        Self::with(rounds, rounds.mendings)
+        Self::with(rounds, rounds.refinements)
     }
 
     fn with(rounds: &Rounds, revisions: usize) -> Self {

@@ -130,7 +130,7 @@ impl<'a> Candidate<'a> {
 
 impl CutKey {
     /// The surface with the key as a patch, and its id. Where the key leaves a piece hanging on another, the
-    /// pieces are mended first.
+    /// pieces are refined first.
     fn imprinted(
         &self,
         ctx: &Ctx,
@@ -146,8 +146,8 @@ impl CutKey {
             return Ok(None);
         };
         if faults(&best.0) > 0
-            && let Some(mended) = segmentation::mended_again(&ctx.fork(), params, &best.0)?
-            && let Some(again) = key::imprint(&mended, &self.site.prism)
+            && let Some(refined) = segmentation::refined_again(&ctx.fork(), params, &best.0)?
+            && let Some(again) = key::imprint(&refined, &self.site.prism)
             && faults(&again.0) < faults(&best.0)
         {
             best = again;

@@ -5,9 +5,9 @@ use shellock_geom::{Aabb, Solid, TriMesh};
 use super::division::Division;
 use super::{DesignError, Params, Settings};
 use crate::body::{PatchDistances, ShellBodies, ShellGrid};
-use crate::connector::{Contact, Run, has_no_bar};
+use crate::connector::{Run, SeamRoom, is_unobstructed};
 use crate::metric::Holding;
-use crate::piece::{FinishParams, Finished, Joint, PressFit, PressFitKind};
+use crate::piece::{FinishParams, Finished, FinishedJoint, PressFit, PressFitKind};
 use crate::plan::{FoundPlan, InstallationPlan, PlanProof};
 use crate::play::{self, KitPlay};
 use crate::sizes::CONTACT_SIZES;
@@ -34,11 +34,11 @@ pub struct Kit {
     /// One printable mesh a piece, in assembled position, mm.
     pub pieces: IdVec<PatchId, TriMesh>,
     /// Connector runs and how they came out.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<FinishedJoint>,
     /// What clicks on the key's way in.
     pub press_fits: Vec<PressFit>,
     /// What the seams offered.
-    pub contacts: Vec<Contact>,
+    pub contacts: Vec<SeamRoom>,
     /// The verdict on the finished meshes.
     pub verification: Verification,
     /// Where the finished pieces touch.
@@ -176,12 +176,12 @@ fn connectors(
     grid: &ShellGrid,
     shell: &ShellBodies,
     plan: &InstallationPlan,
-) -> (Vec<Run>, Vec<Contact>) {
+) -> (Vec<Run>, Vec<SeamRoom>) {
     let curves = shell
         .inner
         .as_ref()
         .map_or(Vec::new(), |inner| connector::curves(grid, inner, plan));
-    let is_free = has_no_bar(&settings.connector, grid, shell);
+    let is_free = is_unobstructed(&settings.connector, grid, shell);
     let runs_for = |slide| connector::runs(&settings.connector, sizes, plan, &curves, slide, &is_free);
     match settings.plan.key.and(settings.plan.key_slide) {
         Some(cut) => runs_for(Some(cut.unit())),
@@ -257,11 +257,11 @@ fn warn_of_press_fits(ctx: &Ctx, finished: &Finished) {
 }
 
 /// Says which long seams came out without any connector.
-fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[Contact], joints: &[Joint]) {
-    let has_room = |c: &&Contact| c.length_mm >= CONTACT_SIZES * sizes.of(c.later, c.earlier);
+fn warn_of_bare_seams(ctx: &Ctx, sizes: &ConnectorSizes, contacts: &[SeamRoom], joints: &[FinishedJoint]) {
+    let has_room = |c: &&SeamRoom| c.length_mm >= CONTACT_SIZES * sizes.of(c.later, c.earlier);
     for contact in contacts.iter().filter(has_room) {
         let pair = [contact.later, contact.earlier];
-        let joins = |j: &&Joint| pair.contains(&j.male) && pair.contains(&j.female);
+        let joins = |j: &&FinishedJoint| pair.contains(&j.male) && pair.contains(&j.female);
         if joints.iter().filter(joins).all(|j| j.length_mm == 0.0) {
             ctx.warn(Warning {
                 cause: Cause::SeamWithoutConnector {

@@ -113,7 +113,7 @@ pub struct Rounds {
     /// Kits made for one segmentation, at most. ≥ 1; 3.
     pub kits: usize,
     /// Segmentations revised after the first, at most; 4.
-    pub mendings: usize,
+    pub refinements: usize,
     /// Kits made of all segmentations, at most. ≥ 1; 8.
     pub kits_in_all: usize,
 }
@@ -122,7 +122,7 @@ impl Default for Rounds {
     fn default() -> Self {
         Self {
             kits: 3,
-            mendings: 4,
+            refinements: 4,
             kits_in_all: 8,
         }
     }

@@ -8,7 +8,7 @@ use shellock_geom::{Solid, TriMesh, Vec3};
 use super::lesson::{Lesson, lessons};
 use super::*;
 use crate::body::BodyError;
-use crate::connector::Contact;
+use crate::connector::SeamRoom;
 use crate::context::Progress;
 use crate::key::{KeyPrism, KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
@@ -162,7 +162,7 @@ fn a_stop_while_pieces_are_changed_is_not_taken_for_a_piece_that_cannot_be_chang
     let stopped = [
         divided(),
         united,
-        segmentation::mended_again(&ctx, &params, &surface),
+        segmentation::refined_again(&ctx, &params, &surface),
     ];
     assert!(
         stopped
@@ -242,7 +242,7 @@ fn a_piece_that_rubs_takes_another_way_and_twice_another_turn() {
 
 #[test]
 fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_loose() {
-    let contact = |later: u32, earlier: u32| Contact {
+    let contact = |later: u32, earlier: u32| SeamRoom {
         later: PatchId(later),
         earlier: PatchId(earlier),
         length_mm: 20.0,
@@ -287,7 +287,7 @@ fn cut_keys_cost_less_than_a_piece_that_is_the_key() {
     let few = Budget::of_cut_key(
         &Rounds {
             kits: 1,
-            mendings: 0,
+            refinements: 0,
             kits_in_all: 1,
         },
         0,

@@ -38,7 +38,7 @@ pub struct Holding {
     /// `Q = −max w d`, mm; higher is better. `None` where pieces come apart in the simulation.
     pub quality_mm: Option<f64>,
     /// Pieces that come apart in the simulation, which knows no friction but the key's; empty where all hold.
-    pub loose: Vec<LoosePart>,
+    pub loose: Vec<LoosePiece>,
     /// The seams, weakest first; those without a connector are left out. Empty where pieces come apart.
     pub seams: Vec<SeamHolding>,
     /// Plans that were compared.
@@ -52,7 +52,7 @@ pub struct Holding {
 
 /// A piece that comes apart.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LoosePart {
+pub struct LoosePiece {
     /// The piece.
     pub piece: PatchId,
     /// A place in its middle, mm in assembly space.
@@ -175,7 +175,7 @@ fn size_mm(surface: &SegmentedSurface) -> f64 {
     surface.mesh.bounds().size().max_element()
 }
 
-fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePart]) {
+fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePiece]) {
     ctx.warn(Warning {
         cause: Cause::ComesApart,
         pieces: loose.iter().map(|part| part.piece).collect(),
@@ -218,7 +218,7 @@ fn holding(
     let (opening, loose) = match resistance {
         Resistance::Holds(opening) => (opening, Vec::new()),
         Resistance::Separable(parts) => {
-            let part = |&p: &u32| LoosePart {
+            let part = |&p: &u32| LoosePiece {
                 piece: PatchId(p),
                 at: middle_of(model, PatchId(p)).to_array(),
             };

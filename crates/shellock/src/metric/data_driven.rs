@@ -16,7 +16,7 @@ use shellock_mechanics::{Meeting, Resistance, SurfaceModel};
 
 use super::PlanModel;
 use crate::PatchId;
-use crate::plan::contact::SeamFrame;
+use crate::plan::interface::SeamFrame;
 use crate::plan::local_tests::LocalTests;
 
 /// Eq. 6 as published: the quality in mm, higher is better; 0 where nothing is joined.

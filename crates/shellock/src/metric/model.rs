@@ -10,7 +10,7 @@ use shellock_mechanics::{
 };
 
 use crate::params::ParamProblem;
-use crate::plan::contact::meeting;
+use crate::plan::interface::meeting;
 use crate::plan::{InstallationPlan, PlanParams};
 use crate::seam::rules::end_gap_mm;
 use crate::seam::{seam_half_edges, stretches};

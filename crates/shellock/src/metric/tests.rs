@@ -138,7 +138,7 @@ fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction
     for (station, meeting) in model.assembly.stations.iter().zip(&meetings) {
         let Some(joint) = meeting.joint else { continue };
         let (tangent, normal, across) = (station.tangent, station.normal, station.across);
-        let frame = crate::plan::contact::SeamFrame {
+        let frame = crate::plan::interface::SeamFrame {
             tangent,
             normal,
             across,

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Vec3, Volume};
 
-use crate::connector::{ConnectorParams, Part, Run, Section, Station};
+use crate::connector::{ConnectorParams, Part, Run, RunStation, Section};
 use crate::{LatticeDirection, PatchId};
 
 /// The socket is grown by this much less than the clearance, mm: the channel's section already keeps the
@@ -40,7 +40,7 @@ fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
             } else {
                 0.0
             };
-            let moved = Station {
+            let moved = RunStation {
                 point: station.point + lengthwise * station.tangent,
                 ..*station
             };
@@ -82,13 +82,13 @@ pub(super) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Vol
 }
 
 /// What a piece sweeps with its half connectors on its way out.
-pub(super) struct Wake {
+pub(super) struct SweptVolume {
     cells: Vec<(Cell, Aabb)>,
     along: Vec3,
 }
 
-impl Wake {
-    /// The wake of all half connectors of `piece`.
+impl SweptVolume {
+    /// The swept volume of all half connectors of `piece`.
     pub(super) fn of(
         params: &ConnectorParams,
         runs: &[Run],
@@ -111,7 +111,7 @@ impl Wake {
         }
     }
 
-    /// The parts of the wake that can meet `room`, each cut to the distances at which it does.
+    /// The parts of the swept volume that can meet `room`, each cut to the distances at which it does.
     fn meeting(&self, room: Aabb, far_mm: f64) -> Vec<Volume> {
         self.cells
             .iter()
@@ -149,10 +149,10 @@ pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm:
     (from <= to).then_some((from, to))
 }
 
-/// `volume` less everything that `wakes` sweep through it.
-pub(super) fn carved(volume: &Volume, wakes: &[Wake], far_mm: f64) -> Volume {
+/// `volume` less everything that `swept_volumes` sweep through it.
+pub(super) fn carved(volume: &Volume, swept_volumes: &[SweptVolume], far_mm: f64) -> Volume {
     let room = volume.bounds();
-    let swept: Vec<Volume> = wakes
+    let swept: Vec<Volume> = swept_volumes
         .par_iter()
         .flat_map_iter(|w| w.meeting(room, far_mm))
         .collect();

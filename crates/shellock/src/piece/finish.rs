@@ -7,7 +7,7 @@ use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::rounding::{NotPrintable, printable_body};
 use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
 
-use super::carve::{Half, Wake, carved, whole_half};
+use super::carve::{Half, SweptVolume, carved, whole_half};
 use super::key_parts::{Change, Grip, detents, notch};
 use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
@@ -28,7 +28,7 @@ const RIB_MARGIN_MM: f64 = 0.1;
 
 /// How one run came out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
+pub struct FinishedJoint {
     /// The piece with the pin.
     pub male: PatchId,
     /// The piece with the channel.
@@ -50,7 +50,7 @@ pub struct Finished {
     /// One closed mesh a piece, with coordinates that 32-bit floats hold.
     pub meshes: IdVec<PatchId, TriMesh>,
     /// One joint a run.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<FinishedJoint>,
     /// What presses on the key's way in, on purpose.
     pub press_fits: Vec<PressFit>,
 }
@@ -108,7 +108,7 @@ pub fn make(
         .fold(Aabb::EMPTY, |b, r| b.union(*r))
         .diagonal();
     let halves = carved_halves(ctx, params, grid, shell, plan, runs, far_mm)?;
-    let joints: Vec<Joint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
+    let joints: Vec<FinishedJoint> = runs.iter().zip(&halves).map(|(run, h)| joint(run, h)).collect();
     let kept: Vec<Run> = runs
         .iter()
         .zip(&joints)
@@ -155,7 +155,7 @@ fn carved_halves(
         };
         runs.len()
     ];
-    let mut wakes: Vec<Wake> = Vec::new();
+    let mut swept_volumes: Vec<SweptVolume> = Vec::new();
     for step in plan.removal() {
         let q = step.piece;
         let mine: Vec<(usize, usize)> = (0..runs.len())
@@ -173,13 +173,13 @@ fn carved_halves(
             .map(|&(r, _)| runs[r].clearance_mm())
             .fold(params.clearance_mm, f64::max);
         let room = Room::of(clearance_mm, grid, shell, q);
-        let made = |whole: &Volume| (whole.volume(), carved(&room.cut(whole), &wakes, far_mm));
+        let made = |whole: &Volume| (whole.volume(), carved(&room.cut(whole), &swept_volumes, far_mm));
         let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
             halves[r].carved[h] = volume;
         }
-        wakes.push(Wake::of(params, runs, q, step.separation));
+        swept_volumes.push(SweptVolume::of(params, runs, q, step.separation));
         ctx.step()?;
     }
     Ok(halves)
@@ -203,7 +203,7 @@ struct Room<'a> {
     grid: &'a ShellGrid,
     clearance_mm: f32,
     /// Positive where the piece may not be: what its way out or a later piece's takes.
-    barred: Vec<f32>,
+    blocked: Vec<f32>,
     /// Positive on its own side of the cuts.
     side: Vec<f32>,
 }
@@ -211,23 +211,23 @@ struct Room<'a> {
 impl<'a> Room<'a> {
     fn of(clearance_mm: f64, grid: &'a ShellGrid, shell: &ShellBodies, q: PatchId) -> Self {
         let cutoff = grid.cutoff_mm();
-        let (barred, side) = rayon::join(
-            || shell.barred[q].spread(&grid.band, cutoff),
+        let (blocked, side) = rayon::join(
+            || shell.blocked[q].spread(&grid.band, cutoff),
             || shell.side[q].spread(&grid.band, -cutoff),
         );
         Self {
             grid,
             clearance_mm: clearance_mm as f32,
-            barred,
+            blocked,
             side,
         }
     }
 
     /// What of `whole` has room: below the wall, a root's depth into it, `clearance_mm` away from what is
-    /// barred, and as far off what other pieces have of the wall: below the wall by that, or so far on the
+    /// blocked, and as far off what other pieces have of the wall: below the wall by that, or so far on the
     /// piece's own side of the cuts.
     ///
-    /// A body's edge along the inner end of a seam is sharp. The one field of what bars the piece rounds it
+    /// A body's edge along the inner end of a seam is sharp. The one field of what obstructs the piece rounds it
     /// off by up to a third of a cell, more than the clearance; two smooth ones, united after they are
     /// contoured, keep it. (Filling the angle in one field instead takes the connectors of narrow cavities
     /// away.)
@@ -244,7 +244,7 @@ impl<'a> Room<'a> {
         let thickness = self.grid.thickness_mm as f32;
         let (ceiling, floor) = (thickness - ROOT_MM as f32, thickness + self.clearance_mm);
         let depth = &self.grid.depth;
-        let space = region(&|n| (depth[n] - ceiling).min(-self.barred[n] - self.clearance_mm));
+        let space = region(&|n| (depth[n] - ceiling).min(-self.blocked[n] - self.clearance_mm));
         let below = region(&|n| depth[n] - floor);
         let beside = region(&|n| self.side[n] - self.clearance_mm);
         let free = whole.intersect(&space);
@@ -252,7 +252,7 @@ impl<'a> Room<'a> {
     }
 }
 
-fn joint(run: &Run, halves: &Halves) -> Joint {
+fn joint(run: &Run, halves: &Halves) -> FinishedJoint {
     let volume_mm3 = [halves.carved[0].volume(), halves.carved[1].volume()];
     let kept = std::array::from_fn(|h| {
         if halves.raw[h] > 0.0 {
@@ -263,7 +263,7 @@ fn joint(run: &Run, halves: &Halves) -> Joint {
     });
     let holds = kept.iter().all(|k| *k >= LEAST_KEPT);
     let length_mm = if holds { run.length() } else { 0.0 };
-    Joint {
+    FinishedJoint {
         male: run.male,
         female: run.female,
         length_mm,
@@ -275,7 +275,7 @@ fn joint(run: &Run, halves: &Halves) -> Joint {
 }
 
 /// The bodies with what hangs from them.
-fn joined(shell: &ShellBodies, joints: &[Joint], halves: &[Halves]) -> IdVec<PatchId, Volume> {
+fn joined(shell: &ShellBodies, joints: &[FinishedJoint], halves: &[Halves]) -> IdVec<PatchId, Volume> {
     let ids: Vec<PatchId> = shell.bodies.ids().collect();
     let pieces: Vec<Volume> = ids
         .par_iter()

@@ -4,7 +4,7 @@ use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
 
 use crate::PatchId;
-use crate::connector::{ConnectorParams, Run, Section, Station};
+use crate::connector::{ConnectorParams, Run, RunStation, Section};
 use crate::{PressFit, PressFitKind};
 
 /// Where on a rail the detent sits, mm from its back end, so that it presses on the last millimetres of the
@@ -80,7 +80,7 @@ pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<PressFit>,
 }
 
 /// A roof across the rail, long at its foot and short at its top, grown by `play_mm`.
-fn wedge(station: &Station, [foot, top]: [f64; 2], [s0, s1]: [f64; 2], play_mm: f64) -> Volume {
+fn wedge(station: &RunStation, [foot, top]: [f64; 2], [s0, s1]: [f64; 2], play_mm: f64) -> Volume {
     let mut points = Vec::new();
     for (n, half_mm) in [(foot, FOOT_MM), (top + play_mm, TOP_MM)] {
         for s in [s0 - play_mm, s1 + play_mm] {
@@ -135,7 +135,7 @@ pub(super) fn notch(grip: &Grip, body: &TriMesh) -> Option<Change> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::connector::{RailPart, Shape};
+    use crate::connector::{RailPart, RunShape};
 
     #[test]
     fn a_bump_interferes_by_what_was_asked_for_and_not_in_its_dimple() {
@@ -143,7 +143,7 @@ mod tests {
             detent_mm: 0.25,
             ..ConnectorParams::default()
         };
-        let station = |arc_mm: f64| Station {
+        let station = |arc_mm: f64| RunStation {
             point: arc_mm * Vec3::X,
             tangent: Vec3::X,
             n: Vec3::Y,
@@ -153,7 +153,7 @@ mod tests {
             arc_mm,
             size_mm: 2.5,
             clearance_mm: params.key_clearance_mm,
-            shape: Shape::Rail(RailPart::Full),
+            shape: RunShape::Rail(RailPart::Full),
         };
         let run = Run {
             male: PatchId(1),

@@ -10,7 +10,7 @@ use shellock_geom::sparse::SparseError;
 use shellock_mechanics::neighbourhood::{outer_ring, two_plates};
 use shellock_mechanics::{Resistance, Station, SurfaceModel, SurfaceParams};
 
-use super::contact::{SeamFrame, meeting};
+use super::interface::{SeamFrame, meeting};
 use crate::LatticeDirection;
 
 /// Orientations of connectors about the seam.

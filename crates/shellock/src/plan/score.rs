@@ -94,7 +94,7 @@ pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &Installa
 /// Cost of one contact where `later` leaves along `s`; a contact that joins nothing costs as much as any can.
 pub(super) fn contact_cost(
     survey: &PlanSurvey,
-    contact: &super::contact::Contact,
+    contact: &super::interface::Interface,
     later: PatchId,
     s: crate::LatticeDirection,
     is_weak: bool,

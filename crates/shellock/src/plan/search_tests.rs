@@ -4,8 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shellock_geom::Vec3;
 
-use super::contact::{Contact, HoldTable, Joint};
 use super::exact::{Budget, Candidate, lower_bound, prove};
+use super::interface::{BlockingTable, Interface, Joint};
 use super::key::{Flatness, KeyChoice, choices};
 use super::local_cost::{ALL_DIRECTIONS, Role, RoleSet, SeamStates, Surroundings, directions_in, mask_of};
 use super::occlusion::Occlusion;
@@ -73,8 +73,8 @@ pub fn made_up(
         .map(|&(a, b)| {
             let mut tables = [(); 2].map(|()| [(); LatticeDirection::COUNT].map(|()| random_joint(rng)));
             tables[0].reverse();
-            let hold = HoldTable::made_up(|| rng.random_range(0.0..most_hold_mm3));
-            Contact::made_up(
+            let hold = BlockingTable::made_up(|| rng.random_range(0.0..most_hold_mm3));
+            Interface::made_up(
                 PatchId(a),
                 PatchId(b),
                 move |p, s| tables[usize::from(p.0 != a)][s.index()],

@@ -2,7 +2,7 @@
 
 use shellock_geom::Vec3;
 
-use super::contact::{Contact, contacts};
+use super::interface::{Interface, contacts};
 use super::key::{Flatness, flatness};
 use super::occlusion::Occlusion;
 use super::{PieceSet, PlanParams};
@@ -16,7 +16,7 @@ pub struct PlanSurvey {
     /// Who is in whose way.
     pub occlusion: Occlusion,
     /// Pairs that share a seam, sorted.
-    pub contacts: Vec<Contact>,
+    pub contacts: Vec<Interface>,
     /// Mean outward normal of each piece, by area: length in [0, 1], near 1 where the piece is flat.
     pub mean_normal: IdVec<PatchId, Vec3>,
     /// Area of each piece, mm².

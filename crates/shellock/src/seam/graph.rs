@@ -7,7 +7,7 @@ use crate::PatchId;
 
 /// Two patches that share a seam.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
+pub struct Adjacency {
     /// The patch with the lower id.
     pub a: PatchId,
     /// The patch with the higher id.
@@ -23,7 +23,7 @@ pub struct Contact {
 pub struct ContactGraph {
     n_patches: usize,
     min_contact_mm: f64,
-    contacts: Vec<Contact>,
+    contacts: Vec<Adjacency>,
 }
 
 impl ContactGraph {
@@ -40,7 +40,7 @@ impl ContactGraph {
         stretches.sort_by_key(|s| (s.0, s.1));
         let contacts = stretches
             .chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
-            .map(|same| Contact {
+            .map(|same| Adjacency {
                 a: same[0].0,
                 b: same[0].1,
                 total_mm: same.iter().map(|s| s.2).sum(),
@@ -60,12 +60,12 @@ impl ContactGraph {
     }
 
     /// All pairs that share a seam, by ids, also those whose stretches are too short to count.
-    pub fn contacts(&self) -> &[Contact] {
+    pub fn contacts(&self) -> &[Adjacency] {
         &self.contacts
     }
 
     /// Whether the contact has room for a connector.
-    pub fn counts(&self, contact: &Contact) -> bool {
+    pub fn counts(&self, contact: &Adjacency) -> bool {
         contact.longest_mm >= self.min_contact_mm
     }
 

@@ -32,7 +32,7 @@ type Seed = (u32, f64);
 /// About `n_pieces` connected patches of similar area, seams rather in concave creases; the same for the same
 /// seed.
 ///
-/// Each patch is connected; disks only after [`super::mend`]. Fails where the model has fewer triangles than
+/// Each patch is connected; disks only after [`super::refine`]. Fails where the model has fewer triangles than
 /// patches are wanted; 0.2 s for 60 000 triangles.
 pub fn auto_labels(
     ctx: &Ctx,

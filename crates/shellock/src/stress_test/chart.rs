@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use shellock_render::svg::{begin, end, text};
 
-use super::{Outcome, Pair, StressReport, Verdict};
+use super::{Outcome, Pair, StressReport, StressVerdict};
 
 const ROW_PX: f64 = 26.0;
 const NAME_PX: f64 = 130.0;
@@ -71,9 +71,9 @@ fn opening(design: &'static str, outcome: &Outcome) -> Row {
 fn stress(design: &'static str, outcome: &Outcome) -> Row {
     let (value, limit) = (100.0 * outcome.strength_share, 100.0);
     let (color, _) = style(if value > limit {
-        Verdict::Yields
+        StressVerdict::Yields
     } else {
-        Verdict::Holds
+        StressVerdict::Holds
     });
     Row {
         design,
@@ -155,11 +155,11 @@ fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, row: &Row) {
     text(svg, [left + after + 8.0, baseline], "", &row.label);
 }
 
-fn style(verdict: Verdict) -> (&'static str, &'static str) {
+fn style(verdict: StressVerdict) -> (&'static str, &'static str) {
     match verdict {
-        Verdict::Holds => ("#4c9a5b", "holds"),
-        Verdict::Opens => ("#d8a12f", "opens"),
-        Verdict::Yields => ("#d2702f", "yields"),
-        Verdict::ComesApart => ("#b53a3a", "comes apart"),
+        StressVerdict::Holds => ("#4c9a5b", "holds"),
+        StressVerdict::Opens => ("#d8a12f", "opens"),
+        StressVerdict::Yields => ("#d2702f", "yields"),
+        StressVerdict::ComesApart => ("#b53a3a", "comes apart"),
     }
 }

@@ -81,10 +81,10 @@ fn a_stronger_material_bears_what_a_weaker_one_does_not() {
         bench.test(&model.meetings(&outwards()), None).unwrap().punch
     };
     let measured = with_strength(42.0);
-    assert_eq!(measured.verdict, Verdict::Holds);
+    assert_eq!(measured.verdict, StressVerdict::Holds);
     let mpa = measured.wall_mpa.max(measured.connector_mpa);
-    assert_eq!(with_strength(0.9 * mpa).verdict, Verdict::Yields);
-    assert_eq!(with_strength(1.1 * mpa).verdict, Verdict::Holds);
+    assert_eq!(with_strength(0.9 * mpa).verdict, StressVerdict::Yields);
+    assert_eq!(with_strength(1.1 * mpa).verdict, StressVerdict::Holds);
 }
 
 #[test]

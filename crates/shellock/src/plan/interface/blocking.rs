@@ -14,7 +14,7 @@
 //! (a rail under a seam along s holds along ±N alone), and the walls where the later piece is pushed at the
 //! earlier one across a seam that does not lean.
 //!
-//! Limits: carving and bars shorten runs, which one factor stands for; ends of runs resist nothing here.
+//! Limits: carving and obstructions shorten runs, which one factor stands for; ends of runs resist nothing here.
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
@@ -40,9 +40,9 @@ pub type Pushes = [[f32; N_PUSHES]; 2];
 
 /// Estimates for both orders and all directions.
 #[derive(Clone, Debug, Default)]
-pub struct HoldTable(Vec<Pushes>);
+pub struct BlockingTable(Vec<Pushes>);
 
-impl HoldTable {
+impl BlockingTable {
     /// The table of a contact between `pair` with these seams and connectors of `size_mm`; `holds(order, s)`
     /// is whether its runs are long enough there.
     pub(super) fn new(

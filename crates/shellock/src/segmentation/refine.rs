@@ -31,7 +31,7 @@ const MAX_IDLE_DIVISIONS: usize = 3;
 ///
 /// The result may still fall short; ask
 /// [`SegmentedSurface::contact_graph`](crate::SegmentedSurface::contact_graph).
-pub fn mend(
+pub fn refine(
     ctx: &Ctx,
     params: &SegmentationParams,
     solid: &Solid,

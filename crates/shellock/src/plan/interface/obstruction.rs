@@ -4,7 +4,7 @@
 //! earlier piece on its way out; nor may the later piece's far wall sweep over the earlier piece's half:
 //!
 //! ```text
-//!   ─────a──────┬──────b─────        a later, leaving along s: barred where
+//!   ─────a──────┬──────b─────        a later, leaving along s: blocked where
 //!          x_a  │  x_b               the ray from x_a along s meets b, or
 //!                                    the ray from x_b along −s meets a, or,
 //!   ─────a─────────────b─────        as b's channel reaches to x_a if a has the pin, from x_a along −s a
@@ -32,25 +32,25 @@ const MOST_WALLS: usize = 8;
 const PAST_WALL_MM: f64 = 0.01;
 
 /// The surface as rays see it.
-pub(super) struct Bars<'a> {
+pub(super) struct Obstructions<'a> {
     surface: &'a SegmentedSurface,
     bvh: TriangleBvh,
     wall_mm: f64,
     far_mm: f64,
 }
 
-/// A bit for each order (0 where the piece with the lower id is later) and direction that is barred.
+/// A bit for each order (0 where the piece with the lower id is later) and direction that is blocked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Barred(u64);
+pub(super) struct Blocked(u64);
 
-impl Barred {
+impl Blocked {
     /// Whether the later piece cannot leave along `s` with a connector here.
     pub fn has(self, order: usize, s: LatticeDirection) -> bool {
         self.0 >> (order * LatticeDirection::COUNT + s.index()) & 1 == 1
     }
 }
 
-impl<'a> Bars<'a> {
+impl<'a> Obstructions<'a> {
     /// `None` where walls have no thickness, so that there is no room to look at.
     pub fn new(params: &PlanParams, surface: &'a SegmentedSurface) -> Option<Self> {
         (params.wall_mm > 0.0).then(|| Self {
@@ -61,9 +61,9 @@ impl<'a> Bars<'a> {
         })
     }
 
-    /// What bars a connector of `size_mm` between `a` and `b` below `point` of the outer surface; `across`
+    /// What obstructs a connector of `size_mm` between `a` and `b` below `point` of the outer surface; `across`
     /// leads from a to b.
-    pub fn at(&self, [a, b]: [PatchId; 2], size_mm: f64, point: Vec3, normal: Vec3, across: Vec3) -> Barred {
+    pub fn at(&self, [a, b]: [PatchId; 2], size_mm: f64, point: Vec3, normal: Vec3, across: Vec3) -> Blocked {
         let height_mm = self.wall_mm + DEPTH_SIZES * size_mm;
         let below = point - height_mm * normal;
         let beside = BESIDE_SIZES * size_mm * across;
@@ -74,7 +74,7 @@ impl<'a> Bars<'a> {
                 .collect()
         };
         let (from_a, from_b): (Vec<[bool; 2]>, Vec<[bool; 2]>) = (seen(in_a), seen(in_b));
-        let mut barred = 0;
+        let mut blocked = 0;
         for s in LatticeDirection::all() {
             let (on, back) = (s.index(), s.opposite().index());
             let later_is_male = s.unit().dot(normal) >= 0.0;
@@ -92,11 +92,11 @@ impl<'a> Bars<'a> {
                     earlier[on][other]
                 };
                 if later[on][other] || earlier[back][own] || channel {
-                    barred |= 1 << (order * LatticeDirection::COUNT + on);
+                    blocked |= 1 << (order * LatticeDirection::COUNT + on);
                 }
             }
         }
-        Barred(barred)
+        Blocked(blocked)
     }
 
     /// Which of two patches the ray from `origin`, so far below the surface, along `s` meets, the wall right

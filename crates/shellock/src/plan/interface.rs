@@ -14,15 +14,15 @@
 //! Limits: seams lie on the outer surface, connectors on the inner one, where carving may shift the line;
 //! what else than the two pieces is in a connector's way shows only later.
 
-mod bars;
-mod hold;
+mod blocking;
+mod obstruction;
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
 use shellock_mechanics::{Joint as MechanicalJoint, Meeting, Side, Station};
 
-use bars::{Barred, Bars};
-pub use hold::{HoldTable, Pushes};
+pub use blocking::{BlockingTable, Pushes};
+use obstruction::{Blocked, Obstructions};
 
 use super::PlanParams;
 use crate::seam::rules::{
@@ -46,13 +46,13 @@ pub struct Joint {
     pub usable: f64,
     /// Longest single run of connectors, mm.
     pub run_mm: f64,
-    /// Whether that run is long enough to hold, see [`Contact::count_runs_from`].
+    /// Whether that run is long enough to hold, see [`Interface::count_runs_from`].
     pub holds: bool,
 }
 
 /// Two pieces that touch along seams.
 #[derive(Clone, Debug)]
-pub struct Contact {
+pub struct Interface {
     /// The piece with the lower id.
     pub a: PatchId,
     /// The piece with the higher id.
@@ -63,7 +63,7 @@ pub struct Contact {
     pub size_mm: f64,
     /// By who is later (a, then b) and by direction.
     joints: [[Joint; LatticeDirection::COUNT]; 2],
-    hold: HoldTable,
+    hold: BlockingTable,
 }
 
 /// A short piece of seam, in the frame of connectors.
@@ -76,7 +76,7 @@ struct Sample {
     length_mm: f64,
     /// Whether it is far enough from the ends of an open seam.
     has_room: bool,
-    barred: Barred,
+    blocked: Blocked,
 }
 
 /// The frame of a seam as its later piece sees it: three unit vectors perpendicular to each other.
@@ -132,7 +132,7 @@ pub(crate) fn meeting(
         normal: station.normal,
         across,
     };
-    // Where s leads towards the earlier piece the face between the walls leans, so that it does not bar the
+    // Where s leads towards the earlier piece the face between the walls leans, so that it does not obstruct the
     // way.
     let in_section = s.reject_from_normalized(station.tangent).normalize_or_zero();
     let lean = in_section.dot(across).max(0.0);
@@ -183,7 +183,7 @@ impl Sample {
     }
 }
 
-impl Contact {
+impl Interface {
     /// What joins the two where `later` is installed after the other and leaves along `s`.
     pub fn joint(&self, later: PatchId, s: LatticeDirection) -> &Joint {
         &self.joints[usize::from(later != self.a)][s.index()]
@@ -224,7 +224,7 @@ impl Contact {
         a: PatchId,
         b: PatchId,
         joint: impl Fn(PatchId, LatticeDirection) -> Joint,
-        hold: HoldTable,
+        hold: BlockingTable,
     ) -> Self {
         let joints =
             [a, b].map(|p| std::array::from_fn(|i| joint(p, LatticeDirection::all().nth(i).unwrap())));
@@ -245,10 +245,10 @@ pub fn contacts(
     surface: &SegmentedSurface,
     seams: &[Seam],
     sizes: &ConnectorSizes,
-) -> Vec<Contact> {
-    let bars = Bars::new(params, surface);
+) -> Vec<Interface> {
+    let obstructions = Obstructions::new(params, surface);
     let sampled = |seam: &Seam| {
-        let found = samples(params, sizes.of(seam.a, seam.b), seam, bars.as_ref());
+        let found = samples(params, sizes.of(seam.a, seam.b), seam, obstructions.as_ref());
         (seam.a, seam.b, found, seam.is_loop())
     };
     let mut sampled: Vec<(PatchId, PatchId, Vec<Sample>, bool)> = seams.par_iter().map(sampled).collect();
@@ -267,7 +267,7 @@ fn contact(
     params: &PlanParams,
     size_mm: f64,
     seams: &[(PatchId, PatchId, Vec<Sample>, bool)],
-) -> Option<Contact> {
+) -> Option<Interface> {
     let (a, b, ..) = seams.first()?;
     let length_mm = seams.iter().flat_map(|s| &s.2).map(|s| s.length_mm).sum();
     if length_mm <= 0.0 {
@@ -283,8 +283,8 @@ fn contact(
     });
     let least_mm = SHORTEST_RUN_SIZES * size_mm;
     let holds = |order: usize, s: LatticeDirection| joints[order][s.index()].run_mm >= least_mm;
-    let hold = HoldTable::new(params, size_mm, [*a, *b], &lines, holds);
-    Some(Contact {
+    let hold = BlockingTable::new(params, size_mm, [*a, *b], &lines, holds);
+    Some(Interface {
         a: *a,
         b: *b,
         length_mm,
@@ -314,15 +314,15 @@ impl Way {
         }
     }
 
-    /// Whether there is a rail at `x`. What would bar it has been looked at where the key was cut.
+    /// Whether there is a rail at `x`. What would obstruct it has been looked at where the key was cut.
     fn has_rail(&self, x: &Sample) -> bool {
         self.is_on_rails && x.has_room && x.frame(self.side).carries_rail(self.s.unit())
     }
 
     /// Whether a connector can be made at `x`.
     fn carries(&self, x: &Sample) -> bool {
-        let is_barred = || x.barred.has(usize::from(self.side < 0.0), self.s);
-        self.has_rail(x) || x.has_room && !is_barred() && x.frame(self.side).carries(self.s.unit())
+        let is_blocked = || x.blocked.has(usize::from(self.side < 0.0), self.s);
+        self.has_rail(x) || x.has_room && !is_blocked() && x.frame(self.side).carries(self.s.unit())
     }
 
     /// Weight of Eq. 4 at `x`; a rail is as good as a connector can be.
@@ -384,7 +384,12 @@ fn longest_run_mm(samples: &[Sample], is_loop: bool, way: Way) -> f64 {
 
 /// The seam in steps of about [`SAMPLE_STEP_MM`], each with its frame; lengths are those on the inner side of
 /// the wall.
-fn samples(params: &PlanParams, size_mm: f64, seam: &Seam, bars: Option<&Bars<'_>>) -> Vec<Sample> {
+fn samples(
+    params: &PlanParams,
+    size_mm: f64,
+    seam: &Seam,
+    obstructions: Option<&Obstructions<'_>>,
+) -> Vec<Sample> {
     let n = (seam.length() / SAMPLE_STEP_MM).ceil().max(1.0);
     let stations: Vec<(Vec3, Vec3)> = seam.resampled(n as usize);
     let inner = seam.below(params.wall_mm, seam.length() / n);
@@ -409,16 +414,17 @@ fn samples(params: &PlanParams, size_mm: f64, seam: &Seam, bars: Option<&Bars<'_
         let has_room = middle >= margin && middle <= total - margin;
         // N × u points to the left, where the surface is seen from outside; there lies patch a.
         let across = -normal.cross(tangent);
-        let barred =
-            |bars: &Bars<'_>| bars.at([seam.a, seam.b], size_mm, 0.5 * (w[0].0 + w[1].0), normal, across);
-        let barred = bars.filter(|_| has_room).map(barred).unwrap_or_default();
+        let blocked = |obstructions: &Obstructions<'_>| {
+            obstructions.at([seam.a, seam.b], size_mm, 0.5 * (w[0].0 + w[1].0), normal, across)
+        };
+        let blocked = obstructions.filter(|_| has_room).map(blocked).unwrap_or_default();
         out.push(Sample {
             tangent,
             normal,
             across,
             length_mm,
             has_room,
-            barred,
+            blocked,
         });
     }
     out
@@ -429,7 +435,7 @@ mod tests {
     use super::*;
     use crate::testing::{label, seams, sphere};
 
-    fn cap_contact(height: f64) -> Contact {
+    fn cap_contact(height: f64) -> Interface {
         let surface = label(sphere(5, Vec3::splat(50.0)), 2, |p| u32::from(p.z > height));
         let mut found = contacts(
             &PlanParams::default(),
