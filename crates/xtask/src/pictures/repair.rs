@@ -110,7 +110,7 @@ fn broken() -> Broken {
     let size = bounds.size();
     let turned_at = bounds.min + Vec3::new(0.5, 0.1, 0.3) * size;
     let is_turned = |f: usize| cat.face_center(f).distance(turned_at) < 0.2 * SIZE_MM;
-    let is_missing = |f: usize| f % MISSING == 0;
+    let is_missing = |f: usize| f.is_multiple_of(MISSING);
     let mut mesh = TriMesh {
         points: cat.points.clone(),
         triangles: Vec::new(),
