@@ -150,3 +150,62 @@ fn write(path: &Path, bytes: &[u8]) -> Result<PathBuf, Failure> {
     fs::write(path, bytes).map_err(fault)?;
     Ok(path.to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// All pictures together, and each, bytes.
+    const MOST_IN_ALL: u64 = 1_500_000;
+    const MOST_EACH: u64 = 150_000;
+
+    fn root() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+    }
+
+    /// The texts that may show pictures.
+    fn texts() -> String {
+        let in_folder = |folder: &str| {
+            fs::read_dir(root().join(folder))
+                .unwrap()
+                .map(|e| e.unwrap().path())
+        };
+        let files = in_folder("docs/notes").chain(in_folder("docs/guide"));
+        let files = files.chain(["README.md", "ARCHITECTURE.md"].map(|f| root().join(f)));
+        files.map(|f| fs::read_to_string(f).unwrap()).collect()
+    }
+
+    #[test]
+    fn every_picture_is_made_by_the_command_and_shown_somewhere() {
+        let made: BTreeSet<String> = PICTURES
+            .iter()
+            .filter_map(|p| p.file.strip_prefix("docs/pictures/"))
+            .map(str::to_owned)
+            .collect();
+        let there: BTreeSet<String> = fs::read_dir(root().join("docs/pictures"))
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        assert_eq!(made, there);
+        let texts = texts();
+        let hidden: Vec<&String> = made
+            .iter()
+            .filter(|name| !texts.contains(&format!("pictures/{name}")))
+            .collect();
+        assert!(hidden.is_empty(), "in no text: {hidden:?}");
+    }
+
+    #[test]
+    fn pictures_are_small() {
+        let bytes = |p: &Picture| fs::metadata(root().join(p.file)).unwrap().len();
+        let large: Vec<&str> = PICTURES
+            .iter()
+            .filter(|p| bytes(p) > MOST_EACH)
+            .map(|p| p.file)
+            .collect();
+        assert!(large.is_empty(), "{large:?}");
+        assert!(PICTURES.iter().map(bytes).sum::<u64>() <= MOST_IN_ALL);
+    }
+}
