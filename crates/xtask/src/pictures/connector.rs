@@ -1,4 +1,5 @@
-//! The connector's section over the angle T, and that of a rail: drawn from the parts that pieces are made of.
+//! The connector's section over the angle T, and that of a rail: drawn from the parts that pieces are made
+//! of.
 
 use shellock::connector::{ConnectorParams, Part, RailPart, Section, Shape, Station};
 use shellock_geom::Vec3;
@@ -93,7 +94,8 @@ fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: Shape) {
     // In a rail n leads from the neighbour, which has the tongue, to the key.
     draw(sheet, &parts.male, MALE);
     draw(sheet, &parts.female, FEMALE);
-    // Parts reach into the wall that they hang from; what is in the seam or in the other's wall is carved off.
+    // Parts reach into the wall that they hang from; what is in the seam or in the other's wall is carved
+    // off.
     let slit = [
         [-gap, 0.0],
         [gap, 0.0],

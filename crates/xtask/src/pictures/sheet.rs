@@ -187,8 +187,8 @@ fn middle(cell: usize) -> [u8; 3] {
     [10, 5, 0].map(|shift| ((cell >> shift & 31) * 255 / 31) as u8)
 }
 
-/// Colours that stand for those of a still: boxes of colours, cut in two at the median, the widest and fullest
-/// first [Heckbert 1982].
+/// Colours that stand for those of a still: boxes of colours, cut in two at the median, the widest and
+/// fullest first [Heckbert 1982].
 fn palette(still: &Image, n: usize) -> Vec<[u8; 3]> {
     let mut count = vec![0_u64; 1 << 15];
     still.rgba.chunks_exact(4).for_each(|p| count[cell(p)] += 1);
