@@ -12,7 +12,8 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_render::stills::{Camera, Image, Painted, crease_normals, projection, render};
 use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 
-use crate::pdf::{Color, PAGE_MM, Page, Style, document, width_mm};
+pub use crate::pdf::Color;
+use crate::pdf::{PAGE_MM, Page, Style, document, width_mm};
 use view::{Sight, side, sights};
 
 /// Free rim of a page, mm.
@@ -40,6 +41,20 @@ pub struct Booklet<'a> {
     pub lines: Vec<String>,
     /// Standing on its feet: z is up, and it looks along −y. In any order.
     pub pieces: Vec<ReportPiece<'a>>,
+}
+
+/// A step, as it is drawn in the booklet.
+pub struct Step {
+    /// What is there in grey, and the new piece in its colour, on its way.
+    pub picture: Image,
+    /// Corners of the arrow over the picture, pixels; none where the first piece has no way.
+    pub arrow: Vec<[f64; 2]>,
+    /// Colour and number of the new piece.
+    pub piece: (Color, u32),
+    /// What to do.
+    pub heading: String,
+    /// From where the picture is seen, and whether that is new.
+    pub seen: (String, bool),
 }
 
 /// A piece with what is drawn of it more than once.
@@ -96,15 +111,7 @@ fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2])
 impl Booklet<'_> {
     /// The booklet as a PDF file; the same for the same pieces.
     pub fn pdf(&self) -> Vec<u8> {
-        let mut drawn: Vec<Drawn<'_>> = self
-            .pieces
-            .par_iter()
-            .map(|piece| Drawn {
-                piece,
-                normals: crease_normals(piece.mesh),
-            })
-            .collect();
-        drawn.sort_by_key(|d| d.piece.order);
+        let drawn = self.drawn();
         let mut pages = vec![self.cover(&drawn)];
         pages.extend(pieces_pages(&drawn));
         pages.extend(steps_pages(&drawn));
@@ -117,6 +124,40 @@ impl Booklet<'_> {
             page.text_within([left, PAGE_MM[1] - 8.0], room_mm, style, &foot);
         }
         document(&self.title, pages)
+    }
+
+    /// Its steps alone, in order, for what is no PDF.
+    pub fn steps(&self) -> Vec<Step> {
+        let drawn = self.drawn();
+        let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
+        let sights = sights(&pieces);
+        let step = |i: usize| {
+            let piece = drawn[i].piece;
+            let (picture, way) = step_picture(&drawn, i, &sights[i], step_pixels());
+            // Arrows have sizes in mm.
+            let on_paper = |way: [[f64; 2]; 2]| arrow(way.map(|p| p.map(|px| px / STEP_DENSITY)));
+            let in_pixels = |corner: [f64; 2]| corner.map(|mm| mm * STEP_DENSITY);
+            let arrow = way.map(on_paper).unwrap_or_default();
+            Step {
+                picture,
+                arrow: arrow.into_iter().map(in_pixels).collect(),
+                piece: (piece.color, piece.id),
+                heading: what_to_do(piece, i),
+                seen: seen_from(&sights, i),
+            }
+        };
+        (0..drawn.len()).into_par_iter().map(step).collect()
+    }
+
+    /// The pieces in order.
+    fn drawn(&self) -> Vec<Drawn<'_>> {
+        let drawn = |piece| Drawn {
+            piece,
+            normals: crease_normals(piece.mesh),
+        };
+        let mut drawn: Vec<Drawn<'_>> = self.pieces.par_iter().map(drawn).collect();
+        drawn.sort_by_key(|d| d.piece.order);
+        drawn
     }
 
     fn cover(&self, drawn: &[Drawn<'_>]) -> Page {
@@ -203,13 +244,22 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     pages
 }
 
+/// Width and height of a step's picture, mm.
+fn step_mm() -> [f64; 2] {
+    let cell = cell_mm(STEPS, 0.0);
+    [cell[0] - 4.0, cell[1] - 24.0]
+}
+
+fn step_pixels() -> [usize; 2] {
+    step_mm().map(|mm| (mm * STEP_DENSITY) as usize)
+}
+
 /// One step a picture, and the finished thing.
 fn steps_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
     let sights = sights(&pieces);
     let cell = cell_mm(STEPS, 0.0);
-    let picture_mm = [cell[0] - 4.0, cell[1] - 24.0];
-    let size = picture_mm.map(|mm| (mm * STEP_DENSITY) as usize);
+    let (picture_mm, size) = (step_mm(), step_pixels());
     let step_pictures: Vec<(Image, Option<[[f64; 2]; 2]>)> = (0..drawn.len())
         .into_par_iter()
         .map(|i| step_picture(drawn, i, &sights[i], size))
@@ -247,14 +297,6 @@ fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sigh
         piece.color,
         &piece.id.to_string(),
     );
-    let what = match (i, piece.is_key) {
-        (0, _) => "begin with this piece".to_owned(),
-        (_, true) => format!(
-            "the key, from {}: it locks all",
-            view::side(-Vec3::from(piece.installation_direction))
-        ),
-        _ => format!("from {}", view::side(-Vec3::from(piece.installation_direction))),
-    };
     let room_mm = x + cell_mm(STEPS, 0.0)[0] - 2.0 - (left + 13.0);
     page.text_within(
         [left + 13.0, y + 6.6],
@@ -264,16 +306,27 @@ fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sigh
             is_bold: false,
             color: INK,
         },
-        &what,
+        &what_to_do(piece, i),
     );
+    let (note, is_new) = seen_from(sights, i);
+    let style = if is_new { bold(3.2, ARROW) } else { small(FAINT) };
+    page.text_within([left + 13.0, y + 11.4], room_mm, style, &note);
+}
+
+fn what_to_do(piece: &ReportPiece<'_>, i: usize) -> String {
+    let from = view::side(-Vec3::from(piece.installation_direction));
+    match (i, piece.is_key) {
+        (0, _) => "begin with this piece".to_owned(),
+        (_, true) => format!("the key, from {from}: it locks all"),
+        _ => format!("from {from}"),
+    }
+}
+
+/// From where a step is seen, and whether that is another view than before.
+fn seen_from(sights: &[Sight], i: usize) -> (String, bool) {
     let seen = format!("seen from {}", view::side(-sights[i].direction));
     let is_new = i > 0 && sights[i].direction != sights[i - 1].direction;
-    let (note, style) = if is_new {
-        (format!("turn it: {seen}"), bold(3.2, ARROW))
-    } else {
-        (seen, small(FAINT))
-    };
-    page.text_within([left + 13.0, y + 11.4], room_mm, style, &note);
+    (if is_new { format!("turn it: {seen}") } else { seen }, is_new)
 }
 
 fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {

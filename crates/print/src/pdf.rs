@@ -20,7 +20,7 @@ const BOLD: f64 = 1.06;
 const EFFORT: u8 = 4;
 
 /// sRGB.
-pub(crate) type Color = [u8; 3];
+pub type Color = [u8; 3];
 
 /// How text is set.
 #[derive(Clone, Copy)]

@@ -4,6 +4,9 @@
 //! After Yao, Chen, Xu, Wang, "Modeling, Evaluation and Optimization of Interlocking Shell Pieces", Computer
 //! Graphics Forum 36(7), Pacific Graphics 2017.
 //!
+// Made by `cargo xtask pictures`; in the text itself, so that it needs no address.
+#![doc = include_str!("../doc/kit.svg")]
+//!
 //! ```no_run
 //! use shellock::{Ctx, DesignOutcome, Params, design, figure};
 //!

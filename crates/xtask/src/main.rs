@@ -1,5 +1,5 @@
 //! Tools for working on Shellock that are no part of it: studies of its metrics and searches, as charts and
-//! tables.
+//! tables, goldens, and the pictures of its documentation.
 //!
 //! `cargo xtask --help` lists them.
 
@@ -8,6 +8,7 @@ mod failure;
 mod golden;
 mod metrics;
 mod model;
+mod pictures;
 mod savings;
 mod search;
 mod statistics;
@@ -34,6 +35,8 @@ enum Task {
     Savings(savings::Options),
     /// Compare what the program writes and says with what it wrote and said before, byte by byte
     Golden(golden::Options),
+    /// Make the pictures of the documentation from a kit of the program's own
+    Pictures(pictures::Options),
 }
 
 fn main() -> ExitCode {
@@ -41,6 +44,7 @@ fn main() -> ExitCode {
         Task::Study(options) => study::run(&options),
         Task::Savings(options) => savings::run(&options),
         Task::Golden(options) => golden::run(&options),
+        Task::Pictures(options) => pictures::run(&options),
     };
     match made {
         Ok(files) => {

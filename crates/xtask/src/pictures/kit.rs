@@ -1,0 +1,143 @@
+//! The kit that is shown.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+use shellock::connector::ConnectorParams;
+use shellock::design::{Params, Settings, Thickness};
+use shellock::figure::{self, Figure};
+use shellock::sizes::{SizeChoice, SizeRange};
+use shellock::{Design, DesignOutcome, PatchId, design};
+use shellock_geom::{Solid, TriMesh, Vec3};
+use shellock_print::Printer;
+use shellock_render::stills::{Painted, crease_normals};
+use shellock_render::{ReportPiece, palette};
+
+use crate::failure::Failure;
+use crate::model::with_ctx;
+
+/// Size of the figure, and of its triangles as a share of that: those of `shellock demo`.
+const SIZE_MM: f64 = 150.0;
+const CELLS: f64 = 94.0;
+
+/// The options that `shellock demo` has where none is given.
+fn params() -> Params {
+    let printer = Printer::sla();
+    let mut params = Params::default();
+    params.thickness = Thickness::Auto;
+    // Ten seconds' worth, as the command line counts them.
+    params.proof_budget = 200_000;
+    params.material = printer.material;
+    params.wall_gap_mm = printer.wall_gap_mm;
+    params.connector = ConnectorParams {
+        size: SizeChoice::Auto(SizeRange::default()),
+        clearance_mm: printer.clearance_mm,
+        key_clearance_mm: printer.key_clearance_mm,
+        min_wall_mm: printer.min_wall_mm,
+        ..ConnectorParams::default()
+    };
+    params
+}
+
+/// A finished kit with its pieces as they stand.
+pub struct Kit {
+    pub design: Design,
+    /// What it was made with, the thickness of its wall included.
+    pub settings: Settings,
+    /// The model as it was given.
+    pub model: Solid,
+    /// One a piece, z up.
+    pub meshes: Vec<TriMesh>,
+    normals: Vec<Vec<[Vec3; 3]>>,
+}
+
+impl Kit {
+    /// The squirrel of `shellock demo`.
+    pub fn squirrel() -> Result<Self, Failure> {
+        let fault = |problem: String| Failure::Model {
+            path: PathBuf::from("squirrel"),
+            problem,
+        };
+        let model = figure::make(Figure::Squirrel, SIZE_MM, SIZE_MM / CELLS);
+        let params = params();
+        let outcome = with_ctx(|ctx| design(ctx, &params, &model, None)).map_err(|e| fault(e.to_string()))?;
+        let design = match outcome {
+            DesignOutcome::Made(design) if design.kit.verification.passed() => *design,
+            DesignOutcome::Made(_) => return Err(fault("its kit fails a check".into())),
+            DesignOutcome::NoPlan { reason, .. } => return Err(fault(reason)),
+        };
+        let settings = Settings::with_thickness(&params, design.kit.thickness_mm);
+        let back = design.turn.inverse();
+        let meshes: Vec<TriMesh> = design
+            .kit
+            .pieces
+            .as_slice()
+            .iter()
+            .map(|m| back.mesh(m))
+            .collect();
+        let normals = meshes.par_iter().map(crease_normals).collect();
+        Ok(Self {
+            design,
+            settings,
+            model,
+            meshes,
+            normals,
+        })
+    }
+
+    /// From assembly space to the model as it stands.
+    pub fn stand(&self, v: Vec3) -> Vec3 {
+        self.design.turn.inverse().apply(v)
+    }
+
+    pub fn standing(&self, mesh: &TriMesh) -> TriMesh {
+        self.design.turn.inverse().mesh(mesh)
+    }
+
+    pub fn ids(&self) -> impl Iterator<Item = PatchId> {
+        self.design.kit.pieces.ids()
+    }
+
+    /// Pieces in order of installation.
+    pub fn in_order(&self) -> Vec<PatchId> {
+        self.design.kit.plan.steps.iter().map(|s| s.piece).collect()
+    }
+
+    pub fn color(&self, piece: PatchId) -> [u8; 3] {
+        palette::color(self.design.kit.plan.position(piece))
+    }
+
+    /// The way out of a piece as it stands, a unit vector.
+    pub fn way_out(&self, piece: PatchId) -> Vec3 {
+        self.stand(self.design.kit.plan.separation(piece).unit())
+    }
+
+    /// A piece as it stands, moved by `shift`.
+    pub fn painted(&self, piece: PatchId, shift: Vec3) -> Painted<'_> {
+        let i = usize::from(piece);
+        Painted {
+            mesh: &self.meshes[i],
+            color: self.color(piece),
+            face_colors: None,
+            normals: Some(&self.normals[i]),
+            shift,
+        }
+    }
+
+    /// As the page and the booklet take them.
+    pub fn report_pieces(&self) -> Vec<ReportPiece<'_>> {
+        let plan = &self.design.kit.plan;
+        self.ids()
+            .map(|p| ReportPiece {
+                id: p.0,
+                name: format!("piece {p}"),
+                color: self.color(p),
+                mesh: &self.meshes[usize::from(p)],
+                installation_direction: (-self.way_out(p)).to_array(),
+                order: plan.position(p),
+                is_key: plan.key() == p,
+                facts: Vec::new(),
+            })
+            .collect()
+    }
+}
