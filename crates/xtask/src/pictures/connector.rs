@@ -1,7 +1,7 @@
 //! The connector's section over the angle T, and that of a rail: drawn from the parts that pieces are made
 //! of.
 
-use shellock::connector::{ConnectorParams, Part, RailPart, Section, Shape, Station};
+use shellock::connector::{ConnectorParams, Part, RailPart, RunShape, RunStation, Section};
 use shellock_geom::Vec3;
 
 use super::sheet::{Sheet, WIDTH};
@@ -23,10 +23,10 @@ const THIN: &str = "stroke=\"#333\" stroke-width=\"0.8\"";
 pub fn profiles() -> String {
     const CELL: [f64; 2] = [WIDTH / 3.0, 212.0];
     let mut sheet = Sheet::new(2.0 * CELL[1] + 34.0);
-    let seams = ANGLES.map(|degrees| (degrees, Shape::Seam));
+    let seams = ANGLES.map(|degrees| (degrees, RunShape::Seam));
     for (i, (degrees, shape)) in seams
         .into_iter()
-        .chain([(0.0, Shape::Rail(RailPart::Full))])
+        .chain([(0.0, RunShape::Rail(RailPart::Full))])
         .enumerate()
     {
         let at = [
@@ -35,7 +35,7 @@ pub fn profiles() -> String {
         ];
         section(&mut sheet, at, degrees, shape);
         let words = match (degrees, shape) {
-            (_, Shape::Rail(_)) => "rail: tongue left, key right".to_owned(),
+            (_, RunShape::Rail(_)) => "rail: tongue left, key right".to_owned(),
             (d, _) if d < 0.0 => format!("T = \u{2212}{}°, forward", -d),
             (0.0, _) => "T = 0°, straight out".to_owned(),
             (d, _) => format!("T = {d}°, backward"),
@@ -64,7 +64,7 @@ fn legend(sheet: &mut Sheet, [x, y]: [f64; 2], fill: &str, words: &str) {
 }
 
 /// A section with its seam on the wall's inner side at `at`.
-fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: Shape) {
+fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: RunShape) {
     let params = ConnectorParams::default();
     let station = station(degrees, shape, &params);
     // x across the seam towards the female, y outwards; the inner side of the wall is y = 0.
@@ -77,8 +77,8 @@ fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: Shape) {
         }
     };
     let lean = match shape {
-        Shape::Rail(_) => 0.0,
-        Shape::Seam => station.theta.max(0.0).tan(),
+        RunShape::Rail(_) => 0.0,
+        RunShape::Seam => station.theta.max(0.0).tan(),
     };
     let gap = 0.5 * params.clearance_mm;
     let wall = |side: f64| {
@@ -107,13 +107,13 @@ fn section(sheet: &mut Sheet, at: [f64; 2], degrees: f64, shape: Shape) {
     sheet.polygon(&wall(1.0), FEMALE, "");
     let outside = on_sheet([-HALF_MM, WALL_MM + 0.18]);
     shellock_render::svg::text(&mut sheet.0, outside, "fill=\"#555\" font-size=\"12\"", "outside");
-    if shape == Shape::Seam {
+    if shape == RunShape::Seam {
         arrow(sheet, &station, &on_sheet);
     }
 }
 
 /// ŝ, from the male's side of the cavity.
-fn arrow(sheet: &mut Sheet, station: &Station, on_sheet: &impl Fn([f64; 2]) -> [f64; 2]) {
+fn arrow(sheet: &mut Sheet, station: &RunStation, on_sheet: &impl Fn([f64; 2]) -> [f64; 2]) {
     // Beside the channel: it leans to the other side where ŝ is backward.
     let foot = if station.theta > 0.1 {
         [3.2, -3.2]
@@ -136,12 +136,12 @@ fn arrow(sheet: &mut Sheet, station: &Station, on_sheet: &impl Fn([f64; 2]) -> [
     sheet.polygon(&head, "#ce2c1e", "");
 }
 
-fn station(degrees: f64, shape: Shape, params: &ConnectorParams) -> Station {
+fn station(degrees: f64, shape: RunShape, params: &ConnectorParams) -> RunStation {
     let theta = degrees.to_radians();
     let (sin, cos) = theta.sin_cos();
     let (to_female, outwards) = (Vec3::X, Vec3::Y);
-    let is_rail = shape != Shape::Seam;
-    Station {
+    let is_rail = shape != RunShape::Seam;
+    RunStation {
         point: Vec3::ZERO,
         tangent: Vec3::Z,
         n: if is_rail {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use shellock::figure::{self, Figure};
-use shellock_geom::repair::{Mended, Mending, mend};
+use shellock_geom::repair::{RepairMode, Repaired, repair};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_render::stills::{Camera, Painted, render};
 use shellock_testkit::shapes;
@@ -37,17 +37,17 @@ pub fn before_and_after() -> Result<Vec<u8>, Failure> {
         path: PathBuf::from("broken cat"),
         problem,
     };
-    let Mended { solid, repairs, .. } =
-        mend(&broken.mesh, Mending::Repair).map_err(|e| fault(e.to_string()))?;
-    let mended = solid.into_mesh();
-    let all = vec![PALE; mended.triangles.len()];
+    let Repaired { solid, repairs, .. } =
+        repair(&broken.mesh, RepairMode::Repair).map_err(|e| fault(e.to_string()))?;
+    let repaired = solid.into_mesh();
+    let all = vec![PALE; repaired.triangles.len()];
     const VIEW: [f64; 2] = [WIDTH / 4.0, 270.0];
     let top = 30.0;
     let said: Vec<String> = repairs.iter().flat_map(|r| lines(&format!("– {r}"))).collect();
     let height = top + VIEW[1] + 20.0 * said.len() as f64 + 70.0;
     let mut sheet = Sheet::new(height);
-    let middle = mended.bounds().center();
-    for (i, (mesh, colors)) in [(&broken.mesh, &broken.colors), (&mended, &all)]
+    let middle = repaired.bounds().center();
+    for (i, (mesh, colors)) in [(&broken.mesh, &broken.colors), (&repaired, &all)]
         .into_iter()
         .enumerate()
     {
@@ -63,7 +63,7 @@ pub fn before_and_after() -> Result<Vec<u8>, Failure> {
                 face_colors: Some(&colors),
                 ..plain(&half, PALE)
             }];
-            let frame = Some(mended.bounds().grown(3.0));
+            let frame = Some(repaired.bounds().grown(3.0));
             render(
                 &scene,
                 &Camera { frame, ..camera },
@@ -75,7 +75,7 @@ pub fn before_and_after() -> Result<Vec<u8>, Failure> {
         sheet.still([left, top], seen(&|_| true, Camera::front()));
         let from_side = Camera::along(Vec3::new(1.0, 0.25, -0.2), Vec3::Z);
         sheet.still([left + VIEW[0], top], seen(&is_behind, from_side));
-        let title = ["as read", "mended"][i];
+        let title = ["as read", "repaired"][i];
         sheet.amid([left + 0.5 * VIEW[0], 20.0], title);
         sheet.amid([left + 1.5 * VIEW[0], 20.0], &format!("{title}, cut open"));
     }
