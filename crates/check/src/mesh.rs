@@ -284,17 +284,9 @@ pub mod tests {
 
     /// A box between two corners.
     pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
-        let corner = |i: usize| std::array::from_fn(|k| if i >> k & 1 == 1 { max[k] } else { min[k] });
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let halves = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
-        Mesh::new(halves.map(|t| t.map(corner)).collect())
+        let (points, triangles) = shellock_testkit::plain::cuboid(min.into(), max.into());
+        let corner = |i: u32| points[i as usize].to_array();
+        Mesh::new(triangles.into_iter().map(|t| t.map(corner)).collect())
     }
 
     /// A box with a hollow inside, half sides in mm, around the origin.

@@ -15,22 +15,14 @@ use shellock::verify::{Assembly, VerifyParams, examine};
 use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
 use shellock_check::{Finding, Verdict, check};
 use shellock_formats::write_stl_binary;
-use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
+use shellock_geom::{Solid, TriMesh, Vec3, Volume};
+use shellock_testkit::shapes::{ALL, PinnedLid, as_written, brick, room};
 
 const CLEARANCE_MM: f64 = 0.1;
 const RIM_MM: f64 = 1.0;
-const ALL: [f64; 2] = [0.0, 30.0];
-
-fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
-    Volume::cuboid(Aabb {
-        min: Vec3::new(x[0], y[0], z[0]),
-        max: Vec3::new(x[1], y[1], z[1]),
-    })
-}
 
 fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
-    let wide = |[low, high]: [f64; 2]| [low - CLEARANCE_MM, high + CLEARANCE_MM];
-    cuboid(wide(x), wide(y), wide(z))
+    room([x, y, z], CLEARANCE_MM)
 }
 
 /// A cube in three parts: a base with a T-shaped groove, a lid whose tongue slides in along −x, and a pin
@@ -41,22 +33,12 @@ fn parts() -> [Volume; 3] {
 
 /// The same with lips that reach over the tongue's foot by so much.
 fn parts_with_lips(lip_mm: f64) -> [Volume; 3] {
-    let stem = ([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]);
-    let foot = ([10.0, 30.0], [11.0 - lip_mm, 19.0 + lip_mm], [5.0, 9.0]);
-    let pin = ([17.0, 24.0], [13.0, 17.0]);
-    let hole = grown(pin.0, pin.1, [1.0, 40.0]);
-    let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([p.0[0], 40.0], p.1, p.2);
-    let base = cuboid(ALL, ALL, [0.0, 15.0 - CLEARANCE_MM]);
-    let tongue = [cuboid(stem.0, stem.1, stem.2), cuboid(foot.0, foot.1, foot.2)];
-    let lid = Volume::union_all([vec![cuboid(ALL, ALL, [15.0, 30.0])], tongue.into()].concat());
-    let base = base.subtract(&open(stem)).subtract(&open(foot)).subtract(&hole);
-    [base, lid.subtract(&hole), cuboid(pin.0, pin.1, [1.0, 30.0])]
-}
-
-fn as_written(v: &Volume) -> TriMesh {
-    let mut mesh = v.to_mesh();
-    mesh.points.iter_mut().for_each(|p| *p = p.as_vec3().as_dvec3());
-    mesh
+    let lid = PinnedLid {
+        gap_mm: CLEARANCE_MM,
+        lip_mm,
+        ..PinnedLid::default()
+    };
+    lid.parts()
 }
 
 fn sha256(bytes: &[u8]) -> String {
@@ -95,7 +77,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
         steps: steps.collect(),
     };
     let (report, stop) = (|_: shellock::context::Progress<'_>| {}, AtomicBool::new(false));
-    let model = Solid::new(cuboid(ALL, ALL, ALL).to_mesh()).unwrap();
+    let model = Solid::new(brick(ALL, ALL, ALL).to_mesh()).unwrap();
     let params = VerifyParams {
         clearance_mm: CLEARANCE_MM,
         seed: 0,
@@ -227,7 +209,11 @@ fn a_piece_moved_by_less_than_a_clearance_or_two_is_off_its_contacts() {
 #[test]
 fn a_piece_without_its_connector_is_off_its_contacts() {
     let lost = refuted(|folder, certificate, _| {
-        let bare = parts()[1].intersect(&cuboid([-1.0, 31.0], [-1.0, 31.0], [15.0, 31.0]));
+        let bare = parts()[1].intersect(&brick(
+            [-1.0, 31.0],
+            [-1.0, 31.0],
+            [15.0 + 0.5 * CLEARANCE_MM, 31.0],
+        ));
         replace(folder, certificate, 1, &bare);
     });
     assert!(
@@ -336,7 +322,7 @@ fn an_open_piece_and_overlapping_pieces_are_refuted() {
             folder,
             certificate,
             2,
-            &cuboid([16.0, 25.0], [12.0, 18.0], [1.0, 30.0]),
+            &brick([16.0, 25.0], [12.0, 18.0], [1.0, 30.0]),
         );
     });
     assert!(
@@ -349,7 +335,7 @@ fn an_open_piece_and_overlapping_pieces_are_refuted() {
 #[test]
 fn a_piece_in_two_halves_or_with_something_inside_is_refuted() {
     let sawn = refuted(|folder, certificate, _| {
-        let slab = cuboid([-1.0, 31.0], [24.0, 24.5], [-1.0, 31.0]);
+        let slab = brick([-1.0, 31.0], [24.0, 24.5], [-1.0, 31.0]);
         replace(folder, certificate, 0, &parts()[0].subtract(&slab));
     });
     assert_eq!(sawn, [BODIES]);
@@ -358,7 +344,7 @@ fn a_piece_in_two_halves_or_with_something_inside_is_refuted() {
             folder,
             certificate,
             0,
-            &parts()[0].subtract(&cuboid([1.0, 5.0], [1.0, 5.0], [1.0, 4.0])),
+            &parts()[0].subtract(&brick([1.0, 5.0], [1.0, 5.0], [1.0, 4.0])),
         );
     });
     assert_eq!(hollow, [BODIES]);
@@ -409,12 +395,12 @@ fn a_kit_that_failed_or_has_wide_gaps_or_files_elsewhere_is_refuted() {
 /// A peg in a cup is the key; the lid beside them lies loose, and is the first piece.
 #[test]
 fn a_first_piece_that_comes_off_is_not_certified() {
-    let cup = cuboid([0.0, 20.0], [0.0, 20.0], [0.0, 20.0]);
+    let cup = brick([0.0, 20.0], [0.0, 20.0], [0.0, 20.0]);
     let peg = ([5.0, 15.0], [5.0, 15.0]);
     let pieces = [
-        cuboid([30.0, 50.0], [0.0, 20.0], [0.0, 5.0]),
+        brick([30.0, 50.0], [0.0, 20.0], [0.0, 5.0]),
         cup.subtract(&grown(peg.0, peg.1, [2.0, 40.0])),
-        cuboid(peg.0, peg.1, [2.0, 20.0]),
+        brick(peg.0, peg.1, [2.0, 20.0]),
     ];
     let made = made_of(&pieces, &[Vec3::X, Vec3::X, Vec3::Z]);
     let folder = tempfile::tempdir().unwrap();
@@ -497,12 +483,18 @@ fn what_is_done_to_a_piece_refutes_its_play() {
         }
         Volume::from_closed_mesh(&mesh).unwrap()
     });
-    let filed = by(&|lid| lid.intersect(&cuboid([-1.0, 31.0], [-1.0, 31.0], [15.0, 31.0])));
+    let filed = by(&|lid| {
+        lid.intersect(&brick(
+            [-1.0, 31.0],
+            [-1.0, 31.0],
+            [15.0 + 0.5 * CLEARANCE_MM, 31.0],
+        ))
+    });
     // Twice the gap on the tongue's sides.
     let slim = by(&|lid| {
         let sides = [[6.0, 7.0 + CLEARANCE_MM], [23.0 - CLEARANCE_MM, 24.0]];
         sides.iter().fold(lid.clone(), |lid, y| {
-            lid.subtract(&cuboid([-1.0, 31.0], *y, [4.0, 9.5]))
+            lid.subtract(&brick([-1.0, 31.0], *y, [4.0, 9.5]))
         })
     });
     for lost in [turned, filed, slim] {

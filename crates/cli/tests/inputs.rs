@@ -8,8 +8,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 use shellock_formats::{write_ply, write_stl_binary};
-use shellock_geom::subdivide::halve_edges;
-use shellock_geom::{Solid, Topology, TriMesh, Vec3};
+use shellock_geom::{TriMesh, Vec3};
+use shellock_testkit::shapes;
 
 fn shellock(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_shellock"))
@@ -21,26 +21,7 @@ fn shellock(folder: &Path, args: &[&str]) -> Output {
 
 /// A ball of 512 triangles, 60 mm wide, around `center`.
 fn ball(center: Vec3) -> TriMesh {
-    let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    let triangles = vec![
-        [0, 2, 4],
-        [2, 1, 4],
-        [1, 3, 4],
-        [3, 0, 4],
-        [2, 0, 5],
-        [1, 2, 5],
-        [3, 1, 5],
-        [0, 3, 5],
-    ];
-    let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
-    for _ in 0..3 {
-        solid = halve_edges(&solid, &Topology::new(&solid), |_, _| true).0;
-    }
-    let mut mesh = solid.into_mesh();
-    mesh.points
-        .iter_mut()
-        .for_each(|p| *p = center + 30.0 * p.normalize());
-    mesh
+    shapes::ball(3, center, 30.0)
 }
 
 fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {

@@ -5,34 +5,16 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use shellock_formats::write_stl_binary;
-use shellock_geom::{Aabb, Vec3, Volume};
+use shellock_testkit::shapes::PinnedLid;
 
-fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
-    let corner = |k: usize| Vec3::new(x[k], y[k], z[k]);
-    Volume::cuboid(Aabb {
-        min: corner(0),
-        max: corner(1),
-    })
-}
-
-/// A rail, a slider on it that goes along x, and a pin through both from above that reaches down to `pin_z`.
+/// A base, a lid that slides along x, and a pin through both from above that reaches down to `pin_z`.
 fn write_pieces(folder: &Path, pin_z: f64) {
-    let (all, foot) = ([0.0, 30.0], [5.0, 9.0]);
-    let groove = cuboid([-1.0, 31.0], [6.9, 23.1], [4.9, 9.1]);
-    let neck = cuboid([-1.0, 31.0], [10.9, 19.1], [8.0, 20.0]);
-    let hole = cuboid([11.9, 18.1], [12.9, 17.1], [pin_z - 0.1, 40.0]);
-    let rail = cuboid(all, all, [0.0, 14.95])
-        .subtract(&groove)
-        .subtract(&neck)
-        .subtract(&hole);
-    let slider = Volume::union_all(vec![
-        cuboid(all, all, [15.05, 25.0]),
-        cuboid(all, [11.0, 19.0], [8.0, 16.0]),
-        cuboid(all, [7.0, 23.0], foot),
-    ])
-    .subtract(&hole);
-    let pin = cuboid([12.0, 18.0], [13.0, 17.0], [pin_z, 25.0]);
-    for (name, piece) in [("rail.stl", rail), ("slider.stl", slider), ("pin.stl", pin)] {
+    let lid = PinnedLid {
+        gap_mm: 0.1,
+        pin: [[12.0, 18.0], [13.0, 17.0], [pin_z, 30.0]],
+        ..PinnedLid::default()
+    };
+    for (name, piece) in ["rail.stl", "slider.stl", "pin.stl"].into_iter().zip(lid.parts()) {
         fs::write(folder.join(name), write_stl_binary(&piece.to_mesh())).unwrap();
     }
 }

@@ -6,13 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use shellock_geom::Vec3;
 use shellock_geom::weld::weld;
-
-fn tetrahedron() -> TriMesh {
-    TriMesh {
-        points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
-        triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
-    }
-}
+use shellock_testkit::shapes::tetrahedron;
 
 fn ascii_stl(mesh: &TriMesh, name: &str) -> String {
     let mut text = format!("solid {name}\n");

@@ -11,17 +11,14 @@ use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
+use shellock_testkit::shapes::contoured_ball;
 
 fn main() {
     divan::main();
 }
 
 fn ball() -> Solid {
-    let bounds = Aabb {
-        min: Vec3::splat(-51.0),
-        max: Vec3::splat(51.0),
-    };
-    Solid::new(dense(bounds, 1.0, |p| 50.0 - p.length())).expect("a ball is closed")
+    Solid::new(contoured_ball(50.0, 1.0)).expect("a ball is closed")
 }
 
 fn band(solid: &Solid) -> (Band, Vec<f32>) {

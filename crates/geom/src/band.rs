@@ -358,7 +358,8 @@ impl BandRule<'_> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::{Solid, Volume};
+    use crate::Solid;
+    use crate::samples::cuboid;
 
     /// The band of the cube [0, 8]³ with h = 0.5, and its distance field.
     pub(crate) fn cube_band() -> (Band, Vec<f32>) {
@@ -366,7 +367,7 @@ pub(crate) mod tests {
             min: Vec3::ZERO,
             max: Vec3::splat(8.0),
         };
-        let solid = Solid::new(Volume::cuboid(b).to_mesh()).unwrap();
+        let solid = Solid::new(cuboid(b.min, b.max).to_mesh()).unwrap();
         Band::along(&SignedDistance::new(&solid), b, 0.5, 1.3, 2.6, 2.6).unwrap()
     }
 

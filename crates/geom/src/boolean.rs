@@ -417,9 +417,10 @@ fn as_gl(mesh: &TriMesh) -> MeshGL64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::samples::cuboid;
 
     fn cube(min: Vec3, size: f64) -> Volume {
-        Volume::cuboid(Aabb { min, max: min + size })
+        cuboid(min, min + size)
     }
 
     #[test]

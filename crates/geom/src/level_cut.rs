@@ -104,15 +104,12 @@ fn parts_of(t: [u32; 3], split: [Option<u32>; 3]) -> Vec<[u32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Aabb, Solid, Vec3, Volume};
+    use crate::Solid;
+    use crate::samples::cuboid;
 
     #[test]
     fn cutting_keeps_the_surface_closed_and_its_area() {
-        let mesh = Volume::cuboid(Aabb {
-            min: Vec3::ZERO,
-            max: Vec3::splat(2.0),
-        })
-        .to_mesh();
+        let mesh = cuboid([0.0; 3], [2.0; 3]).to_mesh();
         let first = cut_at_zero(
             &mesh,
             &mesh

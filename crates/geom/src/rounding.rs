@@ -178,16 +178,10 @@ fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Aabb;
+    use crate::samples::cuboid;
 
     #[test]
     fn a_body_loses_its_chips_and_its_slivers_of_hollow() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| {
-            Volume::cuboid(Aabb {
-                min: min.into(),
-                max: max.into(),
-            })
-        };
         let body = cuboid([0.0; 3], [9.0; 3]);
         let hollow = body
             .subtract(&cuboid([4.0; 3], [4.01, 4.1, 5.0]))
@@ -199,14 +193,8 @@ mod tests {
 
     #[test]
     fn boxes_that_touch_along_an_edge_come_apart() {
-        let a = Volume::cuboid(Aabb {
-            min: Vec3::ZERO,
-            max: Vec3::ONE,
-        });
-        let b = Volume::cuboid(Aabb {
-            min: Vec3::new(1.0, 1.0, 0.0),
-            max: Vec3::new(2.0, 2.0, 1.0),
-        });
+        let a = cuboid(Vec3::ZERO, Vec3::ONE);
+        let b = cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0]);
         let both = a.union(&b);
         let mesh = printable(&both).unwrap();
         assert!(coincident(&mesh).is_empty());
@@ -215,10 +203,7 @@ mod tests {
 
     #[test]
     fn coordinates_are_exactly_what_32_bits_hold() {
-        let v = Volume::cuboid(Aabb {
-            min: Vec3::splat(0.1),
-            max: Vec3::splat(140.3),
-        });
+        let v = cuboid([0.1; 3], [140.3; 3]);
         for p in &printable(&v).unwrap().points {
             assert!(p.to_array().iter().all(|&x| f64::from(x as f32) == x));
         }

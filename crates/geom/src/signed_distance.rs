@@ -93,7 +93,8 @@ fn faces_across(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Aabb, Volume};
+    use crate::Aabb;
+    use crate::samples::cuboid;
 
     #[test]
     fn distances_to_a_box_are_exact_with_their_sign() {
@@ -101,7 +102,7 @@ mod tests {
             min: Vec3::ZERO,
             max: Vec3::new(4.0, 3.0, 2.0),
         };
-        let solid = Solid::new(Volume::cuboid(b).to_mesh()).unwrap();
+        let solid = Solid::new(cuboid(b.min, b.max).to_mesh()).unwrap();
         let field = SignedDistance::new(&solid);
         for i in 0..1000 {
             let p = Vec3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)) * 0.71 - 1.3;

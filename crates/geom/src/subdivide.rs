@@ -92,14 +92,11 @@ pub fn fill_triangle([a, b, c]: [u32; 3], on_sides: [&[u32]; 3], out: &mut Vec<[
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::samples::tetrahedron;
 
     #[test]
     fn halving_keeps_area_and_volume_whatever_edges_are_chosen() {
-        let solid = Solid::new(TriMesh {
-            points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
-        })
-        .unwrap();
+        let solid = Solid::new(tetrahedron()).unwrap();
         let topology = Topology::new(&solid);
         for chosen in 0..64u32 {
             let edges = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];

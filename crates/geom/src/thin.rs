@@ -77,16 +77,10 @@ pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Aabb, Volume};
+    use crate::samples::cuboid;
 
     #[test]
     fn a_fin_on_a_block_is_found_with_its_thickness_and_both_sides() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| {
-            Volume::cuboid(Aabb {
-                min: min.into(),
-                max: max.into(),
-            })
-        };
         let mesh = cuboid([0.0; 3], [10.0; 3])
             .union(&cuboid([0.0, 4.0, 10.0], [10.0, 4.5, 20.0]))
             .to_mesh();

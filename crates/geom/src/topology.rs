@@ -104,15 +104,11 @@ pub fn components(topology: &Topology, joined: impl Fn(u32, u32) -> bool) -> (Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Vec3;
+    use crate::samples::tetrahedron;
 
     #[test]
     fn every_edge_has_two_sides_that_run_opposite_ways() {
-        let solid = Solid::new(TriMesh {
-            points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
-        })
-        .unwrap();
+        let solid = Solid::new(tetrahedron()).unwrap();
         let topology = Topology::new(&solid);
         for h in 0..12 {
             assert_eq!(topology.opposite(topology.opposite(h)), h);

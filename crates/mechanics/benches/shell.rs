@@ -14,25 +14,7 @@ fn main() {
 }
 
 fn torus() -> TriMesh {
-    let [n, m] = CELLS;
-    let point = |i: u32, j: u32| {
-        let (around, tube) = (
-            TURN * f64::from(i) / f64::from(n),
-            TURN * f64::from(j) / f64::from(m),
-        );
-        let radius = 50.0 + 25.0 * tube.cos();
-        Vec3::new(radius * around.cos(), radius * around.sin(), 25.0 * tube.sin())
-    };
-    let cells = || (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
-    let at = |i: u32, j: u32| i % n * m + j % m;
-    let triangles = cells().flat_map(|(i, j)| {
-        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    });
-    TriMesh {
-        points: cells().map(|(i, j)| point(i, j)).collect(),
-        triangles: triangles.collect(),
-    }
+    shellock_testkit::shapes::torus(50.0, 25.0, CELLS)
 }
 
 /// A push on the lower tenth along each of [`N_CASES`] directions, held at the upper tenth.

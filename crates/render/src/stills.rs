@@ -286,11 +286,7 @@ mod tests {
     use super::*;
 
     fn ball() -> TriMesh {
-        let bounds = Aabb {
-            min: Vec3::splat(-10.0),
-            max: Vec3::splat(10.0),
-        };
-        shellock_geom::contour::contour(bounds, 0.5, |p| 10.0 - p.length())
+        shellock_testkit::shapes::contoured_ball(10.0, 0.5)
     }
 
     #[test]

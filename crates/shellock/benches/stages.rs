@@ -1,5 +1,7 @@
 //! Stages and the whole job on the squirrel at 150 mm.
 
+mod made;
+
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
@@ -7,11 +9,19 @@ use divan::{Bencher, black_box};
 use shellock::body::{BodyParams, PatchDistances, ShellGrid};
 use shellock::design::{Params, design};
 use shellock::figure::{Figure, make};
-use shellock::plan::{PlanConstraints, PlanParams, search, survey};
+use shellock::key::{KeyParams, sites};
+use shellock::plan::{PlanConstraints, PlanOutcome, PlanParams, search, survey};
 use shellock::segmentation::{SegmentationParams, segment};
 use shellock::strength::{self, StrengthParams};
-use shellock::{ConnectorSizes, Ctx, SegmentedSurface};
+use shellock::verify::clearance::kit_gaps;
+use shellock::verify::examine;
+use shellock::{ConnectorSizes, Ctx, InstallationStep, SegmentedSurface, metric};
 use shellock_geom::Solid;
+use shellock_render::ReportPiece;
+use shellock_render::palette::color;
+use shellock_render::pieces_picture;
+
+use made::Made;
 
 fn main() {
     divan::main();
@@ -79,4 +89,94 @@ fn whole_job(bencher: Bencher) {
         let ctx = Ctx::new(&|_| {}, &STOP);
         design(&ctx, &Params::default(), squirrel(), None).is_ok()
     });
+}
+
+/// The kit that the stages from the wall on are measured with.
+fn kit() -> &'static Made {
+    static KIT: OnceLock<Made> = OnceLock::new();
+    KIT.get_or_init(|| Made::new(squirrel(), surface()))
+}
+
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn key_search(bencher: Bencher) {
+    let surface = surface();
+    let params = KeyParams {
+        piece_mm2: surface.mesh.area() / surface.n_patches as f64,
+        ..KeyParams::default()
+    };
+    bencher.bench_local(|| sites(&Ctx::quiet(), &params, black_box(&surface)));
+}
+
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn choice_of_plan(bencher: Bencher) {
+    let surface = surface();
+    let (params, sizes) = (PlanParams::default(), ConnectorSizes::default());
+    let ctx = Ctx::quiet();
+    let tables = survey(&ctx, &params, &surface, &surface.seams(), &sizes).expect("not stopped");
+    let outcome = search(&ctx, &params, &tables, &PlanConstraints::default()).expect("not stopped");
+    let PlanOutcome::Found(found) = outcome else {
+        panic!("the squirrel has a plan");
+    };
+    bencher
+        .with_inputs(|| (*found).clone())
+        .bench_local_values(|found| metric::choose(&ctx, &params, &surface, &sizes, found).is_ok());
+}
+
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn body(bencher: Bencher) {
+    let k = kit();
+    bencher.bench_local(|| made::split(&k.settings, &k.surface, &k.sizes, &k.grid, &k.distances, &k.plan));
+}
+
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn connectors(bencher: Bencher) {
+    let k = kit();
+    bencher.bench_local(|| made::runs(&k.settings, &k.sizes, &k.grid, &k.shell, &k.plan));
+}
+
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn pieces(bencher: Bencher) {
+    let k = kit();
+    bencher.bench_local(|| {
+        made::finish(
+            &k.settings,
+            &k.surface,
+            &k.sizes,
+            &k.grid,
+            &k.shell,
+            &k.plan,
+            &k.runs,
+        )
+    });
+}
+
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn verification(bencher: Bencher) {
+    let k = kit();
+    let assembly = k.assembly(squirrel());
+    bencher.bench_local(|| examine(&Ctx::quiet(), &k.settings.verify, black_box(&assembly)));
+}
+
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn gaps(bencher: Bencher) {
+    let k = kit();
+    let (model, rim_mm) = (Some(squirrel()), k.settings.body.rim_mm);
+    bencher.bench_local(|| kit_gaps(&Ctx::quiet(), model, &k.finished.meshes, &k.plan, rim_mm));
+}
+
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn pictures(bencher: Bencher) {
+    let k = kit();
+    let piece = |(order, step): (usize, &InstallationStep)| ReportPiece {
+        id: step.piece.0,
+        name: format!("piece {}", step.piece),
+        color: color(order),
+        mesh: &k.finished.meshes[step.piece],
+        installation_direction: (-step.separation.unit()).to_array(),
+        order,
+        is_key: step.piece == k.plan.key(),
+        facts: Vec::new(),
+    };
+    let pieces: Vec<ReportPiece<'_>> = k.plan.steps.iter().enumerate().map(piece).collect();
+    bencher.bench_local(|| pieces_picture(black_box(&pieces)));
 }

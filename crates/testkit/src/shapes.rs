@@ -1,51 +1,111 @@
-//! Simple bodies.
+//! Simple bodies as meshes and volumes, and an assembly of three that locks.
 
-use std::collections::BTreeMap;
+use shellock_geom::contour::contour;
+use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
-use shellock_geom::{TriMesh, Vec3};
+use crate::plain::{self, Plain};
+
+fn mesh((points, triangles): Plain) -> TriMesh {
+    TriMesh { points, triangles }
+}
 
 /// An octahedron, `n_splits` times refined, on the ellipsoid with half axes `radii_mm`: 8 · 4ⁿ triangles.
 pub fn sphere(n_splits: usize, radii_mm: Vec3) -> TriMesh {
-    let mut points = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
-    let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 1, 2],
-        [1, 3, 2],
-        [3, 4, 2],
-        [4, 0, 2],
-        [1, 0, 5],
-        [3, 1, 5],
-        [4, 3, 5],
-        [0, 4, 5],
-    ];
-    for _ in 0..n_splits {
-        let mut middles = BTreeMap::new();
-        let mut middle = |a: u32, b: u32, points: &mut Vec<Vec3>| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                points.push((points[a as usize] + points[b as usize]).normalize());
-                points.len() as u32 - 1
-            })
-        };
-        let mut finer = Vec::with_capacity(4 * triangles.len());
-        for [a, b, c] in triangles {
-            let (ab, bc, ca) = (
-                middle(a, b, &mut points),
-                middle(b, c, &mut points),
-                middle(c, a, &mut points),
-            );
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
-    TriMesh {
-        points: points.into_iter().map(|p| p * radii_mm).collect(),
-        triangles,
-    }
+    mesh(plain::sphere(n_splits, radii_mm))
+}
+
+/// A ball around `center`: [`sphere`], moved.
+pub fn ball(n_splits: usize, center: Vec3, radius_mm: f64) -> TriMesh {
+    let mut ball = sphere(n_splits, Vec3::splat(radius_mm));
+    ball.points.iter_mut().for_each(|p| *p += center);
+    ball
+}
+
+/// A ball around the origin as a contour on a grid: triangles of about the same size everywhere.
+pub fn contoured_ball(radius_mm: f64, cell_mm: f64) -> TriMesh {
+    let bounds = Aabb {
+        min: Vec3::splat(-radius_mm),
+        max: Vec3::splat(radius_mm),
+    };
+    contour(bounds, cell_mm, |p| radius_mm - p.length())
 }
 
 /// A corner of the unit cube, outwards.
 pub fn tetrahedron() -> TriMesh {
-    TriMesh {
-        points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
-        triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+    mesh(plain::tetrahedron())
+}
+
+/// A torus around z as a grid of `cells` around and across it, each cut in two.
+pub fn torus(radius_mm: f64, tube_mm: f64, cells: [u32; 2]) -> TriMesh {
+    mesh(plain::torus(radius_mm, tube_mm, cells))
+}
+
+/// A box between two corners.
+pub fn cuboid(min: impl Into<Vec3>, max: impl Into<Vec3>) -> Volume {
+    Volume::cuboid(Aabb {
+        min: min.into(),
+        max: max.into(),
+    })
+}
+
+/// A box as the range of each coordinate: the other way to say it, where boxes stand beside each other.
+pub fn brick(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
+    cuboid([x[0], y[0], z[0]], [x[1], y[1], z[1]])
+}
+
+/// The room that a box needs with `gap_mm` on all sides.
+pub fn room(ranges: [[f64; 2]; 3], gap_mm: f64) -> Volume {
+    let [x, y, z] = ranges.map(|[low, high]| [low - gap_mm, high + gap_mm]);
+    brick(x, y, z)
+}
+
+/// Each side of the cube of [`PinnedLid`].
+pub const ALL: [f64; 2] = [0.0, 30.0];
+
+/// A cube in three parts: a base with a T-shaped groove that ends blind at x = 10, a lid whose T-shaped
+/// tongue slides in along −x, and a pin through both, pushed in along −z. They lock while the pin is in.
+#[derive(Clone, Debug)]
+pub struct PinnedLid {
+    /// The gap of all that face each other.
+    pub gap_mm: f64,
+    /// How far the base's lips reach over the tongue's foot.
+    pub lip_mm: f64,
+    /// The pin; 1 to 30 mm along z. One that ends above the lid's lower side holds nothing.
+    pub pin: [[f64; 2]; 3],
+}
+
+impl Default for PinnedLid {
+    fn default() -> Self {
+        Self {
+            gap_mm: 0.1,
+            lip_mm: 4.0,
+            pin: [[17.0, 24.0], [13.0, 17.0], [1.0, 30.0]],
+        }
     }
+}
+
+impl PinnedLid {
+    /// Base, lid and pin. They leave along x, x and z.
+    pub fn parts(&self) -> [Volume; 3] {
+        let stem = [[10.0, 30.0], [11.0, 19.0], [9.0, 16.0]];
+        let foot = [[10.0, 30.0], [11.0 - self.lip_mm, 19.0 + self.lip_mm], [5.0, 9.0]];
+        let [x, y, z] = self.pin;
+        let hole = room([x, y, [z[0], 40.0]], self.gap_mm);
+        let open = |[x, y, z]: [[f64; 2]; 3]| room([[x[0], 40.0], y, z], self.gap_mm);
+        let base = brick(ALL, ALL, [0.0, 15.0 - 0.5 * self.gap_mm])
+            .subtract(&open(stem))
+            .subtract(&open(foot))
+            .subtract(&hole);
+        let plate = brick(ALL, ALL, [15.0 + 0.5 * self.gap_mm, 30.0]);
+        let tongue = [stem, foot].map(|[x, y, z]| brick(x, y, z));
+        let lid = Volume::union_all([vec![plate], tongue.into()].concat()).subtract(&hole);
+        [base, lid, brick(x, y, z)]
+    }
+}
+
+/// A volume as a file of 32-bit coordinates has it.
+pub fn as_written(volume: &Volume) -> TriMesh {
+    let mut mesh = volume.to_mesh();
+    mesh.points.iter_mut().for_each(|p| *p = p.as_vec3().as_dvec3());
+    mesh
 }

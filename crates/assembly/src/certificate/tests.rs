@@ -9,7 +9,7 @@ use super::proof::Question;
 use super::*;
 use crate::LatticeDirection;
 use crate::motion::free_motion;
-use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, PIN, cuboid, grown, pinned_kit, pinned_lid};
+use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, PIN, brick, grown, pinned_kit, pinned_lid};
 
 fn certified(kit: &Kit) -> Certificate {
     let file = |id: PatchId| PieceFile {
@@ -106,9 +106,9 @@ fn a_pinned_lid_is_certified_with_few_contacts_whose_proof_adds_up() {
 
 #[test]
 fn walls_without_connectors_are_not_certified() {
-    let slice = |from: f64| cuboid(ALL, ALL, [from, from + 9.9]);
+    let slice = |from: f64| brick(ALL, ALL, [from, from + 9.9]);
     let kit = Kit::new(
-        cuboid(ALL, ALL, ALL),
+        brick(ALL, ALL, ALL),
         &[slice(0.0), slice(10.0), slice(20.0)],
         &[Vec3::Z; 3],
     );
@@ -118,7 +118,7 @@ fn walls_without_connectors_are_not_certified() {
 #[test]
 fn a_lid_without_its_tongue_is_not_certified() {
     let [_, lid, pin] = pinned_lid(PIN);
-    let above = cuboid([-1.0, 31.0], [-1.0, 31.0], [15.0 + HALF_GAP_MM, 31.0]);
+    let above = brick([-1.0, 31.0], [-1.0, 31.0], [15.0 + HALF_GAP_MM, 31.0]);
     let bare = lid.intersect(&above);
     assert_eq!(movers(&pinned_kit(|pieces| pieces[1] = bare)), [1]);
     drop(pin);
@@ -135,15 +135,15 @@ fn a_cap_that_touches_nothing_but_a_locked_lid_is_not_certified() {
     let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([-5.0, p.0[1]], p.1, p.2);
     let [base, lid, pin] = pinned_lid(PIN);
     let lid = lid.subtract(&open(stem)).subtract(&open(foot));
-    let top = cuboid([0.0, 10.0], ALL, [30.0 + 2.0 * HALF_GAP_MM, 36.0]);
+    let top = brick([0.0, 10.0], ALL, [30.0 + 2.0 * HALF_GAP_MM, 36.0]);
     let cap = Volume::union_all(vec![
         top,
-        cuboid(stem.0, stem.1, stem.2),
-        cuboid(foot.0, foot.1, foot.2),
+        brick(stem.0, stem.1, stem.2),
+        brick(foot.0, foot.1, foot.2),
     ]);
     let out = [Vec3::X, Vec3::X, Vec3::NEG_X, Vec3::Z];
     assert_eq!(
-        movers(&Kit::new(cuboid(ALL, ALL, ALL), &[base, lid, cap, pin], &out)),
+        movers(&Kit::new(brick(ALL, ALL, ALL), &[base, lid, cap, pin], &out)),
         [2]
     );
 }
@@ -176,11 +176,11 @@ fn a_piece_that_alone_joins_another_to_the_rest_does_not_lock_it() {
 #[test]
 fn blocks_in_a_straight_groove_are_not_certified() {
     let hole = grown([-5.0, 35.0], [10.0, 20.0], [10.0, 20.0]);
-    let tube = cuboid(ALL, ALL, ALL).subtract(&hole);
-    let block = |from: f64, to: f64| cuboid([from, to], [10.0, 20.0], [10.0, 20.0]);
+    let tube = brick(ALL, ALL, ALL).subtract(&hole);
+    let block = |from: f64, to: f64| brick([from, to], [10.0, 20.0], [10.0, 20.0]);
     let pieces = [tube, block(0.0, 9.9), block(20.0, 30.0), block(10.0, 19.9)];
     let kit = Kit::new(
-        cuboid(ALL, ALL, ALL),
+        brick(ALL, ALL, ALL),
         &pieces,
         &[Vec3::X, Vec3::NEG_X, Vec3::X, Vec3::X],
     );
@@ -368,9 +368,9 @@ fn a_plan_that_leaves_a_piece_out_is_not_certified() {
 fn what_only_a_key_that_may_move_holds_is_not_certified() {
     // A block in a slot that is open along x, and a key across it that leaves along the same x.
     let slot = grown([-5.0, 40.0], [10.0, 20.0], [10.0, 20.0]);
-    let base = cuboid(ALL, ALL, ALL).subtract(&slot);
-    let block = cuboid([5.0, 15.0], [10.0, 20.0], [10.0, 20.0]);
-    let key = cuboid([15.1, 30.0], [10.0, 20.0], [10.0, 20.0]);
-    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[base, block, key], &[Vec3::X; 3]);
+    let base = brick(ALL, ALL, ALL).subtract(&slot);
+    let block = brick([5.0, 15.0], [10.0, 20.0], [10.0, 20.0]);
+    let key = brick([15.1, 30.0], [10.0, 20.0], [10.0, 20.0]);
+    let kit = Kit::new(brick(ALL, ALL, ALL), &[base, block, key], &[Vec3::X; 3]);
     assert_eq!(movers(&kit), [1]);
 }

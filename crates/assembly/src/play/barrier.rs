@@ -249,13 +249,7 @@ fn height_on_axis(t: [Vec3; 3]) -> f64 {
 mod tests {
     use super::*;
     use shellock_geom::Volume;
-
-    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb {
-            min: min.into(),
-            max: max.into(),
-        })
-    }
+    use shellock_testkit::shapes::cuboid;
 
     /// The barrier of `roof` above the origin, which the point is `sideways` off from, for moves of `radius`.
     fn above(roof: &Volume, sideways: f64, radius: f64) -> Option<f64> {

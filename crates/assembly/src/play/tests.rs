@@ -6,7 +6,7 @@ use rand_chacha::rand_core::SeedableRng;
 use shellock_geom::{Quat, Volume};
 
 use super::*;
-use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, cuboid, pinned_kit};
+use crate::verify::kits::{ALL, HALF_GAP_MM, Kit, brick, pinned_kit};
 
 const CLEARANCE_MM: f64 = 2.0 * HALF_GAP_MM;
 
@@ -26,32 +26,32 @@ fn measured(kit: &Kit, clearance_mm: f64) -> KitPlay {
 /// A cube of 10 mm in a closed cage with a gap all round; the key is elsewhere.
 fn caged(gap_mm: f64) -> Kit {
     let hollow = [10.0 - gap_mm, 20.0 + gap_mm];
-    let cage = cuboid(ALL, ALL, ALL).subtract(&cuboid(hollow, hollow, hollow));
+    let cage = brick(ALL, ALL, ALL).subtract(&brick(hollow, hollow, hollow));
     let inside = [10.0, 20.0];
-    let key = cuboid([40.0, 41.0], ALL, ALL);
+    let key = brick([40.0, 41.0], ALL, ALL);
     Kit::new(
-        cuboid(ALL, ALL, ALL),
-        &[cage, cuboid(inside, inside, inside), key],
+        brick(ALL, ALL, ALL),
+        &[cage, brick(inside, inside, inside), key],
         &[Vec3::X; 3],
     )
 }
 
 /// A thin plate in a recess under two lips that reach over it by `lip_mm`, with `gap_mm` on all sides.
 fn under_lips(lip_mm: f64, gap_mm: f64) -> Kit {
-    let plate = cuboid([5.0, 25.0], [5.0, 25.0], [20.0, 21.0]);
-    let recess = cuboid(
+    let plate = brick([5.0, 25.0], [5.0, 25.0], [20.0, 21.0]);
+    let recess = brick(
         [5.0 - gap_mm, 25.0 + gap_mm],
         [5.0 - gap_mm, 25.0 + gap_mm],
         [20.0 - gap_mm, 21.0 + gap_mm],
     );
-    let mouth = cuboid(
+    let mouth = brick(
         [5.0 + lip_mm, 25.0 - lip_mm],
         [5.0 - gap_mm, 25.0 + gap_mm],
         [20.5, 40.0],
     );
-    let base = cuboid(ALL, ALL, ALL).subtract(&recess).subtract(&mouth);
-    let key = cuboid([40.0, 41.0], ALL, ALL);
-    Kit::new(cuboid(ALL, ALL, ALL), &[base, plate, key], &[Vec3::X; 3])
+    let base = brick(ALL, ALL, ALL).subtract(&recess).subtract(&mouth);
+    let key = brick([40.0, 41.0], ALL, ALL);
+    Kit::new(brick(ALL, ALL, ALL), &[base, plate, key], &[Vec3::X; 3])
 }
 
 #[test]
@@ -124,16 +124,16 @@ fn the_play_of_all_together_is_no_less_than_that_of_each_alone() {
     // A cube in a cage, and a key that fills a shaft beside it.
     let (inside, shaft) = ([4.0, 12.0], [16.0, 26.0]);
     let wide = |[low, high]: [f64; 2]| [low - 0.1, high + 0.1];
-    let cage = cuboid(ALL, ALL, ALL)
-        .subtract(&cuboid(wide(inside), wide(inside), wide(inside)))
-        .subtract(&cuboid(wide(shaft), wide(shaft), [9.9, 40.0]));
+    let cage = brick(ALL, ALL, ALL)
+        .subtract(&brick(wide(inside), wide(inside), wide(inside)))
+        .subtract(&brick(wide(shaft), wide(shaft), [9.9, 40.0]));
     let pieces = [
         cage,
-        cuboid(inside, inside, inside),
-        cuboid(shaft, shaft, [10.0, 30.0]),
+        brick(inside, inside, inside),
+        brick(shaft, shaft, [10.0, 30.0]),
     ];
     let play = measured(
-        &Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z]),
+        &Kit::new(brick(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z]),
         0.1,
     );
     let Some(together) = &play.together else {
@@ -159,13 +159,13 @@ fn the_play_of_all_together_is_no_less_than_that_of_each_alone() {
 fn what_nothing_holds_is_found_to_come_out() {
     // A block in a shaft that is open above, which is not the key.
     let (shaft, wide) = ([10.0, 20.0], [9.9, 20.1]);
-    let base = cuboid(ALL, ALL, ALL).subtract(&cuboid(wide, wide, [19.9, 40.0]));
+    let base = brick(ALL, ALL, ALL).subtract(&brick(wide, wide, [19.9, 40.0]));
     let pieces = [
         base,
-        cuboid(shaft, shaft, [20.0, 30.0]),
-        cuboid([40.0, 41.0], ALL, ALL),
+        brick(shaft, shaft, [20.0, 30.0]),
+        brick([40.0, 41.0], ALL, ALL),
     ];
-    let kit = Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X; 3]);
+    let kit = Kit::new(brick(ALL, ALL, ALL), &pieces, &[Vec3::X; 3]);
     let play = measured(&kit, 0.1);
     assert!(
         !play.alone[PatchId(1)].is_some_and(|p| p.is_proven),
@@ -212,12 +212,12 @@ fn what_lies_under_wide_lips_is_proven_to_stay_and_under_narrow_ones_it_is_not()
 
 #[test]
 fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
-    let key = cuboid([60.0, 61.0], ALL, ALL);
+    let key = brick([60.0, 61.0], ALL, ALL);
     // Open in front alone; a drawer of 16 mm that must be pulled all its way.
-    let cabinet = cuboid(ALL, ALL, ALL).subtract(&cuboid([10.0, 40.0], [9.9, 20.1], [9.9, 20.1]));
-    let drawer = cuboid([14.0, 30.0], [10.0, 20.0], [10.0, 20.0]);
+    let cabinet = brick(ALL, ALL, ALL).subtract(&brick([10.0, 40.0], [9.9, 20.1], [9.9, 20.1]));
+    let drawer = brick([14.0, 30.0], [10.0, 20.0], [10.0, 20.0]);
     let kit = Kit::new(
-        cuboid(ALL, ALL, ALL),
+        brick(ALL, ALL, ALL),
         &[cabinet, drawer, key.clone()],
         &[Vec3::X; 3],
     );
@@ -234,12 +234,11 @@ fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
             .unwrap()
             .translate(Vec3::splat(15.0))
     };
-    let socket = cuboid(ALL, ALL, ALL).subtract(&ball(8.15)).subtract(&cuboid(
-        [14.0, 16.0],
-        [14.0, 16.0],
-        [15.0, 40.0],
-    ));
-    let kit = Kit::new(cuboid(ALL, ALL, ALL), &[socket, ball(8.0), key], &[Vec3::X; 3]);
+    let socket =
+        brick(ALL, ALL, ALL)
+            .subtract(&ball(8.15))
+            .subtract(&brick([14.0, 16.0], [14.0, 16.0], [15.0, 40.0]));
+    let kit = Kit::new(brick(ALL, ALL, ALL), &[socket, ball(8.0), key], &[Vec3::X; 3]);
     let play = measured(&kit, 0.1);
     assert!(play.unproven().any(|id| id == PatchId(1)));
     assert_eq!(play.ways_out, Some(Vec::new()));
@@ -249,12 +248,12 @@ fn a_drawer_is_found_to_come_out_and_a_ball_that_spins_in_its_socket_is_not() {
 fn a_speck_is_no_bearing() {
     // The cube touches its cage on a needle alone: 0.05 mm wide, on one side.
     let hollow = [9.0, 21.0];
-    let cage = cuboid(ALL, ALL, ALL).subtract(&cuboid(hollow, hollow, hollow));
-    let needle = cuboid([19.9, 20.95], [15.0, 15.05], [15.0, 15.05]);
-    let cube = Volume::union_all(vec![cuboid([10.0, 20.0], [10.0, 20.0], [10.0, 20.0]), needle]);
+    let cage = brick(ALL, ALL, ALL).subtract(&brick(hollow, hollow, hollow));
+    let needle = brick([19.9, 20.95], [15.0, 15.05], [15.0, 15.05]);
+    let cube = Volume::union_all(vec![brick([10.0, 20.0], [10.0, 20.0], [10.0, 20.0]), needle]);
     let kit = Kit::new(
-        cuboid(ALL, ALL, ALL),
-        &[cage, cube, cuboid([40.0, 41.0], ALL, ALL)],
+        brick(ALL, ALL, ALL),
+        &[cage, cube, brick([40.0, 41.0], ALL, ALL)],
         &[Vec3::X; 3],
     );
     let play = measured(&kit, 0.1);

@@ -177,14 +177,7 @@ fn edge_use(mesh: &TriMesh) -> EdgeUse {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shellock_geom::Aabb;
-
-    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb {
-            min: min.into(),
-            max: max.into(),
-        })
-    }
+    use shellock_testkit::shapes::cuboid;
 
     fn joined(parts: &[TriMesh]) -> TriMesh {
         let mut all = TriMesh::default();

@@ -201,14 +201,8 @@ mod tests {
     use super::*;
     use crate::InstallationStep;
     use crate::LatticeDirection;
-    use shellock_geom::{Aabb, Vec3, Volume};
-
-    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb {
-            min: min.into(),
-            max: max.into(),
-        })
-    }
+    use shellock_geom::{Vec3, Volume};
+    use shellock_testkit::shapes::cuboid;
 
     /// A block that lies in a tray, flush with its rim, and touches the walls there alone. It leaves upwards.
     fn kit() -> (Solid, IdVec<PatchId, TriMesh>, InstallationPlan) {

@@ -220,15 +220,10 @@ fn cross_triangle(grid: &Grid, [a, b, c]: [Vec3; 3], hits: &mut Vec<Hit>) {
 mod tests {
     use super::*;
     use shellock_geom::Volume;
+    use shellock_testkit::shapes::cuboid;
 
     #[test]
     fn ray_lengths_add_up_to_volumes_of_solids_and_of_their_common_part() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| {
-            Volume::cuboid(Aabb {
-                min: min.into(),
-                max: max.into(),
-            })
-        };
         let holed = cuboid([0.0; 3], [8.0; 3]).subtract(&cuboid([3.0, -1.0, 3.0], [5.0, 9.0, 5.0]));
         let other = cuboid([4.1; 3], [11.0, 7.3, 9.0]);
         for s in [Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::new(-1.0, 1.0, 1.0)] {

@@ -1,6 +1,8 @@
 //! Small assemblies of boxes, for tests.
 
-use shellock_geom::{Aabb, Solid, TriMesh, Vec3, Volume};
+use shellock_geom::{Solid, TriMesh, Vec3, Volume};
+pub use shellock_testkit::shapes::{ALL, brick};
+use shellock_testkit::shapes::{PinnedLid, as_written, room};
 
 use super::contact::Contact;
 use super::{Assembly, Verification, VerifyParams, examine};
@@ -10,23 +12,8 @@ use crate::{Ctx, IdVec, LatticeDirection, PatchId};
 /// Half the gap between faces, mm.
 pub const HALF_GAP_MM: f64 = 0.05;
 
-pub fn cuboid(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
-    Volume::cuboid(Aabb {
-        min: Vec3::new(x[0], y[0], z[0]),
-        max: Vec3::new(x[1], y[1], z[1]),
-    })
-}
-
 pub fn grown(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
-    let gap = 2.0 * HALF_GAP_MM;
-    let wide = |[low, high]: [f64; 2]| [low - gap, high + gap];
-    cuboid(wide(x), wide(y), wide(z))
-}
-
-pub fn as_written(v: &Volume) -> TriMesh {
-    let mut mesh = v.to_mesh();
-    mesh.points.iter_mut().for_each(|p| *p = p.as_vec3().as_dvec3());
-    mesh
+    room([x, y, z], 2.0 * HALF_GAP_MM)
 }
 
 pub struct Kit {
@@ -71,28 +58,14 @@ impl Kit {
     }
 }
 
-pub const ALL: [f64; 2] = [0.0, 30.0];
-
-/// A cube in three parts: a base with a T-shaped groove that ends blind at x = 10, a lid whose T-shaped
-/// tongue slides in along −x, and a pin through both, pushed in along −z.
+/// The cube in three parts that lock, with this pin.
 pub fn pinned_lid(pin: [[f64; 2]; 3]) -> [Volume; 3] {
-    let (stem, foot) = (
-        ([10.0, 30.0], [11.0, 19.0], [9.0, 16.0]),
-        ([10.0, 30.0], [7.0, 23.0], [5.0, 9.0]),
-    );
-    let hole = grown(pin[0], pin[1], [pin[2][0], 40.0]);
-    let open = |p: ([f64; 2], [f64; 2], [f64; 2])| grown([p.0[0], 40.0], p.1, p.2);
-    let base = cuboid(ALL, ALL, [0.0, 15.0 - HALF_GAP_MM])
-        .subtract(&open(stem))
-        .subtract(&open(foot))
-        .subtract(&hole);
-    let lid = Volume::union_all(vec![
-        cuboid(ALL, ALL, [15.0 + HALF_GAP_MM, 30.0]),
-        cuboid(stem.0, stem.1, stem.2),
-        cuboid(foot.0, foot.1, foot.2),
-    ])
-    .subtract(&hole);
-    [base, lid, cuboid(pin[0], pin[1], pin[2])]
+    let lid = PinnedLid {
+        gap_mm: 2.0 * HALF_GAP_MM,
+        pin,
+        ..PinnedLid::default()
+    };
+    lid.parts()
 }
 
 pub const PIN: [[f64; 2]; 3] = [[17.0, 24.0], [13.0, 17.0], [1.0, 30.0]];
@@ -100,5 +73,5 @@ pub const PIN: [[f64; 2]; 3] = [[17.0, 24.0], [13.0, 17.0], [1.0, 30.0]];
 pub fn pinned_kit(change: impl FnOnce(&mut [Volume; 3])) -> Kit {
     let mut pieces = pinned_lid(PIN);
     change(&mut pieces);
-    Kit::new(cuboid(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z])
+    Kit::new(brick(ALL, ALL, ALL), &pieces, &[Vec3::X, Vec3::X, Vec3::Z])
 }

@@ -125,16 +125,10 @@ pub fn check_outside(model: &Solid, bodies: &IdVec<PatchId, Body>) -> (Check, Op
 mod tests {
     use super::*;
     use crate::PressFitKind;
-    use shellock_geom::Aabb;
+    use shellock_testkit::shapes::cuboid;
 
     #[test]
     fn a_press_fit_explains_what_it_takes_and_nothing_larger_or_elsewhere() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| {
-            Volume::cuboid(Aabb {
-                min: min.into(),
-                max: max.into(),
-            })
-        };
         let piece = PatchId(1);
         let fit = PressFit {
             kind: PressFitKind::Rib,

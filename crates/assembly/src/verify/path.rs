@@ -238,17 +238,14 @@ mod tests {
     use rand::RngExt;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
+    use shellock_testkit::shapes::cuboid;
 
     fn random_boxes(rng: &mut ChaCha8Rng, shift: Vec3) -> Volume {
         let mut corner = || Vec3::new(rng.random(), rng.random(), rng.random()) * 6.0;
         let parts = (0..3)
             .map(|_| (corner(), corner()))
             .map(|(a, b)| (a.min(b) + shift, a.max(b) + shift + 1.0));
-        Volume::union_all(
-            parts
-                .map(|(min, max)| Volume::cuboid(Aabb { min, max }))
-                .collect(),
-        )
+        Volume::union_all(parts.map(|(min, max)| cuboid(min, max)).collect())
     }
 
     /// Overlap volume at `travel_mm` as the sweep of events has it.

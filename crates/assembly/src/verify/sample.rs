@@ -51,15 +51,11 @@ pub fn on_surface(mesh: &TriMesh, n: usize, seed: u64) -> Vec<Sample> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shellock_geom::{Aabb, Volume};
+    use shellock_testkit::shapes::cuboid;
 
     #[test]
     fn each_face_of_a_box_gets_its_share_of_the_points() {
-        let mesh = Volume::cuboid(Aabb {
-            min: Vec3::ZERO,
-            max: Vec3::new(1.0, 2.0, 3.0),
-        })
-        .to_mesh();
+        let mesh = cuboid([0.0; 3], [1.0, 2.0, 3.0]).to_mesh();
         let samples = on_surface(&mesh, 2200, 5);
         assert!((samples.len() as i32 - 2200).abs() <= 1);
         for (normal, area) in [(Vec3::X, 6.0), (Vec3::Y, 3.0), (Vec3::Z, 2.0)] {

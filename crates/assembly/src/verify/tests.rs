@@ -2,7 +2,7 @@
 
 use shellock_geom::{TriMesh, Vec3, Volume};
 
-use super::kits::{ALL, Kit, PIN, cuboid, grown, pinned_kit, pinned_lid};
+use super::kits::{ALL, Kit, PIN, brick, grown, pinned_kit, pinned_lid};
 use super::*;
 use crate::{LatticeDirection, PatchId};
 
@@ -23,8 +23,8 @@ fn of_a_pinned_lid_nothing_but_the_key_moves() {
 fn a_tongue_leaves_its_groove_one_way_only() {
     let [base, lid, _] = pinned_lid([[50.0, 51.0], [50.0, 51.0], [50.0, 51.0]]);
     let kit = Kit::new(
-        cuboid(ALL, ALL, ALL),
-        &[base, lid, cuboid([60.0, 61.0], ALL, ALL)],
+        brick(ALL, ALL, ALL),
+        &[base, lid, brick([60.0, 61.0], ALL, ALL)],
         &[Vec3::X; 3],
     );
     let verdict = kit.verdict();
@@ -66,7 +66,7 @@ fn a_path_through_a_wall_is_caught_with_place_and_partner() {
 
 #[test]
 fn a_pin_that_misses_the_base_leaves_it_loose() {
-    let verdict = pinned_kit(|pieces| pieces[2] = cuboid(PIN[0], PIN[1], [20.0, 30.0])).verdict();
+    let verdict = pinned_kit(|pieces| pieces[2] = brick(PIN[0], PIN[1], [20.0, 30.0])).verdict();
     // The pin still holds the lid; the base slips off both along −x, and only the finite push can see it,
     // because the base is the piece that the infinitesimal test holds.
     assert_eq!(
@@ -104,11 +104,11 @@ fn a_piece_moved_by_more_than_the_gap_overlaps() {
 fn sliders_in_a_straight_groove_move_together_though_each_is_enclosed() {
     // A tube along x, open at both ends, with three blocks in a row: the key is the middle one.
     let hole = grown([-5.0, 35.0], [10.0, 20.0], [10.0, 20.0]);
-    let tube = cuboid(ALL, ALL, ALL).subtract(&hole);
-    let block = |from: f64, to: f64| cuboid([from, to], [10.0, 20.0], [10.0, 20.0]);
+    let tube = brick(ALL, ALL, ALL).subtract(&hole);
+    let block = |from: f64, to: f64| brick([from, to], [10.0, 20.0], [10.0, 20.0]);
     let pieces = [tube, block(0.0, 9.9), block(20.0, 30.0), block(10.0, 19.9)];
     let kit = Kit::new(
-        cuboid(ALL, ALL, ALL),
+        brick(ALL, ALL, ALL),
         &pieces,
         &[Vec3::X, Vec3::NEG_X, Vec3::X, Vec3::X],
     );
@@ -136,7 +136,7 @@ fn a_missing_lid_is_a_lost_surface_and_a_broken_plan() {
             .findings
             .contains(&Finding::PlanBroken { piece: PatchId(2) })
     );
-    let mut kit = pinned_kit(|pieces| pieces[1] = cuboid([40.0, 41.0], ALL, ALL));
+    let mut kit = pinned_kit(|pieces| pieces[1] = brick([40.0, 41.0], ALL, ALL));
     kit.plan.steps.clear();
     let verdict = kit.verdict();
     assert!(

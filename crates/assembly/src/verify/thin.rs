@@ -68,14 +68,8 @@ pub fn thin_share(mesh: &TriMesh, min_wall_mm: f64) -> ThinShare {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shellock_geom::{Aabb, Vec3, Volume};
-
-    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb {
-            min: min.into(),
-            max: max.into(),
-        })
-    }
+    use shellock_geom::{Vec3, Volume};
+    use shellock_testkit::shapes::cuboid;
 
     #[test]
     fn the_thin_part_of_a_block_with_a_fin_is_the_fin() {

@@ -1,27 +1,5 @@
 use super::*;
-use crate::samples::{both, flipped, unwelded};
-
-/// A cube of edge `size` with its least corner at `at`, outwards.
-fn cube(at: Vec3, size: f64) -> TriMesh {
-    let points = (0..8)
-        .map(|i| at + size * Vec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64))
-        .collect();
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    TriMesh {
-        points,
-        triangles: quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect(),
-    }
-}
+use crate::samples::{both, cube, flipped, unwelded};
 
 fn error(mesh: &TriMesh) -> InputError {
     into_solid(mesh).expect_err("the mesh is broken")

@@ -257,15 +257,12 @@ fn winding_number(mesh: &TriMesh, q: Vec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Aabb, Solid, Volume};
+    use crate::Solid;
+    use crate::samples::cuboid;
 
     #[test]
     fn a_surface_winds_once_around_what_is_inside() {
-        let cube = Volume::cuboid(Aabb {
-            min: Vec3::ZERO,
-            max: Vec3::ONE,
-        })
-        .to_mesh();
+        let cube = cuboid(Vec3::ZERO, Vec3::ONE).to_mesh();
         assert!((winding_number(&cube, Vec3::new(0.1, 0.7, 0.9)) - 1.0).abs() < 1e-12);
         assert!(winding_number(&cube, Vec3::new(1.1, 0.7, 0.9)).abs() < 1e-12);
     }
@@ -274,12 +271,6 @@ mod tests {
     fn a_flap_turned_inside_out_does_not_make_the_outside_deep() {
         // The flap over the cube is as thin as rounding; what is above and below it is outside, whatever its
         // normals say.
-        let cuboid = |min: [f64; 3], max: [f64; 3]| {
-            Volume::cuboid(Aabb {
-                min: min.into(),
-                max: max.into(),
-            })
-        };
         let mut mesh = cuboid([0.0; 3], [4.0; 3]).to_mesh();
         let flap = cuboid([1.0, 1.0, 4.5], [3.0, 3.0, 4.5 + 1e-7]).to_mesh();
         let first = mesh.points.len() as u32;
@@ -315,12 +306,6 @@ mod tests {
     #[test]
     fn depth_along_a_track_is_that_of_dense_samples() {
         // An L: the deepest point of the diagonal is neither an end nor a middle.
-        let cuboid = |min: [f64; 3], max: [f64; 3]| {
-            Volume::cuboid(Aabb {
-                min: min.into(),
-                max: max.into(),
-            })
-        };
         let solid = cuboid([0.0; 3], [6.0, 2.0, 3.0]).union(&cuboid([0.0; 3], [2.0, 5.0, 3.0]));
         let fixed = Shape::new(&Solid::new(solid.to_mesh()).unwrap());
         let passage = Passage {

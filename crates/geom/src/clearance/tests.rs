@@ -3,19 +3,13 @@ use super::*;
 use crate::Volume;
 use crate::bvh::nearest_on_triangle;
 use crate::contour::contour;
+use crate::samples::cuboid;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
 fn solid(volume: &Volume) -> Solid {
     Solid::new(volume.to_mesh()).expect("a solid")
-}
-
-fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-    Volume::cuboid(Aabb {
-        min: min.into(),
-        max: max.into(),
-    })
 }
 
 fn shape(volume: &Volume) -> Shape {

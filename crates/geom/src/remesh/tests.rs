@@ -2,65 +2,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
 use crate::Solid;
-use crate::Volume;
 use crate::bvh::TriangleBvh;
-
-/// A torus around z as a grid of `n_around` × `n_across` quadrilaterals, each cut in two.
-fn torus(radius_mm: f64, tube_mm: f64, n_around: u32, n_across: u32) -> TriMesh {
-    let at = |i: u32, j: u32| (i % n_around) * n_across + j % n_across;
-    let mut mesh = TriMesh::default();
-    for i in 0..n_around {
-        for j in 0..n_across {
-            let (u, v) = (
-                f64::from(i) / f64::from(n_around),
-                f64::from(j) / f64::from(n_across),
-            );
-            let ((su, cu), (sv, cv)) = (
-                (u * std::f64::consts::TAU).sin_cos(),
-                (v * std::f64::consts::TAU).sin_cos(),
-            );
-            let r = radius_mm + tube_mm * cv;
-            mesh.points.push(Vec3::new(r * cu, r * su, tube_mm * sv));
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            mesh.triangles.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    mesh
-}
-
-/// An octahedron with each edge halved `n_splits` times, on the ellipsoid with half axes `radii_mm`.
-fn ellipsoid(n_splits: u32, radii_mm: Vec3) -> TriMesh {
-    let mut points = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
-    let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 1, 2],
-        [1, 3, 2],
-        [3, 4, 2],
-        [4, 0, 2],
-        [1, 0, 5],
-        [3, 1, 5],
-        [4, 3, 5],
-        [0, 4, 5],
-    ];
-    for _ in 0..n_splits {
-        let mut middles = BTreeMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                points.push((points[a as usize] + points[b as usize]).normalize());
-                points.len() as u32 - 1
-            })
-        };
-        let mut finer = Vec::with_capacity(4 * triangles.len());
-        for [a, b, c] in triangles {
-            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
-    TriMesh {
-        points: points.into_iter().map(|p| p * radii_mm).collect(),
-        triangles,
-    }
-}
+use crate::samples::{cuboid, ellipsoid, torus};
 
 fn label(mesh: &TriMesh, at: impl Fn(Vec3) -> u32) -> Vec<u32> {
     (0..mesh.triangles.len())
@@ -279,7 +222,7 @@ fn seam_points_lie_on_the_seams_of_the_input() {
 
 #[test]
 fn a_torus_keeps_its_hole_and_loops() {
-    let ring = torus(30.0, 10.0, 240, 80);
+    let ring = torus(30.0, 10.0, [240, 80]);
     // Two half tubes meet in closed seams without a corner; the four quarters of the other half have corners.
     let labels = label(&ring, |p| {
         if p.y > 0.0 {
@@ -398,11 +341,7 @@ fn what_is_no_task_comes_back_unchanged() {
 /// triangle is a needle.
 #[test]
 fn a_plate_of_twelve_triangles_keeps_its_shape() {
-    let plate = Volume::cuboid(crate::Aabb {
-        min: Vec3::ZERO,
-        max: Vec3::new(100.0, 80.0, 8.0),
-    })
-    .to_mesh();
+    let plate = cuboid([0.0; 3], [100.0, 80.0, 8.0]).to_mesh();
     let out = remesh(
         &RemeshParams {
             target_edge_mm: 2.1,

@@ -1,39 +1,6 @@
 use super::*;
-use crate::samples::{both, flipped, unwelded};
-use crate::{Aabb, Vec3, Volume};
-
-/// A ball of 4 · 4ⁿ·2 triangles, outwards.
-fn ball(center: Vec3, radius: f64, n: u32) -> TriMesh {
-    let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    let triangles = vec![
-        [0, 2, 4],
-        [2, 1, 4],
-        [1, 3, 4],
-        [3, 0, 4],
-        [2, 0, 5],
-        [1, 2, 5],
-        [3, 1, 5],
-        [0, 3, 5],
-    ];
-    let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
-    for _ in 0..n {
-        let topology = crate::Topology::new(&solid);
-        solid = crate::subdivide::halve_edges(&solid, &topology, |_, _| true).0;
-    }
-    let mut mesh = solid.into_mesh();
-    mesh.points
-        .iter_mut()
-        .for_each(|p| *p = center + radius * p.normalize());
-    mesh
-}
-
-fn cube(at: Vec3, size: f64) -> TriMesh {
-    Volume::cuboid(Aabb {
-        min: at,
-        max: at + size,
-    })
-    .to_mesh()
-}
+use crate::samples::{ball, both, cube, flipped, unwelded};
+use crate::{Vec3, Volume};
 
 fn mended(mesh: &TriMesh) -> Repaired {
     repair(mesh, RepairMode::Repair).unwrap_or_else(|e| panic!("{e}"))
@@ -177,7 +144,7 @@ fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_th
         holed.triangles.retain(|t| !t.contains(&(n as u32)));
         holed
     };
-    let fine = ball(Vec3::ZERO, 10.0, 6);
+    let fine = ball(Vec3::ZERO, 10.0, 7);
     let repaired = mended(&around(&fine, 0));
     assert_eq!(repaired.repairs[0].kind.code(), "holes-closed");
     assert!((repaired.solid.volume() / fine.signed_volume() - 1.0).abs() < 1e-5);

@@ -1,14 +1,7 @@
-use shellock_geom::{Aabb, TriMesh, Volume};
+use shellock_geom::TriMesh;
+use shellock_testkit::shapes::cuboid;
 
 use super::*;
-
-fn block(min: [f64; 3], max: [f64; 3]) -> TriMesh {
-    Volume::cuboid(Aabb {
-        min: min.into(),
-        max: max.into(),
-    })
-    .to_mesh()
-}
 
 fn piece(mesh: &TriMesh, order: usize, along: [f64; 3]) -> ReportPiece<'_> {
     ReportPiece {
@@ -26,9 +19,9 @@ fn piece(mesh: &TriMesh, order: usize, along: [f64; 3]) -> ReportPiece<'_> {
 /// A tall wall behind which the second piece comes down, and a third in front.
 fn meshes() -> [TriMesh; 3] {
     [
-        block([-30.0, 0.0, 0.0], [30.0, 4.0, 60.0]),
-        block([-8.0, 6.0, 0.0], [8.0, 14.0, 10.0]),
-        block([-8.0, -9.0, 0.0], [8.0, -1.0, 10.0]),
+        cuboid([-30.0, 0.0, 0.0], [30.0, 4.0, 60.0]).to_mesh(),
+        cuboid([-8.0, 6.0, 0.0], [8.0, 14.0, 10.0]).to_mesh(),
+        cuboid([-8.0, -9.0, 0.0], [8.0, -1.0, 10.0]).to_mesh(),
     ]
 }
 

@@ -1,23 +1,11 @@
 use shellock_geom::Volume;
+use shellock_testkit::shapes::{contoured_ball, cuboid};
 
 use super::*;
 
-fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-    Volume::cuboid(Aabb {
-        min: min.into(),
-        max: max.into(),
-    })
-}
-
 /// A bowl: half a hollow ball, its rim on z = 0, its skin above.
 fn bowl() -> TriMesh {
-    let ball = |r: f64| {
-        let bounds = Aabb {
-            min: Vec3::splat(-r),
-            max: Vec3::splat(r),
-        };
-        Volume::from_closed_mesh(&shellock_geom::contour::contour(bounds, 1.0, |p| r - p.length())).unwrap()
-    };
+    let ball = |r: f64| Volume::from_closed_mesh(&contoured_ball(r, 1.0)).unwrap();
     ball(20.0)
         .subtract(&ball(18.0))
         .intersect(&cuboid([-30.0, -30.0, 0.0], [30.0; 3]))

@@ -143,15 +143,11 @@ fn longest_straight(surface: &SegmentedSurface, key: PatchId, slide: Vec3) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shellock_geom::{Aabb, Volume};
+    use shellock_testkit::shapes::cuboid;
 
     /// A cube of 40 mm whose top is the key; its other faces alternate between two pieces.
     fn cube() -> SegmentedSurface {
-        let mesh = Volume::cuboid(Aabb {
-            min: Vec3::ZERO,
-            max: Vec3::splat(40.0),
-        })
-        .to_mesh();
+        let mesh = cuboid([0.0; 3], [40.0; 3]).to_mesh();
         let label = |f: usize| {
             let n = mesh.face_normal(f);
             if n.z > 0.5 {

@@ -212,6 +212,8 @@ impl Skin {
 
 #[cfg(test)]
 mod tests {
+    use shellock_testkit::shapes::cuboid;
+
     use super::*;
 
     #[test]
@@ -244,12 +246,6 @@ mod tests {
     /// asked for.
     #[test]
     fn what_was_too_near_on_the_way_keeps_the_gap_afterwards_and_the_rest_stays() {
-        let cuboid = |min: [f64; 3], max: [f64; 3]| {
-            Volume::cuboid(Aabb {
-                min: min.into(),
-                max: max.into(),
-            })
-        };
         let skin = |volume: &Volume| Skin {
             whole: volume.to_mesh(),
             beneath: volume.to_mesh(),

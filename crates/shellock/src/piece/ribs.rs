@@ -228,14 +228,7 @@ fn rib(place: &Place, along: Vec3, height_mm: f64) -> Volume {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shellock_geom::Aabb;
-
-    fn cuboid(min: [f64; 3], max: [f64; 3]) -> Volume {
-        Volume::cuboid(Aabb {
-            min: min.into(),
-            max: max.into(),
-        })
-    }
+    use shellock_testkit::shapes::cuboid;
 
     /// A block of 20 mm in the middle of a tray that is 0.1 mm wider on each side; it leaves upwards.
     fn ribs_of_a_block(least_depth_mm: f64) -> (Vec<PressFit>, Vec<Change>) {

@@ -1,6 +1,7 @@
 use shellock_geom::{TriMesh, Vec3};
 
 use super::*;
+use crate::testing::sphere;
 
 fn with_ctx<T>(run: impl FnOnce(&Ctx) -> T) -> T {
     run(&Ctx::quiet())
@@ -26,36 +27,13 @@ fn limbed() -> Solid {
             .map(|a| 60.0 * (-40.0 * (1.0 - a.dot(d))).exp())
             .sum::<f64>()
     };
-    let sphere = octasphere(5);
+    let sphere = sphere(5, Vec3::ONE);
     let points = sphere.points.iter().map(|&p| p * radius(p)).collect();
     Solid::new(TriMesh {
         points,
         triangles: sphere.triangles,
     })
     .unwrap()
-}
-
-/// The unit octahedron, each triangle divided into four `levels` times and pushed onto the unit sphere.
-fn octasphere(levels: usize) -> TriMesh {
-    let points = vec![Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-    let triangles = vec![
-        [0, 2, 4],
-        [2, 1, 4],
-        [1, 3, 4],
-        [3, 0, 4],
-        [2, 0, 5],
-        [1, 2, 5],
-        [3, 1, 5],
-        [0, 3, 5],
-    ];
-    let mut solid = Solid::new(TriMesh { points, triangles }).unwrap();
-    for _ in 0..levels {
-        let (finer, _) = halve_edges(&solid, &Topology::new(&solid), |_, _| true);
-        let mut mesh = finer.into_mesh();
-        mesh.points.iter_mut().for_each(|p| *p = p.normalize());
-        solid = Solid::new(mesh).unwrap();
-    }
-    solid.into_mesh()
 }
 
 /// One label for each arm's triangles and 0 for the body: the arms hang on the body alone.

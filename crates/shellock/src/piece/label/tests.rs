@@ -1,19 +1,14 @@
 use super::*;
 use crate::testing::sphere;
+use shellock_testkit::shapes::cuboid;
 
 const WALL_MM: f64 = 2.0;
 
 /// A quarter of a hollow ball of radius `r_mm`: three flat cuts, an outer and an inner side.
 fn quarter(r_mm: f64) -> Volume {
     let ball = |r: f64| Volume::from_closed_mesh(&sphere(5, Vec3::splat(r))).unwrap();
-    let half = |min: Vec3| {
-        Volume::cuboid(shellock_geom::Aabb {
-            min,
-            max: Vec3::splat(2.0 * r_mm),
-        })
-    };
     let shell = ball(r_mm).subtract(&ball(r_mm - WALL_MM));
-    shell.intersect(&half(Vec3::new(0.0, 0.0, -2.0 * r_mm)))
+    shell.intersect(&cuboid([0.0, 0.0, -2.0 * r_mm], [2.0 * r_mm; 3]))
 }
 
 fn engraved(r_mm: f64, number: u32) -> (Volume, Option<Volume>) {

@@ -1,0 +1,134 @@
+//! A kit made stage by stage, as the whole job makes one where a piece is the key: for benches of single
+//! stages and for tests of what comes out.
+
+use shellock::body::{PatchDistances, ShellBodies, ShellGrid};
+use shellock::connector::{self, Run, is_unobstructed};
+use shellock::piece::{self, FinishParams, Finished, LabelParams, Relief};
+use shellock::plan::{PlanConstraints, PlanOutcome, search, survey};
+use shellock::verify::Assembly;
+use shellock::{
+    ConnectorSizes, Ctx, IdVec, InstallationPlan, Params, PatchId, SegmentedSurface, Settings, body,
+};
+use shellock_geom::{Aabb, Solid};
+
+/// A kit and all that it was made from.
+pub struct Made {
+    pub settings: Settings,
+    pub sizes: ConnectorSizes,
+    pub surface: SegmentedSurface,
+    pub plan: InstallationPlan,
+    pub grid: ShellGrid,
+    pub distances: PatchDistances,
+    pub shell: ShellBodies,
+    pub runs: Vec<Run>,
+    pub finished: Finished,
+}
+
+impl Made {
+    /// The first plan of `surface`, made into pieces.
+    pub fn new(model: &Solid, surface: SegmentedSurface) -> Self {
+        let ctx = &Ctx::quiet();
+        let settings = Settings::resolve(&Params::default());
+        let sizes = ConnectorSizes::default();
+        let seams = surface.seams();
+        let tables = survey(ctx, &settings.plan, &surface, &seams, &sizes).expect("not stopped");
+        let none = PlanConstraints::default();
+        let PlanOutcome::Found(found) = search(ctx, &settings.plan, &tables, &none).expect("not stopped")
+        else {
+            panic!("there is no plan");
+        };
+        let plan = found.plan;
+        let room_mm = settings.connector.room_mm(sizes.largest_mm());
+        let grid = ShellGrid::new(&settings.body, model, room_mm).expect("there is a cavity");
+        let distances = PatchDistances::measure(&grid, &surface);
+        let shell = split(&settings, &surface, &sizes, &grid, &distances, &plan);
+        let runs = runs(&settings, &sizes, &grid, &shell, &plan);
+        let finished = finish(&settings, &surface, &sizes, &grid, &shell, &plan, &runs);
+        Self {
+            settings,
+            sizes,
+            surface,
+            plan,
+            grid,
+            distances,
+            shell,
+            runs,
+            finished,
+        }
+    }
+
+    /// The pieces, to be judged.
+    pub fn assembly<'a>(&'a self, model: &'a Solid) -> Assembly<'a> {
+        Assembly {
+            model: Some(model),
+            pieces: &self.finished.meshes,
+            plan: &self.plan,
+            press_fits: &self.finished.press_fits,
+        }
+    }
+}
+
+/// Where each piece's body may be: around its patch.
+fn rooms(settings: &Settings, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> IdVec<PatchId, Aabb> {
+    let mut rooms: IdVec<PatchId, Aabb> = IdVec::from_fn(surface.n_patches, |_| Aabb::EMPTY);
+    for (face, &p) in surface.patch_of_face.iter().enumerate() {
+        rooms[p] = rooms[p].union(Aabb::around(surface.mesh.corners(face)));
+    }
+    let reach_mm = settings.body.thickness_mm + settings.connector.room_mm(sizes.largest_mm()) + 2.0;
+    rooms.as_slice().iter().map(|r| r.grown(reach_mm)).collect()
+}
+
+/// The wall, split along the plan.
+pub fn split(
+    settings: &Settings,
+    surface: &SegmentedSurface,
+    sizes: &ConnectorSizes,
+    grid: &ShellGrid,
+    distances: &PatchDistances,
+    plan: &InstallationPlan,
+) -> ShellBodies {
+    let rooms = rooms(settings, surface, sizes);
+    body::build(&Ctx::quiet(), &settings.body, grid, distances, plan, &rooms).expect("pieces leave freely")
+}
+
+/// Connectors under its seams.
+pub fn runs(
+    settings: &Settings,
+    sizes: &ConnectorSizes,
+    grid: &ShellGrid,
+    shell: &ShellBodies,
+    plan: &InstallationPlan,
+) -> Vec<Run> {
+    let inner = shell.inner.as_ref().expect("there is a cavity");
+    let curves = connector::curves(grid, inner, plan);
+    let is_free = is_unobstructed(&settings.connector, grid, shell);
+    connector::runs(&settings.connector, sizes, plan, &curves, None, &is_free).0
+}
+
+/// Pieces, carved and joined, with numbers.
+pub fn finish(
+    settings: &Settings,
+    surface: &SegmentedSurface,
+    sizes: &ConnectorSizes,
+    grid: &ShellGrid,
+    shell: &ShellBodies,
+    plan: &InstallationPlan,
+    runs: &[Run],
+) -> Finished {
+    let gap_mm = settings
+        .connector
+        .clearance_mm
+        .min(2.0 * settings.body.wall_gap_mm);
+    let params = FinishParams {
+        connector: &settings.connector,
+        relief: Relief {
+            rim_mm: settings.body.rim_mm,
+            gap_mm,
+            key_gap_mm: gap_mm,
+        },
+        grip: None,
+        label: Some(LabelParams::default()),
+    };
+    let rooms = rooms(settings, surface, sizes);
+    piece::make(&Ctx::quiet(), &params, grid, shell, plan, runs, &rooms).expect("pieces can be written")
+}

@@ -1,0 +1,262 @@
+//! What does not depend on how a model lies or how its pieces are numbered: its division, and what planning
+//! measures of it and charges for plans. And what a turn of the model is.
+
+use std::sync::LazyLock;
+
+use proptest::prelude::*;
+use shellock::key::Turn;
+use shellock::plan::{PlanConstraints, PlanParams, PlanSurvey, random_plans, score, survey};
+use shellock::segmentation::{SegmentationParams, segment};
+use shellock::{ConnectorSizes, Ctx, InstallationPlan, LatticeDirection, PatchId, SegmentedSurface};
+use shellock_geom::topology::components;
+use shellock_geom::{Solid, Topology, Vec3};
+use shellock_testkit::property::{LatticeTurn, cases, orders, turns, vectors};
+use shellock_testkit::shapes::sphere;
+
+/// Patches of the pebble as they are labelled.
+const N: usize = 7;
+
+/// An egg with three different axes, so that nothing is decided by a tie.
+fn pebble() -> Solid {
+    Solid::new(sphere(4, Vec3::new(41.0, 34.0, 29.0))).unwrap()
+}
+
+/// For each triangle the nearest of [`N`] directions, spread unevenly.
+fn labels() -> Vec<usize> {
+    let solid = pebble();
+    let site = |i: usize| {
+        let (t, z) = (2.4 * i as f64, 1.0 - 2.0 * (i as f64 + 0.5) / N as f64);
+        Vec3::new((1.0 - z * z).sqrt() * t.cos(), (1.0 - z * z).sqrt() * t.sin(), z)
+    };
+    let nearest = |f: usize| {
+        let p = solid.mesh().face_center(f);
+        (0..N).max_by(|&i, &j| site(i).dot(p).total_cmp(&site(j).dot(p)))
+    };
+    (0..solid.mesh().triangles.len()).filter_map(nearest).collect()
+}
+
+/// The pebble turned, shifted and divided along its labels, which have these names.
+fn divided(turn: &LatticeTurn, shift: Vec3, names: &[usize]) -> SegmentedSurface {
+    let solid = Solid::new(turn.mesh(pebble().mesh(), shift)).unwrap();
+    let named: Vec<i64> = labels().iter().map(|&l| names[l] as i64).collect();
+    segment(
+        &Ctx::quiet(),
+        &SegmentationParams::default(),
+        &solid,
+        Some(&named),
+    )
+    .unwrap()
+}
+
+fn as_given() -> &'static SegmentedSurface {
+    static GIVEN: LazyLock<SegmentedSurface> =
+        LazyLock::new(|| divided(&LatticeTurn::all()[0], Vec3::ZERO, &Vec::from_iter(0..N)));
+    &GIVEN
+}
+
+fn surveyed(surface: &SegmentedSurface) -> PlanSurvey {
+    let params = PlanParams::default();
+    survey(
+        &Ctx::quiet(),
+        &params,
+        surface,
+        &surface.seams(),
+        &ConnectorSizes::default(),
+    )
+    .unwrap()
+}
+
+fn survey_as_given() -> &'static PlanSurvey {
+    static GIVEN: LazyLock<PlanSurvey> = LazyLock::new(|| surveyed(as_given()));
+    &GIVEN
+}
+
+/// The same surface with the `i`-th piece called `number[i]`.
+fn renumbered(surface: &SegmentedSurface, number: &[usize]) -> SegmentedSurface {
+    let new = |&p: &PatchId| PatchId::from(number[usize::from(p)]);
+    SegmentedSurface {
+        patch_of_face: surface.patch_of_face.iter().map(new).collect(),
+        ..surface.clone()
+    }
+}
+
+/// Asserts that `other` has the contacts and the flat pieces of the pebble as it was given, where piece `i` is
+/// called `number[i]` and all directions are turned; with runs of connectors if `has_runs`.
+fn assert_same_contacts(
+    other: &PlanSurvey,
+    turn: &LatticeTurn,
+    number: &[usize],
+    tolerance: f64,
+    has_runs: bool,
+) {
+    let given = survey_as_given();
+    assert_eq!(other.contacts.len(), given.contacts.len());
+    let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
+    let is_near = |a: f64, b: f64| (a - b).abs() <= tolerance * a.abs().max(1.0);
+    for contact in &given.contacts {
+        let pair = [new(contact.a), new(contact.b)];
+        let same = other
+            .contacts
+            .iter()
+            .find(|c| pair.contains(&c.a) && pair.contains(&c.b))
+            .unwrap();
+        assert!(is_near(same.length_mm, contact.length_mm));
+        for (later, s) in [contact.a, contact.b]
+            .into_iter()
+            .flat_map(|p| LatticeDirection::all().map(move |s| (p, s)))
+        {
+            let turned = LatticeDirection::nearest(turn.apply(s.unit()));
+            let (one, two) = (contact.joint(later, s), same.joint(new(later), turned));
+            assert!(is_near(one.weight, two.weight), "{one:?} {two:?}");
+            assert!(is_near(one.usable, two.usable), "{one:?} {two:?}");
+            if has_runs {
+                assert!(is_near(one.run_mm, two.run_mm), "{one:?} {two:?}");
+            }
+        }
+    }
+    for p in (0..N).map(PatchId::from) {
+        assert!(is_near(other.area_mm2[new(p)], given.area_mm2[p]));
+        let turned = turn.apply(given.mean_normal[p]);
+        assert!(other.mean_normal[new(p)].distance(turned) < tolerance);
+    }
+}
+
+/// Whether the joints of `plan` hold in both surveys or in none. The longest run is that of a walk along the
+/// seam, which goes the other way where the pair's numbers change order, and it may count other samples then.
+fn hold_alike(plan: &InstallationPlan, other: &PlanSurvey, number: &[usize]) -> bool {
+    let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
+    survey_as_given().contacts.iter().all(|contact| {
+        let is_b_later = plan.position(contact.b) > plan.position(contact.a);
+        let later = if is_b_later { contact.b } else { contact.a };
+        let pair = [new(contact.a), new(contact.b)];
+        let same = other
+            .contacts
+            .iter()
+            .find(|c| pair.contains(&c.a) && pair.contains(&c.b));
+        let s = plan.separation(later);
+        same.is_some_and(|same| same.joint(new(later), s).holds == contact.joint(later, s).holds)
+    })
+}
+
+/// How much shares of what is in whose way differ at most.
+fn farthest_share(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize]) -> f64 {
+    let given = survey_as_given();
+    let new = |p: usize| PatchId::from(number[p]);
+    let mut farthest = 0.0f64;
+    for (p, q) in (0..N)
+        .flat_map(|p| (0..N).map(move |q| (p, q)))
+        .filter(|(p, q)| p != q)
+    {
+        for s in LatticeDirection::all() {
+            let turned = LatticeDirection::nearest(turn.apply(s.unit()));
+            let one = given.occlusion.share(p.into(), q.into(), s);
+            farthest = farthest.max((one - other.occlusion.share(new(p), new(q), turned)).abs());
+        }
+    }
+    farthest
+}
+
+/// Patches that are connected, part a closed surface and hold each other twice.
+fn assert_valid(surface: &SegmentedSurface, volume_mm3: f64) {
+    let cut = Solid::new(surface.mesh.clone()).unwrap();
+    assert!((cut.volume() / volume_mm3 - 1.0).abs() < 1e-9);
+    let patch = &surface.patch_of_face;
+    let (_, n) = components(&Topology::new(&cut), |f, g| {
+        patch[f as usize] == patch[g as usize]
+    });
+    assert_eq!(n, surface.n_patches);
+    let least_mm = SegmentationParams::default().min_contact_mm;
+    assert!(surface.contact_graph(least_mm).is_two_connected());
+}
+
+proptest! {
+    #![proptest_config(cases(6))]
+
+    #[test]
+    fn a_division_along_labels_is_the_same_however_the_model_lies_and_its_labels_are_named(
+        turn in turns(), shift in vectors(80.0), names in orders(N),
+    ) {
+        let surface = divided(&turn, shift, &names);
+        prop_assert_eq!(surface.n_patches, as_given().n_patches);
+        assert_valid(&surface, pebble().volume());
+        let (areas, given) = (surface.areas(), as_given().areas());
+        for (label, &name) in names.iter().enumerate() {
+            let (a, b) = (areas[PatchId::from(name)], given[PatchId::from(label)]);
+            prop_assert!((a / b - 1.0).abs() < 1e-6, "label {}: {} mm² and {} mm²", label, a, b);
+        }
+    }
+
+    #[test]
+    fn an_automatic_division_is_valid_and_has_as_many_pieces_however_the_model_lies(
+        turn in turns(), shift in vectors(80.0),
+    ) {
+        let params = SegmentationParams { n_pieces: Some(6), ..SegmentationParams::default() };
+        let of = |solid: &Solid| segment(&Ctx::quiet(), &params, solid, None).unwrap();
+        let surface = of(&Solid::new(turn.mesh(pebble().mesh(), shift)).unwrap());
+        assert_valid(&surface, pebble().volume());
+        prop_assert_eq!(surface.n_patches, of(&pebble()).n_patches);
+    }
+
+    #[test]
+    fn what_seams_offer_and_what_is_in_the_way_turn_with_the_model(turn in turns()) {
+        let mut turned = as_given().clone();
+        turned.mesh = turn.mesh(&turned.mesh, Vec3::ZERO);
+        let survey = surveyed(&turned);
+        let same = Vec::from_iter(0..N);
+        assert_same_contacts(&survey, &turn, &same, 1e-6, true);
+        // Pictures have pixels, and turn only nearly with what they show.
+        let farthest = farthest_share(&survey, &turn, &same);
+        prop_assert!(farthest < 0.01, "{}", farthest);
+    }
+
+    #[test]
+    fn a_plan_costs_the_same_however_its_pieces_are_numbered(number in orders(N), seed in 0..1000u64) {
+        let survey = surveyed(&renumbered(as_given(), &number));
+        let none = LatticeTurn::all()[0];
+        assert_same_contacts(&survey, &none, &number, 1e-9, false);
+        prop_assert!(farthest_share(&survey, &none, &number) < 1e-9);
+        let params = PlanParams { seed, ..PlanParams::default() };
+        let plans = random_plans(&params, survey_as_given(), 20);
+        let mut plans = plans.into_iter().filter(|plan| hold_alike(plan, &survey, &number)).peekable();
+        prop_assume!(plans.peek().is_some());
+        for plan in plans {
+            let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
+            let other = InstallationPlan::new(plan.steps.iter().map(|s| (new(s.piece), s.separation)));
+            let one = score(survey_as_given(), &PlanConstraints::default(), &plan);
+            let two = score(&survey, &PlanConstraints::default(), &other);
+            prop_assert!((one.worst - two.worst).abs() < 1e-9, "{:?} {:?}", one, two);
+            for (p, cost) in one.pieces.iter() {
+                prop_assert!((cost - two.pieces[new(p)]).abs() < 1e-9, "{:?} {:?}", one, two);
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "fails: the longest run depends on the way that the seam is walked, so 23.5 mm become 18.6 mm"]
+fn the_longest_run_of_connectors_is_the_same_however_pieces_are_numbered() {
+    let number = [0, 1, 3, 2, 4, 6, 5];
+    let survey = surveyed(&renumbered(as_given(), &number));
+    assert_same_contacts(&survey, &LatticeTurn::all()[0], &number, 1e-9, true);
+}
+
+proptest! {
+    #![proptest_config(cases(200))]
+
+    #[test]
+    fn a_turn_keeps_lengths_and_hands_and_its_inverse_undoes_it(
+        normal in vectors(1.0), slide in vectors(1.0), a in vectors(50.0), b in vectors(50.0),
+    ) {
+        prop_assume!(normal.length() > 0.1 && slide.cross(normal).length() > 0.01);
+        let normal = normal.normalize();
+        let slide = slide.reject_from_normalized(normal).normalize();
+        let (turn, along) = Turn::laying(normal, slide);
+        prop_assert!(turn.apply(slide).distance(along.unit()) < 1e-9);
+        prop_assert!((turn.apply(normal).abs().max_element() - 1.0).abs() < 1e-9);
+        prop_assert!(turn.inverse().apply(turn.apply(a)).distance(a) < 1e-9);
+        prop_assert!(turn.inverse().inverse() == turn);
+        prop_assert!((turn.apply(a).dot(turn.apply(b)) - a.dot(b)).abs() < 1e-9);
+        prop_assert!(turn.apply(a).cross(turn.apply(b)).distance(turn.apply(a.cross(b))) < 1e-9);
+        prop_assert!((turn.angle() - turn.inverse().angle()).abs() < 1e-6);
+    }
+}
