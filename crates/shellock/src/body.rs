@@ -5,7 +5,9 @@
 //! the zero level of a field
 //!
 //! ```text
-//! φ_p = ½ (min_j d_j − d_p)                      nearer to patch p than to any patch j that remains
+//! φ_p                                            beyond the sheets through p's seams (`sheets`);
+//!                                                away from them ½ (min_j d_j − d_p), nearer to
+//!                                                patch p than to any patch j that remains
 //! U   = max_{t ≥ 0} skin_p(x − t s)              ahead of p's outer skin: must go with p
 //! V   = max_{t ≥ 0} (E' + margin)(x + t s)       behind what remains: must stay
 //! g_p = min(max(φ_p, U), −V)                     p's side is positive
@@ -13,13 +15,14 @@
 //!
 //! so that along every line in direction s all remaining material comes before p: p leaves freely by
 //! construction. Fragments that a cut leaves on either side are given to the other one, which p then keeps
-//! out of the way of. Inside, the two sides of a cut keep a small gap that tapers to three tenths of it (15
-//! µm a side) at the outer rim. Where outer patches hide each other a little, only the seam shifts. The
-//! first-installed piece is what is left.
+//! out of the way of. The two sides of a cut keep a small gap, the same from the inner side to the outer rim.
+//! Where outer patches hide each other a little, only the seam shifts. The first-installed piece is what is
+//! left.
 
 mod error;
 mod grid;
 mod separate;
+mod sheets;
 #[cfg(test)]
 mod tests;
 
@@ -47,7 +50,7 @@ pub struct BodyParams {
     /// The same along the seams of a key that slides on rails; [0, 0.4], `None` where it does not. Such a key
     /// is to be taken out by hand.
     pub key_gap_mm: Option<f64>,
-    /// Depth over which that gap grows from three tenths at the outer rim. [0.05, 5]; 1.
+    /// Depth of the rim, within which gaps are told apart from those beneath. [0.05, 5]; 1.
     pub rim_mm: f64,
 }
 

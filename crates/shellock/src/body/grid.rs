@@ -10,7 +10,8 @@ use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 
 use super::BodyParams;
-use crate::{PatchId, SegmentedSurface};
+use super::sheets::Sheets;
+use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
 /// Values are cut off this far from the level, in cells: nothing farther than a few cells shapes a contour,
 /// and bounded fields interpolate without jumps.
@@ -119,6 +120,7 @@ pub struct PatchDistances {
     /// Entries of node n are `start[n] .. start[n + 1]`.
     start: Vec<u32>,
     entries: Vec<Entry>,
+    sheets: Sheets,
 }
 
 impl PatchDistances {
@@ -161,7 +163,30 @@ impl PatchDistances {
             }
             entries.extend(part);
         }
-        Self { start, entries }
+        let near_seams: Vec<u32> = (0..n as u32)
+            .filter(|&i| start[i as usize + 1] - start[i as usize] > 1)
+            .collect();
+        let foot = |x: Vec3| bvh.nearest(x, f64::INFINITY).map(|nearest| nearest.point);
+        let sheets = Sheets::new(grid, surface, &near_seams, foot);
+        Self {
+            start,
+            entries,
+            sheets,
+        }
+    }
+
+    /// Positive on the side of `p`, which leaves along `separation` from what `remains`: near their seams the
+    /// distance to the sheets through them, elsewhere [`Self::preference`].
+    pub fn side_of(
+        &self,
+        grid: &ShellGrid,
+        p: PatchId,
+        remains: &[bool],
+        separation: LatticeDirection,
+    ) -> Vec<f32> {
+        let mut side = self.preference(p, remains, grid.cutoff_mm());
+        self.sheets.shape(grid, p, remains, separation, &mut side);
+        side
     }
 
     /// `½ (min over remaining j ≠ p of d_j − d_p)` at every node, cut off at ±`cutoff`: positive nearer to

@@ -19,10 +19,6 @@ use crate::{Cancelled, Cause, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSu
 const SKIN_CELLS: f64 = 1.5;
 /// What remains is grown by this many cells before it is swept, so that interpolation leaves no rub.
 const MARGIN_CELLS: f64 = 0.15;
-/// Share of the wall gap that is left at the rim. With a tenth of it the two sides of most seams crossed
-/// somewhere, by up to 0.1 mm, and paths rubbed there; half of that is left. At 15 µm a side the surface
-/// still counts as covered everywhere.
-const RIM_LEAST: f64 = 0.3;
 /// What is nearer than this to the key's cut is its seam, mm.
 const KEY_REACH_MM: f32 = 1.5;
 /// Cutting tools are simplified by at most this share of the gap and this many mm where they cut, so that
@@ -61,6 +57,8 @@ pub struct ShellBodies {
     /// Positive on each piece's own side of all cuts; with the wall's limits it is the body. On the nodes
     /// around its patch.
     pub side: IdVec<PatchId, LocalField>,
+    /// How far each side of a cut stays away from it, mm, on all nodes.
+    pub gap_mm: Vec<f32>,
 }
 
 /// Splits the wall along the plan. The result is a partition of the wall but for the gap inside the seams.
@@ -118,12 +116,14 @@ pub fn build(
     ctx.stage("bodies", plan.steps.len())?;
     let key_cut = cuts[0].field.as_ref().filter(|_| params.key_gap_mm.is_some());
     let key_side = key_cut.map(|field| field.spread(&grid.band, -grid.cutoff_mm()));
+    let gap = |n: usize| gap_mm(params, key_side.as_deref(), n);
+    let gap_mm: Vec<f32> = (0..grid.band.len()).into_par_iter().map(gap).collect();
     let mut parts = split(
         &Splitter {
             ctx,
             params,
             grid,
-            key_side,
+            gap_mm: &gap_mm,
         },
         grid.wall.clone(),
         &cuts,
@@ -137,6 +137,7 @@ pub fn build(
         inner: inner.finish(plan.steps.len()),
         blocked: of_every_piece(blocked),
         side: of_every_piece(side),
+        gap_mm,
     })
 }
 
@@ -157,8 +158,8 @@ struct Splitter<'a> {
     ctx: &'a Ctx<'a>,
     params: &'a BodyParams,
     grid: &'a ShellGrid,
-    /// Positive on the key's side of its cut, where its seams have a gap of their own.
-    key_side: Option<Vec<f32>>,
+    /// How far each side of a cut stays away from it, mm.
+    gap_mm: &'a [f32],
 }
 
 /// Divides `wall` among the pieces of `cuts`, which stand in the order of taking apart: first into the
@@ -244,7 +245,7 @@ impl Splitter<'_> {
     fn whole_side(&self, g: &[f32], sign: f32) -> Volume {
         let field: Vec<f32> = (0..g.len())
             .into_par_iter()
-            .map(|n| (sign * g[n] - self.gap_mm(n)).min(self.limits(n)))
+            .map(|n| (sign * g[n] - self.gap_mm[n]).min(self.limits(n)))
             .collect();
         // The same corners as the other side's collar cuts apart.
         let apart = if sign > 0.0 {
@@ -254,21 +255,6 @@ impl Splitter<'_> {
         };
         let mesh = contour_cutting(&self.grid.band, &field, OffBand::Outside, apart);
         Volume::from_closed_mesh(&mesh).expect("contours are manifold")
-    }
-
-    /// How far each side of a cut stays away from it, mm: less towards the outer rim, more along the key's
-    /// seams where it has its own gap.
-    fn gap_mm(&self, n: usize) -> f32 {
-        let is_at_key = self
-            .key_side
-            .as_ref()
-            .is_some_and(|key| key[n].abs() < KEY_REACH_MM);
-        let gap = self
-            .params
-            .key_gap_mm
-            .filter(|_| is_at_key)
-            .unwrap_or(self.params.wall_gap_mm) as f32;
-        gap * (self.grid.depth[n] / self.params.rim_mm as f32).clamp(RIM_LEAST as f32, 1.0)
     }
 
     /// Positive where tools reach. Nothing is cut below the wall or far outside: cuts are unknown there. The
@@ -322,7 +308,7 @@ impl Splitter<'_> {
             }
         }
         field.par_iter_mut().enumerate().for_each(|(n, f)| {
-            *f = f.min(self.gap_mm(n) - sign * g[n]).min(self.limits(n));
+            *f = f.min(self.gap_mm[n] - sign * g[n]).min(self.limits(n));
         });
         field
     }
@@ -340,9 +326,15 @@ impl Splitter<'_> {
         if h < -0.4 * cell || depth < -reach || depth > params.thickness_mm + reach {
             return FREE_TOLERANCE_MM;
         }
-        let taper = (depth / params.rim_mm).clamp(0.0, 1.0);
-        (GAP_SHARE * params.wall_gap_mm * taper).min(CUT_TOLERANCE_MM)
+        (GAP_SHARE * params.wall_gap_mm).min(CUT_TOLERANCE_MM)
     }
+}
+
+/// How far each side of a cut stays away from it, mm: more along the key's seams where it has its own gap.
+fn gap_mm(params: &BodyParams, key_side: Option<&[f32]>, n: usize) -> f32 {
+    let is_at_key = key_side.is_some_and(|key| key[n].abs() < KEY_REACH_MM);
+    let own = params.key_gap_mm.filter(|_| is_at_key);
+    own.unwrap_or(params.wall_gap_mm) as f32
 }
 
 /// The largest connected part of `body`.
@@ -406,7 +398,10 @@ impl<'a> Separation<'a> {
         let cell = self.grid.band.cell_mm() as f32;
         let (skin_mm, margin) = (SKIN_CELLS as f32 * cell, MARGIN_CELLS as f32 * cell);
         let along = separation.step();
-        let phi = self.distances.preference(p, &self.remains, cutoff);
+        let mut phi = self.distances.side_of(self.grid, p, &self.remains, separation);
+        // What remains is swept a margin larger.
+        phi.par_iter_mut()
+            .for_each(|phi| *phi = (*phi + margin).min(cutoff));
         let at = |node: usize, side: f32| self.wall(node, cell).min(side).min(self.rest[node]);
         let skin: Vec<f32> = (0..phi.len())
             .into_par_iter()

@@ -168,7 +168,7 @@ impl Section {
                 is_tongue.then_some(Part {
                     n0: -pin_width,
                     n1: ROOT_MM,
-                    s0: 0.35,
+                    s0: 0.5 * c,
                     s1: top_male,
                 }),
             ],

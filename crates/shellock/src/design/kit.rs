@@ -140,6 +140,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     let finish = FinishParams {
         connector: &settings.connector,
         relief,
+        rim_mm: settings.body.rim_mm,
         grip: *grip,
         label,
     };

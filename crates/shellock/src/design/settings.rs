@@ -113,13 +113,12 @@ impl Settings {
         }
     }
 
-    /// The least gaps that finished pieces keep beneath the rim: those of connectors and of walls, whichever
+    /// The least gaps that finished pieces keep: those of connectors and of walls, whichever
     /// is narrower.
     pub(super) fn relief(&self) -> Relief {
         let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.wall_gap_mm);
         let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
         Relief {
-            rim_mm: self.body.rim_mm,
             gap_mm,
             key_gap_mm: self.body.key_gap_mm.map_or(gap_mm, of_key),
         }

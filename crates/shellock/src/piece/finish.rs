@@ -77,6 +77,8 @@ pub struct FinishParams<'a> {
     pub connector: &'a ConnectorParams,
     /// Least gaps of the finished pieces.
     pub relief: Relief,
+    /// Ribs stay so far below the model's surface, mm.
+    pub rim_mm: f64,
     /// The notch that the key is to have.
     pub grip: Option<Grip>,
     /// How numbers are engraved, if they are.
@@ -117,7 +119,7 @@ pub fn make(
         .collect();
     ctx.stage("pieces", plan.steps.len())?;
     let mut pieces = joined(shell, &joints, &halves);
-    relieve(ctx, &finish.relief, grid, plan, &mut pieces)?;
+    relieve(ctx, &finish.relief, plan, &mut pieces)?;
     let (mut press_fits, mut changes) = detents(params, &kept);
     changes.extend(
         finish
@@ -126,7 +128,7 @@ pub fn make(
             .and_then(|grip| notch_or_warning(ctx, grip, shell)),
     );
     if params.key_rib_mm > 0.0 && !kept.iter().any(Run::is_rail) {
-        let (fits, added) = ribs_of_key(ctx, params.key_rib_mm, finish.relief.rim_mm, grid, plan, &pieces);
+        let (fits, added) = ribs_of_key(ctx, params.key_rib_mm, finish.rim_mm, grid, plan, &pieces);
         press_fits.extend(fits);
         changes.extend(added);
     }
@@ -202,6 +204,8 @@ fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Chang
 struct Room<'a> {
     grid: &'a ShellGrid,
     clearance_mm: f32,
+    /// How far the piece stays away from the cuts, mm, on all nodes.
+    gap_mm: &'a [f32],
     /// Positive where the piece may not be: what its way out or a later piece's takes.
     blocked: Vec<f32>,
     /// Positive on its own side of the cuts.
@@ -209,7 +213,7 @@ struct Room<'a> {
 }
 
 impl<'a> Room<'a> {
-    fn of(clearance_mm: f64, grid: &'a ShellGrid, shell: &ShellBodies, q: PatchId) -> Self {
+    fn of(clearance_mm: f64, grid: &'a ShellGrid, shell: &'a ShellBodies, q: PatchId) -> Self {
         let cutoff = grid.cutoff_mm();
         let (blocked, side) = rayon::join(
             || shell.blocked[q].spread(&grid.band, cutoff),
@@ -218,6 +222,7 @@ impl<'a> Room<'a> {
         Self {
             grid,
             clearance_mm: clearance_mm as f32,
+            gap_mm: &shell.gap_mm,
             blocked,
             side,
         }
@@ -244,9 +249,15 @@ impl<'a> Room<'a> {
         let thickness = self.grid.thickness_mm as f32;
         let (ceiling, floor) = (thickness - ROOT_MM as f32, thickness + self.clearance_mm);
         let depth = &self.grid.depth;
-        let space = region(&|n| (depth[n] - ceiling).min(-self.blocked[n] - self.clearance_mm));
+        let cell = self.grid.band.cell_mm() as f32;
+        // A piece's wall reaches to its gap, so what hangs from it does, too: slots between the two would fuse.
+        let away = |n: usize| {
+            let below = ((depth[n] - floor) / cell).clamp(0.0, 1.0);
+            self.gap_mm[n] + (self.clearance_mm - self.gap_mm[n]).max(0.0) * below
+        };
+        let space = region(&|n| (depth[n] - ceiling).min(-self.blocked[n] - away(n)));
         let below = region(&|n| depth[n] - floor);
-        let beside = region(&|n| self.side[n] - self.clearance_mm);
+        let beside = region(&|n| self.side[n] - self.gap_mm[n]);
         let free = whole.intersect(&space);
         free.intersect(&below.union(&beside))
     }

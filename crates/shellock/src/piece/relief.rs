@@ -2,17 +2,14 @@
 //!
 //! Carving keeps the clearances wherever sampled fields are smooth. Where seams of three pieces meet, or a
 //! wall is crooked within a cell of the grid, they come out smaller in spots, and in the worst ones surfaces
-//! cross. So the exact gaps of the finished pieces beneath the rim are asked, and each triangle that a piece
-//! passes too near by is swollen by the clearance, drawn out against the piece's way, and cut from it. The
-//! rim stays: nobody shall see a difference.
+//! cross. So the exact gaps of the finished pieces are asked, and each triangle that a piece
+//! passes too near by is swollen by the clearance, drawn out against the piece's way, and cut from it.
 
 use rayon::prelude::*;
 use shellock_geom::clearance::{Passed, Translation, faces_passed};
-use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use super::carve::distances_that_meet;
-use crate::body::ShellGrid;
 use crate::plan::InstallationPlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
@@ -22,31 +19,23 @@ const TOLERANCE_MM: f64 = 0.0195;
 /// What is cut keeps this much less than the gap wanted, mm: faces that would coincide with a socket's stay
 /// apart.
 const SHY_MM: f64 = 0.005;
-/// Rims nearer than the first are cut until they keep the second, mm: by design they are 0.03 mm apart.
-const RIM_LEAST_MM: f64 = 0.003;
-const RIM_GAP_MM: f64 = 0.008;
-/// The rim ends so much higher here than where gaps are measured, mm: depths are read off the grid.
-const RIM_MARGIN_MM: f64 = 0.15;
 /// Triangles within this of a plane, so parallel to it and together no larger are cut out as one.
 const FLAT_MM: f64 = 0.02;
 const FLAT_COS: f64 = 0.97;
 const FLAT_SIZE_MM: f64 = 4.0;
 
-/// Least gaps beneath the rim, mm.
+/// Least gaps, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relief {
-    /// What lies within this depth of the model's surface is rim.
-    pub rim_mm: f64,
     /// Between any two pieces.
     pub gap_mm: f64,
     /// Between the key and any other piece.
     pub key_gap_mm: f64,
 }
 
-/// The surface of a piece: all of it, and what lies beneath the rim.
+/// The surface of a piece.
 struct Skin {
-    whole: TriMesh,
-    beneath: TriMesh,
+    mesh: TriMesh,
     bounds: Aabb,
 }
 
@@ -54,14 +43,13 @@ struct Skin {
 pub(super) fn relieve(
     ctx: &Ctx,
     params: &Relief,
-    grid: &ShellGrid,
     plan: &InstallationPlan,
     pieces: &mut IdVec<PatchId, Volume>,
 ) -> Result<(), Cancelled> {
     let skins: Vec<Skin> = pieces
         .as_slice()
         .par_iter()
-        .map(|piece| Skin::of(grid, piece, params.rim_mm))
+        .map(|piece| Skin::of(piece))
         .collect();
     let skins: IdVec<PatchId, Skin> = skins.into_iter().collect();
     let order: Vec<_> = plan.removal().collect();
@@ -87,8 +75,7 @@ pub(super) fn relieve(
     Ok(())
 }
 
-/// What must go of a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`, and that their
-/// rims do not touch.
+/// What must go of a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`.
 fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
     if distances_that_meet(piece.bounds.grown(gap_mm), along, earlier.bounds, f64::INFINITY).is_none() {
         return Vec::new();
@@ -98,21 +85,12 @@ fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
         from_mm: 0.0,
         far_mm: f64::INFINITY,
     };
-    let of = |piece: &TriMesh, earlier: &TriMesh, least_mm: f64, gap_mm: f64| -> Vec<Volume> {
-        let passed = faces_passed(piece, earlier, &way_out, least_mm);
-        flats(earlier, &passed)
-            .iter()
-            .filter_map(|flat| flat.drawn_out(along, gap_mm))
-            .collect()
-    };
-    let mut cuts = of(
-        &piece.beneath,
-        &earlier.beneath,
-        gap_mm - TOLERANCE_MM,
-        gap_mm - SHY_MM,
-    );
-    cuts.extend(of(&piece.whole, &earlier.whole, RIM_LEAST_MM, RIM_GAP_MM));
-    cuts
+    let passed = faces_passed(&piece.mesh, &earlier.mesh, &way_out, gap_mm - TOLERANCE_MM);
+    let flats = flats(&earlier.mesh, &passed);
+    let drawn_out = flats
+        .iter()
+        .filter_map(|flat| flat.drawn_out(along, gap_mm - SHY_MM));
+    drawn_out.collect()
 }
 
 /// Triangles that lie about in a plane, and what passes them.
@@ -183,29 +161,11 @@ impl Flat {
 }
 
 impl Skin {
-    fn of(grid: &ShellGrid, piece: &Volume, rim_mm: f64) -> Self {
-        let whole = piece.to_mesh();
-        let depth = |p: &Vec3| grid.band.sample(&grid.depth, *p).unwrap_or(f64::INFINITY);
-        // What is off the band lies far beneath; lines are cut between finite values.
-        let rim_mm = (rim_mm - RIM_MARGIN_MM).max(0.0);
-        let values: Vec<f64> = whole
-            .points
-            .iter()
-            .map(|p| (depth(p) - rim_mm).min(10.0))
-            .collect();
-        let cut = cut_at_zero(&whole, &values, |_| true);
-        let sides = cut.mesh.triangles.iter().zip(&cut.side);
-        let triangles = sides
-            .filter(|(_, side)| **side == Side::Positive)
-            .map(|(t, _)| *t)
-            .collect();
+    fn of(piece: &Volume) -> Self {
+        let mesh = piece.to_mesh();
         Self {
-            bounds: whole.bounds(),
-            beneath: TriMesh {
-                points: cut.mesh.points,
-                triangles,
-            },
-            whole,
+            bounds: mesh.bounds(),
+            mesh,
         }
     }
 }
@@ -247,8 +207,7 @@ mod tests {
     #[test]
     fn what_was_too_near_on_the_way_keeps_the_gap_afterwards_and_the_rest_stays() {
         let skin = |volume: &Volume| Skin {
-            whole: volume.to_mesh(),
-            beneath: volume.to_mesh(),
+            mesh: volume.to_mesh(),
             bounds: volume.bounds(),
         };
         let block = cuboid([0.0; 3], [4.0, 4.0, 4.0]);
