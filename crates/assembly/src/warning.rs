@@ -143,6 +143,13 @@ pub enum Cause {
         by_mm: f64,
         after_mm: f64,
     },
+    ThinPlaces {
+        n_sheets: usize,
+        n_slots: usize,
+        longest_mm: f64,
+        thickness_mm: f64,
+        is_slot: bool,
+    },
     NotProven {
         figures: Vec<EstimatedPlay>,
         is_searched: bool,
@@ -474,6 +481,27 @@ impl Warning {
                      there: sand it a little"
                 ),
             ),
+            Cause::ThinPlaces {
+                n_sheets,
+                n_slots,
+                longest_mm,
+                thickness_mm,
+                is_slot,
+            } => {
+                let (kind, end) = if *is_slot {
+                    ("slot", "wide")
+                } else {
+                    ("sheet", "thick")
+                };
+                (
+                    "thin-places",
+                    format!(
+                        "{} have {n_sheets} thin sheets, which may break off, and {n_slots} hair slots, which may fuse; the \
+                         longest is a {kind} of {longest_mm:.0} mm, {thickness_mm:.2} mm {end}; look there before you assemble",
+                        in_words(&self.pieces)
+                    ),
+                )
+            }
             Cause::NotProven { figures, is_searched } => {
                 ("not-proven", self.not_proven(figures, *is_searched))
             }

@@ -200,15 +200,11 @@ fn print_text(to: &Destination, made: &Design, settings: &Settings, summary: &Su
         "connectors on {:.0} % of the seam length that fits any",
         100.0 * summary.connector_share
     );
+    if let Some(line) = fits(made) {
+        println!("{line}");
+    }
     print_verdict(&made.kit.verification);
     print_warnings(warnings);
-    if summary.thin_share > 0.002 {
-        let percent = 100.0 * summary.thin_share;
-        println!(
-            "warning: up to {percent:.1} % of a piece is thinner than {} mm",
-            settings.connector.min_wall_mm
-        );
-    }
     println!(
         "written to {}: open report.html in a browser, print plates.3mf",
         to.folder().display()
@@ -310,6 +306,15 @@ pub fn weakest(holding: &Holding) -> Vec<String> {
         .iter()
         .map(|l| format!("comes apart at 10 N/m: piece {}, {}", l.piece, place(l.at)));
     seam.into_iter().chain(loose).collect()
+}
+
+/// How exact a printer must be; nothing where surfaces cross, which is warned of.
+pub fn fits(made: &Design) -> Option<String> {
+    let within_mm = made.fits_within_mm().filter(|mm| *mm > 0.0)?;
+    Some(format!(
+        "fits if printed faces stand out by no more than {within_mm:.2} mm: the least gap is {:.2} mm, at rest and on every way out",
+        2.0 * within_mm
+    ))
 }
 
 /// Each on a line, with its place.

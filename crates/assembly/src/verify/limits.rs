@@ -25,6 +25,8 @@ pub const RUB_MM3: f64 = 0.45;
 pub const RUB_MM: f64 = 0.027;
 /// Overlap with others that holds a piece that is pushed, mm³.
 pub const HOLD_MM3: f64 = 0.55;
+/// Slots within one piece that are narrower are told, mm: resin fuses them, and no nozzle leaves them open.
+pub const LEAST_SLOT_MM: f64 = 0.2;
 /// Travels, mm, at which doubt about a way is always resolved exactly: those that the outside judge tries.
 pub const TRAVELS_MM: [f64; 18] = [
     0.05, 0.15, 0.3, 0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 28.0, 40.0, 60.0, 90.0,

@@ -1,10 +1,13 @@
-//! How much of a piece is too thin to print well.
+//! How much of a piece is too thin to print well, and where: sheets of material and slots within one piece.
+
+use std::collections::HashMap;
 
 use rayon::prelude::*;
-use shellock_geom::TriMesh;
+use serde::{Deserialize, Serialize};
 use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::{TriMesh, Vec3};
 
-use super::sample;
+use super::sample::{self, Sample};
 
 /// Rays shot into a piece. The share is known to 1 % (two sigma at one half).
 const N_SAMPLES: usize = 10_000;
@@ -65,6 +68,125 @@ pub fn thin_share(mesh: &TriMesh, min_wall_mm: f64) -> ThinShare {
     }
 }
 
+/// Rays a mm² for places: a place as long as [`LEAST_LENGTH_MM`] and a quarter as wide is met by six.
+const RAYS_PER_MM2: f64 = 6.0;
+/// Most rays of one piece, each way.
+const MOST_RAYS: usize = 300_000;
+/// Cosine of the greatest angle between the two sides of a sheet or a slot; beyond 15° they make an edge or a
+/// notch.
+const COS_SHEET: f64 = 0.965_925_826_289_068_3;
+/// Points that are nearer to each other lie in one place, mm: three mean distances between rays.
+const JOINED_MM: f64 = 1.2;
+/// Shorter places are not told, mm, and places met by fewer rays.
+const LEAST_LENGTH_MM: f64 = 2.0;
+const LEAST_RAYS: usize = 4;
+
+/// What is too thin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ThinKind {
+    /// Material between two faces: it may break off.
+    Sheet,
+    /// Air between two faces of one piece: it may fuse.
+    Slot,
+}
+
+/// Where a piece is too thin to print well.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ThinPlace {
+    /// Sheet or slot.
+    pub kind: ThinKind,
+    /// How long it is, mm: the diagonal of its bounds.
+    pub length_mm: f64,
+    /// How thick in the median, mm.
+    pub thickness_mm: f64,
+    /// The ray that met it nearest to its middle, mm.
+    pub at: [f64; 3],
+}
+
+/// Sheets of material thinner than `least_wall_mm` and slots narrower than `least_slot_mm` within one piece,
+/// 2 mm or longer; the longest first.
+///
+/// From points on the surface a ray goes inwards and one outwards. Where it meets, within the limit, a face
+/// that is parallel within 15°, the point is thin; thin points of one kind less than 1.2 mm apart are one place.
+pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Vec<ThinPlace> {
+    let n = ((mesh.area() * RAYS_PER_MM2) as usize).min(MOST_RAYS);
+    if n == 0 {
+        return Vec::new();
+    }
+    let samples = sample::on_surface(mesh, n, SEED);
+    let bvh = TriangleBvh::new(mesh);
+    let mut places = Vec::new();
+    for (kind, inwards, limit_mm) in [
+        (ThinKind::Sheet, -1.0, least_wall_mm),
+        (ThinKind::Slot, 1.0, least_slot_mm),
+    ] {
+        let thickness = |s: &Sample| {
+            let along = inwards * s.normal;
+            let (face, on_mm) = bvh.first_hit(s.point + along * START_MM, along, limit_mm)?;
+            let faces = -s.normal.dot(mesh.face_normal(face as usize));
+            // Faces that touch there are an edge, not a sheet.
+            (faces >= COS_SHEET && on_mm > 10.0 * START_MM).then_some((s.point, on_mm + START_MM))
+        };
+        let thin: Vec<(Vec3, f64)> = samples.par_iter().filter_map(thickness).collect();
+        places.extend(joined(&thin).iter().filter_map(|members| place(kind, members)));
+    }
+    places.sort_by(|a, b| b.length_mm.total_cmp(&a.length_mm));
+    places
+}
+
+/// One place of its points and their thicknesses.
+fn place(kind: ThinKind, members: &[(Vec3, f64)]) -> Option<ThinPlace> {
+    let bounds = shellock_geom::Aabb::around(members.iter().map(|m| m.0));
+    if members.len() < LEAST_RAYS || bounds.diagonal() < LEAST_LENGTH_MM {
+        return None;
+    }
+    let middle = bounds.center();
+    let nearest = members.iter().min_by(|a, b| {
+        a.0.distance_squared(middle)
+            .total_cmp(&b.0.distance_squared(middle))
+    })?;
+    let mut thicknesses: Vec<f64> = members.iter().map(|m| m.1).collect();
+    thicknesses.sort_unstable_by(f64::total_cmp);
+    Some(ThinPlace {
+        kind,
+        length_mm: bounds.diagonal(),
+        thickness_mm: thicknesses[thicknesses.len() / 2],
+        at: nearest.0.to_array(),
+    })
+}
+
+/// The points in groups whose members are linked by steps of [`JOINED_MM`], in the order of their first ones.
+fn joined(points: &[(Vec3, f64)]) -> Vec<Vec<(Vec3, f64)>> {
+    let cube = |p: Vec3| (p / JOINED_MM).floor().to_array().map(|x| x as i32);
+    let mut members: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
+    for (i, p) in points.iter().enumerate() {
+        members.entry(cube(p.0)).or_default().push(i);
+    }
+    let mut is_seen = vec![false; points.len()];
+    let mut groups = Vec::new();
+    for seed in 0..points.len() {
+        if std::mem::replace(&mut is_seen[seed], true) {
+            continue;
+        }
+        let (mut group, mut next) = (vec![seed], 0);
+        while next < group.len() {
+            let p = points[group[next]].0;
+            let [i, j, k] = cube(p);
+            let around = (0..27).map(|at| [i + at / 9 - 1, j + at / 3 % 3 - 1, k + at % 3 - 1]);
+            for &other in around.filter_map(|c| members.get(&c)).flatten() {
+                if !is_seen[other] && points[other].0.distance(p) < JOINED_MM {
+                    is_seen[other] = true;
+                    group.push(other);
+                }
+            }
+            next += 1;
+        }
+        groups.push(group.into_iter().map(|i| points[i]).collect());
+    }
+    groups
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,5 +224,23 @@ mod tests {
         ]);
         assert_eq!(thin_share(&wedge.to_mesh(), 0.8).share, 0.0);
         assert_eq!(thin_share(&TriMesh::default(), 0.8).share, 0.0);
+    }
+
+    #[test]
+    fn a_fin_and_a_slot_are_found_with_their_lengths_and_a_wall_and_a_wedge_are_not() {
+        let block = cuboid([0.0; 3], [12.0, 10.0, 6.0]);
+        let fin = cuboid([2.0, 1.0, 6.0], [10.0, 1.3, 8.0]);
+        let slot = cuboid([-1.0, 6.0, 4.0], [13.0, 6.15, 7.0]);
+        let mesh = block.union(&fin).subtract(&slot).to_mesh();
+        let places = thin_places(&mesh, 0.4, 0.2);
+        let kinds: Vec<ThinKind> = places.iter().map(|p| p.kind).collect();
+        assert_eq!(kinds, [ThinKind::Slot, ThinKind::Sheet], "{places:?}");
+        let near = |a: f64, b: f64, by: f64| (a - b).abs() < by;
+        let [slot, fin] = places[..] else { unreachable!() };
+        assert!(near(slot.length_mm, 12.0f64.hypot(2.0), 0.7) && near(slot.thickness_mm, 0.15, 1e-6));
+        assert!(near(fin.length_mm, 8.0f64.hypot(2.0), 0.7) && near(fin.thickness_mm, 0.3, 1e-6));
+        assert!(near(slot.at[1], 6.07, 0.1) && near(fin.at[1], 1.15, 0.2));
+        assert_eq!(thin_places(&mesh, 0.25, 0.1), []);
+        assert_eq!(thin_places(&TriMesh::default(), 1.0, 1.0), []);
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use shellock::strength::Material;
 use shellock_assembly::PatchId;
-use shellock_assembly::verify::{Check, Finding};
+use shellock_assembly::verify::{Check, Finding, ThinPlace};
 
 use super::{even_null, if_readable};
 
@@ -131,6 +131,9 @@ pub struct PieceEntry {
     pub n_triangles: Option<usize>,
     /// Share of its volume that is thinner than the thinnest wall, in [0, 1].
     pub thin_share: Option<f64>,
+    /// Its sheets that may break off and slots that may fuse, 2 mm or longer, the longest first.
+    #[serde(default)]
+    pub thin_places: Vec<ThinPlace>,
     /// How far it moves within its gaps; `None` where nothing ends its motions.
     pub rattle: Option<RattleEntry>,
 }
@@ -213,6 +216,8 @@ pub struct GapsEntry {
     pub on_the_way_beneath_rim_mm: Option<f64>,
     /// On the key's way in beneath the rim, mm.
     pub key_on_the_way_beneath_rim_mm: Option<f64>,
+    /// How far printed faces may stand out, each on its side, mm.
+    pub fits_within_mm: Option<f64>,
 }
 
 /// The verdict on the finished pieces.

@@ -134,6 +134,7 @@ fn pieces(design: &Design, thin_shares: &[f64]) -> Vec<PieceEntry> {
         installation_direction: (-plan.separation(p).unit() + 0.0).to_array(),
         n_triangles: Some(mesh.triangles.len()),
         thin_share: thin_shares.get(usize::from(p)).copied(),
+        thin_places: design.thin[p].clone(),
         rattle: RattleEntry::of(design, p),
     };
     design.kit.pieces.iter().map(piece).collect()
@@ -281,6 +282,7 @@ impl GapsEntry {
             on_the_way_mm: least(paths.iter().map(|p| p.overall.gap_mm)),
             on_the_way_beneath_rim_mm: least(paths.iter().filter_map(beneath)),
             key_on_the_way_beneath_rim_mm: least(of_key.filter_map(beneath)),
+            fits_within_mm: design.fits_within_mm(),
         }
     }
 }

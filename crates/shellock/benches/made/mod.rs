@@ -122,10 +122,10 @@ pub fn finish(
     let params = FinishParams {
         connector: &settings.connector,
         relief: Relief {
-            rim_mm: settings.body.rim_mm,
             gap_mm,
             key_gap_mm: gap_mm,
         },
+        rim_mm: settings.body.rim_mm,
         grip: None,
         label: Some(LabelParams::default()),
     };

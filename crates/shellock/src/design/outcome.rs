@@ -1,6 +1,6 @@
 //! How a job ends.
 
-use shellock_geom::Vec3;
+use shellock_geom::{TriMesh, Vec3};
 
 use super::attempt::Failure;
 use super::budget::RATTLING_KEYS;
@@ -14,7 +14,9 @@ use crate::plan::Blocker;
 use crate::segmentation::{self, SegmentationError};
 use crate::strength::{Strength, StrengthError};
 use crate::verify::clearance::{KitGaps, kit_gaps};
-use crate::{Cancelled, Cause, Ctx, Warning};
+use crate::verify::limits::LEAST_SLOT_MM;
+use crate::verify::{ThinKind, ThinPlace, thin_places};
+use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
 /// A finished kit and the wall that it is made of. All places are in assembly space: the model as it was
 /// given, turned by `turn`.
@@ -30,6 +32,8 @@ pub struct Design {
     pub strength: Option<Strength>,
     /// How near pieces come, at rest and on their way.
     pub gaps: KitGaps,
+    /// Where each piece is too thin to print well, the longest place first.
+    pub thin: IdVec<PatchId, Vec<ThinPlace>>,
     /// What it took to find it.
     pub effort: Effort,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
@@ -157,6 +161,9 @@ impl<'a> Best<'a> {
             &kit.plan,
             job.settings().body.rim_mm,
         )?;
+        let least_wall_mm = job.settings().connector.min_wall_mm;
+        let thin = |mesh: &TriMesh| thin_places(mesh, least_wall_mm, LEAST_SLOT_MM);
+        let thin: IdVec<PatchId, Vec<ThinPlace>> = kit.pieces.as_slice().iter().map(thin).collect();
         let ctx = ctx.fork();
         segmentation::tell(
             &ctx,
@@ -170,6 +177,7 @@ impl<'a> Best<'a> {
         let place = |at: [f64; 3]| turn.apply(Vec3::from(at)).to_array();
         warnings.extend(job.wall.warnings.iter().map(|w| w.clone().turned(place)));
         warnings.extend(crossing(&kit, &gaps));
+        warnings.extend(thin_in_all(&thin));
         match &key {
             Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, &key.site)),
             None if job.params.key == KeySource::Cut => {
@@ -188,6 +196,7 @@ impl<'a> Best<'a> {
             key,
             strength,
             gaps,
+            thin,
             effort,
             warnings,
         })))
@@ -211,6 +220,54 @@ fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
         cause: Cause::KeyWithoutRails,
         pieces: vec![key],
         at: Some(site.prism.origin.to_array()),
+    }
+}
+
+/// Says which pieces have sheets that may break off or slots that may fuse.
+fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinPlace>>) -> Option<Warning> {
+    let all = || thin.as_slice().iter().flatten();
+    let longest = all().max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))?;
+    let n_sheets = all().filter(|place| place.kind == ThinKind::Sheet).count();
+    Some(Warning {
+        cause: Cause::ThinPlaces {
+            n_sheets,
+            n_slots: all().count() - n_sheets,
+            longest_mm: longest.length_mm,
+            thickness_mm: longest.thickness_mm,
+            is_slot: longest.kind == ThinKind::Slot,
+        },
+        pieces: thin
+            .iter()
+            .filter(|(_, places)| !places.is_empty())
+            .map(|(p, _)| p)
+            .collect(),
+        at: Some(longest.at),
+    })
+}
+
+impl Design {
+    /// How far printed faces may stand out, each on its side, mm: half of the least gap between two pieces, at
+    /// rest and on any way out, but for a key's ribs or bumps, which are to press. ≤ 0 where surfaces cross;
+    /// `None` where no two pieces come near.
+    pub fn fits_within_mm(&self) -> Option<f64> {
+        let (key, presses) = (self.kit.plan.key(), !self.kit.press_fits.is_empty());
+        let is_pressed = |a: PatchId, b: PatchId| presses && (a == key || b == key);
+        let at_rest = self
+            .gaps
+            .pairs
+            .iter()
+            .filter(|p| !is_pressed(p.a, p.b))
+            .map(|p| p.overall.gap_mm);
+        let on_ways = self
+            .gaps
+            .paths
+            .iter()
+            .filter(|p| !is_pressed(p.piece, p.against))
+            .map(|p| p.overall.gap_mm);
+        at_rest
+            .chain(on_ways)
+            .min_by(f64::total_cmp)
+            .map(|gap_mm| 0.5 * gap_mm)
     }
 }
 

@@ -46,11 +46,7 @@ pub(super) fn relieve(
     plan: &InstallationPlan,
     pieces: &mut IdVec<PatchId, Volume>,
 ) -> Result<(), Cancelled> {
-    let skins: Vec<Skin> = pieces
-        .as_slice()
-        .par_iter()
-        .map(|piece| Skin::of(piece))
-        .collect();
+    let skins: Vec<Skin> = pieces.as_slice().par_iter().map(Skin::of).collect();
     let skins: IdVec<PatchId, Skin> = skins.into_iter().collect();
     let order: Vec<_> = plan.removal().collect();
     let relieved: Vec<Option<Volume>> = (0..order.len())
