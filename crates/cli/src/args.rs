@@ -422,10 +422,16 @@ pub struct Options {
     /// Leave out instructions.pdf, which takes about a second
     #[arg(long, help_heading = "Make")]
     pub no_booklet: bool,
-    /// Gap that each side of a seam leaves inside the wall, mm, 0 to 0.4; nothing at the outer surface
-    /// [default: the printer's]
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
-    pub wall_gap: Option<f64>,
+    /// How far each side of a seam stays back, mm, 0 to 0.4; less for those who sand [default: the printer's
+    /// tolerance]
+    #[arg(
+        long,
+        alias = "wall-gap",
+        value_name = "MM",
+        allow_hyphen_values = true,
+        help_heading = "Make"
+    )]
+    pub seam_gap: Option<f64>,
     /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported [default: the
     /// printer's]
     #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
@@ -490,7 +496,7 @@ impl Options {
         };
         p.material = self.material.unwrap_or(printer.material);
         p.drop_m = self.drop;
-        p.wall_gap_mm = self.wall_gap.unwrap_or(printer.wall_gap_mm);
+        p.seam_gap_mm = self.seam_gap.unwrap_or(printer.tolerance_mm);
         p.cell_mm = self.grid;
         p.connector = ConnectorParams {
             size: self.connector,

@@ -169,7 +169,7 @@ fn print_json(
         "status": if code == 0 { "verified" } else { "failed" },
         "out": to.folder(), "notes": notes,
         "pieces": made.kit.pieces.len(), "key_piece": made.kit.plan.key(),
-        "volume_ratio": summary.volume_ratio, "print_time_ratio": summary.print_time_ratio, "connector_share": summary.connector_share,
+        "volume_ratio": summary.volume_ratio, "grams": summary.grams, "fits_within_mm": made.fits_within_mm(), "connector_share": summary.connector_share,
         "thin_share": summary.thin_share, "thickness_mm": made.kit.thickness_mm,
         "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
         "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.kit.sizes.largest_mm(),

@@ -99,7 +99,8 @@ struct Own {
     bed: Option<[f64; 3]>,
     clearance: Option<f64>,
     key_clearance: Option<f64>,
-    wall_gap: Option<f64>,
+    #[serde(alias = "wall-gap")]
+    tolerance: Option<f64>,
     min_wall: Option<f64>,
     layer: Option<f64>,
     material: Option<String>,
@@ -156,7 +157,7 @@ fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
         bed_mm: own.bed.unwrap_or(base.bed_mm),
         clearance_mm: own.clearance.unwrap_or(base.clearance_mm),
         key_clearance_mm: own.key_clearance.unwrap_or(base.key_clearance_mm),
-        wall_gap_mm: own.wall_gap.unwrap_or(base.wall_gap_mm),
+        tolerance_mm: own.tolerance.unwrap_or(base.tolerance_mm),
         min_wall_mm: own.min_wall.unwrap_or(base.min_wall_mm),
         layer_mm: own.layer.unwrap_or(base.layer_mm),
         material: material.unwrap_or(base.material),

@@ -48,8 +48,8 @@ const KIT_FILES: [&str; 13] = [
 pub struct Summary {
     /// Material of all pieces over the solid model's.
     pub volume_ratio: f64,
-    /// Print time of all plates over the solid model's, by closed forms.
-    pub print_time_ratio: f64,
+    /// What the pieces weigh without supports, g.
+    pub grams: f64,
     /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].
     pub connector_share: f64,
     /// Greatest share of a piece's volume that is thinner than the thinnest wall.
@@ -195,7 +195,7 @@ pub fn files(
     let made: f64 = design.kit.joints.iter().map(|j| j.length_mm).sum();
     let summary = Summary {
         volume_ratio: volume / model.solid.volume(),
-        print_time_ratio: printing.time_ratio(),
+        grams: printing.grams(),
         connector_share: if usable > 0.0 {
             (made / usable).min(1.0)
         } else {

@@ -193,15 +193,13 @@ fn kit_facts(
         ),
         (
             "material".into(),
-            format!("{:.0} % of the solid model", 100.0 * summary.volume_ratio),
-        ),
-        (
-            "print time".into(),
             format!(
-                "about {:.0} % of the solid model's",
-                100.0 * summary.print_time_ratio
+                "{:.0} g without supports, {:.0} % of the solid model",
+                summary.grams,
+                100.0 * summary.volume_ratio
             ),
         ),
+        ("fits if printed within".into(), printed_within(design)),
         (
             "seams with connectors".into(),
             format!("{:.0} % of what fits", 100.0 * summary.connector_share),
@@ -239,6 +237,14 @@ fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
         format!("{} pieces, {}", shown.len(), size(shown)),
         "no glue: each piece locks those before it; the last one, the key, locks all".to_owned(),
     ]
+}
+
+/// How exact a printer must be.
+fn printed_within(design: &Design) -> String {
+    match design.fits_within_mm() {
+        Some(mm) if mm > 0.0 => format!("± {mm:.2} mm"),
+        _ => "surfaces cross; see the warnings".to_owned(),
+    }
 }
 
 /// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is

@@ -28,6 +28,8 @@ pub struct Printing {
     plates: Plates,
     /// Time by the closed forms, s: all plates, and the solid model.
     seconds: [f64; 2],
+    /// What the pieces weigh without supports, g.
+    grams: f64,
 }
 
 impl Printing {
@@ -51,6 +53,8 @@ impl Printing {
             printer: printer.clone(),
             plates,
             seconds: [pieces_s, solid_s],
+            grams: pieces.iter().map(TriMesh::signed_volume).sum::<f64>() * printer.material.density_g_cm3
+                / 1000.0,
         }
     }
 
@@ -59,9 +63,9 @@ impl Printing {
         self.seconds
     }
 
-    /// Print time of all plates over that of the solid model, by closed forms.
-    pub fn time_ratio(&self) -> f64 {
-        self.seconds[0] / self.seconds[1].max(f64::MIN_POSITIVE)
+    /// What the pieces weigh without supports, g.
+    pub fn grams(&self) -> f64 {
+        self.grams
     }
 
     /// Says which pieces the printer cannot make.
@@ -84,16 +88,16 @@ impl Printing {
             Process::Sls => String::new(),
             _ => format!("; {:.1} cm² of the outer skin need support", outer_mm2 / 100.0),
         };
-        let ratio = 100.0 * self.time_ratio();
-        let time = match self.plates.too_large.len() {
+        let rest = match self.plates.too_large.len() {
             0 => format!(
-                "; print time about {ratio:.0} % of the solid model's (closed form; `shellock report` asks PrusaSlicer)"
+                "; {:.0} g and what supports take; `shellock report` tells hours",
+                self.grams
             ),
             n => format!("; {n} pieces are not on them"),
         };
         let plates = if n == 1 { "plate" } else { "plates" };
         format!(
-            "plates.3mf: {n} {plates} of {}{supports}{time}",
+            "plates.3mf: {n} {plates} of {}{supports}{rest}",
             described(&self.printer)
         )
     }

@@ -62,7 +62,7 @@ pub struct PlanFile {
     /// Sizes of pairs; only where pairs have sizes of their own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub connector_sizes: Option<Vec<PairSizeEntry>>,
-    /// Gap that each side of a seam leaves inside the wall, mm.
+    /// How far each side of a seam stays back, mm.
     pub wall_gap: Option<f64>,
     /// Which way is up when the model stands: a direction of any length.
     pub up: Option<[f64; 3]>,

@@ -40,8 +40,8 @@ pub struct Printer {
     pub clearance_mm: f64,
     /// The same on the rails of the key. [0.03, 0.8].
     pub key_clearance_mm: f64,
-    /// Gap that each side of a seam leaves inside the wall. [0, 0.4].
-    pub wall_gap_mm: f64,
+    /// How far a printed face may stand out: each side of a seam stays back by as much. [0, 0.4].
+    pub tolerance_mm: f64,
     /// Thinnest wall that it makes. [0.1, 2].
     pub min_wall_mm: f64,
     /// Height of a layer. [0.01, 1].
@@ -59,7 +59,7 @@ impl Printer {
             bed_mm: [192.0, 120.0, 200.0],
             clearance_mm: 0.12,
             key_clearance_mm: 0.15,
-            wall_gap_mm: 0.05,
+            tolerance_mm: 0.05,
             min_wall_mm: 0.4,
             layer_mm: 0.05,
             material: Material::SLA_RESIN,
@@ -74,7 +74,7 @@ impl Printer {
             bed_mm: [220.0, 220.0, 250.0],
             clearance_mm: 0.2,
             key_clearance_mm: 0.22,
-            wall_gap_mm: 0.1,
+            tolerance_mm: 0.1,
             min_wall_mm: 0.45,
             layer_mm: 0.2,
             material: Material::PLA,
@@ -87,7 +87,7 @@ impl Printer {
             name: "fdm-petg".into(),
             clearance_mm: 0.3,
             key_clearance_mm: 0.32,
-            wall_gap_mm: 0.14,
+            tolerance_mm: 0.14,
             material: Material::PETG,
             ..Self::fdm()
         }
@@ -101,7 +101,7 @@ impl Printer {
             bed_mm: [165.0, 165.0, 300.0],
             clearance_mm: 0.25,
             key_clearance_mm: 0.28,
-            wall_gap_mm: 0.12,
+            tolerance_mm: 0.12,
             min_wall_mm: 0.6,
             layer_mm: 0.11,
             material: Material::PA12,
@@ -129,7 +129,7 @@ impl Printer {
                 0.03,
                 0.8,
             ),
-            ParamProblem::unless_within("wall gap of the printer", "mm", self.wall_gap_mm, 0.0, 0.4),
+            ParamProblem::unless_within("tolerance of the printer", "mm", self.tolerance_mm, 0.0, 0.4),
             ParamProblem::unless_within("minimum wall of the printer", "mm", self.min_wall_mm, 0.1, 2.0),
             ParamProblem::unless_within("layer of the printer", "mm", self.layer_mm, 0.01, 1.0),
         ];

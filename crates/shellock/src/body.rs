@@ -45,8 +45,8 @@ pub struct BodyParams {
     /// At a third the inner surface is off by 0.003 mm on average; 0.8 mm for a 2 mm wall takes 0.6 of the
     /// time of that and passes the same checks. The connectors' own shape does not depend on it.
     pub cell_mm: Option<f64>,
-    /// Gap that each side of a seam leaves inside the wall. [0, 0.4]; 0.05.
-    pub wall_gap_mm: f64,
+    /// How far each side of a seam stays back. [0, 0.4]; 0.05.
+    pub seam_gap_mm: f64,
     /// The same along the seams of a key that slides on rails; [0, 0.4], `None` where it does not. Such a key
     /// is to be taken out by hand.
     pub key_gap_mm: Option<f64>,
@@ -59,7 +59,7 @@ impl Default for BodyParams {
         Self {
             thickness_mm: 2.0,
             cell_mm: None,
-            wall_gap_mm: 0.05,
+            seam_gap_mm: 0.05,
             key_gap_mm: None,
             rim_mm: 1.0,
         }
@@ -78,7 +78,7 @@ impl BodyParams {
         [
             ParamProblem::unless_within("thickness", "mm", self.thickness_mm, 0.8, 10.0),
             ParamProblem::unless_within("grid spacing", "mm", cell, 0.05, self.thickness_mm / 2.0),
-            ParamProblem::unless_within("wall gap", "mm", self.wall_gap_mm, 0.0, 0.4),
+            ParamProblem::unless_within("seam gap", "mm", self.seam_gap_mm, 0.0, 0.4),
             self.key_gap_mm
                 .and_then(|mm| ParamProblem::unless_within("gap of the key", "mm", mm, 0.0, 0.4)),
             ParamProblem::unless_within("rim", "mm", self.rim_mm, 0.05, 5.0),

@@ -72,10 +72,10 @@ impl PlanFile {
             clearance: settings
                 .connector
                 .clearance_mm
-                .max(2.0 * settings.body.wall_gap_mm),
+                .max(2.0 * settings.body.seam_gap_mm),
             connector_size: Some(kit.sizes.largest_mm()),
             connector_sizes: pair_sizes(design),
-            wall_gap: Some(settings.body.wall_gap_mm),
+            wall_gap: Some(settings.body.seam_gap_mm),
             up: Some(up.to_array()),
             min_wall: Some(settings.connector.min_wall_mm),
             key_piece: Some(kit.plan.key()),

@@ -118,7 +118,7 @@ pub fn finish(
     let gap_mm = settings
         .connector
         .clearance_mm
-        .min(2.0 * settings.body.wall_gap_mm);
+        .min(2.0 * settings.body.seam_gap_mm);
     let params = FinishParams {
         connector: &settings.connector,
         relief: Relief {

@@ -326,7 +326,7 @@ impl Splitter<'_> {
         if h < -0.4 * cell || depth < -reach || depth > params.thickness_mm + reach {
             return FREE_TOLERANCE_MM;
         }
-        (GAP_SHARE * params.wall_gap_mm).min(CUT_TOLERANCE_MM)
+        (GAP_SHARE * params.seam_gap_mm).min(CUT_TOLERANCE_MM)
     }
 }
 
@@ -334,7 +334,7 @@ impl Splitter<'_> {
 fn gap_mm(params: &BodyParams, key_side: Option<&[f32]>, n: usize) -> f32 {
     let is_at_key = key_side.is_some_and(|key| key[n].abs() < KEY_REACH_MM);
     let own = params.key_gap_mm.filter(|_| is_at_key);
-    own.unwrap_or(params.wall_gap_mm) as f32
+    own.unwrap_or(params.seam_gap_mm) as f32
 }
 
 /// The largest connected part of `body`.

@@ -38,8 +38,8 @@ pub struct Params {
     pub label: Option<LabelParams>,
     /// How connectors are made.
     pub connector: ConnectorParams,
-    /// Gap that each side of a seam leaves inside the wall, mm. [0, 0.4]; 0.05.
-    pub wall_gap_mm: f64,
+    /// How far each side of a seam stays back, mm. [0, 0.4]; 0.05.
+    pub seam_gap_mm: f64,
     /// Spacing of the grid that fields live on, mm. (0, thickness / 2]; `None` takes the thickness over 2.5.
     pub cell_mm: Option<f64>,
     /// Work that the exact search for a plan may do: pieces revised. [0, 10⁹]; 100 000.
@@ -63,7 +63,7 @@ impl Default for Params {
             has_grip: false,
             label: None,
             connector: ConnectorParams::default(),
-            wall_gap_mm: 0.05,
+            seam_gap_mm: 0.05,
             cell_mm: None,
             proof_budget: 100_000,
             is_play_together: false,

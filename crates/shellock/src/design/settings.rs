@@ -49,7 +49,7 @@ impl Settings {
     pub fn with_thickness(params: &Params, thickness_mm: f64) -> Self {
         let Params {
             seed,
-            wall_gap_mm,
+            seam_gap_mm,
             cell_mm,
             ..
         } = *params;
@@ -57,7 +57,7 @@ impl Settings {
         let clearance_mm = connector.clearance_mm;
         let smallest_mm = connector.size.smallest_mm();
         let verify = VerifyParams {
-            clearance_mm: clearance_mm.max(2.0 * wall_gap_mm),
+            clearance_mm: clearance_mm.max(2.0 * seam_gap_mm),
             seed,
         };
         Self {
@@ -82,7 +82,7 @@ impl Settings {
             body: BodyParams {
                 thickness_mm,
                 cell_mm,
-                wall_gap_mm,
+                seam_gap_mm,
                 ..BodyParams::default()
             },
             connector,
@@ -98,7 +98,7 @@ impl Settings {
 
     /// The same for pieces of which `key` was cut to leave along `slide` alone.
     pub(super) fn with_key(&self, key: PatchId, slide: LatticeDirection) -> Self {
-        let key_gap_mm = self.body.wall_gap_mm.max(0.5 * self.connector.key_clearance_mm);
+        let key_gap_mm = self.body.seam_gap_mm.max(0.5 * self.connector.key_clearance_mm);
         Self {
             plan: PlanParams {
                 key: Some(key),
@@ -116,7 +116,7 @@ impl Settings {
     /// The least gaps that finished pieces keep: those of connectors and of walls, whichever
     /// is narrower.
     pub(super) fn relief(&self) -> Relief {
-        let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.wall_gap_mm);
+        let gap_mm = self.connector.clearance_mm.min(2.0 * self.body.seam_gap_mm);
         let of_key = |side_mm: f64| self.connector.key_clearance_mm.min(2.0 * side_mm);
         Relief {
             gap_mm,

@@ -125,7 +125,7 @@ pub fn seams(kit: &Kit) -> Result<Vec<u8>, Failure> {
         "Cut faces are bright; the wall ({:.1} mm) is above. Gaps are as printed: {} mm in connectors, {} mm in the wall.",
         made.thickness_mm,
         kit.settings.connector.clearance_mm,
-        2.0 * kit.settings.body.wall_gap_mm
+        2.0 * kit.settings.body.seam_gap_mm
     );
     sheet.note([0.5 * WIDTH, VIEW[1] + 44.0], &words);
     Ok(sheet.bytes())

@@ -28,7 +28,7 @@ fn params() -> Params {
     // Ten seconds' worth, as the command line counts them.
     params.proof_budget = 200_000;
     params.material = printer.material;
-    params.wall_gap_mm = printer.wall_gap_mm;
+    params.seam_gap_mm = printer.tolerance_mm;
     params.connector = ConnectorParams {
         size: SizeChoice::Auto(SizeRange::default()),
         clearance_mm: printer.clearance_mm,
