@@ -84,7 +84,7 @@ fn sources(krate: &str) -> Vec<PathBuf> {
     found
 }
 
-/// The module path of a file within its crate: `plan/contact/hold.rs` is `plan::contact::hold`.
+/// The module path of a file within its crate: `plan/interface/blocking.rs` is `plan::interface::blocking`.
 fn module(krate: &str, file: &Path) -> Vec<String> {
     let inside = file
         .strip_prefix(crates().join(krate).join("src"))

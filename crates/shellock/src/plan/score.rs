@@ -4,7 +4,7 @@
 //! bottleneck over the pieces, and like Eq. 6 the cost of a piece depends only on the directions along its
 //! own boundaries. The metrics of a later stage may rank the same plans anew; [`score`] is the one place to
 //! change. Pieces that the verification would find loose cost more than anything else: see
-//! [`contact`](super::contact). The cost of a plan is the pure bottleneck, so that bounds can be proved; the
+//! [`interface`](super::interface). The cost of a plan is the pure bottleneck, so that bounds can be proved; the
 //! mean decides among plans with the same bottleneck.
 
 use super::space::Space;
