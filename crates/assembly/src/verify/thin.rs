@@ -93,7 +93,7 @@ pub enum ThinKind {
 
 /// Where a piece is too thin to print well.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ThinPlace {
+pub struct ThinFeature {
     /// Sheet or slot.
     pub kind: ThinKind,
     /// How long it is, mm: the diagonal of its bounds.
@@ -109,7 +109,7 @@ pub struct ThinPlace {
 ///
 /// From points on the surface a ray goes inwards and one outwards. Where it meets, within the limit, a face
 /// that is parallel within 15°, the point is thin; thin points of one kind less than 1.2 mm apart are one place.
-pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Vec<ThinPlace> {
+pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Vec<ThinFeature> {
     let n = ((mesh.area() * RAYS_PER_MM2) as usize).min(MOST_RAYS);
     if n == 0 {
         return Vec::new();
@@ -136,7 +136,7 @@ pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Ve
 }
 
 /// One place of its points and their thicknesses.
-fn place(kind: ThinKind, members: &[(Vec3, f64)]) -> Option<ThinPlace> {
+fn place(kind: ThinKind, members: &[(Vec3, f64)]) -> Option<ThinFeature> {
     let bounds = shellock_geom::Aabb::around(members.iter().map(|m| m.0));
     if members.len() < LEAST_RAYS || bounds.diagonal() < LEAST_LENGTH_MM {
         return None;
@@ -148,7 +148,7 @@ fn place(kind: ThinKind, members: &[(Vec3, f64)]) -> Option<ThinPlace> {
     })?;
     let mut thicknesses: Vec<f64> = members.iter().map(|m| m.1).collect();
     thicknesses.sort_unstable_by(f64::total_cmp);
-    Some(ThinPlace {
+    Some(ThinFeature {
         kind,
         length_mm: bounds.diagonal(),
         thickness_mm: thicknesses[thicknesses.len() / 2],

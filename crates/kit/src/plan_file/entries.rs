@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use shellock::strength::Material;
 use shellock_assembly::PatchId;
-use shellock_assembly::verify::{Check, Finding, ThinPlace};
+use shellock_assembly::verify::{Check, Finding, ThinFeature};
 
 use super::{even_null, if_readable};
 
@@ -133,7 +133,7 @@ pub struct PieceEntry {
     pub thin_share: Option<f64>,
     /// Its sheets that may break off and slots that may fuse, 2 mm or longer, the longest first.
     #[serde(default)]
-    pub thin_places: Vec<ThinPlace>,
+    pub thin_places: Vec<ThinFeature>,
     /// How far it moves within its gaps; `None` where nothing ends its motions.
     pub rattle: Option<RattleEntry>,
 }

@@ -15,7 +15,7 @@ use crate::segmentation::{self, SegmentationError};
 use crate::strength::{Strength, StrengthError};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::limits::LEAST_SLOT_MM;
-use crate::verify::{ThinKind, ThinPlace, thin_places};
+use crate::verify::{ThinFeature, ThinKind, thin_places};
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
 /// A finished kit and the wall that it is made of. All places are in assembly space: the model as it was
@@ -33,7 +33,7 @@ pub struct Design {
     /// How near pieces come, at rest and on their way.
     pub gaps: KitGaps,
     /// Where each piece is too thin to print well, the longest place first.
-    pub thin: IdVec<PatchId, Vec<ThinPlace>>,
+    pub thin: IdVec<PatchId, Vec<ThinFeature>>,
     /// What it took to find it.
     pub effort: Effort,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
@@ -163,7 +163,7 @@ impl<'a> Best<'a> {
         )?;
         let least_wall_mm = job.settings().connector.min_wall_mm;
         let thin = |mesh: &TriMesh| thin_places(mesh, least_wall_mm, LEAST_SLOT_MM);
-        let thin: IdVec<PatchId, Vec<ThinPlace>> = kit.pieces.as_slice().iter().map(thin).collect();
+        let thin: IdVec<PatchId, Vec<ThinFeature>> = kit.pieces.as_slice().iter().map(thin).collect();
         let ctx = ctx.fork();
         segmentation::tell(
             &ctx,
@@ -224,7 +224,7 @@ fn without_rails(kit: &Kit, site: &KeySite) -> Warning {
 }
 
 /// Says which pieces have sheets that may break off or slots that may fuse.
-fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinPlace>>) -> Option<Warning> {
+fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinFeature>>) -> Option<Warning> {
     let all = || thin.as_slice().iter().flatten();
     let longest = all().max_by(|a, b| a.length_mm.total_cmp(&b.length_mm))?;
     let n_sheets = all().filter(|place| place.kind == ThinKind::Sheet).count();
