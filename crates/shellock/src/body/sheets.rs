@@ -29,14 +29,14 @@ use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
 /// Distance between samples along a seam, mm: a seam with a radius of 3 mm is met within 4 µm.
 const STEP_MM: f64 = 0.3;
-/// Normals and tangents are averaged over so many samples to each side, with falling weights: bumps smaller
-/// than the wall is thick do not bend a sheet.
+/// Rounds of averaging normals and tangents with those of the samples beside them: a bell of 0.95 mm (one
+/// sigma), so that bumps smaller than the wall is thick do not bend a sheet. Chosen by eye.
 const SMOOTHING_ROUNDS: usize = 20;
-/// ε, mm.
+/// ε, mm: a sixth of the step, so that a sheet passes through the samples. Chosen by eye.
 const LEAST_MM: f64 = 0.05;
-/// R, in cells.
+/// R, in cells: as far as fields are kept.
 const REACH_CELLS: f64 = 3.5;
-/// From this share of R on the sheet gives way to the distances to the patches.
+/// From this share of R on the sheet gives way to the distances to the patches. Chosen by eye.
 const SURE: f64 = 0.6;
 /// A piece leaves a sheet at no less than this angle, rad: the field of what remains is read off a grid, and
 /// would shave a sheet that is merely parallel to the way out.
