@@ -64,7 +64,7 @@ impl Shell {
         let steps = steps
             .map(|(piece, separation)| InstallationStep {
                 piece: piece.into(),
-                separation,
+                separation: separation.into(),
             })
             .collect();
         // Only their boxes are asked for.

@@ -2,7 +2,7 @@
 //! the same with a pin that is too short to reach into the base, which does not.
 //! `cargo run --release -p shellock-assembly --example verify_your_own`
 
-use shellock_assembly::{Assembly, Ctx, InstallationPlan, LatticeDirection, VerifyParams, verify};
+use shellock_assembly::{Assembly, Ctx, Direction, InstallationPlan, VerifyParams, verify};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 const CLEARANCE_MM: f64 = 0.1;
@@ -45,7 +45,7 @@ fn boxes(pin_z: f64) -> Vec<TriMesh> {
 }
 
 fn main() {
-    let [along, up] = [Vec3::X, Vec3::Z].map(LatticeDirection::nearest);
+    let [along, up] = [Vec3::X, Vec3::Z].map(|way| Direction::of(way).expect("it is no zero"));
     let plan = InstallationPlan::new([(0.into(), along), (1.into(), along), (2.into(), up)]);
     for (name, pin_z) in [("a pin through both", 1.0), ("a pin that is too short", 16.0)] {
         let pieces = boxes(pin_z).into_iter().collect();

@@ -33,7 +33,7 @@ use proof::{Proof, Question, prove};
 /// What [`Certificate::format`] says.
 pub const FORMAT: &str = "shellock-certificate";
 /// What [`Certificate::version`] says: readers refuse what they do not know.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// A file of a kit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

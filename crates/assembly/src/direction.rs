@@ -1,7 +1,29 @@
-//! The 26 directions along which pieces come and go (Sect. 6.2).
+//! Directions along which pieces come and go: any, and the 26 that plans choose from (Sect. 6.2).
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
+
+/// A unit vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction(Vec3);
+
+impl Direction {
+    /// The direction of `v`; `None` where it has none: zero, or not finite.
+    pub fn of(v: Vec3) -> Option<Self> {
+        v.try_normalize().map(Self)
+    }
+
+    /// The vector, of length 1.
+    pub fn unit(self) -> Vec3 {
+        self.0
+    }
+}
+
+impl From<LatticeDirection> for Direction {
+    fn from(d: LatticeDirection) -> Self {
+        Self(d.unit())
+    }
+}
 
 /// One of the 26 directions from a grid cell to its neighbours: 6 axial, 12 in-plane diagonal, 8 space
 /// diagonal.

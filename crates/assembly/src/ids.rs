@@ -5,10 +5,37 @@ use std::ops::{Index, IndexMut};
 
 use serde::{Deserialize, Serialize};
 
-/// A patch of the outer surface, and the piece that carries it.
+/// A patch of the outer surface, and the piece that carries it: its place in a list, from 0. People and files
+/// count from 1: [`Self::number`], which is also what is printed and what serde writes and reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(transparent)]
+#[serde(into = "u32", try_from = "u32")]
 pub struct PatchId(pub u32);
+
+impl PatchId {
+    /// What people call it, from 1.
+    pub fn number(self) -> u32 {
+        self.0.saturating_add(1)
+    }
+
+    /// The piece that people call so; `None` for 0.
+    pub fn numbered(number: u32) -> Option<Self> {
+        number.checked_sub(1).map(Self)
+    }
+}
+
+impl From<PatchId> for u32 {
+    fn from(id: PatchId) -> Self {
+        id.number()
+    }
+}
+
+impl TryFrom<u32> for PatchId {
+    type Error = &'static str;
+
+    fn try_from(number: u32) -> Result<Self, Self::Error> {
+        Self::numbered(number).ok_or("pieces are numbered from 1")
+    }
+}
 
 impl From<usize> for PatchId {
     fn from(i: usize) -> Self {
@@ -24,7 +51,7 @@ impl From<PatchId> for usize {
 
 impl std::fmt::Display for PatchId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.0.fmt(f)
+        self.number().fmt(f)
     }
 }
 

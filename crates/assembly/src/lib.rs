@@ -8,7 +8,7 @@
 //! A block that nothing keeps from being lifted out of its tray is no lock:
 //!
 //! ```
-//! use shellock_assembly::{Assembly, Ctx, InstallationPlan, LatticeDirection, VerifyParams, verify};
+//! use shellock_assembly::{Assembly, Ctx, Direction, InstallationPlan, VerifyParams, verify};
 //! use shellock_geom::{Aabb, Vec3, Volume};
 //!
 //! let cuboid = |min, max| {
@@ -19,7 +19,7 @@
 //! let block = cuboid([5.0; 3], [25.0, 25.0, 10.0]);
 //! let knob = cuboid([10.0, 10.0, 10.1], [20.0, 20.0, 20.0]);
 //! let pieces = [tray, block, knob].iter().map(Volume::to_mesh).collect();
-//! let up = LatticeDirection::nearest(Vec3::Z);
+//! let up = Direction::of(Vec3::Z).unwrap();
 //! let plan = InstallationPlan::new([(0.into(), up), (1.into(), up), (2.into(), up)]);
 //! let assembly = Assembly { model: None, pieces: &pieces, plan: &plan, press_fits: &[] };
 //! let params = VerifyParams { clearance_mm: 0.1, seed: 0 };
@@ -43,7 +43,7 @@ pub mod verify;
 pub mod warning;
 
 pub use context::{Cancelled, Ctx};
-pub use direction::LatticeDirection;
+pub use direction::{Direction, LatticeDirection};
 pub use ids::{IdVec, PatchId};
 pub use press_fit::{PressFit, PressFitKind};
 pub use sequence::{InstallationPlan, InstallationStep};

@@ -2,29 +2,29 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{LatticeDirection, PatchId};
+use crate::{Direction, PatchId};
 
 /// One piece of a plan and the direction along which it leaves everything installed before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct InstallationStep {
+pub struct InstallationStep<D = Direction> {
     /// The piece that is put in.
     pub piece: PatchId,
-    /// The unit step along which it separates; it is installed along the opposite. Without meaning for the
+    /// The direction along which it separates; it is installed along the opposite. Without meaning for the
     /// first piece.
-    pub separation: LatticeDirection,
+    pub separation: D,
 }
 
-/// The order in which pieces are installed, first to last, each with its direction. The last piece is the
-/// key.
+/// The order in which pieces are installed, first to last, each with its direction: any, or one of a few that
+/// a search chooses from. The last piece is the key.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct InstallationPlan {
+pub struct InstallationPlan<D = Direction> {
     /// First to last; every piece once; at least two.
-    pub steps: Vec<InstallationStep>,
+    pub steps: Vec<InstallationStep<D>>,
 }
 
-impl InstallationPlan {
+impl<D: Copy> InstallationPlan<D> {
     /// Pieces, first to last, each with the direction along which it separates.
-    pub fn new(steps: impl IntoIterator<Item = (PatchId, LatticeDirection)>) -> Self {
+    pub fn new(steps: impl IntoIterator<Item = (PatchId, D)>) -> Self {
         let step = |(piece, separation)| InstallationStep { piece, separation };
         Self {
             steps: steps.into_iter().map(step).collect(),
@@ -45,12 +45,12 @@ impl InstallationPlan {
     }
 
     /// The separation direction of `piece`.
-    pub fn separation(&self, piece: PatchId) -> LatticeDirection {
+    pub fn separation(&self, piece: PatchId) -> D {
         self.steps[self.position(piece)].separation
     }
 
     /// The disassembly sequence: key first, first-installed last.
-    pub fn removal(&self) -> impl Iterator<Item = InstallationStep> + '_ {
+    pub fn removal(&self) -> impl Iterator<Item = InstallationStep<D>> + '_ {
         self.steps.iter().rev().copied()
     }
 }

@@ -33,7 +33,7 @@ use crate::PressFit;
 use crate::motion::{self, Freedom, Twist};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 use contact::Contact;
-pub use thin::{ThinFeature, ThinKind, ThinShare, thin_places, thin_share};
+pub use thin::{ThinFeature, ThinKind, ThinPoint, ThinShare, thin_places, thin_points, thin_share};
 
 /// How the finished kit is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use proptest::prelude::*;
 use shellock_assembly::verify::{Finding, Verification, examine};
 use shellock_assembly::{
-    Assembly, Ctx, IdVec, InstallationPlan, LatticeDirection, PatchId, PressFit, PressFitKind, VerifyParams,
+    Assembly, Ctx, Direction, IdVec, InstallationPlan, LatticeDirection, PatchId, PressFit, PressFitKind, VerifyParams,
     verify,
 };
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -52,7 +52,7 @@ impl Placed {
         for (part, &number) in parts.into_iter().zip(&self.number) {
             pieces[PatchId::from(number)] = part;
         }
-        let way = |way: Vec3| LatticeDirection::nearest(self.turn.apply(way));
+        let way = |way: Vec3| Direction::from(LatticeDirection::nearest(self.turn.apply(way)));
         let steps = self.number.iter().zip(ways);
         let plan = InstallationPlan::new(steps.map(|(&number, w)| (number.into(), way(w))));
         let params = VerifyParams {

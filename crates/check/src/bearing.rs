@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use crate::barrier::{Frame, Prism, SIDES, stays_below};
 use crate::mesh::Mesh;
+use crate::number;
 use crate::vector::{Vec3, dot, norm, scale, sub};
 
 /// Difference of unit vectors, and of perpendicular ones.
@@ -18,7 +19,9 @@ const BED_DROP_MM: f64 = 0.08 + 1e-6;
 /// A point of piece `a` that rises along the normal, towards piece `b`.
 #[derive(Clone, Deserialize)]
 pub struct Bearing {
+    #[serde(deserialize_with = "crate::number::place")]
     pub a: usize,
+    #[serde(deserialize_with = "crate::number::place")]
     pub b: usize,
     /// On `a`, mm.
     pub point: Vec3,
@@ -49,7 +52,7 @@ impl Bearing {
         };
         let (triangle, point) = own
             .on_surface(self.point)
-            .ok_or_else(|| format!("is not on piece {}", self.a))?;
+            .ok_or_else(|| format!("is not on piece {}", number::of(self.a)))?;
         let (normal, across) = exact(self.normal, self.across);
         let bearing = Self {
             point,
@@ -59,7 +62,7 @@ impl Bearing {
         };
         match bearing.has_bed(own, triangle) {
             true => Ok(bearing),
-            false => Err(format!("is on a speck of piece {}", self.a)),
+            false => Err(format!("is on a speck of piece {}", number::of(self.a))),
         }
     }
 

@@ -34,6 +34,7 @@ pub type Ends = [Vec<(usize, f64)>; 2];
 #[derive(Clone, Deserialize)]
 pub struct Bounded {
     /// In ascending order.
+    #[serde(deserialize_with = "crate::number::places")]
     pub free: Vec<usize>,
     /// Turn and displacement of each, by their places in `quantities`.
     pub of_piece: Vec<[usize; 2]>,
@@ -47,8 +48,10 @@ pub struct Bounded {
 /// How far the key may have slid.
 #[derive(Clone, Deserialize)]
 pub struct Slide {
+    #[serde(deserialize_with = "crate::number::place")]
     pub key: usize,
     /// The piece that it slides against.
+    #[serde(deserialize_with = "crate::number::place")]
     pub seat: usize,
     /// The place of the key that is measured, mm.
     pub at: Vec3,

@@ -5,6 +5,7 @@ use std::thread;
 use crate::bearing::Bearing;
 use crate::bounded::{self, Bounded};
 use crate::mesh::Mesh;
+use crate::number;
 use crate::vector::{Vec3, scale};
 use crate::{
     Certificate, Claim, Contact, Finding, LeastGaps, Tested, ToldPlay, gap, lock, rays, within_play,
@@ -47,7 +48,8 @@ impl Kit<'_> {
                 hold,
             } => {
                 let name = format!(
-                    "nothing but the key, piece {leaves}, moves while {} held",
+                    "nothing but the key, piece {}, moves while {} held",
+                    number::of(*leaves),
                     are(held)
                 );
                 (
@@ -70,7 +72,7 @@ impl Kit<'_> {
             } => {
                 let others: Vec<usize> = (0..self.meshes.len()).filter(|p| p != piece).collect();
                 let tested = self.test_path(*piece, *direction, &others, least);
-                (format!("the key, piece {piece}, can leave"), tested)
+                (format!("the key, piece {}, can leave", number::of(*piece)), tested)
             }
             Claim::Installs {
                 piece,
@@ -80,7 +82,7 @@ impl Kit<'_> {
                 let order = self.c.installation_order.iter().copied();
                 let earlier: Vec<usize> = order.take_while(|p| p != piece).collect();
                 let tested = self.test_path(*piece, scale(*direction, -1.0), &earlier, least);
-                (format!("piece {piece} can be installed"), tested)
+                (format!("piece {} can be installed", number::of(*piece)), tested)
             }
             Claim::Apart { least } => {
                 let all: Vec<usize> = (0..self.meshes.len()).collect();
@@ -180,11 +182,11 @@ fn is_enough(told: &ToldPlay, proven: &bounded::Play) -> bool {
     told.translation_mm >= proven.shift_mm - SAME_PLAY && told.rotation_deg >= proven.turn_deg - SAME_PLAY
 }
 
-/// "0 is", "1 and 2 are".
+/// "1 is", "2 and 3 are".
 fn are(held: &[usize]) -> String {
     let names = held
         .iter()
-        .map(usize::to_string)
+        .map(|&id| number::of(id).to_string())
         .collect::<Vec<_>>()
         .join(" and ");
     if held.len() == 1 {
@@ -194,11 +196,11 @@ fn are(held: &[usize]) -> String {
     }
 }
 
-/// "piece 7", "pieces 1 and 7".
+/// "piece 8", "pieces 2 and 8".
 fn named(pieces: &[usize]) -> String {
     let names = pieces
         .iter()
-        .map(usize::to_string)
+        .map(|&id| number::of(id).to_string())
         .collect::<Vec<_>>()
         .join(" and ");
     if pieces.len() == 1 {
@@ -216,7 +218,7 @@ mod tests {
     use crate::mesh::tests::{cuboid, hollow};
     use crate::{Verdict, test_completeness, unproven};
 
-    /// Of a cube, piece 1, in a hollow, piece 0. It is the key here, though nothing lets it out.
+    /// Of a cube, piece 2, in a hollow, piece 1. It is the key here, though nothing lets it out.
     fn certificate(play: &Value) -> Value {
         let axes = json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let (mut bearings, mut multipliers) = (Vec::new(), [Vec::new(), Vec::new()]);
@@ -226,7 +228,7 @@ mod tests {
                 |v: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| v[(k + 3 - i as usize / 8) % 3]) };
             let point = turned([5.0 * signs[0], 4.9 * signs[1], 4.9 * signs[2]]);
             let (normal, across) = (turned([signs[0], 0.0, 0.0]), turned([0.0, 1.0, 0.0]));
-            bearings.push(json!({ "a": 1, "b": 0, "point": point, "normal": normal, "across": across }));
+            bearings.push(json!({ "a": 2, "b": 1, "point": point, "normal": normal, "across": across }));
         }
         for axis in 0..3 {
             let face = (axis + 1) % 3;
@@ -238,13 +240,13 @@ mod tests {
                 [0, 4].map(|side| pair([0, 1, 2, 3].map(|i| 8 * axis + side + i), 0.25))
             ));
         }
-        let quantity = |at: Value, most: f64| json!({ "plus": 1, "minus": null, "at": at, "axes": axes, "most": vec![[most; 2]; 3] });
-        let bounded = json!({ "claim": "bounded", "free": [1], "of_piece": [[0, 1]],
+        let quantity = |at: Value, most: f64| json!({ "plus": 2, "minus": null, "at": at, "axes": axes, "most": vec![[most; 2]; 3] });
+        let bounded = json!({ "claim": "bounded", "free": [2], "of_piece": [[0, 1]],
             "quantities": [quantity(Value::Null, 0.024), quantity(json!([0.0, 0.0, 0.0]), 0.12)],
             "rows": (0..24).map(|i| [i, 1, 0]).collect::<Vec<_>>(), "multipliers": multipliers });
         let piece = |id: usize, play: &Value| json!({ "id": id, "file": "", "sha256": "", "play": play });
-        json!({ "clearance_mm": 0.1, "reach_mm": 0.2, "center": [0.0, 0.0, 0.0], "length_mm": 5.0, "key": 1,
-            "installation_order": [0, 1], "pieces": [piece(0, &Value::Null), piece(1, play)], "contacts": [],
+        json!({ "clearance_mm": 0.1, "reach_mm": 0.2, "center": [0.0, 0.0, 0.0], "length_mm": 5.0, "key": 2,
+            "installation_order": [1, 2], "pieces": [piece(1, &Value::Null), piece(2, play)], "contacts": [],
             "bearings": bearings, "slide": null, "failed": [], "claims": [bounded] })
     }
 
@@ -270,9 +272,9 @@ mod tests {
         let claim = |id: usize| format!("{:52}", format!("piece {id} stays within its play"));
         assert_eq!(
             lines[0],
-            format!("confirmed  {}  0.21 mm, 2.38°, 24 bearings", claim(1))
+            format!("confirmed  {}  0.21 mm, 2.38°, 24 bearings", claim(2))
         );
-        assert_eq!(lines[1], format!("unproven   {}  not claimed", claim(0)));
+        assert_eq!(lines[1], format!("unproven   {}  not claimed", claim(1)));
         assert_eq!(lines.len(), 2);
     }
 
@@ -300,11 +302,11 @@ mod tests {
     #[test]
     fn one_lock_that_the_key_leaves_is_needed() {
         let least = json!({ "overall": null, "beneath_rim": null });
-        let lock = json!({ "claim": "locked", "held": [0], "leaves": 1, "multipliers": [], "residual": 0.0, "hold": 0.1 });
+        let lock = json!({ "claim": "locked", "held": [1], "leaves": 2, "multipliers": [], "residual": 0.0, "hold": 0.1 });
         let up = [0.0, 0.0, 1.0];
         let others = [
-            json!({ "claim": "key-leaves", "piece": 1, "direction": up, "least": least }),
-            json!({ "claim": "installs", "piece": 1, "direction": up, "least": least }),
+            json!({ "claim": "key-leaves", "piece": 2, "direction": up, "least": least }),
+            json!({ "claim": "installs", "piece": 2, "direction": up, "least": least }),
             json!({ "claim": "apart", "least": least }),
         ];
         let is_complete = |locks: &[Value]| {
@@ -319,14 +321,14 @@ mod tests {
             other[field] = value;
             other
         };
-        assert!(!is_complete(&[changed("leaves", 0.into())]));
-        assert!(!is_complete(&[changed("held", json!([1]))]));
-        assert!(!is_complete(&[changed("held", json!([0, 1]))]));
+        assert!(!is_complete(&[changed("leaves", 1.into())]));
+        assert!(!is_complete(&[changed("held", json!([2]))]));
+        assert!(!is_complete(&[changed("held", json!([1, 2]))]));
     }
 
     #[test]
     fn pieces_are_named_in_words() {
-        assert_eq!([are(&[0]), are(&[1, 2])], ["0 is", "1 and 2 are"]);
-        assert_eq!([named(&[7]), named(&[1, 7])], ["piece 7", "pieces 1 and 7"]);
+        assert_eq!([are(&[0]), are(&[1, 2])], ["1 is", "2 and 3 are"]);
+        assert_eq!([named(&[7]), named(&[1, 7])], ["piece 8", "pieces 2 and 8"]);
     }
 }

@@ -5,6 +5,7 @@
 //! look for what is in the way.
 
 use crate::mesh::Mesh;
+use crate::number;
 use crate::vector::{Vec3, scale, sub};
 use crate::{Gap, LeastGaps, PressFit, Tested};
 
@@ -33,7 +34,8 @@ pub fn test(
         if gap.gap_mm < -CROSSING_MM && !press_fits.iter().any(|fit| is_of(fit, gap, moving)) {
             return Err(format!(
                 "surfaces cross by {:.3} mm, piece {} one of them",
-                -gap.gap_mm, gap.against
+                -gap.gap_mm,
+                number::of(gap.against)
             ));
         }
     }
@@ -94,7 +96,8 @@ fn test_place(
     } = gap;
     if !others.contains(against) || *travel_mm < 0.0 {
         return Err(format!(
-            "a least gap against piece {against}, which is not in the way"
+            "a least gap against piece {}, which is not in the way",
+            number::of(*against)
         ));
     }
     let reach_mm = 0.5 * gap_mm.abs() + SAME_GAP_MM;

@@ -11,6 +11,7 @@ mod claims;
 mod gap;
 mod lock;
 mod mesh;
+mod number;
 mod pieces;
 mod quantity;
 mod rays;
@@ -32,7 +33,7 @@ use vector::Vec3;
 
 /// What is read.
 const FORMAT: &str = "shellock-certificate";
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 /// Greater clearances are no joint, mm.
 const MOST_CLEARANCE_MM: f64 = 0.8;
 /// Most that a contact's faces may be apart beyond the clearance, mm.
@@ -102,7 +103,9 @@ struct Certificate {
     reach_mm: f64,
     center: Vec3,
     length_mm: f64,
+    #[serde(deserialize_with = "crate::number::place")]
     key: usize,
+    #[serde(deserialize_with = "crate::number::places")]
     installation_order: Vec<usize>,
     pieces: Vec<PieceFile>,
     contacts: Vec<Contact>,
@@ -128,6 +131,7 @@ struct OtherFile {
 /// A place on a piece where the key is pressed on purpose.
 #[derive(Deserialize)]
 struct PressFit {
+    #[serde(deserialize_with = "crate::number::place")]
     piece: usize,
     at: Vec3,
     interference_mm: f64,
@@ -142,6 +146,7 @@ impl PressFit {
 
 #[derive(Deserialize)]
 struct PieceFile {
+    #[serde(deserialize_with = "crate::number::place")]
     id: usize,
     file: String,
     sha256: String,
@@ -158,7 +163,9 @@ struct ToldPlay {
 /// A point of piece `a`, its normal there, and the piece that it faces.
 #[derive(Clone, Deserialize)]
 struct Contact {
+    #[serde(deserialize_with = "crate::number::place")]
     a: usize,
+    #[serde(deserialize_with = "crate::number::place")]
     b: usize,
     point: Vec3,
     normal: Vec3,
@@ -169,18 +176,22 @@ struct Contact {
 #[serde(tag = "claim", rename_all = "kebab-case")]
 enum Claim {
     Locked {
+        #[serde(deserialize_with = "crate::number::places")]
         held: Vec<usize>,
+        #[serde(deserialize_with = "crate::number::place")]
         leaves: usize,
         multipliers: Vec<(usize, f64)>,
         hold: f64,
     },
     Bounded(Bounded),
     KeyLeaves {
+        #[serde(deserialize_with = "crate::number::place")]
         piece: usize,
         direction: Vec3,
         least: LeastGaps,
     },
     Installs {
+        #[serde(deserialize_with = "crate::number::place")]
         piece: usize,
         direction: Vec3,
         least: LeastGaps,
@@ -204,6 +215,7 @@ struct Gap {
     gap_mm: f64,
     travel_mm: f64,
     at: Vec3,
+    #[serde(deserialize_with = "crate::number::place")]
     against: usize,
 }
 
@@ -307,7 +319,7 @@ fn unproven(c: &Certificate) -> impl Iterator<Item = Finding> {
 }
 
 fn within_play(piece: usize) -> String {
-    format!("piece {piece} stays within its play")
+    format!("piece {} stays within its play", number::of(piece))
 }
 
 fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
@@ -326,9 +338,9 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
     if c.contacts.iter().any(|c| c.a.max(c.b) >= n || c.a == c.b) {
         return Err("a contact is not one of two pieces".into());
     }
-    let order: Vec<Value> = c.installation_order.iter().map(|&id| id.into()).collect();
+    let order: Vec<Value> = c.installation_order.iter().map(|&id| number::of(id).into()).collect();
     let is_near = |value: &Value, x: f64| value.as_f64().is_some_and(|y| (x - y).abs() <= SAME);
-    if plan["installation_order"] != Value::Array(order) || plan["key_piece"] != c.key {
+    if plan["installation_order"] != Value::Array(order) || plan["key_piece"] != number::of(c.key) {
         return Err("the plan has another order or key".into());
     }
     if c.installation_order.last() != Some(&c.key) || !is_near(&plan["clearance"], c.clearance_mm) {
@@ -349,7 +361,10 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
         };
         let planned = &plan["pieces"][*piece]["installation_direction"];
         if !(0..3).all(|k| is_near(&planned[k], direction[k])) {
-            return Err(format!("the plan installs piece {piece} along another direction"));
+            return Err(format!(
+                "the plan installs piece {} along another direction",
+                number::of(*piece)
+            ));
         }
     }
     for (piece, rattle) in c.pieces.iter().map(|p| (p, &plan["pieces"][p.id]["rattle"])) {
@@ -360,7 +375,7 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
         if rattle["is_proven"] == true && !piece.play.as_ref().is_some_and(is_no_less) {
             return Err(format!(
                 "the plan calls a play of piece {} proven that is not the certificate's",
-                piece.id
+                number::of(piece.id)
             ));
         }
     }
@@ -369,8 +384,8 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
         .iter()
         .find(|p| plan["pieces"][p.id]["file"] != p.file.as_str())
     {
-        Some(p) => Err(format!("the plan has another file for piece {}", p.id)),
-        None => Ok(format!("{n} pieces, key {}", c.key)),
+        Some(p) => Err(format!("the plan has another file for piece {}", number::of(p.id))),
+        None => Ok(format!("{n} pieces, key {}", number::of(c.key))),
     }
 }
 
@@ -400,7 +415,8 @@ fn test_completeness(c: &Certificate) -> Tested {
     let is_needed_lock = |claim: &Claim| matches!(claim, Claim::Locked { held, leaves, .. } if *held == [first] && *leaves == c.key);
     if first == c.key || count(&is_lock) != 1 || count(&is_needed_lock) != 1 {
         return Err(format!(
-            "it is not claimed, once, that nothing but the key moves while piece {first} is held"
+            "it is not claimed, once, that nothing but the key moves while piece {} is held",
+            number::of(first)
         ));
     }
     if count(&|claim| matches!(claim, Claim::KeyLeaves { piece, .. } if *piece == c.key)) != 1 {
@@ -411,7 +427,10 @@ fn test_completeness(c: &Certificate) -> Tested {
     }
     for &id in c.installation_order.iter().skip(1) {
         if count(&|claim| matches!(claim, Claim::Installs { piece, .. } if *piece == id)) != 1 {
-            return Err(format!("it is not claimed that piece {id} can be installed"));
+            return Err(format!(
+                "it is not claimed that piece {} can be installed",
+                number::of(id)
+            ));
         }
     }
     Ok(format!("{} claims", c.claims.len()))
@@ -431,10 +450,13 @@ fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
             gap_mm,
         } = contact;
         let on_a = meshes[*a].triangle_at(*point, *normal);
-        let (point, normal) = on_a.ok_or_else(|| format!("contact {i} is not on piece {a}"))?;
+        let (point, normal) = on_a.ok_or_else(|| format!("contact {i} is not on piece {}", number::of(*a)))?;
         let is_near = *gap_mm <= c.reach_mm && meshes[*b].is_faced(point, normal, *gap_mm);
         if !is_near {
-            return Err(format!("contact {i} does not face piece {b} at {gap_mm:.3} mm"));
+            return Err(format!(
+                "contact {i} does not face piece {} at {gap_mm:.3} mm",
+                number::of(*b)
+            ));
         }
         Ok(Contact {
             point,
@@ -470,10 +492,10 @@ mod tests {
             fs::write(folder.path().join("certificate.json"), text).unwrap();
             check(folder.path()).unwrap_err()
         };
-        let older = why(r#"{ "format": "shellock-certificate", "version": 2 }"#);
-        assert!(older.ends_with("version 2 is not known"), "{older}");
-        assert!(why(r#"{ "format": "another", "version": 3 }"#).ends_with("is not known"));
-        let empty = why(r#"{ "format": "shellock-certificate", "version": 3 }"#);
+        let older = why(r#"{ "format": "shellock-certificate", "version": 3 }"#);
+        assert!(older.ends_with("version 3 is not known"), "{older}");
+        assert!(why(r#"{ "format": "another", "version": 4 }"#).ends_with("is not known"));
+        let empty = why(r#"{ "format": "shellock-certificate", "version": 4 }"#);
         assert!(
             empty.starts_with("certificate.json"),
             "no certificate of this version, nor a plan: {empty}"

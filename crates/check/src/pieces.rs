@@ -6,6 +6,7 @@ use std::path::{Component, Path};
 use sha2::{Digest, Sha256};
 
 use crate::mesh::Mesh;
+use crate::number;
 use crate::{OtherFile, PieceFile, Tested};
 
 /// Larger files are not read, bytes.
@@ -49,11 +50,12 @@ pub fn test_closed(meshes: &[Mesh]) -> Tested {
         let (n_open, n_surfaces, volume_mm3) = (mesh.n_open_edges(), mesh.n_surfaces(), mesh.volume_mm3());
         if n_open > 0 || volume_mm3.is_nan() || volume_mm3 <= 0.0 {
             return Err(format!(
-                "piece {id} has {n_open} open edges and a volume of {volume_mm3:.1} mm³"
+                "piece {} has {n_open} open edges and a volume of {volume_mm3:.1} mm³",
+                number::of(id)
             ));
         }
         if n_surfaces > 1 {
-            return Err(format!("piece {id} falls into {n_surfaces} surfaces"));
+            return Err(format!("piece {} falls into {n_surfaces} surfaces", number::of(id)));
         }
     }
     Ok(format!(

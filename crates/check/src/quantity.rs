@@ -18,7 +18,9 @@ const BETWEEN_LINES: f64 = 1.1281;
 #[derive(Clone, Deserialize)]
 pub struct Quantity {
     /// The free piece that counts, and the one that counts against it; `None` for one at rest.
+    #[serde(deserialize_with = "crate::number::place_if_any")]
     pub plus: Option<usize>,
+    #[serde(deserialize_with = "crate::number::place_if_any")]
     pub minus: Option<usize>,
     /// The displacement there, mm; `None` for a turn, rad.
     pub at: Option<Vec3>,

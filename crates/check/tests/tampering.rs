@@ -8,11 +8,10 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use shellock::certificate::{Evidence, PieceFile, certify};
-use shellock::plan::{InstallationPlan, InstallationStep};
 use shellock::play::{PlayParams, SLIDE_MM, measure};
 use shellock::verify::clearance::kit_gaps;
 use shellock::verify::{Assembly, VerifyParams, examine};
-use shellock::{Ctx, IdVec, LatticeDirection, PatchId};
+use shellock::{Ctx, Direction, IdVec, InstallationPlan, InstallationStep, PatchId};
 use shellock_check::{Finding, Verdict, check};
 use shellock_formats::write_stl_binary;
 use shellock_geom::{Solid, TriMesh, Vec3, Volume};
@@ -71,7 +70,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let steps = ways.iter().copied().enumerate();
     let steps = steps.map(|(i, d)| InstallationStep {
         piece: i.into(),
-        separation: LatticeDirection::nearest(d),
+        separation: Direction::of(d).unwrap(),
     });
     let plan = InstallationPlan {
         steps: steps.collect(),
@@ -121,7 +120,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let pieces = plan.steps.iter().map(|s| {
         json!({ "file": format!("{}.stl", s.piece), "installation_direction": (-s.separation.unit() + 0.0).to_array() })
     });
-    let plan = json!({ "key_piece": 2, "installation_order": [0, 1, 2], "clearance": CLEARANCE_MM,
+    let plan = json!({ "key_piece": 3, "installation_order": [1, 2, 3], "clearance": CLEARANCE_MM,
                        "pieces": pieces.collect::<Vec<_>>() });
     let mut certificate = serde_json::to_value(certificate).unwrap();
     // Gaps show outside, which is not of interest here.
@@ -169,9 +168,9 @@ fn multipliers(certificate: &mut Value) -> (&mut Vec<Value>, usize) {
 const FILES: &str = "the files are those that were certified";
 const CONTACTS: &str = "the contacts lie on both pieces' surfaces";
 const BODIES: &str = "each piece is one closed surface around a volume";
-const LOCK: &str = "nothing but the key, piece 2, moves while 0 is held";
+const LOCK: &str = "nothing but the key, piece 3, moves while 1 is held";
 const BEARINGS: &str = "the bearings lie on their pieces' surfaces";
-const LID: &str = "piece 1 stays within its play";
+const LID: &str = "piece 2 stays within its play";
 const PLAN: &str = "the certificate speaks of this plan";
 const COMPLETE: &str = "every claim that a kit needs is made";
 
@@ -261,7 +260,7 @@ fn a_turned_normal_is_not_that_of_the_piece() {
 #[test]
 fn a_changed_direction_is_not_the_plans_and_not_free() {
     let turned = json!([0.0, 1.0, 0.0]);
-    let is_lid = |c: &&mut Value| c["claim"] == "installs" && c["piece"] == 1;
+    let is_lid = |c: &&mut Value| c["claim"] == "installs" && c["piece"] == 2;
     let turn = |certificate: &mut Value| {
         let claim = certificate["claims"]
             .as_array_mut()
@@ -276,7 +275,7 @@ fn a_changed_direction_is_not_the_plans_and_not_free() {
         turn(certificate);
         plan["pieces"][1]["installation_direction"] = turned.clone();
     });
-    assert_eq!(both, ["piece 1 can be installed"]);
+    assert_eq!(both, ["piece 2 can be installed"]);
 }
 
 #[test]
@@ -431,8 +430,8 @@ fn a_gap_that_is_told_wrong_or_at_another_place_is_refuted() {
         })
     };
     for (claim, text) in [
-        ("key-leaves", "the key, piece 2, can leave"),
-        ("installs", "piece 1 can be installed"),
+        ("key-leaves", "the key, piece 3, can leave"),
+        ("installs", "piece 2 can be installed"),
         ("apart", "the assembled pieces do not overlap"),
     ] {
         assert_eq!(
@@ -511,7 +510,7 @@ fn a_play_that_is_told_less_than_it_is_or_proven_by_less_is_refuted() {
         let mut claims = certificate["claims"].as_array_mut().unwrap().iter_mut();
         with(
             claims
-                .find(|c| c["claim"] == "bounded" && c["free"] == json!([1]))
+                .find(|c| c["claim"] == "bounded" && c["free"] == json!([2]))
                 .unwrap(),
         );
     };

@@ -268,7 +268,7 @@ impl FromStr for Thickness {
 pub enum Key {
     Auto,
     Flattest,
-    Piece(u32),
+    Piece(i64),
 }
 
 impl FromStr for Key {
@@ -281,7 +281,7 @@ impl FromStr for Key {
             number => number
                 .parse()
                 .map(Self::Piece)
-                .map_err(|_| "give auto, piece, or the number of a piece".to_owned()),
+                .map_err(|_| "give auto, piece, or the number of a piece (its label, where there are labels)".to_owned()),
         }
     }
 }
@@ -345,7 +345,8 @@ pub struct Options {
     #[arg(long, value_name = "N", help_heading = "Pieces")]
     pub pieces: Option<usize>,
     /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
-    /// piece, the flattest piece that works, as it is; or the number of a piece
+    /// piece, the flattest piece that works, as it is; or a piece, by its label or by the number that
+    /// `segment` gives it
     #[arg(
         long,
         value_name = "auto|piece|N",
@@ -487,7 +488,7 @@ impl Options {
         p.key = match self.key {
             Key::Auto => KeySource::Cut,
             Key::Flattest => KeySource::Flattest,
-            Key::Piece(id) => KeySource::Piece(shellock::PatchId(id)),
+            Key::Piece(id) => KeySource::Piece(id),
         };
         p.has_grip = self.key_grip;
         p.thickness = match self.thickness {

@@ -9,7 +9,7 @@ use shellock::design::{Design, Settings};
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StressMap};
 use shellock::verify::thin_share;
-use shellock::{PatchId, Warning};
+use shellock::Warning;
 use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
@@ -216,7 +216,7 @@ pub fn files(
         .surface
         .patch_of_face
         .iter()
-        .map(|p| p.0 as i32)
+        .map(|p| p.number() as i32)
         .collect();
     let chart = design
         .strength
@@ -226,11 +226,10 @@ pub fn files(
         .iter()
         .map(|svg| ("Stress in a fall".to_owned(), svg.clone()))
         .collect();
-    let place = |i: usize| design.kit.plan.position(PatchId(i as u32));
     let archives = || {
         rayon::join(
             || assembly(design),
-            || printing.files(design.kit.pieces.as_slice(), place),
+            || printing.files(design.kit.pieces.as_slice()),
         )
     };
     let ((archive, plates), (page, picture, booklet)) = rayon::join(archives, || {
@@ -285,7 +284,6 @@ fn plan_file(
 
 /// All pieces in place, named and coloured; on the plate they stand as the model was given.
 fn assembly(design: &Design) -> Vec<u8> {
-    let turned = (!design.turn.is_none()).then(|| design.turn.rows());
     let names: Vec<String> = design.kit.pieces.ids().map(|p| format!("piece {p}")).collect();
     let objects: Vec<NamedObject> = design
         .kit
@@ -294,9 +292,9 @@ fn assembly(design: &Design) -> Vec<u8> {
         .zip(&names)
         .map(|((p, mesh), name)| NamedObject {
             name,
-            color: palette::color(design.kit.plan.position(p)),
+            color: palette::color(p.into()),
             mesh,
-            turned,
+            turned: None,
             moved_mm: [0.0; 3],
         })
         .collect();
@@ -388,13 +386,12 @@ fn stress_chart(options: &Options, settings: &Settings, design: &Design, strengt
         })
         .collect();
     strength_chart(strength, settings.strength.material.strength_mpa, &seams, |v| {
-        standing(options.up, design, v)
+        standing(options.up, v)
     })
 }
 
-/// From assembly space to the model as it was given, then so that `up` becomes z.
-pub fn standing(up: Axis, design: &Design, v: Vec3) -> Vec3 {
-    let v = design.turn.inverse().apply(v);
+/// Turned so that `up` becomes z.
+pub fn standing(up: Axis, v: Vec3) -> Vec3 {
     match up {
         Axis::X => Vec3::new(-v.z, v.y, v.x),
         Axis::Y => Vec3::new(v.x, -v.z, v.y),

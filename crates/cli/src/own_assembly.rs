@@ -7,7 +7,7 @@ use serde_json::json;
 use shellock::certificate::PieceFile;
 use shellock::context::Progress;
 use shellock::verify::{Assembly, VerifyParams};
-use shellock::{Ctx, InstallationPlan, LatticeDirection, PatchId, Verdict};
+use shellock::{Ctx, Direction, InstallationPlan, PatchId, Verdict};
 use shellock_geom::Vec3;
 use shellock_geom::weld::weld;
 
@@ -108,8 +108,6 @@ pub fn verify(session: &Session, folder: &Path) -> Result<u8, Failure> {
 
 /// The order and directions, or what is wrong with them.
 fn plan(pieces: &[PieceEntry]) -> Result<InstallationPlan, String> {
-    /// Directions are one of 26; what is off by more than this, degrees, is another.
-    const MOST_OFF_DEG: f64 = 1.0;
     let step = |(i, piece): (usize, &PieceEntry)| {
         let name = &piece.file;
         let along = match piece.pulled_out_along {
@@ -121,16 +119,8 @@ fn plan(pieces: &[PieceEntry]) -> Result<InstallationPlan, String> {
                 ));
             }
         };
-        let unit = along
-            .try_normalize()
-            .ok_or_else(|| format!("the way of {name} has no direction"))?;
-        let nearest = LatticeDirection::nearest(unit);
-        if nearest.unit().dot(unit) < MOST_OFF_DEG.to_radians().cos() {
-            return Err(format!(
-                "the way of {name} is not along an axis or a diagonal of the axes; turn all pieces so that it is"
-            ));
-        }
-        Ok((PatchId::from(i), nearest))
+        let way = Direction::of(along).ok_or_else(|| format!("the way of {name} has no direction"))?;
+        Ok((PatchId::from(i), way))
     };
     pieces
         .iter()

@@ -33,7 +33,7 @@ pub fn report(
     summary: &Summary,
     figures: Vec<(String, String)>,
 ) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
-    let stand = |v: Vec3| standing(options.up, design, v);
+    let stand = |v: Vec3| standing(options.up, v);
     let shown = shown(design, stand);
     let failed = design.kit.verification.findings.iter().map(failure);
     let warnings: Vec<Warning> = failed
@@ -46,12 +46,12 @@ pub fn report(
         .pieces
         .ids()
         .map(|p| ReportPiece {
-            id: p.0,
+            number: p.number(),
             name: format!("piece {p}"),
-            color: palette::color(plan.position(p)),
-            mesh: &shown[p.0 as usize],
+            color: palette::color(p.into()),
+            mesh: &shown[usize::from(p)],
             installation_direction: stand(-plan.separation(p).unit()).to_array(),
-            order: plan.position(p),
+            order: p.into(),
             is_key: plan.key() == p,
             facts: piece_facts(design, p),
         })

@@ -70,7 +70,7 @@ impl Printing {
 
     /// Says which pieces the printer cannot make.
     pub fn warnings(&self) -> Option<Warning> {
-        let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| PatchId(i as u32)).collect();
+        let pieces: Vec<PatchId> = self.plates.too_large.iter().map(|&i| i.into()).collect();
         (!pieces.is_empty()).then(|| Warning {
             cause: Cause::PieceTooLarge {
                 printer: described(&self.printer),
@@ -107,15 +107,14 @@ impl Printing {
         PrintingEntry::of(&self.printer, &self.plates, self.seconds)
     }
 
-    /// All plates side by side, and each alone where there are several. `place` is where a piece stands in
-    /// the order of installation.
-    pub fn files(&self, pieces: &[TriMesh], place: impl Fn(usize) -> usize) -> Vec<(String, Vec<u8>)> {
-        let names: Vec<String> = (0..pieces.len()).map(|i| format!("piece {i}")).collect();
+    /// All plates side by side, and each alone where there are several.
+    pub fn files(&self, pieces: &[TriMesh]) -> Vec<(String, Vec<u8>)> {
+        let names: Vec<String> = (1..=pieces.len()).map(|number| format!("piece {number}")).collect();
         let object = |laid: &Laid, moved_mm: [f64; 3]| {
             let (name, mesh) = (names[laid.piece].as_str(), &pieces[laid.piece]);
             NamedObject {
                 name,
-                color: palette::color(place(laid.piece)),
+                color: palette::color(laid.piece),
                 mesh,
                 turned: Some(laid.turned),
                 moved_mm,

@@ -37,7 +37,7 @@ const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 /// `shellock report`.
 pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: bool) -> Result<u8, Failure> {
     let plan = plan_of(kit)?;
-    let Kit { pieces, order, .. } = pieces_of(kit, &plan)?;
+    let Kit { pieces, .. } = pieces_of(kit, &plan)?;
     let solid = model_of(kit, &plan, model)?;
     let slicer = if closed_form { None } else { Slicer::find()? };
     let mut times = serde_json::Map::new();
@@ -45,9 +45,8 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
         let bed_mm = plan.printing.as_ref().map_or(printer.bed_mm, |p| p.bed);
         let printer = Printer { bed_mm, ..printer };
         let printing = Printing::of(&printer, pieces.as_slice(), solid.mesh(), &solid);
-        let place = |i: usize| order.position(shellock::PatchId(i as u32));
         let sliced = match &slicer {
-            Some(slicer) => slicer.seconds(&printer, printing.files(pieces.as_slice(), place), &solid)?,
+            Some(slicer) => slicer.seconds(&printer, printing.files(pieces.as_slice()), &solid)?,
             None => None,
         };
         let by = if sliced.is_some() {

@@ -7,9 +7,8 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::{Value, json};
 use shellock::certificate::{OtherFile, PieceFile};
 use shellock::design::{self, DesignError, Planned, Settings};
-use shellock::plan::InstallationPlan;
 use shellock::verify::{Assembly, VerifyParams};
-use shellock::{Ctx, IdVec, PatchId, segmentation};
+use shellock::{Ctx, IdVec, InstallationPlan, PatchId, segmentation};
 use shellock_formats::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -76,7 +75,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     let mut notes = model.notes.clone();
     let bytes = match kind.as_str() {
         "ply" => {
-            let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.0 as i32).collect();
+            let labels: Vec<i32> = surface.patch_of_face.iter().map(|p| p.number() as i32).collect();
             write_ply(&surface.mesh, Some(&labels))
         }
         "3mf" => {
@@ -102,9 +101,9 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     Ok(0)
 }
 
-/// For each face of the file, the patch that has most of its area; faces that were dropped get patch 0.
+/// For each face of the file, the patch that has most of its area; faces that were dropped are of the first.
 fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) -> Vec<u32> {
-    let mut best = vec![(0.0f64, 0u32); model.n_file_faces];
+    let mut best = vec![(0.0f64, PatchId(0)); model.n_file_faces];
     let mut area = vec![0.0; surface.n_patches];
     let mut from = 0;
     let mut order: Vec<usize> = (0..surface.mesh.triangles.len()).collect();
@@ -127,11 +126,11 @@ fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) ->
             .expect("there is at least one patch");
         let entry = &mut best[model.file_face[source as usize] as usize];
         if share > entry.0 {
-            *entry = (share, patch as u32);
+            *entry = (share, patch.into());
         }
         from = to;
     }
-    best.into_iter().map(|b| b.1).collect()
+    best.into_iter().map(|b| b.1.number()).collect()
 }
 
 /// `shellock plan`.
@@ -150,31 +149,33 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
         .inspect_err(|_| display.finish())?;
     display.finish();
     let Planned {
-        found,
+        plan,
+        proof,
+        mean_cost,
+        n_plans,
         holding,
         warnings,
         ..
     } = planned.map_err(|reason| Failure::NoPlan(format!("no plan was found: {reason}")))?;
-    let (proof, steps) = (found.proof(), &found.plan.steps);
+    let steps = &plan.steps;
     if session.is_json {
         let order: Vec<PatchId> = steps.iter().map(|s| s.piece).collect();
         let steps: Vec<Value> = steps
             .iter()
-            .map(|s| json!({ "piece": s.piece, "separation": s.separation.step() }))
+            .map(|s| json!({ "piece": s.piece, "separation": (s.separation.unit() + 0.0).to_array() }))
             .collect();
         println!(
             "{}",
             json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof, "holding": holding,
-                    "mean_cost": found.score.mean, "n_plans": found.pool.len(), "warnings": warnings })
+                    "mean_cost": mean_cost, "n_plans": n_plans, "warnings": warnings })
         );
         return Ok(0);
     }
-    for (i, s) in steps.iter().enumerate() {
-        let (cost, d) = (found.score.pieces[s.piece], -s.separation.unit() + 0.0);
+    for s in steps {
+        let (cost, d) = (proof.piece_costs[s.piece], -s.separation.unit() + 0.0);
         let [x, y, z] = d.to_array();
         println!(
-            "{:3}. piece {:3} moves in along ({x:+.2}, {y:+.2}, {z:+.2}), cost {cost:.2}",
-            i + 1,
+            "piece {:3} moves in along ({x:+.2}, {y:+.2}, {z:+.2}), cost {cost:.2}",
             s.piece
         );
     }

@@ -9,7 +9,8 @@ use shellock::sizes::SizeChoice;
 use shellock::stress_test::{
     Outcome, Pair, PunchAt, StressParams, StressReport, StressVerdict, chart, stress_test,
 };
-use shellock::{Ctx, LatticeDirection, PatchId, SegmentedSurface};
+use shellock::key::Turn;
+use shellock::{Ctx, PatchId, SegmentedSurface};
 use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
 use shellock_kit::{PlanFile, PlanFileError};
@@ -122,15 +123,14 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
         source,
     })?;
     let patch = |&face: &u32| {
-        let label = u32::try_from(labels[face as usize])
-            .ok()
-            .filter(|&label| (label as usize) < n_pieces);
-        label
-            .map(PatchId)
+        let number = u32::try_from(labels[face as usize]).ok();
+        number
+            .and_then(PatchId::numbered)
+            .filter(|&piece| usize::from(piece) < n_pieces)
             .ok_or_else(|| wrong("a face has a label that is no piece of plan.json"))
     };
     let patch_of_face: Vec<PatchId> = kept.iter().map(patch).collect::<Result<_, _>>()?;
-    if (0..n_pieces as u32).any(|piece| !patch_of_face.contains(&PatchId(piece))) {
+    if (0..n_pieces).any(|piece| !patch_of_face.contains(&piece.into())) {
         return Err(wrong("a piece of plan.json has no face"));
     }
     Ok(SegmentedSurface {
@@ -156,9 +156,11 @@ fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
         return Err(problems.join("; "));
     }
     let mut plan_params = Settings::resolve(&params).plan;
+    let mut turn = Turn::default();
     if let Some(key) = &plan.key {
+        let (laid, along) = Turn::laying(Vec3::from(key.plane_normal), Vec3::from(key.slide));
         plan_params.key = plan.key_piece;
-        plan_params.key_slide = Some(LatticeDirection::nearest(Vec3::from(key.slide)));
+        (turn, plan_params.key_slide) = (laid, Some(along));
     }
     let built = || plan.strength.as_ref().and_then(|s| s.material);
     let (material, edge_share) = (blows.material.or_else(built).unwrap_or_default(), blows.edges);
@@ -178,6 +180,7 @@ fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
         metric,
         sizes,
         plan: plan_params,
+        turn,
     })
 }
 

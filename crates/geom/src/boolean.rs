@@ -8,7 +8,7 @@ use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use manifold_rust::csg_tree::CsgNode;
-use manifold_rust::linalg::Vec3 as V;
+use manifold_rust::linalg::{Mat3x4, Vec3 as V};
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{Error, MeshGL64, OpType, WindingRule};
 
@@ -155,6 +155,12 @@ impl Volume {
     /// The region moved by `by` mm.
     pub fn translate(&self, by: Vec3) -> Self {
         Self(self.0.translate(v(by)))
+    }
+
+    /// The region turned about the origin by the rotation whose columns are where the axes go.
+    pub fn rotate(&self, columns: [Vec3; 3]) -> Self {
+        let [x, y, z] = columns.map(v);
+        Self(self.0.transform(&Mat3x4::from_cols(x, y, z, V::new(0.0, 0.0, 0.0))))
     }
 
     /// Fewer triangles for the same shape within `tolerance_mm`; stays manifold.

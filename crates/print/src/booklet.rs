@@ -141,7 +141,7 @@ impl Booklet<'_> {
             Step {
                 picture,
                 arrow: arrow.into_iter().map(in_pixels).collect(),
-                piece: (piece.color, piece.id),
+                piece: (piece.color, piece.number),
                 heading: what_to_do(piece, i),
                 seen: seen_from(&sights, i),
             }
@@ -213,7 +213,7 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let picture_mm = (cell[1] - 14.0).min(cell[0] - 4.0);
     let n_pixels = (picture_mm * OTHER_DENSITY) as usize;
     let mut by_number: Vec<&Drawn<'_>> = drawn.iter().collect();
-    by_number.sort_by_key(|d| d.piece.id);
+    by_number.sort_by_key(|d| d.piece.number);
     let pictures: Vec<Image> = by_number
         .par_iter()
         .map(|d| from_inside(d.piece, &d.normals, middle, n_pixels))
@@ -221,7 +221,7 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let mut cells = by_number.into_iter().zip(pictures).peekable();
     let mut pages = Vec::new();
     while cells.peek().is_some() {
-        let mut page = headed("Pieces", "each carries its number on its inner side");
+        let mut page = headed("Pieces", "each carries its number on its inner side; they go in by number");
         for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
             let [x, y] = corner_mm(i, grid, cell, 14.0);
             page.picture([x + 0.5 * (cell[0] - picture_mm), y + 12.0], picture_mm, picture);
@@ -230,18 +230,24 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
                 [x + 5.0, y + 6.0],
                 4.6,
                 d.piece.color,
-                &d.piece.id.to_string(),
+                &d.piece.number.to_string(),
             );
-            let step = format!(
-                "step {}{}",
-                d.piece.order + 1,
-                if d.piece.is_key { ", the key" } else { "" }
-            );
-            page.text([x + 12.0, y + 7.4], small(FAINT), &step);
+            if let Some(role) = role(d.piece) {
+                page.text([x + 12.0, y + 7.4], small(FAINT), role);
+            }
         }
         pages.push(page);
     }
     pages
+}
+
+/// What is special about a piece.
+fn role(piece: &ReportPiece<'_>) -> Option<&'static str> {
+    match (piece.order, piece.is_key) {
+        (0, _) => Some("the first"),
+        (_, true) => Some("the key, the last"),
+        _ => None,
+    }
 }
 
 /// Width and height of a step's picture, mm.
@@ -288,14 +294,13 @@ fn steps_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
 }
 
 fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sights: &[Sight], i: usize) {
-    page.text([x + 1.0, y + 11.0], bold(10.0, INK), &(i + 1).to_string());
-    let left = x + 4.0 + width_mm(bold(10.0, INK), &(i + 1).to_string());
+    let left = x + 1.0;
     numbered(
         page,
         [left + 5.0, y + 7.2],
         5.0,
         piece.color,
-        &piece.id.to_string(),
+        &piece.number.to_string(),
     );
     let room_mm = x + cell_mm(STEPS, 0.0)[0] - 2.0 - (left + 13.0);
     page.text_within(
@@ -334,7 +339,7 @@ fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
     if let Some(key) = drawn.last() {
         let how = format!(
             "to take it apart, pull piece {} out first, against its arrow",
-            key.piece.id
+            key.piece.number
         );
         let room_mm = cell_mm(STEPS, 0.0)[0] - 3.0;
         page.text_within([x + 1.0, y + 11.4], room_mm, small(FAINT), &how);

@@ -41,8 +41,8 @@ pub struct ReportData<'a> {
 /// One piece in assembled position.
 #[derive(Clone, Debug)]
 pub struct ReportPiece<'a> {
-    /// As warnings name it.
-    pub id: u32,
+    /// Its number, from 1: what is engraved on it.
+    pub number: u32,
     /// For people, for example `"piece 3"`.
     pub name: String,
     /// sRGB; see [`palette`].

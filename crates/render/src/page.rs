@@ -147,7 +147,7 @@ struct Note {
 }
 
 fn note(warning: &Warning, pieces: &[ReportPiece<'_>]) -> Note {
-    let named = |id: &PatchId| match pieces.iter().find(|p| p.id == id.0) {
+    let named = |id: &PatchId| match pieces.iter().find(|p| p.number == id.number()) {
         Some(piece) => piece.name.clone(),
         None => format!("piece {id}"),
     };
@@ -275,7 +275,7 @@ mod tests {
         };
         let hostile = || (HOSTILE.to_owned(), HOSTILE.to_owned());
         let piece = ReportPiece {
-            id: 0,
+            number: 1,
             name: HOSTILE.into(),
             color: [1, 2, 3],
             mesh: &mesh,

@@ -125,13 +125,13 @@ fn choice_of_plan(bencher: Bencher) {
 #[divan::bench(sample_count = 3, sample_size = 1)]
 fn body(bencher: Bencher) {
     let k = kit();
-    bencher.bench_local(|| made::split(&k.settings, &k.surface, &k.sizes, &k.grid, &k.distances, &k.plan));
+    bencher.bench_local(|| made::split(&k.settings, &k.surface, &k.sizes, &k.grid, &k.distances, &k.found));
 }
 
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn connectors(bencher: Bencher) {
     let k = kit();
-    bencher.bench_local(|| made::runs(&k.settings, &k.sizes, &k.grid, &k.shell, &k.plan));
+    bencher.bench_local(|| made::runs(&k.settings, &k.sizes, &k.grid, &k.shell, &k.found));
 }
 
 #[divan::bench(sample_count = 3, sample_size = 1)]
@@ -144,7 +144,7 @@ fn pieces(bencher: Bencher) {
             &k.sizes,
             &k.grid,
             &k.shell,
-            &k.plan,
+            &k.found,
             &k.runs,
         )
     });
@@ -168,7 +168,7 @@ fn gaps(bencher: Bencher) {
 fn pictures(bencher: Bencher) {
     let k = kit();
     let piece = |(order, step): (usize, &InstallationStep)| ReportPiece {
-        id: step.piece.0,
+        number: step.piece.number(),
         name: format!("piece {}", step.piece),
         color: color(order),
         mesh: &k.finished.meshes[step.piece],

@@ -147,7 +147,7 @@ fn piece<'a>(i: usize, mesh: &'a TriMesh, count: usize, model: &TriMesh) -> Repo
     let inwards = model.bounds().center() - mesh.bounds().center();
     let direction = LatticeDirection::nearest(inwards).unit();
     ReportPiece {
-        id: i as u32,
+        number: i as u32 + 1,
         name: format!("piece {i}"),
         color: palette::color(i),
         mesh,

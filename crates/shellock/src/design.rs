@@ -14,6 +14,7 @@ mod attempt;
 mod budget;
 mod candidate;
 mod division;
+mod handover;
 mod kit;
 mod lesson;
 mod outcome;
@@ -26,14 +27,15 @@ use shellock_geom::Solid;
 
 use crate::key::Turn;
 use crate::metric::Holding;
-use crate::plan::{FoundPlan, PlanConstraints, survey};
+use crate::plan::{FoundPlan, PlanConstraints, PlanProof, survey};
 use crate::strength::{Strength, StrengthError, StressMap};
-use crate::{Cause, Ctx, SegmentedSurface, Warning, segmentation, strength};
+use crate::{Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength};
 use attempt::{Attempt, Failure, Next};
 use budget::Budget;
 pub use budget::Effort;
 use candidate::Candidate;
 use division::{Division, WallGrid, revised};
+use handover::Handover;
 pub use kit::Kit;
 use outcome::Best;
 pub use outcome::{Design, DesignError, DesignOutcome};
@@ -101,7 +103,7 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                 .room_mm(division.chosen.sizes.largest_mm()),
         );
         let n_pieces = division.surface.n_patches;
-        match attempt::plans(ctx, job.params, &mut wall, &division, &mut budget, &mut kit)? {
+        match attempt::plans(ctx, job, &candidate.turn, &mut wall, &division, &mut budget, &mut kit)? {
             Attempt::Passed => {
                 return Ok(Explored {
                     kit,
@@ -143,19 +145,47 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
     }
 }
 
-/// The plan that [`design`] would make first.
+/// The plan that [`design`] would make first, in the space of the model as it was given; pieces are numbered
+/// as they go in.
 #[non_exhaustive]
 pub struct Planned {
-    /// The pieces, in the space of the model as it was given, turned by `turn`.
+    /// The pieces.
     pub surface: SegmentedSurface,
-    /// How the model was turned.
-    pub turn: Turn,
-    /// The plan and how good it is.
-    pub found: FoundPlan,
+    /// Order and directions.
+    pub plan: InstallationPlan,
+    /// How good it is.
+    pub proof: PlanProof,
+    /// Mean cost of its pieces.
+    pub mean_cost: f64,
+    /// How many plans it was chosen from.
+    pub n_plans: usize,
     /// How it holds by simulation.
     pub holding: Holding,
     /// What was warned of on the way.
     pub warnings: Vec<Warning>,
+}
+
+impl Planned {
+    /// What was found for a `surface` that was turned by `turn`; warnings of its own, then of the wall.
+    fn of(
+        turn: &Turn,
+        surface: &SegmentedSurface,
+        found: FoundPlan,
+        holding: Holding,
+        (own, of_wall): (Vec<Warning>, Vec<Warning>),
+    ) -> Self {
+        let (proof, mean_cost, n_plans) = (found.proof(), found.score.mean, found.pool.len());
+        let handover = Handover::new(turn, found.plan);
+        Self {
+            surface: handover.surface(surface),
+            plan: handover.plan(),
+            proof: handover.proof(proof),
+            mean_cost,
+            n_plans,
+            holding: handover.holding(holding),
+            warnings: [handover.warnings(own), of_wall].concat(),
+        }
+    }
 }
 
 /// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and
@@ -189,17 +219,8 @@ pub fn plan(
             let none = PlanConstraints::default();
             division = match attempt::next_plan(&ctx, params, &current, &survey, &none, n_joinings > 0)? {
                 Next::Plan(found, holding) => {
-                    let (turn, warnings) = (
-                        candidate.turn,
-                        [ctx.into_warnings(), wall.warnings.clone()].concat(),
-                    );
-                    return Ok(Ok(Planned {
-                        surface: current.surface,
-                        turn,
-                        found: *found,
-                        holding,
-                        warnings,
-                    }));
+                    let own = (ctx.into_warnings(), wall.warnings.clone());
+                    return Ok(Ok(Planned::of(&candidate.turn, &current.surface, *found, holding, own)));
                 }
                 Next::Joined(fewer) => {
                     n_joinings -= 1;
@@ -230,6 +251,8 @@ struct Job<'a> {
     wall: &'a Wall,
     stress: Option<StressMap<'a>>,
     surface: SegmentedSurface,
+    /// Which triangles of the model the user wants the key to have; `None` where that is left to us.
+    key_faces: Option<Vec<bool>>,
 }
 
 impl<'a> Job<'a> {
@@ -249,12 +272,53 @@ impl<'a> Job<'a> {
             labels,
             wall,
             stress,
+            key_faces: key_faces(params.key, model, labels, &surface)?,
             surface,
         })
     }
 
+    /// The patch that has most of what the user wants the key to have.
+    fn key_of(&self, surface: &SegmentedSurface) -> Option<PatchId> {
+        let is_key = self.key_faces.as_ref()?;
+        let mut area_mm2: IdVec<PatchId, f64> = IdVec::from_fn(surface.n_patches, |_| 0.0);
+        for (face, &patch) in surface.patch_of_face.iter().enumerate() {
+            if is_key[surface.source_face[face] as usize] {
+                area_mm2[patch] += surface.mesh.face_area(face);
+            }
+        }
+        area_mm2.iter().max_by(|a, b| a.1.total_cmp(b.1)).map(|(patch, _)| patch)
+    }
+
     fn settings(&self) -> &Settings {
         &self.wall.settings
+    }
+}
+
+/// Which triangles of `model` the key is to have, as [`KeySource::Piece`] says.
+fn key_faces(
+    key: KeySource,
+    model: &Solid,
+    labels: Option<&[i64]>,
+    surface: &SegmentedSurface,
+) -> Result<Option<Vec<bool>>, DesignError> {
+    let KeySource::Piece(name) = key else {
+        return Ok(None);
+    };
+    let mut is_key = vec![false; model.mesh().triangles.len()];
+    if let Some(labels) = labels {
+        is_key.iter_mut().zip(labels).for_each(|(is_key, label)| *is_key = *label == name);
+    } else {
+        let faces = surface.patch_of_face.iter().zip(&surface.source_face);
+        faces
+            .filter(|(patch, _)| i64::from(patch.number()) == name)
+            .for_each(|(_, &source)| is_key[source as usize] = true);
+    }
+    if is_key.contains(&true) {
+        Ok(Some(is_key))
+    } else if labels.is_some() {
+        Err(DesignError::NoLabelOfKey(name))
+    } else {
+        Err(DesignError::NoPieceOfKey(name, surface.n_patches))
     }
 }
 

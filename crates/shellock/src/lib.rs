@@ -47,7 +47,7 @@ mod testing;
 pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, design};
 pub use seam::graph::{Adjacency, ContactGraph};
 pub use shellock_assembly::{
-    Cancelled, Cause, Ctx, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit,
+    Cancelled, Cause, Ctx, Direction, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit,
     PressFitKind, Verdict, Warning, certificate, context, direction, ids, motion, params, play, push, verify,
     warning,
 };

@@ -11,6 +11,7 @@ mod key_parts;
 mod label;
 mod relief;
 mod ribs;
+mod thin;
 
 pub use crate::{PressFit, PressFitKind};
 pub use finish::{FinishParams, Finished, FinishedJoint, PieceError, make};

@@ -33,7 +33,6 @@ pub mod study;
 mod survey;
 pub mod types;
 
-pub use crate::{InstallationPlan, InstallationStep};
 pub use local_cost::{PieceCosts, SeamCosts};
 pub use params::PlanParams;
 pub use piece_set::PieceSet;
@@ -41,4 +40,4 @@ pub use sample::random_plans;
 pub use score::{PlanScore, score};
 pub use search::{MakeCosts, search, search_with};
 pub use survey::{PlanSurvey, survey};
-pub use types::{Blocker, FoundPlan, PlanConstraints, PlanOutcome, PlanProof, ProofScope, RankedPlan};
+pub use types::{Blocker, LatticePlan, LatticeStep, FoundPlan, PlanConstraints, PlanOutcome, PlanProof, ProofScope, RankedPlan};

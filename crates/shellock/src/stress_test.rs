@@ -23,8 +23,11 @@ use shellock_mechanics::{
 
 use crate::impact::impact_n;
 use crate::metric::{MetricParams, PlanModel};
-use crate::plan::{InstallationPlan, PlanParams, random_plans, survey};
-use crate::{Cancelled, ConnectorSizes, Ctx, PatchId, SegmentedSurface};
+use crate::key::Turn;
+use crate::plan::{LatticePlan, PlanParams, random_plans, survey};
+use crate::{
+    Cancelled, ConnectorSizes, Ctx, InstallationPlan, InstallationStep, LatticeDirection, PatchId, SegmentedSurface,
+};
 
 pub use chart::chart;
 use region::{around, highest, highest_in_the_middle, lowest, spread};
@@ -98,6 +101,9 @@ pub struct StressParams {
     pub sizes: ConnectorSizes,
     /// How plans are drawn; `up` says where the top is.
     pub plan: PlanParams,
+    /// How the model is turned so that the pieces' ways out are lattice directions, as those of plans that are
+    /// drawn are.
+    pub turn: Turn,
 }
 
 impl Default for StressParams {
@@ -109,6 +115,7 @@ impl Default for StressParams {
             metric: MetricParams::default(),
             sizes: ConnectorSizes::default(),
             plan: PlanParams::default(),
+            turn: Turn::default(),
         }
     }
 }
@@ -232,6 +239,9 @@ pub enum StressError {
         /// Patches of the surface.
         patches: usize,
     },
+    /// A way out is none of the 26, once the model is turned.
+    #[error("piece {0} leaves along a direction that no plan of this program has")]
+    Direction(PatchId),
     /// The simulation failed.
     #[error("the simulation failed: {0}")]
     Volume(#[from] VolumeError),
@@ -241,6 +251,37 @@ pub enum StressError {
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+/// The same of the turned model.
+fn turned(params: &StressParams) -> StressParams {
+    let mut turned = params.clone();
+    turned.plan.up = params.turn.apply(Vec3::from(params.plan.up)).to_array();
+    turned
+}
+
+fn turned_surface(params: &StressParams, surface: &SegmentedSurface) -> SegmentedSurface {
+    SegmentedSurface {
+        mesh: params.turn.mesh(&surface.mesh),
+        ..surface.clone()
+    }
+}
+
+/// The plan with the directions of the turned model.
+fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, StressError> {
+    /// A direction that is farther off, degrees, is another.
+    const MOST_OFF_DEG: f64 = 1.0;
+    let step = |step: &InstallationStep| {
+        let out = params.turn.apply(step.separation.unit());
+        let nearest = LatticeDirection::nearest(out);
+        let is_it = nearest.unit().dot(out) >= MOST_OFF_DEG.to_radians().cos();
+        is_it.then_some((step.piece, nearest)).ok_or(StressError::Direction(step.piece))
+    };
+    // The first piece goes nowhere.
+    let first = plan.steps.first().map(|first| Ok((first.piece, LatticeDirection::nearest(Vec3::Z))));
+    let others = plan.steps.iter().skip(1).map(step);
+    let steps: Result<Vec<_>, _> = first.into_iter().chain(others).collect();
+    steps.map(LatticePlan::new)
 }
 
 /// Tests the pieces of `surface` under `plan`, with connectors of half the size, and under a plan of half the
@@ -261,9 +302,10 @@ pub fn stress_test(
             patches: surface.n_patches,
         });
     }
+    let (params, surface, plan) = (&turned(params), &turned_surface(params, surface), &laid(params, plan)?);
     ctx.stage("a plan of half the score", 0)?;
     let model = sound_model(ctx, params, surface)?;
-    let scored = |plan: &InstallationPlan| score(&model, plan);
+    let scored = |plan: &LatticePlan| score(&model, plan);
     let score_mm = scored(plan)?;
     let worse = match score_mm {
         Some(score_mm) => half_as_good(ctx, params, surface, &model, score_mm)?,
@@ -326,7 +368,7 @@ fn sound_model(
 }
 
 /// Quality by the surface metric, mm; `None` where pieces come apart.
-fn score(model: &PlanModel, plan: &InstallationPlan) -> Result<Option<f64>, SparseError> {
+fn score(model: &PlanModel, plan: &LatticePlan) -> Result<Option<f64>, SparseError> {
     let solved = model
         .surface_model()?
         .resist(&model.meetings(plan), plan.key().0)?;
@@ -343,11 +385,11 @@ fn half_as_good(
     surface: &SegmentedSurface,
     model: &PlanModel,
     score_mm: f64,
-) -> Result<Option<(InstallationPlan, f64)>, StressError> {
+) -> Result<Option<(LatticePlan, f64)>, StressError> {
     let survey = survey(ctx, &params.plan, surface, &surface.seams(), &params.sizes)?;
     let plans = random_plans(&params.plan, &survey, N_DRAWN);
     let solver = model.surface_model()?;
-    let mut best: Option<(f64, InstallationPlan, f64)> = None;
+    let mut best: Option<(f64, LatticePlan, f64)> = None;
     for plan in plans {
         ctx.check()?;
         let solved = solver.resist(&model.meetings(&plan), plan.key().0)?;
@@ -445,7 +487,7 @@ impl<'a> Bench<'a> {
                     .map_or(largest_mm(meetings), |j| j.size_mm),
             ),
             between: widest.map(|i| self.model.pieces_at(i)),
-            at: widest.map(|i| self.model.place_of(i).to_array()),
+            at: widest.map(|i| self.params.turn.inverse().apply(self.model.place_of(i)).to_array()),
             n_lost: loaded.lost.len(),
             wall_mpa: loaded.walls.robust_mpa,
             connector_mpa: loaded.connectors.robust_mpa,

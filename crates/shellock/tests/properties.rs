@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 
 use proptest::prelude::*;
 use shellock::key::Turn;
-use shellock::plan::{PlanConstraints, PlanParams, PlanSurvey, random_plans, score, survey};
+use shellock::plan::{LatticePlan, PlanConstraints, PlanParams, PlanSurvey, random_plans, score, survey};
 use shellock::segmentation::{SegmentationParams, segment};
-use shellock::{ConnectorSizes, Ctx, InstallationPlan, LatticeDirection, PatchId, SegmentedSurface};
+use shellock::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface};
 use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology, Vec3};
 use shellock_testkit::property::{LatticeTurn, cases, orders, turns, vectors};
@@ -123,7 +123,7 @@ fn assert_same_contacts(
 
 /// Whether the joints of `plan` hold in both surveys or in none. The longest run is that of a walk along the
 /// seam, which goes the other way where the pair's numbers change order, and it may count other samples then.
-fn hold_alike(plan: &InstallationPlan, other: &PlanSurvey, number: &[usize]) -> bool {
+fn hold_alike(plan: &LatticePlan, other: &PlanSurvey, number: &[usize]) -> bool {
     let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
     survey_as_given().contacts.iter().all(|contact| {
         let is_b_later = plan.position(contact.b) > plan.position(contact.a);
@@ -221,7 +221,7 @@ proptest! {
         prop_assume!(plans.peek().is_some());
         for plan in plans {
             let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
-            let other = InstallationPlan::new(plan.steps.iter().map(|s| (new(s.piece), s.separation)));
+            let other = LatticePlan::new(plan.steps.iter().map(|s| (new(s.piece), s.separation)));
             let one = score(survey_as_given(), &PlanConstraints::default(), &plan);
             let two = score(&survey, &PlanConstraints::default(), &other);
             prop_assert!((one.worst - two.worst).abs() < 1e-9, "{:?} {:?}", one, two);

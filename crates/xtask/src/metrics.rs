@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::Args;
 use shellock::design::Settings;
 use shellock::metric::{MetricParams, PlanModel};
-use shellock::plan::{InstallationPlan, PlanSurvey, random_plans};
+use shellock::plan::{LatticePlan, PlanSurvey, random_plans};
 use shellock_mechanics::Meeting;
 
 use crate::failure::Failure;
@@ -39,7 +39,7 @@ pub struct MetricsOptions {
 struct Subject {
     model: PlanModel,
     survey: PlanSurvey,
-    plans: Vec<InstallationPlan>,
+    plans: Vec<LatticePlan>,
     /// What each plan makes of the stations.
     meetings: Vec<Vec<Meeting>>,
     key: u32,

@@ -202,7 +202,7 @@ fn a_path_that_rubs_is_not_claimed() {
         claims.filter_map(piece).collect::<Vec<u32>>()
     };
     assert_eq!(installs(&kit), [1, 2]);
-    kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X);
+    kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X).into();
     assert_eq!(installs(&kit), [2]);
 }
 

@@ -214,7 +214,7 @@ mod tests {
         let steps = [Vec3::Z, Vec3::Z, Vec3::X].into_iter().zip(0..);
         let steps = steps.map(|(d, i)| InstallationStep {
             piece: PatchId(i),
-            separation: LatticeDirection::nearest(d),
+            separation: LatticeDirection::nearest(d).into(),
         });
         let pieces = [model.subtract(&seat), block, ledge]
             .iter()

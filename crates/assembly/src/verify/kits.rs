@@ -29,7 +29,7 @@ impl Kit {
         let steps = steps
             .map(|(i, &d)| InstallationStep {
                 piece: PatchId(i as u32),
-                separation: LatticeDirection::nearest(d),
+                separation: LatticeDirection::nearest(d).into(),
             })
             .collect();
         Self {

@@ -41,7 +41,7 @@ fn a_tongue_leaves_its_groove_one_way_only() {
 #[test]
 fn a_path_through_a_wall_is_caught_with_place_and_partner() {
     let mut kit = pinned_kit(|_| {});
-    kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X);
+    kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X).into();
     let verdict = kit.verdict();
     let rub = verdict
         .findings

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::{TriMesh, Vec3};
+use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use super::sample::{self, Sample};
 
@@ -110,58 +110,90 @@ pub struct ThinFeature {
 /// From points on the surface a ray goes inwards and one outwards. Where it meets, within the limit, a face
 /// that is parallel within 15°, the point is thin; thin points of one kind less than 1.2 mm apart are one place.
 pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Vec<ThinFeature> {
+    let all = thin_points(mesh, [least_wall_mm, least_slot_mm]);
+    let mut places: Vec<ThinFeature> = all.iter().map(|members| feature(members)).collect();
+    places.sort_by(|a, b| b.length_mm.total_cmp(&a.length_mm));
+    places
+}
+
+/// A point of the surface across which a piece is thin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThinPoint {
+    /// Sheet or slot.
+    pub kind: ThinKind,
+    /// The point, mm.
+    pub at: Vec3,
+    /// Unit vector across the sheet or the slot.
+    pub across: Vec3,
+    /// How far the other side is, mm.
+    pub thickness_mm: f64,
+}
+
+/// The points of each sheet thinner and each slot narrower than its limit (mm) that [`thin_places`] tells of, in
+/// no order; always the same for the same mesh.
+pub fn thin_points(mesh: &TriMesh, limits_mm: [f64; 2]) -> Vec<Vec<ThinPoint>> {
     let n = ((mesh.area() * RAYS_PER_MM2) as usize).min(MOST_RAYS);
     if n == 0 {
         return Vec::new();
     }
     let samples = sample::on_surface(mesh, n, SEED);
     let bvh = TriangleBvh::new(mesh);
-    let mut places = Vec::new();
-    for (kind, inwards, limit_mm) in [
-        (ThinKind::Sheet, -1.0, least_wall_mm),
-        (ThinKind::Slot, 1.0, least_slot_mm),
-    ] {
-        let thickness = |s: &Sample| {
-            let along = inwards * s.normal;
-            let (face, on_mm) = bvh.first_hit(s.point + along * START_MM, along, limit_mm)?;
-            let faces = -s.normal.dot(mesh.face_normal(face as usize));
+    let found = |kind: ThinKind, sense: f64, limit_mm: f64| {
+        let point = |s: &Sample| {
+            let across = sense * s.normal;
+            let (face, on_mm) = bvh.first_hit(s.point + across * START_MM, across, limit_mm)?;
+            let opposed = -s.normal.dot(mesh.face_normal(face as usize));
             // Faces that touch there are an edge, not a sheet.
-            (faces >= COS_SHEET && on_mm > 10.0 * START_MM).then_some((s.point, on_mm + START_MM))
+            (opposed >= COS_SHEET && on_mm > 10.0 * START_MM).then_some(ThinPoint {
+                kind,
+                at: s.point,
+                across,
+                thickness_mm: on_mm + START_MM,
+            })
         };
-        let thin: Vec<(Vec3, f64)> = samples.par_iter().filter_map(thickness).collect();
-        places.extend(joined(&thin).iter().filter_map(|members| place(kind, members)));
-    }
-    places.sort_by(|a, b| b.length_mm.total_cmp(&a.length_mm));
+        joined(&samples.par_iter().filter_map(point).collect::<Vec<_>>())
+    };
+    let [least_wall_mm, least_slot_mm] = limits_mm;
+    let mut places = [
+        found(ThinKind::Sheet, -1.0, least_wall_mm),
+        found(ThinKind::Slot, 1.0, least_slot_mm),
+    ]
+    .concat();
+    places.retain(|members| {
+        members.len() >= LEAST_RAYS && bounds(members).diagonal() >= LEAST_LENGTH_MM
+    });
     places
 }
 
-/// One place of its points and their thicknesses.
-fn place(kind: ThinKind, members: &[(Vec3, f64)]) -> Option<ThinFeature> {
-    let bounds = shellock_geom::Aabb::around(members.iter().map(|m| m.0));
-    if members.len() < LEAST_RAYS || bounds.diagonal() < LEAST_LENGTH_MM {
-        return None;
-    }
+fn bounds(members: &[ThinPoint]) -> Aabb {
+    Aabb::around(members.iter().map(|m| m.at))
+}
+
+/// One place of its points.
+fn feature(members: &[ThinPoint]) -> ThinFeature {
+    let bounds = bounds(members);
     let middle = bounds.center();
-    let nearest = members.iter().min_by(|a, b| {
-        a.0.distance_squared(middle)
-            .total_cmp(&b.0.distance_squared(middle))
-    })?;
-    let mut thicknesses: Vec<f64> = members.iter().map(|m| m.1).collect();
+    let far = |m: &&ThinPoint| m.at.distance_squared(middle);
+    let nearest = members
+        .iter()
+        .min_by(|a, b| far(a).total_cmp(&far(b)))
+        .expect("a place has points");
+    let mut thicknesses: Vec<f64> = members.iter().map(|m| m.thickness_mm).collect();
     thicknesses.sort_unstable_by(f64::total_cmp);
-    Some(ThinFeature {
-        kind,
+    ThinFeature {
+        kind: nearest.kind,
         length_mm: bounds.diagonal(),
         thickness_mm: thicknesses[thicknesses.len() / 2],
-        at: nearest.0.to_array(),
-    })
+        at: nearest.at.to_array(),
+    }
 }
 
 /// The points in groups whose members are linked by steps of [`JOINED_MM`], in the order of their first ones.
-fn joined(points: &[(Vec3, f64)]) -> Vec<Vec<(Vec3, f64)>> {
+fn joined(points: &[ThinPoint]) -> Vec<Vec<ThinPoint>> {
     let cube = |p: Vec3| (p / JOINED_MM).floor().to_array().map(|x| x as i32);
     let mut members: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for (i, p) in points.iter().enumerate() {
-        members.entry(cube(p.0)).or_default().push(i);
+        members.entry(cube(p.at)).or_default().push(i);
     }
     let mut is_seen = vec![false; points.len()];
     let mut groups = Vec::new();
@@ -171,11 +203,11 @@ fn joined(points: &[(Vec3, f64)]) -> Vec<Vec<(Vec3, f64)>> {
         }
         let (mut group, mut next) = (vec![seed], 0);
         while next < group.len() {
-            let p = points[group[next]].0;
+            let p = points[group[next]].at;
             let [i, j, k] = cube(p);
             let around = (0..27).map(|at| [i + at / 9 - 1, j + at / 3 % 3 - 1, k + at % 3 - 1]);
             for &other in around.filter_map(|c| members.get(&c)).flatten() {
-                if !is_seen[other] && points[other].0.distance(p) < JOINED_MM {
+                if !is_seen[other] && points[other].at.distance(p) < JOINED_MM {
                     is_seen[other] = true;
                     group.push(other);
                 }

@@ -107,15 +107,15 @@ mod tests {
     fn a_finding_names_its_pieces_and_its_place() {
         let at = [1.0, 2.25, -3.0];
         let text = Finding::Overlap {
-            a: PatchId(3),
-            b: PatchId(7),
+            a: PatchId(2),
+            b: PatchId(6),
             volume_mm3: 0.625,
             at,
         }
         .to_string();
         assert_eq!(text, "pieces 3 and 7 overlap by 0.62 mm³ at (1.0, 2.2, -3.0) mm");
         let text = Finding::Loose {
-            piece: PatchId(4),
+            piece: PatchId(3),
             directions: vec![[0.0, 0.0, 1.0]],
         }
         .to_string();

@@ -221,7 +221,7 @@ fn quantities_of_other_pieces_or_kinds_are_refused() {
 #[test]
 fn a_point_off_its_surface_or_a_normal_that_is_none_is_refused() {
     let off = Caged::new().refused(|c| c.bearings[3].point[0] += 0.001);
-    assert_eq!(off, "bearing 3 is not on piece 1");
+    assert_eq!(off, "bearing 3 is not on piece 2");
     Caged::new().refused(|c| c.bearings[3].normal[0] *= 1.001);
     Caged::new().refused(|c| c.bearings[3].normal = [0.6, 0.0, 0.8]);
     Caged::new().refused(|c| c.bearings[3].b = 1);

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use shellock::ConnectorSizes;
-use shellock_assembly::{InstallationPlan, InstallationStep, LatticeDirection, PressFit};
+use shellock_assembly::{Direction, InstallationPlan, InstallationStep, PatchId, PressFit};
 use shellock_geom::Vec3;
 
 use super::{PlanFile, PlanFileError};
@@ -17,17 +17,21 @@ fn wrong(what: String) -> PlanFileError {
     PlanFileError::Contradiction(what)
 }
 
+fn no_direction(piece: PatchId) -> PlanFileError {
+    wrong(format!("the installation_direction of piece {piece} is no unit vector"))
+}
+
 impl PlanFile {
     /// The order and the directions, if every piece stands at the place of its id and is installed once.
     pub fn order(&self) -> Result<InstallationPlan, PlanFileError> {
         let mut directions = Vec::new();
         for (i, piece) in self.pieces.iter().enumerate() {
+            let number = i + 1;
             if usize::from(piece.id) != i {
-                return Err(wrong(format!("piece number {i} does not have the id {i}")));
+                return Err(wrong(format!("the piece at place {number} does not have the id {number}")));
             }
-            directions.push(LatticeDirection::nearest(-Vec3::from(
-                piece.installation_direction,
-            )));
+            let out = Direction::of(-Vec3::from(piece.installation_direction));
+            directions.push(out.ok_or_else(|| no_direction(piece.id))?);
         }
         let mut is_named = vec![false; directions.len()];
         let mut steps = Vec::new();
@@ -46,7 +50,10 @@ impl PlanFile {
             });
         }
         match is_named.iter().position(|is_named| !is_named) {
-            Some(piece) => Err(wrong(format!("the installation order leaves out piece {piece}"))),
+            Some(place) => Err(wrong(format!(
+                "the installation order leaves out piece {}",
+                PatchId::from(place)
+            ))),
             None => Ok(InstallationPlan { steps }),
         }
     }
@@ -55,10 +62,7 @@ impl PlanFile {
     pub fn check_directions(&self) -> Result<(), PlanFileError> {
         let is_unit = |d: [f64; 3]| (Vec3::from(d).length_squared() - 1.0).abs() <= UNIT_SLACK;
         match self.pieces.iter().find(|p| !is_unit(p.installation_direction)) {
-            Some(piece) => Err(wrong(format!(
-                "the installation_direction of piece {} is no unit vector",
-                piece.id
-            ))),
+            Some(piece) => Err(no_direction(piece.id)),
             None => Ok(()),
         }
     }

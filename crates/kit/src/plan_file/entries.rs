@@ -109,14 +109,12 @@ pub struct KeyEntry {
     pub slide: [f64; 3],
     /// Normal of its plane, a unit vector.
     pub plane_normal: [f64; 3],
-    /// By how much the model was turned for it, degrees.
-    pub turned_degrees: f64,
 }
 
 /// A piece.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PieceEntry {
-    /// Its place in the list, from 0.
+    /// Its number: the first to go in is 1. Pieces are listed in this order.
     pub id: PatchId,
     /// Its mesh, as a path within the kit.
     pub file: Option<String>,
@@ -250,9 +248,9 @@ pub struct PrintingEntry {
     /// How pieces lie, in order; what is too large is left out.
     #[serde(default)]
     pub laid: Vec<LaidEntry>,
-    /// Places of pieces in the list that the printer cannot make.
+    /// Pieces that the printer cannot make.
     #[serde(default)]
-    pub too_large: Vec<usize>,
+    pub too_large: Vec<PatchId>,
     /// Print time.
     pub time: Option<TimeEntry>,
 }
@@ -260,8 +258,8 @@ pub struct PrintingEntry {
 /// How a piece lies on its plate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LaidEntry {
-    /// Its place in the list of pieces.
-    pub piece: usize,
+    /// The piece.
+    pub piece: PatchId,
     /// The plate, from 1.
     pub plate: usize,
     /// Width, depth and height as it lies, mm.

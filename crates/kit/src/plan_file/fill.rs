@@ -8,7 +8,6 @@ use shellock::strength::Strength;
 use shellock_assembly::verify::Play;
 use shellock_assembly::verify::clearance::PathGap;
 use shellock_assembly::{PatchId, Warning};
-use shellock_geom::Vec3;
 use shellock_geom::repair::{Repair, RepairKind};
 use shellock_print::{Plates, Printer, Process};
 
@@ -25,7 +24,7 @@ pub struct Source<'a> {
     pub file: &'a str,
     /// SHA-256 of its bytes, in lower-case hexadecimal digits.
     pub sha256: &'a str,
-    /// The model as it was given to the design, mm, from the file's coordinates: 4 × 4, row by row.
+    /// The model in mm, from the file's coordinates: 4 × 4, row by row.
     pub transform: [f64; 16],
     /// What was changed to make one body of it.
     pub repairs: &'a [Repair],
@@ -52,20 +51,19 @@ pub struct Told<'a> {
 
 /// A piece's mesh, as a path within the kit.
 pub fn piece_file(piece: PatchId) -> String {
-    format!("pieces/piece-{:02}.stl", piece.0)
+    format!("pieces/piece-{:02}.stl", piece.number())
 }
 
 impl PlanFile {
     /// What the file of a design says.
     pub fn of(settings: &Settings, design: &Design, told: &Told<'_>) -> Self {
         let kit = &design.kit;
-        let up = design.turn.apply(Vec3::from(settings.plan.up));
         Self {
             format: Some(FORMAT.to_owned()),
             version: Some(VERSION),
             units: Some("mm".to_owned()),
             program: Some(told.program.to_owned()),
-            input: Some(InputEntry::of(&told.source, design)),
+            input: Some(InputEntry::of(&told.source)),
             seed: settings.plan.seed,
             shell_thickness: Some(kit.thickness_mm),
             strength: design.strength.as_ref().map(|s| StrengthEntry::of(s, settings)),
@@ -76,7 +74,7 @@ impl PlanFile {
             connector_size: Some(kit.sizes.largest_mm()),
             connector_sizes: pair_sizes(design),
             wall_gap: Some(settings.body.seam_gap_mm),
-            up: Some(up.to_array()),
+            up: Some(settings.plan.up),
             min_wall: Some(settings.connector.min_wall_mm),
             key_piece: Some(kit.plan.key()),
             key: design.key.as_ref().map(|key| KeyEntry::of(design, key)),
@@ -168,27 +166,15 @@ fn contacts(design: &Design) -> Vec<ContactEntry> {
 }
 
 impl InputEntry {
-    fn of(source: &Source<'_>, design: &Design) -> Self {
+    fn of(source: &Source<'_>) -> Self {
         Self {
             file: source.file.to_owned(),
             sha256: source.sha256.to_owned(),
-            transform: turned(source.transform, design),
+            transform: source.transform,
             largest_only: source.repairs.iter().any(|r| r.kind == RepairKind::LeftOut),
             repairs: source.repairs.iter().map(RepairEntry::of).collect(),
         }
     }
-}
-
-/// The model's own transform, then turned for the key.
-fn turned(own: [f64; 16], design: &Design) -> [f64; 16] {
-    let column = |c: usize| Vec3::new(own[c], own[4 + c], own[8 + c]);
-    let columns = [0, 1, 2, 3].map(|c| design.turn.apply(column(c)) + 0.0);
-    let mut all = [0.0; 16];
-    for (c, v) in columns.iter().enumerate() {
-        (all[c], all[4 + c], all[8 + c]) = (v.x, v.y, v.z);
-    }
-    all[15] = 1.0;
-    all
 }
 
 impl RepairEntry {
@@ -237,7 +223,6 @@ impl KeyEntry {
             side_share: key.side_share,
             slide: key.prism.slide.to_array(),
             plane_normal: key.prism.normal.to_array(),
-            turned_degrees: design.turn.angle().to_degrees(),
         }
     }
 }
@@ -293,7 +278,7 @@ impl PrintingEntry {
     pub fn of(printer: &Printer, plates: &Plates, seconds: [f64; 2]) -> Self {
         let process = Process::ALL.iter().find(|(_, p)| *p == printer.process);
         let laid = plates.laid.iter().map(|l| LaidEntry {
-            piece: l.piece,
+            piece: l.piece.into(),
             plate: l.plate + 1,
             size: l.size_mm,
             turned: l.turned,
@@ -310,7 +295,7 @@ impl PrintingEntry {
             layer: printer.layer_mm,
             plates: plates.n_plates,
             laid: laid.collect(),
-            too_large: plates.too_large.clone(),
+            too_large: plates.too_large.iter().map(|&i| i.into()).collect(),
             time: Some(TimeEntry {
                 by: "closed form".to_owned(),
                 pieces_s,

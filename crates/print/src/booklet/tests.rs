@@ -5,7 +5,7 @@ use super::*;
 
 fn piece(mesh: &TriMesh, order: usize, along: [f64; 3]) -> ReportPiece<'_> {
     ReportPiece {
-        id: order as u32,
+        number: order as u32 + 1,
         name: format!("piece {order}"),
         color: [200, 90, 40],
         mesh,

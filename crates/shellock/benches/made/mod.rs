@@ -3,8 +3,9 @@
 
 use shellock::body::{PatchDistances, ShellBodies, ShellGrid};
 use shellock::connector::{self, Run, is_unobstructed};
+use shellock::key::Turn;
 use shellock::piece::{self, FinishParams, Finished, LabelParams, Relief};
-use shellock::plan::{PlanConstraints, PlanOutcome, search, survey};
+use shellock::plan::{LatticePlan, PlanConstraints, PlanOutcome, search, survey};
 use shellock::verify::Assembly;
 use shellock::{
     ConnectorSizes, Ctx, IdVec, InstallationPlan, Params, PatchId, SegmentedSurface, Settings, body,
@@ -16,6 +17,9 @@ pub struct Made {
     pub settings: Settings,
     pub sizes: ConnectorSizes,
     pub surface: SegmentedSurface,
+    /// As it was found.
+    pub found: LatticePlan,
+    /// The same, to be judged.
     pub plan: InstallationPlan,
     pub grid: ShellGrid,
     pub distances: PatchDistances,
@@ -44,11 +48,13 @@ impl Made {
         let shell = split(&settings, &surface, &sizes, &grid, &distances, &plan);
         let runs = runs(&settings, &sizes, &grid, &shell, &plan);
         let finished = finish(&settings, &surface, &sizes, &grid, &shell, &plan, &runs);
+        let judged = InstallationPlan::new(plan.steps.iter().map(|s| (s.piece, s.separation.into())));
         Self {
             settings,
             sizes,
             surface,
-            plan,
+            found: plan,
+            plan: judged,
             grid,
             distances,
             shell,
@@ -85,7 +91,7 @@ pub fn split(
     sizes: &ConnectorSizes,
     grid: &ShellGrid,
     distances: &PatchDistances,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
 ) -> ShellBodies {
     let rooms = rooms(settings, surface, sizes);
     body::build(&Ctx::quiet(), &settings.body, grid, distances, plan, &rooms).expect("pieces leave freely")
@@ -97,7 +103,7 @@ pub fn runs(
     sizes: &ConnectorSizes,
     grid: &ShellGrid,
     shell: &ShellBodies,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
 ) -> Vec<Run> {
     let inner = shell.inner.as_ref().expect("there is a cavity");
     let curves = connector::curves(grid, inner, plan);
@@ -112,7 +118,7 @@ pub fn finish(
     sizes: &ConnectorSizes,
     grid: &ShellGrid,
     shell: &ShellBodies,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     runs: &[Run],
 ) -> Finished {
     let gap_mm = settings
@@ -128,6 +134,7 @@ pub fn finish(
         rim_mm: settings.body.rim_mm,
         grip: None,
         label: Some(LabelParams::default()),
+        turn: Turn::default(),
     };
     let rooms = rooms(settings, surface, sizes);
     piece::make(&Ctx::quiet(), &params, grid, shell, plan, runs, &rooms).expect("pieces can be written")

@@ -12,7 +12,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use super::grid::{LocalField, PatchDistances, ShellGrid};
 use super::{BodyError, BodyParams};
-use crate::plan::InstallationPlan;
+use crate::plan::LatticePlan;
 use crate::{Cancelled, Cause, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
 
 /// Outer skin of a piece that other pieces' paths must not take from it, in cells. [geometry notes: 1.5]
@@ -67,7 +67,7 @@ pub fn build(
     params: &BodyParams,
     grid: &ShellGrid,
     distances: &PatchDistances,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<ShellBodies, BodyError> {
     ctx.stage("cuts", plan.steps.len())?;

@@ -1,25 +1,25 @@
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 
 use super::*;
-use crate::plan::{InstallationPlan, InstallationStep};
+use crate::plan::{LatticePlan, LatticeStep};
 use crate::testing::{label, sphere};
 use crate::{Ctx, IdVec, LatticeDirection, SegmentedSurface};
 
 const RADIUS_MM: f64 = 16.0;
 
 /// Eight octants of a ball, the one at (−, −, −) first; each is to leave outwards.
-fn octants() -> (SegmentedSurface, InstallationPlan) {
+fn octants() -> (SegmentedSurface, LatticePlan) {
     let octant = |p: Vec3| u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0);
     let steps = (0..8u32).map(|i| {
         let outwards = Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0));
-        InstallationStep {
+        LatticeStep {
             piece: (i as usize).into(),
             separation: LatticeDirection::nearest(outwards),
         }
     });
     (
         label(sphere(5, Vec3::splat(RADIUS_MM)), 8, octant),
-        InstallationPlan {
+        LatticePlan {
             steps: steps.collect(),
         },
     )
@@ -28,7 +28,7 @@ fn octants() -> (SegmentedSurface, InstallationPlan) {
 fn built(
     params: &BodyParams,
     surface: &SegmentedSurface,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
 ) -> (ShellGrid, Result<ShellBodies, BodyError>) {
     let model = Solid::new(surface.mesh.clone()).unwrap();
     let ctx = Ctx::quiet();
@@ -45,7 +45,7 @@ fn built(
 
 /// Asserts that every piece leaves what was installed before it, along its direction, with less than
 /// `most_mm3` of overlap.
-fn assert_leave_freely(bodies: &IdVec<crate::PatchId, Volume>, plan: &InstallationPlan, most_mm3: f64) {
+fn assert_leave_freely(bodies: &IdVec<crate::PatchId, Volume>, plan: &LatticePlan, most_mm3: f64) {
     for (at, step) in plan.steps.iter().enumerate().skip(1) {
         for travel_mm in [0.0, 0.3, 1.0, 3.0, 8.0] {
             let moved = bodies[step.piece].translate(travel_mm * step.separation.unit());

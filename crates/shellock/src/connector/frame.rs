@@ -3,7 +3,7 @@
 use shellock_geom::Vec3;
 
 use crate::body::{ShellGrid, outward};
-use crate::plan::InstallationPlan;
+use crate::plan::LatticePlan;
 use crate::{PatchId, Seam, SegmentedSurface};
 
 /// Distance between the points of a curve, mm: half the finest connector, so that smoothing keeps the seam's
@@ -33,7 +33,7 @@ pub struct Curve {
 }
 
 /// One curve for each seam of the inner surface that is long enough to have points of its own.
-pub fn curves(grid: &ShellGrid, inner: &SegmentedSurface, plan: &InstallationPlan) -> Vec<Curve> {
+pub fn curves(grid: &ShellGrid, inner: &SegmentedSurface, plan: &LatticePlan) -> Vec<Curve> {
     inner
         .seams()
         .iter()
@@ -41,7 +41,7 @@ pub fn curves(grid: &ShellGrid, inner: &SegmentedSurface, plan: &InstallationPla
         .collect()
 }
 
-fn curve(grid: &ShellGrid, seam: &Seam, plan: &InstallationPlan) -> Option<Curve> {
+fn curve(grid: &ShellGrid, seam: &Seam, plan: &LatticePlan) -> Option<Curve> {
     if seam.length() < 4.0 * STEP_MM {
         return None;
     }

@@ -49,6 +49,9 @@ pub struct Section {
     pub male: [Option<Part>; 2],
     /// Bottom, far wall and near wall of the channel.
     pub female: [Option<Part>; 3],
+    /// What fills the corner between a tongue and the edge of the wall that it hangs from, a slot as narrow as
+    /// the clearance; it reaches beyond the wall's side of the seam.
+    pub corner: Option<Part>,
 }
 
 /// Below this angle between ŝ and the surface normal, in radians, the pin is a tongue and needs a foot: at
@@ -56,6 +59,8 @@ pub struct Section {
 const TONGUE_ANGLE: f64 = -0.698;
 /// How far parts reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.6;
+/// How far what fills a tongue's corner reaches into tongue and wall, mm.
+const CORNER_MM: f64 = 0.1;
 
 /// How far the lip of a key's groove stays from the seam, mm.
 const LIP_GAP_MM: f64 = 0.1;
@@ -131,6 +136,7 @@ impl Section {
                     s1: RAIL_ROOT_MM,
                 }),
             ],
+            corner: None,
         }
     }
 
@@ -158,6 +164,12 @@ impl Section {
         let (c_s, floor) = (c * k, -pin_depth - c * k - bottom * k);
         let far = -pin_width - c - wall;
         Self {
+            corner: is_tongue.then_some(Part {
+                n0: -c - CORNER_MM,
+                n1: CORNER_MM,
+                s0: -c,
+                s1: top_male.min(ROOT_MM),
+            }),
             male: [
                 Some(Part {
                     n0: -pin_width,

@@ -5,7 +5,7 @@ use shellock_geom::Vec3;
 use super::frame::Curve;
 use super::rail::rails;
 use super::{ConnectorParams, Section};
-use crate::plan::InstallationPlan;
+use crate::plan::LatticePlan;
 use crate::seam::rules::{MAX_ALONG_SEAM, MAX_BACKWARD_RAD, ROLE_HYSTERESIS, SHORTEST_RUN_SIZES, end_gap_mm};
 use crate::{ConnectorSizes, PatchId};
 
@@ -121,7 +121,7 @@ pub struct SeamRoom {
 pub fn runs(
     params: &ConnectorParams,
     sizes: &ConnectorSizes,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     curves: &[Curve],
     slide: Option<Vec3>,
     is_free: &dyn Fn(PatchId, Vec3) -> Option<bool>,

@@ -4,10 +4,11 @@ use super::budget::{BLOCKED_PLANS, Budget};
 use super::division::{Division, WallGrid, joined};
 use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
-use super::{DesignError, KeySource, Kit, Params};
+use super::{DesignError, Job, KeySource, Kit, Params};
 use crate::body::{BodyError, GridError, PatchDistances};
 use crate::metric::Holding;
-use crate::plan::{Blocker, FoundPlan, InstallationPlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::plan::{Blocker, FoundPlan, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::key::Turn;
 use crate::{Ctx, PatchId, SegmentedSurface, key, metric, plan};
 
 /// How one division went.
@@ -43,12 +44,14 @@ pub(super) fn keep(best: &mut Option<Kit>, kit: Kit) {
 /// Plans and makes kits of one division. The best kit goes to `best`, what it cost off the `budget`.
 pub(super) fn plans(
     ctx: &Ctx,
-    params: &Params,
+    job: &Job<'_>,
+    turn: &Turn,
     wall: &mut WallGrid<'_>,
     division: &Division,
     budget: &mut Budget,
     best: &mut Option<Kit>,
 ) -> Result<Attempt, DesignError> {
+    let params = job.params;
     let Division {
         surface,
         settings,
@@ -95,14 +98,15 @@ pub(super) fn plans(
             Next::Joined(fewer) => return Ok(Attempt::Joined(fewer)),
             Next::None(failure) => return Ok(Attempt::Failed(learned.failure.after(failure))),
         };
-        let (model, grid) = (wall.model, wall.get()?);
+        let grid = wall.get()?;
         let distances = distances.as_ref().expect("they were measured beside the plan");
         let kit = match make(
             kit_ctx,
             Recipe {
                 params,
                 division,
-                model,
+                model: job.model,
+                turn,
                 grid,
                 distances,
                 found,
@@ -168,7 +172,9 @@ impl Learned {
         }
         if kit.only_rattles() {
             // The plan was chosen to rattle least: other pieces are what helps.
-            let (reason, rattling) = ("pieces rattle".into(), kit.rattling());
+            let patch = |piece: PatchId| kit.handover.patch(piece);
+            let rattling = kit.rattling().into_iter().map(patch).collect();
+            let reason = "pieces rattle".into();
             return Some(Attempt::Failed(Failure {
                 reason,
                 rattling,
@@ -277,7 +283,7 @@ pub(super) fn next_plan(
 }
 
 /// Says which conditions a key breaks that was not cut to meet them.
-fn warn_of_key(ctx: &Ctx, params: &Params, division: &Division, plan: &InstallationPlan) {
+fn warn_of_key(ctx: &Ctx, params: &Params, division: &Division, plan: &LatticePlan) {
     let may_be_cut = params.key != KeySource::Cut;
     let Some(last) = plan.steps.last() else { return };
     if let Some(found) = key::conditions(&division.surface, last.piece, last.separation.unit()) {

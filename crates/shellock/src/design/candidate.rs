@@ -13,9 +13,12 @@ use crate::piece::Grip;
 use crate::segmentation::{self, SegmentationError};
 use crate::{Ctx, LatticeDirection, PatchId, SegmentedSurface, sizes};
 
-/// A key that is cut, in assembly space.
+/// A key that is cut.
 pub(super) struct CutKey {
-    pub site: KeySite,
+    /// Where, in the model as it was given.
+    pub given: KeySite,
+    /// The same in the turned model.
+    site: KeySite,
     along: LatticeDirection,
 }
 
@@ -60,6 +63,7 @@ impl<'a> Candidate<'a> {
         };
         let (turn, along) = Turn::laying(site.prism.normal, site.prism.slide);
         let key = Some(CutKey {
+            given: site.clone(),
             site: turn.site(site, along),
             along,
         });
@@ -85,7 +89,8 @@ impl<'a> Candidate<'a> {
         surface: SegmentedSurface,
     ) -> Result<Option<Division>, DesignError> {
         let Some(key) = &self.key else {
-            let settings = job.settings().clone();
+            let mut settings = job.settings().clone();
+            settings.plan.key = job.key_of(&surface);
             let chosen = self.sizes(ctx, job, &settings, &surface)?;
             return Ok(Some(Division {
                 surface,

@@ -3,19 +3,23 @@
 use shellock_geom::{Aabb, Solid, TriMesh};
 
 use super::division::Division;
+use super::handover::Handover;
 use super::{DesignError, Params, Settings};
 use crate::body::{PatchDistances, ShellBodies, ShellGrid};
 use crate::connector::{Run, SeamRoom, is_unobstructed};
+use crate::key::Turn;
 use crate::metric::Holding;
 use crate::piece::{FinishParams, Finished, FinishedJoint, PressFit, PressFitKind};
-use crate::plan::{FoundPlan, InstallationPlan, PlanProof};
+use crate::plan::{FoundPlan, LatticePlan, PlanProof};
 use crate::play::{self, KitPlay};
 use crate::sizes::CONTACT_SIZES;
 use crate::verify::{self, Finding, Verification};
-use crate::{Cause, ConnectorSizes, Ctx, IdVec, PatchId, SegmentedSurface, Warning, body, connector, piece};
+use crate::{
+    Cause, ConnectorSizes, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, body, connector, piece,
+};
 
-/// Pieces that were made as planned, and what is known of them. All places are in the space of the model that
-/// they were made from.
+/// Pieces that were made as planned, and what is known of them. All places and directions are those of the
+/// model as it was given; pieces are numbered as they go in.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Kit {
@@ -47,6 +51,8 @@ pub struct Kit {
     pub play: KitPlay,
     /// What its stages warned of.
     pub warnings: Vec<Warning>,
+    /// Which patches its pieces were made of.
+    pub(super) handover: Handover,
 }
 
 impl Kit {
@@ -104,7 +110,9 @@ impl Kit {
 pub(super) struct Recipe<'a> {
     pub params: &'a Params,
     pub division: &'a Division,
+    /// The model as it was given, and how it was turned for the division.
     pub model: &'a Solid,
+    pub turn: &'a Turn,
     /// It must have room for the division's largest connectors.
     pub grid: &'a ShellGrid,
     pub distances: &'a PatchDistances,
@@ -118,6 +126,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         params,
         division,
         model,
+        turn,
         grid,
         distances,
         found,
@@ -129,12 +138,14 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         chosen,
         grip,
     } = division;
-    let (sizes, proof, plan) = (&chosen.sizes, found.proof(), found.plan);
+    let (sizes, proof) = (&chosen.sizes, found.proof());
+    let handover = Handover::new(turn, found.plan);
+    let plan = handover.found_plan();
     let rooms = rooms(settings, surface, sizes);
     // The wall, split along the plan.
-    let shell = body::build(&ctx, &settings.body, grid, distances, &plan, &rooms)?;
+    let shell = body::build(&ctx, &settings.body, grid, distances, plan, &rooms)?;
     // Connectors under its seams.
-    let (runs, contacts) = connectors(settings, sizes, grid, &shell, &plan);
+    let (runs, contacts) = connectors(settings, sizes, grid, &shell, plan);
     // Pieces, joined and carved.
     let (relief, label) = (settings.relief(), params.label);
     let finish = FinishParams {
@@ -143,30 +154,34 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         rim_mm: settings.body.rim_mm,
         grip: *grip,
         label,
+        turn: *handover.turn(),
     };
-    let finished = piece::make(&ctx, &finish, grid, &shell, &plan, &runs, &rooms)?;
-    warn_of_press_fits(&ctx, &finished);
+    let made = piece::make(&ctx, &finish, grid, &shell, plan, &runs, &rooms)?;
+    warn_of_press_fits(&ctx, &made);
+    warn_of_bare_seams(&ctx, sizes, &contacts, &made.joints);
+    let (finished, plan) = (handover.finished(made), handover.plan());
     // The verdict, from the finished meshes alone.
-    let (verification, touching, play) = judged(&ctx, settings, model, &finished, &plan)?;
-    play::warning(&play)
-        .into_iter()
-        .for_each(|warning| ctx.warn(warning));
-    warn_of_bare_seams(&ctx, sizes, &contacts, &finished.joints);
+    let judging = ctx.fork();
+    let (verification, touching, play) = judged(&judging, settings, model, &finished, &plan)?;
+    let mut warnings = handover.warnings(ctx.into_warnings());
+    warnings.extend(judging.into_warnings());
+    warnings.extend(play::warning(&play));
     Ok(Kit {
-        surface: surface.clone(),
-        sizes: sizes.clone(),
+        surface: handover.surface(surface),
+        sizes: handover.sizes(sizes),
         plan,
-        proof,
-        holding,
+        proof: handover.proof(proof),
+        holding: handover.holding(holding),
         thickness_mm: settings.body.thickness_mm,
         pieces: finished.meshes,
         joints: finished.joints,
         press_fits: finished.press_fits,
-        contacts,
+        contacts: handover.rooms(contacts),
         verification,
         touching,
         play,
-        warnings: ctx.into_warnings(),
+        warnings,
+        handover,
     })
 }
 
@@ -176,7 +191,7 @@ fn connectors(
     sizes: &ConnectorSizes,
     grid: &ShellGrid,
     shell: &ShellBodies,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
 ) -> (Vec<Run>, Vec<SeamRoom>) {
     let curves = shell
         .inner

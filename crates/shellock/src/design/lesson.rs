@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Kit;
-use crate::plan::{InstallationPlan, PlanConstraints};
+use crate::plan::{LatticePlan, PlanConstraints};
 use crate::seam::rules::SHORTEST_RUN_SIZES;
 use crate::verify::Finding;
 use crate::{LatticeDirection, PatchId};
@@ -40,7 +40,7 @@ pub enum Lesson {
     /// The plan as a whole failed.
     FailedPlan {
         /// The plan.
-        plan: InstallationPlan,
+        plan: LatticePlan,
         /// Pieces that were loose or moved.
         loose: Vec<PatchId>,
     },
@@ -164,11 +164,13 @@ impl std::fmt::Display for Lesson {
     }
 }
 
-/// The lessons of a kit; none where it passed. The last one always rules this plan out.
+/// The lessons of a kit for the division that it was made of, told by its patches; none where it passed. The
+/// last one always rules this plan out.
 pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     if kit.verification.passed() {
         return Vec::new();
     }
+    let (patch, found) = (|piece| kit.handover.patch(piece), kit.handover.found_plan());
     let mut loose = Vec::new();
     let mut learned = Vec::new();
     for finding in &kit.verification.findings {
@@ -181,11 +183,11 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
                 volume_mm3,
                 ..
             } => {
-                let separation = kit.plan.separation(piece);
+                let piece = patch(piece);
                 learned.push(Lesson::RubbingPath {
                     piece,
-                    separation,
-                    against,
+                    separation: found.separation(piece),
+                    against: patch(against),
                     travel_mm,
                     thickness_mm,
                     volume_mm3,
@@ -194,9 +196,9 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
             Finding::Loose { piece, .. }
             | Finding::PlayTooWide { piece, .. }
             | Finding::ComesOut { piece, .. } => {
-                loose.push(*piece);
+                loose.push(patch(*piece));
             }
-            Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| m.piece)),
+            Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| patch(m.piece))),
             _ => {}
         }
     }
@@ -204,7 +206,7 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
     loose.dedup();
     learned.extend(weak_joints(kit).filter(|_| !loose.is_empty()));
     learned.push(Lesson::FailedPlan {
-        plan: kit.plan.clone(),
+        plan: found.clone(),
         loose,
     });
     learned
@@ -235,11 +237,11 @@ fn weak_joints(kit: &Kit) -> Option<Lesson> {
         .filter(|(pair, [length_mm, _])| is_weak(*pair, *length_mm));
     let joints: Vec<WeakJoint> = weak
         .map(|((later, earlier), [length_mm, seam_mm])| {
-            let separation = kit.plan.separation(later);
+            let [later, earlier] = [later, earlier].map(|piece| kit.handover.patch(piece));
             WeakJoint {
                 later,
                 earlier,
-                separation,
+                separation: kit.handover.found_plan().separation(later),
                 length_mm,
                 seam_mm,
             }

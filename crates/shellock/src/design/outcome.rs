@@ -1,13 +1,13 @@
 //! How a job ends.
 
-use shellock_geom::{TriMesh, Vec3};
+use shellock_geom::TriMesh;
 
 use super::attempt::Failure;
 use super::budget::RATTLING_KEYS;
 use super::candidate::{self, Candidate};
 use super::{Effort, Explored, Job, KeySource, Kit};
 use crate::body::{BodyError, GridError};
-use crate::key::{KeySite, Turn};
+use crate::key::KeySite;
 use crate::metric::ChoiceError;
 use crate::piece::PieceError;
 use crate::plan::Blocker;
@@ -18,14 +18,11 @@ use crate::verify::limits::LEAST_SLOT_MM;
 use crate::verify::{ThinFeature, ThinKind, thin_places};
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
-/// A finished kit and the wall that it is made of. All places are in assembly space: the model as it was
-/// given, turned by `turn`.
+/// A finished kit and the wall that it is made of. All places are those of the model as it was given.
 #[non_exhaustive]
 pub struct Design {
     /// The pieces, their plan and the verdict on them.
     pub kit: Kit,
-    /// How the model was turned to make it.
-    pub turn: Turn,
     /// How its key was cut; `None` where the key is one of the pieces.
     pub key: Option<KeySite>,
     /// What the wall bears; `None` where the stress could not be computed, which is warned of.
@@ -153,10 +150,10 @@ impl<'a> Best<'a> {
         let Some(Kept { kit, candidate }) = kit else {
             return Ok(DesignOutcome::NoPlan { reason, blockers });
         };
-        let Candidate { turn, model, key, .. } = candidate;
+        let key = candidate.key.map(|key| key.given);
         let gaps = kit_gaps(
             ctx,
-            Some(&model),
+            Some(job.model),
             &kit.pieces,
             &kit.plan,
             job.settings().body.rim_mm,
@@ -168,18 +165,17 @@ impl<'a> Best<'a> {
         segmentation::tell(
             &ctx,
             &job.settings().segmentation,
-            &model,
+            job.model,
             job.labels,
             &kit.surface,
         )?;
         let mut warnings = ctx.into_warnings();
         warnings.extend(kit.warnings.iter().cloned());
-        let place = |at: [f64; 3]| turn.apply(Vec3::from(at)).to_array();
-        warnings.extend(job.wall.warnings.iter().map(|w| w.clone().turned(place)));
+        warnings.extend(job.wall.warnings.iter().cloned());
         warnings.extend(crossing(&kit, &gaps));
         warnings.extend(thin_in_all(&thin));
         match &key {
-            Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, &key.site)),
+            Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, key)),
             None if job.params.key == KeySource::Cut => {
                 if reasons.is_empty() {
                     reasons.push("nowhere is the surface flat, free and thick enough to cut one".into());
@@ -188,11 +184,9 @@ impl<'a> Best<'a> {
             }
             _ => {}
         }
-        let strength = job.wall.strength.clone().map(|s| s.turned(|v| turn.apply(v)));
-        let key = key.map(|k| k.site);
+        let strength = job.wall.strength.clone();
         Ok(DesignOutcome::Made(Box::new(Design {
             kit,
-            turn,
             key,
             strength,
             gaps,
@@ -312,6 +306,12 @@ pub enum DesignError {
     /// A piece cannot be finished.
     #[error(transparent)]
     Piece(PieceError),
+    /// No triangle has the label that the key is to have.
+    #[error("no part of the model has the label {0}, which the key is to have (--key)")]
+    NoLabelOfKey(i64),
+    /// No piece has the number that the key is to have.
+    #[error("there is no piece {0} to be the key (--key): the model is divided into pieces 1 to {1}")]
+    NoPieceOfKey(i64, usize),
     /// The user asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

@@ -2,7 +2,6 @@
 
 use shellock_mechanics::Material;
 
-use crate::PatchId;
 use crate::connector::ConnectorParams;
 use crate::piece::LabelParams;
 
@@ -103,8 +102,9 @@ pub enum KeySource {
     Cut,
     /// The flattest piece that works.
     Flattest,
-    /// This piece.
-    Piece(PatchId),
+    /// The piece with this label, where labels are given; else the one that has this number, from 1, once the
+    /// model is divided (as `shellock segment` numbers them).
+    Piece(i64),
 }
 
 /// Bounds of the feedback loop.

@@ -1,6 +1,6 @@
 //! What stages are given, resolved once from what the user set and from what the wall must bear.
 
-use super::{KeySource, Params, Thickness};
+use super::{Params, Thickness};
 use crate::body::BodyParams;
 use crate::connector::ConnectorParams;
 use crate::piece::Relief;
@@ -158,14 +158,8 @@ fn plan(params: &Params) -> PlanParams {
         proof_budget,
         ..
     } = *params;
-    let key = if let KeySource::Piece(id) = params.key {
-        Some(id)
-    } else {
-        None
-    };
     PlanParams {
         seed,
-        key,
         up,
         proof_budget,
         ..PlanParams::default()

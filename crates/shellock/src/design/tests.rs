@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use shellock_geom::{Solid, TriMesh, Vec3};
 
+use super::handover::Handover;
 use super::lesson::{Lesson, lessons};
 use super::*;
 use crate::body::BodyError;
@@ -14,7 +15,7 @@ use crate::key::{KeyPrism, KeySite, Turn};
 use crate::metric::{ChoiceError, Holding};
 use crate::piece::PieceError;
 use crate::plan::key::KeyDirections;
-use crate::plan::{InstallationPlan, InstallationStep, PlanConstraints, PlanProof, ProofScope};
+use crate::plan::{LatticePlan, PlanConstraints, PlanProof, ProofScope};
 use crate::play::{KitPlay, Slide};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::verify::{Check, Finding, Play, Verification};
@@ -36,12 +37,21 @@ fn check(name: &str, ok: bool) -> Check {
 
 /// A kit of three pieces, the last of them the key, that has these checks and findings.
 fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
-    let separation = LatticeDirection::nearest(Vec3::Z);
-    let plan = InstallationPlan {
-        steps: ids()
-            .map(|piece| InstallationStep { piece, separation })
-            .collect(),
-    };
+    handed_over(
+        Handover::new(&Turn::default(), found_plan([0, 1, 2])),
+        checks,
+        findings,
+    )
+}
+
+/// Patches in this order, all of which leave upwards.
+fn found_plan(order: [u32; N]) -> LatticePlan {
+    let up = LatticeDirection::nearest(Vec3::Z);
+    LatticePlan::new(order.map(|patch| (PatchId(patch), up)))
+}
+
+fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
+    let plan = handover.plan();
     let slide = Slide {
         key: plan.key(),
         seat: PatchId(0),
@@ -101,6 +111,7 @@ fn kit(checks: &[(&str, bool)], findings: Vec<Finding>) -> Kit {
             pieces: Vec::new(),
             at: None,
         }],
+        handover,
     }
 }
 
@@ -209,8 +220,33 @@ fn a_kit_that_passed_teaches_nothing_and_one_that_failed_never_comes_again() {
         lessons(&failed)
             .iter()
             .for_each(|lesson| lesson.teach(&mut constraints));
-        assert_eq!(constraints.rejected, [failed.plan]);
+        assert_eq!(constraints.rejected, [found_plan([0, 1, 2])]);
     }
+}
+
+#[test]
+fn a_kit_tells_pieces_by_their_turn_to_go_in_and_teaches_its_division_by_patches() {
+    let turn = Turn::laying(Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.8, 0.0, 0.6)).0;
+    let handover = Handover::new(&turn, found_plan([2, 0, 1]));
+    let told = handover.warnings(vec![Warning {
+        cause: Cause::SeamWithoutConnector { length_mm: 9.0 },
+        pieces: vec![PatchId(2), PatchId(1)],
+        at: Some(turn.apply(Vec3::X).to_array()),
+    }]);
+    assert_eq!(told[0].pieces, [PatchId(0), PatchId(2)]);
+    assert!(Vec3::from(told[0].at.unwrap()).distance(Vec3::X) < 1e-12);
+    let plan = handover.plan();
+    assert_eq!(plan.steps.iter().map(|s| s.piece.number()).collect::<Vec<_>>(), [1, 2, 3]);
+    assert!(turn.apply(plan.separation(PatchId(1)).unit()).distance(Vec3::Z) < 1e-12);
+    let finding = Finding::Loose {
+        piece: PatchId(1),
+        directions: Vec::new(),
+    };
+    let learned = lessons(&handed_over(handover, &[("blocked", false)], vec![finding]));
+    assert_eq!(learned.iter().flat_map(Lesson::loose).collect::<Vec<_>>(), [PatchId(0)]);
+    let mut constraints = PlanConstraints::default();
+    learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
+    assert_eq!(constraints.rejected, [found_plan([2, 0, 1])]);
 }
 
 #[test]
@@ -236,7 +272,7 @@ fn a_piece_that_rubs_takes_another_way_and_twice_another_turn() {
     }
     assert_eq!(
         constraints.forbidden,
-        [(PatchId(1), failed.plan.separation(PatchId(1)))].into()
+        [(PatchId(1), LatticeDirection::nearest(Vec3::Z))].into()
     );
 }
 
@@ -254,7 +290,7 @@ fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_lo
     let learned = lessons(&failed);
     let mut constraints = PlanConstraints::default();
     learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
-    let s = failed.plan.separation(PatchId(1));
+    let s = LatticeDirection::nearest(Vec3::Z);
     assert!(
         constraints.is_weak(PatchId(1), PatchId(0), s) && !constraints.is_weak(PatchId(0), PatchId(1), s)
     );
@@ -341,6 +377,7 @@ impl Ball {
             wall: &self.wall,
             stress: None,
             surface,
+            key_faces: None,
         }
     }
 

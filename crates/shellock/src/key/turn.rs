@@ -1,7 +1,7 @@
 //! Laying the model so that a key's slide is one of the 26 directions.
 
 use glam::{DMat3, DQuat};
-use shellock_geom::{NotSolid, Solid, TriMesh, Vec3};
+use shellock_geom::{NotSolid, Solid, TriMesh, Vec3, Volume};
 
 use super::{KeyPrism, KeySite};
 use crate::LatticeDirection;
@@ -74,6 +74,15 @@ impl Turn {
         Solid::new(self.mesh(solid.mesh()))
     }
 
+    /// A region, turned.
+    pub fn volume(&self, volume: &Volume) -> Volume {
+        if self.is_none() {
+            volume.clone()
+        } else {
+            volume.rotate([self.0.x_axis, self.0.y_axis, self.0.z_axis])
+        }
+    }
+
     /// A prism, turned.
     pub fn prism(&self, prism: &KeyPrism) -> KeyPrism {
         let KeyPrism {
@@ -101,10 +110,5 @@ impl Turn {
             prism: KeyPrism { normal, ..prism },
             ..*site
         }
-    }
-
-    /// The 3 × 3 matrix, row by row.
-    pub fn rows(&self) -> [[f64; 3]; 3] {
-        self.0.transpose().to_cols_array_2d()
     }
 }

@@ -8,7 +8,7 @@ use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
 use super::{Foreseen, MetricParams, PlanModel, foreseen};
-use crate::plan::{FoundPlan, InstallationPlan, PlanParams};
+use crate::plan::{FoundPlan, LatticePlan, PlanParams};
 use crate::{Cancelled, Cause, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
 /// Plans whose cost is within this share of the best one's are compared by simulation.
@@ -211,7 +211,7 @@ fn middle_of(model: &PlanModel, piece: PatchId) -> Vec3 {
 /// Puts the stations' openings together by pairs of pieces.
 fn holding(
     model: &PlanModel,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     meetings: &[Meeting],
     resistance: &Resistance,
 ) -> Holding {
@@ -252,7 +252,7 @@ fn holding(
 /// The weakest place of every pair of pieces that has a connector.
 fn weakest_places(
     model: &PlanModel,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     meetings: &[Meeting],
     opening: &Opening,
 ) -> Vec<SeamHolding> {
@@ -289,7 +289,7 @@ fn weakest_places(
 
 fn reason(
     model: &PlanModel,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     station: usize,
     [later, earlier]: [PatchId; 2],
 ) -> String {

@@ -23,7 +23,7 @@ use shellock_mechanics::{Meeting, Side};
 use super::PlanModel;
 use crate::PatchId;
 use crate::motion::{Contact, farthest, most_play};
-use crate::plan::InstallationPlan;
+use crate::plan::LatticePlan;
 
 /// A pin goes on to a station that is no farther than this many times their mean length.
 const NEXT: f64 = 1.6;
@@ -39,7 +39,7 @@ pub struct Foreseen {
 /// How far pieces go, and whether they may. `size_mm` is the longest side of the model.
 pub fn foreseen(
     model: &PlanModel,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     meetings: &[Meeting],
     size_mm: f64,
     clearance_mm: f64,
@@ -60,7 +60,7 @@ pub fn foreseen(
 /// Displacement, mm, and turn, degrees, of each piece.
 fn plays(
     model: &PlanModel,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     meetings: &[Meeting],
     clearance_mm: f64,
 ) -> Vec<[f64; 2]> {

@@ -11,7 +11,7 @@ use shellock_mechanics::{
 
 use crate::params::ParamProblem;
 use crate::plan::interface::meeting;
-use crate::plan::{InstallationPlan, PlanParams};
+use crate::plan::{LatticePlan, PlanParams};
 use crate::seam::rules::end_gap_mm;
 use crate::seam::{seam_half_edges, stretches};
 use crate::{ConnectorSizes, LatticeDirection, PatchId, SegmentedSurface};
@@ -269,7 +269,7 @@ impl PlanModel {
     }
 
     /// What `plan` makes of each station.
-    pub fn meetings(&self, plan: &InstallationPlan) -> Vec<Meeting> {
+    pub fn meetings(&self, plan: &LatticePlan) -> Vec<Meeting> {
         let mut position = vec![0; self.assembly.n_parts];
         plan.steps
             .iter()

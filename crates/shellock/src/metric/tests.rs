@@ -3,7 +3,7 @@ use shellock_mechanics::{Resistance, Side};
 
 use super::*;
 use crate::plan::{
-    FoundPlan, InstallationPlan, InstallationStep, PlanConstraints, PlanOutcome, PlanParams, search, survey,
+    FoundPlan, LatticePlan, LatticeStep, PlanConstraints, PlanOutcome, PlanParams, search, survey,
 };
 use crate::testing::{label, seams, sphere, voronoi};
 use crate::{ConnectorSizes, Ctx, LatticeDirection, PatchId, SegmentedSurface, Warning};
@@ -14,12 +14,12 @@ fn octants() -> PlanModel {
     PlanModel::new(&MetricParams::default(), &surface, &ConnectorSizes::default())
 }
 
-fn plan(directions: impl Fn(u32) -> Vec3) -> InstallationPlan {
-    let step = |i: u32| InstallationStep {
+fn plan(directions: impl Fn(u32) -> Vec3) -> LatticePlan {
+    let step = |i: u32| LatticeStep {
         piece: PatchId(i),
         separation: LatticeDirection::nearest(directions(i)),
     };
-    InstallationPlan {
+    LatticePlan {
         steps: (0..8).map(step).collect(),
     }
 }

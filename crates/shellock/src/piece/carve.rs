@@ -10,11 +10,12 @@ use crate::{LatticeDirection, PatchId};
 /// clearance, and faces that would coincide stay apart.
 const SOCKET_SLACK_MM: f64 = 0.01;
 
-/// Which half of a run.
+/// Which half of a run, or what fills the corner between tongue and wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Half {
     Male,
     Female,
+    Corner,
 }
 
 /// The corners of one convex cell of a run.
@@ -32,6 +33,7 @@ fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
             let parts = match half {
                 Half::Male => section.male.to_vec(),
                 Half::Female => section.female.to_vec(),
+                Half::Corner => vec![section.corner],
             };
             let lengthwise = if i == 0 {
                 -grown_mm
@@ -83,6 +85,7 @@ pub(super) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Vol
 
 /// What a piece sweeps with its half connectors on its way out.
 pub(super) struct SweptVolume {
+    pub piece: PatchId,
     cells: Vec<(Cell, Aabb)>,
     along: Vec3,
 }
@@ -106,6 +109,7 @@ impl SweptVolume {
             .map(|cell| (cell, Aabb::around(cell)))
             .collect();
         Self {
+            piece,
             cells,
             along: separation.unit(),
         }
@@ -150,8 +154,13 @@ pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm:
 }
 
 /// `volume` less everything that `swept_volumes` sweep through it.
-pub(super) fn carved(volume: &Volume, swept_volumes: &[SweptVolume], far_mm: f64) -> Volume {
+pub(super) fn carved<'a>(
+    volume: &Volume,
+    swept_volumes: impl IntoIterator<Item = &'a SweptVolume>,
+    far_mm: f64,
+) -> Volume {
     let room = volume.bounds();
+    let swept_volumes: Vec<&SweptVolume> = swept_volumes.into_iter().collect();
     let swept: Vec<Volume> = swept_volumes
         .par_iter()
         .flat_map_iter(|w| w.meeting(room, far_mm))

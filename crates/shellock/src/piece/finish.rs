@@ -12,10 +12,12 @@ use super::key_parts::{Change, Grip, detents, notch};
 use super::label::{self, LabelParams};
 use super::relief::{Relief, relieve};
 use super::ribs::{Seat, ribs};
+use super::thin;
 use crate::PressFit;
 use crate::body::{ShellBodies, ShellGrid};
-use crate::connector::{ConnectorParams, Run};
-use crate::plan::InstallationPlan;
+use crate::connector::{ConnectorParams, Run, RunStation, Section};
+use crate::key::Turn;
+use crate::plan::LatticePlan;
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
 /// How far connectors reach into the wall they hang from, mm.
@@ -47,7 +49,7 @@ pub struct FinishedJoint {
 
 /// The finished pieces.
 pub struct Finished {
-    /// One closed mesh a piece, with coordinates that 32-bit floats hold.
+    /// One closed mesh a piece, turned, with coordinates that 32-bit floats hold.
     pub meshes: IdVec<PatchId, TriMesh>,
     /// One joint a run.
     pub joints: Vec<FinishedJoint>,
@@ -81,8 +83,10 @@ pub struct FinishParams<'a> {
     pub rim_mm: f64,
     /// The notch that the key is to have.
     pub grip: Option<Grip>,
-    /// How numbers are engraved, if they are.
+    /// How numbers are engraved, if they are: the first piece to go in is 1.
     pub label: Option<LabelParams>,
+    /// How meshes are turned at last, before they are rounded.
+    pub turn: Turn,
 }
 
 /// Both halves of a run while they are carved.
@@ -99,7 +103,7 @@ pub fn make(
     finish: &FinishParams<'_>,
     grid: &ShellGrid,
     shell: &ShellBodies,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     runs: &[Run],
     rooms: &IdVec<PatchId, Aabb>,
 ) -> Result<Finished, PieceError> {
@@ -119,7 +123,9 @@ pub fn make(
         .collect();
     ctx.stage("pieces", plan.steps.len())?;
     let mut pieces = joined(shell, &joints, &halves);
+    let depth = |p: Vec3| grid.band.sample(&grid.depth, p);
     relieve(ctx, &finish.relief, plan, &mut pieces)?;
+    thin::shave(ctx, params.min_wall_mm, &depth, &mut pieces)?;
     let (mut press_fits, mut changes) = detents(params, &kept);
     changes.extend(
         finish
@@ -133,7 +139,7 @@ pub fn make(
         changes.extend(added);
     }
     Ok(Finished {
-        meshes: printed(ctx, finish, grid, &pieces, &changes)?,
+        meshes: printed(ctx, finish, grid, plan, &pieces, &changes)?,
         joints,
         press_fits,
     })
@@ -145,7 +151,7 @@ fn carved_halves(
     params: &ConnectorParams,
     grid: &ShellGrid,
     shell: &ShellBodies,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     runs: &[Run],
     far_mm: f64,
 ) -> Result<Vec<Halves>, Cancelled> {
@@ -175,8 +181,22 @@ fn carved_halves(
             .map(|&(r, _)| runs[r].clearance_mm())
             .fold(params.clearance_mm, f64::max);
         let room = Room::of(clearance_mm, grid, shell, q);
-        let made = |whole: &Volume| (whole.volume(), carved(&room.cut(whole), &swept_volumes, far_mm));
-        let made: Vec<(f64, Volume)> = whole.par_iter().map(made).collect();
+        // A corner ends where its wall does: the field of what obstructs is too coarse there, and the other
+        // wall's way, with the clearance of connectors around it, too wide.
+        let corner = |&(r, h): &(usize, usize)| {
+            if h == 1 {
+                return Volume::empty();
+            }
+            let corner = room.corner(params, &runs[r]);
+            let strangers = swept_volumes.iter().filter(|w| w.piece != runs[r].female);
+            carved(&corner, strangers, far_mm)
+        };
+        let corners: Vec<Volume> = mine.par_iter().map(corner).collect();
+        let made = |(whole, corner): (&Volume, &Volume)| {
+            let half = carved(&room.cut(whole), &swept_volumes, far_mm);
+            (whole.volume(), half.union(corner))
+        };
+        let made: Vec<(f64, Volume)> = whole.par_iter().zip(&corners).map(made).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
             halves[r].carved[h] = volume;
@@ -228,6 +248,53 @@ impl<'a> Room<'a> {
         }
     }
 
+    /// Where `field` is positive around `whole`.
+    fn region(&self, whole: &Volume, field: &dyn Fn(usize) -> f32) -> Volume {
+        let (part, nodes) = self
+            .grid
+            .band
+            .part_in(whole.bounds().grown(2.0 * self.grid.band.cell_mm()));
+        let field: Vec<f32> = nodes.iter().map(|&n| field(n as usize)).collect();
+        Volume::from_closed_mesh(&contour(&part, &field, OffBand::Outside)).expect("contours are manifold")
+    }
+
+    /// Connectors reach so near to the outer surface, mm below it.
+    fn ceiling(&self) -> f32 {
+        (self.grid.thickness_mm - ROOT_MM) as f32
+    }
+
+    /// What fills the corners of a run's tongue where it has room, as far off the cuts as the wall.
+    fn corner(&self, params: &ConnectorParams, run: &Run) -> Volume {
+        let has_tongue: Vec<bool> = run.stations.iter().map(|at| self.has_tongue(params, at)).collect();
+        let stretches = (0..has_tongue.len()).collect::<Vec<_>>();
+        let stretches = stretches.chunk_by(|&i, &j| has_tongue[i] && has_tongue[j]);
+        let corner = |stretch: &[usize]| {
+            let stations = stretch.iter().map(|&i| run.stations[i]).collect();
+            whole_half(params, &Run { stations, ..run.clone() }, Half::Corner)
+        };
+        let whole = Volume::union_all(stretches.filter(|s| s.len() > 1).map(corner).collect());
+        if whole.is_empty() {
+            return whole;
+        }
+        let (ceiling, depth) = (self.ceiling(), &self.grid.depth);
+        whole.intersect(&self.region(&whole, &|n| (self.side[n] - self.gap_mm[n]).min(depth[n] - ceiling)))
+    }
+
+    /// Whether a tongue has room in its middle, on both sides of the seam.
+    fn has_tongue(&self, params: &ConnectorParams, station: &RunStation) -> bool {
+        let section = Section::at(params, station);
+        let (Some(_), Some(tongue)) = (section.corner, section.male[0]) else {
+            return false;
+        };
+        let n = 0.5 * (tongue.n0 + tongue.n1);
+        let is_free = |s: f64| {
+            let place = station.point + n * station.n + s * station.s;
+            let blocked = self.grid.band.sample(&self.blocked, place);
+            blocked.is_some_and(|by| by < -f64::from(self.clearance_mm))
+        };
+        [0.5, 0.25, -0.25].into_iter().all(|share| is_free(share * tongue.s0))
+    }
+
     /// What of `whole` has room: below the wall, a root's depth into it, `clearance_mm` away from what is
     /// blocked, and as far off what other pieces have of the wall: below the wall by that, or so far on the
     /// piece's own side of the cuts.
@@ -237,17 +304,8 @@ impl<'a> Room<'a> {
     /// contoured, keep it. (Filling the angle in one field instead takes the connectors of narrow cavities
     /// away.)
     fn cut(&self, whole: &Volume) -> Volume {
-        let (part, nodes) = self
-            .grid
-            .band
-            .part_in(whole.bounds().grown(2.0 * self.grid.band.cell_mm()));
-        let region = |field: &dyn Fn(usize) -> f32| {
-            let field: Vec<f32> = nodes.iter().map(|&n| field(n as usize)).collect();
-            Volume::from_closed_mesh(&contour(&part, &field, OffBand::Outside))
-                .expect("contours are manifold")
-        };
-        let thickness = self.grid.thickness_mm as f32;
-        let (ceiling, floor) = (thickness - ROOT_MM as f32, thickness + self.clearance_mm);
+        let region = |field: &dyn Fn(usize) -> f32| self.region(whole, field);
+        let (ceiling, floor) = (self.ceiling(), self.grid.thickness_mm as f32 + self.clearance_mm);
         let depth = &self.grid.depth;
         let cell = self.grid.band.cell_mm() as f32;
         // A piece's wall reaches to its gap, so what hangs from it does, too: slots between the two would fuse.
@@ -312,7 +370,7 @@ fn ribs_of_key(
     interference_mm: f64,
     rim_mm: f64,
     grid: &ShellGrid,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     pieces: &IdVec<PatchId, Volume>,
 ) -> (Vec<PressFit>, Vec<Change>) {
     let key = plan.key();
@@ -366,6 +424,7 @@ fn printed(
     ctx: &Ctx,
     finish: &FinishParams<'_>,
     grid: &ShellGrid,
+    plan: &LatticePlan,
     pieces: &IdVec<PatchId, Volume>,
     changes: &[Change],
 ) -> Result<IdVec<PatchId, TriMesh>, PieceError> {
@@ -384,11 +443,12 @@ fn printed(
             let number = finish
                 .label
                 .as_ref()
-                .and_then(|params| label::cut(params, grid, q, &piece));
+                .and_then(|params| label::cut(params, grid, plan.position(q) + 1, &piece));
+            let printable = |piece: &Volume| printable_body(&finish.turn.volume(piece));
             // A number is worth less than a piece that can be written.
-            let numbered = number.and_then(|cut| printable_body(&piece.subtract(&cut)).ok());
+            let numbered = number.and_then(|cut| printable(&piece.subtract(&cut)).ok());
             let has_number = numbered.is_some();
-            let mesh = numbered.map_or_else(|| printable_body(&piece), Ok);
+            let mesh = numbered.map_or_else(|| printable(&piece), Ok);
             ctx.step()?;
             Ok((
                 mesh.map_err(|reason| PieceError::NotPrintable { piece: q, reason })?,

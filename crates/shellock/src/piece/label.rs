@@ -17,7 +17,6 @@ mod digits;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
 
-use crate::PatchId;
 use crate::body::ShellGrid;
 use crate::params::ParamProblem;
 use digits::Drawing;
@@ -80,10 +79,10 @@ const SHORTEST_MM: f64 = 0.6;
 /// Directions in which a number may run: turned by so much, radians.
 const TURNS: [f64; 4] = [0.0, 0.5, -0.5, 1.57];
 
-/// What to cut from `piece` so that it carries its number; `None` where no place has room for it.
-pub(super) fn cut(params: &LabelParams, grid: &ShellGrid, id: PatchId, piece: &Volume) -> Option<Volume> {
+/// What to cut from `piece` so that it carries its `number`; `None` where no place has room for it.
+pub(super) fn cut(params: &LabelParams, grid: &ShellGrid, number: usize, piece: &Volume) -> Option<Volume> {
     let depth = |p: Vec3| grid.band.sample(&grid.depth, p);
-    Wall::new(params, piece.to_mesh(), grid.thickness_mm, &depth).engraved(id.0)
+    Wall::new(params, piece.to_mesh(), grid.thickness_mm, &depth).engraved(u32::try_from(number).ok()?)
 }
 
 /// A piece's wall as a number needs to know it.

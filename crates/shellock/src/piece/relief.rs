@@ -10,7 +10,7 @@ use shellock_geom::clearance::{Passed, Translation, faces_passed};
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use super::carve::distances_that_meet;
-use crate::plan::InstallationPlan;
+use crate::plan::LatticePlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
 /// Gaps smaller than wanted by up to this much stay, mm: sockets are half as much tighter by design, and what
@@ -43,7 +43,7 @@ struct Skin {
 pub(super) fn relieve(
     ctx: &Ctx,
     params: &Relief,
-    plan: &InstallationPlan,
+    plan: &LatticePlan,
     pieces: &mut IdVec<PatchId, Volume>,
 ) -> Result<(), Cancelled> {
     let skins: Vec<Skin> = pieces.as_slice().par_iter().map(Skin::of).collect();

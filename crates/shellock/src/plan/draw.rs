@@ -12,7 +12,7 @@ use super::key::KeyChoice;
 use super::local_cost::directions_in;
 use super::score::just_above;
 use super::space::Space;
-use super::{InstallationPlan, InstallationStep, PieceSet};
+use super::{LatticePlan, LatticeStep, PieceSet};
 use crate::{LatticeDirection, PatchId};
 
 /// Spreads of the random order of candidates, in units of their cost; draws take turns.
@@ -22,7 +22,7 @@ const SPREADS: [f64; 4] = [0.05, 0.2, 0.6, 100.0];
 
 /// How a draw ended.
 pub(super) struct Drawn {
-    pub plan: Option<InstallationPlan>,
+    pub plan: Option<LatticePlan>,
     /// Pieces taken off, put back ones included.
     pub n_tries: usize,
     /// Costs of pieces asked for.
@@ -50,7 +50,7 @@ struct Draw<'a> {
     limits: DrawLimits,
     tries_left: usize,
     n_evaluations: usize,
-    removed: Vec<InstallationStep>,
+    removed: Vec<LatticeStep>,
     /// Directions of the pieces taken off.
     separations: Vec<Option<LatticeDirection>>,
     joints: Vec<DirectedJoint>,
@@ -81,7 +81,7 @@ pub(super) fn draw(
     let found = draw.descend(space.all(), PieceSet::one(key.piece));
     let plan = found.then(|| {
         draw.removed.reverse();
-        InstallationPlan {
+        LatticePlan {
             steps: std::mem::take(&mut draw.removed),
         }
     });
@@ -109,7 +109,7 @@ impl Draw<'_> {
             let rest = left.minus(PieceSet::one(piece));
             let n_joints = self.joints.len();
             self.joints.extend(self.space.joints(piece, separation, rest));
-            self.removed.push(InstallationStep { piece, separation });
+            self.removed.push(LatticeStep { piece, separation });
             self.separations[usize::from(piece)] = Some(separation);
             // What comes loose already, with the rest as one block, cannot lock any more.
             let holds = loose_part_fused(self.space.n, &self.joints, self.key.piece, rest).is_none();
@@ -131,7 +131,7 @@ impl Draw<'_> {
     fn finish(&mut self, left: PieceSet, attached: PieceSet) -> bool {
         let piece = left.iter().next().expect("one piece is left");
         let separation = LatticeDirection::nearest(self.space.survey.mean_normal[piece]);
-        let step = InstallationStep { piece, separation };
+        let step = LatticeStep { piece, separation };
         let cost = self.cost(step, PieceSet::EMPTY);
         if !attached.contains(piece) || !self.is_cheap(cost) {
             return false;
@@ -139,7 +139,7 @@ impl Draw<'_> {
         self.removed.push(step);
         let mut steps = self.removed.clone();
         steps.reverse();
-        if self.space.is_rejected(&InstallationPlan { steps }) {
+        if self.space.is_rejected(&LatticePlan { steps }) {
             self.removed.pop();
             return false;
         }
@@ -147,7 +147,7 @@ impl Draw<'_> {
     }
 
     /// What the piece of `step` costs when it leaves `rest`.
-    fn cost(&mut self, step: InstallationStep, rest: PieceSet) -> f64 {
+    fn cost(&mut self, step: LatticeStep, rest: PieceSet) -> f64 {
         self.n_evaluations += 1;
         let (role, around) = self.space.leaving(step, rest, &self.separations);
         self.space.costs.bound(step.piece, role, &around)
@@ -167,7 +167,7 @@ impl Draw<'_> {
                 continue;
             }
             for separation in directions_in(self.space.allowed(piece)) {
-                let step = InstallationStep { piece, separation };
+                let step = LatticeStep { piece, separation };
                 let is_allowed = !is_first || self.key.directions.contains(&separation);
                 if !is_allowed
                     || !self.space.is_free(piece, separation, rest)
@@ -185,7 +185,7 @@ impl Draw<'_> {
                 }
             }
         }
-        let name = |step: InstallationStep| (step.piece, step.separation);
+        let name = |step: LatticeStep| (step.piece, step.separation);
         candidates.sort_by(|x, y| x.0.total_cmp(&y.0).then_with(|| name(x.1).cmp(&name(y.1))));
         candidates.into_iter().map(|(_, step)| name(step)).collect()
     }

@@ -29,7 +29,7 @@ use super::local_cost::{Role, RoleSet};
 use super::pool::Pool;
 use super::score::{just_above, just_below};
 use super::space::Space;
-use super::{InstallationPlan, PieceSet};
+use super::{LatticePlan, PieceSet};
 use crate::{Cancelled, Ctx, PatchId};
 use domains::{Conflict, Domains, Propagator};
 use sequence::{Sequence, sequence};
@@ -66,7 +66,7 @@ impl Budget {
 
 /// The answer to "is there a plan whose pieces all cost at most this?".
 enum Answer {
-    Plan(InstallationPlan),
+    Plan(LatticePlan),
     None,
     Unknown,
 }
@@ -93,7 +93,7 @@ impl<'k> Candidate<'k> {
         }
     }
 
-    fn add(&mut self, space: &Space<'_>, plan: InstallationPlan) {
+    fn add(&mut self, space: &Space<'_>, plan: LatticePlan) {
         let score = space.score(&plan);
         let improved = improve(space, self.key, plan.clone());
         self.pool.add(space, score, plan);

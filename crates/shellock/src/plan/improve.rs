@@ -5,7 +5,7 @@ use super::key::KeyChoice;
 use super::local_cost::{Role, Surroundings, mask_of};
 use super::score::PlanScore;
 use super::space::Space;
-use super::{InstallationPlan, PieceSet};
+use super::{LatticePlan, PieceSet};
 use crate::{IdVec, LatticeDirection, PatchId};
 
 /// Improvements after which a plan is left as it is: a bound on time, since each one lowers the cost anyway.
@@ -14,14 +14,14 @@ const MAX_IMPROVEMENTS: usize = 100;
 /// A plan, what it costs, and how many others were looked at for it.
 pub(super) struct Improved {
     pub score: PlanScore,
-    pub plan: InstallationPlan,
+    pub plan: LatticePlan,
     pub n_evaluations: usize,
 }
 
 /// A plan of the same order that is at least as good as `plan`, which keeps all conditions.
 ///
 /// Stops where no single change of direction helps.
-pub(super) fn improve(space: &Space<'_>, key: &KeyChoice, plan: InstallationPlan) -> Improved {
+pub(super) fn improve(space: &Space<'_>, key: &KeyChoice, plan: LatticePlan) -> Improved {
     let mut best = Improved {
         score: space.score(&plan),
         plan,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::InstallationPlan;
+use super::LatticePlan;
 use super::score::{PlanScore, rounded};
 use super::space::{Relations, Space};
 
@@ -12,7 +12,7 @@ pub(super) const MOST_PLANS: usize = 100;
 /// Different plans, best first.
 #[derive(Default)]
 pub(super) struct Pool {
-    plans: Vec<(PlanScore, InstallationPlan)>,
+    plans: Vec<(PlanScore, LatticePlan)>,
     /// The least cost of each that was met, kept or not.
     seen: BTreeMap<Relations, f64>,
 }
@@ -23,7 +23,7 @@ impl Pool {
     ///
     /// Where pieces that do not touch are in each other's way, their order changes the cost, but not what is
     /// joined.
-    pub fn add(&mut self, space: &Space<'_>, score: PlanScore, plan: InstallationPlan) {
+    pub fn add(&mut self, space: &Space<'_>, score: PlanScore, plan: LatticePlan) {
         let relations = space.relations(&plan);
         match self.seen.get(&relations) {
             Some(&least) if rounded(least) <= rounded(score.worst) => return,
@@ -45,7 +45,7 @@ impl Pool {
     }
 
     /// The best plan.
-    pub fn best(&self) -> Option<&(PlanScore, InstallationPlan)> {
+    pub fn best(&self) -> Option<&(PlanScore, LatticePlan)> {
         self.plans.first()
     }
 
@@ -55,7 +55,7 @@ impl Pool {
     }
 
     /// All plans, best first.
-    pub fn plans(&self) -> &[(PlanScore, InstallationPlan)] {
+    pub fn plans(&self) -> &[(PlanScore, LatticePlan)] {
         &self.plans
     }
 

@@ -4,7 +4,7 @@ use super::draw::{DrawLimits, draw};
 use super::key::choices;
 use super::search::stream;
 use super::space::Space;
-use super::{InstallationPlan, PlanConstraints, PlanParams, PlanSurvey};
+use super::{LatticePlan, PlanConstraints, PlanParams, PlanSurvey};
 use crate::seam::rules::COUNTED_RUN_SIZES;
 
 /// Draws with the widest spread, which hardly look at costs, have this index among the spreads.
@@ -14,7 +14,7 @@ const DRAWS_PER_PLAN: usize = 4;
 const TRIES_PER_PIECE: usize = 20;
 
 /// Up to `n` different plans with one and the same key: of the key that has most within the allowed draws.
-pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<InstallationPlan> {
+pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<LatticePlan> {
     let constraints = PlanConstraints::default();
     let mut most = Vec::new();
     for sizes in COUNTED_RUN_SIZES {
@@ -22,7 +22,7 @@ pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<I
         counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes));
         let space = Space::new(&counted, &constraints, params.relaxed_tolerance);
         for key in choices(params, &counted) {
-            let mut plans: Vec<InstallationPlan> = Vec::new();
+            let mut plans: Vec<LatticePlan> = Vec::new();
             for i in 0..DRAWS_PER_PLAN * n {
                 let limits = DrawLimits {
                     bound: f64::INFINITY,

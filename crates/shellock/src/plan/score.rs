@@ -8,7 +8,7 @@
 //! mean decides among plans with the same bottleneck.
 
 use super::space::Space;
-use super::{InstallationPlan, PlanConstraints, PlanSurvey};
+use super::{LatticePlan, PlanConstraints, PlanSurvey};
 use crate::{IdVec, PatchId};
 
 /// What the share of seam without connectors costs, in units of Eq. 4's weight.
@@ -86,7 +86,7 @@ impl PlanScore {
 
 /// Costs of `plan` by [`SeamCosts`](super::SeamCosts): of each piece the mean over its seams, by length, of
 /// Eq. 4's weight and of what cannot be used, its way, and what it lacks in hold.
-pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &InstallationPlan) -> PlanScore {
+pub fn score(survey: &PlanSurvey, constraints: &PlanConstraints, plan: &LatticePlan) -> PlanScore {
     // No tolerance is asked for: costs do not depend on what may pass.
     Space::new(survey, constraints, 0.0).score(plan)
 }
@@ -128,7 +128,7 @@ mod tests {
 
     use super::*;
     use crate::LatticeDirection;
-    use crate::plan::{InstallationStep, PlanParams, survey};
+    use crate::plan::{LatticeStep, PlanParams, survey};
     use crate::testing::{label, seams, sphere};
 
     #[test]
@@ -146,12 +146,12 @@ mod tests {
         let up = LatticeDirection::nearest(Vec3::Z);
         let value = |separation| {
             let steps = [0, 1]
-                .map(|p| InstallationStep {
+                .map(|p| LatticeStep {
                     piece: PatchId(p),
                     separation,
                 })
                 .to_vec();
-            score(&survey, &PlanConstraints::default(), &InstallationPlan { steps }).worst
+            score(&survey, &PlanConstraints::default(), &LatticePlan { steps }).worst
         };
         for s in LatticeDirection::all().filter(|&s| s != up) {
             assert!(value(up) < value(s));
@@ -172,7 +172,7 @@ mod tests {
         .unwrap();
         let separation = LatticeDirection::nearest(s);
         let steps = [0, 1]
-            .map(|p| InstallationStep {
+            .map(|p| LatticeStep {
                 piece: PatchId(p),
                 separation,
             })
@@ -181,7 +181,7 @@ mod tests {
         if is_weak {
             constraints.weaken(PatchId(0), PatchId(1));
         }
-        let plan = InstallationPlan { steps };
+        let plan = LatticePlan { steps };
         let space = Space::new(&survey, &constraints, 0.0);
         let (role, around) = &space.surroundings(&plan)[0];
         super::super::SeamCosts::new(&survey, &constraints).hold_mm3(PatchId(0), *role, around)

@@ -23,7 +23,7 @@ use super::pool::{MOST_PLANS, Pool};
 use super::score::just_below;
 use super::space::Space;
 use super::{
-    FoundPlan, InstallationPlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey,
+    FoundPlan, LatticePlan, PieceSet, PlanConstraints, PlanOutcome, PlanParams, PlanScore, PlanSurvey,
     ProofScope, RankedPlan, diagnose,
 };
 use crate::seam::rules::COUNTED_RUN_SIZES;
@@ -239,7 +239,7 @@ fn proven<'k>(
         );
         ctx.check()?;
     }
-    let ranked = |(score, plan): &(PlanScore, InstallationPlan)| RankedPlan {
+    let ranked = |(score, plan): &(PlanScore, LatticePlan)| RankedPlan {
         plan: plan.clone(),
         score: score.clone(),
         loose: space.loose(plan),
@@ -298,7 +298,7 @@ fn draw_plans(
         // The sort is stable: of equal plans the one drawn first wins.
         plans.sort_by(|x, y| x.0.worst.total_cmp(&y.0.worst));
         plans.dedup_by(|x, y| x.1 == y.1);
-        let cheapest: Vec<&InstallationPlan> = plans.iter().take(N_IMPROVED).map(|x| &x.1).collect();
+        let cheapest: Vec<&LatticePlan> = plans.iter().take(N_IMPROVED).map(|x| &x.1).collect();
         let improved: Vec<Improved> = cheapest
             .into_par_iter()
             .map(|plan| improve(space, key, plan.clone()))

@@ -3,7 +3,7 @@
 use super::cluster::{DirectedJoint, loose_part};
 use super::local_cost::{PieceCosts, Role, SeamCosts, SeamStates, Surroundings, mask_of};
 use super::score::PlanScore;
-use super::{InstallationPlan, InstallationStep, PieceSet, PlanConstraints, PlanSurvey};
+use super::{LatticePlan, LatticeStep, PieceSet, PlanConstraints, PlanSurvey};
 use crate::{LatticeDirection, PatchId};
 
 /// Per piece and direction.
@@ -131,7 +131,7 @@ impl<'a> Space<'a> {
 
     /// Whether `plan` keeps every condition: paths free, each piece joined to an earlier and a later one,
     /// what is still to be installed connected, locked, and not rejected before.
-    pub fn allows(&self, plan: &InstallationPlan) -> bool {
+    pub fn allows(&self, plan: &LatticePlan) -> bool {
         let mut rest = self.all();
         let mut attached = PieceSet::one(plan.key());
         let mut joints = Vec::new();
@@ -154,14 +154,14 @@ impl<'a> Space<'a> {
     }
 
     /// Whether an earlier round turned down a plan with the same relations.
-    pub fn is_rejected(&self, plan: &InstallationPlan) -> bool {
+    pub fn is_rejected(&self, plan: &LatticePlan) -> bool {
         let is_same =
-            |r: &InstallationPlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
+            |r: &LatticePlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
         self.constraints.rejected.iter().any(is_same)
     }
 
     /// What tells `plan` from others.
-    pub fn relations(&self, plan: &InstallationPlan) -> Relations {
+    pub fn relations(&self, plan: &LatticePlan) -> Relations {
         let mut position = vec![0; self.n];
         let mut separations = vec![None; self.n];
         for (i, step) in plan.steps.iter().enumerate() {
@@ -181,7 +181,7 @@ impl<'a> Space<'a> {
     }
 
     /// Costs of `plan`; lower is better.
-    pub fn score(&self, plan: &InstallationPlan) -> PlanScore {
+    pub fn score(&self, plan: &LatticePlan) -> PlanScore {
         let around = self.surroundings(plan);
         let cost =
             |(p, (role, around)): (usize, &(Role, Surroundings))| self.costs.bound(p.into(), *role, around);
@@ -189,7 +189,7 @@ impl<'a> Space<'a> {
     }
 
     /// Pieces of `plan` that hardly anything holds.
-    pub fn loose(&self, plan: &InstallationPlan) -> Vec<PatchId> {
+    pub fn loose(&self, plan: &LatticePlan) -> Vec<PatchId> {
         let around = self.surroundings(plan);
         let is_loose = |p: &PatchId| {
             let (role, around) = &around[usize::from(*p)];
@@ -199,7 +199,7 @@ impl<'a> Space<'a> {
     }
 
     /// Role and surroundings of each piece in `plan`.
-    pub fn surroundings(&self, plan: &InstallationPlan) -> Vec<(Role, Surroundings)> {
+    pub fn surroundings(&self, plan: &LatticePlan) -> Vec<(Role, Surroundings)> {
         let mut separations = vec![None; self.n];
         let mut rest = self.all();
         let mut found = vec![(Role::First, Surroundings::default()); self.n];
@@ -215,7 +215,7 @@ impl<'a> Space<'a> {
     /// before.
     pub fn leaving(
         &self,
-        step: InstallationStep,
+        step: LatticeStep,
         rest: PieceSet,
         separations: &[Option<LatticeDirection>],
     ) -> (Role, Surroundings) {

@@ -8,7 +8,7 @@ use super::key::choices;
 use super::score::PlanScore;
 use super::search::stream;
 use super::space::Space;
-use super::{InstallationPlan, PlanConstraints, PlanParams, PlanSurvey};
+use super::{LatticePlan, PlanConstraints, PlanParams, PlanSurvey};
 use crate::{Cancelled, Ctx};
 
 /// Draws between two looks at the best cost: the bound is that of the draws before.
@@ -78,7 +78,7 @@ pub fn convergence(
             let one = |i: usize| {
                 // The last of the spreads is uniform.
                 let drawn = draw(&space, &key, stream(params.seed, i), UNIFORM, limits);
-                let done = |plan: InstallationPlan| finished(&space, &key, technique, plan);
+                let done = |plan: LatticePlan| finished(&space, &key, technique, plan);
                 (drawn.n_evaluations, drawn.plan.map(done))
             };
             let found: Vec<(usize, Option<(usize, PlanScore)>)> = (batch * BATCH..(batch + 1) * BATCH)
@@ -126,7 +126,7 @@ fn finished(
     space: &Space<'_>,
     key: &super::key::KeyChoice,
     technique: Technique,
-    plan: InstallationPlan,
+    plan: LatticePlan,
 ) -> (usize, PlanScore) {
     if technique.improves() {
         let improved = improve(space, key, plan);

@@ -7,7 +7,12 @@ use serde::{Deserialize, Serialize};
 use super::PlanScore;
 use super::key::KeyDirections;
 use super::space::MOST_RUBS;
-use crate::{IdVec, InstallationPlan, LatticeDirection, PatchId};
+use crate::{IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId};
+
+/// A plan whose directions are of the 26: what the search finds and pieces are made by.
+pub type LatticePlan = InstallationPlan<LatticeDirection>;
+/// A step of it.
+pub type LatticeStep = InstallationStep<LatticeDirection>;
 
 /// What earlier rounds taught: the search must respect all of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -21,7 +26,7 @@ pub struct PlanConstraints {
     /// it.
     pub rubbed: BTreeMap<(PatchId, PatchId), usize>,
     /// Whole plans that failed for a reason that none of the above says.
-    pub rejected: Vec<InstallationPlan>,
+    pub rejected: Vec<LatticePlan>,
 }
 
 impl PlanConstraints {
@@ -67,7 +72,7 @@ pub struct Blocker {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RankedPlan {
     /// The plan.
-    pub plan: InstallationPlan,
+    pub plan: LatticePlan,
     /// Its cost, which is that of its worst piece, and the cost of every piece.
     pub score: PlanScore,
     /// Pieces that are held by less than the verification asks for, by estimate.
@@ -78,7 +83,7 @@ pub struct RankedPlan {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundPlan {
     /// The best plan.
-    pub plan: InstallationPlan,
+    pub plan: LatticePlan,
     /// Its cost, which is that of its worst piece, and the cost of every piece.
     pub score: PlanScore,
     /// Proven: no allowed plan within `scope` costs less.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::LatticeDirection;
-use crate::plan::InstallationStep;
+use crate::plan::LatticeStep;
 use crate::testing::{label, sphere};
 
 fn octants() -> SegmentedSurface {
@@ -9,16 +9,20 @@ fn octants() -> SegmentedSurface {
 }
 
 /// Every octant leaves outwards.
-fn outwards() -> InstallationPlan {
+fn outwards() -> LatticePlan {
     let direction =
         |i: u32| Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0));
-    let step = |i: u32| InstallationStep {
+    let step = |i: u32| LatticeStep {
         piece: PatchId(i),
         separation: LatticeDirection::nearest(direction(i)),
     };
-    InstallationPlan {
+    LatticePlan {
         steps: (0..8).map(step).collect(),
     }
+}
+
+fn as_it_lies(plan: &LatticePlan) -> InstallationPlan {
+    InstallationPlan::new(plan.steps.iter().map(|s| (s.piece, s.separation.into())))
 }
 
 /// A coarse mesh: what is tested here holds on any.
@@ -55,7 +59,7 @@ fn forces_are_spread_over_what_they_hit_and_add_up() {
 #[test]
 fn half_connectors_fare_worse_than_whole_ones_and_the_report_says_so() {
     let ctx = Ctx::quiet();
-    let tested = stress_test(&ctx, &coarse(), &octants(), &outwards()).unwrap();
+    let tested = stress_test(&ctx, &coarse(), &octants(), &as_it_lies(&outwards())).unwrap();
     let (kit, half) = (&tested.kit, &tested.half_connectors);
     for (whole, half) in [(&kit.punch, &half.punch), (&kit.drop, &half.drop)] {
         assert!(half.opening_mm > whole.opening_mm, "{half:?} {whole:?}");
@@ -88,12 +92,30 @@ fn a_stronger_material_bears_what_a_weaker_one_does_not() {
 }
 
 #[test]
+fn the_directions_of_a_turned_model_are_those_of_the_lattice_again() {
+    let turn = Turn::laying(Vec3::new(0.48, 0.6, 0.64), Vec3::new(0.8, 0.0, -0.6)).0;
+    let params = StressParams { turn, ..coarse() };
+    let ways = outwards().steps.into_iter().map(|s| {
+        let way = turn.inverse().apply(s.separation.unit());
+        (s.piece, crate::Direction::of(way).unwrap())
+    });
+    let found = laid(&params, &InstallationPlan::new(ways)).unwrap();
+    assert_eq!(found.steps[1..], outwards().steps[1..]);
+    let up = turned(&params).plan.up;
+    assert!(turn.inverse().apply(Vec3::from(up)).distance(Vec3::Z) < 1e-12);
+}
+
+#[test]
 fn what_does_not_belong_together_is_refused() {
     let ctx = Ctx::quiet();
     let mut plan = outwards();
     plan.steps.pop();
-    let refused = stress_test(&ctx, &coarse(), &octants(), &plan);
+    let refused = stress_test(&ctx, &coarse(), &octants(), &as_it_lies(&plan));
     assert_eq!(refused, Err(StressError::Plan { steps: 7, patches: 8 }));
+    let mut astray = as_it_lies(&outwards());
+    astray.steps[3].separation = crate::Direction::of(Vec3::new(1.0, 0.2, 0.0)).unwrap();
+    let refused = stress_test(&ctx, &coarse(), &octants(), &astray);
+    assert_eq!(refused, Err(StressError::Direction(PatchId(3))));
     let params = StressParams {
         punch_n: f64::NAN,
         drop_mm: -1.0,

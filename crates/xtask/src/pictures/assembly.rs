@@ -110,7 +110,7 @@ pub fn steps(kit: &Kit) -> Vec<u8> {
 pub fn segmentation(kit: &Kit) -> Vec<u8> {
     const VIEW: [f64; 2] = [WIDTH / 3.0, 330.0];
     let surface = &kit.design.kit.surface;
-    let mesh = kit.standing(&surface.mesh);
+    let mesh = &surface.mesh;
     let patches: Vec<(PatchId, TriMesh)> = kit
         .ids()
         .map(|p| (p, part(&mesh, |f| surface.patch_of_face[f] == p)))
@@ -122,7 +122,7 @@ pub fn segmentation(kit: &Kit) -> Vec<u8> {
     let seams = surface.seams();
     let lines: Vec<TriMesh> = seams
         .iter()
-        .map(|s| kit.standing(&tube(&s.points, 1.5)))
+        .map(|s| tube(&s.points, 1.5))
         .collect();
     let mut of_seam: Vec<Painted<'_>> = lines
         .iter()
@@ -165,7 +165,7 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
     let outwards = |p: PatchId| (kit.meshes[usize::from(p)].bounds().center() - middle).normalize();
     // The two pieces of whose contacts most are seen from inside, but for the key, which may leave.
     let seen = |p: PatchId| {
-        let faces_viewer = |n: Vec3| kit.stand(n).dot(-outwards(p)) > 0.5;
+        let faces_viewer = |n: Vec3| n.dot(-outwards(p)) > 0.5;
         made.touching
             .iter()
             .filter(|c| c.a == p && faces_viewer(c.normal))
@@ -182,7 +182,7 @@ pub fn contacts(kit: &Kit) -> Vec<u8> {
         let mut by_other: BTreeMap<PatchId, Vec<Vec3>> = BTreeMap::new();
         let mut n = 0;
         for c in made.touching.iter().filter(|c| c.a == piece) {
-            let (place, dots) = (kit.stand(c.point), by_other.entry(c.b).or_default());
+            let (place, dots) = (c.point, by_other.entry(c.b).or_default());
             n += 1;
             if dots.iter().all(|dot| dot.distance(place) > APART_MM) {
                 dots.push(place);

@@ -182,7 +182,7 @@ pub fn key(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let site = kit.design.key.as_ref().ok_or_else(|| fault("no key was cut"))?;
     let prism = site.prism;
     let key = kit.design.kit.plan.key();
-    let [slide, normal] = [prism.slide, prism.normal].map(|v| kit.stand(v));
+    let [slide, normal] = [prism.slide, prism.normal].map(|v| v);
     let camera = Camera::along(-normal - 0.55 * slide + 0.35 * slide.cross(normal), normal);
     let out = 0.75 * prism.length_mm() * slide;
     let edges = edges(kit);
@@ -248,10 +248,8 @@ fn edges(kit: &Kit) -> Vec<TriMesh> {
     };
     let far = 1.9 * prism.length_mm();
     let place = |along: f64, side: f64, below: f64| {
-        kit.stand(
-            prism.origin + along * prism.slide + side * prism.half_width_at(along) * prism.across()
-                - below * prism.normal,
-        )
+        prism.origin + along * prism.slide + side * prism.half_width_at(along) * prism.across()
+            - below * prism.normal
     };
     let mut lines = Vec::new();
     for below in [-0.6, prism.depth_mm] {

@@ -67,14 +67,7 @@ impl Kit {
             DesignOutcome::NoPlan { reason, .. } => return Err(fault(reason)),
         };
         let settings = Settings::with_thickness(&params, design.kit.thickness_mm);
-        let back = design.turn.inverse();
-        let meshes: Vec<TriMesh> = design
-            .kit
-            .pieces
-            .as_slice()
-            .iter()
-            .map(|m| back.mesh(m))
-            .collect();
+        let meshes: Vec<TriMesh> = design.kit.pieces.as_slice().to_vec();
         let normals = meshes.par_iter().map(crease_normals).collect();
         Ok(Self {
             design,
@@ -83,15 +76,6 @@ impl Kit {
             meshes,
             normals,
         })
-    }
-
-    /// From assembly space to the model as it stands.
-    pub fn stand(&self, v: Vec3) -> Vec3 {
-        self.design.turn.inverse().apply(v)
-    }
-
-    pub fn standing(&self, mesh: &TriMesh) -> TriMesh {
-        self.design.turn.inverse().mesh(mesh)
     }
 
     pub fn ids(&self) -> impl Iterator<Item = PatchId> {
@@ -109,7 +93,7 @@ impl Kit {
 
     /// The way out of a piece as it stands, a unit vector.
     pub fn way_out(&self, piece: PatchId) -> Vec3 {
-        self.stand(self.design.kit.plan.separation(piece).unit())
+        self.design.kit.plan.separation(piece).unit()
     }
 
     /// A piece as it stands, moved by `shift`.
@@ -129,7 +113,7 @@ impl Kit {
         let plan = &self.design.kit.plan;
         self.ids()
             .map(|p| ReportPiece {
-                id: p.0,
+                number: p.number(),
                 name: format!("piece {p}"),
                 color: self.color(p),
                 mesh: &self.meshes[usize::from(p)],

@@ -7,7 +7,8 @@ use shellock::metric::MetricParams;
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StressMap};
 use shellock::stress_test::{StressParams, chart, stress_test};
-use shellock::{LatticeDirection, PatchId};
+use shellock::PatchId;
+use shellock::key::Turn;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_render::stills::{Camera, Painted, render};
 
@@ -32,7 +33,7 @@ pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
     const VIEW: [f64; 2] = [WIDTH / 2.0, 380.0];
     let strength = strength_of(kit)?;
     let most = strength.stress_mpa;
-    let mesh = kit.standing(&strength.mesh);
+    let mesh = &strength.mesh;
     let colors: Vec<[u8; 3]> = strength
         .deciding_mpa
         .iter()
@@ -53,7 +54,7 @@ pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let bar = [0.5 * WIDTH - 150.0, VIEW[1] + 14.0];
     color_bar(&mut sheet, bar, 300.0, &format!("{most:.1} MPa"), words);
     let (number, down) = strength.deciding;
-    let down = kit.stand(down);
+    let down = down;
     let note = format!(
         "fall {} of {}, down along ({:.2}, {:.2}, {:.2}); wall of {:.2} mm; the material bears {} MPa; grey: too thin to be hollow",
         number + 1,
@@ -86,7 +87,7 @@ pub fn strength(kit: &Kit) -> Result<Vec<u8>, Failure> {
         })
         .collect();
     let bears = kit.settings.strength.material.strength_mpa;
-    let chart = strength_chart(strength, bears, &seams, |v| kit.stand(v));
+    let chart = strength_chart(strength, bears, &seams, |v| v);
     Ok(with_small_stills(&chart).into_bytes())
 }
 
@@ -107,12 +108,12 @@ pub fn openings(kit: &Kit) -> Vec<u8> {
         .iter()
         .map(|s| {
             let color = weak.get(&[s.a, s.b]).map_or(NONE, |mm| color_of(mm / most));
-            (kit.standing(&tube(&s.points, 1.1)), color)
+            (tube(&s.points, 1.1), color)
         })
         .collect();
-    let mesh = kit.standing(&made.surface.mesh);
+    let mesh = &made.surface.mesh;
     let worst = made.holding.seams.iter().take(1);
-    let spots = dots(worst.map(|s| kit.stand(Vec3::from_array(s.at))), 3.2);
+    let spots = dots(worst.map(|s| Vec3::from_array(s.at)), 3.2);
     let mut scene: Vec<Painted<'_>> = lines.iter().map(|(line, color)| plain(line, *color)).collect();
     scene.push(plain(&mesh, PALE));
     scene.push(plain(&spots, RED));
@@ -133,10 +134,11 @@ pub fn openings(kit: &Kit) -> Vec<u8> {
 /// The chart of `shellock test` with its defaults.
 pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let made = &kit.design.kit;
-    let mut plan = kit.settings.plan.clone();
+    let (mut plan, mut turn) = (kit.settings.plan.clone(), Turn::default());
     if let Some(site) = &kit.design.key {
         plan.key = Some(made.plan.key());
-        plan.key_slide = Some(LatticeDirection::nearest(site.prism.slide));
+        let (laid, along) = Turn::laying(site.prism.normal, site.prism.slide);
+        (turn, plan.key_slide) = (laid, Some(along));
     }
     let params = StressParams {
         metric: MetricParams {
@@ -145,6 +147,7 @@ pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
         },
         sizes: made.sizes.clone(),
         plan,
+        turn,
         ..StressParams::default()
     };
     let report = with_ctx(|ctx| stress_test(ctx, &params, &made.surface, &made.plan));

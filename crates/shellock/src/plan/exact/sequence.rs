@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::super::space::Space;
 use super::domains::Domains;
-use crate::plan::{InstallationPlan, InstallationStep, PieceSet};
+use crate::plan::{LatticePlan, LatticeStep, PieceSet};
 use crate::{LatticeDirection, PatchId};
 
 /// Sets of remaining pieces looked at before the question is left open.
@@ -12,7 +12,7 @@ const MOST_SETS: usize = 4000;
 
 /// What came of it.
 pub(super) enum Sequence {
-    Plan(InstallationPlan),
+    Plan(LatticePlan),
     /// There is no such order.
     None,
     /// Too many to try.
@@ -24,7 +24,7 @@ struct Sequencer<'a> {
     d: &'a Domains,
     limit: f64,
     separations: Vec<LatticeDirection>,
-    removed: Vec<InstallationStep>,
+    removed: Vec<LatticeStep>,
     /// What was left where no order was found; only asked for membership.
     dead: HashSet<PieceSet>,
 }
@@ -56,7 +56,7 @@ pub(super) fn sequence(space: &Space<'_>, d: &Domains, limit: f64) -> Sequence {
         };
     }
     s.removed.reverse();
-    let plan = InstallationPlan { steps: s.removed };
+    let plan = LatticePlan { steps: s.removed };
     // Relations are the same for all orders, so one that is turned down speaks for all.
     if space.allows(&plan) {
         Sequence::Plan(plan)
@@ -76,7 +76,7 @@ impl Sequencer<'_> {
         for p in left.iter() {
             let rest = left.minus(PieceSet::one(p));
             if self.may_leave(p, rest) {
-                self.removed.push(InstallationStep {
+                self.removed.push(LatticeStep {
                     piece: p,
                     separation: self.separations[usize::from(p)],
                 });
@@ -91,7 +91,7 @@ impl Sequencer<'_> {
     }
 
     fn may_leave(&self, p: PatchId, rest: PieceSet) -> bool {
-        let step = InstallationStep {
+        let step = LatticeStep {
             piece: p,
             separation: self.separations[usize::from(p)],
         };

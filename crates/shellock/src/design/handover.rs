@@ -1,0 +1,204 @@
+//! From where pieces are made to what people hold: the model as they gave it, and pieces numbered in the order
+//! in which they go in.
+//!
+//! Pieces are made of the model turned for its key, by the patches of a division. Nobody outside needs to know
+//! of either: what a kit says is in the space of the model as it was given, and its first piece is number 1.
+
+use shellock_geom::{TriMesh, Vec3};
+
+use crate::connector::SeamRoom;
+use crate::key::Turn;
+use crate::metric::{Holding, LoosePiece, SeamHolding};
+use crate::piece::{Finished, FinishedJoint};
+use crate::plan::{LatticePlan, PlanProof, ProofScope};
+use crate::{
+    Cause, ConnectorSizes, Direction, IdVec, InstallationPlan, PatchId, PressFit, SegmentedSurface, Warning,
+};
+
+/// How one is told by the other.
+#[derive(Clone, Debug)]
+pub(super) struct Handover {
+    back: Turn,
+    /// Of each patch of the division, the piece of the kit.
+    pieces: IdVec<PatchId, PatchId>,
+    /// The plan as it was found.
+    plan: LatticePlan,
+}
+
+impl Handover {
+    /// For pieces made by `plan` of a model that was turned by `turn`.
+    pub fn new(turn: &Turn, plan: LatticePlan) -> Self {
+        Self {
+            back: turn.inverse(),
+            pieces: IdVec::from_fn(plan.steps.len(), |patch| plan.position(patch).into()),
+            plan,
+        }
+    }
+
+    /// The plan as it was found: patches of the division, directions of the lattice.
+    pub fn found_plan(&self) -> &LatticePlan {
+        &self.plan
+    }
+
+    /// The patch of the division that a piece of the kit was made of.
+    pub fn patch(&self, piece: PatchId) -> PatchId {
+        self.plan.steps[usize::from(piece)].piece
+    }
+
+    /// The turn that pieces get at last.
+    pub fn turn(&self) -> &Turn {
+        &self.back
+    }
+
+    fn piece(&self, patch: PatchId) -> PatchId {
+        self.pieces[patch]
+    }
+
+    fn all(&self, patches: &[PatchId]) -> Vec<PatchId> {
+        patches.iter().map(|&p| self.piece(p)).collect()
+    }
+
+    fn at(&self, place: [f64; 3]) -> [f64; 3] {
+        self.back.apply(Vec3::from(place)).to_array()
+    }
+
+    /// One element a piece, in their order.
+    fn in_order<T: Clone>(&self, of_patches: &[T]) -> Vec<T> {
+        let patches = self.plan.steps.iter().map(|step| usize::from(step.piece));
+        patches
+            .filter_map(|patch| of_patches.get(patch).cloned())
+            .collect()
+    }
+
+    /// The order and the directions.
+    pub fn plan(&self) -> InstallationPlan {
+        let way = |v: Vec3| Direction::of(self.back.apply(v)).expect("a turned direction has one");
+        let steps = self.plan.steps.iter().enumerate();
+        InstallationPlan::new(steps.map(|(i, step)| (i.into(), way(step.separation.unit()))))
+    }
+
+    pub fn surface(&self, surface: &SegmentedSurface) -> SegmentedSurface {
+        SegmentedSurface {
+            mesh: self.back.mesh(&surface.mesh),
+            patch_of_face: self.all(&surface.patch_of_face),
+            ..surface.clone()
+        }
+    }
+
+    pub fn sizes(&self, sizes: &ConnectorSizes) -> ConnectorSizes {
+        let pairs = sizes
+            .pairs()
+            .map(|(pair, size_mm)| (pair.map(|p| self.piece(p)), size_mm));
+        ConnectorSizes::with_pairs(sizes.default_mm(), pairs)
+    }
+
+    pub fn proof(&self, proof: PlanProof) -> PlanProof {
+        PlanProof {
+            proven_for: ProofScope {
+                keys: self.all(&proof.proven_for.keys),
+                ..proof.proven_for
+            },
+            piece_costs: self
+                .in_order(proof.piece_costs.as_slice())
+                .into_iter()
+                .collect(),
+            ..proof
+        }
+    }
+
+    pub fn holding(&self, holding: Holding) -> Holding {
+        let loose = |l: LoosePiece| LoosePiece {
+            piece: self.piece(l.piece),
+            at: self.at(l.at),
+        };
+        let seam = |s: SeamHolding| SeamHolding {
+            later: self.piece(s.later),
+            earlier: self.piece(s.earlier),
+            at: self.at(s.at),
+            ..s
+        };
+        Holding {
+            loose: holding.loose.into_iter().map(loose).collect(),
+            seams: holding.seams.into_iter().map(seam).collect(),
+            foreseen_play: self.in_order(&holding.foreseen_play),
+            foreseen_excess: self.in_order(&holding.foreseen_excess),
+            ..holding
+        }
+    }
+
+    /// Pieces whose meshes were turned already, before they were rounded.
+    pub fn finished(&self, finished: Finished) -> Finished {
+        let joint = |j: FinishedJoint| FinishedJoint {
+            male: self.piece(j.male),
+            female: self.piece(j.female),
+            at: self.back.apply(j.at),
+            ..j
+        };
+        let fit = |f: PressFit| PressFit {
+            piece: self.piece(f.piece),
+            at: self.at(f.at),
+            ..f
+        };
+        let meshes: Vec<TriMesh> = self.in_order(finished.meshes.as_slice());
+        Finished {
+            meshes: meshes.into_iter().collect(),
+            joints: finished.joints.into_iter().map(joint).collect(),
+            press_fits: finished.press_fits.into_iter().map(fit).collect(),
+        }
+    }
+
+    pub fn rooms(&self, rooms: Vec<SeamRoom>) -> Vec<SeamRoom> {
+        let room = |r: SeamRoom| SeamRoom {
+            later: self.piece(r.later),
+            earlier: self.piece(r.earlier),
+            at: self.back.apply(r.at),
+            ..r
+        };
+        rooms.into_iter().map(room).collect()
+    }
+
+    pub fn warnings(&self, warnings: Vec<Warning>) -> Vec<Warning> {
+        let told = |w: Warning| {
+            let mut pieces = self.all(&w.pieces);
+            if matches!(
+                w.cause,
+                Cause::ShortContacts { .. } | Cause::WeakGraph | Cause::ComesApart | Cause::PieceWithoutNumber
+            ) {
+                // A plain list.
+                pieces.sort_unstable();
+            }
+            Warning {
+                cause: self.cause(w.cause),
+                pieces,
+                at: w.at.map(|at| self.at(at)),
+            }
+        };
+        warnings.into_iter().map(told).collect()
+    }
+
+    /// Causes that name pieces beside the warning's own.
+    fn cause(&self, cause: Cause) -> Cause {
+        match cause {
+            Cause::LabelsDivided { into } => Cause::LabelsDivided {
+                into: into
+                    .into_iter()
+                    .map(|(label, pieces)| (label, self.all(&pieces)))
+                    .collect(),
+            },
+            Cause::ConnectorLimited {
+                pair,
+                by,
+                wanted_mm,
+                given_mm,
+                n_others,
+            } => Cause::ConnectorLimited {
+                pair: pair.map(|p| self.piece(p)),
+                by,
+                wanted_mm,
+                given_mm,
+                n_others,
+            },
+            other => other,
+        }
+    }
+}

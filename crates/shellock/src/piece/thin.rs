@@ -1,0 +1,132 @@
+//! Sheets that carving leaves of pins and of the wall's inner side, and that no printer makes: shaved off where
+//! nobody sees it.
+//!
+//! ```text
+//!      ┌──┐ ┌┐            ┌──┐
+//!      │  │ ││    ─────►  │  │
+//!   ───┘  └─┘└───      ───┘  └──────
+//! ```
+//!
+//! They are found by rays, from points of the surface straight to the other side, and cut with boxes as thick as
+//! what was met there. That takes nothing from the freedom of any piece.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+use shellock_geom::{TriMesh, Vec3, Volume};
+
+use crate::verify::{ThinPoint, thin_points};
+use crate::{Cancelled, Ctx, IdVec, PatchId};
+
+/// Sheets up to this are shaved where the printer's least wall is thicker: connectors' own walls are no
+/// thinner, mm.
+const MOST_SHEET_MM: f64 = 0.5;
+/// Half of a box's width, mm: rays are about as far apart.
+const HALF_MM: f64 = 0.4;
+/// A box is at least so thick, mm, so that it cuts no slot into what a sheet hangs on, and reaches so far
+/// beyond either side.
+const LEAST_CUT_MM: f64 = 0.35;
+const BEYOND_MM: f64 = 0.05;
+/// Of points in one cube of this side, mm, one is worked on.
+const SPACING_MM: f64 = 0.3;
+/// What lies less deep below the outer surface stays as it is, mm.
+const SKIN_MM: f64 = 0.6;
+/// What two rounds leave is told.
+const MOST_ROUNDS: usize = 2;
+
+/// Depth below the outer surface, mm, where it is known: near the wall.
+pub(super) type Depth<'a> = dyn Fn(Vec3) -> Option<f64> + Sync + 'a;
+
+/// Shaves the sheets thinner than `least_wall_mm` off each piece.
+pub(super) fn shave(
+    ctx: &Ctx,
+    least_wall_mm: f64,
+    depth: &Depth<'_>,
+    pieces: &mut IdVec<PatchId, Volume>,
+) -> Result<(), Cancelled> {
+    let shaved: Vec<Option<Volume>> = pieces
+        .as_slice()
+        .par_iter()
+        .map(|piece| {
+            ctx.check()?;
+            Ok(shaved(piece, least_wall_mm.min(MOST_SHEET_MM), depth))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    for (i, volume) in shaved.into_iter().enumerate() {
+        if let Some(volume) = volume {
+            pieces[PatchId::from(i)] = volume;
+        }
+    }
+    Ok(())
+}
+
+/// `None` where nothing is thin.
+fn shaved(piece: &Volume, limit_mm: f64, depth: &Depth<'_>) -> Option<Volume> {
+    let mut shaved = None;
+    for _ in 0..MOST_ROUNDS {
+        let body: &Volume = shaved.as_ref().unwrap_or(piece);
+        let sheets = points(&body.to_mesh(), limit_mm, depth);
+        if sheets.is_empty() {
+            break;
+        }
+        let thick = |p: &ThinPoint| (p.thickness_mm + 2.0 * BEYOND_MM).max(LEAST_CUT_MM);
+        let boxes: Vec<Volume> = sheets.iter().map(|p| slab(p, thick(p))).collect();
+        let rest = body.subtract(&Volume::union_all(boxes));
+        shaved = Some(rest.components().into_iter().next().unwrap_or_else(Volume::empty));
+    }
+    shaved
+}
+
+/// Where a piece is thin, below the skin; one point a cube.
+fn points(mesh: &TriMesh, limit_mm: f64, depth: &Depth<'_>) -> Vec<ThinPoint> {
+    let is_deep = |p: Vec3| depth(p).is_none_or(|mm| mm > SKIN_MM);
+    let mut taken = BTreeSet::new();
+    let mut found = thin_points(mesh, [limit_mm, 0.0]).concat();
+    found.retain(|p| {
+        is_deep(p.at)
+            && is_deep(p.at + p.thickness_mm * p.across)
+            && taken.insert((p.at / SPACING_MM).floor().to_array().map(|x| x as i64))
+    });
+    found
+}
+
+/// A box around the middle between both sides.
+fn slab(p: &ThinPoint, thick_mm: f64) -> Volume {
+    let (u, v) = p.across.any_orthonormal_pair();
+    let middle = p.at + 0.5 * p.thickness_mm * p.across;
+    let half = [HALF_MM * u, HALF_MM * v, 0.5 * thick_mm * p.across];
+    let sign = |bits: u8, axis: u8| if bits >> axis & 1 == 1 { 1.0 } else { -1.0 };
+    let corner = |bits: u8| middle + sign(bits, 0) * half[0] + sign(bits, 1) * half[1] + sign(bits, 2) * half[2];
+    Volume::hull(&(0..8).map(corner).collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_testkit::shapes::cuboid;
+
+    use super::*;
+    use crate::verify::thin_places;
+
+    /// A block with a fin of 0.3 mm.
+    fn block() -> Volume {
+        cuboid([0.0; 3], [12.0, 10.0, 6.0]).union(&cuboid([2.0, 1.0, 6.0], [10.0, 1.3, 8.0]))
+    }
+
+    #[test]
+    fn a_fin_is_shaved_and_the_block_stays() {
+        let mut pieces: IdVec<PatchId, Volume> = std::iter::once(block()).collect();
+        shave(&Ctx::quiet(), 0.4, &|_| None, &mut pieces).unwrap();
+        let made = &pieces[PatchId(0)];
+        assert_eq!(thin_places(&made.to_mesh(), 0.4, 0.2), []);
+        // Its root keeps a step or a groove.
+        assert!((made.volume() - 720.0).abs() < 2.0, "{}", made.volume());
+        assert_eq!(made.components().len(), 1);
+    }
+
+    #[test]
+    fn what_is_near_the_skin_stays() {
+        let mut pieces: IdVec<PatchId, Volume> = std::iter::once(block()).collect();
+        shave(&Ctx::quiet(), 0.4, &|_| Some(0.1), &mut pieces).unwrap();
+        assert!((pieces[PatchId(0)].volume() - block().volume()).abs() < 1e-9);
+    }
+}
