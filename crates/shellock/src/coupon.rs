@@ -54,7 +54,7 @@ const KEY_MM: f64 = 6.0;
 /// What joins the two grooves of a key besides their own walls, mm.
 const CORE_MM: f64 = 1.0;
 /// Width of the rail's sides, mm, which carry numbers, and of its back.
-const SIDE_MM: f64 = 4.2;
+const SIDE_MM: f64 = 4.6;
 const BACK_MM: f64 = 2.5;
 /// Halves reach so far into what they hang from where they end in it, mm.
 const ROOT_MM: f64 = 0.6;
@@ -496,7 +496,7 @@ impl<'a> SlideJoint<'a> {
             (grown(open_x, past), grown(open_y, past), floor - PAST_MM),
         ]);
         let side = Sheet {
-            middle: Vec3::new(-half - gap - 0.5 * SIDE_MM, 0.5 * (BACK_MM - KEY_MM), WALL_MM),
+            middle: Vec3::new(-half - 0.5 * (SIDE_MM + gap), 0.5 * (BACK_MM - KEY_MM), WALL_MM),
             right: Vec3::X,
             up: Vec3::Y,
         };
@@ -506,18 +506,26 @@ impl<'a> SlideJoint<'a> {
 
     fn key(&self, number: &str) -> Volume {
         let (gap, floor) = (self.tolerance_mm, self.key_floor_mm);
-        let [_, grooves] = self.halves(gap);
+        // Beneath the wall it is the clearance that counts, from the edge of the other's wall, too.
+        let back = gap.max(self.clearance_mm - gap);
+        let [_, grooves] = self.halves(back);
         let (half, core) = (self.half_mm - gap, self.half_mm - self.groove_mm);
         let along = [-KEY_MM, -gap];
         let body = Volume::union_all(vec![
             grooves,
             block([-half, half], along, [0.0, WALL_MM]),
-            block([-core, core], along, [floor, 0.5 * WALL_MM]),
+            block([-core, core], [-KEY_MM, -back], [floor, 0.5 * WALL_MM]),
         ]);
         // As in kits, what hangs from a wall stays back with it above the clearance.
-        let above = [-self.clearance_mm, WALL_MM + PAST_MM];
-        let beside = [half, self.half_mm + PAST_MM];
-        let beyond = [beside, [-beside[1], -beside[0]]].map(|x| block(x, grown(along, PAST_MM), above));
+        let beside = |from: f64, z: [f64; 2]| {
+            let (from, to) = (self.half_mm - from, self.half_mm + PAST_MM);
+            [[from, to], [-to, -from]].map(|x| block(x, grown(along, PAST_MM), z))
+        };
+        let beyond = [
+            beside(back, [-self.clearance_mm, 0.0]),
+            beside(gap, [-0.5 * self.clearance_mm, WALL_MM + PAST_MM]),
+        ]
+        .concat();
         // The end that stands on the plate is smaller.
         let front = -KEY_MM + BROKEN_MM;
         let ends = [

@@ -50,13 +50,11 @@ fn shape(part: &Part) -> Shape {
     Shape::new(&Solid::new(part.mesh.clone()).unwrap())
 }
 
-/// Whether a face of a moving part belongs to its pin or its grooves: not to its wall, nor to the end with
-/// which a key meets the wall behind it.
+/// Whether a face of a moving part belongs to its pin or its grooves: not to its wall.
 fn is_beneath_wall(part: &Part, face: usize) -> bool {
     let corners = part.mesh.corners(face);
     let wall = corners.iter().any(|p| p.z > ROUNDING_MM) || corners.iter().all(|p| p.z > -ROUNDING_MM);
-    let back = corners.iter().all(|p| p.y > -part.fit.tolerance_mm - ROUNDING_MM);
-    !(wall || back && part.kind == Kind::Key)
+    !wall
 }
 
 fn connector_mm(part: &Part) -> f64 {
