@@ -36,26 +36,25 @@ use engraving::Sheet;
 /// How many clearances a coupon has.
 pub const N_FITS: usize = 5;
 
-/// Connector size D, mm: between the 2 and 4 mm of kits.
-const SIZE_MM: f64 = 2.5;
-/// Thickness of the walls, mm: between the 1.6 and 3 mm of kits.
-const WALL_MM: f64 = 2.0;
+/// Connector size D, mm: the least of kits, whose walls are the hardest to print.
+const SIZE_MM: f64 = 2.0;
+/// Thickness of the walls, mm: the least of kits.
+const WALL_MM: f64 = 1.6;
 /// Length of the pin's seam, mm; the pin ends so far before the wall does.
-const SEAM_MM: f64 = 13.0;
-const PIN_END_MM: f64 = 1.0;
+const SEAM_MM: f64 = 10.0;
+const PIN_END_MM: f64 = 0.8;
 /// How far the pin's wall and the channel's go from the seam, mm; how far the cheeks embrace the pin's.
-const PIN_DEEP_MM: f64 = 8.0;
-const CHANNEL_DEEP_MM: f64 = 7.0;
-const CHEEK_DEEP_MM: f64 = 5.5;
-/// Thickness of the cheeks, mm.
-const CHEEK_MM: f64 = 2.5;
+const PIN_DEEP_MM: f64 = 5.0;
+const CHANNEL_DEEP_MM: f64 = 1.8;
+const CHEEK_DEEP_MM: f64 = 3.8;
 /// Length of the key, mm. It stands: a resin printer takes half an hour for 6.2 mm.
-const KEY_MM: f64 = 6.0;
-/// What joins the two grooves of a key besides their own walls, mm.
-const CORE_MM: f64 = 1.0;
-/// Width of the rail's sides, mm, which carry numbers, and of its back.
-const SIDE_MM: f64 = 4.6;
-const BACK_MM: f64 = 2.5;
+const KEY_MM: f64 = 5.6;
+/// What joins the two grooves of a key besides their own walls, mm: so that its number has room.
+const CORE_MM: f64 = 0.6;
+/// Width of what holds both ends of a seam, and both sides of a rail, mm: the left one carries the number.
+const HOLDS_MM: [f64; 2] = [3.8, 1.6];
+/// Width of what joins the sides of a rail, mm.
+const BACK_MM: f64 = 1.8;
 /// Halves reach so far into what they hang from where they end in it, mm.
 const ROOT_MM: f64 = 0.6;
 /// Edges of walls that lie on the plate, and those of tongues, are broken by so much, mm: a first layer comes
@@ -243,13 +242,8 @@ fn parts(fit: &Fit, min_wall_mm: f64) -> Result<[Part; 4], NotPrintable> {
     let seam = SeamJoint::of(&connector, fit.tolerance_mm);
     let slide = SlideJoint::of(&connector, fit.tolerance_mm);
     let number = fit.number.to_string();
-    // ".12": all clearances are less than a millimetre.
-    let clearance = fit.clearance_mm.to_string();
     let made = [
-        (
-            Kind::Channel,
-            seam.channel(&number, clearance.trim_start_matches('0')),
-        ),
+        (Kind::Channel, seam.channel(&number)),
         (Kind::Pin, seam.pin(&number)),
         (Kind::Rail, slide.rail(&number)),
         (Kind::Key, slide.key(&number)),
@@ -338,10 +332,9 @@ impl<'a> SeamJoint<'a> {
         whole_halves(self.connector, &run)
     }
 
-    fn channel(&self, number: &str, clearance: &str) -> Volume {
-        let (gap, floor) = (self.tolerance_mm, self.floor_mm);
-        let half = 0.5 * SEAM_MM;
-        let outer = half + CHEEK_MM;
+    fn channel(&self, number: &str) -> Volume {
+        let (gap, floor, half) = (self.tolerance_mm, self.floor_mm, 0.5 * SEAM_MM);
+        let outer = [-half - HOLDS_MM[0], half + HOLDS_MM[1]];
         let [_, female] = self.halves(half + ROOT_MM + gap);
         // As in kits, what hangs from a wall stays back with it above the clearance.
         let near = -0.5 * self.connector.clearance_mm;
@@ -351,22 +344,21 @@ impl<'a> SeamJoint<'a> {
         let cheek_y = [-CHEEK_DEEP_MM, CHANNEL_DEEP_MM];
         let body = Volume::union_all(vec![
             female,
-            block([-outer, outer], [gap, CHANNEL_DEEP_MM], [0.0, WALL_MM]),
-            block([-outer, outer], behind, [floor, 0.5 * WALL_MM]),
-            block([-outer, -half - gap], cheek_y, [floor, WALL_MM]),
-            block([half + gap, outer], cheek_y, [floor, WALL_MM]),
+            block(outer, [gap, CHANNEL_DEEP_MM], [0.0, WALL_MM]),
+            block(outer, behind, [floor, 0.5 * WALL_MM]),
+            block([outer[0], -half - gap], cheek_y, [floor, WALL_MM]),
+            block([half + gap, outer[1]], cheek_y, [floor, WALL_MM]),
         ]);
-        let top = |x: f64| Sheet {
-            middle: Vec3::new(x, 0.5 * (gap + CHANNEL_DEEP_MM), WALL_MM),
+        let cheek = Sheet {
+            middle: Vec3::new(
+                0.5 * (outer[0] - half - gap),
+                0.5 * (cheek_y[0] + cheek_y[1]),
+                WALL_MM,
+            ),
             right: Vec3::X,
             up: Vec3::Y,
         };
-        let cut = [
-            top(-0.6 * half).strokes(number),
-            top(0.4 * half).strokes(clearance),
-        ]
-        .concat();
-        body.subtract(&Volume::union_all(cut))
+        body.subtract(&Volume::union_all(cheek.strokes(number)))
     }
 
     fn pin(&self, number: &str) -> Volume {
@@ -386,10 +378,11 @@ impl<'a> SeamJoint<'a> {
             ]),
         ];
         let body = Volume::union_all(wall.into_iter().chain([male]).collect());
+        // Sideways, where it has more room.
         let inner_side = Sheet {
             middle: Vec3::new(0.0, -0.5 * (PIN_DEEP_MM + 0.5 * SIZE_MM), 0.0),
-            right: Vec3::X,
-            up: -Vec3::Y,
+            right: -Vec3::Y,
+            up: -Vec3::X,
         };
         body.subtract(&Volume::union_all(inner_side.strokes(number)))
     }
@@ -476,17 +469,17 @@ impl<'a> SlideJoint<'a> {
 
     fn rail(&self, number: &str) -> Volume {
         let (gap, floor, half) = (self.tolerance_mm, self.tongue_floor_mm, self.half_mm);
-        let outer = half + SIDE_MM;
+        let outer = [-half - HOLDS_MM[0], half + HOLDS_MM[1]];
         let [tongues, _] = self.halves(-ROOT_MM);
         let along = [-KEY_MM, BACK_MM];
         let below = half + self.clearance_mm.max(gap);
         let body = Volume::union_all(vec![
             tongues,
-            block([-outer, -half - gap], along, [0.0, WALL_MM]),
-            block([half + gap, outer], along, [0.0, WALL_MM]),
-            block([-outer, -below], along, [floor, 0.5 * WALL_MM]),
-            block([below, outer], along, [floor, 0.5 * WALL_MM]),
-            block([-outer, outer], [gap, BACK_MM], [floor, WALL_MM]),
+            block([outer[0], -half - gap], along, [0.0, WALL_MM]),
+            block([half + gap, outer[1]], along, [0.0, WALL_MM]),
+            block([outer[0], -below], along, [floor, 0.5 * WALL_MM]),
+            block([below, outer[1]], along, [floor, 0.5 * WALL_MM]),
+            block(outer, [gap, BACK_MM], [floor, WALL_MM]),
         ]);
         // The edges of what is open on the plate: tongues and back.
         let (open_x, open_y) = (half - self.reach_mm, [-KEY_MM - PAST_MM, gap]);
@@ -496,7 +489,7 @@ impl<'a> SlideJoint<'a> {
             (grown(open_x, past), grown(open_y, past), floor - PAST_MM),
         ]);
         let side = Sheet {
-            middle: Vec3::new(-half - 0.5 * (SIDE_MM + gap), 0.5 * (BACK_MM - KEY_MM), WALL_MM),
+            middle: Vec3::new(0.5 * (outer[0] - half - gap), 0.5 * (BACK_MM - KEY_MM), WALL_MM),
             right: Vec3::X,
             up: Vec3::Y,
         };
