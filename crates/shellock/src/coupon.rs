@@ -6,13 +6,12 @@
 //! All else is there to be held.
 //!
 //! ```text
-//!     ┌───────────────┐  channel, from above:       ┌───────────────┐  rail:
-//!     │   1     .06   │  number, clearance          │       1       │
-//!     │┌─────────────┐│  seam                       │  ┌─────────┐  │
-//!     ││  pin, in    ││                             │  │  key,   │  │
-//!     ││  its place  ││  cheeks at the pin's ends   │  │ halfway │  │
-//!     └┘             └┘                             └──┤    1    ├──┘
-//!      └─────────────┘                                 └─────────┘
+//!     ┌───┬─────────────┬─┐  channel, from above:     ┌───┬─────────┬─┐  rail:
+//!     │ 1 │             │ │  wall                     │   └─────────┘ │
+//!     │   ├─────────────┤ │  seam                     │ 1 │  key,   │ │  tongues on
+//!     │   │ pin, in its │ │  cheeks at the            │   │ in its  │ │  both sides
+//!     └───┤ place       ├─┘  pin's ends               └───┤  place  ├─┘
+//!         └─────────────┘                                 └─────────┘
 //! ```
 //!
 //! Nothing of it needs supports. Channels and rails print with their outer side up, pins with it down, keys
@@ -44,17 +43,17 @@ const WALL_MM: f64 = 1.6;
 const SEAM_MM: f64 = 10.0;
 const PIN_END_MM: f64 = 0.8;
 /// How far the pin's wall and the channel's go from the seam, mm; how far the cheeks embrace the pin's.
-const PIN_DEEP_MM: f64 = 5.0;
+const PIN_DEEP_MM: f64 = 4.8;
 const CHANNEL_DEEP_MM: f64 = 1.8;
-const CHEEK_DEEP_MM: f64 = 3.8;
+const CHEEK_DEEP_MM: f64 = 3.5;
 /// Length of the key, mm. It stands: a resin printer takes half an hour for 6.2 mm.
-const KEY_MM: f64 = 5.6;
+const KEY_MM: f64 = 5.4;
 /// What joins the two grooves of a key besides their own walls, mm: so that its number has room.
-const CORE_MM: f64 = 0.6;
+const CORE_MM: f64 = 0.5;
 /// Width of what holds both ends of a seam, and both sides of a rail, mm: the left one carries the number.
-const HOLDS_MM: [f64; 2] = [3.8, 1.6];
+const HOLDS_MM: [f64; 2] = [3.7, 1.5];
 /// Width of what joins the sides of a rail, mm.
-const BACK_MM: f64 = 1.8;
+const BACK_MM: f64 = 1.6;
 /// Halves reach so far into what they hang from where they end in it, mm.
 const ROOT_MM: f64 = 0.6;
 /// Edges of walls that lie on the plate, and those of tongues, are broken by so much, mm: a first layer comes

@@ -3,11 +3,9 @@
 use shellock_geom::{Vec3, Volume};
 
 /// Height and width of a digit between the middles of its strokes, and from one digit to the next, mm.
-const HEIGHT_MM: f64 = 3.4;
-const WIDTH_MM: f64 = 1.9;
-const ADVANCE_MM: f64 = 3.5;
-/// The same for a point.
-const POINT_ADVANCE_MM: f64 = 1.6;
+const HEIGHT_MM: f64 = 3.2;
+const WIDTH_MM: f64 = 1.7;
+const ADVANCE_MM: f64 = 3.3;
 /// Width and depth of strokes, mm, as those of pieces' numbers.
 const STROKE_MM: f64 = 0.8;
 const DEPTH_MM: f64 = 0.4;
@@ -47,24 +45,18 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
-    /// What the digits and points of `text` take off the face; other characters leave a gap.
+    /// What the digits of `text` take off the face; other characters leave a gap.
     pub(super) fn strokes(&self, text: &str) -> Vec<Volume> {
-        let advance = |c: char| if c == '.' { POINT_ADVANCE_MM } else { ADVANCE_MM };
-        let total_mm: f64 = text.chars().map(advance).sum();
-        let last_mm = ADVANCE_MM - WIDTH_MM;
-        let mut left = -0.5 * (total_mm - last_mm);
+        let first = -0.5 * (ADVANCE_MM * (text.chars().count() as f64 - 1.0) + WIDTH_MM);
         let mut cuts = Vec::new();
-        for c in text.chars() {
+        for (i, c) in text.chars().enumerate() {
+            let Some(digit) = c.to_digit(10) else { continue };
+            // A lone stroke stands in the middle of its place.
+            let aside = if digit == 1 { -0.5 * WIDTH_MM } else { 0.0 };
+            let left = first + i as f64 * ADVANCE_MM + aside;
             let at = |[x, y]: [f64; 2]| [left + x * WIDTH_MM, (y - 0.5) * HEIGHT_MM];
-            if c == '.' {
-                cuts.push(self.stroke([[0.0, 0.0]; 2].map(at)));
-            } else if let Some(digit) = c.to_digit(10) {
-                let drawn = DIGITS[digit as usize].iter().zip(ENDS).filter(|(d, _)| **d == 1);
-                // A lone stroke stands in the middle of its place.
-                let aside = if digit == 1 { -0.5 * WIDTH_MM } else { 0.0 };
-                cuts.extend(drawn.map(|(_, ends)| self.stroke(ends.map(at).map(|[x, y]| [x + aside, y]))));
-            }
-            left += advance(c);
+            let drawn = DIGITS[digit as usize].iter().zip(ENDS).filter(|(d, _)| **d == 1);
+            cuts.extend(drawn.map(|(_, ends)| self.stroke(ends.map(at))));
         }
         cuts
     }
