@@ -329,11 +329,20 @@ fn entry(printers: &mut dyn TableLike, base: &Printer, name: &str) -> Result<Str
             base.name
         ));
     }
-    let made = named(&base.name).map(|(_, own)| own).unwrap_or_else(|| {
-        let mut table = Table::new();
-        table.insert("like", toml_edit::value(&base.name));
-        Item::Table(table)
-    });
+    let made = match named(&base.name) {
+        // A copy stands at the end, without what was noted beside the other.
+        Some((_, Item::Table(mut own))) => {
+            own.set_position(None);
+            own.decor_mut().clear();
+            Item::Table(own)
+        }
+        Some((_, own)) => own,
+        None => {
+            let mut table = Table::new();
+            table.insert("like", toml_edit::value(&base.name));
+            Item::Table(table)
+        }
+    };
     printers.insert(name, made);
     Ok(name.to_owned())
 }

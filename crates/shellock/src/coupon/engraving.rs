@@ -3,9 +3,9 @@
 use shellock_geom::{Vec3, Volume};
 
 /// Height and width of a digit between the middles of its strokes, and from one digit to the next, mm.
-const HEIGHT_MM: f64 = 3.2;
-const WIDTH_MM: f64 = 1.7;
-const ADVANCE_MM: f64 = 3.3;
+const HEIGHT_MM: f64 = 3.0;
+const WIDTH_MM: f64 = 1.6;
+const ADVANCE_MM: f64 = 3.2;
 /// Width and depth of strokes, mm, as those of pieces' numbers.
 const STROKE_MM: f64 = 0.8;
 const DEPTH_MM: f64 = 0.4;
