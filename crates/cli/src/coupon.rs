@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use shellock::coupon::{self, Fit, Kind, Part};
 use shellock_formats::{NamedObject, write_3mf, write_stl_binary};
 use shellock_geom::TriMesh;
-use shellock_print::Printer;
 use shellock_print::time::{Load, seconds};
+use shellock_print::{Printer, Process};
 use shellock_render::palette;
 use toml_edit::{DocumentMut, Item, Table, TableLike};
 
@@ -147,8 +147,12 @@ impl<'a> Plate<'a> {
         whole
     }
 
-    /// How long the printer takes for it, about, s.
-    fn seconds(&self) -> f64 {
+    /// How long the printer takes for it, about, s; `None` for filament, where small parts take four times what
+    /// the closed form, made for large ones, says.
+    fn seconds(&self) -> Option<f64> {
+        if self.printer.process == Process::Fdm {
+            return None;
+        }
         let load = |part: &Part| Load {
             height_mm: self.size_mm[2],
             volume_mm3: part.mesh.signed_volume(),
@@ -156,7 +160,7 @@ impl<'a> Plate<'a> {
             support_mm3: 0.0,
         };
         let all = self.parts.iter().map(load).fold(Load::default(), Load::and);
-        seconds(self.printer, &all)
+        Some(seconds(self.printer, &all))
     }
 
     fn tell(&self, session: &Session, files: &[PathBuf; 2]) {
@@ -172,11 +176,15 @@ impl<'a> Plate<'a> {
             return;
         }
         let [width, depth, height] = self.size_mm;
+        // docs/guide/fit-test.md has what a slicer says of filament.
+        let time = self.seconds().map_or_else(
+            || "about half an hour".to_owned(),
+            |s| format!("about {:.0} min", s / 60.0),
+        );
         println!(
-            "{}: {} parts, {width:.0} × {depth:.0} × {height:.1} mm; about {:.0} min on the printer \"{name}\"",
+            "{}: {} parts, {width:.0} × {depth:.0} × {height:.1} mm; {time} on the printer \"{name}\"",
             files[0].display(),
-            self.parts.len(),
-            self.seconds() / 60.0
+            self.parts.len()
         );
         println!("{}: the same as one mesh", files[1].display());
         println!("number  clearance  on rails  tolerance, mm");

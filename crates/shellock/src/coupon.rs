@@ -40,7 +40,7 @@ const SIZE_MM: f64 = 2.0;
 /// Thickness of the walls, mm: the least of kits.
 const WALL_MM: f64 = 1.6;
 /// Length of the pin's seam, mm; the pin ends so far before the wall does.
-const SEAM_MM: f64 = 9.0;
+const SEAM_MM: f64 = 8.6;
 const PIN_END_MM: f64 = 0.8;
 /// How far the pin's wall and the channel's go from the seam, mm; how far the cheeks embrace the pin's.
 const PIN_DEEP_MM: f64 = 4.8;
@@ -51,9 +51,9 @@ const KEY_MM: f64 = 5.2;
 /// What joins the two grooves of a key besides their own walls, mm: so that its number has room.
 const CORE_MM: f64 = 0.5;
 /// Width of what holds both ends of a seam, and both sides of a rail, mm: the left one carries the number.
-const HOLDS_MM: [f64; 2] = [3.9, 1.4];
+const HOLDS_MM: [f64; 2] = [3.9, 1.2];
 /// Width of what joins the sides of a rail, mm.
-const BACK_MM: f64 = 1.6;
+const BACK_MM: f64 = 1.2;
 /// Halves reach so far into what they hang from where they end in it, mm.
 const ROOT_MM: f64 = 0.6;
 /// Edges of walls that lie on the plate, and those of tongues, are broken by so much, mm: a first layer comes
