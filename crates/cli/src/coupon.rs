@@ -118,7 +118,7 @@ impl<'a> Plate<'a> {
 
     /// All parts, each an object with its name and the colour of its number.
     fn archive(&self) -> Vec<u8> {
-        let names: Vec<String> = self.parts.iter().map(|part| object_name(part)).collect();
+        let names: Vec<String> = self.parts.iter().map(object_name).collect();
         let objects: Vec<NamedObject<'_>> = self
             .parts
             .iter()

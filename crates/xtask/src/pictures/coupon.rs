@@ -31,7 +31,7 @@ pub fn plate() -> Result<Vec<u8>, Failure> {
     let laid: Vec<(TriMesh, [u8; 3])> = parts.iter().map(|p| (p.on_plate(), color(p))).collect();
     let scene: Vec<Painted<'_>> = laid.iter().map(|(mesh, color)| plain(mesh, *color)).collect();
     let mut sheet = Sheet::new(PLATE[1] + JOINT[1] + 70.0);
-    let from_above = Camera::along(Vec3::new(0.0, 0.7, -1.0), Vec3::Z);
+    let from_above = Camera::along(Vec3::new(-0.3, 0.6, -1.0), Vec3::Y);
     sheet.still(
         [0.0, 0.0],
         render(&scene, &from_above, pixels(PLATE[0]), pixels(PLATE[1])),
