@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use shellock::connector::ConnectorParams;
+use shellock::coupon::N_FITS;
 use shellock::design::{self, KeySource, Params};
 use shellock::piece::LabelParams;
 use shellock::sizes::SizeChoice;
@@ -101,6 +102,9 @@ pub enum Command {
         #[arg(long)]
         closed_form: bool,
     },
+    /// Make a small plate of pins, channels, keys and rails at five clearances, to find those that fit on your
+    /// printer; then keep them as a printer of your own
+    Coupon(CouponOptions),
     /// Print what a shell needs to complete commands and options, for example `shellock completions bash`
     Completions {
         /// The shell
@@ -175,6 +179,40 @@ pub struct Out {
     /// Replace the folder if it holds an earlier kit
     #[arg(short, long)]
     pub force: bool,
+}
+
+/// Which fit test is made, or what came of it.
+#[derive(Args)]
+pub struct CouponOptions {
+    /// The printer whose clearances are the middle ones: sla, fdm, fdm-petg, sls, or one of the configuration
+    /// file
+    #[arg(long, value_name = "NAME", default_value = "sla")]
+    pub printer: String,
+    /// Options and printers, in TOML; --save writes there [default: shellock.toml]
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// The printers of the configuration file.
+    #[arg(skip)]
+    pub own_printers: Vec<Printer>,
+    /// A .3mf file, and a .stl file beside it; or a folder for both [default: shellock-coupon.3mf]
+    #[arg(short, long, value_name = "FILE", conflicts_with = "fits")]
+    pub out: Option<PathBuf>,
+    /// Replace files of an earlier fit test
+    #[arg(short, long, conflicts_with = "fits")]
+    pub force: bool,
+    /// The number whose parts fit; --printer is the one that the plate was made for
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=N_FITS as i64), requires = "save")]
+    pub fits: Option<u32>,
+    /// Keep the clearances of that number in the configuration file, as a printer of this name
+    #[arg(long, value_name = "NAME", requires = "fits")]
+    pub save: Option<String>,
+}
+
+impl CouponOptions {
+    /// The printer that is named: of the user's own, or of those that come with the program.
+    pub fn chosen_printer(&self) -> Result<Printer, String> {
+        printer_called(&self.printer, &self.own_printers)
+    }
 }
 
 /// An axis of the file.
@@ -453,30 +491,7 @@ const REVISIONS_PER_SECOND: f64 = 20_000.0;
 impl Options {
     /// The printer that is named: of the user's own, or of those that come with the program.
     pub fn chosen_printer(&self) -> Result<Printer, String> {
-        let known: Vec<Printer> = self
-            .own_printers
-            .iter()
-            .cloned()
-            .chain(Printer::presets())
-            .collect();
-        let found = known
-            .iter()
-            .find(|p| p.name.eq_ignore_ascii_case(&self.printer))
-            .cloned();
-        let names = || {
-            known
-                .iter()
-                .map(|p| p.name.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        found.ok_or_else(|| {
-            format!(
-                "there is no printer \"{}\"; choose one of {}",
-                self.printer,
-                names()
-            )
-        })
+        printer_called(&self.printer, &self.own_printers)
     }
 
     /// The library's parameters for pieces made on `printer`.
@@ -512,6 +527,20 @@ impl Options {
         p.is_play_together = self.play_together;
         p
     }
+}
+
+/// The printer of that name: one of the user's `own`, or of those that come with the program.
+fn printer_called(name: &str, own: &[Printer]) -> Result<Printer, String> {
+    let known: Vec<Printer> = own.iter().cloned().chain(Printer::presets()).collect();
+    let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(name)).cloned();
+    let names = || {
+        known
+            .iter()
+            .map(|p| p.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    found.ok_or_else(|| format!("there is no printer \"{name}\"; choose one of {}", names()))
 }
 
 /// How numbers are engraved: strokes of two lines, and a wall behind them that the printer makes.

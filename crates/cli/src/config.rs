@@ -27,7 +27,7 @@ use crate::args::{self, Cli};
 use crate::stress;
 
 /// The file that is read without being named.
-const USUAL: &str = "shellock.toml";
+pub const USUAL: &str = "shellock.toml";
 /// A larger file is no configuration, bytes.
 const MOST_BYTES: u64 = 1 << 20;
 
@@ -51,6 +51,13 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     let Some(path) = file_of(given) else {
         return Ok(cli);
     };
+    // What is saved there may be the first of it.
+    let saves = given
+        .try_get_one::<String>("save")
+        .is_ok_and(|name| name.is_some());
+    if saves && !path.exists() {
+        return Ok(cli);
+    }
     let refused = |problem: String| Refusal::File(format!("{}: {problem}", path.display()));
     let Config { options, printers } = read(&path).map_err(refused)?;
     let extra = extra_arguments(&Cli::command(), name, given, &options).map_err(refused)?;
@@ -60,8 +67,8 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
         all.splice(at..at, extra.into_iter().map(OsString::from));
         cli = Cli::try_parse_from(all).map_err(|e| refused(e.to_string()))?;
     }
-    if let Some(options) = options_of(&mut cli.command) {
-        options.own_printers = printers;
+    if let Some(own) = own_printers(&mut cli.command) {
+        *own = printers;
     }
     Ok(cli)
 }
@@ -74,12 +81,13 @@ fn file_of(given: &ArgMatches) -> Option<PathBuf> {
         .or_else(|| Path::new(USUAL).is_file().then(|| PathBuf::from(USUAL)))
 }
 
-fn options_of(command: &mut args::Command) -> Option<&mut args::Options> {
-    use args::Command::{Build, Demo, Plan, Segment};
+fn own_printers(command: &mut args::Command) -> Option<&mut Vec<Printer>> {
+    use args::Command::{Build, Coupon, Demo, Plan, Segment};
     match command {
         Build { options, .. } | Demo { options, .. } | Segment { options, .. } | Plan { options, .. } => {
-            Some(options)
+            Some(&mut options.own_printers)
         }
+        Coupon(options) => Some(&mut options.own_printers),
         _ => None,
     }
 }
@@ -111,7 +119,15 @@ fn read(path: &Path) -> Result<Config, String> {
     if size > MOST_BYTES {
         return Err(format!("{size} bytes are too many for a configuration"));
     }
-    let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
+    parse(&fs::read_to_string(path).map_err(|e| e.to_string())?)
+}
+
+/// The printers of a configuration.
+pub fn printers_of(text: &str) -> Result<Vec<Printer>, String> {
+    Ok(parse(text)?.printers)
+}
+
+fn parse(text: &str) -> Result<Config, String> {
     let mut options: toml::Table = text.parse().map_err(|e: toml::de::Error| e.to_string())?;
     let printers = match options.remove("printers") {
         None => Vec::new(),

@@ -3,6 +3,7 @@
 mod args;
 mod build;
 mod config;
+mod coupon;
 mod failure;
 mod input;
 mod inspect;
@@ -152,6 +153,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
             closed_form,
         } => savings::report(session, &kit, model.as_deref(), closed_form),
         Command::Inspect { model, options } => inspect::inspect(session, &model, &options),
+        Command::Coupon(options) => coupon::coupon(session, &options),
         Command::Completions { shell } => Ok(manual::completions(shell)),
         Command::Manual { folder } => manual::write(&folder),
         Command::Figure {

@@ -491,3 +491,99 @@ fn a_test_says_how_it_ended_by_its_exit_code_and_leaves_figures_and_a_picture() 
         ["plan.json", "segmentation.ply", "stress.json", "stress.svg"]
     );
 }
+
+#[test]
+fn a_fit_test_is_written_once_and_what_fits_becomes_a_printer() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| shellock(dir.path(), args);
+    let json = |o: &Output| serde_json::from_slice::<serde_json::Value>(&o.stdout).unwrap();
+    let made = run(&["coupon", "--printer", "fdm", "-o", "plate", "--json"]);
+    assert_eq!(code(&made), 0, "{}", errors(&made));
+    let told = json(&made);
+    assert_eq!(
+        (&told["parts"], &told["numbers"][2]["clearance"]),
+        (&20.into(), &0.2.into())
+    );
+    let names: Vec<String> = content(dir.path()).into_iter().map(|(name, _)| name).collect();
+    assert_eq!(names, ["plate/shellock-coupon.3mf", "plate/shellock-coupon.stl"]);
+    let again = run(&["coupon", "--printer", "fdm", "-o", "plate"]);
+    assert!(
+        code(&again) == 2 && errors(&again).contains("--force"),
+        "{}",
+        errors(&again)
+    );
+    let forced = run(&["coupon", "--printer", "fdm", "-o", "plate", "--force", "-q"]);
+    assert_eq!((code(&forced), forced.stdout.len()), (0, 0));
+
+    let save = [
+        "coupon",
+        "--printer",
+        "fdm",
+        "--fits",
+        "4",
+        "--save",
+        "workshop",
+        "--config",
+        "own.toml",
+    ];
+    assert_eq!(code(&run(&save)), 0);
+    let next = run(&[
+        "coupon",
+        "--printer",
+        "workshop",
+        "--config",
+        "own.toml",
+        "-o",
+        "next.3mf",
+        "--json",
+    ]);
+    for gap in ["clearance", "key_clearance", "tolerance"] {
+        assert_eq!(json(&next)["numbers"][2][gap], told["numbers"][3][gap]);
+    }
+}
+
+#[test]
+fn what_is_no_fit_or_no_file_leaves_the_configuration_as_it_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = "# mine\n[printers.workshop]\nlike = \"fdm\"\n";
+    fs::write(dir.path().join("shellock.toml"), text).unwrap();
+    fs::write(dir.path().join("broken.toml"), "size = [").unwrap();
+    let refusals: [(&[&str], i32, &str); 7] = [
+        (&["--fits", "6", "--save", "workshop"], 2, "1..=5"),
+        (&["--fits", "2"], 2, "--save"),
+        (&["--save", "workshop"], 2, "--fits"),
+        (&["--fits", "2", "--save", "SLA"], 2, "comes with the program"),
+        (
+            &["--fits", "2", "--save", "workshop"],
+            2,
+            "is like \"fdm\", not \"sla\"",
+        ),
+        (
+            &["--fits", "2", "--save", "other", "--config", "broken.toml"],
+            2,
+            "broken.toml",
+        ),
+        (
+            &["--fits", "2", "--save", "other", "--config", "no/folder/own.toml"],
+            4,
+            "no/folder/own.toml",
+        ),
+    ];
+    for (args, expected, word) in refusals {
+        let refused = shellock(dir.path(), &[&["coupon"], args].concat());
+        assert!(
+            code(&refused) == expected && errors(&refused).contains(word),
+            "{args:?}: {}",
+            errors(&refused)
+        );
+    }
+    assert_eq!(
+        fs::read_to_string(dir.path().join("shellock.toml")).unwrap(),
+        text
+    );
+    assert_eq!(
+        fs::read_to_string(dir.path().join("broken.toml")).unwrap(),
+        "size = ["
+    );
+    assert_eq!(content(dir.path()).len(), 2);
+}

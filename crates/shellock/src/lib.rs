@@ -28,6 +28,7 @@
 
 pub mod body;
 pub mod connector;
+pub mod coupon;
 pub mod design;
 pub mod figure;
 mod impact;

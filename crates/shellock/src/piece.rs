@@ -18,3 +18,12 @@ pub use finish::{FinishParams, Finished, FinishedJoint, PieceError, make};
 pub use key_parts::Grip;
 pub use label::LabelParams;
 pub use relief::Relief;
+
+use shellock_geom::Volume;
+
+use crate::connector::{ConnectorParams, Run};
+
+/// The male and the female half of a run as they are before anything is carved.
+pub(crate) fn whole_halves(params: &ConnectorParams, run: &Run) -> [Volume; 2] {
+    [carve::Half::Male, carve::Half::Female].map(|half| carve::whole_half(params, run, half))
+}

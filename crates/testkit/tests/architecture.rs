@@ -8,7 +8,7 @@ use syn::visit::Visit;
 
 /// Modules of a crate; each may name those before it. `plan` stands before `body` because bodies are split
 /// along a plan.
-const DESIGN: [&str; 12] = [
+const DESIGN: [&str; 13] = [
     "seam",
     "strength",
     "segmentation",
@@ -20,6 +20,7 @@ const DESIGN: [&str; 12] = [
     "body",
     "connector",
     "piece",
+    "coupon",
     "design",
 ];
 const ASSEMBLY: [&str; 10] = [

@@ -6,6 +6,7 @@
 mod assembly;
 mod closeup;
 mod connector;
+mod coupon;
 mod draw;
 mod kit;
 mod mechanics;
@@ -53,10 +54,14 @@ impl Source {
     }
 }
 
-const PICTURES: [Picture; 15] = [
+const PICTURES: [Picture; 16] = [
     Picture {
         file: "docs/pictures/connector.svg",
         make: |_| Ok(connector::profiles().into_bytes()),
+    },
+    Picture {
+        file: "docs/pictures/fit-test.svg",
+        make: |_| coupon::plate(),
     },
     Picture {
         file: "docs/pictures/repair.svg",

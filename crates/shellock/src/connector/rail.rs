@@ -201,32 +201,41 @@ fn rail(
         .map(|i| has_room(params, &station(arc(i), RailPart::Full), male, female, is_free))
         .collect();
     let (from, to) = longest(&free)?;
-    let stop_mm = clearance_mm + STOP_SIZES * size_mm;
     let (start, end) = (arc(from), arc(to));
     if end - start < SHORTEST_SIZES * size_mm {
         return None;
     }
-    let tip = end - LEAD_IN_SIZES * size_mm;
-    let mut stations = vec![
-        station(start, RailPart::Full),
-        station(tip, RailPart::Full),
-        station(end, RailPart::LeadIn),
-    ];
-    if has_room(
-        params,
-        &station(end + stop_mm, RailPart::Stop),
-        male,
-        female,
-        is_free,
-    ) {
-        let stop = [end + clearance_mm, end + stop_mm];
-        stations.extend(stop.map(|arc_mm| station(arc_mm, RailPart::Stop)));
-    }
+    let places = rail_places([start, end], size_mm, clearance_mm);
+    let (stop_mm, stop) = places[4];
+    let has_stop = has_room(params, &station(stop_mm, stop), male, female, is_free);
+    let made = places.into_iter().take(if has_stop { 5 } else { 3 });
+    let stations = made.map(|(arc_mm, part)| station(arc_mm, part)).collect();
     Some(Run {
         male,
         female,
         stations,
     })
+}
+
+/// Where the sections of a rail are whose tongue reaches from `start_mm` to `end_mm` of its line: the tongue, its
+/// tip, and beyond it the groove's end.
+pub(crate) fn rail_places(
+    [start_mm, end_mm]: [f64; 2],
+    size_mm: f64,
+    clearance_mm: f64,
+) -> [(f64, RailPart); 5] {
+    [
+        (start_mm, RailPart::Full),
+        (end_mm - LEAD_IN_SIZES * size_mm, RailPart::Full),
+        (end_mm, RailPart::LeadIn),
+        (end_mm + clearance_mm, RailPart::Stop),
+        (end_mm + stop_mm(size_mm, clearance_mm), RailPart::Stop),
+    ]
+}
+
+/// How far a key's groove reaches beyond the tongue's tip, mm.
+pub(crate) fn stop_mm(size_mm: f64, clearance_mm: f64) -> f64 {
+    clearance_mm + STOP_SIZES * size_mm
 }
 
 /// The longest row of `true`, as an index range with both ends.
