@@ -181,22 +181,20 @@ fn carved_halves(
             .map(|&(r, _)| runs[r].clearance_mm())
             .fold(params.clearance_mm, f64::max);
         let room = Room::of(clearance_mm, grid, shell, q);
-        // A corner ends where its wall does: the field of what obstructs is too coarse there, and the other
-        // wall's way, with the clearance of connectors around it, too wide.
-        let corner = |&(r, h): &(usize, usize)| {
+        let carve = |(&(r, h), whole): (&(usize, usize), &Volume)| {
+            let free = room.cut(whole);
             if h == 1 {
-                return Volume::empty();
+                return (whole.volume(), carved(&free, &swept_volumes, far_mm));
             }
-            let corner = room.corner(params, &runs[r]);
-            let strangers = swept_volumes.iter().filter(|w| w.piece != runs[r].female);
-            carved(&corner, strangers, far_mm)
+            // A corner ends where its wall does: the field of what obstructs is too coarse there, and the other
+            // wall's way, with the clearance of connectors around it, too wide.
+            let is_partner = |w: &&SweptVolume| w.piece == runs[r].female;
+            let pin = carved(&free, swept_volumes.iter().filter(is_partner), far_mm);
+            let half = pin.union(&room.corner(params, &runs[r]));
+            let strangers = swept_volumes.iter().filter(|w| !is_partner(w));
+            (whole.volume(), carved(&half, strangers, far_mm))
         };
-        let corners: Vec<Volume> = mine.par_iter().map(corner).collect();
-        let made = |(whole, corner): (&Volume, &Volume)| {
-            let half = carved(&room.cut(whole), &swept_volumes, far_mm);
-            (whole.volume(), half.union(corner))
-        };
-        let made: Vec<(f64, Volume)> = whole.par_iter().zip(&corners).map(made).collect();
+        let made: Vec<(f64, Volume)> = mine.par_iter().zip(&whole).map(carve).collect();
         for ((r, h), (raw, volume)) in mine.into_iter().zip(made) {
             halves[r].raw[h] = raw;
             halves[r].carved[h] = volume;
