@@ -7,8 +7,8 @@ use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Solid, TriMesh};
 use shellock_kit::plan_file::PrintingEntry;
-use shellock_print::plates::{Laid, Plates, Printable, fits, fits_whole, lay, lay_alone};
 use shellock_print::load::Load;
+use shellock_print::plates::{Laid, Plates, Printable, fits, fits_whole, lay, lay_alone};
 use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
@@ -105,10 +105,18 @@ impl Printing {
     /// "about 13 h 50 min and 104 g on this printer with supports; the whole model …".
     fn cost_words(&self) -> String {
         let process = self.printer.process;
-        let supports = if process == Process::Sls { "" } else { " with supports" };
+        let supports = if process == Process::Sls {
+            ""
+        } else {
+            " with supports"
+        };
         let ours = format!("about {} on this printer{supports}", self.cost.words());
         match self.whole {
-            Some(whole) => format!("{ours}; the whole model {} takes {}", whole_words(process), whole.words()),
+            Some(whole) => format!(
+                "{ours}; the whole model {} takes {}",
+                whole_words(process),
+                whole.words()
+            ),
             None => ours,
         }
     }

@@ -31,8 +31,7 @@ const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height =
 const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
     supports_enable = 1\npad_enable = 1\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
     display_pixels_y = 1000\n";
-const FDM_SETTINGS: &str =
-    "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\nperimeters = 2\n\
+const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\nperimeters = 2\n\
     fill_density = 15%\n";
 /// The whole model of resin.
 const HOLLOWED: &str = "hollowing_enable = 1\nhollowing_min_thickness = 2\n";
@@ -61,7 +60,11 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
             "closed form"
         };
         let (cost, whole) = printing.costs();
-        let Costs { pieces, whole, filled } = sliced.unwrap_or(Costs {
+        let Costs {
+            pieces,
+            whole,
+            filled,
+        } = sliced.unwrap_or(Costs {
             pieces: cost,
             whole: whole.unwrap_or_default(),
             filled: None,
@@ -191,7 +194,11 @@ impl Slicer {
         } else {
             None
         };
-        Ok(Some(Costs { pieces, whole, filled }))
+        Ok(Some(Costs {
+            pieces,
+            whole,
+            filled,
+        }))
     }
 
     /// What a 3MF file holds; `more` settings stand last.

@@ -141,11 +141,14 @@ fn cross(
         return;
     }
     // In mm: the cross product is in cells along x and y.
-    let upward = normal.z / (normal.z * normal.z + (normal.x.powi(2) + normal.y.powi(2)) / cell_mm.powi(2)).sqrt();
+    let upward =
+        normal.z / (normal.z * normal.z + (normal.x.powi(2) + normal.y.powi(2)) / cell_mm.powi(2)).sqrt();
     let range = |k: usize| {
-        let (lo, hi) = corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-            (lo.min(p[k]), hi.max(p[k]))
-        });
+        let (lo, hi) = corners
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
+                (lo.min(p[k]), hi.max(p[k]))
+            });
         (lo.ceil().max(0.0) as usize)..((hi.floor() + 1.0).clamp(0.0, size[k] as f64) as usize)
     };
     for iy in range(1) {
@@ -167,7 +170,11 @@ fn cross(
 
 /// Where each column's spans start, and all spans: between where a line gets in and where it is out again.
 fn spans(n_columns: usize, mut crossings: Vec<Crossing>) -> (Vec<u32>, Vec<Span>) {
-    crossings.sort_by(|a, b| (a.column, a.height_mm).partial_cmp(&(b.column, b.height_mm)).unwrap_or(std::cmp::Ordering::Equal));
+    crossings.sort_by(|a, b| {
+        (a.column, a.height_mm)
+            .partial_cmp(&(b.column, b.height_mm))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
     let mut starts = Vec::with_capacity(n_columns + 1);
     let mut spans: Vec<Span> = Vec::with_capacity(crossings.len() / 2);
     let mut rest = crossings.as_slice();

@@ -2,7 +2,7 @@
 //!
 //! Slices are looked at every millimetre or so, as a slicer does every layer: how much of a slice is farther
 //! from its outline than the perimeters reach and from the surface above and below than solid layers reach
-//! (that is sparse infill, if there is enough of it), what supports take, and how many islands there are.
+//! (that is sparse infill, if there is enough of it), what supports take, and how much of its outlines are short loops.
 
 use shellock_geom::{TriMesh, Vec3};
 
@@ -18,6 +18,10 @@ const SOLID_LAYERS: f64 = 3.0;
 const SOLID_BELOW_MM2: f64 = 70.0;
 /// A layer may stand out beyond the one below by so much without support, mm: half a line.
 const OVERHANG_MM: f64 = 0.225;
+/// Loops that are shorter are laid slowly, mm: those of a radius below 6.5, as the slicer has it.
+const SHORT_MM: f64 = 41.0;
+/// Length of an outline over that of the edges of its cells.
+const OUTLINE: f64 = std::f64::consts::FRAC_PI_4;
 /// Supports keep away from the piece above by so much, mm.
 const CONTACT_MM: f64 = 0.2;
 
@@ -36,8 +40,8 @@ pub struct Load {
     pub shadow_mm2: f64,
     /// Volume of what is filled sparsely, mm³.
     pub sparse_mm3: f64,
-    /// Numbers of islands of all slices times their distance, mm.
-    pub islands_mm: f64,
+    /// Short loops of all slices times their distance, mm²: they are laid slowly.
+    pub small_side_mm2: f64,
     /// Volume that supports fill, mm³.
     pub support_mm3: f64,
     /// The same a millimetre wider on all sides, as slicers draw it, mm³.
@@ -64,7 +68,7 @@ impl Load {
             top_mm2: self.top_mm2 + other.top_mm2,
             shadow_mm2: self.shadow_mm2 + other.shadow_mm2,
             sparse_mm3: self.sparse_mm3 + other.sparse_mm3,
-            islands_mm: self.islands_mm + other.islands_mm,
+            small_side_mm2: self.small_side_mm2 + other.small_side_mm2,
             support_mm3: self.support_mm3 + other.support_mm3,
             wide_support_mm3: self.wide_support_mm3 + other.wide_support_mm3,
             wide_side_mm2: self.wide_side_mm2 + other.wide_side_mm2,
@@ -93,11 +97,15 @@ impl Load {
             load.side_mm2 += (doubled.length_squared() - upward * upward).max(0.0).sqrt() / 2.0;
             load.top_mm2 += upward.max(0.0) / 2.0;
         }
-        let n_shaded = (0..columns.len()).filter(|&c| !columns.spans(c).is_empty()).count();
+        let n_shaded = (0..columns.len())
+            .filter(|&c| !columns.spans(c).is_empty())
+            .count();
         load.shadow_mm2 = n_shaded as f64 * columns.cell_mm2();
         let supports = Supports::of(columns, layer_mm);
         load.support_mm3 = supports.volume_mm3(columns);
-        let n_slices = (columns.height_mm / columns.cell_mm).ceil().clamp(1.0, MOST_SLICES);
+        let n_slices = (columns.height_mm / columns.cell_mm)
+            .ceil()
+            .clamp(1.0, MOST_SLICES);
         let step_mm = columns.height_mm / n_slices;
         let mut slice = Slice::of(columns);
         for i in 0..n_slices as usize {
@@ -127,7 +135,11 @@ impl Supports {
             supports.starts.push(supports.filled.len() as u32);
             let mut below_mm = 0.0;
             for span in columns.spans(column) {
-                let Span { bottom_mm, top_mm, bottom_normal } = *span;
+                let Span {
+                    bottom_mm,
+                    top_mm,
+                    bottom_normal,
+                } = *span;
                 if bottom_normal < least_normal && bottom_mm - below_mm > CONTACT_MM + layer_mm {
                     supports.filled.push([below_mm, bottom_mm - CONTACT_MM]);
                 }
@@ -150,6 +162,7 @@ impl Supports {
 /// A slice, with a free rim of a cell around it.
 struct Slice {
     width: usize,
+    cell_mm: f64,
     /// Of each cell, whether it is inside the piece.
     inside: Vec<bool>,
     /// Farther from the surface above and below than solid layers reach.
@@ -169,6 +182,7 @@ impl Slice {
         let empty = vec![false; width * height];
         Self {
             width,
+            cell_mm: columns.cell_mm,
             inside: empty.clone(),
             deep: empty.clone(),
             support: empty.clone(),
@@ -188,7 +202,10 @@ impl Slice {
             self.inside[cell] = span.is_some();
             self.deep[cell] =
                 span.is_some_and(|s| z_mm - s.bottom_mm > solid_mm && s.top_mm - z_mm > solid_mm);
-            self.support[cell] = supports.of_column(column).iter().any(|[lo, hi]| *lo <= z_mm && z_mm < *hi);
+            self.support[cell] = supports
+                .of_column(column)
+                .iter()
+                .any(|[lo, hi]| *lo <= z_mm && z_mm < *hi);
         }
     }
 
@@ -196,8 +213,10 @@ impl Slice {
     fn add(&mut self, step_mm: f64, cell_mm: f64, load: &mut Load) {
         let (width, cell_mm2) = (self.width, cell_mm * cell_mm);
         let islands = self.islands.find(&self.inside, width);
-        load.islands_mm += islands.len() as f64 * step_mm;
-        load.widest_mm2 = load.widest_mm2.max(islands.iter().sum::<usize>() as f64 * cell_mm2);
+        load.widest_mm2 = load
+            .widest_mm2
+            .max(islands.iter().sum::<usize>() as f64 * cell_mm2);
+        let of_island = self.islands.label.clone();
         // Perimeters take about a cell: what has a neighbour outside is no infill.
         let neighbours = |cell: usize| [cell - 1, cell + 1, cell - width, cell + width];
         let is_sparse = |cell: usize| {
@@ -211,13 +230,34 @@ impl Slice {
         let [wide, below] = &self.wide;
         let n_wide = wide.iter().filter(|s| **s).count();
         load.wide_support_mm3 += n_wide as f64 * cell_mm2 * step_mm;
-        load.wide_top_mm2 += below.iter().zip(wide).filter(|(below, here)| **below && !**here).count() as f64 * cell_mm2;
+        load.wide_top_mm2 += below
+            .iter()
+            .zip(wide)
+            .filter(|(below, here)| **below && !**here)
+            .count() as f64
+            * cell_mm2;
         let differs = |cell: usize, next: usize| usize::from(wide[cell] != wide[next]);
         let edges = (0..wide.len() - width)
             .map(|cell| differs(cell, cell + 1) + differs(cell, cell + width))
             .sum::<usize>();
         load.wide_side_mm2 += edges as f64 * cell_mm * step_mm;
         load.cup_mm3 += self.vent() as f64 * cell_mm2 * step_mm;
+        // The labels are those of lakes now.
+        load.small_side_mm2 += self.short_outlines(&of_island) as f64 * OUTLINE * cell_mm * step_mm;
+    }
+
+    /// Edges of cells along all short loops: each goes between an island, `of_island`, and a lake.
+    fn short_outlines(&self, of_island: &[u32]) -> usize {
+        let mut edges: Vec<(u32, u32)> = Vec::new();
+        for cell in (0..self.inside.len()).filter(|&cell| self.inside[cell]) {
+            let neighbours = [cell - 1, cell + 1, cell - self.width, cell + self.width];
+            let outside = neighbours.into_iter().filter(|&n| !self.inside[n]);
+            edges.extend(outside.map(|n| (of_island[cell], self.islands.label[n])));
+        }
+        edges.sort_unstable();
+        let loops = edges.chunk_by(|a, b| a == b).map(<[_]>::len);
+        let is_short = |n: &usize| *n as f64 * OUTLINE * self.cell_mm < SHORT_MM;
+        loops.filter(is_short).sum()
     }
 
     /// Draws supports a cell wider, but not into the piece.
@@ -278,7 +318,12 @@ impl Islands {
             while let Some(cell) = self.stack.pop() {
                 n += 1;
                 // Rows wrap around at their ends, where the rim is free: that joins nothing but the rim.
-                for next in [cell.wrapping_sub(1), cell + 1, cell.wrapping_sub(width), cell + width] {
+                for next in [
+                    cell.wrapping_sub(1),
+                    cell + 1,
+                    cell.wrapping_sub(width),
+                    cell + width,
+                ] {
                     if next < set.len() && set[next] && self.label[next] == u32::MAX {
                         self.label[next] = sizes.len() as u32;
                         self.stack.push(next);

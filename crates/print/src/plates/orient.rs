@@ -233,7 +233,9 @@ impl<'a> Body<'a> {
             let r = (1.0 - z * z).sqrt();
             Vec3::new(r * cos, r * sin, z)
         });
-        let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
+        let axes = [Vec3::X, Vec3::Y, Vec3::Z]
+            .into_iter()
+            .flat_map(|axis| [axis, -axis]);
         resting.chain(axes).chain(spread).collect()
     }
 
@@ -279,15 +281,24 @@ impl<'a> Body<'a> {
         let [x, y] = axes.map(|axis| self.center.dot(axis));
         let foot: Vec<[f64; 2]> = (0..columns.len())
             .filter(|&column| {
-                let lies = columns.spans(column).first().is_some_and(|s| s.bottom_mm < FOOT_MM);
-                lies || supports.of_column(column).first().is_some_and(|[lo, _]| *lo == 0.0)
+                let lies = columns
+                    .spans(column)
+                    .first()
+                    .is_some_and(|s| s.bottom_mm < FOOT_MM);
+                lies || supports
+                    .of_column(column)
+                    .first()
+                    .is_some_and(|[lo, _]| *lo == 0.0)
             })
             .map(|column| columns.middle(column))
             .map(|[at, along]| [at - x, along - y])
             .collect();
         (0..24).all(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
-            let reach = foot.iter().map(|[x, y]| x * cos + y * sin).fold(f64::NEG_INFINITY, f64::max);
+            let reach = foot
+                .iter()
+                .map(|[x, y]| x * cos + y * sin)
+                .fold(f64::NEG_INFINITY, f64::max);
             reach >= STANDING_MM
         })
     }
