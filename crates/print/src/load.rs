@@ -335,3 +335,116 @@ impl Islands {
         sizes
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::Volume;
+    use shellock_testkit::shapes::cuboid;
+
+    use super::*;
+    use crate::Printer;
+    use crate::time::Cost;
+
+    const UPRIGHT: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
+    /// Upside down.
+    const TURNED: [Vec3; 3] = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z];
+
+    fn load(volume: &Volume, axes: [Vec3; 3]) -> Load {
+        Load::of(&volume.to_mesh(), axes, 0.2)
+    }
+
+    /// A top of 40 × 40 mm, 4 mm thick, 20 mm above the plate on a leg of 10 × 10 mm.
+    fn table() -> Volume {
+        cuboid([0.0, 0.0, 20.0], [40.0, 40.0, 24.0]).union(&cuboid([15.0, 15.0, 0.0], [25.0, 25.0, 21.0]))
+    }
+
+    /// A cup of 30 mm with walls and a floor of 3 mm.
+    fn cup() -> Volume {
+        cuboid([0.0; 3], [30.0; 3]).subtract(&cuboid([3.0; 3], [27.0, 27.0, 40.0]))
+    }
+
+    #[test]
+    fn supports_of_a_table_are_its_clear_height_times_the_area_that_hangs() {
+        let load = load(&table(), UPRIGHT);
+        let expected = (40.0 * 40.0 - 10.0 * 10.0) * (20.0 - CONTACT_MM);
+        assert!(
+            (load.support_mm3 / expected - 1.0).abs() < 0.01,
+            "{} {expected}",
+            load.support_mm3
+        );
+        assert_eq!(Load::of(&table().to_mesh(), TURNED, 0.2).support_mm3, 0.0);
+    }
+
+    #[test]
+    fn supports_of_a_bridge_end_on_the_pieces_own_floor() {
+        let under = cuboid([10.0, -1.0, 12.0], [50.0, 31.0, 22.0]);
+        let bridge = cuboid([0.0; 3], [60.0, 30.0, 25.0]).subtract(&under);
+        let expected = 40.0 * 30.0 * (10.0 - CONTACT_MM);
+        let support_mm3 = load(&bridge, UPRIGHT).support_mm3;
+        assert!(
+            (support_mm3 / expected - 1.0).abs() < 0.02,
+            "{support_mm3} {expected}"
+        );
+    }
+
+    #[test]
+    fn a_cup_catches_what_it_holds_and_a_bell_drains() {
+        let inside = 24.0 * 24.0 * 27.0;
+        let caught = load(&cup(), UPRIGHT).cup_mm3;
+        assert!((caught / inside - 1.0).abs() < 0.08, "{caught} {inside}");
+        assert_eq!(load(&cup(), TURNED).cup_mm3, 0.0);
+        // With a hole in its wall at the floor, so does the cup.
+        let drained = cup().subtract(&cuboid([-1.0, 12.0, 3.0], [4.0, 18.0, 9.0]));
+        assert_eq!(load(&drained, UPRIGHT).cup_mm3, 0.0);
+    }
+
+    #[test]
+    fn a_block_is_filled_sparsely_but_for_its_perimeters_and_solid_layers_and_a_rod_is_not() {
+        let block = load(&cuboid([0.0; 3], [40.0; 3]), UPRIGHT);
+        let expected = 38.0 * 38.0 * (40.0 - 2.0 * SOLID_LAYERS * 0.2);
+        assert!(
+            (block.sparse_mm3 / expected - 1.0).abs() < 0.05,
+            "{} {expected}",
+            block.sparse_mm3
+        );
+        assert!((block.volume_mm3 - 64e3).abs() < 1e-6 && block.small_side_mm2 == 0.0);
+        let rod = load(&cuboid([0.0; 3], [8.0, 8.0, 40.0]), UPRIGHT);
+        assert_eq!(rod.sparse_mm3, 0.0, "too small an area");
+        assert!(
+            (rod.small_side_mm2 / (OUTLINE * 32.0 * 40.0) - 1.0).abs() < 0.02,
+            "its loops are short"
+        );
+    }
+    /// Name, shape, pose, seconds and cm³ as the slicer tells them.
+    type Sliced = (&'static str, fn() -> Volume, [Vec3; 3], f64, f64);
+
+    /// By PrusaSlicer 2.5 with two perimeters, 15 % infill, layers of 0.2 mm and supports.
+    const SLICED: [Sliced; 2] = [
+        (
+            "cube of 40 mm",
+            || cuboid([0.0; 3], [40.0; 3]),
+            UPRIGHT,
+            4475.0,
+            16.06,
+        ),
+        ("cup", cup, UPRIGHT, 3129.0, 7.79),
+    ];
+
+    #[test]
+    fn boxes_take_what_the_slicer_tells_within_a_quarter_and_plastic_within_a_sixth() {
+        for (name, volume, axes, seconds, cm3) in SLICED {
+            let ours = Cost::of(&Printer::fdm(), &load(&volume(), axes));
+            let grams = cm3 * Printer::fdm().material.density_g_cm3;
+            assert!(
+                (ours.seconds / seconds - 1.0).abs() < 0.25,
+                "{name}: {} s, {seconds} s",
+                ours.seconds
+            );
+            assert!(
+                (ours.grams / grams - 1.0).abs() < 0.16,
+                "{name}: {} g, {grams} g",
+                ours.grams
+            );
+        }
+    }
+}
