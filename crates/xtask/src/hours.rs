@@ -10,6 +10,7 @@ use std::process::{Command, Stdio};
 use clap::Args;
 use shellock_formats::{NamedObject, read_mesh, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::weld::weld;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_print::Printer;
 use shellock_print::load::Load;
@@ -78,7 +79,8 @@ impl Kit {
                 path: path.clone(),
                 problem: e.to_string(),
             })?;
-            Ok(loaded.mesh)
+            // Slicers want triangles that share their points.
+            Ok(weld(&loaded.mesh).mesh)
         };
         let pieces = folder.join("pieces");
         let fault = |source| Failure::File {
