@@ -79,7 +79,7 @@ pub struct Plates {
 
 /// Lays all `pieces` flat and packs them on plates of `printer`; the same for the same input.
 ///
-/// Some 5 ms for a piece of 20 000 triangles.
+/// Some 0.3 to 1 s for a piece of 20 000 triangles: 150 poses are judged coarsely, 20 finely.
 pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
     let poses: Vec<Option<Pose>> = pieces
         .par_iter()
