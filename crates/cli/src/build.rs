@@ -133,7 +133,7 @@ fn make(
     to.write(&files)?;
     let code = u8::from(!made.kit.verification.passed());
     if session.is_json {
-        print_json(to, &notes, &made, &summary, &warnings, code);
+        print_json(to, &notes, &made, &summary, &warnings, &printing, code);
     } else if session.shown == Shown::Nothing {
         print_failures(&made.kit.verification);
         print_warnings(&warnings);
@@ -163,13 +163,14 @@ fn print_json(
     made: &Design,
     summary: &Summary,
     warnings: &[Warning],
+    printing: &Printing,
     code: u8,
 ) {
     let value = json!({
         "status": if code == 0 { "verified" } else { "failed" },
         "out": to.folder(), "notes": notes,
         "pieces": made.kit.pieces.len(), "key_piece": made.kit.plan.key(),
-        "volume_ratio": summary.volume_ratio, "grams": summary.grams, "fits_within_mm": made.fits_within_mm(), "connector_share": summary.connector_share,
+        "volume_ratio": summary.volume_ratio, "grams": summary.grams, "print": printing.entry().time, "fits_within_mm": made.fits_within_mm(), "connector_share": summary.connector_share,
         "thin_share": summary.thin_share, "thickness_mm": made.kit.thickness_mm,
         "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
         "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.kit.sizes.largest_mm(),

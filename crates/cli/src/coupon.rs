@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use shellock::coupon::{self, Fit, Kind, Part};
 use shellock_formats::{NamedObject, write_3mf, write_stl_binary};
-use shellock_geom::TriMesh;
-use shellock_print::time::{Load, seconds};
-use shellock_print::{Printer, Process};
+use shellock_geom::{TriMesh, Vec3};
+use shellock_print::load::Load;
+use shellock_print::time::seconds_flat;
+use shellock_print::Printer;
 use shellock_render::palette;
 use toml_edit::{DocumentMut, Item, Table, TableLike};
 
@@ -147,20 +148,17 @@ impl<'a> Plate<'a> {
         whole
     }
 
-    /// How long the printer takes for it, about, s; `None` for filament, where small parts take four times what
-    /// the closed form, made for large ones, says.
-    fn seconds(&self) -> Option<f64> {
-        if self.printer.process == Process::Fdm {
-            return None;
-        }
+    /// How long the printer takes for it, about, s.
+    fn seconds(&self) -> f64 {
+        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
         let load = |part: &Part| Load {
-            height_mm: self.size_mm[2],
-            volume_mm3: part.mesh.signed_volume(),
-            area_mm2: part.mesh.area(),
+            // It is laid so that it needs none.
             support_mm3: 0.0,
+            wide_support_mm3: 0.0,
+            ..Load::of(&part.on_plate(), axes, self.printer.layer_mm)
         };
         let all = self.parts.iter().map(load).fold(Load::default(), Load::and);
-        Some(seconds(self.printer, &all))
+        seconds_flat(self.printer, &all)
     }
 
     fn tell(&self, session: &Session, files: &[PathBuf; 2]) {
@@ -176,11 +174,8 @@ impl<'a> Plate<'a> {
             return;
         }
         let [width, depth, height] = self.size_mm;
-        // docs/guide/fit-test.md has what a slicer says of filament.
-        let time = self.seconds().map_or_else(
-            || "about half an hour".to_owned(),
-            |s| format!("about {:.0} min", s / 60.0),
-        );
+        // docs/guide/fit-test.md has what a slicer says.
+        let time = format!("about {:.0} min", self.seconds() / 60.0);
         println!(
             "{}: {} parts, {width:.0} × {depth:.0} × {height:.1} mm; {time} on the printer \"{name}\"",
             files[0].display(),

@@ -7,8 +7,9 @@ use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Solid, TriMesh};
 use shellock_kit::plan_file::PrintingEntry;
+use shellock_print::load::Load;
 use shellock_print::plates::{Laid, Plates, Printable, fits, fits_whole, lay, lay_alone};
-use shellock_print::time::{Load, seconds};
+use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
 
@@ -26,8 +27,9 @@ const MOST_TRIES: u32 = 5;
 pub struct Printing {
     printer: Printer,
     plates: Plates,
-    /// Time by the closed forms, s: all plates, and the solid model.
-    seconds: [f64; 2],
+    /// By the closed forms: all plates, and the whole model as people print it; `None` where it cannot be laid.
+    cost: Cost,
+    whole: Option<Cost>,
     /// What the pieces weigh without supports, g.
     grams: f64,
 }
@@ -41,26 +43,27 @@ impl Printing {
         let plates = lay(printer, &printables);
         let mut loads = vec![Load::default(); plates.n_plates];
         for laid in &plates.laid {
-            loads[laid.plate] = loads[laid.plate].and(load(laid, &pieces[laid.piece]));
+            loads[laid.plate] = loads[laid.plate].and(laid.load);
         }
-        let pieces_s = loads
-            .iter()
-            .map(|load| seconds(printer, load))
-            .fold(0.0, |sum, s| sum + s);
-        let solid_s =
-            lay_alone(printer, solid.mesh()).map_or(0.0, |l| seconds(printer, &load(&l, solid.mesh())));
+        let whole = lay_alone(printer, solid.mesh()).map(|laid| {
+            let load = whole(printer.process, laid.load, solid.mesh().area());
+            Cost::of(printer, &load)
+        });
         Self {
             printer: printer.clone(),
             plates,
-            seconds: [pieces_s, solid_s],
+            cost: loads
+                .iter()
+                .fold(Cost::default(), |sum, load| sum.and(Cost::of(printer, load))),
+            whole,
             grams: pieces.iter().map(TriMesh::signed_volume).sum::<f64>() * printer.material.density_g_cm3
                 / 1000.0,
         }
     }
 
-    /// Print time of all plates and of the solid model by closed forms, s.
-    pub fn seconds(&self) -> [f64; 2] {
-        self.seconds
+    /// What all plates take by closed forms, and the whole model as people print it.
+    pub fn costs(&self) -> (Cost, Option<Cost>) {
+        (self.cost, self.whole)
     }
 
     /// What the pieces weigh without supports, g.
@@ -89,10 +92,7 @@ impl Printing {
             _ => format!("; {:.1} cm² of the outer skin need support", outer_mm2 / 100.0),
         };
         let rest = match self.plates.too_large.len() {
-            0 => format!(
-                "; {:.0} g and what supports take; `shellock report` tells hours",
-                self.grams
-            ),
+            0 => format!("; {}", self.cost_words()),
             n => format!("; {n} pieces are not on them"),
         };
         let plates = if n == 1 { "plate" } else { "plates" };
@@ -102,9 +102,28 @@ impl Printing {
         )
     }
 
+    /// "about 13 h 50 min and 104 g on this printer with supports; the whole model …".
+    fn cost_words(&self) -> String {
+        let process = self.printer.process;
+        let supports = if process == Process::Sls {
+            ""
+        } else {
+            " with supports"
+        };
+        let ours = format!("about {} on this printer{supports}", self.cost.words());
+        match self.whole {
+            Some(whole) => format!(
+                "{ours}; the whole model {} takes {}",
+                whole_words(process),
+                whole.words()
+            ),
+            None => ours,
+        }
+    }
+
     /// For plan.json.
     pub fn entry(&self) -> PrintingEntry {
-        PrintingEntry::of(&self.printer, &self.plates, self.seconds)
+        PrintingEntry::of(&self.printer, &self.plates, self.cost, self.whole)
     }
 
     /// All plates side by side, and each alone where there are several.
@@ -154,15 +173,6 @@ fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
     Printable {
         mesh,
         is_outer: (0..mesh.triangles.len()).into_par_iter().map(is_outer).collect(),
-    }
-}
-
-fn load(laid: &Laid, mesh: &TriMesh) -> Load {
-    Load {
-        height_mm: laid.size_mm[2],
-        volume_mm3: mesh.signed_volume(),
-        area_mm2: mesh.area(),
-        support_mm3: laid.support_mm3,
     }
 }
 

@@ -1,7 +1,8 @@
 //! `report`: what a kit saves over the solid model, as the paper's Table 1 tells it.
 //!
-//! Print times are PrusaSlicer's own estimates where it is installed, else closed forms. Pieces are laid on
-//! plates anew for either process; the solid lies in the pose that needs the least support.
+//! Time and material are PrusaSlicer's own estimates where it is installed, else closed forms, with supports and
+//! the same settings for both. Pieces are laid on plates anew for either process; the whole model is printed as
+//! people print it (filament at 15 % infill, resin hollowed) in the pose that takes the least.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,6 +12,7 @@ use serde_json::{Value, json};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::{Solid, TriMesh};
 use shellock_print::plates::lay_alone;
+use shellock_print::time::{Cost, whole_words};
 use shellock_print::{Printer, Process};
 
 use crate::Session;
@@ -23,15 +25,17 @@ const SAVINGS: &str = "savings.json";
 /// The slicer's program.
 const SLICER: &str = "prusa-slicer";
 
-/// Settings of both technologies, as far as they matter for time, on a bed that holds everything. The display
-/// of the resin printer is coarse: its pixels cost time here and change nothing.
+/// Settings of both technologies, where they are not the slicer's defaults, on a bed that holds everything. The
+/// display of the resin printer is coarse: its pixels cost time here and change little.
 const ROOMY: &str = "bed_shape = 0x0,1000x0,1000x1000,0x1000\nmax_print_height = 1000\n";
 const SLA_SETTINGS: &str = "printer_technology = SLA\nexposure_time = 7.5\ninitial_exposure_time = 35\nfaded_layers = 10\n\
-    supports_enable = 0\npad_enable = 0\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
+    supports_enable = 1\npad_enable = 1\ndisplay_width = 1000\ndisplay_height = 1000\ndisplay_pixels_x = 1000\n\
     display_pixels_y = 1000\n";
-const FDM_SETTINGS: &str =
-    "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\n";
-/// Instead of the slicer's 20 %.
+const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsupport_material = 1\nskirts = 0\nperimeters = 2\n\
+    fill_density = 15%\n";
+/// The whole model of resin.
+const HOLLOWED: &str = "hollowing_enable = 1\nhollowing_min_thickness = 2\n";
+/// Instead of 15 %.
 const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 
 /// `shellock report`.
@@ -46,7 +50,7 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
         let printer = Printer { bed_mm, ..printer };
         let printing = Printing::of(&printer, pieces.as_slice(), solid.mesh(), &solid);
         let sliced = match &slicer {
-            Some(slicer) => slicer.seconds(&printer, printing.files(pieces.as_slice()), &solid)?,
+            Some(slicer) => slicer.costs(&printer, printing.files(pieces.as_slice()), &solid)?,
             None => None,
         };
         let by = if sliced.is_some() {
@@ -54,19 +58,22 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
         } else {
             "closed form"
         };
-        let [pieces_s, solid_s] = printing.seconds();
-        let Times {
-            pieces_s,
-            solid_s,
-            filled_s,
-        } = sliced.unwrap_or(Times {
-            pieces_s,
-            solid_s,
-            filled_s: None,
+        let (cost, whole) = printing.costs();
+        let Costs {
+            pieces,
+            whole,
+            filled,
+        } = sliced.unwrap_or(Costs {
+            pieces: cost,
+            whole: whole.unwrap_or_default(),
+            filled: None,
         });
-        let ratio = |whole_s: f64| pieces_s / whole_s.max(f64::MIN_POSITIVE);
-        let told = json!({ "by": by, "pieces_s": pieces_s, "solid_s": solid_s, "ratio": ratio(solid_s),
-            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(ratio) });
+        let over = |whole: f64, ours: f64| ours / whole.max(f64::MIN_POSITIVE);
+        let filled_s = filled.map(|f| f.seconds);
+        let told = json!({ "by": by, "pieces_s": pieces.seconds, "solid_s": whole.seconds,
+            "ratio": over(whole.seconds, pieces.seconds), "pieces_g": pieces.grams, "solid_g": whole.grams,
+            "material_ratio": over(whole.grams, pieces.grams), "solid_as": whole_words(printer.process),
+            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(|s| over(s, pieces.seconds)) });
         times.insert(printer.name, told);
     }
     let volume: f64 = pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
@@ -96,15 +103,20 @@ fn print(told: &Value) {
     );
     for (name, time) in told["print_time"].as_object().into_iter().flatten() {
         println!(
-            "time, {name}   {:5.1} % of the solid model's: {:.1} h instead of {:.1} h, by {}",
+            "{name}   {:5.1} % of the time and {:.1} % of the material of the whole model {}: {:.1} h and {:.0} g instead of \
+             {:.1} h and {:.0} g, by {}",
             percent(&time["ratio"]),
+            percent(&time["material_ratio"]),
+            time["solid_as"].as_str().unwrap_or_default(),
             hours(&time["pieces_s"]),
+            time["pieces_g"].as_f64().unwrap_or_default(),
             hours(&time["solid_s"]),
+            time["solid_g"].as_f64().unwrap_or_default(),
             time["by"].as_str().unwrap_or_default()
         );
         if !time["filled_ratio"].is_null() {
             println!(
-                "            {:5.1} % of {:.1} h where the solid is filled to 100 %",
+                "      {:5.1} % of {:.1} h where the whole model is filled to 100 %",
                 percent(&time["filled_ratio"]),
                 hours(&time["filled_solid_s"])
             );
@@ -112,14 +124,14 @@ fn print(told: &Value) {
     }
 }
 
-/// Print times, s.
-struct Times {
-    /// Of all plates.
-    pieces_s: f64,
-    /// Of the solid model, by filament with a fifth of its inside filled.
-    solid_s: f64,
-    /// Of the solid model, filled, where that is another.
-    filled_s: Option<f64>,
+/// By the slicer.
+struct Costs {
+    /// All plates.
+    pieces: Cost,
+    /// The whole model as people print it.
+    whole: Cost,
+    /// The whole model, filled, where that is another.
+    filled: Option<Cost>,
 }
 
 /// PrusaSlicer, and a folder for its files.
@@ -142,13 +154,13 @@ impl Slicer {
         Ok(Some(Self { folder }))
     }
 
-    /// Times for all plates among `files` and for the solid; `None` where the slicer refuses something.
-    fn seconds(
+    /// All plates among `files`, and the solid; `None` where the slicer refuses something.
+    fn costs(
         &self,
         printer: &Printer,
         files: Vec<(String, Vec<u8>)>,
         solid: &Solid,
-    ) -> Result<Option<Times>, Failure> {
+    ) -> Result<Option<Costs>, Failure> {
         let Some(laid) = lay_alone(printer, solid.mesh()) else {
             return Ok(None);
         };
@@ -164,31 +176,32 @@ impl Slicer {
             .into_iter()
             .filter(|(name, _)| is_single || name.starts_with("plates/"))
             .map(|(_, bytes)| bytes);
-        let mut pieces_s = 0.0;
+        let mut pieces = Cost::default();
         for bytes in plates {
-            let Some(s) = self.seconds_of(printer, &bytes, "")? else {
+            let Some(plate) = self.cost_of(printer, &bytes, "")? else {
                 return Ok(None);
             };
-            pieces_s += s;
+            pieces = pieces.and(plate);
         }
-        let whole = write_3mf(&[object]);
-        let Some(solid_s) = self.seconds_of(printer, &whole, "")? else {
+        let model = write_3mf(&[object]);
+        let is_filament = printer.process == Process::Fdm;
+        let Some(whole) = self.cost_of(printer, &model, if is_filament { "" } else { HOLLOWED })? else {
             return Ok(None);
         };
-        let filled_s = if printer.process == Process::Fdm {
-            self.seconds_of(printer, &whole, FILLED)?
+        let filled = if is_filament {
+            self.cost_of(printer, &model, FILLED)?
         } else {
             None
         };
-        Ok(Some(Times {
-            pieces_s,
-            solid_s,
-            filled_s,
+        Ok(Some(Costs {
+            pieces,
+            whole,
+            filled,
         }))
     }
 
-    /// Time for what a 3MF file holds, s; `more` settings stand last.
-    fn seconds_of(&self, printer: &Printer, bytes: &[u8], more: &str) -> Result<Option<f64>, Failure> {
+    /// What a 3MF file holds; `more` settings stand last.
+    fn cost_of(&self, printer: &Printer, bytes: &[u8], more: &str) -> Result<Option<Cost>, Failure> {
         let [model, settings, out] =
             ["job.3mf", "job.ini", "job.out"].map(|name| self.folder.path().join(name));
         let (text, export) = match printer.process {
@@ -218,19 +231,21 @@ impl Slicer {
         if !done.is_ok_and(|status| status.success()) {
             return Ok(None);
         }
-        Ok(told_time(&out, printer.process))
+        Ok(told_cost(&out, printer))
     }
 }
 
-/// The time that the slicer wrote into its result, s.
-fn told_time(out: &PathBuf, process: Process) -> Option<f64> {
-    match process {
+/// The time and the material that the slicer wrote into its result.
+fn told_cost(out: &PathBuf, printer: &Printer) -> Option<Cost> {
+    let grams = |cm3: f64| cm3 * printer.material.density_g_cm3;
+    match printer.process {
         Process::Fdm => {
             let code = fs::read_to_string(out).ok()?;
-            let line = code
-                .lines()
-                .find(|l| l.contains("estimated printing time (normal mode)"))?;
-            Some(seconds_in(line.split_once('=')?.1))
+            let told = |name: &str| Some(code.lines().find(|l| l.contains(name))?.split_once('=')?.1);
+            Some(Cost {
+                seconds: seconds_in(told("estimated printing time (normal mode)")?),
+                grams: grams(told("filament used [cm3]")?.trim().parse().ok()?),
+            })
         }
         Process::Sla | Process::Sls => {
             let archive = Command::new("unzip")
@@ -240,8 +255,14 @@ fn told_time(out: &PathBuf, process: Process) -> Option<f64> {
                 .output()
                 .ok()?;
             let text = String::from_utf8_lossy(&archive.stdout).into_owned();
-            let line = text.lines().find(|l| l.starts_with("printTime"))?;
-            line.split_once('=')?.1.trim().parse().ok()
+            let told = |name: &str| {
+                let line = text.lines().find(|l| l.starts_with(name))?;
+                line.split_once('=')?.1.trim().parse().ok()
+            };
+            Some(Cost {
+                seconds: told("printTime")?,
+                grams: grams(told("usedMaterial")?),
+            })
         }
     }
 }

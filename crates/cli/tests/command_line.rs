@@ -385,8 +385,8 @@ fn labelled_cube(label: [i32; 12]) -> String {
 }
 
 /// What `test` reads of a plan of two pieces.
-const TWO_PIECES: &str = r#"{ "pieces": [ { "id": 0, "installation_direction": [0, 0, 1] },
-    { "id": 1, "installation_direction": [0, 0, -1] } ], "installation_order": [0, 1], "up": [0, 0, 1],
+const TWO_PIECES: &str = r#"{ "pieces": [ { "id": 1, "installation_direction": [0, 0, 1] },
+    { "id": 2, "installation_direction": [0, 0, -1] } ], "installation_order": [1, 2], "up": [0, 0, 1],
     "shell_thickness": 2, "connector_size": 2.5 }"#;
 
 #[test]
@@ -405,7 +405,7 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     fs::create_dir(&kit).unwrap();
     refused(&["kit", "shellock build"]);
     let plan = kit.join("plan.json");
-    let twice = TWO_PIECES.replace("[0, 1], \"up\"", "[1, 1], \"up\"");
+    let twice = TWO_PIECES.replace("[1, 2], \"up\"", "[1, 1], \"up\"");
     let thick = TWO_PIECES.replace("\"shell_thickness\": 2", "\"shell_thickness\": -3");
     let unsaid = TWO_PIECES.replace("\"shell_thickness\": 2,", "");
     fs::write(&plan, "{ \"pieces\": [").unwrap();
@@ -416,17 +416,17 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     refused(&["plan.json", "names piece 1 twice"]);
     fs::write(&plan, TWO_PIECES).unwrap();
     refused(&["segmentation.ply"]);
-    fs::write(kit.join("segmentation.ply"), labelled_cube([0; 12])).unwrap();
+    fs::write(kit.join("segmentation.ply"), labelled_cube([1; 12])).unwrap();
     refused(&["segmentation.ply", "no face"]);
     fs::write(
         kit.join("segmentation.ply"),
-        labelled_cube([0, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0]),
+        labelled_cube([1, 1, 2, 2, 3, 1, 1, 1, 1, 1, 1, 1]),
     )
     .unwrap();
     refused(&["segmentation.ply", "label"]);
     fs::write(
         kit.join("segmentation.ply"),
-        labelled_cube([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0]),
+        labelled_cube([1, 1, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1]),
     )
     .unwrap();
     fs::write(&plan, unsaid).unwrap();
@@ -464,7 +464,7 @@ fn a_test_says_how_it_ended_by_its_exit_code_and_leaves_figures_and_a_picture() 
     let kit = dir.path().join("kit");
     fs::create_dir(&kit).unwrap();
     fs::write(kit.join("plan.json"), TWO_PIECES).unwrap();
-    let lid = labelled_cube([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0]);
+    let lid = labelled_cube([1, 1, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1]);
     fs::write(kit.join("segmentation.ply"), lid).unwrap();
     let o = shellock(dir.path(), &["test", "kit", "--edges", "3", "--json"]);
     let told: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();

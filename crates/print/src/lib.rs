@@ -4,6 +4,8 @@
 //! drawn.
 
 pub mod booklet;
+pub mod columns;
+pub mod load;
 mod pdf;
 pub mod plates;
 pub mod printer;

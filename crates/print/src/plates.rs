@@ -9,6 +9,7 @@ mod pack;
 use rayon::prelude::*;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
+use crate::load::Load;
 use crate::printer::Printer;
 use orient::Pose;
 use pack::{Spot, pack};
@@ -47,8 +48,8 @@ pub struct Laid {
     pub outer_support_mm2: f64,
     /// All surface that needs support, mm².
     pub support_mm2: f64,
-    /// Volume between that surface and the plate, mm³.
-    pub support_mm3: f64,
+    /// What it asks of the printer as it lies.
+    pub load: Load,
 }
 
 impl Laid {
@@ -78,7 +79,7 @@ pub struct Plates {
 
 /// Lays all `pieces` flat and packs them on plates of `printer`; the same for the same input.
 ///
-/// Some 5 ms for a piece of 20 000 triangles.
+/// Some 0.3 to 1 s for a piece of 20 000 triangles: 150 poses are judged coarsely, 20 finely.
 pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
     let poses: Vec<Option<Pose>> = pieces
         .par_iter()
@@ -185,7 +186,7 @@ pub fn fits(printer: &Printer, mesh: &TriMesh) -> bool {
         mesh,
         is_outer: vec![false; mesh.triangles.len()],
     };
-    orient::best(printer, &piece, room_mm(printer)).is_some()
+    orient::fits(&piece, room_mm(printer))
 }
 
 /// Whether everything that fits into a box fits the printer, however it is cut.
@@ -239,7 +240,7 @@ fn placed(piece: usize, pose: &Pose, spot: &Spot) -> Laid {
         size_mm: pose.bounds.size().to_array(),
         outer_support_mm2: pose.support.outer_mm2,
         support_mm2: pose.support.all_mm2,
-        support_mm3: pose.support.below_mm3,
+        load: pose.load,
     }
 }
 

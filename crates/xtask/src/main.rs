@@ -6,6 +6,7 @@
 mod chart;
 mod failure;
 mod golden;
+mod hours;
 mod metrics;
 mod model;
 mod pictures;

@@ -8,6 +8,7 @@ use clap::{Args, Subcommand};
 
 use crate::chart::{Corner, Curve, Labels, bands, scatter, sorted_scores};
 use crate::failure::Failure;
+use crate::hours::{self, HoursOptions};
 use crate::metrics::{self, MetricsOptions};
 use crate::search::{self, SearchOptions};
 use crate::statistics::{band, kendall, spearman};
@@ -32,6 +33,8 @@ enum Study {
     Search(SearchOptions),
     /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
     Strength(StrengthOptions),
+    /// How well print time and plastic by closed forms agree with PrusaSlicer's, on kits or on their pieces
+    Hours(HoursOptions),
     /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a
     /// row for each plan; the first column is the metric that the others are compared with
     Scores {
@@ -58,6 +61,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
         Study::Metrics(metrics) => metrics::run(metrics, &options.out),
         Study::Search(search) => search::run(search, &options.out),
         Study::Strength(strength) => strength::run(strength, &options.out),
+        Study::Hours(hours) => hours::run(hours, &options.out),
         Study::Scores { file } => write_all(&options.out, &stem(file), &agreement(&read(file)?)?),
         Study::Convergence { file, optimum, names } => {
             let runs = runs(&read(file)?).map_err(|problem| Failure::Table {

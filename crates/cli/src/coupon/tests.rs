@@ -95,13 +95,9 @@ fn the_plate_fits_the_bed_of_every_preset_and_a_small_bed_is_refused_with_the_si
         assert!(bounds.min.x >= EDGE_MM && bounds.max.x <= width - EDGE_MM);
         assert!(bounds.min.y >= EDGE_MM && bounds.max.y <= depth - EDGE_MM);
         assert!(bounds.min.z == 0.0 && bounds.max.z <= height);
-        // Resin and powder by the layer, which the closed form knows; filament is measured with a slicer.
+        // Half an hour by a slicer; the closed form, made for large parts, says a sixth more for filament.
         let seconds = plate.seconds();
-        assert!(
-            seconds.is_none_or(|s| s <= 1800.0),
-            "{}: {seconds:?}",
-            printer.name
-        );
+        assert!((300.0..2200.0).contains(&seconds), "{}: {seconds}", printer.name);
     }
     let small = Printer {
         bed_mm: [60.0, 60.0, 60.0],

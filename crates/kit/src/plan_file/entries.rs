@@ -274,15 +274,24 @@ pub struct LaidEntry {
     pub outer_support_mm2: f64,
 }
 
-/// Print time.
+/// Print time and material, with supports.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeEntry {
     /// How it was found: "closed form".
     pub by: String,
     /// Of all plates, s.
     pub pieces_s: f64,
-    /// Of the solid model, s; 0 where the printer cannot make it.
+    /// Of the whole model as people print it, s; 0 where the printer cannot make it.
     pub solid_s: f64,
     /// The one over the other; `None` where the printer cannot make the solid model.
     pub ratio: Option<f64>,
+    /// Material of all plates, g.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pieces_g: Option<f64>,
+    /// Material of the whole model, g.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid_g: Option<f64>,
+    /// How people print the whole model: "at 15 % infill".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid_as: Option<String>,
 }

@@ -9,6 +9,7 @@ use shellock_assembly::verify::Play;
 use shellock_assembly::verify::clearance::PathGap;
 use shellock_assembly::{PatchId, Warning};
 use shellock_geom::repair::{Repair, RepairKind};
+use shellock_print::time::{Cost, whole_words};
 use shellock_print::{Plates, Printer, Process};
 
 use super::{
@@ -273,9 +274,8 @@ impl GapsEntry {
 }
 
 impl PrintingEntry {
-    /// Pieces on `plates` of `printer`; `seconds` are the print times of all plates and of the solid model, by
-    /// closed forms.
-    pub fn of(printer: &Printer, plates: &Plates, seconds: [f64; 2]) -> Self {
+    /// Pieces on `plates` of `printer`, and what all plates and the whole model take by closed forms.
+    pub fn of(printer: &Printer, plates: &Plates, cost: Cost, whole: Option<Cost>) -> Self {
         let process = Process::ALL.iter().find(|(_, p)| *p == printer.process);
         let laid = plates.laid.iter().map(|l| LaidEntry {
             piece: l.piece.into(),
@@ -286,7 +286,7 @@ impl PrintingEntry {
             support_mm2: l.support_mm2,
             outer_support_mm2: l.outer_support_mm2,
         });
-        let [pieces_s, solid_s] = seconds;
+        let (pieces_s, solid_s) = (cost.seconds, whole.map_or(0.0, |w| w.seconds));
         let ratio = pieces_s / solid_s.max(f64::MIN_POSITIVE);
         Self {
             printer: printer.name.clone(),
@@ -301,6 +301,9 @@ impl PrintingEntry {
                 pieces_s,
                 solid_s,
                 ratio: ratio.is_finite().then_some(ratio),
+                pieces_g: Some(cost.grams),
+                solid_g: whole.map(|w| w.grams),
+                solid_as: whole.map(|_| whole_words(printer.process).to_owned()),
             }),
         }
     }

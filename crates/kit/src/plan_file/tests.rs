@@ -14,38 +14,39 @@ const WHOLE: &str = r#"{
         "density_g_cm3": 1.15 }, "drop_m": 1.275, "n_falls": 12, "stress_mpa": 30.5, "is_too_weak": false,
         "at": [1.0, 2.0, 3.0], "deciding_fall": 3, "down": [0.0, 0.0, -1.0],
         "tried": [{ "thickness_mm": 2.5, "stress_mpa": 30.5 }], "solid": [{ "area_mm2": 60.5, "at": [0.0, 0.0, 0.0] }] },
-    "clearance": 0.12, "connector_size": 3.0, "connector_sizes": [{ "pieces": [0, 1], "size_mm": 3.0 }],
-    "wall_gap": 0.05, "up": [0.0, 0.0, 1.0], "min_wall": 0.4, "key_piece": 1,
+    "clearance": 0.12, "connector_size": 3.0, "connector_sizes": [{ "pieces": [1, 2], "size_mm": 3.0 }],
+    "wall_gap": 0.05, "up": [0.0, 0.0, 1.0], "min_wall": 0.4, "key_piece": 2,
     "key": { "rails": 20.5, "area_mm2": 400.5, "flat_share": 0.9, "side_share": 0.8, "slide": [1.0, 0.0, 0.0],
-        "plane_normal": [0.0, 0.0, 1.0], "turned_degrees": 12.5 },
-    "press_fits": [{ "kind": "rib", "piece": 1, "at": [0.0, 0.0, 0.0], "interference_mm": 0.08, "travel_mm": 2.0 }],
+        "plane_normal": [0.0, 0.0, 1.0] },
+    "press_fits": [{ "kind": "rib", "piece": 2, "at": [0.0, 0.0, 0.0], "interference_mm": 0.08, "travel_mm": 2.0 }],
     "pieces": [
-        { "id": 0, "file": "pieces/piece-00.stl", "neighbors": [1], "volume_mm3": 900.5, "n_triangles": 12,
+        { "id": 1, "file": "pieces/piece-01.stl", "neighbors": [2], "volume_mm3": 900.5, "n_triangles": 12,
           "installation_direction": [0.0, 0.0, 1.0], "thin_share": 0.0, "thin_places": [], "rattle": null },
-        { "id": 1, "file": "pieces/piece-01.stl", "neighbors": [0], "volume_mm3": 800.5, "n_triangles": 12,
+        { "id": 2, "file": "pieces/piece-02.stl", "neighbors": [1], "volume_mm3": 800.5, "n_triangles": 12,
           "installation_direction": [0.0, 0.0, -1.0], "thin_share": 0.1,
           "thin_places": [{ "kind": "slot", "length_mm": 4.5, "thickness_mm": 0.125, "at": [0.0, 0.0, 1.0] }],
           "rattle": { "translation_mm": 0.2, "rotation_deg": 0.3, "is_proven": true, "together": null } }],
-    "installation_order": [0, 1],
+    "installation_order": [1, 2],
     "plan": { "cost": 1.5, "lower_bound": 1.5, "gap": 0.0, "optimal": true, "least_cost": 1.5, "key_lower_bound": 1.5,
-        "proven_for": { "keys": [1], "key_slides": "within its plane", "lessons": 0 }, "piece_costs": [1.5, 0.5] },
-    "holding": { "quality_mm": -0.5, "loose": [], "seams": [{ "later": 1, "earlier": 0, "score_mm": 0.5,
+        "proven_for": { "keys": [2], "key_slides": "within its plane", "lessons": 0 }, "piece_costs": [1.5, 0.5] },
+    "holding": { "quality_mm": -0.5, "loose": [], "seams": [{ "later": 2, "earlier": 1, "score_mm": 0.5,
         "opening_mm": 0.25, "weight": 2.0, "at": [0.0, 0.0, 0.0], "reason": "short" }], "n_compared": 3,
         "foreseen_play": [[0.1, 0.2], [0.0, 0.0]], "foreseen_excess": [0.5, 0.0] },
     "volume_ratio": 0.3, "connector_share": 0.75,
-    "joints": [{ "male": 0, "female": 1, "length_mm": 20.5, "volume_mm3": [1.5, 2.5], "kept": [1.0, 0.9],
+    "joints": [{ "male": 1, "female": 2, "length_mm": 20.5, "volume_mm3": [1.5, 2.5], "kept": [1.0, 0.9],
         "at": [0.0, 0.0, 0.0] }],
-    "contacts": [{ "later": 1, "earlier": 0, "length_mm": 80.5, "usable_mm": 60.5, "at": [0.0, 0.0, 0.0] }],
+    "contacts": [{ "later": 2, "earlier": 1, "length_mm": 80.5, "usable_mm": 60.5, "at": [0.0, 0.0, 0.0] }],
     "effort": { "keys": 1, "segmentations": 2, "plans": 3, "kits": 1 },
     "gaps": { "at_rest_mm": 0.1, "at_rest_beneath_rim_mm": 0.12, "on_the_way_mm": 0.05,
         "on_the_way_beneath_rim_mm": null, "key_on_the_way_beneath_rim_mm": 0.1, "fits_within_mm": 0.025 },
-    "verification": { "passed": false, "checks": [{ "name": "pieces are closed", "ok": false, "figure": "1 is not" }],
-        "findings": [{ "kind": "not-closed", "piece": 1 }] },
-    "warnings": [{ "code": "key-ribs", "message": "file them", "pieces": [1], "at": null }],
+    "verification": { "passed": false, "checks": [{ "name": "pieces are closed", "ok": false, "figure": "2 is not" }],
+        "findings": [{ "kind": "not-closed", "piece": 2 }] },
+    "warnings": [{ "code": "key-ribs", "message": "file them", "pieces": [2], "at": null }],
     "printing": { "printer": "sla", "process": "sla", "bed": [192.0, 120.0, 200.0], "layer": 0.05, "plates": 1,
-        "laid": [{ "piece": 0, "plate": 1, "size": [20.0, 20.0, 5.0], "turned": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0],
+        "laid": [{ "piece": 1, "plate": 1, "size": [20.0, 20.0, 5.0], "turned": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0],
             [0.0, 0.0, 1.0]], "moved": [4.0, 4.0, 0.0], "support_mm2": 10.5, "outer_support_mm2": 0.5 }],
-        "too_large": [1], "time": { "by": "closed form", "pieces_s": 3600.5, "solid_s": 0.0, "ratio": null } }
+        "too_large": [2], "time": { "by": "closed form", "pieces_s": 3600.5, "solid_s": 0.0, "ratio": null,
+            "pieces_g": 104.5, "solid_g": 84.5, "solid_as": "hollowed to 2 mm walls" } }
 }"#;
 
 fn whole() -> Value {
@@ -176,7 +177,7 @@ fn what_is_no_plan_is_refused() {
 #[test]
 fn kits_of_earlier_versions_are_read() {
     let least =
-        json!({ "pieces": [{ "id": 0, "installation_direction": [0, 0, 1] }], "installation_order": [0] });
+        json!({ "pieces": [{ "id": 1, "installation_direction": [0, 0, 1] }], "installation_order": [1] });
     let plan = read(&least).unwrap();
     assert_eq!(plan.order().unwrap().steps.len(), 1);
     assert!(
@@ -214,9 +215,9 @@ fn orders_name_every_piece_once() {
         plan.order().map_err(|e| e.to_string())
     };
     assert!(order(&[1, 0]).is_ok_and(|plan| plan.key() == PatchId(0)));
-    assert!(order(&[0, 0]).unwrap_err().contains("piece 0 twice"));
-    assert!(order(&[0]).unwrap_err().contains("leaves out piece 1"));
-    assert!(order(&[0, 1, 2]).unwrap_err().contains("names 2"));
+    assert!(order(&[0, 0]).unwrap_err().contains("piece 1 twice"));
+    assert!(order(&[0]).unwrap_err().contains("leaves out piece 2"));
+    assert!(order(&[0, 1, 2]).unwrap_err().contains("names 3"));
     let mut plan = read(&whole()).unwrap();
     plan.pieces.swap(0, 1);
     assert!(plan.order().is_err() && plan.check_directions().is_ok());
@@ -225,7 +226,7 @@ fn orders_name_every_piece_once() {
         plan.check_directions()
             .unwrap_err()
             .to_string()
-            .contains("piece 1")
+            .contains("piece 2")
     );
 }
 
@@ -238,7 +239,7 @@ fn sizes_belong_to_pieces_that_are_there() {
         plan.sizes().map_err(|e| e.to_string())
     };
     assert!(sizes([0, 1], 2.0).is_ok_and(|s| s.of(PatchId(1), PatchId(0)) == 2.0));
-    assert!(sizes([0, 2], 2.0).unwrap_err().contains("pieces 0 and 2"));
+    assert!(sizes([0, 2], 2.0).unwrap_err().contains("pieces 1 and 3"));
     assert!(sizes([0, 1], 25.0).unwrap_err().contains("25 mm"));
     let mut plan = read(&whole()).unwrap();
     plan.connector_sizes = Some(Vec::new());

@@ -1,0 +1,203 @@
+//! A piece in its pose as columns: where a vertical line through the middle of each cell of a grid is inside.
+//!
+//! ```text
+//!        ┌──────────┐  top
+//!        │ a span   │
+//!        └──────────┘  bottom: hangs where the face is flatter than an overhang may be
+//!             :        support, down to the next span or to the plate
+//!        ┌──────────┐
+//! ───────┴──────────┴─────── plate, z = 0
+//! ```
+//!
+//! That is what supports depend on: one above another part of the same piece ends there, not on the plate.
+//! Limits: what is narrower than a cell may fall between two columns.
+
+use shellock_geom::{Aabb, TriMesh, Vec3};
+
+/// Where the lines stand in their cells, from the middle, in cells: off any round number, so that edges of
+/// boxes are not met.
+const OFF_MIDDLE: [f64; 2] = [0.0137, -0.0219];
+
+/// A stretch of a column that is inside the piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Lower end above the plate, mm.
+    pub bottom_mm: f64,
+    /// Upper end above the plate, mm.
+    pub top_mm: f64,
+    /// Upward part of the normal at the lower end, in [−1, 0]: −1 where it hangs flat.
+    pub bottom_normal: f64,
+}
+
+/// All columns of a piece in its pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    /// Width of a cell, mm.
+    pub cell_mm: f64,
+    /// Cells along x and y.
+    pub size: [usize; 2],
+    /// Its least x and y on the axes of the plate, mm.
+    corner_mm: [f64; 2],
+    /// Of its highest point, mm.
+    pub height_mm: f64,
+    /// Of each column, x fastest, where its spans start; and where the last ends.
+    starts: Vec<u32>,
+    spans: Vec<Span>,
+}
+
+/// A crossing of a column with a face: column, height, upward part of the normal.
+struct Crossing {
+    column: u32,
+    height_mm: f64,
+    normal: f64,
+}
+
+impl Columns {
+    /// Columns of a closed `mesh` turned so that `axes` are those of the plate, with its lowest point at z = 0.
+    ///
+    /// A cell is `cell_mm` wide, or more where there were too many otherwise. Linear in faces and cells.
+    pub fn of(mesh: &TriMesh, axes: [Vec3; 3], cell_mm: f64) -> Self {
+        /// Cells along the longer side.
+        const MOST_CELLS: f64 = 160.0;
+        let points: Vec<Vec3> = mesh
+            .points
+            .iter()
+            .map(|p| Vec3::from_array(axes.map(|a| a.dot(*p))))
+            .collect();
+        let bounds = Aabb::around(points.iter().copied());
+        let reach = bounds.max - bounds.min;
+        let cell_mm = cell_mm.max(reach.x.max(reach.y) / MOST_CELLS);
+        let size = [reach.x, reach.y].map(|mm| (mm / cell_mm).ceil().max(1.0) as usize);
+        let to_grid = |p: &Vec3| {
+            let q = *p - bounds.min;
+            Vec3::new(
+                q.x / cell_mm - 0.5 - OFF_MIDDLE[0],
+                q.y / cell_mm - 0.5 - OFF_MIDDLE[1],
+                q.z,
+            )
+        };
+        let points: Vec<Vec3> = points.iter().map(to_grid).collect();
+        let mut crossings = Vec::new();
+        for corners in &mesh.triangles {
+            cross(&points, *corners, size, cell_mm, &mut crossings);
+        }
+        let (starts, spans) = spans(size[0] * size[1], crossings);
+        Self {
+            cell_mm,
+            size,
+            corner_mm: [bounds.min.x, bounds.min.y],
+            height_mm: reach.z,
+            starts,
+            spans,
+        }
+    }
+
+    /// The spans of a column, lowest first.
+    pub fn spans(&self, column: usize) -> &[Span] {
+        &self.spans[self.starts[column] as usize..self.starts[column + 1] as usize]
+    }
+
+    /// Where the middle of a column is on the axes of the plate, mm.
+    pub fn middle(&self, column: usize) -> [f64; 2] {
+        let at = [column % self.size[0], column / self.size[0]];
+        [0, 1].map(|k| self.corner_mm[k] + (at[k] as f64 + 0.5) * self.cell_mm)
+    }
+
+    /// How many columns there are.
+    pub fn len(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Area of a cell, mm².
+    pub fn cell_mm2(&self) -> f64 {
+        self.cell_mm * self.cell_mm
+    }
+}
+
+/// Twice the area of `abp`, seen from above: exactly the opposite for `bap`, so that a column meets just one
+/// of two faces with a common edge.
+fn side(points: &[Vec3], a: u32, b: u32, x: f64, y: f64) -> f64 {
+    let (lo, hi) = (points[a.min(b) as usize], points[a.max(b) as usize]);
+    let doubled = (hi.x - lo.x) * (y - lo.y) - (hi.y - lo.y) * (x - lo.x);
+    if a < b { doubled } else { -doubled }
+}
+
+/// Adds where columns cross a face, whose points are in cells along x and y.
+fn cross(
+    points: &[Vec3],
+    [a, b, c]: [u32; 3],
+    size: [usize; 2],
+    cell_mm: f64,
+    crossings: &mut Vec<Crossing>,
+) {
+    let corners = [a, b, c].map(|i| points[i as usize]);
+    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    if normal.z == 0.0 {
+        return;
+    }
+    // In mm: the cross product is in cells along x and y.
+    let upward =
+        normal.z / (normal.z * normal.z + (normal.x.powi(2) + normal.y.powi(2)) / cell_mm.powi(2)).sqrt();
+    let range = |k: usize| {
+        let (lo, hi) = corners
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
+                (lo.min(p[k]), hi.max(p[k]))
+            });
+        (lo.ceil().max(0.0) as usize)..((hi.floor() + 1.0).clamp(0.0, size[k] as f64) as usize)
+    };
+    for iy in range(1) {
+        for ix in range(0) {
+            let (x, y) = (ix as f64, iy as f64);
+            let weights = [(b, c), (c, a), (a, b)].map(|(p, q)| side(points, p, q, x, y));
+            if weights.iter().all(|w| *w > 0.0) || weights.iter().all(|w| *w < 0.0) {
+                let sum: f64 = weights.iter().sum();
+                let height_mm = (0..3).map(|k| weights[k] * corners[k].z).sum::<f64>() / sum;
+                crossings.push(Crossing {
+                    column: (iy * size[0] + ix) as u32,
+                    height_mm,
+                    normal: upward,
+                });
+            }
+        }
+    }
+}
+
+/// Where each column's spans start, and all spans: between where a line gets in and where it is out again.
+fn spans(n_columns: usize, mut crossings: Vec<Crossing>) -> (Vec<u32>, Vec<Span>) {
+    crossings.sort_by(|a, b| {
+        (a.column, a.height_mm)
+            .partial_cmp(&(b.column, b.height_mm))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let mut starts = Vec::with_capacity(n_columns + 1);
+    let mut spans: Vec<Span> = Vec::with_capacity(crossings.len() / 2);
+    let mut rest = crossings.as_slice();
+    for column in 0..n_columns {
+        starts.push(spans.len() as u32);
+        let n = rest.iter().take_while(|c| c.column as usize == column).count();
+        let (mine, others) = rest.split_at(n);
+        rest = others;
+        let mut entered: Vec<&Crossing> = Vec::new();
+        for crossing in mine {
+            if crossing.normal < 0.0 {
+                entered.push(crossing);
+            } else if let Some(below) = entered.pop()
+                && entered.is_empty()
+            {
+                spans.push(Span {
+                    bottom_mm: below.height_mm,
+                    top_mm: crossing.height_mm,
+                    bottom_normal: below.normal,
+                });
+            }
+        }
+    }
+    starts.push(spans.len() as u32);
+    (starts, spans)
+}

@@ -1,0 +1,450 @@
+//! What a piece in its pose asks of a printer: walls, insides and supports, from its columns.
+//!
+//! Slices are looked at every millimetre or so, as a slicer does every layer: how much of a slice is farther
+//! from its outline than the perimeters reach and from the surface above and below than solid layers reach
+//! (that is sparse infill, if there is enough of it), what supports take, and how much of its outlines are short loops.
+
+use shellock_geom::{TriMesh, Vec3};
+
+use crate::columns::{Columns, Span};
+
+/// Width of a cell, mm.
+pub(crate) const CELL_MM: f64 = 1.0;
+/// Most slices that are looked at, a cell's width apart.
+const MOST_SLICES: f64 = 120.0;
+/// Solid layers above and below.
+const SOLID_LAYERS: f64 = 3.0;
+/// Infill of less is solid, mm².
+const SOLID_BELOW_MM2: f64 = 70.0;
+/// A layer may stand out beyond the one below by so much without support, mm: half a line.
+const OVERHANG_MM: f64 = 0.225;
+/// Loops that are shorter are laid slowly, mm: those of a radius below 6.5, as the slicer has it.
+const SHORT_MM: f64 = 41.0;
+/// Length of an outline over that of the edges of its cells.
+const OUTLINE: f64 = std::f64::consts::FRAC_PI_4;
+/// Supports keep away from the piece above by so much, mm.
+const CONTACT_MM: f64 = 0.2;
+
+/// What is printed, of one piece or of several on one plate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Of its highest part, mm.
+    pub height_mm: f64,
+    /// Of all of it, mm³.
+    pub volume_mm3: f64,
+    /// Outlines of all slices times their distance, mm²: surface as it is seen from the sides.
+    pub side_mm2: f64,
+    /// Surface as it is seen from above, mm².
+    pub top_mm2: f64,
+    /// Area of the shadow on the plate, mm².
+    pub shadow_mm2: f64,
+    /// Volume of what is filled sparsely, mm³.
+    pub sparse_mm3: f64,
+    /// Short loops of all slices times their distance, mm²: they are laid slowly.
+    pub small_side_mm2: f64,
+    /// Volume that supports fill, mm³.
+    pub support_mm3: f64,
+    /// The same a millimetre wider on all sides, as slicers draw it, mm³.
+    pub wide_support_mm3: f64,
+    /// The sides of that, mm².
+    pub wide_side_mm2: f64,
+    /// Its upper ends, mm².
+    pub wide_top_mm2: f64,
+    /// Largest area of a slice, mm²: what a layer of resin is peeled off at.
+    pub widest_mm2: f64,
+    /// Volume of cups that open upwards only, mm³: resin printers hang pieces upside down, so there resin is
+    /// caught and the film sucks. A bell, open below, drains through what lifts it off the plate.
+    pub cup_mm3: f64,
+}
+
+impl Load {
+    /// Both at once, on one plate.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            height_mm: self.height_mm.max(other.height_mm),
+            volume_mm3: self.volume_mm3 + other.volume_mm3,
+            side_mm2: self.side_mm2 + other.side_mm2,
+            top_mm2: self.top_mm2 + other.top_mm2,
+            shadow_mm2: self.shadow_mm2 + other.shadow_mm2,
+            sparse_mm3: self.sparse_mm3 + other.sparse_mm3,
+            small_side_mm2: self.small_side_mm2 + other.small_side_mm2,
+            support_mm3: self.support_mm3 + other.support_mm3,
+            wide_support_mm3: self.wide_support_mm3 + other.wide_support_mm3,
+            wide_side_mm2: self.wide_side_mm2 + other.wide_side_mm2,
+            wide_top_mm2: self.wide_top_mm2 + other.wide_top_mm2,
+            widest_mm2: self.widest_mm2 + other.widest_mm2,
+            cup_mm3: self.cup_mm3 + other.cup_mm3,
+        }
+    }
+
+    /// Of a closed `mesh` turned so that `axes` are those of the plate, in layers of `layer_mm`; some 10 ms for
+    /// a piece of 20 000 triangles and 60 mm.
+    pub fn of(mesh: &TriMesh, axes: [Vec3; 3], layer_mm: f64) -> Self {
+        Self::of_columns(mesh, axes[2], layer_mm, &Columns::of(mesh, axes, CELL_MM))
+    }
+
+    /// [`Self::of`] by columns of the mesh, whose lines run along `up`.
+    pub(crate) fn of_columns(mesh: &TriMesh, up: Vec3, layer_mm: f64, columns: &Columns) -> Self {
+        let mut load = Self {
+            height_mm: columns.height_mm,
+            volume_mm3: mesh.signed_volume(),
+            ..Self::default()
+        };
+        for face in 0..mesh.triangles.len() {
+            let doubled = mesh.area_vector_doubled(face);
+            let upward = doubled.dot(up);
+            load.side_mm2 += (doubled.length_squared() - upward * upward).max(0.0).sqrt() / 2.0;
+            load.top_mm2 += upward.max(0.0) / 2.0;
+        }
+        let n_shaded = (0..columns.len())
+            .filter(|&c| !columns.spans(c).is_empty())
+            .count();
+        load.shadow_mm2 = n_shaded as f64 * columns.cell_mm2();
+        let supports = Supports::of(columns, layer_mm);
+        load.support_mm3 = supports.volume_mm3(columns);
+        let n_slices = (columns.height_mm / columns.cell_mm)
+            .ceil()
+            .clamp(1.0, MOST_SLICES);
+        let step_mm = columns.height_mm / n_slices;
+        let mut slice = Slice::of(columns);
+        for i in 0..n_slices as usize {
+            let z_mm = (i as f64 + 0.5) * step_mm;
+            slice.cut(columns, &supports, z_mm, SOLID_LAYERS * layer_mm);
+            slice.add(step_mm, columns.cell_mm, &mut load);
+        }
+        load
+    }
+}
+
+/// Of each column, what supports fill.
+pub(crate) struct Supports {
+    starts: Vec<u32>,
+    /// Lower and upper end, mm.
+    filled: Vec<[f64; 2]>,
+}
+
+impl Supports {
+    pub fn of(columns: &Columns, layer_mm: f64) -> Self {
+        let least_normal = -OVERHANG_MM / OVERHANG_MM.hypot(layer_mm);
+        let mut supports = Self {
+            starts: Vec::with_capacity(columns.len() + 1),
+            filled: Vec::new(),
+        };
+        for column in 0..columns.len() {
+            supports.starts.push(supports.filled.len() as u32);
+            let mut below_mm = 0.0;
+            for span in columns.spans(column) {
+                let Span {
+                    bottom_mm,
+                    top_mm,
+                    bottom_normal,
+                } = *span;
+                if bottom_normal < least_normal && bottom_mm - below_mm > CONTACT_MM + layer_mm {
+                    supports.filled.push([below_mm, bottom_mm - CONTACT_MM]);
+                }
+                below_mm = top_mm;
+            }
+        }
+        supports.starts.push(supports.filled.len() as u32);
+        supports
+    }
+
+    fn volume_mm3(&self, columns: &Columns) -> f64 {
+        self.filled.iter().map(|[lo, hi]| hi - lo).sum::<f64>() * columns.cell_mm2()
+    }
+
+    pub fn of_column(&self, column: usize) -> &[[f64; 2]] {
+        &self.filled[self.starts[column] as usize..self.starts[column + 1] as usize]
+    }
+}
+
+/// A slice, with a free rim of a cell around it.
+struct Slice {
+    width: usize,
+    cell_mm: f64,
+    /// Of each cell, whether it is inside the piece.
+    inside: Vec<bool>,
+    /// Farther from the surface above and below than solid layers reach.
+    deep: Vec<bool>,
+    /// In a support.
+    support: Vec<bool>,
+    /// In a support as it is drawn, in this slice and in the one below.
+    wide: [Vec<bool>; 2],
+    /// Outside the piece, and air or resin get there from below.
+    vented: Vec<bool>,
+    islands: Islands,
+}
+
+impl Slice {
+    fn of(columns: &Columns) -> Self {
+        let [width, height] = columns.size.map(|n| n + 2);
+        let empty = vec![false; width * height];
+        Self {
+            width,
+            cell_mm: columns.cell_mm,
+            inside: empty.clone(),
+            deep: empty.clone(),
+            support: empty.clone(),
+            wide: [empty.clone(), empty],
+            vented: vec![true; width * height],
+            islands: Islands::default(),
+        }
+    }
+
+    /// Goes on to the slice at `z_mm`; solid layers reach `solid_mm` below the surface.
+    fn cut(&mut self, columns: &Columns, supports: &Supports, z_mm: f64, solid_mm: f64) {
+        let n_along = columns.size[0];
+        for column in 0..columns.len() {
+            let cell = (column / n_along + 1) * self.width + column % n_along + 1;
+            let is_here = |s: &&Span| s.bottom_mm <= z_mm && z_mm < s.top_mm;
+            let span = columns.spans(column).iter().find(is_here);
+            self.inside[cell] = span.is_some();
+            self.deep[cell] =
+                span.is_some_and(|s| z_mm - s.bottom_mm > solid_mm && s.top_mm - z_mm > solid_mm);
+            self.support[cell] = supports
+                .of_column(column)
+                .iter()
+                .any(|[lo, hi]| *lo <= z_mm && z_mm < *hi);
+        }
+    }
+
+    /// Adds this slice, which stands for `step_mm`.
+    fn add(&mut self, step_mm: f64, cell_mm: f64, load: &mut Load) {
+        let (width, cell_mm2) = (self.width, cell_mm * cell_mm);
+        let islands = self.islands.find(&self.inside, width);
+        load.widest_mm2 = load
+            .widest_mm2
+            .max(islands.iter().sum::<usize>() as f64 * cell_mm2);
+        let of_island = self.islands.label.clone();
+        // Perimeters take about a cell: what has a neighbour outside is no infill.
+        let neighbours = |cell: usize| [cell - 1, cell + 1, cell - width, cell + width];
+        let is_sparse = |cell: usize| {
+            self.inside[cell] && self.deep[cell] && neighbours(cell).iter().all(|&n| self.inside[n])
+        };
+        let sparse: Vec<bool> = (0..self.inside.len()).map(is_sparse).collect();
+        let enough = |n: &&usize| **n as f64 * cell_mm2 >= SOLID_BELOW_MM2;
+        let n_sparse: usize = self.islands.find(&sparse, width).iter().filter(enough).sum();
+        load.sparse_mm3 += n_sparse as f64 * cell_mm2 * step_mm;
+        self.widen();
+        let [wide, below] = &self.wide;
+        let n_wide = wide.iter().filter(|s| **s).count();
+        load.wide_support_mm3 += n_wide as f64 * cell_mm2 * step_mm;
+        load.wide_top_mm2 += below
+            .iter()
+            .zip(wide)
+            .filter(|(below, here)| **below && !**here)
+            .count() as f64
+            * cell_mm2;
+        let differs = |cell: usize, next: usize| usize::from(wide[cell] != wide[next]);
+        let edges = (0..wide.len() - width)
+            .map(|cell| differs(cell, cell + 1) + differs(cell, cell + width))
+            .sum::<usize>();
+        load.wide_side_mm2 += edges as f64 * cell_mm * step_mm;
+        load.cup_mm3 += self.vent() as f64 * cell_mm2 * step_mm;
+        // The labels are those of lakes now.
+        load.small_side_mm2 += self.short_outlines(&of_island) as f64 * OUTLINE * cell_mm * step_mm;
+    }
+
+    /// Edges of cells along all short loops: each goes between an island, `of_island`, and a lake.
+    fn short_outlines(&self, of_island: &[u32]) -> usize {
+        let mut edges: Vec<(u32, u32)> = Vec::new();
+        for cell in (0..self.inside.len()).filter(|&cell| self.inside[cell]) {
+            let neighbours = [cell - 1, cell + 1, cell - self.width, cell + self.width];
+            let outside = neighbours.into_iter().filter(|&n| !self.inside[n]);
+            edges.extend(outside.map(|n| (of_island[cell], self.islands.label[n])));
+        }
+        edges.sort_unstable();
+        let loops = edges.chunk_by(|a, b| a == b).map(<[_]>::len);
+        let is_short = |n: &usize| *n as f64 * OUTLINE * self.cell_mm < SHORT_MM;
+        loops.filter(is_short).sum()
+    }
+
+    /// Draws supports a cell wider, but not into the piece.
+    fn widen(&mut self) {
+        self.wide.swap(0, 1);
+        let (width, n) = (self.width, self.inside.len());
+        for cell in 0..n {
+            let rows = [cell.wrapping_sub(width), cell, cell + width];
+            let mut block = rows.iter().flat_map(|c| [c.wrapping_sub(1), *c, c + 1]);
+            self.wide[0][cell] = !self.inside[cell] && block.any(|c| c < n && self.support[c]);
+        }
+    }
+
+    /// Lets air spread from below and from the rim; returns how many cells outside it does not reach.
+    fn vent(&mut self) -> usize {
+        let width = self.width;
+        let outside: Vec<bool> = self.inside.iter().map(|inside| !inside).collect();
+        let n_lakes = self.islands.find(&outside, width).len();
+        let mut is_open = vec![false; n_lakes];
+        if let Some(rim) = self.islands.label.first() {
+            is_open[*rim as usize] = true;
+        }
+        for (cell, label) in self.islands.label.iter().enumerate() {
+            if outside[cell] && self.vented[cell] {
+                is_open[*label as usize] = true;
+            }
+        }
+        let mut n_closed = 0;
+        for (cell, label) in self.islands.label.iter().enumerate() {
+            self.vented[cell] = outside[cell] && is_open[*label as usize];
+            n_closed += usize::from(outside[cell] && !self.vented[cell]);
+        }
+        n_closed
+    }
+}
+
+/// Cells that are connected.
+#[derive(Default)]
+struct Islands {
+    /// Of each cell that is set, the number of its island.
+    label: Vec<u32>,
+    stack: Vec<usize>,
+}
+
+impl Islands {
+    /// Numbers of cells of all islands of `set`, in rows of `width`.
+    fn find(&mut self, set: &[bool], width: usize) -> Vec<usize> {
+        self.label.clear();
+        self.label.resize(set.len(), u32::MAX);
+        let mut sizes = Vec::new();
+        for first in 0..set.len() {
+            if !set[first] || self.label[first] != u32::MAX {
+                continue;
+            }
+            let mut n = 0;
+            self.label[first] = sizes.len() as u32;
+            self.stack.push(first);
+            while let Some(cell) = self.stack.pop() {
+                n += 1;
+                // Rows wrap around at their ends, where the rim is free: that joins nothing but the rim.
+                for next in [
+                    cell.wrapping_sub(1),
+                    cell + 1,
+                    cell.wrapping_sub(width),
+                    cell + width,
+                ] {
+                    if next < set.len() && set[next] && self.label[next] == u32::MAX {
+                        self.label[next] = sizes.len() as u32;
+                        self.stack.push(next);
+                    }
+                }
+            }
+            sizes.push(n);
+        }
+        sizes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::Volume;
+    use shellock_testkit::shapes::cuboid;
+
+    use super::*;
+    use crate::Printer;
+    use crate::time::Cost;
+
+    const UPRIGHT: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
+    /// Upside down.
+    const TURNED: [Vec3; 3] = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z];
+
+    fn load(volume: &Volume, axes: [Vec3; 3]) -> Load {
+        Load::of(&volume.to_mesh(), axes, 0.2)
+    }
+
+    /// A top of 40 × 40 mm, 4 mm thick, 20 mm above the plate on a leg of 10 × 10 mm.
+    fn table() -> Volume {
+        cuboid([0.0, 0.0, 20.0], [40.0, 40.0, 24.0]).union(&cuboid([15.0, 15.0, 0.0], [25.0, 25.0, 21.0]))
+    }
+
+    /// A cup of 30 mm with walls and a floor of 3 mm.
+    fn cup() -> Volume {
+        cuboid([0.0; 3], [30.0; 3]).subtract(&cuboid([3.0; 3], [27.0, 27.0, 40.0]))
+    }
+
+    #[test]
+    fn supports_of_a_table_are_its_clear_height_times_the_area_that_hangs() {
+        let load = load(&table(), UPRIGHT);
+        let expected = (40.0 * 40.0 - 10.0 * 10.0) * (20.0 - CONTACT_MM);
+        assert!(
+            (load.support_mm3 / expected - 1.0).abs() < 0.01,
+            "{} {expected}",
+            load.support_mm3
+        );
+        assert_eq!(Load::of(&table().to_mesh(), TURNED, 0.2).support_mm3, 0.0);
+    }
+
+    #[test]
+    fn supports_of_a_bridge_end_on_the_pieces_own_floor() {
+        let under = cuboid([10.0, -1.0, 12.0], [50.0, 31.0, 22.0]);
+        let bridge = cuboid([0.0; 3], [60.0, 30.0, 25.0]).subtract(&under);
+        let expected = 40.0 * 30.0 * (10.0 - CONTACT_MM);
+        let support_mm3 = load(&bridge, UPRIGHT).support_mm3;
+        assert!(
+            (support_mm3 / expected - 1.0).abs() < 0.02,
+            "{support_mm3} {expected}"
+        );
+    }
+
+    #[test]
+    fn a_cup_catches_what_it_holds_and_a_bell_drains() {
+        let inside = 24.0 * 24.0 * 27.0;
+        let caught = load(&cup(), UPRIGHT).cup_mm3;
+        assert!((caught / inside - 1.0).abs() < 0.08, "{caught} {inside}");
+        assert_eq!(load(&cup(), TURNED).cup_mm3, 0.0);
+        // With a hole in its wall at the floor, so does the cup.
+        let drained = cup().subtract(&cuboid([-1.0, 12.0, 3.0], [4.0, 18.0, 9.0]));
+        assert_eq!(load(&drained, UPRIGHT).cup_mm3, 0.0);
+    }
+
+    #[test]
+    fn a_block_is_filled_sparsely_but_for_its_perimeters_and_solid_layers_and_a_rod_is_not() {
+        let block = load(&cuboid([0.0; 3], [40.0; 3]), UPRIGHT);
+        let expected = 38.0 * 38.0 * (40.0 - 2.0 * SOLID_LAYERS * 0.2);
+        assert!(
+            (block.sparse_mm3 / expected - 1.0).abs() < 0.05,
+            "{} {expected}",
+            block.sparse_mm3
+        );
+        assert!((block.volume_mm3 - 64e3).abs() < 1e-6 && block.small_side_mm2 == 0.0);
+        let rod = load(&cuboid([0.0; 3], [8.0, 8.0, 40.0]), UPRIGHT);
+        assert_eq!(rod.sparse_mm3, 0.0, "too small an area");
+        assert!(
+            (rod.small_side_mm2 / (OUTLINE * 32.0 * 40.0) - 1.0).abs() < 0.02,
+            "its loops are short"
+        );
+    }
+    /// Name, shape, pose, seconds and cm³ as the slicer tells them.
+    type Sliced = (&'static str, fn() -> Volume, [Vec3; 3], f64, f64);
+
+    /// By PrusaSlicer 2.5 with two perimeters, 15 % infill, layers of 0.2 mm and supports.
+    const SLICED: [Sliced; 2] = [
+        (
+            "cube of 40 mm",
+            || cuboid([0.0; 3], [40.0; 3]),
+            UPRIGHT,
+            4475.0,
+            16.06,
+        ),
+        ("cup", cup, UPRIGHT, 3129.0, 7.79),
+    ];
+
+    #[test]
+    fn boxes_take_what_the_slicer_tells_within_a_quarter_and_plastic_within_a_sixth() {
+        for (name, volume, axes, seconds, cm3) in SLICED {
+            let ours = Cost::of(&Printer::fdm(), &load(&volume(), axes));
+            let grams = cm3 * Printer::fdm().material.density_g_cm3;
+            assert!(
+                (ours.seconds / seconds - 1.0).abs() < 0.25,
+                "{name}: {} s, {seconds} s",
+                ours.seconds
+            );
+            assert!(
+                (ours.grams / grams - 1.0).abs() < 0.16,
+                "{name}: {} g, {grams} g",
+                ours.grams
+            );
+        }
+    }
+}
