@@ -493,12 +493,24 @@ impl Warning {
                 } else {
                     ("sheet", "thick")
                 };
+                let count = |n: usize, what: &str, risk: &str| match n {
+                    0 => None,
+                    1 => Some(format!("a {what}, which may {risk}")),
+                    n => Some(format!("{n} {what}s, which may {risk}")),
+                };
+                let places = [
+                    count(*n_sheets, "thin sheet", "break off"),
+                    count(*n_slots, "hair slot", "fuse"),
+                ];
+                let places: Vec<String> = places.into_iter().flatten().collect();
+                let have = if self.pieces.len() == 1 { "has" } else { "have" };
                 (
                     "thin-places",
                     format!(
-                        "{} have {n_sheets} thin sheets, which may break off, and {n_slots} hair slots, which may fuse; the \
-                         longest is a {kind} of {longest_mm:.0} mm, {thickness_mm:.2} mm {end}; look there before you assemble",
-                        in_words(&self.pieces)
+                        "{} {have} {}; the longest is a {kind} of {longest_mm:.0} mm, {thickness_mm:.2} mm {end}; look there \
+                         before you assemble",
+                        in_words(&self.pieces),
+                        places.join(", and ")
                     ),
                 )
             }

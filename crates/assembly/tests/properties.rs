@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use proptest::prelude::*;
 use shellock_assembly::verify::{Finding, Verification, examine};
 use shellock_assembly::{
-    Assembly, Ctx, Direction, IdVec, InstallationPlan, LatticeDirection, PatchId, PressFit, PressFitKind, VerifyParams,
-    verify,
+    Assembly, Ctx, Direction, IdVec, InstallationPlan, LatticeDirection, PatchId, PressFit, PressFitKind,
+    VerifyParams, verify,
 };
 use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_testkit::property::{LatticeTurn, cases, orders, turns, vectors};

@@ -72,7 +72,10 @@ impl Kit<'_> {
             } => {
                 let others: Vec<usize> = (0..self.meshes.len()).filter(|p| p != piece).collect();
                 let tested = self.test_path(*piece, *direction, &others, least);
-                (format!("the key, piece {}, can leave", number::of(*piece)), tested)
+                (
+                    format!("the key, piece {}, can leave", number::of(*piece)),
+                    tested,
+                )
             }
             Claim::Installs {
                 piece,

@@ -338,7 +338,11 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
     if c.contacts.iter().any(|c| c.a.max(c.b) >= n || c.a == c.b) {
         return Err("a contact is not one of two pieces".into());
     }
-    let order: Vec<Value> = c.installation_order.iter().map(|&id| number::of(id).into()).collect();
+    let order: Vec<Value> = c
+        .installation_order
+        .iter()
+        .map(|&id| number::of(id).into())
+        .collect();
     let is_near = |value: &Value, x: f64| value.as_f64().is_some_and(|y| (x - y).abs() <= SAME);
     if plan["installation_order"] != Value::Array(order) || plan["key_piece"] != number::of(c.key) {
         return Err("the plan has another order or key".into());
@@ -384,7 +388,10 @@ fn test_plan(c: &Certificate, plan: &Value) -> Tested {
         .iter()
         .find(|p| plan["pieces"][p.id]["file"] != p.file.as_str())
     {
-        Some(p) => Err(format!("the plan has another file for piece {}", number::of(p.id))),
+        Some(p) => Err(format!(
+            "the plan has another file for piece {}",
+            number::of(p.id)
+        )),
         None => Ok(format!("{n} pieces, key {}", number::of(c.key))),
     }
 }
@@ -450,7 +457,8 @@ fn located(c: &Certificate, meshes: &[Mesh]) -> Result<Vec<Contact>, String> {
             gap_mm,
         } = contact;
         let on_a = meshes[*a].triangle_at(*point, *normal);
-        let (point, normal) = on_a.ok_or_else(|| format!("contact {i} is not on piece {}", number::of(*a)))?;
+        let (point, normal) =
+            on_a.ok_or_else(|| format!("contact {i} is not on piece {}", number::of(*a)))?;
         let is_near = *gap_mm <= c.reach_mm && meshes[*b].is_faced(point, normal, *gap_mm);
         if !is_near {
             return Err(format!(

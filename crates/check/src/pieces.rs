@@ -55,7 +55,10 @@ pub fn test_closed(meshes: &[Mesh]) -> Tested {
             ));
         }
         if n_surfaces > 1 {
-            return Err(format!("piece {} falls into {n_surfaces} surfaces", number::of(id)));
+            return Err(format!(
+                "piece {} falls into {n_surfaces} surfaces",
+                number::of(id)
+            ));
         }
     }
     Ok(format!(

@@ -316,10 +316,9 @@ impl FromStr for Key {
         match text.to_ascii_lowercase().as_str() {
             "auto" => Ok(Self::Auto),
             "piece" => Ok(Self::Flattest),
-            number => number
-                .parse()
-                .map(Self::Piece)
-                .map_err(|_| "give auto, piece, or the number of a piece (its label, where there are labels)".to_owned()),
+            number => number.parse().map(Self::Piece).map_err(|_| {
+                "give auto, piece, or the number of a piece (its label, where there are labels)".to_owned()
+            }),
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::inspect::thin_warnings;
 use crate::output::{Destination, Summary, files};
+use crate::place::Standing;
 use crate::printing::{Printing, too_large};
 use crate::progress::{Display, PlanClock, Shown};
 
@@ -132,13 +133,14 @@ fn make(
     }
     to.write(&files)?;
     let code = u8::from(!made.kit.verification.passed());
+    let standing = Standing::of(options.up, model.solid.mesh());
     if session.is_json {
         print_json(to, &notes, &made, &summary, &warnings, &printing, code);
     } else if session.shown == Shown::Nothing {
         print_failures(&made.kit.verification);
-        print_warnings(&warnings);
+        print_warnings(&warnings, &standing);
     } else {
-        print_text(to, &made, settings, &summary, &warnings);
+        print_text(to, &made, settings, &summary, &warnings, &standing);
         println!("{}", printing.words());
     }
     Ok(code)
@@ -181,7 +183,14 @@ fn print_json(
     println!("{value}");
 }
 
-fn print_text(to: &Destination, made: &Design, settings: &Settings, summary: &Summary, warnings: &[Warning]) {
+fn print_text(
+    to: &Destination,
+    made: &Design,
+    settings: &Settings,
+    summary: &Summary,
+    warnings: &[Warning],
+    standing: &Standing,
+) {
     println!(
         "{} pieces, the last is piece {}; walls {:.2} mm; material {:.0} % of the solid model",
         made.kit.pieces.len(),
@@ -190,10 +199,10 @@ fn print_text(to: &Destination, made: &Design, settings: &Settings, summary: &Su
         100.0 * summary.volume_ratio
     );
     if let Some(strength) = &made.strength {
-        println!("{}", bearing(strength, settings));
+        println!("{}", bearing(strength, settings, standing));
     }
     println!("{}", quality(&made.kit.proof));
-    weakest(&made.kit.holding)
+    weakest(&made.kit.holding, standing)
         .into_iter()
         .for_each(|line| println!("{line}"));
     println!("pieces sit {}", play::words(&made.kit.play));
@@ -205,7 +214,7 @@ fn print_text(to: &Destination, made: &Design, settings: &Settings, summary: &Su
         println!("{line}");
     }
     print_verdict(&made.kit.verification);
-    print_warnings(warnings);
+    print_warnings(warnings, standing);
     println!(
         "written to {}: open report.html in a browser, print plates.3mf",
         to.folder().display()
@@ -213,8 +222,7 @@ fn print_text(to: &Destination, made: &Design, settings: &Settings, summary: &Su
 }
 
 /// What the wall bears, in words.
-pub fn bearing(strength: &Strength, settings: &Settings) -> String {
-    let [x, y, z] = strength.at.to_array();
+pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) -> String {
     let StrengthParams { drop_m, material, .. } = &settings.strength;
     let hollow = 100.0 * (1.0 - strength.solid_share());
     // Hardly anything was judged where hardly anything is hollow.
@@ -224,9 +232,10 @@ pub fn bearing(strength: &Strength, settings: &Settings) -> String {
         String::new()
     };
     format!(
-        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the material bears, \
-         at ({x:.1}, {y:.1}, {z:.1}) mm",
-        strength.stress_mpa, material.strength_mpa
+        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the material bears ({})",
+        strength.stress_mpa,
+        material.strength_mpa,
+        standing.words(strength.at.to_array())
     )
 }
 
@@ -292,20 +301,22 @@ pub fn scope(proof: &PlanProof) -> String {
 }
 
 /// Where a plan is weakest: a seam, or each piece that comes apart.
-pub fn weakest(holding: &Holding) -> Vec<String> {
-    let place = |[x, y, z]: [f64; 3]| format!("at ({x:.1}, {y:.1}, {z:.1}) mm");
+pub fn weakest(holding: &Holding, standing: &Standing) -> Vec<String> {
     let seam = holding.seams.first().map(|s| {
         let (later, earlier, opening_mm) = (s.later, s.earlier, s.opening_mm);
-        let at = place(s.at);
+        let at = standing.words(s.at);
         format!(
-            "weakest seam: pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m {at}: {}",
+            "weakest seam ({at}): pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m: {}",
             s.reason
         )
     });
-    let loose = holding
-        .loose
-        .iter()
-        .map(|l| format!("comes apart at 10 N/m: piece {}, {}", l.piece, place(l.at)));
+    let loose = holding.loose.iter().map(|l| {
+        format!(
+            "comes apart at 10 N/m: piece {}, {}",
+            l.piece,
+            standing.words(l.at)
+        )
+    });
     seam.into_iter().chain(loose).collect()
 }
 
@@ -319,11 +330,10 @@ pub fn fits(made: &Design) -> Option<String> {
 }
 
 /// Each on a line, with its place.
-pub fn print_warnings(warnings: &[Warning]) {
+pub fn print_warnings(warnings: &[Warning], standing: &Standing) {
     for w in warnings {
-        let place = w.at.map_or_else(String::new, |[x, y, z]| {
-            format!(" [at ({x:.1}, {y:.1}, {z:.1}) mm]")
-        });
+        let place =
+            w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
         println!("warning: {w}{place}");
     }
 }

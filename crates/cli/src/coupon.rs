@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use shellock::coupon::{self, Fit, Kind, Part};
 use shellock_formats::{NamedObject, write_3mf, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
+use shellock_print::Printer;
 use shellock_print::load::Load;
 use shellock_print::time::seconds_flat;
-use shellock_print::Printer;
 use shellock_render::palette;
 use toml_edit::{DocumentMut, Item, Table, TableLike};
 

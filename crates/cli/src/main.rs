@@ -12,6 +12,7 @@ mod output;
 mod own_assembly;
 mod page;
 mod paint;
+mod place;
 mod printing;
 mod progress;
 mod savings;

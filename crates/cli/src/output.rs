@@ -4,12 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use shellock::Warning;
 use shellock::certificate::{Certificate, Evidence, OtherFile, PieceFile, certify};
 use shellock::design::{Design, Settings};
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StressMap};
 use shellock::verify::thin_share;
-use shellock::Warning;
 use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};

@@ -18,6 +18,7 @@ use crate::args::Options;
 use crate::build::{bearing, scope};
 use crate::input::Model;
 use crate::output::{Summary, connector_sizes, standing};
+use crate::place::Standing;
 
 /// Pieces are shown within this share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
 const SEEN: f64 = 3e-4;
@@ -56,7 +57,8 @@ pub fn report(
             facts: piece_facts(design, p),
         })
         .collect();
-    let facts = kit_facts(&shown, settings, design, summary, stand);
+    let standing = Standing::of(options.up, model.solid.mesh());
+    let facts = kit_facts(&shown, settings, design, summary, &standing);
     let checks = design
         .kit
         .verification
@@ -180,7 +182,7 @@ fn kit_facts(
     settings: &Settings,
     design: &Design,
     summary: &Summary,
-    stand: impl Fn(Vec3) -> Vec3,
+    standing: &Standing,
 ) -> Vec<(String, String)> {
     let mut facts: Vec<(String, String)> = vec![
         ("size".into(), size(shown)),
@@ -209,9 +211,9 @@ fn kit_facts(
         design
             .strength
             .iter()
-            .map(|s| ("fall".into(), bearing(s, settings))),
+            .map(|s| ("fall".into(), bearing(s, settings, standing))),
     );
-    facts.extend(plan_facts(design, stand));
+    facts.extend(plan_facts(design, standing));
     facts
 }
 
@@ -249,7 +251,7 @@ fn printed_within(design: &Design) -> String {
 
 /// What a person wants to know of the plan: how good it is, and where it is weakest on the model as it is
 /// made to `stand`.
-fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, String)> {
+fn plan_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> {
     let Kit {
         proof: p, holding, ..
     } = &design.kit;
@@ -260,18 +262,17 @@ fn plan_facts(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<(String, Str
     };
     let cost = ("plan's cost".into(), format!("{:.2}; {how} {}", p.cost, scope(p)));
     let weakest = holding.seams.first().map(|s| {
-        let [x, y, z] = stand(Vec3::from_array(s.at)).to_array();
+        let place = standing.words(s.at);
         let figure = format!(
-            "{} and {}: opens {:.2} mm at 10 N/m at ({x:.1}, {y:.1}, {z:.1}) mm; {}",
+            "{} and {}, {place}: opens {:.2} mm at 10 N/m; {}",
             s.later, s.earlier, s.opening_mm, s.reason
         );
         ("weakest seam".into(), figure)
     });
     let loose = holding.loose.iter().map(|part| {
-        let [x, y, z] = stand(Vec3::from_array(part.at)).to_array();
         (
             "comes apart".into(),
-            format!("piece {} at ({x:.1}, {y:.1}, {z:.1}) mm, at 10 N/m", part.piece),
+            format!("piece {}, {}, at 10 N/m", part.piece, standing.words(part.at)),
         )
     });
     [cost].into_iter().chain(weakest).chain(loose).collect()

@@ -128,7 +128,9 @@ impl Printing {
 
     /// All plates side by side, and each alone where there are several.
     pub fn files(&self, pieces: &[TriMesh]) -> Vec<(String, Vec<u8>)> {
-        let names: Vec<String> = (1..=pieces.len()).map(|number| format!("piece {number}")).collect();
+        let names: Vec<String> = (1..=pieces.len())
+            .map(|number| format!("piece {number}"))
+            .collect();
         let object = |laid: &Laid, moved_mm: [f64; 3]| {
             let (name, mesh) = (names[laid.piece].as_str(), &pieces[laid.piece]);
             NamedObject {

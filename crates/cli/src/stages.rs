@@ -21,6 +21,7 @@ use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
 use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
+use crate::place::Standing;
 use crate::progress::{Display, PlanClock};
 
 /// Writes one file: whole or not at all.
@@ -180,8 +181,11 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
         );
     }
     println!("{}", quality(&proof));
-    weakest(&holding).iter().for_each(|line| println!("{line}"));
-    print_warnings(&warnings);
+    let standing = Standing::of(options.up, model.solid.mesh());
+    weakest(&holding, &standing)
+        .iter()
+        .for_each(|line| println!("{line}"));
+    print_warnings(&warnings, &standing);
     Ok(0)
 }
 

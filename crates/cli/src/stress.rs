@@ -4,12 +4,12 @@ use std::path::Path;
 
 use serde_json::json;
 use shellock::design::{Params, Settings, Thickness};
+use shellock::key::Turn;
 use shellock::metric::MetricParams;
 use shellock::sizes::SizeChoice;
 use shellock::stress_test::{
     Outcome, Pair, PunchAt, StressParams, StressReport, StressVerdict, chart, stress_test,
 };
-use shellock::key::Turn;
 use shellock::{Ctx, PatchId, SegmentedSurface};
 use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;

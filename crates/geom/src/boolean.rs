@@ -160,7 +160,10 @@ impl Volume {
     /// The region turned about the origin by the rotation whose columns are where the axes go.
     pub fn rotate(&self, columns: [Vec3; 3]) -> Self {
         let [x, y, z] = columns.map(v);
-        Self(self.0.transform(&Mat3x4::from_cols(x, y, z, V::new(0.0, 0.0, 0.0))))
+        Self(
+            self.0
+                .transform(&Mat3x4::from_cols(x, y, z, V::new(0.0, 0.0, 0.0))),
+        )
     }
 
     /// Fewer triangles for the same shape within `tolerance_mm`; stays manifold.

@@ -221,7 +221,10 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let mut cells = by_number.into_iter().zip(pictures).peekable();
     let mut pages = Vec::new();
     while cells.peek().is_some() {
-        let mut page = headed("Pieces", "each carries its number on its inner side; they go in by number");
+        let mut page = headed(
+            "Pieces",
+            "each carries its number on its inner side; they go in by number",
+        );
         for (i, (d, picture)) in cells.by_ref().take(grid[0] * grid[1]).enumerate() {
             let [x, y] = corner_mm(i, grid, cell, 14.0);
             page.picture([x + 0.5 * (cell[0] - picture_mm), y + 12.0], picture_mm, picture);

@@ -29,7 +29,9 @@ use crate::key::Turn;
 use crate::metric::Holding;
 use crate::plan::{FoundPlan, PlanConstraints, PlanProof, survey};
 use crate::strength::{Strength, StrengthError, StressMap};
-use crate::{Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength};
+use crate::{
+    Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength,
+};
 use attempt::{Attempt, Failure, Next};
 use budget::Budget;
 pub use budget::Effort;
@@ -103,7 +105,15 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                 .room_mm(division.chosen.sizes.largest_mm()),
         );
         let n_pieces = division.surface.n_patches;
-        match attempt::plans(ctx, job, &candidate.turn, &mut wall, &division, &mut budget, &mut kit)? {
+        match attempt::plans(
+            ctx,
+            job,
+            &candidate.turn,
+            &mut wall,
+            &division,
+            &mut budget,
+            &mut kit,
+        )? {
             Attempt::Passed => {
                 return Ok(Explored {
                     kit,
@@ -220,7 +230,13 @@ pub fn plan(
             division = match attempt::next_plan(&ctx, params, &current, &survey, &none, n_joinings > 0)? {
                 Next::Plan(found, holding) => {
                     let own = (ctx.into_warnings(), wall.warnings.clone());
-                    return Ok(Ok(Planned::of(&candidate.turn, &current.surface, *found, holding, own)));
+                    return Ok(Ok(Planned::of(
+                        &candidate.turn,
+                        &current.surface,
+                        *found,
+                        holding,
+                        own,
+                    )));
                 }
                 Next::Joined(fewer) => {
                     n_joinings -= 1;
@@ -286,7 +302,10 @@ impl<'a> Job<'a> {
                 area_mm2[patch] += surface.mesh.face_area(face);
             }
         }
-        area_mm2.iter().max_by(|a, b| a.1.total_cmp(b.1)).map(|(patch, _)| patch)
+        area_mm2
+            .iter()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .map(|(patch, _)| patch)
     }
 
     fn settings(&self) -> &Settings {
@@ -306,7 +325,10 @@ fn key_faces(
     };
     let mut is_key = vec![false; model.mesh().triangles.len()];
     if let Some(labels) = labels {
-        is_key.iter_mut().zip(labels).for_each(|(is_key, label)| *is_key = *label == name);
+        is_key
+            .iter_mut()
+            .zip(labels)
+            .for_each(|(is_key, label)| *is_key = *label == name);
     } else {
         let faces = surface.patch_of_face.iter().zip(&surface.source_face);
         faces

@@ -48,9 +48,9 @@ mod testing;
 pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, design};
 pub use seam::graph::{Adjacency, ContactGraph};
 pub use shellock_assembly::{
-    Cancelled, Cause, Ctx, Direction, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId, PressFit,
-    PressFitKind, Verdict, Warning, certificate, context, direction, ids, motion, params, play, push, verify,
-    warning,
+    Cancelled, Cause, Ctx, Direction, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId,
+    PressFit, PressFitKind, Verdict, Warning, certificate, context, direction, ids, motion, params, play,
+    push, verify, warning,
 };
 pub use sizes::ConnectorSizes;
 pub use surface::{Seam, SegmentedSurface};

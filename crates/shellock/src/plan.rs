@@ -40,4 +40,7 @@ pub use sample::random_plans;
 pub use score::{PlanScore, score};
 pub use search::{MakeCosts, search, search_with};
 pub use survey::{PlanSurvey, survey};
-pub use types::{Blocker, LatticePlan, LatticeStep, FoundPlan, PlanConstraints, PlanOutcome, PlanProof, ProofScope, RankedPlan};
+pub use types::{
+    Blocker, FoundPlan, LatticePlan, LatticeStep, PlanConstraints, PlanOutcome, PlanProof, ProofScope,
+    RankedPlan,
+};

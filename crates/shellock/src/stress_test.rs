@@ -22,11 +22,12 @@ use shellock_mechanics::{
 };
 
 use crate::impact::impact_n;
-use crate::metric::{MetricParams, PlanModel};
 use crate::key::Turn;
+use crate::metric::{MetricParams, PlanModel};
 use crate::plan::{LatticePlan, PlanParams, random_plans, survey};
 use crate::{
-    Cancelled, ConnectorSizes, Ctx, InstallationPlan, InstallationStep, LatticeDirection, PatchId, SegmentedSurface,
+    Cancelled, ConnectorSizes, Ctx, InstallationPlan, InstallationStep, LatticeDirection, PatchId,
+    SegmentedSurface,
 };
 
 pub use chart::chart;
@@ -275,10 +276,15 @@ fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, S
         let out = params.turn.apply(step.separation.unit());
         let nearest = LatticeDirection::nearest(out);
         let is_it = nearest.unit().dot(out) >= MOST_OFF_DEG.to_radians().cos();
-        is_it.then_some((step.piece, nearest)).ok_or(StressError::Direction(step.piece))
+        is_it
+            .then_some((step.piece, nearest))
+            .ok_or(StressError::Direction(step.piece))
     };
     // The first piece goes nowhere.
-    let first = plan.steps.first().map(|first| Ok((first.piece, LatticeDirection::nearest(Vec3::Z))));
+    let first = plan
+        .steps
+        .first()
+        .map(|first| Ok((first.piece, LatticeDirection::nearest(Vec3::Z))));
     let others = plan.steps.iter().skip(1).map(step);
     let steps: Result<Vec<_>, _> = first.into_iter().chain(others).collect();
     steps.map(LatticePlan::new)
@@ -302,7 +308,11 @@ pub fn stress_test(
             patches: surface.n_patches,
         });
     }
-    let (params, surface, plan) = (&turned(params), &turned_surface(params, surface), &laid(params, plan)?);
+    let (params, surface, plan) = (
+        &turned(params),
+        &turned_surface(params, surface),
+        &laid(params, plan)?,
+    );
     ctx.stage("a plan of half the score", 0)?;
     let model = sound_model(ctx, params, surface)?;
     let scored = |plan: &LatticePlan| score(&model, plan);
@@ -487,7 +497,13 @@ impl<'a> Bench<'a> {
                     .map_or(largest_mm(meetings), |j| j.size_mm),
             ),
             between: widest.map(|i| self.model.pieces_at(i)),
-            at: widest.map(|i| self.params.turn.inverse().apply(self.model.place_of(i)).to_array()),
+            at: widest.map(|i| {
+                self.params
+                    .turn
+                    .inverse()
+                    .apply(self.model.place_of(i))
+                    .to_array()
+            }),
             n_lost: loaded.lost.len(),
             wall_mpa: loaded.walls.robust_mpa,
             connector_mpa: loaded.connectors.robust_mpa,

@@ -47,7 +47,7 @@ pub const QUICK: [Case; 3] = [
         ],
     },
     Case {
-        name: "vase, no plan",
+        name: "vase, no such key",
         args: &[
             "demo", "--figure", "vase", "--size", "40", "--pieces", "3", "--key", "40",
         ],

@@ -159,9 +159,7 @@ pub fn thin_points(mesh: &TriMesh, limits_mm: [f64; 2]) -> Vec<Vec<ThinPoint>> {
         found(ThinKind::Slot, 1.0, least_slot_mm),
     ]
     .concat();
-    places.retain(|members| {
-        members.len() >= LEAST_RAYS && bounds(members).diagonal() >= LEAST_LENGTH_MM
-    });
+    places.retain(|members| members.len() >= LEAST_RAYS && bounds(members).diagonal() >= LEAST_LENGTH_MM);
     places
 }
 

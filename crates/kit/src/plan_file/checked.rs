@@ -18,7 +18,9 @@ fn wrong(what: String) -> PlanFileError {
 }
 
 fn no_direction(piece: PatchId) -> PlanFileError {
-    wrong(format!("the installation_direction of piece {piece} is no unit vector"))
+    wrong(format!(
+        "the installation_direction of piece {piece} is no unit vector"
+    ))
 }
 
 impl PlanFile {
@@ -28,7 +30,9 @@ impl PlanFile {
         for (i, piece) in self.pieces.iter().enumerate() {
             let number = i + 1;
             if usize::from(piece.id) != i {
-                return Err(wrong(format!("the piece at place {number} does not have the id {number}")));
+                return Err(wrong(format!(
+                    "the piece at place {number} does not have the id {number}"
+                )));
             }
             let out = Direction::of(-Vec3::from(piece.installation_direction));
             directions.push(out.ok_or_else(|| no_direction(piece.id))?);

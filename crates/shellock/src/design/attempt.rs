@@ -6,9 +6,9 @@ use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
 use super::{DesignError, Job, KeySource, Kit, Params};
 use crate::body::{BodyError, GridError, PatchDistances};
+use crate::key::Turn;
 use crate::metric::Holding;
 use crate::plan::{Blocker, FoundPlan, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
-use crate::key::Turn;
 use crate::{Ctx, PatchId, SegmentedSurface, key, metric, plan};
 
 /// How one division went.

@@ -63,7 +63,7 @@ impl<'a> Candidate<'a> {
         };
         let (turn, along) = Turn::laying(site.prism.normal, site.prism.slide);
         let key = Some(CutKey {
-            given: site.clone(),
+            given: *site,
             site: turn.site(site, along),
             along,
         });

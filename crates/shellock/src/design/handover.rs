@@ -98,10 +98,7 @@ impl Handover {
                 keys: self.all(&proof.proven_for.keys),
                 ..proof.proven_for
             },
-            piece_costs: self
-                .in_order(proof.piece_costs.as_slice())
-                .into_iter()
-                .collect(),
+            piece_costs: self.in_order(proof.piece_costs.as_slice()).into_iter().collect(),
             ..proof
         }
     }
@@ -162,7 +159,10 @@ impl Handover {
             let mut pieces = self.all(&w.pieces);
             if matches!(
                 w.cause,
-                Cause::ShortContacts { .. } | Cause::WeakGraph | Cause::ComesApart | Cause::PieceWithoutNumber
+                Cause::ShortContacts { .. }
+                    | Cause::WeakGraph
+                    | Cause::ComesApart
+                    | Cause::PieceWithoutNumber
             ) {
                 // A plain list.
                 pieces.sort_unstable();

@@ -15,7 +15,8 @@ use crate::play::{self, KitPlay};
 use crate::sizes::CONTACT_SIZES;
 use crate::verify::{self, Finding, Verification};
 use crate::{
-    Cause, ConnectorSizes, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, body, connector, piece,
+    Cause, ConnectorSizes, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, body, connector,
+    piece,
 };
 
 /// Pieces that were made as planned, and what is known of them. All places and directions are those of the

@@ -236,14 +236,20 @@ fn a_kit_tells_pieces_by_their_turn_to_go_in_and_teaches_its_division_by_patches
     assert_eq!(told[0].pieces, [PatchId(0), PatchId(2)]);
     assert!(Vec3::from(told[0].at.unwrap()).distance(Vec3::X) < 1e-12);
     let plan = handover.plan();
-    assert_eq!(plan.steps.iter().map(|s| s.piece.number()).collect::<Vec<_>>(), [1, 2, 3]);
+    assert_eq!(
+        plan.steps.iter().map(|s| s.piece.number()).collect::<Vec<_>>(),
+        [1, 2, 3]
+    );
     assert!(turn.apply(plan.separation(PatchId(1)).unit()).distance(Vec3::Z) < 1e-12);
     let finding = Finding::Loose {
         piece: PatchId(1),
         directions: Vec::new(),
     };
     let learned = lessons(&handed_over(handover, &[("blocked", false)], vec![finding]));
-    assert_eq!(learned.iter().flat_map(Lesson::loose).collect::<Vec<_>>(), [PatchId(0)]);
+    assert_eq!(
+        learned.iter().flat_map(Lesson::loose).collect::<Vec<_>>(),
+        [PatchId(0)]
+    );
     let mut constraints = PlanConstraints::default();
     learned.iter().for_each(|lesson| lesson.teach(&mut constraints));
     assert_eq!(constraints.rejected, [found_plan([2, 0, 1])]);

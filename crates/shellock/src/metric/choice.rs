@@ -209,12 +209,7 @@ fn middle_of(model: &PlanModel, piece: PatchId) -> Vec3 {
 }
 
 /// Puts the stations' openings together by pairs of pieces.
-fn holding(
-    model: &PlanModel,
-    plan: &LatticePlan,
-    meetings: &[Meeting],
-    resistance: &Resistance,
-) -> Holding {
+fn holding(model: &PlanModel, plan: &LatticePlan, meetings: &[Meeting], resistance: &Resistance) -> Holding {
     let (opening, loose) = match resistance {
         Resistance::Holds(opening) => (opening, Vec::new()),
         Resistance::Separable(parts) => {
@@ -287,12 +282,7 @@ fn weakest_places(
     worst.into_iter().map(seam).collect()
 }
 
-fn reason(
-    model: &PlanModel,
-    plan: &LatticePlan,
-    station: usize,
-    [later, earlier]: [PatchId; 2],
-) -> String {
+fn reason(model: &PlanModel, plan: &LatticePlan, station: usize, [later, earlier]: [PatchId; 2]) -> String {
     let s = plan.separation(later).unit();
     let frame = &model.assembly.stations[station];
     let across = if later == model.pieces_at(station)[0] {

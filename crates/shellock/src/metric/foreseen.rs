@@ -58,12 +58,7 @@ pub fn foreseen(
 }
 
 /// Displacement, mm, and turn, degrees, of each piece.
-fn plays(
-    model: &PlanModel,
-    plan: &LatticePlan,
-    meetings: &[Meeting],
-    clearance_mm: f64,
-) -> Vec<[f64; 2]> {
+fn plays(model: &PlanModel, plan: &LatticePlan, meetings: &[Meeting], clearance_mm: f64) -> Vec<[f64; 2]> {
     let mut contacts: Vec<Vec<Contact>> = vec![Vec::new(); model.assembly.n_parts];
     let ends = pin_ends(model, meetings);
     for (station, meeting) in meetings.iter().enumerate() {

@@ -263,19 +263,32 @@ impl<'a> Room<'a> {
 
     /// What fills the corners of a run's tongue where it has room, as far off the cuts as the wall.
     fn corner(&self, params: &ConnectorParams, run: &Run) -> Volume {
-        let has_tongue: Vec<bool> = run.stations.iter().map(|at| self.has_tongue(params, at)).collect();
+        let has_tongue: Vec<bool> = run
+            .stations
+            .iter()
+            .map(|at| self.has_tongue(params, at))
+            .collect();
         let stretches = (0..has_tongue.len()).collect::<Vec<_>>();
         let stretches = stretches.chunk_by(|&i, &j| has_tongue[i] && has_tongue[j]);
         let corner = |stretch: &[usize]| {
             let stations = stretch.iter().map(|&i| run.stations[i]).collect();
-            whole_half(params, &Run { stations, ..run.clone() }, Half::Corner)
+            whole_half(
+                params,
+                &Run {
+                    stations,
+                    ..run.clone()
+                },
+                Half::Corner,
+            )
         };
         let whole = Volume::union_all(stretches.filter(|s| s.len() > 1).map(corner).collect());
         if whole.is_empty() {
             return whole;
         }
         let (ceiling, depth) = (self.ceiling(), &self.grid.depth);
-        whole.intersect(&self.region(&whole, &|n| (self.side[n] - self.gap_mm[n]).min(depth[n] - ceiling)))
+        whole.intersect(&self.region(&whole, &|n| {
+            (self.side[n] - self.gap_mm[n]).min(depth[n] - ceiling)
+        }))
     }
 
     /// Whether a tongue has room in its middle, on both sides of the seam.
@@ -290,7 +303,9 @@ impl<'a> Room<'a> {
             let blocked = self.grid.band.sample(&self.blocked, place);
             blocked.is_some_and(|by| by < -f64::from(self.clearance_mm))
         };
-        [0.5, 0.25, -0.25].into_iter().all(|share| is_free(share * tongue.s0))
+        [0.5, 0.25, -0.25]
+            .into_iter()
+            .all(|share| is_free(share * tongue.s0))
     }
 
     /// What of `whole` has room: below the wall, a root's depth into it, `clearance_mm` away from what is

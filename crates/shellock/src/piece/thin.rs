@@ -96,7 +96,8 @@ fn slab(p: &ThinPoint, thick_mm: f64) -> Volume {
     let middle = p.at + 0.5 * p.thickness_mm * p.across;
     let half = [HALF_MM * u, HALF_MM * v, 0.5 * thick_mm * p.across];
     let sign = |bits: u8, axis: u8| if bits >> axis & 1 == 1 { 1.0 } else { -1.0 };
-    let corner = |bits: u8| middle + sign(bits, 0) * half[0] + sign(bits, 1) * half[1] + sign(bits, 2) * half[2];
+    let corner =
+        |bits: u8| middle + sign(bits, 0) * half[0] + sign(bits, 1) * half[1] + sign(bits, 2) * half[2];
     Volume::hull(&(0..8).map(corner).collect::<Vec<_>>())
 }
 

@@ -24,11 +24,7 @@ fn searched(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstrai
 }
 
 /// The plan found, `None` where there is none.
-fn plan_of(
-    params: &PlanParams,
-    survey: &PlanSurvey,
-    constraints: &PlanConstraints,
-) -> Option<LatticePlan> {
+fn plan_of(params: &PlanParams, survey: &PlanSurvey, constraints: &PlanConstraints) -> Option<LatticePlan> {
     match searched(params, survey, constraints) {
         PlanOutcome::Found(found) => Some(found.plan),
         PlanOutcome::Infeasible { .. } => None,
@@ -108,12 +104,7 @@ fn random_joint(rng: &mut ChaCha8Rng) -> Joint {
 
 /// All allowed plans with a key among `keys`, by trying every order and direction; the best cost.
 pub fn brute_force(space: &Space<'_>, keys: &[KeyChoice]) -> Option<f64> {
-    fn extend(
-        space: &Space<'_>,
-        removal: &mut Vec<LatticeStep>,
-        keys: &[KeyChoice],
-        best: &mut Option<f64>,
-    ) {
+    fn extend(space: &Space<'_>, removal: &mut Vec<LatticeStep>, keys: &[KeyChoice], best: &mut Option<f64>) {
         let left = removal
             .iter()
             .fold(space.all(), |l, s| l.minus(PieceSet::one(s.piece)));

@@ -155,8 +155,7 @@ impl<'a> Space<'a> {
 
     /// Whether an earlier round turned down a plan with the same relations.
     pub fn is_rejected(&self, plan: &LatticePlan) -> bool {
-        let is_same =
-            |r: &LatticePlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
+        let is_same = |r: &LatticePlan| r.steps.len() == self.n && self.relations(r) == self.relations(plan);
         self.constraints.rejected.iter().any(is_same)
     }
 

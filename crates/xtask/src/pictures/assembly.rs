@@ -113,23 +113,20 @@ pub fn segmentation(kit: &Kit) -> Vec<u8> {
     let mesh = &surface.mesh;
     let patches: Vec<(PatchId, TriMesh)> = kit
         .ids()
-        .map(|p| (p, part(&mesh, |f| surface.patch_of_face[f] == p)))
+        .map(|p| (p, part(mesh, |f| surface.patch_of_face[f] == p)))
         .collect();
     let colored: Vec<Painted<'_>> = patches
         .iter()
         .map(|(p, mesh)| plain(mesh, kit.color(*p)))
         .collect();
     let seams = surface.seams();
-    let lines: Vec<TriMesh> = seams
-        .iter()
-        .map(|s| tube(&s.points, 1.5))
-        .collect();
+    let lines: Vec<TriMesh> = seams.iter().map(|s| tube(&s.points, 1.5)).collect();
     let mut of_seam: Vec<Painted<'_>> = lines
         .iter()
         .enumerate()
         .map(|(i, line)| plain(line, shellock_render::palette::color(i)))
         .collect();
-    of_seam.push(plain(&mesh, PALE));
+    of_seam.push(plain(mesh, PALE));
     let mut sheet = Sheet::new(VIEW[1] + 40.0);
     let size = VIEW.map(pixels);
     let stills = [

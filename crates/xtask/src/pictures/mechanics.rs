@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use shellock::PatchId;
+use shellock::key::Turn;
 use shellock::metric::MetricParams;
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StressMap};
 use shellock::stress_test::{StressParams, chart, stress_test};
-use shellock::PatchId;
-use shellock::key::Turn;
 use shellock_geom::{TriMesh, Vec3};
 use shellock_render::stills::{Camera, Painted, render};
 
@@ -42,7 +42,7 @@ pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
         .collect();
     let scene = [Painted {
         face_colors: Some(&colors),
-        ..plain(&mesh, PALE)
+        ..plain(mesh, PALE)
     }];
     let size = VIEW.map(pixels);
     let mut sheet = Sheet::new(VIEW[1] + 86.0);
@@ -54,7 +54,6 @@ pub fn stress(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let bar = [0.5 * WIDTH - 150.0, VIEW[1] + 14.0];
     color_bar(&mut sheet, bar, 300.0, &format!("{most:.1} MPa"), words);
     let (number, down) = strength.deciding;
-    let down = down;
     let note = format!(
         "fall {} of {}, down along ({:.2}, {:.2}, {:.2}); wall of {:.2} mm; the material bears {} MPa; grey: too thin to be hollow",
         number + 1,
@@ -115,7 +114,7 @@ pub fn openings(kit: &Kit) -> Vec<u8> {
     let worst = made.holding.seams.iter().take(1);
     let spots = dots(worst.map(|s| Vec3::from_array(s.at)), 3.2);
     let mut scene: Vec<Painted<'_>> = lines.iter().map(|(line, color)| plain(line, *color)).collect();
-    scene.push(plain(&mesh, PALE));
+    scene.push(plain(mesh, PALE));
     scene.push(plain(&spots, RED));
     let size = VIEW.map(pixels);
     let mut sheet = Sheet::new(VIEW[1] + 84.0);

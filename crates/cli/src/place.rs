@@ -1,0 +1,69 @@
+//! Places in a maker's words, for somebody who stands in front of the model; figures are for machines.
+
+use shellock_geom::{Aabb, TriMesh, Vec3};
+
+use crate::args::Axis;
+use crate::output::standing;
+
+/// A model as it stands.
+pub struct Standing {
+    up: Axis,
+    /// With z up; the front is towards −y, the left towards −x.
+    bounds: Aabb,
+}
+
+impl Standing {
+    /// Of a mesh that stands with `up` upwards.
+    pub fn of(up: Axis, mesh: &TriMesh) -> Self {
+        let bounds = Aabb::around(mesh.points.iter().map(|&p| standing(up, p)));
+        Self { up, bounds }
+    }
+
+    /// As in "left front, 42 mm up" or "underneath, in the middle".
+    pub fn words(&self, at: [f64; 3]) -> String {
+        /// Nearer to the ground or to the top than this share of the height is there.
+        const END: f64 = 0.03;
+        let from_corner = standing(self.up, Vec3::from(at)) - self.bounds.min;
+        let share = from_corner / self.bounds.size().max(Vec3::splat(f64::MIN_POSITIVE));
+        let third = |share: f64, ends: [&'static str; 2]| match share {
+            s if s < 1.0 / 3.0 => Some(ends[0]),
+            s if s > 2.0 / 3.0 => Some(ends[1]),
+            _ => None,
+        };
+        let around = [
+            third(share.x, ["left", "right"]),
+            third(share.y, ["front", "back"]),
+        ];
+        let around: Vec<&str> = around.into_iter().flatten().collect();
+        let around = match &around[..] {
+            [] => "in the middle".to_owned(),
+            [one] => format!("at the {one}"),
+            both => both.join(" "),
+        };
+        match share.z {
+            z if z < END => format!("underneath, {around}"),
+            z if z > 1.0 - END => format!("on top, {around}"),
+            _ => format!("{around}, {:.0} mm up", from_corner.z),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_told_as_one_sees_them_from_the_front() {
+        let mesh = TriMesh {
+            points: vec![Vec3::ZERO, Vec3::new(90.0, 60.0, 100.0)],
+            triangles: Vec::new(),
+        };
+        let z_up = Standing::of(Axis::Z, &mesh);
+        assert_eq!(z_up.words([1.0, 1.0, 42.0]), "left front, 42 mm up");
+        assert_eq!(z_up.words([80.0, 30.0, 1.0]), "underneath, at the right");
+        assert_eq!(z_up.words([45.0, 30.0, 99.0]), "on top, in the middle");
+        // With y up, what has the greatest z stands in front.
+        let y_up = Standing::of(Axis::Y, &mesh);
+        assert_eq!(y_up.words([45.0, 30.0, 99.0]), "at the front, 30 mm up");
+    }
+}
