@@ -90,7 +90,7 @@ fn made_of(parts: &[Volume; 3], ways: &[Vec3; 3]) -> Made {
     let (verdict, contacts) = examine(&Ctx::new(&report, &stop), &params, &assembly).unwrap();
     let files: Vec<(String, Vec<u8>)> = pieces
         .iter()
-        .map(|(id, mesh)| (format!("{id}.stl"), write_stl_binary(mesh)))
+        .map(|(id, mesh)| (format!("{}.stl", usize::from(id)), write_stl_binary(mesh)))
         .collect();
     let named = pieces.ids().zip(&files);
     let named = named
