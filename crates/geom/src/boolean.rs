@@ -280,26 +280,20 @@ impl Volume {
         }
     }
 
-    /// The boundary as a mesh; no points where empty.
+    /// The boundary as a mesh; no points where empty. Its order follows from what it was made of alone: the
+    /// library's own export sorts triangles by when their sources were made, which varies where several threads
+    /// make them.
     pub fn to_mesh(&self) -> TriMesh {
-        if self.is_empty() {
-            return TriMesh::default();
-        }
-        let gl = self.0.get_mesh_gl64(-1);
-        let step = usize::try_from(gl.num_prop).expect("three properties a point");
+        let made = self.0.as_impl();
+        let index = |i: i32| u32::try_from(i).expect("edges of a made body have points");
         TriMesh {
-            points: gl
-                .vert_properties
-                .chunks_exact(step)
-                .map(|c| Vec3::new(c[0], c[1], c[2]))
-                .collect(),
-            triangles: gl
-                .tri_verts
-                .chunks_exact(3)
-                .map(|t| {
-                    [t[0], t[1], t[2]]
-                        .map(|i| u32::try_from(i).expect("the library counts points in 32 bits"))
-                })
+            points: made.vert_pos.iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect(),
+            triangles: made
+                .halfedge
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .map(|edges| edges.each_ref().map(|e| index(e.start_vert)))
                 .collect(),
         }
     }
@@ -471,6 +465,30 @@ mod tests {
             [ring(3.0), ring(1.0), ring(0.0)],
         ] {
             assert!((Volume::loft(&rings).volume() - 6.0).abs() < 1e-12);
+        }
+    }
+
+    /// Threads make volumes in any order.
+    #[test]
+    fn a_mesh_does_not_depend_on_which_part_was_made_first() {
+        let slab = |x: f64| {
+            let to = Vec3::new(x + 0.7, 1.0 + 0.1 * x, 1.0);
+            Volume::cuboid(Aabb {
+                min: Vec3::new(x, 0.1 * x, 0.0),
+                max: to,
+            })
+        };
+        let made = |order: [usize; 3]| {
+            let mut slabs = vec![Volume::empty(); 3];
+            for i in order {
+                slabs[i] = slab(0.5 * i as f64);
+            }
+            Volume::union_all(slabs).to_mesh()
+        };
+        let first = made([0, 1, 2]);
+        assert!(first.triangles.len() > 30);
+        for order in [[2, 1, 0], [1, 0, 2], [0, 2, 1]] {
+            assert_eq!(made(order), first);
         }
     }
 

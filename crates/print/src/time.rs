@@ -9,9 +9,10 @@
 //! their volume, their outlines and the solid layers on top of them. The reference is
 //! PrusaSlicer with its default print settings, two perimeters, 15 % infill and supports wherever it sees fit.
 //! `cargo xtask study hours` slices pieces and finds the coefficients. Limits: they are those of curved shells and
-//! of whole models in layers of 0.2 mm. Large flat faces take less than is told (a table top of 40 mm on supports by
-//! two fifths, a cube by a sixth), and a small piece alone takes more, as the slicer waits for layers to cool. Powder: height, as every layer is spread
-//! alike.
+//! of whole models in layers of 0.2 mm. Large flat faces take less than is told (a table top of 40 mm on supports
+//! by two fifths, a cube by a sixth), and a small piece alone takes more, as the slicer waits for layers to cool.
+//!
+//! Powder: height, as every layer is spread alike.
 
 use crate::load::Load;
 use crate::printer::{Printer, Process};

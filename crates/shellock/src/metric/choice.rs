@@ -74,7 +74,7 @@ pub struct SeamHolding {
     pub weight: f64,
     /// The place, mm in assembly space.
     pub at: [f64; 3],
-    /// Why it is weak there, for people.
+    /// Why it is weak there, for people; it says "the later one" and "the earlier".
     pub reason: String,
 }
 
@@ -268,7 +268,7 @@ fn weakest_places(
         };
         let weight = meetings[station].joint.map_or(0.0, |j| j.weight);
         let at = model.place_of(station).to_array();
-        let reason = reason(model, plan, station, [later, earlier]);
+        let reason = reason(model, plan, station, later).to_owned();
         SeamHolding {
             later,
             earlier,
@@ -282,7 +282,8 @@ fn weakest_places(
     worst.into_iter().map(seam).collect()
 }
 
-fn reason(model: &PlanModel, plan: &LatticePlan, station: usize, [later, earlier]: [PatchId; 2]) -> String {
+/// Why it is weak there, without names: those of the kit's pieces are not known yet.
+fn reason(model: &PlanModel, plan: &LatticePlan, station: usize, later: PatchId) -> &'static str {
     let s = plan.separation(later).unit();
     let frame = &model.assembly.stations[station];
     let across = if later == model.pieces_at(station)[0] {
@@ -291,11 +292,11 @@ fn reason(model: &PlanModel, plan: &LatticePlan, station: usize, [later, earlier
         -frame.across
     };
     if s.dot(frame.tangent).abs() >= ALONG_SHARE {
-        format!("the direction of piece {later} runs along the seam, so the connector is shallow")
+        "the later one goes in along the seam, so the connector is shallow"
     } else if s.dot(across) >= BACKWARD_SHARE {
-        format!("piece {later} leaves towards piece {earlier}, so the connector leans backward")
+        "the later one leaves towards the earlier, so the connector leans backward"
     } else {
-        format!("piece {later} bends away from piece {earlier} here, far from what holds it back")
+        "the later one bends away from the earlier here, far from what holds it back"
     }
 }
 
