@@ -213,7 +213,7 @@ function meshList(header, meshes, order, on) {
     const pick = button("", `Select ${m.name}`, () => on.choose(row.classList.contains("chosen") ? -1 : i));
     pick.className = "pick";
     const dot = element("span", "dot");
-    pick.append(element("span", "number", String(m.step + 1)), dot, element("span", "name", m.name));
+    pick.append(dot, element("span", "name", m.name));
     if (m.badge) pick.append(element("span", "badge", m.badge));
     const eye = button("hide", `Hide or show ${m.name}`, () => on.toggle(i));
     eye.className = "eye";

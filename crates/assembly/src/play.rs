@@ -134,6 +134,7 @@ pub fn measure(
             centers: &centers,
             slide: &slide,
             free: &[id],
+            set_back_mm: 0.0,
         };
         question.solve(ctx)
     };
@@ -178,6 +179,7 @@ pub fn measure(
             centers: &centers,
             slide: &slide,
             free: &free,
+            set_back_mm: 0.0,
         };
         if let Ok(proof) = question.solve(ctx)?.proof {
             let plays: BTreeMap<PatchId, Play> = proof.plays().collect();
@@ -223,6 +225,37 @@ pub fn look_for_ways_out(
     };
     play.ways_out = Some(found.into_iter().flatten().collect());
     Ok(())
+}
+
+/// How far each piece goes, for small motions as in [`KitPlay::estimates`], where every printed face stands
+/// back by `set_back_mm`; `None` where nothing ends its motions. Takes a second of processor time.
+pub fn printed_thin(
+    ctx: &Ctx,
+    pieces: &IdVec<PatchId, TriMesh>,
+    play: &KitPlay,
+    set_back_mm: f64,
+) -> Result<IdVec<PatchId, Option<Play>>, Cancelled> {
+    let surfaces = Surfaces::new(pieces);
+    let centers = pieces.as_slice().iter().map(TriMesh::centroid).collect();
+    let small = |id: PatchId| {
+        ctx.check()?;
+        let question = Problem {
+            surfaces: &surfaces,
+            bearings: &play.bearings,
+            candidates: Candidates::All,
+            centers: &centers,
+            slide: &play.slide,
+            free: &[id],
+            set_back_mm,
+        };
+        Ok(question
+            .small_motions()
+            .first()
+            .map(|&linear| play_of(linear, false)))
+    };
+    let ids: Vec<PatchId> = pieces.ids().collect();
+    let plays: Vec<Option<Play>> = ids.into_par_iter().map(small).collect::<Result<_, Cancelled>>()?;
+    Ok(plays.into_iter().collect())
 }
 
 /// All but the piece that touches others at most points: held, it leaves the others least room.
@@ -290,13 +323,8 @@ pub fn check(
     size_mm: f64,
     clearance_mm: f64,
 ) -> (Check, Vec<Finding>) {
-    let endless = Play {
-        translation_mm: f64::INFINITY,
-        rotation_deg: f64::INFINITY,
-        is_proven: false,
-    };
     let told = |(piece, play): (PatchId, &Option<Play>)| {
-        let (play, mesh) = (play.unwrap_or(endless), &pieces[piece]);
+        let (play, mesh) = (play.unwrap_or(Play::ENDLESS), &pieces[piece]);
         let most = most_play(size_mm, clearance_mm, mesh.bounds().diagonal());
         let excess = (play.translation_mm / most[0]).max(play.rotation_deg / most[1]);
         (

@@ -23,7 +23,7 @@ mod probe;
 #[cfg(test)]
 mod tests;
 mod thin;
-mod words;
+pub mod words;
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Aabb, Solid, TriMesh};
@@ -105,6 +105,15 @@ pub struct Play {
     pub rotation_deg: f64,
     /// Whether no path of motions of any size goes farther; else it is an estimate for small motions.
     pub is_proven: bool,
+}
+
+impl Play {
+    /// That of a piece that nothing holds.
+    pub const ENDLESS: Self = Self {
+        translation_mm: f64::INFINITY,
+        rotation_deg: f64::INFINITY,
+        is_proven: false,
+    };
 }
 
 /// What is wrong, where, and with whom. Places are mm in assembly space.

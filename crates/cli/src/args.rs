@@ -229,6 +229,13 @@ impl Axis {
         self as usize
     }
 
+    /// The one along a direction, if there is one.
+    pub fn of(along: [f64; 3]) -> Option<Self> {
+        [Self::X, Self::Y, Self::Z]
+            .into_iter()
+            .find(|a| a.unit() == along)
+    }
+
     /// Along it.
     pub fn unit(self) -> [f64; 3] {
         std::array::from_fn(|axis| f64::from(u8::from(axis == self.index())))

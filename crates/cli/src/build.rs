@@ -11,6 +11,7 @@ use shellock::plan::key::KeyDirections;
 use shellock::plan::{PlanProof, ProofScope};
 use shellock::strength::{Strength, StrengthParams};
 use shellock::verify::Verification;
+use shellock::verify::words::PlaceWords;
 use shellock::{Ctx, Warning, play};
 
 use crate::Session;
@@ -137,7 +138,7 @@ fn make(
     if session.is_json {
         print_json(to, &notes, &made, &summary, &warnings, &printing, code);
     } else if session.shown == Shown::Nothing {
-        print_failures(&made.kit.verification);
+        print_failures(&made.kit.verification, &standing);
         print_warnings(&warnings, &standing);
     } else {
         print_text(to, &made, settings, &summary, &warnings, &standing);
@@ -172,7 +173,7 @@ fn print_json(
         "status": if code == 0 { "verified" } else { "failed" },
         "out": to.folder(), "notes": notes,
         "pieces": made.kit.pieces.len(), "key_piece": made.kit.plan.key(),
-        "volume_ratio": summary.volume_ratio, "grams": summary.grams, "print": printing.entry().time, "fits_within_mm": made.fits_within_mm(), "connector_share": summary.connector_share,
+        "volume_ratio": summary.volume_ratio, "grams": summary.grams, "print": printing.entry().time, "fits_within_mm": made.fit.within_mm, "connector_share": summary.connector_share,
         "thin_share": summary.thin_share, "thickness_mm": made.kit.thickness_mm,
         "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
         "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.kit.sizes.largest_mm(),
@@ -213,7 +214,7 @@ fn print_text(
     if let Some(line) = fits(made) {
         println!("{line}");
     }
-    print_verdict(&made.kit.verification);
+    print_verdict(&made.kit.verification, standing);
     print_warnings(warnings, standing);
     println!(
         "written to {}: open report.html in a browser, print plates.3mf",
@@ -322,10 +323,20 @@ pub fn weakest(holding: &Holding, standing: &Standing) -> Vec<String> {
 
 /// How exact a printer must be; nothing where surfaces cross, which is warned of.
 pub fn fits(made: &Design) -> Option<String> {
-    let within_mm = made.fits_within_mm().filter(|mm| *mm > 0.0)?;
+    let within_mm = made.fit.within_mm.filter(|mm| *mm > 0.0)?;
+    let least_mm = 2.0 * within_mm;
+    let as_drawn = |piece| made.kit.play.estimates[piece].map_or(f64::INFINITY, |play| play.translation_mm);
+    let thin = match made.fit.loosest {
+        Some((piece, play)) if play.translation_mm.is_finite() => format!(
+            "; where all stand back by as much, piece {piece} rattles about {:.1} mm instead of {:.1} mm",
+            play.translation_mm,
+            as_drawn(piece)
+        ),
+        Some((piece, _)) => format!("; where all stand back by as much, piece {piece} comes loose"),
+        None => String::new(),
+    };
     Some(format!(
-        "fits if printed faces stand out by no more than {within_mm:.2} mm: the least gap is {:.2} mm, at rest and on every way out",
-        2.0 * within_mm
+        "fits if printed faces stand out by no more than {within_mm:.2} mm: the least gap is {least_mm:.2} mm, at rest and on every way out{thin}"
     ))
 }
 
@@ -339,7 +350,7 @@ pub fn print_warnings(warnings: &[Warning], standing: &Standing) {
 }
 
 /// Each check on a line, and loudly what failed and where.
-pub fn print_verdict(verdict: &Verification) {
+pub fn print_verdict(verdict: &Verification, words: &dyn PlaceWords) {
     for c in &verdict.checks {
         println!(
             "{}  {:52} {}",
@@ -348,17 +359,17 @@ pub fn print_verdict(verdict: &Verification) {
             c.figure
         );
     }
-    print_failures(verdict);
+    print_failures(verdict, words);
 }
 
 /// What failed and where, if something did.
-fn print_failures(verdict: &Verification) {
+fn print_failures(verdict: &Verification, words: &dyn PlaceWords) {
     if !verdict.passed() {
         eprintln!(
             "FAILED: this kit does not hold together as it should; do not print it. What failed, and where:"
         );
         for finding in &verdict.findings {
-            eprintln!("  {finding}");
+            eprintln!("  {}", finding.told(words));
         }
     }
 }

@@ -143,8 +143,8 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         Command::Demo { figure, options, out } => build::demo(session, &figure, &options, out),
         Command::Segment { model, options, out } => stages::segment(session, &model, &options, &out),
         Command::Plan { model, options } => stages::plan(session, &model, &options),
-        Command::Verify { kit, .. } if kit.join(own_assembly::ASSEMBLY).is_file() => {
-            own_assembly::verify(session, &kit)
+        Command::Verify { kit, model } if kit.join(own_assembly::ASSEMBLY).is_file() => {
+            own_assembly::verify(session, &kit, model.as_deref())
         }
         Command::Verify { kit, model } => stages::verify(session, &kit, model.as_deref()),
         Command::Test { kit, blows } => stress::test(session, &kit, &blows),

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde_json::json;
 use shellock::certificate::PieceFile;
 use shellock::context::Progress;
+use shellock::verify::words::Coordinates;
 use shellock::verify::{Assembly, VerifyParams};
 use shellock::{Ctx, Direction, InstallationPlan, PatchId, Verdict};
 use shellock_geom::Vec3;
@@ -21,6 +22,10 @@ use crate::stages::write;
 
 /// The file that says how the pieces go together.
 pub const ASSEMBLY: &str = "assembly.json";
+
+/// What it has to look like.
+const HOW: &str = "it looks like { \"clearance\": 0.1, \"pieces\": [{ \"file\": \"first.stl\" }, \
+                   { \"file\": \"key.stl\", \"pulled_out_along\": [0, 0, 1] }] }";
 
 /// What `assembly.json` says.
 #[derive(Deserialize)]
@@ -43,10 +48,17 @@ struct PieceEntry {
 }
 
 /// `shellock verify FOLDER`, where the folder has an `assembly.json`.
-pub fn verify(session: &Session, folder: &Path) -> Result<u8, Failure> {
+pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<u8, Failure> {
+    if let Some(model) = model {
+        return Err(Failure::Wrong(format!(
+            "the assembly of {ASSEMBLY} is verified without a model: leave {} out",
+            model.display()
+        )));
+    }
     let path = folder.join(ASSEMBLY);
     let wrong = |what: String| Failure::Wrong(format!("{}: {what}", path.display()));
-    let told: AssemblyFile = serde_json::from_slice(&read(&path)?).map_err(|e| wrong(e.to_string()))?;
+    let told: AssemblyFile =
+        serde_json::from_slice(&read(&path)?).map_err(|e| wrong(format!("{e}; {HOW}")))?;
     if !(0.0..=1.0).contains(&told.clearance) {
         return Err(wrong(format!(
             "a clearance of {} mm is none; 0 to 1 mm are",
@@ -140,7 +152,7 @@ fn print(session: &Session, verdict: &Verdict) -> u8 {
         });
         println!("{value}");
     } else {
-        print_verdict(found);
+        print_verdict(found, &Coordinates);
     }
     code
 }

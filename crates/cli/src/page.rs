@@ -36,7 +36,9 @@ pub fn report(
 ) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
     let stand = |v: Vec3| standing(options.up, v);
     let shown = shown(design, stand);
-    let failed = design.kit.verification.findings.iter().map(failure);
+    let standing = Standing::of(options.up, model.solid.mesh());
+    let failed = design.kit.verification.findings.iter();
+    let failed = failed.map(|finding| failure(finding, &standing));
     let warnings: Vec<Warning> = failed
         .chain(warnings.iter().cloned())
         .map(|w| w.turned(|at| stand(Vec3::from_array(at)).to_array()))
@@ -57,7 +59,6 @@ pub fn report(
             facts: piece_facts(design, p),
         })
         .collect();
-    let standing = Standing::of(options.up, model.solid.mesh());
     let facts = kit_facts(&shown, settings, design, summary, &standing);
     let checks = design
         .kit
@@ -147,10 +148,10 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
 }
 
 /// What failed, for the list of warnings.
-fn failure(finding: &Finding) -> Warning {
+fn failure(finding: &Finding, standing: &Standing) -> Warning {
     Warning {
         cause: Cause::Failed {
-            finding: finding.to_string(),
+            finding: finding.told(standing),
         },
         pieces: Vec::new(),
         at: finding.place(),
@@ -243,7 +244,7 @@ fn cover_lines(shown: &[TriMesh]) -> Vec<String> {
 
 /// How exact a printer must be.
 fn printed_within(design: &Design) -> String {
-    match design.fits_within_mm() {
+    match design.fit.within_mm {
         Some(mm) if mm > 0.0 => format!("± {mm:.2} mm"),
         _ => "surfaces cross; see the warnings".to_owned(),
     }

@@ -1,5 +1,6 @@
 //! Places in a maker's words, for somebody who stands in front of the model; figures are for machines.
 
+use shellock::verify::words::PlaceWords;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::args::Axis;
@@ -48,6 +49,27 @@ impl Standing {
     }
 }
 
+impl PlaceWords for Standing {
+    fn place(&self, at: [f64; 3]) -> String {
+        self.words(at)
+    }
+
+    /// As in "to the left and up".
+    fn way(&self, along: [f64; 3]) -> String {
+        /// Smaller components than this share of the length are not told: 22.5°.
+        const LEAST: f64 = 0.38;
+        let d = standing(self.up, Vec3::from(along)).normalize_or_zero();
+        let part = |x: f64, ways: [&'static str; 2]| (x.abs() > LEAST).then(|| ways[usize::from(x > 0.0)]);
+        let parts = [
+            part(d.x, ["to the left", "to the right"]),
+            part(d.y, ["to the front", "to the back"]),
+            part(d.z, ["down", "up"]),
+        ];
+        let parts: Vec<&str> = parts.into_iter().flatten().collect();
+        parts.join(" and ")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,6 +84,8 @@ mod tests {
         assert_eq!(z_up.words([1.0, 1.0, 42.0]), "left front, 42 mm up");
         assert_eq!(z_up.words([80.0, 30.0, 1.0]), "underneath, at the right");
         assert_eq!(z_up.words([45.0, 30.0, 99.0]), "on top, in the middle");
+        assert_eq!(z_up.way([0.0, 0.0, -2.0]), "down");
+        assert_eq!(z_up.way([-1.0, 0.1, 1.0]), "to the left and up");
         // With y up, what has the greatest z stands in front.
         let y_up = Standing::of(Axis::Y, &mesh);
         assert_eq!(y_up.words([45.0, 30.0, 99.0]), "at the front, 30 mm up");

@@ -7,6 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use serde_json::{Value, json};
 use shellock::certificate::{OtherFile, PieceFile};
 use shellock::design::{self, DesignError, Planned, Settings};
+use shellock::verify::words::Coordinates;
 use shellock::verify::{Assembly, VerifyParams};
 use shellock::{Ctx, IdVec, InstallationPlan, PatchId, segmentation};
 use shellock_formats::{write_labels, write_ply, write_stl_binary};
@@ -15,7 +16,7 @@ use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_kit::PlanFile;
 
 use crate::Session;
-use crate::args::Options;
+use crate::args::{Axis, Options};
 use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
@@ -227,7 +228,11 @@ pub fn verify(session: &Session, kit: &Path, model: Option<&Path>) -> Result<u8,
             json!({ "passed": verdict.passed(), "checks": verdict.checks, "findings": verdict.findings, "exit_code": code })
         );
     } else {
-        print_verdict(&verdict);
+        let up = plan.up.and_then(Axis::of);
+        match up.map(|up| Standing::of(up, solid.mesh())) {
+            Some(standing) => print_verdict(&verdict, &standing),
+            None => print_verdict(&verdict, &Coordinates),
+        }
     }
     Ok(code)
 }

@@ -22,9 +22,9 @@ use shellock_assembly::warning::WarningEntry;
 use shellock_assembly::{PatchId, PressFit};
 
 pub use entries::{
-    ContactEntry, GapsEntry, InputEntry, JointEntry, KeyEntry, LaidEntry, PairSizeEntry, PieceEntry,
-    PlayEntry, PrintingEntry, RattleEntry, RepairEntry, SolidEntry, StrengthEntry, TimeEntry, TriedEntry,
-    VerdictEntry,
+    ContactEntry, GapsEntry, InputEntry, JointEntry, KeyEntry, LaidEntry, LoosestEntry, PairSizeEntry,
+    PieceEntry, PlayEntry, PrintingEntry, RattleEntry, RepairEntry, SolidEntry, StrengthEntry, TimeEntry,
+    TriedEntry, VerdictEntry,
 };
 pub use error::PlanFileError;
 pub use fill::{Source, Told, piece_file};

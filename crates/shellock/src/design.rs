@@ -40,7 +40,7 @@ use division::{Division, WallGrid, revised};
 use handover::Handover;
 pub use kit::Kit;
 use outcome::Best;
-pub use outcome::{Design, DesignError, DesignOutcome};
+pub use outcome::{Design, DesignError, DesignOutcome, PrintedFit};
 pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
 

@@ -136,6 +136,8 @@ pub(super) struct Problem<'a> {
     pub slide: &'a Slide,
     /// In ascending order.
     pub free: &'a [PatchId],
+    /// How far every face stands back, mm: printed thin. Proofs are of faces as they are, 0.
+    pub set_back_mm: f64,
 }
 
 /// What one round found of a quantity: for each axis, against it and along it, the multipliers; or that it
@@ -156,16 +158,32 @@ impl Problem<'_> {
         self.free.binary_search(&p).is_ok()
     }
 
-    /// Looks for the proof. The answer is a function of the question alone, on any number of threads.
-    pub fn solve(&self, ctx: &Ctx) -> Result<Answer, Cancelled> {
+    /// The bearings of the free pieces that are looked at, by their place among all.
+    fn own(&self) -> Vec<usize> {
         let is_candidate = |i: usize| match self.candidates {
             Candidates::All => true,
             Candidates::Some(some) => some.contains(&i),
         };
         let is_own = |i: usize| self.is_free(self.bearings[i].a) || self.is_free(self.bearings[i].b);
-        let own: Vec<usize> = (0..self.bearings.len())
+        (0..self.bearings.len())
             .filter(|&i| is_own(i) && is_candidate(i))
-            .collect();
+            .collect()
+    }
+
+    /// How far each free piece goes where sideways moves and turns are taken as none, as in [`Answer::linear`].
+    pub fn small_motions(&self) -> Vec<[f64; 2]> {
+        let bearings: Vec<Bearing> = self.own().iter().map(|&i| self.bearings[i]).collect();
+        let quantities = Quantities::new(self.free, self.centers, &bearings);
+        let beds: Vec<OnceLock<bool>> = bearings.iter().map(|_| OnceLock::new()).collect();
+        let round = Round::new(self, &bearings, &quantities, &beds);
+        round
+            .ends()
+            .map_or_else(Vec::new, |found| quantities.linear(&round.found(&found.ends)))
+    }
+
+    /// Looks for the proof. The answer is a function of the question alone, on any number of threads.
+    pub fn solve(&self, ctx: &Ctx) -> Result<Answer, Cancelled> {
+        let own = self.own();
         let bearings: Vec<Bearing> = own.iter().map(|&i| self.bearings[i]).collect();
         let mut quantities = Quantities::new(self.free, self.centers, &bearings);
         let beds: Vec<OnceLock<bool>> = bearings.iter().map(|_| OnceLock::new()).collect();
@@ -188,10 +206,7 @@ impl Problem<'_> {
                 return open(answer, Open::Far);
             };
             let guesses = round.guesses(&ends, &motions);
-            let found: BTreeMap<usize, Vec<[f64; 2]>> = ends
-                .iter()
-                .map(|(&q, ends)| (q, ends.iter().map(|e| round.values(q, e)).collect()))
-                .collect();
+            let found = round.found(&ends);
             let is_within = |(&q, found): (&usize, &Vec<[f64; 2]>)| {
                 found
                     .iter()
@@ -304,9 +319,15 @@ impl<'a> Round<'a> {
     /// The least that a row's bound can be.
     fn least_mm(&self, row: usize) -> f64 {
         let i = self.system.rows[row].contact;
-        self.bearings
-            .get(i)
-            .map_or_else(|| self.slide_mm(), |b| b.gap_mm + self.errors_mm[i])
+        self.bearings.get(i).map_or_else(
+            || self.slide_mm(),
+            |b| b.gap_mm + self.set_back_mm() + self.errors_mm[i],
+        )
+    }
+
+    /// How much wider a gap is than it looks: both faces stand back.
+    fn set_back_mm(&self) -> f64 {
+        2.0 * self.problem.set_back_mm
     }
 
     /// What bounds the slide, which is measured like the point of a bearing.
@@ -353,9 +374,9 @@ impl<'a> Round<'a> {
         let region = self
             .quantities
             .region(b, &self.quantities.places[i], self.errors_mm[i]);
-        surfaces
-            .rise_mm(b, &region)
-            .map_or(f64::INFINITY, |rise_mm| rise_mm + self.errors_mm[i])
+        surfaces.rise_mm(b, &region).map_or(f64::INFINITY, |rise_mm| {
+            rise_mm + self.set_back_mm() + self.errors_mm[i]
+        })
     }
 
     /// What ends each quantity that matters, and the motions that go there; `None` where one has no end.
@@ -465,6 +486,13 @@ impl<'a> Round<'a> {
             }
         }
         objective
+    }
+
+    /// How far each quantity goes, for each axis against it and along it.
+    fn found(&self, ends: &BTreeMap<usize, Ends>) -> BTreeMap<usize, Vec<[f64; 2]>> {
+        ends.iter()
+            .map(|(&q, ends)| (q, ends.iter().map(|e| self.values(q, e)).collect()))
+            .collect()
     }
 
     /// How far the multipliers show that a quantity goes, against an axis and along it.

@@ -73,6 +73,22 @@ fn a_cube_in_a_cage_is_proven_to_go_hardly_farther_than_its_gap() {
     );
 }
 
+#[test]
+fn faces_that_stand_back_are_a_wider_gap() {
+    let (narrow, wide) = (caged(0.1), caged(0.2));
+    let play = measured(&narrow, 0.2);
+    let thin = printed_thin(&Ctx::quiet(), &narrow.pieces, &play, 0.05).unwrap();
+    let cube = |plays: &IdVec<PatchId, Option<Play>>| plays[PatchId(1)].unwrap();
+    let (thin, wide) = (cube(&thin), cube(&measured(&wide, 0.2).estimates));
+    assert!(
+        (thin.translation_mm - wide.translation_mm).abs() < 0.02,
+        "{thin:?} {wide:?}"
+    );
+    assert!(thin.translation_mm > 1.8 * cube(&play.estimates).translation_mm);
+    let as_is = printed_thin(&Ctx::quiet(), &narrow.pieces, &play, 0.0).unwrap();
+    assert_eq!(as_is, play.estimates);
+}
+
 /// A random walk of the lid, each step with exact intersections, goes nowhere that the proof denies.
 #[test]
 fn no_free_walk_leads_beyond_the_proven_play() {

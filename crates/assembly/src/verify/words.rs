@@ -2,28 +2,54 @@
 
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Finding, Motion};
+use super::{Finding, Motion, Play};
+
+/// How places and ways are told.
+pub trait PlaceWords {
+    /// A place, as in "at (1.0, 2.0, 3.0) mm" or "left front, 42 mm up".
+    fn place(&self, at: [f64; 3]) -> String;
+    /// A direction, as in "along (1.00, 0.00, 0.00)" or "to the left".
+    fn way(&self, along: [f64; 3]) -> String;
+}
+
+/// Places and ways as figures, mm in assembly space.
+pub struct Coordinates;
+
+impl PlaceWords for Coordinates {
+    fn place(&self, [x, y, z]: [f64; 3]) -> String {
+        format!("at ({x:.1}, {y:.1}, {z:.1}) mm")
+    }
+
+    fn way(&self, [x, y, z]: [f64; 3]) -> String {
+        format!("along ({x:.2}, {y:.2}, {z:.2})")
+    }
+}
 
 impl Display for Finding {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        f.write_str(&self.told(&Coordinates))
+    }
+}
+
+impl Finding {
+    /// A sentence, with places as `words` has them.
+    pub fn told(&self, words: &dyn PlaceWords) -> String {
         match self {
-            Self::PlanBroken { piece } => write!(f, "the plan does not name piece {piece} exactly once"),
+            Self::PlanBroken { piece } => format!("the plan does not name piece {piece} exactly once"),
             Self::NotClosed { piece } => {
-                write!(f, "piece {piece} is not closed: it has holes, or is inside out")
+                format!("piece {piece} is not closed: it has holes, or is inside out")
             }
-            Self::SharedEdges { piece, count, at } => {
-                write!(
-                    f,
-                    "{count} edges of piece {piece} have more than two triangles, first {}",
-                    At(at)
-                )
-            }
-            Self::SeveralBodies { piece, count } => write!(f, "piece {piece} falls into {count} bodies"),
-            Self::Overlap { a, b, volume_mm3, at } => {
-                write!(f, "pieces {a} and {b} overlap by {volume_mm3:.2} mm³ {}", At(at))
-            }
+            Self::SharedEdges { piece, count, at } => format!(
+                "{count} edges of piece {piece} have more than two triangles, first {}",
+                words.place(*at)
+            ),
+            Self::SeveralBodies { piece, count } => format!("piece {piece} falls into {count} bodies"),
+            Self::Overlap { a, b, volume_mm3, at } => format!(
+                "pieces {a} and {b} overlap by {volume_mm3:.2} mm³ {}",
+                words.place(*at)
+            ),
             Self::Outside { volume_mm3 } => {
-                write!(f, "{volume_mm3:.2} mm³ of the pieces lie outside the model")
+                format!("{volume_mm3:.2} mm³ of the pieces lie outside the model")
             }
             Self::PathRubs {
                 piece,
@@ -32,70 +58,60 @@ impl Display for Finding {
                 thickness_mm,
                 volume_mm3,
                 at,
-            } => write!(
-                f,
+            } => format!(
                 "on its way in, {travel_mm:.1} mm from its place, piece {piece} runs into piece {against} by {volume_mm3:.2} mm³, \
                  {thickness_mm:.3} mm thick, {}",
-                At(at)
+                words.place(*at)
             ),
-            Self::Loose { piece, directions } => {
-                let [x, y, z] = directions.first().copied().unwrap_or_default();
-                write!(
-                    f,
-                    "piece {piece} comes off by itself in {} of the directions that are tried, first along ({x:.2}, {y:.2}, {z:.2}); \
-                     longer seams hold better: try fewer pieces, a larger model or other labels",
-                    directions.len()
-                )
-            }
+            Self::Loose { piece, directions } => format!(
+                "piece {piece} comes off by itself in {} of the directions that are tried, first {}; \
+                 longer seams hold better: try fewer pieces, a larger model or other labels",
+                directions.len(),
+                words.way(directions.first().copied().unwrap_or_default())
+            ),
             Self::ClusterMoves { motions } => {
-                write!(f, "these pieces come apart from the rest: {}", named(motions))
+                let way = |m: &Motion| format!("piece {} {}", m.piece, words.way(m.velocity));
+                let ways: Vec<String> = motions.iter().map(way).collect();
+                format!("these pieces come apart from the rest: {}", ways.join(", "))
             }
             Self::PlayTooWide {
                 piece,
                 play,
-                most: [most_mm, most_deg],
+                most,
                 at,
-            } => write!(
-                f,
-                "piece {piece} rattles by {:.1} mm and {:.1}°, where {most_mm:.1} mm and {most_deg:.1}° are allowed, {}: its seams are too short for \
-                 the clearance; try fewer pieces, a larger model, labels that cut where it is wider, or a smaller --clearance if your printer \
-                 holds it",
-                play.translation_mm,
-                play.rotation_deg,
-                At(at)
+            } => format!(
+                "piece {piece} {}, {}: its seams are too short for the clearance; try fewer pieces, a larger model, labels that cut where \
+                 it is wider, or a smaller --clearance if your printer holds it",
+                too_wide(play, *most),
+                words.place(*at)
             ),
-            Self::ComesOut { piece, at } => write!(
-                f,
+            Self::ComesOut { piece, at } => format!(
                 "piece {piece} can be worked out by hand, turned past its connectors, {}: join it to a neighbour, or cut where it is wider",
-                At(at)
+                words.place(*at)
             ),
-            Self::SurfaceLost { fraction, at } => write!(
-                f,
+            Self::SurfaceLost { fraction, at } => format!(
                 "{:.2} % of the model's surface are on no piece, farthest from any {}",
                 100.0 * fraction,
-                At(at)
+                words.place(*at)
             ),
         }
     }
 }
 
-/// A place.
-struct At<'a>(&'a [f64; 3]);
-
-impl Display for At<'_> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let [x, y, z] = self.0;
-        write!(f, "at ({x:.1}, {y:.1}, {z:.1}) mm")
+/// What of the play is more than is allowed.
+fn too_wide(play: &Play, [most_mm, most_deg]: [f64; 2]) -> String {
+    if !play.translation_mm.is_finite() || !play.rotation_deg.is_finite() {
+        return "moves without end".to_owned();
     }
-}
-
-/// Which pieces move, each with the way it goes.
-fn named(motions: &[Motion]) -> String {
-    let way = |m: &Motion| {
-        let [x, y, z] = m.velocity;
-        format!("piece {} along ({x:.2}, {y:.2}, {z:.2})", m.piece)
-    };
-    motions.iter().map(way).collect::<Vec<_>>().join(", ")
+    let (mm, deg) = (play.translation_mm, play.rotation_deg);
+    let mut parts = Vec::new();
+    if mm > most_mm {
+        parts.push(format!("by {mm:.2} mm, where {most_mm:.2} mm are allowed"));
+    }
+    if deg > most_deg {
+        parts.push(format!("by {deg:.2}°, where {most_deg:.2}° are allowed"));
+    }
+    format!("rattles {}", parts.join(", and "))
 }
 
 #[cfg(test)]
@@ -123,5 +139,20 @@ mod tests {
             text.starts_with("piece 4 ") && text.contains("(0.00, 0.00, 1.00)"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn only_what_is_too_much_is_told_of_play() {
+        let told = |translation_mm, rotation_deg| {
+            let play = Play {
+                translation_mm,
+                rotation_deg,
+                is_proven: false,
+            };
+            too_wide(&play, [0.5, 2.0])
+        };
+        assert_eq!(told(0.51, 1.0), "rattles by 0.51 mm, where 0.50 mm are allowed");
+        assert_eq!(told(0.4, 2.5), "rattles by 2.50°, where 2.00° are allowed");
+        assert_eq!(told(f64::INFINITY, 1.0), "moves without end");
     }
 }

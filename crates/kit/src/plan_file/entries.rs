@@ -216,6 +216,20 @@ pub struct GapsEntry {
     pub key_on_the_way_beneath_rim_mm: Option<f64>,
     /// How far printed faces may stand out, each on its side, mm.
     pub fits_within_mm: Option<f64>,
+    /// What rattles most where they all stand back by as much; `None` where nobody looked.
+    #[serde(default)]
+    pub loosest_if_thin: Option<LoosestEntry>,
+}
+
+/// How far a piece moves where all faces are printed thin.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoosestEntry {
+    /// Which piece.
+    pub piece: PatchId,
+    /// For small motions, mm; `None` where nothing ends them.
+    pub translation_mm: Option<f64>,
+    /// For small motions, degrees; `None` where nothing ends them.
+    pub rotation_deg: Option<f64>,
 }
 
 /// The verdict on the finished pieces.

@@ -13,9 +13,9 @@ use shellock_print::time::{Cost, whole_words};
 use shellock_print::{Plates, Printer, Process};
 
 use super::{
-    ContactEntry, FORMAT, GapsEntry, InputEntry, JointEntry, KeyEntry, LaidEntry, PairSizeEntry, PieceEntry,
-    PlanFile, PlayEntry, PrintingEntry, RattleEntry, RepairEntry, SolidEntry, StrengthEntry, TimeEntry,
-    TriedEntry, VERSION, VerdictEntry,
+    ContactEntry, FORMAT, GapsEntry, InputEntry, JointEntry, KeyEntry, LaidEntry, LoosestEntry,
+    PairSizeEntry, PieceEntry, PlanFile, PlayEntry, PrintingEntry, RattleEntry, RepairEntry, SolidEntry,
+    StrengthEntry, TimeEntry, TriedEntry, VERSION, VerdictEntry,
 };
 
 /// The file of the model that a kit was made from.
@@ -268,7 +268,12 @@ impl GapsEntry {
             on_the_way_mm: least(paths.iter().map(|p| p.overall.gap_mm)),
             on_the_way_beneath_rim_mm: least(paths.iter().filter_map(beneath)),
             key_on_the_way_beneath_rim_mm: least(of_key.filter_map(beneath)),
-            fits_within_mm: design.fits_within_mm(),
+            fits_within_mm: design.fit.within_mm,
+            loosest_if_thin: design.fit.loosest.map(|(piece, play)| LoosestEntry {
+                piece,
+                translation_mm: Some(play.translation_mm).filter(|mm| mm.is_finite()),
+                rotation_deg: Some(play.rotation_deg).filter(|deg| deg.is_finite()),
+            }),
         }
     }
 }

@@ -62,12 +62,13 @@ impl Handover {
         self.back.apply(Vec3::from(place)).to_array()
     }
 
-    /// One element a piece, in their order.
+    /// One element a piece, in their order; none where there are none.
     fn in_order<T: Clone>(&self, of_patches: &[T]) -> Vec<T> {
+        if of_patches.is_empty() {
+            return Vec::new();
+        }
         let patches = self.plan.steps.iter().map(|step| usize::from(step.piece));
-        patches
-            .filter_map(|patch| of_patches.get(patch).cloned())
-            .collect()
+        patches.map(|patch| of_patches[patch].clone()).collect()
     }
 
     /// The order and the directions.

@@ -11,11 +11,12 @@ use crate::key::KeySite;
 use crate::metric::ChoiceError;
 use crate::piece::PieceError;
 use crate::plan::Blocker;
+use crate::play;
 use crate::segmentation::{self, SegmentationError};
 use crate::strength::{Strength, StrengthError};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::limits::LEAST_SLOT_MM;
-use crate::verify::{ThinFeature, ThinKind, thin_places};
+use crate::verify::{Play, ThinFeature, ThinKind, thin_places};
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
 /// A finished kit and the wall that it is made of. All places are those of the model as it was given.
@@ -29,12 +30,26 @@ pub struct Design {
     pub strength: Option<Strength>,
     /// How near pieces come, at rest and on their way.
     pub gaps: KitGaps,
+    /// How far faces may stand out as they are printed, and what becomes of the play where they stand back.
+    pub fit: PrintedFit,
     /// Where each piece is too thin to print well, the longest place first.
     pub thin: IdVec<PatchId, Vec<ThinFeature>>,
     /// What it took to find it.
     pub effort: Effort,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
+}
+
+/// What a printer's error does to a kit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PrintedFit {
+    /// How far printed faces may stand out, each on its side, mm: half of the least gap between two pieces, at
+    /// rest and on any way out, but for a key's ribs or bumps, which are to press. ≤ 0 where surfaces cross;
+    /// `None` where no two pieces come near.
+    pub within_mm: Option<f64>,
+    /// The piece that rattles most where all faces stand back by as much, and how far, for small motions; play
+    /// without end where it comes loose. `None` for kits that fail anyway.
+    pub loosest: Option<(PatchId, Play)>,
 }
 
 /// How the job ended.
@@ -158,6 +173,7 @@ impl<'a> Best<'a> {
             &kit.plan,
             job.settings().body.rim_mm,
         )?;
+        let fit = PrintedFit::of(ctx, &kit, &gaps)?;
         let least_wall_mm = job.settings().connector.min_wall_mm;
         let thin = |mesh: &TriMesh| thin_places(mesh, least_wall_mm, LEAST_SLOT_MM);
         let thin: IdVec<PatchId, Vec<ThinFeature>> = kit.pieces.as_slice().iter().map(thin).collect();
@@ -190,6 +206,7 @@ impl<'a> Best<'a> {
             key,
             strength,
             gaps,
+            fit,
             thin,
             effort,
             warnings,
@@ -239,30 +256,42 @@ fn thin_in_all(thin: &IdVec<PatchId, Vec<ThinFeature>>) -> Option<Warning> {
     })
 }
 
-impl Design {
-    /// How far printed faces may stand out, each on its side, mm: half of the least gap between two pieces, at
-    /// rest and on any way out, but for a key's ribs or bumps, which are to press. ≤ 0 where surfaces cross;
-    /// `None` where no two pieces come near.
-    pub fn fits_within_mm(&self) -> Option<f64> {
-        let (key, presses) = (self.kit.plan.key(), !self.kit.press_fits.is_empty());
-        let is_pressed = |a: PatchId, b: PatchId| presses && (a == key || b == key);
-        let at_rest = self
-            .gaps
-            .pairs
-            .iter()
-            .filter(|p| !is_pressed(p.a, p.b))
-            .map(|p| p.overall.gap_mm);
-        let on_ways = self
-            .gaps
-            .paths
-            .iter()
-            .filter(|p| !is_pressed(p.piece, p.against))
-            .map(|p| p.overall.gap_mm);
-        at_rest
-            .chain(on_ways)
-            .min_by(f64::total_cmp)
-            .map(|gap_mm| 0.5 * gap_mm)
+impl PrintedFit {
+    fn of(ctx: &Ctx, kit: &Kit, gaps: &KitGaps) -> Result<Self, Cancelled> {
+        let within_mm = fits_within_mm(kit, gaps);
+        let tried_mm = within_mm.filter(|mm| *mm > 0.0 && kit.verification.passed());
+        let loosest = tried_mm.map(|mm| {
+            let plays = play::printed_thin(ctx, &kit.pieces, &kit.play, mm)?;
+            let plays = plays
+                .iter()
+                .map(|(piece, play)| (piece, play.unwrap_or(Play::ENDLESS)));
+            Ok(plays.max_by(|a, b| a.1.translation_mm.total_cmp(&b.1.translation_mm)))
+        });
+        Ok(Self {
+            within_mm,
+            loosest: loosest.transpose()?.flatten(),
+        })
     }
+}
+
+/// Half of the least gap that is to be one, mm.
+fn fits_within_mm(kit: &Kit, gaps: &KitGaps) -> Option<f64> {
+    let (key, presses) = (kit.plan.key(), !kit.press_fits.is_empty());
+    let is_pressed = |a: PatchId, b: PatchId| presses && (a == key || b == key);
+    let at_rest = gaps
+        .pairs
+        .iter()
+        .filter(|p| !is_pressed(p.a, p.b))
+        .map(|p| p.overall.gap_mm);
+    let on_ways = gaps
+        .paths
+        .iter()
+        .filter(|p| !is_pressed(p.piece, p.against))
+        .map(|p| p.overall.gap_mm);
+    at_rest
+        .chain(on_ways)
+        .min_by(f64::total_cmp)
+        .map(|gap_mm| 0.5 * gap_mm)
 }
 
 /// Says where finished pieces cross that are not meant to press: on a way out, or at rest.
