@@ -31,6 +31,7 @@ pub struct Ctx<'a> {
     report: &'a (dyn Fn(Progress<'_>) + Sync),
     stop: &'a AtomicBool,
     is_time_up: Option<&'a (dyn Fn() -> bool + Sync)>,
+    seconds_left: Option<&'a (dyn Fn() -> f64 + Sync)>,
     warnings: Mutex<Vec<Warning>>,
 }
 
@@ -41,6 +42,7 @@ impl<'a> Ctx<'a> {
             report,
             stop,
             is_time_up: None,
+            seconds_left: None,
             warnings: Mutex::new(Vec::new()),
         }
     }
@@ -60,6 +62,22 @@ impl<'a> Ctx<'a> {
             is_time_up: Some(is_time_up),
             ..self
         }
+    }
+
+    /// The same with a clock that says how many seconds the whole job may still take: what is made again and again
+    /// until it is good is not begun anew where that would end too late.
+    ///
+    /// What comes of the job then depends on how fast the machine is; it is warned of.
+    pub fn with_deadline(self, seconds_left: &'a (dyn Fn() -> f64 + Sync)) -> Self {
+        Self {
+            seconds_left: Some(seconds_left),
+            ..self
+        }
+    }
+
+    /// Seconds that the whole job may still take; no end where there is no clock.
+    pub fn seconds_left(&self) -> f64 {
+        self.seconds_left.map_or(f64::INFINITY, |left| left())
     }
 
     /// Whether to be content with what was found.
@@ -107,6 +125,7 @@ impl<'a> Ctx<'a> {
             report: self.report,
             stop: self.stop,
             is_time_up: self.is_time_up,
+            seconds_left: self.seconds_left,
             warnings: Mutex::new(Vec::new()),
         }
     }

@@ -42,6 +42,7 @@ pub enum Cause {
     // The wall
     StrengthUnknown {
         error: String,
+        thickness_mm: f64,
     },
     WallTooWeak {
         thickness_mm: f64,
@@ -100,6 +101,9 @@ pub enum Cause {
         reasons: Vec<String>,
     },
     KeyWithoutRails,
+    TimeUp {
+        kits: usize,
+    },
     KeyWithoutRibs,
     KeyWithoutGrip,
     KeyRibs {
@@ -210,10 +214,10 @@ impl Warning {
     fn told(&self) -> (&'static str, String) {
         let (first, second) = (self.id(0), self.id(1));
         match &self.cause {
-            Cause::StrengthUnknown { error } => (
+            Cause::StrengthUnknown { error, thickness_mm } => (
                 "strength-unknown",
                 format!(
-                    "what the wall bears could not be computed ({error}); connectors are sized as if nothing pressed on them"
+                    "what the wall bears could not be computed ({error}): it is {thickness_mm:.2} mm thick, and connectors are sized as if nothing pressed on them"
                 ),
             ),
             Cause::WallTooWeak {
@@ -356,6 +360,13 @@ impl Warning {
                 format!(
                     "piece {first} is the key as it is, without rails: {}",
                     reasons.join("; ")
+                ),
+            ),
+            Cause::TimeUp { kits } => (
+                "time-up",
+                format!(
+                    "the time was over (--time) after {kits} {}: this is the best of them; on a faster computer, or with more time, it may be another",
+                    if *kits == 1 { "kit" } else { "kits" }
                 ),
             ),
             Cause::KeyWithoutRails => (

@@ -398,6 +398,16 @@ pub struct Options {
         help_heading = "Pieces"
     )]
     pub key: Key,
+    /// Seconds for the whole job: no further kit is begun that would end later, and the best so far is finished; 0
+    /// takes the time it takes
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        allow_hyphen_values = true,
+        default_value_t = 60.0,
+        help_heading = "Pieces"
+    )]
+    pub time: f64,
     /// Work spent on proving that no plan is better, in seconds of an ordinary computer; a slower one ends
     /// after twice that
     #[arg(
@@ -458,6 +468,9 @@ pub struct Options {
     /// for small kits only, and takes some seconds to a minute
     #[arg(long, help_heading = "Make")]
     pub play_together: bool,
+    /// Make pieces though hardly anything of the model can be hollow; they are mostly solid, with few connectors
+    #[arg(long, help_heading = "Make")]
+    pub allow_thin: bool,
     /// Cut a notch for a fingernail into the key, 0.45 mm deep
     #[arg(long, help_heading = "Make")]
     pub key_grip: bool,
@@ -531,6 +544,7 @@ impl Options {
         p.label = (!self.no_labels).then(|| label(p.connector.min_wall_mm));
         p.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
         p.is_play_together = self.play_together;
+        p.allows_thin = self.allow_thin;
         p
     }
 }

@@ -22,7 +22,8 @@ use crate::inspect::thin_warnings;
 use crate::output::{Destination, Summary, files};
 use crate::place::Standing;
 use crate::printing::{Printing, too_large};
-use crate::progress::{Display, PlanClock, Shown};
+use crate::progress::{Deadline, Display, PlanClock, Shown};
+use crate::stopwatch::StageTime;
 
 /// `shellock build`.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
@@ -56,6 +57,9 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
     let mut problems = params.problems();
     problems.extend(printer.problems().iter().map(ToString::to_string));
     // An infinite time is one: until the proof is closed.
+    if options.time.is_nan() || options.time < 0.0 {
+        problems.push(format!("time is {} s; it must be 0 or more", options.time));
+    }
     if options.plan_time.is_nan() || options.plan_time < 0.0 {
         problems.push(format!(
             "plan time is {} s; it must be 0 or more",
@@ -95,7 +99,11 @@ fn make(
         display.show(p);
     };
     let is_time_up = || clock.is_up();
-    let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
+    let deadline = Deadline::new(options.time, session.since);
+    let seconds_left = || deadline.seconds_left();
+    let ctx = Ctx::new(&report, &session.stop)
+        .with_time_limit(&is_time_up)
+        .with_deadline(&seconds_left);
     let outcome =
         design(&ctx, params, &model.solid, model.labels.as_deref()).inspect_err(|_| display.finish())?;
     let made = match outcome {
@@ -136,7 +144,11 @@ fn make(
     let code = u8::from(!made.kit.verification.passed());
     let standing = Standing::of(options.up, model.solid.mesh());
     if session.is_json {
-        print_json(to, &notes, &made, &summary, &warnings, &printing, code);
+        let course = Course {
+            notes: &notes,
+            stages: &display.stages(),
+        };
+        print_json(to, &course, &made, &summary, &warnings, &printing, code);
     } else if session.shown == Shown::Nothing {
         print_failures(&made.kit.verification, &standing);
         print_warnings(&warnings, &standing);
@@ -160,9 +172,15 @@ fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> Failure {
     Failure::NoPlan(text)
 }
 
+/// How a job went.
+struct Course<'a> {
+    notes: &'a [String],
+    stages: &'a [StageTime],
+}
+
 fn print_json(
     to: &Destination,
-    notes: &[String],
+    course: &Course<'_>,
     made: &Design,
     summary: &Summary,
     warnings: &[Warning],
@@ -171,7 +189,7 @@ fn print_json(
 ) {
     let value = json!({
         "status": if code == 0 { "verified" } else { "failed" },
-        "out": to.folder(), "notes": notes,
+        "out": to.folder(), "notes": course.notes,
         "pieces": made.kit.pieces.len(), "key_piece": made.kit.plan.key(),
         "volume_ratio": summary.volume_ratio, "grams": summary.grams, "print": printing.entry().time, "fits_within_mm": made.fit.within_mm, "connector_share": summary.connector_share,
         "thin_share": summary.thin_share, "thickness_mm": made.kit.thickness_mm,
@@ -179,6 +197,7 @@ fn print_json(
         "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.kit.sizes.largest_mm(),
         "key_slides_on_rails_mm": made.kit.rails_mm(),
         "checks": made.kit.verification.checks, "findings": made.kit.verification.findings,
+        "effort": made.effort, "stages": course.stages,
         "warnings": warnings, "exit_code": code,
     });
     println!("{value}");

@@ -155,7 +155,7 @@ impl<'a> Plate<'a> {
             // It is laid so that it needs none.
             support_mm3: 0.0,
             wide_support_mm3: 0.0,
-            ..Load::of(&part.on_plate(), axes, self.printer.layer_mm)
+            ..Load::of(&part.on_plate(), axes, self.printer)
         };
         let all = self.parts.iter().map(load).fold(Load::default(), Load::and);
         seconds_flat(self.printer, &all)

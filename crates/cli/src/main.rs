@@ -17,6 +17,7 @@ mod printing;
 mod progress;
 mod savings;
 mod stages;
+mod stopwatch;
 mod stress;
 
 use std::process::ExitCode;
@@ -37,6 +38,8 @@ pub struct Session {
     pub shown: progress::Shown,
     /// Becomes true with Ctrl-C.
     pub stop: Arc<AtomicBool>,
+    /// When it began.
+    pub since: std::time::Instant,
 }
 
 impl Session {
@@ -87,6 +90,7 @@ fn main() -> ExitCode {
         is_json: cli.json,
         shown: shown(&cli),
         stop: Arc::new(AtomicBool::new(false)),
+        since: std::time::Instant::now(),
     };
     let stop = Arc::clone(&session.stop);
     // Without a handler Ctrl-C would still end the program, only less tidily.

@@ -8,13 +8,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use shellock::context::Progress;
 
+use crate::stopwatch::{StageTime, Stopwatch};
+
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// A bar on a terminal, plain lines elsewhere.
     ForPeople,
     /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, `{"event": "note", "text",
-    /// "seconds"}`.
+    /// "seconds"}`; at last `{"event": "effort", "stages": [{"name", "seconds", "cpu_seconds", "rounds"}], "seconds"}`.
     Events,
     /// Not at all.
     Nothing,
@@ -26,6 +28,7 @@ pub struct Display {
     is_terminal: bool,
     shown: Shown,
     since: Instant,
+    watch: Stopwatch,
 }
 
 impl Display {
@@ -36,11 +39,20 @@ impl Display {
             is_terminal: std::io::stderr().is_terminal(),
             shown,
             since: Instant::now(),
+            watch: Stopwatch::new(),
         }
+    }
+
+    /// What each stage took until now.
+    pub fn stages(&self) -> Vec<StageTime> {
+        self.watch.stages()
     }
 
     /// What the library reports.
     pub fn show(&self, progress: Progress<'_>) {
+        if let Progress::Stage { name, .. } = progress {
+            self.watch.begin(name);
+        }
         match self.shown {
             Shown::ForPeople => self.show_people(progress),
             Shown::Events => self.show_event(&progress),
@@ -86,11 +98,40 @@ impl Display {
         }
     }
 
-    /// Takes the last bar away.
+    /// Takes the last bar away, and says what the stages took to machines.
     pub fn finish(&self) {
+        if self.shown == Shown::Events {
+            let seconds = self.since.elapsed().as_secs_f64();
+            eprintln!(
+                "{}",
+                json!({ "event": "effort", "stages": self.stages(), "seconds": seconds })
+            );
+        }
         if let Some(bar) = self.bar.lock().expect("no holder of this lock panics").take() {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// When the whole job is to be done.
+pub struct Deadline(Option<Instant>);
+
+impl Deadline {
+    /// So many seconds after `since`; never for 0.
+    pub fn new(seconds: f64, since: Instant) -> Self {
+        let time = Duration::try_from_secs_f64(seconds).ok();
+        let time = time.filter(|time| !time.is_zero());
+        Self(time.and_then(|time| since.checked_add(time)))
+    }
+
+    /// Until then; below 0 when it is past.
+    pub fn seconds_left(&self) -> f64 {
+        let Some(at) = self.0 else {
+            return f64::INFINITY;
+        };
+        let now = Instant::now();
+        at.checked_duration_since(now)
+            .map_or_else(|| -(now - at).as_secs_f64(), |left| left.as_secs_f64())
     }
 }
 

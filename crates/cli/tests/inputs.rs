@@ -359,3 +359,20 @@ fn a_segmentation_written_as_paint_is_read_as_the_same_pieces() {
     );
     assert!(String::from_utf8_lossy(&o.stderr).contains("no groups divide it; what does: paint"));
 }
+
+#[test]
+fn a_model_too_thin_to_be_hollow_is_refused_at_once_with_what_would_do() {
+    let dir = tempfile::tempdir().unwrap();
+    let plate = changed(|m| m.points.iter_mut().for_each(|p| p.z *= 0.02));
+    fs::write(dir.path().join("plate.stl"), write_stl_binary(&plate)).unwrap();
+    let o = shellock(dir.path(), &["build", "plate.stl", "-o", "kit"]);
+    let said = String::from_utf8_lossy(&o.stderr).into_owned();
+    assert_eq!(o.status.code(), Some(2), "{said}");
+    for word in ["too thin to be hollow", "--size", "--thickness", "--allow-thin"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    assert!(!dir.path().join("kit").exists());
+    let o = shellock(dir.path(), &["build", "plate.stl", "--time", "-1"]);
+    assert_eq!(o.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&o.stderr).contains("time is -1 s"));
+}

@@ -29,6 +29,13 @@ pub struct Span {
     pub bottom_normal: f64,
 }
 
+impl Span {
+    /// Whether a height is within.
+    pub fn holds(&self, z_mm: f64) -> bool {
+        self.bottom_mm <= z_mm && z_mm < self.top_mm
+    }
+}
+
 /// All columns of a piece in its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {
@@ -95,6 +102,11 @@ impl Columns {
     /// The spans of a column, lowest first.
     pub fn spans(&self, column: usize) -> &[Span] {
         &self.spans[self.starts[column] as usize..self.starts[column + 1] as usize]
+    }
+
+    /// Columns that meet the piece.
+    pub fn shaded(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.len()).filter(|&column| !self.spans(column).is_empty())
     }
 
     /// Where the middle of a column is on the axes of the plate, mm.

@@ -33,8 +33,8 @@ use crate::{
     Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength,
 };
 use attempt::{Attempt, Failure, Next};
-use budget::Budget;
 pub use budget::Effort;
+use budget::{Budget, Pace};
 use candidate::Candidate;
 use division::{Division, WallGrid, revised};
 use handover::Handover;
@@ -57,7 +57,7 @@ pub fn design(
     let mut best = Best::default();
     let places = candidate::places(ctx, &job)?;
     for (i, place) in places.iter().enumerate() {
-        if best.is_enough(place.as_ref()) {
+        if best.is_enough(place.as_ref()) || (i > 0 && job.pace.is_late(ctx)) {
             continue;
         }
         if let Some(site) = place {
@@ -133,7 +133,11 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                 }
             }
             Attempt::Failed(failure) => {
-                let next = revised(ctx, &division, &failure, kit.is_some(), &mut budget)?;
+                let next = if job.pace.is_late(ctx) {
+                    None
+                } else {
+                    revised(ctx, &division, &failure, kit.is_some(), &mut budget)?
+                };
                 let next = next
                     .map(|surface| candidate.division(ctx, job, surface))
                     .transpose()?
@@ -265,6 +269,7 @@ struct Job<'a> {
     model: &'a Solid,
     labels: Option<&'a [i64]>,
     wall: &'a Wall,
+    pace: Pace,
     stress: Option<StressMap<'a>>,
     surface: SegmentedSurface,
     /// Which triangles of the model the user wants the key to have; `None` where that is left to us.
@@ -287,6 +292,7 @@ impl<'a> Job<'a> {
             model,
             labels,
             wall,
+            pace: Pace::default(),
             stress,
             key_faces: key_faces(params.key, model, labels, &surface)?,
             surface,
@@ -354,6 +360,13 @@ struct Wall {
 impl Wall {
     fn decide(ctx: &Ctx, params: &Params, model: &Solid) -> Result<Self, DesignError> {
         let nominal = Settings::resolve(params);
+        if !params.allows_thin {
+            let thinnest_mm = match params.thickness {
+                Thickness::Mm(mm) => mm,
+                Thickness::Auto => nominal.strength.least_mm,
+            };
+            strength::is_hollow(model, thinnest_mm)?;
+        }
         let ctx = &ctx.fork();
         let found = match params.thickness {
             Thickness::Mm(mm) => strength::stress(ctx, &nominal.strength, model, mm),
@@ -369,9 +382,12 @@ impl Wall {
                     warnings,
                 })
             }
-            Err(StrengthError::Shell(e)) if params.thickness != Thickness::Auto => {
+            Err(StrengthError::Shell(e)) => {
                 let warning = Warning {
-                    cause: Cause::StrengthUnknown { error: e.to_string() },
+                    cause: Cause::StrengthUnknown {
+                        error: e.to_string(),
+                        thickness_mm: nominal.body.thickness_mm,
+                    },
                     pieces: Vec::new(),
                     at: None,
                 };

@@ -23,10 +23,12 @@
 
 pub mod chart;
 mod falls;
+mod hollow;
 mod thin;
 
 use std::f64::consts::{PI, TAU};
 
+pub use hollow::{TooThin, is_hollow};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -287,7 +287,7 @@ pub fn run(program: &Path, case: &Case, n_threads: usize, models: Option<&Path>)
     let run = Command::new(program)
         .current_dir(at)
         .args(case.args)
-        .args(["--threads", &n_threads.to_string(), "-o", "kit"])
+        .args(["--threads", &n_threads.to_string(), "--time", "0", "-o", "kit"])
         .output()?;
     let mut said = run.stdout;
     said.extend(run.stderr);

@@ -228,7 +228,7 @@ fn coefficients(slicer: &Slicer, folders: &[PathBuf]) -> Result<String, Failure>
                     slicer.cost(&printer, &print, false),
                 ) {
                     samples.push(Sample {
-                        load: Load::of(mesh, axes, printer.layer_mm),
+                        load: Load::of(mesh, axes, &printer),
                         without,
                         with,
                     });

@@ -4,8 +4,10 @@
 //! `cargo xtask --help` lists them.
 
 mod chart;
+mod effort;
 mod failure;
 mod golden;
+mod hard;
 mod hours;
 mod metrics;
 mod model;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 
 use crate::chart::{Corner, Curve, Labels, bands, scatter, sorted_scores};
+use crate::effort::{self, EffortOptions};
 use crate::failure::Failure;
 use crate::hours::{self, HoursOptions};
 use crate::metrics::{self, MetricsOptions};
@@ -33,6 +34,8 @@ enum Study {
     Search(SearchOptions),
     /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
     Strength(StrengthOptions),
+    /// What kits of many models cost: time by stage, kits made in vain
+    Effort(EffortOptions),
     /// How well print time and plastic by closed forms agree with PrusaSlicer's, on kits or on their pieces
     Hours(HoursOptions),
     /// How well metrics agree: CSV with a column of scores for each metric, "name" or "name [unit]", and a
@@ -61,6 +64,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
         Study::Metrics(metrics) => metrics::run(metrics, &options.out),
         Study::Search(search) => search::run(search, &options.out),
         Study::Strength(strength) => strength::run(strength, &options.out),
+        Study::Effort(effort) => effort::run(effort, &options.out),
         Study::Hours(hours) => hours::run(hours, &options.out),
         Study::Scores { file } => write_all(&options.out, &stem(file), &agreement(&read(file)?)?),
         Study::Convergence { file, optimum, names } => {

@@ -110,7 +110,7 @@ pub struct ThinFeature {
 /// From points on the surface a ray goes inwards and one outwards. Where it meets, within the limit, a face
 /// that is parallel within 15°, the point is thin; thin points of one kind less than 1.2 mm apart are one place.
 pub fn thin_places(mesh: &TriMesh, least_wall_mm: f64, least_slot_mm: f64) -> Vec<ThinFeature> {
-    let all = thin_points(mesh, [least_wall_mm, least_slot_mm]);
+    let all = thin_points(mesh, [least_wall_mm, least_slot_mm], &|_| true);
     let mut places: Vec<ThinFeature> = all.iter().map(|members| feature(members)).collect();
     places.sort_by(|a, b| b.length_mm.total_cmp(&a.length_mm));
     places
@@ -129,14 +129,21 @@ pub struct ThinPoint {
     pub thickness_mm: f64,
 }
 
-/// The points of each sheet thinner and each slot narrower than its limit (mm) that [`thin_places`] tells of, in
-/// no order; always the same for the same mesh.
-pub fn thin_points(mesh: &TriMesh, limits_mm: [f64; 2]) -> Vec<Vec<ThinPoint>> {
+/// The points of each sheet thinner and each slot narrower than its limit (mm, 0 for none) that [`thin_places`]
+/// tells of, of those that `counts` accepts; in no order, always the same for the same mesh.
+pub fn thin_points(
+    mesh: &TriMesh,
+    limits_mm: [f64; 2],
+    counts: &(dyn Fn(Vec3) -> bool + Sync),
+) -> Vec<Vec<ThinPoint>> {
     let n = ((mesh.area() * RAYS_PER_MM2) as usize).min(MOST_RAYS);
     if n == 0 {
         return Vec::new();
     }
-    let samples = sample::on_surface(mesh, n, SEED);
+    let samples: Vec<Sample> = sample::on_surface(mesh, n, SEED)
+        .into_par_iter()
+        .filter(|s| counts(s.point))
+        .collect();
     let bvh = TriangleBvh::new(mesh);
     let found = |kind: ThinKind, sense: f64, limit_mm: f64| {
         let point = |s: &Sample| {
@@ -151,6 +158,9 @@ pub fn thin_points(mesh: &TriMesh, limits_mm: [f64; 2]) -> Vec<Vec<ThinPoint>> {
                 thickness_mm: on_mm + START_MM,
             })
         };
+        if limit_mm <= 0.0 {
+            return Vec::new();
+        }
         joined(&samples.par_iter().filter_map(point).collect::<Vec<_>>())
     };
     let [least_wall_mm, least_slot_mm] = limits_mm;

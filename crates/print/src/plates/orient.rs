@@ -30,6 +30,8 @@ const COARSE_MM: f64 = 2.0;
 /// All directions are judged by a mesh that is so near to the piece's own, mm, and has a fifth of its triangles.
 const SIMPLE_MM: f64 = 0.15;
 const N_AGAIN: usize = 8;
+/// Directions that are judged at once.
+const N_AT_ONCE: usize = 12;
 const N_NEAR: usize = 2;
 const NEAR_RAD: f64 = 0.1;
 /// A piece stands on what is so near to the plate, mm, and on its supports, if its centre of mass is above
@@ -136,26 +138,43 @@ struct Judged {
 /// that is tried.
 pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) -> Option<Pose> {
     let body = Body::of(piece)?;
-    let all = |directions: Vec<Vec3>, mesh: &TriMesh, cell_mm: f64| {
-        let mut judged: Vec<Judged> = directions
+    let all = |directions: Vec<Vec3>, mesh: &TriMesh, cell_mm: f64| -> Vec<Judged> {
+        directions
             .into_par_iter()
             .map(|up| body.judged(printer, up, mesh, cell_mm))
-            .collect();
-        // Stable: of equally good directions the first stays first.
-        judged.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s));
-        judged
+            .collect()
     };
     let simple = Volume::from_closed_mesh(piece.mesh).map(|volume| volume.simplify(SIMPLE_MM).to_mesh());
     let simple = simple.as_ref().unwrap_or(piece.mesh);
-    let coarse = all(body.directions(), simple, COARSE_MM);
+    let mut coarse: Vec<Judged> = Vec::new();
+    let mut rest = body.by_least_cost(printer);
+    // What costs more at the least than so many that were judged need not be.
+    while !rest.is_empty() && (coarse.len() < N_AGAIN || rest[0].0 < coarse[N_AGAIN - 1].cost_s) {
+        let few = rest
+            .drain(..rest.len().min(N_AT_ONCE))
+            .map(|(_, up)| up)
+            .collect();
+        coarse.extend(all(few, simple, COARSE_MM));
+        cheapest_first(&mut coarse);
+    }
     let again: Vec<Vec3> = coarse.iter().take(N_AGAIN).map(|j| j.up).collect();
     let mut fine = all(again, piece.mesh, crate::load::CELL_MM);
+    cheapest_first(&mut fine);
     let near = fine.iter().take(N_NEAR).flat_map(|j| nearby(j.up)).collect();
     fine.extend(all(near, piece.mesh, crate::load::CELL_MM));
-    fine.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s));
-    fine.into_iter()
-        .chain(coarse)
+    cheapest_first(&mut fine);
+    let judged = fine.into_iter().chain(coarse);
+    let unjudged = rest
+        .into_iter()
+        .map(|(_, up)| body.judged(printer, up, simple, COARSE_MM));
+    judged
+        .chain(unjudged)
         .find_map(|judged| body.turned(judged.up, judged.load, room_mm))
+}
+
+/// Stable: of equally good directions the first stays first.
+fn cheapest_first(judged: &mut [Judged]) {
+    judged.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s));
 }
 
 /// Whether some pose has room.
@@ -241,12 +260,34 @@ impl Body {
         resting.chain(axes).chain(spread).collect()
     }
 
+    /// All directions with what they cost at the least, in seconds of print time: height, material without
+    /// supports, marks. That of the least first.
+    fn by_least_cost(&self, printer: &Printer) -> Vec<(f64, Vec3)> {
+        let prices = prices(printer.process);
+        let least = |up: Vec3| {
+            let heights = self.hull.points.iter().map(|p| p.dot(up));
+            let [lo, hi] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], h| {
+                [lo.min(h), hi.max(h)]
+            });
+            // Columns and simplified meshes may be a little lower.
+            let load = Load {
+                height_mm: (hi - lo - COARSE_MM).max(0.0),
+                ..Load::default()
+            };
+            let mark_s = prices.mark_s * self.support(up).outer_mm2;
+            (seconds(printer, &load) + mark_s, up)
+        };
+        let mut all: Vec<(f64, Vec3)> = self.directions().into_par_iter().map(least).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all
+    }
+
     /// What a direction costs, by cells of so many mm.
     fn judged(&self, printer: &Printer, up: Vec3, mesh: &TriMesh, cell_mm: f64) -> Judged {
         let prices = prices(printer.process);
         let (x, y) = up.any_orthonormal_pair();
         let columns = Columns::of(mesh, [x, y, up], cell_mm);
-        let load = Load::of_columns(mesh, up, printer.layer_mm, &columns);
+        let load = Load::of_columns(mesh, up, printer, &columns);
         let mut cost_s = seconds(printer, &load)
             + prices.gram_s * grams(printer, &load)
             + prices.mark_s * self.support(up).outer_mm2

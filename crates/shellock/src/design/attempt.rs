@@ -68,7 +68,12 @@ pub(super) fn plans(
     let mut distances: Option<PatchDistances> = None;
     let mut learned = Learned::default();
     let most_kits = budget.kits_each.min(budget.kits);
-    while learned.n_kits < most_kits && learned.n_blocked < BLOCKED_PLANS {
+    let is_first = |learned: &Learned| learned.n_kits + learned.n_blocked == 0;
+    while learned.n_kits < most_kits
+        && learned.n_blocked < BLOCKED_PLANS
+        && (is_first(&learned) || !job.pace.is_late(ctx))
+    {
+        let left_s = ctx.seconds_left();
         // A kit that is given up takes its warnings with it.
         let kit_ctx = ctx.fork();
         chosen.tell(&kit_ctx);
@@ -130,6 +135,7 @@ pub(super) fn plans(
             }
             made => made?,
         };
+        job.pace.made(ctx, left_s);
         budget.kits -= 1;
         budget.spent.kits += 1;
         let ending = learned.learn(ctx, &kit, budget.kits_each);
@@ -210,7 +216,7 @@ impl Failure {
 /// The pieces that are foreseen to rattle far more than they may, the loosest first.
 fn foreseen_to_rattle(found: &FoundPlan, holding: &Holding) -> Vec<PatchId> {
     /// Play is foreseen within about this factor.
-    const SURELY: f64 = 1.4;
+    const SURELY: f64 = 1.2;
     let excess = holding
         .foreseen_excess
         .iter()

@@ -1,8 +1,12 @@
 //! What a job may cost: one table for all its bounds.
 
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
 use serde::{Deserialize, Serialize};
 
 use super::Rounds;
+use crate::Ctx;
 
 /// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where
 /// the best does not do, others seldom do.
@@ -32,6 +36,44 @@ pub struct Effort {
     pub plans: usize,
     /// Kits that were made and judged.
     pub kits: usize,
+}
+
+/// How long kits of this job take, by the context's clock; nothing where it has none.
+#[derive(Debug, Default)]
+pub(super) struct Pace {
+    /// The slowest kit, s, as bits.
+    slowest: AtomicU64,
+    /// Whether something was not begun for want of time.
+    is_cut_short: AtomicBool,
+}
+
+impl Pace {
+    /// What a kit's files and gaps take on top of it, as a share of it, and what kits differ.
+    const MORE: f64 = 1.5;
+
+    /// A kit was begun with so many seconds left.
+    pub fn made(&self, ctx: &Ctx, left_before_s: f64) {
+        let took_s = left_before_s - ctx.seconds_left();
+        if took_s.is_finite() {
+            let slowest_s = f64::from_bits(self.slowest.load(Relaxed)).max(took_s);
+            self.slowest.store(slowest_s.to_bits(), Relaxed);
+        }
+    }
+
+    /// Whether another kit would end too late. Before the first, only whether the time is over.
+    pub fn is_late(&self, ctx: &Ctx) -> bool {
+        let slowest_s = f64::from_bits(self.slowest.load(Relaxed));
+        let is_late = ctx.seconds_left() < Self::MORE * slowest_s || ctx.seconds_left() <= 0.0;
+        if is_late {
+            self.is_cut_short.store(true, Relaxed);
+        }
+        is_late
+    }
+
+    /// Whether something was not begun for want of time.
+    pub fn is_cut_short(&self) -> bool {
+        self.is_cut_short.load(Relaxed)
+    }
 }
 
 impl std::ops::AddAssign for Effort {
@@ -94,5 +136,33 @@ impl Budget {
     /// Whether half of the revisions are gone.
     pub fn is_half_gone(&self) -> bool {
         2 * (self.revisions_at_first - self.revisions) >= self.revisions_at_first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kit_is_begun_only_where_one_and_a_half_as_slow_as_the_slowest_are_in_time() {
+        static STOP: AtomicBool = AtomicBool::new(false);
+        let left_s = AtomicU64::new(60);
+        let seconds_left = || left_s.load(Relaxed) as f64;
+        let ctx = Ctx::new(&|_| {}, &STOP).with_deadline(&seconds_left);
+        let pace = Pace::default();
+        assert!(!pace.is_late(&ctx), "nothing is known yet");
+        left_s.store(40, Relaxed);
+        pace.made(&ctx, 60.0);
+        assert!(!pace.is_late(&ctx));
+        left_s.store(29, Relaxed);
+        assert!(!pace.is_cut_short());
+        assert!(pace.is_late(&ctx) && pace.is_cut_short());
+    }
+
+    #[test]
+    fn without_a_clock_nothing_is_late() {
+        let (ctx, pace) = (Ctx::quiet(), Pace::default());
+        pace.made(&ctx, ctx.seconds_left());
+        assert!(!pace.is_late(&ctx));
     }
 }

@@ -13,7 +13,7 @@ use crate::piece::PieceError;
 use crate::plan::Blocker;
 use crate::play;
 use crate::segmentation::{self, SegmentationError};
-use crate::strength::{Strength, StrengthError};
+use crate::strength::{Strength, StrengthError, TooThin};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::limits::LEAST_SLOT_MM;
 use crate::verify::{Play, ThinFeature, ThinKind, thin_places};
@@ -163,6 +163,11 @@ impl<'a> Best<'a> {
             ..
         } = self;
         let Some(Kept { kit, candidate }) = kit else {
+            let reason = if job.pace.is_cut_short() {
+                format!("the time was over (--time); {reason}")
+            } else {
+                reason
+            };
             return Ok(DesignOutcome::NoPlan { reason, blockers });
         };
         let key = candidate.key.map(|key| key.given);
@@ -200,6 +205,9 @@ impl<'a> Best<'a> {
             }
             _ => {}
         }
+        if job.pace.is_cut_short() && !kit.verification.passed() {
+            warnings.push(time_up(effort.kits));
+        }
         let strength = job.wall.strength.clone();
         Ok(DesignOutcome::Made(Box::new(Design {
             kit,
@@ -220,6 +228,15 @@ fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
     Warning {
         cause: Cause::KeyNotCut { reasons },
         pieces: vec![key],
+        at: None,
+    }
+}
+
+/// Says that kits that were not made might be better.
+fn time_up(kits: usize) -> Warning {
+    Warning {
+        cause: Cause::TimeUp { kits },
+        pieces: Vec::new(),
         at: None,
     }
 }
@@ -335,6 +352,9 @@ pub enum DesignError {
     /// A piece cannot be finished.
     #[error(transparent)]
     Piece(PieceError),
+    /// Hardly anything of it can be hollow.
+    #[error(transparent)]
+    TooThin(#[from] TooThin),
     /// No triangle has the label that the key is to have.
     #[error("no part of the model has the label {0}, which the key is to have (--key)")]
     NoLabelOfKey(i64),

@@ -43,6 +43,8 @@ pub struct Params {
     pub cell_mm: Option<f64>,
     /// Work that the exact search for a plan may do: pieces revised. [0, 10⁹]; 100 000.
     pub proof_budget: usize,
+    /// Whether pieces are made though hardly anything of the model can be hollow.
+    pub allows_thin: bool,
     /// Whether the play of all pieces together is looked for, too.
     pub is_play_together: bool,
     /// How often a kit that failed its verification is planned and made again.
@@ -65,6 +67,7 @@ impl Default for Params {
             seam_gap_mm: 0.05,
             cell_mm: None,
             proof_budget: 100_000,
+            allows_thin: false,
             is_play_together: false,
             rounds: Rounds::default(),
         }

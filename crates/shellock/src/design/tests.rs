@@ -358,7 +358,10 @@ impl Ball {
     fn new() -> Self {
         let params = Params::default();
         let told = Warning {
-            cause: Cause::StrengthUnknown { error: String::new() },
+            cause: Cause::StrengthUnknown {
+                error: String::new(),
+                thickness_mm: 2.0,
+            },
             pieces: Vec::new(),
             at: None,
         };
@@ -377,6 +380,7 @@ impl Ball {
     fn job(&self) -> Job<'_> {
         let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
         Job {
+            pace: Pace::default(),
             params: &self.params,
             model: &self.model,
             labels: None,

@@ -142,17 +142,59 @@ impl Flat {
         Some(Volume::hull(&ends.collect::<Vec<_>>()))
     }
 
-    /// Corners whose hull holds all points within `by_mm`: a cube around each corner, one axis along the
-    /// normal.
+    /// Corners whose hull holds all points within `by_mm`: a prism along the normal over an octagon, two of whose
+    /// sides run along an edge. Few corners, as unions of what is drawn out cost most of the relief.
     fn swollen(&self, by_mm: f64) -> Vec<Vec3> {
-        let (u, v) = self.normal.any_orthonormal_pair();
-        let signs =
-            (0..8u8).map(|bits| [0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { by_mm } else { -by_mm }));
-        let cube: Vec<Vec3> = signs.map(|[x, y, z]| x * u + y * v + z * self.normal).collect();
-        self.corners
-            .iter()
-            .flat_map(|&p| cube.iter().map(move |&d| p + d))
-            .collect()
+        let origin = self.corners[0];
+        let (u, v) = self.axes();
+        let range = |d: Vec3, by_mm: f64| {
+            let [lo, hi] = self.range(d);
+            [lo - by_mm, hi + by_mm]
+        };
+        let aslant_mm = by_mm * std::f64::consts::SQRT_2;
+        let ([x0, x1], [y0, y1]) = (range(u, by_mm), range(v, by_mm));
+        let ([s0, s1], [d0, d1]) = (range(u + v, aslant_mm), range(u - v, aslant_mm));
+        let octagon = [
+            [x1, s1 - x1],
+            [s1 - y1, y1],
+            [y1 + d0, y1],
+            [x0, x0 - d0],
+            [x0, s0 - x0],
+            [s0 - y0, y0],
+            [y0 + d1, y0],
+            [x1, x1 - d1],
+        ];
+        let height = range(self.normal, by_mm);
+        let corner = |[x, y]: [f64; 2]| height.map(|z| origin + x * u + y * v + z * self.normal);
+        octagon.into_iter().flat_map(corner).collect()
+    }
+
+    /// Unit vectors in the plane, along and across an edge of the first triangle: that around which all corners
+    /// have the smallest rectangle.
+    fn axes(&self) -> (Vec3, Vec3) {
+        let (other, _) = self.normal.any_orthonormal_pair();
+        let edges = [[0, 1], [1, 2], [2, 0]].map(|[a, b]| self.corners[b] - self.corners[a]);
+        let along = edges
+            .into_iter()
+            .filter_map(|edge| edge.reject_from(self.normal).try_normalize());
+        let width = |d: Vec3| {
+            let [lo, hi] = self.range(d);
+            hi - lo
+        };
+        let area = |(u, v): &(Vec3, Vec3)| width(*u) * width(*v);
+        along
+            .chain([other])
+            .map(|u| (u, self.normal.cross(u)))
+            .min_by(|a, b| area(a).total_cmp(&area(b)))
+            .expect("there is one at least")
+    }
+
+    /// How far the corners reach along `d` from the first, mm.
+    fn range(&self, d: Vec3) -> [f64; 2] {
+        let along = self.corners.iter().map(|p| (*p - self.corners[0]).dot(d));
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| {
+            [lo.min(x), hi.max(x)]
+        })
     }
 }
 

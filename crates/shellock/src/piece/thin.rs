@@ -81,10 +81,9 @@ fn shaved(piece: &Volume, limit_mm: f64, depth: &Depth<'_>) -> Option<Volume> {
 fn points(mesh: &TriMesh, limit_mm: f64, depth: &Depth<'_>) -> Vec<ThinPoint> {
     let is_deep = |p: Vec3| depth(p).is_none_or(|mm| mm > SKIN_MM);
     let mut taken = BTreeSet::new();
-    let mut found = thin_points(mesh, [limit_mm, 0.0]).concat();
+    let mut found = thin_points(mesh, [limit_mm, 0.0], &is_deep).concat();
     found.retain(|p| {
-        is_deep(p.at)
-            && is_deep(p.at + p.thickness_mm * p.across)
+        is_deep(p.at + p.thickness_mm * p.across)
             && taken.insert((p.at / SPACING_MM).floor().to_array().map(|x| x as i64))
     });
     found

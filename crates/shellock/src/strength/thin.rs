@@ -10,7 +10,7 @@ use shellock_geom::{Topology, TriMesh, Vec3};
 
 /// Share of H that the point below must be away from the surface; flat faces of a coarse mesh lie a little
 /// inside it.
-const LEAST_SHARE: f64 = 0.9;
+pub(super) const LEAST_SHARE: f64 = 0.9;
 
 /// A connected part of the surface with no cavity below.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,0 +1,326 @@
+//! What kits of many models cost: time by stage, kits made in vain, how it ended. Runs the program itself.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use rayon::prelude::*;
+use serde_json::Value;
+use shellock_formats::write_stl_binary;
+
+use crate::failure::Failure;
+use crate::hard;
+use crate::study::write_all;
+
+/// Which models, and how they are made.
+#[derive(Args)]
+pub struct EffortOptions {
+    /// Models, or folders of them
+    models: Vec<PathBuf>,
+    /// Add models that are hard to make kits of, made by code
+    #[arg(long)]
+    hard: bool,
+    /// Longest edges, mm, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "150")]
+    sizes: Vec<f64>,
+    /// The program that is measured
+    #[arg(long, default_value = "target/release/shellock")]
+    program: PathBuf,
+    /// Jobs at once; times are worth something with one
+    #[arg(long, default_value_t = 1)]
+    jobs: usize,
+    /// Seconds after which a job is given up
+    #[arg(long, default_value_t = 300)]
+    most_seconds: u64,
+    /// Keep the kits, in this folder
+    #[arg(long)]
+    keep: Option<PathBuf>,
+    /// Further options of `build`, after "--"
+    #[arg(last = true)]
+    options: Vec<String>,
+}
+
+/// What one job came to.
+struct Run {
+    name: String,
+    /// `None` where it was given up.
+    exit_code: Option<i32>,
+    seconds: f64,
+    cpu_seconds: f64,
+    peak_mb: f64,
+    /// Processor seconds of each stage, largest first.
+    stages: Vec<(String, f64)>,
+    kits: Option<u64>,
+    /// The last line that it said.
+    last: String,
+    /// Why kits and divisions were given up.
+    notes: Vec<String>,
+}
+
+/// Runs all jobs; returns the table's file.
+pub fn run(options: &EffortOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let folder = out.join("effort");
+    let mut models = Vec::new();
+    for path in &options.models {
+        models.extend(models_in(path)?);
+    }
+    if options.hard {
+        models.extend(written(&folder.join("hard"))?);
+    }
+    let jobs: Vec<(PathBuf, f64)> = models
+        .iter()
+        .flat_map(|m| options.sizes.iter().map(move |&size_mm| (m.clone(), size_mm)))
+        .collect();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.jobs.max(1))
+        .build()
+        .expect("threads can be made");
+    // Lines come as jobs end.
+    let said = Mutex::new(());
+    let runs: Result<Vec<Run>, Failure> = pool.install(|| {
+        jobs.par_iter()
+            .map(|(model, size_mm)| {
+                let run = one(options, &folder, model, *size_mm)?;
+                let _one_at_a_time = said.lock().expect("no holder of this lock panics");
+                println!("{}", line(&run).join(" | "));
+                Ok(run)
+            })
+            .collect()
+    });
+    write_all(out, "effort", &[("effort.md".into(), text(&runs?))])
+}
+
+/// A model, or those in a folder, by name.
+fn models_in(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    const ENDINGS: [&str; 5] = ["stl", "obj", "ply", "off", "3mf"];
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let wrong = |source| Failure::File {
+        path: path.to_owned(),
+        source,
+    };
+    let mut models = Vec::new();
+    for entry in fs::read_dir(path).map_err(wrong)? {
+        let file = entry.map_err(wrong)?.path();
+        let ending = file.extension().map(|e| e.to_ascii_lowercase());
+        if ending.is_some_and(|e| ENDINGS.iter().any(|known| e == *known)) {
+            models.push(file);
+        }
+    }
+    models.sort();
+    Ok(models)
+}
+
+/// The hard family as files.
+fn written(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let wrong = |path: &Path| {
+        let path = path.to_owned();
+        move |source| Failure::File { path, source }
+    };
+    fs::create_dir_all(folder).map_err(wrong(folder))?;
+    hard::family()
+        .into_iter()
+        .map(|model| {
+            let path = folder.join(format!("{}.stl", model.name));
+            fs::write(&path, write_stl_binary(&model.mesh)).map_err(wrong(&path))?;
+            Ok(path)
+        })
+        .collect()
+}
+
+/// One job, watched until it ends or its time is up.
+fn one(options: &EffortOptions, folder: &Path, model: &Path, size_mm: f64) -> Result<Run, Failure> {
+    let stem = model
+        .file_stem()
+        .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    let name = format!("{stem}-{size_mm}");
+    let kit = options.keep.as_deref().unwrap_or(folder).join(&name);
+    let wrong = |source| Failure::File {
+        path: options.program.clone(),
+        source,
+    };
+    let [out, err] = ["json", "events"].map(|ending| folder.join(format!("{name}.{ending}")));
+    fs::create_dir_all(folder).map_err(wrong)?;
+    let since = Instant::now();
+    let mut child = Command::new(&options.program)
+        .args(["--json", "build", "--force", "--size", &size_mm.to_string(), "-o"])
+        .arg(&kit)
+        .arg(model)
+        .args(&options.options)
+        .stdin(Stdio::null())
+        .stdout(fs::File::create(&out).map_err(wrong)?)
+        .stderr(fs::File::create(&err).map_err(wrong)?)
+        .spawn()
+        .map_err(wrong)?;
+    let mut peak_mb = 0.0f64;
+    let ended = loop {
+        if let Some(status) = child.try_wait().map_err(wrong)? {
+            break status.code();
+        }
+        if since.elapsed() > Duration::from_secs(options.most_seconds) {
+            let _ = child.kill();
+            let _ = child.wait();
+            break None;
+        }
+        peak_mb = peak_mb.max(resident_mb(child.id()));
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let seconds = since.elapsed().as_secs_f64();
+    if options.keep.is_none() {
+        let _ = fs::remove_dir_all(&kit);
+    }
+    let (answer, events) = (read(&out), read(&err));
+    Ok(Run {
+        name,
+        exit_code: ended,
+        seconds,
+        peak_mb,
+        ..told(&answer, &events)
+    })
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_default()
+}
+
+/// The most that a process ever had, MB, where the system tells it.
+fn resident_mb(pid: u32) -> f64 {
+    let status = read(Path::new(&format!("/proc/{pid}/status")));
+    let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kb = peak.and_then(|l| l.trim().trim_end_matches(" kB").parse::<f64>().ok());
+    kb.unwrap_or(0.0) / 1024.0
+}
+
+/// What the program said of a job.
+fn told(answer: &str, events: &str) -> Run {
+    let answer: Value = answer.lines().last().map_or(Value::Null, json);
+    let events: Vec<Value> = events.lines().map(json).collect();
+    let of = |kind: &'static str| events.iter().filter(move |e| e["event"] == kind);
+    let mut stages: BTreeMap<String, f64> = BTreeMap::new();
+    for stage in of("effort").filter_map(|e| e["stages"].as_array()).flatten() {
+        let name = stage["name"].as_str().unwrap_or_default().to_owned();
+        *stages.entry(name).or_default() += stage["cpu_seconds"].as_f64().unwrap_or(0.0);
+    }
+    let cpu_seconds = stages.values().sum();
+    let mut stages: Vec<(String, f64)> = stages.into_iter().collect();
+    stages.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let text = |v: &Value| v.as_str().unwrap_or_default().to_owned();
+    let failed = answer["checks"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter(|c| c["ok"] == false);
+    let failed: Vec<String> = failed.map(|c| text(&c["name"])).collect();
+    let last = match answer["status"].as_str() {
+        Some("failed") => format!("fails: {}", failed.join(", ")),
+        Some("error") => text(&answer["error"]),
+        Some(status) => status.to_owned(),
+        None => "no answer".into(),
+    };
+    Run {
+        name: String::new(),
+        exit_code: None,
+        seconds: 0.0,
+        cpu_seconds,
+        peak_mb: 0.0,
+        stages,
+        kits: answer["effort"]["kits"].as_u64(),
+        last,
+        notes: of("note").map(|e| text(&e["text"])).collect(),
+    }
+}
+
+fn json(line: &str) -> Value {
+    serde_json::from_str(line).unwrap_or(Value::Null)
+}
+
+/// What the table has of a job.
+fn line(run: &Run) -> Vec<String> {
+    const LONGEST: usize = 90;
+    let stages: Vec<String> = run
+        .stages
+        .iter()
+        .take(4)
+        .map(|(name, s)| format!("{name} {s:.1}"))
+        .collect();
+    let brief: String = run.last.chars().take(LONGEST).collect();
+    vec![
+        run.name.clone(),
+        run.exit_code
+            .map_or_else(|| "given up".into(), |code| code.to_string()),
+        run.kits.map_or_else(String::new, |kits| kits.to_string()),
+        format!("{:.1}", run.seconds),
+        format!("{:.1}", run.cpu_seconds),
+        format!("{:.0}", run.peak_mb),
+        stages.join(", "),
+        brief.replace(['|', '\n'], " "),
+    ]
+}
+
+/// The table, its sums, and what each job noted.
+fn text(runs: &[Run]) -> String {
+    const HEAD: [&str; 8] = [
+        "model",
+        "exit code",
+        "kits",
+        "s",
+        "CPU s",
+        "MB",
+        "most CPU s",
+        "end",
+    ];
+    let mut text = String::from("# What kits cost\n\n");
+    let row = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    text += &row(&HEAD.map(str::to_owned));
+    text += &row(&HEAD.map(|_| "---".to_owned()));
+    runs.iter().for_each(|run| text += &row(&line(run)));
+    let made: Vec<u64> = runs.iter().filter_map(|r| r.kits).collect();
+    let n = |code: i32| runs.iter().filter(|r| r.exit_code == Some(code)).count();
+    let _ = write!(
+        text,
+        "\n{} jobs: {} verified, {} failed, {} without a plan, {} refused, {} given up; {:.2} kits made for one; {:.0} CPU s in all; slowest {:.0} s\n",
+        runs.len(),
+        n(0),
+        n(1),
+        n(3),
+        n(2),
+        runs.iter().filter(|r| r.exit_code.is_none()).count(),
+        made.iter().sum::<u64>() as f64 / made.len().max(1) as f64,
+        runs.iter().map(|r| r.cpu_seconds).sum::<f64>(),
+        runs.iter().map(|r| r.seconds).fold(0.0, f64::max)
+    );
+    for run in runs.iter().filter(|r| !r.notes.is_empty()) {
+        let _ = write!(text, "\n## {}\n", run.name);
+        run.notes.iter().for_each(|note| text += &format!("- {note}\n"));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_told_from_what_the_program_says() {
+        let answer = r#"{"status":"failed","effort":{"kits":3},"checks":[{"name":"a","ok":true},{"name":"b","ok":false}]}"#;
+        let events = concat!(
+            r#"{"event":"note","text":"another plan"}"#,
+            "\n",
+            r#"{"event":"effort","stages":[{"name":"plan","cpu_seconds":2.0},{"name":"cut","cpu_seconds":3.0}]}"#
+        );
+        let run = told(answer, events);
+        assert_eq!(
+            (run.kits, run.last.as_str(), run.cpu_seconds),
+            (Some(3), "fails: b", 5.0)
+        );
+        assert_eq!(run.stages[0].0, "cut");
+        assert_eq!(run.notes, ["another plan"]);
+        assert_eq!(told("", "").last, "no answer");
+    }
+}
