@@ -7,6 +7,7 @@ mod coupon;
 mod failure;
 mod input;
 mod inspect;
+mod interrupt;
 mod manual;
 mod output;
 mod own_assembly;
@@ -22,7 +23,7 @@ mod stress;
 
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use clap::error::ErrorKind;
 use serde_json::json;
@@ -92,9 +93,11 @@ fn main() -> ExitCode {
         stop: Arc::new(AtomicBool::new(false)),
         since: std::time::Instant::now(),
     };
-    let stop = Arc::clone(&session.stop);
-    // Without a handler Ctrl-C would still end the program, only less tidily.
-    let _ = ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed));
+    let is_json = session.is_json;
+    interrupt::watch(&session.stop, move || {
+        let stopped = Failure::Stopped;
+        refuse(is_json, &stopped.to_string(), stopped.exit_code());
+    });
     if let Some(n) = cli.threads
         && let Err(e) = rayon::ThreadPoolBuilder::new()
             .num_threads(n.clamp(1, MOST_THREADS))

@@ -18,6 +18,7 @@ use shellock_render::palette;
 use crate::args::{Axis, Options};
 use crate::failure::Failure;
 use crate::input::{Model, sha256};
+use crate::interrupt::Writing;
 use crate::page;
 use crate::paint::painted;
 use crate::printing::Printing;
@@ -117,6 +118,7 @@ impl Destination {
 
     /// Writes all files; the folder appears whole or not at all.
     pub fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+        let _writing = Writing::begin();
         let temporary = self.temporary()?;
         let made = temporary.path().join("kit");
         for (name, bytes) in files {

@@ -17,6 +17,7 @@ use shellock_print::{Printer, Process};
 
 use crate::Session;
 use crate::failure::Failure;
+use crate::interrupt::Writing;
 use crate::printing::Printing;
 use crate::stages::{Kit, model_of, pieces_of, plan_of, write};
 
@@ -137,6 +138,8 @@ struct Costs {
 /// PrusaSlicer, and a folder for its files.
 struct Slicer {
     folder: tempfile::TempDir,
+    /// Until the folder is gone.
+    _writing: Writing,
 }
 
 impl Slicer {
@@ -150,8 +153,9 @@ impl Slicer {
         if !runs.is_ok_and(|status| status.success()) {
             return Ok(None);
         }
+        let _writing = Writing::begin();
         let folder = tempfile::tempdir().map_err(Failure::unwritable(&std::env::temp_dir()))?;
-        Ok(Some(Self { folder }))
+        Ok(Some(Self { folder, _writing }))
     }
 
     /// All plates among `files`, and the solid; `None` where the slicer refuses something.

@@ -20,6 +20,7 @@ use crate::args::{Axis, Options};
 use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
+use crate::interrupt::Writing;
 use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
 use crate::place::Standing;
@@ -27,6 +28,7 @@ use crate::progress::{Display, PlanClock};
 
 /// Writes one file: whole or not at all.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let _writing = Writing::begin();
     let parent = path
         .parent()
         .filter(|p| !p.as_os_str().is_empty())

@@ -587,3 +587,35 @@ fn what_is_no_fit_or_no_file_leaves_the_configuration_as_it_is() {
     );
     assert_eq!(content(dir.path()).len(), 2);
 }
+
+/// Stages that look for it end by themselves; within a boolean the program ends from outside.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_a_job_anywhere_and_leaves_nothing() {
+    use std::io::{BufRead, BufReader};
+    use std::process::Stdio;
+    for stage in ["thickness", "pieces"] {
+        let dir = tempfile::tempdir().unwrap();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_shellock"))
+            .current_dir(dir.path())
+            .args([
+                "--json", "demo", "--figure", "vase", "--size", "60", "--pieces", "5", "-o", "kit",
+            ])
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stderr.take().unwrap())
+            .lines()
+            .map_while(Result::ok);
+        let is_there = lines.any(|line| line.contains(&format!("\"name\":\"{stage}\"")));
+        assert!(is_there, "{stage} never began");
+        let interrupted = Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status();
+        assert!(interrupted.unwrap().success());
+        lines.for_each(drop);
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{stage}");
+        assert_eq!(content(dir.path()), [], "{stage}");
+    }
+}
