@@ -97,9 +97,8 @@ fn rounded(mesh: &TriMesh) -> TriMesh {
     }
 }
 
-/// The same mesh with points sorted by coordinates and triangles by their corners, the lowest first. The
-/// boolean library orders its output by numbers that it gives to meshes as they are made, which depends on
-/// how threads happen to run.
+/// The same mesh with points sorted by coordinates and triangles by their corners, the lowest first: what a file
+/// holds depends on the surface alone, not on how it was made.
 fn in_canonical_order(mesh: &TriMesh) -> TriMesh {
     let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let key = |v: &u32| mesh.points[*v as usize].to_array();
