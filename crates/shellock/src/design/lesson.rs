@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use shellock_geom::Vec3;
+use shellock_geom::bvh::TriangleBvh;
+
 use super::Kit;
 use crate::plan::{LatticePlan, PlanConstraints};
 use crate::seam::rules::SHORTEST_RUN_SIZES;
@@ -36,6 +39,15 @@ pub enum Lesson {
         separation: LatticeDirection,
         /// Share of its wall that it could take along, in [0, 1].
         kept: f64,
+    },
+    /// A piece lost outer surface to what it passes on its way along a direction.
+    SkinLost {
+        /// The piece.
+        piece: PatchId,
+        /// The direction.
+        separation: LatticeDirection,
+        /// Where the hole is deepest.
+        at: Vec3,
     },
     /// The plan as a whole failed.
     FailedPlan {
@@ -81,6 +93,9 @@ impl Lesson {
             }
             Self::Blocked {
                 piece, separation, ..
+            }
+            | Self::SkinLost {
+                piece, separation, ..
             } => {
                 constraints.forbidden.insert((*piece, *separation));
             }
@@ -92,7 +107,9 @@ impl Lesson {
     pub fn blamed(&self) -> Vec<PatchId> {
         match self {
             Self::WeakJoints(_) => Vec::new(),
-            Self::RubbingPath { piece, .. } | Self::Blocked { piece, .. } => vec![*piece],
+            Self::RubbingPath { piece, .. } | Self::Blocked { piece, .. } | Self::SkinLost { piece, .. } => {
+                vec![*piece]
+            }
             Self::FailedPlan { loose, .. } => loose.clone(),
         }
     }
@@ -148,6 +165,12 @@ impl std::fmt::Display for Lesson {
                     100.0 * kept
                 )
             }
+            Self::SkinLost { piece, at, .. } => {
+                write!(
+                    f,
+                    "piece {piece} loses outer surface on its way out, at {at:.0} mm"
+                )
+            }
             Self::FailedPlan { loose, .. } if loose.is_empty() => {
                 write!(f, "the kit failed its verification")
             }
@@ -198,6 +221,20 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
             | Finding::ComesOut { piece, .. } => {
                 loose.push(patch(*piece));
             }
+            &Finding::SurfaceLost { at, .. } => {
+                let (at, stays) = (at.into(), kit.plan.steps[0].piece);
+                let piece = patch_at(kit, at);
+                // What stays to the last gives way to nothing.
+                if piece != stays {
+                    let piece = patch(piece);
+                    let separation = found.separation(piece);
+                    learned.push(Lesson::SkinLost {
+                        piece,
+                        separation,
+                        at,
+                    });
+                }
+            }
             Finding::ClusterMoves { motions } => loose.extend(motions.iter().map(|m| patch(m.piece))),
             _ => {}
         }
@@ -210,6 +247,12 @@ pub fn lessons(kit: &Kit) -> Vec<Lesson> {
         loose,
     });
     learned
+}
+
+/// The piece that has the outer surface at a place.
+fn patch_at(kit: &Kit, at: Vec3) -> PatchId {
+    let nearest = TriangleBvh::new(&kit.surface.mesh).nearest(at, f64::INFINITY);
+    kit.surface.patch_of_face[nearest.expect("a surface has triangles").face as usize]
 }
 
 /// Pairs whose connectors are too short: they must not be counted on again in this way.

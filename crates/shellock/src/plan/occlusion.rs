@@ -11,10 +11,16 @@
 //! The area of p with q ahead is positive along s exactly where the area of q with p ahead is along −s; the
 //! two amounts differ where one patch crosses a ray more often than the other.
 //!
+//! Faces along a line show nothing on it, though a piece cannot slide along a plane where the wall of another
+//! lies ahead in it: from each of them a walk over the surface finds what is ahead ([`along_surface`]).
+//!
 //! Limits: features thinner than a pixel may be missed; only outer patches are seen, walls are carved later.
+
+mod along_surface;
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
+use shellock_geom::topology::Topology;
 
 use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
@@ -79,7 +85,15 @@ impl Occlusion {
         let half = LatticeDirection::COUNT / 2;
         // Direction i and its opposite 25 − i share a picture.
         let lines: Vec<LatticeDirection> = LatticeDirection::all().take(half).collect();
-        let pictures: Vec<[Table; 2]> = lines.par_iter().map(|&s| look_along(surface, s)).collect();
+        let topology = Topology::of_mesh(&surface.mesh);
+        let look = |&s: &LatticeDirection| {
+            let mut tables = look_along(surface, s);
+            if let Some(topology) = &topology {
+                along_surface::add(surface, topology, s.unit(), &mut tables);
+            }
+            tables
+        };
+        let pictures: Vec<[Table; 2]> = lines.par_iter().map(look).collect();
         let (forwards, backwards): (Vec<Table>, Vec<Table>) =
             pictures.into_iter().map(|[f, b]| (f, b)).unzip();
         let tables = forwards.into_iter().chain(backwards.into_iter().rev()).collect();
@@ -115,12 +129,12 @@ impl Occlusion {
         self.tables[s.index()].first_hit[at] = Some((0.0, Vec3::ZERO));
     }
 
-    /// Projected area of all layers of `p` along `s`, mm².
+    /// Projected area of all layers of `p` along `s`, and area of what lies along `s`, mm².
     pub fn total_mm2(&self, p: PatchId, s: LatticeDirection) -> f64 {
         self.tables[s.index()].total_mm2[usize::from(p)]
     }
 
-    /// Projected area of `p` that has `q` ahead of it along `s`, mm².
+    /// Of [`total_mm2`](Self::total_mm2) that which has `q` ahead of it along `s`, mm².
     pub fn occluded_mm2(&self, p: PatchId, q: PatchId, s: LatticeDirection) -> f64 {
         self.tables[s.index()].occluded_mm2[self.at(p, q)]
     }
@@ -129,7 +143,7 @@ impl Occlusion {
     pub fn share(&self, p: PatchId, q: PatchId, s: LatticeDirection) -> f64 {
         let total = self.total_mm2(p, s);
         if total > 0.0 {
-            self.occluded_mm2(p, q, s) / total
+            (self.occluded_mm2(p, q, s) / total).min(1.0)
         } else {
             0.0
         }
@@ -314,10 +328,17 @@ impl Tally {
             }
             *counted = self.n_fragments;
             let pair = f.patch as usize * self.n + g.patch as usize;
-            table.occluded_mm2[pair] += pixel_mm2;
-            if table.first_hit[pair].is_none_or(|(least, _)| gap < least) {
-                table.first_hit[pair] = Some((gap, camera.point(f)));
-            }
+            table.occlude(pair, pixel_mm2, gap, camera.point(f));
+        }
+    }
+}
+
+impl Table {
+    /// Counts so much of a patch as occluded for a `pair`, at a point that meets the other after `gap_mm`.
+    fn occlude(&mut self, pair: usize, area_mm2: f64, gap_mm: f64, at: Vec3) {
+        self.occluded_mm2[pair] += area_mm2;
+        if self.first_hit[pair].is_none_or(|(least, _)| gap_mm < least) {
+            self.first_hit[pair] = Some((gap_mm, at));
         }
     }
 }

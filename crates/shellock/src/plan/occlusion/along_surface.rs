@@ -1,0 +1,162 @@
+//! What is ahead of faces that lie along a line: they slide in their own plane, edge on.
+//!
+//! ```text
+//!   ──────p──────┬────q────┐          ──────p──────┐ q        each p slides to the right: q is in its way
+//!   wall of p    │ of q    │          wall of p    │
+//!   ─────────────┴─────────┤          ─────────────┤
+//! ```
+
+use shellock_geom::Vec3;
+use shellock_geom::topology::{HalfEdge, Topology};
+
+use super::Table;
+use crate::{PatchId, SegmentedSurface};
+
+/// Faces whose normals have no larger cosine with a line lie along it: on a way of 60 mm they rise by the
+/// 1.2 mm of skin that carving spares, so all of what slides there towards another wall would be lost.
+const ALONG_COS: f64 = 0.02;
+/// What is lost to another wall counts so many times: a strip 1 mm wide is a hole already, and where faces are
+/// merely shaded, carving finds a way around nearly as often.
+const LOST_WEIGHT: f64 = 4.0;
+/// Faces that a walk passes, at most.
+const MOST_STEPS: usize = 4096;
+
+/// Adds faces along `s` to the tables of `s` and of its opposite: with their areas, since they are lost whole.
+pub(super) fn add(surface: &SegmentedSurface, topology: &Topology, s: Vec3, tables: &mut [Table; 2]) {
+    let n = surface.n_patches;
+    for (face, &patch) in surface.patch_of_face.iter().enumerate() {
+        let corners = surface.mesh.corners(face);
+        let doubled = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let area_mm2 = 0.5 * doubled.length();
+        if area_mm2 == 0.0 || doubled.dot(s).abs() > ALONG_COS * 2.0 * area_mm2 {
+            continue;
+        }
+        for (table, way) in tables.iter_mut().zip([s, -s]) {
+            table.total_mm2[usize::from(patch)] += area_mm2;
+            let walk = Walk::from_middle(surface, topology, face, way);
+            let mut met = vec![patch];
+            for (ahead, gap_mm) in walk {
+                if !met.contains(&ahead) {
+                    met.push(ahead);
+                    let pair = usize::from(patch) * n + usize::from(ahead);
+                    table.occlude(
+                        pair,
+                        LOST_WEIGHT * area_mm2,
+                        gap_mm,
+                        corners.iter().sum::<Vec3>() / 3.0,
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A walk over faces along a direction, until the surface turns away from it; a face that turns towards it is
+/// the last.
+struct Walk<'a> {
+    surface: &'a SegmentedSurface,
+    topology: &'a Topology,
+    along: Vec3,
+    /// The edge by which the present face was entered, if it was.
+    entered: Option<HalfEdge>,
+    face: usize,
+    at: Vec3,
+    gone_mm: f64,
+    n_steps: usize,
+}
+
+impl<'a> Walk<'a> {
+    fn from_middle(surface: &'a SegmentedSurface, topology: &'a Topology, face: usize, along: Vec3) -> Self {
+        Self {
+            surface,
+            topology,
+            along,
+            entered: None,
+            face,
+            at: surface.mesh.corners(face).iter().sum::<Vec3>() / 3.0,
+            gone_mm: 0.0,
+            n_steps: 0,
+        }
+    }
+
+    /// By which half-edge the present face is left, and after how many mm.
+    fn way_out(&self) -> Option<(HalfEdge, f64)> {
+        let corners = self.surface.mesh.corners(self.face);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let first = 3 * self.face as u32;
+        let outs = (0..3)
+            .filter(|&k| self.entered != Some(first + k))
+            .filter_map(|k| {
+                let (from, to) = (corners[k as usize], corners[(k as usize + 1) % 3]);
+                let outwards = (to - from).cross(normal);
+                let speed = self.along.dot(outwards);
+                (speed > 0.0).then(|| (first + k, ((from - self.at).dot(outwards) / speed).max(0.0)))
+            });
+        outs.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+impl Iterator for Walk<'_> {
+    type Item = (PatchId, f64);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.n_steps == MOST_STEPS {
+            return None;
+        }
+        let (edge, mm) = self.way_out()?;
+        let opposite = self.topology.opposite(edge);
+        (self.at, self.gone_mm) = (self.at + mm * self.along, self.gone_mm + mm);
+        (self.face, self.entered) = (opposite as usize / 3, Some(opposite));
+        let [a, b, c] = self.surface.mesh.corners(self.face);
+        let doubled = (b - a).cross(c - a);
+        let towards = doubled.dot(self.along) / doubled.length().max(f64::MIN_POSITIVE);
+        self.n_steps += 1;
+        if towards > ALONG_COS {
+            return None;
+        }
+        if towards < -ALONG_COS {
+            self.n_steps = MOST_STEPS;
+        }
+        Some((self.surface.patch_of_face[self.face], self.gone_mm))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::Volume;
+    use shellock_testkit::shapes::cuboid;
+
+    use super::super::Occlusion;
+    use super::*;
+    use crate::LatticeDirection;
+    use crate::testing::label;
+
+    fn shares(surface: &SegmentedSurface, p: u32, q: u32) -> [f64; 3] {
+        let occlusion = Occlusion::measure(surface);
+        let along = |s: Vec3| occlusion.share(PatchId(p), PatchId(q), LatticeDirection::nearest(s));
+        [Vec3::Z, -Vec3::Z, Vec3::X].map(along)
+    }
+
+    #[test]
+    fn a_side_wall_cannot_slide_to_where_its_plane_goes_on_in_another_piece() {
+        let square =
+            |z: f64| [[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]].map(|[x, y]| Vec3::new(x, y, z));
+        let box_of_two = Volume::loft(&[0.0, 20.0, 40.0].map(|z| square(z).to_vec())).to_mesh();
+        // Both lids go to a third patch, so that sides alone are asked for.
+        let surface = label(box_of_two, 3, |p| match p.z {
+            z if !(1.0..=39.0).contains(&z) => 2,
+            z => u32::from(z > 20.0),
+        });
+        assert_eq!(shares(&surface, 0, 1), [1.0, 0.0, 0.0]);
+        assert_eq!(shares(&surface, 1, 0), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn a_post_cannot_slide_into_the_floor_that_it_stands_on() {
+        let floor = cuboid([-20.0, -20.0, -10.0], [30.0, 30.0, 0.0]);
+        let post = cuboid([0.0, 0.0, -5.0], [10.0, 10.0, 30.0]);
+        let surface = label(floor.union(&post).to_mesh(), 2, |p| u32::from(p.z > 1e-6));
+        let [up, down, _] = shares(&surface, 1, 0);
+        assert_eq!((up, down), (0.0, 1.0));
+    }
+}
