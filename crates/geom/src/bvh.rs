@@ -1,5 +1,7 @@
 //! A bounding-volume hierarchy over triangles: nearest points, and nearest distances by group.
 
+use rayon::prelude::*;
+
 use crate::{Aabb, TriMesh, Vec3};
 
 /// Triangles a leaf holds at most. Four was the fastest of 1 … 8 on 200 k triangles (closest-point queries).
@@ -72,66 +74,19 @@ impl TriangleBvh {
     /// Sorts all triangles of `mesh`; `group_of_face` (one a triangle, or empty for a single group) serves
     /// [`Self::nearest_by_group`].
     pub fn with_groups(mesh: &TriMesh, group_of_face: &[u32]) -> Self {
-        let n = mesh.triangles.len();
-        let boxes: Vec<Aabb> = (0..n).map(|f| Aabb::around(mesh.corners(f))).collect();
-        let centers: Vec<Vec3> = boxes.iter().map(|b| b.center()).collect();
-        let mut order: Vec<u32> = (0..u32::try_from(n).expect("faces are counted in 32 bits")).collect();
-        let group = |f: u32| group_of_face.get(f as usize).copied().unwrap_or(0);
-        let mut nodes = vec![Node {
-            bounds: Aabb::EMPTY,
-            first: 0,
-            count: 0,
-            group: 0,
-        }];
-        let mut todo = vec![(0usize, 0usize, n, 0u32)];
-        while let Some((at, from, to, depth)) = todo.pop() {
-            let range = &mut order[from..to];
-            let bounds = range.iter().fold(Aabb::EMPTY, |b, &f| b.union(boxes[f as usize]));
-            let shared = range.first().map_or(0, |&f| group(f));
-            let group = if range.iter().all(|&f| group(f) == shared) {
-                shared
-            } else {
-                MIXED
-            };
-            let split = if range.len() <= LEAF_SIZE {
-                None
-            } else {
-                Some(partition(range, &boxes, &centers, depth > MAX_UNEVEN_DEPTH))
-            };
-            match split {
-                None => {
-                    nodes[at] = Node {
-                        bounds,
-                        first: from as u32,
-                        count: (to - from) as u32,
-                        group,
-                    }
-                }
-                Some(middle) => {
-                    let left = nodes.len();
-                    nodes[at] = Node {
-                        bounds,
-                        first: left as u32,
-                        count: 0,
-                        group,
-                    };
-                    nodes.extend(
-                        [Node {
-                            bounds,
-                            first: 0,
-                            count: 0,
-                            group: MIXED,
-                        }; 2],
-                    );
-                    todo.push((left, from, from + middle, depth + 1));
-                    todo.push((left + 1, from + middle, to, depth + 1));
-                }
-            }
-        }
+        let n = u32::try_from(mesh.triangles.len()).expect("faces are counted in 32 bits");
+        let corners = |face: u32| mesh.corners(face as usize);
+        let boxes: Vec<Aabb> = (0..n).into_par_iter().map(|f| Aabb::around(corners(f))).collect();
+        let builder = Builder {
+            centers: boxes.par_iter().map(|b| b.center()).collect(),
+            boxes,
+            group_of_face,
+        };
+        let mut order: Vec<u32> = (0..n).collect();
         Self {
-            nodes,
-            corners: order.iter().map(|&f| mesh.corners(f as usize)).collect(),
-            groups: order.iter().map(|&f| group(f)).collect(),
+            nodes: builder.tree(&mut order, 0, 0),
+            corners: order.par_iter().map(|&f| corners(f)).collect(),
+            groups: order.iter().map(|&f| builder.group(f)).collect(),
             faces: order,
         }
     }
@@ -288,6 +243,85 @@ fn ray_meets_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Op
     let v = direction.dot(q) / det;
     let t = ac.dot(q) / det;
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0).then_some(t)
+}
+
+/// Triangles from which a subtree is built on a thread of its own, at least.
+const LEAST_APART: usize = 1 << 13;
+
+/// What a tree is built of.
+struct Builder<'a> {
+    boxes: Vec<Aabb>,
+    centers: Vec<Vec3>,
+    group_of_face: &'a [u32],
+}
+
+impl Builder<'_> {
+    fn group(&self, face: u32) -> u32 {
+        self.group_of_face.get(face as usize).copied().unwrap_or(0)
+    }
+
+    /// The tree over `order`, whose first triangle is the `first` in leaf order; its root is node 0. Its shape is
+    /// the same on any number of threads.
+    fn tree(&self, order: &mut [u32], first: usize, depth: u32) -> Vec<Node> {
+        if order.len() < LEAST_APART {
+            let mut nodes = vec![self.node(order, first)];
+            self.split(&mut nodes, 0, order, first, depth);
+            return nodes;
+        }
+        let mut root = self.node(order, first);
+        let middle = partition(order, &self.boxes, &self.centers, depth > MAX_UNEVEN_DEPTH);
+        let (left, right) = order.split_at_mut(middle);
+        let (left, right) = rayon::join(
+            || self.tree(left, first, depth + 1),
+            || self.tree(right, first + middle, depth + 1),
+        );
+        (root.first, root.count) = (1, 0);
+        // Both roots follow, then what is below the left one, then what is below the right one.
+        let moved = |node: &Node, by: usize| Node {
+            first: if node.count == 0 {
+                node.first + by as u32
+            } else {
+                node.first
+            },
+            ..*node
+        };
+        let (by_left, by_right) = (2, 1 + left.len());
+        let mut nodes = vec![root, moved(&left[0], by_left), moved(&right[0], by_right)];
+        nodes.extend(left[1..].iter().map(|n| moved(n, by_left)));
+        nodes.extend(right[1..].iter().map(|n| moved(n, by_right)));
+        nodes
+    }
+
+    /// A leaf of the triangles of `order`.
+    fn node(&self, order: &[u32], first: usize) -> Node {
+        let shared = order.first().map_or(0, |&f| self.group(f));
+        Node {
+            bounds: order
+                .iter()
+                .fold(Aabb::EMPTY, |b, &f| b.union(self.boxes[f as usize])),
+            first: first as u32,
+            count: order.len() as u32,
+            group: if order.iter().all(|&f| self.group(f) == shared) {
+                shared
+            } else {
+                MIXED
+            },
+        }
+    }
+
+    /// Splits leaf `at` of `nodes`, which has the triangles of `order`, until leaves are small.
+    fn split(&self, nodes: &mut Vec<Node>, at: usize, order: &mut [u32], first: usize, depth: u32) {
+        if order.len() <= LEAF_SIZE {
+            return;
+        }
+        let middle = partition(order, &self.boxes, &self.centers, depth > MAX_UNEVEN_DEPTH);
+        let (left, right) = order.split_at_mut(middle);
+        let child = nodes.len();
+        nodes.extend([self.node(left, first), self.node(right, first + middle)]);
+        (nodes[at].first, nodes[at].count) = (child as u32, 0);
+        self.split(nodes, child, left, first, depth + 1);
+        self.split(nodes, child + 1, right, first + middle, depth + 1);
+    }
 }
 
 /// Splits `faces` in place where the surface-area heuristic is least; returns how many go left (never 0 or
