@@ -374,6 +374,9 @@ impl Wall {
         };
         match found {
             Ok(strength) => {
+                if !params.allows_thin {
+                    strength::is_hollow(model, strength.thickness_mm)?;
+                }
                 let settings = Settings::with_thickness(params, strength.thickness_mm);
                 let warnings = strength.warnings(&nominal.strength);
                 Ok(Self {
