@@ -12,7 +12,7 @@
 //! two amounts differ where one patch crosses a ray more often than the other.
 //!
 //! Faces along a line show nothing on it, though a piece cannot slide along a plane where the wall of another
-//! lies ahead in it: from each of them a walk over the surface finds what is ahead ([`along_surface`]).
+//! lies ahead in it: from each of them a walk over the surface finds what is ahead (`along_surface`).
 //!
 //! Limits: features thinner than a pixel may be missed; only outer patches are seen, walls are carved later.
 

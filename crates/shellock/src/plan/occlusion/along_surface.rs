@@ -21,32 +21,53 @@ const LOST_WEIGHT: f64 = 4.0;
 /// Faces that a walk passes, at most.
 const MOST_STEPS: usize = 4096;
 
+/// Walks for one line, about: each stands for as much area, so that fine meshes of flat things cost no more.
+const N_WALKS: f64 = 50_000.0;
+
 /// Adds faces along `s` to the tables of `s` and of its opposite: with their areas, since they are lost whole.
 pub(super) fn add(surface: &SegmentedSurface, topology: &Topology, s: Vec3, tables: &mut [Table; 2]) {
-    let n = surface.n_patches;
-    for (face, &patch) in surface.patch_of_face.iter().enumerate() {
-        let corners = surface.mesh.corners(face);
-        let doubled = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let area_mm2 = 0.5 * doubled.length();
-        if area_mm2 == 0.0 || doubled.dot(s).abs() > ALONG_COS * 2.0 * area_mm2 {
-            continue;
-        }
-        for (table, way) in tables.iter_mut().zip([s, -s]) {
-            table.total_mm2[usize::from(patch)] += area_mm2;
-            let walk = Walk::from_middle(surface, topology, face, way);
-            let mut met = vec![patch];
-            for (ahead, gap_mm) in walk {
-                if !met.contains(&ahead) {
-                    met.push(ahead);
-                    let pair = usize::from(patch) * n + usize::from(ahead);
-                    table.occlude(
-                        pair,
-                        LOST_WEIGHT * area_mm2,
-                        gap_mm,
-                        corners.iter().sum::<Vec3>() / 3.0,
-                    );
-                }
+    let lying: Vec<(usize, f64)> = (0..surface.patch_of_face.len())
+        .filter_map(|face| {
+            let doubled = surface.mesh.area_vector_doubled(face);
+            let area_mm2 = 0.5 * doubled.length();
+            let lies_along = area_mm2 > 0.0 && doubled.dot(s).abs() <= ALONG_COS * 2.0 * area_mm2;
+            lies_along.then_some((face, area_mm2))
+        })
+        .collect();
+    let step_mm2 = lying.iter().map(|l| l.1).sum::<f64>() / N_WALKS;
+    // A walk starts where the area passed so far reaches another step, from the middle of one.
+    let mut passed = 0.5;
+    for (face, area_mm2) in lying {
+        let patch = usize::from(surface.patch_of_face[face]);
+        tables.iter_mut().for_each(|t| t.total_mm2[patch] += area_mm2);
+        let before = f64::floor(passed);
+        passed += area_mm2 / step_mm2;
+        let stands_for_mm2 = (passed.floor() - before) * step_mm2;
+        if stands_for_mm2 > 0.0 {
+            for (table, way) in tables.iter_mut().zip([s, -s]) {
+                count(surface, topology, (face, stands_for_mm2), way, table);
             }
+        }
+    }
+}
+
+/// Counts each patch that is ahead of a face on its `way` as occluding the area it stands for.
+fn count(
+    surface: &SegmentedSurface,
+    topology: &Topology,
+    (face, area_mm2): (usize, f64),
+    way: Vec3,
+    table: &mut Table,
+) {
+    let patch = surface.patch_of_face[face];
+    let walk = Walk::from_middle(surface, topology, face, way);
+    let at = walk.at;
+    let mut met = vec![patch];
+    for (ahead, gap_mm) in walk {
+        if !met.contains(&ahead) {
+            met.push(ahead);
+            let pair = usize::from(patch) * surface.n_patches + usize::from(ahead);
+            table.occlude(pair, LOST_WEIGHT * area_mm2, gap_mm, at);
         }
     }
 }
