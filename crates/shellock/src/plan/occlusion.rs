@@ -134,7 +134,8 @@ impl Occlusion {
         self.tables[s.index()].total_mm2[usize::from(p)]
     }
 
-    /// Of [`total_mm2`](Self::total_mm2) that which has `q` ahead of it along `s`, mm².
+    /// Of [`total_mm2`](Self::total_mm2) that which has `q` ahead of it along `s`, mm²; what lies along `s`
+    /// counts fourfold, so that it can be more than the total.
     pub fn occluded_mm2(&self, p: PatchId, q: PatchId, s: LatticeDirection) -> f64 {
         self.tables[s.index()].occluded_mm2[self.at(p, q)]
     }
