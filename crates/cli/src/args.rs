@@ -371,6 +371,16 @@ pub struct Options {
     /// Of several bodies apart from each other make the largest
     #[arg(long, help_heading = "Surface")]
     pub largest: bool,
+    /// Detail to keep of a surface with more than 100 000 triangles, mm, 0 to 0.1: it is described by fewer,
+    /// none farther from it than this; 0 keeps all
+    #[arg(
+        long,
+        value_name = "MM",
+        default_value_t = 0.015,
+        allow_hyphen_values = true,
+        help_heading = "Surface"
+    )]
+    pub resolution: f64,
     /// One label a face: a .seg file (one integer a line) or a .ply with a face property; a label is a piece
     #[arg(long, value_name = "FILE", help_heading = "Pieces")]
     pub labels: Option<PathBuf>,

@@ -35,7 +35,7 @@ pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Res
         out.out.unwrap_or_else(|| PathBuf::from(format!("{stem}-kit"))),
         out.force,
     )?;
-    let model = input::model(session, file, options)?;
+    let model = input::simple_model(session, file, options)?;
     make(session, &model, options, &params, &to)
 }
 
@@ -64,6 +64,12 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
         problems.push(format!(
             "plan time is {} s; it must be 0 or more",
             options.plan_time
+        ));
+    }
+    if !(0.0..=0.1).contains(&options.resolution) {
+        problems.push(format!(
+            "resolution is {} mm; it must be from 0 to 0.1",
+            options.resolution
         ));
     }
     if problems.is_empty() {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 use shellock_formats::{LabelSource, Loaded, read_labels, read_mesh};
 use shellock_geom::repair::{Repair, RepairMode, Repaired, repair};
+use shellock_geom::simplify::simplify;
 use shellock_geom::{Aabb, Solid, Vec3};
 
 use crate::Session;
@@ -19,6 +20,8 @@ const MAX_FILE_BYTES: u64 = 2 << 30;
 const PLAUSIBLE_MM: std::ops::RangeInclusive<f64> = 20.0..=1000.0;
 /// Longest side of what is made, mm: a torus of 2000 mm already takes 8 GB and more than three minutes.
 const MADE_MM: std::ops::RangeInclusive<f64> = 10.0..=2000.0;
+/// Surfaces with more triangles are described by fewer: most take twice the time with twice as many.
+const MANY_TRIANGLES: usize = 100_000;
 /// Longest side of everything else, mm.
 const DEFAULT_SIZE_MM: f64 = 150.0;
 
@@ -105,6 +108,40 @@ pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model,
         let (loaded, bytes) = load(path)?;
         model_of(path, &loaded, &bytes, options)
     })
+}
+
+/// The same, described by fewer triangles where it has very many.
+pub fn simple_model(session: &Session, path: &Path, options: &Options) -> Result<Model, Failure> {
+    let model = model(session, path, options)?;
+    let n_triangles = model.solid.mesh().triangles.len();
+    if n_triangles <= MANY_TRIANGLES || options.resolution == 0.0 {
+        return Ok(model);
+    }
+    session.during("simplifying", || simplified(model, options.resolution))
+}
+
+/// `model` with fewer triangles, all within `resolution_mm` of its surface, and a note that says so.
+fn simplified(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
+    let n_before = model.solid.mesh().triangles.len();
+    match simplify(&model.solid, model.labels.as_deref(), resolution_mm) {
+        Some(simple) if simple.solid.mesh().triangles.len() < n_before => {
+            model.notes.push(format!(
+                "{n_before} triangles are more than a printer can show: {} are used, none farther than {:.3} mm \
+                 from the surface (--resolution 0 uses all)",
+                simple.solid.mesh().triangles.len(),
+                simple.farthest_mm
+            ));
+            let of = |labels: Vec<i64>| simple.source_face.iter().map(|&f| labels[f as usize]).collect();
+            model.labels = model.labels.map(of);
+            model.file_face = simple.source_face.iter().map(|&f| model.file_face[f as usize]).collect();
+            model.solid = simple.solid;
+        }
+        _ => model.notes.push(format!(
+            "{n_before} triangles could not be made fewer within {resolution_mm} mm of the surface: all are used, \
+             which takes longer"
+        )),
+    }
+    Ok(model)
 }
 
 /// The model in what was read from `path`.

@@ -140,7 +140,7 @@ fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) ->
 /// `shellock plan`.
 pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
     let params = checked(options)?;
-    let model = input::model(session, file, options)?;
+    let model = input::simple_model(session, file, options)?;
     let display = Display::new(session.shown);
     let clock = PlanClock::new(options.plan_time);
     let report = |p: shellock::context::Progress<'_>| {

@@ -20,6 +20,7 @@ pub mod rounding;
 #[cfg(test)]
 mod samples;
 pub mod signed_distance;
+pub mod simplify;
 pub mod solid;
 pub mod sparse;
 pub mod subdivide;

@@ -27,6 +27,7 @@ pub use split::split_piece;
 pub use user::user_labels;
 
 use changes::Changes;
+use refine::{Ground, refine_on};
 
 use crate::{Cancelled, Ctx, PatchId, SegmentedSurface};
 
@@ -262,11 +263,12 @@ pub fn segment(
     ctx.stage("segmentation", 0)?;
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
     let (fine, source_face) = halve_long_edges(params, solid);
+    let ground = Ground::new(&fine);
     let mut surface = match given {
         Some(labels) => {
             let labels = labels.inherited(&source_face);
-            let (_, surface) = best_contacts(ctx, params, &fine, &labels, LabelOrigin::User)?;
-            surface
+            let found = best_contacts(ctx, params, &ground, &labels, LabelOrigin::User, f64::INFINITY)?;
+            found.expect("nothing is dearer than that").1
         }
         None => {
             let mut best: Option<(f64, SegmentedSurface)> = None;
@@ -276,12 +278,11 @@ pub fn segment(
                     ..params.clone()
                 };
                 let labels = auto_labels(ctx, &reseeded, &fine)?;
-                let (cost, surface) = best_contacts(ctx, params, &fine, &labels, LabelOrigin::Automatic)?;
-                let enough = LabelOrigin::Automatic.good_cost(labels.n_patches());
-                if best.as_ref().is_none_or(|b| cost < b.0) {
-                    best = Some((cost, surface));
-                }
-                if cost <= enough {
+                let origin = LabelOrigin::Automatic;
+                let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+                best = best_contacts(ctx, params, &ground, &labels, origin, limit)?.or(best);
+                let enough = origin.good_cost(labels.n_patches());
+                if best.as_ref().is_some_and(|b| b.0 <= enough) {
                     break;
                 }
             }
@@ -318,6 +319,16 @@ impl LabelOrigin {
         }
     }
 
+    /// What the changes from `labels` to `mended` cost at least, before seams are smooth: [`Self::cost`] without
+    /// labels that lose their piece.
+    fn least_cost(self, labels: &FaceLabels, mended: &FaceLabels) -> f64 {
+        let (before, after) = (labels.n_patches() as f64, mended.n_patches() as f64);
+        match self {
+            Self::Automatic => (after - before).max(2.0 * (before - after)),
+            Self::User => (after - before).max(0.0),
+        }
+    }
+
     /// A cost with which nothing else is tried, for `n` patches in the beginning.
     fn good_cost(self, n: usize) -> f64 {
         match self {
@@ -349,46 +360,58 @@ fn kept_limit_mm(params: &SegmentationParams, surface: &SegmentedSurface) -> f64
         .expect("there is at least one limit")
 }
 
-/// Mends `labels` for long contacts, and for shorter ones where those cost too much; the cheapest surface and
-/// its cost.
+/// Mends `labels` for long contacts, and for shorter ones where those cost too much; the cheapest surface that
+/// costs less than `limit`, and its cost.
 fn best_contacts(
     ctx: &Ctx,
     params: &SegmentationParams,
-    solid: &Solid,
+    ground: &Ground<'_>,
     labels: &FaceLabels,
     origin: LabelOrigin,
-) -> Result<(f64, SegmentedSurface), SegmentationError> {
+    limit: f64,
+) -> Result<Option<(f64, SegmentedSurface)>, SegmentationError> {
     let mut best: Option<(f64, SegmentedSurface)> = None;
     for (i, limit_mm) in contact_limits(params).into_iter().enumerate() {
         let limited = SegmentationParams {
             min_contact_mm: limit_mm,
             ..params.clone()
         };
-        let (faults, surface) = held_twice(ctx, &limited, solid, labels.clone())?;
-        let cost = FAULT_COST * faults as f64 + origin.cost(labels, &surface) + SHORTER_COST * i as f64;
-        if best.as_ref().is_none_or(|b| cost < b.0) {
-            best = Some((cost, surface));
+        let shorter = SHORTER_COST * i as f64;
+        let limit = best.as_ref().map_or(limit, |b| b.0);
+        let is_too_dear = |mended: &FaceLabels| origin.least_cost(labels, mended) + shorter >= limit;
+        if let Some((faults, surface)) = held_twice(ctx, &limited, ground, labels.clone(), is_too_dear)? {
+            let cost = FAULT_COST * faults as f64 + origin.cost(labels, &surface) + shorter;
+            if cost < limit {
+                best = Some((cost, surface));
+            }
         }
-        if cost <= origin.good_cost(labels.n_patches()) {
+        if best
+            .as_ref()
+            .is_some_and(|b| b.0 <= origin.good_cost(labels.n_patches()))
+        {
             break;
         }
     }
-    Ok(best.expect("there is at least one limit"))
+    Ok(best)
 }
 
 /// Mends, smooths and cuts until the smooth seams hold every piece twice; the best round and its faults where
-/// none does.
+/// none does. Ends before it cuts what `is_too_dear`.
 fn held_twice(
     ctx: &Ctx,
     params: &SegmentationParams,
-    solid: &Solid,
+    ground: &Ground<'_>,
     mut labels: FaceLabels,
-) -> Result<(usize, SegmentedSurface), SegmentationError> {
+    is_too_dear: impl Fn(&FaceLabels) -> bool,
+) -> Result<Option<(usize, SegmentedSurface)>, SegmentationError> {
     let mut strict = params.clone();
     let mut best: Option<(usize, SegmentedSurface)> = None;
     for _ in 0..MAX_MEND_ROUNDS {
-        labels = refine(ctx, &strict, solid, &labels)?;
-        let surface = smooth_and_cut(ctx, params, solid, &labels)?;
+        labels = refine_on(ctx, &strict, ground, &labels)?;
+        if is_too_dear(&labels) {
+            break;
+        }
+        let surface = smooth_and_cut(ctx, params, ground.solid, &labels)?;
         let faults = surface
             .contact_graph_below(params.wall_mm, params.min_contact_mm)
             .n_faults();
@@ -400,7 +423,7 @@ fn held_twice(
         }
         strict.min_contact_mm *= STRICTER;
     }
-    Ok(best.expect("there is at least one round"))
+    Ok(best)
 }
 
 /// The same surface with `patch` divided in two, refined and smoothed again; `None` where it cannot be

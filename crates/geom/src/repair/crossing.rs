@@ -37,13 +37,35 @@ pub fn crossings(mesh: &TriMesh) -> Crossings {
     let tree = Boxes::of(mesh);
     let found: Vec<(usize, Option<u32>)> = (0..tree.order.len().div_ceil(LEAF))
         .into_par_iter()
-        .map(|leaf| tree.crossings_of(mesh, leaf))
+        .map(|leaf| {
+            let (mut count, mut first) = (0, None);
+            tree.crossings_of(mesh, leaf, |[face, _]| {
+                count += 1;
+                first = Some(first.map_or(face, |f: u32| f.min(face)));
+            });
+            (count, first)
+        })
         .collect();
     let first = found.iter().filter_map(|(_, first)| *first).min();
     Crossings {
         count: found.iter().map(|(count, _)| count).sum(),
         first: first.map_or(Vec3::ZERO, |face| mesh.face_center(face as usize)),
     }
+}
+
+/// The triangles that [`crossings`] counts, each once, in order.
+pub(crate) fn crossing_faces(mesh: &TriMesh) -> Vec<u32> {
+    let tree = Boxes::of(mesh);
+    let of_leaf = |leaf: usize| {
+        let mut faces = Vec::new();
+        tree.crossings_of(mesh, leaf, |pair| faces.extend(pair));
+        faces
+    };
+    let n_leaves = tree.order.len().div_ceil(LEAF);
+    let mut faces: Vec<u32> = (0..n_leaves).into_par_iter().flat_map_iter(of_leaf).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    faces
 }
 
 /// Makes one surface of what a surface encloses at least once, where it crosses itself, has edges of more
@@ -163,12 +185,11 @@ impl Boxes {
         leaf * LEAF..self.order.len().min((leaf + 1) * LEAF)
     }
 
-    /// How many triangles of this and later leaves cross those of `leaf`, and the first of `leaf` that is
-    /// crossed.
-    fn crossings_of(&self, mesh: &TriMesh, leaf: usize) -> (usize, Option<u32>) {
+    /// Shows `found` each pair of a triangle of `leaf` and one of this or a later leaf that cross.
+    fn crossings_of(&self, mesh: &TriMesh, leaf: usize, mut found: impl FnMut([u32; 2])) {
         let own = self.places(leaf);
         let around = self.levels[0][leaf];
-        let (mut count, mut first, mut n_pairs) = (0, None, 0);
+        let mut n_pairs = 0;
         let mut todo = vec![(self.levels.len() - 1, 0)];
         while let Some((level, at)) = todo.pop().filter(|_| n_pairs < MAX_PAIRS_OF_LEAF) {
             // Earlier leaves have looked at this one.
@@ -190,13 +211,11 @@ impl Boxes {
                 for place in own.clone().take_while(|&place| place < other) {
                     let faces = [place, other].map(|p| self.order[p]);
                     if self.boxes[place].intersects(self.boxes[other]) && cross(mesh, faces) {
-                        count += 1;
-                        first = Some(first.map_or(faces[0], |f: u32| f.min(faces[0])));
+                        found(faces);
                     }
                 }
             }
         }
-        (count, first)
     }
 }
 

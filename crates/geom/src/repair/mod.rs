@@ -19,6 +19,7 @@ mod near;
 mod report;
 mod shells;
 
+pub(crate) use crossing::crossing_faces;
 pub use crossing::{Crossings, crossings};
 pub use report::{Repair, RepairKind};
 

@@ -5,11 +5,13 @@
 //! [`crate::seam::graph`] for why. Where no division helps, because the seam is too short for two contacts,
 //! what hangs on a piece is joined to it.
 
+use rayon::prelude::*;
 use shellock_geom::{HalfEdge, Solid, Topology};
 
 use super::dual_graph::{CreaseCost, DualGraph};
 use super::split::{Divider, Division, euler_characteristics, raw_contact_graph};
 use super::{FaceLabels, SegmentationError, SegmentationParams};
+use crate::seam::graph::Adjacency;
 use crate::seam::seam_half_edges;
 use crate::{ContactGraph, Ctx, PatchId};
 
@@ -37,14 +39,39 @@ pub fn refine(
     solid: &Solid,
     labels: &FaceLabels,
 ) -> Result<FaceLabels, SegmentationError> {
-    let topology = Topology::new(solid);
-    let faces = DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE);
-    let min_piece_mm2 = SPLIT_RESERVE * params.min_piece_mm2;
+    refine_on(ctx, params, &Ground::new(solid), labels)
+}
+
+/// What refining asks of a surface, made once for all rounds.
+pub(super) struct Ground<'a> {
+    pub solid: &'a Solid,
+    topology: Topology,
+    faces: DualGraph,
+}
+
+impl<'a> Ground<'a> {
+    pub fn new(solid: &'a Solid) -> Self {
+        let topology = Topology::new(solid);
+        Self {
+            solid,
+            faces: DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE),
+            topology,
+        }
+    }
+}
+
+/// [`refine`] on a surface that was looked at before.
+pub(super) fn refine_on(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    ground: &Ground<'_>,
+    labels: &FaceLabels,
+) -> Result<FaceLabels, SegmentationError> {
     let divider = Divider {
-        mesh: solid.mesh(),
-        topology: &topology,
-        faces: &faces,
-        min_piece_mm2,
+        mesh: ground.solid.mesh(),
+        topology: &ground.topology,
+        faces: &ground.faces,
+        min_piece_mm2: SPLIT_RESERVE * params.min_piece_mm2,
     };
     let mut work = Work {
         divider,
@@ -195,7 +222,7 @@ impl Work<'_> {
     }
 
     /// The best way to divide `patch`, mostly through its seams with what hangs on it.
-    fn best_division(&mut self, seam: &[HalfEdge], graph: &ContactGraph, patch: u32) -> Option<Division> {
+    fn best_division(&self, seam: &[HalfEdge], graph: &ContactGraph, patch: u32) -> Option<Division> {
         let n_parts = graph.parts().len();
         let parts = graph.parts_without(PatchId(patch));
         // A part that no counted contact ties to this patch cannot be reached by dividing it.
@@ -228,7 +255,7 @@ impl Work<'_> {
                 after.n_faults() as f64
             }
         };
-        divider.best(&mut self.label, n, patch, &pairs, faults)
+        divider.best(&self.label, n, patch, &pairs, faults)
     }
 
     /// Two triangles of `patch`, far apart along its seam with the pieces of `part`.
@@ -265,21 +292,25 @@ impl Work<'_> {
         let articulations = graph.articulation_pieces();
         let areas = self.areas();
         let n_before = graph.n_faults() + self.holes().iter().sum::<usize>();
-        let mut best: Option<(usize, f64, u32, u32)> = None;
-        for contact in graph.contacts().iter().filter(|c| graph.counts(c)) {
-            if !articulations.contains(&contact.a) && !articulations.contains(&contact.b) {
-                continue;
-            }
-            let (a, b) = (contact.a.0, contact.b.0);
-            let (small, large) = if areas[a as usize] <= areas[b as usize] {
+        let ordered = |c: &Adjacency| {
+            let (a, b) = (c.a.0, c.b.0);
+            if areas[a as usize] <= areas[b as usize] {
                 (a, b)
             } else {
                 (b, a)
-            };
+            }
+        };
+        let hangs = |c: &&Adjacency| articulations.contains(&c.a) || articulations.contains(&c.b);
+        let counted = graph.contacts().iter().filter(|c| graph.counts(c)).filter(hangs);
+        let pairs: Vec<(u32, u32)> = counted.map(ordered).collect();
+        let joined = pairs.into_par_iter().map(|(small, large)| {
             let n_faults = self.faults_if_joined(seam, small, large);
-            let area = areas[small as usize];
-            if n_faults < n_before && best.is_none_or(|x| (n_faults, area) < (x.0, x.1)) {
-                best = Some((n_faults, area, small, large));
+            (n_faults, areas[small as usize], small, large)
+        });
+        let mut best: Option<(usize, f64, u32, u32)> = None;
+        for found in joined.collect::<Vec<_>>() {
+            if found.0 < n_before && best.is_none_or(|x| (found.0, found.1) < (x.0, x.1)) {
+                best = Some(found);
             }
         }
         best.is_some_and(|(_, _, small, large)| {

@@ -6,6 +6,7 @@
 //! of shape, wins.
 
 use nalgebra::{Matrix3, SymmetricEigen};
+use rayon::prelude::*;
 use shellock_geom::topology::ends;
 use shellock_geom::{HalfEdge, Solid, Topology, TriMesh, Vec3};
 
@@ -54,7 +55,7 @@ pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option
         min_piece_mm2: 0.0,
     };
     let mut label = labels.as_slice().to_vec();
-    let division = divider.best(&mut label, labels.n_patches(), patch.0, &[], |_, _| 0.0)?;
+    let division = divider.best(&label, labels.n_patches(), patch.0, &[], |_, _| 0.0)?;
     division
         .moved
         .iter()
@@ -66,16 +67,15 @@ pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option
 }
 
 impl Divider<'_> {
-    /// The cheapest division of `patch`; `label` is the same afterwards. `pairs` are far points that Voronoi
-    /// halves are tried with, and `faults` counts what else is wrong with a labelling, given with the seams
-    /// inside the patch; infinite forbids it.
+    /// The cheapest division of `patch`. `pairs` are far points that Voronoi halves are tried with, and `faults`
+    /// counts what else is wrong with a labelling, given with the seams inside the patch; infinite forbids it.
     pub fn best(
         &self,
-        label: &mut [u32],
+        label: &[u32],
         n_patches: usize,
         patch: u32,
         pairs: &[[u32; 2]],
-        faults: impl Fn(&[u32], &[HalfEdge]) -> f64,
+        faults: impl Fn(&[u32], &[HalfEdge]) -> f64 + Sync,
     ) -> Option<Division> {
         let members: Vec<u32> = (0..label.len() as u32)
             .filter(|&f| label[f as usize] == patch)
@@ -83,42 +83,65 @@ impl Divider<'_> {
         if members.len() < 2 {
             return None;
         }
+        let region = Region::new(self.mesh, &members);
+        let mut candidates: Vec<Vec<u32>> = self.plane_halves(&members).collect();
+        candidates.extend(self.voronoi_halves(label, &members, pairs));
+        let divisions: Vec<Option<Division>> = candidates
+            .into_par_iter()
+            .map_init(
+                || label.to_vec(),
+                |label, moved| {
+                    let division = self.division(label, &region, [patch, n_patches as u32], &moved, &faults);
+                    members.iter().for_each(|&f| label[f as usize] = patch);
+                    division
+                },
+            )
+            .collect();
+        let cheaper = |best: Division, d: Division| if d.cost < best.cost { d } else { best };
+        divisions.into_iter().flatten().reduce(cheaper)
+    }
+
+    /// The halves that come of giving `moved` to the second of `halves` once both are connected; `label` is left
+    /// as they are. `None` where that is no division, or one that `faults` forbids.
+    fn division(
+        &self,
+        label: &mut [u32],
+        region: &Region<'_>,
+        halves: [u32; 2],
+        moved: &[u32],
+        faults: &(impl Fn(&[u32], &[HalfEdge]) -> f64 + Sync),
+    ) -> Option<Division> {
         let area_of = |faces: &[u32]| faces.iter().map(|&f| self.faces.area[f as usize]).sum::<f64>();
-        let area = area_of(&members);
-        let mut best: Option<Division> = None;
-        let candidates = self
-            .plane_halves(&members)
-            .chain(self.voronoi_halves(label, &members, pairs));
-        for moved in candidates.collect::<Vec<_>>() {
-            moved.iter().for_each(|&f| label[f as usize] = n_patches as u32);
-            self.join_islands(label, &members, [patch, n_patches as u32]);
-            let moved: Vec<u32> = members
-                .iter()
-                .copied()
-                .filter(|&f| label[f as usize] != patch)
-                .collect();
-            let moved_mm2 = area_of(&moved);
-            let is_division = !moved.is_empty() && moved.len() < members.len();
-            if is_division && moved_mm2.min(area - moved_mm2) >= self.min_piece_mm2 {
-                let seam = self.seam_beside(label, &members, n_patches as u32);
-                let length: f64 = seam.iter().map(|&h| self.edge_length(h)).sum();
-                let euler = euler_characteristics(self.mesh, self.topology, label, n_patches + 1);
-                let holes = (1 - euler[patch as usize]).abs() + (1 - euler[n_patches]).abs();
-                let n_faults = holes as f64 + faults(label, &seam);
-                let cost = FAULT * n_faults
-                    + UNEVENNESS * ((area - 2.0 * moved_mm2) / area).powi(2)
-                    + SEAM_LENGTH * length / area.sqrt();
-                if cost.is_finite() && best.as_ref().is_none_or(|b| cost < b.cost) {
-                    best = Some(Division {
-                        cost,
-                        n_faults,
-                        moved,
-                    });
-                }
-            }
-            members.iter().for_each(|&f| label[f as usize] = patch);
+        let members = region.faces;
+        let area = area_of(members);
+        moved.iter().for_each(|&f| label[f as usize] = halves[1]);
+        self.join_islands(label, members, halves);
+        let second = members
+            .iter()
+            .copied()
+            .filter(|&f| label[f as usize] != halves[0]);
+        let moved: Vec<u32> = second.collect();
+        let moved_mm2 = area_of(&moved);
+        let is_division = !moved.is_empty() && moved.len() < members.len();
+        if !is_division || moved_mm2.min(area - moved_mm2) < self.min_piece_mm2 {
+            return None;
         }
-        best
+        let seam = self.seam_beside(label, members, halves[1]);
+        let length: f64 = seam.iter().map(|&h| self.edge_length(h)).sum();
+        let euler = region.euler_characteristics(self.topology, label, halves);
+        let holes: i64 = euler
+            .iter()
+            .map(|characteristic| (1 - characteristic).abs())
+            .sum();
+        let n_faults = holes as f64 + faults(label, &seam);
+        let cost = FAULT * n_faults
+            + UNEVENNESS * ((area - 2.0 * moved_mm2) / area).powi(2)
+            + SEAM_LENGTH * length / area.sqrt();
+        cost.is_finite().then_some(Division {
+            cost,
+            n_faults,
+            moved,
+        })
     }
 
     /// The half-edges between `members` and the patch `other`, which has a higher number.
@@ -198,7 +221,7 @@ impl Divider<'_> {
             members.iter().copied().filter(is_second).collect()
         };
         sources
-            .into_iter()
+            .into_par_iter()
             .filter(|s| s[0] != s[s.len() / 2])
             .map(nearer_to_second)
             .collect()
@@ -233,6 +256,56 @@ impl Divider<'_> {
                     .for_each(|&f| label[f as usize] = if i == main { own } else { other });
             }
         }
+    }
+}
+
+/// The triangles of one patch, their corners numbered among themselves: what is asked of its halves costs what
+/// the patch has, not what the model has.
+struct Region<'a> {
+    faces: &'a [u32],
+    corners: Vec<[u32; 3]>,
+    n_points: usize,
+}
+
+impl<'a> Region<'a> {
+    fn new(mesh: &TriMesh, faces: &'a [u32]) -> Self {
+        let of = |f: u32| mesh.triangles[f as usize];
+        let mut points: Vec<u32> = faces.iter().flat_map(|&f| of(f)).collect();
+        points.sort_unstable();
+        points.dedup();
+        let number = |v: u32| points.binary_search(&v).expect("it is a corner") as u32;
+        Self {
+            faces,
+            corners: faces.iter().map(|&f| of(f).map(number)).collect(),
+            n_points: points.len(),
+        }
+    }
+
+    /// [`euler_characteristics`] of two halves that together are the patch.
+    fn euler_characteristics(&self, topology: &Topology, label: &[u32], halves: [u32; 2]) -> [i64; 2] {
+        const UNSEEN: u8 = 2;
+        const BORDER: u8 = 3;
+        let mut of_point = vec![UNSEEN; self.n_points];
+        let mut doubled = [0i64; 2];
+        for (&face, t) in self.faces.iter().zip(&self.corners) {
+            let side = usize::from(label[face as usize] == halves[1]);
+            doubled[side] -= 1;
+            for corner in 0..3 {
+                let beside = topology.opposite(3 * face + corner as u32) as usize / 3;
+                let (start, end) = (t[corner] as usize, t[(corner + 1) % 3] as usize);
+                if label[beside] != halves[side] {
+                    doubled[side] += 1;
+                    of_point[start] = BORDER;
+                    of_point[end] = BORDER;
+                } else if of_point[start] == UNSEEN {
+                    of_point[start] = side as u8;
+                }
+            }
+        }
+        for inner in of_point.iter().filter(|&&side| side < UNSEEN) {
+            doubled[usize::from(*inner)] += 2;
+        }
+        doubled.map(|d| d / 2)
     }
 }
 

@@ -1,0 +1,166 @@
+//! Fewer triangles within a stated distance of a solid: what no printer shows costs no time.
+//!
+//! [`decimate`] keeps a mean of squared distances small; here the distance itself is measured afterwards, both
+//! ways, and points that lost too much get their triangles back.
+
+use rayon::prelude::*;
+
+use crate::bvh::TriangleBvh;
+use crate::decimate::decimate;
+use crate::repair::crossing_faces;
+use crate::{Solid, TriMesh, Vec3};
+
+/// What of the distance the mean distance may use: of what comes out so, nearly all lies within the distance.
+const MEAN_SHARE: f64 = 0.4;
+/// How often points that lost too much are given back.
+const MOST_ROUNDS: usize = 8;
+
+/// A solid with fewer triangles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simplified {
+    /// The solid.
+    pub solid: Solid,
+    /// For each of its triangles the one of the solid before that is nearest to its middle.
+    pub source_face: Vec<u32>,
+    /// The largest distance found, mm: of a point or a triangle's middle of one surface from the other.
+    pub farthest_mm: f64,
+}
+
+/// `solid` with edges collapsed, such that points and middles of triangles of both surfaces stay within
+/// `within_mm` of the other surface. Points between triangles of different `labels` (one a triangle, or none)
+/// stay where they are.
+///
+/// `None` where that cannot be kept, or where the surface would cross itself. The same on any number of
+/// threads.
+pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option<Simplified> {
+    let mesh = solid.mesh();
+    let old = TriangleBvh::new(mesh);
+    let mut tolerance = vec![MEAN_SHARE * within_mm; mesh.points.len()];
+    for point in labels.map(|l| points_between(mesh, l)).unwrap_or_default() {
+        tolerance[point as usize] = 0.0;
+    }
+    for _ in 0..MOST_ROUNDS {
+        let few = decimate(mesh.clone(), &tolerance);
+        let new = TriangleBvh::new(&few);
+        let (mut away, of_old) = points_away(mesh, &new, within_mm);
+        let (stray, of_new) = points_away(&few, &old, within_mm);
+        away.extend(stray);
+        let crossed = if away.is_empty() {
+            crossing_faces(&few)
+        } else {
+            Vec::new()
+        };
+        if away.is_empty() && crossed.is_empty() {
+            let nearest = |f: usize| old.nearest(few.face_center(f), f64::INFINITY).map(|n| n.face);
+            let source_face: Option<Vec<u32>> =
+                (0..few.triangles.len()).into_par_iter().map(nearest).collect();
+            return Some(Simplified {
+                source_face: source_face?,
+                solid: Solid::new(few).ok()?,
+                farthest_mm: of_old.max(of_new),
+            });
+        }
+        // A triangle that crosses another may be large: its corners are given back, and its middle.
+        let corners_and_middle = |&f: &u32| {
+            few.corners(f as usize)
+                .into_iter()
+                .chain([few.face_center(f as usize)])
+        };
+        away.extend(crossed.iter().flat_map(corners_and_middle));
+        let nearest = |at: Vec3| old.nearest(at, f64::INFINITY).map(|n| n.face);
+        let beside: Vec<u32> = away.into_par_iter().filter_map(nearest).collect();
+        for v in beside.into_iter().flat_map(|f| mesh.triangles[f as usize]) {
+            tolerance[v as usize] = 0.0;
+        }
+    }
+    None
+}
+
+/// The points where triangles of different labels meet.
+fn points_between(mesh: &TriMesh, labels: &[i64]) -> Vec<u32> {
+    let mut seen: Vec<Option<i64>> = vec![None; mesh.points.len()];
+    let mut between = Vec::new();
+    for (t, &label) in mesh.triangles.iter().zip(labels) {
+        for &v in t {
+            match seen[v as usize].replace(label) {
+                Some(other) if other != label => between.push(v),
+                _ => {}
+            }
+        }
+    }
+    between
+}
+
+/// Points and middles of triangles of `mesh` farther than `within_mm` from `other`, and the largest distance of
+/// the rest, mm.
+fn points_away(mesh: &TriMesh, other: &TriangleBvh, within_mm: f64) -> (Vec<Vec3>, f64) {
+    let limit_sq = within_mm * within_mm;
+    let of = |at: Vec3| (at, other.nearest(at, limit_sq).map(|n| n.distance_sq));
+    let points = mesh.points.par_iter().map(|&p| of(p));
+    let middles = (0..mesh.triangles.len())
+        .into_par_iter()
+        .map(|f| of(mesh.face_center(f)));
+    let found: Vec<(Vec3, Option<f64>)> = points.chain(middles).collect();
+    let farthest_sq = found.iter().filter_map(|f| f.1).fold(0.0, f64::max);
+    let away = found.iter().filter(|f| f.1.is_none()).map(|f| f.0).collect();
+    (away, farthest_sq.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Aabb;
+    use crate::contour::contour;
+
+    fn ball(radius: f64) -> Solid {
+        let bounds = Aabb {
+            min: Vec3::splat(-1.1 * radius),
+            max: Vec3::splat(1.1 * radius),
+        };
+        Solid::new(contour(bounds, radius / 30.0, |p| radius - p.length())).expect("closed")
+    }
+
+    fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
+        let tree = TriangleBvh::new(to);
+        let of = |p: &Vec3| {
+            tree.nearest(*p, f64::INFINITY)
+                .expect("there is a triangle")
+                .distance_sq
+        };
+        from.points.iter().map(of).fold(0.0, f64::max).sqrt()
+    }
+
+    #[test]
+    fn no_point_is_farther_than_said() {
+        let solid = ball(20.0);
+        let few = simplify(&solid, None, 0.05).expect("a ball is simple");
+        assert!(2 * few.solid.mesh().triangles.len() < solid.mesh().triangles.len());
+        assert!(farthest(solid.mesh(), few.solid.mesh()) <= 0.05);
+        assert!(farthest(few.solid.mesh(), solid.mesh()) <= 0.05);
+        assert!(few.farthest_mm <= 0.05 && few.farthest_mm > 0.0);
+    }
+
+    #[test]
+    fn borders_of_labels_stay() {
+        let solid = ball(20.0);
+        let mesh = solid.mesh();
+        let label = |mesh: &TriMesh, f: usize| i64::from(mesh.face_center(f).x > 0.3);
+        let labels: Vec<i64> = (0..mesh.triangles.len()).map(|f| label(mesh, f)).collect();
+        let few = simplify(&solid, Some(&labels), 0.05).expect("a ball is simple");
+        let after: Vec<i64> = few.source_face.iter().map(|&f| labels[f as usize]).collect();
+        let border = |mesh: &TriMesh, labels: &[i64]| {
+            let mut points: Vec<[i64; 3]> = points_between(mesh, labels)
+                .iter()
+                .map(|&v| {
+                    mesh.points[v as usize]
+                        .to_array()
+                        .map(|x| (x * 1e6).round() as i64)
+                })
+                .collect();
+            points.sort_unstable();
+            points.dedup();
+            points
+        };
+        assert_eq!(border(few.solid.mesh(), &after), border(mesh, &labels));
+    }
+}
