@@ -5,6 +5,7 @@ use std::io::{Cursor, Read};
 
 use flate2::read::MultiGzDecoder;
 use zip::ZipArchive;
+use zip::result::ZipError;
 
 use super::{ReadError, recognise, stl};
 
@@ -50,9 +51,7 @@ pub(super) fn read_bounded(source: impl Read, limit: u64) -> Result<Vec<u8>, Rea
     source
         .take(limit + 1)
         .read_to_end(&mut bytes)
-        .map_err(|e| ReadError::Damaged {
-            reason: e.to_string(),
-        })?;
+        .map_err(|e| unopened(e.into()))?;
     if bytes.len() as u64 > limit {
         Err(ReadError::Bomb {
             limit_mb: limit >> 20,
@@ -64,9 +63,29 @@ pub(super) fn read_bounded(source: impl Read, limit: u64) -> Result<Vec<u8>, Rea
 
 /// Opens a zip archive.
 pub(super) fn archive(bytes: &[u8]) -> Result<ZipArchive<Cursor<&[u8]>>, ReadError> {
-    ZipArchive::new(Cursor::new(bytes)).map_err(|e| ReadError::Damaged {
-        reason: e.to_string(),
-    })
+    ZipArchive::new(Cursor::new(bytes)).map_err(unopened)
+}
+
+/// Why an archive, or a file in one, cannot be opened.
+pub(super) fn unopened(error: ZipError) -> ReadError {
+    // Some are told only when the file is read, wrapped.
+    let error = match error {
+        ZipError::Io(io) => io.downcast().unwrap_or_else(ZipError::Io),
+        other => other,
+    };
+    match error {
+        ZipError::UnsupportedArchive(_)
+        | ZipError::CompressionMethodNotSupported(_)
+        | ZipError::InvalidPassword => ReadError::Packing {
+            reason: error.to_string(),
+        },
+        ZipError::Io(io) => ReadError::Damaged {
+            reason: io.to_string(),
+        },
+        other => ReadError::Damaged {
+            reason: other.to_string(),
+        },
+    }
 }
 
 /// Whether a zip archive is a 3MF package; a damaged one is if it looks like one.
@@ -100,9 +119,7 @@ fn only_mesh(bytes: &[u8]) -> Result<(Vec<u8>, String), ReadError> {
         .file_names_raw()
         .nth(only)
         .map_or_else(String::new, |n| String::from_utf8_lossy(n).into_owned());
-    let file = archive.by_index(only).map_err(|e| ReadError::Damaged {
-        reason: e.to_string(),
-    })?;
+    let file = archive.by_index(only).map_err(unopened)?;
     Ok((read_bounded(file, limit(bytes.len()))?, name))
 }
 

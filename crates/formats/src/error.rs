@@ -22,6 +22,14 @@ pub enum ReadError {
         /// What the unpacker says.
         reason: String,
     },
+    /// An archive that is packed, or locked, in a way that is not read.
+    #[error(
+        "the archive cannot be opened ({reason}); pack it again as an ordinary zip, or give the plain mesh file"
+    )]
+    Packing {
+        /// What the unpacker says.
+        reason: String,
+    },
     /// Unpacking would take more memory than an honest file needs.
     #[error(
         "unpacked, the file has more than {limit_mb} MB; it is broken or hostile: export a plain mesh file"

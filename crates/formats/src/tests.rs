@@ -367,12 +367,56 @@ fn ply_skips_what_it_does_not_know_and_keeps_labels() {
     let loaded = read(&ascii).unwrap();
     assert_eq!(loaded, read(&binary).unwrap());
     assert_eq!(loaded.face_labels(), Some(&[5, 5, -1][..]));
+    assert!(
+        loaded
+            .notes
+            .iter()
+            .any(|n| n.contains("1 of 2 faces have a \"label\" below 0")),
+        "{:?}",
+        loaded.notes
+    );
     assert_eq!(loaded.file_face, [0, 0, 1]);
     assert_eq!(loaded.mesh.points[3], Vec3::new(0.0, 1.0, -2.0));
     assert!(matches!(
         read(&binary[..binary.len() - 1]),
         Err(ReadError::CutOff { .. })
     ));
+}
+
+#[test]
+fn labels_of_a_float_property_divide_where_they_are_whole() {
+    let ply = |label: &str| {
+        read(format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 2\nproperty list uchar int vertex_indices\nproperty float label\nend_header\n\
+             0 0 0\n1 0 0\n0 1 0\n3 0 1 2 1.0\n3 0 2 1 {label}\n"
+        ))
+        .unwrap()
+    };
+    assert_eq!(ply("4.0").face_labels(), Some(&[1, 4][..]));
+    let odd = ply("0.5");
+    assert_eq!(odd.face_labels(), None);
+    assert!(
+        odd.notes.iter().any(|n| n.contains("not all are whole numbers")),
+        "{:?}",
+        odd.notes
+    );
+}
+
+#[test]
+fn a_packing_that_is_not_read_is_no_damage() {
+    const METHOD_IN_FILE: usize = 8;
+    const METHOD_IN_DIRECTORY: usize = 10;
+    let mut bytes = zip_of(&[("a.stl", b"solid a\nendsolid a\n")]);
+    let directory = bytes.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+    for at in [METHOD_IN_FILE, directory + METHOD_IN_DIRECTORY] {
+        bytes[at..at + 2].copy_from_slice(&12_u16.to_le_bytes());
+    }
+    assert!(
+        matches!(read(&bytes), Err(ReadError::Packing { .. })),
+        "{:?}",
+        read(&bytes)
+    );
 }
 
 #[test]

@@ -76,10 +76,6 @@ impl Scalar {
             Self::F64 => 8,
         }
     }
-
-    pub(super) fn is_integer(self) -> bool {
-        !matches!(self, Self::F32 | Self::F64)
-    }
 }
 
 impl Header {

@@ -58,7 +58,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
 
 fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
-    let mut labels = Vec::new();
+    let mut labels = FaceLabels::default();
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_points(element, &mut source, &mut polygons)?,
@@ -77,8 +77,18 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
         }
     }
     // Strips have no labels; with faces that have, they would be told apart by chance.
-    labels.retain(|(_, labels)| labels.len() == polygons.n_faces());
-    polygons.finish(Format::Ply, labels)
+    let mut found = labels.found;
+    found.retain(|(_, labels)| labels.len() == polygons.n_faces());
+    let mut loaded = polygons.finish(Format::Ply, found)?;
+    loaded.notes.extend(labels.note);
+    Ok(loaded)
+}
+
+/// What divides the faces, and what a person should know about that.
+#[derive(Default)]
+struct FaceLabels {
+    found: Vec<(LabelSource, Vec<i64>)>,
+    note: Option<String>,
 }
 
 fn read_points(
@@ -124,16 +134,13 @@ fn read_faces(
     element: &Element,
     source: &mut impl Source,
     polygons: &mut Polygons,
-) -> Result<Vec<(LabelSource, Vec<i64>)>, ReadError> {
+) -> Result<FaceLabels, ReadError> {
     let corners_property = corners_property(element, "a PLY file whose faces lack vertex_indices")?;
     let scalar_named = |name: &str| {
         let is_it = |p: &Property| p.name == name && matches!(p.kind, Kind::Scalar(_));
         element.properties.iter().position(is_it)
     };
-    let is_integer = |i: &usize| matches!(element.properties[*i].kind, Kind::Scalar(s) if s.is_integer());
-    let label_property = LABEL_NAMES
-        .iter()
-        .find_map(|name| scalar_named(name).filter(is_integer));
+    let label_property = LABEL_NAMES.iter().find_map(|name| scalar_named(name));
     let color_properties = COLOR_NAMES.map(scalar_named);
     let has_colors = color_properties[..3].iter().all(Option::is_some);
 
@@ -151,7 +158,9 @@ fn read_faces(
                         corners.push(polygons.corner(whole(source, item)?, at)?);
                     }
                 }
-                Kind::Scalar(scalar) if Some(i) == label_property => labels.push(whole(source, scalar)?),
+                Kind::Scalar(scalar) if Some(i) == label_property => {
+                    labels.push(whole_of(source.next(scalar)?));
+                }
                 Kind::Scalar(scalar) if has_colors && color_properties.contains(&Some(i)) => {
                     let channel = color_properties
                         .iter()
@@ -167,10 +176,31 @@ fn read_faces(
             colors.push(numbering.number(color));
         }
     }
-    let mut found = Vec::new();
-    found.extend(label_property.map(|_| (LabelSource::Property, labels)));
+    let (mut found, mut note) = (Vec::new(), None);
+    if let Some(property) = label_property {
+        let whole: Option<Vec<i64>> = labels.into_iter().collect();
+        note = label_note(&element.properties[property].name, whole.as_deref());
+        found.extend(whole.map(|labels| (LabelSource::Property, labels)));
+    }
     found.extend(has_colors.then_some((LabelSource::Color, colors)));
-    Ok(found)
+    Ok(FaceLabels { found, note })
+}
+
+/// What is odd about the labels of a property, `None` for those that are no whole numbers.
+fn label_note(name: &str, labels: Option<&[i64]>) -> Option<String> {
+    let Some(labels) = labels else {
+        return Some(format!(
+            "the faces have a {name:?}, but not all are whole numbers; it divides nothing"
+        ));
+    };
+    let n_below = labels.iter().filter(|label| **label < 0).count();
+    (n_below > 0).then(|| {
+        format!(
+            "{n_below} of {} faces have a {name:?} below 0, as programs mark what has none; they are taken as a \
+             piece of their own, or one for each place",
+            labels.len()
+        )
+    })
 }
 
 fn corners_property(element: &Element, lacking: &'static str) -> Result<usize, ReadError> {

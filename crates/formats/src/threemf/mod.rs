@@ -13,7 +13,7 @@ use glam::DAffine3;
 pub use write::{NamedObject, write_3mf, write_painted_3mf};
 
 use super::assembly::{Occurrence, Part, occurrences};
-use super::container::{archive, limit, read_bounded};
+use super::container::{archive, limit, read_bounded, unopened};
 use super::paint::{self, Painted};
 use super::polygons::{Numbering, divides};
 use super::{Format, LabelSource, Labelling, Loaded, ReadError};
@@ -36,7 +36,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut notes = root.notes.clone();
     let mut loaded = build(&root, &settings, &mut notes)?;
     loaded.unit_mm = Some(root.unit_mm);
-    loaded.notes = notes;
+    loaded.notes.extend(notes);
     Ok(loaded)
 }
 
@@ -64,9 +64,7 @@ impl<'a> Package<'a> {
                 .position(|other| other.eq_ignore_ascii_case(name.as_bytes()))
         });
         let Some(index) = index else { return Ok(None) };
-        let file = self.archive.by_index(index).map_err(|e| ReadError::Damaged {
-            reason: e.to_string(),
-        })?;
+        let file = self.archive.by_index(index).map_err(unopened)?;
         let bytes = read_bounded(file, self.bytes_left)?;
         self.bytes_left -= bytes.len() as u64;
         Ok(Some(xml::text(bytes)))
@@ -177,13 +175,23 @@ fn retain<T>(all: &mut Vec<T>, is_kept: &[bool]) {
     all.retain(|_| kept.next() == Some(&true));
 }
 
+/// A word on triangles of colours that are not there.
+fn unnamed_note(n_triangles: usize) -> Option<String> {
+    (n_triangles > 0).then(|| {
+        format!(
+            "{n_triangles} triangles have a colour or material that the file does not have; those of the same \
+             missing one are taken as one"
+        )
+    })
+}
+
 /// One mesh of all occurrences, with every way in which the file divides it.
 fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loaded, ReadError> {
     let mut mesh = TriMesh::default();
     let mut file_face = Vec::new();
     let [mut paint, mut color, mut material, mut object] = [const { Vec::new() }; 4];
     let (mut colors, mut materials) = (Numbering::default(), Numbering::default());
-    let mut n_faces = 0;
+    let (mut n_faces, mut n_unnamed) = (0, 0_usize);
     for (number, occurrence) in (0_i64..).zip(found) {
         let Body { object: of, painted } = &bodies[occurrence.part];
         let first = u32::try_from(mesh.points.len()).unwrap_or(u32::MAX);
@@ -205,6 +213,7 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
                 n_faces += 1;
             }
             file_face.push(n_faces - 1);
+            n_unnamed += usize::from(of.property(source).is_some_and(|p| !model.has(p)));
             let (of_color, of_material) = match of.property(source) {
                 Some(property) if model.color_groups.contains_key(&property.group()) => {
                     (Some(property), None)
@@ -248,7 +257,7 @@ fn flatten(model: &Model, bodies: &[Body], found: &[Occurrence]) -> Result<Loade
         file_face,
         format: Format::ThreeMf,
         unit_mm: None,
-        notes: Vec::new(),
+        notes: unnamed_note(n_unnamed).into_iter().collect(),
     })
 }
 

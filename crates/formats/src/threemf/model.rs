@@ -13,6 +13,15 @@ use shellock_geom::{TriMesh, Vec3};
 /// Files of one package that are read as model parts at most.
 const MAX_PARTS: usize = 1000;
 
+/// Elements whose entries a triangle may have as its property.
+const GROUPS: [&[u8]; 5] = [
+    b"basematerials",
+    b"colorgroup",
+    b"texture2dgroup",
+    b"compositematerials",
+    b"multiproperties",
+];
+
 /// All model parts of a package, read into one.
 pub(super) struct Model {
     /// mm.
@@ -24,6 +33,8 @@ pub(super) struct Model {
     switched_off: Vec<Component>,
     /// Colours of each colour group, by part and id.
     pub(super) color_groups: BTreeMap<(u32, u32), Vec<String>>,
+    /// All that triangles may have as a property, by part and id.
+    groups: BTreeSet<(u32, u32)>,
     pub(super) notes: Vec<String>,
     /// Names of the parts read, in order; the root is the first.
     parts: Vec<String>,
@@ -97,6 +108,7 @@ impl Model {
             items: Vec::new(),
             switched_off: Vec::new(),
             color_groups: BTreeMap::new(),
+            groups: BTreeSet::new(),
             notes: Vec::new(),
             parts: Vec::new(),
         };
@@ -111,6 +123,13 @@ impl Model {
             ));
         }
         Ok(model)
+    }
+
+    /// Whether the file has that colour, or the group of that material.
+    pub(super) fn has(&self, property: Property) -> bool {
+        let group = property.group();
+        let n_colors = self.color_groups.get(&group).map(Vec::len);
+        self.groups.contains(&group) && n_colors.is_none_or(|n| (property.index as usize) < n)
     }
 
     /// Reads the parts that components and items name, and those that they name.
@@ -189,6 +208,10 @@ impl PartReader<'_, '_> {
                     continue;
                 }
             };
+            if GROUPS.contains(&element.local_name().as_ref().as_bytes()) {
+                let id = self.id_of(&element)?;
+                self.model.groups.insert((self.number, id));
+            }
             match (element.local_name().as_ref().as_bytes(), &mut object, &mut group) {
                 (b"model", ..) => {
                     has_model = true;

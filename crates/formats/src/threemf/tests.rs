@@ -101,6 +101,17 @@ fn colours_and_materials_divide_and_supports_are_left_out() {
         "{:?}",
         loaded.notes
     );
+    assert!(!loaded.notes.iter().any(|n| n.contains("does not have")));
+    let none = resources.replace(r#"p1="1""#, r#"p1="2""#);
+    let loaded = read_model(&none, r#"<item objectid="1"/>"#).unwrap();
+    assert!(
+        loaded
+            .notes
+            .iter()
+            .any(|n| n.contains("1 triangles have a colour")),
+        "{:?}",
+        loaded.notes
+    );
     let materials = format!(r#"<basematerials id="5"/><object id="1" pid="5" pindex="0">{painted}</object>"#);
     let loaded = read_model(&materials, r#"<item objectid="1"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Material), Some(&[0, 1, 0, 0][..]));
