@@ -4,7 +4,7 @@ use crate::certificate::{Certificate, Evidence, PieceFile, certify};
 use crate::play::{self, KitPlay, PlayParams};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::contact::Contact;
-use crate::verify::{Assembly, Finding, Verification, VerifyParams, examine};
+use crate::verify::{Assembly, Finding, Verification, VerifyParams, examine, reaches_far_out};
 use crate::{Cancelled, Ctx};
 
 /// A verdict with what it rests on.
@@ -34,7 +34,7 @@ pub fn verify(ctx: &Ctx, params: &VerifyParams, assembly: &Assembly<'_>) -> Resu
     let is_plan = verification.checks.first().is_some_and(|check| check.ok);
     // Barriers are those of closed surfaces.
     let is_open = |f: &Finding| matches!(f, Finding::NotClosed { .. } | Finding::SharedEdges { .. });
-    let is_sound = is_plan && !verification.findings.iter().any(is_open);
+    let is_sound = is_plan && !verification.findings.iter().any(is_open) && !reaches_far_out(assembly);
     let play = if is_sound {
         Some(played(ctx, params, assembly, &mut verification)?)
     } else {

@@ -372,7 +372,7 @@ pub struct Options {
     #[arg(long, help_heading = "Surface")]
     pub largest: bool,
     /// Detail to keep of a surface with more than 100 000 triangles, mm, 0 to 0.1: it is described by fewer,
-    /// none farther from it than this; 0 keeps all
+    /// none farther from it than this; 0 keeps all, as `segment` does
     #[arg(
         long,
         value_name = "MM",

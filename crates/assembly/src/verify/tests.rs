@@ -39,6 +39,24 @@ fn a_tongue_leaves_its_groove_one_way_only() {
 }
 
 #[test]
+fn pieces_of_another_size_are_refused_without_asking_for_paths() {
+    let mut kit = pinned_kit(|_| {});
+    for piece in 0..3 {
+        let mesh = &mut kit.pieces[PatchId(piece)];
+        mesh.points.iter_mut().for_each(|p| *p *= 1000.0);
+    }
+    let (verdict, contacts) = kit.examined();
+    assert!(!verdict.passed() && contacts.is_empty());
+    assert!(
+        verdict
+            .findings
+            .iter()
+            .any(|f| matches!(f, Finding::Outside { .. })),
+        "{verdict:#?}"
+    );
+}
+
+#[test]
 fn a_path_through_a_wall_is_caught_with_place_and_partner() {
     let mut kit = pinned_kit(|_| {});
     kit.plan.steps[1].separation = LatticeDirection::nearest(Vec3::NEG_X).into();
