@@ -126,8 +126,8 @@ fn simplified(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
     match simplify(&model.solid, model.labels.as_deref(), resolution_mm) {
         Some(simple) if simple.solid.mesh().triangles.len() < n_before => {
             model.notes.push(format!(
-                "{n_before} triangles are more than a printer can show: {} are used, none farther than {:.3} mm \
-                 from the surface (--resolution 0 uses all)",
+                "of {n_before} triangles {} are enough: none is farther than {:.3} mm from the surface as it was given \
+                 (--resolution 0 uses all)",
                 simple.solid.mesh().triangles.len(),
                 simple.farthest_mm
             ));
@@ -381,4 +381,57 @@ fn labels_of(file: &Path, loaded: &Loaded, file_face: &[u32]) -> Result<Vec<i64>
         )));
     }
     Ok(file_face.iter().map(|&f| a_file_face[f as usize]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A figure of the program, labelled in two halves, as if it came from a file of its own faces.
+    fn halved() -> Model {
+        let (solid, _) = shellock_figure("vase", 40.0).expect("there is such a figure");
+        let mut model = made_of(solid, 1.0, Path::new("vase.stl")).expect("it is small");
+        let mesh = model.solid.mesh();
+        let n_faces = mesh.triangles.len();
+        model.labels = Some(
+            (0..n_faces)
+                .map(|f| i64::from(mesh.face_center(f).z > 20.0))
+                .collect(),
+        );
+        model.file_face = (0..n_faces as u32).collect();
+        model
+    }
+
+    #[test]
+    fn a_simplified_model_keeps_its_labels_and_says_what_was_done() {
+        let model = halved();
+        let n_before = model.solid.mesh().triangles.len();
+        let few = simplified(model, 0.05).unwrap();
+        let mesh = few.solid.mesh();
+        assert!(mesh.triangles.len() < n_before);
+        let labels = few.labels.expect("labels stay");
+        assert!(labels.contains(&0) && labels.contains(&1));
+        assert_eq!(
+            (labels.len(), few.file_face.len()),
+            (mesh.triangles.len(), mesh.triangles.len())
+        );
+        for (f, label) in labels.iter().enumerate() {
+            let z = mesh.face_center(f).z;
+            assert_eq!(*label, i64::from(z > 20.0), "{z}");
+        }
+        assert!(
+            few.notes[0].starts_with(&format!("of {n_before} triangles")),
+            "{:?}",
+            few.notes
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_simplified_stays_and_is_told() {
+        let solid = Solid::new(shellock_testkit::shapes::tetrahedron()).expect("closed");
+        let model = made_of(solid.clone(), 1.0, Path::new("tetrahedron.stl")).expect("it is small");
+        let same = simplified(model, 0.01).unwrap();
+        assert!(same.solid == solid);
+        assert!(same.notes[0].contains("all are used"), "{:?}", same.notes);
+    }
 }

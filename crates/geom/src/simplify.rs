@@ -141,6 +141,26 @@ mod tests {
     }
 
     #[test]
+    fn surfaces_nearer_than_the_distance_do_not_cross_afterwards() {
+        let ball = ball(20.0);
+        let n_points = ball.mesh().points.len() as u32;
+        let mut shell = ball.mesh().clone();
+        shell
+            .points
+            .extend(ball.mesh().points.iter().map(|p| *p * (1.0 - 3e-3)));
+        let inside_out = |&[a, b, c]: &[u32; 3]| [a, c, b].map(|v| v + n_points);
+        shell
+            .triangles
+            .extend(ball.mesh().triangles.iter().map(inside_out));
+        let shell = Solid::new(shell).expect("a ball with a cavity");
+        let tolerance = vec![MEAN_SHARE * 0.1; shell.mesh().points.len()];
+        assert!(!crossing_faces(&decimate(shell.mesh().clone(), &tolerance)).is_empty());
+        let few = simplify(&shell, None, 0.1).expect("some of it is simple");
+        assert!(crossing_faces(few.solid.mesh()).is_empty());
+        assert!(few.solid.mesh().triangles.len() < shell.mesh().triangles.len());
+    }
+
+    #[test]
     fn borders_of_labels_stay() {
         let solid = ball(20.0);
         let mesh = solid.mesh();

@@ -179,7 +179,7 @@ fn retain<T>(all: &mut Vec<T>, is_kept: &[bool]) {
 fn unnamed_note(n_triangles: usize) -> Option<String> {
     (n_triangles > 0).then(|| {
         format!(
-            "{n_triangles} triangles have a colour or material that the file does not have; those of the same \
+            "{n_triangles} triangle(s) have a colour or material that the file does not have; those of the same \
              missing one are taken as one"
         )
     })

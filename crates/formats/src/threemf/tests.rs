@@ -1,5 +1,6 @@
 use std::io::{Cursor, Write as _};
 
+use super::super::tests::assert_told;
 use super::super::{LabelSource, Loaded, ReadError, read_mesh};
 use super::*;
 use shellock_geom::Vec3;
@@ -96,22 +97,11 @@ fn colours_and_materials_divide_and_supports_are_left_out() {
     );
     let loaded = read_model(&resources, r#"<item objectid="1"/><item objectid="2"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Color), Some(&[0, 1, 0, 0][..]));
-    assert!(
-        loaded.notes.iter().any(|n| n.contains("support")),
-        "{:?}",
-        loaded.notes
-    );
+    assert_told(&loaded, "support");
     assert!(!loaded.notes.iter().any(|n| n.contains("does not have")));
     let none = resources.replace(r#"p1="1""#, r#"p1="2""#);
     let loaded = read_model(&none, r#"<item objectid="1"/>"#).unwrap();
-    assert!(
-        loaded
-            .notes
-            .iter()
-            .any(|n| n.contains("1 triangles have a colour")),
-        "{:?}",
-        loaded.notes
-    );
+    assert_told(&loaded, "1 triangle(s) have a colour");
     let materials = format!(r#"<basematerials id="5"/><object id="1" pid="5" pindex="0">{painted}</object>"#);
     let loaded = read_model(&materials, r#"<item objectid="1"/>"#).unwrap();
     assert_eq!(loaded.labels(LabelSource::Material), Some(&[0, 1, 0, 0][..]));
@@ -126,11 +116,7 @@ fn what_is_not_to_print_is_left_out_unless_nothing_else_is_there() {
     )
     .unwrap();
     assert_eq!(loaded.mesh.triangles.len(), 4);
-    assert!(
-        loaded.notes.iter().any(|n| n.contains("not to print")),
-        "{:?}",
-        loaded.notes
-    );
+    assert_told(&loaded, "not to print");
     let alone = read_model(&resources, r#"<item objectid="2" printable="0"/>"#).unwrap();
     assert_eq!(alone.mesh.triangles.len(), 4);
 }

@@ -355,3 +355,30 @@ pub(super) fn raw_contact_graph(
         .map(|s| (PatchId(s.a), PatchId(s.b), s.length(divider.mesh)));
     ContactGraph::from_stretches(n_patches, min_contact_mm, lengths)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::sphere;
+
+    /// Halves of a patch, by any labelling of its triangles, have the characteristics that the whole surface has
+    /// them with.
+    #[test]
+    fn halves_have_the_characteristics_that_all_patches_have() {
+        let ball = Solid::new(sphere(3, Vec3::ONE)).expect("closed");
+        let (mesh, topology) = (ball.mesh(), Topology::new(&ball));
+        let n_faces = mesh.triangles.len() as u32;
+        for step in [2u32, 3, 5, 7, 11] {
+            // A cap, and within it what a stride marks: islands, pinched points, rings.
+            let in_cap = |f: u32| mesh.face_center(f as usize).z > -0.3;
+            let members: Vec<u32> = (0..n_faces).filter(|&f| in_cap(f)).collect();
+            let half = |f: u32| u32::from((f / step).is_multiple_of(3)) * 2;
+            let label: Vec<u32> = (0..n_faces)
+                .map(|f| if in_cap(f) { half(f) } else { 1 })
+                .collect();
+            let all = euler_characteristics(mesh, &topology, &label, 3);
+            let own = Region::new(mesh, &members).euler_characteristics(&topology, &label, [0, 2]);
+            assert_eq!(own, [all[0], all[2]], "{step}");
+        }
+    }
+}
