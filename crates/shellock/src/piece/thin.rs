@@ -13,7 +13,7 @@
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
-use shellock_geom::{TriMesh, Vec3, Volume};
+use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
 use crate::verify::{ThinPoint, thin_points};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
@@ -31,6 +31,8 @@ const BEYOND_MM: f64 = 0.05;
 const SPACING_MM: f64 = 0.3;
 /// What lies less deep below the outer surface stays as it is, mm.
 const SKIN_MM: f64 = 0.6;
+/// A corner with less depth than this lies on the outer surface, mm.
+const ON_SURFACE_MM: f64 = 0.1;
 /// What two rounds leave is told.
 const MOST_ROUNDS: usize = 2;
 
@@ -70,11 +72,44 @@ fn shaved(piece: &Volume, limit_mm: f64, depth: &Depth<'_>) -> Option<Volume> {
             break;
         }
         let thick = |p: &ThinPoint| (p.thickness_mm + 2.0 * BEYOND_MM).max(LEAST_CUT_MM);
-        let boxes: Vec<Volume> = sheets.iter().map(|p| slab(p, thick(p))).collect();
-        let rest = body.subtract(&Volume::union_all(boxes));
-        shaved = Some(rest.components().into_iter().next().unwrap_or_else(Volume::empty));
+        let boxes = sheets.iter().map(|p| slab(p, thick(p))).collect();
+        match less(body, boxes, depth) {
+            Some(rest) => shaved = Some(rest),
+            None => break,
+        }
     }
     shaved
+}
+
+/// The largest part of `body` without the boxes. A part that has some of the outer surface must not come off:
+/// the boxes around it stay uncut, and the sheet by which it hangs is told. `None` where all of them do.
+fn less(body: &Volume, mut boxes: Vec<Volume>, depth: &Depth<'_>) -> Option<Volume> {
+    while !boxes.is_empty() {
+        let mut parts = body
+            .subtract(&Volume::union_all(boxes.clone()))
+            .components()
+            .into_iter();
+        let rest = parts.next()?;
+        let with_skin: Vec<Aabb> = parts
+            .filter(|part| has_skin(part, depth))
+            .map(|part| part.bounds().grown(BEYOND_MM))
+            .collect();
+        if with_skin.is_empty() {
+            return Some(rest);
+        }
+        let n_boxes = boxes.len();
+        boxes.retain(|b| !with_skin.iter().any(|part| part.intersects(b.bounds())));
+        if boxes.len() == n_boxes {
+            break;
+        }
+    }
+    None
+}
+
+/// Whether a corner of `part` lies on the outer surface.
+fn has_skin(part: &Volume, depth: &Depth<'_>) -> bool {
+    let is_skin = |p: &Vec3| depth(*p).is_some_and(|mm| mm < ON_SURFACE_MM);
+    part.to_mesh().points.iter().any(is_skin)
 }
 
 /// Where a piece is thin, below the skin; one point a cube.
@@ -121,6 +156,22 @@ mod tests {
         // Its root keeps a step or a groove.
         assert!((made.volume() - 720.0).abs() < 2.0, "{}", made.volume());
         assert_eq!(made.components().len(), 1);
+    }
+
+    /// Two blocks that hang together by a sheet, the smaller with some of the outer surface: the sheet stays.
+    #[test]
+    fn what_has_outer_surface_does_not_come_off_with_a_sheet() {
+        let tip = cuboid([2.0, 0.0, 8.0], [10.0, 4.0, 11.0]);
+        let piece = block().union(&tip);
+        let depth = |p: Vec3| Some(11.0 - p.z);
+        let mut pieces: IdVec<PatchId, Volume> = std::iter::once(piece.clone()).collect();
+        shave(&Ctx::quiet(), 0.4, &depth, &mut pieces).unwrap();
+        let made = &pieces[PatchId(0)];
+        assert_eq!(made.components().len(), 1);
+        assert!(made.intersect(&tip).volume() > tip.volume() - 1.0);
+        let mut pieces: IdVec<PatchId, Volume> = std::iter::once(piece).collect();
+        shave(&Ctx::quiet(), 0.4, &|_| None, &mut pieces).unwrap();
+        assert!(pieces[PatchId(0)].bounds().max.z < 8.0 + 1e-9);
     }
 
     #[test]
