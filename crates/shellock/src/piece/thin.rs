@@ -31,8 +31,6 @@ const BEYOND_MM: f64 = 0.05;
 const SPACING_MM: f64 = 0.3;
 /// What lies less deep below the outer surface stays as it is, mm.
 const SKIN_MM: f64 = 0.6;
-/// A corner with less depth than this lies on the outer surface, mm.
-const ON_SURFACE_MM: f64 = 0.1;
 /// What two rounds leave is told.
 const MOST_ROUNDS: usize = 2;
 
@@ -106,10 +104,10 @@ fn less(body: &Volume, mut boxes: Vec<Volume>, depth: &Depth<'_>) -> Option<Volu
     None
 }
 
-/// Whether a corner of `part` lies on the outer surface.
+/// Whether a corner of `part` lies on the outer surface or so little below it that a hole would show there.
 fn has_skin(part: &Volume, depth: &Depth<'_>) -> bool {
-    let is_skin = |p: &Vec3| depth(*p).is_some_and(|mm| mm < ON_SURFACE_MM);
-    part.to_mesh().points.iter().any(is_skin)
+    let is_near = |p: &Vec3| depth(*p).is_some_and(|mm| mm < SKIN_MM);
+    part.to_mesh().points.iter().any(is_near)
 }
 
 /// Where a piece is thin, below the skin; one point a cube.
