@@ -1,5 +1,5 @@
-//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing;
-//! clearances of two half shells of 26 000 triangles.
+//! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing,
+//! simplifying; clearances of two half shells of 26 000 triangles.
 
 use divan::{Bencher, black_box};
 use shellock_geom::band::Band;
@@ -9,6 +9,7 @@ use shellock_geom::contour::contour as dense;
 use shellock_geom::marching_cubes::{OffBand, contour};
 use shellock_geom::remesh::{RemeshParams, remesh};
 use shellock_geom::signed_distance::SignedDistance;
+use shellock_geom::simplify::simplify;
 use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, Solid, Vec3, Volume};
 use shellock_testkit::shapes::contoured_ball;
@@ -37,6 +38,12 @@ fn band(solid: &Solid) -> (Band, Vec<f32>) {
 fn build_bvh(bencher: Bencher) {
     let ball = ball();
     bencher.bench(|| TriangleBvh::new(black_box(ball.mesh())));
+}
+
+#[divan::bench]
+fn simplify_to_a_hundredth(bencher: Bencher) {
+    let ball = ball();
+    bencher.bench(|| simplify(black_box(&ball), None, 0.01));
 }
 
 #[divan::bench]
