@@ -20,6 +20,8 @@ const MAX_FILE_BYTES: u64 = 2 << 30;
 const PLAUSIBLE_MM: std::ops::RangeInclusive<f64> = 20.0..=1000.0;
 /// Longest side of what is made, mm: a torus of 2000 mm already takes 8 GB and more than three minutes.
 const MADE_MM: std::ops::RangeInclusive<f64> = 10.0..=2000.0;
+/// Share by which scaling to a length may miss it.
+const ROUNDING: f64 = 1e-9;
 /// Surfaces with more triangles are described by fewer: most take twice the time with twice as many.
 const MANY_TRIANGLES: usize = 100_000;
 /// Longest side of everything else, mm.
@@ -316,12 +318,18 @@ fn scale(options: &Options, loaded: &Loaded, bounds: Aabb, notes: &mut Vec<Strin
 }
 
 fn check_size(longest_mm: f64) -> Result<(), Failure> {
-    if MADE_MM.contains(&longest_mm) {
+    let (least, most) = (MADE_MM.start(), MADE_MM.end());
+    // A model scaled to an end of the range may miss it by rounding.
+    if (least * (1.0 - ROUNDING)..=most * (1.0 + ROUNDING)).contains(&longest_mm) {
         return Ok(());
     }
-    let (least, most) = (MADE_MM.start(), MADE_MM.end());
+    let told = if (0.001..1e6).contains(&longest_mm) {
+        format!("{}", (1000.0 * longest_mm).round() / 1000.0)
+    } else {
+        format!("{longest_mm:.4e}")
+    };
     Err(Failure::Wrong(format!(
-        "the longest side would be {longest_mm:.4e} mm; it must lie between {least} and {most} mm: choose with --size"
+        "the longest side would be {told} mm; it must lie between {least} and {most} mm: choose with --size"
     )))
 }
 
@@ -400,6 +408,20 @@ mod tests {
         );
         model.file_face = (0..n_faces as u32).collect();
         model
+    }
+
+    /// 2000 mm asked for may come out as 2000.0000000000002.
+    #[test]
+    fn both_ends_of_the_range_of_sizes_are_made_whatever_rounding_does() {
+        for mm in [10.0_f64, 2000.0] {
+            for made in [mm.next_down(), mm, mm.next_up()] {
+                assert!(check_size(made).is_ok(), "{made:e}");
+            }
+        }
+        let told = |mm: f64| check_size(mm).unwrap_err().to_string();
+        assert!(told(2000.04).contains("2000.04 mm"), "{}", told(2000.04));
+        assert!(told(9.0).contains("be 9 mm"), "{}", told(9.0));
+        assert!(told(1e30).contains("1.0000e30 mm"), "{}", told(1e30));
     }
 
     #[test]
