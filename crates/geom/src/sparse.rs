@@ -425,6 +425,11 @@ impl Cholesky {
         Ok(trailing)
     }
 
+    /// Rows of the matrix.
+    pub fn n_rows(&self) -> usize {
+        self.symbolic.nrows()
+    }
+
     /// Replaces the right-hand sides, `n` numbers each and one after the other, by their solutions.
     ///
     /// # Panics

@@ -60,6 +60,19 @@ pub struct ShellAssembly {
     pub steps: Vec<[u32; 2]>,
 }
 
+impl ShellAssembly {
+    /// A third of its triangles' area for each point, mm².
+    pub fn point_areas_mm2(&self) -> Vec<f64> {
+        let mut areas_mm2 = vec![0.0; self.points.len()];
+        for t in &self.triangles {
+            let [a, b, c] = t.map(|p| self.points[p as usize]);
+            let third = (b - a).cross(c - a).length() / 6.0;
+            t.iter().for_each(|&p| areas_mm2[p as usize] += third);
+        }
+        areas_mm2
+    }
+}
+
 /// A place on a seam with its frame: three unit vectors perpendicular to each other, u × `across` = ± N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {

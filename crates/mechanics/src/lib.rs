@@ -19,5 +19,5 @@ pub use material::Material;
 pub use shell::{
     Displacements, FaceStress, LoadCase, ShellError, ShellModel, ShellSolver, ShellStress, Support,
 };
-pub use surface::{SurfaceModel, SurfaceParams, SurfaceSolution};
+pub use surface::{Bearing, Closed, Drift, JoinedParts, SurfaceModel, SurfaceParams, SurfaceSolution};
 pub use volume::{Loaded, StressLevel, VolumeError, VolumeModel, VolumeParams};

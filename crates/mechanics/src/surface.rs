@@ -32,6 +32,7 @@
 
 mod contact;
 mod join;
+mod load;
 mod parts;
 mod solve;
 mod terms;
@@ -43,7 +44,9 @@ use shellock_geom::sparse::SparseError;
 use crate::Material;
 use crate::assembly::{Joint, Meeting, Resistance, ShellAssembly, Station};
 use crate::connector::{PIN_DEPTH, PIN_WIDTH};
+pub use load::{Bearing, Closed, Drift, JoinedParts};
 use parts::{N_MOTIONS, Part, parts};
+use solve::Layout;
 
 /// How the shell resists. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,6 +102,10 @@ pub struct SurfaceModel {
     params: SurfaceParams,
     assembly: ShellAssembly,
     parts: Vec<Part>,
+    /// Whether any point is.
+    is_held: bool,
+    /// Where no part is held.
+    free: Layout,
 }
 
 /// A solved plan.
@@ -126,11 +133,20 @@ impl SurfaceModel {
     ) -> Result<Self, SparseError> {
         let parts = parts(params, assembly, is_held)?;
         let (params, assembly) = (*params, assembly.clone());
+        let free = Layout::new(&parts, assembly.stations.len(), &[], 0.0);
         Ok(Self {
+            free,
             params,
             assembly,
             parts,
+            is_held: is_held.contains(&true),
         })
+    }
+
+    /// What all plans share that hold the parts with `is_held`.
+    fn layout(&self, is_held: &[bool]) -> Layout {
+        let held_mm_n = solve::held_compliance(&self.params);
+        Layout::new(&self.parts, self.assembly.stations.len(), is_held, held_mm_n)
     }
 
     /// Motions of both sides of all stations, of which a plan's equilibrium consists.

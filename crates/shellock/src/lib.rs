@@ -31,6 +31,7 @@ pub mod connector;
 pub mod coupon;
 pub mod design;
 pub mod figure;
+pub mod handling;
 mod impact;
 pub mod key;
 pub mod metric;

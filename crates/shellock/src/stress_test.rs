@@ -10,7 +10,6 @@
 //! everywhere where the plan has room for them, carved or not.
 
 mod chart;
-mod region;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +20,8 @@ use shellock_mechanics::{
     Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams,
 };
 
+use crate::handling::OPEN_SIZES;
+use crate::handling::region::{around, highest, highest_in_the_middle, lowest, spread};
 use crate::impact::impact_n;
 use crate::key::Turn;
 use crate::metric::{MetricParams, PlanModel};
@@ -31,16 +32,12 @@ use crate::{
 };
 
 pub use chart::chart;
-use region::{around, highest, highest_in_the_middle, lowest, spread};
 
 /// Radius of the fist, mm.
 pub const PUNCH_RADIUS_MM: f64 = 10.0;
 
 /// Plans drawn at random, among which one of half the score is looked for.
 const N_DRAWN: usize = 100;
-
-/// An opening of this many connector sizes shows, and is half of what lets a pin out.
-const OPEN_SIZES: f64 = 0.3;
 
 /// How far a seam with connectors of that size may open and still hold, mm.
 fn limit_mm(connector_mm: f64) -> f64 {

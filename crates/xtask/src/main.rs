@@ -9,6 +9,7 @@ mod failure;
 mod golden;
 mod hard;
 mod hours;
+mod loads;
 mod metrics;
 mod model;
 mod pictures;

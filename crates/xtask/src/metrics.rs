@@ -18,6 +18,7 @@ use crate::model::{Divided, ModelOptions, at_least_one, divide, load, with_ctx};
 use crate::study::{Sheet, agreement, write_all};
 use crate::table::Table;
 use column::Column;
+pub use column::failed;
 
 /// Plans on which linearity in Young's modulus is tested.
 const N_LINEAR: usize = 3;
@@ -26,23 +27,30 @@ const N_LINEAR: usize = 3;
 #[derive(Args)]
 pub struct MetricsOptions {
     #[command(flatten)]
-    model: ModelOptions,
+    subject: SubjectOptions,
+}
+
+/// Random plans of a model, and the mesh that they are rated on.
+#[derive(Args)]
+pub struct SubjectOptions {
+    #[command(flatten)]
+    pub model: ModelOptions,
     /// How many plans
     #[arg(long, default_value_t = 100, value_parser = at_least_one)]
-    plans: usize,
+    pub plans: usize,
     /// Length of triangle edges, 0.2 to 5; 1, which build uses, gives about 1000 points
     #[arg(long, default_value_t = 0.7, allow_negative_numbers = true)]
-    edge_share: f64,
+    pub edge_share: f64,
 }
 
 /// The plans and what the metrics know of them.
-struct Subject {
-    model: PlanModel,
-    survey: PlanSurvey,
-    plans: Vec<LatticePlan>,
+pub struct Subject {
+    pub model: PlanModel,
+    pub survey: PlanSurvey,
+    pub plans: Vec<LatticePlan>,
     /// What each plan makes of the stations.
-    meetings: Vec<Vec<Meeting>>,
-    key: u32,
+    pub meetings: Vec<Vec<Meeting>>,
+    pub key: u32,
 }
 
 /// Every metric that is compared: all with the first, and those after the second with that, too. A new metric
@@ -69,12 +77,12 @@ fn stiffness_columns(subject: &Subject) -> Result<Vec<Column>, Failure> {
 
 /// Runs the study; returns the files written.
 pub fn run(options: &MetricsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>, Failure> {
-    let subject = subject(options)?;
+    let subject = subject(&options.subject)?;
     let columns = columns(&subject)?;
     let stiffness = stiffness_columns(&subject)?;
     let linearity = linearity(&subject, &columns[0])?;
 
-    let name = options.model.name();
+    let name = options.subject.model.name();
     let table = table(columns.iter().chain(&stiffness));
     let compared = agreement(&self::table(&columns).complete())?;
     let by_surface = agreement(&self::table(&columns[1..]).complete())?;
@@ -101,7 +109,8 @@ pub fn run(options: &MetricsOptions, out: &std::path::Path) -> Result<Vec<PathBu
     Ok(files)
 }
 
-fn subject(options: &MetricsOptions) -> Result<Subject, Failure> {
+/// Divides the model and draws the plans.
+pub fn subject(options: &SubjectOptions) -> Result<Subject, Failure> {
     let path = &options.model.model;
     // Before the model is divided, which takes its time.
     let metric = MetricParams {

@@ -10,6 +10,7 @@ use crate::chart::{Corner, Curve, Labels, bands, scatter, sorted_scores};
 use crate::effort::{self, EffortOptions};
 use crate::failure::Failure;
 use crate::hours::{self, HoursOptions};
+use crate::loads::{self, LoadsOptions};
 use crate::metrics::{self, MetricsOptions};
 use crate::search::{self, SearchOptions};
 use crate::statistics::{band, kendall, spearman};
@@ -30,6 +31,8 @@ pub struct Options {
 enum Study {
     /// How well the metrics agree on random plans of a model
     Metrics(MetricsOptions),
+    /// What random plans of a model bear, load by load, by the surface model and by the solid one
+    Loads(LoadsOptions),
     /// How fast plans of a model are found, and what its segmentations allow
     Search(SearchOptions),
     /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
@@ -62,6 +65,7 @@ enum Study {
 pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     match &options.study {
         Study::Metrics(metrics) => metrics::run(metrics, &options.out),
+        Study::Loads(loads) => loads::run(loads, &options.out),
         Study::Search(search) => search::run(search, &options.out),
         Study::Strength(strength) => strength::run(strength, &options.out),
         Study::Effort(effort) => effort::run(effort, &options.out),

@@ -7,20 +7,59 @@ use super::SurfaceModel;
 use super::parts::{Motions, N_MOTIONS};
 use crate::assembly::{Meeting, Side, Station};
 
+/// Contacts of a station, of which a plan may leave some out: always as many, so that all plans have the same
+/// unknowns.
+pub(super) const N_CONTACTS: usize = 5;
+
+/// The place of each among a station's contacts: the walls of both sides;
+pub(super) const WALL: usize = 0;
+/// the pin's tip and a side of the channel;
+pub(super) const TIP: usize = 1;
+/// the same at the pin's root;
+pub(super) const ROOT: usize = 2;
+/// the pin's tip and the channel's floor, and what friction holds back besides;
+pub(super) const FLOOR: usize = 3;
+/// what friction holds along the channel.
+pub(super) const SLIDE: usize = 4;
+
+/// When a contact bears something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Law {
+    /// Always.
+    Both,
+    /// Where it is pressed together.
+    Push,
+    /// Never: there is none.
+    Absent,
+}
+
 /// One contact: its energy is `(g · r)²/2` in the motions r of side a from side b, where one-sided only for a
 /// negative sum.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Contact {
     pub station: usize,
     /// The gap's gradient times the root of the stiffness, N/mm.
     pub gradient: Motions,
-    pub is_one_sided: bool,
+    pub law: Law,
 }
 
 impl Contact {
     /// What presses: all of `gap`, or what of it is negative.
     pub fn pressed(&self, gap: f64) -> f64 {
-        if self.is_one_sided { gap.min(0.0) } else { gap }
+        match self.law {
+            Law::Both => gap,
+            Law::Push => gap.min(0.0),
+            Law::Absent => 0.0,
+        }
+    }
+
+    /// Whether it bears something at `gap`.
+    pub fn is_closed(&self, gap: f64) -> bool {
+        match self.law {
+            Law::Both => true,
+            Law::Push => gap <= 0.0,
+            Law::Absent => false,
+        }
     }
 }
 
@@ -37,37 +76,33 @@ pub(super) fn gap(station: &Station, from: Side, offset: Vec3, g: Vec3) -> Motio
     motions.map(|m| if from == Side::A { m } else { -m })
 }
 
-/// The contacts of a plan, station by station. Where there is a connector, neither the tips nor the seam
-/// points may part across the channel, and the male's tip may not go deeper; the walls may not enter each
-/// other anywhere.
-pub(super) fn contacts(model: &SurfaceModel, plan: &[Meeting]) -> Vec<Contact> {
-    let mut contacts = Vec::with_capacity(4 * plan.len());
-    for (i, (station, meeting)) in model.assembly.stations.iter().zip(plan).enumerate() {
-        let size_mm = meeting
-            .joint
-            .map_or(model.params.connector_mm, |joint| joint.size_mm);
-        let root = model.params.contact_n_mm(size_mm, station.length_mm).sqrt();
-        let contact = |gap: Motions, is_one_sided| Contact {
-            station: i,
-            gradient: gap.map(|g| root * g),
-            is_one_sided,
-        };
-        contacts.push(contact(gap(station, Side::B, Vec3::ZERO, meeting.wall), true));
-        if let Some(joint) = meeting.joint {
-            let n = station.tangent.cross(joint.leaves).normalize_or_zero();
-            let tip = -model.params.strip_mm(&joint) * joint.leaves;
-            contacts.push(contact(gap(station, joint.male, tip, n), false));
-            contacts.push(contact(gap(station, joint.male, Vec3::ZERO, n), false));
-            contacts.push(contact(
-                gap(station, joint.male, tip, joint.leaves),
-                !joint.is_fast,
-            ));
-            if joint.is_fast {
-                contacts.push(contact(gap(station, joint.male, tip, station.tangent), false));
-            }
+/// The contacts of station `i`. Where there is a connector, neither the tips nor the seam points may part
+/// across the channel, and the male's tip may not go deeper; the walls may not enter each other anywhere.
+pub(super) fn contacts_at(model: &SurfaceModel, i: usize, meeting: &Meeting) -> [Contact; N_CONTACTS] {
+    let station = &model.assembly.stations[i];
+    let size_mm = meeting
+        .joint
+        .map_or(model.params.connector_mm, |joint| joint.size_mm);
+    let root = model.params.contact_n_mm(size_mm, station.length_mm).sqrt();
+    let contact = |gap: Motions, law| Contact {
+        station: i,
+        gradient: gap.map(|g| root * g),
+        law,
+    };
+    let mut found = [contact([0.0; N_MOTIONS], Law::Absent); N_CONTACTS];
+    found[WALL] = contact(gap(station, Side::B, Vec3::ZERO, meeting.wall), Law::Push);
+    if let Some(joint) = meeting.joint {
+        let n = station.tangent.cross(joint.leaves).normalize_or_zero();
+        let tip = -model.params.strip_mm(&joint) * joint.leaves;
+        let floor = if joint.is_fast { Law::Both } else { Law::Push };
+        found[TIP] = contact(gap(station, joint.male, tip, n), Law::Both);
+        found[ROOT] = contact(gap(station, joint.male, Vec3::ZERO, n), Law::Both);
+        found[FLOOR] = contact(gap(station, joint.male, tip, joint.leaves), floor);
+        if joint.is_fast {
+            found[SLIDE] = contact(gap(station, joint.male, tip, station.tangent), Law::Both);
         }
     }
-    contacts
+    found
 }
 
 /// The pulls on the tips of side a and, the other way, of side b, as forces on the stations' motions.

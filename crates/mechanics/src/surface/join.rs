@@ -42,10 +42,15 @@ struct Front {
     values: Vec<f64>,
 }
 
-/// All joinings in order, with the memory that they need.
-#[derive(Debug)]
+/// All joinings in order.
+#[derive(Debug, Default)]
 pub(super) struct Joinings {
     joinings: Vec<Joining>,
+}
+
+/// The memory that joinings need.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Fronts {
     fronts: Vec<Front>,
     /// Place of each contact in the front at hand.
     place: Vec<usize>,
@@ -104,47 +109,52 @@ impl Joinings {
                 contacts.sort_unstable();
             }
         }
-        let fronts = vec![Front::default(); joinings.len()];
-        (
-            Self {
-                joinings,
-                fronts,
-                place: vec![0; n_contacts],
-            },
-            order,
-        )
+        (Self { joinings }, order)
+    }
+
+    /// The same where each contact is `n` that touch the same bodies: contact c becomes those from n c on.
+    pub fn of_groups(mut self, n: u32) -> Self {
+        for joining in &mut self.joinings {
+            for contacts in [&mut joining.eliminated, &mut joining.kept] {
+                *contacts = contacts.iter().flat_map(|c| n * c..n * (c + 1)).collect();
+            }
+        }
+        self
     }
 
     /// The solution for the contacts that are closed, 0 for the others.
     pub fn solve(
-        &mut self,
-        bodies: &[Body],
+        &self,
+        Fronts { fronts, place }: &mut Fronts,
+        bodies: &[impl AsRef<Body>],
         is_closed: &[bool],
         side: &[f64],
     ) -> Result<Vec<f64>, SparseError> {
+        fronts.resize_with(self.joinings.len(), Front::default);
+        place.resize(side.len(), 0);
         for (i, joining) in self.joinings.iter().enumerate() {
-            let (done, rest) = self.fronts.split_at_mut(i);
+            let (done, rest) = fronts.split_at_mut(i);
             let front = &mut rest[0];
             front.gather(joining, is_closed, side);
             front
                 .contacts
                 .iter()
                 .enumerate()
-                .for_each(|(i, &c)| self.place[c as usize] = i);
+                .for_each(|(i, &c)| place[c as usize] = i);
             joining
                 .bodies
                 .iter()
-                .for_each(|b| front.add_body(&bodies[*b], is_closed, &self.place));
+                .for_each(|b| front.add_body(bodies[*b].as_ref(), is_closed, place));
             joining
                 .joined
                 .iter()
-                .for_each(|j| front.add_joint(&done[*j], &self.place));
+                .for_each(|j| front.add_joint(&done[*j], place));
             if front.n_eliminated > 0 {
                 eliminate_leading(&mut front.values, front.contacts.len() + 1, front.n_eliminated)?;
             }
         }
         let mut solution = vec![0.0; side.len()];
-        self.fronts.iter().rev().for_each(|f| f.substitute(&mut solution));
+        fronts.iter().rev().for_each(|f| f.substitute(&mut solution));
         Ok(solution)
     }
 }
@@ -264,6 +274,8 @@ impl Front {
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
+    use std::sync::Arc;
+
     use super::*;
 
     /// Seven bodies in a ring with a chord, 31 contacts between them and 5 that touch one body alone.
@@ -284,25 +296,26 @@ mod tests {
     #[test]
     fn joined_bodies_bear_what_the_whole_system_does_whatever_is_closed() {
         let (touched, n) = ring();
-        let (mut joinings, order) = Joinings::new(touched.clone(), n as usize);
+        let (joinings, order) = Joinings::new(touched.clone(), n as usize);
+        let mut fronts = Fronts::default();
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, (0..n).collect::<Vec<_>>());
         let wave = |i: usize, j: usize| ((7 * i + 13 * j + i * j) as f64).sin();
-        let bodies: Vec<Body> = (touched.iter())
+        let bodies: Vec<Arc<Body>> = (touched.iter())
             .map(|own| {
                 let contacts: Vec<u32> = (0..n).filter(|i| own.contains(&order[*i as usize])).collect();
                 let root = DMatrix::from_fn(contacts.len(), contacts.len(), wave);
-                Body {
+                Arc::new(Body {
                     contacts,
                     compliance: (&root * root.transpose()).as_slice().to_vec(),
-                }
+                })
             })
             .collect();
         let side: Vec<f64> = (0..n as usize).map(|i| wave(i, 2)).collect();
         for modulus in [1, 2, 3, 100] {
             let is_closed: Vec<bool> = (0..n).map(|i| i % modulus == 0).collect();
-            let found = joinings.solve(&bodies, &is_closed, &side).unwrap();
+            let found = joinings.solve(&mut fronts, &bodies, &is_closed, &side).unwrap();
             let mut whole = DMatrix::<f64>::identity(n as usize, n as usize);
             for body in &bodies {
                 let m = body.contacts.len();

@@ -38,13 +38,41 @@ const LEAST_COMPLIANCE: f64 = 1e-3;
 type Gradient = Vec<(u32, Vec3)>;
 
 /// A part as its seams feel it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Part {
     /// The stations at which it is a side, ascending.
     pub stations: Vec<u32>,
     /// How side a moves from side b at each of them, in [`N_MOTIONS`], under forces that pull them apart:
     /// mm/N (1/N for a turn, 1/N mm for two). What the other sides' parts add is not in it.
     pub compliance: DMatrix<f64>,
+    inside: Inside,
+}
+
+/// What is condensed away.
+#[derive(Debug)]
+struct Inside {
+    /// The mesh on its supports.
+    factor: Cholesky,
+    /// The part's points that may move, ascending, with the row of their x.
+    rows: Vec<(u32, u32)>,
+    /// The stations' motions, as the part's points see them.
+    gradients: Vec<Gradient>,
+    floating: Option<Floating>,
+}
+
+/// A part that nothing holds.
+#[derive(Debug)]
+struct Floating {
+    /// The stations' motions when the part moves as a rigid body.
+    rigid: DMatrix<f64>,
+    /// Stiffness of the ground, N/mm.
+    ground_n_mm: f64,
+}
+
+/// The points of the outer surface, moved to the middle of the wall.
+pub(super) fn mid_wall(params: &SurfaceParams, assembly: &ShellAssembly) -> Vec<Vec3> {
+    let points = assembly.points.iter().zip(&assembly.normals);
+    points.map(|(p, n)| *p - 0.5 * params.wall_mm * *n).collect()
 }
 
 /// All parts; points with `is_held` do not move.
@@ -53,12 +81,7 @@ pub(super) fn parts(
     assembly: &ShellAssembly,
     is_held: &[bool],
 ) -> Result<Vec<Part>, SparseError> {
-    let mid_wall = assembly
-        .points
-        .iter()
-        .zip(&assembly.normals)
-        .map(|(p, n)| *p - 0.5 * params.wall_mm * *n);
-    let points: Vec<Vec3> = mid_wall.collect();
+    let points = mid_wall(params, assembly);
     let mut terms: Vec<Vec<Term>> = vec![Vec::new(); assembly.n_parts];
     for term in patch_terms(params, assembly, &points) {
         terms[assembly.part_of_point[term.corners[0].0 as usize] as usize].push(term);
@@ -85,16 +108,12 @@ pub(super) fn parts(
         }
     }
     let row = rows_by_part(assembly, is_held);
-    let mut floats: Vec<Vec<u32>> = vec![Vec::new(); assembly.n_parts];
+    let mut own: Vec<Vec<u32>> = vec![Vec::new(); assembly.n_parts];
     (0..)
         .zip(&assembly.part_of_point)
-        .for_each(|(v, &part)| floats[part as usize].push(v));
-    floats
-        .iter_mut()
-        .filter(|f| f.iter().any(|&v| is_held[v as usize]))
-        .for_each(Vec::clear);
-    let all = terms.par_iter().zip(motions).zip(floats);
-    all.map(|((terms, motions), floats)| part(params, &row, &points, terms, motions, &floats))
+        .for_each(|(v, &part)| own[part as usize].push(v));
+    let all = terms.par_iter().zip(motions).zip(own);
+    all.map(|((terms, motions), own)| part(params, &row, &points, terms, motions, &own))
         .collect()
 }
 
@@ -142,8 +161,10 @@ fn part(
     points: &[Vec3],
     terms: &[Term],
     motions: Vec<(u32, [Gradient; N_MOTIONS])>,
-    floats: &[u32],
+    own: &[u32],
 ) -> Result<Part, SparseError> {
+    let is_held = own.iter().any(|v| row[*v as usize].is_none());
+    let floats = if is_held { &[][..] } else { own };
     let (stations, gradients): (Vec<u32>, Vec<_>) = motions.into_iter().unzip();
     let gradients: Vec<Gradient> = gradients.into_iter().flatten().collect();
     let supports = supports(params, points, floats);
@@ -170,15 +191,58 @@ fn part(
     for i in 0..m {
         compliance[(i, i)] += LEAST_COMPLIANCE / params.contact_n_mm(params.connector_mm, 1.0);
     }
-    if !floats.is_empty() {
-        let ground = GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm * floats.len() as f64;
-        let rigid = DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &gradients[i], j));
-        compliance += &rigid * rigid.transpose() / ground;
+    let floating = (!floats.is_empty()).then(|| Floating {
+        rigid: DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &gradients[i], j)),
+        ground_n_mm: GROUND_SHARE
+            * params.material.youngs_modulus_mpa
+            * params.wall_mm
+            * floats.len() as f64,
+    });
+    if let Some(Floating { rigid, ground_n_mm }) = &floating {
+        compliance += rigid * rigid.transpose() / *ground_n_mm;
     }
+    let rows = own.iter().filter_map(|&v| row[v as usize].map(|r| (v, r))).collect();
     Ok(Part {
         stations,
         compliance: 0.5 * (&compliance + compliance.transpose()),
+        inside: Inside {
+            factor,
+            rows,
+            gradients,
+            floating,
+        },
     })
+}
+
+impl Part {
+    /// How side a moves from side b at each of the part's stations under `forces_n` on all points of the
+    /// assembly at mid-wall, where nothing else but the ground holds the part.
+    pub fn drift(&self, points: &[Vec3], forces_n: &[Vec3]) -> Vec<f64> {
+        let Inside {
+            factor,
+            rows,
+            gradients,
+            floating,
+        } = &self.inside;
+        let mut moved = vec![0.0; factor.n_rows()];
+        rows.iter()
+            .for_each(|&(v, r)| add(&mut moved, Some(r), forces_n[v as usize]));
+        factor.solve_in_place(&mut moved);
+        let row_of = |v: u32| rows.binary_search_by_key(&v, |r| r.0).ok().map(|at| rows[at].1 as usize);
+        let along = |gradient: &Gradient| {
+            let at = |&(v, g): &(u32, Vec3)| row_of(v).map_or(0.0, |r| g.dot(Vec3::from_slice(&moved[r..r + 3])));
+            gradient.iter().map(at).sum::<f64>()
+        };
+        let mut drift: Vec<f64> = gradients.iter().map(along).collect();
+        if let Some(Floating { rigid, ground_n_mm }) = floating {
+            let own: Gradient = rows.iter().map(|&(v, _)| (v, forces_n[v as usize])).collect();
+            for j in 0..6 {
+                let shift = rigid_motion(points, &own, j) / ground_n_mm;
+                drift.iter_mut().zip(rigid.column(j).iter()).for_each(|(d, r)| *d += shift * r);
+            }
+        }
+        drift
+    }
 }
 
 /// What a motion's gradient sees of rigid motion `j`: a shift, or a turn about an axis through the origin.

@@ -5,14 +5,15 @@
 //! those of the gaps, `μ = (G r)⁻`.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 
-use super::contact::{Contact, contacts, forces, gap};
-use super::join::{Body, Joinings};
+use super::contact::{Contact, Law, N_CONTACTS, contacts_at, forces, gap};
+use super::join::{Body, Fronts, Joinings};
 use super::parts::{Motions, N_MOTIONS, Part};
-use super::{SurfaceModel, SurfaceSolution};
+use super::{SurfaceModel, SurfaceParams, SurfaceSolution};
 use crate::assembly::{Meeting, Opening, Side, Station};
 
 /// Newton steps of a line search; the slope is piecewise linear and most searches end after two or three.
@@ -28,8 +29,10 @@ pub(super) fn solve(
     is_held: &[bool],
     pulls: &[Vec3],
 ) -> Result<SurfaceSolution, SparseError> {
-    let (sent, n_iterations, error) = minimise(model, plan, is_held, pulls)?;
-    let opening = rated(model, plan, &answer(model, is_held, &sent));
+    let layout = model.layout(is_held);
+    let load = Load::of_pulls(model, plan, pulls);
+    let balance = Jointed::new(model, &layout, plan).balance(&load, &mut Fronts::default(), None)?;
+    let opening = Opening::rated(plan, openings(model, plan, &balance.moved));
     let part_of = |p: u32| model.assembly.part_of_point[p as usize];
     let is_free = |part: &u32| !is_held.get(*part as usize).is_some_and(|h| *h);
     let resistance = opening.resistance(plan, |station| {
@@ -41,79 +44,199 @@ pub(super) fn solve(
     });
     Ok(SurfaceSolution {
         resistance,
-        n_iterations,
-        error,
+        n_iterations: balance.n_iterations,
+        error: balance.error,
     })
 }
 
-/// What the pulls and the contacts send through the stations at the least energy, steps taken, and what is
-/// left of the force as a share of it.
-pub(super) fn minimise(
-    model: &SurfaceModel,
-    plan: &[Meeting],
-    is_held: &[bool],
-    pulls: &[Vec3],
-) -> Result<(Vec<Motions>, usize, f64), SparseError> {
-    let force = forces(model, plan, pulls);
-    let (contacts, bodies, mut joinings) = system(model, plan, is_held);
-    // The first step leaves all one-sided contacts open, which takes three steps fewer than all closed.
-    let mut is_closed: Vec<bool> = contacts.iter().map(|c| !c.is_one_sided).collect();
-    let (mut borne, mut gaps) = (
-        vec![0.0; contacts.len()],
-        gaps(&contacts, &answer(model, is_held, &force)),
-    );
-    let (mut n_iterations, mut error) = (0, if norm(&force) > 0.0 { 1.0 } else { 0.0 });
-    while error > model.params.tolerance && n_iterations < model.params.max_iterations {
-        let step = step(&mut joinings, &bodies, &is_closed, &borne, &gaps)?;
-        let opened = opened(&bodies, &step);
-        let length = if n_iterations == 0 {
-            1.0
-        } else {
-            length(&contacts, [&borne, &step], [&gaps, &opened])
-        };
-        borne.iter_mut().zip(&step).for_each(|(b, s)| *b += length * s);
-        gaps.iter_mut().zip(&opened).for_each(|(g, o)| *g += length * o);
-        let pressed = contacts.iter().zip(&gaps).map(|(c, g)| c.pressed(*g));
-        let left: Vec<f64> = borne.iter().zip(pressed).map(|(b, p)| b - p).collect();
-        error = norm(&less(&contacts, vec![[0.0; N_MOTIONS]; force.len()], &left)) / norm(&force);
-        is_closed = contacts
-            .iter()
-            .zip(&gaps)
-            .map(|(c, g)| !c.is_one_sided || *g <= 0.0)
-            .collect();
-        n_iterations += 1;
-    }
-    Ok((less(&contacts, force, &borne), n_iterations, error))
+/// What acts on the parts besides the contacts.
+#[derive(Clone, Debug)]
+pub(super) struct Load {
+    /// Forces between the sides of each station.
+    pub sent: Vec<Motions>,
+    /// How side a would move from side b at each station by other forces, if nothing joined the parts, mm.
+    pub drift: Vec<Motions>,
+    /// The force beside which what is left of it counts, N.
+    pub scale_n: f64,
 }
 
-/// The contacts of a plan in the order in which they are eliminated, and the bodies that are joined by them.
-fn system(model: &SurfaceModel, plan: &[Meeting], is_held: &[bool]) -> (Vec<Contact>, Vec<Body>, Joinings) {
-    let (touched, n_stations) = (touched(model, is_held), model.assembly.stations.len());
-    let contacts = contacts(model, plan);
-    let of_station = ranges(&contacts, n_stations);
-    let of_body = |t: &Touched| {
-        t.stations
-            .iter()
-            .flat_map(|s| of_station[*s as usize].clone())
-            .map(|c| c as u32)
-            .collect()
-    };
-    let (joinings, order) = Joinings::new(touched.iter().map(of_body).collect(), contacts.len());
+impl Load {
+    /// Pulls on the tips of side a and, the other way, of side b, N.
+    pub fn of_pulls(model: &SurfaceModel, plan: &[Meeting], pulls: &[Vec3]) -> Self {
+        let sent = forces(model, plan, pulls);
+        Self {
+            scale_n: norm(&sent),
+            drift: vec![[0.0; N_MOTIONS]; sent.len()],
+            sent,
+        }
+    }
+}
 
-    let contacts: Vec<Contact> = order.iter().map(|c| contacts[*c as usize]).collect();
-    let (of_station, given) = (ranges(&contacts, n_stations), given(model, is_held));
-    let bodies = touched
-        .iter()
-        .map(|t| body(t, &contacts, &of_station, &given))
-        .collect();
-    (contacts, bodies, joinings)
+/// What all plans have in common that hold the same parts: which parts feel which stations, and in which
+/// order contacts are eliminated.
+#[derive(Debug)]
+pub(super) struct Layout {
+    is_held: Vec<bool>,
+    touched: Vec<Touched>,
+    joinings: Joinings,
+    /// The place of each station in the order of elimination; its contacts are N_CONTACTS in a row.
+    rank: Vec<usize>,
+    /// Compliance that held parts add at each station, mm/N.
+    given: Vec<f64>,
+}
+
+impl Layout {
+    pub fn new(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Self {
+        let touched = touched(parts, n_stations, is_held);
+        let (joinings, order) = Joinings::new(touched.iter().map(|t| t.stations.clone()).collect(), n_stations);
+        let mut rank = vec![0; n_stations];
+        order.iter().enumerate().for_each(|(i, s)| rank[*s as usize] = i);
+        Self {
+            is_held: is_held.to_vec(),
+            joinings: joinings.of_groups(N_CONTACTS as u32),
+            given: given(parts, n_stations, is_held, held_mm_n),
+            touched,
+            rank,
+        }
+    }
+}
+
+/// One plan's contacts, and the parts as they feel them: the same for all loads.
+#[derive(Clone)]
+pub(super) struct Jointed<'a> {
+    pub model: &'a SurfaceModel,
+    layout: &'a Layout,
+    /// In the order in which they are eliminated.
+    pub contacts: Vec<Contact>,
+    bodies: Vec<Arc<Body>>,
+}
+
+/// The state of least energy under a load.
+#[derive(Clone, Debug)]
+pub(super) struct Balance {
+    /// How side a moves from side b at each station.
+    pub moved: Vec<Motions>,
+    /// What each contact bears, in the root of its stiffness times mm.
+    pub borne: Vec<f64>,
+    /// Newton steps.
+    pub n_iterations: usize,
+    /// What is left of the force, as a share of it.
+    pub error: f64,
+}
+
+impl<'a> Jointed<'a> {
+    pub fn new(model: &'a SurfaceModel, layout: &'a Layout, plan: &[Meeting]) -> Self {
+        let contacts = contacts(model, layout, plan);
+        let bodies = (layout.touched.iter())
+            .map(|t| Arc::new(body(model, layout, t, &contacts)))
+            .collect();
+        Self {
+            model,
+            layout,
+            contacts,
+            bodies,
+        }
+    }
+
+    /// Another plan: parts whose contacts are the same are not computed again.
+    pub fn changed(&self, plan: &[Meeting]) -> Self {
+        let contacts = contacts(self.model, self.layout, plan);
+        let is_same = |s: &u32| {
+            let own = own_contacts(self.layout, *s);
+            contacts[own.clone()] == self.contacts[own]
+        };
+        let again = |(t, old): (&Touched, &Arc<Body>)| {
+            if t.stations.iter().all(is_same) {
+                old.clone()
+            } else {
+                Arc::new(body(self.model, self.layout, t, &contacts))
+            }
+        };
+        Self {
+            bodies: self.layout.touched.iter().zip(&self.bodies).map(again).collect(),
+            contacts,
+            ..*self
+        }
+    }
+
+    /// The balance under `load`, sought from the contacts that are closed at first; without them from all
+    /// one-sided ones open, which takes three steps fewer than all closed.
+    pub fn balance(
+        &self,
+        load: &Load,
+        fronts: &mut Fronts,
+        closed: Option<&[bool]>,
+    ) -> Result<Balance, SparseError> {
+        let Self {
+            model,
+            layout: Layout { joinings, is_held, .. },
+            contacts,
+            bodies,
+        } = self;
+        let is_first = |(i, c): (usize, &Contact)| match c.law {
+            Law::Both => true,
+            Law::Push => closed.is_some_and(|closed| closed[i]),
+            Law::Absent => false,
+        };
+        let mut is_closed: Vec<bool> = contacts.iter().enumerate().map(is_first).collect();
+        let (mut borne, mut gaps) = (
+            vec![0.0; contacts.len()],
+            gaps(contacts, &added(&load.drift, answer(model, is_held, &load.sent))),
+        );
+        let (mut n_iterations, mut error) = (0, if load.scale_n > 0.0 { 1.0 } else { 0.0 });
+        while error > model.params.tolerance && n_iterations < model.params.max_iterations {
+            let step = step(joinings, fronts, bodies, &is_closed, &borne, &gaps)?;
+            let opened = opened(bodies, &step);
+            let length = if n_iterations == 0 {
+                1.0
+            } else {
+                length(contacts, [&borne, &step], [&gaps, &opened])
+            };
+            borne.iter_mut().zip(&step).for_each(|(b, s)| *b += length * s);
+            gaps.iter_mut().zip(&opened).for_each(|(g, o)| *g += length * o);
+            let pressed = contacts.iter().zip(&gaps).map(|(c, g)| c.pressed(*g));
+            let left: Vec<f64> = borne.iter().zip(pressed).map(|(b, p)| b - p).collect();
+            error = norm(&less(contacts, vec![[0.0; N_MOTIONS]; load.sent.len()], &left)) / load.scale_n;
+            is_closed = contacts.iter().zip(&gaps).map(|(c, g)| c.is_closed(*g)).collect();
+            n_iterations += 1;
+        }
+        let sent = less(contacts, load.sent.clone(), &borne);
+        Ok(Balance {
+            moved: added(&load.drift, answer(model, is_held, &sent)),
+            borne,
+            n_iterations,
+            error,
+        })
+    }
+}
+
+/// The places of a station's contacts among all.
+fn own_contacts(layout: &Layout, station: u32) -> Range<usize> {
+    let first = N_CONTACTS * layout.rank[station as usize];
+    first..first + N_CONTACTS
+}
+
+/// The contacts of a plan in the order in which they are eliminated.
+fn contacts(model: &SurfaceModel, layout: &Layout, plan: &[Meeting]) -> Vec<Contact> {
+    let mut contacts: Vec<Option<Contact>> = vec![None; N_CONTACTS * plan.len()];
+    for (i, meeting) in plan.iter().enumerate() {
+        let own = contacts[own_contacts(layout, i as u32)].iter_mut();
+        own.zip(contacts_at(model, i, meeting)).for_each(|(place, c)| *place = Some(c));
+    }
+    contacts.into_iter().flatten().collect()
+}
+
+fn added(to: &[Motions], mut motions: Vec<Motions>) -> Vec<Motions> {
+    motions.iter_mut().zip(to).for_each(|(m, t)| add(m, 1.0, t));
+    motions
 }
 
 /// What contacts must bear more for the balance of the closed ones. Only differences from it are solved for,
 /// since rounding is in proportion to what the ground bears, and that is soft.
 fn step(
-    joinings: &mut Joinings,
-    bodies: &[Body],
+    joinings: &Joinings,
+    fronts: &mut Fronts,
+    bodies: &[Arc<Body>],
     is_closed: &[bool],
     borne: &[f64],
     gaps: &[f64],
@@ -128,7 +251,7 @@ fn step(
         .zip(gaps)
         .zip(borne)
         .for_each(|((s, g), b)| *s += g - b);
-    let closed = joinings.solve(bodies, is_closed, &side)?;
+    let closed = joinings.solve(fronts, bodies, is_closed, &side)?;
     step.iter_mut().zip(closed).for_each(|(s, c)| *s += c);
     Ok(step)
 }
@@ -143,11 +266,8 @@ fn length(contacts: &[Contact], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f
             let gap = gaps[i] + length * opened[i];
             let pressed = contact.pressed(gap);
             slope += (pressed - borne[i] - length * step[i]) * opened[i];
-            let stiffness = if !contact.is_one_sided || gap < 0.0 {
-                opened[i]
-            } else {
-                0.0
-            };
+            let is_pressed = contact.law == Law::Both || (contact.law == Law::Push && gap < 0.0);
+            let stiffness = if is_pressed { opened[i] } else { 0.0 };
             curve += (stiffness - step[i]) * opened[i];
         }
         if slope.abs() <= 1e-12 * first.get_or_insert(slope).abs() || curve <= 0.0 {
@@ -159,8 +279,8 @@ fn length(contacts: &[Contact], [borne, step]: [&[f64]; 2], [gaps, opened]: [&[f
 }
 
 /// Compliance of what is held, mm/N.
-fn held_compliance(model: &SurfaceModel) -> f64 {
-    1.0 / (HELD_SHARE * model.params.contact_n_mm(model.params.connector_mm, 1.0))
+pub(super) fn held_compliance(params: &SurfaceParams) -> f64 {
+    1.0 / (HELD_SHARE * params.contact_n_mm(params.connector_mm, 1.0))
 }
 
 /// How side a moves from side b at each station under forces that pull them apart.
@@ -171,7 +291,7 @@ pub(super) fn answer(model: &SurfaceModel, is_held: &[bool], forces: &[Motions])
             for &s in &part.stations {
                 add(
                     &mut moved[s as usize],
-                    held_compliance(model),
+                    held_compliance(&model.params),
                     &forces[s as usize],
                 );
             }
@@ -195,26 +315,22 @@ pub(super) fn answer(model: &SurfaceModel, is_held: &[bool], forces: &[Motions])
 }
 
 /// What a plan's contacts touch: a free part, or a station between held parts alone.
-struct Touched<'a> {
+#[derive(Debug)]
+struct Touched {
     stations: Vec<u32>,
-    part: Option<&'a Part>,
+    part: Option<usize>,
 }
 
-fn touched<'a>(model: &'a SurfaceModel, is_held: &[bool]) -> Vec<Touched<'a>> {
+fn touched(parts: &[Part], n_stations: usize, is_held: &[bool]) -> Vec<Touched> {
     let is_held = |part: usize| is_held.get(part).is_some_and(|h| *h);
-    let free = model
-        .parts
-        .iter()
-        .enumerate()
+    let mut touched: Vec<_> = (parts.iter().enumerate())
         .filter(|(i, _)| !is_held(*i))
-        .map(|(_, part)| part);
-    let mut touched: Vec<_> = free
-        .map(|p| Touched {
-            stations: p.stations.clone(),
-            part: Some(p),
+        .map(|(i, part)| Touched {
+            stations: part.stations.clone(),
+            part: Some(i),
         })
         .collect();
-    let mut is_free = vec![false; model.assembly.stations.len()];
+    let mut is_free = vec![false; n_stations];
     touched
         .iter()
         .flat_map(|t| &t.stations)
@@ -228,35 +344,24 @@ fn touched<'a>(model: &'a SurfaceModel, is_held: &[bool]) -> Vec<Touched<'a>> {
 }
 
 /// Compliance that held parts add at each station, mm/N.
-fn given(model: &SurfaceModel, is_held: &[bool]) -> Vec<f64> {
-    let mut given = vec![0.0; model.assembly.stations.len()];
-    for (part, _) in model.parts.iter().zip(is_held).filter(|(_, is_held)| **is_held) {
+fn given(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Vec<f64> {
+    let mut given = vec![0.0; n_stations];
+    for (part, _) in parts.iter().zip(is_held).filter(|(_, is_held)| **is_held) {
         part.stations
             .iter()
-            .for_each(|s| given[*s as usize] += held_compliance(model));
+            .for_each(|s| given[*s as usize] += held_mm_n);
     }
     given
 }
 
-/// The contacts of each station, which follow each other.
-fn ranges(contacts: &[Contact], n_stations: usize) -> Vec<Range<usize>> {
-    let mut ranges = vec![0..0; n_stations];
-    let mut first = 0;
-    for same in contacts.chunk_by(|a, b| a.station == b.station) {
-        ranges[same[0].station] = first..first + same.len();
-        first += same.len();
-    }
-    ranges
-}
-
 /// How the contacts feel a body, with what held parts add.
-fn body(touched: &Touched, contacts: &[Contact], ranges: &[Range<usize>], given: &[f64]) -> Body {
+fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Contact]) -> Body {
     let n = N_MOTIONS * touched.stations.len();
     // In the order of the contacts, with the place of each station in the part.
     let mut stations: Vec<(Range<usize>, usize)> = touched
         .stations
         .iter()
-        .map(|s| ranges[*s as usize].clone())
+        .map(|s| own_contacts(layout, *s))
         .zip((0..).step_by(N_MOTIONS))
         .collect();
     stations.sort_unstable_by_key(|(range, _)| range.start);
@@ -268,15 +373,19 @@ fn body(touched: &Touched, contacts: &[Contact], ranges: &[Range<usize>], given:
     let mut moved = vec![0.0; n];
     for (range, place) in &stations {
         for contact in &contacts[range.clone()] {
+            if contact.law == Law::Absent {
+                compliance.resize(compliance.len() + ids.len(), 0.0);
+                continue;
+            }
             moved.fill(0.0);
             let columns = touched
                 .part
-                .map_or(&[][..], |p| &p.compliance.as_slice()[n * place..]);
+                .map_or(&[][..], |p| &model.parts[p].compliance.as_slice()[n * place..]);
             columns
                 .chunks_exact(n)
                 .zip(&contact.gradient)
                 .for_each(|(column, g)| add(&mut moved, *g, column));
-            add(&mut moved[*place..], given[contact.station], &contact.gradient);
+            add(&mut moved[*place..], layout.given[contact.station], &contact.gradient);
             for (range, place) in &stations {
                 let moved = &moved[*place..*place + N_MOTIONS];
                 compliance.extend(contacts[range.clone()].iter().map(|c| dot(&c.gradient, moved)));
@@ -290,7 +399,7 @@ fn body(touched: &Touched, contacts: &[Contact], ranges: &[Range<usize>], given:
 }
 
 /// How gaps change when contacts bear `borne` more.
-fn opened(bodies: &[Body], borne: &[f64]) -> Vec<f64> {
+fn opened(bodies: &[Arc<Body>], borne: &[f64]) -> Vec<f64> {
     let mut opened = vec![0.0; borne.len()];
     let mut own = Vec::new();
     for body in bodies {
@@ -324,8 +433,8 @@ fn less(contacts: &[Contact], mut force: Vec<Motions>, borne: &[f64]) -> Vec<Mot
     force
 }
 
-/// The distances between the tips of both sides.
-fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Opening {
+/// The distances between the tips of both sides, mm; 0 where there is no joint.
+pub(super) fn openings(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Vec<f64> {
     let opening = |((station, m), moved): ((&Station, &Meeting), &Motions)| {
         let Some(joint) = m.joint else { return 0.0 };
         let along = |g| {
@@ -336,17 +445,8 @@ fn rated(model: &SurfaceModel, plan: &[Meeting], moved: &[Motions]) -> Opening {
         };
         Vec3::from_array([station.tangent, station.normal, station.across].map(along)).length()
     };
-    Opening::rated(
-        plan,
-        model
-            .assembly
-            .stations
-            .iter()
-            .zip(plan)
-            .zip(moved)
-            .map(opening)
-            .collect(),
-    )
+    let stations = model.assembly.stations.iter();
+    stations.zip(plan).zip(moved).map(opening).collect()
 }
 
 fn add(to: &mut [f64], factor: f64, x: &[f64]) {

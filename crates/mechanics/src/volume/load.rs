@@ -76,27 +76,48 @@ impl VolumeModel {
         plan: &[Meeting],
         forces_n: &[Vec3],
     ) -> Result<Result<Loaded, Vec<u32>>, VolumeError> {
+        let mut all = self.under_loads(plan, &[forces_n.to_vec()])?;
+        Ok(all.remove(0))
+    }
+
+    /// What each of `loads_n` does on its own, as [`under_load`](Self::under_load) says; in less time.
+    pub fn under_loads(
+        &self,
+        plan: &[Meeting],
+        loads_n: &[Vec<Vec3>],
+    ) -> Result<Vec<Result<Loaded, Vec<u32>>>, VolumeError> {
         if plan.len() != self.stations.len() {
             return Err(VolumeError::Joints {
                 joints: plan.len(),
                 stations: self.stations.len(),
             });
         }
-        if forces_n.len() != self.part_of_point.len() || !forces_n.iter().all(|f| f.is_finite()) {
+        let n_points = self.part_of_point.len();
+        if let Some(wrong) = (loads_n.iter()).find(|f| f.len() != n_points || !f.iter().all(|f| f.is_finite())) {
             return Err(VolumeError::Forces {
-                forces: forces_n.len(),
-                points: self.part_of_point.len(),
+                forces: wrong.len(),
+                points: n_points,
             });
         }
         let sections = bars::sections(self, plan);
         let bars = bars::bars(self, plan, &sections);
-        let loads_n = self.balanced(forces_n)?;
-        let (mut bodies, mut responses): (Vec<Body>, Vec<Response>) = (0..self.parts.len() as u32)
+        let mut bodies: Vec<Body> = (0..self.parts.len() as u32)
             .into_par_iter()
-            .map(|part| Body::new(self, part, plan, &sections, &bars, &loads_n))
-            .collect::<Result<Vec<_>, _>>()?
-            .into_iter()
-            .unzip();
+            .map(|part| Body::new(self, part, plan, &sections, &bars))
+            .collect::<Result<Vec<_>, _>>()?;
+        loads_n.iter().map(|forces_n| self.loaded(plan, &sections, &mut bodies, forces_n)).collect()
+    }
+
+    fn loaded(
+        &self,
+        plan: &[Meeting],
+        sections: &Sections,
+        bodies: &mut [Body<'_>],
+        forces_n: &[Vec3],
+    ) -> Result<Result<Loaded, Vec<u32>>, VolumeError> {
+        let balanced_n = self.balanced(forces_n)?;
+        let mut responses: Vec<Response> =
+            bodies.par_iter_mut().map(|body| body.load(self, plan, sections, &balanced_n)).collect();
         // Where all parts float, the first is where the others are seen from; its forces balance with the
         // whole's.
         let n_motions = number_motions(&mut responses, |i| {
@@ -112,11 +133,11 @@ impl VolumeModel {
             };
         };
         bodies.par_iter_mut().for_each(|body| body.move_by(&equilibrium));
-        let opening_mm = self.openings(plan, &responses, &equilibrium, &sections);
-        let (triangle_mpa, walls) = self.wall_stress(&bodies);
+        let opening_mm = self.openings(plan, &responses, &equilibrium, sections);
+        let (triangle_mpa, walls) = self.wall_stress(bodies);
         let connectors: Vec<Sample> = bodies
             .par_iter()
-            .flat_map_iter(|b| b.bar_samples(self, &sections))
+            .flat_map_iter(|b| b.bar_samples(self, sections))
             .collect();
         Ok(Ok(Loaded {
             lost: (0..)
@@ -243,6 +264,7 @@ fn imbalance(responses: &[Response], equilibrium: &Equilibrium, forces_n: &[Vec3
 
 /// One part with its connectors.
 pub(super) struct Body<'a> {
+    part: u32,
     /// Tetrahedra of its wall.
     tets: Vec<u32>,
     numbering: Numbering,
@@ -256,6 +278,8 @@ pub(super) struct Body<'a> {
     is_pinned: Vec<bool>,
     /// For each contact row, the unknowns that it acts on.
     rows: BTreeMap<u32, Vec<(u32, f64)>>,
+    /// What contact sees: minus the displacement along each row by each row's force and, last, by the load.
+    front: Front,
     /// Force on each unknown, N.
     load_n: Vec<f64>,
     /// Displacement of each unknown, but for a rigid motion where the part is free, mm.
@@ -266,15 +290,14 @@ pub(super) struct Body<'a> {
 type Entries = Vec<(u32, u32, f64)>;
 
 impl<'a> Body<'a> {
-    /// The part, and what contact sees of it; `loads_n` are the forces at the wall nodes.
+    /// The part, under no load.
     pub fn new(
         model: &'a VolumeModel,
         part: u32,
         plan: &[Meeting],
         sections: &Sections,
         bars: &'a [Bar],
-        loads_n: &[Vec3],
-    ) -> Result<(Self, Response), SparseError> {
+    ) -> Result<Self, SparseError> {
         let (order, material) = (model.params.order, &model.params.material);
         let n_points = model.part_of_point.len();
         let is_own =
@@ -298,16 +321,14 @@ impl<'a> Body<'a> {
         own.dedup();
         fronts.extend(model.wall_fronts(part, plan, labels));
         let n = numbering.n + own.len();
-        let mut load_n = vec![0.0; n];
-        for (node, first) in numbering.vertices.iter().zip(&numbering.first) {
-            let Some(first) = first else { continue };
-            load_n[*first as usize..][..3].copy_from_slice(&loads_n[*node as usize].to_array());
-        }
+        let load_n = vec![0.0; n];
         let kept = &model.parts[part as usize].kept;
         let rows = BTreeMap::new();
         let (is_pinned, moved_mm) = (vec![false; n], Vec::new());
         let stiffness = Cholesky::new(&SparseSymmetric::from_entries(0, Vec::new()))?;
         let mut body = Self {
+            part,
+            front: Front::default(),
             tets,
             numbering,
             bars,
@@ -327,15 +348,41 @@ impl<'a> Body<'a> {
         let is_pinned = &body.is_pinned;
         entries.retain(|(p, q, _)| p == q || !(is_pinned[*p as usize] || is_pinned[*q as usize]));
         body.stiffness = Cholesky::new(&SparseSymmetric::from_entries(n, entries))?;
-        let mut response = model.read(part, &body.front(), labels, plan, sections);
+        body.front = body.front();
+        Ok(body)
+    }
+
+    /// Puts the forces at the wall nodes on it: what contact sees of it.
+    pub fn load(
+        &mut self,
+        model: &VolumeModel,
+        plan: &[Meeting],
+        sections: &Sections,
+        loads_n: &[Vec3],
+    ) -> Response {
+        self.load_n.fill(0.0);
+        for (node, first) in self.numbering.vertices.iter().zip(&self.numbering.first) {
+            let Some(first) = first else { continue };
+            self.load_n[*first as usize..][..3].copy_from_slice(&loads_n[*node as usize].to_array());
+        }
+        let mut side = self.load_n.clone();
+        self.release_pins(&mut side);
+        self.stiffness.solve_in_place(&mut side);
+        // The load is the last row of the front.
+        let m = self.front.ids.len();
+        for (j, row) in self.rows.values().enumerate() {
+            let along: f64 = row.iter().map(|(of, value)| side[*of as usize] * value).sum();
+            self.front.values[m - 1 + m * j] = -along;
+        }
+        let mut response = model.read(self.part, &self.front, self.labels, plan, sections);
         response.rigid_load_n = [0.0; 6];
-        if let Some(rigid) = model.parts[part as usize].rigid {
-            for node in &body.numbering.vertices {
+        if let Some(rigid) = model.parts[self.part as usize].rigid {
+            for node in &self.numbering.vertices {
                 let modes = rigid.at(model.wall.nodes[*node as usize]);
                 (0..6).for_each(|m| response.rigid_load_n[m] += modes[m].dot(loads_n[*node as usize]));
             }
         }
-        Ok((body, response))
+        response
     }
 
     /// The unknown that a label means; none for contact rows and the load.
@@ -410,26 +457,21 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Minus the displacement along each row by each row's force and by the load, mm/N and mm.
+    /// Minus the displacement along each row by each row's force, mm/N; the load's row is empty.
     fn front(&self) -> Front {
         let n = self.load_n.len();
         let m = self.rows.len() + 1;
-        let mut sides = vec![0.0; n * m];
+        let mut sides = vec![0.0; n * (m - 1)];
         for (side, row) in sides.chunks_exact_mut(n.max(1)).zip(self.rows.values()) {
             row.iter().for_each(|(of, value)| side[*of as usize] += value);
+            self.release_pins(side);
         }
-        if let Some(last) = sides.chunks_exact_mut(n.max(1)).last() {
-            last.copy_from_slice(&self.load_n);
-        }
-        sides
-            .chunks_exact_mut(n.max(1))
-            .for_each(|side| self.release_pins(side));
         self.stiffness.solve_in_place(&mut sides);
         let mut values = vec![0.0; m * m];
         for (j, side) in sides.chunks_exact(n.max(1)).enumerate() {
-            for (i, row) in self.rows.values().enumerate() {
+            for (i, row) in self.rows.values().enumerate().skip(j) {
                 let along: f64 = row.iter().map(|(of, value)| side[*of as usize] * value).sum();
-                values[i.max(j) + m * i.min(j)] = -along;
+                values[i + m * j] = -along;
             }
         }
         Front {

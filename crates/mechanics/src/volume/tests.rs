@@ -750,7 +750,8 @@ fn a_clamped_part_yields_to_its_contacts_alike_for_plans_and_for_loads() {
     let loads_n = vec![Vec3::ZERO; model.wall.nodes.len()];
     for part in 0..2 {
         let condensed = model.response(part, false, &plan, &sections, &bars).unwrap();
-        let (_, sparse) = super::load::Body::new(&model, part, &plan, &sections, &bars, &loads_n).unwrap();
+        let mut body = super::load::Body::new(&model, part, &plan, &sections, &bars).unwrap();
+        let sparse = body.load(&model, &plan, &sections, &loads_n);
         assert_eq!(condensed.rows, sparse.rows);
         let n = condensed.rows.len();
         let largest = condensed.compliance.iter().copied().fold(0.0, f64::max);

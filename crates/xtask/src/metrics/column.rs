@@ -220,7 +220,8 @@ fn volume_model(subject: &Subject, youngs_modulus_mpa: f64) -> Result<VolumeMode
     VolumeModel::new(&params, &subject.model.assembly)
 }
 
-fn failed(metric: &str, problem: &dyn std::fmt::Display) -> Failure {
+/// A metric that could not be computed.
+pub fn failed(metric: &str, problem: &dyn std::fmt::Display) -> Failure {
     Failure::Metric {
         metric: metric.to_owned(),
         problem: problem.to_string(),

@@ -1,0 +1,158 @@
+//! Forces from outside: how far seams open, and how much pins are bent, under many loads on one plan.
+//!
+//! A load is a force on every point of the outer surface. What of them does not balance accelerates the whole
+//! as a rigid body, and the inertia of the walls bears it, spread by area (inertia relief). A part's answer to
+//! its own forces, if nothing joined it to others, is one solve with the factor that it has anyway; contacts
+//! then see a load as gaps that are there before they bear anything. Without a clearance contacts open in
+//! proportion to the load: a load twice as large opens twice as far.
+
+use nalgebra::{SMatrix, SVector};
+use shellock_geom::Vec3;
+use shellock_geom::sparse::SparseError;
+
+use super::parts::{N_MOTIONS, mid_wall};
+use super::solve::{Balance, Jointed, Load, openings};
+use super::SurfaceModel;
+use super::contact::{Contact, N_CONTACTS, TIP};
+use super::join::Fronts;
+use crate::assembly::Meeting;
+use crate::connector::{PIN_DEPTH, PIN_WIDTH};
+
+/// One load as the stations feel it before anything joins the parts.
+#[derive(Clone, Debug)]
+pub struct Drift(Load);
+
+/// What one load does to a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bearing {
+    /// Distance between the male and the female at each station, mm; 0 where there is no joint.
+    pub opening_mm: Vec<f64>,
+    /// The largest bending stress in the pin of each station, MPa; 0 where there is no joint.
+    pub pin_mpa: Vec<f64>,
+    /// Newton steps that it took.
+    pub n_iterations: usize,
+    /// What is left of the force, as a share of it.
+    pub error: f64,
+}
+
+/// Which contacts are closed under a load: where to begin with a plan that is nearly the same.
+#[derive(Clone, Debug, Default)]
+pub struct Closed(Vec<bool>);
+
+/// The parts joined by a plan. Plans that differ little are made of each other, and loads begin where those of
+/// another plan ended.
+#[derive(Clone)]
+pub struct JoinedParts<'a> {
+    jointed: Jointed<'a>,
+    fronts: Fronts,
+}
+
+impl JoinedParts<'_> {
+    /// The same parts joined by another plan; those whose seams it leaves alone are not computed again.
+    pub fn changed(&self, plan: &[Meeting]) -> Self {
+        Self {
+            jointed: self.jointed.changed(plan),
+            fronts: self.fronts.clone(),
+        }
+    }
+
+    /// What `load` does; `plan` is what they are joined by. The answer does not depend on `closed`, but for
+    /// rounding.
+    pub fn bear(
+        &mut self,
+        plan: &[Meeting],
+        load: &Drift,
+        closed: Option<&Closed>,
+    ) -> Result<(Bearing, Closed), SparseError> {
+        let balance = self.jointed.balance(&load.0, &mut self.fronts, closed.map(|c| &c.0[..]))?;
+        let bearing = self.jointed.model.bearing(plan, &self.jointed.contacts, &balance);
+        Ok((bearing, Closed(balance.borne.iter().map(|b| *b < 0.0).collect())))
+    }
+}
+
+impl SurfaceModel {
+    /// What `forces_n` on the points of the outer surface do; where nothing holds the parts, inertia bears
+    /// what of them does not balance.
+    ///
+    /// # Panics
+    /// Where there is not one force for each point.
+    pub fn drift(&self, forces_n: &[Vec3]) -> Drift {
+        let points = mid_wall(&self.params, &self.assembly);
+        assert_eq!(forces_n.len(), points.len(), "one force for each point");
+        let balanced_n = self.balanced(&points, forces_n);
+        let mut drift = vec![[0.0; N_MOTIONS]; self.assembly.stations.len()];
+        for part in &self.parts {
+            let own = part.drift(&points, &balanced_n);
+            for (s, own) in part.stations.iter().zip(own.chunks_exact(N_MOTIONS)) {
+                drift[*s as usize].iter_mut().zip(own).for_each(|(d, o)| *d += o);
+            }
+        }
+        Drift(Load {
+            sent: vec![[0.0; N_MOTIONS]; drift.len()],
+            drift,
+            scale_n: forces_n.iter().map(|f| f.length()).sum(),
+        })
+    }
+
+    /// What each of `loads` does to the parts joined by `plan`; nothing but the model's held points is held.
+    pub fn bear(&self, plan: &[Meeting], loads: &[Drift]) -> Result<Vec<Bearing>, SparseError> {
+        let mut joined = self.joined(plan);
+        loads.iter().map(|load| joined.bear(plan, load, None).map(|found| found.0)).collect()
+    }
+
+    /// The parts joined by `plan`, ready for loads.
+    pub fn joined(&self, plan: &[Meeting]) -> JoinedParts<'_> {
+        JoinedParts {
+            jointed: Jointed::new(self, &self.free, plan),
+            fronts: Fronts::default(),
+        }
+    }
+
+    fn bearing(&self, plan: &[Meeting], contacts: &[Contact], balance: &Balance) -> Bearing {
+        let mut pin_mpa = vec![0.0_f64; plan.len()];
+        let own = contacts.chunks_exact(N_CONTACTS).zip(balance.borne.chunks_exact(N_CONTACTS));
+        for (contacts, borne) in own {
+            let i = contacts[TIP].station;
+            let Some(joint) = plan[i].joint else { continue };
+            let length_mm = self.assembly.stations[i].length_mm;
+            let root = self.params.contact_n_mm(joint.size_mm, length_mm).sqrt();
+            let (depth, thickness) = (PIN_DEPTH * joint.size_mm, PIN_WIDTH * joint.size_mm);
+            pin_mpa[i] = 6.0 * (root * borne[TIP]).abs() / length_mm * depth / thickness.powi(2);
+        }
+        Bearing {
+            opening_mm: openings(self, plan, &balance.moved),
+            pin_mpa,
+            n_iterations: balance.n_iterations,
+            error: balance.error,
+        }
+    }
+
+    /// The forces, with the walls' inertia where nothing holds the parts.
+    fn balanced(&self, points: &[Vec3], forces_n: &[Vec3]) -> Vec<Vec3> {
+        let mut balanced_n = forces_n.to_vec();
+        if self.is_held {
+            return balanced_n;
+        }
+        let areas_mm2 = self.assembly.point_areas_mm2();
+        let total: f64 = areas_mm2.iter().sum();
+        let center = points.iter().zip(&areas_mm2).map(|(p, a)| *a * *p).sum::<Vec3>() / total;
+        let modes = |p: Vec3| -> [Vec3; 6] {
+            let arm = p - center;
+            std::array::from_fn(|j| if j < 3 { Vec3::AXES[j] } else { Vec3::AXES[j - 3].cross(arm) })
+        };
+        let (mut inertia, mut work) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
+        for ((p, area), f) in points.iter().zip(&areas_mm2).zip(forces_n) {
+            let modes = modes(*p);
+            for a in 0..6 {
+                work[a] += modes[a].dot(*f);
+                (0..6).for_each(|b| inertia[(a, b)] += area * modes[a].dot(modes[b]));
+            }
+        }
+        let acceleration = inertia.cholesky().map_or(SVector::zeros(), |c| c.solve(&work));
+        for ((p, area), f) in points.iter().zip(&areas_mm2).zip(&mut balanced_n) {
+            let modes = modes(*p);
+            (0..6).for_each(|a| *f -= acceleration[a] * *area * modes[a]);
+        }
+        balanced_n
+    }
+}

@@ -1,0 +1,178 @@
+//! What random plans of a model bear by the surface model and by the solid one, load by load.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use rayon::prelude::*;
+use shellock::handling::{Deed, Failure as Way, Handling, LoadCase, OPEN_SIZES, borne, load_cases};
+use shellock_mechanics::{Drift, Meeting, VolumeModel};
+
+use crate::failure::Failure;
+use crate::metrics::{Subject, SubjectOptions, subject};
+use crate::statistics::spearman;
+use crate::study::write_all;
+use crate::table::{Table, markdown};
+
+/// Which plans of which model.
+#[derive(Args)]
+pub struct LoadsOptions {
+    #[command(flatten)]
+    subject: SubjectOptions,
+    /// Compare with the solid model, which takes some seconds a plan and load
+    #[arg(long)]
+    solid: bool,
+    /// The first so many loads only
+    #[arg(long)]
+    loads: Option<usize>,
+}
+
+/// Load factors of all plans under one load.
+struct Row {
+    case: LoadCase,
+    surface: Vec<f64>,
+    /// The stations that decide.
+    stations: Vec<Option<(Way, u32)>>,
+    /// Not a number where the solid model was not asked.
+    solid: Vec<f64>,
+}
+
+/// Runs the study; returns the files written.
+pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>, Failure> {
+    let subject = subject(&options.subject)?;
+    let params = subject.model.params;
+    let up = options.subject.model.params().up;
+    let handling = Handling::new(up, params.wall_mm, params.material);
+    let mut cases = load_cases(&handling, &subject.model.assembly);
+    cases.truncate(options.loads.unwrap_or(usize::MAX));
+    let mut rows = by_surface(&subject, &cases)?;
+    if options.solid {
+        by_solid(&subject, &mut rows)?;
+    }
+    for r in &rows {
+        let best = (0..r.surface.len()).max_by(|a, b| r.surface[*a].total_cmp(&r.surface[*b])).unwrap();
+        let st = r.stations[best].map(|s| (s.0, subject.model.pieces_at(s.1 as usize), subject.model.place_of(s.1 as usize)));
+        let net: shellock_geom::Vec3 = r.case.forces_n.iter().sum();
+        let tq: shellock_geom::Vec3 = r.case.forces_n.iter().zip(&subject.model.assembly.points).map(|(f, p)| (*p - r.case.at).cross(*f)).sum();
+        eprintln!("{:?} at {:.0} net {:.1} torque {:.0} best {:.3} {:?}", r.case.deed, r.case.at, net.length(), tq.length(), r.surface[best], st);
+    }
+    let b = subject.model.assembly.points.iter().fold((shellock_geom::Vec3::splat(1e9), shellock_geom::Vec3::splat(-1e9)), |b, p| (b.0.min(*p), b.1.max(*p)));
+    eprintln!("{:.0} {:.0}", b.0, b.1);
+    let name = options.subject.model.name();
+    let least = |of: fn(&Row) -> &Vec<f64>| -> Vec<f64> {
+        let plan = |i: usize| rows.iter().map(|r| of(r)[i]).fold(f64::INFINITY, f64::min);
+        (0..subject.plans.len()).map(plan).collect()
+    };
+    let mut table: Vec<Vec<String>> = rows.iter().map(said).collect();
+    let (surface, solid) = (least(|r| &r.surface), least(|r| &r.solid));
+    table.push(line("least of all", &surface, &solid));
+    let head = ["load", "factor: least", "median", "largest", "solid, median", "ρ with solid"];
+    let columns = rows
+        .iter()
+        .flat_map(|r| [(format!("{} surface", deed(&r.case.deed)), r.surface.clone()), (format!("{} solid", deed(&r.case.deed)), r.solid.clone())])
+        .collect();
+    let sheets = [
+        ("loads.md".to_owned(), markdown(&head, &table)),
+        ("loads.csv".to_owned(), Table { columns }.to_csv()),
+    ];
+    write_all(out, &format!("{name}/loads"), &sheets)
+}
+
+fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure> {
+    let failed = |e| crate::metrics::failed("surface", &e);
+    let start = Instant::now();
+    let model = subject.model.surface_model().map_err(failed)?;
+    let drifts: Vec<Drift> = cases.par_iter().map(|case| model.drift(&case.forces_n)).collect();
+    eprintln!("{} loads, {} stations, ready after {:.2} s", cases.len(), model.n_rows() / 8, start.elapsed().as_secs_f64());
+    let start = Instant::now();
+    let strength_mpa = subject.model.params.material.strength_mpa;
+    let all = subject
+        .meetings
+        .par_iter()
+        .map(|plan| model.bear(plan, &drifts))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(failed)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let steps: usize = all.iter().flatten().map(|b| b.n_iterations).sum();
+    let worst = all.iter().flatten().map(|b| b.error).fold(0.0, f64::max);
+    let n = (all.len() * cases.len()).max(1) as f64;
+    eprintln!("{:.2} ms a plan and load, {:.1} steps, error {worst:.1e}", 1e3 * seconds / n, steps as f64 / n);
+    let row = |(i, case): (usize, &LoadCase)| {
+        let of = |(plan, bearings): (&Vec<Meeting>, &Vec<_>)| borne(plan, &bearings[i], strength_mpa);
+        let found: Vec<_> = subject.meetings.iter().zip(&all).map(of).collect();
+        Row {
+            case: case.clone(),
+            surface: found.iter().map(|b| b.factor).collect(),
+            stations: found.iter().map(|b| b.first).collect(),
+            solid: vec![f64::NAN; found.len()],
+        }
+    };
+    Ok(cases.iter().enumerate().map(row).collect())
+}
+
+fn by_solid(subject: &Subject, rows: &mut [Row]) -> Result<(), Failure> {
+    let failed = |e| crate::metrics::failed("volume", &e);
+    let model = subject.model.volume_model().map_err(failed)?;
+    let forces: Vec<_> = rows.iter().map(|r| r.case.forces_n.clone()).collect();
+    let start = Instant::now();
+    let all: Vec<Vec<f64>> = subject
+        .meetings
+        .par_iter()
+        .map(|plan| factors(&model, plan, &forces))
+        .collect::<Result<_, _>>()
+        .map_err(failed)?;
+    let n = (all.len() * rows.len()).max(1) as f64;
+    eprintln!("solid: {:.2} s a plan and load", start.elapsed().as_secs_f64() / n);
+    for (i, row) in rows.iter_mut().enumerate() {
+        row.solid = all.iter().map(|plan| plan[i]).collect();
+    }
+    Ok(())
+}
+
+/// By how many times each load may grow until a seam opens too far, by the solid model.
+fn factors(model: &VolumeModel, plan: &[Meeting], forces: &[Vec<shellock_geom::Vec3>]) -> Result<Vec<f64>, shellock_mechanics::VolumeError> {
+    let factor = |opening_mm: &[f64]| {
+        let of = |(m, d): (&Meeting, &f64)| m.joint.map_or(f64::INFINITY, |j| OPEN_SIZES * j.size_mm / d);
+        plan.iter().zip(opening_mm).map(of).fold(f64::INFINITY, f64::min)
+    };
+    let all = model.under_loads(plan, forces)?;
+    Ok(all.iter().map(|loaded| loaded.as_ref().map_or(0.0, |l| factor(&l.opening_mm))).collect())
+}
+
+fn said(row: &Row) -> Vec<String> {
+    let yields = row.stations.iter().flatten().filter(|s| s.0 == Way::PinYields).count();
+    let mut cells = line(&deed(&row.case.deed), &row.surface, &row.solid);
+    if yields > 0 {
+        cells[0] += &format!(" (pins in {yields})");
+    }
+    cells
+}
+
+fn line(name: &str, surface: &[f64], solid: &[f64]) -> Vec<String> {
+    let [least, median, largest] = quantiles(surface);
+    let rho = spearman(solid, surface).map_or("–".to_owned(), |r| format!("{r:.3}"));
+    let say = |x: f64| format!("{x:.2}");
+    vec![name.to_owned(), say(least), say(median), say(largest), say(quantiles(solid)[1]), rho]
+}
+
+fn quantiles(values: &[f64]) -> [f64; 3] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| sorted.get((share * (sorted.len().max(1) - 1) as f64) as usize).copied().unwrap_or(f64::NAN);
+    [at(0.0), at(0.5), at(1.0)]
+}
+
+/// In words.
+fn deed(deed: &Deed) -> String {
+    let way = |d: &[f64; 3]| format!("{:.1} {:.1} {:.1}", d[0], d[1], d[2]);
+    match deed {
+        Deed::PressTop => "press, top".into(),
+        Deed::PressMiddle => "press, middle".into(),
+        Deed::PressSide { toward } => format!("press, side {}", way(toward)),
+        Deed::GripNarrow => "grip, narrowest".into(),
+        Deed::GripWide => "grip, widest".into(),
+        Deed::FallUpright => "fall upright".into(),
+        Deed::Fall { down } => format!("fall {}", way(down)),
+        Deed::Hang { piece } => format!("hangs by {piece}"),
+    }
+}
