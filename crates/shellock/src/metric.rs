@@ -6,6 +6,7 @@
 //! separation force of 10 N/m; higher is better.
 
 mod choice;
+mod climb;
 mod data_driven;
 mod foreseen;
 mod model;
@@ -13,6 +14,7 @@ mod model;
 mod tests;
 
 pub use choice::{ChoiceError, Holding, LoosePiece, SeamHolding, choose};
+pub use climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
 pub use data_driven::{data_driven, pieces_alone};
 pub use foreseen::{Foreseen, foreseen};
 pub use model::{MetricParams, PlanModel};

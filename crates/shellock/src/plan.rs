@@ -19,6 +19,7 @@ pub mod interface;
 pub mod key;
 pub mod local_cost;
 pub mod local_tests;
+mod neighbours;
 pub mod occlusion;
 mod params;
 mod piece_set;
@@ -34,6 +35,7 @@ mod survey;
 pub mod types;
 
 pub use local_cost::{PieceCosts, SeamCosts};
+pub use neighbours::{Neighbourhood, PlanName};
 pub use params::PlanParams;
 pub use piece_set::PieceSet;
 pub use sample::random_plans;

@@ -22,6 +22,12 @@ pub struct LoadsOptions {
     /// Compare with the solid model, which takes some seconds a plan and load
     #[arg(long)]
     solid: bool,
+    /// Climb from the search's plans with so many loads solved
+    #[arg(long)]
+    climb: Option<usize>,
+    /// Cost that plans may have, over the least
+    #[arg(long, default_value_t = 1.25)]
+    slack: f64,
     /// The first so many loads only
     #[arg(long)]
     loads: Option<usize>,
@@ -58,6 +64,9 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
     }
     let b = subject.model.assembly.points.iter().fold((shellock_geom::Vec3::splat(1e9), shellock_geom::Vec3::splat(-1e9)), |b, p| (b.0.min(*p), b.1.max(*p)));
     eprintln!("{:.0} {:.0}", b.0, b.1);
+    if let Some(n_solves) = options.climb {
+        climbed(&subject, options, &handling, n_solves)?;
+    }
     let name = options.subject.model.name();
     let least = |of: fn(&Row) -> &Vec<f64>| -> Vec<f64> {
         let plan = |i: usize| rows.iter().map(|r| of(r)[i]).fold(f64::INFINITY, f64::min);
@@ -76,6 +85,28 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
         ("loads.csv".to_owned(), Table { columns }.to_csv()),
     ];
     write_all(out, &format!("{name}/loads"), &sheets)
+}
+
+fn climbed(subject: &Subject, options: &LoadsOptions, handling: &Handling, n_solves: usize) -> Result<(), Failure> {
+    use shellock::metric::{Bench, ClimbParams, climb};
+    use shellock::plan::{Neighbourhood, PlanConstraints, PlanOutcome, search};
+    let params = shellock::design::Settings::resolve(&options.subject.model.params()).plan;
+    let constraints = PlanConstraints::default();
+    let ctx = shellock::Ctx::quiet();
+    let PlanOutcome::Found(found) = search(&ctx, &params, &subject.survey, &constraints).unwrap() else { panic!() };
+    let counted = found.counted(&subject.survey);
+    let around = Neighbourhood::new(&params, &counted, &constraints, &found, found.score.worst * options.slack);
+    let bench = Bench::new(handling, &subject.model).unwrap();
+    for n_starts in [1, 3] {
+    let start = Instant::now();
+    let first = bench.rated(found.pool[0].clone()).unwrap();
+    let top = climb(&ctx, ClimbParams { n_solves, n_starts }, &bench, &around, &found.pool, &|_| true).unwrap();
+    eprintln!("pool {} first least {:.3} climbed {:.3}; {} plans, {} solves, {:.2} s; cost {:.3} of {:.3}", found.pool.len(), first.least(), top.best.least(), top.n_plans, top.n_solves, start.elapsed().as_secs_f64(), top.best.ranked.score.worst, found.score.worst);
+    for (case, borne) in bench.cases.iter().zip(&top.best.borne).take(14) {
+        eprintln!("   {} {:.2} {:?}", deed(&case.deed), borne.factor, borne.first);
+    }
+    }
+    Ok(())
 }
 
 fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure> {

@@ -1,13 +1,16 @@
-//! The forces in closed contacts: bodies are joined two at a time.
+//! The forces in contacts: bodies are joined two at a time.
 //!
 //! ```text
 //!   (W₁ + W₂ + … + 1) μ = b      Wᵢ: how contacts give way because body i does; a contact is between two bodies, so when
 //!                                they are joined its row is complete: it is eliminated, and the two have become one
 //! ```
 //!
-//! Fronts are small and dense, and hold the closed contacts alone.
+//! Contacts that bear both ways are eliminated once for a plan, whatever loads there are. Those that only push
+//! are kept to the end: what is left is how they give way under each other, a small dense matrix.
 
 use shellock_geom::sparse::{SparseError, eliminate_leading};
+
+use super::contact::Law;
 
 /// What a place of a front costs besides the elimination, for clearing and adding up, in multiplications.
 const COST_OF_PLACE: usize = 30;
@@ -33,8 +36,7 @@ struct Joining {
     kept: Vec<u32>,
 }
 
-/// The closed contacts of a joining, ascending, and their matrix: the lower triangle by columns, with the
-/// right-hand side as the last row.
+/// The contacts of a joining and their matrix, the lower triangle by columns; the first ones are eliminated.
 #[derive(Clone, Debug, Default)]
 struct Front {
     contacts: Vec<u32>,
@@ -48,12 +50,14 @@ pub(super) struct Joinings {
     joinings: Vec<Joining>,
 }
 
-/// The memory that joinings need.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Fronts {
+/// What is left when the contacts that bear both ways are eliminated.
+#[derive(Debug)]
+pub(super) struct Reduced {
     fronts: Vec<Front>,
-    /// Place of each contact in the front at hand.
-    place: Vec<usize>,
+    /// The contacts that only push, ascending.
+    pub pushes: Vec<u32>,
+    /// How each of them opens under forces in the others, by columns; symmetric.
+    pub compliance: Vec<f64>,
 }
 
 impl Joinings {
@@ -122,40 +126,83 @@ impl Joinings {
         self
     }
 
-    /// The solution for the contacts that are closed, 0 for the others.
-    pub fn solve(
-        &self,
-        Fronts { fronts, place }: &mut Fronts,
-        bodies: &[impl AsRef<Body>],
-        is_closed: &[bool],
-        side: &[f64],
-    ) -> Result<Vec<f64>, SparseError> {
-        fronts.resize_with(self.joinings.len(), Front::default);
-        place.resize(side.len(), 0);
-        for (i, joining) in self.joinings.iter().enumerate() {
-            let (done, rest) = fronts.split_at_mut(i);
-            let front = &mut rest[0];
-            front.gather(joining, is_closed, side);
-            front
-                .contacts
-                .iter()
-                .enumerate()
-                .for_each(|(i, &c)| place[c as usize] = i);
-            joining
-                .bodies
-                .iter()
-                .for_each(|b| front.add_body(bodies[*b].as_ref(), is_closed, place));
-            joining
-                .joined
-                .iter()
-                .for_each(|j| front.add_joint(&done[*j], place));
+    /// Joins all bodies.
+    pub fn reduce(&self, bodies: &[impl AsRef<Body>], laws: &[Law]) -> Result<Reduced, SparseError> {
+        let mut fronts: Vec<Front> = Vec::with_capacity(self.joinings.len());
+        let mut place = vec![0; laws.len()];
+        let mut is_root = vec![true; self.joinings.len()];
+        for joining in &self.joinings {
+            let mut front = Front::of(joining, bodies, &fronts, laws);
+            (0..).zip(&front.contacts).for_each(|(i, c)| place[*c as usize] = i);
+            for b in &joining.bodies {
+                front.add_body(bodies[*b].as_ref(), laws, &place);
+            }
+            for j in &joining.joined {
+                is_root[*j] = false;
+                front.add_joint(&fronts[*j], &place);
+            }
             if front.n_eliminated > 0 {
-                eliminate_leading(&mut front.values, front.contacts.len() + 1, front.n_eliminated)?;
+                eliminate_leading(&mut front.values, front.contacts.len(), front.n_eliminated)?;
+            }
+            fronts.push(front);
+        }
+        let pushes: Vec<u32> = (0..laws.len() as u32).filter(|c| laws[*c as usize] == Law::Push).collect();
+        (0..).zip(&pushes).for_each(|(i, c)| place[*c as usize] = i);
+        let n = pushes.len();
+        let mut compliance = vec![0.0; n * n];
+        for root in fronts.iter().zip(is_root).filter(|(_, is)| *is).map(|(f, _)| f) {
+            let (m, first) = (root.contacts.len(), root.n_eliminated);
+            for j in first..m {
+                let column = place[root.contacts[j] as usize];
+                for i in j..m {
+                    let (row, value) = (place[root.contacts[i] as usize], root.values[m * j + i]);
+                    compliance[n * column + row] += value;
+                    if i > j {
+                        compliance[n * row + column] += value;
+                    }
+                }
             }
         }
-        let mut solution = vec![0.0; side.len()];
-        fronts.iter().rev().for_each(|f| f.substitute(&mut solution));
-        Ok(solution)
+        Ok(Reduced {
+            fronts,
+            pushes,
+            compliance,
+        })
+    }
+}
+
+impl Reduced {
+    /// Of the gaps of all contacts, those of the pushing ones when the others have closed theirs; what the
+    /// others need for [`finish`](Self::finish) takes the place of their own.
+    pub fn begin(&self, gaps: &mut [f64]) {
+        for front in &self.fronts {
+            let n = front.contacts.len();
+            for i in 0..front.n_eliminated {
+                let column = &front.values[n * i..n * (i + 1)];
+                let at = front.contacts[i] as usize;
+                gaps[at] /= column[i];
+                let own = gaps[at];
+                for (c, l) in front.contacts[i + 1..].iter().zip(&column[i + 1..]) {
+                    gaps[*c as usize] -= l * own;
+                }
+            }
+        }
+    }
+
+    /// From what [`begin`](Self::begin) left, and with what the pushing contacts bear in their places: what
+    /// all bear.
+    pub fn finish(&self, borne: &mut [f64]) {
+        for front in self.fronts.iter().rev() {
+            let n = front.contacts.len();
+            for i in (0..front.n_eliminated).rev() {
+                let column = &front.values[n * i..n * (i + 1)];
+                let known: f64 = (front.contacts[i + 1..].iter().zip(&column[i + 1..]))
+                    .map(|(c, l)| l * borne[*c as usize])
+                    .sum();
+                let at = front.contacts[i] as usize;
+                borne[at] = (borne[at] - known) / column[i];
+            }
+        }
     }
 }
 
@@ -202,70 +249,58 @@ impl Joining {
 }
 
 impl Front {
-    /// Empties the front and takes the closed contacts of `joining`, with the 1 and the right-hand side of
-    /// those that it eliminates.
-    fn gather(&mut self, joining: &Joining, is_closed: &[bool], side: &[f64]) {
-        let closed = |of: &[u32]| {
-            of.iter()
-                .copied()
-                .filter(|&c| is_closed[c as usize])
-                .collect::<Vec<u32>>()
+    /// With places for what is eliminated, for what waits for other bodies, and for all that pushes; empty
+    /// but for the 1 of what is eliminated.
+    fn of(joining: &Joining, bodies: &[impl AsRef<Body>], done: &[Self], laws: &[Law]) -> Self {
+        let both = |of: &[u32]| {
+            let is = |c: &u32| laws[*c as usize] == Law::Both;
+            of.iter().copied().filter(is).collect::<Vec<u32>>()
         };
-        self.contacts = closed(&joining.eliminated);
-        self.n_eliminated = self.contacts.len();
-        self.contacts.extend(closed(&joining.kept));
-        let n = self.contacts.len();
-        self.values.clear();
-        self.values.resize((n + 1) * (n + 1), 0.0);
-        for (i, &c) in self.contacts[..self.n_eliminated].iter().enumerate() {
-            self.values[(n + 1) * i + i] = 1.0;
-            self.values[(n + 1) * i + n] = side[c as usize];
+        let mut contacts = both(&joining.eliminated);
+        let n_eliminated = contacts.len();
+        contacts.extend(both(&joining.kept));
+        let own = joining.bodies.iter().flat_map(|b| &bodies[*b].as_ref().contacts);
+        let joined = joining.joined.iter().flat_map(|j| &done[*j].contacts);
+        let mut pushes: Vec<u32> = own.chain(joined).copied().filter(|c| laws[*c as usize] == Law::Push).collect();
+        pushes.sort_unstable();
+        pushes.dedup();
+        contacts.extend(pushes);
+        let n = contacts.len();
+        let mut values = vec![0.0; n * n];
+        (0..n_eliminated).for_each(|i| values[n * i + i] = 1.0);
+        Self {
+            contacts,
+            n_eliminated,
+            values,
         }
     }
 
-    fn add_body(&mut self, body: &Body, is_closed: &[bool], place: &[usize]) {
-        let (n, m) = (self.contacts.len() + 1, body.contacts.len());
-        let closed: Vec<(usize, usize)> = (body.contacts.iter().enumerate())
-            .filter(|(_, c)| is_closed[**c as usize])
+    fn add(&mut self, row: usize, column: usize, value: f64) {
+        self.values[self.contacts.len() * row.min(column) + row.max(column)] += value;
+    }
+
+    fn add_body(&mut self, body: &Body, laws: &[Law], place: &[usize]) {
+        let m = body.contacts.len();
+        let there: Vec<(usize, usize)> = (body.contacts.iter().enumerate())
+            .filter(|(_, c)| laws[**c as usize] != Law::Absent)
             .map(|(i, c)| (i, place[*c as usize]))
             .collect();
-        for (j, &(from, column)) in closed.iter().enumerate() {
+        for (j, &(from, column)) in there.iter().enumerate() {
             let source = &body.compliance[m * from..m * (from + 1)];
-            let target = &mut self.values[n * column..n * (column + 1)];
-            closed[j..].iter().for_each(|&(i, row)| target[row] += source[i]);
+            for &(i, row) in &there[j..] {
+                self.add(row, column, source[i]);
+            }
         }
     }
 
     fn add_joint(&mut self, joint: &Self, place: &[usize]) {
-        let (n, m, first) = (
-            self.contacts.len() + 1,
-            joint.contacts.len() + 1,
-            joint.n_eliminated,
-        );
-        let mut rows: Vec<usize> = joint.contacts[first..]
-            .iter()
-            .map(|c| place[*c as usize])
-            .collect();
-        rows.push(n - 1);
-        for (j, &column) in rows[..rows.len() - 1].iter().enumerate() {
+        let (m, first) = (joint.contacts.len(), joint.n_eliminated);
+        let rows: Vec<usize> = joint.contacts[first..].iter().map(|c| place[*c as usize]).collect();
+        for (j, &column) in rows.iter().enumerate() {
             let source = &joint.values[m * (first + j) + first + j..m * (first + j + 1)];
-            let target = &mut self.values[n * column..n * (column + 1)];
-            rows[j..]
-                .iter()
-                .zip(source)
-                .for_each(|(row, value)| target[*row] += value);
-        }
-    }
-
-    /// Solves for the eliminated contacts; those kept are solved already.
-    fn substitute(&self, solution: &mut [f64]) {
-        let n = self.contacts.len();
-        let mut x: Vec<f64> = self.contacts.iter().map(|c| solution[*c as usize]).collect();
-        for i in (0..self.n_eliminated).rev() {
-            let column = &self.values[(n + 1) * i..(n + 1) * (i + 1)];
-            let known: f64 = column[i + 1..n].iter().zip(&x[i + 1..]).map(|(l, x)| l * x).sum();
-            x[i] = (column[n] - known) / column[i];
-            solution[self.contacts[i] as usize] = x[i];
+            for (row, value) in rows[j..].iter().zip(source) {
+                self.add(*row, column, *value);
+            }
         }
     }
 }
@@ -294,10 +329,9 @@ mod tests {
     }
 
     #[test]
-    fn joined_bodies_bear_what_the_whole_system_does_whatever_is_closed() {
+    fn joined_bodies_bear_what_the_whole_system_does_whatever_is_eliminated_first() {
         let (touched, n) = ring();
         let (joinings, order) = Joinings::new(touched.clone(), n as usize);
-        let mut fronts = Fronts::default();
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, (0..n).collect::<Vec<_>>());
@@ -314,22 +348,26 @@ mod tests {
             .collect();
         let side: Vec<f64> = (0..n as usize).map(|i| wave(i, 2)).collect();
         for modulus in [1, 2, 3, 100] {
-            let is_closed: Vec<bool> = (0..n).map(|i| i % modulus == 0).collect();
-            let found = joinings.solve(&mut fronts, &bodies, &is_closed, &side).unwrap();
+            let law = |i| if i % modulus == 0 { Law::Both } else { Law::Push };
+            let laws: Vec<Law> = (0..n).map(law).collect();
+            let reduced = joinings.reduce(&bodies, &laws).unwrap();
+            let mut found = side.clone();
+            reduced.begin(&mut found);
+            let m = reduced.pushes.len();
+            let pushing = DMatrix::from_column_slice(m, m, &reduced.compliance) + DMatrix::identity(m, m);
+            let gaps = DVector::from_fn(m, |i, _| found[reduced.pushes[i] as usize]);
+            let pressed = pushing.cholesky().unwrap().solve(&gaps);
+            (0..m).for_each(|i| found[reduced.pushes[i] as usize] = pressed[i]);
+            reduced.finish(&mut found);
             let mut whole = DMatrix::<f64>::identity(n as usize, n as usize);
             for body in &bodies {
                 let m = body.contacts.len();
                 for (k, value) in body.compliance.iter().enumerate() {
                     let [row, column] = [k % m, k / m].map(|i| body.contacts[i] as usize);
-                    whole[(row, column)] += if is_closed[row] && is_closed[column] {
-                        *value
-                    } else {
-                        0.0
-                    };
+                    whole[(row, column)] += *value;
                 }
             }
-            let masked = DVector::from_fn(n as usize, |i, _| if is_closed[i] { side[i] } else { 0.0 });
-            let expected = whole.cholesky().unwrap().solve(&masked);
+            let expected = whole.cholesky().unwrap().solve(&DVector::from_vec(side.clone()));
             assert!((expected - DVector::from_vec(found)).amax() < 1e-12);
         }
     }

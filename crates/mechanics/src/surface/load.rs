@@ -14,7 +14,6 @@ use super::parts::{N_MOTIONS, mid_wall};
 use super::solve::{Balance, Jointed, Load, openings};
 use super::SurfaceModel;
 use super::contact::{Contact, N_CONTACTS, TIP};
-use super::join::Fronts;
 use crate::assembly::Meeting;
 use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 
@@ -42,30 +41,24 @@ pub struct Closed(Vec<bool>);
 /// The parts joined by a plan. Plans that differ little are made of each other, and loads begin where those of
 /// another plan ended.
 #[derive(Clone)]
-pub struct JoinedParts<'a> {
-    jointed: Jointed<'a>,
-    fronts: Fronts,
-}
+pub struct JoinedParts<'a>(Jointed<'a>);
 
 impl JoinedParts<'_> {
     /// The same parts joined by another plan; those whose seams it leaves alone are not computed again.
-    pub fn changed(&self, plan: &[Meeting]) -> Self {
-        Self {
-            jointed: self.jointed.changed(plan),
-            fronts: self.fronts.clone(),
-        }
+    pub fn changed(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
+        self.0.changed(plan).map(Self)
     }
 
     /// What `load` does; `plan` is what they are joined by. The answer does not depend on `closed`, but for
     /// rounding.
     pub fn bear(
-        &mut self,
+        &self,
         plan: &[Meeting],
         load: &Drift,
         closed: Option<&Closed>,
     ) -> Result<(Bearing, Closed), SparseError> {
-        let balance = self.jointed.balance(&load.0, &mut self.fronts, closed.map(|c| &c.0[..]))?;
-        let bearing = self.jointed.model.bearing(plan, &self.jointed.contacts, &balance);
+        let balance = self.0.balance(&load.0, closed.map(|c| &c.0[..]))?;
+        let bearing = self.0.model.bearing(plan, &self.0.contacts, &balance);
         Ok((bearing, Closed(balance.borne.iter().map(|b| *b < 0.0).collect())))
     }
 }
@@ -96,16 +89,13 @@ impl SurfaceModel {
 
     /// What each of `loads` does to the parts joined by `plan`; nothing but the model's held points is held.
     pub fn bear(&self, plan: &[Meeting], loads: &[Drift]) -> Result<Vec<Bearing>, SparseError> {
-        let mut joined = self.joined(plan);
+        let joined = self.joined(plan)?;
         loads.iter().map(|load| joined.bear(plan, load, None).map(|found| found.0)).collect()
     }
 
     /// The parts joined by `plan`, ready for loads.
-    pub fn joined(&self, plan: &[Meeting]) -> JoinedParts<'_> {
-        JoinedParts {
-            jointed: Jointed::new(self, &self.free, plan),
-            fronts: Fronts::default(),
-        }
+    pub fn joined(&self, plan: &[Meeting]) -> Result<JoinedParts<'_>, SparseError> {
+        Jointed::new(self, &self.free, plan).map(JoinedParts)
     }
 
     fn bearing(&self, plan: &[Meeting], contacts: &[Contact], balance: &Balance) -> Bearing {

@@ -8,10 +8,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use shellock_geom::Vec3;
-use shellock_geom::sparse::SparseError;
+use shellock_geom::sparse::{SparseError, eliminate_leading};
 
 use super::contact::{Contact, Law, N_CONTACTS, contacts_at, forces, gap};
-use super::join::{Body, Fronts, Joinings};
+use super::join::{Body, Joinings, Reduced};
 use super::parts::{Motions, N_MOTIONS, Part};
 use super::{SurfaceModel, SurfaceParams, SurfaceSolution};
 use crate::assembly::{Meeting, Opening, Side, Station};
@@ -31,7 +31,7 @@ pub(super) fn solve(
 ) -> Result<SurfaceSolution, SparseError> {
     let layout = model.layout(is_held);
     let load = Load::of_pulls(model, plan, pulls);
-    let balance = Jointed::new(model, &layout, plan).balance(&load, &mut Fronts::default(), None)?;
+    let balance = Jointed::new(model, &layout, plan)?.balance(&load, None)?;
     let opening = Opening::rated(plan, openings(model, plan, &balance.moved));
     let part_of = |p: u32| model.assembly.part_of_point[p as usize];
     let is_free = |part: &u32| !is_held.get(*part as usize).is_some_and(|h| *h);
@@ -109,6 +109,7 @@ pub(super) struct Jointed<'a> {
     /// In the order in which they are eliminated.
     pub contacts: Vec<Contact>,
     bodies: Vec<Arc<Body>>,
+    reduced: Arc<Reduced>,
 }
 
 /// The state of least energy under a load.
@@ -125,21 +126,16 @@ pub(super) struct Balance {
 }
 
 impl<'a> Jointed<'a> {
-    pub fn new(model: &'a SurfaceModel, layout: &'a Layout, plan: &[Meeting]) -> Self {
+    pub fn new(model: &'a SurfaceModel, layout: &'a Layout, plan: &[Meeting]) -> Result<Self, SparseError> {
         let contacts = contacts(model, layout, plan);
         let bodies = (layout.touched.iter())
             .map(|t| Arc::new(body(model, layout, t, &contacts)))
             .collect();
-        Self {
-            model,
-            layout,
-            contacts,
-            bodies,
-        }
+        Self::of(model, layout, contacts, bodies)
     }
 
     /// Another plan: parts whose contacts are the same are not computed again.
-    pub fn changed(&self, plan: &[Meeting]) -> Self {
+    pub fn changed(&self, plan: &[Meeting]) -> Result<Self, SparseError> {
         let contacts = contacts(self.model, self.layout, plan);
         let is_same = |s: &u32| {
             let own = own_contacts(self.layout, *s);
@@ -152,58 +148,69 @@ impl<'a> Jointed<'a> {
                 Arc::new(body(self.model, self.layout, t, &contacts))
             }
         };
-        Self {
-            bodies: self.layout.touched.iter().zip(&self.bodies).map(again).collect(),
+        let bodies = self.layout.touched.iter().zip(&self.bodies).map(again).collect();
+        Self::of(self.model, self.layout, contacts, bodies)
+    }
+
+    fn of(
+        model: &'a SurfaceModel,
+        layout: &'a Layout,
+        contacts: Vec<Contact>,
+        bodies: Vec<Arc<Body>>,
+    ) -> Result<Self, SparseError> {
+        let laws: Vec<Law> = contacts.iter().map(|c| c.law).collect();
+        let reduced = Arc::new(layout.joinings.reduce(&bodies, &laws)?);
+        Ok(Self {
+            model,
+            layout,
             contacts,
-            ..*self
-        }
+            bodies,
+            reduced,
+        })
     }
 
     /// The balance under `load`, sought from the contacts that are closed at first; without them from all
     /// one-sided ones open, which takes three steps fewer than all closed.
-    pub fn balance(
-        &self,
-        load: &Load,
-        fronts: &mut Fronts,
-        closed: Option<&[bool]>,
-    ) -> Result<Balance, SparseError> {
+    pub fn balance(&self, load: &Load, closed: Option<&[bool]>) -> Result<Balance, SparseError> {
         let Self {
             model,
-            layout: Layout { joinings, is_held, .. },
+            layout: Layout { is_held, .. },
             contacts,
-            bodies,
+            reduced,
+            ..
         } = self;
-        let is_first = |(i, c): (usize, &Contact)| match c.law {
-            Law::Both => true,
-            Law::Push => closed.is_some_and(|closed| closed[i]),
-            Law::Absent => false,
+        let mut all = gaps(contacts, &added(&load.drift, answer(model, is_held, &load.sent)));
+        reduced.begin(&mut all);
+        let pushing: Vec<Contact> = reduced.pushes.iter().map(|c| contacts[*c as usize]).collect();
+        let mut gaps: Vec<f64> = reduced.pushes.iter().map(|c| all[*c as usize]).collect();
+        let mut borne = vec![0.0; gaps.len()];
+        let mut is_closed: Vec<bool> = match closed {
+            Some(closed) => reduced.pushes.iter().map(|c| closed[*c as usize]).collect(),
+            None => gaps.iter().map(|g| *g <= 0.0).collect(),
         };
-        let mut is_closed: Vec<bool> = contacts.iter().enumerate().map(is_first).collect();
-        let (mut borne, mut gaps) = (
-            vec![0.0; contacts.len()],
-            gaps(contacts, &added(&load.drift, answer(model, is_held, &load.sent))),
-        );
         let (mut n_iterations, mut error) = (0, if load.scale_n > 0.0 { 1.0 } else { 0.0 });
         while error > model.params.tolerance && n_iterations < model.params.max_iterations {
-            let step = step(joinings, fronts, bodies, &is_closed, &borne, &gaps)?;
-            let opened = opened(bodies, &step);
+            let step = step(&reduced.compliance, &is_closed, &borne, &gaps)?;
+            let opened = opened(&reduced.compliance, &step);
             let length = if n_iterations == 0 {
                 1.0
             } else {
-                length(contacts, [&borne, &step], [&gaps, &opened])
+                length(&pushing, [&borne, &step], [&gaps, &opened])
             };
             borne.iter_mut().zip(&step).for_each(|(b, s)| *b += length * s);
             gaps.iter_mut().zip(&opened).for_each(|(g, o)| *g += length * o);
-            let pressed = contacts.iter().zip(&gaps).map(|(c, g)| c.pressed(*g));
+            let pressed = pushing.iter().zip(&gaps).map(|(c, g)| c.pressed(*g));
             let left: Vec<f64> = borne.iter().zip(pressed).map(|(b, p)| b - p).collect();
-            error = norm(&less(contacts, vec![[0.0; N_MOTIONS]; load.sent.len()], &left)) / load.scale_n;
-            is_closed = contacts.iter().zip(&gaps).map(|(c, g)| c.is_closed(*g)).collect();
+            error = norm(&less(&pushing, vec![[0.0; N_MOTIONS]; load.sent.len()], &left)) / load.scale_n;
+            is_closed = pushing.iter().zip(&gaps).map(|(c, g)| c.is_closed(*g)).collect();
             n_iterations += 1;
         }
-        let sent = less(contacts, load.sent.clone(), &borne);
+        reduced.pushes.iter().zip(&borne).for_each(|(c, b)| all[*c as usize] = *b);
+        reduced.finish(&mut all);
+        let sent = less(contacts, load.sent.clone(), &all);
         Ok(Balance {
             moved: added(&load.drift, answer(model, is_held, &sent)),
-            borne,
+            borne: all,
             n_iterations,
             error,
         })
@@ -231,28 +238,33 @@ fn added(to: &[Motions], mut motions: Vec<Motions>) -> Vec<Motions> {
     motions
 }
 
-/// What contacts must bear more for the balance of the closed ones. Only differences from it are solved for,
-/// since rounding is in proportion to what the ground bears, and that is soft.
-fn step(
-    joinings: &Joinings,
-    fronts: &mut Fronts,
-    bodies: &[Arc<Body>],
-    is_closed: &[bool],
-    borne: &[f64],
-    gaps: &[f64],
-) -> Result<Vec<f64>, SparseError> {
+/// What contacts must bear more for the balance of the closed ones; `compliance` is how they give way under
+/// each other. Only differences from it are solved for, since rounding is in proportion to what the ground
+/// bears, and that is soft.
+fn step(compliance: &[f64], is_closed: &[bool], borne: &[f64], gaps: &[f64]) -> Result<Vec<f64>, SparseError> {
+    let n = borne.len();
     let mut step: Vec<f64> = borne
         .iter()
         .zip(is_closed)
         .map(|(b, closed)| if *closed { 0.0 } else { -b })
         .collect();
-    let mut side = opened(bodies, &step);
-    side.iter_mut()
-        .zip(gaps)
-        .zip(borne)
-        .for_each(|((s, g), b)| *s += g - b);
-    let closed = joinings.solve(fronts, bodies, is_closed, &side)?;
-    step.iter_mut().zip(closed).for_each(|(s, c)| *s += c);
+    let opened = opened(compliance, &step);
+    let closed: Vec<usize> = (0..n).filter(|i| is_closed[*i]).collect();
+    // The lower triangle by columns, with the right-hand side as the last row.
+    let m = closed.len() + 1;
+    let mut values = vec![0.0; m * m];
+    for (j, &column) in closed.iter().enumerate() {
+        let (source, target) = (&compliance[n * column..n * (column + 1)], &mut values[m * j..m * (j + 1)]);
+        closed[j..].iter().zip(&mut target[j..]).for_each(|(i, t)| *t = source[*i]);
+        target[j] += 1.0;
+        target[m - 1] = opened[column] + gaps[column] - borne[column];
+    }
+    eliminate_leading(&mut values, m, m - 1)?;
+    for j in (0..m - 1).rev() {
+        let column = &values[m * j..m * (j + 1)];
+        let known: f64 = (closed[j + 1..].iter().zip(&column[j + 1..])).map(|(i, l)| l * step[*i]).sum();
+        step[closed[j]] = (column[m - 1] - known) / column[j];
+    }
     Ok(step)
 }
 
@@ -399,20 +411,13 @@ fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Co
 }
 
 /// How gaps change when contacts bear `borne` more.
-fn opened(bodies: &[Arc<Body>], borne: &[f64]) -> Vec<f64> {
-    let mut opened = vec![0.0; borne.len()];
-    let mut own = Vec::new();
-    for body in bodies {
-        own.clear();
-        own.resize(body.contacts.len(), 0.0);
-        for (column, &c) in body.compliance.chunks_exact(own.len().max(1)).zip(&body.contacts) {
-            if borne[c as usize] != 0.0 {
-                add(&mut own, -borne[c as usize], column);
-            }
+fn opened(compliance: &[f64], borne: &[f64]) -> Vec<f64> {
+    let n = borne.len();
+    let mut opened = vec![0.0; n];
+    for (column, b) in compliance.chunks_exact(n.max(1)).zip(borne) {
+        if *b != 0.0 {
+            add(&mut opened, -b, column);
         }
-        own.iter()
-            .zip(&body.contacts)
-            .for_each(|(o, &c)| opened[c as usize] += o);
     }
     opened
 }

@@ -93,8 +93,9 @@ pub fn search_with(
     for (i, sizes) in COUNTED_RUN_SIZES.into_iter().enumerate() {
         let mut counted = survey.clone();
         counted.contacts.iter_mut().for_each(|c| c.count_runs_from(sizes));
-        let outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys, costs)?;
-        if let PlanOutcome::Found(_) = outcome {
+        let mut outcome = with_any_tolerance(ctx, params, &counted, constraints, &keys, costs)?;
+        if let PlanOutcome::Found(found) = &mut outcome {
+            found.run_sizes = sizes;
             if i > 0 {
                 let least_mm = survey
                     .contacts
@@ -256,6 +257,8 @@ fn proven<'k>(
             slides: key.slides,
             n_lessons: space.constraints.n_lessons(),
         },
+        tolerance: space.tolerance,
+        run_sizes: COUNTED_RUN_SIZES[0],
         plan,
         score,
         pool: pool.plans().iter().map(ranked).collect(),

@@ -18,6 +18,8 @@ pub(super) struct Space<'a> {
     pub survey: &'a PlanSurvey,
     pub constraints: &'a PlanConstraints,
     pub n: usize,
+    /// Share of a piece that another may occlude.
+    pub tolerance: f64,
     /// Who keeps a piece from leaving along a direction.
     blocks: ByDirection<PieceSet>,
     /// Which earlier pieces a later one joins if it leaves along a direction.
@@ -92,6 +94,7 @@ impl<'a> Space<'a> {
             survey,
             constraints,
             n,
+            tolerance,
             blocks,
             joins,
             neighbours,

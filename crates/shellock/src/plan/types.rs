@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::PlanScore;
+use super::{PlanScore, PlanSurvey};
 use super::key::KeyDirections;
 use super::space::MOST_RUBS;
 use crate::{IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId};
@@ -95,6 +95,10 @@ pub struct FoundPlan {
     pub is_optimal: bool,
     /// For which plans that holds.
     pub scope: ProofScope,
+    /// Share of a piece that others may occlude, under which it was found.
+    pub tolerance: f64,
+    /// Runs of this many connector sizes counted as joints.
+    pub run_sizes: f64,
     /// Up to 100 plans with the same key and different relations between pieces: `plan`, then the others,
     /// cheapest first.
     pub pool: Vec<RankedPlan>,
@@ -136,6 +140,16 @@ pub struct PlanProof {
 }
 
 impl FoundPlan {
+    /// The survey with joints counted as when the plan was found.
+    pub fn counted(&self, survey: &PlanSurvey) -> PlanSurvey {
+        let mut counted = survey.clone();
+        counted
+            .contacts
+            .iter_mut()
+            .for_each(|c| c.count_runs_from(self.run_sizes));
+        counted
+    }
+
     /// The figures alone.
     pub fn proof(&self) -> PlanProof {
         let (cost, lower_bound) = (self.score.worst, self.lower_bound);
