@@ -165,9 +165,8 @@ fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
     let built = || plan.strength.as_ref().and_then(|s| s.material);
     let (material, edge_share) = (blows.material.or_else(built).unwrap_or_default(), blows.edges);
     let metric = MetricParams {
-        material,
         edge_share,
-        ..MetricParams::of_plan(&plan_params, &sizes)
+        ..MetricParams::of_plan(&plan_params, &sizes, material)
     };
     let punch_at = match blows.at {
         Place::Top => PunchAt::Top,

@@ -9,6 +9,7 @@ use divan::{Bencher, black_box};
 use shellock::body::{BodyParams, PatchDistances, ShellGrid};
 use shellock::design::{Params, design};
 use shellock::figure::{Figure, make};
+use shellock::handling::Handling;
 use shellock::key::{KeyParams, sites};
 use shellock::plan::{PlanConstraints, PlanOutcome, PlanParams, search, survey};
 use shellock::segmentation::{SegmentationParams, segment};
@@ -17,6 +18,7 @@ use shellock::verify::clearance::kit_gaps;
 use shellock::verify::examine;
 use shellock::{ConnectorSizes, Ctx, InstallationStep, SegmentedSurface, metric};
 use shellock_geom::Solid;
+use shellock_mechanics::Material;
 use shellock_render::ReportPiece;
 use shellock_render::palette::color;
 use shellock_render::pieces_picture;
@@ -119,7 +121,18 @@ fn choice_of_plan(bencher: Bencher) {
     };
     bencher
         .with_inputs(|| (*found).clone())
-        .bench_local_values(|found| metric::choose(&ctx, &params, &surface, &sizes, found).is_ok());
+        .bench_local_values(|found| {
+            let choice = metric::Choice {
+                params: &params,
+                surface: &surface,
+                sizes: &sizes,
+                survey: &tables,
+                constraints: &PlanConstraints::default(),
+                handling: &Handling::new(params.up, 2.0, Material::default()),
+                climb: metric::ClimbParams::default(),
+            };
+            metric::choose(&ctx, &choice, found).is_ok()
+        });
 }
 
 #[divan::bench(sample_count = 3, sample_size = 1)]

@@ -231,7 +231,15 @@ pub fn plan(
             chosen.tell(&ctx);
             let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
             let none = PlanConstraints::default();
-            division = match attempt::next_plan(&ctx, params, &current, &survey, &none, n_joinings > 0)? {
+            division = match attempt::next_plan(
+                &ctx,
+                params,
+                &candidate.turn,
+                &current,
+                &survey,
+                &none,
+                n_joinings > 0,
+            )? {
                 Next::Plan(found, holding) => {
                     let own = (ctx.into_warnings(), wall.warnings.clone());
                     return Ok(Ok(Planned::of(

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::boolean::Volume;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3};
-use shellock_mechanics::{Bearing, Material, Meeting, ShellAssembly};
+use shellock_mechanics::{Bearing, Loaded, Material, Meeting, ShellAssembly};
 
 use crate::PatchId;
 use crate::impact::impact_n;
@@ -115,6 +115,14 @@ pub enum Deed {
     },
 }
 
+impl Deed {
+    /// Whether a kit is used like that. It may fall on any side, too, but only once in a while; and what
+    /// lands on an ear or a tail hardly any plan bears.
+    pub fn is_use(&self) -> bool {
+        !matches!(self, Self::Fall { .. })
+    }
+}
+
 /// A load.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadCase {
@@ -144,7 +152,14 @@ pub fn load_cases(handling: &Handling, assembly: &ShellAssembly) -> Vec<LoadCase
     cases.extend(bench.grips());
     cases.push(bench.fall(Deed::FallUpright, -up));
     let falls = even_directions(up, handling.n_falls);
-    cases.extend(falls.map(|down| bench.fall(Deed::Fall { down: down.to_array() }, down)));
+    cases.extend(falls.map(|down| {
+        bench.fall(
+            Deed::Fall {
+                down: down.to_array(),
+            },
+            down,
+        )
+    }));
     cases.extend((0..assembly.n_parts).map(|piece| bench.hang(PatchId::from(piece), up)));
     cases
 }
@@ -202,8 +217,14 @@ impl<'a> Bench<'a> {
         let weight: f64 = feet.iter().map(|v| self.areas_mm2[*v as usize]).sum();
         let at = |v: &u32| self.areas_mm2[*v as usize] * self.assembly.points[*v as usize];
         let middle = feet.iter().map(at).sum::<Vec3>() / weight.max(f64::MIN_POSITIVE);
-        let aside = |i: usize| (self.assembly.points[i] - middle).reject_from_normalized(up).length();
-        self.pressed(up).into_iter().min_by(|a, b| aside(*a).total_cmp(&aside(*b)))
+        let aside = |i: usize| {
+            (self.assembly.points[i] - middle)
+                .reject_from_normalized(up)
+                .length()
+        };
+        self.pressed(up)
+            .into_iter()
+            .min_by(|a, b| aside(*a).total_cmp(&aside(*b)))
     }
 
     fn pressed(&self, up: Vec3) -> Vec<usize> {
@@ -237,7 +258,13 @@ impl<'a> Bench<'a> {
     /// Of the walls' mass.
     fn center(&self) -> Vec3 {
         let total: f64 = self.areas_mm2.iter().sum();
-        let moment: Vec3 = self.assembly.points.iter().zip(&self.areas_mm2).map(|(p, a)| *a * *p).sum();
+        let moment: Vec3 = self
+            .assembly
+            .points
+            .iter()
+            .zip(&self.areas_mm2)
+            .map(|(p, a)| *a * *p)
+            .sum();
         moment / total.max(f64::MIN_POSITIVE)
     }
 
@@ -278,15 +305,24 @@ impl<'a> Bench<'a> {
         let center = points().sum::<Vec3>() / feet.len().max(1) as f64;
         let reach_mm = points().map(|p| p.distance(center)).fold(1.0, f64::max);
         // What pressure works on: a shift along `up` and the two turns about the plane's axes.
-        let modes = |p: Vec3| [1.0, (p - center).dot(x) / reach_mm, (p - center).dot(y) / reach_mm];
+        let modes = |p: Vec3| {
+            [
+                1.0,
+                (p - center).dot(x) / reach_mm,
+                (p - center).dot(y) / reach_mm,
+            ]
+        };
         let mut asked = nalgebra::Vector3::zeros();
         for (p, f) in self.assembly.points.iter().zip(forces_n.iter()) {
             // Turns of all forces, not only of those along `up`, about the floor's axes.
             let turn = (*p - center).cross(*f) / reach_mm;
             asked -= nalgebra::Vector3::new(f.dot(up), -turn.dot(y), turn.dot(x));
         }
-        let soles: Vec<([f64; 3], f64)> =
-            feet.iter().zip(points()).map(|(&v, p)| (modes(p), self.areas_mm2[v as usize].max(1e-9))).collect();
+        let soles: Vec<([f64; 3], f64)> = feet
+            .iter()
+            .zip(points())
+            .map(|(&v, p)| (modes(p), self.areas_mm2[v as usize].max(1e-9)))
+            .collect();
         for (&v, pressed_n) in feet.iter().zip(region::pressures(&soles, asked)) {
             forces_n[v as usize] += pressed_n * up;
         }
@@ -295,10 +331,17 @@ impl<'a> Bench<'a> {
     /// Two fingers where it is narrowest, but no narrower than what is gripped, and where it is widest.
     fn grips(&self) -> Vec<LoadCase> {
         let widths = region::widths(self.assembly, &self.mesh, &self.bvh);
-        let wide = || widths.iter().filter(|w| w.width_mm >= self.handling.least_width_mm);
+        let wide = || {
+            widths
+                .iter()
+                .filter(|w| w.width_mm >= self.handling.least_width_mm)
+        };
         let narrow = wide().min_by(|a, b| a.width_mm.total_cmp(&b.width_mm));
         let widest = wide().max_by(|a, b| a.width_mm.total_cmp(&b.width_mm));
-        let grips = narrow.map(|w| (Deed::GripNarrow, w)).into_iter().chain(widest.map(|w| (Deed::GripWide, w)));
+        let grips = narrow
+            .map(|w| (Deed::GripNarrow, w))
+            .into_iter()
+            .chain(widest.map(|w| (Deed::GripWide, w)));
         grips.map(|(deed, width)| self.grip(deed, width)).collect()
     }
 
@@ -323,7 +366,11 @@ impl<'a> Bench<'a> {
     /// The floor stops it.
     fn fall(&self, deed: Deed, down: Vec3) -> LoadCase {
         let feet = lowest(self.assembly, -down);
-        let at = feet.iter().map(|&v| self.assembly.points[v as usize]).sum::<Vec3>() / feet.len().max(1) as f64;
+        let at = feet
+            .iter()
+            .map(|&v| self.assembly.points[v as usize])
+            .sum::<Vec3>()
+            / feet.len().max(1) as f64;
         let force_n = self.share_struck(at, down) * impact_n(self.mass_t(), self.handling.drop_mm);
         LoadCase {
             deed,
@@ -337,10 +384,14 @@ impl<'a> Bench<'a> {
     fn hang(&self, piece: PatchId, up: Vec3) -> LoadCase {
         let weight_n = self.mass_t() * GRAVITY_MM_S2;
         let total_mm2: f64 = self.areas_mm2.iter().sum();
-        let mut forces_n: Vec<Vec3> =
-            self.areas_mm2.iter().map(|a| -up * (weight_n * a / total_mm2.max(f64::MIN_POSITIVE))).collect();
-        let own: Vec<usize> =
-            (0..forces_n.len()).filter(|&v| self.assembly.part_of_point[v] == piece.0).collect();
+        let mut forces_n: Vec<Vec3> = self
+            .areas_mm2
+            .iter()
+            .map(|a| -up * (weight_n * a / total_mm2.max(f64::MIN_POSITIVE)))
+            .collect();
+        let own: Vec<usize> = (0..forces_n.len())
+            .filter(|&v| self.assembly.part_of_point[v] == piece.0)
+            .collect();
         region::hold(self.assembly, &self.areas_mm2, &own, &mut forces_n);
         let at = own.iter().map(|&v| self.assembly.points[v]).sum::<Vec3>() / own.len().max(1) as f64;
         LoadCase {
@@ -360,6 +411,8 @@ pub enum Failure {
     Opens,
     /// A pin is bent beyond what the material bears.
     PinYields,
+    /// A wall is.
+    WallYields,
 }
 
 /// How much of one load a plan bears.
@@ -371,29 +424,66 @@ pub struct Borne {
     pub first: Option<(Failure, u32)>,
 }
 
-/// The load factor of what `bearing` says of a plan under one load.
-pub fn borne(plan: &[Meeting], bearing: &Bearing, strength_mpa: f64) -> Borne {
-    let mut least = Borne {
+impl Borne {
+    /// Of a load that nothing gives way to.
+    pub const ANY: Self = Self {
         factor: f64::INFINITY,
         first: None,
     };
-    for (i, meeting) in (0..).zip(plan) {
-        let Some(joint) = meeting.joint else { continue };
-        let [opening_mm, pin_mpa] = [bearing.opening_mm[i as usize], bearing.pin_mpa[i as usize]];
-        let factors = [
-            (Failure::Opens, OPEN_SIZES * joint.size_mm / opening_mm),
-            (Failure::PinYields, strength_mpa / pin_mpa),
-        ];
-        for (failure, factor) in factors {
-            // What is no number has no answer: such a plan bears nothing.
-            let factor = if factor.is_nan() { 0.0 } else { factor };
-            if factor < least.factor {
-                least = Borne {
-                    factor,
-                    first: Some((failure, i)),
-                };
+
+    /// The less of this and of a failure at a station. What is no number has no answer: such a plan bears
+    /// nothing.
+    fn and(self, factor: f64, failure: Failure, station: u32) -> Self {
+        let factor = if factor.is_nan() { 0.0 } else { factor };
+        if factor < self.factor {
+            Self {
+                factor,
+                first: Some((failure, station)),
             }
+        } else {
+            self
         }
     }
-    least
+
+    /// With the openings of all joints of `plan`.
+    fn opening(self, plan: &[Meeting], opening_mm: &[f64]) -> Self {
+        let joints = (0..).zip(plan.iter().zip(opening_mm));
+        joints.fold(self, |least, (i, (meeting, mm))| match meeting.joint {
+            Some(joint) => least.and(OPEN_SIZES * joint.size_mm / mm, Failure::Opens, i),
+            None => least,
+        })
+    }
+}
+
+/// The load factor of what `bearing` says of a plan under one load.
+pub fn borne(plan: &[Meeting], bearing: &Bearing, strength_mpa: f64) -> Borne {
+    let opened = Borne::ANY.opening(plan, &bearing.opening_mm);
+    let pins = (0..).zip(&bearing.pin_mpa);
+    pins.fold(opened, |least, (i, mpa)| {
+        least.and(strength_mpa / mpa, Failure::PinYields, i)
+    })
+}
+
+/// The same of what the solid model says: there walls yield, too; where they or pins do is not known as a
+/// station, so the one that opens most stands for it. `None` where parts come off.
+pub fn borne_by_solids(plan: &[Meeting], loaded: Option<&Loaded>, strength_mpa: f64) -> Borne {
+    let Some(loaded) = loaded else {
+        return Borne {
+            factor: 0.0,
+            first: None,
+        };
+    };
+    let opened = Borne::ANY.opening(plan, &loaded.opening_mm);
+    let station = opened.first.map_or(0, |f| f.1);
+    opened
+        .and(
+            strength_mpa / loaded.connectors.robust_mpa,
+            Failure::PinYields,
+            station,
+        )
+        .and(
+            strength_mpa / loaded.walls.robust_mpa,
+            Failure::WallYields,
+            station,
+        )
 }

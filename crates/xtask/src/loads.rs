@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use clap::Args;
 use rayon::prelude::*;
-use shellock::handling::{Deed, Failure as Way, Handling, LoadCase, OPEN_SIZES, borne, load_cases};
+use shellock::handling::{
+    Borne, Deed, Failure as Way, Handling, LoadCase, borne, borne_by_solids, load_cases,
+};
 use shellock_mechanics::{Drift, Meeting, VolumeModel};
 
 use crate::failure::Failure;
@@ -41,6 +43,8 @@ struct Row {
     stations: Vec<Option<(Way, u32)>>,
     /// Not a number where the solid model was not asked.
     solid: Vec<f64>,
+    /// How it gives way by the solid model.
+    ways: Vec<Way>,
 }
 
 /// Runs the study; returns the files written.
@@ -56,13 +60,38 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
         by_solid(&subject, &mut rows)?;
     }
     for r in &rows {
-        let best = (0..r.surface.len()).max_by(|a, b| r.surface[*a].total_cmp(&r.surface[*b])).unwrap();
-        let st = r.stations[best].map(|s| (s.0, subject.model.pieces_at(s.1 as usize), subject.model.place_of(s.1 as usize)));
+        let best = (0..r.surface.len())
+            .max_by(|a, b| r.surface[*a].total_cmp(&r.surface[*b]))
+            .unwrap();
+        let st = r.stations[best].map(|s| {
+            (
+                s.0,
+                subject.model.pieces_at(s.1 as usize),
+                subject.model.place_of(s.1 as usize),
+            )
+        });
         let net: shellock_geom::Vec3 = r.case.forces_n.iter().sum();
-        let tq: shellock_geom::Vec3 = r.case.forces_n.iter().zip(&subject.model.assembly.points).map(|(f, p)| (*p - r.case.at).cross(*f)).sum();
-        eprintln!("{:?} at {:.0} net {:.1} torque {:.0} best {:.3} {:?}", r.case.deed, r.case.at, net.length(), tq.length(), r.surface[best], st);
+        let tq: shellock_geom::Vec3 = r
+            .case
+            .forces_n
+            .iter()
+            .zip(&subject.model.assembly.points)
+            .map(|(f, p)| (*p - r.case.at).cross(*f))
+            .sum();
+        eprintln!(
+            "{:?} at {:.0} net {:.1} torque {:.0} best {:.3} {:?}",
+            r.case.deed,
+            r.case.at,
+            net.length(),
+            tq.length(),
+            r.surface[best],
+            st
+        );
     }
-    let b = subject.model.assembly.points.iter().fold((shellock_geom::Vec3::splat(1e9), shellock_geom::Vec3::splat(-1e9)), |b, p| (b.0.min(*p), b.1.max(*p)));
+    let b = subject.model.assembly.points.iter().fold(
+        (shellock_geom::Vec3::splat(1e9), shellock_geom::Vec3::splat(-1e9)),
+        |b, p| (b.0.min(*p), b.1.max(*p)),
+    );
     eprintln!("{:.0} {:.0}", b.0, b.1);
     if let Some(n_solves) = options.climb {
         climbed(&subject, options, &handling, n_solves)?;
@@ -75,10 +104,22 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
     let mut table: Vec<Vec<String>> = rows.iter().map(said).collect();
     let (surface, solid) = (least(|r| &r.surface), least(|r| &r.solid));
     table.push(line("least of all", &surface, &solid));
-    let head = ["load", "factor: least", "median", "largest", "solid, median", "ρ with solid"];
+    let head = [
+        "load",
+        "factor: least",
+        "median",
+        "largest",
+        "solid, median",
+        "ρ with solid",
+    ];
     let columns = rows
         .iter()
-        .flat_map(|r| [(format!("{} surface", deed(&r.case.deed)), r.surface.clone()), (format!("{} solid", deed(&r.case.deed)), r.solid.clone())])
+        .flat_map(|r| {
+            [
+                (format!("{} surface", deed(&r.case.deed)), r.surface.clone()),
+                (format!("{} solid", deed(&r.case.deed)), r.solid.clone()),
+            ]
+        })
         .collect();
     let sheets = [
         ("loads.md".to_owned(), markdown(&head, &table)),
@@ -87,24 +128,62 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
     write_all(out, &format!("{name}/loads"), &sheets)
 }
 
-fn climbed(subject: &Subject, options: &LoadsOptions, handling: &Handling, n_solves: usize) -> Result<(), Failure> {
+fn climbed(
+    subject: &Subject,
+    options: &LoadsOptions,
+    handling: &Handling,
+    n_solves: usize,
+) -> Result<(), Failure> {
     use shellock::metric::{Bench, ClimbParams, climb};
     use shellock::plan::{Neighbourhood, PlanConstraints, PlanOutcome, search};
     let params = shellock::design::Settings::resolve(&options.subject.model.params()).plan;
     let constraints = PlanConstraints::default();
     let ctx = shellock::Ctx::quiet();
-    let PlanOutcome::Found(found) = search(&ctx, &params, &subject.survey, &constraints).unwrap() else { panic!() };
+    let PlanOutcome::Found(found) = search(&ctx, &params, &subject.survey, &constraints).unwrap() else {
+        panic!()
+    };
     let counted = found.counted(&subject.survey);
-    let around = Neighbourhood::new(&params, &counted, &constraints, &found, found.score.worst * options.slack);
+    let around = Neighbourhood::new(
+        &params,
+        &counted,
+        &constraints,
+        &found,
+        found.score.worst * options.slack,
+    );
     let bench = Bench::new(handling, &subject.model).unwrap();
-    for n_starts in [1, 3] {
-    let start = Instant::now();
-    let first = bench.rated(found.pool[0].clone()).unwrap();
-    let top = climb(&ctx, ClimbParams { n_solves, n_starts }, &bench, &around, &found.pool, &|_| true).unwrap();
-    eprintln!("pool {} first least {:.3} climbed {:.3}; {} plans, {} solves, {:.2} s; cost {:.3} of {:.3}", found.pool.len(), first.least(), top.best.least(), top.n_plans, top.n_solves, start.elapsed().as_secs_f64(), top.best.ranked.score.worst, found.score.worst);
-    for (case, borne) in bench.cases.iter().zip(&top.best.borne).take(14) {
-        eprintln!("   {} {:.2} {:?}", deed(&case.deed), borne.factor, borne.first);
-    }
+    for (n_starts, n_solves) in [
+        (1, n_solves),
+        (2, n_solves),
+        (3, n_solves),
+        (2, 2 * n_solves),
+        (4, 2 * n_solves),
+        (4, 10 * n_solves),
+    ] {
+        let start = Instant::now();
+        let first = bench.rated(found.pool[0].clone()).unwrap();
+        let top = climb(
+            &ctx,
+            ClimbParams { n_solves, n_starts },
+            &bench,
+            &around,
+            &found.pool,
+            &|_| true,
+        )
+        .unwrap();
+        eprintln!(
+            "pool {} first least {:.3} climbed {:.3}; {} plans, {} solves, {:.2} s; cost {:.3} of {:.3}",
+            found.pool.len(),
+            first.least(),
+            top.best.least(),
+            top.n_plans,
+            top.n_solves,
+            start.elapsed().as_secs_f64(),
+            top.best.ranked.score.worst,
+            found.score.worst
+        );
+        for (case, borne) in bench.cases.iter().zip(&top.best.borne).take(14) {
+            eprintln!("   {} {:.2} {:?}", deed(&case.deed), borne.factor, borne.first);
+        }
     }
     Ok(())
 }
@@ -114,7 +193,12 @@ fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure
     let start = Instant::now();
     let model = subject.model.surface_model().map_err(failed)?;
     let drifts: Vec<Drift> = cases.par_iter().map(|case| model.drift(&case.forces_n)).collect();
-    eprintln!("{} loads, {} stations, ready after {:.2} s", cases.len(), model.n_rows() / 8, start.elapsed().as_secs_f64());
+    eprintln!(
+        "{} loads, {} stations, ready after {:.2} s",
+        cases.len(),
+        model.n_rows() / 8,
+        start.elapsed().as_secs_f64()
+    );
     let start = Instant::now();
     let strength_mpa = subject.model.params.material.strength_mpa;
     let all = subject
@@ -127,7 +211,11 @@ fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure
     let steps: usize = all.iter().flatten().map(|b| b.n_iterations).sum();
     let worst = all.iter().flatten().map(|b| b.error).fold(0.0, f64::max);
     let n = (all.len() * cases.len()).max(1) as f64;
-    eprintln!("{:.2} ms a plan and load, {:.1} steps, error {worst:.1e}", 1e3 * seconds / n, steps as f64 / n);
+    eprintln!(
+        "{:.2} ms a plan and load, {:.1} steps, error {worst:.1e}",
+        1e3 * seconds / n,
+        steps as f64 / n
+    );
     let row = |(i, case): (usize, &LoadCase)| {
         let of = |(plan, bearings): (&Vec<Meeting>, &Vec<_>)| borne(plan, &bearings[i], strength_mpa);
         let found: Vec<_> = subject.meetings.iter().zip(&all).map(of).collect();
@@ -136,6 +224,7 @@ fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure
             surface: found.iter().map(|b| b.factor).collect(),
             stations: found.iter().map(|b| b.first).collect(),
             solid: vec![f64::NAN; found.len()],
+            ways: Vec::new(),
         }
     };
     Ok(cases.iter().enumerate().map(row).collect())
@@ -146,35 +235,57 @@ fn by_solid(subject: &Subject, rows: &mut [Row]) -> Result<(), Failure> {
     let model = subject.model.volume_model().map_err(failed)?;
     let forces: Vec<_> = rows.iter().map(|r| r.case.forces_n.clone()).collect();
     let start = Instant::now();
-    let all: Vec<Vec<f64>> = subject
+    let strength_mpa = subject.model.params.material.strength_mpa;
+    let all: Vec<Vec<Borne>> = subject
         .meetings
         .par_iter()
-        .map(|plan| factors(&model, plan, &forces))
+        .map(|plan| factors(&model, plan, &forces, strength_mpa))
         .collect::<Result<_, _>>()
         .map_err(failed)?;
     let n = (all.len() * rows.len()).max(1) as f64;
-    eprintln!("solid: {:.2} s a plan and load", start.elapsed().as_secs_f64() / n);
+    eprintln!(
+        "solid: {:.2} s a plan and load",
+        start.elapsed().as_secs_f64() / n
+    );
     for (i, row) in rows.iter_mut().enumerate() {
-        row.solid = all.iter().map(|plan| plan[i]).collect();
+        row.solid = all.iter().map(|plan| plan[i].factor).collect();
+        row.ways = all.iter().filter_map(|plan| plan[i].first.map(|f| f.0)).collect();
     }
     Ok(())
 }
 
-/// By how many times each load may grow until a seam opens too far, by the solid model.
-fn factors(model: &VolumeModel, plan: &[Meeting], forces: &[Vec<shellock_geom::Vec3>]) -> Result<Vec<f64>, shellock_mechanics::VolumeError> {
-    let factor = |opening_mm: &[f64]| {
-        let of = |(m, d): (&Meeting, &f64)| m.joint.map_or(f64::INFINITY, |j| OPEN_SIZES * j.size_mm / d);
-        plan.iter().zip(opening_mm).map(of).fold(f64::INFINITY, f64::min)
-    };
+/// What a plan bears of each load by the solid model.
+fn factors(
+    model: &VolumeModel,
+    plan: &[Meeting],
+    forces: &[Vec<shellock_geom::Vec3>],
+    strength_mpa: f64,
+) -> Result<Vec<Borne>, shellock_mechanics::VolumeError> {
     let all = model.under_loads(plan, forces)?;
-    Ok(all.iter().map(|loaded| loaded.as_ref().map_or(0.0, |l| factor(&l.opening_mm))).collect())
+    Ok(all
+        .iter()
+        .map(|loaded| borne_by_solids(plan, loaded.as_ref().ok(), strength_mpa))
+        .collect())
 }
 
 fn said(row: &Row) -> Vec<String> {
-    let yields = row.stations.iter().flatten().filter(|s| s.0 == Way::PinYields).count();
+    let yields = row
+        .stations
+        .iter()
+        .flatten()
+        .filter(|s| s.0 == Way::PinYields)
+        .count();
     let mut cells = line(&deed(&row.case.deed), &row.surface, &row.solid);
     if yields > 0 {
         cells[0] += &format!(" (pins in {yields})");
+    }
+    let by = |way| row.ways.iter().filter(|w| **w == way).count();
+    if !row.ways.is_empty() {
+        cells[4] += &format!(
+            " (pins in {}, walls in {})",
+            by(Way::PinYields),
+            by(Way::WallYields)
+        );
     }
     cells
 }
@@ -183,13 +294,25 @@ fn line(name: &str, surface: &[f64], solid: &[f64]) -> Vec<String> {
     let [least, median, largest] = quantiles(surface);
     let rho = spearman(solid, surface).map_or("–".to_owned(), |r| format!("{r:.3}"));
     let say = |x: f64| format!("{x:.2}");
-    vec![name.to_owned(), say(least), say(median), say(largest), say(quantiles(solid)[1]), rho]
+    vec![
+        name.to_owned(),
+        say(least),
+        say(median),
+        say(largest),
+        say(quantiles(solid)[1]),
+        rho,
+    ]
 }
 
 fn quantiles(values: &[f64]) -> [f64; 3] {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let at = |share: f64| sorted.get((share * (sorted.len().max(1) - 1) as f64) as usize).copied().unwrap_or(f64::NAN);
+    let at = |share: f64| {
+        sorted
+            .get((share * (sorted.len().max(1) - 1) as f64) as usize)
+            .copied()
+            .unwrap_or(f64::NAN)
+    };
     [at(0.0), at(0.5), at(1.0)]
 }
 

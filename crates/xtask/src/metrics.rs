@@ -135,7 +135,7 @@ pub fn subject(options: &SubjectOptions) -> Result<Subject, Failure> {
     };
     let metric = MetricParams {
         edge_share: metric.edge_share,
-        ..MetricParams::of_plan(&plan_params, &sizes)
+        ..MetricParams::of_plan(&plan_params, &sizes, params.material)
     };
     Failure::unless_right(metric.problems())?;
     let model = PlanModel::new(&metric, &surface, &sizes);

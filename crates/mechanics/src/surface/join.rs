@@ -133,7 +133,9 @@ impl Joinings {
         let mut is_root = vec![true; self.joinings.len()];
         for joining in &self.joinings {
             let mut front = Front::of(joining, bodies, &fronts, laws);
-            (0..).zip(&front.contacts).for_each(|(i, c)| place[*c as usize] = i);
+            (0..)
+                .zip(&front.contacts)
+                .for_each(|(i, c)| place[*c as usize] = i);
             for b in &joining.bodies {
                 front.add_body(bodies[*b].as_ref(), laws, &place);
             }
@@ -146,7 +148,9 @@ impl Joinings {
             }
             fronts.push(front);
         }
-        let pushes: Vec<u32> = (0..laws.len() as u32).filter(|c| laws[*c as usize] == Law::Push).collect();
+        let pushes: Vec<u32> = (0..laws.len() as u32)
+            .filter(|c| laws[*c as usize] == Law::Push)
+            .collect();
         (0..).zip(&pushes).for_each(|(i, c)| place[*c as usize] = i);
         let n = pushes.len();
         let mut compliance = vec![0.0; n * n];
@@ -261,7 +265,11 @@ impl Front {
         contacts.extend(both(&joining.kept));
         let own = joining.bodies.iter().flat_map(|b| &bodies[*b].as_ref().contacts);
         let joined = joining.joined.iter().flat_map(|j| &done[*j].contacts);
-        let mut pushes: Vec<u32> = own.chain(joined).copied().filter(|c| laws[*c as usize] == Law::Push).collect();
+        let mut pushes: Vec<u32> = own
+            .chain(joined)
+            .copied()
+            .filter(|c| laws[*c as usize] == Law::Push)
+            .collect();
         pushes.sort_unstable();
         pushes.dedup();
         contacts.extend(pushes);
@@ -295,7 +303,10 @@ impl Front {
 
     fn add_joint(&mut self, joint: &Self, place: &[usize]) {
         let (m, first) = (joint.contacts.len(), joint.n_eliminated);
-        let rows: Vec<usize> = joint.contacts[first..].iter().map(|c| place[*c as usize]).collect();
+        let rows: Vec<usize> = joint.contacts[first..]
+            .iter()
+            .map(|c| place[*c as usize])
+            .collect();
         for (j, &column) in rows.iter().enumerate() {
             let source = &joint.values[m * (first + j) + first + j..m * (first + j + 1)];
             for (row, value) in rows[j..].iter().zip(source) {

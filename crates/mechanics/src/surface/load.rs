@@ -10,10 +10,10 @@ use nalgebra::{SMatrix, SVector};
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 
-use super::parts::{N_MOTIONS, mid_wall};
-use super::solve::{Balance, Jointed, Load, openings};
 use super::SurfaceModel;
 use super::contact::{Contact, N_CONTACTS, TIP};
+use super::parts::{N_MOTIONS, mid_wall};
+use super::solve::{Balance, Jointed, Load, openings};
 use crate::assembly::Meeting;
 use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 
@@ -90,7 +90,10 @@ impl SurfaceModel {
     /// What each of `loads` does to the parts joined by `plan`; nothing but the model's held points is held.
     pub fn bear(&self, plan: &[Meeting], loads: &[Drift]) -> Result<Vec<Bearing>, SparseError> {
         let joined = self.joined(plan)?;
-        loads.iter().map(|load| joined.bear(plan, load, None).map(|found| found.0)).collect()
+        loads
+            .iter()
+            .map(|load| joined.bear(plan, load, None).map(|found| found.0))
+            .collect()
     }
 
     /// The parts joined by `plan`, ready for loads.
@@ -100,7 +103,9 @@ impl SurfaceModel {
 
     fn bearing(&self, plan: &[Meeting], contacts: &[Contact], balance: &Balance) -> Bearing {
         let mut pin_mpa = vec![0.0_f64; plan.len()];
-        let own = contacts.chunks_exact(N_CONTACTS).zip(balance.borne.chunks_exact(N_CONTACTS));
+        let own = contacts
+            .chunks_exact(N_CONTACTS)
+            .zip(balance.borne.chunks_exact(N_CONTACTS));
         for (contacts, borne) in own {
             let i = contacts[TIP].station;
             let Some(joint) = plan[i].joint else { continue };
@@ -128,7 +133,13 @@ impl SurfaceModel {
         let center = points.iter().zip(&areas_mm2).map(|(p, a)| *a * *p).sum::<Vec3>() / total;
         let modes = |p: Vec3| -> [Vec3; 6] {
             let arm = p - center;
-            std::array::from_fn(|j| if j < 3 { Vec3::AXES[j] } else { Vec3::AXES[j - 3].cross(arm) })
+            std::array::from_fn(|j| {
+                if j < 3 {
+                    Vec3::AXES[j]
+                } else {
+                    Vec3::AXES[j - 3].cross(arm)
+                }
+            })
         };
         let (mut inertia, mut work) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
         for ((p, area), f) in points.iter().zip(&areas_mm2).zip(forces_n) {

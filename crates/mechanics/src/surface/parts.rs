@@ -193,15 +193,15 @@ fn part(
     }
     let floating = (!floats.is_empty()).then(|| Floating {
         rigid: DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &gradients[i], j)),
-        ground_n_mm: GROUND_SHARE
-            * params.material.youngs_modulus_mpa
-            * params.wall_mm
-            * floats.len() as f64,
+        ground_n_mm: GROUND_SHARE * params.material.youngs_modulus_mpa * params.wall_mm * floats.len() as f64,
     });
     if let Some(Floating { rigid, ground_n_mm }) = &floating {
         compliance += rigid * rigid.transpose() / *ground_n_mm;
     }
-    let rows = own.iter().filter_map(|&v| row[v as usize].map(|r| (v, r))).collect();
+    let rows = own
+        .iter()
+        .filter_map(|&v| row[v as usize].map(|r| (v, r)))
+        .collect();
     Ok(Part {
         stations,
         compliance: 0.5 * (&compliance + compliance.transpose()),
@@ -228,9 +228,14 @@ impl Part {
         rows.iter()
             .for_each(|&(v, r)| add(&mut moved, Some(r), forces_n[v as usize]));
         factor.solve_in_place(&mut moved);
-        let row_of = |v: u32| rows.binary_search_by_key(&v, |r| r.0).ok().map(|at| rows[at].1 as usize);
+        let row_of = |v: u32| {
+            rows.binary_search_by_key(&v, |r| r.0)
+                .ok()
+                .map(|at| rows[at].1 as usize)
+        };
         let along = |gradient: &Gradient| {
-            let at = |&(v, g): &(u32, Vec3)| row_of(v).map_or(0.0, |r| g.dot(Vec3::from_slice(&moved[r..r + 3])));
+            let at =
+                |&(v, g): &(u32, Vec3)| row_of(v).map_or(0.0, |r| g.dot(Vec3::from_slice(&moved[r..r + 3])));
             gradient.iter().map(at).sum::<f64>()
         };
         let mut drift: Vec<f64> = gradients.iter().map(along).collect();
@@ -238,7 +243,10 @@ impl Part {
             let own: Gradient = rows.iter().map(|&(v, _)| (v, forces_n[v as usize])).collect();
             for j in 0..6 {
                 let shift = rigid_motion(points, &own, j) / ground_n_mm;
-                drift.iter_mut().zip(rigid.column(j).iter()).for_each(|(d, r)| *d += shift * r);
+                drift
+                    .iter_mut()
+                    .zip(rigid.column(j).iter())
+                    .for_each(|(d, r)| *d += shift * r);
             }
         }
         drift

@@ -88,7 +88,8 @@ pub(super) struct Layout {
 impl Layout {
     pub fn new(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Self {
         let touched = touched(parts, n_stations, is_held);
-        let (joinings, order) = Joinings::new(touched.iter().map(|t| t.stations.clone()).collect(), n_stations);
+        let (joinings, order) =
+            Joinings::new(touched.iter().map(|t| t.stations.clone()).collect(), n_stations);
         let mut rank = vec![0; n_stations];
         order.iter().enumerate().for_each(|(i, s)| rank[*s as usize] = i);
         Self {
@@ -205,7 +206,11 @@ impl<'a> Jointed<'a> {
             is_closed = pushing.iter().zip(&gaps).map(|(c, g)| c.is_closed(*g)).collect();
             n_iterations += 1;
         }
-        reduced.pushes.iter().zip(&borne).for_each(|(c, b)| all[*c as usize] = *b);
+        reduced
+            .pushes
+            .iter()
+            .zip(&borne)
+            .for_each(|(c, b)| all[*c as usize] = *b);
         reduced.finish(&mut all);
         let sent = less(contacts, load.sent.clone(), &all);
         Ok(Balance {
@@ -228,7 +233,8 @@ fn contacts(model: &SurfaceModel, layout: &Layout, plan: &[Meeting]) -> Vec<Cont
     let mut contacts: Vec<Option<Contact>> = vec![None; N_CONTACTS * plan.len()];
     for (i, meeting) in plan.iter().enumerate() {
         let own = contacts[own_contacts(layout, i as u32)].iter_mut();
-        own.zip(contacts_at(model, i, meeting)).for_each(|(place, c)| *place = Some(c));
+        own.zip(contacts_at(model, i, meeting))
+            .for_each(|(place, c)| *place = Some(c));
     }
     contacts.into_iter().flatten().collect()
 }
@@ -241,7 +247,12 @@ fn added(to: &[Motions], mut motions: Vec<Motions>) -> Vec<Motions> {
 /// What contacts must bear more for the balance of the closed ones; `compliance` is how they give way under
 /// each other. Only differences from it are solved for, since rounding is in proportion to what the ground
 /// bears, and that is soft.
-fn step(compliance: &[f64], is_closed: &[bool], borne: &[f64], gaps: &[f64]) -> Result<Vec<f64>, SparseError> {
+fn step(
+    compliance: &[f64],
+    is_closed: &[bool],
+    borne: &[f64],
+    gaps: &[f64],
+) -> Result<Vec<f64>, SparseError> {
     let n = borne.len();
     let mut step: Vec<f64> = borne
         .iter()
@@ -254,15 +265,23 @@ fn step(compliance: &[f64], is_closed: &[bool], borne: &[f64], gaps: &[f64]) -> 
     let m = closed.len() + 1;
     let mut values = vec![0.0; m * m];
     for (j, &column) in closed.iter().enumerate() {
-        let (source, target) = (&compliance[n * column..n * (column + 1)], &mut values[m * j..m * (j + 1)]);
-        closed[j..].iter().zip(&mut target[j..]).for_each(|(i, t)| *t = source[*i]);
+        let (source, target) = (
+            &compliance[n * column..n * (column + 1)],
+            &mut values[m * j..m * (j + 1)],
+        );
+        closed[j..]
+            .iter()
+            .zip(&mut target[j..])
+            .for_each(|(i, t)| *t = source[*i]);
         target[j] += 1.0;
         target[m - 1] = opened[column] + gaps[column] - borne[column];
     }
     eliminate_leading(&mut values, m, m - 1)?;
     for j in (0..m - 1).rev() {
         let column = &values[m * j..m * (j + 1)];
-        let known: f64 = (closed[j + 1..].iter().zip(&column[j + 1..])).map(|(i, l)| l * step[*i]).sum();
+        let known: f64 = (closed[j + 1..].iter().zip(&column[j + 1..]))
+            .map(|(i, l)| l * step[*i])
+            .sum();
         step[closed[j]] = (column[m - 1] - known) / column[j];
     }
     Ok(step)
@@ -359,9 +378,7 @@ fn touched(parts: &[Part], n_stations: usize, is_held: &[bool]) -> Vec<Touched> 
 fn given(parts: &[Part], n_stations: usize, is_held: &[bool], held_mm_n: f64) -> Vec<f64> {
     let mut given = vec![0.0; n_stations];
     for (part, _) in parts.iter().zip(is_held).filter(|(_, is_held)| **is_held) {
-        part.stations
-            .iter()
-            .for_each(|s| given[*s as usize] += held_mm_n);
+        part.stations.iter().for_each(|s| given[*s as usize] += held_mm_n);
     }
     given
 }
@@ -397,7 +414,11 @@ fn body(model: &SurfaceModel, layout: &Layout, touched: &Touched, contacts: &[Co
                 .chunks_exact(n)
                 .zip(&contact.gradient)
                 .for_each(|(column, g)| add(&mut moved, *g, column));
-            add(&mut moved[*place..], layout.given[contact.station], &contact.gradient);
+            add(
+                &mut moved[*place..],
+                layout.given[contact.station],
+                &contact.gradient,
+            );
             for (range, place) in &stations {
                 let moved = &moved[*place..*place + N_MOTIONS];
                 compliance.extend(contacts[range.clone()].iter().map(|c| dot(&c.gradient, moved)));

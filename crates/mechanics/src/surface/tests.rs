@@ -265,8 +265,7 @@ fn energy(model: &SurfaceModel, plan: &[Meeting], stiffness: &DMatrix<f64>, move
     };
     let contacts = (0..plan.len()).flat_map(|i| contacts_at(model, i, &plan[i]));
     let contacts: Vec<Contact> = contacts.collect();
-    0.5 * all.dot(&(stiffness * &all)) - all.dot(&force)
-        + contacts.iter().map(of_contact).sum::<f64>()
+    0.5 * all.dot(&(stiffness * &all)) - all.dot(&force) + contacts.iter().map(of_contact).sum::<f64>()
 }
 
 #[test]

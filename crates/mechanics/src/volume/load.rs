@@ -93,7 +93,9 @@ impl VolumeModel {
             });
         }
         let n_points = self.part_of_point.len();
-        if let Some(wrong) = (loads_n.iter()).find(|f| f.len() != n_points || !f.iter().all(|f| f.is_finite())) {
+        if let Some(wrong) =
+            (loads_n.iter()).find(|f| f.len() != n_points || !f.iter().all(|f| f.is_finite()))
+        {
             return Err(VolumeError::Forces {
                 forces: wrong.len(),
                 points: n_points,
@@ -105,7 +107,10 @@ impl VolumeModel {
             .into_par_iter()
             .map(|part| Body::new(self, part, plan, &sections, &bars))
             .collect::<Result<Vec<_>, _>>()?;
-        loads_n.iter().map(|forces_n| self.loaded(plan, &sections, &mut bodies, forces_n)).collect()
+        loads_n
+            .iter()
+            .map(|forces_n| self.loaded(plan, &sections, &mut bodies, forces_n))
+            .collect()
     }
 
     fn loaded(
@@ -116,8 +121,10 @@ impl VolumeModel {
         forces_n: &[Vec3],
     ) -> Result<Result<Loaded, Vec<u32>>, VolumeError> {
         let balanced_n = self.balanced(forces_n)?;
-        let mut responses: Vec<Response> =
-            bodies.par_iter_mut().map(|body| body.load(self, plan, sections, &balanced_n)).collect();
+        let mut responses: Vec<Response> = bodies
+            .par_iter_mut()
+            .map(|body| body.load(self, plan, sections, &balanced_n))
+            .collect();
         // Where all parts float, the first is where the others are seen from; its forces balance with the
         // whole's.
         let n_motions = number_motions(&mut responses, |i| {

@@ -6,10 +6,12 @@ use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
 use super::{DesignError, Job, KeySource, Kit, Params};
 use crate::body::{BodyError, GridError, PatchDistances};
+use crate::handling::Handling;
 use crate::key::Turn;
-use crate::metric::Holding;
+use crate::metric::{Choice, ClimbParams, Holding};
 use crate::plan::{Blocker, FoundPlan, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::{Ctx, PatchId, SegmentedSurface, key, metric, plan};
+use shellock_geom::Vec3;
 
 /// How one division went.
 pub(super) enum Attempt {
@@ -90,6 +92,7 @@ pub(super) fn plans(
                 next_plan(
                     &kit_ctx,
                     params,
+                    turn,
                     division,
                     &survey,
                     &learned.constraints,
@@ -243,6 +246,7 @@ pub(super) enum Next {
 pub(super) fn next_plan(
     ctx: &Ctx,
     params: &Params,
+    turn: &Turn,
     division: &Division,
     survey: &PlanSurvey,
     constraints: &PlanConstraints,
@@ -273,7 +277,17 @@ pub(super) fn next_plan(
             }));
         }
     };
-    let (found, holding) = metric::choose(ctx, &settings.plan, surface, &chosen.sizes, *found)?;
+    let up = turn.apply(Vec3::from_array(params.up)).to_array();
+    let choice = Choice {
+        params: &settings.plan,
+        surface,
+        sizes: &chosen.sizes,
+        survey,
+        constraints,
+        handling: &Handling::new(up, settings.body.thickness_mm, params.material),
+        climb: ClimbParams::default(),
+    };
+    let (found, holding) = metric::choose(ctx, &choice, *found)?;
     if settings.plan.key_slide.is_none() {
         warn_of_key(ctx, params, division, &found.plan);
     }

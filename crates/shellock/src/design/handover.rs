@@ -7,8 +7,9 @@
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::connector::SeamRoom;
+use crate::handling::Deed;
 use crate::key::Turn;
-use crate::metric::{Holding, LoosePiece, SeamHolding};
+use crate::metric::{GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding};
 use crate::piece::{Finished, FinishedJoint};
 use crate::plan::{LatticePlan, PlanProof, ProofScope};
 use crate::{
@@ -115,7 +116,28 @@ impl Handover {
             at: self.at(s.at),
             ..s
         };
+        let way = |d: [f64; 3]| self.back.apply(Vec3::from_array(d)).to_array();
+        let deed = |deed: Deed| match deed {
+            Deed::PressSide { toward } => Deed::PressSide { toward: way(toward) },
+            Deed::Fall { down } => Deed::Fall { down: way(down) },
+            Deed::Hang { piece } => Deed::Hang {
+                piece: self.piece(piece),
+            },
+            other => other,
+        };
+        let gives_way = |g: GivesWay| GivesWay {
+            between: g.between.map(|p| self.piece(p)),
+            at: self.at(g.at),
+            ..g
+        };
+        let borne = |b: LoadBorne| LoadBorne {
+            deed: deed(b.deed),
+            at: self.at(b.at),
+            first: b.first.map(gives_way),
+            ..b
+        };
         Holding {
+            bears: holding.bears.into_iter().map(borne).collect(),
             loose: holding.loose.into_iter().map(loose).collect(),
             seams: holding.seams.into_iter().map(seam).collect(),
             foreseen_play: self.in_order(&holding.foreseen_play),

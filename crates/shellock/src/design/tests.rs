@@ -83,6 +83,7 @@ fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Findin
             loose: Vec::new(),
             seams: Vec::new(),
             n_compared: 1,
+            bears: Vec::new(),
             foreseen_play: Vec::new(),
             foreseen_excess: Vec::new(),
         },

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Topology, TriMesh, Vec3};
-use std::f64::consts::{PI, TAU};
 use shellock_mechanics::ShellAssembly;
+use std::f64::consts::{PI, TAU};
 
 /// What lies within this share of the height above the lowest point touches the floor.
 const FOOT_SHARE: f64 = 0.02;
@@ -90,7 +90,9 @@ pub fn is_wide(assembly: &ShellAssembly, surface: &TriangleBvh, width_mm: f64, i
     const GIVE: f64 = 0.2;
     let radius_mm = 0.5 * width_mm;
     let middle = assembly.points[i] - radius_mm * assembly.normals[i];
-    surface.nearest(middle, ((1.0 - GIVE) * radius_mm).powi(2)).is_none()
+    surface
+        .nearest(middle, ((1.0 - GIVE) * radius_mm).powi(2))
+        .is_none()
 }
 
 /// Whether nothing of the model is above point `i`.
@@ -110,8 +112,13 @@ pub fn is_over(assembly: &ShellAssembly, feet: &[u32], up: Vec3, p: Vec3) -> boo
     };
     let mut angles: Vec<f64> = feet.iter().map(angle).collect();
     angles.sort_by(f64::total_cmp);
-    let Some((first, last)) = angles.first().zip(angles.last()) else { return false };
-    let widest = angles.windows(2).map(|w| w[1] - w[0]).fold(first + TAU - last, f64::max);
+    let Some((first, last)) = angles.first().zip(angles.last()) else {
+        return false;
+    };
+    let widest = angles
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .fold(first + TAU - last, f64::max);
     widest <= PI
 }
 
@@ -128,7 +135,9 @@ pub fn at_rest(hull: &TriMesh, center: Vec3, up: Vec3) -> Option<Vec3> {
             let [from, to] = [k, (k + 1) % 3].map(|k| hull.points[hull.triangles[face][k] as usize]);
             normal(face).dot((to - from).cross(center - from)) < 0.0
         };
-        let Some(edge) = (0..3).find(|k| outside(*k)) else { break };
+        let Some(edge) = (0..3).find(|k| outside(*k)) else {
+            break;
+        };
         face = topology.opposite((3 * face + edge) as u32) as usize / 3;
     }
     Some(-normal(face))
@@ -153,9 +162,11 @@ pub fn widths(assembly: &ShellAssembly, mesh: &TriMesh, surface: &TriangleBvh) -
         let opposite = mesh.area_vector_doubled(face as usize).normalize_or_zero().dot(n) <= OPPOSITE;
         let hit = p - width_mm * n;
         let corners = mesh.triangles[face as usize].map(|v| v as usize);
-        let end = corners
-            .into_iter()
-            .min_by(|a, b| assembly.points[*a].distance(hit).total_cmp(&assembly.points[*b].distance(hit)))?;
+        let end = corners.into_iter().min_by(|a, b| {
+            assembly.points[*a]
+                .distance(hit)
+                .total_cmp(&assembly.points[*b].distance(hit))
+        })?;
         opposite.then_some(Width {
             ends: [i, end],
             width_mm,
@@ -173,9 +184,13 @@ pub fn pressures(soles: &[([f64; 3], f64)], asked: Vector3<f64>) -> Vec<f64> {
     /// Beside the stiffness of the whole bed: keeps a footing on a line from turning about it.
     const LEAST: f64 = 1e-9;
     let total: f64 = soles.iter().map(|s| s.1).sum();
-    let press = |bed: &Vector3<f64>, (modes, area): &([f64; 3], f64)| (area * bed.dot(&Vector3::from(*modes))).max(0.0);
+    let press = |bed: &Vector3<f64>, (modes, area): &([f64; 3], f64)| {
+        (area * bed.dot(&Vector3::from(*modes))).max(0.0)
+    };
     let answer = |bed: &Vector3<f64>| {
-        soles.iter().fold(Vector3::zeros(), |sum, s| sum + press(bed, s) * Vector3::from(s.0))
+        soles.iter().fold(Vector3::zeros(), |sum, s| {
+            sum + press(bed, s) * Vector3::from(s.0)
+        })
     };
     let energy = |bed: &Vector3<f64>| {
         let springs: f64 = soles.iter().map(|s| press(bed, s).powi(2) / (2.0 * s.1)).sum();
@@ -192,7 +207,9 @@ pub fn pressures(soles: &[([f64; 3], f64)], asked: Vector3<f64>) -> Vec<f64> {
             let modes = Vector3::from(*modes);
             stiffness += *area * modes * modes.transpose();
         }
-        let Some(step) = stiffness.cholesky().map(|c| c.solve(&left)) else { break };
+        let Some(step) = stiffness.cholesky().map(|c| c.solve(&left)) else {
+            break;
+        };
         let mut length = 1.0;
         while length > 1e-6 && energy(&(bed + length * step)) > energy(&bed) {
             length *= 0.5;
@@ -206,20 +223,35 @@ pub fn pressures(soles: &[([f64; 3], f64)], asked: Vector3<f64>) -> Vec<f64> {
 /// balance `forces_n`.
 pub fn hold(assembly: &ShellAssembly, areas_mm2: &[f64], own: &[usize], forces_n: &mut [Vec3]) {
     let total: f64 = own.iter().map(|v| areas_mm2[*v]).sum();
-    let center = own.iter().map(|v| areas_mm2[*v] * assembly.points[*v]).sum::<Vec3>() / total.max(1e-9);
+    let center = own
+        .iter()
+        .map(|v| areas_mm2[*v] * assembly.points[*v])
+        .sum::<Vec3>()
+        / total.max(1e-9);
     let modes = |p: Vec3| -> [Vec3; 6] {
-        std::array::from_fn(|j| if j < 3 { Vec3::AXES[j] } else { Vec3::AXES[j - 3].cross(p - center) })
+        std::array::from_fn(|j| {
+            if j < 3 {
+                Vec3::AXES[j]
+            } else {
+                Vec3::AXES[j - 3].cross(p - center)
+            }
+        })
     };
     let mut asked = SVector::<f64, 6>::zeros();
     for (p, f) in assembly.points.iter().zip(forces_n.iter()) {
-        modes(*p).iter().enumerate().for_each(|(a, mode)| asked[a] -= mode.dot(*f));
+        modes(*p)
+            .iter()
+            .enumerate()
+            .for_each(|(a, mode)| asked[a] -= mode.dot(*f));
     }
     let mut grip = SMatrix::<f64, 6, 6>::zeros();
     for &v in own {
         let modes = modes(assembly.points[v]);
         (0..36).for_each(|k| grip[(k / 6, k % 6)] += areas_mm2[v] * modes[k / 6].dot(modes[k % 6]));
     }
-    let Some(held) = grip.cholesky().map(|c| c.solve(&asked)) else { return };
+    let Some(held) = grip.cholesky().map(|c| c.solve(&asked)) else {
+        return;
+    };
     for &v in own {
         let modes = modes(assembly.points[v]);
         forces_n[v] += (0..6).map(|a| held[a] * areas_mm2[v] * modes[a]).sum::<Vec3>();

@@ -1,5 +1,4 @@
-//! The plan that holds best among those that the search cannot tell apart, and what is weak about it (Sect.
-//! 6.2).
+//! The plan that bears most of those that the search allows, and what is weak about it (Sect. 6.2).
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -7,19 +6,24 @@ use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
+use super::climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
 use super::{Foreseen, MetricParams, PlanModel, foreseen};
-use crate::plan::{FoundPlan, LatticePlan, PlanParams};
+use crate::handling::{Borne, Deed, Failure, Handling, LoadCase};
+use crate::plan::{
+    FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanParams, PlanSurvey, RankedPlan,
+};
 use crate::{Cancelled, Cause, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
-/// Plans whose cost is within this share of the best one's are compared by simulation.
+/// Plans whose cost is at most this share above the least may be chosen.
 ///
 /// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins
-/// hold), so it decides among plans of about the same cost only.
-const COST_SLACK: f64 = 0.05;
+/// hold). With a tenth less of the choice the kits bear a fifth less, with twice as much hardly more:
+/// docs/notes/metrics.md.
+const COST_SLACK: f64 = 0.25;
 
-/// Where pieces of all these would rattle too far, plans up to this share above the best one's cost are
-/// looked at, too.
-const COST_SLACK_FOR_PLAY: f64 = 0.25;
+/// Play is foreseen within a factor of about one and a half; pieces that are foreseen to have less than this
+/// share of what they may have hardly ever rattle.
+const SURE_PLAY: f64 = 0.85;
 
 /// Plans whose widest play is within this share of the least are alike.
 const PLAY_TIE: f64 = 0.05;
@@ -43,11 +47,40 @@ pub struct Holding {
     pub seams: Vec<SeamHolding>,
     /// Plans that were compared.
     pub n_compared: usize,
+    /// What the kit bears of each load, by simulation without a print to compare.
+    #[serde(default)]
+    pub bears: Vec<LoadBorne>,
     /// The play of each piece that was foreseen from the plan: displacement, mm, and turn, degrees; zeros for
     /// the key.
     pub foreseen_play: Vec<[f64; 2]>,
     /// By how many times that is more than the piece may.
     pub foreseen_excess: Vec<f64>,
+}
+
+/// How much of one load a kit bears.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadBorne {
+    /// What is done.
+    pub deed: Deed,
+    /// How much of it, N.
+    pub force_n: f64,
+    /// Where, mm in assembly space.
+    pub at: [f64; 3],
+    /// By how many times the load may grow; `None` where nothing gives way.
+    pub factor: Option<f64>,
+    /// What gives way first.
+    pub first: Option<GivesWay>,
+}
+
+/// Where a kit gives way, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GivesWay {
+    /// What happens.
+    pub how: Failure,
+    /// The pieces that part.
+    pub between: [PatchId; 2],
+    /// The place, mm in assembly space.
+    pub at: [f64; 3],
 }
 
 /// A piece that comes apart.
@@ -78,55 +111,68 @@ pub struct SeamHolding {
     pub reason: String,
 }
 
-/// Simulates the plans of the pool that cost about as little as the best one and are not foreseen to rattle;
-/// the chosen plan takes the place of `found`'s. Where all of these would, more costly ones are looked at,
-/// and those that rattle least are simulated.
+/// What a plan is chosen for.
+pub struct Choice<'a> {
+    /// How plans are judged.
+    pub params: &'a PlanParams,
+    /// The pieces.
+    pub surface: &'a SegmentedSurface,
+    /// Connectors of each pair.
+    pub sizes: &'a ConnectorSizes,
+    /// Of the pieces.
+    pub survey: &'a PlanSurvey,
+    /// What earlier kits taught.
+    pub constraints: &'a PlanConstraints,
+    /// What the kit is to bear.
+    pub handling: &'a Handling,
+    /// How much may be looked at.
+    pub climb: ClimbParams,
+}
+
+/// Climbs from the plans of the pool to one that bears more and costs at most a quarter more than the least,
+/// and that is not foreseen to rattle where any is not; it takes the place of `found`'s.
 ///
-/// Warns with `comes-apart` where none of them holds without friction, and with `piece-loose` of each piece
+/// Warns with `comes-apart` where it does not hold without friction, and with `piece-loose` of each piece
 /// that hardly anything holds by the estimate of the costs.
 pub fn choose(
     ctx: &Ctx<'_>,
-    params: &PlanParams,
-    surface: &SegmentedSurface,
-    sizes: &ConnectorSizes,
+    choice: &Choice<'_>,
     mut found: FoundPlan,
 ) -> Result<(FoundPlan, Holding), ChoiceError> {
-    ctx.stage("which plan holds best", 0)?;
-    let model = PlanModel::new(&MetricParams::of_plan(params, sizes), surface, sizes);
-    let plans = shortlist(&model, surface, params.clearance_mm, &found);
-    let meetings: Vec<Vec<Meeting>> = plans
-        .iter()
-        .map(|&i| model.meetings(&found.pool[i].plan))
-        .collect();
-    let key = found.plan.key();
-    ctx.check()?;
-    let solved = model.surface_model()?.resist_all(&meetings, key.0)?;
-    let quality = |i: usize| match &solved[i].resistance {
-        Resistance::Holds(opening) => opening.quality_mm,
-        Resistance::Separable(parts) => -1e3 * parts.len() as f64,
-    };
-    // The earlier of equals, which costs less.
-    let best = (0..plans.len()).reduce(|best, i| if quality(i) > quality(best) { i } else { best });
-    let Some(best) = best else {
-        return Err(ChoiceError::NoPlan);
-    };
-    let chosen = found.pool.remove(plans[best]);
+    ctx.stage("which plan bears most", 0)?;
+    let Choice {
+        params,
+        surface,
+        sizes,
+        ..
+    } = *choice;
+    let model = PlanModel::new(
+        &MetricParams::of_plan(params, sizes, choice.handling.material),
+        surface,
+        sizes,
+    );
+    let bench = Bench::new(choice.handling, &model)?;
+    let (best, n_compared) = most_bearing(ctx, choice, &model, &bench, &found)?;
+    let chosen = best.ranked.clone();
+    let solved = model
+        .surface_model()?
+        .resist(&best.meetings, chosen.plan.key().0)?;
     let Foreseen {
         play: foreseen_play,
         excess: foreseen_excess,
     } = foreseen(
         &model,
         &chosen.plan,
-        &meetings[best],
+        &best.meetings,
         size_mm(surface),
         params.clearance_mm,
     );
-    let holding = holding(&model, &chosen.plan, &meetings[best], &solved[best].resistance);
     let holding = Holding {
-        n_compared: plans.len(),
+        n_compared,
         foreseen_play,
         foreseen_excess,
-        ..holding
+        bears: bears(&model, &bench, &best),
+        ..holding(&model, &chosen.plan, &best.meetings, &solved.resistance)
     };
     if !holding.loose.is_empty() {
         warn_of_parting(ctx, &holding.loose);
@@ -137,37 +183,70 @@ pub fn choose(
         .for_each(|&piece| warn_of_loose(ctx, &model, piece));
     found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
     (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
+    found.pool.retain(|p| p.plan != chosen.plan);
     found.pool.insert(0, chosen);
     Ok((found, holding))
 }
 
-/// The plans that are worth a simulation, by their places in the pool.
-fn shortlist(
+/// The plan that bears most, and how many were looked at.
+fn most_bearing<'b>(
+    ctx: &Ctx<'_>,
+    choice: &Choice<'_>,
     model: &PlanModel,
-    surface: &SegmentedSurface,
-    clearance_mm: f64,
+    bench: &'b Bench<'_>,
     found: &FoundPlan,
-) -> Vec<usize> {
-    // How far the loosest piece goes beyond what is allowed; 1 for plans in which none does.
-    let excess = |&i: &usize| {
-        let plan = &found.pool[i].plan;
-        let foreseen = foreseen(model, plan, &model.meetings(plan), size_mm(surface), clearance_mm);
-        foreseen.excess.into_iter().fold(1.0, f64::max)
+) -> Result<(Rated<'b>, usize), ChoiceError> {
+    let Some(first) = found.pool.first() else {
+        return Err(ChoiceError::NoPlan);
     };
-    let within = |slack: f64| -> Vec<(usize, f64)> {
-        let limit = found.score.worst * (1.0 + slack);
-        let plans: Vec<usize> = (0..found.pool.len())
-            .filter(|&i| found.pool[i].score.worst <= limit)
-            .collect();
-        plans.par_iter().map(|i| (*i, excess(i))).collect()
+    let most_cost = found.score.worst * (1.0 + COST_SLACK);
+    let counted = found.counted(choice.survey);
+    let around = Neighbourhood::new(choice.params, &counted, choice.constraints, found, most_cost);
+    // How far the loosest piece goes, as a share of what it may; no less than what surely passes.
+    let excess = |plan: &LatticePlan| {
+        let meetings = model.meetings(plan);
+        let foreseen = foreseen(
+            model,
+            plan,
+            &meetings,
+            size_mm(choice.surface),
+            choice.params.clearance_mm,
+        );
+        foreseen.excess.into_iter().fold(SURE_PLAY, f64::max)
     };
-    let least = |plans: &[(usize, f64)]| plans.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-    let mut plans = within(COST_SLACK);
-    if least(&plans) > 1.0 {
-        plans = within(COST_SLACK_FOR_PLAY);
+    let starts: Vec<(RankedPlan, f64)> = (found.pool.par_iter())
+        .filter(|p| p.score.worst <= most_cost)
+        .map(|p| (p.clone(), excess(&p.plan)))
+        .collect();
+    let most_excess = starts.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) * (1.0 + PLAY_TIE);
+    let may_be = |p: &RankedPlan| excess(&p.plan) <= most_excess;
+    let starts: Vec<RankedPlan> = starts
+        .into_iter()
+        .filter(|s| s.1 <= most_excess)
+        .map(|s| s.0)
+        .collect();
+    match climb(ctx, choice.climb, bench, &around, &starts, &may_be) {
+        Ok(Climbed { best, n_plans, .. }) => Ok((best, n_plans)),
+        Err(ClimbError::NoPlan) => Ok((bench.rated(first.clone())?, 1)),
+        Err(ClimbError::Solve(e)) => Err(e.into()),
+        Err(ClimbError::Cancelled(e)) => Err(e.into()),
     }
-    let most = least(&plans) * (1.0 + PLAY_TIE);
-    plans.into_iter().filter(|p| p.1 <= most).map(|p| p.0).collect()
+}
+
+/// What a plan bears, in assembly space.
+fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> Vec<LoadBorne> {
+    let one = |(case, borne): (&LoadCase, &Borne)| LoadBorne {
+        deed: case.deed,
+        force_n: case.force_n,
+        at: case.at.to_array(),
+        factor: borne.factor.is_finite().then_some(borne.factor),
+        first: borne.first.map(|(how, station)| GivesWay {
+            how,
+            between: model.pieces_at(station as usize),
+            at: model.place_of(station as usize).to_array(),
+        }),
+    };
+    bench.cases.iter().zip(&rated.borne).map(one).collect()
 }
 
 /// The longest side of the model.
@@ -223,6 +302,7 @@ fn holding(model: &PlanModel, plan: &LatticePlan, meetings: &[Meeting], resistan
                 loose,
                 seams: Vec::new(),
                 n_compared: 0,
+                bears: Vec::new(),
                 foreseen_play: Vec::new(),
                 foreseen_excess: Vec::new(),
             };
@@ -239,6 +319,7 @@ fn holding(model: &PlanModel, plan: &LatticePlan, meetings: &[Meeting], resistan
         loose,
         seams,
         n_compared: 0,
+        bears: Vec::new(),
         foreseen_play: Vec::new(),
         foreseen_excess: Vec::new(),
     }

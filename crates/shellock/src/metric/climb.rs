@@ -8,6 +8,7 @@
 //!
 //! Batches are of fixed size, no clock is read and ties go to the first, so threads play no part.
 
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
@@ -28,7 +29,7 @@ const NO_LESS: f64 = 0.99;
 /// sake.
 const LEAST_OF_PEAK: f64 = 0.97;
 /// Loads that are borne that many times over are not worth a move.
-const ENOUGH: f64 = 2.0;
+const ENOUGH: f64 = 1.5;
 
 /// The loads on one division and what solves them.
 pub struct Bench<'a> {
@@ -36,6 +37,7 @@ pub struct Bench<'a> {
     surface: SurfaceModel,
     /// What is done.
     pub cases: Vec<LoadCase>,
+    is_use: Vec<bool>,
     drifts: Vec<Drift>,
     strength_mpa: f64,
 }
@@ -53,7 +55,7 @@ impl Default for ClimbParams {
     fn default() -> Self {
         Self {
             n_solves: 4000,
-            n_starts: 3,
+            n_starts: 4,
         }
     }
 }
@@ -67,21 +69,33 @@ pub struct Rated<'a> {
     pub meetings: Vec<Meeting>,
     /// In the order of the bench's cases.
     pub borne: Vec<Borne>,
+    is_use: &'a [bool],
     joined: JoinedParts<'a>,
     closed: Vec<Closed>,
 }
 
 impl Rated<'_> {
-    /// The least load factor.
+    /// The least load factor of all uses.
     pub fn least(&self) -> f64 {
-        self.borne.iter().map(|b| b.factor).fold(f64::INFINITY, f64::min)
+        let uses = self.borne.iter().zip(self.is_use).filter(|(_, is)| **is);
+        uses.map(|(b, _)| b.factor).fold(f64::INFINITY, f64::min)
     }
 
-    /// Cases from that which it bears least of on.
+    /// Cases from that which it bears least of on, uses before falls that may happen.
     fn worst_first(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.borne.len()).collect();
-        order.sort_by(|a, b| self.borne[*a].factor.total_cmp(&self.borne[*b].factor));
+        order.sort_by(|a, b| {
+            self.urgency(*a)
+                .partial_cmp(&self.urgency(*b))
+                .unwrap_or(Ordering::Equal)
+        });
         order
+    }
+
+    /// What is not borne enough comes first.
+    fn urgency(&self, case: usize) -> (bool, bool, f64) {
+        let factor = self.borne[case].factor;
+        (factor >= ENOUGH, !self.is_use[case], factor)
     }
 }
 
@@ -90,10 +104,14 @@ impl<'a> Bench<'a> {
     pub fn new(handling: &Handling, model: &'a PlanModel) -> Result<Self, SparseError> {
         let surface = model.surface_model()?;
         let cases = load_cases(handling, &model.assembly);
-        let drifts = cases.par_iter().map(|case| surface.drift(&case.forces_n)).collect();
+        let drifts = cases
+            .par_iter()
+            .map(|case| surface.drift(&case.forces_n))
+            .collect();
         Ok(Self {
             model,
             surface,
+            is_use: cases.iter().map(|c| c.deed.is_use()).collect(),
             cases,
             drifts,
             strength_mpa: handling.material.strength_mpa,
@@ -118,11 +136,7 @@ impl<'a> Bench<'a> {
     ) -> Result<(Option<Rated<'b>>, usize), SparseError> {
         let meetings = self.model.meetings(&ranked.plan);
         let joined = from.map_or_else(|| self.surface.joined(&meetings), |f| f.joined.changed(&meetings))?;
-        let nothing = Borne {
-            factor: f64::INFINITY,
-            first: None,
-        };
-        let mut all = vec![nothing; self.cases.len()];
+        let mut all = vec![Borne::ANY; self.cases.len()];
         let mut closed = vec![Closed::default(); self.cases.len()];
         for (n_solved, &case) in order.iter().enumerate() {
             let start = from.map(|f| &f.closed[case]);
@@ -137,6 +151,7 @@ impl<'a> Bench<'a> {
             ranked,
             meetings,
             borne: all,
+            is_use: &self.is_use,
             joined,
             closed,
         };
@@ -191,7 +206,8 @@ pub fn climb<'b>(
     let mut best: Option<Rated<'b>> = None;
     for (i, start) in starts.into_iter().enumerate() {
         // Each has its share of what is left.
-        climber.most_solves = climber.n_solves + (params.n_solves - climber.n_solves.min(params.n_solves)) / (params.n_starts - i).max(1);
+        climber.most_solves = climber.n_solves
+            + (params.n_solves - climber.n_solves.min(params.n_solves)) / (params.n_starts - i).max(1);
         let top = climber.ascend(start)?;
         if best.as_ref().is_none_or(|b| is_above(&top, b)) {
             best = Some(top);
@@ -207,7 +223,14 @@ pub fn climb<'b>(
 /// Whether `a` bears more: of the first load by rank, from the worst on, that they bear differently.
 fn is_above(a: &Rated<'_>, b: &Rated<'_>) -> bool {
     let factors = |r: &Rated<'_>| -> Vec<f64> {
-        r.worst_first().into_iter().map(|i| r.borne[i].factor.min(ENOUGH)).collect()
+        let mut uses: Vec<f64> = Vec::new();
+        let mut falls: Vec<f64> = Vec::new();
+        for (b, is_use) in r.borne.iter().zip(r.is_use) {
+            if *is_use { &mut uses } else { &mut falls }.push(b.factor.min(ENOUGH));
+        }
+        uses.sort_by(f64::total_cmp);
+        falls.sort_by(f64::total_cmp);
+        uses.into_iter().chain(falls).collect()
     };
     for (x, y) in factors(a).into_iter().zip(factors(b)) {
         if x > MORE * y || y > MORE * x {
@@ -231,17 +254,27 @@ struct Climber<'c, 'b> {
 impl<'b> Climber<'_, 'b> {
     /// The starts that bear most of their worst loads, best first.
     fn best_starts(&mut self, starts: &[RankedPlan], n: usize) -> Result<Vec<Rated<'b>>, ClimbError> {
-        let Some(first) = starts.first() else { return Err(ClimbError::NoPlan) };
+        let allowed: Vec<RankedPlan> = (starts.par_iter())
+            .filter_map(|start| self.around.ranked(start.plan.clone()))
+            .collect();
+        let Some((first, others)) = allowed.split_first() else {
+            return Err(ClimbError::NoPlan);
+        };
         let mut best = vec![self.bench.rated(first.clone())?];
         self.n_solves += self.bench.cases.len();
-        for batch in starts[1..].chunks(BATCH) {
+        for batch in others.chunks(BATCH) {
             self.ctx.check()?;
             // What the last one kept bears least decides who else is kept.
             let order = best[0].worst_first();
-            let floor = if best.len() < n { 0.0 } else { best[best.len() - 1].least() };
+            let floor = if best.len() < n {
+                0.0
+            } else {
+                best[best.len() - 1].least()
+            };
+            let asked = |case: usize| if self.bench.is_use[case] { floor } else { 0.0 };
             let tried: Vec<_> = batch
                 .par_iter()
-                .map(|start| self.bench.tried(start.clone(), Some(&best[0]), &order, &|_| floor))
+                .map(|start| self.bench.tried(start.clone(), Some(&best[0]), &order, &asked))
                 .collect::<Result<_, _>>()?;
             for (found, n_solved) in tried {
                 self.n_solves += n_solved;
@@ -275,12 +308,26 @@ impl<'b> Climber<'_, 'b> {
     }
 
     /// A move that lets more of the load of that rank be borne, and no less of those before.
-    fn step(&mut self, at: &Rated<'b>, order: &[usize], rank: usize, floor: f64) -> Result<Option<Rated<'b>>, ClimbError> {
+    fn step(
+        &mut self,
+        at: &Rated<'b>,
+        order: &[usize],
+        rank: usize,
+        floor: f64,
+    ) -> Result<Option<Rated<'b>>, ClimbError> {
         let target = order[rank];
         let asked_more = MORE * at.borne[target].factor;
         let asked = |case: usize| {
             let place = order.iter().position(|c| *c == case).unwrap_or(rank);
-            if place < rank { (NO_LESS * at.borne[case].factor).max(floor) } else { asked_more.min(ENOUGH) }
+            if place < rank {
+                (NO_LESS * at.borne[case].factor).max(if self.bench.is_use[case] { floor } else { 0.0 })
+            } else if self.bench.is_use[case] == self.bench.is_use[target] {
+                asked_more.min(ENOUGH)
+            } else if self.bench.is_use[case] {
+                (NO_LESS * at.borne[case].factor).min(ENOUGH)
+            } else {
+                0.0
+            }
         };
         // The load that is to be helped comes first: most moves do not help it.
         let mut cases = vec![target];
@@ -299,8 +346,7 @@ impl<'b> Climber<'_, 'b> {
                     .collect::<Result<_, _>>()?;
                 self.n_plans += batch.len();
                 self.n_solves += tried.iter().map(|t| t.1).sum::<usize>();
-                let higher = tried.into_iter().filter_map(|t| t.0);
-                let best = higher.reduce(|best, other| if is_above(&other, &best) { other } else { best });
+                let best = self.highest(tried.into_iter().filter_map(|t| t.0).collect());
                 if best.is_some() || self.n_solves >= self.most_solves {
                     return Ok(best);
                 }
@@ -309,9 +355,29 @@ impl<'b> Climber<'_, 'b> {
         Ok(None)
     }
 
+    /// The plan that bears most of those that may be; the first of equals.
+    fn highest(&self, mut plans: Vec<Rated<'b>>) -> Option<Rated<'b>> {
+        while !plans.is_empty() {
+            let best = (1..plans.len()).fold(0, |best, i| {
+                if is_above(&plans[i], &plans[best]) {
+                    i
+                } else {
+                    best
+                }
+            });
+            let plan = plans.remove(best);
+            if (self.may_be)(&plan.ranked) {
+                return Some(plan);
+            }
+        }
+        None
+    }
+
     /// The pieces whose moves may help `case`: the two that part, then their neighbours.
     fn movers(&self, at: &Rated<'b>, case: usize) -> Vec<Vec<PatchId>> {
-        let Some((_, station)) = at.borne[case].first else { return Vec::new() };
+        let Some((_, station)) = at.borne[case].first else {
+            return Vec::new();
+        };
         let two = self.bench.model.pieces_at(station as usize);
         let mut near: Vec<PatchId> = (0..self.bench.model.assembly.stations.len())
             .map(|i| self.bench.model.pieces_at(i))
@@ -328,7 +394,7 @@ impl<'b> Climber<'_, 'b> {
     fn allowed(&self, moves: Vec<LatticePlan>) -> Vec<RankedPlan> {
         let ranked: Vec<Option<RankedPlan>> = moves
             .into_par_iter()
-            .map(|plan| self.around.ranked(plan).filter(|r| (self.may_be)(r)))
+            .map(|plan| self.around.ranked(plan))
             .collect();
         ranked.into_iter().flatten().collect()
     }

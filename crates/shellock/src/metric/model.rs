@@ -50,8 +50,8 @@ impl Default for MetricParams {
 }
 
 impl MetricParams {
-    /// The same wall and floor as the plan's.
-    pub fn of_plan(params: &PlanParams, sizes: &ConnectorSizes) -> Self {
+    /// The same wall and floor as the plan's, of that material.
+    pub fn of_plan(params: &PlanParams, sizes: &ConnectorSizes, material: Material) -> Self {
         let defaults = Self::default();
         let wall_mm = if params.wall_mm > 0.0 {
             params.wall_mm
@@ -64,6 +64,7 @@ impl MetricParams {
             connector_mm: sizes.default_mm(),
             beta: params.beta,
             rails,
+            material,
             ..defaults
         }
     }

@@ -61,7 +61,12 @@ impl<'a> Neighbourhood<'a> {
 
     /// Plans in which `piece` alone goes elsewhere: along another way, or earlier or later, none of them
     /// `seen`; whether they keep the conditions is not looked at.
-    pub fn moves(&self, plan: &LatticePlan, piece: PatchId, seen: &mut BTreeSet<PlanName>) -> Vec<LatticePlan> {
+    pub fn moves(
+        &self,
+        plan: &LatticePlan,
+        piece: PatchId,
+        seen: &mut BTreeSet<PlanName>,
+    ) -> Vec<LatticePlan> {
         let at = plan.position(piece);
         let mut moves = Vec::new();
         let mut add = |other: LatticePlan| {

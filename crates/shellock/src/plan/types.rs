@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::{PlanScore, PlanSurvey};
 use super::key::KeyDirections;
 use super::space::MOST_RUBS;
+use super::{PlanScore, PlanSurvey};
 use crate::{IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId};
 
 /// A plan whose directions are of the 26: what the search finds and pieces are made by.

@@ -140,10 +140,7 @@ pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
         (turn, plan.key_slide) = (laid, Some(along));
     }
     let params = StressParams {
-        metric: MetricParams {
-            material: kit.settings.strength.material,
-            ..MetricParams::of_plan(&plan, &made.sizes)
-        },
+        metric: MetricParams::of_plan(&plan, &made.sizes, kit.settings.strength.material),
         sizes: made.sizes.clone(),
         plan,
         turn,
