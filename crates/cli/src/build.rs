@@ -16,6 +16,7 @@ use shellock::{Ctx, Warning, play};
 
 use crate::Session;
 use crate::args::{Options, Out};
+use crate::bears;
 use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::inspect::thin_warnings;
@@ -202,6 +203,7 @@ fn print_json(
         "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
         "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.kit.sizes.largest_mm(),
         "key_slides_on_rails_mm": made.kit.rails_mm(),
+        "bears": made.kit.holding.summary(),
         "checks": made.kit.verification.checks, "findings": made.kit.verification.findings,
         "effort": made.effort, "stages": course.stages,
         "warnings": warnings, "exit_code": code,
@@ -228,6 +230,9 @@ fn print_text(
         println!("{}", bearing(strength, settings, standing));
     }
     println!("{}", quality(&made.kit.proof));
+    bears::lines(&made.kit.holding, standing)
+        .into_iter()
+        .for_each(|line| println!("{line}"));
     weakest(&made.kit.holding, standing)
         .into_iter()
         .for_each(|line| println!("{line}"));

@@ -1,6 +1,7 @@
 //! The command line of Shellock: arguments → parameters → library → files.
 
 mod args;
+mod bears;
 mod build;
 mod config;
 mod coupon;

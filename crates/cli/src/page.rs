@@ -15,6 +15,7 @@ use shellock_render::{
 };
 
 use crate::args::Options;
+use crate::bears;
 use crate::build::{bearing, scope};
 use crate::input::Model;
 use crate::output::{Summary, connector_sizes, standing};
@@ -85,6 +86,7 @@ pub fn report(
     let booklet = Booklet {
         title: title(&model.name),
         lines: cover_lines(&shown),
+        last: bears::short(&design.kit.holding),
         pieces: data.pieces.clone(),
     };
     let (page, (picture, booklet)) = rayon::join(
@@ -214,7 +216,23 @@ fn kit_facts(
             .iter()
             .map(|s| ("fall".into(), bearing(s, settings, standing))),
     );
+    facts.extend(bearing_facts(design, standing));
     facts.extend(plan_facts(design, standing));
+    facts
+}
+
+/// What the kit bears.
+fn bearing_facts(design: &Design, standing: &Standing) -> Vec<(String, String)> {
+    let holding = &design.kit.holding;
+    let Some(summary) = holding.summary() else {
+        return Vec::new();
+    };
+    let mut facts: Vec<(String, String)> = bears::figures(&summary)
+        .into_iter()
+        .map(|(what, much)| (what.to_owned(), much))
+        .collect();
+    facts.extend(bears::weakest(holding, standing).map(|w| ("gives way first".to_owned(), w)));
+    facts.push(("these figures are".to_owned(), bears::BY_SIMULATION.to_owned()));
     facts
 }
 

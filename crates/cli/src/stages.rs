@@ -17,6 +17,7 @@ use shellock_kit::PlanFile;
 
 use crate::Session;
 use crate::args::{Axis, Options};
+use crate::bears;
 use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
@@ -170,7 +171,7 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
             .collect();
         println!(
             "{}",
-            json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof, "holding": holding,
+            json!({ "status": "found", "installation_order": order, "steps": steps, "plan": proof, "holding": holding, "bears": holding.summary(),
                     "mean_cost": mean_cost, "n_plans": n_plans, "warnings": warnings })
         );
         return Ok(0);
@@ -185,6 +186,9 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     }
     println!("{}", quality(&proof));
     let standing = Standing::of(options.up, model.solid.mesh());
+    bears::lines(&holding, &standing)
+        .iter()
+        .for_each(|line| println!("{line}"));
     weakest(&holding, &standing)
         .iter()
         .for_each(|line| println!("{line}"));

@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use shellock::design::Effort;
-use shellock::metric::Holding;
+use shellock::metric::{Bears, Holding};
 use shellock::plan::PlanProof;
 use shellock_assembly::warning::WarningEntry;
 use shellock_assembly::{PatchId, PressFit};
@@ -85,6 +85,9 @@ pub struct PlanFile {
     /// How the plan holds by simulation; `None` where an earlier version told it in another way.
     #[serde(default, deserialize_with = "if_readable")]
     pub holding: Option<Holding>,
+    /// What the kit bears, in short; `None` in kits of earlier versions.
+    #[serde(default, deserialize_with = "if_readable")]
+    pub bears: Option<Bears>,
     /// Material of all pieces over the solid model's.
     pub volume_ratio: Option<f64>,
     /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].

@@ -39,6 +39,8 @@ pub struct Booklet<'a> {
     pub title: String,
     /// Lines below it.
     pub lines: Vec<String>,
+    /// Lines where it is finished, two at most.
+    pub last: Vec<String>,
     /// Standing on its feet: z is up, and it looks along −y. In any order.
     pub pieces: Vec<ReportPiece<'a>>,
 }
@@ -114,7 +116,7 @@ impl Booklet<'_> {
         let drawn = self.drawn();
         let mut pages = vec![self.cover(&drawn)];
         pages.extend(pieces_pages(&drawn));
-        pages.extend(steps_pages(&drawn));
+        pages.extend(steps_pages(&drawn, &self.last));
         let n_pages = pages.len();
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
             let foot = format!("{}  –  {} of {n_pages}", self.title, i + 1);
@@ -264,7 +266,7 @@ fn step_pixels() -> [usize; 2] {
 }
 
 /// One step a picture, and the finished thing.
-fn steps_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
+fn steps_pages(drawn: &[Drawn<'_>], last: &[String]) -> Vec<Page> {
     let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
     let sights = sights(&pieces);
     let cell = cell_mm(STEPS, 0.0);
@@ -290,7 +292,7 @@ fn steps_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
         }
         match drawn.get(i) {
             Some(d) => step_heading(page, [x, y], d.piece, &sights, i),
-            None => finish_heading(page, [x, y], drawn),
+            None => finish_heading(page, [x, y], drawn, last),
         }
     }
     pages
@@ -337,15 +339,20 @@ fn seen_from(sights: &[Sight], i: usize) -> (String, bool) {
     (if is_new { format!("turn it: {seen}") } else { seen }, is_new)
 }
 
-fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
+fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], last: &[String]) {
+    const LINE_MM: f64 = 3.6;
+    let room_mm = cell_mm(STEPS, 0.0)[0] - 3.0;
     page.text([x + 1.0, y + 6.6], bold(5.0, INK), "done");
     if let Some(key) = drawn.last() {
         let how = format!(
             "to take it apart, pull piece {} out first, against its arrow",
             key.piece.number
         );
-        let room_mm = cell_mm(STEPS, 0.0)[0] - 3.0;
         page.text_within([x + 1.0, y + 11.4], room_mm, small(FAINT), &how);
+    }
+    for (i, line) in (1..).zip(last) {
+        let down_mm = 11.4 + LINE_MM * f64::from(i);
+        page.text_within([x + 1.0, y + down_mm], room_mm, small(FAINT), line);
     }
 }
 

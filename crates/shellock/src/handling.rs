@@ -36,6 +36,9 @@ use region::{around, highest_of, lowest, spread};
 /// An opening of this many connector sizes shows, and is half of what lets a pin out.
 pub const OPEN_SIZES: f64 = 0.3;
 
+/// Height of falls, mm: the paper's.
+pub const DROP_MM: f64 = 2000.0;
+
 /// Gravity, mm/s².
 const GRAVITY_MM_S2: f64 = 9806.65;
 /// g/cm³ in t/mm³, so that t · mm/s² = N.
@@ -75,7 +78,7 @@ impl Handling {
             press_radius_mm: 10.0,
             grip_n: 20.0,
             finger_radius_mm: 6.0,
-            drop_mm: 2000.0,
+            drop_mm: DROP_MM,
             n_falls: 12,
             least_width_mm: 15.0,
             wall_mm,

@@ -13,7 +13,7 @@ mod model;
 #[cfg(test)]
 mod tests;
 
-pub use choice::{Choice, ChoiceError, GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding, choose};
+pub use choice::{Bears, Choice, ChoiceError, GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding, choose};
 pub use climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
 pub use data_driven::{data_driven, pieces_alone};
 pub use foreseen::{Foreseen, foreseen};

@@ -84,6 +84,7 @@ impl PlanFile {
             installation_order: kit.plan.steps.iter().map(|s| s.piece).collect(),
             plan: Some(kit.proof.clone()),
             holding: Some(kit.holding.clone()),
+            bears: kit.holding.summary(),
             volume_ratio: Some(told.volume_ratio),
             connector_share: Some(told.connector_share),
             joints: joints(design),

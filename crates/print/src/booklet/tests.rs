@@ -67,6 +67,7 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
         let pieces = (0..3).map(|i| piece(&meshes[i], i, along[i])).collect();
         Booklet {
             title: "a wall".into(),
+            last: Vec::new(),
             lines: vec!["3 pieces".into()],
             pieces,
         }
@@ -88,6 +89,7 @@ fn no_pieces_make_a_booklet_without_steps() {
     assert!(
         Booklet {
             title: String::new(),
+            last: Vec::new(),
             lines: Vec::new(),
             pieces: Vec::new()
         }

@@ -24,7 +24,10 @@ fn assembly(surface: &SegmentedSurface) -> ShellAssembly {
 /// Sum of forces and of torques about the origin.
 fn wrench(assembly: &ShellAssembly, case: &LoadCase) -> [Vec3; 2] {
     let all = || assembly.points.iter().zip(&case.forces_n);
-    [all().map(|(_, f)| *f).sum(), all().map(|(p, f)| p.cross(*f)).sum()]
+    [
+        all().map(|(_, f)| *f).sum(),
+        all().map(|(p, f)| p.cross(*f)).sum(),
+    ]
 }
 
 #[test]
@@ -34,7 +37,9 @@ fn what_rests_or_is_held_is_in_balance_and_what_falls_is_stopped_by_what_it_land
     for case in &cases {
         let [force, torque] = wrench(&ball, case);
         match case.deed {
-            Deed::FallUpright | Deed::Fall { .. } => assert!((force.length() / case.force_n - 1.0).abs() < 1e-9),
+            Deed::FallUpright | Deed::Fall { .. } => {
+                assert!((force.length() / case.force_n - 1.0).abs() < 1e-9)
+            }
             Deed::GripNarrow | Deed::GripWide => assert!(force.length() < 1e-9 * case.force_n, "{case:?}"),
             _ => assert!(
                 force.length() < 1e-6 * case.force_n && torque.length() < 1e-4 * case.force_n,
@@ -46,7 +51,10 @@ fn what_rests_or_is_held_is_in_balance_and_what_falls_is_stopped_by_what_it_land
     let n = |is: fn(&Deed) -> bool| cases.iter().filter(|c| is(&c.deed)).count();
     assert_eq!(n(|d| matches!(d, Deed::Fall { .. })), 12);
     assert_eq!(n(|d| matches!(d, Deed::Hang { .. })), 8);
-    assert_eq!(n(|d| matches!(d, Deed::PressTop | Deed::PressMiddle | Deed::FallUpright)), 3);
+    assert_eq!(
+        n(|d| matches!(d, Deed::PressTop | Deed::PressMiddle | Deed::FallUpright)),
+        3
+    );
 }
 
 #[test]
@@ -54,7 +62,9 @@ fn a_press_avoids_what_is_thin_and_what_would_tip_over() {
     // A table of 60 mm with a needle on top, and an arm that hangs over.
     let block = |from: [f64; 3], to: [f64; 3]| {
         let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|i: usize| {
-            Vec3::from_array(std::array::from_fn(|k| if i >> k & 1 == 1 { to[k] } else { from[k] }))
+            Vec3::from_array(std::array::from_fn(
+                |k| if i >> k & 1 == 1 { to[k] } else { from[k] },
+            ))
         });
         Volume::hull(&corners)
     };
@@ -97,10 +107,18 @@ fn a_body_laid_down_rests_on_the_side_below_its_middle() {
 #[test]
 fn a_floor_presses_as_a_lever_says_and_never_pulls() {
     // Feet at −1 and 1; pressed at x between them, each bears its share.
-    let feet = [([1.0, -1.0, 0.0], 2.0), ([1.0, 1.0, 0.0], 2.0), ([1.0, 0.0, 1.0], 1e-6), ([1.0, 0.0, -1.0], 1e-6)];
+    let feet = [
+        ([1.0, -1.0, 0.0], 2.0),
+        ([1.0, 1.0, 0.0], 2.0),
+        ([1.0, 0.0, 1.0], 1e-6),
+        ([1.0, 0.0, -1.0], 1e-6),
+    ];
     for x in [-0.9, -0.5, 0.0, 0.3] {
         let found = region::pressures(&feet, Vector3::new(70.0, 70.0 * x, 0.0));
-        assert!((found[0] - 35.0 * (1.0 - x)).abs() < 1e-2 && (found[1] - 35.0 * (1.0 + x)).abs() < 1e-2, "{found:?}");
+        assert!(
+            (found[0] - 35.0 * (1.0 - x)).abs() < 1e-2 && (found[1] - 35.0 * (1.0 + x)).abs() < 1e-2,
+            "{found:?}"
+        );
     }
     let beyond = region::pressures(&feet, Vector3::new(70.0, 90.0, 0.0));
     assert!(beyond.iter().all(|p| *p >= 0.0) && beyond[0] == 0.0, "{beyond:?}");
@@ -134,7 +152,10 @@ fn the_factor_is_that_of_the_joint_that_gives_way_first() {
     assert_eq!(opens.first, Some((Failure::Opens, 0)));
     assert!((opens.factor - 2.0).abs() < 1e-12);
     let yields = borne(&plan, &bearing([0.3, 9.0, 0.4], [1.0, 0.0, 42.0]), 42.0);
-    assert_eq!((yields.factor, yields.first), (1.0, Some((Failure::PinYields, 2))));
+    assert_eq!(
+        (yields.factor, yields.first),
+        (1.0, Some((Failure::PinYields, 2)))
+    );
     assert_eq!(borne(&plan, &bearing([0.0; 3], [0.0; 3]), 42.0), Borne::ANY);
     assert_eq!(borne_by_solids(&plan, None, 42.0).factor, 0.0);
 }

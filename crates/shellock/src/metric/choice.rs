@@ -8,7 +8,7 @@ use shellock_mechanics::{Meeting, Opening, Resistance};
 
 use super::climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
 use super::{Foreseen, MetricParams, PlanModel, foreseen};
-use crate::handling::{Borne, Deed, Failure, Handling, LoadCase};
+use crate::handling::{Borne, DROP_MM, Deed, Failure, Handling, LoadCase};
 use crate::plan::{
     FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanParams, PlanSurvey, RankedPlan,
 };
@@ -70,6 +70,63 @@ pub struct LoadBorne {
     pub factor: Option<f64>,
     /// What gives way first.
     pub first: Option<GivesWay>,
+}
+
+/// What a kit bears, in short. `None` where a load has no place on it, or nothing gives way.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bears {
+    /// A press on its top, N.
+    pub top_n: Option<f64>,
+    /// On the highest place above its middle, N.
+    pub middle_n: Option<f64>,
+    /// On the weakest of its sides as it lies, N.
+    pub sides_n: Option<f64>,
+    /// The weaker of two grips, N a finger.
+    pub grip_n: Option<f64>,
+    /// A fall onto its feet, m.
+    pub fall_upright_m: Option<f64>,
+    /// The worst of all falls, m.
+    pub fall_m: Option<f64>,
+}
+
+impl Holding {
+    /// What the kit bears, in short; `None` where no loads were simulated.
+    pub fn summary(&self) -> Option<Bears> {
+        /// Nobody cares for more than that many times a load.
+        const MOST: f64 = 10.0;
+        let least = |is: fn(&Deed) -> bool| {
+            let factors = self
+                .bears
+                .iter()
+                .filter(|b| is(&b.deed))
+                .map(|b| (b.factor.unwrap_or(MOST).min(MOST), b));
+            factors.min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let newtons = |is| least(is).map(|(factor, load)| factor * load.force_n);
+        // Forces go with the root of the height.
+        let metres = |is| least(is).map(|(factor, _)| 1e-3 * DROP_MM * factor * factor);
+        (!self.bears.is_empty()).then(|| Bears {
+            top_n: newtons(|d| *d == Deed::PressTop),
+            middle_n: newtons(|d| *d == Deed::PressMiddle),
+            sides_n: newtons(|d| matches!(d, Deed::PressSide { .. })),
+            grip_n: newtons(|d| matches!(d, Deed::GripNarrow | Deed::GripWide)),
+            fall_upright_m: metres(|d| *d == Deed::FallUpright),
+            fall_m: metres(|d| matches!(d, Deed::Fall { .. } | Deed::FallUpright)),
+        })
+    }
+
+    /// The use of which the kit bears least beside what is asked.
+    pub fn weakest_use(&self) -> Option<&LoadBorne> {
+        let uses = self
+            .bears
+            .iter()
+            .filter(|b| b.deed.is_use() && b.factor.is_some());
+        uses.min_by(|a, b| {
+            a.factor
+                .partial_cmp(&b.factor)
+                .unwrap_or(std::cmp::Ordering::Equal)
+        })
+    }
 }
 
 /// Where a kit gives way, and how.
