@@ -31,7 +31,11 @@ const WHOLE: &str = r#"{
         "proven_for": { "keys": [2], "key_slides": "within its plane", "lessons": 0 }, "piece_costs": [1.5, 0.5] },
     "holding": { "quality_mm": -0.5, "loose": [], "seams": [{ "later": 2, "earlier": 1, "score_mm": 0.5,
         "opening_mm": 0.25, "weight": 2.0, "at": [0.0, 0.0, 0.0], "reason": "short" }], "n_compared": 3,
-        "foreseen_play": [[0.1, 0.2], [0.0, 0.0]], "foreseen_excess": [0.5, 0.0] },
+        "foreseen_play": [[0.1, 0.2], [0.0, 0.0]], "foreseen_excess": [0.5, 0.0],
+        "bears": [{ "deed": { "kind": "hang", "piece": 1 }, "force_n": 1.5, "at": [0.0, 0.0, 0.0], "factor": 2.0,
+            "first": { "how": "opens", "between": [2, 1], "at": [0.0, 1.0, 0.0] } }] },
+    "bears": { "top_n": 84.5, "middle_n": 70.5, "sides_n": null, "grip_n": 20.5, "fall_upright_m": 2.5,
+        "fall_m": 0.5 },
     "volume_ratio": 0.3, "connector_share": 0.75,
     "joints": [{ "male": 1, "female": 2, "length_mm": 20.5, "volume_mm3": [1.5, 2.5], "kept": [1.0, 0.9],
         "at": [0.0, 0.0, 0.0] }],
@@ -80,7 +84,7 @@ fn what_is_read_is_written_again_byte_for_byte() {
     assert_eq!(String::from_utf8(plan.to_bytes()).unwrap(), text);
     assert_eq!(PlanFile::read(&plan.to_bytes()).unwrap(), plan);
     assert_eq!(plan.press_fits[0].kind, PressFitKind::Rib);
-    assert!(plan.plan.is_some() && plan.holding.is_some());
+    assert!(plan.plan.is_some() && plan.holding.is_some() && plan.bears.is_some());
     assert!(plan.verification.unwrap().findings.is_some());
 }
 
