@@ -5,9 +5,13 @@ use std::time::Instant;
 
 use clap::Args;
 use rayon::prelude::*;
+use shellock::Ctx;
+use shellock::design::Settings;
 use shellock::handling::{
     Borne, Deed, Failure as Way, Handling, LoadCase, borne, borne_by_solids, load_cases,
 };
+use shellock::metric::{Bench, ClimbError, ClimbParams, climb};
+use shellock::plan::{Neighbourhood, PlanConstraints, PlanOutcome, search};
 use shellock_mechanics::{Drift, Meeting, VolumeModel};
 
 use crate::failure::Failure;
@@ -59,47 +63,21 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
     if options.solid {
         by_solid(&subject, &mut rows)?;
     }
-    for r in &rows {
-        let best = (0..r.surface.len())
-            .max_by(|a, b| r.surface[*a].total_cmp(&r.surface[*b]))
-            .unwrap();
-        let st = r.stations[best].map(|s| {
-            (
-                s.0,
-                subject.model.pieces_at(s.1 as usize),
-                subject.model.place_of(s.1 as usize),
-            )
-        });
-        let net: shellock_geom::Vec3 = r.case.forces_n.iter().sum();
-        let tq: shellock_geom::Vec3 = r
-            .case
-            .forces_n
-            .iter()
-            .zip(&subject.model.assembly.points)
-            .map(|(f, p)| (*p - r.case.at).cross(*f))
-            .sum();
-        eprintln!(
-            "{:?} at {:.0} net {:.1} torque {:.0} best {:.3} {:?}",
-            r.case.deed,
-            r.case.at,
-            net.length(),
-            tq.length(),
-            r.surface[best],
-            st
-        );
-    }
-    let b = subject.model.assembly.points.iter().fold(
-        (shellock_geom::Vec3::splat(1e9), shellock_geom::Vec3::splat(-1e9)),
-        |b, p| (b.0.min(*p), b.1.max(*p)),
-    );
-    eprintln!("{:.0} {:.0}", b.0, b.1);
+    let mut sheets = tables(&rows, subject.plans.len());
     if let Some(n_solves) = options.climb {
-        climbed(&subject, options, &handling, n_solves)?;
+        sheets.push((
+            "climb.md".to_owned(),
+            climbed(&subject, options, &handling, n_solves)?,
+        ));
     }
-    let name = options.subject.model.name();
+    write_all(out, &format!("{}/loads", options.subject.model.name()), &sheets)
+}
+
+/// All load factors, and how well the two models agree.
+fn tables(rows: &[Row], n_plans: usize) -> Vec<(String, String)> {
     let least = |of: fn(&Row) -> &Vec<f64>| -> Vec<f64> {
         let plan = |i: usize| rows.iter().map(|r| of(r)[i]).fold(f64::INFINITY, f64::min);
-        (0..subject.plans.len()).map(plan).collect()
+        (0..n_plans).map(plan).collect()
     };
     let mut table: Vec<Vec<String>> = rows.iter().map(said).collect();
     let (surface, solid) = (least(|r| &r.surface), least(|r| &r.solid));
@@ -112,80 +90,64 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
         "solid, median",
         "ρ with solid",
     ];
-    let columns = rows
-        .iter()
-        .flat_map(|r| {
-            [
-                (format!("{} surface", deed(&r.case.deed)), r.surface.clone()),
-                (format!("{} solid", deed(&r.case.deed)), r.solid.clone()),
-            ]
-        })
-        .collect();
-    let sheets = [
+    let both = |r: &Row| {
+        let name = deed(&r.case.deed);
+        [
+            (format!("{name} surface"), r.surface.clone()),
+            (format!("{name} solid"), r.solid.clone()),
+        ]
+    };
+    let columns = rows.iter().flat_map(both).collect();
+    vec![
         ("loads.md".to_owned(), markdown(&head, &table)),
         ("loads.csv".to_owned(), Table { columns }.to_csv()),
-    ];
-    write_all(out, &format!("{name}/loads"), &sheets)
+    ]
 }
 
+/// What the search's first plan bears and what the plan bears that a climb ends at, load by load.
 fn climbed(
     subject: &Subject,
     options: &LoadsOptions,
     handling: &Handling,
     n_solves: usize,
-) -> Result<(), Failure> {
-    use shellock::metric::{Bench, ClimbParams, climb};
-    use shellock::plan::{Neighbourhood, PlanConstraints, PlanOutcome, search};
-    let params = shellock::design::Settings::resolve(&options.subject.model.params()).plan;
-    let constraints = PlanConstraints::default();
-    let ctx = shellock::Ctx::quiet();
-    let PlanOutcome::Found(found) = search(&ctx, &params, &subject.survey, &constraints).unwrap() else {
-        panic!()
+) -> Result<String, Failure> {
+    let params = Settings::resolve(&options.subject.model.params()).plan;
+    let (constraints, ctx) = (PlanConstraints::default(), Ctx::quiet());
+    let found = match search(&ctx, &params, &subject.survey, &constraints) {
+        Ok(PlanOutcome::Found(found)) => found,
+        Ok(_) => return Err(crate::metrics::failed("search", &"no plan keeps all conditions")),
+        Err(e) => return Err(crate::metrics::failed("search", &e)),
     };
     let counted = found.counted(&subject.survey);
-    let around = Neighbourhood::new(
-        &params,
-        &counted,
-        &constraints,
-        &found,
-        found.score.worst * options.slack,
+    let most_cost = found.score.worst * options.slack;
+    let around = Neighbourhood::new(&params, &counted, &constraints, &found, most_cost);
+    let failed = |e: ClimbError| crate::metrics::failed("climb", &e);
+    let bench = Bench::new(handling, &subject.model).map_err(|e| failed(e.into()))?;
+    let first = bench.rated(found.pool[0].clone()).map_err(|e| failed(e.into()))?;
+    let start = Instant::now();
+    let budget = ClimbParams {
+        n_solves,
+        ..Default::default()
+    };
+    let top = climb(&ctx, budget, &bench, &around, &found.pool, &|_| true).map_err(failed)?;
+    eprintln!(
+        "{} plans, {} loads solved in {:.2} s; cost {:.3}, least {:.3}",
+        top.n_plans,
+        top.n_solves,
+        start.elapsed().as_secs_f64(),
+        top.best.ranked.score.worst,
+        found.score.worst
     );
-    let bench = Bench::new(handling, &subject.model).unwrap();
-    for (n_starts, n_solves) in [
-        (1, n_solves),
-        (2, n_solves),
-        (3, n_solves),
-        (2, 2 * n_solves),
-        (4, 2 * n_solves),
-        (4, 10 * n_solves),
-    ] {
-        let start = Instant::now();
-        let first = bench.rated(found.pool[0].clone()).unwrap();
-        let top = climb(
-            &ctx,
-            ClimbParams { n_solves, n_starts },
-            &bench,
-            &around,
-            &found.pool,
-            &|_| true,
-        )
-        .unwrap();
-        eprintln!(
-            "pool {} first least {:.3} climbed {:.3}; {} plans, {} solves, {:.2} s; cost {:.3} of {:.3}",
-            found.pool.len(),
-            first.least(),
-            top.best.least(),
-            top.n_plans,
-            top.n_solves,
-            start.elapsed().as_secs_f64(),
-            top.best.ranked.score.worst,
-            found.score.worst
-        );
-        for (case, borne) in bench.cases.iter().zip(&top.best.borne).take(14) {
-            eprintln!("   {} {:.2} {:?}", deed(&case.deed), borne.factor, borne.first);
-        }
+    let row = |name: String, from: f64, to: f64| vec![name, format!("{from:.2}"), format!("{to:.2}")];
+    let mut table = vec![row("least use".into(), first.least(), top.best.least())];
+    for (i, case) in bench.cases.iter().enumerate() {
+        table.push(row(
+            deed(&case.deed),
+            first.borne[i].factor,
+            top.best.borne[i].factor,
+        ));
     }
-    Ok(())
+    Ok(markdown(&["load", "the search's plan", "climbed"], &table))
 }
 
 fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure> {
