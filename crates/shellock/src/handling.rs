@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::boolean::Volume;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3};
-use shellock_mechanics::{Bearing, Loaded, Material, Meeting, ShellAssembly};
+use shellock_mechanics::{Bearing, Loaded, Material, Meeting, Opening, ShellAssembly};
 
 use crate::PatchId;
 use crate::impact::impact_n;
@@ -35,6 +35,9 @@ use region::{around, highest_of, lowest, spread};
 
 /// An opening of this many connector sizes shows, and is half of what lets a pin out.
 pub const OPEN_SIZES: f64 = 0.3;
+
+/// A weighted opening under the separation force that counts as once; only ratios of it matter.
+const PULLED_MM: f64 = 0.1;
 
 /// Height of falls, mm: the paper's.
 pub const DROP_MM: f64 = 2000.0;
@@ -434,6 +437,15 @@ impl Borne {
         first: None,
     };
 
+    /// Of the separation force: by how many times it may grow until the seam that decides the plan's quality opens
+    /// by [`PULLED_MM`].
+    pub fn of_pull(opening: &Opening) -> Self {
+        match opening.worst {
+            Some(station) => Self::ANY.and(PULLED_MM / -opening.quality_mm, Failure::Opens, station),
+            None => Self::ANY,
+        }
+    }
+
     /// The less of this and of a failure at a station. What is no number has no answer: such a plan bears
     /// nothing.
     fn and(self, factor: f64, failure: Failure, station: u32) -> Self {
@@ -461,10 +473,36 @@ impl Borne {
 /// The load factor of what `bearing` says of a plan under one load.
 pub fn borne(plan: &[Meeting], bearing: &Bearing, strength_mpa: f64) -> Borne {
     let opened = Borne::ANY.opening(plan, &bearing.opening_mm);
-    let pins = (0..).zip(&bearing.pin_mpa);
-    pins.fold(opened, |least, (i, mpa)| {
-        least.and(strength_mpa / mpa, Failure::PinYields, i)
-    })
+    match robust_pin(plan, bearing) {
+        Some((station, mpa)) => opened.and(strength_mpa / mpa, Failure::PinYields, station),
+        None => opened,
+    }
+}
+
+/// Share of the pins' volume that may be bent more than the stress that counts.
+///
+/// A station has one stress, so a single one in a corner would decide. Against the solid model, whose stress all
+/// but 0.5 % of the connectors' volume stays under, load factors of 40 random plans on three models agree best
+/// from 0.03 on (least ρ of any use on a teddy 0.95, a gargoyle 0.93, a bunny 0.85; without it 0.30, 0.50, 0.75).
+const PIN_PEAK_SHARE: f64 = 0.03;
+
+/// The station whose pin all but [`PIN_PEAK_SHARE`] of the pins' volume are bent no more than, and that stress,
+/// MPa. `None` where there are no pins.
+fn robust_pin(plan: &[Meeting], bearing: &Bearing) -> Option<(u32, f64)> {
+    let volume = |(i, meeting): (usize, &Meeting)| {
+        let joint = meeting.joint?;
+        let volume_mm3 = bearing.length_mm[i] * joint.size_mm.powi(2);
+        Some((i as u32, bearing.pin_mpa[i], volume_mm3))
+    };
+    let mut pins: Vec<(u32, f64, f64)> = plan.iter().enumerate().filter_map(volume).collect();
+    pins.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let peak_mm3 = PIN_PEAK_SHARE * pins.iter().map(|p| p.2).sum::<f64>();
+    let mut above_mm3 = 0.0;
+    let robust = pins.iter().find(|pin| {
+        above_mm3 += pin.2;
+        above_mm3 >= peak_mm3
+    });
+    robust.or(pins.last()).map(|pin| (pin.0, pin.1))
 }
 
 /// The same of what the solid model says: there walls yield, too; where they or pins do is not known as a

@@ -10,11 +10,13 @@ mod climb;
 mod data_driven;
 mod foreseen;
 mod model;
+mod rating;
 #[cfg(test)]
 mod tests;
 
 pub use choice::{Bears, Choice, ChoiceError, GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding, choose};
-pub use climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
+pub use climb::{ClimbError, ClimbParams, Climbed, climb};
 pub use data_driven::{data_driven, pieces_alone};
 pub use foreseen::{Foreseen, foreseen};
 pub use model::{MetricParams, PlanModel};
+pub use rating::{Bench, Rated};

@@ -143,8 +143,8 @@ fn climbed(
     for (i, case) in bench.cases.iter().enumerate() {
         table.push(row(
             deed(&case.deed),
-            first.borne[i].factor,
-            top.best.borne[i].factor,
+            first.borne()[i].factor,
+            top.best.borne()[i].factor,
         ));
     }
     Ok(markdown(&["load", "the search's plan", "climbed"], &table))

@@ -14,7 +14,7 @@ use super::SurfaceModel;
 use super::contact::{Contact, N_CONTACTS, TIP};
 use super::parts::{N_MOTIONS, mid_wall};
 use super::solve::{Balance, Jointed, Load, openings};
-use crate::assembly::Meeting;
+use crate::assembly::{Meeting, Opening};
 use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 
 /// One load as the stations feel it before anything joins the parts.
@@ -28,6 +28,8 @@ pub struct Bearing {
     pub opening_mm: Vec<f64>,
     /// The largest bending stress in the pin of each station, MPa; 0 where there is no joint.
     pub pin_mpa: Vec<f64>,
+    /// Length of each station, mm.
+    pub length_mm: Vec<f64>,
     /// Newton steps that it took.
     pub n_iterations: usize,
     /// What is left of the force, as a share of it.
@@ -37,6 +39,12 @@ pub struct Bearing {
 /// Which contacts are closed under a load: where to begin with a plan that is nearly the same.
 #[derive(Clone, Debug, Default)]
 pub struct Closed(Vec<bool>);
+
+impl Closed {
+    fn of(balance: &Balance) -> Self {
+        Self(balance.borne.iter().map(|b| *b < 0.0).collect())
+    }
+}
 
 /// The parts joined by a plan. Plans that differ little are made of each other, and loads begin where those of
 /// another plan ended.
@@ -59,7 +67,20 @@ impl JoinedParts<'_> {
     ) -> Result<(Bearing, Closed), SparseError> {
         let balance = self.0.balance(&load.0, closed.map(|c| &c.0[..]))?;
         let bearing = self.0.model.bearing(plan, &self.0.contacts, &balance);
-        Ok((bearing, Closed(balance.borne.iter().map(|b| *b < 0.0).collect())))
+        Ok((bearing, Closed::of(&balance)))
+    }
+
+    /// How far the separation force opens the seams; no part is held, since the pulls of all seams balance.
+    pub fn pulled(
+        &self,
+        plan: &[Meeting],
+        closed: Option<&Closed>,
+    ) -> Result<(Opening, Closed), SparseError> {
+        let model = self.0.model;
+        let load = Load::of_pulls(model, plan, &model.pulls(plan));
+        let balance = self.0.balance(&load, closed.map(|c| &c.0[..]))?;
+        let opening = Opening::rated(plan, openings(model, plan, &balance.moved));
+        Ok((opening, Closed::of(&balance)))
     }
 }
 
@@ -117,6 +138,7 @@ impl SurfaceModel {
         Bearing {
             opening_mm: openings(self, plan, &balance.moved),
             pin_mpa,
+            length_mm: self.assembly.stations.iter().map(|s| s.length_mm).collect(),
             n_iterations: balance.n_iterations,
             error: balance.error,
         }

@@ -6,7 +6,8 @@ use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
-use super::climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
+use super::climb::{ClimbError, ClimbParams, Climbed, climb};
+use super::rating::{Bench, Rated};
 use super::{Foreseen, MetricParams, PlanModel, foreseen};
 use crate::handling::{Borne, DROP_MM, Deed, Failure, Handling, LoadCase};
 use crate::plan::{
@@ -303,7 +304,7 @@ fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> Vec<LoadBor
             at: model.place_of(station as usize).to_array(),
         }),
     };
-    bench.cases.iter().zip(&rated.borne).map(one).collect()
+    bench.cases.iter().zip(&rated.borne()).map(one).collect()
 }
 
 /// The longest side of the model.

@@ -1,23 +1,21 @@
 //! The plan that bears most: a climb of the least load factor under the conditions of the search (Sect. 6.2).
 //!
-//! Plans of the pool are rated load by load, worst first, and given up with the first load that they bear less
+//! Plans of the pool are rated goal by goal, worst first, and given up with the first use that they bear less
 //! of than the best so far. From the best ones the climb moves one piece at a time, another way or another
-//! place in the order. What decides a load is a station between two pieces, so their moves and their
-//! neighbours' are tried. A move is kept that lets the kit bear more of the worst load; where none does, more
-//! of the next without losing any of those before (leximin).
+//! place in the order. What decides a goal is a station between two pieces, so their moves and their
+//! neighbours' are tried. A move is kept that lets the kit bear more of the worst use; where none does, more
+//! of the next without losing any of those before (leximin). Then the same for the pull on all seams, without
+//! losing of any use, and for falls, without losing of both.
 //!
 //! Batches are of fixed size, no clock is read and ties go to the first, so threads play no part.
 
-use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 use shellock_geom::sparse::SparseError;
-use shellock_mechanics::{Closed, Drift, JoinedParts, Meeting, SurfaceModel};
 
-use super::PlanModel;
-use crate::handling::{Borne, Handling, LoadCase, borne, load_cases};
-use crate::plan::{LatticePlan, Neighbourhood, PlanName, RankedPlan};
+use super::rating::{Bench, Rank, Rated};
+use crate::plan::{LatticePlan, Neighbourhood, RankedPlan};
 use crate::{Cancelled, Ctx, PatchId};
 
 /// Moves that are tried side by side before the best of them is taken.
@@ -25,22 +23,8 @@ const BATCH: usize = 8;
 /// What counts as bearing more, and what as no less.
 const MORE: f64 = 1.01;
 const NO_LESS: f64 = 0.99;
-/// Below this share of the most that the worst load ever was borne, the climb does not go for other loads'
-/// sake.
+/// What was reached of a goal is not given up below this share for what is less important.
 const LEAST_OF_PEAK: f64 = 0.97;
-/// Loads that are borne that many times over are not worth a move.
-const ENOUGH: f64 = 1.5;
-
-/// The loads on one division and what solves them.
-pub struct Bench<'a> {
-    model: &'a PlanModel,
-    surface: SurfaceModel,
-    /// What is done.
-    pub cases: Vec<LoadCase>,
-    is_use: Vec<bool>,
-    drifts: Vec<Drift>,
-    strength_mpa: f64,
-}
 
 /// How much a climb may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,102 +44,15 @@ impl Default for ClimbParams {
     }
 }
 
-/// A plan and how much of each load it bears.
-#[derive(Clone)]
-pub struct Rated<'a> {
-    /// With its costs.
-    pub ranked: RankedPlan,
-    /// What it makes of each station.
-    pub meetings: Vec<Meeting>,
-    /// In the order of the bench's cases.
-    pub borne: Vec<Borne>,
-    is_use: &'a [bool],
-    joined: JoinedParts<'a>,
-    closed: Vec<Closed>,
-}
-
-impl Rated<'_> {
-    /// The least load factor of all uses.
-    pub fn least(&self) -> f64 {
-        let uses = self.borne.iter().zip(self.is_use).filter(|(_, is)| **is);
-        uses.map(|(b, _)| b.factor).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Cases from that which it bears least of on, uses before falls that may happen.
-    fn worst_first(&self) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.borne.len()).collect();
-        order.sort_by(|a, b| {
-            self.urgency(*a)
-                .partial_cmp(&self.urgency(*b))
-                .unwrap_or(Ordering::Equal)
-        });
-        order
-    }
-
-    /// What is not borne enough comes first.
-    fn urgency(&self, case: usize) -> (bool, bool, f64) {
-        let factor = self.borne[case].factor;
-        (factor >= ENOUGH, !self.is_use[case], factor)
-    }
-}
-
-impl<'a> Bench<'a> {
-    /// Loads of `handling` on the pieces of `model`.
-    pub fn new(handling: &Handling, model: &'a PlanModel) -> Result<Self, SparseError> {
-        let surface = model.surface_model()?;
-        let cases = load_cases(handling, &model.assembly);
-        let drifts = cases
-            .par_iter()
-            .map(|case| surface.drift(&case.forces_n))
-            .collect();
-        Ok(Self {
-            model,
-            surface,
-            is_use: cases.iter().map(|c| c.deed.is_use()).collect(),
-            cases,
-            drifts,
-            strength_mpa: handling.material.strength_mpa,
-        })
-    }
-
-    /// All loads on a plan, from the start.
-    pub fn rated(&self, ranked: RankedPlan) -> Result<Rated<'_>, SparseError> {
-        let order: Vec<usize> = (0..self.cases.len()).collect();
-        let all = self.tried(ranked, None, &order, &|_| 0.0).map(|tried| tried.0)?;
-        Ok(all.expect("no load is asked for more than nothing"))
-    }
-
-    /// The plan with its load factors, beginning `from` a plan that is nearly the same; none where it bears
-    /// less of a load than `asked` of that case. And how many loads were solved.
-    fn tried<'b>(
-        &'b self,
-        ranked: RankedPlan,
-        from: Option<&Rated<'b>>,
-        order: &[usize],
-        asked: &dyn Fn(usize) -> f64,
-    ) -> Result<(Option<Rated<'b>>, usize), SparseError> {
-        let meetings = self.model.meetings(&ranked.plan);
-        let joined = from.map_or_else(|| self.surface.joined(&meetings), |f| f.joined.changed(&meetings))?;
-        let mut all = vec![Borne::ANY; self.cases.len()];
-        let mut closed = vec![Closed::default(); self.cases.len()];
-        for (n_solved, &case) in order.iter().enumerate() {
-            let start = from.map(|f| &f.closed[case]);
-            let (bearing, touching) = joined.bear(&meetings, &self.drifts[case], start)?;
-            all[case] = borne(&meetings, &bearing, self.strength_mpa);
-            closed[case] = touching;
-            if all[case].factor < asked(case) {
-                return Ok((None, n_solved + 1));
-            }
-        }
-        let rated = Rated {
-            ranked,
-            meetings,
-            borne: all,
-            is_use: &self.is_use,
-            joined,
-            closed,
+impl ClimbParams {
+    /// Loads that may be solved until the goals of a rank, and those before, are climbed.
+    fn until(&self, rank: Rank) -> usize {
+        let tenths = match rank {
+            Rank::Use => 6,
+            Rank::Pull => 9,
+            Rank::Fall | Rank::Hang => 10,
         };
-        Ok((Some(rated), order.len()))
+        self.n_solves * tenths / 10
     }
 }
 
@@ -187,7 +84,7 @@ pub enum ClimbError {
 pub fn climb<'b>(
     ctx: &Ctx<'_>,
     params: ClimbParams,
-    bench: &'b Bench<'_>,
+    bench: &'b Bench<'b>,
     around: &Neighbourhood<'_>,
     starts: &[RankedPlan],
     may_be: &(dyn Fn(&RankedPlan) -> bool + Sync),
@@ -197,47 +94,44 @@ pub fn climb<'b>(
         bench,
         around,
         may_be,
-        seen: BTreeSet::new(),
         n_plans: 0,
         n_solves: 0,
-        most_solves: params.n_solves,
+        floors: vec![0.0; bench.ranks.len()],
     };
     let starts = climber.best_starts(starts, params.n_starts)?;
+    let (n, until) = (starts.len(), params.until(Rank::Use));
     let mut best: Option<Rated<'b>> = None;
     for (i, start) in starts.into_iter().enumerate() {
         // Each has its share of what is left.
-        climber.most_solves = climber.n_solves
-            + (params.n_solves - climber.n_solves.min(params.n_solves)) / (params.n_starts - i).max(1);
-        let top = climber.ascend(start)?;
-        if best.as_ref().is_none_or(|b| is_above(&top, b)) {
+        let left = until.saturating_sub(climber.n_solves);
+        let top = climber.ascend(start, Rank::Use, climber.n_solves + left / (n - i))?;
+        if best.as_ref().is_none_or(|b| is_above(&top, b, Rank::Use)) {
             best = Some(top);
         }
     }
+    let mut best = best.ok_or(ClimbError::NoPlan)?;
+    for rank in [Rank::Pull, Rank::Fall] {
+        best = climber.ascend(best, rank, params.until(rank))?;
+    }
+    climber.complete(&mut best, Rank::Hang)?;
     Ok(Climbed {
-        best: best.ok_or(ClimbError::NoPlan)?,
+        best,
         n_plans: climber.n_plans,
         n_solves: climber.n_solves,
     })
 }
 
-/// Whether `a` bears more: of the first load by rank, from the worst on, that they bear differently.
-fn is_above(a: &Rated<'_>, b: &Rated<'_>) -> bool {
-    let factors = |r: &Rated<'_>| -> Vec<f64> {
-        let mut uses: Vec<f64> = Vec::new();
-        let mut falls: Vec<f64> = Vec::new();
-        for (b, is_use) in r.borne.iter().zip(r.is_use) {
-            if *is_use { &mut uses } else { &mut falls }.push(b.factor.min(ENOUGH));
-        }
-        uses.sort_by(f64::total_cmp);
-        falls.sort_by(f64::total_cmp);
-        uses.into_iter().chain(falls).collect()
-    };
-    for (x, y) in factors(a).into_iter().zip(factors(b)) {
+/// Whether `a` bears more: of the first goal of that rank, from the worst on, that they meet differently;
+/// where there is none, of the next rank.
+fn is_above(a: &Rated<'_>, b: &Rated<'_>, rank: Rank) -> bool {
+    let factors = |r: &Rated<'_>, rank| -> Vec<f64> { r.factors(rank) };
+    let pairs = factors(a, rank).into_iter().zip(factors(b, rank));
+    for (x, y) in pairs {
         if x > MORE * y || y > MORE * x {
             return x > y;
         }
     }
-    false
+    rank == Rank::Use && is_above(a, b, Rank::Pull)
 }
 
 struct Climber<'c, 'b> {
@@ -245,14 +139,14 @@ struct Climber<'c, 'b> {
     bench: &'b Bench<'b>,
     around: &'c Neighbourhood<'c>,
     may_be: &'c (dyn Fn(&RankedPlan) -> bool + Sync),
-    seen: BTreeSet<PlanName>,
     n_plans: usize,
     n_solves: usize,
-    most_solves: usize,
+    /// What may not be lost of each goal of the ranks that were climbed.
+    floors: Vec<f64>,
 }
 
 impl<'b> Climber<'_, 'b> {
-    /// The starts that bear most of their worst loads, best first.
+    /// The starts that bear most of their worst uses, best first.
     fn best_starts(&mut self, starts: &[RankedPlan], n: usize) -> Result<Vec<Rated<'b>>, ClimbError> {
         let allowed: Vec<RankedPlan> = (starts.par_iter())
             .filter_map(|start| self.around.ranked(start.plan.clone()))
@@ -260,94 +154,138 @@ impl<'b> Climber<'_, 'b> {
         let Some((first, others)) = allowed.split_first() else {
             return Err(ClimbError::NoPlan);
         };
-        let mut best = vec![self.bench.rated(first.clone())?];
-        self.n_solves += self.bench.cases.len();
+        let mut first = self.bench.begun(first.clone(), None)?;
+        self.complete(&mut first, Rank::Use)?;
+        self.complete(&mut first, Rank::Pull)?;
+        let mut best = vec![first];
         for batch in others.chunks(BATCH) {
             self.ctx.check()?;
             // What the last one kept bears least decides who else is kept.
-            let order = best[0].worst_first();
             let floor = if best.len() < n {
                 0.0
             } else {
                 best[best.len() - 1].least()
             };
-            let asked = |case: usize| if self.bench.is_use[case] { floor } else { 0.0 };
-            let tried: Vec<_> = batch
-                .par_iter()
-                .map(|start| self.bench.tried(start.clone(), Some(&best[0]), &order, &asked))
-                .collect::<Result<_, _>>()?;
-            for (found, n_solved) in tried {
-                self.n_solves += n_solved;
-                best.extend(found);
-            }
-            self.n_plans += batch.len();
+            let mut asked: Vec<(usize, f64)> = self
+                .bench
+                .goals(Rank::Use)
+                .into_iter()
+                .map(|g| (g, floor))
+                .collect();
+            asked.sort_by(|a, b| best[0].factor(a.0).total_cmp(&best[0].factor(b.0)));
+            asked.extend(self.bench.goals(Rank::Pull).into_iter().map(|g| (g, 0.0)));
+            best.extend(self.tried(batch, &best[0].clone(), &asked)?);
             best.sort_by(|a, b| b.least().total_cmp(&a.least()));
             best.truncate(n);
         }
         Ok(best)
     }
 
-    /// To where no move helps any more, or the work is done.
-    fn ascend(&mut self, start: Rated<'b>) -> Result<Rated<'b>, ClimbError> {
-        let (mut at, mut peak) = (start, 0.0_f64);
-        self.seen.insert(self.around.name(&at.ranked.plan));
-        let mut rank = 0;
-        while rank < at.borne.len() && self.n_solves < self.most_solves {
-            self.ctx.check()?;
-            let order = at.worst_first();
-            peak = peak.max(at.least());
-            if at.borne[order[rank]].factor >= ENOUGH {
+    /// Asks for all goals of a rank.
+    fn complete(&mut self, plan: &mut Rated<'b>, rank: Rank) -> Result<(), ClimbError> {
+        for goal in self.bench.goals(rank) {
+            self.n_solves += usize::from(plan.ask(goal, None)?);
+        }
+        Ok(())
+    }
+
+    /// Those of `plans`, which are like `like`, that meet the goals as `asked`; the others are given up with
+    /// the first that they do not meet.
+    fn tried(
+        &mut self,
+        plans: &[RankedPlan],
+        like: &Rated<'b>,
+        asked: &[(usize, f64)],
+    ) -> Result<Vec<Rated<'b>>, ClimbError> {
+        let one = |ranked: &RankedPlan| -> Result<(Option<Rated<'b>>, usize), SparseError> {
+            let mut rated = self.bench.begun(ranked.clone(), Some(like))?;
+            for (i, &(goal, least)) in asked.iter().enumerate() {
+                rated.ask(goal, Some(like))?;
+                if rated.factor(goal) < least {
+                    return Ok((None, i + 1));
+                }
+            }
+            Ok((Some(rated), asked.len()))
+        };
+        let all: Vec<_> = plans.par_iter().map(one).collect::<Result<_, _>>()?;
+        self.n_plans += all.len();
+        self.n_solves += all.iter().map(|t| t.1).sum::<usize>();
+        Ok(all.into_iter().filter_map(|t| t.0).collect())
+    }
+
+    /// To where no move helps the goals of a rank any more, or `most_solves` are done. What is reached counts
+    /// as a floor for the ranks that come after.
+    fn ascend(&mut self, start: Rated<'b>, rank: Rank, most_solves: usize) -> Result<Rated<'b>, ClimbError> {
+        let mut at = start;
+        self.complete(&mut at, rank)?;
+        let mut peak = at.least_of(rank);
+        let mut place = 0;
+        while self.n_solves < most_solves {
+            let order = at.worst_first(rank);
+            if place >= order.len() {
                 break;
             }
-            match self.step(&at, &order, rank, LEAST_OF_PEAK * peak)? {
-                Some(higher) => (at, rank) = (higher, 0),
-                None => rank += 1,
+            match self.step(&at, rank, &order[..], place, LEAST_OF_PEAK * peak, most_solves)? {
+                Some(higher) => (at, place) = (higher, 0),
+                None => place += 1,
             }
+            peak = peak.max(at.least_of(rank));
+        }
+        for goal in self.bench.goals(rank) {
+            self.floors[goal] = LEAST_OF_PEAK * at.factor(goal).min(rank.enough());
         }
         Ok(at)
     }
 
-    /// A move that lets more of the load of that rank be borne, and no less of those before.
+    /// What a move must keep so that more is borne of the goal at that place of `order`, that goal first: most
+    /// moves do not help it.
+    fn asked(
+        &self,
+        at: &Rated<'b>,
+        rank: Rank,
+        order: &[usize],
+        place: usize,
+        floor: f64,
+    ) -> Vec<(usize, f64)> {
+        let more = (MORE * at.factor(order[place])).min(rank.enough());
+        let mut asked = vec![(order[place], more)];
+        let before = order[..place]
+            .iter()
+            .map(|g| (*g, (NO_LESS * at.factor(*g)).max(floor)));
+        asked.extend(before);
+        let others = self
+            .bench
+            .goals(rank)
+            .into_iter()
+            .filter(|g| !order[..=place].contains(g));
+        asked.extend(others.map(|g| (g, more)));
+        let higher = (0..self.floors.len()).filter(|g| self.bench.ranks[*g] < rank);
+        asked.extend(higher.map(|g| (g, self.floors[g])));
+        asked
+    }
+
+    /// A move that meets more of the goal at that place of `order`, and no less of those before.
     fn step(
         &mut self,
         at: &Rated<'b>,
+        rank: Rank,
         order: &[usize],
-        rank: usize,
+        place: usize,
         floor: f64,
+        most_solves: usize,
     ) -> Result<Option<Rated<'b>>, ClimbError> {
-        let target = order[rank];
-        let asked_more = MORE * at.borne[target].factor;
-        let asked = |case: usize| {
-            let place = order.iter().position(|c| *c == case).unwrap_or(rank);
-            if place < rank {
-                (NO_LESS * at.borne[case].factor).max(if self.bench.is_use[case] { floor } else { 0.0 })
-            } else if self.bench.is_use[case] == self.bench.is_use[target] {
-                asked_more.min(ENOUGH)
-            } else if self.bench.is_use[case] {
-                (NO_LESS * at.borne[case].factor).min(ENOUGH)
-            } else {
-                0.0
-            }
-        };
-        // The load that is to be helped comes first: most moves do not help it.
-        let mut cases = vec![target];
-        cases.extend(order.iter().filter(|c| **c != target));
-        let mut seen = BTreeSet::new();
-        for pieces in self.movers(at, target) {
+        let asked = self.asked(at, rank, order, place, floor);
+        let mut seen = BTreeSet::from([self.around.name(&at.ranked.plan)]);
+        for pieces in self.movers(at, order[place]) {
             let mut moves = Vec::new();
             for piece in pieces {
                 moves.extend(self.around.moves(&at.ranked.plan, piece, &mut seen));
             }
             for batch in self.allowed(moves).chunks(BATCH) {
                 self.ctx.check()?;
-                let tried: Vec<_> = batch
-                    .par_iter()
-                    .map(|ranked| self.bench.tried(ranked.clone(), Some(at), &cases, &asked))
-                    .collect::<Result<_, _>>()?;
-                self.n_plans += batch.len();
-                self.n_solves += tried.iter().map(|t| t.1).sum::<usize>();
-                let best = self.highest(tried.into_iter().filter_map(|t| t.0).collect());
-                if best.is_some() || self.n_solves >= self.most_solves {
+                let met = self.tried(batch, at, &asked)?;
+                let best = self.highest(met, rank);
+                if best.is_some() || self.n_solves >= most_solves {
                     return Ok(best);
                 }
             }
@@ -356,10 +294,10 @@ impl<'b> Climber<'_, 'b> {
     }
 
     /// The plan that bears most of those that may be; the first of equals.
-    fn highest(&self, mut plans: Vec<Rated<'b>>) -> Option<Rated<'b>> {
+    fn highest(&self, mut plans: Vec<Rated<'b>>, rank: Rank) -> Option<Rated<'b>> {
         while !plans.is_empty() {
             let best = (1..plans.len()).fold(0, |best, i| {
-                if is_above(&plans[i], &plans[best]) {
+                if is_above(&plans[i], &plans[best], rank) {
                     i
                 } else {
                     best
@@ -373,9 +311,9 @@ impl<'b> Climber<'_, 'b> {
         None
     }
 
-    /// The pieces whose moves may help `case`: the two that part, then their neighbours.
-    fn movers(&self, at: &Rated<'b>, case: usize) -> Vec<Vec<PatchId>> {
-        let Some((_, station)) = at.borne[case].first else {
+    /// The pieces whose moves may help a goal: the two that part, then their neighbours.
+    fn movers(&self, at: &Rated<'b>, goal: usize) -> Vec<Vec<PatchId>> {
+        let Some(station) = at.station(goal) else {
             return Vec::new();
         };
         let two = self.bench.model.pieces_at(station as usize);

@@ -1,0 +1,210 @@
+//! What plans bear: goals in ranks, and as much of them solved as is asked for.
+//!
+//! ```text
+//!   rank    goals                                        enough
+//!   use     presses, grips, the fall onto its feet       ENOUGH times the load
+//!   pull    the separation force on all seams            there is no enough
+//!   fall    falls onto any side                          ENOUGH times the load
+//!   hang    its weight, held at one piece                ENOUGH times the load: all plans bear it several times
+//! ```
+
+use rayon::prelude::*;
+use shellock_geom::sparse::SparseError;
+use shellock_mechanics::{Closed, Drift, JoinedParts, Meeting, SurfaceModel};
+
+use super::PlanModel;
+use crate::handling::{Borne, Deed, Handling, LoadCase, borne, load_cases};
+use crate::plan::RankedPlan;
+
+/// Loads that are borne that many times over are not worth a move.
+pub const ENOUGH: f64 = 1.5;
+
+/// What goals are for, most important first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Rank {
+    /// What people do to a kit.
+    Use,
+    /// How little seams open when all are pulled apart.
+    Pull,
+    /// What happens once in a while; what lands on an ear or a tail hardly any plan bears.
+    Fall,
+    /// Its own weight.
+    Hang,
+}
+
+impl Rank {
+    fn of(deed: &Deed) -> Self {
+        match deed {
+            Deed::Fall { .. } => Self::Fall,
+            Deed::Hang { .. } => Self::Hang,
+            _ => Self::Use,
+        }
+    }
+
+    /// What is more than this counts as this.
+    pub fn enough(self) -> f64 {
+        if self == Self::Pull { f64::INFINITY } else { ENOUGH }
+    }
+}
+
+/// The loads on one division and what solves them.
+pub struct Bench<'a> {
+    pub(super) model: &'a PlanModel,
+    surface: SurfaceModel,
+    /// What is done.
+    pub cases: Vec<LoadCase>,
+    drifts: Vec<Drift>,
+    strength_mpa: f64,
+    /// Of each goal: the cases, then the pull.
+    pub(super) ranks: Vec<Rank>,
+}
+
+/// A plan and how much of each load it bears.
+#[derive(Clone)]
+pub struct Rated<'a> {
+    /// With its costs.
+    pub ranked: RankedPlan,
+    /// What it makes of each station.
+    pub meetings: Vec<Meeting>,
+    bench: &'a Bench<'a>,
+    /// Of each goal that was asked for.
+    answers: Vec<Option<Answer>>,
+    joined: JoinedParts<'a>,
+}
+
+#[derive(Clone)]
+struct Answer {
+    borne: Borne,
+    closed: Closed,
+}
+
+impl<'a> Bench<'a> {
+    /// Loads of `handling` on the pieces of `model`.
+    pub fn new(handling: &Handling, model: &'a PlanModel) -> Result<Self, SparseError> {
+        let surface = model.surface_model()?;
+        let cases = load_cases(handling, &model.assembly);
+        let drifts = cases
+            .par_iter()
+            .map(|case| surface.drift(&case.forces_n))
+            .collect();
+        let ranks = cases
+            .iter()
+            .map(|c| Rank::of(&c.deed))
+            .chain([Rank::Pull])
+            .collect();
+        Ok(Self {
+            model,
+            surface,
+            cases,
+            drifts,
+            strength_mpa: handling.material.strength_mpa,
+            ranks,
+        })
+    }
+
+    /// All goals of a plan.
+    pub fn rated(&self, ranked: RankedPlan) -> Result<Rated<'_>, SparseError> {
+        let mut rated = self.begun(ranked, None)?;
+        for goal in 0..self.ranks.len() {
+            rated.ask(goal, None)?;
+        }
+        Ok(rated)
+    }
+
+    /// A plan of which nothing is asked yet; beginning `from` one that is nearly the same.
+    pub(super) fn begun<'b>(
+        &'b self,
+        ranked: RankedPlan,
+        from: Option<&Rated<'b>>,
+    ) -> Result<Rated<'b>, SparseError> {
+        let meetings = self.model.meetings(&ranked.plan);
+        let joined = from.map_or_else(|| self.surface.joined(&meetings), |f| f.joined.changed(&meetings))?;
+        Ok(Rated {
+            ranked,
+            meetings,
+            bench: self,
+            answers: vec![None; self.ranks.len()],
+            joined,
+        })
+    }
+
+    /// The goals of a rank.
+    pub(super) fn goals(&self, rank: Rank) -> Vec<usize> {
+        (0..self.ranks.len()).filter(|g| self.ranks[*g] == rank).collect()
+    }
+}
+
+impl<'b> Rated<'b> {
+    /// The least load factor of what people do to it; infinite where nothing gives way.
+    pub fn least(&self) -> f64 {
+        let uses = self.bench.goals(Rank::Use);
+        uses.into_iter()
+            .map(|g| self.factor(g))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// How much it bears of each load, in the order of the bench's cases; without end where that was not
+    /// asked.
+    pub fn borne(&self) -> Vec<Borne> {
+        (0..self.bench.cases.len())
+            .map(|goal| self.answer(goal))
+            .collect()
+    }
+
+    fn answer(&self, goal: usize) -> Borne {
+        self.answers[goal].as_ref().map_or(Borne::ANY, |a| a.borne)
+    }
+
+    /// The load factor of a goal; infinite where it was not asked.
+    pub(super) fn factor(&self, goal: usize) -> f64 {
+        self.answer(goal).factor
+    }
+
+    /// Where it gives way first under a goal.
+    pub(super) fn station(&self, goal: usize) -> Option<u32> {
+        self.answer(goal).first.map(|f| f.1)
+    }
+
+    /// Asks for a goal; what was asked already is not solved again. `like` is a plan that is nearly the same.
+    /// Whether anything was solved.
+    pub(super) fn ask(&mut self, goal: usize, like: Option<&Rated<'b>>) -> Result<bool, SparseError> {
+        if self.answers[goal].is_some() {
+            return Ok(false);
+        }
+        let start = like.and_then(|l| l.answers[goal].as_ref()).map(|a| &a.closed);
+        let (meetings, bench) = (&self.meetings, self.bench);
+        let (borne, closed) = match bench.drifts.get(goal) {
+            Some(load) => {
+                let (bearing, closed) = self.joined.bear(meetings, load, start)?;
+                (borne(meetings, &bearing, bench.strength_mpa), closed)
+            }
+            None => {
+                let (opening, closed) = self.joined.pulled(meetings, start)?;
+                (Borne::of_pull(&opening), closed)
+            }
+        };
+        self.answers[goal] = Some(Answer { borne, closed });
+        Ok(true)
+    }
+
+    /// The least load factor of a rank.
+    pub(super) fn least_of(&self, rank: Rank) -> f64 {
+        self.factors(rank).first().copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// Load factors of a rank, the least first; what is more than enough counts as enough.
+    pub(super) fn factors(&self, rank: Rank) -> Vec<f64> {
+        let capped = |g| self.factor(g).min(rank.enough());
+        let mut factors: Vec<f64> = self.bench.goals(rank).into_iter().map(capped).collect();
+        factors.sort_by(f64::total_cmp);
+        factors
+    }
+
+    /// Goals of a rank that are not met enough, worst first.
+    pub(super) fn worst_first(&self, rank: Rank) -> Vec<usize> {
+        let mut goals = self.bench.goals(rank);
+        goals.retain(|g| self.factor(*g) < rank.enough());
+        goals.sort_by(|a, b| self.factor(*a).total_cmp(&self.factor(*b)));
+        goals
+    }
+}
