@@ -124,6 +124,26 @@ pub enum Cause {
     },
     ComesApart,
     PieceLoose,
+    BearsLittle {
+        done: String,
+        bears: String,
+        asked: String,
+        gives_way: String,
+    },
+    // What was changed so that a kit bears more
+    WallForUse {
+        from_mm: f64,
+        to_mm: f64,
+        done: String,
+    },
+    ConnectorsForUse {
+        from_mm: f64,
+        to_mm: f64,
+        done: String,
+    },
+    JoinedForUse {
+        done: String,
+    },
     // The bodies, connectors and pieces
     ConnectorLimited {
         pair: [PatchId; 2],
@@ -428,6 +448,39 @@ impl Warning {
                 format!(
                     "in the simulation without friction these pieces can be pulled apart: {}",
                     self.ids()
+                ),
+            ),
+            Cause::BearsLittle {
+                done,
+                bears,
+                asked,
+                gives_way,
+            } => (
+                "bears-little",
+                format!(
+                    "where the kit is {done} it bears {bears}, not {asked}: {gives_way} between pieces {first} and {second}; by \
+                     simulation, without a print to compare; handle it with care there, print it larger, or choose fewer pieces \
+                     (--pieces)"
+                ),
+            ),
+            Cause::WallForUse { from_mm, to_mm, done } => (
+                "wall-for-use",
+                format!(
+                    "walls are {to_mm:.1} mm thick where {from_mm:.1} mm bear a fall, so that seams stay closed where the kit is \
+                     {done}; --thickness {from_mm:.1} leaves that out"
+                ),
+            ),
+            Cause::ConnectorsForUse { from_mm, to_mm, done } => (
+                "connectors-for-use",
+                format!(
+                    "connectors between pieces {first} and {second} are {to_mm:.1} mm instead of {from_mm:.1} mm, so that their seam \
+                     stays closed where the kit is {done}"
+                ),
+            ),
+            Cause::JoinedForUse { done } => (
+                "joined-for-use",
+                format!(
+                    "two pieces are one here, since the seam between them would give way where the kit is {done}"
                 ),
             ),
             Cause::PieceLoose => (

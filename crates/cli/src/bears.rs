@@ -1,7 +1,7 @@
 //! What a kit bears, in a maker's words.
 
-use shellock::handling::{Deed, Failure};
-use shellock::metric::{Bears, Holding, LoadBorne};
+use shellock::handling::Failure;
+use shellock::metric::{Bears, Holding};
 
 use crate::place::Standing;
 
@@ -85,21 +85,7 @@ pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
     };
     Some(format!(
         "where it is {}: {how} ({})",
-        done(worst),
+        worst.deed.done(),
         standing.words(first.at)
     ))
-}
-
-/// What is done, as in "it is …".
-fn done(load: &LoadBorne) -> &'static str {
-    match load.deed {
-        Deed::PressTop => "pressed on its top",
-        Deed::PressMiddle => "pressed on its middle",
-        Deed::PressSide { .. } => "pressed as it lies",
-        Deed::GripNarrow => "gripped where it is narrow",
-        Deed::GripWide => "gripped where it is wide",
-        Deed::FallUpright => "dropped onto its feet",
-        Deed::Fall { .. } => "dropped",
-        Deed::Hang { .. } => "lifted by one piece",
-    }
 }

@@ -20,6 +20,7 @@ mod lesson;
 mod outcome;
 mod params;
 mod settings;
+mod strengthen;
 #[cfg(test)]
 mod tests;
 
@@ -32,9 +33,9 @@ use crate::strength::{Strength, StrengthError, StressMap};
 use crate::{
     Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength,
 };
-use attempt::{Attempt, Failure, Next};
+use attempt::{Attempt, Failure, Next, Planning};
 pub use budget::Effort;
-use budget::{Budget, Pace};
+use budget::{Budget, Levers, Pace, THICKER_WALLS};
 use candidate::Candidate;
 use division::{Division, WallGrid, revised};
 use handover::Handover;
@@ -43,6 +44,7 @@ use outcome::Best;
 pub use outcome::{Design, DesignError, DesignOutcome, PrintedFit};
 pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
+use strengthen::{Remedy, Thicker};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or
 /// the rounds are used up; then the best of them is returned, its failures told.
@@ -52,10 +54,35 @@ pub fn design(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<DesignOutcome, DesignError> {
-    let wall = Wall::decide(ctx, params, model)?;
-    let job = Job::new(ctx, params, model, labels, &wall)?;
-    let mut best = Best::default();
-    let places = candidate::places(ctx, &job)?;
+    let mut wall = Wall::decide(ctx, params, model)?;
+    let (mut n_left, mut effort) = (THICKER_WALLS, Effort::default());
+    loop {
+        let job = Job::new(ctx, params, model, labels, &wall, n_left > 0)?;
+        match with_wall(ctx, &job, &mut effort)? {
+            Walled::Done(outcome) => return Ok(outcome),
+            Walled::Thicker(thicker) => {
+                n_left -= 1;
+                wall = wall.thicker(ctx, params, model, &thicker)?;
+            }
+        }
+    }
+}
+
+/// How a job with one wall ended.
+enum Walled<T> {
+    Done(T),
+    /// The wall must be thicker, or it bears too little.
+    Thicker(Thicker),
+}
+
+/// The job with the wall as thick as it is, on top of the `effort` that was made.
+fn with_wall(
+    ctx: &Ctx,
+    job: &Job<'_>,
+    effort: &mut Effort,
+) -> Result<Walled<DesignOutcome>, DesignError> {
+    let mut best = Best::after(*effort);
+    let places = candidate::places(ctx, job)?;
     for (i, place) in places.iter().enumerate() {
         if best.is_enough(place.as_ref()) || (i > 0 && job.pace.is_late(ctx)) {
             continue;
@@ -63,12 +90,21 @@ pub fn design(
         if let Some(site) = place {
             ctx.note(&candidate::words(site));
         }
-        if let Some(candidate) = Candidate::new(&job, i, place.as_ref()) {
-            let explored = explore(ctx, &job, &candidate);
+        if let Some(candidate) = Candidate::new(job, i, place.as_ref()) {
+            let explored = explore(ctx, job, &candidate);
+            if let Ok(Explored {
+                thicker: Some(thicker),
+                effort: spent,
+                ..
+            }) = explored
+            {
+                *effort += spent;
+                return Ok(Walled::Thicker(thicker));
+            }
             best.add(ctx, place.as_ref(), candidate, explored)?;
         }
     }
-    best.finished(ctx, &job)
+    best.finished(ctx, job).map(Walled::Done)
 }
 
 /// What came of one candidate.
@@ -77,6 +113,8 @@ struct Explored {
     kit: Option<Kit>,
     /// Why there is none, for people, and who is in whose way.
     failure: Failure,
+    /// The wall that it needs; nothing was made.
+    thicker: Option<Thicker>,
     effort: Effort,
 }
 
@@ -93,6 +131,7 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
         return Ok(Explored {
             kit,
             failure,
+            thicker: None,
             effort: budget.spent,
         });
     };
@@ -118,6 +157,7 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                 return Ok(Explored {
                     kit,
                     failure: Failure::default(),
+                    thicker: None,
                     effort: budget.spent,
                 });
             }
@@ -132,6 +172,17 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                     None => budget.foreseen_joinings = 0,
                 }
             }
+            Attempt::Weak(remedy) => match strengthened(ctx, job, candidate, division, *remedy, &mut budget.levers)? {
+                Walled::Done(next) => division = next,
+                Walled::Thicker(thicker) => {
+                    return Ok(Explored {
+                        kit,
+                        failure: Failure::default(),
+                        thicker: Some(thicker),
+                        effort: budget.spent,
+                    });
+                }
+            },
             Attempt::Failed(failure) => {
                 let next = if job.pace.is_late(ctx) {
                     None
@@ -146,6 +197,7 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                     return Ok(Explored {
                         kit,
                         failure,
+                        thicker: None,
                         effort: budget.spent,
                     });
                 };
@@ -157,6 +209,47 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
             }
         }
     }
+}
+
+/// The division with what lets it bear more; the lever that was used is used up.
+fn strengthened(
+    ctx: &Ctx,
+    job: &Job<'_>,
+    candidate: &Candidate<'_>,
+    division: Division,
+    remedy: Remedy,
+    levers: &mut Levers,
+) -> Result<Walled<Division>, DesignError> {
+    let next = match remedy {
+        Remedy::Wall(thicker) => {
+            ctx.note(&format!(
+                "it would give way where it is {}: walls of {:.1} mm",
+                thicker.weakest.deed.done(),
+                thicker.thickness_mm
+            ));
+            return Ok(Walled::Thicker(thicker));
+        }
+        Remedy::Connectors(chosen) => {
+            levers.connectors -= 1;
+            ctx.note("it would give way where it is used: larger connectors there");
+            Division { chosen, ..division }
+        }
+        Remedy::Joined(surface, told) => {
+            levers.weak_joinings -= 1;
+            match candidate.division(ctx, job, surface)? {
+                Some(next) => {
+                    ctx.note(&format!("{told}: {} pieces", next.surface.n_patches));
+                    let told = division.told.into_iter().chain([told]).collect();
+                    Division { told, ..next }
+                }
+                None => {
+                    levers.weak_joinings = 0;
+                    division
+                }
+            }
+        }
+    };
+    Ok(Walled::Done(next))
 }
 
 /// The plan that [`design`] would make first, in the space of the model as it was given; pieces are numbered
@@ -211,15 +304,30 @@ pub fn plan(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<Result<Planned, String>, DesignError> {
-    let wall = Wall::decide(ctx, params, model)?;
-    let job = Job::new(ctx, params, model, labels, &wall)?;
+    let mut wall = Wall::decide(ctx, params, model)?;
+    let mut n_left = THICKER_WALLS;
+    loop {
+        let job = Job::new(ctx, params, model, labels, &wall, n_left > 0)?;
+        match plan_with_wall(ctx, &job)? {
+            Walled::Done(planned) => return Ok(planned),
+            Walled::Thicker(thicker) => {
+                n_left -= 1;
+                wall = wall.thicker(ctx, params, model, &thicker)?;
+            }
+        }
+    }
+}
+
+/// The same with the wall as thick as it is.
+fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, String>>, DesignError> {
     let mut reason = String::new();
-    for (i, place) in candidate::places(ctx, &job)?.iter().enumerate() {
-        let Some(candidate) = Candidate::new(&job, i, place.as_ref()) else {
+    for (i, place) in candidate::places(ctx, job)?.iter().enumerate() {
+        let Some(candidate) = Candidate::new(job, i, place.as_ref()) else {
             continue;
         };
         let mut n_joinings = candidate.budget.foreseen_joinings;
-        let mut division = candidate.division(ctx, &job, candidate.surface.clone())?;
+        let mut levers = candidate.budget.levers;
+        let mut division = candidate.division(ctx, job, candidate.surface.clone())?;
         while let Some(current) = division {
             let ctx = ctx.fork();
             let Division {
@@ -228,31 +336,32 @@ pub fn plan(
                 chosen,
                 ..
             } = &current;
-            chosen.tell(&ctx);
+            current.tell(&ctx);
             let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
             let none = PlanConstraints::default();
-            division = match attempt::next_plan(
-                &ctx,
-                params,
-                &candidate.turn,
-                &current,
-                &survey,
-                &none,
-                n_joinings > 0,
-            )? {
+            let planning = Planning {
+                params: job.params,
+                model: job.model,
+                turn: &candidate.turn,
+                division: &current,
+                survey: &survey,
+                constraints: &none,
+            };
+            division = match attempt::next_plan(&ctx, &planning, n_joinings > 0, &levers)? {
                 Next::Plan(found, holding) => {
-                    let own = (ctx.into_warnings(), wall.warnings.clone());
-                    return Ok(Ok(Planned::of(
-                        &candidate.turn,
-                        &current.surface,
-                        *found,
-                        holding,
-                        own,
-                    )));
+                    let own = (ctx.into_warnings(), job.wall.warnings.clone());
+                    let planned = Planned::of(&candidate.turn, &current.surface, *found, holding, own);
+                    return Ok(Walled::Done(Ok(planned)));
+                }
+                Next::Weak(remedy) => {
+                    match strengthened(&ctx, job, &candidate, current, *remedy, &mut levers)? {
+                        Walled::Done(next) => Some(next),
+                        Walled::Thicker(thicker) => return Ok(Walled::Thicker(thicker)),
+                    }
                 }
                 Next::Joined(fewer) => {
                     n_joinings -= 1;
-                    match candidate.division(&ctx, &job, fewer)? {
+                    match candidate.division(&ctx, job, fewer)? {
                         Some(next) => Some(next),
                         None => {
                             n_joinings = 0;
@@ -267,7 +376,7 @@ pub fn plan(
             };
         }
     }
-    Ok(Err(reason))
+    Ok(Walled::Done(Err(reason)))
 }
 
 /// What all kits of a job have in common.
@@ -277,6 +386,8 @@ struct Job<'a> {
     model: &'a Solid,
     labels: Option<&'a [i64]>,
     wall: &'a Wall,
+    /// Whether it may begin anew with a thicker wall.
+    may_thicken: bool,
     pace: Pace,
     stress: Option<StressMap<'a>>,
     surface: SegmentedSurface,
@@ -292,6 +403,7 @@ impl<'a> Job<'a> {
         model: &'a Solid,
         labels: Option<&'a [i64]>,
         wall: &'a Wall,
+        may_thicken: bool,
     ) -> Result<Self, DesignError> {
         let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
         let stress = wall.strength.as_ref().map(StressMap::new);
@@ -300,6 +412,7 @@ impl<'a> Job<'a> {
             model,
             labels,
             wall,
+            may_thicken,
             pace: Pace::default(),
             stress,
             key_faces: key_faces(params.key, model, labels, &surface)?,
@@ -366,6 +479,27 @@ struct Wall {
 }
 
 impl Wall {
+    /// The same model with a thicker wall, for the sake of what people do to the kit.
+    fn thicker(&self, ctx: &Ctx, params: &Params, model: &Solid, thicker: &Thicker) -> Result<Self, DesignError> {
+        let thickness = Thickness::Mm(thicker.thickness_mm);
+        let mut wall = Self::decide(
+            ctx,
+            &Params {
+                thickness,
+                ..params.clone()
+            },
+            model,
+        )?;
+        // The thinnest wall of those before stays the one that a fall asks for.
+        let is_told = |w: &&Warning| matches!(w.cause, Cause::WallForUse { .. });
+        let from_mm = match self.warnings.iter().find(is_told).map(|w| &w.cause) {
+            Some(Cause::WallForUse { from_mm, .. }) => *from_mm,
+            _ => self.settings.body.thickness_mm,
+        };
+        wall.warnings.push(thicker.warning(from_mm));
+        Ok(wall)
+    }
+
     fn decide(ctx: &Ctx, params: &Params, model: &Solid) -> Result<Self, DesignError> {
         let nominal = Settings::resolve(params);
         if !params.allows_thin {

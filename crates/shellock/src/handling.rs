@@ -127,6 +127,25 @@ impl Deed {
     pub fn is_use(&self) -> bool {
         !matches!(self, Self::Fall { .. })
     }
+
+    /// Whether it is told by the height of a fall.
+    pub fn is_fall(&self) -> bool {
+        matches!(self, Self::Fall { .. } | Self::FallUpright)
+    }
+
+    /// What is done, as in "where it is …".
+    pub fn done(&self) -> &'static str {
+        match self {
+            Self::PressTop => "pressed on its top",
+            Self::PressMiddle => "pressed on its middle",
+            Self::PressSide { .. } => "pressed as it lies",
+            Self::GripNarrow => "gripped where it is narrow",
+            Self::GripWide => "gripped where it is wide",
+            Self::FallUpright => "dropped onto its feet",
+            Self::Fall { .. } => "dropped",
+            Self::Hang { .. } => "lifted by one piece",
+        }
+    }
 }
 
 /// A load.

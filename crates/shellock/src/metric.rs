@@ -11,6 +11,7 @@ mod data_driven;
 mod foreseen;
 mod model;
 mod rating;
+mod what_if;
 #[cfg(test)]
 mod tests;
 
@@ -20,3 +21,4 @@ pub use data_driven::{data_driven, pieces_alone};
 pub use foreseen::{Foreseen, foreseen};
 pub use model::{MetricParams, PlanModel};
 pub use rating::{Bench, Rated};
+pub use what_if::bears_with;

@@ -480,6 +480,24 @@ pub fn unite(
     })
 }
 
+/// Another segmentation with two pieces that touch made one; `None` where that leaves nothing to lock.
+pub fn unite_two(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    surface: &SegmentedSurface,
+    [a, b]: [PatchId; 2],
+) -> Result<Option<SegmentedSurface>, SegmentationError> {
+    changed(ctx, params, surface, |solid, labels| {
+        let label: Vec<u32> = labels
+            .as_slice()
+            .iter()
+            .map(|&k| if k == b.0 { a.0 } else { k })
+            .collect();
+        let joined = FaceLabels::from_connected(&Topology::new(solid), &label);
+        (1 < joined.n_patches() && joined.n_patches() < surface.n_patches).then_some(joined)
+    })
+}
+
 /// Whether some of the contacts that hold `surface` together are shorter than wanted.
 pub fn has_short_contacts(params: &SegmentationParams, surface: &SegmentedSurface) -> bool {
     kept_limit_mm(params, surface) < params.min_contact_mm

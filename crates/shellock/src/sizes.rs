@@ -96,8 +96,13 @@ impl ConnectorSizes {
         }
     }
 
+    /// Sets the size between two pieces, in either order.
+    fn set(&mut self, [a, b]: [PatchId; 2], size_mm: f64) {
+        self.by_pair.insert([a.min(b), a.max(b)], size_mm);
+    }
+
     /// Lets no pair with `piece` have a larger size than `most_mm`.
-    pub fn cap(&mut self, piece: PatchId, most_mm: f64) {
+    fn cap(&mut self, piece: PatchId, most_mm: f64) {
         self.by_pair
             .iter_mut()
             .filter(|(pair, _)| pair.contains(&piece))
@@ -255,6 +260,22 @@ pub struct ChosenSizes {
     pub sizes: ConnectorSizes,
     /// The pairs whose size was limited by more than a user would overlook, sorted.
     pub limited: Vec<LimitedSize>,
+    /// What fits at most between a pair, mm, the lower id first, and a place of its seam; empty where the user
+    /// says the size.
+    most: BTreeMap<[PatchId; 2], (f64, Vec3)>,
+    /// Pairs whose connectors are larger than the stress asks for.
+    raised: Vec<RaisedSize>,
+}
+
+/// A pair whose connectors are larger than Eq. 3 has them, for the sake of use.
+#[derive(Clone, Debug, PartialEq)]
+struct RaisedSize {
+    pair: [PatchId; 2],
+    at: Vec3,
+    from_mm: f64,
+    to_mm: f64,
+    /// What is done to the kit, as in "where it is …".
+    done: &'static str,
 }
 
 /// A pair whose connectors are smaller than Eq. 3 has them.
@@ -296,6 +317,8 @@ pub fn choose(
             return Ok(ChosenSizes {
                 sizes: ConnectorSizes::uniform(*size_mm),
                 limited: Vec::new(),
+                most: BTreeMap::new(),
+                raised: Vec::new(),
             });
         }
         SizeChoice::Auto(range) => range,
@@ -309,7 +332,7 @@ pub fn choose(
         bvh: TriangleBvh::new(&surface.mesh),
         far_mm: surface.mesh.bounds().diagonal(),
     };
-    let chosen: Vec<LimitedSize> = seams_of
+    let chosen: Vec<(LimitedSize, f64)> = seams_of
         .into_par_iter()
         .map(|(pair, seams)| {
             let stress = |field: StressField<'_>| {
@@ -328,22 +351,30 @@ pub fn choose(
                 SizeLimit::Cavity
             };
             let given_mm = wanted_mm.min(seam_mm).min(cavity_mm).max(range.min_mm);
-            LimitedSize {
+            let limited = LimitedSize {
                 pair,
                 at,
                 wanted_mm,
                 given_mm,
                 limit,
-            }
+            };
+            (limited, range.max_mm.min(seam_mm).min(cavity_mm).max(given_mm))
         })
         .collect();
     ctx.check()?;
-    let sizes = ConnectorSizes::with_pairs(range.min_mm, chosen.iter().map(|c| (c.pair, c.given_mm)));
+    let sizes = ConnectorSizes::with_pairs(range.min_mm, chosen.iter().map(|c| (c.0.pair, c.0.given_mm)));
+    let most = chosen.iter().map(|(c, most_mm)| (c.pair, (*most_mm, c.at))).collect();
     let limited = chosen
         .into_iter()
+        .map(|c| c.0)
         .filter(|c| c.wanted_mm - c.given_mm > TOLD_FROM_MM)
         .collect();
-    Ok(ChosenSizes { sizes, limited })
+    Ok(ChosenSizes {
+        sizes,
+        limited,
+        most,
+        raised: Vec::new(),
+    })
 }
 
 /// The largest size with which the longest of `seams` is a contact, mm, and the middle of that seam.
@@ -390,9 +421,49 @@ fn size_within_mm(params: &SizeParams, thickness_mm: f64) -> f64 {
 }
 
 impl ChosenSizes {
-    /// Warns with `connector-limited`: once for all seams that are too short, once for all cavities that are
+    /// Lets no pair with `piece` have a larger size than `most_mm`, now and when sizes are raised.
+    pub fn cap(&mut self, piece: PatchId, most_mm: f64) {
+        self.sizes.cap(piece, most_mm);
+        let own = self.most.iter_mut().filter(|(pair, _)| pair.contains(&piece));
+        own.for_each(|(_, most)| most.0 = most.0.min(most_mm));
+    }
+
+    /// Makes the connectors of a pair as large as fit, for the sake of what is done to the kit; whether they
+    /// grew.
+    pub fn raise(&mut self, [a, b]: [PatchId; 2], done: &'static str) -> bool {
+        /// Less is no change, mm.
+        const LEAST_MM: f64 = 0.05;
+        let pair = [a.min(b), a.max(b)];
+        let from_mm = self.sizes.of(a, b);
+        let Some(&(to_mm, at)) = self.most.get(&pair).filter(|m| m.0 >= from_mm + LEAST_MM) else {
+            return false;
+        };
+        self.sizes.set(pair, to_mm);
+        self.raised.push(RaisedSize {
+            pair,
+            at,
+            from_mm,
+            to_mm,
+            done,
+        });
+        true
+    }
+
+    /// Warns with `connector-raised` of each pair that got larger ones than the stress asks for, and with
+    /// `connector-limited`: once for all seams that are too short, once for all cavities that are
     /// too narrow.
     pub fn tell(&self, ctx: &Ctx<'_>) {
+        for raised in &self.raised {
+            ctx.warn(Warning {
+                cause: Cause::ConnectorsForUse {
+                    from_mm: raised.from_mm,
+                    to_mm: raised.to_mm,
+                    done: raised.done.to_owned(),
+                },
+                pieces: raised.pair.to_vec(),
+                at: Some(raised.at.to_array()),
+            });
+        }
         for limit in [SizeLimit::Seam, SizeLimit::Cavity] {
             let limited: Vec<&LimitedSize> = self.limited.iter().filter(|l| l.limit == limit).collect();
             let lost_mm = |l: &LimitedSize| l.wanted_mm - l.given_mm;

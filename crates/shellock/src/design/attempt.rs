@@ -1,9 +1,10 @@
 //! Plans and kits of one division, until one passes or nothing new can be tried.
 
-use super::budget::{BLOCKED_PLANS, Budget};
+use super::budget::{BLOCKED_PLANS, Budget, Levers};
 use super::division::{Division, WallGrid, joined};
 use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
+use super::strengthen::{Remedy, remedy};
 use super::{DesignError, Job, KeySource, Kit, Params};
 use crate::body::{BodyError, GridError, PatchDistances};
 use crate::handling::Handling;
@@ -11,13 +12,15 @@ use crate::key::Turn;
 use crate::metric::{Choice, ClimbParams, Holding};
 use crate::plan::{Blocker, FoundPlan, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::{Ctx, PatchId, SegmentedSurface, key, metric, plan};
-use shellock_geom::Vec3;
+use shellock_geom::{Solid, Vec3};
 
 /// How one division went.
 pub(super) enum Attempt {
     Passed,
     /// Nothing was made, since pieces are foreseen to rattle; with these pieces less.
     Joined(SegmentedSurface),
+    /// Nothing was made, since it would bear too little; what helps.
+    Weak(Box<Remedy>),
     Failed(Failure),
 }
 
@@ -78,9 +81,15 @@ pub(super) fn plans(
         let left_s = ctx.seconds_left();
         // A kit that is given up takes its warnings with it.
         let kit_ctx = ctx.fork();
-        chosen.tell(&kit_ctx);
+        division.tell(&kit_ctx);
         // The proof of a plan runs on one thread; the grid and distances in it are made beside it.
         let may_join = budget.foreseen_joinings > 0;
+        // What was learned of these pieces is lost where they change.
+        let levers = if learned.n_kits == 0 {
+            budget.levers
+        } else {
+            Levers::default()
+        };
         budget.spent.plans += 1;
         let (measured, next) = rayon::join(
             || {
@@ -89,21 +98,22 @@ pub(super) fn plans(
                 Ok::<(), GridError>(())
             },
             || {
-                next_plan(
-                    &kit_ctx,
+                let planning = Planning {
                     params,
+                    model: job.model,
                     turn,
                     division,
-                    &survey,
-                    &learned.constraints,
-                    may_join,
-                )
+                    survey: &survey,
+                    constraints: &learned.constraints,
+                };
+                next_plan(&kit_ctx, &planning, may_join, &levers)
             },
         );
         measured?;
         let (found, holding) = match next? {
             Next::Plan(found, holding) => (*found, holding),
             Next::Joined(fewer) => return Ok(Attempt::Joined(fewer)),
+            Next::Weak(remedy) => return Ok(Attempt::Weak(remedy)),
             Next::None(failure) => return Ok(Attempt::Failed(learned.failure.after(failure))),
         };
         let grid = wall.get()?;
@@ -238,20 +248,38 @@ pub(super) enum Next {
     Plan(Box<FoundPlan>, Holding),
     /// Nothing yet: pieces are foreseen to rattle; with these pieces less.
     Joined(SegmentedSurface),
+    /// Nothing yet: it would bear too little; what helps.
+    Weak(Box<Remedy>),
     /// Nothing, and why.
     None(Failure),
+}
+
+/// What a plan is sought for.
+pub(super) struct Planning<'a> {
+    pub params: &'a Params,
+    /// As it was given, and how it was turned for the division.
+    pub model: &'a Solid,
+    pub turn: &'a Turn,
+    pub division: &'a Division,
+    pub survey: &'a PlanSurvey,
+    pub constraints: &'a PlanConstraints,
 }
 
 /// The next plan of a division to make.
 pub(super) fn next_plan(
     ctx: &Ctx,
-    params: &Params,
-    turn: &Turn,
-    division: &Division,
-    survey: &PlanSurvey,
-    constraints: &PlanConstraints,
+    planning: &Planning<'_>,
     may_join: bool,
+    levers: &Levers,
 ) -> Result<Next, DesignError> {
+    let &Planning {
+        params,
+        turn,
+        division,
+        survey,
+        constraints,
+        ..
+    } = planning;
     let Division {
         surface,
         settings,
@@ -278,13 +306,14 @@ pub(super) fn next_plan(
         }
     };
     let up = turn.apply(Vec3::from_array(params.up)).to_array();
+    let handling = Handling::new(up, settings.body.thickness_mm, params.material);
     let choice = Choice {
         params: &settings.plan,
         surface,
         sizes: &chosen.sizes,
         survey,
         constraints,
-        handling: &Handling::new(up, settings.body.thickness_mm, params.material),
+        handling: &handling,
         climb: ClimbParams::default(),
     };
     let (found, holding) = metric::choose(ctx, &choice, *found)?;
@@ -296,8 +325,11 @@ pub(super) fn next_plan(
     } else {
         Vec::new()
     };
-    Ok(match joined(ctx, &settings.segmentation, surface, &rattling)? {
-        Some(fewer) => Next::Joined(fewer),
+    if let Some(fewer) = joined(ctx, &settings.segmentation, surface, &rattling)? {
+        return Ok(Next::Joined(fewer));
+    }
+    Ok(match remedy(ctx, planning, &handling, (&found.pool[0], &holding), levers)? {
+        Some(remedy) => Next::Weak(Box::new(remedy)),
         None => Next::Plan(Box::new(found), holding),
     })
 }

@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use serde::{Deserialize, Serialize};
 
-use super::Rounds;
+use super::{Params, Rounds, Thickness};
 use crate::Ctx;
+use crate::sizes::SizeChoice;
 
 /// Kits that are made for each of the best places for a key, before one of the pieces becomes the key: where
 /// the best does not do, others seldom do.
@@ -24,6 +25,36 @@ const JOININGS_FORESEEN: usize = 5;
 /// Plans of one division that may be given up because a piece could not take its wall along; they cost
 /// seconds.
 pub(super) const BLOCKED_PLANS: usize = 8;
+
+/// How often connectors grow and pieces are joined because the plan that bears most bears less than asked; each
+/// costs a search for a plan and no kit.
+const LARGER_CONNECTORS: usize = 2;
+const WEAK_JOININGS: usize = 2;
+/// How often a job begins anew with a thicker wall for the same reason.
+pub(super) const THICKER_WALLS: usize = 2;
+
+/// What may still be changed so that a kit bears more, before it is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Levers {
+    /// How often connectors may grow.
+    pub connectors: usize,
+    /// Whether the wall may.
+    pub wall: bool,
+    /// How often pieces that part may be joined.
+    pub weak_joinings: usize,
+}
+
+impl Levers {
+    /// Those that the user leaves to us: what is set stays as it is.
+    pub fn of(params: &Params, has_labels: bool, may_thicken: bool) -> Self {
+        let grows = matches!(params.connector.size, SizeChoice::Auto(_));
+        Self {
+            connectors: if grows { LARGER_CONNECTORS } else { 0 },
+            wall: may_thicken && params.thickness == Thickness::Auto,
+            weak_joinings: if has_labels { 0 } else { WEAK_JOININGS },
+        }
+    }
+}
 
 /// What a job has cost so far, in work and not in time: the same on any machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -99,6 +130,8 @@ pub(super) struct Budget {
     pub joinings: usize,
     /// How often pieces that are foreseen to rattle may still be joined.
     pub foreseen_joinings: usize,
+    /// What may still be changed for the sake of use.
+    pub levers: Levers,
     /// What it has cost.
     pub spent: Effort,
 }
@@ -118,6 +151,11 @@ impl Budget {
         Self::with(rounds, rounds.refinements)
     }
 
+    /// The same with what may be changed before a kit is made.
+    pub fn with_levers(self, levers: Levers) -> Self {
+        Self { levers, ..self }
+    }
+
     fn with(rounds: &Rounds, revisions: usize) -> Self {
         Self {
             kits_each: rounds.kits,
@@ -126,6 +164,7 @@ impl Budget {
             revisions_at_first: revisions,
             joinings: JOININGS_OF_RATTLING,
             foreseen_joinings: JOININGS_FORESEEN,
+            levers: Levers::default(),
             spent: Effort {
                 keys: 1,
                 ..Effort::default()

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use shellock_geom::Solid;
 
-use super::budget::{Budget, KITS_OF_CUT_KEYS};
+use super::budget::{Budget, KITS_OF_CUT_KEYS, Levers};
 use super::division::Division;
 use super::{DesignError, Job, KeySource, Settings};
 use crate::key::{self, KeyParams, KeyPrism, KeySite, Turn};
@@ -51,12 +51,13 @@ impl<'a> Candidate<'a> {
     /// The `i`-th of the places. The model is turned so that a key that is cut slides along a lattice
     /// direction; `None` where rounding leaves no solid.
     pub fn new(job: &Job<'a>, i: usize, place: Option<&KeySite>) -> Option<Self> {
+        let levers = Levers::of(job.params, job.labels.is_some(), job.may_thicken && i == 0);
         let as_it_lies = Self {
             turn: Turn::default(),
             model: Cow::Borrowed(job.model),
             surface: job.surface.clone(),
             key: None,
-            budget: Budget::of_piece(&job.params.rounds),
+            budget: Budget::of_piece(&job.params.rounds).with_levers(levers),
         };
         let Some(site) = place else {
             return Some(as_it_lies);
@@ -69,7 +70,7 @@ impl<'a> Candidate<'a> {
         });
         let mut turned = Self {
             key,
-            budget: Budget::of_cut_key(&job.params.rounds, i),
+            budget: Budget::of_cut_key(&job.params.rounds, i).with_levers(levers),
             ..as_it_lies
         };
         if !turn.is_none() {
@@ -97,6 +98,7 @@ impl<'a> Candidate<'a> {
                 settings,
                 chosen,
                 grip: None,
+                told: Vec::new(),
             }));
         };
         let Some((surface, patch)) = key.imprinted(ctx, job.settings(), &surface)? else {
@@ -105,13 +107,14 @@ impl<'a> Candidate<'a> {
         let settings = job.settings().with_key(patch, key.along);
         let mut chosen = self.sizes(ctx, job, &settings, &surface)?;
         // Its rails have as much room as it was cut for.
-        chosen.sizes.cap(patch, settings.connector.size.usual_mm());
+        chosen.cap(patch, settings.connector.size.usual_mm());
         let grip = job.params.has_grip.then(|| key.grip(patch));
         Ok(Some(Division {
             surface,
             settings,
             chosen,
             grip,
+            told: Vec::new(),
         }))
     }
 

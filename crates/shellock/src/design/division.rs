@@ -9,7 +9,7 @@ use crate::body::{BodyParams, GridError, ShellGrid};
 use crate::piece::Grip;
 use crate::segmentation::{self, SegmentationError, SegmentationParams};
 use crate::sizes::ChosenSizes;
-use crate::{Ctx, PatchId, SegmentedSurface};
+use crate::{Ctx, PatchId, SegmentedSurface, Warning};
 
 /// Pieces, and what stages are given for them.
 pub(super) struct Division {
@@ -18,6 +18,16 @@ pub(super) struct Division {
     pub chosen: ChosenSizes,
     /// The notch that the key is to have.
     pub grip: Option<Grip>,
+    /// What was changed for the sake of use.
+    pub told: Vec<Warning>,
+}
+
+impl Division {
+    /// Warns of what is not as it was wished.
+    pub fn tell(&self, ctx: &Ctx<'_>) {
+        self.chosen.tell(ctx);
+        self.told.iter().for_each(|w| ctx.warn(w.clone()));
+    }
 }
 
 /// The grid of a model's wall, made when it is first asked for.

@@ -138,6 +138,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         settings,
         chosen,
         grip,
+        ..
     } = division;
     let (sizes, proof) = (&chosen.sizes, found.proof());
     let handover = Handover::new(turn, found.plan);

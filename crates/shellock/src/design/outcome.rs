@@ -85,6 +85,14 @@ struct Kept<'a> {
 }
 
 impl<'a> Best<'a> {
+    /// Nothing yet, on top of an effort that was made.
+    pub fn after(effort: Effort) -> Self {
+        Self {
+            effort,
+            ..Self::default()
+        }
+    }
+
     /// Whether a key at `place` need not be tried. A piece as it is rattles no less as the key than one that
     /// was cut.
     pub fn is_enough(&self, place: Option<&KeySite>) -> bool {

@@ -239,6 +239,9 @@ pub fn choose(
         .loose
         .iter()
         .for_each(|&piece| warn_of_loose(ctx, &model, piece));
+    if let Some(weakest) = holding.weakest_use().filter(|w| w.factor.is_some_and(|f| f < 1.0)) {
+        warn_of_use(ctx, weakest);
+    }
     found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
     (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
     found.pool.retain(|p| p.plan != chosen.plan);
@@ -292,7 +295,7 @@ fn most_bearing<'b>(
 }
 
 /// What a plan bears, in assembly space.
-fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> Vec<LoadBorne> {
+pub(super) fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> Vec<LoadBorne> {
     let one = |(case, borne): (&LoadCase, &Borne)| LoadBorne {
         deed: case.deed,
         force_n: case.force_n,
@@ -317,6 +320,35 @@ fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePiece]) {
         cause: Cause::ComesApart,
         pieces: loose.iter().map(|part| part.piece).collect(),
         at: loose.first().map(|part| part.at),
+    });
+}
+
+fn warn_of_use(ctx: &Ctx<'_>, weakest: &LoadBorne) {
+    let (Some(factor), Some(first)) = (weakest.factor, weakest.first) else {
+        return;
+    };
+    // Forces go with the root of the height.
+    let much = |factor: f64| {
+        if weakest.deed.is_fall() {
+            format!("a fall of {:.1} m", 1e-3 * DROP_MM * factor * factor)
+        } else {
+            format!("{:.0} N", factor * weakest.force_n)
+        }
+    };
+    let gives_way = match first.how {
+        Failure::Opens => "the seam opens",
+        Failure::PinYields => "pins bend",
+        Failure::WallYields => "walls yield",
+    };
+    ctx.warn(Warning {
+        cause: Cause::BearsLittle {
+            done: weakest.deed.done().to_owned(),
+            bears: much(factor),
+            asked: much(1.0),
+            gives_way: gives_way.to_owned(),
+        },
+        pieces: first.between.to_vec(),
+        at: Some(first.at),
     });
 }
 

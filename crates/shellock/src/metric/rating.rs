@@ -81,8 +81,18 @@ struct Answer {
 impl<'a> Bench<'a> {
     /// Loads of `handling` on the pieces of `model`.
     pub fn new(handling: &Handling, model: &'a PlanModel) -> Result<Self, SparseError> {
+        Self::of(handling, model, load_cases(handling, &model.assembly))
+    }
+
+    /// Those of its loads alone that people put on a kit.
+    pub(super) fn of_uses(handling: &Handling, model: &'a PlanModel) -> Result<Self, SparseError> {
+        let mut cases = load_cases(handling, &model.assembly);
+        cases.retain(|c| Rank::of(&c.deed) == Rank::Use);
+        Self::of(handling, model, cases)
+    }
+
+    fn of(handling: &Handling, model: &'a PlanModel, cases: Vec<LoadCase>) -> Result<Self, SparseError> {
         let surface = model.surface_model()?;
-        let cases = load_cases(handling, &model.assembly);
         let drifts = cases
             .par_iter()
             .map(|case| surface.drift(&case.forces_n))
