@@ -18,6 +18,7 @@ use crate::args::Options;
 use crate::bears;
 use crate::build::{bearing, scope};
 use crate::input::Model;
+use crate::loads;
 use crate::output::{Summary, connector_sizes, standing};
 use crate::place::Standing;
 
@@ -82,6 +83,7 @@ pub fn report(
         figures,
         quantities,
         motions: motions(design, stand),
+        loads: loads::loads(design, &standing, stand),
     };
     let booklet = Booklet {
         title: title(&model.name),
@@ -216,7 +218,9 @@ fn kit_facts(
             .iter()
             .map(|s| ("fall".into(), bearing(s, settings, standing))),
     );
-    facts.extend(bearing_facts(design, standing));
+    if design.kit.deformed.loads.is_empty() {
+        facts.extend(bearing_facts(design, standing));
+    }
     facts.extend(plan_facts(design, standing));
     facts
 }

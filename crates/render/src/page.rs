@@ -8,6 +8,7 @@ use shellock_assembly::{PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
+use super::loads::LoadsHeader;
 use super::{ReportCheck, ReportData, ReportMotion, ReportPiece, ReportQuantity, exploded_shifts};
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -38,6 +39,7 @@ pub fn html(data: &ReportData<'_>) -> String {
         figures: data.figures.iter().map(Figure::new).collect(),
         quantities: &data.quantities,
         motions: &data.motions,
+        loads: LoadsHeader::new(&data.loads, &mut arrays),
     };
     let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
     // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
@@ -79,6 +81,8 @@ struct Header<'a> {
     quantities: &'a [ReportQuantity],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     motions: &'a [ReportMotion],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loads: Option<LoadsHeader<'a>>,
 }
 
 /// A picture with a title.
@@ -123,7 +127,7 @@ struct Draft {
 }
 
 #[derive(Serialize)]
-struct PointArray {
+pub(crate) struct PointArray {
     offset: usize,
     count: usize,
     min: [f64; 3],
@@ -131,7 +135,7 @@ struct PointArray {
 }
 
 #[derive(Serialize)]
-struct TriangleArray {
+pub(crate) struct TriangleArray {
     offset: usize,
     count: usize,
     /// Bytes of a corner: 2 or 4.
@@ -185,7 +189,7 @@ impl<'a> MeshHeader<'a> {
     }
 }
 
-fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
+pub(crate) fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
     let bounds = mesh.bounds();
     let (min, size) = if mesh.points.is_empty() {
         (Vec3::ZERO, Vec3::ZERO)
@@ -209,7 +213,7 @@ fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
     }
 }
 
-fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
+pub(crate) fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
     align(arrays);
     let offset = arrays.len();
     let bytes = if mesh.points.len() <= 65_536 { 2 } else { 4 };
@@ -224,7 +228,7 @@ fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
 }
 
 /// Typed arrays begin at multiples of their element size.
-fn align(arrays: &mut Vec<u8>) {
+pub(crate) fn align(arrays: &mut Vec<u8>) {
     arrays.resize(arrays.len().next_multiple_of(4), 0);
 }
 
@@ -260,7 +264,7 @@ mod tests {
     use shellock_assembly::Cause;
 
     use super::*;
-    use crate::ReportMove;
+    use crate::{ReportLoads, ReportMove};
 
     const HOSTILE: &str = "</script><script>alert('x')</script>{{arrays}}<!--";
 
@@ -308,6 +312,7 @@ mod tests {
                 values: vec![None],
             }],
             motions,
+            loads: ReportLoads::default(),
         })
     }
 

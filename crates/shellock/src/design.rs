@@ -26,8 +26,8 @@ mod tests;
 use shellock_geom::Solid;
 
 use crate::key::Turn;
-use crate::metric::Holding;
-use crate::plan::{FoundPlan, PlanConstraints, PlanProof, survey};
+use crate::metric::{Chosen, Holding};
+use crate::plan::{PlanConstraints, PlanProof, survey};
 use crate::strength::{Strength, StrengthError, StressMap};
 use crate::{
     Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength,
@@ -184,8 +184,7 @@ impl Planned {
     fn of(
         turn: &Turn,
         surface: &SegmentedSurface,
-        found: FoundPlan,
-        holding: Holding,
+        Chosen { found, holding, .. }: Chosen,
         (own, of_wall): (Vec<Warning>, Vec<Warning>),
     ) -> Self {
         let (proof, mean_cost, n_plans) = (found.proof(), found.score.mean, found.pool.len());
@@ -240,15 +239,9 @@ pub fn plan(
                 &none,
                 n_joinings > 0,
             )? {
-                Next::Plan(found, holding) => {
+                Next::Plan(chosen) => {
                     let own = (ctx.into_warnings(), wall.warnings.clone());
-                    return Ok(Ok(Planned::of(
-                        &candidate.turn,
-                        &current.surface,
-                        *found,
-                        holding,
-                        own,
-                    )));
+                    return Ok(Ok(Planned::of(&candidate.turn, &current.surface, *chosen, own)));
                 }
                 Next::Joined(fewer) => {
                     n_joinings -= 1;

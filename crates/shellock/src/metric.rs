@@ -8,13 +8,18 @@
 mod choice;
 mod climb;
 mod data_driven;
+mod deform;
 mod foreseen;
 mod model;
 #[cfg(test)]
 mod tests;
 
-pub use choice::{Bears, Choice, ChoiceError, GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding, choose};
+pub use choice::{
+    Bears, Choice, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES, SeamHolding,
+    choose,
+};
 pub use climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
 pub use data_driven::{data_driven, pieces_alone};
+pub use deform::{Deformed, DeformedLoad, Told, Touch};
 pub use foreseen::{Foreseen, foreseen};
 pub use model::{MetricParams, PlanModel};

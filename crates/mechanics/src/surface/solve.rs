@@ -120,6 +120,8 @@ pub(super) struct Balance {
     pub moved: Vec<Motions>,
     /// What each contact bears, in the root of its stiffness times mm.
     pub borne: Vec<f64>,
+    /// Forces between the sides of each station, those of the contacts included.
+    pub sent: Vec<Motions>,
     /// Newton steps.
     pub n_iterations: usize,
     /// What is left of the force, as a share of it.
@@ -216,6 +218,7 @@ impl<'a> Jointed<'a> {
         Ok(Balance {
             moved: added(&load.drift, answer(model, is_held, &sent)),
             borne: all,
+            sent,
             n_iterations,
             error,
         })

@@ -8,7 +8,7 @@ use super::{DesignError, Job, KeySource, Kit, Params};
 use crate::body::{BodyError, GridError, PatchDistances};
 use crate::handling::Handling;
 use crate::key::Turn;
-use crate::metric::{Choice, ClimbParams, Holding};
+use crate::metric::{Choice, Chosen, ClimbParams, Holding};
 use crate::plan::{Blocker, FoundPlan, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::{Ctx, PatchId, SegmentedSurface, key, metric, plan};
 use shellock_geom::Vec3;
@@ -101,8 +101,8 @@ pub(super) fn plans(
             },
         );
         measured?;
-        let (found, holding) = match next? {
-            Next::Plan(found, holding) => (*found, holding),
+        let chosen = match next? {
+            Next::Plan(chosen) => *chosen,
             Next::Joined(fewer) => return Ok(Attempt::Joined(fewer)),
             Next::None(failure) => return Ok(Attempt::Failed(learned.failure.after(failure))),
         };
@@ -117,8 +117,7 @@ pub(super) fn plans(
                 turn,
                 grid,
                 distances,
-                found,
-                holding,
+                chosen,
             },
         ) {
             Err(DesignError::Body(BodyError::Blocked {
@@ -235,7 +234,7 @@ fn foreseen_to_rattle(found: &FoundPlan, holding: &Holding) -> Vec<PatchId> {
 /// What is to be made of a division.
 pub(super) enum Next {
     /// The plan that holds best of those that cost about the least.
-    Plan(Box<FoundPlan>, Holding),
+    Plan(Box<Chosen>),
     /// Nothing yet: pieces are foreseen to rattle; with these pieces less.
     Joined(SegmentedSurface),
     /// Nothing, and why.
@@ -287,18 +286,18 @@ pub(super) fn next_plan(
         handling: &Handling::new(up, settings.body.thickness_mm, params.material),
         climb: ClimbParams::default(),
     };
-    let (found, holding) = metric::choose(ctx, &choice, *found)?;
+    let best = metric::choose(ctx, &choice, *found)?;
     if settings.plan.key_slide.is_none() {
-        warn_of_key(ctx, params, division, &found.plan);
+        warn_of_key(ctx, params, division, &best.found.plan);
     }
     let rattling = if may_join {
-        foreseen_to_rattle(&found, &holding)
+        foreseen_to_rattle(&best.found, &best.holding)
     } else {
         Vec::new()
     };
     Ok(match joined(ctx, &settings.segmentation, surface, &rattling)? {
         Some(fewer) => Next::Joined(fewer),
-        None => Next::Plan(Box::new(found), holding),
+        None => Next::Plan(Box::new(best)),
     })
 }
 

@@ -7,7 +7,7 @@ use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
 use super::climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
-use super::{Foreseen, MetricParams, PlanModel, foreseen};
+use super::{Deformed, Foreseen, MetricParams, PlanModel, foreseen};
 use crate::handling::{Borne, DROP_MM, Deed, Failure, Handling, LoadCase};
 use crate::plan::{
     FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanParams, PlanSurvey, RankedPlan,
@@ -30,6 +30,9 @@ const PLAY_TIE: f64 = 0.05;
 
 /// Costs that differ by less than this share are the same but for rounding.
 const COST_TIE: f64 = 1e-9;
+
+/// Nobody cares for more than that many times a load.
+pub const MOST_TIMES: f64 = 10.0;
 
 /// Share of `s` along the seam, or towards the earlier piece, from which that is named as the reason why a
 /// seam is weak.
@@ -92,14 +95,12 @@ pub struct Bears {
 impl Holding {
     /// What the kit bears, in short; `None` where no loads were simulated.
     pub fn summary(&self) -> Option<Bears> {
-        /// Nobody cares for more than that many times a load.
-        const MOST: f64 = 10.0;
         let least = |is: fn(&Deed) -> bool| {
             let factors = self
                 .bears
                 .iter()
                 .filter(|b| is(&b.deed))
-                .map(|b| (b.factor.unwrap_or(MOST).min(MOST), b));
+                .map(|b| (b.factor.unwrap_or(MOST_TIMES).min(MOST_TIMES), b));
             factors.min_by(|a, b| a.0.total_cmp(&b.0))
         };
         let newtons = |is| least(is).map(|(factor, load)| factor * load.force_n);
@@ -186,16 +187,22 @@ pub struct Choice<'a> {
     pub climb: ClimbParams,
 }
 
+/// The plan that bears most.
+pub struct Chosen {
+    /// What the search found, with that plan in its place.
+    pub found: FoundPlan,
+    /// How the plan holds.
+    pub holding: Holding,
+    /// How the pieces move under what people are told that it bears.
+    pub deformed: Deformed,
+}
+
 /// Climbs from the plans of the pool to one that bears more and costs at most a quarter more than the least,
 /// and that is not foreseen to rattle where any is not; it takes the place of `found`'s.
 ///
 /// Warns with `comes-apart` where it does not hold without friction, and with `piece-loose` of each piece
 /// that hardly anything holds by the estimate of the costs.
-pub fn choose(
-    ctx: &Ctx<'_>,
-    choice: &Choice<'_>,
-    mut found: FoundPlan,
-) -> Result<(FoundPlan, Holding), ChoiceError> {
+pub fn choose(ctx: &Ctx<'_>, choice: &Choice<'_>, mut found: FoundPlan) -> Result<Chosen, ChoiceError> {
     ctx.stage("which plan bears most", 0)?;
     let Choice {
         params,
@@ -224,11 +231,13 @@ pub fn choose(
         size_mm(surface),
         params.clearance_mm,
     );
+    let bears = bears(&model, &bench, &best);
+    let deformed = Deformed::of(&model, &bench, &best, &bears)?;
     let holding = Holding {
         n_compared,
         foreseen_play,
         foreseen_excess,
-        bears: bears(&model, &bench, &best),
+        bears,
         ..holding(&model, &chosen.plan, &best.meetings, &solved.resistance)
     };
     if !holding.loose.is_empty() {
@@ -242,7 +251,11 @@ pub fn choose(
     (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
     found.pool.retain(|p| p.plan != chosen.plan);
     found.pool.insert(0, chosen);
-    Ok((found, holding))
+    Ok(Chosen {
+        found,
+        holding,
+        deformed,
+    })
 }
 
 /// The plan that bears most, and how many were looked at.

@@ -12,6 +12,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
+use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Closed, Drift, JoinedParts, Meeting, SurfaceModel};
 
@@ -79,6 +80,12 @@ impl Rated<'_> {
     pub fn least(&self) -> f64 {
         let uses = self.borne.iter().zip(self.is_use).filter(|(_, is)| **is);
         uses.map(|(b, _)| b.factor).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How far each point of the outer surface goes under a case, mm.
+    pub(super) fn moved_mm(&self, bench: &Bench<'_>, case: usize) -> Result<Vec<Vec3>, SparseError> {
+        let forces_n = &bench.cases[case].forces_n;
+        self.joined.moved_mm(forces_n, Some(&self.closed[case]))
     }
 
     /// Cases from that which it bears least of on, uses before falls that may happen.
