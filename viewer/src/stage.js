@@ -213,6 +213,33 @@ export class Stage {
     this.lookFrom(inwards, center, 1.15 * box.getSize(new Vector3()).length());
   }
 
+  /** Whether nothing of the carriers is in front of a place that is looked at along `direction`. */
+  #isSeen(place, direction) {
+    this.skins ??= this.carriers.map(({ positions, indices }) => {
+      const geometry = new BufferGeometry();
+      geometry.setIndex(new BufferAttribute(indices, 1));
+      geometry.setAttribute("position", new BufferAttribute(positions, 3));
+      return new Mesh(geometry, new MeshBasicMaterial({ side: DoubleSide }));
+    });
+    const ray = new Raycaster(place.clone().addScaledVector(direction, 0.02 * this.size), direction);
+    return !ray.intersectObjects(this.skins).length;
+  }
+
+  /** Looks at `center` from where `place` is seen: as it is looked at, where that will do, else from as near to that as possible. */
+  showPlace(place, center, size) {
+    const now = this.camera.position.clone().sub(this.controls.target).normalize();
+    const around = [now];
+    for (const height of [0.45, 0, -0.45]) {
+      for (let i = 0; i < 16; i++) around.push(new Vector3(Math.cos((i * Math.PI) / 8), Math.sin((i * Math.PI) / 8), height).normalize());
+    }
+    const outwards = place.clone().sub(this.center).normalize();
+    // Rather a little aside than along the surface.
+    const worth = (d) => d.dot(now) + 0.5 * d.dot(outwards);
+    const seen = around.filter((d) => this.#isSeen(place, d)).sort((a, b) => worth(b) - worth(a));
+    const isFine = seen.includes(now) && now.dot(outwards) > 0.2;
+    this.lookFrom(isFine || !seen.length ? now : seen[0], center, size);
+  }
+
   /** Turns to a place, from the side of the middle of the scene it lies on. */
   lookAt(place) {
     const side = place.clone().sub(this.center);
@@ -318,6 +345,13 @@ export class Stage {
       arrow.visible = true;
       arrow.userData = { rest: arrow.position.clone(), move: moved ? moveAt(this.carriers, moved, tip) : [0, 0, 0] };
       this.signs.add(arrow);
+    }
+    if (place) {
+      const ball = new Mesh(new SphereGeometry(0.009 * this.size, 24, 16), new MeshBasicMaterial({ color: SIGN, depthTest: false, transparent: true, opacity: 0.85 }));
+      ball.position.set(...place.at);
+      ball.renderOrder = 10;
+      ball.userData = { rest: ball.position.clone(), move: moved ? moveAt(this.carriers.filter((_, i) => i === place.mesh), [moved[place.mesh]], place.at) : [0, 0, 0] };
+      this.signs.add(ball);
     }
     if (floor) this.signs.add(this.#floor(...floor));
     for (const line of place?.lines ?? []) this.#line(line, this.carriers[place.mesh], moved?.[place.mesh]);

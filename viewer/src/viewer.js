@@ -10,6 +10,7 @@ import { Swayer } from "./sway.js";
 const FLIGHT_MS = 1100;
 const REST_MS = 350;
 const LARGE = 5;
+const LOAD_AIR = 1.12;
 
 function start() {
   const { header, meshes, carriers, loads } = readPage(document);
@@ -110,6 +111,9 @@ function start() {
       assemble();
       swayer.choose(i, matchMedia("(prefers-reduced-motion: reduce)").matches);
       stage.sign(swayer.load, swayer.load.moved);
+      // Room for arrows, and for what is read above.
+      const { place } = swayer.load;
+      place ? stage.showPlace(new Vector3(...place.at), stage.center, LOAD_AIR * stage.size) : stage.fit(0, LOAD_AIR);
     }
     update();
   }
@@ -122,7 +126,8 @@ function start() {
       assemble();
       state.isWeakest = true;
       stage.sign({ place: header.loads.weakest.place });
-      stage.lookAt(new Vector3(...header.loads.weakest.place.at));
+      const at = new Vector3(...header.loads.weakest.place.at);
+      stage.showPlace(at, at, 0.7 * stage.size);
     }
     update();
   }
@@ -207,6 +212,7 @@ function start() {
     const text = player.caption() || swayer.caption();
     // Said once, not with every frame.
     if (caption.textContent !== text) caption.textContent = text;
+    document.getElementById("tools").classList.toggle("loaded", state.load >= 0);
   }
 
   function arrange(flying) {
@@ -235,8 +241,8 @@ function start() {
     if (state.note?.at) return [{ text: state.note.title, at: state.note.at }];
     const { arrows = [], place = null } = swayer.load ?? {};
     const tail = ({ tip, along }) => tip.map((x, k) => x - 0.17 * stage.size * along[k]);
-    const named = arrows.filter((a) => a.name).map((a) => ({ text: a.name, at: tail(a) }));
-    return place ? [...named, { text: place.name, at: place.at }] : named;
+    const named = arrows.filter((a) => a.name).map((a) => ({ text: a.name, at: tail(a), tip: a.tip }));
+    return place ? [{ text: place.name, at: place.at }, ...named] : named;
   }
 
   function lookAtNote() {
@@ -257,12 +263,14 @@ function start() {
       const wanted = labels();
       while (shown.length < wanted.length) { shown.push(element("div", "label")); holder.append(shown.at(-1)); }
       const taken = [];
+      const room = { top: caption.offsetHeight ? caption.offsetTop + caption.offsetHeight : 0, right: holder.clientWidth, bottom: holder.clientHeight - tools.offsetHeight - 20 };
       shown.forEach((label, i) => {
         const at = wanted[i] && stage.onScreen(new Vector3(...wanted[i].at));
         label.hidden = !at;
         if (!at) return;
         if (label.textContent !== wanted[i].text) label.textContent = wanted[i].text;
-        label.style.transform = `translate(${placed(at, label, holder, tools, taken).map((x) => `${x}px`)})`;
+        const tip = wanted[i].tip && stage.onScreen(new Vector3(...wanted[i].tip));
+        label.style.transform = `translate(${placed(at, tip, label, room, taken).map((x) => `${x}px`)})`;
       });
     };
     clicks(holder.querySelector("canvas"), (x, y) => choose(stage.pick(x, y)));
@@ -273,15 +281,18 @@ function start() {
   document.documentElement.dataset.ready = "true";
 }
 
-// Where a label of a place stands: right of it, left where there is no room; over no other label, nor over the tools.
-function placed([x, y], { offsetWidth: width, offsetHeight: height }, holder, tools, taken) {
-  const left = x + 12 + width < holder.clientWidth ? x + 12 : Math.max(4, x - 12 - width);
-  let top = Math.min(Math.max(y - 14, 4), holder.clientHeight - tools.offsetHeight - 24 - height);
-  for (const other of taken) {
-    if (left < other.left + other.width && other.left < left + width && Math.abs(top - other.top) < height + 2) top = other.top + height + 3;
-  }
-  taken.push({ left, top, width });
-  return [left, top];
+// Where a label stands: beyond the tail of an arrow; of a place right of it, or left, above or below where there is more room. Over no other label, nor over what is at the top and at the bottom.
+function placed([x, y], tip, { offsetWidth: width, offsetHeight: height }, { top, right, bottom }, taken) {
+  const inside = ([left, up]) => [Math.min(Math.max(left, 4), right - 4 - width), Math.min(Math.max(up, top + 4), bottom - 4 - height)];
+  const overlap = ([left, up]) => taken.some((t) => left < t.left + t.width + 3 && t.left < left + width + 3 && up < t.up + t.height + 3 && t.up < up + height + 3);
+  const ways = [[x + 14, y - 0.5 * height], [x - 14 - width, y - 0.5 * height], [x - 0.5 * width, y - 14 - height], [x - 0.5 * width, y + 14]];
+  const away = tip ? [x - tip[0], y - tip[1]] : [0, 0];
+  const far = Math.hypot(...away);
+  if (far > 1) ways.unshift([x + (away[0] / far) * (0.5 * width + 6) - 0.5 * width, y + (away[1] / far) * (0.5 * height + 6) - 0.5 * height]);
+  const fits = (way) => inside(way).every((v, k) => Math.abs(v - way[k]) < 1) && !overlap(way);
+  const [left, up] = ways.find(fits) ?? ways.slice().reverse().map(inside).find((way) => !overlap(way)) ?? inside(ways[0]);
+  taken.push({ left, up, width, height });
+  return [left, up];
 }
 
 const eased = (share) => 1 - (1 - share) ** 3;

@@ -64,22 +64,6 @@ pub fn lines(holding: &Holding, standing: &Standing) -> Vec<String> {
     lines
 }
 
-/// What matters most, for the booklet: two lines.
-pub fn short(holding: &Holding) -> Vec<String> {
-    let Some(bears) = holding.summary() else {
-        return Vec::new();
-    };
-    let said: Vec<String> = figures(&bears)
-        .into_iter()
-        .filter(|(what, _)| !what.contains("gripped") && !what.contains("any side"))
-        .map(|(what, much)| format!("{what} {much}"))
-        .collect();
-    vec![
-        format!("bears: {}", said.join(", ")),
-        format!("({BY_SIMULATION})"),
-    ]
-}
-
 /// Under which use a kit gives way first, how and where.
 pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
     let worst = holding.weakest_use()?;
@@ -107,9 +91,9 @@ pub fn told(told: Told) -> &'static str {
     match told {
         Told::Top => "pressed on its top",
         Told::Middle => "pressed on its middle",
-        Told::Side => "pressed on its side as it lies",
-        Told::GripNarrow => "gripped where it is narrow",
-        Told::GripWide => "gripped where it is wide",
+        Told::Side => "pressed as it lies",
+        Told::GripNarrow => "gripped where narrow",
+        Told::GripWide => "gripped where wide",
         Told::Feet => "falls onto its feet from",
         Told::AnySide => "falls onto any side from",
         Told::Lifted => "lifted by one piece, weighing",
