@@ -212,7 +212,7 @@ function start() {
     const text = player.caption() || swayer.caption();
     // Said once, not with every frame.
     if (caption.textContent !== text) caption.textContent = text;
-    document.getElementById("tools").classList.toggle("loaded", state.load >= 0);
+    document.getElementById("tools").classList.toggle("loaded", state.load >= 0 || state.isWeakest);
   }
 
   function arrange(flying) {

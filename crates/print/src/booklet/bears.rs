@@ -13,8 +13,8 @@ use crate::pdf::{Page, Style, width_mm};
 /// Distance of lines of text, mm.
 const LINE_MM: f64 = 5.2;
 /// Half the width of the line along a seam, and radius of the mark, mm.
-const HALF_SEAM_MM: f64 = 0.45;
-const MARK_MM: f64 = 1.7;
+const HALF_SEAM_MM: f64 = 0.5;
+const MARK_MM: f64 = 1.25;
 
 /// What the finished thing bears.
 #[derive(Clone, Debug, Default)]
@@ -111,7 +111,7 @@ fn place(
             stroke(page, [on_page(step[0]), on_page(step[1])]);
         }
     }
-    page.disc(on_page(weakest.at), MARK_MM + 0.5, WHITE);
+    page.disc(on_page(weakest.at), MARK_MM + 0.35, WHITE);
     page.disc(on_page(weakest.at), MARK_MM, ARROW);
     for (i, d) in drawn.iter().filter(|d| is_parting(d)).enumerate() {
         let middle = [left + 5.0 + 11.0 * i as f64, top + height_mm - 5.0];
