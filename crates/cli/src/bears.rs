@@ -4,9 +4,7 @@ use shellock::handling::{DROP_MM, Deed, Failure};
 use shellock::metric::{Bears, GivesWay, Holding, LoadBorne, MOST_TIMES, Told};
 
 use crate::place::Standing;
-
-/// Said wherever figures of the simulation stand.
-pub const BY_SIMULATION: &str = "by simulation, without a print to compare";
+pub use shellock::metric::BY_SIMULATION;
 
 /// Newtons that a kilogram weighs.
 const N_PER_KG: f64 = 9.80665;

@@ -15,8 +15,8 @@ mod model;
 mod tests;
 
 pub use choice::{
-    Bears, Choice, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES, SeamHolding,
-    choose,
+    BY_SIMULATION, Bears, Choice, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES,
+    SeamHolding, WeakestUse, choose,
 };
 pub use climb::{Bench, ClimbError, ClimbParams, Climbed, Rated, climb};
 pub use data_driven::{data_driven, pieces_alone};

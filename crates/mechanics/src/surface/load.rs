@@ -19,7 +19,7 @@ use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 
 /// One load as the stations feel it before anything joins the parts.
 #[derive(Clone, Debug)]
-pub struct Drift(Load);
+pub struct Drift(pub(super) Load);
 
 /// What one load does to a plan.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@ use shellock_geom::Vec3;
 
 use super::contact::{Contact, contacts_at, forces};
 use super::parts::Motions;
-use super::terms::{Term, patch_terms};
+use super::terms::{Root, Term, patch_terms};
 use super::*;
 use crate::neighbourhood::{outer_ring, two_plates};
 use crate::sample::ball;
@@ -411,7 +411,8 @@ fn points_move_as_the_stations_that_the_balance_is_of() {
     for model in [held, free] {
         let forces_n = twisting(&model);
         let joined = model.joined(&plan).unwrap();
-        let balance = joined.0.balance(&model.drift(&forces_n).0, None).unwrap();
+        let jointed = solve::Jointed::new(&model, &model.free, &plan).unwrap();
+        let balance = jointed.balance(&model.drift(&forces_n).0, None).unwrap();
         let found = moved_at_stations(&model, &joined.moved_mm(&forces_n, None).unwrap());
         let largest = balance
             .moved

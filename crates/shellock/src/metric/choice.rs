@@ -76,7 +76,7 @@ pub struct LoadBorne {
 }
 
 /// What a kit bears, in short. `None` where a load has no place on it, or nothing gives way.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bears {
     /// A press on its top, N.
     pub top_n: Option<f64>,
@@ -90,6 +90,24 @@ pub struct Bears {
     pub fall_upright_m: Option<f64>,
     /// The worst of all falls, m.
     pub fall_m: Option<f64>,
+    /// Where it gives way first when it is used; `None` in kits of earlier versions, too.
+    #[serde(default)]
+    pub weakest: Option<WeakestUse>,
+    /// What the figures are worth, in words; empty in kits of earlier versions.
+    #[serde(default)]
+    pub basis: String,
+}
+
+/// Said wherever figures of the simulation stand.
+pub const BY_SIMULATION: &str = "by simulation, without a print to compare";
+
+/// The use that a kit bears least of, and what it does to it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WeakestUse {
+    /// What is done.
+    pub deed: Deed,
+    /// What gives way, and where.
+    pub first: GivesWay,
 }
 
 impl Holding {
@@ -113,6 +131,11 @@ impl Holding {
             grip_n: newtons(|d| matches!(d, Deed::GripNarrow | Deed::GripWide)),
             fall_upright_m: metres(|d| *d == Deed::FallUpright),
             fall_m: metres(|d| matches!(d, Deed::Fall { .. } | Deed::FallUpright)),
+            weakest: self.weakest_use().and_then(|worst| {
+                let deed = worst.deed;
+                worst.first.map(|first| WeakestUse { deed, first })
+            }),
+            basis: BY_SIMULATION.to_owned(),
         })
     }
 
