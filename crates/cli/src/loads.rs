@@ -152,7 +152,7 @@ fn seam_through(surface: &SegmentedSurface, between: [PatchId; 2], at: Vec3) -> 
     // All of them are more than a picture needs.
     let n = nearest.points.len() - 1;
     let every = n.div_ceil(LINE_POINTS).max(1);
-    let last = nearest.points.last().filter(|_| n % every != 0);
+    let last = nearest.points.last().filter(|_| !n.is_multiple_of(every));
     Some(
         nearest
             .points
@@ -168,22 +168,23 @@ fn seam_through(surface: &SegmentedSurface, between: [PatchId; 2], at: Vec3) -> 
 mod tests {
     use super::*;
 
-    /// A fan of six triangles about a point, halved: pieces meet along two edges through the middle.
+    /// Two pyramids on a hexagon, halved: pieces meet along a loop in y = 0.
     fn halved() -> SegmentedSurface {
         let rim = (0..6).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_3).sin_cos();
             Vec3::new(cos, sin, 0.0)
         });
-        let triangles = (0..6).map(|i| [0, 1 + i, 1 + (i + 1) % 6]).collect();
+        let sides = (0..6).map(|i| [2 + i, 2 + (i + 1) % 6]);
+        let triangles = sides.flat_map(|[u, v]| [[0, u, v], [1, v, u]]).collect();
         let mesh = TriMesh {
-            points: [Vec3::ZERO].into_iter().chain(rim).collect(),
+            points: [Vec3::Z, -Vec3::Z].into_iter().chain(rim).collect(),
             triangles,
         };
         SegmentedSurface {
             mesh,
-            patch_of_face: (0..6).map(|i| PatchId(i / 3)).collect(),
+            patch_of_face: (0..12).map(|i| PatchId(i / 6)).collect(),
+            source_face: (0..12).collect(),
             n_patches: 2,
-            ..SegmentedSurface::default()
         }
     }
 

@@ -281,7 +281,7 @@ fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
     let finished = (!drawn.is_empty()).then(|| (all_pieces(drawn, &together, size), None));
     let mut pages = Vec::new();
     let page_of = |i: usize, pages: &mut Vec<Page>| {
-        if i % (STEPS[0] * STEPS[1]) == 0 {
+        if i.is_multiple_of(STEPS[0] * STEPS[1]) {
             pages.push(Page::new());
         }
         pages.len() - 1

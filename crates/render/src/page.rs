@@ -97,7 +97,7 @@ impl<'a> Figure<'a> {
     fn new((title, svg): &'a (String, String)) -> Self {
         Self {
             title,
-            source: format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg)),
+            source: format!("data:image/svg+xml,{}", percent_encoded(svg)),
         }
     }
 }
@@ -232,6 +232,20 @@ pub(crate) fn align(arrays: &mut Vec<u8>) {
     arrays.resize(arrays.len().next_multiple_of(4), 0);
 }
 
+/// As it may stand in an address. Charts are mostly pictures in base64, which stay as they are: encoded as a
+/// whole they were a third larger.
+fn percent_encoded(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for byte in text.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-_.~+/=,:;()".contains(&byte) {
+            out.push(char::from(byte));
+        } else {
+            out.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    out
+}
+
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -264,7 +278,7 @@ mod tests {
     use shellock_assembly::Cause;
 
     use super::*;
-    use crate::{ReportLoads, ReportMove};
+    use crate::{ReportLoad, ReportLoads, ReportMove, ReportPlace};
 
     const HOSTILE: &str = "</script><script>alert('x')</script>{{arrays}}<!--";
 
@@ -312,8 +326,32 @@ mod tests {
                 values: vec![None],
             }],
             motions,
-            loads: ReportLoads::default(),
+            loads: loads(&mesh),
         })
+    }
+
+    fn loads(mesh: &TriMesh) -> ReportLoads {
+        let place = ReportPlace {
+            name: HOSTILE.into(),
+            at: [0.0; 3],
+            lines: Vec::new(),
+            piece: 0,
+        };
+        let load = ReportLoad {
+            name: HOSTILE.into(),
+            figure: HOSTILE.into(),
+            title: HOSTILE.into(),
+            place: Some(place.clone()),
+            moved_mm: vec![vec![Vec3::ZERO, Vec3::X, Vec3::Y]],
+            ..ReportLoad::default()
+        };
+        ReportLoads {
+            title: HOSTILE.into(),
+            note: HOSTILE.into(),
+            carriers: vec![mesh.clone()],
+            loads: vec![load],
+            weakest: Some((HOSTILE.into(), place)),
+        }
     }
 
     fn header(page: &str) -> serde_json::Value {
@@ -332,6 +370,8 @@ mod tests {
         assert_eq!(header["title"], HOSTILE);
         let note = header["notes"][0]["text"].as_str().unwrap();
         assert!(note.ends_with(HOSTILE), "{note}");
+        assert_eq!(header["loads"]["loads"][0]["title"], HOSTILE);
+        assert_eq!(header["loads"]["weakest"]["place"]["mesh"], 0);
     }
 
     #[test]
@@ -364,6 +404,26 @@ mod tests {
             header(&self::page()).get("motions").is_none(),
             "a page without motions says nothing of them"
         );
+    }
+
+    #[test]
+    fn figures_are_addresses_that_say_all_of_them() {
+        let address = header(&page())["figures"][0]["source"]
+            .as_str()
+            .unwrap()
+            .to_owned();
+        let told = address.strip_prefix("data:image/svg+xml,").unwrap();
+        assert!(
+            told.bytes()
+                .all(|b| b.is_ascii_graphic() && !b"<>\"'#".contains(&b))
+        );
+        let mut parts = told.split('%');
+        let mut text = parts.next().unwrap().to_owned();
+        for part in parts {
+            text.push(char::from(u8::from_str_radix(&part[..2], 16).unwrap()));
+            text.push_str(&part[2..]);
+        }
+        assert_eq!(text, HOSTILE);
     }
 
     #[test]
