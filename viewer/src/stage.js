@@ -225,19 +225,24 @@ export class Stage {
     return !ray.intersectObjects(this.skins).length;
   }
 
-  /** Looks at `center` from where `place` is seen: as it is looked at, where that will do, else from as near to that as possible. */
-  showPlace(place, center, size) {
+  /** Looks at `center` from where a place and most of its lines are seen: as it is looked at, where that will do, else from near to that. */
+  showPlace({ at, lines = [] }, center, size) {
+    const place = new Vector3(...at);
+    // A dozen of all points will do.
+    const points = lines.flat();
+    const some = points.filter((_, i) => i % Math.ceil(points.length / 12) === 0).map((p) => new Vector3(...p));
     const now = this.camera.position.clone().sub(this.controls.target).normalize();
     const around = [now];
     for (const height of [0.45, 0, -0.45]) {
       for (let i = 0; i < 16; i++) around.push(new Vector3(Math.cos((i * Math.PI) / 8), Math.sin((i * Math.PI) / 8), height).normalize());
     }
     const outwards = place.clone().sub(this.center).normalize();
+    const share = (d) => some.filter((p) => this.#isSeen(p, d)).length / (some.length || 1);
     // Rather a little aside than along the surface.
-    const worth = (d) => d.dot(now) + 0.5 * d.dot(outwards);
-    const seen = around.filter((d) => this.#isSeen(place, d)).sort((a, b) => worth(b) - worth(a));
-    const isFine = seen.includes(now) && now.dot(outwards) > 0.2;
-    this.lookFrom(isFine || !seen.length ? now : seen[0], center, size);
+    const worth = (d) => d.dot(now) + 0.5 * d.dot(outwards) + 1.5 * share(d);
+    const seen = around.filter((d) => this.#isSeen(place, d)).map((d) => ({ d, worth: worth(d) })).sort((a, b) => b.worth - a.worth);
+    const isFine = seen.some(({ d }) => d === now) && now.dot(outwards) > 0.2 && share(now) > 0.5;
+    this.lookFrom(isFine || !seen.length ? now : seen[0].d, center, size);
   }
 
   /** Turns to a place, from the side of the middle of the scene it lies on. */

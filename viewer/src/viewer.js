@@ -113,7 +113,7 @@ function start() {
       stage.sign(swayer.load, swayer.load.moved);
       // Room for arrows, and for what is read above.
       const { place } = swayer.load;
-      place ? stage.showPlace(new Vector3(...place.at), stage.center, LOAD_AIR * stage.size) : stage.fit(0, LOAD_AIR);
+      place ? stage.showPlace(place, stage.center, LOAD_AIR * stage.size) : stage.fit(0, LOAD_AIR);
     }
     update();
   }
@@ -126,8 +126,8 @@ function start() {
       assemble();
       state.isWeakest = true;
       stage.sign({ place: header.loads.weakest.place });
-      const at = new Vector3(...header.loads.weakest.place.at);
-      stage.showPlace(at, at, 0.7 * stage.size);
+      const { place } = header.loads.weakest;
+      stage.showPlace(place, new Vector3(...place.at), 0.7 * stage.size);
     }
     update();
   }
