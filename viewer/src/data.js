@@ -5,12 +5,23 @@
 // header.meshes[i].draft     = { points, triangles }: the same, coarser, for what moves on slow machines; may be missing
 // header.quantities[j]       = { name, unit, values }: one number or null a mesh, to colour meshes by
 // header.motions             = what moves how: see motion.js; may be missing
+// header.loads              = what loads do to meshes: see sway.js; may be missing
 // Offsets count bytes. Everything else in the header is text and numbers to show.
 
 export function readPage(document) {
   const header = JSON.parse(document.getElementById("header").textContent);
   const buffer = bytesFromBase64(document.getElementById("arrays").textContent.trim()).buffer;
-  return { header, meshes: header.meshes.map((m) => ({ ...m, ...arrays(m, buffer), draft: m.draft && arrays(m.draft, buffer) })) };
+  const meshes = header.meshes.map((m) => ({ ...m, ...arrays(m, buffer), draft: m.draft && arrays(m.draft, buffer) }));
+  return { header, meshes, ...loadArrays(header.loads, buffer) };
+}
+
+// How far the points of carriers go shows as large as the load is to show.
+function loadArrays(all, buffer) {
+  const moved = ({ moved, step_mm, scale }) => moved.map(({ offset, count }) => Float32Array.from(new Int16Array(buffer, offset, 3 * count), (x) => x * step_mm * scale));
+  return {
+    carriers: (all?.carriers ?? []).map((c) => arrays(c, buffer)),
+    loads: (all?.loads ?? []).map((l) => ({ ...l, moved: moved(l) })),
+  };
 }
 
 function bytesFromBase64(text) {

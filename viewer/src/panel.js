@@ -40,11 +40,14 @@ export function buildPanel(header, meshes, order, on) {
   const cut = cutControls(on);
   const paint = paintControls(header, on);
   const motions = motionControls(header, on);
+  const sway = swayControls(on);
+  const loads = loadList(header, on);
   const turn = button("Turn", "Turn the model on and on", on.turn);
   const view = element("div", "modes");
   view.append(turn, button("Reset", "Reset the view", on.home));
-  tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, ...motions.holders, view);
+  tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, ...motions.holders, sway.holder, view);
   panel.append(element("h1", "", header.title), summary(header));
+  if (loads.holder) panel.append(loads.holder);
   const list = meshList(header, meshes, order, on);
   panel.append(list.holder);
   if (header.notes.length) panel.append(noteList(header, on));
@@ -60,6 +63,8 @@ export function buildPanel(header, meshes, order, on) {
       turn.setAttribute("aria-pressed", state.turning);
       paint.update(state);
       motions.update(state);
+      sway.update(state);
+      loads.update(state);
       steps.update(state, flying === undefined ? "" : meshes[flying].name);
       list.update(state, flying);
     },
@@ -200,6 +205,54 @@ function motionControls(header, on) {
     update(state) {
       buttons.forEach((b, i) => b.setAttribute("aria-pressed", state.motion === i));
       large.setAttribute("aria-pressed", state.magnified);
+    },
+  };
+}
+
+// How much of a load shows, while one does.
+function swayControls(on) {
+  const holder = element("div", "steps sway");
+  const playing = button("❚❚", "Play or pause", on.pause);
+  const amount = slider("Load", 0, on.amount);
+  amount.input.title = "How much of the load shows";
+  amount.input.setAttribute("aria-label", amount.input.title);
+  holder.append(playing, amount.holder);
+  return {
+    holder,
+    update(state) {
+      holder.hidden = state.load < 0;
+      playing.textContent = state.swaying ? "❚❚" : "▶";
+      amount.input.value = state.amount;
+    },
+  };
+}
+
+// What it bears: a button for each load, and one for what gives way first.
+function loadList(header, on) {
+  const { title, note, loads = [], weakest = null } = header.loads ?? {};
+  if (!loads.length) return { holder: null, update: () => {} };
+  const list = element("ul", "loads");
+  const buttons = loads.map(({ name, figure, title: words }, i) => {
+    const b = button("", words, () => on.load(i));
+    b.append(element("span", "", name), element("strong", "", figure));
+    const item = element("li");
+    item.append(b);
+    list.append(item);
+    return b;
+  });
+  const parts = [list];
+  const first = weakest && button("", "Show the place", on.weakest);
+  if (first) {
+    first.className = "weakest";
+    first.append(element("strong", "", "Gives way first"), element("span", "", weakest.text));
+    parts.push(first);
+  }
+  if (note) parts.push(element("p", "remark", note));
+  return {
+    holder: section(title, ...parts),
+    update(state) {
+      buttons.forEach((b, i) => b.setAttribute("aria-pressed", state.load === i));
+      first?.setAttribute("aria-pressed", state.isWeakest);
     },
   };
 }

@@ -2,11 +2,12 @@
 
 import {
   Box3, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, BackSide, FrontSide,
-  Group, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Plane, Quaternion,
-  Raycaster, Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
+  CatmullRomCurve3, CircleGeometry, Group, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Plane, Quaternion,
+  Raycaster, Scene, SphereGeometry, TubeGeometry, Vector2, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { shaded } from "./data.js";
+import { carriedBy, carriedMoves, moveAt } from "./sway.js";
 
 const UP = new Vector3(0, 0, 1);
 // Frames that follow each other more slowly than this, ms, show drafts.
@@ -15,6 +16,8 @@ const SLOW_MS = 30;
 const REST_MS = 200;
 // How much of what is seen through is seen.
 const FAINT = 0.3;
+// Of what is pointed at.
+const SIGN = 0xd33c2f;
 
 // A shaft and a head, unlit, from the origin along +y before it is turned.
 class Arrow extends Group {
@@ -59,9 +62,20 @@ function shape({ positions, indices }) {
   return geometry;
 }
 
+// Points at rest and a share of their moves.
+function bendTo(geometry, amount) {
+  const { rest, moves } = geometry.userData;
+  if (!moves || geometry.userData.amount === amount) return;
+  geometry.userData.amount = amount;
+  const { position } = geometry.attributes;
+  for (let k = 0; k < rest.length; k++) position.array[k] = rest[k] + amount * moves[k];
+  position.needsUpdate = true;
+}
+
 export class Stage {
-  constructor(holder, meshes) {
+  constructor(holder, meshes, carriers = []) {
     this.holder = holder;
+    this.carriers = carriers;
     this.room = 0;
     this.renderer = new WebGLRenderer({ alpha: true, preserveDrawingBuffer: true });
     // Four samples a pixel on plain screens: edges are smooth without the library's own way, which cannot be turned off in motion.
@@ -88,8 +102,10 @@ export class Stage {
     this.center = this.box.getCenter(new Vector3());
     this.size = this.box.getSize(new Vector3()).length() || 1;
     this.marks = new Group();
-    this.scene.add(this.marks);
-    this.arrow = new Arrow(0xd33c2f, true);
+    this.signs = new Group();
+    this.scene.add(this.marks, this.signs);
+    this.bent = { moved: null, amount: 0 };
+    this.arrow = new Arrow(SIGN, true);
     this.ways = meshes.map((m) => new Arrow(new Color(...m.color.map((c) => (0.7 * c) / 255)).convertSRGBToLinear(), false));
     this.scene.add(this.arrow, ...this.ways);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
@@ -138,6 +154,7 @@ export class Stage {
     this.pending = requestAnimationFrame((now) => {
       this.pending = 0;
       this.#pace(now);
+      this.#bend();
       this.renderer.render(this.scene, this.camera);
       this.afterDraw?.();
       // While it turns, this asks for the next frame.
@@ -194,6 +211,38 @@ export class Stage {
     if (inwards.length() < 0.05 * this.size) inwards.copy(travel);
     if (inwards.lengthSq() === 0) inwards.copy(UP);
     this.lookFrom(inwards, center, 1.15 * box.getSize(new Vector3()).length());
+  }
+
+  /** Whether nothing of the carriers is in front of a place that is looked at along `direction`. */
+  #isSeen(place, direction) {
+    this.skins ??= this.carriers.map(({ positions, indices }) => {
+      const geometry = new BufferGeometry();
+      geometry.setIndex(new BufferAttribute(indices, 1));
+      geometry.setAttribute("position", new BufferAttribute(positions, 3));
+      return new Mesh(geometry, new MeshBasicMaterial({ side: DoubleSide }));
+    });
+    const ray = new Raycaster(place.clone().addScaledVector(direction, 0.02 * this.size), direction);
+    return !ray.intersectObjects(this.skins).length;
+  }
+
+  /** Looks at `center` from where a place and most of its lines are seen: as it is looked at, where that will do, else from near to that. */
+  showPlace({ at, lines = [] }, center, size) {
+    const place = new Vector3(...at);
+    // A dozen of all points will do.
+    const points = lines.flat();
+    const some = points.filter((_, i) => i % Math.ceil(points.length / 12) === 0).map((p) => new Vector3(...p));
+    const now = this.camera.position.clone().sub(this.controls.target).normalize();
+    const around = [now];
+    for (const height of [0.45, 0, -0.45]) {
+      for (let i = 0; i < 16; i++) around.push(new Vector3(Math.cos((i * Math.PI) / 8), Math.sin((i * Math.PI) / 8), height).normalize());
+    }
+    const outwards = place.clone().sub(this.center).normalize();
+    const share = (d) => some.filter((p) => this.#isSeen(p, d)).length / (some.length || 1);
+    // Rather a little aside than along the surface.
+    const worth = (d) => d.dot(now) + 0.5 * d.dot(outwards) + 1.5 * share(d);
+    const seen = around.filter((d) => this.#isSeen(place, d)).map((d) => ({ d, worth: worth(d) })).sort((a, b) => b.worth - a.worth);
+    const isFine = seen.some(({ d }) => d === now) && now.dot(outwards) > 0.2 && share(now) > 0.5;
+    this.lookFrom(isFine || !seen.length ? now : seen[0].d, center, size);
   }
 
   /** Turns to a place, from the side of the middle of the scene it lies on. */
@@ -288,10 +337,87 @@ export class Stage {
     this.arrow.point(center.clone().addScaledVector(direction, -length), direction, 0.85 * length, 0.02 * this.size);
   }
 
+  /** Shows arrows, a floor and a place with its lines, none of them where `signs` is null; they go with what `moved` says that carriers do. */
+  sign(signs, moved = null) {
+    for (const { geometry, material } of this.signs.children.flatMap((c) => (c.isMesh ? [c] : c.children))) { geometry.dispose(); material.dispose(); }
+    this.signs.clear();
+    const { arrows = [], floor = null, place = null } = signs ?? {};
+    for (const { tip, along } of arrows) {
+      const length = 0.16 * this.size;
+      const way = new Vector3(...along);
+      const arrow = new Arrow(SIGN, true);
+      arrow.point(new Vector3(...tip).addScaledVector(way, -1.06 * length), way, length, 0.02 * this.size);
+      arrow.visible = true;
+      arrow.userData = { rest: arrow.position.clone(), move: moved ? moveAt(this.carriers, moved, tip) : [0, 0, 0] };
+      this.signs.add(arrow);
+    }
+    if (place) {
+      const ball = new Mesh(new SphereGeometry(0.009 * this.size, 24, 16), new MeshBasicMaterial({ color: SIGN, depthTest: false, transparent: true, opacity: 0.85 }));
+      ball.position.set(...place.at);
+      ball.renderOrder = 10;
+      ball.userData = { rest: ball.position.clone(), move: moved ? moveAt(this.carriers.filter((_, i) => i === place.mesh), [moved[place.mesh]], place.at) : [0, 0, 0] };
+      this.signs.add(ball);
+    }
+    if (floor) this.signs.add(this.#floor(...floor));
+    for (const line of place?.lines ?? []) this.#line(line, this.carriers[place.mesh], moved?.[place.mesh]);
+    this.draw();
+  }
+
+  // What it stands on, seen from above; from below one looks through it.
+  #floor(at, normal) {
+    const disc = new Mesh(new CircleGeometry(0.3 * this.size, 64), new MeshBasicMaterial({ color: 0x8d8a96, transparent: true, opacity: 0.3, side: FrontSide, depthWrite: false }));
+    disc.quaternion.setFromUnitVectors(UP, new Vector3(...normal));
+    disc.position.set(...at).addScaledVector(new Vector3(...normal), -0.002 * this.size);
+    return disc;
+  }
+
+  // A seam: bold where it is seen, faint where something is in front of it.
+  #line(points, carrier, moved) {
+    if (points.length < 2) return;
+    const curve = new CatmullRomCurve3(points.map((p) => new Vector3(...p)), false, "centripetal");
+    const geometry = new TubeGeometry(curve, Math.min(600, 4 * points.length), 0.0045 * this.size, 8);
+    const bound = carrier && moved ? carriedBy(carrier, geometry.attributes.position.array) : null;
+    geometry.userData = { rest: geometry.attributes.position.array.slice(), moves: bound && carriedMoves(bound, moved), amount: 0 };
+    for (const [depthTest, opacity] of [[true, 1], [false, 0.28]]) {
+      const tube = new Mesh(geometry, new MeshBasicMaterial({ color: SIGN, transparent: true, opacity, depthTest }));
+      tube.renderOrder = 8;
+      this.signs.add(tube);
+    }
+  }
+
+  /** Moves the points of all meshes by a share `amount` of what `moved` says of their carriers' points; null puts them back. */
+  sway(moved, amount) {
+    this.bent = { moved, amount: moved ? amount : 0 };
+    this.draw();
+  }
+
+  // The geometries that show, as they are to be bent.
+  #bend() {
+    const { moved, amount } = this.bent;
+    this.items.forEach(({ group }, i) => {
+      const { geometry } = group.children[0];
+      const data = geometry.userData;
+      if (!data.rest) {
+        if (!amount) return;
+        const rest = geometry.attributes.position.array.slice();
+        const bound = this.carriers[i] && carriedBy(this.carriers[i], rest);
+        Object.assign(data, { rest, bound, amount: 0 });
+        // What is bent still counts as seen.
+        geometry.boundingSphere.radius += 0.06 * this.size;
+      }
+      if (moved && data.moved !== moved) Object.assign(data, { moved, moves: data.bound && carriedMoves(data.bound, moved[i]), amount: NaN });
+      bendTo(geometry, amount);
+    });
+    for (const sign of this.signs.children) {
+      if (sign.userData.move) sign.position.copy(sign.userData.rest).addScaledVector(new Vector3(...sign.userData.move), amount);
+      if (sign.geometry?.userData.moves) bendTo(sign.geometry, amount);
+    }
+  }
+
   mark(place) {
     this.marks.clear();
     if (place) {
-      const ball = new Mesh(new SphereGeometry(0.006 * this.size, 24, 16), new MeshBasicMaterial({ color: 0xd33c2f, depthTest: false, transparent: true, opacity: 0.85, side: DoubleSide }));
+      const ball = new Mesh(new SphereGeometry(0.006 * this.size, 24, 16), new MeshBasicMaterial({ color: SIGN, depthTest: false, transparent: true, opacity: 0.85, side: DoubleSide }));
       ball.position.copy(place);
       ball.renderOrder = 10;
       this.marks.add(ball);

@@ -5,24 +5,27 @@ import { readPage, shades } from "./data.js";
 import { Player } from "./motion.js";
 import { buildPanel, element } from "./panel.js";
 import { Stage } from "./stage.js";
+import { Swayer } from "./sway.js";
 
 const FLIGHT_MS = 1100;
 const REST_MS = 350;
 const LARGE = 5;
+const LOAD_AIR = 1.12;
 
 function start() {
-  const { header, meshes } = readPage(document);
+  const { header, meshes, carriers, loads } = readPage(document);
   const holder = document.getElementById("stage");
   let stage;
   try {
-    stage = new Stage(holder, meshes);
+    stage = new Stage(holder, meshes, carriers);
   } catch (error) {
     holder.append(element("p", "failure", `This browser cannot show 3D (${error.message}). The lists beside still hold.`));
   }
   const order = meshes.map((_, i) => i).sort((a, b) => meshes[a].step - meshes[b].step);
   // apart: 0 … 1 · step: how many have arrived, with the share of the one on its way
-  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null, turning: false, motion: -1, magnified: false };
+  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null, turning: false, motion: -1, magnified: false, load: -1, isWeakest: false };
   const player = new Player(header.motions ?? [], () => update());
+  const swayer = new Swayer(loads, () => update());
   const caption = element("p", "caption");
   caption.setAttribute("role", "status");
   const panel = buildPanel(header, meshes, order, {
@@ -36,14 +39,18 @@ function start() {
     paint,
     motion,
     magnify,
+    load,
+    weakest,
+    pause: () => { swayer.isPlaying ? swayer.pause() : swayer.play(); update(); },
+    amount: (share) => { swayer.show(share); update(); },
     choose,
     toggle: (i) => { state.hidden.has(i) ? state.hidden.delete(i) : state.hidden.add(i); update(); },
     inside,
     turn: () => { state.turning = !state.turning; stage?.turn(state.turning); update(); },
     alone: () => { state.alone = !state.alone && state.chosen >= 0; update(); },
     showAll: () => { state.hidden.clear(); state.alone = false; choose(-1); },
-    home: () => { stage?.mark(null); state.note = null; stage?.lookFrom(new Vector3(0.62, -0.95, 0.42)); fit(); },
-    note: (note) => { state.note = note; lookAtNote(); },
+    home: () => { if (state.isWeakest) stop(); stage?.mark(null); state.note = null; stage?.lookFrom(new Vector3(0.62, -0.95, 0.42)); fit(); },
+    note: (note) => { stop(); state.note = note; lookAtNote(); },
   });
 
   function setMode(mode) {
@@ -92,6 +99,36 @@ function start() {
     assemble();
     isStepped ? player.step(i) : player.play(i);
     fitMotion();
+    update();
+  }
+
+  // Shows what a load does, or puts everything back.
+  function load(i) {
+    if (!stage || !loads[i]) return;
+    const isBack = swayer.index === i;
+    stop();
+    if (!isBack) {
+      assemble();
+      swayer.choose(i, matchMedia("(prefers-reduced-motion: reduce)").matches);
+      stage.sign(swayer.load, swayer.load.moved);
+      // Room for arrows, and for what is read above.
+      const { place } = swayer.load;
+      place ? stage.showPlace(place, stage.center, LOAD_AIR * stage.size) : stage.fit(0, LOAD_AIR);
+    }
+    update();
+  }
+
+  // Shows where it gives way before all else, or no more.
+  function weakest() {
+    const isBack = state.isWeakest;
+    stop();
+    if (stage && header.loads?.weakest && !isBack) {
+      assemble();
+      state.isWeakest = true;
+      stage.sign({ place: header.loads.weakest.place });
+      const { place } = header.loads.weakest;
+      stage.showPlace(place, new Vector3(...place.at), 0.7 * stage.size);
+    }
     update();
   }
 
@@ -160,18 +197,22 @@ function start() {
     clearTimeout(state.pause);
     state.playing = false;
     player.stop();
+    if (state.isWeakest || swayer.load) { stage?.sign(null); stage?.mark(null); state.note = null; }
+    state.isWeakest = false;
+    swayer.stop();
     if (state.isFar) { state.isFar = false; fit(); }
     update();
   }
 
   function update() {
-    state.motion = player.index;
+    Object.assign(state, { motion: player.index, load: swayer.index, amount: swayer.amount, swaying: swayer.isPlaying });
     const flying = state.mode === "steps" ? order[Math.ceil(state.step) - 1] : undefined;
     if (stage) arrange(flying);
     panel.update(state, flying);
-    const text = player.caption();
+    const text = player.caption() || swayer.caption();
     // Said once, not with every frame.
     if (caption.textContent !== text) caption.textContent = text;
+    document.getElementById("tools").classList.toggle("loaded", state.load >= 0 || state.isWeakest);
   }
 
   function arrange(flying) {
@@ -189,9 +230,19 @@ function start() {
       stage.showWay(i, state.mode === "apart" && !hidden ? offset : null);
     });
     if (flying !== undefined && travelled < 1) stage.showArrow(flying, way);
-    else if (state.mode === "together" && state.chosen >= 0 && !state.alone && !places.size) stage.showArrow(state.chosen, 0.7 * way);
+    else if (state.mode === "together" && state.chosen >= 0 && !state.alone && !places.size && !swayer.load) stage.showArrow(state.chosen, 0.7 * way);
     else stage.arrow.visible = false;
-    stage.draw();
+    stage.sway(swayer.load?.moved ?? null, swayer.amount);
+  }
+
+  // Words at places: of what a load is, and where it gives way.
+  function labels() {
+    if (state.isWeakest) return [{ text: header.loads.weakest.place.name, at: header.loads.weakest.place.at }];
+    if (state.note?.at) return [{ text: state.note.title, at: state.note.at }];
+    const { arrows = [], place = null } = swayer.load ?? {};
+    const tail = ({ tip, along }) => tip.map((x, k) => x - 0.17 * stage.size * along[k]);
+    const named = arrows.filter((a) => a.name).map((a) => ({ text: a.name, at: tail(a), tip: a.tip }));
+    return place ? [{ text: place.name, at: place.at }, ...named] : named;
   }
 
   function lookAtNote() {
@@ -206,19 +257,42 @@ function start() {
     new ResizeObserver(() => stage.leaveRoom(tools.offsetHeight + 16)).observe(tools);
     stage.leaveRoom(tools.offsetHeight + 16);
     fit();
-    const label = element("div", "label");
-    holder.append(label, caption);
+    holder.append(caption);
+    const shown = [];
     stage.afterDraw = () => {
-      const at = state.note?.at && stage.onScreen(new Vector3(...state.note.at));
-      label.hidden = !at;
-      if (at) { label.textContent = state.note.title; label.style.transform = `translate(${at[0] + 12}px, ${at[1] - 14}px)`; }
+      const wanted = labels();
+      while (shown.length < wanted.length) { shown.push(element("div", "label")); holder.append(shown.at(-1)); }
+      const taken = [];
+      const room = { top: caption.offsetHeight ? caption.offsetTop + caption.offsetHeight : 0, right: holder.clientWidth, bottom: holder.clientHeight - tools.offsetHeight - 20 };
+      shown.forEach((label, i) => {
+        const at = wanted[i] && stage.onScreen(new Vector3(...wanted[i].at));
+        label.hidden = !at;
+        if (!at) return;
+        if (label.textContent !== wanted[i].text) label.textContent = wanted[i].text;
+        const tip = wanted[i].tip && stage.onScreen(new Vector3(...wanted[i].tip));
+        label.style.transform = `translate(${placed(at, tip, label, room, taken).map((x) => `${x}px`)})`;
+      });
     };
     clicks(holder.querySelector("canvas"), (x, y) => choose(stage.pick(x, y)));
   }
-  keys({ next: () => goTo(Math.floor(state.step) + 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => (state.playing ? stop() : play()), escape: () => { if (player.motion) stop(); choose(-1); } });
-  fromAddress(location.hash, { state, setMode, update, choose, inside, paint, motion, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
+  keys({ next: () => goTo(Math.floor(state.step) + 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => { if (swayer.load) { swayer.isPlaying ? swayer.pause() : swayer.play(); update(); } else state.playing ? stop() : play(); }, escape: () => { if (player.motion || swayer.load || state.isWeakest) stop(); choose(-1); } });
+  fromAddress(location.hash, { state, setMode, update, choose, inside, paint, motion, load: (i) => load(i), weakest, amount: (share) => { swayer.show(share); update(); }, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
   update();
   document.documentElement.dataset.ready = "true";
+}
+
+// Where a label stands: beyond the tail of an arrow; of a place right of it, or left, above or below where there is more room. Over no other label, nor over what is at the top and at the bottom.
+function placed([x, y], tip, { offsetWidth: width, offsetHeight: height }, { top, right, bottom }, taken) {
+  const inside = ([left, up]) => [Math.min(Math.max(left, 4), right - 4 - width), Math.min(Math.max(up, top + 4), bottom - 4 - height)];
+  const overlap = ([left, up]) => taken.some((t) => left < t.left + t.width + 3 && t.left < left + width + 3 && up < t.up + t.height + 3 && t.up < up + height + 3);
+  const ways = [[x + 14, y - 0.5 * height], [x - 14 - width, y - 0.5 * height], [x - 0.5 * width, y - 14 - height], [x - 0.5 * width, y + 14]];
+  const away = tip ? [x - tip[0], y - tip[1]] : [0, 0];
+  const far = Math.hypot(...away);
+  if (far > 1) ways.unshift([x + (away[0] / far) * (0.5 * width + 6) - 0.5 * width, y + (away[1] / far) * (0.5 * height + 6) - 0.5 * height]);
+  const fits = (way) => inside(way).every((v, k) => Math.abs(v - way[k]) < 1) && !overlap(way);
+  const [left, up] = ways.find(fits) ?? ways.slice().reverse().map(inside).find((way) => !overlap(way)) ?? inside(ways[0]);
+  taken.push({ left, up, width, height });
+  return [left, up];
 }
 
 const eased = (share) => 1 - (1 - share) ** 3;
@@ -242,8 +316,8 @@ function keys({ next, back, play, escape }) {
   });
 }
 
-// #apart, #apart=0.5, #step=3.4, #choose=2, #inside=2, #cut=0.5, #note=0, #paint=1, #motion=0 show that view at once: for links and for pictures.
-function fromAddress(hash, { state, setMode, update, choose, inside, paint, motion, note, cut }) {
+// #apart, #apart=0.5, #step=3.4, #choose=2, #inside=2, #cut=0.5, #note=0, #paint=1, #motion=0, #load=0, #load=0&amount=1, #weakest show that view at once: for links and for pictures.
+function fromAddress(hash, { state, setMode, update, choose, inside, paint, motion, load, weakest, amount, note, cut }) {
   for (const [key, text] of new URLSearchParams(hash.slice(1))) {
     const value = Number(text);
     if (!Number.isFinite(value)) continue;
@@ -255,6 +329,9 @@ function fromAddress(hash, { state, setMode, update, choose, inside, paint, moti
     if (key === "note") note(value);
     if (key === "paint") paint(value);
     if (key === "motion") motion(value);
+    if (key === "load") load(value);
+    if (key === "amount") amount(value);
+    if (key === "weakest") weakest();
   }
   state.step = Math.min(state.step, document.querySelectorAll(".mesh").length);
   update();

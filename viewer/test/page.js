@@ -89,9 +89,68 @@ setTimeout(() => {
   document.documentElement.dataset.moments = btoa(JSON.stringify(moments));
 }, 1000);`;
 
-export const scripts = { clicks: CLICKS, motions: MOTIONS, steps: STEPS };
+// Chooses loads by pointer and keyboard; says where the first point of each mesh is, and what shows besides.
+const LOADS = `${MOTIONS.split("const [first")[0]}
+const [press, nothing] = document.querySelectorAll(".loads button");
+const weakest = document.querySelector(".weakest");
+const sway = document.querySelector(".sway");
+const moments = [];
+const note = (name) => {
+  const groups = scene.children.filter((c) => c.type === "Group");
+  const at = (group) => [...group.children[0].geometry.attributes.position.array.slice(0, 3)];
+  const signs = groups.filter((g) => g.visible).flatMap((g) => g.children).filter((c) => c.type === "Group" && c.visible || c.geometry?.type === "TubeGeometry" || c.geometry?.type === "CircleGeometry");
+  moments.push({
+    name, points: groups.slice(0, 2).map(at), signs: signs.map((c) => c.geometry?.type ?? "Arrow").sort(), caption: document.querySelector(".caption").textContent,
+    pressed: [press, nothing, weakest].map((b) => b.getAttribute("aria-pressed")), hasSlider: !sway.hidden, amount: Number(sway.querySelector("input").value), isPlaying: sway.querySelector("button").textContent === "❚❚",
+    labels: [...document.querySelectorAll(".label")].filter((l) => !l.hidden).map((l) => l.textContent),
+  });
+};
+const key = (name) => dispatchEvent(new KeyboardEvent("keydown", { key: name }));
+setTimeout(() => {
+  wait(40);
+  note("before");
+  document.querySelectorAll(".modes button")[1].click();
+  press.click();
+  wait(1720);
+  note("full");
+  wait(1680);
+  note("back at rest");
+  key(" ");
+  wait(400);
+  note("paused");
+  const slider = sway.querySelector("input");
+  slider.value = "0.5";
+  slider.dispatchEvent(new Event("input"));
+  wait(400);
+  note("half");
+  nothing.click();
+  wait(1720);
+  note("nothing");
+  key("Escape");
+  wait(40);
+  note("escaped");
+  weakest.click();
+  wait(40);
+  note("weakest");
+  document.querySelectorAll(".modes button")[2].click();
+  wait(40);
+  note("steps");
+  document.documentElement.dataset.moments = btoa(JSON.stringify(moments));
+}, 1000);`;
 
-export async function samplePage({ motions, script = CLICKS } = {}) {
+export const scripts = { clicks: CLICKS, motions: MOTIONS, steps: STEPS, loads: LOADS };
+
+// Mesh 1 goes down, by 0.5 mm, seen four times as far.
+function sampleLoads(meshes, add) {
+  const moved = (z) => meshes.map((_, i) => ({ offset: add(Int16Array.from({ length: 24 }, (_, k) => (i === 1 && k % 3 === 2 ? z : 0))), count: 8 }));
+  const place = { name: "opens here <b>", at: [1, 0, 5], lines: [[[1, -5, 5], [1, 0, 6], [1, 5, 5]]], mesh: 1 };
+  const load = { name: "pressed <b>", figure: "70 N", title: "Pressed <b>", arrows: [{ name: "70 N", tip: [6, 0, 10], along: [0, 0, -1] }], floor: [[0, 0, 0], [0, 0, 1]], place, scale: 4, step_mm: 0.001, moved: moved(-500) };
+  const nothing = { name: "held", figure: "more than 9 N", title: "Nothing gives way", arrows: [], floor: null, place: null, scale: 1, step_mm: 0, moved: moved(0) };
+  const carriers = meshes.map(({ points, triangles }) => ({ points, triangles }));
+  return { title: "What it bears", note: "By simulation.", carriers, loads: [load, nothing], weakest: { text: "pressed: it opens", place } };
+}
+
+export async function samplePage({ motions, hasLoads = false, script = CLICKS } = {}) {
   const parts = [];
   let offset = 0;
   const add = (array) => {
@@ -116,6 +175,7 @@ export async function samplePage({ motions, script = CLICKS } = {}) {
     notes: [{ title: "corner", text: "look here", at: [11, 5, 10] }, { title: "general", text: "no place", at: null }],
     quantities: [{ name: "size <i>", unit: "mm", values: [10, null] }, { name: "nothing", unit: "", values: [null, null] }],
     motions,
+    loads: hasLoads ? sampleLoads(meshes, add) : undefined,
   };
   const dist = (name) => readFile(new URL(`../../crates/render/viewer/${name}`, import.meta.url), "utf8");
   return `<!doctype html><meta charset="utf-8"><title>t</title><style>${await dist("viewer.css")}</style>

@@ -8,6 +8,7 @@ import { bundle } from "../build.js";
 import { shaded, shades } from "../src/data.js";
 import { duration, momentAt, Player, poseAt } from "../src/motion.js";
 import { poseMatrix } from "../src/stage.js";
+import { beatAt, carriedBy, carriedMoves, nearestOn } from "../src/sway.js";
 import { samplePage, scripts } from "./page.js";
 
 /** SHELLOCK_CHROMIUM, or chromium on the path; undefined where neither runs. */
@@ -70,6 +71,7 @@ test("the page draws, answers every control and reports no error", { skip: witho
   assert.deepEqual(data("moments").replaceAll("&lt;", "<").replaceAll("&gt;", ">").split("|"), ["1 / 2  mesh 0 <b>", "2 / 2  mesh 1 <b>", "2 / 2  mesh 1 <b>"]);
   assert.match(dom, /<h1>Two cubes &lt;\/script&gt;<\/h1>/);
   assert.ok(!dom.includes('class="modes motions"'), "no motions, no buttons");
+  assert.ok(!dom.includes('class="loads"'), "no loads, no list");
 });
 
 const REST = [0, 0, 0, 0, 0, 0];
@@ -141,4 +143,64 @@ test("who wants no animation sees pose after pose", { skip: withoutBrowser }, as
   assert.equal(m.second.caption, `${OUT.title} (pose 3 of 3)`);
   assert.ok(isClose(m.back.matrix, ASSEMBLED));
   assert.deepEqual(m.back.pressed, ["false", "false", "false"]);
+});
+
+test("the nearest point of a triangle is inside it, on an edge or a corner", () => {
+  const [a, b, c] = [[0, 0, 0], [4, 0, 0], [0, 4, 0]];
+  for (const [p, u, v, distance] of [[[1, 1, 3], 0.25, 0.25, 9], [[-1, -1, 0], 0, 0, 2], [[6, 0, 0], 1, 0, 4], [[2, -3, 0], 0.5, 0, 9], [[4, 4, 0], 0.5, 0.5, 8], [[0, 9, 0], 0, 1, 25], [[-2, 1, 0], 0, 0.25, 4]]) {
+    assert.deepEqual(nearestOn(a, b, c, p), { u, v, distance }, `${p}`);
+  }
+  assert.equal(nearestOn(a, a, a, [0, 0, 2]).distance, 4, "a triangle without area is a point");
+});
+
+test("points go with a carrier as a rigid body does, and with what is nearest to them", () => {
+  const carrier = { positions: Float32Array.of(0, 0, 0, 4, 0, 0, 0, 4, 0, 4, 4, 0), indices: Uint16Array.of(0, 1, 2, 1, 3, 2) };
+  const points = Float32Array.of(1, 1, 0.5, 3, 3, -1, 9, 9, 0);
+  const bound = carriedBy(carrier, points);
+  const shifted = carriedMoves(bound, Float32Array.from({ length: 12 }, (_, k) => [1, 2, 3][k % 3]));
+  assert.deepEqual([...shifted], [1, 2, 3, 1, 2, 3, 1, 2, 3]);
+  // Only the last corner moves: it takes along what is near it.
+  const lifted = carriedMoves(bound, Float32Array.of(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8));
+  assert.deepEqual([lifted[2], lifted[5], lifted[8]], [0, 4, 8]);
+  assert.equal(carriedBy({ positions: new Float32Array(), indices: new Uint16Array() }, points), null);
+});
+
+test("a load comes and goes smoothly", () => {
+  assert.deepEqual([0, 1.7, 3.4].map((s) => +beatAt(s).toFixed(12)), [0, 1, 0]);
+  assert.ok(beatAt(0.05) < 0.005 && Math.abs(beatAt(0.85) - 0.5) < 1e-12);
+});
+
+const near = (points, expected) => points.flat().every((x, k) => Math.abs(x - expected.flat()[k]) < 0.02);
+
+test("choosing a load moves points, tells the factor and shows where it acts", { skip: withoutBrowser }, async () => {
+  const { dom, data } = await opened(await samplePage({ hasLoads: true, script: scripts.loads }));
+  const m = moments(data);
+  const rest = m.before.points;
+  const down = (mm) => [rest[0], [rest[1][0], rest[1][1], rest[1][2] - mm]];
+  assert.deepEqual([m.before.hasSlider, m.before.signs, m.before.labels], [false, [], []]);
+  assert.ok(near(m.full.points, down(2)), `0.5 mm, four times: ${m.full.points}`);
+  assert.equal(m.full.caption, "Pressed <b> (4 times exaggerated)");
+  assert.deepEqual(m.full.signs, ["Arrow", "CircleGeometry", "TubeGeometry", "TubeGeometry"]);
+  assert.deepEqual([m.full.pressed, m.full.labels, m.full.hasSlider, m.full.isPlaying], [["true", "false", "false"], ["opens here <b>", "70 N"], true, true]);
+  assert.ok(near(m["back at rest"].points, rest));
+  assert.deepEqual([m.paused.isPlaying, near(m.paused.points, m["back at rest"].points)], [false, true], "space pauses");
+  assert.ok(near(m.half.points, down(1)) && m.half.amount === 0.5 && !m.half.isPlaying);
+  assert.ok(near(m.nothing.points, rest));
+  assert.deepEqual([m.nothing.caption, m.nothing.signs, m.nothing.labels, m.nothing.pressed], ["Nothing gives way", [], [], ["false", "true", "false"]]);
+  for (const back of [m.escaped, m.steps]) {
+    assert.ok(near(back.points, rest));
+    assert.deepEqual([back.caption, back.signs, back.labels, back.hasSlider, back.pressed], ["", [], [], false, ["false", "false", "false"]]);
+  }
+  assert.deepEqual([m.weakest.signs, m.weakest.labels, m.weakest.pressed], [["TubeGeometry", "TubeGeometry"], ["opens here <b>"], ["false", "false", "true"]]);
+  assert.ok(!dom.includes("<b>"), "text stays text");
+});
+
+test("who wants no animation sees a load at its full, still, and has the slider", { skip: withoutBrowser }, async () => {
+  const { data } = await opened(await samplePage({ hasLoads: true, script: scripts.loads }), "--force-prefers-reduced-motion");
+  const m = moments(data);
+  const [still, [x, y, z]] = m.before.points;
+  const full = [still, [x, y, z - 2]];
+  assert.ok(near(m.full.points, full) && near(m["back at rest"].points, full), "nothing moves by itself");
+  assert.deepEqual([m.full.isPlaying, m.full.amount, m.full.caption], [false, 1, "Pressed <b> (4 times exaggerated)"]);
+  assert.ok(near(m.half.points, [still, [x, y, z - 1]]));
 });

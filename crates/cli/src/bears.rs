@@ -1,26 +1,31 @@
 //! What a kit bears, in a maker's words.
 
-use shellock::handling::Failure;
-use shellock::metric::{Bears, Holding};
+use shellock::handling::{DROP_MM, Deed, Failure};
+use shellock::metric::{Bears, GivesWay, Holding, LoadBorne, MOST_TIMES, Told};
 
 use crate::place::Standing;
-
-/// Said wherever figures of the simulation stand.
-pub const BY_SIMULATION: &str = "by simulation, without a print to compare";
+pub use shellock::metric::BY_SIMULATION;
 
 /// Newtons that a kilogram weighs.
 const N_PER_KG: f64 = 9.80665;
 
+/// Less than this share of a load is no load: hardly anything holds.
+const HARDLY: f64 = 0.05;
+
+fn newtons(n: f64) -> String {
+    format!("{n:.0} N ({:.1} kg)", n / N_PER_KG)
+}
+
+fn metres(m: f64) -> String {
+    if m < 1.0 {
+        format!("{:.0} cm", 100.0 * m)
+    } else {
+        format!("{m:.1} m")
+    }
+}
+
 /// What it bears, one thing each: what is done, and how much of it.
 pub fn figures(bears: &Bears) -> Vec<(&'static str, String)> {
-    let newtons = |n: f64| format!("{n:.0} N ({:.1} kg)", n / N_PER_KG);
-    let metres = |m: f64| {
-        if m < 1.0 {
-            format!("{:.0} cm", 100.0 * m)
-        } else {
-            format!("{m:.1} m")
-        }
-    };
     let mut all = vec![(
         "pressed on its top",
         bears
@@ -57,35 +62,85 @@ pub fn lines(holding: &Holding, standing: &Standing) -> Vec<String> {
     lines
 }
 
-/// What matters most, for the booklet: two lines.
-pub fn short(holding: &Holding) -> Vec<String> {
-    let Some(bears) = holding.summary() else {
-        return Vec::new();
-    };
-    let said: Vec<String> = figures(&bears)
-        .into_iter()
-        .filter(|(what, _)| !what.contains("gripped") && !what.contains("any side"))
-        .map(|(what, much)| format!("{what} {much}"))
-        .collect();
-    vec![
-        format!("bears: {}", said.join(", ")),
-        format!("({BY_SIMULATION})"),
-    ]
-}
-
 /// Under which use a kit gives way first, how and where.
 pub fn weakest(holding: &Holding, standing: &Standing) -> Option<String> {
     let worst = holding.weakest_use()?;
     let first = worst.first?;
+    Some(format!(
+        "where it is {}: {} ({})",
+        worst.deed.done(),
+        gives_way(&first),
+        standing.words(first.at)
+    ))
+}
+
+/// What happens where a kit gives way.
+pub fn gives_way(first: &GivesWay) -> String {
     let [a, b] = first.between;
-    let how = match first.how {
+    match first.how {
         Failure::Opens => format!("the seam of pieces {a} and {b} opens"),
         Failure::PinYields => format!("pins between pieces {a} and {b} bend"),
         Failure::WallYields => format!("walls at pieces {a} and {b} yield"),
+    }
+}
+
+/// A load's name in a list, before its figure.
+pub fn told(told: Told) -> &'static str {
+    match told {
+        Told::Top => "pressed on its top",
+        Told::Middle => "pressed on its middle",
+        Told::Side => "pressed as it lies",
+        Told::GripNarrow => "gripped where narrow",
+        Told::GripWide => "gripped where wide",
+        Told::Feet => "falls onto its feet from",
+        Told::AnySide => "falls onto any side from",
+        Told::Lifted => "lifted by one piece, weighing",
+    }
+}
+
+/// By how many times a load may grow, as far as anybody cares.
+pub fn counted(borne: &LoadBorne) -> f64 {
+    borne.factor.unwrap_or(MOST_TIMES).min(MOST_TIMES)
+}
+
+/// How much of a load is borne.
+pub fn figure(borne: &LoadBorne) -> String {
+    let factor = counted(borne);
+    let much = match borne.deed {
+        Deed::FallUpright | Deed::Fall { .. } => metres(1e-3 * DROP_MM * factor * factor),
+        _ => newtons(factor * borne.force_n),
     };
-    Some(format!(
-        "where it is {}: {how} ({})",
-        worst.deed.done(),
-        standing.words(first.at)
-    ))
+    if factor < HARDLY {
+        "comes apart".to_owned()
+    } else if factor < MOST_TIMES {
+        much
+    } else {
+        format!("more than {much}")
+    }
+}
+
+/// What is seen where as much of a load acts as is borne.
+pub fn sentence(as_told: Told, borne: &LoadBorne) -> String {
+    let what = told(as_told)
+        .trim_end_matches(" from")
+        .trim_end_matches(", weighing");
+    let is_fall = matches!(borne.deed, Deed::FallUpright | Deed::Fall { .. });
+    let with = if is_fall { "from" } else { "with" };
+    let (figure, factor) = (figure(borne), counted(borne));
+    match &borne.first {
+        Some(first) if factor < HARDLY => {
+            format!(
+                "{what}: hardly anything holds, {}; {BY_SIMULATION}",
+                gives_way(first)
+            )
+        }
+        Some(first) if factor < MOST_TIMES => {
+            format!(
+                "{what} {with} {figure}: then {}; {BY_SIMULATION}",
+                gives_way(first)
+            )
+        }
+        None if factor < HARDLY => format!("{what}: it comes apart; {BY_SIMULATION}"),
+        _ => format!("{what}: nothing gives way, it bears {figure}; {BY_SIMULATION}"),
+    }
 }

@@ -9,6 +9,7 @@ mod failure;
 mod input;
 mod inspect;
 mod interrupt;
+mod loads;
 mod manual;
 mod output;
 mod own_assembly;

@@ -8,16 +8,17 @@ use shellock::verify::{Finding, Play};
 use shellock::{Cause, IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
-use shellock_print::booklet::Booklet;
+use shellock_print::booklet::{Booklet, Borne, WeakPlace};
 use shellock_render::{
-    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportQuantity, html, palette,
-    pieces_picture,
+    ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportPlace, ReportQuantity, html,
+    palette, pieces_picture,
 };
 
 use crate::args::Options;
 use crate::bears;
 use crate::build::{bearing, scope};
 use crate::input::Model;
+use crate::loads;
 use crate::output::{Summary, connector_sizes, standing};
 use crate::place::Standing;
 
@@ -82,11 +83,12 @@ pub fn report(
         figures,
         quantities,
         motions: motions(design, stand),
+        loads: loads::loads(design, &standing, stand),
     };
     let booklet = Booklet {
         title: title(&model.name),
         lines: cover_lines(&shown),
-        last: bears::short(&design.kit.holding),
+        bears: borne(design, &data.loads.weakest),
         pieces: data.pieces.clone(),
     };
     let (page, (picture, booklet)) = rayon::join(
@@ -147,6 +149,31 @@ fn motions(design: &Design, stand: impl Fn(Vec3) -> Vec3) -> Vec<ReportMotion> {
         .into_iter()
         .chain(ways_out)
         .collect()
+}
+
+/// What the booklet says of loads.
+fn borne(design: &Design, weakest: &Option<(String, ReportPlace)>) -> Option<Borne> {
+    let holding = &design.kit.holding;
+    let bears = holding.summary()?;
+    let between = holding.weakest_use().and_then(|worst| worst.first);
+    let place = weakest.as_ref().zip(between);
+    Some(Borne {
+        figures: bears::figures(&bears)
+            .into_iter()
+            .map(|(what, much)| (what.to_owned(), much))
+            .collect(),
+        note: bears::BY_SIMULATION.to_owned(),
+        weakest: place.map(|((words, place), first)| WeakPlace {
+            words: words.clone(),
+            at: Vec3::from(place.at),
+            lines: place
+                .lines
+                .iter()
+                .map(|line| line.iter().map(|p| Vec3::from(*p)).collect())
+                .collect(),
+            between: first.between.map(PatchId::number),
+        }),
+    })
 }
 
 /// What failed, for the list of warnings.
@@ -216,7 +243,9 @@ fn kit_facts(
             .iter()
             .map(|s| ("fall".into(), bearing(s, settings, standing))),
     );
-    facts.extend(bearing_facts(design, standing));
+    if design.kit.deformed.loads.is_empty() {
+        facts.extend(bearing_facts(design, standing));
+    }
     facts.extend(plan_facts(design, standing));
     facts
 }

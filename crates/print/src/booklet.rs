@@ -5,6 +5,7 @@
 //! from where most of the new piece, of its place and of its way is seen (`view`); a note says so where the
 //! view changes.
 
+mod bears;
 mod view;
 
 use rayon::prelude::*;
@@ -14,6 +15,7 @@ use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 
 pub use crate::pdf::Color;
 use crate::pdf::{PAGE_MM, Page, Style, document, width_mm};
+pub use bears::{Borne, WeakPlace};
 use view::{Sight, side, sights};
 
 /// Free rim of a page, mm.
@@ -39,8 +41,8 @@ pub struct Booklet<'a> {
     pub title: String,
     /// Lines below it.
     pub lines: Vec<String>,
-    /// Lines where it is finished, two at most.
-    pub last: Vec<String>,
+    /// What the finished thing bears, where that is known.
+    pub bears: Option<Borne>,
     /// Standing on its feet: z is up, and it looks along −y. In any order.
     pub pieces: Vec<ReportPiece<'a>>,
 }
@@ -116,7 +118,7 @@ impl Booklet<'_> {
         let drawn = self.drawn();
         let mut pages = vec![self.cover(&drawn)];
         pages.extend(pieces_pages(&drawn));
-        pages.extend(steps_pages(&drawn, &self.last));
+        pages.extend(steps_pages(&drawn, self.bears.as_ref()));
         let n_pages = pages.len();
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
             let foot = format!("{}  –  {} of {n_pages}", self.title, i + 1);
@@ -265,8 +267,8 @@ fn step_pixels() -> [usize; 2] {
     step_mm().map(|mm| (mm * STEP_DENSITY) as usize)
 }
 
-/// One step a picture, and the finished thing.
-fn steps_pages(drawn: &[Drawn<'_>], last: &[String]) -> Vec<Page> {
+/// One step a picture, the finished thing, and what it bears.
+fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
     let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
     let sights = sights(&pieces);
     let cell = cell_mm(STEPS, 0.0);
@@ -278,11 +280,15 @@ fn steps_pages(drawn: &[Drawn<'_>], last: &[String]) -> Vec<Page> {
     let together = vec![Vec3::ZERO; drawn.len()];
     let finished = (!drawn.is_empty()).then(|| (all_pieces(drawn, &together, size), None));
     let mut pages = Vec::new();
-    for (i, (picture, way)) in step_pictures.into_iter().chain(finished).enumerate() {
-        if i % (STEPS[0] * STEPS[1]) == 0 {
+    let page_of = |i: usize, pages: &mut Vec<Page>| {
+        if i.is_multiple_of(STEPS[0] * STEPS[1]) {
             pages.push(Page::new());
         }
-        let page = pages.last_mut().expect("there is a page for each step");
+        pages.len() - 1
+    };
+    for (i, (picture, way)) in step_pictures.into_iter().chain(finished).enumerate() {
+        let at = page_of(i, &mut pages);
+        let page = &mut pages[at];
         let [x, y] = corner_mm(i, STEPS, cell, 0.0);
         let at = [x + 2.0, y + 20.0];
         page.picture(at, picture_mm[0], picture);
@@ -292,8 +298,13 @@ fn steps_pages(drawn: &[Drawn<'_>], last: &[String]) -> Vec<Page> {
         }
         match drawn.get(i) {
             Some(d) => step_heading(page, [x, y], d.piece, &sights, i),
-            None => finish_heading(page, [x, y], drawn, last),
+            None => finish_heading(page, [x, y], drawn),
         }
+    }
+    if let Some(bears) = bears.filter(|_| !drawn.is_empty()) {
+        let i = drawn.len() + 1;
+        let at = page_of(i, &mut pages);
+        bears::fill(&mut pages[at], corner_mm(i, STEPS, cell, 0.0), drawn, bears);
     }
     pages
 }
@@ -339,8 +350,7 @@ fn seen_from(sights: &[Sight], i: usize) -> (String, bool) {
     (if is_new { format!("turn it: {seen}") } else { seen }, is_new)
 }
 
-fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], last: &[String]) {
-    const LINE_MM: f64 = 3.6;
+fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
     let room_mm = cell_mm(STEPS, 0.0)[0] - 3.0;
     page.text([x + 1.0, y + 6.6], bold(5.0, INK), "done");
     if let Some(key) = drawn.last() {
@@ -349,10 +359,6 @@ fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], last: 
             key.piece.number
         );
         page.text_within([x + 1.0, y + 11.4], room_mm, small(FAINT), &how);
-    }
-    for (i, line) in (1..).zip(last) {
-        let down_mm = 11.4 + LINE_MM * f64::from(i);
-        page.text_within([x + 1.0, y + down_mm], room_mm, small(FAINT), line);
     }
 }
 

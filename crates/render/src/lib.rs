@@ -3,6 +3,7 @@
 //! The page is self-contained and needs no network. Its viewer (`viewer/` of the repository) knows meshes,
 //! arrows and points with labels; what they mean for shells is said here.
 
+mod loads;
 mod page;
 pub mod palette;
 mod pictures;
@@ -14,6 +15,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use shellock_assembly::Warning;
 
+pub use loads::{ReportArrow, ReportLoad, ReportLoads, ReportPlace};
 pub use page::html;
 pub use pictures::{from_inside, pieces_picture};
 
@@ -36,6 +38,8 @@ pub struct ReportData<'a> {
     pub quantities: Vec<ReportQuantity>,
     /// What the page can play, in the order of its buttons; may be empty.
     pub motions: Vec<ReportMotion>,
+    /// What loads do to the pieces; may be empty.
+    pub loads: ReportLoads,
 }
 
 /// One piece in assembled position.

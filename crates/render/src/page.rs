@@ -8,6 +8,7 @@ use shellock_assembly::{PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
+use super::loads::LoadsHeader;
 use super::{ReportCheck, ReportData, ReportMotion, ReportPiece, ReportQuantity, exploded_shifts};
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -38,6 +39,7 @@ pub fn html(data: &ReportData<'_>) -> String {
         figures: data.figures.iter().map(Figure::new).collect(),
         quantities: &data.quantities,
         motions: &data.motions,
+        loads: LoadsHeader::new(&data.loads, &mut arrays),
     };
     let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
     // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
@@ -79,6 +81,8 @@ struct Header<'a> {
     quantities: &'a [ReportQuantity],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     motions: &'a [ReportMotion],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loads: Option<LoadsHeader<'a>>,
 }
 
 /// A picture with a title.
@@ -93,7 +97,7 @@ impl<'a> Figure<'a> {
     fn new((title, svg): &'a (String, String)) -> Self {
         Self {
             title,
-            source: format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg)),
+            source: format!("data:image/svg+xml,{}", percent_encoded(svg)),
         }
     }
 }
@@ -123,7 +127,7 @@ struct Draft {
 }
 
 #[derive(Serialize)]
-struct PointArray {
+pub(crate) struct PointArray {
     offset: usize,
     count: usize,
     min: [f64; 3],
@@ -131,7 +135,7 @@ struct PointArray {
 }
 
 #[derive(Serialize)]
-struct TriangleArray {
+pub(crate) struct TriangleArray {
     offset: usize,
     count: usize,
     /// Bytes of a corner: 2 or 4.
@@ -185,7 +189,7 @@ impl<'a> MeshHeader<'a> {
     }
 }
 
-fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
+pub(crate) fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
     let bounds = mesh.bounds();
     let (min, size) = if mesh.points.is_empty() {
         (Vec3::ZERO, Vec3::ZERO)
@@ -209,7 +213,7 @@ fn append_points(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PointArray {
     }
 }
 
-fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
+pub(crate) fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
     align(arrays);
     let offset = arrays.len();
     let bytes = if mesh.points.len() <= 65_536 { 2 } else { 4 };
@@ -224,8 +228,22 @@ fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> TriangleArray {
 }
 
 /// Typed arrays begin at multiples of their element size.
-fn align(arrays: &mut Vec<u8>) {
+pub(crate) fn align(arrays: &mut Vec<u8>) {
     arrays.resize(arrays.len().next_multiple_of(4), 0);
+}
+
+/// As it may stand in an address. Charts are mostly pictures in base64, which stay as they are: encoded as a
+/// whole they were a third larger.
+fn percent_encoded(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for byte in text.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-_.~+/=,:;()".contains(&byte) {
+            out.push(char::from(byte));
+        } else {
+            out.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    out
 }
 
 fn escaped(text: &str) -> String {
@@ -260,7 +278,7 @@ mod tests {
     use shellock_assembly::Cause;
 
     use super::*;
-    use crate::ReportMove;
+    use crate::{ReportLoad, ReportLoads, ReportMove, ReportPlace};
 
     const HOSTILE: &str = "</script><script>alert('x')</script>{{arrays}}<!--";
 
@@ -308,7 +326,32 @@ mod tests {
                 values: vec![None],
             }],
             motions,
+            loads: loads(&mesh),
         })
+    }
+
+    fn loads(mesh: &TriMesh) -> ReportLoads {
+        let place = ReportPlace {
+            name: HOSTILE.into(),
+            at: [0.0; 3],
+            lines: Vec::new(),
+            piece: 0,
+        };
+        let load = ReportLoad {
+            name: HOSTILE.into(),
+            figure: HOSTILE.into(),
+            title: HOSTILE.into(),
+            place: Some(place.clone()),
+            moved_mm: vec![vec![Vec3::ZERO, Vec3::X, Vec3::Y]],
+            ..ReportLoad::default()
+        };
+        ReportLoads {
+            title: HOSTILE.into(),
+            note: HOSTILE.into(),
+            carriers: vec![mesh.clone()],
+            loads: vec![load],
+            weakest: Some((HOSTILE.into(), place)),
+        }
     }
 
     fn header(page: &str) -> serde_json::Value {
@@ -327,6 +370,8 @@ mod tests {
         assert_eq!(header["title"], HOSTILE);
         let note = header["notes"][0]["text"].as_str().unwrap();
         assert!(note.ends_with(HOSTILE), "{note}");
+        assert_eq!(header["loads"]["loads"][0]["title"], HOSTILE);
+        assert_eq!(header["loads"]["weakest"]["place"]["mesh"], 0);
     }
 
     #[test]
@@ -359,6 +404,26 @@ mod tests {
             header(&self::page()).get("motions").is_none(),
             "a page without motions says nothing of them"
         );
+    }
+
+    #[test]
+    fn figures_are_addresses_that_say_all_of_them() {
+        let address = header(&page())["figures"][0]["source"]
+            .as_str()
+            .unwrap()
+            .to_owned();
+        let told = address.strip_prefix("data:image/svg+xml,").unwrap();
+        assert!(
+            told.bytes()
+                .all(|b| b.is_ascii_graphic() && !b"<>\"'#".contains(&b))
+        );
+        let mut parts = told.split('%');
+        let mut text = parts.next().unwrap().to_owned();
+        for part in parts {
+            text.push(char::from(u8::from_str_radix(&part[..2], 16).unwrap()));
+            text.push_str(&part[2..]);
+        }
+        assert_eq!(text, HOSTILE);
     }
 
     #[test]

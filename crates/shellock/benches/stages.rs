@@ -131,7 +131,8 @@ fn choice_of_plan(bencher: Bencher) {
                 handling: &Handling::new(params.up, 2.0, Material::default()),
                 climb: metric::ClimbParams::default(),
             };
-            metric::choose(&ctx, &choice, found).is_ok()
+            let foresight = metric::Foresight::of(&choice, &found);
+            metric::choose(&ctx, &choice, &foresight, found).is_ok()
         });
 }
 

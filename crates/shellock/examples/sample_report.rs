@@ -60,6 +60,7 @@ fn main() -> std::io::Result<()> {
             values,
         }],
         motions,
+        loads: Default::default(),
     };
     std::fs::write(folder.join("report.html"), html(&data))
 }

@@ -27,8 +27,8 @@ mod tests;
 use shellock_geom::Solid;
 
 use crate::key::Turn;
-use crate::metric::Holding;
-use crate::plan::{FoundPlan, PlanConstraints, PlanProof, survey};
+use crate::metric::{Chosen, Holding};
+use crate::plan::{PlanConstraints, PlanProof, survey};
 use crate::strength::{Strength, StrengthError, StressMap};
 use crate::{
     Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength,
@@ -76,11 +76,7 @@ enum Walled<T> {
 }
 
 /// The job with the wall as thick as it is, on top of the `effort` that was made.
-fn with_wall(
-    ctx: &Ctx,
-    job: &Job<'_>,
-    effort: &mut Effort,
-) -> Result<Walled<DesignOutcome>, DesignError> {
+fn with_wall(ctx: &Ctx, job: &Job<'_>, effort: &mut Effort) -> Result<Walled<DesignOutcome>, DesignError> {
     let mut best = Best::after(*effort);
     let places = candidate::places(ctx, job)?;
     for (i, place) in places.iter().enumerate() {
@@ -172,17 +168,19 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                     None => budget.foreseen_joinings = 0,
                 }
             }
-            Attempt::Weak(remedy) => match strengthened(ctx, job, candidate, division, *remedy, &mut budget.levers)? {
-                Walled::Done(next) => division = next,
-                Walled::Thicker(thicker) => {
-                    return Ok(Explored {
-                        kit,
-                        failure: Failure::default(),
-                        thicker: Some(thicker),
-                        effort: budget.spent,
-                    });
+            Attempt::Weak(remedy) => {
+                match strengthened(ctx, job, candidate, division, *remedy, &mut budget.levers)? {
+                    Walled::Done(next) => division = next,
+                    Walled::Thicker(thicker) => {
+                        return Ok(Explored {
+                            kit,
+                            failure: Failure::default(),
+                            thicker: Some(thicker),
+                            effort: budget.spent,
+                        });
+                    }
                 }
-            },
+            }
             Attempt::Failed(failure) => {
                 let next = if job.pace.is_late(ctx) {
                     None
@@ -277,8 +275,7 @@ impl Planned {
     fn of(
         turn: &Turn,
         surface: &SegmentedSurface,
-        found: FoundPlan,
-        holding: Holding,
+        Chosen { found, holding, .. }: Chosen,
         (own, of_wall): (Vec<Warning>, Vec<Warning>),
     ) -> Self {
         let (proof, mean_cost, n_plans) = (found.proof(), found.score.mean, found.pool.len());
@@ -348,9 +345,9 @@ fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, Str
                 constraints: &none,
             };
             division = match attempt::next_plan(&ctx, &planning, n_joinings > 0, &levers)? {
-                Next::Plan(found, holding) => {
+                Next::Plan(chosen) => {
                     let own = (ctx.into_warnings(), job.wall.warnings.clone());
-                    let planned = Planned::of(&candidate.turn, &current.surface, *found, holding, own);
+                    let planned = Planned::of(&candidate.turn, &current.surface, *chosen, own);
                     return Ok(Walled::Done(Ok(planned)));
                 }
                 Next::Weak(remedy) => {
@@ -480,7 +477,13 @@ struct Wall {
 
 impl Wall {
     /// The same model with a thicker wall, for the sake of what people do to the kit.
-    fn thicker(&self, ctx: &Ctx, params: &Params, model: &Solid, thicker: &Thicker) -> Result<Self, DesignError> {
+    fn thicker(
+        &self,
+        ctx: &Ctx,
+        params: &Params,
+        model: &Solid,
+        thicker: &Thicker,
+    ) -> Result<Self, DesignError> {
         let thickness = Thickness::Mm(thicker.thickness_mm);
         let mut wall = Self::decide(
             ctx,

@@ -8,17 +8,24 @@
 mod choice;
 mod climb;
 mod data_driven;
+mod deform;
 mod foreseen;
+mod foresight;
 mod model;
 mod rating;
-mod what_if;
 #[cfg(test)]
 mod tests;
+mod what_if;
 
-pub use choice::{Bears, Choice, ChoiceError, GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding, choose};
+pub use choice::{
+    BY_SIMULATION, Bears, Choice, ChoiceError, Chosen, GivesWay, Holding, LoadBorne, LoosePiece, MOST_TIMES,
+    SeamHolding, WeakestUse, choose,
+};
 pub use climb::{ClimbError, ClimbParams, Climbed, climb};
 pub use data_driven::{data_driven, pieces_alone};
+pub use deform::{Deformed, DeformedLoad, Told, Touch};
 pub use foreseen::{Foreseen, foreseen};
+pub use foresight::Foresight;
 pub use model::{MetricParams, PlanModel};
 pub use rating::{Bench, Rated};
 pub use what_if::bears_with;

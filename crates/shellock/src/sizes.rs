@@ -363,7 +363,10 @@ pub fn choose(
         .collect();
     ctx.check()?;
     let sizes = ConnectorSizes::with_pairs(range.min_mm, chosen.iter().map(|c| (c.0.pair, c.0.given_mm)));
-    let most = chosen.iter().map(|(c, most_mm)| (c.pair, (*most_mm, c.at))).collect();
+    let most = chosen
+        .iter()
+        .map(|(c, most_mm)| (c.pair, (*most_mm, c.at)))
+        .collect();
     let limited = chosen
         .into_iter()
         .map(|c| c.0)

@@ -35,7 +35,9 @@ const WHOLE: &str = r#"{
         "bears": [{ "deed": { "kind": "hang", "piece": 1 }, "force_n": 1.5, "at": [0.0, 0.0, 0.0], "factor": 2.0,
             "first": { "how": "opens", "between": [2, 1], "at": [0.0, 1.0, 0.0] } }] },
     "bears": { "top_n": 84.5, "middle_n": 70.5, "sides_n": null, "grip_n": 20.5, "fall_upright_m": 2.5,
-        "fall_m": 0.5 },
+        "fall_m": 0.5, "basis": "by simulation",
+        "weakest": { "deed": { "kind": "press-top" },
+            "first": { "how": "opens", "between": [2, 1], "at": [0.0, 1.0, 0.0] } } },
     "volume_ratio": 0.3, "connector_share": 0.75,
     "joints": [{ "male": 1, "female": 2, "length_mm": 20.5, "volume_mm3": [1.5, 2.5], "kept": [1.0, 0.9],
         "at": [0.0, 0.0, 0.0] }],
@@ -86,6 +88,19 @@ fn what_is_read_is_written_again_byte_for_byte() {
     assert_eq!(plan.press_fits[0].kind, PressFitKind::Rib);
     assert!(plan.plan.is_some() && plan.holding.is_some() && plan.bears.is_some());
     assert!(plan.verification.unwrap().findings.is_some());
+}
+
+#[test]
+fn what_a_kit_bears_is_read_where_it_does_not_say_of_what_gives_way() {
+    let mut older = whole();
+    let bears = older["bears"].as_object_mut().unwrap();
+    bears.remove("basis");
+    bears.remove("weakest");
+    let bears = read(&older).unwrap().bears.unwrap();
+    assert_eq!(
+        (bears.top_n, bears.weakest, bears.basis),
+        (Some(84.5), None, String::new())
+    );
 }
 
 #[test]

@@ -8,6 +8,8 @@
 //! Contacts that bear both ways are eliminated once for a plan, whatever loads there are. Those that only push
 //! are kept to the end: what is left is how they give way under each other, a small dense matrix.
 
+use std::sync::Arc;
+
 use shellock_geom::sparse::{SparseError, eliminate_leading};
 
 use super::contact::Law;
@@ -53,7 +55,7 @@ pub(super) struct Joinings {
 /// What is left when the contacts that bear both ways are eliminated.
 #[derive(Debug)]
 pub(super) struct Reduced {
-    fronts: Vec<Front>,
+    fronts: Vec<Arc<Front>>,
     /// The contacts that only push, ascending.
     pub pushes: Vec<u32>,
     /// How each of them opens under forces in the others, by columns; symmetric.
@@ -126,27 +128,39 @@ impl Joinings {
         self
     }
 
-    /// Joins all bodies.
-    pub fn reduce(&self, bodies: &[impl AsRef<Body>], laws: &[Law]) -> Result<Reduced, SparseError> {
-        let mut fronts: Vec<Front> = Vec::with_capacity(self.joinings.len());
+    /// Joins all bodies. Where some are those of `before`, what was made of them alone is not made again.
+    pub fn reduce(
+        &self,
+        bodies: &[Arc<Body>],
+        laws: &[Law],
+        before: Option<(&[Arc<Body>], &Reduced)>,
+    ) -> Result<Reduced, SparseError> {
+        let mut fronts: Vec<Arc<Front>> = Vec::with_capacity(self.joinings.len());
         let mut place = vec![0; laws.len()];
         let mut is_root = vec![true; self.joinings.len()];
-        for joining in &self.joinings {
+        for (i, joining) in self.joinings.iter().enumerate() {
+            joining.joined.iter().for_each(|j| is_root[*j] = false);
+            if let Some((old, reduced)) = before
+                && joining.bodies.iter().all(|b| Arc::ptr_eq(&bodies[*b], &old[*b]))
+                && (joining.joined.iter()).all(|j| Arc::ptr_eq(&fronts[*j], &reduced.fronts[*j]))
+            {
+                fronts.push(reduced.fronts[i].clone());
+                continue;
+            }
             let mut front = Front::of(joining, bodies, &fronts, laws);
             (0..)
                 .zip(&front.contacts)
                 .for_each(|(i, c)| place[*c as usize] = i);
             for b in &joining.bodies {
-                front.add_body(bodies[*b].as_ref(), laws, &place);
+                front.add_body(&bodies[*b], laws, &place);
             }
             for j in &joining.joined {
-                is_root[*j] = false;
                 front.add_joint(&fronts[*j], &place);
             }
             if front.n_eliminated > 0 {
                 eliminate_leading(&mut front.values, front.contacts.len(), front.n_eliminated)?;
             }
-            fronts.push(front);
+            fronts.push(Arc::new(front));
         }
         let pushes: Vec<u32> = (0..laws.len() as u32)
             .filter(|c| laws[*c as usize] == Law::Push)
@@ -255,7 +269,7 @@ impl Joining {
 impl Front {
     /// With places for what is eliminated, for what waits for other bodies, and for all that pushes; empty
     /// but for the 1 of what is eliminated.
-    fn of(joining: &Joining, bodies: &[impl AsRef<Body>], done: &[Self], laws: &[Law]) -> Self {
+    fn of(joining: &Joining, bodies: &[Arc<Body>], done: &[Arc<Self>], laws: &[Law]) -> Self {
         let both = |of: &[u32]| {
             let is = |c: &u32| laws[*c as usize] == Law::Both;
             of.iter().copied().filter(is).collect::<Vec<u32>>()
@@ -263,7 +277,7 @@ impl Front {
         let mut contacts = both(&joining.eliminated);
         let n_eliminated = contacts.len();
         contacts.extend(both(&joining.kept));
-        let own = joining.bodies.iter().flat_map(|b| &bodies[*b].as_ref().contacts);
+        let own = joining.bodies.iter().flat_map(|b| &bodies[*b].contacts);
         let joined = joining.joined.iter().flat_map(|j| &done[*j].contacts);
         let mut pushes: Vec<u32> = own
             .chain(joined)
@@ -320,8 +334,6 @@ impl Front {
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
-    use std::sync::Arc;
-
     use super::*;
 
     /// Seven bodies in a ring with a chord, 31 contacts between them and 5 that touch one body alone.
@@ -361,7 +373,7 @@ mod tests {
         for modulus in [1, 2, 3, 100] {
             let law = |i| if i % modulus == 0 { Law::Both } else { Law::Push };
             let laws: Vec<Law> = (0..n).map(law).collect();
-            let reduced = joinings.reduce(&bodies, &laws).unwrap();
+            let reduced = joinings.reduce(&bodies, &laws, None).unwrap();
             let mut found = side.clone();
             reduced.begin(&mut found);
             let m = reduced.pushes.len();

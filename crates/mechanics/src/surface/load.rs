@@ -19,7 +19,7 @@ use crate::connector::{PIN_DEPTH, PIN_WIDTH};
 
 /// One load as the stations feel it before anything joins the parts.
 #[derive(Clone, Debug)]
-pub struct Drift(Load);
+pub struct Drift(pub(super) Load);
 
 /// What one load does to a plan.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,6 +81,32 @@ impl JoinedParts<'_> {
         let balance = self.0.balance(&load, closed.map(|c| &c.0[..]))?;
         let opening = Opening::rated(plan, openings(model, plan, &balance.moved));
         Ok((opening, Closed::of(&balance)))
+    }
+
+    /// How far each point of the outer surface goes under `forces_n` on all of them, mm: with the middle of the
+    /// wall below it. How the whole moves as a rigid body, in the mean over the area, is left out where no
+    /// points are held: nothing says how far that is.
+    ///
+    /// One solve a part with the factor that it has. The answer does not depend on `closed`, but for rounding.
+    ///
+    /// # Panics
+    /// Where there is not one force for each point.
+    pub fn moved_mm(&self, forces_n: &[Vec3], closed: Option<&Closed>) -> Result<Vec<Vec3>, SparseError> {
+        let model = self.0.model;
+        let load = model.drift(forces_n).0;
+        let balance = self.0.balance(&load, closed.map(|c| &c.0[..]))?;
+        let points = mid_wall(&model.params, &model.assembly);
+        let balanced_n = model.balanced(&points, forces_n);
+        let mut moved_mm = vec![Vec3::ZERO; points.len()];
+        for part in &model.parts {
+            let own = part.moved(&points, &balanced_n, &balance.sent);
+            own.into_iter()
+                .for_each(|(v, moved)| moved_mm[v as usize] = moved);
+        }
+        if !model.is_held {
+            model.without_whole(&points, &mut moved_mm);
+        }
+        Ok(moved_mm)
     }
 }
 
@@ -151,31 +177,74 @@ impl SurfaceModel {
             return balanced_n;
         }
         let areas_mm2 = self.assembly.point_areas_mm2();
-        let total: f64 = areas_mm2.iter().sum();
-        let center = points.iter().zip(&areas_mm2).map(|(p, a)| *a * *p).sum::<Vec3>() / total;
-        let modes = |p: Vec3| -> [Vec3; 6] {
-            let arm = p - center;
-            std::array::from_fn(|j| {
-                if j < 3 {
-                    Vec3::AXES[j]
-                } else {
-                    Vec3::AXES[j - 3].cross(arm)
-                }
-            })
-        };
-        let (mut inertia, mut work) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
-        for ((p, area), f) in points.iter().zip(&areas_mm2).zip(forces_n) {
-            let modes = modes(*p);
-            for a in 0..6 {
-                work[a] += modes[a].dot(*f);
-                (0..6).for_each(|b| inertia[(a, b)] += area * modes[a].dot(modes[b]));
-            }
-        }
-        let acceleration = inertia.cholesky().map_or(SVector::zeros(), |c| c.solve(&work));
+        let whole = Whole::new(points, &areas_mm2);
+        let acceleration = whole.motion(points.iter().zip(forces_n).map(|(p, f)| (*p, *f)));
         for ((p, area), f) in points.iter().zip(&areas_mm2).zip(&mut balanced_n) {
-            let modes = modes(*p);
+            let modes = whole.modes(*p);
             (0..6).for_each(|a| *f -= acceleration[a] * *area * modes[a]);
         }
         balanced_n
+    }
+
+    /// Takes from motions what of them is the whole's, in the mean over the area.
+    fn without_whole(&self, points: &[Vec3], moved_mm: &mut [Vec3]) {
+        let areas_mm2 = self.assembly.point_areas_mm2();
+        let whole = Whole::new(points, &areas_mm2);
+        let weighted = points.iter().zip(&areas_mm2).zip(moved_mm.iter());
+        let motion = whole.motion(weighted.map(|((p, area), m)| (*p, *area * *m)));
+        for (p, m) in points.iter().zip(moved_mm) {
+            let modes = whole.modes(*p);
+            (0..6).for_each(|a| *m -= motion[a] * modes[a]);
+        }
+    }
+}
+
+/// All walls as one rigid body, their mass that of their area.
+struct Whole {
+    center: Vec3,
+    /// Against [`Self::modes`], mm² and mm² times arms.
+    inertia: SMatrix<f64, 6, 6>,
+}
+
+impl Whole {
+    fn new(points: &[Vec3], areas_mm2: &[f64]) -> Self {
+        let total: f64 = areas_mm2.iter().sum();
+        let center = points.iter().zip(areas_mm2).map(|(p, a)| *a * *p).sum::<Vec3>() / total;
+        let mut whole = Self {
+            center,
+            inertia: SMatrix::zeros(),
+        };
+        for (p, area) in points.iter().zip(areas_mm2) {
+            let modes = whole.modes(*p);
+            for a in 0..6 {
+                (0..6).for_each(|b| whole.inertia[(a, b)] += area * modes[a].dot(modes[b]));
+            }
+        }
+        whole
+    }
+
+    /// How a point moves with each of three shifts and three turns about the center.
+    fn modes(&self, p: Vec3) -> [Vec3; 6] {
+        let arm = p - self.center;
+        std::array::from_fn(|j| {
+            if j < 3 {
+                Vec3::AXES[j]
+            } else {
+                Vec3::AXES[j - 3].cross(arm)
+            }
+        })
+    }
+
+    /// The motion with the same work, in its modes, as `pushes` at points: its acceleration under forces. None
+    /// where it is no body.
+    fn motion(&self, pushes: impl Iterator<Item = (Vec3, Vec3)>) -> SVector<f64, 6> {
+        let mut work = SVector::<f64, 6>::zeros();
+        for (p, push) in pushes {
+            let modes = self.modes(p);
+            (0..6).for_each(|a| work[a] += modes[a].dot(push));
+        }
+        self.inertia
+            .cholesky()
+            .map_or(SVector::zeros(), |c| c.solve(&work))
     }
 }

@@ -69,6 +69,11 @@ struct Floating {
     ground_n_mm: f64,
 }
 
+/// What every motion gives way by besides the mesh, mm/N.
+pub(super) fn least_compliance(params: &SurfaceParams) -> f64 {
+    LEAST_COMPLIANCE / params.contact_n_mm(params.connector_mm, 1.0)
+}
+
 /// The points of the outer surface, moved to the middle of the wall.
 pub(super) fn mid_wall(params: &SurfaceParams, assembly: &ShellAssembly) -> Vec<Vec3> {
     let points = assembly.points.iter().zip(&assembly.normals);
@@ -189,7 +194,7 @@ fn part(
     factor.solve_in_place(&mut sides);
     let mut compliance = forces.transpose() * DMatrix::from_column_slice(n, m, &sides);
     for i in 0..m {
-        compliance[(i, i)] += LEAST_COMPLIANCE / params.contact_n_mm(params.connector_mm, 1.0);
+        compliance[(i, i)] += least_compliance(params);
     }
     let floating = (!floats.is_empty()).then(|| Floating {
         rigid: DMatrix::from_fn(m, 6, |i, j| rigid_motion(points, &gradients[i], j)),
@@ -228,14 +233,11 @@ impl Part {
         rows.iter()
             .for_each(|&(v, r)| add(&mut moved, Some(r), forces_n[v as usize]));
         factor.solve_in_place(&mut moved);
-        let row_of = |v: u32| {
-            rows.binary_search_by_key(&v, |r| r.0)
-                .ok()
-                .map(|at| rows[at].1 as usize)
-        };
         let along = |gradient: &Gradient| {
-            let at =
-                |&(v, g): &(u32, Vec3)| row_of(v).map_or(0.0, |r| g.dot(Vec3::from_slice(&moved[r..r + 3])));
+            let at = |&(v, g): &(u32, Vec3)| {
+                let row = self.inside.place_of(v).map(|at| rows[at].1 as usize);
+                row.map_or(0.0, |r| g.dot(Vec3::from_slice(&moved[r..r + 3])))
+            };
             gradient.iter().map(at).sum::<f64>()
         };
         let mut drift: Vec<f64> = gradients.iter().map(along).collect();
@@ -251,19 +253,65 @@ impl Part {
         }
         drift
     }
+
+    /// How far each of the part's points that may move goes, mm, under `forces_n` on all points of the
+    /// assembly at mid-wall and what is `sent` between the sides of all stations.
+    pub fn moved(&self, points: &[Vec3], forces_n: &[Vec3], sent: &[Motions]) -> Vec<(u32, Vec3)> {
+        let Inside {
+            factor,
+            rows,
+            gradients,
+            floating,
+        } = &self.inside;
+        let mut own: Gradient = rows.iter().map(|&(v, _)| (v, forces_n[v as usize])).collect();
+        let sent = self.stations.iter().flat_map(|s| sent[*s as usize]);
+        for (gradient, force) in gradients.iter().zip(sent) {
+            for &(v, g) in gradient {
+                if let Some(at) = self.inside.place_of(v) {
+                    own[at].1 += force * g;
+                }
+            }
+        }
+        let mut bent = vec![0.0; factor.n_rows()];
+        rows.iter()
+            .zip(&own)
+            .for_each(|(&(_, r), &(_, force))| add(&mut bent, Some(r), force));
+        factor.solve_in_place(&mut bent);
+        let rigid: [f64; 6] = std::array::from_fn(|j| match floating {
+            Some(Floating { ground_n_mm, .. }) => rigid_motion(points, &own, j) / ground_n_mm,
+            None => 0.0,
+        });
+        let moved = |&(v, r): &(u32, u32)| {
+            let whole: Vec3 = (0..6).map(|j| rigid[j] * rigid_mode(points[v as usize], j)).sum();
+            (v, whole + Vec3::from_slice(&bent[r as usize..r as usize + 3]))
+        };
+        rows.iter().map(moved).collect()
+    }
 }
 
-/// What a motion's gradient sees of rigid motion `j`: a shift, or a turn about an axis through the origin.
+impl Inside {
+    /// The place of a point among those that may move.
+    fn place_of(&self, point: u32) -> Option<usize> {
+        self.rows.binary_search_by_key(&point, |r| r.0).ok()
+    }
+}
+
+/// What a motion's gradient sees of rigid motion `j`.
 fn rigid_motion(points: &[Vec3], gradient: &[(u32, Vec3)], j: usize) -> f64 {
+    gradient
+        .iter()
+        .map(|&(v, g)| g.dot(rigid_mode(points[v as usize], j)))
+        .sum()
+}
+
+/// Where rigid motion `j` takes a point: a shift, or a turn about an axis through the origin.
+fn rigid_mode(point: Vec3, j: usize) -> Vec3 {
     let axis = Vec3::AXES[j % 3];
-    let moved = |v: u32| {
-        if j < 3 {
-            axis
-        } else {
-            axis.cross(points[v as usize]) / RADIUS_MM
-        }
-    };
-    gradient.iter().map(|&(v, g)| g.dot(moved(v))).sum()
+    if j < 3 {
+        axis
+    } else {
+        axis.cross(point) / RADIUS_MM
+    }
 }
 
 fn mesh_stiffness<'a>(

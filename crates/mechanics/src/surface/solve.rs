@@ -120,6 +120,8 @@ pub(super) struct Balance {
     pub moved: Vec<Motions>,
     /// What each contact bears, in the root of its stiffness times mm.
     pub borne: Vec<f64>,
+    /// Forces between the sides of each station, those of the contacts included.
+    pub sent: Vec<Motions>,
     /// Newton steps.
     pub n_iterations: usize,
     /// What is left of the force, as a share of it.
@@ -132,7 +134,7 @@ impl<'a> Jointed<'a> {
         let bodies = (layout.touched.iter())
             .map(|t| Arc::new(body(model, layout, t, &contacts)))
             .collect();
-        Self::of(model, layout, contacts, bodies)
+        Self::of(model, layout, contacts, bodies, None)
     }
 
     /// Another plan: parts whose contacts are the same are not computed again.
@@ -150,7 +152,8 @@ impl<'a> Jointed<'a> {
             }
         };
         let bodies = self.layout.touched.iter().zip(&self.bodies).map(again).collect();
-        Self::of(self.model, self.layout, contacts, bodies)
+        let before = Some((&self.bodies[..], &*self.reduced));
+        Self::of(self.model, self.layout, contacts, bodies, before)
     }
 
     fn of(
@@ -158,9 +161,10 @@ impl<'a> Jointed<'a> {
         layout: &'a Layout,
         contacts: Vec<Contact>,
         bodies: Vec<Arc<Body>>,
+        before: Option<(&[Arc<Body>], &Reduced)>,
     ) -> Result<Self, SparseError> {
         let laws: Vec<Law> = contacts.iter().map(|c| c.law).collect();
-        let reduced = Arc::new(layout.joinings.reduce(&bodies, &laws)?);
+        let reduced = Arc::new(layout.joinings.reduce(&bodies, &laws, before)?);
         Ok(Self {
             model,
             layout,
@@ -216,6 +220,7 @@ impl<'a> Jointed<'a> {
         Ok(Balance {
             moved: added(&load.drift, answer(model, is_held, &sent)),
             borne: all,
+            sent,
             n_iterations,
             error,
         })

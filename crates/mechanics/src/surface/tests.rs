@@ -3,7 +3,7 @@ use shellock_geom::Vec3;
 
 use super::contact::{Contact, contacts_at, forces};
 use super::parts::Motions;
-use super::terms::{Term, patch_terms};
+use super::terms::{Root, Term, patch_terms};
 use super::*;
 use crate::neighbourhood::{outer_ring, two_plates};
 use crate::sample::ball;
@@ -345,4 +345,144 @@ fn a_plate_that_nothing_holds_back_comes_apart() {
     let model = SurfaceModel::new(&SurfaceParams::default(), &two_plates(N, ROWS, 5.0)).unwrap();
     let solution = model.resist(&joints(Vec3::Z, Vec3::Z), 0).unwrap();
     assert_eq!(solution.resistance, Resistance::Separable(vec![1]));
+}
+
+/// Forces that press plate a down in its middle and lift plate b.
+fn twisting(model: &SurfaceModel) -> Vec<Vec3> {
+    let push = |(p, part): (&Vec3, &u32)| {
+        if *part == 0 {
+            Vec3::new(0.2, 0.0, -p.x.abs())
+        } else {
+            Vec3::new(0.0, 0.1 * p.x, 0.5)
+        }
+    };
+    let assembly = &model.assembly;
+    assembly
+        .points
+        .iter()
+        .zip(&assembly.part_of_point)
+        .map(push)
+        .collect()
+}
+
+/// What the stations' motions are by how far points went.
+fn moved_at_stations(model: &SurfaceModel, moved_mm: &[Vec3]) -> Vec<Motions> {
+    let points = parts::mid_wall(&model.params, &model.assembly);
+    let triangles_at = |point: u32| {
+        let of_point = move |t: &[u32; 3]| t.contains(&point);
+        let triangles: Vec<[u32; 3]> = model
+            .assembly
+            .triangles
+            .iter()
+            .copied()
+            .filter(of_point)
+            .collect();
+        triangles.into_iter()
+    };
+    let seen = |gradient: Vec<(u32, Vec3)>| {
+        let at = |&(v, g): &(u32, Vec3)| g.dot(moved_mm[v as usize]);
+        gradient.iter().map(at).sum::<f64>()
+    };
+    let motions = |station: &Station| {
+        let side = |point: u32| {
+            let root = Root::new(&points, point, triangles_at(point));
+            let [t, n, across] =
+                [station.tangent, station.normal, station.across].map(|g| seen(root.shift(g)));
+            [t, n, across, seen(root.turn(station.tangent))]
+        };
+        let [a, b] = station.points.map(side);
+        std::array::from_fn(|i| a[i] - b[i])
+    };
+    model.assembly.stations.iter().map(motions).collect()
+}
+
+/// But for the compliance that parts have besides the mesh's, a thousandth of a contact's.
+#[test]
+fn points_move_as_the_stations_that_the_balance_is_of() {
+    let params = SurfaceParams::default();
+    let held =
+        SurfaceModel::with_held_points(&params, &two_plates(N, ROWS, 5.0), &outer_ring(N, ROWS)).unwrap();
+    let free = SurfaceModel::new(&params, &two_plates(N, ROWS, 5.0)).unwrap();
+    let mut plan = joints(Vec3::Z, Vec3::Z);
+    // One that holds both plates, so that neither drifts.
+    plan.iter_mut()
+        .filter_map(|m| m.joint.as_mut())
+        .for_each(|joint| joint.is_fast = true);
+    for model in [held, free] {
+        let forces_n = twisting(&model);
+        let joined = model.joined(&plan).unwrap();
+        let jointed = solve::Jointed::new(&model, &model.free, &plan).unwrap();
+        let balance = jointed.balance(&model.drift(&forces_n).0, None).unwrap();
+        let found = moved_at_stations(&model, &joined.moved_mm(&forces_n, None).unwrap());
+        let largest = balance
+            .moved
+            .concat()
+            .iter()
+            .fold(0.0, |l: f64, m| l.max(m.abs()));
+        let least = parts::least_compliance(&model.params);
+        for ((found, expected), sent) in found.iter().zip(&balance.moved).zip(&balance.sent) {
+            for i in 0..N_MOTIONS {
+                // Both sides have it.
+                let difference = found[i] + 2.0 * least * sent[i] - expected[i];
+                assert!(difference.abs() < 1e-8 * largest, "{found:?} {expected:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_that_move_the_whole_as_a_rigid_body_bend_nothing() {
+    let model = SurfaceModel::new(&SurfaceParams::default(), &two_plates(N, ROWS, 5.0)).unwrap();
+    let plan = joints(Vec3::Z, Vec3::Z);
+    let points = parts::mid_wall(&model.params, &model.assembly);
+    let areas_mm2 = model.assembly.point_areas_mm2();
+    let rigid = |p: &Vec3| Vec3::new(0.3, -0.1, 0.2) + Vec3::new(0.01, 0.02, -0.03).cross(*p);
+    let forces_n: Vec<Vec3> = points
+        .iter()
+        .zip(&areas_mm2)
+        .map(|(p, a)| *a * rigid(p))
+        .collect();
+    let joined = model.joined(&plan).unwrap();
+    let largest = |moved: Vec<Vec3>| moved.iter().map(|m| m.length()).fold(0.0, f64::max);
+    let bent = largest(joined.moved_mm(&twisting(&model), None).unwrap());
+    let moved = largest(joined.moved_mm(&forces_n, None).unwrap());
+    assert!(
+        moved < 1e-6 * bent,
+        "{moved} mm, {bent} mm under forces that bend"
+    );
+}
+
+#[test]
+fn how_the_whole_moves_is_left_out_and_twice_the_load_moves_points_twice_as_far() {
+    let model = SurfaceModel::new(&SurfaceParams::default(), &two_plates(N, ROWS, 5.0)).unwrap();
+    let mut plan = joints(Vec3::Z, Vec3::Z);
+    plan.iter_mut()
+        .filter_map(|m| m.joint.as_mut())
+        .for_each(|joint| joint.is_fast = true);
+    let joined = model.joined(&plan).unwrap();
+    let forces_n = twisting(&model);
+    let twice: Vec<Vec3> = forces_n.iter().map(|f| 2.0 * *f).collect();
+    let [once, twice] = [forces_n, twice].map(|f| joined.moved_mm(&f, None).unwrap());
+    let areas_mm2 = model.assembly.point_areas_mm2();
+    let points = parts::mid_wall(&model.params, &model.assembly);
+    let largest = once.iter().map(|m| m.length()).fold(0.0, f64::max);
+    let area_mm2: f64 = areas_mm2.iter().sum();
+    let weighted = || once.iter().zip(&areas_mm2).map(|(m, a)| *m * (*a / area_mm2));
+    let center = points
+        .iter()
+        .zip(&areas_mm2)
+        .map(|(p, a)| *p * (*a / area_mm2))
+        .sum::<Vec3>();
+    let shift = weighted().sum::<Vec3>();
+    let turn = weighted()
+        .zip(&points)
+        .map(|(m, p)| (*p - center).cross(m))
+        .sum::<Vec3>();
+    assert!(
+        shift.length() < 1e-9 * largest && turn.length() < 1e-9 * 20.0 * largest,
+        "{shift} {turn}"
+    );
+    for (one, two) in once.iter().zip(&twice) {
+        assert!((2.0 * *one - *two).length() < 1e-6 * largest, "{one} {two}");
+    }
 }

@@ -1,6 +1,7 @@
 use shellock_geom::TriMesh;
 use shellock_testkit::shapes::cuboid;
 
+use super::view::Lookout;
 use super::*;
 
 fn piece(mesh: &TriMesh, order: usize, along: [f64; 3]) -> ReportPiece<'_> {
@@ -62,18 +63,18 @@ fn an_arrow_points_where_the_piece_goes_and_is_never_too_short() {
 #[test]
 fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_time() {
     let meshes = meshes();
-    let made = || {
+    let made = |bears: Option<Borne>| {
         let along = [[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
         let pieces = (0..3).map(|i| piece(&meshes[i], i, along[i])).collect();
         Booklet {
             title: "a wall".into(),
-            last: Vec::new(),
+            bears,
             lines: vec!["3 pieces".into()],
             pieces,
         }
         .pdf()
     };
-    let bytes = made();
+    let bytes = made(None);
     let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
     // Cover, pieces, one page of three steps and the end; two pictures on the cover, one a piece, one a step,
     // one at the end.
@@ -81,7 +82,25 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
         (count(b"/Type /Page\n"), count(b"/Subtype /Image")),
         (3, 2 + 3 + 3 + 1)
     );
-    assert!(bytes == made());
+    assert!(bytes == made(None));
+    // What it bears has the cell after the end: on a page of its own after four steps and the end.
+    let bears = Borne {
+        figures: vec![("pressed on its top".into(), "70 N".into())],
+        note: "by simulation".into(),
+        weakest: Some(WeakPlace {
+            words: "the seam of pieces 1 and 3 opens".into(),
+            at: Vec3::new(0.0, -1.0, 5.0),
+            lines: vec![vec![Vec3::new(0.0, -1.0, 0.0), Vec3::new(0.0, -1.0, 10.0)]],
+            between: [1, 3],
+        }),
+    };
+    let bytes = made(Some(bears.clone()));
+    let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
+    assert_eq!(
+        (count(b"/Type /Page\n"), count(b"/Subtype /Image")),
+        (4, 2 + 3 + 3 + 1 + 1)
+    );
+    assert!(bytes == made(Some(bears)));
 }
 
 #[test]
@@ -89,7 +108,7 @@ fn no_pieces_make_a_booklet_without_steps() {
     assert!(
         Booklet {
             title: String::new(),
-            last: Vec::new(),
+            bears: None,
             lines: Vec::new(),
             pieces: Vec::new()
         }
@@ -103,4 +122,22 @@ fn sides_are_told_by_their_names() {
     assert_eq!(view::side(Vec3::Z), "above");
     assert_eq!(view::side(Vec3::new(0.0, -1.0, -1.0)), "below and the front");
     assert_eq!(view::side(Vec3::ZERO), "its place");
+}
+
+#[test]
+fn a_place_is_looked_at_from_where_it_is_seen() {
+    let meshes = meshes();
+    let pieces: Vec<ReportPiece<'_>> = (0..3).map(|i| piece(&meshes[i], i, [0.0; 3])).collect();
+    let lookout = Lookout::new(&pieces.iter().collect::<Vec<_>>());
+    for (at, sign) in [
+        (Vec3::new(0.0, 4.0, 40.0), -1.0),
+        (Vec3::new(0.0, 0.0, 40.0), 1.0),
+    ] {
+        let direction = lookout.best(at, &[vec![at]]);
+        assert!(
+            sign * direction.y > 0.3 && lookout.is_seen(at, direction),
+            "{direction}"
+        );
+        assert!(!lookout.is_seen(at, -direction));
+    }
 }

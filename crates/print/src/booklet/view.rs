@@ -95,6 +95,53 @@ fn travel_mm(piece: &ReportPiece<'_>, diagonal_mm: f64) -> f64 {
     (0.5 * extent + 0.1 * diagonal_mm).clamp(0.16 * diagonal_mm, 0.42 * diagonal_mm)
 }
 
+/// All pieces in place, for whoever looks for a place on them.
+pub(super) struct Lookout {
+    trees: Vec<TriangleBvh>,
+    diagonal_mm: f64,
+}
+
+impl Lookout {
+    /// Places are looked at this share of the diagonal in front of them: seams are cut and meshes made coarser.
+    const OFF: f64 = 0.012;
+
+    pub fn new(pieces: &[&ReportPiece<'_>]) -> Self {
+        let all = pieces.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
+        Self {
+            trees: pieces.par_iter().map(|p| TriangleBvh::new(p.mesh)).collect(),
+            diagonal_mm: all.diagonal(),
+        }
+    }
+
+    /// Whether somebody far away who looks along `direction` sees a place.
+    pub fn is_seen(&self, place: Vec3, direction: Vec3) -> bool {
+        let from = place - Self::OFF * self.diagonal_mm * direction;
+        let far_mm = 3.0 * self.diagonal_mm;
+        self.trees
+            .iter()
+            .all(|tree| tree.first_hit(from, -direction, far_mm).is_none())
+    }
+
+    /// Along which direction a place and most of the lines through it are seen.
+    pub fn best(&self, at: Vec3, lines: &[Vec<Vec3>]) -> Vec3 {
+        /// The place matters more than the lines.
+        const PLACE: f64 = 2.0;
+        let points: Vec<Vec3> = lines.iter().flatten().copied().collect();
+        let worth = |direction: &Vec3| {
+            let seen = points.iter().filter(|p| self.is_seen(**p, *direction)).count();
+            let share = seen as f64 / points.len().max(1) as f64;
+            let place = if self.is_seen(at, *direction) { PLACE } else { 0.0 };
+            place + share + preference(*direction)
+        };
+        let directions = directions();
+        let worths: Vec<f64> = directions.par_iter().map(worth).collect();
+        let best = (0..directions.len())
+            .rev()
+            .max_by(|&a, &b| worths[a].total_cmp(&worths[b]));
+        directions[best.unwrap_or(0)]
+    }
+}
+
 /// One step: points of the new piece, with their normals, and what may hide them.
 struct Step<'a> {
     points: Vec<(Vec3, Vec3)>,

@@ -9,8 +9,8 @@ use super::{DesignError, Job, KeySource, Kit, Params};
 use crate::body::{BodyError, GridError, PatchDistances};
 use crate::handling::Handling;
 use crate::key::Turn;
-use crate::metric::{Choice, ClimbParams, Holding};
-use crate::plan::{Blocker, FoundPlan, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
+use crate::metric::{Choice, Chosen, ClimbParams, Foresight};
+use crate::plan::{Blocker, LatticePlan, PlanConstraints, PlanOutcome, PlanSurvey};
 use crate::{Ctx, PatchId, SegmentedSurface, key, metric, plan};
 use shellock_geom::{Solid, Vec3};
 
@@ -84,12 +84,7 @@ pub(super) fn plans(
         division.tell(&kit_ctx);
         // The proof of a plan runs on one thread; the grid and distances in it are made beside it.
         let may_join = budget.foreseen_joinings > 0;
-        // What was learned of these pieces is lost where they change.
-        let levers = if learned.n_kits == 0 {
-            budget.levers
-        } else {
-            Levers::default()
-        };
+        let levers = learned.levers(budget);
         budget.spent.plans += 1;
         let (measured, next) = rayon::join(
             || {
@@ -110,8 +105,8 @@ pub(super) fn plans(
             },
         );
         measured?;
-        let (found, holding) = match next? {
-            Next::Plan(found, holding) => (*found, holding),
+        let chosen = match next? {
+            Next::Plan(chosen) => *chosen,
             Next::Joined(fewer) => return Ok(Attempt::Joined(fewer)),
             Next::Weak(remedy) => return Ok(Attempt::Weak(remedy)),
             Next::None(failure) => return Ok(Attempt::Failed(learned.failure.after(failure))),
@@ -127,8 +122,7 @@ pub(super) fn plans(
                 turn,
                 grid,
                 distances,
-                found,
-                holding,
+                chosen,
             },
         ) {
             Err(DesignError::Body(BodyError::Blocked {
@@ -174,6 +168,16 @@ struct Learned {
 }
 
 impl Learned {
+    /// What may be changed so that a kit bears more: nothing where kits taught something of these pieces, which
+    /// would be lost.
+    fn levers(&self, budget: &Budget) -> Levers {
+        if self.n_kits == 0 {
+            budget.levers
+        } else {
+            Levers::default()
+        }
+    }
+
     /// A plan was given up since a piece could not take its wall along.
     fn give_up(&mut self, ctx: &Ctx, lesson: Lesson) {
         ctx.note(&format!("another plan: {lesson}"));
@@ -227,16 +231,15 @@ impl Failure {
 }
 
 /// The pieces that are foreseen to rattle far more than they may, the loosest first.
-fn foreseen_to_rattle(found: &FoundPlan, holding: &Holding) -> Vec<PatchId> {
+fn foreseen_to_rattle(key: PatchId, excess: &[f64]) -> Vec<PatchId> {
     /// Play is foreseen within about this factor.
     const SURELY: f64 = 1.2;
-    let excess = holding
-        .foreseen_excess
+    let excess = excess
         .iter()
         .enumerate()
         .map(|(i, excess)| (PatchId::from(i), *excess));
     let mut wide: Vec<(PatchId, f64)> = excess
-        .filter(|(p, excess)| *excess > SURELY && *p != found.plan.key())
+        .filter(|(p, excess)| *excess > SURELY && *p != key)
         .collect();
     wide.sort_by(|a, b| b.1.total_cmp(&a.1));
     wide.into_iter().map(|w| w.0).collect()
@@ -245,7 +248,7 @@ fn foreseen_to_rattle(found: &FoundPlan, holding: &Holding) -> Vec<PatchId> {
 /// What is to be made of a division.
 pub(super) enum Next {
     /// The plan that holds best of those that cost about the least.
-    Plan(Box<FoundPlan>, Holding),
+    Plan(Box<Chosen>),
     /// Nothing yet: pieces are foreseen to rattle; with these pieces less.
     Joined(SegmentedSurface),
     /// Nothing yet: it would bear too little; what helps.
@@ -316,21 +319,22 @@ pub(super) fn next_plan(
         handling: &handling,
         climb: ClimbParams::default(),
     };
-    let (found, holding) = metric::choose(ctx, &choice, *found)?;
+    ctx.stage("what would rattle", 0)?;
+    let foresight = Foresight::of(&choice, &found);
+    if may_join && let Some((plan, excess)) = foresight.steadiest() {
+        let rattling = foreseen_to_rattle(plan.plan.key(), excess);
+        if let Some(fewer) = joined(ctx, &settings.segmentation, surface, &rattling)? {
+            return Ok(Next::Joined(fewer));
+        }
+    }
+    let best = metric::choose(ctx, &choice, &foresight, *found)?;
     if settings.plan.key_slide.is_none() {
-        warn_of_key(ctx, params, division, &found.plan);
+        warn_of_key(ctx, params, division, &best.found.plan);
     }
-    let rattling = if may_join {
-        foreseen_to_rattle(&found, &holding)
-    } else {
-        Vec::new()
-    };
-    if let Some(fewer) = joined(ctx, &settings.segmentation, surface, &rattling)? {
-        return Ok(Next::Joined(fewer));
-    }
-    Ok(match remedy(ctx, planning, &handling, (&found.pool[0], &holding), levers)? {
+    let plan = (&best.found.pool[0], &best.holding);
+    Ok(match remedy(ctx, planning, &handling, plan, levers)? {
         Some(remedy) => Next::Weak(Box::new(remedy)),
-        None => Next::Plan(Box::new(found), holding),
+        None => Next::Plan(Box::new(best)),
     })
 }
 

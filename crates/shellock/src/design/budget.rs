@@ -29,7 +29,7 @@ pub(super) const BLOCKED_PLANS: usize = 8;
 /// How often connectors grow and pieces are joined because the plan that bears most bears less than asked; each
 /// costs a search for a plan and no kit.
 const LARGER_CONNECTORS: usize = 2;
-const WEAK_JOININGS: usize = 2;
+const WEAK_JOININGS: usize = 1;
 /// How often a job begins anew with a thicker wall for the same reason.
 pub(super) const THICKER_WALLS: usize = 2;
 

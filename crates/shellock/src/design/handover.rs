@@ -9,7 +9,7 @@ use shellock_geom::{TriMesh, Vec3};
 use crate::connector::SeamRoom;
 use crate::handling::Deed;
 use crate::key::Turn;
-use crate::metric::{GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding};
+use crate::metric::{Deformed, DeformedLoad, GivesWay, Holding, LoadBorne, LoosePiece, SeamHolding, Touch};
 use crate::piece::{Finished, FinishedJoint};
 use crate::plan::{LatticePlan, PlanProof, ProofScope};
 use crate::{
@@ -116,10 +116,23 @@ impl Handover {
             at: self.at(s.at),
             ..s
         };
-        let way = |d: [f64; 3]| self.back.apply(Vec3::from_array(d)).to_array();
-        let deed = |deed: Deed| match deed {
-            Deed::PressSide { toward } => Deed::PressSide { toward: way(toward) },
-            Deed::Fall { down } => Deed::Fall { down: way(down) },
+        Holding {
+            bears: holding.bears.into_iter().map(|b| self.borne(b)).collect(),
+            loose: holding.loose.into_iter().map(loose).collect(),
+            seams: holding.seams.into_iter().map(seam).collect(),
+            foreseen_play: self.in_order(&holding.foreseen_play),
+            foreseen_excess: self.in_order(&holding.foreseen_excess),
+            ..holding
+        }
+    }
+
+    fn borne(&self, borne: LoadBorne) -> LoadBorne {
+        // Of a direction as of a place: turns keep the origin.
+        let deed = match borne.deed {
+            Deed::PressSide { toward } => Deed::PressSide {
+                toward: self.at(toward),
+            },
+            Deed::Fall { down } => Deed::Fall { down: self.at(down) },
             Deed::Hang { piece } => Deed::Hang {
                 piece: self.piece(piece),
             },
@@ -130,19 +143,29 @@ impl Handover {
             at: self.at(g.at),
             ..g
         };
-        let borne = |b: LoadBorne| LoadBorne {
-            deed: deed(b.deed),
-            at: self.at(b.at),
-            first: b.first.map(gives_way),
-            ..b
+        LoadBorne {
+            deed,
+            at: self.at(borne.at),
+            first: borne.first.map(gives_way),
+            ..borne
+        }
+    }
+
+    pub fn deformed(&self, deformed: Deformed) -> Deformed {
+        let touch = |t: Touch| Touch {
+            at: self.back.apply(t.at),
+            force_n: self.back.apply(t.force_n),
         };
-        Holding {
-            bears: holding.bears.into_iter().map(borne).collect(),
-            loose: holding.loose.into_iter().map(loose).collect(),
-            seams: holding.seams.into_iter().map(seam).collect(),
-            foreseen_play: self.in_order(&holding.foreseen_play),
-            foreseen_excess: self.in_order(&holding.foreseen_excess),
-            ..holding
+        let load = |l: DeformedLoad| DeformedLoad {
+            borne: self.borne(l.borne),
+            touches: l.touches.into_iter().map(touch).collect(),
+            moved_mm: l.moved_mm.into_iter().map(|m| self.back.apply(m)).collect(),
+            told: l.told,
+        };
+        Deformed {
+            surface: self.back.mesh(&deformed.surface),
+            piece_of_point: self.all(&deformed.piece_of_point),
+            loads: deformed.loads.into_iter().map(load).collect(),
         }
     }
 

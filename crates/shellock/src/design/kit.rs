@@ -8,9 +8,9 @@ use super::{DesignError, Params, Settings};
 use crate::body::{PatchDistances, ShellBodies, ShellGrid};
 use crate::connector::{Run, SeamRoom, is_unobstructed};
 use crate::key::Turn;
-use crate::metric::Holding;
+use crate::metric::{Chosen, Deformed, Holding};
 use crate::piece::{FinishParams, Finished, FinishedJoint, PressFit, PressFitKind};
-use crate::plan::{FoundPlan, LatticePlan, PlanProof};
+use crate::plan::{LatticePlan, PlanProof};
 use crate::play::{self, KitPlay};
 use crate::sizes::CONTACT_SIZES;
 use crate::verify::{self, Finding, Verification};
@@ -34,6 +34,8 @@ pub struct Kit {
     pub proof: PlanProof,
     /// How it holds by simulation, and where it is weak.
     pub holding: Holding,
+    /// How its pieces move under what it is told to bear.
+    pub deformed: Deformed,
     /// Thickness of its walls, mm.
     pub thickness_mm: f64,
     /// One printable mesh a piece, in assembled position, mm.
@@ -117,8 +119,7 @@ pub(super) struct Recipe<'a> {
     /// It must have room for the division's largest connectors.
     pub grid: &'a ShellGrid,
     pub distances: &'a PatchDistances,
-    pub found: FoundPlan,
-    pub holding: Holding,
+    pub chosen: Chosen,
 }
 
 /// Makes and verifies the kit of one plan; `ctx` has what was warned of on the way to the plan.
@@ -130,8 +131,11 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         turn,
         grid,
         distances,
-        found,
-        holding,
+        chosen: Chosen {
+            found,
+            holding,
+            deformed,
+        },
     } = recipe;
     let Division {
         surface,
@@ -174,6 +178,7 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         plan,
         proof: handover.proof(proof),
         holding: handover.holding(holding),
+        deformed: handover.deformed(deformed),
         thickness_mm: settings.body.thickness_mm,
         pieces: finished.meshes,
         joints: finished.joints,

@@ -3,10 +3,10 @@
 //!
 //! The same plan is rated with each change first; what follows is planned anew with it.
 
+use super::DesignError;
 use super::attempt::Planning;
 use super::budget::Levers;
 use super::division::Division;
-use super::DesignError;
 use crate::handling::Handling;
 use crate::metric::{ChoiceError, Holding, LoadBorne, bears_with};
 use crate::plan::{PlanParams, RankedPlan};
@@ -75,7 +75,10 @@ pub(super) fn remedy(
         && let Some(thickness_mm) = trial.thicker_wall(planning, &sizes, least)?
     {
         let weakest = weakest.clone();
-        return Ok(Some(Remedy::Wall(Thicker { thickness_mm, weakest })));
+        return Ok(Some(Remedy::Wall(Thicker {
+            thickness_mm,
+            weakest,
+        })));
     }
     if least >= GAIN * factor(weakest) {
         return Ok(Some(Remedy::Connectors(sizes)));
@@ -167,7 +170,8 @@ impl Trial<'_> {
         let (mut wall_mm, mut borne) = (self.handling.wall_mm, before);
         for _ in 0..MOST_WALLS {
             // Plates bend with the cube of their thickness, but openings grow with less than that.
-            let wanted_mm = wall_mm * (WANTED / borne.max(0.1)).sqrt();
+            // What is planned anew with it bears more than this plan does.
+            let wanted_mm = wall_mm * (ASKED / borne.max(0.1)).sqrt();
             let stepped_mm = (wanted_mm / WALL_STEP_MM).ceil() * WALL_STEP_MM;
             let next_mm = stepped_mm.max(wall_mm + WALL_STEP_MM).min(most_mm);
             if next_mm <= wall_mm + 0.5 * WALL_STEP_MM || !is_hollow(next_mm) {
@@ -175,7 +179,7 @@ impl Trial<'_> {
             }
             wall_mm = next_mm;
             borne = least(&self.uses(wall_mm, sizes)?);
-            if borne >= WANTED {
+            if borne >= ASKED {
                 break;
             }
         }

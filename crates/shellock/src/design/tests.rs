@@ -87,6 +87,7 @@ fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Findin
             foreseen_play: Vec::new(),
             foreseen_excess: Vec::new(),
         },
+        deformed: crate::metric::Deformed::default(),
         thickness_mm: 2.0,
         pieces: ids().map(|_| TriMesh::default()).collect(),
         joints: Vec::new(),

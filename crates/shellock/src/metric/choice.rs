@@ -1,36 +1,25 @@
 //! The plan that bears most of those that the search allows, and what is weak about it (Sect. 6.2).
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Meeting, Opening, Resistance};
 
 use super::climb::{ClimbError, ClimbParams, Climbed, climb};
+use super::foresight::{COST_SLACK, Foresight};
 use super::rating::{Bench, Rated};
-use super::{Foreseen, MetricParams, PlanModel, foreseen};
+use super::{Deformed, Foreseen, PlanModel, foreseen};
 use crate::handling::{Borne, DROP_MM, Deed, Failure, Handling, LoadCase};
 use crate::plan::{
     FoundPlan, LatticePlan, Neighbourhood, PlanConstraints, PlanParams, PlanSurvey, RankedPlan,
 };
 use crate::{Cancelled, Cause, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
-/// Plans whose cost is at most this share above the least may be chosen.
-///
-/// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins
-/// hold). With a tenth less of the choice the kits bear a fifth less, with twice as much hardly more:
-/// docs/notes/metrics.md.
-const COST_SLACK: f64 = 0.25;
-
-/// Play is foreseen within a factor of about one and a half; pieces that are foreseen to have less than this
-/// share of what they may have hardly ever rattle.
-const SURE_PLAY: f64 = 0.85;
-
-/// Plans whose widest play is within this share of the least are alike.
-const PLAY_TIE: f64 = 0.05;
-
 /// Costs that differ by less than this share are the same but for rounding.
 const COST_TIE: f64 = 1e-9;
+
+/// Nobody cares for more than that many times a load.
+pub const MOST_TIMES: f64 = 10.0;
 
 /// Share of `s` along the seam, or towards the earlier piece, from which that is named as the reason why a
 /// seam is weak.
@@ -74,7 +63,7 @@ pub struct LoadBorne {
 }
 
 /// What a kit bears, in short. `None` where a load has no place on it, or nothing gives way.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bears {
     /// A press on its top, N.
     pub top_n: Option<f64>,
@@ -88,19 +77,35 @@ pub struct Bears {
     pub fall_upright_m: Option<f64>,
     /// The worst of all falls, m.
     pub fall_m: Option<f64>,
+    /// Where it gives way first when it is used; `None` in kits of earlier versions, too.
+    #[serde(default)]
+    pub weakest: Option<WeakestUse>,
+    /// What the figures are worth, in words; empty in kits of earlier versions.
+    #[serde(default)]
+    pub basis: String,
+}
+
+/// Said wherever figures of the simulation stand.
+pub const BY_SIMULATION: &str = "by simulation, without a print to compare";
+
+/// The use that a kit bears least of, and what it does to it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WeakestUse {
+    /// What is done.
+    pub deed: Deed,
+    /// What gives way, and where.
+    pub first: GivesWay,
 }
 
 impl Holding {
     /// What the kit bears, in short; `None` where no loads were simulated.
     pub fn summary(&self) -> Option<Bears> {
-        /// Nobody cares for more than that many times a load.
-        const MOST: f64 = 10.0;
         let least = |is: fn(&Deed) -> bool| {
             let factors = self
                 .bears
                 .iter()
                 .filter(|b| is(&b.deed))
-                .map(|b| (b.factor.unwrap_or(MOST).min(MOST), b));
+                .map(|b| (b.factor.unwrap_or(MOST_TIMES).min(MOST_TIMES), b));
             factors.min_by(|a, b| a.0.total_cmp(&b.0))
         };
         let newtons = |is| least(is).map(|(factor, load)| factor * load.force_n);
@@ -113,6 +118,11 @@ impl Holding {
             grip_n: newtons(|d| matches!(d, Deed::GripNarrow | Deed::GripWide)),
             fall_upright_m: metres(|d| *d == Deed::FallUpright),
             fall_m: metres(|d| matches!(d, Deed::Fall { .. } | Deed::FallUpright)),
+            weakest: self.weakest_use().and_then(|worst| {
+                let deed = worst.deed;
+                worst.first.map(|first| WeakestUse { deed, first })
+            }),
+            basis: BY_SIMULATION.to_owned(),
         })
     }
 
@@ -187,6 +197,16 @@ pub struct Choice<'a> {
     pub climb: ClimbParams,
 }
 
+/// The plan that bears most.
+pub struct Chosen {
+    /// What the search found, with that plan in its place.
+    pub found: FoundPlan,
+    /// How the plan holds.
+    pub holding: Holding,
+    /// How the pieces move under what people are told that it bears.
+    pub deformed: Deformed,
+}
+
 /// Climbs from the plans of the pool to one that bears more and costs at most a quarter more than the least,
 /// and that is not foreseen to rattle where any is not; it takes the place of `found`'s.
 ///
@@ -195,42 +215,34 @@ pub struct Choice<'a> {
 pub fn choose(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
+    foresight: &Foresight,
     mut found: FoundPlan,
-) -> Result<(FoundPlan, Holding), ChoiceError> {
+) -> Result<Chosen, ChoiceError> {
     ctx.stage("which plan bears most", 0)?;
-    let Choice {
-        params,
-        surface,
-        sizes,
-        ..
-    } = *choice;
-    let model = PlanModel::new(
-        &MetricParams::of_plan(params, sizes, choice.handling.material),
-        surface,
-        sizes,
-    );
-    let bench = Bench::new(choice.handling, &model)?;
-    let (best, n_compared) = most_bearing(ctx, choice, &model, &bench, &found)?;
+    let Choice { params, surface, .. } = *choice;
+    let model = &foresight.model;
+    let bench = Bench::new(choice.handling, model)?;
+    let (best, n_compared) = most_bearing(ctx, choice, foresight, &bench, &found)?;
     let chosen = best.ranked.clone();
-    let solved = model
-        .surface_model()?
-        .resist(&best.meetings, chosen.plan.key().0)?;
+    let solved = bench.surface.resist(&best.meetings, chosen.plan.key().0)?;
     let Foreseen {
         play: foreseen_play,
         excess: foreseen_excess,
     } = foreseen(
-        &model,
+        model,
         &chosen.plan,
         &best.meetings,
-        size_mm(surface),
+        surface.mesh.bounds().size().max_element(),
         params.clearance_mm,
     );
+    let bears = bears(model, &bench, &best);
+    let deformed = Deformed::of(model, &bench, &best, &bears)?;
     let holding = Holding {
         n_compared,
         foreseen_play,
         foreseen_excess,
-        bears: bears(&model, &bench, &best),
-        ..holding(&model, &chosen.plan, &best.meetings, &solved.resistance)
+        bears,
+        ..holding(model, &chosen.plan, &best.meetings, &solved.resistance)
     };
     if !holding.loose.is_empty() {
         warn_of_parting(ctx, &holding.loose);
@@ -238,22 +250,29 @@ pub fn choose(
     chosen
         .loose
         .iter()
-        .for_each(|&piece| warn_of_loose(ctx, &model, piece));
-    if let Some(weakest) = holding.weakest_use().filter(|w| w.factor.is_some_and(|f| f < 1.0)) {
+        .for_each(|&piece| warn_of_loose(ctx, model, piece));
+    if let Some(weakest) = holding
+        .weakest_use()
+        .filter(|w| w.factor.is_some_and(|f| f < 1.0))
+    {
         warn_of_use(ctx, weakest);
     }
     found.is_optimal &= chosen.score.worst <= found.score.worst * (1.0 + COST_TIE);
     (found.plan, found.score) = (chosen.plan.clone(), chosen.score.clone());
     found.pool.retain(|p| p.plan != chosen.plan);
     found.pool.insert(0, chosen);
-    Ok((found, holding))
+    Ok(Chosen {
+        found,
+        holding,
+        deformed,
+    })
 }
 
 /// The plan that bears most, and how many were looked at.
 fn most_bearing<'b>(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
-    model: &PlanModel,
+    foresight: &Foresight,
     bench: &'b Bench<'_>,
     found: &FoundPlan,
 ) -> Result<(Rated<'b>, usize), ChoiceError> {
@@ -263,29 +282,8 @@ fn most_bearing<'b>(
     let most_cost = found.score.worst * (1.0 + COST_SLACK);
     let counted = found.counted(choice.survey);
     let around = Neighbourhood::new(choice.params, &counted, choice.constraints, found, most_cost);
-    // How far the loosest piece goes, as a share of what it may; no less than what surely passes.
-    let excess = |plan: &LatticePlan| {
-        let meetings = model.meetings(plan);
-        let foreseen = foreseen(
-            model,
-            plan,
-            &meetings,
-            size_mm(choice.surface),
-            choice.params.clearance_mm,
-        );
-        foreseen.excess.into_iter().fold(SURE_PLAY, f64::max)
-    };
-    let starts: Vec<(RankedPlan, f64)> = (found.pool.par_iter())
-        .filter(|p| p.score.worst <= most_cost)
-        .map(|p| (p.clone(), excess(&p.plan)))
-        .collect();
-    let most_excess = starts.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) * (1.0 + PLAY_TIE);
-    let may_be = |p: &RankedPlan| excess(&p.plan) <= most_excess;
-    let starts: Vec<RankedPlan> = starts
-        .into_iter()
-        .filter(|s| s.1 <= most_excess)
-        .map(|s| s.0)
-        .collect();
+    let may_be = |p: &RankedPlan| foresight.is_steady(&p.plan);
+    let starts = foresight.steady();
     match climb(ctx, choice.climb, bench, &around, &starts, &may_be) {
         Ok(Climbed { best, n_plans, .. }) => Ok((best, n_plans)),
         Err(ClimbError::NoPlan) => Ok((bench.rated(first.clone())?, 1)),
@@ -308,11 +306,6 @@ pub(super) fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> 
         }),
     };
     bench.cases.iter().zip(&rated.borne()).map(one).collect()
-}
-
-/// The longest side of the model.
-fn size_mm(surface: &SegmentedSurface) -> f64 {
-    surface.mesh.bounds().size().max_element()
 }
 
 fn warn_of_parting(ctx: &Ctx<'_>, loose: &[LoosePiece]) {

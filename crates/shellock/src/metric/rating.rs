@@ -9,6 +9,7 @@
 //! ```
 
 use rayon::prelude::*;
+use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
 use shellock_mechanics::{Closed, Drift, JoinedParts, Meeting, SurfaceModel};
 
@@ -50,7 +51,7 @@ impl Rank {
 /// The loads on one division and what solves them.
 pub struct Bench<'a> {
     pub(super) model: &'a PlanModel,
-    surface: SurfaceModel,
+    pub(super) surface: SurfaceModel,
     /// What is done.
     pub cases: Vec<LoadCase>,
     drifts: Vec<Drift>,
@@ -208,6 +209,13 @@ impl<'b> Rated<'b> {
         let mut factors: Vec<f64> = self.bench.goals(rank).into_iter().map(capped).collect();
         factors.sort_by(f64::total_cmp);
         factors
+    }
+
+    /// How far each point of the outer surface goes under a case, mm.
+    pub(super) fn moved_mm(&self, case: usize) -> Result<Vec<Vec3>, SparseError> {
+        let forces_n = &self.bench.cases[case].forces_n;
+        let closed = self.answers[case].as_ref().map(|a| &a.closed);
+        self.joined.moved_mm(forces_n, closed)
     }
 
     /// Goals of a rank that are not met enough, worst first.

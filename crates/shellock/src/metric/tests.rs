@@ -180,8 +180,60 @@ fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
         handling,
         climb,
     };
-    let (found, holding) = choose(&ctx, &choice, *found).unwrap();
+    let Chosen {
+        found,
+        holding,
+        deformed,
+    } = choose(&ctx, &choice, &Foresight::of(&choice, &found), *found).unwrap();
+    check_deformed(&holding, &deformed);
     (found, holding, ctx.into_warnings())
+}
+
+/// What is shown of a kit is told of it, all of it moves, and no point goes far where nothing gives way.
+fn check_deformed(holding: &Holding, deformed: &Deformed) {
+    assert!(deformed.loads.iter().any(|l| l.told == Told::Feet));
+    let n_points = deformed.surface.points.len();
+    assert_eq!(deformed.piece_of_point.len(), n_points);
+    for load in &deformed.loads {
+        assert!(holding.bears.contains(&load.borne), "{load:?}");
+        assert_eq!(load.moved_mm.len(), n_points);
+        assert!(load.moved_mm.iter().any(|m| m.length() > 1e-6));
+        let (first, second) = (load.touches[0].force_n, load.touches.get(1));
+        assert!(
+            second.is_none_or(|t| t.force_n.dot(first) < 0.0),
+            "{:?}",
+            load.touches
+        );
+    }
+}
+
+#[test]
+fn pieces_move_by_the_same_bits_on_any_number_of_threads() {
+    let surface = voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1);
+    let sizes = ConnectorSizes::default();
+    let model = PlanModel::new(&MetricParams::default(), &surface, &sizes);
+    let params = PlanParams::default();
+    let ctx = Ctx::quiet();
+    let survey = survey(&ctx, &params, &surface, &seams(&surface), &sizes).unwrap();
+    let PlanOutcome::Found(found) = search(&ctx, &params, &survey, &PlanConstraints::default()).unwrap()
+    else {
+        panic!("a sphere has a plan")
+    };
+    let handling = Handling::new(params.up, 2.0, Material::default());
+    let on = |n_threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n_threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let bench = Bench::new(&handling, &model).unwrap();
+            let rated = bench.rated(found.pool[0].clone()).unwrap();
+            (0..bench.cases.len())
+                .map(|i| rated.moved_mm(i).unwrap())
+                .collect::<Vec<_>>()
+        })
+    };
+    assert!(on(1) == on(2));
 }
 
 #[test]

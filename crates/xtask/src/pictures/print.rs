@@ -84,7 +84,7 @@ fn bed(printer: &Printer) -> TriMesh {
 pub fn booklet(kit: &Kit) -> Vec<u8> {
     let booklet = Booklet {
         title: "squirrel".into(),
-        last: Vec::new(),
+        bears: None,
         lines: Vec::new(),
         pieces: kit.report_pieces(),
     };

@@ -1,0 +1,176 @@
+//! The last cell: what the finished thing bears, and where it gives way first, drawn.
+
+use shellock_geom::Vec3;
+use shellock_render::stills::{Camera, Painted, projection, render};
+
+use super::view::Lookout;
+use super::{
+    ARROW, Color, Drawn, FAINT, Facing, GREY, INK, OTHER_DENSITY, STEPS, WHITE, bold, cell_mm, numbered,
+    small,
+};
+use crate::pdf::{Page, Style, width_mm};
+
+/// Distance of lines of text, mm.
+const LINE_MM: f64 = 5.2;
+/// Half the width of the line along a seam, and radius of the mark, mm.
+const HALF_SEAM_MM: f64 = 0.5;
+const MARK_MM: f64 = 1.25;
+
+/// What the finished thing bears.
+#[derive(Clone, Debug, Default)]
+pub struct Borne {
+    /// What is done, and how much of it.
+    pub figures: Vec<(String, String)>,
+    /// What the figures are worth.
+    pub note: String,
+    /// Where it gives way first.
+    pub weakest: Option<WeakPlace>,
+}
+
+/// Where something gives way.
+#[derive(Clone, Debug)]
+pub struct WeakPlace {
+    /// When, how and where, in words.
+    pub words: String,
+    /// The place, mm, where the pieces stand.
+    pub at: Vec3,
+    /// The seam through it, as lines of points.
+    pub lines: Vec<Vec<Vec3>>,
+    /// Numbers of the pieces that part.
+    pub between: [u32; 2],
+}
+
+/// Fills the cell with its upper left corner at `[x, y]`.
+pub(super) fn fill(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne: &Borne) {
+    let cell = cell_mm(STEPS, 0.0);
+    let (left, room_mm) = (x + 1.0, cell[0] - 4.0);
+    page.text([left, y + 6.6], bold(5.0, INK), "what it bears");
+    let mut down = y + 6.6;
+    for (what, much) in &borne.figures {
+        down += LINE_MM;
+        page.text_within([left, down], 0.62 * room_mm, plain(INK), what);
+        page.text_within(
+            [left + 0.64 * room_mm, down],
+            0.36 * room_mm,
+            bold(3.4, INK),
+            much,
+        );
+    }
+    down += LINE_MM;
+    page.text_within([left, down], room_mm, small(FAINT), &borne.note);
+    let Some(weakest) = &borne.weakest else { return };
+    down += 1.6 * LINE_MM;
+    page.text([left, down], bold(3.8, ARROW), "gives way first");
+    for line in wrapped(&weakest.words, plain(INK), room_mm) {
+        down += LINE_MM;
+        page.text_within([left, down], room_mm, plain(INK), &line);
+    }
+    down += 3.0;
+    place(
+        page,
+        [left, down],
+        [room_mm, y + cell[1] - 4.0 - down],
+        drawn,
+        weakest,
+    );
+}
+
+/// The two pieces in their colours among the others in grey, with their seam and the place on it.
+fn place(
+    page: &mut Page,
+    [left, top]: [f64; 2],
+    [width_mm, height_mm]: [f64; 2],
+    drawn: &[Drawn<'_>],
+    weakest: &WeakPlace,
+) {
+    let pieces: Vec<_> = drawn.iter().map(|d| d.piece).collect();
+    let lookout = Lookout::new(&pieces);
+    let direction = lookout.best(weakest.at, &weakest.lines);
+    let camera = Camera::along(direction, Vec3::Z);
+    let is_parting = |d: &Drawn<'_>| weakest.between.contains(&d.piece.number);
+    let facing: Vec<Facing> = drawn.iter().map(|d| d.facing(direction)).collect();
+    let color = |d: &Drawn<'_>| if is_parting(d) { d.piece.color } else { GREY };
+    let scene: Vec<Painted<'_>> = facing
+        .iter()
+        .zip(drawn)
+        .map(|(f, d)| f.painted(color(d), Vec3::ZERO))
+        .collect();
+    let size = [width_mm, height_mm].map(|mm| (mm.max(1.0) * OTHER_DENSITY) as usize);
+    let on_picture = projection(&scene, &camera, size[0], size[1]);
+    let on_page = |p: Vec3| {
+        let [x, y] = on_picture(p).map(|px| px / OTHER_DENSITY);
+        [left + x, top + y]
+    };
+    page.picture(
+        [left, top],
+        size[0] as f64 / OTHER_DENSITY,
+        render(&scene, &camera, size[0], size[1]),
+    );
+    for step in weakest.lines.iter().flat_map(|line| line.windows(2)) {
+        if lookout.is_seen(0.5 * (step[0] + step[1]), direction) {
+            stroke(page, [on_page(step[0]), on_page(step[1])]);
+        }
+    }
+    page.disc(on_page(weakest.at), MARK_MM + 0.35, WHITE);
+    page.disc(on_page(weakest.at), MARK_MM, ARROW);
+    for (i, d) in drawn.iter().filter(|d| is_parting(d)).enumerate() {
+        let middle = [left + 5.0 + 11.0 * i as f64, top + height_mm - 5.0];
+        numbered(page, middle, 4.2, d.piece.color, &d.piece.number.to_string());
+    }
+}
+
+/// A short line.
+fn stroke(page: &mut Page, [from, to]: [[f64; 2]; 2]) {
+    let way = [to[0] - from[0], to[1] - from[1]];
+    let far = way[0].hypot(way[1]);
+    if far < 1e-6 {
+        return;
+    }
+    let aside = [-way[1], way[0]].map(|x| HALF_SEAM_MM * x / far);
+    let corner = |p: [f64; 2], sign: f64| [p[0] + sign * aside[0], p[1] + sign * aside[1]];
+    let corners = [
+        corner(from, 1.0),
+        corner(to, 1.0),
+        corner(to, -1.0),
+        corner(from, -1.0),
+    ];
+    page.polygon(&corners, ARROW, 0.0, ARROW);
+}
+
+fn plain(color: Color) -> Style {
+    Style {
+        size_mm: 3.4,
+        is_bold: false,
+        color,
+    }
+}
+
+/// Lines of whole words that have room.
+fn wrapped(text: &str, style: Style, room_mm: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if width_mm(style, &format!("{line} {word}")) <= room_mm => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_have_room_and_all_words() {
+        let text =
+            "where it is pressed as it lies: pins between pieces 7 and 10 bend (in the middle, 37 mm up)";
+        let lines = wrapped(text, plain(INK), 50.0);
+        assert!(lines.len() > 1 && lines.iter().all(|l| width_mm(plain(INK), l) <= 50.0));
+        assert_eq!(lines.join(" "), text);
+        assert!(wrapped("", plain(INK), 50.0).is_empty());
+    }
+}
