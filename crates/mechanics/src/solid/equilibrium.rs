@@ -24,6 +24,12 @@ use super::laws::{Contact, Grip, answers, force};
 
 /// Newton steps before the contacts are called unsettled.
 const MOST_STEPS: usize = 200;
+/// Contacts are first this much softer, so that pieces that start apart find all that stops them at once;
+/// stiff ones are found one by one, in hundreds of steps.
+const SOFTER: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
+/// Steps with softer contacts, and how right forces must be to go on.
+const SOFT_STEPS: usize = 40;
+const SOFT_SETTLED: f64 = 1e-2;
 /// The same in each round of friction's bounds, after which the next round goes on.
 const STEPS_A_ROUND: usize = 30;
 /// Forces of contacts that are out of their law by this share of the load are right.
@@ -176,6 +182,19 @@ impl Problem<'_> {
     /// The answer without friction.
     pub fn settle(&self, compliance: &mut Compliance, start: State) -> Result<State, SolidError> {
         let free = vec![Grip::default(); self.contacts.len()];
+        let mut start = start;
+        for share in SOFTER {
+            let softened = |c: &Contact| Contact {
+                stiffness: share * c.stiffness,
+                ..*c
+            };
+            let contacts: Vec<Contact> = self.contacts.iter().map(softened).collect();
+            let softer = Problem {
+                contacts: &contacts,
+                ..*self
+            };
+            (start, _) = softer.stepped(compliance, &free, start, SOFT_STEPS, SOFT_SETTLED)?;
+        }
         let (state, off) = self.stepped(compliance, &free, start, MOST_STEPS, SETTLED)?;
         if off > SETTLED {
             return Err(SolidError::Contact);
