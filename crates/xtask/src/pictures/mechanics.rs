@@ -146,7 +146,7 @@ pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
         turn,
         ..StressParams::default()
     };
-    let solids = made.pieces.iter().map(|piece| Solid::new(piece.clone()));
+    let solids = made.pieces.iter().map(|(_, piece)| Solid::new(piece.clone()));
     let solids = solids
         .collect::<Result<Vec<_>, _>>()
         .map_err(|e| Failure::Model {
