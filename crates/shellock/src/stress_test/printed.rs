@@ -121,7 +121,17 @@ impl<'a> Bench<'a> {
             force_n: *force_n,
         };
         let loaded = forces_n.iter().enumerate().filter(|f| *f.1 != Vec3::ZERO);
-        let pushes: Vec<Push> = loaded.map(push).collect();
+        let all: Vec<Push> = loaded.map(push).collect();
+        // Where relief or a fragment took the surface away, the places about it bear its share.
+        let has_material = |push: &&Push| self.solid.spot(push.part, push.at).is_some();
+        let mut pushes: Vec<Push> = all.iter().filter(has_material).copied().collect();
+        let total = |pushes: &[Push]| pushes.iter().map(|p| p.force_n.length()).sum::<f64>();
+        let share = total(&all) / total(&pushes).max(f64::MIN_POSITIVE);
+        if pushes.is_empty() {
+            pushes = all;
+        } else {
+            pushes.iter_mut().for_each(|push| push.force_n *= share);
+        }
         let moved = self
             .solid
             .under_load(&pushes, answer, friction, &|| ctx.check().is_err())
