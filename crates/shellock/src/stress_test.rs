@@ -1,21 +1,27 @@
 //! What a punch on top and a fall do to the assembled pieces (Sect. 7, Fig. 15), and what they would do to
 //! worse ones.
 //!
-//! The pieces are walls and connectors of tetrahedra with contact, as in the volume metric. Punch: the force
-//! presses on what faces upwards within [`PUNCH_RADIUS_MM`] of the top, or of the highest place in the
-//! middle; what stands on the table is held. Fall: the model lands on its feet and is stopped within 1/300 s
-//! (Sect. 4.3); the floor pushes with `M v / Δt` on what touches it, and inertia balances it.
+//! What is tested is what is printed (`printed`): the finished meshes, with the gaps that they have, without
+//! friction and with some. Punch: the force presses on what faces upwards within [`PUNCH_RADIUS_MM`] of the
+//! top, or of the highest place in the middle; what stands on the table is held. Fall: the model lands on its
+//! feet and is stopped within 1/300 s (Sect. 4.3); the floor pushes with `M v / Δt` on what touches it, and
+//! inertia balances it.
 //!
-//! Limits: static and linear; no friction but at the key, no clearance; the fall is upright; connectors are
-//! everywhere where the plan has room for them, carved or not.
+//! Worse designs have no finished pieces. [`compare`] makes walls and connectors of tetrahedra for them, as
+//! in the volume metric, and for the kit's own plan, too, so that like is compared with like: without gaps,
+//! without friction but at the key, with connectors everywhere where the plan has room.
+//!
+//! Limits: static and linear; the fall is upright.
 
 mod chart;
+mod printed;
 #[cfg(test)]
 mod tests;
 
 use serde::{Deserialize, Serialize};
-use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
+use shellock_geom::{Solid, Vec3};
+use shellock_mechanics::solid::{SolidError, SolidParams};
 use shellock_mechanics::{
     Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams,
 };
@@ -32,6 +38,7 @@ use crate::{
 };
 
 pub use chart::chart;
+pub use printed::FRICTION;
 
 /// Radius of the fist, mm.
 pub const PUNCH_RADIUS_MM: f64 = 10.0;
@@ -93,6 +100,8 @@ pub struct StressParams {
     pub punch_at: PunchAt,
     /// Height of the fall, mm. (0, 10⁵]; 2000, as in the paper.
     pub drop_mm: f64,
+    /// Edge of the cells that finished pieces are cut into, mm. [0.5, 20]; 2.5.
+    pub cell_mm: f64,
     /// Walls, connectors and material.
     pub metric: MetricParams,
     /// Connectors of each pair of pieces.
@@ -110,6 +119,7 @@ impl Default for StressParams {
             punch_n: 70.0,
             punch_at: PunchAt::default(),
             drop_mm: 2000.0,
+            cell_mm: SolidParams::default().cell_mm,
             metric: MetricParams::default(),
             sizes: ConnectorSizes::default(),
             plan: PlanParams::default(),
@@ -123,6 +133,12 @@ impl StressParams {
     pub fn problems(&self) -> Vec<String> {
         let mut problems = self.plan.problems();
         problems.extend(self.metric.problems().iter().map(ToString::to_string));
+        if !(0.5..=20.0).contains(&self.cell_mm) {
+            problems.push(format!(
+                "cells are {} mm; they must be from 0.5 to 20 mm",
+                self.cell_mm
+            ));
+        }
         for (name, value) in [
             ("the punch", self.punch_n),
             ("the height of the fall", self.drop_mm),
@@ -160,6 +176,8 @@ pub struct Outcome {
     pub force_n: f64,
     /// The widest opening, mm; infinite (`null`) where nothing stops some piece.
     pub opening_mm: f64,
+    /// How much of it is play: what a hundredth of the force does; 0 where there are no gaps.
+    pub play_mm: f64,
     /// How far the connectors there may come out and still hold, mm.
     pub limit_mm: f64,
     /// The pieces that part there.
@@ -192,34 +210,72 @@ pub struct Pair {
     pub connector_mm: f64,
 }
 
-/// The tests of a kit and of two that ought to be worse.
+/// Both tests of the finished pieces.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StressReport {
-    /// As it is.
+pub struct Printed {
+    /// Coefficient of friction between pieces.
+    pub friction: f64,
+    /// Punched on the top.
+    pub punch: Outcome,
+    /// Fallen.
+    pub drop: Outcome,
+}
+
+/// The tests of the kit's plan and of two designs that ought to be worse, by the model of walls and
+/// connectors without gaps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// The kit's plan.
     pub kit: Pair,
     /// With connectors of half the size.
     pub half_connectors: Pair,
     /// With the plan of those drawn whose score is nearest to twice as bad; none if none holds at all.
     pub half_score: Option<Pair>,
-    /// Mass of the walls, g.
+}
+
+impl Comparison {
+    /// The designs with their names, the kit's first.
+    pub fn designs(&self) -> Vec<(&'static str, &Pair)> {
+        let mut all = vec![
+            ("kit's plan", &self.kit),
+            ("half connectors", &self.half_connectors),
+        ];
+        all.extend(self.half_score.iter().map(|pair| ("half score", pair)));
+        all
+    }
+}
+
+/// The tests of a kit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StressReport {
+    /// The finished pieces, with each friction of [`FRICTION`].
+    pub printed: Vec<Printed>,
+    /// Worse designs, where they were asked for.
+    pub compared: Option<Comparison>,
+    /// Mass of the pieces, g.
     pub mass_g: f64,
     /// What the material bears, MPa.
     pub strength_mpa: f64,
 }
 
 impl StressReport {
-    /// The designs with their names, the kit first.
-    pub fn designs(&self) -> Vec<(&'static str, &Pair)> {
-        let mut all = vec![("kit", &self.kit), ("half connectors", &self.half_connectors)];
-        all.extend(self.half_score.iter().map(|pair| ("half score", pair)));
-        all
+    /// Whether the finished pieces hold in both tests, whatever the friction.
+    pub fn passed(&self) -> bool {
+        self.printed
+            .iter()
+            .flat_map(|printed| [&printed.punch, &printed.drop])
+            .all(|o| o.verdict == StressVerdict::Holds)
     }
 
-    /// Whether the kit holds in both tests.
-    pub fn passed(&self) -> bool {
-        [&self.kit.punch, &self.kit.drop]
-            .iter()
-            .all(|o| o.verdict == StressVerdict::Holds)
+    /// Name, punch and fall of all that was tested, the finished pieces first.
+    pub fn rows(&self) -> Vec<(String, &Outcome, &Outcome)> {
+        let printed = self.printed.iter();
+        let mut rows: Vec<_> = printed
+            .map(|p| (format!("printed, μ {}", p.friction), &p.punch, &p.drop))
+            .collect();
+        let designs = self.compared.iter().flat_map(Comparison::designs);
+        rows.extend(designs.map(|(name, pair)| (name.to_owned(), &pair.punch, &pair.drop)));
+        rows
     }
 }
 
@@ -237,6 +293,20 @@ pub enum StressError {
         /// Patches of the surface.
         patches: usize,
     },
+    /// There must be one finished piece for each patch.
+    #[error("{pieces} finished pieces of a surface of {patches}: they do not belong together")]
+    Pieces {
+        /// How many were given.
+        pieces: usize,
+        /// Patches of the surface.
+        patches: usize,
+    },
+    /// The model's surface has no volume.
+    #[error("the surface of the segmentation is not one closed body")]
+    NotClosed,
+    /// The simulation of finished pieces failed.
+    #[error("the simulation of the finished pieces failed: {0}")]
+    Finished(#[from] SolidError),
     /// A way out is none of the 26, once the model is turned.
     #[error("piece {0} leaves along a direction that no plan of this program has")]
     Direction(PatchId),
@@ -287,14 +357,61 @@ fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, S
     steps.map(LatticePlan::new)
 }
 
-/// Tests the pieces of `surface` under `plan`, with connectors of half the size, and under a plan of half the
-/// score.
+/// Tests the finished `pieces`, one for each patch of `surface` where they are when put together, which `plan`
+/// joins; 10 to 60 s for kits of 10 pieces.
+///
+/// `compared` is what [`compare`] found, for the report.
 pub fn stress_test(
     ctx: &Ctx<'_>,
     params: &StressParams,
     surface: &SegmentedSurface,
     plan: &InstallationPlan,
+    pieces: &[Solid],
+    compared: Option<Comparison>,
 ) -> Result<StressReport, StressError> {
+    check(params, surface, plan)?;
+    if pieces.len() != surface.n_patches {
+        return Err(StressError::Pieces {
+            pieces: pieces.len(),
+            patches: surface.n_patches,
+        });
+    }
+    let turn = params.turn;
+    let pieces: Vec<Solid> = pieces
+        .iter()
+        .map(|piece| turn.solid(piece).map_err(|_| StressError::NotClosed))
+        .collect::<Result<_, _>>()?;
+    let (params, surface, plan) = (
+        &turned(params),
+        &turned_surface(params, surface),
+        &laid(params, plan)?,
+    );
+    ctx.stage("finished pieces", 0)?;
+    let model = PlanModel::new(&params.metric, surface, &params.sizes);
+    let meetings = model.meetings(plan);
+    let mut bench = printed::Bench::new(ctx, params, surface, &model, &meetings, &pieces)?;
+    let mut tested = Vec::new();
+    for friction in FRICTION {
+        ctx.stage(&format!("stress test with friction {friction}"), 0)?;
+        tested.push(Printed {
+            friction,
+            punch: bench.punch(ctx, friction)?,
+            drop: bench.drop(ctx, friction)?,
+        });
+    }
+    Ok(StressReport {
+        printed: tested,
+        compared,
+        mass_g: bench.mass_t() * 1e6,
+        strength_mpa: params.metric.material.strength_mpa,
+    })
+}
+
+fn check(
+    params: &StressParams,
+    surface: &SegmentedSurface,
+    plan: &InstallationPlan,
+) -> Result<(), StressError> {
     let problems = params.problems();
     if !problems.is_empty() {
         return Err(StressError::Params(problems));
@@ -305,6 +422,18 @@ pub fn stress_test(
             patches: surface.n_patches,
         });
     }
+    Ok(())
+}
+
+/// Tests walls and connectors of `surface` under `plan`, with connectors of half the size, and under a plan of
+/// half the score: all made anew, without gaps.
+pub fn compare(
+    ctx: &Ctx<'_>,
+    params: &StressParams,
+    surface: &SegmentedSurface,
+    plan: &InstallationPlan,
+) -> Result<Comparison, StressError> {
+    check(params, surface, plan)?;
     let (params, surface, plan) = (
         &turned(params),
         &turned_surface(params, surface),
@@ -312,29 +441,26 @@ pub fn stress_test(
     );
     ctx.stage("a plan of half the score", 0)?;
     let model = sound_model(ctx, params, surface)?;
-    let scored = |plan: &LatticePlan| score(&model, plan);
-    let score_mm = scored(plan)?;
+    let score_mm = score(&model, plan)?;
     let worse = match score_mm {
         Some(score_mm) => half_as_good(ctx, params, surface, &model, score_mm)?,
         None => None,
     };
 
     let meetings = model.meetings(plan);
-    ctx.stage("stress test: the kit", 0)?;
+    ctx.stage("comparison: the kit's plan", 0)?;
     let bench = Bench::new(params, &model)?;
     let kit = bench.test(&meetings, score_mm)?;
-    ctx.stage("stress test: half the score", 0)?;
+    ctx.stage("comparison: half the score", 0)?;
     let half_score = worse
         .map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm)))
         .transpose()?;
-    ctx.stage("stress test: half connectors", 0)?;
+    ctx.stage("comparison: half connectors", 0)?;
     let half_connectors = bench.test(&meetings.iter().map(with_half_the_size).collect::<Vec<_>>(), None)?;
-    Ok(StressReport {
+    Ok(Comparison {
         kit,
         half_connectors,
         half_score,
-        mass_g: bench.free.mass_t() * 1e6,
-        strength_mpa: params.metric.material.strength_mpa,
     })
 }
 
@@ -488,6 +614,7 @@ impl<'a> Bench<'a> {
             verdict,
             force_n,
             opening_mm,
+            play_mm: 0.0,
             limit_mm: limit_mm(
                 widest
                     .and_then(|i| meetings[i].joint)
