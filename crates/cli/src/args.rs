@@ -151,7 +151,7 @@ pub struct Blows {
     /// Force of the punch
     #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true, value_parser = stress::newtons)]
     pub punch: f64,
-    /// Where it presses: on the highest point, or on the highest place above the middle
+    /// Where it presses: on the highest place 15 mm wide or wider, or on the highest place above the middle
     #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
     pub at: Place,
     /// Height of the fall: m, cm or mm

@@ -232,14 +232,12 @@ fn print_table(params: &StressParams, tested: &StressReport) {
         "printed: the finished pieces with their gaps; μ: friction; the others: walls and connectors without gaps"
     );
     for (name, pair) in compared.designs() {
-        if let Some(score_mm) = pair.score_mm {
-            println!("{name:16} score by the surface metric {score_mm:.4} mm");
+        if let Some(score) = pair.score {
+            println!("{name:16} score, by how many times it bears what people do to it: {score:.2}");
         }
     }
-    if compared.kit.score_mm.is_none() {
-        println!("by the surface metric this plan comes apart, so there is none of half its score");
-    } else if compared.half_score.is_none() {
-        println!("no other plan that holds was found, so none of half the score was tested");
+    if compared.half_score.is_none() {
+        println!("no other plan was found, so none of half the score was tested");
     }
 }
 

@@ -14,6 +14,7 @@
 //! Limits: static and linear; the fall is upright.
 
 mod chart;
+mod compare;
 mod printed;
 #[cfg(test)]
 mod tests;
@@ -22,29 +23,24 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::sparse::SparseError;
 use shellock_geom::{Solid, Vec3};
 use shellock_mechanics::solid::{SolidError, SolidParams};
-use shellock_mechanics::{
-    Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams,
-};
+use shellock_mechanics::{Meeting, ShellAssembly, VolumeError};
 
-use crate::handling::OPEN_SIZES;
-use crate::handling::region::{around, highest, highest_in_the_middle, lowest, spread};
-use crate::impact::impact_n;
+use crate::handling::region::{highest, highest_in_the_middle};
+use crate::handling::{self, Handling, OPEN_SIZES};
 use crate::key::Turn;
 use crate::metric::{MetricParams, PlanModel};
-use crate::plan::{LatticePlan, PlanParams, random_plans, survey};
+use crate::plan::{LatticePlan, PlanParams};
 use crate::{
     Cancelled, ConnectorSizes, Ctx, InstallationPlan, InstallationStep, LatticeDirection, PatchId,
     SegmentedSurface,
 };
 
 pub use chart::chart;
+pub use compare::compare;
 pub use printed::FRICTION;
 
 /// Radius of the fist, mm.
 pub const PUNCH_RADIUS_MM: f64 = 10.0;
-
-/// Plans drawn at random, among which one of half the score is looked for.
-const N_DRAWN: usize = 100;
 
 /// How far a seam with connectors of that size may open and still hold, mm.
 fn limit_mm(connector_mm: f64) -> f64 {
@@ -60,6 +56,18 @@ fn largest_mm(meetings: &[Meeting]) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// The point that the punch hits.
+fn hit(params: &StressParams, assembly: &ShellAssembly) -> Option<usize> {
+    let up = Vec3::from_array(params.plan.up).normalize_or(Vec3::Z);
+    match params.punch_at {
+        PunchAt::Top => {
+            let handling = Handling::new(params.plan.up, params.metric.wall_mm, params.metric.material);
+            handling::top(&handling, assembly).or_else(|| highest(assembly, up))
+        }
+        PunchAt::Middle => highest_in_the_middle(assembly, up, PUNCH_RADIUS_MM),
+    }
+}
+
 /// Whether some connector has come out too far.
 fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
     meetings
@@ -68,23 +76,12 @@ fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
         .any(|(m, d)| m.joint.is_some_and(|joint| *d >= limit_mm(joint.size_mm)))
 }
 
-/// The same with a connector half as large.
-fn with_half_the_size(meeting: &Meeting) -> Meeting {
-    let half = |joint: Joint| Joint {
-        size_mm: joint.size_mm / 2.0,
-        ..joint
-    };
-    Meeting {
-        joint: meeting.joint.map(half),
-        ..*meeting
-    }
-}
-
 /// Where the punch lands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PunchAt {
-    /// On the highest point, be it the tip of an ear.
+    /// On the highest place that is wide enough and above what it stands on, as kits are made for; on the highest
+    /// point where there is none.
     #[default]
     Top,
     /// On the highest place above the middle of the surface.
@@ -96,7 +93,7 @@ pub enum PunchAt {
 pub struct StressParams {
     /// Force on the top, N. (0, 10⁵]; 70, as in the paper.
     pub punch_n: f64,
-    /// Where it presses. The highest point.
+    /// Where it presses. The top.
     pub punch_at: PunchAt,
     /// Height of the fall, mm. (0, 10⁵]; 2000, as in the paper.
     pub drop_mm: f64,
@@ -203,9 +200,9 @@ pub struct Pair {
     pub punch: Outcome,
     /// Fallen.
     pub drop: Outcome,
-    /// The plan's score, by the surface metric, mm (higher is better); `None` where pieces come apart in it,
-    /// and for half connectors, whose plan is the kit's.
-    pub score_mm: Option<f64>,
+    /// The plan's score, which is the least load factor of what people do to it (higher is better); `None` for half
+    /// connectors, whose plan is the kit's.
+    pub score: Option<f64>,
     /// Size of the largest connectors, mm.
     pub connector_mm: f64,
 }
@@ -423,229 +420,4 @@ fn check(
         });
     }
     Ok(())
-}
-
-/// Tests walls and connectors of `surface` under `plan`, with connectors of half the size, and under a plan of
-/// half the score: all made anew, without gaps.
-pub fn compare(
-    ctx: &Ctx<'_>,
-    params: &StressParams,
-    surface: &SegmentedSurface,
-    plan: &InstallationPlan,
-) -> Result<Comparison, StressError> {
-    check(params, surface, plan)?;
-    let (params, surface, plan) = (
-        &turned(params),
-        &turned_surface(params, surface),
-        &laid(params, plan)?,
-    );
-    ctx.stage("a plan of half the score", 0)?;
-    let model = sound_model(ctx, params, surface)?;
-    let score_mm = score(&model, plan)?;
-    let worse = match score_mm {
-        Some(score_mm) => half_as_good(ctx, params, surface, &model, score_mm)?,
-        None => None,
-    };
-
-    let meetings = model.meetings(plan);
-    ctx.stage("comparison: the kit's plan", 0)?;
-    let bench = Bench::new(params, &model)?;
-    let kit = bench.test(&meetings, score_mm)?;
-    ctx.stage("comparison: half the score", 0)?;
-    let half_score = worse
-        .map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm)))
-        .transpose()?;
-    ctx.stage("comparison: half connectors", 0)?;
-    let half_connectors = bench.test(&meetings.iter().map(with_half_the_size).collect::<Vec<_>>(), None)?;
-    Ok(Comparison {
-        kit,
-        half_connectors,
-        half_score,
-    })
-}
-
-/// Lengths of the edges to try, as shares of what is asked for: where a coarse mesh folds so that no wall
-/// stands on it, a somewhat finer or coarser one mostly does not.
-const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
-
-/// The model on the first mesh on which walls stand.
-fn sound_model(
-    ctx: &Ctx<'_>,
-    params: &StressParams,
-    surface: &SegmentedSurface,
-) -> Result<PlanModel, StressError> {
-    let mut failure = None;
-    for share in EDGE_SHARES {
-        let model = PlanModel::new(
-            &MetricParams {
-                edge_share: share * params.metric.edge_share,
-                ..params.metric
-            },
-            surface,
-            &params.sizes,
-        );
-        match model.volume_model() {
-            Err(e @ VolumeError::FlatTriangle(_)) => failure = failure.or(Some(e)),
-            Err(e) => return Err(e.into()),
-            Ok(_) => {
-                if share != 1.0 {
-                    ctx.note(&format!(
-                        "the mesh folds; its edges are made {share} times as long as asked for"
-                    ));
-                }
-                return Ok(model);
-            }
-        }
-    }
-    Err(failure.map_or(VolumeError::Contact, |e| e).into())
-}
-
-/// Quality by the surface metric, mm; `None` where pieces come apart.
-fn score(model: &PlanModel, plan: &LatticePlan) -> Result<Option<f64>, SparseError> {
-    let solved = model
-        .surface_model()?
-        .resist(&model.meetings(plan), plan.key().0)?;
-    Ok(match solved.resistance {
-        Resistance::Holds(opening) => Some(opening.quality_mm),
-        Resistance::Separable(_) => None,
-    })
-}
-
-/// The plan of those drawn whose score is nearest, by ratio, to twice `score_mm` (scores are negative).
-fn half_as_good(
-    ctx: &Ctx<'_>,
-    params: &StressParams,
-    surface: &SegmentedSurface,
-    model: &PlanModel,
-    score_mm: f64,
-) -> Result<Option<(LatticePlan, f64)>, StressError> {
-    let survey = survey(ctx, &params.plan, surface, &surface.seams(), &params.sizes)?;
-    let plans = random_plans(&params.plan, &survey, N_DRAWN);
-    let solver = model.surface_model()?;
-    let mut best: Option<(f64, LatticePlan, f64)> = None;
-    for plan in plans {
-        ctx.check()?;
-        let solved = solver.resist(&model.meetings(&plan), plan.key().0)?;
-        let Resistance::Holds(opening) = solved.resistance else {
-            continue;
-        };
-        let distance = (opening.quality_mm / (2.0 * score_mm)).ln().abs();
-        if best.as_ref().is_none_or(|b| distance < b.0) {
-            best = Some((distance, plan, opening.quality_mm));
-        }
-    }
-    Ok(best.map(|(_, plan, score_mm)| (plan, score_mm)))
-}
-
-/// The pieces of one design, standing and falling.
-struct Bench<'a> {
-    params: &'a StressParams,
-    model: &'a PlanModel,
-    /// Held where it stands.
-    standing: VolumeModel,
-    /// Held nowhere.
-    free: VolumeModel,
-}
-
-impl<'a> Bench<'a> {
-    fn new(params: &'a StressParams, model: &'a PlanModel) -> Result<Self, VolumeError> {
-        let (wall_mm, material) = (params.metric.wall_mm, params.metric.material);
-        let volume = VolumeParams {
-            wall_mm,
-            material,
-            ..VolumeParams::default()
-        };
-        let held = lowest(&model.assembly, Vec3::from_array(params.plan.up));
-        let standing = VolumeModel::clamped(&volume, &model.assembly, &held)?;
-        let free = VolumeModel::new(&volume, &model.assembly)?;
-        Ok(Self {
-            params,
-            model,
-            standing,
-            free,
-        })
-    }
-
-    fn test(&self, meetings: &[Meeting], score_mm: Option<f64>) -> Result<Pair, VolumeError> {
-        let up = Vec3::from_array(self.params.plan.up).normalize_or(Vec3::Z);
-        let assembly = &self.model.assembly;
-        let hit = match self.params.punch_at {
-            PunchAt::Top => highest(assembly, up),
-            PunchAt::Middle => highest_in_the_middle(assembly, up, PUNCH_RADIUS_MM),
-        };
-        let fist = hit.map_or_else(Vec::new, |hit| around(assembly, up, hit, PUNCH_RADIUS_MM));
-        let punch = spread(assembly, &fist, -up * self.params.punch_n);
-        let impact_n = impact_n(self.free.mass_t(), self.params.drop_mm);
-        let impact = spread(assembly, &lowest(assembly, up), up * impact_n);
-        let punched = self.standing.under_load(meetings, &punch)?;
-        let fallen = self.free.under_load(meetings, &impact)?;
-        Ok(Pair {
-            punch: self.outcome(punched, meetings, self.params.punch_n),
-            drop: self.outcome(fallen, meetings, impact_n),
-            score_mm,
-            connector_mm: largest_mm(meetings),
-        })
-    }
-
-    fn outcome(&self, loaded: Result<Loaded, Vec<u32>>, meetings: &[Meeting], force_n: f64) -> Outcome {
-        let strength_mpa = self.params.metric.material.strength_mpa;
-        let loaded = loaded.unwrap_or_else(|parts| Loaded {
-            opening_mm: self.openings_of(&parts),
-            lost: Vec::new(),
-            walls: StressLevel::default(),
-            connectors: StressLevel::default(),
-            triangle_mpa: Vec::new(),
-            imbalance: 0.0,
-        });
-        let widest = (0..loaded.opening_mm.len())
-            .max_by(|a, b| loaded.opening_mm[*a].total_cmp(&loaded.opening_mm[*b]));
-        let opening_mm = widest.map_or(0.0, |i| loaded.opening_mm[i]);
-        let strength_share = loaded.walls.robust_mpa.max(loaded.connectors.robust_mpa) / strength_mpa;
-        let verdict = if !loaded.lost.is_empty() || opening_mm.is_infinite() {
-            StressVerdict::ComesApart
-        } else if strength_share > 1.0 {
-            StressVerdict::Yields
-        } else if is_open(&loaded.opening_mm, meetings) {
-            StressVerdict::Opens
-        } else {
-            StressVerdict::Holds
-        };
-        Outcome {
-            verdict,
-            force_n,
-            opening_mm,
-            play_mm: 0.0,
-            limit_mm: limit_mm(
-                widest
-                    .and_then(|i| meetings[i].joint)
-                    .map_or(largest_mm(meetings), |j| j.size_mm),
-            ),
-            between: widest.map(|i| self.model.pieces_at(i)),
-            at: widest.map(|i| {
-                self.params
-                    .turn
-                    .inverse()
-                    .apply(self.model.place_of(i))
-                    .to_array()
-            }),
-            n_lost: loaded.lost.len(),
-            wall_mpa: loaded.walls.robust_mpa,
-            connector_mpa: loaded.connectors.robust_mpa,
-            peak_mpa: loaded.walls.largest_mpa.max(loaded.connectors.largest_mpa),
-            strength_share,
-        }
-    }
-
-    /// Infinite at the stations of `parts`, which come off, and nothing elsewhere.
-    fn openings_of(&self, parts: &[u32]) -> Vec<f64> {
-        let is_loose = |i: usize| {
-            self.model
-                .pieces_at(i)
-                .iter()
-                .any(|piece| parts.contains(&piece.0))
-        };
-        (0..self.model.assembly.stations.len())
-            .map(|i| if is_loose(i) { f64::INFINITY } else { 0.0 })
-            .collect()
-    }
 }

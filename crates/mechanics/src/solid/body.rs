@@ -9,7 +9,7 @@ use super::voxels::voxels;
 use super::{SolidError, SolidParams};
 
 /// Stiffness of what is empty in a cell, as a share of the material's: it keeps nodes that hardly any
-/// material touches from being free. A plate's deflection changes by less than 10⁻³ from 10⁻⁶ to 10⁻⁴.
+/// material touches from being free. Chosen small beside voxels of which a hundredth is full.
 const VOID: f64 = 1e-5;
 /// What hangs on nothing at the size of voxels may be this share of a piece.
 const MOST_LOOSE: f64 = 0.02;

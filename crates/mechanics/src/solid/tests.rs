@@ -45,7 +45,7 @@ fn voxels_have_the_volume_of_what_fills_them_however_it_lies() {
 }
 
 #[test]
-fn even_strain_is_reproduced_exactly_in_cells_that_are_cut() {
+fn a_bar_that_is_pulled_stretches_evenly_in_cells_that_are_cut_to_two_hundredths() {
     // A bar of a square section that fills no cell, pulled at its ends by forces as a uniform stress has them.
     let bar = upright([0.3, 0.2, 0.0], [4.2, 4.1, 20.0]);
     let mut model = model(&STEEP, &[bar], &[]);

@@ -9,10 +9,9 @@ use shellock_mechanics::solid::{Answer, Hold, Moved, Push, SolidError, SolidMode
 use shellock_mechanics::{Meeting, StressLevel};
 
 use super::{
-    Outcome, PUNCH_RADIUS_MM, PunchAt, StressError, StressParams, StressVerdict, is_open, largest_mm,
-    limit_mm,
+    Outcome, PUNCH_RADIUS_MM, StressError, StressParams, StressVerdict, hit, is_open, largest_mm, limit_mm,
 };
-use crate::handling::region::{around, highest, highest_in_the_middle, lowest, spread};
+use crate::handling::region::{around, lowest, spread};
 use crate::impact::impact_n;
 use crate::metric::PlanModel;
 use crate::{Ctx, SegmentedSurface};
@@ -88,11 +87,8 @@ impl<'a> Bench<'a> {
     pub fn punch(&mut self, ctx: &Ctx<'_>, friction: f64) -> Result<Outcome, StressError> {
         let up = Vec3::from_array(self.params.plan.up).normalize_or(Vec3::Z);
         let assembly = &self.model.assembly;
-        let hit = match self.params.punch_at {
-            PunchAt::Top => highest(assembly, up),
-            PunchAt::Middle => highest_in_the_middle(assembly, up, PUNCH_RADIUS_MM),
-        };
-        let fist = hit.map_or_else(Vec::new, |hit| around(assembly, up, hit, PUNCH_RADIUS_MM));
+        let fist = hit(self.params, assembly)
+            .map_or_else(Vec::new, |hit| around(assembly, up, hit, PUNCH_RADIUS_MM));
         let forces_n = spread(assembly, &fist, -up * self.params.punch_n);
         self.outcome(ctx, &forces_n, Answer::Held, self.params.punch_n, friction)
     }

@@ -1,7 +1,9 @@
 use shellock_geom::{Aabb, Volume};
 
+use super::compare::Bench;
 use super::*;
 use crate::LatticeDirection;
+use crate::handling::region::{around, lowest, spread};
 use crate::plan::LatticeStep;
 use crate::testing::{label, sphere};
 
