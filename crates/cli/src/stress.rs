@@ -8,11 +8,11 @@ use shellock::key::Turn;
 use shellock::metric::MetricParams;
 use shellock::sizes::SizeChoice;
 use shellock::stress_test::{
-    Outcome, Pair, PunchAt, StressParams, StressReport, StressVerdict, chart, stress_test,
+    Outcome, PunchAt, StressParams, StressReport, StressVerdict, chart, compare, stress_test,
 };
 use shellock::{Ctx, PatchId, SegmentedSurface};
-use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
+use shellock_geom::{Solid, Vec3};
 use shellock_kit::{PlanFile, PlanFileError};
 use shellock_mechanics::Material;
 
@@ -72,16 +72,22 @@ pub fn test(session: &Session, kit: &Path, blows: &Blows) -> Result<u8, Failure>
     check_kit(kit, &plan)?;
     let surface = surface_of(&kit.join("segmentation.ply"), order.steps.len())?;
     let params = params_of(&plan, blows).map_err(broken(kit))?;
+    let pieces = pieces_of(kit, &plan)?;
 
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let tested = stress_test(&ctx, &params, &surface, &order).inspect_err(|_| display.finish())?;
+    let tested = blows
+        .compare
+        .then(|| compare(&ctx, &params, &surface, &order))
+        .transpose()
+        .and_then(|compared| stress_test(&ctx, &params, &surface, &order, &pieces, compared))
+        .inspect_err(|_| display.finish())?;
     display.finish();
 
     let code = u8::from(!tested.passed());
     let value = json!({
-        "format": "shellock-stress", "version": 1, "punch_n": params.punch_n,
+        "format": "shellock-stress", "version": 2, "punch_n": params.punch_n,
         "punch_at": params.punch_at, "drop_mm": params.drop_mm,
         "material": params.metric.material, "connector_size": params.sizes.largest_mm(), "up": params.plan.up,
         "passed": tested.passed(), "report": tested,
@@ -109,6 +115,25 @@ fn check_kit(kit: &Path, plan: &PlanFile) -> Result<(), Failure> {
         ))),
         None => Ok(()),
     }
+}
+
+/// The finished pieces, by their ids.
+fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Vec<Solid>, Failure> {
+    let piece = |(number, file): (usize, Option<&String>)| {
+        let missing = || {
+            broken(kit)(format!(
+                "names no file of piece {number}; the test is of finished pieces"
+            ))
+        };
+        let path = kit.join(file.ok_or_else(missing)?);
+        let (loaded, _) = load(&path)?;
+        let solid = into_solid(&loaded.mesh);
+        Ok(solid.map_err(|source| Failure::NotOneBody { path, source })?.0)
+    };
+    (1..)
+        .zip(plan.pieces.iter().map(|entry| entry.file.as_ref()))
+        .map(piece)
+        .collect()
 }
 
 /// The surface with its patches that `build` wrote.
@@ -176,6 +201,7 @@ fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
         punch_n: blows.punch,
         punch_at,
         drop_mm: 1000.0 * blows.drop,
+        cell_mm: blows.cell,
         metric,
         sizes,
         plan: plan_params,
@@ -185,52 +211,54 @@ fn params_of(plan: &PlanFile, blows: &Blows) -> Result<StressParams, String> {
 
 fn print_table(params: &StressParams, tested: &StressReport) {
     println!(
-        "walls weigh {:.0} g; punch {:.0} N, fall from {:.2} m; material bears {} MPa",
+        "pieces weigh {:.0} g; punch {:.0} N, fall from {:.2} m; material bears {} MPa",
         tested.mass_g,
         params.punch_n,
         params.drop_mm / 1000.0,
         tested.strength_mpa
     );
     println!(
-        "design           test   force N  opening mm  between   walls MPa  connectors MPa  of strength  verdict"
+        "design           test   force N  opening mm  play mm  between   walls MPa  connectors MPa  of strength  verdict"
     );
-    for (
-        name,
-        Pair {
-            punch,
-            drop,
-            score_mm,
-            ..
-        },
-    ) in tested.designs()
-    {
+    for (name, punch, drop) in tested.rows() {
         for (test, o) in [("punch", punch), ("fall", drop)] {
-            let Outcome {
-                force_n,
-                opening_mm,
-                wall_mpa,
-                connector_mpa,
-                ..
-            } = o;
-            let between = o
-                .between
-                .map_or_else(String::new, |[a, b]| format!("{a} and {b}"));
-            let percent = 100.0 * o.strength_share;
-            let verdict = words(o.verdict);
-            println!(
-                "{name:16} {test:6} {force_n:7.0}  {opening_mm:10.3}  {between:9} {wall_mpa:9.1}  {connector_mpa:14.1}  \
-                 {percent:9.0} %  {verdict}"
-            );
-        }
-        if let Some(score_mm) = score_mm {
-            println!("{name:16} score by the surface metric {score_mm:.4} mm");
+            print_row(&name, test, o);
         }
     }
-    if tested.kit.score_mm.is_none() {
-        println!("by the surface metric this plan comes apart, so there is none of half its score");
-    } else if tested.half_score.is_none() {
-        println!("no other plan that holds was found, so none of half the score was tested");
+    let Some(compared) = &tested.compared else {
+        return;
+    };
+    println!(
+        "printed: the finished pieces with their gaps; μ: friction; the others: walls and connectors without gaps"
+    );
+    for (name, pair) in compared.designs() {
+        if let Some(score) = pair.score {
+            println!("{name:16} score, by how many times it bears what people do to it: {score:.2}");
+        }
     }
+    if compared.half_score.is_none() {
+        println!("no other plan was found, so none of half the score was tested");
+    }
+}
+
+fn print_row(name: &str, test: &str, o: &Outcome) {
+    let Outcome {
+        force_n,
+        opening_mm,
+        play_mm,
+        wall_mpa,
+        connector_mpa,
+        ..
+    } = o;
+    let between = o
+        .between
+        .map_or_else(String::new, |[a, b]| format!("{a} and {b}"));
+    let percent = 100.0 * o.strength_share;
+    let verdict = words(o.verdict);
+    println!(
+        "{name:16} {test:6} {force_n:7.0}  {opening_mm:10.3}  {play_mm:7.3}  {between:9} {wall_mpa:9.1}  \
+         {connector_mpa:14.1}  {percent:9.0} %  {verdict}"
+    );
 }
 
 fn words(verdict: StressVerdict) -> &'static str {

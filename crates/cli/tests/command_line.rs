@@ -4,6 +4,9 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use shellock_formats::write_stl_binary;
+use shellock_testkit::shapes::cuboid;
+
 fn shellock(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_shellock"))
         .current_dir(folder)
@@ -389,6 +392,12 @@ const TWO_PIECES: &str = r#"{ "pieces": [ { "id": 1, "installation_direction": [
     { "id": 2, "installation_direction": [0, 0, -1] } ], "installation_order": [1, 2], "up": [0, 0, 1],
     "shell_thickness": 2, "connector_size": 2.5 }"#;
 
+/// The same with the files of its pieces.
+fn with_files(plan: &str) -> String {
+    plan.replace("\"id\": 1,", "\"id\": 1, \"file\": \"box.stl\",")
+        .replace("\"id\": 2,", "\"id\": 2, \"file\": \"lid.stl\",")
+}
+
 #[test]
 fn a_folder_that_is_no_kit_is_not_tested() {
     let dir = tempfile::tempdir().unwrap();
@@ -433,6 +442,14 @@ fn a_folder_that_is_no_kit_is_not_tested() {
     refused(&["plan.json", "shell_thickness"]);
     fs::write(&plan, thick).unwrap();
     refused(&["plan.json", "thickness"]);
+    fs::write(&plan, TWO_PIECES).unwrap();
+    refused(&["plan.json", "no file of piece 1"]);
+    fs::write(&plan, with_files(TWO_PIECES)).unwrap();
+    refused(&["box.stl", "not there"]);
+    for file in ["box.stl", "lid.stl"] {
+        fs::write(kit.join(file), "solid of nothing\nendsolid\n").unwrap();
+    }
+    refused(&["box.stl"]);
 }
 
 #[test]
@@ -457,27 +474,43 @@ fn blows_that_are_none_are_refused() {
     }
 }
 
-/// A lid on a box comes off: nothing stops it, whatever the walls are made of.
+/// A lid that lies on a box.
 #[test]
 fn a_test_says_how_it_ended_by_its_exit_code_and_leaves_figures_and_a_picture() {
     let dir = tempfile::tempdir().unwrap();
     let kit = dir.path().join("kit");
     fs::create_dir(&kit).unwrap();
-    fs::write(kit.join("plan.json"), TWO_PIECES).unwrap();
+    fs::write(kit.join("plan.json"), with_files(TWO_PIECES)).unwrap();
+    let hollow = cuboid([0.0; 3], [80.0, 80.0, 78.0]).subtract(&cuboid([2.0; 3], [78.0, 78.0, 81.0]));
+    let cover = cuboid([0.0, 0.0, 78.1], [80.0; 3]);
+    for (file, volume) in [("box.stl", hollow), ("lid.stl", cover)] {
+        fs::write(kit.join(file), write_stl_binary(&volume.to_mesh())).unwrap();
+    }
     let lid = labelled_cube([1, 1, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1]);
     fs::write(kit.join("segmentation.ply"), lid).unwrap();
-    let o = shellock(dir.path(), &["test", "kit", "--edges", "3", "--json"]);
+    let o = shellock(
+        dir.path(),
+        &["test", "kit", "--edges", "3", "--compare", "--json"],
+    );
     let told: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
     let written: serde_json::Value =
         serde_json::from_slice(&fs::read(kit.join("stress.json")).unwrap()).unwrap();
     assert_eq!(told, written);
-    let verdicts = ["punch", "drop"].map(|test| written["report"]["kit"][test]["verdict"].clone());
-    assert_eq!(
-        written["passed"],
-        verdicts.iter().all(|v| v == "holds"),
-        "{verdicts:?}"
-    );
-    assert_eq!(code(&o), i32::from(written["passed"] == false), "{}", errors(&o));
+    let mut is_held = true;
+    for (of, friction) in written["report"]["printed"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip([0.0, 0.2])
+    {
+        assert_eq!(of["friction"], friction);
+        is_held &= ["punch", "drop"]
+            .iter()
+            .all(|test| of[test]["verdict"] == "holds");
+    }
+    assert_eq!(written["passed"], is_held);
+    assert_eq!(code(&o), i32::from(!is_held), "{}", errors(&o));
+    assert!(written["report"]["compared"]["kit"]["punch"]["verdict"].is_string());
     let svg = fs::read_to_string(kit.join("stress.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
     let mut names: Vec<_> = fs::read_dir(&kit)
@@ -488,7 +521,14 @@ fn a_test_says_how_it_ended_by_its_exit_code_and_leaves_figures_and_a_picture() 
     names.sort();
     assert_eq!(
         names,
-        ["plan.json", "segmentation.ply", "stress.json", "stress.svg"]
+        [
+            "box.stl",
+            "lid.stl",
+            "plan.json",
+            "segmentation.ply",
+            "stress.json",
+            "stress.svg"
+        ]
     );
 }
 

@@ -11,6 +11,7 @@ pub mod material;
 pub mod neighbourhood;
 pub mod sample;
 pub mod shell;
+pub mod solid;
 pub mod surface;
 pub mod volume;
 
@@ -19,5 +20,6 @@ pub use material::Material;
 pub use shell::{
     Displacements, FaceStress, LoadCase, ShellError, ShellModel, ShellSolver, ShellStress, Support,
 };
+pub use solid::{SolidError, SolidModel, SolidParams};
 pub use surface::{Bearing, Closed, Drift, JoinedParts, SurfaceModel, SurfaceParams, SurfaceSolution};
 pub use volume::{Loaded, StressLevel, VolumeError, VolumeModel, VolumeParams};

@@ -33,7 +33,7 @@ use shellock_geom::sparse::SparseError;
 
 pub use element::Order;
 pub use load::Loaded;
-pub use stress::StressLevel;
+pub use stress::{Sample as StressSample, StressLevel};
 pub use wall::{MIN_VOLUME_SHARE, Wall};
 
 use crate::{Material, Meeting, Opening, Resistance, ShellAssembly, Side, Station};

@@ -189,6 +189,11 @@ pub fn load_cases(handling: &Handling, assembly: &ShellAssembly) -> Vec<LoadCase
     cases
 }
 
+/// The highest point of `assembly` that is wide enough to be pressed and above what it stands on.
+pub(crate) fn top(handling: &Handling, assembly: &ShellAssembly) -> Option<usize> {
+    Bench::new(handling, assembly).top(Vec3::from_array(handling.up).normalize_or(Vec3::Z))
+}
+
 /// Directions that are as even as few can be: a spiral of equal areas about `pole`.
 fn even_directions(pole: Vec3, n: usize) -> impl Iterator<Item = Vec3> {
     let (x, y) = pole.any_orthonormal_pair();

@@ -1,43 +1,46 @@
 //! What a punch on top and a fall do to the assembled pieces (Sect. 7, Fig. 15), and what they would do to
 //! worse ones.
 //!
-//! The pieces are walls and connectors of tetrahedra with contact, as in the volume metric. Punch: the force
-//! presses on what faces upwards within [`PUNCH_RADIUS_MM`] of the top, or of the highest place in the
-//! middle; what stands on the table is held. Fall: the model lands on its feet and is stopped within 1/300 s
-//! (Sect. 4.3); the floor pushes with `M v / Δt` on what touches it, and inertia balances it.
+//! What is tested is what is printed (`printed`): the finished meshes, with the gaps that they have, without
+//! friction and with some. Punch: the force presses on what faces upwards within [`PUNCH_RADIUS_MM`] of the
+//! top, or of the highest place in the middle; what stands on the table is held. Fall: the model lands on its
+//! feet and is stopped within 1/300 s (Sect. 4.3); the floor pushes with `M v / Δt` on what touches it, and
+//! inertia balances it.
 //!
-//! Limits: static and linear; no friction but at the key, no clearance; the fall is upright; connectors are
-//! everywhere where the plan has room for them, carved or not.
+//! Worse designs have no finished pieces. [`compare`] makes walls and connectors of tetrahedra for them, as
+//! in the volume metric, and for the kit's own plan, too, so that like is compared with like: without gaps,
+//! without friction but at the key, with connectors everywhere where the plan has room.
+//!
+//! Limits: static and linear; the fall is upright.
 
 mod chart;
+mod compare;
+mod printed;
 #[cfg(test)]
 mod tests;
 
 use serde::{Deserialize, Serialize};
-use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
-use shellock_mechanics::{
-    Joint, Loaded, Meeting, Resistance, StressLevel, VolumeError, VolumeModel, VolumeParams,
-};
+use shellock_geom::{Solid, Vec3};
+use shellock_mechanics::solid::{SolidError, SolidParams};
+use shellock_mechanics::{Meeting, ShellAssembly, VolumeError};
 
-use crate::handling::OPEN_SIZES;
-use crate::handling::region::{around, highest, highest_in_the_middle, lowest, spread};
-use crate::impact::impact_n;
+use crate::handling::region::{highest, highest_in_the_middle};
+use crate::handling::{self, Handling, OPEN_SIZES};
 use crate::key::Turn;
 use crate::metric::{MetricParams, PlanModel};
-use crate::plan::{LatticePlan, PlanParams, random_plans, survey};
+use crate::plan::{LatticePlan, PlanParams};
 use crate::{
     Cancelled, ConnectorSizes, Ctx, InstallationPlan, InstallationStep, LatticeDirection, PatchId,
     SegmentedSurface,
 };
 
 pub use chart::chart;
+pub use compare::compare;
+pub use printed::FRICTION;
 
 /// Radius of the fist, mm.
 pub const PUNCH_RADIUS_MM: f64 = 10.0;
-
-/// Plans drawn at random, among which one of half the score is looked for.
-const N_DRAWN: usize = 100;
 
 /// How far a seam with connectors of that size may open and still hold, mm.
 fn limit_mm(connector_mm: f64) -> f64 {
@@ -53,6 +56,18 @@ fn largest_mm(meetings: &[Meeting]) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// The point that the punch hits.
+fn hit(params: &StressParams, assembly: &ShellAssembly) -> Option<usize> {
+    let up = Vec3::from_array(params.plan.up).normalize_or(Vec3::Z);
+    match params.punch_at {
+        PunchAt::Top => {
+            let handling = Handling::new(params.plan.up, params.metric.wall_mm, params.metric.material);
+            handling::top(&handling, assembly).or_else(|| highest(assembly, up))
+        }
+        PunchAt::Middle => highest_in_the_middle(assembly, up, PUNCH_RADIUS_MM),
+    }
+}
+
 /// Whether some connector has come out too far.
 fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
     meetings
@@ -61,23 +76,12 @@ fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
         .any(|(m, d)| m.joint.is_some_and(|joint| *d >= limit_mm(joint.size_mm)))
 }
 
-/// The same with a connector half as large.
-fn with_half_the_size(meeting: &Meeting) -> Meeting {
-    let half = |joint: Joint| Joint {
-        size_mm: joint.size_mm / 2.0,
-        ..joint
-    };
-    Meeting {
-        joint: meeting.joint.map(half),
-        ..*meeting
-    }
-}
-
 /// Where the punch lands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PunchAt {
-    /// On the highest point, be it the tip of an ear.
+    /// On the highest place that is wide enough and above what it stands on, as kits are made for; on the highest
+    /// point where there is none.
     #[default]
     Top,
     /// On the highest place above the middle of the surface.
@@ -89,10 +93,12 @@ pub enum PunchAt {
 pub struct StressParams {
     /// Force on the top, N. (0, 10⁵]; 70, as in the paper.
     pub punch_n: f64,
-    /// Where it presses. The highest point.
+    /// Where it presses. The top.
     pub punch_at: PunchAt,
     /// Height of the fall, mm. (0, 10⁵]; 2000, as in the paper.
     pub drop_mm: f64,
+    /// Edge of the cells that finished pieces are cut into, mm. [0.5, 20]; 2.5.
+    pub cell_mm: f64,
     /// Walls, connectors and material.
     pub metric: MetricParams,
     /// Connectors of each pair of pieces.
@@ -110,6 +116,7 @@ impl Default for StressParams {
             punch_n: 70.0,
             punch_at: PunchAt::default(),
             drop_mm: 2000.0,
+            cell_mm: SolidParams::default().cell_mm,
             metric: MetricParams::default(),
             sizes: ConnectorSizes::default(),
             plan: PlanParams::default(),
@@ -123,6 +130,12 @@ impl StressParams {
     pub fn problems(&self) -> Vec<String> {
         let mut problems = self.plan.problems();
         problems.extend(self.metric.problems().iter().map(ToString::to_string));
+        if !(0.5..=20.0).contains(&self.cell_mm) {
+            problems.push(format!(
+                "cells are {} mm; they must be from 0.5 to 20 mm",
+                self.cell_mm
+            ));
+        }
         for (name, value) in [
             ("the punch", self.punch_n),
             ("the height of the fall", self.drop_mm),
@@ -160,6 +173,8 @@ pub struct Outcome {
     pub force_n: f64,
     /// The widest opening, mm; infinite (`null`) where nothing stops some piece.
     pub opening_mm: f64,
+    /// How much of it is play: what a hundredth of the force does; 0 where there are no gaps.
+    pub play_mm: f64,
     /// How far the connectors there may come out and still hold, mm.
     pub limit_mm: f64,
     /// The pieces that part there.
@@ -185,41 +200,79 @@ pub struct Pair {
     pub punch: Outcome,
     /// Fallen.
     pub drop: Outcome,
-    /// The plan's score, by the surface metric, mm (higher is better); `None` where pieces come apart in it,
-    /// and for half connectors, whose plan is the kit's.
-    pub score_mm: Option<f64>,
+    /// The plan's score, which is the least load factor of what people do to it (higher is better); `None` for half
+    /// connectors, whose plan is the kit's.
+    pub score: Option<f64>,
     /// Size of the largest connectors, mm.
     pub connector_mm: f64,
 }
 
-/// The tests of a kit and of two that ought to be worse.
+/// Both tests of the finished pieces.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StressReport {
-    /// As it is.
+pub struct Printed {
+    /// Coefficient of friction between pieces.
+    pub friction: f64,
+    /// Punched on the top.
+    pub punch: Outcome,
+    /// Fallen.
+    pub drop: Outcome,
+}
+
+/// The tests of the kit's plan and of two designs that ought to be worse, by the model of walls and
+/// connectors without gaps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// The kit's plan.
     pub kit: Pair,
     /// With connectors of half the size.
     pub half_connectors: Pair,
     /// With the plan of those drawn whose score is nearest to twice as bad; none if none holds at all.
     pub half_score: Option<Pair>,
-    /// Mass of the walls, g.
+}
+
+impl Comparison {
+    /// The designs with their names, the kit's first.
+    pub fn designs(&self) -> Vec<(&'static str, &Pair)> {
+        let mut all = vec![
+            ("kit's plan", &self.kit),
+            ("half connectors", &self.half_connectors),
+        ];
+        all.extend(self.half_score.iter().map(|pair| ("half score", pair)));
+        all
+    }
+}
+
+/// The tests of a kit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StressReport {
+    /// The finished pieces, with each friction of [`FRICTION`].
+    pub printed: Vec<Printed>,
+    /// Worse designs, where they were asked for.
+    pub compared: Option<Comparison>,
+    /// Mass of the pieces, g.
     pub mass_g: f64,
     /// What the material bears, MPa.
     pub strength_mpa: f64,
 }
 
 impl StressReport {
-    /// The designs with their names, the kit first.
-    pub fn designs(&self) -> Vec<(&'static str, &Pair)> {
-        let mut all = vec![("kit", &self.kit), ("half connectors", &self.half_connectors)];
-        all.extend(self.half_score.iter().map(|pair| ("half score", pair)));
-        all
+    /// Whether the finished pieces hold in both tests, whatever the friction.
+    pub fn passed(&self) -> bool {
+        self.printed
+            .iter()
+            .flat_map(|printed| [&printed.punch, &printed.drop])
+            .all(|o| o.verdict == StressVerdict::Holds)
     }
 
-    /// Whether the kit holds in both tests.
-    pub fn passed(&self) -> bool {
-        [&self.kit.punch, &self.kit.drop]
-            .iter()
-            .all(|o| o.verdict == StressVerdict::Holds)
+    /// Name, punch and fall of all that was tested, the finished pieces first.
+    pub fn rows(&self) -> Vec<(String, &Outcome, &Outcome)> {
+        let printed = self.printed.iter();
+        let mut rows: Vec<_> = printed
+            .map(|p| (format!("printed, μ {}", p.friction), &p.punch, &p.drop))
+            .collect();
+        let designs = self.compared.iter().flat_map(Comparison::designs);
+        rows.extend(designs.map(|(name, pair)| (name.to_owned(), &pair.punch, &pair.drop)));
+        rows
     }
 }
 
@@ -237,6 +290,20 @@ pub enum StressError {
         /// Patches of the surface.
         patches: usize,
     },
+    /// There must be one finished piece for each patch.
+    #[error("{pieces} finished pieces of a surface of {patches}: they do not belong together")]
+    Pieces {
+        /// How many were given.
+        pieces: usize,
+        /// Patches of the surface.
+        patches: usize,
+    },
+    /// The model's surface has no volume.
+    #[error("the surface of the segmentation is not one closed body")]
+    NotClosed,
+    /// The simulation of finished pieces failed.
+    #[error("the simulation of the finished pieces failed: {0}")]
+    Finished(#[from] SolidError),
     /// A way out is none of the 26, once the model is turned.
     #[error("piece {0} leaves along a direction that no plan of this program has")]
     Direction(PatchId),
@@ -287,14 +354,61 @@ fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, S
     steps.map(LatticePlan::new)
 }
 
-/// Tests the pieces of `surface` under `plan`, with connectors of half the size, and under a plan of half the
-/// score.
+/// Tests the finished `pieces`, one for each patch of `surface` where they are when put together, which `plan`
+/// joins; 10 to 60 s for kits of 10 pieces.
+///
+/// `compared` is what [`compare`] found, for the report.
 pub fn stress_test(
     ctx: &Ctx<'_>,
     params: &StressParams,
     surface: &SegmentedSurface,
     plan: &InstallationPlan,
+    pieces: &[Solid],
+    compared: Option<Comparison>,
 ) -> Result<StressReport, StressError> {
+    check(params, surface, plan)?;
+    if pieces.len() != surface.n_patches {
+        return Err(StressError::Pieces {
+            pieces: pieces.len(),
+            patches: surface.n_patches,
+        });
+    }
+    let turn = params.turn;
+    let pieces: Vec<Solid> = pieces
+        .iter()
+        .map(|piece| turn.solid(piece).map_err(|_| StressError::NotClosed))
+        .collect::<Result<_, _>>()?;
+    let (params, surface, plan) = (
+        &turned(params),
+        &turned_surface(params, surface),
+        &laid(params, plan)?,
+    );
+    ctx.stage("finished pieces", 0)?;
+    let model = PlanModel::new(&params.metric, surface, &params.sizes);
+    let meetings = model.meetings(plan);
+    let mut bench = printed::Bench::new(ctx, params, surface, &model, &meetings, &pieces)?;
+    let mut tested = Vec::new();
+    for friction in FRICTION {
+        ctx.stage(&format!("stress test with friction {friction}"), 0)?;
+        tested.push(Printed {
+            friction,
+            punch: bench.punch(ctx, friction)?,
+            drop: bench.drop(ctx, friction)?,
+        });
+    }
+    Ok(StressReport {
+        printed: tested,
+        compared,
+        mass_g: bench.mass_t() * 1e6,
+        strength_mpa: params.metric.material.strength_mpa,
+    })
+}
+
+fn check(
+    params: &StressParams,
+    surface: &SegmentedSurface,
+    plan: &InstallationPlan,
+) -> Result<(), StressError> {
     let problems = params.problems();
     if !problems.is_empty() {
         return Err(StressError::Params(problems));
@@ -305,220 +419,5 @@ pub fn stress_test(
             patches: surface.n_patches,
         });
     }
-    let (params, surface, plan) = (
-        &turned(params),
-        &turned_surface(params, surface),
-        &laid(params, plan)?,
-    );
-    ctx.stage("a plan of half the score", 0)?;
-    let model = sound_model(ctx, params, surface)?;
-    let scored = |plan: &LatticePlan| score(&model, plan);
-    let score_mm = scored(plan)?;
-    let worse = match score_mm {
-        Some(score_mm) => half_as_good(ctx, params, surface, &model, score_mm)?,
-        None => None,
-    };
-
-    let meetings = model.meetings(plan);
-    ctx.stage("stress test: the kit", 0)?;
-    let bench = Bench::new(params, &model)?;
-    let kit = bench.test(&meetings, score_mm)?;
-    ctx.stage("stress test: half the score", 0)?;
-    let half_score = worse
-        .map(|(plan, score_mm)| bench.test(&model.meetings(&plan), Some(score_mm)))
-        .transpose()?;
-    ctx.stage("stress test: half connectors", 0)?;
-    let half_connectors = bench.test(&meetings.iter().map(with_half_the_size).collect::<Vec<_>>(), None)?;
-    Ok(StressReport {
-        kit,
-        half_connectors,
-        half_score,
-        mass_g: bench.free.mass_t() * 1e6,
-        strength_mpa: params.metric.material.strength_mpa,
-    })
-}
-
-/// Lengths of the edges to try, as shares of what is asked for: where a coarse mesh folds so that no wall
-/// stands on it, a somewhat finer or coarser one mostly does not.
-const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
-
-/// The model on the first mesh on which walls stand.
-fn sound_model(
-    ctx: &Ctx<'_>,
-    params: &StressParams,
-    surface: &SegmentedSurface,
-) -> Result<PlanModel, StressError> {
-    let mut failure = None;
-    for share in EDGE_SHARES {
-        let model = PlanModel::new(
-            &MetricParams {
-                edge_share: share * params.metric.edge_share,
-                ..params.metric
-            },
-            surface,
-            &params.sizes,
-        );
-        match model.volume_model() {
-            Err(e @ VolumeError::FlatTriangle(_)) => failure = failure.or(Some(e)),
-            Err(e) => return Err(e.into()),
-            Ok(_) => {
-                if share != 1.0 {
-                    ctx.note(&format!(
-                        "the mesh folds; its edges are made {share} times as long as asked for"
-                    ));
-                }
-                return Ok(model);
-            }
-        }
-    }
-    Err(failure.map_or(VolumeError::Contact, |e| e).into())
-}
-
-/// Quality by the surface metric, mm; `None` where pieces come apart.
-fn score(model: &PlanModel, plan: &LatticePlan) -> Result<Option<f64>, SparseError> {
-    let solved = model
-        .surface_model()?
-        .resist(&model.meetings(plan), plan.key().0)?;
-    Ok(match solved.resistance {
-        Resistance::Holds(opening) => Some(opening.quality_mm),
-        Resistance::Separable(_) => None,
-    })
-}
-
-/// The plan of those drawn whose score is nearest, by ratio, to twice `score_mm` (scores are negative).
-fn half_as_good(
-    ctx: &Ctx<'_>,
-    params: &StressParams,
-    surface: &SegmentedSurface,
-    model: &PlanModel,
-    score_mm: f64,
-) -> Result<Option<(LatticePlan, f64)>, StressError> {
-    let survey = survey(ctx, &params.plan, surface, &surface.seams(), &params.sizes)?;
-    let plans = random_plans(&params.plan, &survey, N_DRAWN);
-    let solver = model.surface_model()?;
-    let mut best: Option<(f64, LatticePlan, f64)> = None;
-    for plan in plans {
-        ctx.check()?;
-        let solved = solver.resist(&model.meetings(&plan), plan.key().0)?;
-        let Resistance::Holds(opening) = solved.resistance else {
-            continue;
-        };
-        let distance = (opening.quality_mm / (2.0 * score_mm)).ln().abs();
-        if best.as_ref().is_none_or(|b| distance < b.0) {
-            best = Some((distance, plan, opening.quality_mm));
-        }
-    }
-    Ok(best.map(|(_, plan, score_mm)| (plan, score_mm)))
-}
-
-/// The pieces of one design, standing and falling.
-struct Bench<'a> {
-    params: &'a StressParams,
-    model: &'a PlanModel,
-    /// Held where it stands.
-    standing: VolumeModel,
-    /// Held nowhere.
-    free: VolumeModel,
-}
-
-impl<'a> Bench<'a> {
-    fn new(params: &'a StressParams, model: &'a PlanModel) -> Result<Self, VolumeError> {
-        let (wall_mm, material) = (params.metric.wall_mm, params.metric.material);
-        let volume = VolumeParams {
-            wall_mm,
-            material,
-            ..VolumeParams::default()
-        };
-        let held = lowest(&model.assembly, Vec3::from_array(params.plan.up));
-        let standing = VolumeModel::clamped(&volume, &model.assembly, &held)?;
-        let free = VolumeModel::new(&volume, &model.assembly)?;
-        Ok(Self {
-            params,
-            model,
-            standing,
-            free,
-        })
-    }
-
-    fn test(&self, meetings: &[Meeting], score_mm: Option<f64>) -> Result<Pair, VolumeError> {
-        let up = Vec3::from_array(self.params.plan.up).normalize_or(Vec3::Z);
-        let assembly = &self.model.assembly;
-        let hit = match self.params.punch_at {
-            PunchAt::Top => highest(assembly, up),
-            PunchAt::Middle => highest_in_the_middle(assembly, up, PUNCH_RADIUS_MM),
-        };
-        let fist = hit.map_or_else(Vec::new, |hit| around(assembly, up, hit, PUNCH_RADIUS_MM));
-        let punch = spread(assembly, &fist, -up * self.params.punch_n);
-        let impact_n = impact_n(self.free.mass_t(), self.params.drop_mm);
-        let impact = spread(assembly, &lowest(assembly, up), up * impact_n);
-        let punched = self.standing.under_load(meetings, &punch)?;
-        let fallen = self.free.under_load(meetings, &impact)?;
-        Ok(Pair {
-            punch: self.outcome(punched, meetings, self.params.punch_n),
-            drop: self.outcome(fallen, meetings, impact_n),
-            score_mm,
-            connector_mm: largest_mm(meetings),
-        })
-    }
-
-    fn outcome(&self, loaded: Result<Loaded, Vec<u32>>, meetings: &[Meeting], force_n: f64) -> Outcome {
-        let strength_mpa = self.params.metric.material.strength_mpa;
-        let loaded = loaded.unwrap_or_else(|parts| Loaded {
-            opening_mm: self.openings_of(&parts),
-            lost: Vec::new(),
-            walls: StressLevel::default(),
-            connectors: StressLevel::default(),
-            triangle_mpa: Vec::new(),
-            imbalance: 0.0,
-        });
-        let widest = (0..loaded.opening_mm.len())
-            .max_by(|a, b| loaded.opening_mm[*a].total_cmp(&loaded.opening_mm[*b]));
-        let opening_mm = widest.map_or(0.0, |i| loaded.opening_mm[i]);
-        let strength_share = loaded.walls.robust_mpa.max(loaded.connectors.robust_mpa) / strength_mpa;
-        let verdict = if !loaded.lost.is_empty() || opening_mm.is_infinite() {
-            StressVerdict::ComesApart
-        } else if strength_share > 1.0 {
-            StressVerdict::Yields
-        } else if is_open(&loaded.opening_mm, meetings) {
-            StressVerdict::Opens
-        } else {
-            StressVerdict::Holds
-        };
-        Outcome {
-            verdict,
-            force_n,
-            opening_mm,
-            limit_mm: limit_mm(
-                widest
-                    .and_then(|i| meetings[i].joint)
-                    .map_or(largest_mm(meetings), |j| j.size_mm),
-            ),
-            between: widest.map(|i| self.model.pieces_at(i)),
-            at: widest.map(|i| {
-                self.params
-                    .turn
-                    .inverse()
-                    .apply(self.model.place_of(i))
-                    .to_array()
-            }),
-            n_lost: loaded.lost.len(),
-            wall_mpa: loaded.walls.robust_mpa,
-            connector_mpa: loaded.connectors.robust_mpa,
-            peak_mpa: loaded.walls.largest_mpa.max(loaded.connectors.largest_mpa),
-            strength_share,
-        }
-    }
-
-    /// Infinite at the stations of `parts`, which come off, and nothing elsewhere.
-    fn openings_of(&self, parts: &[u32]) -> Vec<f64> {
-        let is_loose = |i: usize| {
-            self.model
-                .pieces_at(i)
-                .iter()
-                .any(|piece| parts.contains(&piece.0))
-        };
-        (0..self.model.assembly.stations.len())
-            .map(|i| if is_loose(i) { f64::INFINITY } else { 0.0 })
-            .collect()
-    }
+    Ok(())
 }

@@ -19,6 +19,7 @@ mod statistics;
 mod strength;
 mod study;
 mod table;
+mod worse;
 
 use std::process::ExitCode;
 

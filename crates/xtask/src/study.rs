@@ -16,6 +16,7 @@ use crate::search::{self, SearchOptions};
 use crate::statistics::{band, kendall, spearman};
 use crate::strength::{self, StrengthOptions};
 use crate::table::{Table, markdown};
+use crate::worse::{self, WorseOptions};
 
 /// What to study and where the charts go.
 #[derive(Args)]
@@ -33,6 +34,8 @@ enum Study {
     Metrics(MetricsOptions),
     /// What random plans of a model bear, load by load, by the surface model and by the solid one
     Loads(LoadsOptions),
+    /// Whether half connectors and plans of half the score are worse under a punch and in a fall
+    Worse(WorseOptions),
     /// How fast plans of a model are found, and what its segmentations allow
     Search(SearchOptions),
     /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
@@ -66,6 +69,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
     match &options.study {
         Study::Metrics(metrics) => metrics::run(metrics, &options.out),
         Study::Loads(loads) => loads::run(loads, &options.out),
+        Study::Worse(worse) => worse::run(worse, &options.out),
         Study::Search(search) => search::run(search, &options.out),
         Study::Strength(strength) => strength::run(strength, &options.out),
         Study::Effort(effort) => effort::run(effort, &options.out),

@@ -394,4 +394,30 @@ mod tests {
             assert!((expected - DVector::from_vec(found)).amax() < 1e-12);
         }
     }
+
+    #[test]
+    fn where_one_body_changes_the_rest_is_kept_and_the_answer_is_that_from_the_start() {
+        let (touched, n) = ring();
+        let (joinings, order) = Joinings::new(touched.clone(), n as usize);
+        let body = |own: &Vec<u32>, soft: f64| {
+            let contacts: Vec<u32> = (0..n).filter(|i| own.contains(&order[*i as usize])).collect();
+            let root = DMatrix::from_fn(contacts.len(), contacts.len(), |i, j| ((3 * i + j) as f64).cos());
+            Arc::new(Body {
+                contacts,
+                compliance: (soft * &root * root.transpose()).as_slice().to_vec(),
+            })
+        };
+        let laws: Vec<Law> = (0..n)
+            .map(|i| if i % 2 == 0 { Law::Both } else { Law::Push })
+            .collect();
+        let before: Vec<Arc<Body>> = touched.iter().map(|own| body(own, 1.0)).collect();
+        let reduced = joinings.reduce(&before, &laws, None).unwrap();
+        for changed in 0..before.len() {
+            let mut after = before.clone();
+            after[changed] = body(&touched[changed], 2.0);
+            let again = joinings.reduce(&after, &laws, Some((&before, &reduced))).unwrap();
+            let anew = joinings.reduce(&after, &laws, None).unwrap();
+            assert_eq!(again.compliance, anew.compliance);
+        }
+    }
 }

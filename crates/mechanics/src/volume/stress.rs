@@ -27,9 +27,12 @@ pub struct StressLevel {
 
 /// Stress at one place, with the volume that it stands for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
+pub struct Sample {
+    /// Von Mises, MPa.
     pub stress_mpa: f64,
+    /// mm³.
     pub volume_mm3: f64,
+    /// mm.
     pub at: Vec3,
 }
 
@@ -55,7 +58,7 @@ pub(super) fn samples(
 
 impl StressLevel {
     /// Of all samples; zero where there are none.
-    pub(super) fn of(mut samples: Vec<Sample>) -> Self {
+    pub fn of(mut samples: Vec<Sample>) -> Self {
         samples.sort_by(|a, b| b.stress_mpa.total_cmp(&a.stress_mpa));
         let Some(largest) = samples.first() else {
             return Self::default();

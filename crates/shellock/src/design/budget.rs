@@ -199,6 +199,22 @@ mod tests {
     }
 
     #[test]
+    fn what_the_user_sets_is_not_changed_for_the_sake_of_use() {
+        let ours = Params {
+            thickness: Thickness::Auto,
+            connector: crate::connector::ConnectorParams {
+                size: SizeChoice::Auto(Default::default()),
+                ..Default::default()
+            },
+            ..Params::default()
+        };
+        let all = Levers::of(&ours, false, true);
+        assert!(all.connectors > 0 && all.wall && all.weak_joinings > 0);
+        assert_eq!(Levers::of(&Params::default(), true, true), Levers::default());
+        assert!(!Levers::of(&ours, false, false).wall);
+    }
+
+    #[test]
     fn without_a_clock_nothing_is_late() {
         let (ctx, pace) = (Ctx::quiet(), Pace::default());
         pace.made(&ctx, ctx.seconds_left());

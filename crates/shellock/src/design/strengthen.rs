@@ -24,8 +24,8 @@ const GAIN: f64 = 1.05;
 const MOST_ROUNDS: usize = 6;
 /// Walls that are rated.
 const MOST_WALLS: usize = 4;
-/// Walls are as many times this thick, mm.
-const WALL_STEP_MM: f64 = 0.1;
+/// Walls that are looked at in a mm.
+const WALLS_A_MM: f64 = 10.0;
 
 /// What lets a kit bear more.
 pub(super) enum Remedy {
@@ -172,9 +172,9 @@ impl Trial<'_> {
             // Plates bend with the cube of their thickness, but openings grow with less than that.
             // What is planned anew with it bears more than this plan does.
             let wanted_mm = wall_mm * (ASKED / borne.max(0.1)).sqrt();
-            let stepped_mm = (wanted_mm / WALL_STEP_MM).ceil() * WALL_STEP_MM;
-            let next_mm = stepped_mm.max(wall_mm + WALL_STEP_MM).min(most_mm);
-            if next_mm <= wall_mm + 0.5 * WALL_STEP_MM || !is_hollow(next_mm) {
+            let stepped_mm = (wanted_mm * WALLS_A_MM).ceil() / WALLS_A_MM;
+            let next_mm = stepped_mm.max(wall_mm + 1.0 / WALLS_A_MM).min(most_mm);
+            if next_mm <= wall_mm + 0.5 / WALLS_A_MM || !is_hollow(next_mm) {
                 break;
             }
             wall_mm = next_mm;

@@ -382,6 +382,7 @@ impl Ball {
     fn job(&self) -> Job<'_> {
         let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
         Job {
+            may_thicken: true,
             pace: Pace::default(),
             params: &self.params,
             model: &self.model,
@@ -446,6 +447,7 @@ fn made(kit: Kit) -> Result<Explored, DesignError> {
     Ok(Explored {
         kit: Some(kit),
         failure: Failure::default(),
+        thicker: None,
         effort: Effort {
             keys: 1,
             kits: 1,
@@ -564,6 +566,7 @@ fn without_any_plan_the_answer_is_why() {
         Ok(Explored {
             kit: None,
             failure: failure(),
+            thicker: None,
             effort: Effort {
                 keys: 1,
                 kits: 1,

@@ -144,6 +144,7 @@ fn the_factor_is_that_of_the_joint_that_gives_way_first() {
     let bearing = |opening_mm: [f64; 3], pin_mpa: [f64; 3]| Bearing {
         opening_mm: opening_mm.to_vec(),
         pin_mpa: pin_mpa.to_vec(),
+        length_mm: vec![1.0; 3],
         n_iterations: 1,
         error: 0.0,
     };
@@ -158,4 +159,35 @@ fn the_factor_is_that_of_the_joint_that_gives_way_first() {
     );
     assert_eq!(borne(&plan, &bearing([0.0; 3], [0.0; 3]), 42.0), Borne::ANY);
     assert_eq!(borne_by_solids(&plan, None, 42.0).factor, 0.0);
+}
+
+#[test]
+fn a_pin_of_three_in_a_hundred_decides_and_one_of_two_does_not() {
+    use shellock_mechanics::{Joint, Side};
+    let joint = Joint {
+        male: Side::A,
+        leaves: Vec3::Z,
+        is_fast: false,
+        pull_on_a: Vec3::Z,
+        weight: 1.0,
+        size_mm: 2.5,
+    };
+    let plan = vec![
+        Meeting {
+            wall: Vec3::X,
+            joint: Some(joint)
+        };
+        100
+    ];
+    let factor = |n_bent: usize| {
+        let bearing = Bearing {
+            opening_mm: vec![0.0; 100],
+            pin_mpa: (0..100).map(|i| if i < n_bent { 84.0 } else { 21.0 }).collect(),
+            length_mm: vec![2.0; 100],
+            n_iterations: 1,
+            error: 0.0,
+        };
+        borne(&plan, &bearing, 42.0).factor
+    };
+    assert_eq!([0, 2, 4, 100].map(factor), [2.0, 2.0, 0.5, 0.5]);
 }

@@ -15,7 +15,7 @@ use shellock_mechanics::{Closed, Drift, JoinedParts, Meeting, SurfaceModel};
 
 use super::PlanModel;
 use crate::handling::{Borne, Deed, Handling, LoadCase, borne, load_cases};
-use crate::plan::RankedPlan;
+use crate::plan::{LatticePlan, RankedPlan};
 
 /// Loads that are borne that many times over are not worth a move.
 pub const ENOUGH: f64 = 1.5;
@@ -111,6 +111,22 @@ impl<'a> Bench<'a> {
             strength_mpa: handling.material.strength_mpa,
             ranks,
         })
+    }
+
+    /// The least load factor of what people do to a kit of that plan: its score.
+    pub fn least_use(&self, plan: &LatticePlan) -> Result<f64, SparseError> {
+        let meetings = self.model.meetings(plan);
+        let joined = self.surface.joined(&meetings)?;
+        let uses = self
+            .drifts
+            .iter()
+            .zip(&self.ranks)
+            .filter(|(_, rank)| **rank == Rank::Use);
+        uses.map(|(load, _)| {
+            let (bearing, _) = joined.bear(&meetings, load, None)?;
+            Ok(borne(&meetings, &bearing, self.strength_mpa).factor)
+        })
+        .try_fold(f64::INFINITY, |least, factor| Ok(least.min(factor?)))
     }
 
     /// All goals of a plan.

@@ -112,6 +112,23 @@ fn a_ball_whose_octants_all_leave_outwards_holds_and_one_whose_pieces_slide_off_
 }
 
 #[test]
+fn the_pull_of_all_seams_opens_them_as_far_whether_a_part_is_held_or_none() {
+    let model = octants();
+    let solver = model.surface_model().unwrap();
+    let meetings = model.meetings(&plan(outwards));
+    let Resistance::Holds(held) = solver.resist(&meetings, 7).unwrap().resistance else {
+        panic!("it holds")
+    };
+    let free = solver
+        .joined(&meetings)
+        .unwrap()
+        .pulled(&meetings, None)
+        .unwrap()
+        .0;
+    assert!((free.quality_mm / held.quality_mm - 1.0).abs() < 1e-3, "{free:?}");
+}
+
+#[test]
 fn a_piece_opens_no_farther_with_its_neighbours_held_than_free() {
     let model = octants();
     let solver = model.surface_model().unwrap();

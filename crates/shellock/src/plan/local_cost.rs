@@ -12,7 +12,7 @@
 //! So the cost of p depends on one [`SeamStates`] a seam, on its [`Role`], and on who remains in its way. The
 //! search asks for bounds while several states are still possible; where one is left, the bound is the cost.
 
-use super::score::{ASKED_MM3, HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
+use super::score::{ASKED_MM3, FIRM_MM3, HELD_MM3, LOOSE_COST, contact_cost, inward_cost, occluded_cost};
 use super::{PieceSet, PlanConstraints, PlanSurvey};
 use crate::push::N_PUSHES;
 use crate::{LatticeDirection, PatchId};
@@ -150,6 +150,12 @@ pub trait PieceCosts: Send + Sync {
     /// know no hold.
     fn is_loose(&self, _piece: PatchId, _role: Role, _around: &Surroundings) -> bool {
         false
+    }
+
+    /// Whether the piece is held by several times what the verification asks for, by estimate; always where the
+    /// costs know no hold.
+    fn is_firm(&self, _piece: PatchId, _role: Role, _around: &Surroundings) -> bool {
+        true
     }
 
     /// Strikes out roles and states that any choice with costs up to `limit` cannot use; may leave some in.
@@ -395,6 +401,10 @@ impl PieceCosts for SeamCosts {
 
     fn is_loose(&self, piece: PatchId, role: Role, around: &Surroundings) -> bool {
         self.hold_mm3(piece, role, around) < ASKED_MM3
+    }
+
+    fn is_firm(&self, piece: PatchId, role: Role, around: &Surroundings) -> bool {
+        self.hold_mm3(piece, role, around) >= FIRM_MM3
     }
 
     fn narrow(&self, piece: PatchId, roles: &mut RoleSet, around: &mut Surroundings, limit: f64) {

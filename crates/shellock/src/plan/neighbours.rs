@@ -17,6 +17,8 @@ pub struct Neighbourhood<'a> {
     most_cost: f64,
     /// Pieces that hardly anything holds in the plan that was found; others may not be.
     loose: Vec<PatchId>,
+    /// Pieces that are not held firmly there; others must be.
+    infirm: Vec<PatchId>,
 }
 
 /// What tells plans apart that join different pieces, or along different ways.
@@ -35,8 +37,10 @@ impl<'a> Neighbourhood<'a> {
         let piece = found.plan.key();
         let is_key = |k: &KeyChoice| k.piece == piece && k.slides == found.scope.slides;
         let key = choices(params, survey).into_iter().find(is_key);
+        let space = Space::new(survey, constraints, found.tolerance);
         Self {
-            space: Space::new(survey, constraints, found.tolerance),
+            infirm: space.infirm(&found.plan),
+            space,
             key_ways: key.map_or_else(|| vec![found.plan.separation(piece)], |k| k.directions),
             most_cost,
             loose: found.pool.first().map_or(Vec::new(), |p| p.loose.clone()),
@@ -51,7 +55,8 @@ impl<'a> Neighbourhood<'a> {
         }
         let loose = self.space.loose(&plan);
         let is_known = loose.iter().all(|p| self.loose.contains(p));
-        is_known.then_some(RankedPlan { plan, score, loose })
+        let is_firm = || self.space.infirm(&plan).iter().all(|p| self.infirm.contains(p));
+        (is_known && is_firm()).then_some(RankedPlan { plan, score, loose })
     }
 
     /// Names a plan.

@@ -200,6 +200,16 @@ impl<'a> Space<'a> {
         (0..self.n).map(PatchId::from).filter(is_loose).collect()
     }
 
+    /// Pieces of `plan` that are not held firmly.
+    pub fn infirm(&self, plan: &LatticePlan) -> Vec<PatchId> {
+        let around = self.surroundings(plan);
+        let is_firm = |p: &PatchId| {
+            let (role, around) = &around[usize::from(*p)];
+            self.costs.is_firm(*p, *role, around)
+        };
+        (0..self.n).map(PatchId::from).filter(|p| !is_firm(p)).collect()
+    }
+
     /// Role and surroundings of each piece in `plan`.
     pub fn surroundings(&self, plan: &LatticePlan) -> Vec<(Role, Surroundings)> {
         let mut separations = vec![None; self.n];

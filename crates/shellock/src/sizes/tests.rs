@@ -73,10 +73,34 @@ fn a_fixed_size_is_that_of_all_pairs_whatever_the_stress() {
         found,
         ChosenSizes {
             sizes: ConnectorSizes::default(),
-            limited: Vec::new()
+            limited: Vec::new(),
+            most: BTreeMap::new(),
+            raised: Vec::new(),
         }
     );
     assert!(warnings.is_empty());
+}
+
+#[test]
+fn for_the_sake_of_use_connectors_grow_once_to_what_fits_and_that_is_told() {
+    let surface = halves(Vec3::splat(40.0));
+    let (mut sizes, _) = chosen(&surface, &PARAMS, None);
+    let mut capped = sizes.clone();
+    assert!(sizes.raise([B, A], "pressed on its top") && !sizes.raise([A, B], "dropped"));
+    assert_eq!(sizes.sizes.of(A, B), 4.0);
+    let ctx = Ctx::quiet();
+    sizes.tell(&ctx);
+    let told = ctx.into_warnings().remove(0);
+    assert_eq!(told.pieces, [A, B]);
+    assert!(told.to_string().contains("4.0 mm instead of 2.0 mm"), "{told}");
+    // A narrow limb has room for no more than the stress asked for; neither have a key's rails.
+    capped.cap(B, 2.0);
+    assert!(!capped.raise([A, B], "dropped") && capped.sizes.of(A, B) == 2.0);
+    let fixed = SizeParams {
+        choice: SizeChoice::Fixed(2.5),
+        ..PARAMS
+    };
+    assert!(!chosen(&surface, &fixed, None).0.raise([A, B], "dropped"));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use shellock_render::svg::{begin, end, text};
 
-use super::{Outcome, Pair, StressReport, StressVerdict};
+use super::{Outcome, StressReport, StressVerdict};
 
 const ROW_PX: f64 = 26.0;
 const NAME_PX: f64 = 130.0;
@@ -15,7 +15,7 @@ const PANEL_PX: f64 = NAME_PX + LONGEST_PX + LABEL_PX + 20.0;
 
 /// One bar.
 struct Row {
-    design: &'static str,
+    design: String,
     value: f64,
     /// It holds below this.
     limit: f64,
@@ -30,10 +30,7 @@ type Groups = [(String, Vec<Row>); 2];
 /// designs under the punch, then in the fall. A line marks the limit of each bar. The verdict of the test
 /// stands at its opening.
 pub fn chart(report: &StressReport) -> String {
-    let (width, height) = (
-        2.0 * PANEL_PX,
-        ROW_PX * (2.0 * report.designs().len() as f64 + 6.0),
-    );
+    let (width, height) = (2.0 * PANEL_PX, ROW_PX * (2.0 * report.rows().len() as f64 + 6.0));
     let mut svg = begin(width, height);
     panel(&mut svg, 0.0, "widest opening, mm", &groups(report, opening));
     panel(
@@ -42,12 +39,12 @@ pub fn chart(report: &StressReport) -> String {
         "stress, % of the strength",
         &groups(report, stress),
     );
-    let note = "Black line: below it the kit holds. Connectors of half the size may open half as far.";
+    let note = "Black line: below it the kit holds. Printed: finished pieces with their gaps; μ: friction.";
     text(&mut svg, [NAME_PX, height - 0.6 * ROW_PX], "fill=\"#555\"", note);
     end(svg)
 }
 
-fn opening(design: &'static str, outcome: &Outcome) -> Row {
+fn opening(design: String, outcome: &Outcome) -> Row {
     let Outcome {
         opening_mm: value,
         limit_mm: limit,
@@ -68,7 +65,7 @@ fn opening(design: &'static str, outcome: &Outcome) -> Row {
     }
 }
 
-fn stress(design: &'static str, outcome: &Outcome) -> Row {
+fn stress(design: String, outcome: &Outcome) -> Row {
     let (value, limit) = (100.0 * outcome.strength_share, 100.0);
     let (color, _) = style(if value > limit {
         StressVerdict::Yields
@@ -85,21 +82,15 @@ fn stress(design: &'static str, outcome: &Outcome) -> Row {
 }
 
 /// The bars of both tests.
-fn groups(report: &StressReport, row: fn(&'static str, &Outcome) -> Row) -> Groups {
-    let rows = |of: fn(&Pair) -> &Outcome| -> Vec<Row> {
-        report
-            .designs()
-            .into_iter()
-            .map(|(design, pair)| row(design, of(pair)))
-            .collect()
-    };
-    let (punch_n, impact_n) = (report.kit.punch.force_n, report.kit.drop.force_n);
+fn groups(report: &StressReport, row: fn(String, &Outcome) -> Row) -> Groups {
+    let all = report.rows();
+    let force_n = |of: fn(&(String, &Outcome, &Outcome)) -> f64| all.first().map_or(0.0, of);
+    let (punch_n, impact_n) = (force_n(|r| r.1.force_n), force_n(|r| r.2.force_n));
+    let punches = all.iter().map(|r| row(r.0.clone(), r.1)).collect();
+    let falls = all.iter().map(|r| row(r.0.clone(), r.2)).collect();
     [
-        (format!("punched with {punch_n:.0} N"), rows(|pair| &pair.punch)),
-        (
-            format!("fallen, stopped with {impact_n:.0} N"),
-            rows(|pair| &pair.drop),
-        ),
+        (format!("punched with {punch_n:.0} N"), punches),
+        (format!("fallen, stopped with {impact_n:.0} N"), falls),
     ]
 }
 
@@ -138,7 +129,7 @@ fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, row: &Row) {
     };
     let (limit, thick) = (row.limit * px_per_unit, 0.8 * ROW_PX);
     let (at, bottom, baseline) = (left + limit, y + thick, y + 0.6 * ROW_PX);
-    text(svg, [left - 8.0, baseline], "text-anchor=\"end\"", row.design);
+    text(svg, [left - 8.0, baseline], "text-anchor=\"end\"", &row.design);
     // Writing to a string cannot fail.
     let _ = writeln!(
         svg,

@@ -1,5 +1,9 @@
+use shellock_geom::{Aabb, Volume};
+
+use super::compare::Bench;
 use super::*;
 use crate::LatticeDirection;
+use crate::handling::region::{around, lowest, spread};
 use crate::plan::LatticeStep;
 use crate::testing::{label, sphere};
 
@@ -56,18 +60,87 @@ fn forces_are_spread_over_what_they_hit_and_add_up() {
     );
 }
 
+/// The octants of a hollow ball, each half a gap back from its neighbours.
+fn finished_octants(gap_mm: f64) -> Vec<Solid> {
+    let ball = |radius_mm: f64| Volume::from_closed_mesh(&sphere(4, Vec3::splat(radius_mm))).unwrap();
+    let wall = ball(40.0).subtract(&ball(38.0));
+    let octant = |i: u32| {
+        let side = |bit: u32| {
+            let (near, far) = (0.5 * gap_mm, 50.0);
+            if i >> bit & 1 == 1 {
+                (near, far)
+            } else {
+                (-far, -near)
+            }
+        };
+        let of = [0, 1, 2].map(side);
+        let cutter = Volume::cuboid(Aabb {
+            min: of.map(|s| s.0).into(),
+            max: of.map(|s| s.1).into(),
+        });
+        Solid::new(wall.intersect(&cutter).to_mesh()).unwrap()
+    };
+    (0..8).map(octant).collect()
+}
+
+/// Nothing but its shape holds a ball that is cut into octants without connectors: on a table it stands under
+/// a light touch no better than its gaps let it, and the report says of what it is.
 #[test]
-fn half_connectors_fare_worse_than_whole_ones_and_the_report_says_so() {
+fn what_is_tested_is_what_is_printed() {
     let ctx = Ctx::quiet();
-    let tested = stress_test(&ctx, &coarse(), &octants(), &as_it_lies(&outwards())).unwrap();
-    let (kit, half) = (&tested.kit, &tested.half_connectors);
+    let test = |pieces: &[Solid]| {
+        let params = StressParams {
+            cell_mm: 5.0,
+            ..coarse()
+        };
+        stress_test(&ctx, &params, &octants(), &as_it_lies(&outwards()), pieces, None)
+    };
+    let tested = test(&finished_octants(0.2)).unwrap();
+    // Walls of 2 mm about a ball of 40 mm, of 1.15 g/cm³.
+    let shell_g = 4.0 / 3.0 * std::f64::consts::PI * (40.0_f64.powi(3) - 38.0_f64.powi(3)) * 1.15e-3;
+    assert!((tested.mass_g / shell_g - 1.0).abs() < 0.03, "{}", tested.mass_g);
+    assert_eq!(tested.printed.len(), FRICTION.len());
+    // Octants without connectors fall apart.
+    assert!(!tested.passed() && tested.compared.is_none());
+    assert!(
+        tested
+            .printed
+            .iter()
+            .all(|p| p.drop.verdict == StressVerdict::ComesApart)
+    );
+    let refused = test(&finished_octants(0.2)[1..]);
+    assert_eq!(
+        refused,
+        Err(StressError::Pieces {
+            pieces: 7,
+            patches: 8
+        })
+    );
+}
+
+#[test]
+fn half_connectors_fare_worse_than_whole_ones_and_the_chart_says_so() {
+    let compared = compare(&Ctx::quiet(), &coarse(), &octants(), &as_it_lies(&outwards())).unwrap();
+    let (kit, half) = (&compared.kit, &compared.half_connectors);
     for (whole, half) in [(&kit.punch, &half.punch), (&kit.drop, &half.drop)] {
         assert!(half.opening_mm > whole.opening_mm, "{half:?} {whole:?}");
         assert!(half.connector_mpa > whole.connector_mpa && half.verdict >= whole.verdict);
     }
-    let drawing = chart(&tested);
-    assert_eq!(drawing.matches("<rect").count(), 1 + 4 * tested.designs().len());
-    assert_eq!(drawing.matches("<line").count(), 4 * tested.designs().len());
+    let printed = FRICTION.map(|friction| Printed {
+        friction,
+        punch: kit.punch.clone(),
+        drop: kit.drop.clone(),
+    });
+    let report = StressReport {
+        printed: printed.to_vec(),
+        compared: Some(compared.clone()),
+        mass_g: 1.0,
+        strength_mpa: 42.0,
+    };
+    let n_rows = FRICTION.len() + compared.designs().len();
+    let drawing = chart(&report);
+    assert_eq!(drawing.matches("<rect").count(), 1 + 4 * n_rows);
+    assert_eq!(drawing.matches("<line").count(), 4 * n_rows);
     assert!(drawing.ends_with("</svg>\n"));
 }
 
@@ -110,16 +183,17 @@ fn what_does_not_belong_together_is_refused() {
     let ctx = Ctx::quiet();
     let mut plan = outwards();
     plan.steps.pop();
-    let refused = stress_test(&ctx, &coarse(), &octants(), &as_it_lies(&plan));
+    let refused = compare(&ctx, &coarse(), &octants(), &as_it_lies(&plan));
     assert_eq!(refused, Err(StressError::Plan { steps: 7, patches: 8 }));
     let mut astray = as_it_lies(&outwards());
     astray.steps[3].separation = crate::Direction::of(Vec3::new(1.0, 0.2, 0.0)).unwrap();
-    let refused = stress_test(&ctx, &coarse(), &octants(), &astray);
+    let refused = compare(&ctx, &coarse(), &octants(), &astray);
     assert_eq!(refused, Err(StressError::Direction(PatchId(3))));
     let params = StressParams {
         punch_n: f64::NAN,
         drop_mm: -1.0,
+        cell_mm: 0.0,
         ..coarse()
     };
-    assert_eq!(params.problems().len(), 2);
+    assert_eq!(params.problems().len(), 3);
 }

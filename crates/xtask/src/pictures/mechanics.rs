@@ -8,8 +8,8 @@ use shellock::key::Turn;
 use shellock::metric::MetricParams;
 use shellock::strength::chart::{SeamStress, strength_chart};
 use shellock::strength::{Strength, StressMap};
-use shellock::stress_test::{StressParams, chart, stress_test};
-use shellock_geom::{TriMesh, Vec3};
+use shellock::stress_test::{StressParams, chart, compare, stress_test};
+use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_render::stills::{Camera, Painted, render};
 
 use super::draw::{PALE, RED, color_bar, color_of, dots, plain, tube};
@@ -130,7 +130,7 @@ pub fn openings(kit: &Kit) -> Vec<u8> {
     sheet.bytes()
 }
 
-/// The chart of `shellock test` with its defaults.
+/// The chart of `shellock test --compare` with its defaults.
 pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
     let made = &kit.design.kit;
     let (mut plan, mut turn) = (kit.settings.plan.clone(), Turn::default());
@@ -146,7 +146,17 @@ pub fn tested(kit: &Kit) -> Result<Vec<u8>, Failure> {
         turn,
         ..StressParams::default()
     };
-    let report = with_ctx(|ctx| stress_test(ctx, &params, &made.surface, &made.plan));
+    let solids = made.pieces.iter().map(|(_, piece)| Solid::new(piece.clone()));
+    let solids = solids
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| Failure::Model {
+            path: PathBuf::from("squirrel"),
+            problem: e.to_string(),
+        })?;
+    let report = with_ctx(|ctx| {
+        let compared = compare(ctx, &params, &made.surface, &made.plan)?;
+        stress_test(ctx, &params, &made.surface, &made.plan, &solids, Some(compared))
+    });
     let report = report.map_err(|e| Failure::Model {
         path: PathBuf::from("squirrel"),
         problem: e.to_string(),

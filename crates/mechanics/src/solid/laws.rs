@@ -1,0 +1,93 @@
+//! What contacts answer to relative motion: pressure once the gap is closed, friction up to a bound, and
+//! holds in all directions.
+
+use shellock_geom::Vec3;
+
+use super::touch::Touch;
+
+/// Depth of material whose compression is the compliance of a contact, mm: what a printed face gives before
+/// it bears. A face of 4 mm² under 10 N gives 0.0001 mm.
+const SKIN_MM: f64 = 0.1;
+/// What is left of a contact's stiffness along the way it slips, as a share: it makes the step unique.
+const SLIP_SHARE: f64 = 1e-6;
+
+/// One contact, between two parts or between a part and the ground.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contact {
+    /// Out of the first end's part into the second's.
+    pub normal: Vec3,
+    pub gap_mm: f64,
+    /// Whether it holds in all directions.
+    pub is_fast: bool,
+    /// N/mm.
+    pub stiffness: f64,
+}
+
+impl Contact {
+    pub fn of_touch(touch: &Touch, youngs_modulus_mpa: f64) -> Self {
+        Self {
+            normal: touch.normal,
+            gap_mm: touch.gap_mm,
+            is_fast: touch.is_fast,
+            stiffness: stiffness(touch.area_mm2, youngs_modulus_mpa),
+        }
+    }
+}
+
+/// Stiffness of a contact of that area, N/mm.
+pub(super) fn stiffness(area_mm2: f64, youngs_modulus_mpa: f64) -> f64 {
+    youngs_modulus_mpa * area_mm2.max(0.01) / SKIN_MM
+}
+
+/// How much friction a contact has, N, and from where its slip is counted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Grip {
+    pub bound_n: f64,
+    pub origin: Vec3,
+}
+
+/// A direction along which a contact answers: `force = −stiffness · motion + constant`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Answer {
+    pub along: Vec3,
+    pub stiffness: f64,
+}
+
+/// Force on the second part, N, where it has moved by `by` relative to the first.
+pub(super) fn force(contact: &Contact, grip: &Grip, by: Vec3) -> Vec3 {
+    if contact.is_fast {
+        return -contact.stiffness * by;
+    }
+    let gap = contact.gap_mm + contact.normal.dot(by);
+    let pressure = contact.normal * (contact.stiffness * (-gap).max(0.0));
+    if grip.bound_n <= 0.0 {
+        return pressure;
+    }
+    let slip = (by - grip.origin).reject_from_normalized(contact.normal);
+    let most = grip.bound_n / contact.stiffness;
+    pressure - contact.stiffness * slip * (most / slip.length().max(most)).min(1.0)
+}
+
+/// The directions along which it answers at all.
+pub(super) fn answers(contact: &Contact, grip: &Grip, by: Vec3) -> Vec<Answer> {
+    let k = contact.stiffness;
+    let along = |along: Vec3, stiffness: f64| Answer { along, stiffness };
+    if contact.is_fast {
+        return Vec3::AXES.map(|axis| along(axis, k)).to_vec();
+    }
+    let n = contact.normal;
+    let mut all = Vec::new();
+    if contact.gap_mm + n.dot(by) < 0.0 {
+        all.push(along(n, k));
+    }
+    if grip.bound_n > 0.0 {
+        let slip = (by - grip.origin).reject_from_normalized(n);
+        let first = slip.try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
+        let second = n.cross(first);
+        let share = grip.bound_n / (k * slip.length()).max(grip.bound_n);
+        let forwards = if share < 1.0 { SLIP_SHARE } else { 1.0 };
+        all.push(along(first, k * forwards));
+        all.push(along(second, k * share.max(SLIP_SHARE)));
+    }
+    all
+}
