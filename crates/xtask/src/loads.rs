@@ -1,21 +1,20 @@
 //! What random plans of a model bear by the surface model and by the solid one, load by load.
 
+mod gain;
+
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 use rayon::prelude::*;
-use shellock::Ctx;
-use shellock::design::Settings;
 use shellock::handling::{
     Borne, Deed, Failure as Way, Handling, LoadCase, borne, borne_by_solids, load_cases,
 };
-use shellock::metric::{Bench, ClimbError, ClimbParams, climb};
-use shellock::plan::{Neighbourhood, PlanConstraints, PlanOutcome, search};
 use shellock_mechanics::{Drift, Meeting, VolumeModel};
 
 use crate::failure::Failure;
 use crate::metrics::{Subject, SubjectOptions, subject};
+use crate::model::at_least_one;
 use crate::statistics::spearman;
 use crate::study::write_all;
 use crate::table::{Table, markdown};
@@ -31,6 +30,9 @@ pub struct LoadsOptions {
     /// Climb from the search's plans with so many loads solved
     #[arg(long)]
     climb: Option<usize>,
+    /// Compare the plan that a climb ends at with so many random plans; as many as --plans says, if not given
+    #[arg(long, value_parser = at_least_one, requires = "climb")]
+    random: Option<usize>,
     /// Cost that plans may have, over the least
     #[arg(long, default_value_t = 1.25)]
     slack: f64,
@@ -65,10 +67,7 @@ pub fn run(options: &LoadsOptions, out: &std::path::Path) -> Result<Vec<PathBuf>
     }
     let mut sheets = tables(&rows, subject.plans.len());
     if let Some(n_solves) = options.climb {
-        sheets.push((
-            "climb.md".to_owned(),
-            climbed(&subject, options, &handling, n_solves)?,
-        ));
+        sheets.extend(gain::sheets(&subject, options, &handling, n_solves)?);
     }
     write_all(out, &format!("{}/loads", options.subject.model.name()), &sheets)
 }
@@ -91,7 +90,8 @@ fn tables(rows: &[Row], n_plans: usize) -> Vec<(String, String)> {
         "ρ with solid",
     ];
     let both = |r: &Row| {
-        let name = deed(&r.case.deed);
+        // No comma may be in the name of a column.
+        let name = deed(&r.case.deed).replace(',', "");
         [
             (format!("{name} surface"), r.surface.clone()),
             (format!("{name} solid"), r.solid.clone()),
@@ -102,52 +102,6 @@ fn tables(rows: &[Row], n_plans: usize) -> Vec<(String, String)> {
         ("loads.md".to_owned(), markdown(&head, &table)),
         ("loads.csv".to_owned(), Table { columns }.to_csv()),
     ]
-}
-
-/// What the search's first plan bears and what the plan bears that a climb ends at, load by load.
-fn climbed(
-    subject: &Subject,
-    options: &LoadsOptions,
-    handling: &Handling,
-    n_solves: usize,
-) -> Result<String, Failure> {
-    let params = Settings::resolve(&options.subject.model.params()).plan;
-    let (constraints, ctx) = (PlanConstraints::default(), Ctx::quiet());
-    let found = match search(&ctx, &params, &subject.survey, &constraints) {
-        Ok(PlanOutcome::Found(found)) => found,
-        Ok(_) => return Err(crate::metrics::failed("search", &"no plan keeps all conditions")),
-        Err(e) => return Err(crate::metrics::failed("search", &e)),
-    };
-    let counted = found.counted(&subject.survey);
-    let most_cost = found.score.worst * options.slack;
-    let around = Neighbourhood::new(&params, &counted, &constraints, &found, most_cost);
-    let failed = |e: ClimbError| crate::metrics::failed("climb", &e);
-    let bench = Bench::new(handling, &subject.model).map_err(|e| failed(e.into()))?;
-    let first = bench.rated(found.pool[0].clone()).map_err(|e| failed(e.into()))?;
-    let start = Instant::now();
-    let budget = ClimbParams {
-        n_solves,
-        ..Default::default()
-    };
-    let top = climb(&ctx, budget, &bench, &around, &found.pool, &|_| true).map_err(failed)?;
-    eprintln!(
-        "{} plans, {} loads solved in {:.2} s; cost {:.3}, least {:.3}",
-        top.n_plans,
-        top.n_solves,
-        start.elapsed().as_secs_f64(),
-        top.best.ranked.score.worst,
-        found.score.worst
-    );
-    let row = |name: String, from: f64, to: f64| vec![name, format!("{from:.2}"), format!("{to:.2}")];
-    let mut table = vec![row("least use".into(), first.least(), top.best.least())];
-    for (i, case) in bench.cases.iter().enumerate() {
-        table.push(row(
-            deed(&case.deed),
-            first.borne()[i].factor,
-            top.best.borne()[i].factor,
-        ));
-    }
-    Ok(markdown(&["load", "the search's plan", "climbed"], &table))
 }
 
 fn by_surface(subject: &Subject, cases: &[LoadCase]) -> Result<Vec<Row>, Failure> {
