@@ -9,8 +9,8 @@ use crate::plan::{FoundPlan, LatticePlan, RankedPlan};
 /// Plans whose cost is at most this share above the least may be chosen.
 ///
 /// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins
-/// hold). With a tenth less of the choice the kits bear a fifth less, with twice as much hardly more:
-/// docs/notes/metrics.md.
+/// hold). With 0.15 three of five kits bear a tenth to a quarter less of the worst use, with 0.5 one bears a
+/// third more and the others, up to what is enough, hardly more: docs/notes/metrics.md.
 pub(super) const COST_SLACK: f64 = 0.25;
 
 /// Play is foreseen within a factor of about one and a half; pieces that are foreseen to have less than this

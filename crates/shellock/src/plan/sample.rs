@@ -1,5 +1,7 @@
 //! Random plans that keep every condition, for studies of metrics (Sect. 5.4).
 
+use std::collections::BTreeSet;
+
 use super::draw::{DrawLimits, draw};
 use super::key::choices;
 use super::search::stream;
@@ -23,13 +25,18 @@ pub fn random_plans(params: &PlanParams, survey: &PlanSurvey, n: usize) -> Vec<L
         let space = Space::new(&counted, &constraints, params.relaxed_tolerance);
         for key in choices(params, &counted) {
             let mut plans: Vec<LatticePlan> = Vec::new();
+            let mut seen = BTreeSet::new();
+            let mut is_new = |plan: &LatticePlan| {
+                let steps = plan.steps.iter().map(|step| (step.piece, step.separation));
+                seen.insert(steps.collect::<Vec<_>>())
+            };
             for i in 0..DRAWS_PER_PLAN * n {
                 let limits = DrawLimits {
                     bound: f64::INFINITY,
                     max_tries: TRIES_PER_PIECE * space.n,
                 };
                 let drawn = draw(&space, &key, stream(params.seed, i), WIDEST, limits);
-                plans.extend(drawn.plan.filter(|p| !plans.contains(p)));
+                plans.extend(drawn.plan.filter(|p| is_new(p)));
                 let is_hopeless = plans.is_empty() && i >= n;
                 if plans.len() >= n {
                     return plans;
