@@ -55,6 +55,8 @@ fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
             "80",
             "--pieces",
             "6",
+            "--time",
+            "0",
             "--threads",
             threads,
             "-o",
