@@ -452,7 +452,7 @@ impl ChosenSizes {
         true
     }
 
-    /// Warns with `connector-raised` of each pair that got larger ones than the stress asks for, and with
+    /// Warns with `connectors-for-use` of each pair that got larger ones than the stress asks for, and with
     /// `connector-limited`: once for all seams that are too short, once for all cavities that are
     /// too narrow.
     pub fn tell(&self, ctx: &Ctx<'_>) {
