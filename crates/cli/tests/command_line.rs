@@ -47,22 +47,8 @@ fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn a_kit_is_whole_verified_and_the_same_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
     let job = |threads: &str, out: &str| {
-        let args = [
-            "demo",
-            "--figure",
-            "vase",
-            "--size",
-            "80",
-            "--pieces",
-            "6",
-            "--time",
-            "0",
-            "--threads",
-            threads,
-            "-o",
-            out,
-            "--json",
-        ];
+        let job = "demo --figure vase --size 80 --pieces 6 --time 0 --json --threads";
+        let args: Vec<&str> = job.split(' ').chain([threads, "-o", out]).collect();
         shellock(dir.path(), &args)
     };
     let one = job("1", "one");

@@ -462,7 +462,7 @@ impl Borne {
     };
 
     /// Of the separation force: by how many times it may grow until the seam that decides the plan's quality opens
-    /// by [`PULLED_MM`].
+    /// by 0.1 mm; only ratios of it matter.
     pub fn of_pull(opening: &Opening) -> Self {
         match opening.worst {
             Some(station) => Self::ANY.and(PULLED_MM / -opening.quality_mm, Failure::Opens, station),
