@@ -225,6 +225,7 @@ fn print_table(params: &StressParams, tested: &StressReport) {
             print_row(&name, test, o);
         }
     }
+    print_key(tested);
     let Some(compared) = &tested.compared else {
         return;
     };
@@ -238,6 +239,22 @@ fn print_table(params: &StressParams, tested: &StressReport) {
     }
     if compared.half_score.is_none() {
         println!("no other plan was found, so none of half the score was tested");
+    }
+}
+
+/// How far the key slides out, where that can be seen.
+fn print_key(tested: &StressReport) {
+    /// What is less is play.
+    const SEEN_MM: f64 = 0.5;
+    for printed in &tested.printed {
+        for (done, o) in [("the punch", &printed.punch), ("the fall", &printed.drop)] {
+            if o.key_slides_mm >= SEEN_MM && o.key_slides_mm.is_finite() {
+                println!(
+                    "with friction {} the key slides out by {:.1} mm in {done}: push it back, or build with --detent 0.2",
+                    printed.friction, o.key_slides_mm
+                );
+            }
+        }
     }
 }
 

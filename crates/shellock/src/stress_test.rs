@@ -175,6 +175,9 @@ pub struct Outcome {
     pub opening_mm: f64,
     /// How much of it is play: what a hundredth of the force does; 0 where there are no gaps.
     pub play_mm: f64,
+    /// How far the key slides out on its way, where nothing but friction or a detent holds it, mm; no part of the
+    /// opening. 0 by the model without gaps, which holds the key fast.
+    pub key_slides_mm: f64,
     /// How far the connectors there may come out and still hold, mm.
     pub limit_mm: f64,
     /// The pieces that part there.
@@ -386,7 +389,7 @@ pub fn stress_test(
     ctx.stage("finished pieces", 0)?;
     let model = PlanModel::new(&params.metric, surface, &params.sizes);
     let meetings = model.meetings(plan);
-    let mut bench = printed::Bench::new(ctx, params, surface, &model, &meetings, &pieces)?;
+    let mut bench = printed::Bench::new(ctx, params, surface, &model, plan, &meetings, &pieces)?;
     let mut tested = Vec::new();
     for friction in FRICTION {
         ctx.stage(&format!("stress test with friction {friction}"), 0)?;

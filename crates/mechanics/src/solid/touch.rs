@@ -87,7 +87,8 @@ pub(super) fn touches(parts: &[Solid], reach_mm: f64, spacing_mm: f64) -> Vec<To
         .collect();
     pairs
         .par_iter()
-        .map(|&[a, b]| between(parts, &trees[b], [a, b], reach_mm, spacing_mm))
+        .flat_map(|&[a, b]| [[a, b], [b, a]])
+        .map(|[a, b]| between(parts, &trees[b], [a, b], reach_mm, spacing_mm))
         .collect::<Vec<_>>()
         .concat()
 }
@@ -108,11 +109,15 @@ fn between(
             continue;
         }
         spots(mesh, face, &mut |spot| {
-            let facing = tree.nearest(spot.at, reach_mm * reach_mm).and_then(|hit| {
-                let its = other.area_vector_doubled(hit.face as usize).try_normalize()?;
-                facing(&spot, hit.point, its)
-            });
-            let Some((normal, gap_mm)) = facing else {
+            let its = |face: u32| other.area_vector_doubled(face as usize).try_normalize();
+            let nearest = tree.nearest(spot.at, reach_mm * reach_mm);
+            let beside = nearest.and_then(|hit| facing(&spot, hit.point, its(hit.face)?));
+            // What is nearest may lie beside the place, and something else in front of it.
+            let ahead = || {
+                let (face, far_mm) = tree.first_hit(spot.at, spot.normal, reach_mm)?;
+                facing(&spot, spot.at + far_mm * spot.normal, its(face)?)
+            };
+            let Some((normal, gap_mm)) = beside.or_else(ahead) else {
                 return;
             };
             let touch = Touch {
@@ -120,7 +125,8 @@ fn between(
                 at: [spot.at, spot.at + gap_mm * normal],
                 normal,
                 gap_mm: gap_mm.max(0.0),
-                area_mm2: spot.area_mm2,
+                // Either part is sampled.
+                area_mm2: spot.area_mm2 / 2.0,
                 is_fast: gap_mm < -PRESSED_MM,
             };
             let [x, y, z] = (spot.at / spacing_mm).to_array().map(|x| x.floor() as i64);

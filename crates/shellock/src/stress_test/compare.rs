@@ -200,6 +200,7 @@ impl<'a> Bench<'a> {
             force_n,
             opening_mm,
             play_mm: 0.0,
+            key_slides_mm: 0.0,
             limit_mm: limit_mm(
                 widest
                     .and_then(|i| meetings[i].joint)

@@ -1,7 +1,5 @@
 //! The tests of the pieces as they are printed: their finished meshes, with the gaps that these have.
 
-use std::ops::Range;
-
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::{Solid, Vec3};
 use shellock_mechanics::connector::PIN_DEPTH;
@@ -14,7 +12,8 @@ use super::{
 use crate::handling::region::{around, lowest, spread};
 use crate::impact::impact_n;
 use crate::metric::PlanModel;
-use crate::{Ctx, SegmentedSurface};
+use crate::plan::LatticePlan;
+use crate::{Ctx, PatchId, SegmentedSurface};
 
 /// Coefficients of friction: none, and little for printed plastic on itself. What is between holds between.
 pub const FRICTION: [f64; 2] = [0.0, 0.2];
@@ -26,6 +25,8 @@ pub(super) struct Bench<'a> {
     params: &'a StressParams,
     model: &'a PlanModel,
     meetings: &'a [Meeting],
+    /// The key and its way out.
+    key: (PatchId, Vec3),
     solid: SolidModel,
     /// Root and tip of each station's pin, on either piece.
     places: Vec<Vec<[Spot; 2]>>,
@@ -37,6 +38,7 @@ impl<'a> Bench<'a> {
         params: &'a StressParams,
         surface: &SegmentedSurface,
         model: &'a PlanModel,
+        plan: &LatticePlan,
         meetings: &'a [Meeting],
         pieces: &[Solid],
     ) -> Result<Self, StressError> {
@@ -73,6 +75,7 @@ impl<'a> Bench<'a> {
             params,
             model,
             meetings,
+            key: (plan.key(), plan.separation(plan.key()).unit()),
             solid,
             places,
         })
@@ -136,54 +139,87 @@ impl<'a> Bench<'a> {
             let percent = 100.0 * moved.friction_off;
             ctx.note(&format!("friction is off by {percent:.1} % of the load"));
         }
-        Ok(Self::judged(
-            self.params,
-            self.model,
-            self.meetings,
-            &self.places,
-            &moved,
-            force_n,
-        ))
+        let seen = Seen {
+            model: self.model,
+            meetings: self.meetings,
+            key: self.key,
+            places: &self.places,
+            moved: &moved,
+        };
+        Ok(seen.judged(self.params, force_n))
+    }
+}
+
+/// What became of the seams.
+struct Seen<'a> {
+    model: &'a PlanModel,
+    meetings: &'a [Meeting],
+    key: (PatchId, Vec3),
+    places: &'a [Vec<[Spot; 2]>],
+    moved: &'a Moved<'a>,
+}
+
+impl Seen<'_> {
+    /// How far the second piece goes from the first at each place of a station.
+    fn apart<'s>(
+        &'s self,
+        station: usize,
+        motion: &'s dyn Fn(&Spot) -> Vec3,
+    ) -> impl Iterator<Item = Vec3> + 's {
+        self.places[station].iter().map(|[a, b]| motion(b) - motion(a))
     }
 
-    fn judged(
-        params: &StressParams,
-        model: &PlanModel,
-        meetings: &[Meeting],
-        places: &[Vec<[Spot; 2]>],
-        moved: &Moved<'_>,
-        force_n: f64,
-    ) -> Outcome {
+    /// How far the key goes out of its way there, of what the pieces go apart; 0 between others.
+    fn slid_mm(&self, station: usize, apart: Vec3) -> f64 {
+        let [a, b] = self.model.pieces_at(station);
+        let (key, out) = self.key;
+        let outward = match key {
+            _ if key == b => apart.dot(out),
+            _ if key == a => -apart.dot(out),
+            _ => 0.0,
+        };
+        outward.max(0.0)
+    }
+
+    /// The widest opening of a station, mm. That the key slides on its way out, where nothing but friction or a
+    /// detent is to hold it, opens nothing.
+    fn widest_mm(&self, station: usize, motion: &dyn Fn(&Spot) -> Vec3) -> f64 {
+        let openings = self.apart(station, motion).map(|apart| {
+            let slid_mm = self.slid_mm(station, apart);
+            (apart.length_squared() - slid_mm * slid_mm).max(0.0).sqrt()
+        });
+        openings.fold(0.0, f64::max)
+    }
+
+    fn opening_mm(&self, station: usize, lost: &[u32]) -> f64 {
+        if self.model.pieces_at(station).iter().any(|piece| lost.contains(&piece.0)) {
+            f64::INFINITY
+        } else {
+            self.widest_mm(station, &|spot| self.moved.moved_mm(spot))
+        }
+    }
+
+    /// How far the key slides out, mm.
+    fn key_slides_mm(&self) -> f64 {
+        let moved = |spot: &Spot| self.moved.moved_mm(spot);
+        let slides = (0..self.meetings.len()).flat_map(|i| {
+            let slid: Vec<f64> = self.apart(i, &moved).map(|apart| self.slid_mm(i, apart)).collect();
+            slid
+        });
+        slides.fold(0.0, f64::max)
+    }
+
+    fn judged(&self, params: &StressParams, force_n: f64) -> Outcome {
+        let (meetings, moved) = (self.meetings, self.moved);
         let lost_parts = moved.lost();
-        let is_loose = |i: usize| {
-            model
-                .pieces_at(i)
-                .iter()
-                .any(|piece| lost_parts.contains(&piece.0))
+        let openings: Vec<f64> = (0..meetings.len())
+            .map(|i| self.opening_mm(i, &lost_parts))
+            .collect();
+        let widest = (0..meetings.len()).max_by(|a, b| openings[*a].total_cmp(&openings[*b]));
+        let is_lost = |(m, opening_mm): &(&Meeting, &f64)| {
+            m.joint.is_some_and(|j| **opening_mm >= PIN_DEPTH * j.size_mm)
         };
-        let widest_at = |i: usize, motion: &dyn Fn(&Spot) -> Vec3| {
-            let apart = places[i].iter().map(|[a, b]| motion(a).distance(motion(b)));
-            apart.fold(0.0, f64::max)
-        };
-        let opening = |i: usize| {
-            if is_loose(i) {
-                f64::INFINITY
-            } else {
-                widest_at(i, &|spot| moved.moved_mm(spot))
-            }
-        };
-        let stations: Range<usize> = 0..meetings.len();
-        let openings: Vec<f64> = stations.clone().map(opening).collect();
-        let widest = stations
-            .clone()
-            .max_by(|a, b| openings[*a].total_cmp(&openings[*b]));
-        let opening_mm = widest.map_or(0.0, |i| openings[i]);
-        let is_lost = |i: &usize| {
-            meetings[*i]
-                .joint
-                .is_some_and(|j| openings[*i] >= PIN_DEPTH * j.size_mm)
-        };
-        let n_lost = stations.filter(is_lost).count();
+        let n_lost = meetings.iter().zip(&openings).filter(is_lost).count();
         let [walls, connectors]: [StressLevel; 2] = moved.stress();
         let strength_share =
             walls.robust_mpa.max(connectors.robust_mpa) / params.metric.material.strength_mpa;
@@ -196,18 +232,19 @@ impl<'a> Bench<'a> {
         } else {
             StressVerdict::Holds
         };
+        let size_mm = widest
+            .and_then(|i| meetings[i].joint)
+            .map_or(largest_mm(meetings), |j| j.size_mm);
+        let settled = |spot: &Spot| moved.settled_mm(spot);
         Outcome {
             verdict,
             force_n,
-            opening_mm,
-            play_mm: widest.map_or(0.0, |i| widest_at(i, &|spot| moved.settled_mm(spot))),
-            limit_mm: limit_mm(
-                widest
-                    .and_then(|i| meetings[i].joint)
-                    .map_or(largest_mm(meetings), |j| j.size_mm),
-            ),
-            between: widest.map(|i| model.pieces_at(i)),
-            at: widest.map(|i| params.turn.inverse().apply(model.place_of(i)).to_array()),
+            opening_mm: widest.map_or(0.0, |i| openings[i]),
+            play_mm: widest.map_or(0.0, |i| self.widest_mm(i, &settled)),
+            key_slides_mm: self.key_slides_mm(),
+            limit_mm: limit_mm(size_mm),
+            between: widest.map(|i| self.model.pieces_at(i)),
+            at: widest.map(|i| params.turn.inverse().apply(self.model.place_of(i)).to_array()),
             n_lost,
             wall_mpa: walls.robust_mpa,
             connector_mpa: connectors.robust_mpa,
