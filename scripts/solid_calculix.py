@@ -17,9 +17,10 @@ from scipy.spatial import cKDTree
 
 EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
 FACES = [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]  # CalculiX's S1 to S4, outwards
-NEAR_MM = 1.0  # faces that are this near to another piece may touch it
+NEAR_MM = 0.4  # faces that are this near to another piece may touch it
 SKIN_MM = 0.1  # as `solid::laws`: contacts are as stiff as material of that depth
 ASTRAY_MM = 500.0  # as `solid`: how far the load moves a piece that nothing but springs stops
+SPRINGS = 40  # nodes of a piece that share that spring
 SETTLING = 0.01  # as `solid`: share of the load that takes up the play
 
 
@@ -91,13 +92,13 @@ def nearest(p, a, b, c):
     t, s = np.dot(np.cross(u, q), n) / area, np.dot(np.cross(q, v), n) / area
     if s >= 0 and t >= 0 and s + t <= 1:
         return np.array([1 - s - t, s, t])
-    best = (np.inf, None)
+    best = (np.inf, 0, (1, 0, 0))
     for i, (x, y) in enumerate([(a, b), (b, c), (c, a)]):
         share = np.clip(np.dot(p - x, y - x) / max(np.dot(y - x, y - x), 1e-30), 0, 1)
         w = np.zeros(3)
         w[i], w[(i + 1) % 3] = 1 - share, share
         d = np.linalg.norm(x + share * (y - x) - p)
-        best = min(best, (d, i, tuple(w)))if best[1] is not None else (d, i, tuple(w))
+        best = min(best, (d, i, tuple(w)))
     return np.array(best[2])
 
 
@@ -127,9 +128,10 @@ def write(case, pieces, friction, file):
     for i, piece in enumerate(pieces):
         for axis in (1, 2, 3):
             out.append(f"*ELEMENT, TYPE=SPRING1, ELSET=S{i}{axis}")
-            out += [f"{number + n},{piece.first_node + n}" for n in range(piece.n_corners)]
-            number += piece.n_corners
-            out += [f"*SPRING, ELSET=S{i}{axis}", f"{axis}", f"{load_n / ASTRAY_MM / piece.n_corners:.6g}"]
+            nodes = np.linspace(0, piece.n_corners - 1, SPRINGS).astype(int)
+            out += [f"{number + n},{piece.first_node + node}" for n, node in enumerate(nodes)]
+            number += SPRINGS
+            out += [f"*SPRING, ELSET=S{i}{axis}", f"{axis}", f"{load_n / ASTRAY_MM / SPRINGS:.6g}"]
     for i, j in itertools.combinations(range(len(pieces)), 2):
         slave, master = (i, j) if len(pieces[i].faces) > len(pieces[j].faces) else (j, i)
         sides = [near_faces(pieces[a], pieces[b]) for a, b in ((slave, master), (master, slave))]
@@ -155,15 +157,19 @@ def write(case, pieces, friction, file):
     for p, f in zip(np.array(case["pushed_at"]), np.array(case["forces_n"])):
         at, shapes, _ = pushed.spot(p)
         force[at] += shapes[:, None] * f
-    # The play first, with few N, so that pieces find each other.
-    for share, first, inc in ((SETTLING, 0.01, 0.5), (1.0, 0.02, 0.3)):
-        out += ["*STEP, INC=400", "*STATIC", f"{first},1.,1e-6,{inc}", "*CLOAD"]
+    for share in shares(friction):
+        out += ["*STEP, INC=400", "*STATIC", "1.,1.,1e-6,1.", "*CLOAD"]
         out += [f"{pushed.first_node + n},{k + 1},{share * force[n, k]:.9g}"
                 for n in np.flatnonzero(np.abs(force).max(axis=1) > 0) for k in range(3)]
         out += ["*NODE FILE, FREQUENCY=9999", "U"]
         out += [x for i in range(len(pieces)) for x in (f"*NODE PRINT, NSET=N{i}, FREQUENCY=9999", "U")]
         out.append("*END STEP")
     open(file, "w").write("\n".join(out) + "\n")
+
+
+def shares(friction):
+    """Shares of the load, step by step: the order matters only with friction."""
+    return (SETTLING, 1.0) if friction > 0 else (1.0,)
 
 
 def results(file, pieces):
@@ -207,7 +213,7 @@ def main():
     forces = np.array(case["forces_n"])
     share = np.linalg.norm(forces, axis=1) / np.linalg.norm(forces, axis=1).sum()
     parts = np.array(case["parts"])
-    for load, moved in zip((SETTLING, 1.0), steps):
+    for load, moved in zip(shares(friction), steps):
         at = lambda part, spot: spot[1] @ moved[part][spot[0]]
         loaded = share @ np.array([at(case["pushed_part"], s) for s in pushed])
         apart = np.array([at(b, s[1]) - at(a, s[0]) for (a, b), s in zip(case["parts"], places)])

@@ -22,7 +22,7 @@ const FRICTION: [f64; 2] = [0.0, 0.2];
 /// Longest edge of the triangles in whose middles the surface is looked at, mm.
 const SAMPLE_MM: f64 = 0.7;
 /// One place in each box of that edge is held, or pushed, for all of the surface there, mm.
-const BOX_MM: f64 = 1.5;
+const BOX_MM: f64 = 0.8;
 
 fn main() -> Any<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
