@@ -74,7 +74,7 @@ class Piece:
     def spot(self, p):
         """The nearest place of the surface: six nodes and their weights."""
         best = (np.inf, None, None)
-        for face in self.tree.query(p, k=min(40, len(self.faces)))[1]:
+        for face in self.tree.query(p, k=min(400, len(self.faces)))[1]:
             a, b, c = self.points[self.faces[face, :3]]
             w = nearest(p, a, b, c)
             d = np.linalg.norm(w[0] * a + w[1] * b + w[2] * c - p)
