@@ -1,0 +1,158 @@
+//! Finished pieces, one held and one pushed, by `solid`: the case and our answers as JSON.
+//!
+//! `cargo run --release -p shellock-mechanics --example solid_case -- CELLS HOLD PUSH PIECE… > case.json`
+//!
+//! CELLS are edges of cells in mm, 2.5,1.5. HOLD is PART,X,Y,Z,RADIUS: what of the surface of piece PART (from
+//! 0) lies in that ball is held. PUSH has a force more: PART,X,Y,Z,RADIUS,FX,FY,FZ. PIECE… are mesh files.
+//! `scripts/solid_calculix.py case.json` solves the same with CalculiX and compares.
+
+use std::collections::BTreeMap;
+use std::fmt::{Debug, Write as _};
+use std::io::Write as _;
+
+use shellock_formats as io;
+use shellock_geom::weld::weld;
+use shellock_geom::{Solid, TriMesh, Vec3};
+use shellock_mechanics::solid::{Answer, Hold, Push, SolidModel, SolidParams, Spot};
+
+type Any<T> = Result<T, Box<dyn std::error::Error>>;
+
+/// Coefficients of friction.
+const FRICTION: [f64; 2] = [0.0, 0.2];
+/// Longest edge of the triangles in whose middles the surface is looked at, mm.
+const SAMPLE_MM: f64 = 0.7;
+/// One place in each box of that edge is held, or pushed, for all of the surface there, mm.
+const BOX_MM: f64 = 0.8;
+
+fn main() -> Any<()> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let [cells, hold, push, files @ ..] = &args[..] else {
+        return Err("CELLS HOLD PUSH PIECE…".into());
+    };
+    let pieces: Vec<Solid> = files.iter().map(|f| piece(f)).collect::<Any<_>>()?;
+    let (held_part, held) = within(&pieces, &numbers(hold)?)?;
+    let of_push = numbers(push)?;
+    let (pushed_part, pushed) = within(&pieces, &of_push)?;
+    let force_n = Vec3::from_slice(of_push.get(5..8).ok_or("PUSH has eight numbers")?);
+    let holds: Vec<Hold> = held
+        .iter()
+        .map(|&(at, area_mm2)| Hold {
+            part: held_part as u32,
+            at,
+            area_mm2,
+        })
+        .collect();
+    let area_mm2: f64 = pushed.iter().map(|p| p.1).sum();
+    let pushes: Vec<Push> = pushed
+        .iter()
+        .map(|&(at, own)| Push {
+            part: pushed_part as u32,
+            at,
+            force_n: force_n * (own / area_mm2),
+        })
+        .collect();
+
+    let mut runs = Vec::new();
+    let mut touches = Vec::new();
+    for cell_mm in numbers(cells)? {
+        let params = SolidParams {
+            cell_mm,
+            ..SolidParams::default()
+        };
+        let mut model = SolidModel::new(&params, &pieces, &holds, &|_| false, &|| false)?;
+        if touches.is_empty() {
+            touches = model.touches().to_vec();
+        }
+        let spots: Vec<Option<Spot>> = pushes.iter().map(|p| model.spot(p.part, p.at)).collect();
+        let ends: Vec<[Option<Spot>; 2]> = touches
+            .iter()
+            .map(|t| [0, 1].map(|i| model.spot(t.parts[i], t.at[i])))
+            .collect();
+        for friction in FRICTION {
+            let moved = model.under_load(&pushes, Answer::Held, friction, &|| false)?;
+            for (load, motion) in [
+                (0.01, &(|s: &Spot| moved.settled_mm(s)) as &dyn Fn(&Spot) -> Vec3),
+                (1.0, &|s: &Spot| moved.moved_mm(s)),
+            ] {
+                let at = |spot: &Option<Spot>| spot.as_ref().map_or([f64::NAN; 3], |s| motion(s).to_array());
+                let mut run = format!(
+                    "{{\"cell_mm\": {cell_mm:?}, \"friction\": {friction:?}, \"load\": {load:?}, \"off\": {:?},",
+                    moved.friction_off
+                );
+                list(&mut run, "pushed_mm", &spots.iter().map(at).collect::<Vec<_>>())?;
+                list(&mut run, "ends_mm", &ends.iter().map(|e| [at(&e[0]), at(&e[1])]).collect::<Vec<_>>())?;
+                run.pop();
+                runs.push(run + "}");
+            }
+        }
+    }
+
+    let params = SolidParams::default();
+    let mut json = format!(
+        "{{\"youngs_modulus_mpa\": {:?}, \"poissons_ratio\": {:?}, \"pieces\": {files:?},",
+        params.material.youngs_modulus_mpa, params.material.poissons_ratio
+    );
+    write!(json, "\"hold\": {:?}, \"pushed_part\": {pushed_part},", numbers(hold)?)?;
+    list(&mut json, "pushed_at", &pushes.iter().map(|p| p.at.to_array()).collect::<Vec<_>>())?;
+    list(&mut json, "forces_n", &pushes.iter().map(|p| p.force_n.to_array()).collect::<Vec<_>>())?;
+    list(&mut json, "parts", &touches.iter().map(|t| t.parts).collect::<Vec<_>>())?;
+    list(&mut json, "gaps_mm", &touches.iter().map(|t| t.gap_mm).collect::<Vec<_>>())?;
+    list(&mut json, "fast", &touches.iter().map(|t| t.is_fast).collect::<Vec<_>>())?;
+    list(&mut json, "ends_at", &touches.iter().map(|t| t.at.map(|p| p.to_array())).collect::<Vec<_>>())?;
+    writeln!(std::io::stdout(), "{json}\"runs\": [{}]}}", runs.join(","))?;
+    Ok(())
+}
+
+fn numbers(text: &str) -> Any<Vec<f64>> {
+    Ok(text.split(',').map(str::parse).collect::<Result<_, _>>()?)
+}
+
+fn list(json: &mut String, name: &str, values: &[impl Debug]) -> std::fmt::Result {
+    write!(json, "\"{name}\": {values:?},")
+}
+
+fn piece(file: &str) -> Any<Solid> {
+    let extension = std::path::Path::new(file).extension().and_then(|e| e.to_str());
+    let mesh = io::read_mesh(&std::fs::read(file)?, extension)?.mesh;
+    Solid::new(weld(&mesh).mesh).map_err(|e| format!("{file}: {e:?}").into())
+}
+
+/// The part, and places of its surface in the ball, each with its area.
+fn within(pieces: &[Solid], ball: &[f64]) -> Any<(usize, Vec<(Vec3, f64)>)> {
+    let [part, x, y, z, radius, ..] = ball else {
+        return Err("PART,X,Y,Z,RADIUS".into());
+    };
+    let part = *part as usize;
+    let mesh = pieces.get(part).ok_or("no such part")?.mesh();
+    let mut boxes: BTreeMap<[i64; 3], (Vec3, f64)> = BTreeMap::new();
+    for face in 0..mesh.triangles.len() {
+        middles(mesh, face, &mut |p, area_mm2| {
+            if p.distance(Vec3::new(*x, *y, *z)) <= *radius {
+                let key = (p / BOX_MM).to_array().map(|x| x.floor() as i64);
+                boxes.entry(key).or_insert((p, 0.0)).1 += area_mm2;
+            }
+        });
+    }
+    if boxes.is_empty() {
+        return Err("nothing in the ball".into());
+    }
+    Ok((part, boxes.into_values().collect()))
+}
+
+/// Middles and areas of a triangle that is cut up until its parts are small.
+fn middles(mesh: &TriMesh, face: usize, each: &mut impl FnMut(Vec3, f64)) {
+    let [a, b, c] = mesh.corners(face);
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let n = (longest / SAMPLE_MM).ceil().max(1.0) as usize;
+    let area_mm2 = mesh.area_vector_doubled(face).length() / 2.0 / (n * n) as f64;
+    let at = |i: f64, j: f64| a + (b - a) * (i / n as f64) + (c - a) * (j / n as f64);
+    for i in 0..n {
+        for j in 0..n - i {
+            let (x, y) = (i as f64 + 1.0 / 3.0, j as f64 + 1.0 / 3.0);
+            each(at(x, y), area_mm2);
+            if i + j + 1 < n {
+                each(at(x + 1.0 / 3.0, y + 1.0 / 3.0), area_mm2);
+            }
+        }
+    }
+}
