@@ -53,6 +53,7 @@ fn divide(method: &str, params: Value, mesh: &TriMesh) -> Vec<u32> {
     use serde_json::from_value as read;
     match method {
         "sdf" => shellock_segment::sdf::divide(&read(params).expect("parameters"), mesh),
+        "random_cuts" => shellock_segment::random_cuts::divide(&read(params).expect("parameters"), mesh),
         _ => panic!("no method {method}"),
     }
 }

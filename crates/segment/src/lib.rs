@@ -11,5 +11,6 @@ pub mod labelling;
 pub mod max_flow;
 pub mod mixture;
 pub mod parts;
+pub mod random_cuts;
 pub mod sdf;
 pub mod shape_diameter;
