@@ -182,7 +182,12 @@ impl Cutter<'_> {
             });
             let area: f64 = cut.side.iter().map(|&f| self.graph.area_mm2[f as usize]).sum();
             let small = area.min(region.area_mm2 - area).max(0.0) / self.total_mm2;
-            cut.score = sum / whole.max(f64::MIN_POSITIVE) * (2.0 * small).powf(self.params.balance);
+            let env = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+            let price: f64 = cut.creases.iter().map(|&c| self.price[c as usize]).sum();
+            let iso = price / (4.0 * std::f64::consts::PI * small * self.total_mm2).sqrt();
+            let ratio = price / whole.max(f64::MIN_POSITIVE);
+            cut.score = (sum / whole.max(f64::MIN_POSITIVE)).powf(env("EA", 1.0)) * (2.0 * small).powf(self.params.balance)
+                * (-env("EB", 0.0) * iso - env("EC", 0.0) * ratio).exp();
             for &c in &cut.creases {
                 let salience = &mut salience[c as usize];
                 *salience = salience.max(cut.score);
