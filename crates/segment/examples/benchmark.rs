@@ -54,6 +54,8 @@ fn divide(method: &str, params: Value, mesh: &TriMesh) -> Vec<u32> {
     match method {
         "sdf" => shellock_segment::sdf::divide(&read(params).expect("parameters"), mesh),
         "random_cuts" => shellock_segment::random_cuts::divide(&read(params).expect("parameters"), mesh),
+        "kmeans" => shellock_segment::kmeans::divide(&read(params).expect("parameters"), mesh),
+        "primitives" => shellock_segment::primitives::divide(&read(params).expect("parameters"), mesh),
         _ => panic!("no method {method}"),
     }
 }

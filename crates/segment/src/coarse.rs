@@ -14,7 +14,7 @@ const FIRST_TOLERANCE: f64 = 2e-4;
 const LOOSER: f64 = 1.6;
 /// Tolerances tried at most: from 2·10⁻⁴ of the diagonal to a twentieth of it.
 const MOST_TOLERANCES: usize = 12;
-/// Decimation that overshoots below this share of what was asked for is taken back.
+/// Decimation that overshoots below this share of what was asked for is done anew, keeping some points.
 const TOO_FEW: f64 = 0.4;
 /// Width of the band in which borders settle on the fine mesh, in mean edges of the coarse one.
 const BAND_EDGES: f64 = 1.5;
@@ -42,6 +42,7 @@ impl Coarse {
             let tolerances = vec![tolerance; coarse.points.len()];
             let fewer = decimate(coarse.clone(), &tolerances);
             if (fewer.triangles.len() as f64) < TOO_FEW * n_faces as f64 {
+                coarse = keeping_points(coarse, tolerance, n_faces / 4);
                 break;
             }
             coarse = fewer;
@@ -69,6 +70,17 @@ impl Coarse {
         }
         brought
     }
+}
+
+/// Decimated, but for about `n_points` of the points, evenly in their order: where all is flat, triangles become few
+/// and long at once, and borders have no edges to run along.
+fn keeping_points(mesh: TriMesh, tolerance_mm: f64, n_points: usize) -> TriMesh {
+    let step = (mesh.points.len() / n_points.max(1)).max(1);
+    let kept = |point: usize| point.is_multiple_of(step);
+    let tolerances: Vec<f64> = (0..mesh.points.len())
+        .map(|p| if kept(p) { 0.0 } else { tolerance_mm })
+        .collect();
+    decimate(mesh, &tolerances)
 }
 
 /// For each triangle of `mesh` the nearest of `coarse`; of those that face the same way, if one is about as

@@ -7,10 +7,12 @@
 pub mod border;
 pub mod coarse;
 pub mod face_graph;
+pub mod kmeans;
 pub mod labelling;
 pub mod max_flow;
 pub mod mixture;
 pub mod parts;
+pub mod primitives;
 pub mod random_cuts;
 pub mod sdf;
 pub mod shape_diameter;
