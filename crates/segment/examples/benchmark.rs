@@ -56,6 +56,7 @@ fn divide(method: &str, params: Value, mesh: &TriMesh) -> Vec<u32> {
         "random_cuts" => shellock_segment::random_cuts::divide(&read(params).expect("parameters"), mesh),
         "kmeans" => shellock_segment::kmeans::divide(&read(params).expect("parameters"), mesh),
         "primitives" => shellock_segment::primitives::divide(&read(params).expect("parameters"), mesh),
+        "auto" => shellock_segment::auto::divide(&read(params).expect("parameters"), mesh),
         _ => panic!("no method {method}"),
     }
 }
@@ -103,7 +104,12 @@ fn main() {
         if args.iter().any(|a| a == "people") {
             let mut counts: Vec<usize> = people.iter().map(|p| n_labels(p)).collect();
             counts.sort_unstable();
-            params["n_parts"] = json!(counts[counts.len() / 2]);
+            let place = if method == "auto" {
+                &mut params["cuts"]
+            } else {
+                &mut params
+            };
+            place["n_parts"] = json!(counts[counts.len() / 2]);
         }
         let mesh = read(&root.join(format!("off/{id}.off")));
         let start = Instant::now();

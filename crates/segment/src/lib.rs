@@ -4,6 +4,7 @@
 //! by their lowest face, and the same on any number of threads. Lengths are millimetres, though only their
 //! proportions count. This crate knows no patch, piece or plan.
 
+pub mod auto;
 pub mod border;
 pub mod coarse;
 pub mod face_graph;

@@ -76,7 +76,7 @@ pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
 
 /// A part for each face of `graph`, which is small.
 pub fn divide_graph(params: &RandomCutsParams, graph: &FaceGraph) -> Vec<u32> {
-    hierarchy(params, graph).labels
+    hierarchy(params, graph, &[]).labels
 }
 
 /// A division and how it came about.
@@ -92,10 +92,13 @@ pub struct Hierarchy {
 }
 
 /// Cuts the best first, until there are parts enough or no cut is good enough.
-pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph) -> Hierarchy {
+///
+/// The borders of `proposals`, other divisions of `graph`, stand for election beside the random cuts.
+pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<u32>]) -> Hierarchy {
     let cutter = Cutter {
         params,
         graph,
+        proposals,
         price: prices(graph),
         way: graph
             .creases
@@ -174,6 +177,7 @@ impl Cut {
 struct Cutter<'a> {
     params: &'a RandomCutsParams,
     graph: &'a FaceGraph,
+    proposals: &'a [Vec<u32>],
     /// What a cut pays on each edge.
     price: Vec<f64>,
     /// Length of the way over each edge.
@@ -196,7 +200,7 @@ impl Cutter<'_> {
             return None;
         }
         let region = Region::new(self, part, labels);
-        let cuts: Vec<Cut> = (0..self.params.n_cuts as u64)
+        let mut cuts: Vec<Cut> = (0..self.params.n_cuts as u64)
             .into_par_iter()
             .filter_map(|i| {
                 let mut rng = ChaCha8Rng::seed_from_u64(self.params.seed);
@@ -204,6 +208,7 @@ impl Cutter<'_> {
                 region.random_cut(&mut rng)
             })
             .collect();
+        cuts.extend(self.proposals.iter().flat_map(|labels| region.proposed(labels)));
         let mut share = vec![0.0; self.graph.creases.len()];
         for cut in &cuts {
             for &crease in &cut.creases {
@@ -214,7 +219,7 @@ impl Cutter<'_> {
         for mut cut in cuts {
             let length = |c: u32| self.graph.creases[c as usize].length_mm;
             let (sum, whole) = cut.creases.iter().fold((0.0, 0.0), |(sum, whole), &c| {
-                (sum + share[c as usize] * length(c), whole + length(c))
+                (sum + share[c as usize].min(1.0) * length(c), whole + length(c))
             });
             let area: f64 = cut.side.iter().map(|&f| self.graph.area_mm2[f as usize]).sum();
             let price: f64 = cut.creases.iter().map(|&c| self.price[c as usize]).sum();
@@ -328,19 +333,62 @@ impl<'a> Region<'a> {
             }
         }
         let (_, sides) = flow.least_cut();
-        let is_first = |f: u32| sides[f as usize] == Terminal::Source;
-        let n_first = (0..self.faces.len() as u32).filter(|&f| is_first(f)).count();
-        let keeps = n_first * 2 > self.faces.len();
-        let side: Vec<u32> = (0..self.faces.len() as u32)
-            .filter(|&f| is_first(f) != keeps)
+        self.cut(|f| sides[f as usize] == Terminal::Source)
+    }
+
+    /// The cuts that divide what one label of `labels` has in the part from all else in it, where both hang
+    /// together.
+    fn proposed(&self, labels: &[u32]) -> Vec<Cut> {
+        let label = |f: u32| labels[self.faces[f as usize] as usize];
+        let mut found: Vec<u32> = (0..self.faces.len() as u32).map(label).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+            .into_iter()
+            .filter(|&l| self.n_components(|f| label(f) == l) == 2)
+            .filter_map(|l| self.cut(|f| label(f) == l))
+            .collect()
+    }
+
+    /// How many connected sets the faces inside and those outside of a set are.
+    fn n_components(&self, is_inside: impl Fn(u32) -> bool) -> usize {
+        let mut seen = vec![false; self.faces.len()];
+        let mut stack = Vec::new();
+        let mut n = 0;
+        for start in 0..self.faces.len() as u32 {
+            if std::mem::replace(&mut seen[start as usize], true) {
+                continue;
+            }
+            n += 1;
+            stack.push(start);
+            while let Some(face) = stack.pop() {
+                for &(other, _) in self.arcs(face) {
+                    if is_inside(other) == is_inside(face)
+                        && !std::mem::replace(&mut seen[other as usize], true)
+                    {
+                        stack.push(other);
+                    }
+                }
+            }
+        }
+        n
+    }
+
+    /// The part cut along the border of a set; `None` where that is all or nothing.
+    fn cut(&self, is_inside: impl Fn(u32) -> bool) -> Option<Cut> {
+        let n = self.faces.len();
+        let n_inside = (0..n as u32).filter(|&f| is_inside(f)).count();
+        let keeps = n_inside * 2 > n;
+        let side = (0..n as u32)
+            .filter(|&f| is_inside(f) != keeps)
             .map(|f| self.faces[f as usize])
             .collect();
-        let creases = (0..self.faces.len() as u32)
+        let creases = (0..n as u32)
             .flat_map(|f| self.arcs(f).iter().map(move |&(g, c)| (f, g, c)))
-            .filter(|&(f, g, _)| f < g && is_first(f) != is_first(g))
+            .filter(|&(f, g, _)| f < g && is_inside(f) != is_inside(g))
             .map(|(.., c)| c)
             .collect();
-        (!side.is_empty() && side.len() < self.faces.len()).then_some(Cut {
+        (n_inside > 0 && n_inside < n).then_some(Cut {
             side,
             creases,
             share: 0.0,
