@@ -112,6 +112,30 @@ fn main() {
             place["n_parts"] = json!(counts[counts.len() / 2]);
         }
         let mesh = read(&root.join(format!("off/{id}.off")));
+        if method == "trace" {
+            use shellock_segment::{coarse::Coarse, random_cuts};
+            let read: random_cuts::RandomCutsParams =
+                serde_json::from_value(params.clone()).expect("parameters");
+            let coarse = Coarse::new(&mesh, read.n_faces);
+            let found = random_cuts::hierarchy(&read, &coarse.graph, &[]);
+            for n in 0..=found.steps.len() {
+                let labels = found.labels(&coarse.graph, n);
+                let fine: Vec<u32> = coarse.of_face.iter().map(|&f| labels[f as usize]).collect();
+                let error = people.iter().map(|p| rand_error(&fine, p)).sum::<f64>() / people.len() as f64;
+                let s = found.steps.get(n).map_or([0.0; 6], |s| {
+                    [
+                        s.score,
+                        s.share,
+                        s.of_share,
+                        s.agreement,
+                        s.tightness,
+                        s.mean_price,
+                    ]
+                });
+                println!("T {id} {n} {error} {s:?}");
+            }
+            continue;
+        }
         let start = Instant::now();
         let labels = divide(method, params.clone(), &mesh);
         let seconds = start.elapsed().as_secs_f64();

@@ -35,7 +35,8 @@ pub fn divide(params: &AutoParams, mesh: &TriMesh) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.cuts.n_faces);
     let proposals = proposals(params, &coarse);
-    let labels = hierarchy(&params.cuts, &coarse.graph, &proposals).labels;
+    let found = hierarchy(&params.cuts, &coarse.graph, &proposals);
+    let labels = found.labels(&coarse.graph, found.n_steps(&params.cuts));
     connected(&fine, &coarse.bring_back(&fine, &labels)).0
 }
 

@@ -32,7 +32,9 @@ const TIGHTNESS: f64 = 6.0;
 /// It falls by e for each such part of the mean price of a millimetre, from 1 where flat to 0.05 where concave.
 const CONCAVITY: f64 = 2.0;
 /// Parts that no division goes beyond where none are asked for.
-const MOST_PARTS: usize = 40;
+const MOST_PARTS: usize = 36;
+/// How the size of a part counts in what cutting it is worth, as a power of its share of the area.
+const WORTH_OF_SIZE: f64 = 0.3;
 
 /// How random cuts divide a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,9 +44,11 @@ pub struct RandomCutsParams {
     pub n_faces: usize,
     /// Cuts of each part. [8, 1000]; 64.
     pub n_cuts: usize,
-    /// Cuts whose score times the root of the smaller side's share is less are not made where no number is asked
-    /// for. [0, 1]; 0.01.
+    /// Where no number is asked for, the first cut of a lower worth ([`Step::worth`]) is not made, nor any after
+    /// it. [0, 1]; 0.075.
     pub least_worth: f64,
+    /// Nor is a cut of a lower share in the worth of the best of the first three. [0, 1]; 0.2.
+    pub least_worth_share: f64,
     /// How much a cut's score falls with the share of the smaller side: its power. [0, 1]; 0.3.
     pub balance: f64,
     /// Parts wanted; `None`: until no cut is worth `least_worth`.
@@ -58,7 +62,8 @@ impl Default for RandomCutsParams {
         Self {
             n_faces: 3000,
             n_cuts: 64,
-            least_worth: 0.01,
+            least_worth: 0.075,
+            least_worth_share: 0.2,
             balance: 0.3,
             n_parts: None,
             seed: 0,
@@ -76,19 +81,88 @@ pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
 
 /// A part for each face of `graph`, which is small.
 pub fn divide_graph(params: &RandomCutsParams, graph: &FaceGraph) -> Vec<u32> {
-    hierarchy(params, graph, &[]).labels
+    let found = hierarchy(params, graph, &[]);
+    found.labels(graph, found.n_steps(params))
 }
 
 /// A division and how it came about.
 pub struct Hierarchy {
-    /// A part for each face.
-    pub labels: Vec<u32>,
-    /// Score of each cut in the order in which they were made; cut i made part i + `n_components`.
-    pub scores: Vec<f64>,
-    /// Parts before the first cut.
+    part: Vec<u32>,
+    /// Parts before the first cut, components of the mesh.
     pub n_components: usize,
-    /// For each edge the highest score of a cut over it, made or not, [0, 1].
-    pub salience: Vec<f64>,
+    /// The cuts in the order in which they were made.
+    pub steps: Vec<Step>,
+}
+
+/// A cut that was made.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// The part that was cut; what was cut off became a new one, the next in number.
+    pub part: u32,
+    /// How good the cut is, [0, 1].
+    pub score: f64,
+    /// The smaller side's share of the whole area, [0, 0.5].
+    pub share: f64,
+    /// The part's share of the whole area before.
+    pub of_share: f64,
+    /// Share of random cuts over its edges, in the mean.
+    pub agreement: f64,
+    /// Its price in the length around a disk of the smaller side's area.
+    pub tightness: f64,
+    /// The mean price of a millimetre of it.
+    pub mean_price: f64,
+}
+
+impl Step {
+    /// How much a division gains by the cut, [0, 1]: it is short for what it cuts off, concave, and what was cut is
+    /// large.
+    pub fn worth(&self) -> f64 {
+        self.shape() * self.of_share.powf(WORTH_OF_SIZE)
+    }
+
+    fn shape(&self) -> f64 {
+        (-TIGHTNESS * self.tightness - CONCAVITY * self.mean_price).exp()
+    }
+
+    const NONE: Self = Self {
+        part: 0,
+        score: 0.0,
+        share: 0.0,
+        of_share: 0.0,
+        agreement: 0.0,
+        tightness: 0.0,
+        mean_price: 0.0,
+    };
+}
+
+impl Hierarchy {
+    /// How many of the cuts `params` asks for, or are worth their while.
+    pub fn n_steps(&self, params: &RandomCutsParams) -> usize {
+        if let Some(n_parts) = params.n_parts {
+            return n_parts.saturating_sub(self.n_components);
+        }
+        let best = self.steps.iter().take(3).map(Step::worth).fold(0.0, f64::max);
+        let least = params.least_worth.max(params.least_worth_share * best);
+        let end = self.steps.iter().position(|s| s.worth() < least);
+        end.unwrap_or(self.steps.len())
+    }
+
+    /// Connected parts after the first `n_steps` cuts, numbered by their lowest face.
+    pub fn labels(&self, graph: &FaceGraph, n_steps: usize) -> Vec<u32> {
+        let n = self.n_components + n_steps.min(self.steps.len());
+        let labels: Vec<u32> = self
+            .part
+            .iter()
+            .map(|&p| {
+                let mut p = p as usize;
+                while p >= n {
+                    p = self.steps[p - self.n_components].part as usize;
+                }
+                p as u32
+            })
+            .collect();
+        connected(graph, &labels).0
+    }
 }
 
 /// Cuts the best first, until there are parts enough or no cut is good enough.
@@ -112,30 +186,24 @@ pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<
     for (face, &label) in labels.iter().enumerate() {
         parts[label as usize].push(face as u32);
     }
-    let mut salience = vec![0.0; graph.creases.len()];
     let mut best: Vec<Option<Cut>> = (0..n_components)
-        .map(|p| cutter.best_cut(&parts[p], p as u64, &labels, &mut salience))
+        .map(|p| cutter.best_cut(&parts[p], p as u64, &labels))
         .collect();
     let wanted = params.n_parts.unwrap_or(MOST_PARTS);
-    let least = if params.n_parts.is_some() {
-        0.0
-    } else {
-        params.least_worth
-    };
-    let mut scores = Vec::new();
+    let mut steps = Vec::new();
     let mut n_asked = n_components as u64;
     while parts.len() < wanted {
         let score = |p: usize| {
             best[p]
                 .as_ref()
                 .filter(|c| c.worth() > least)
-                .map_or(-1.0, |c| c.score)
+                .map_or(-1.0, |c| c.step.score)
         };
         let Some(part) = (0..parts.len()).max_by(|&p, &q| score(p).total_cmp(&score(q)).then(q.cmp(&p)))
         else {
             break;
         };
-        if score(part) < 0.0 {
+        if score(part) <= 0.0 {
             break;
         }
         let Some(cut) = best[part].take() else { break };
@@ -143,18 +211,20 @@ pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<
         cut.side.iter().for_each(|&f| labels[f as usize] = new as u32);
         parts[part].retain(|&f| labels[f as usize] == part as u32);
         parts.push(cut.side);
-        scores.push(cut.score);
+        steps.push(Step {
+            part: part as u32,
+            ..cut.step
+        });
         best.push(None);
         for p in [part, new] {
-            best[p] = cutter.best_cut(&parts[p], n_asked, &labels, &mut salience);
+            best[p] = cutter.best_cut(&parts[p], n_asked, &labels);
             n_asked += 1;
         }
     }
     Hierarchy {
-        labels: connected(graph, &labels).0,
-        scores,
+        part: labels,
         n_components,
-        salience,
+        steps,
     }
 }
 
@@ -163,15 +233,7 @@ pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<
 struct Cut {
     side: Vec<u32>,
     creases: Vec<u32>,
-    /// The smaller side's share of the whole area.
-    share: f64,
-    score: f64,
-}
-
-impl Cut {
-    fn worth(&self) -> f64 {
-        self.score * (2.0 * self.share).sqrt()
-    }
+    step: Step,
 }
 
 struct Cutter<'a> {
@@ -186,16 +248,23 @@ struct Cutter<'a> {
 }
 
 impl Cutter<'_> {
-    /// How good a cut is, [0, 1]: many cuts agree on it, it is short for what it cuts off, concave, and cuts off much.
-    fn score(&self, share: f64, agreement: f64, price_mm: f64, mean_price: f64) -> f64 {
+    /// How good a cut is: many cuts agree on it, it is short for what it cuts off, concave, and cuts off much.
+    fn judge(&self, share: f64, agreement: f64, price_mm: f64, mean_price: f64) -> Step {
         let around_disk_mm = (4.0 * PI * share * self.total_mm2).sqrt().max(f64::MIN_POSITIVE);
-        agreement.powf(AGREEMENT_POWER)
-            * (2.0 * share).powf(self.params.balance)
-            * (-TIGHTNESS * price_mm / around_disk_mm - CONCAVITY * mean_price).exp()
+        let mut step = Step {
+            share,
+            agreement,
+            tightness: price_mm / around_disk_mm,
+            mean_price,
+            ..Step::NONE
+        };
+        let size = (2.0 * share).powf(self.params.balance);
+        step.score = agreement.powf(AGREEMENT_POWER) * size * step.shape();
+        step
     }
 
-    /// The cut of `part` on whose edges most cuts agree; the salience of all its edges goes into `salience`.
-    fn best_cut(&self, part: &[u32], stream: u64, labels: &[u32], salience: &mut [f64]) -> Option<Cut> {
+    /// The best cut of `part`.
+    fn best_cut(&self, part: &[u32], stream: u64, labels: &[u32]) -> Option<Cut> {
         if part.len() < 8 {
             return None;
         }
@@ -224,13 +293,10 @@ impl Cutter<'_> {
             let area: f64 = cut.side.iter().map(|&f| self.graph.area_mm2[f as usize]).sum();
             let price: f64 = cut.creases.iter().map(|&c| self.price[c as usize]).sum();
             let whole = whole.max(f64::MIN_POSITIVE);
-            cut.share = area.min(region.area_mm2 - area).max(0.0) / self.total_mm2;
-            cut.score = self.score(cut.share, sum / whole, price, price / whole);
-            for &c in &cut.creases {
-                let salience = &mut salience[c as usize];
-                *salience = salience.max(cut.score);
-            }
-            if best.as_ref().is_none_or(|b| cut.score > b.score) {
+            let share = area.min(region.area_mm2 - area).max(0.0) / self.total_mm2;
+            cut.step = self.judge(share, sum / whole, price, price / whole);
+            cut.step.of_share = region.area_mm2 / self.total_mm2;
+            if best.as_ref().is_none_or(|b| cut.step.score > b.step.score) {
                 best = Some(cut);
             }
         }
@@ -391,8 +457,7 @@ impl<'a> Region<'a> {
         (n_inside > 0 && n_inside < n).then_some(Cut {
             side,
             creases,
-            share: 0.0,
-            score: 0.0,
+            step: Step::NONE,
         })
     }
 }
