@@ -51,7 +51,7 @@ pub struct RandomCutsParams {
     pub least_worth_share: f64,
     /// How much a cut's score falls with the share of the smaller side: its power. [0, 1]; 0.3.
     pub balance: f64,
-    /// Parts wanted; `None`: until no cut is worth `least_worth`.
+    /// Parts wanted; `None`: until no cut is worth it.
     pub n_parts: Option<usize>,
     /// Seed of all random choices; 0.
     pub seed: u64,
@@ -193,12 +193,7 @@ pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<
     let mut steps = Vec::new();
     let mut n_asked = n_components as u64;
     while parts.len() < wanted {
-        let score = |p: usize| {
-            best[p]
-                .as_ref()
-                .filter(|c| c.worth() > least)
-                .map_or(-1.0, |c| c.step.score)
-        };
+        let score = |p: usize| best[p].as_ref().map_or(0.0, |c| c.step.score);
         let Some(part) = (0..parts.len()).max_by(|&p, &q| score(p).total_cmp(&score(q)).then(q.cmp(&p)))
         else {
             break;
