@@ -11,6 +11,7 @@ use shellock_geom::TriMesh;
 
 use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
+use crate::params::{no_parts, outside};
 use crate::parts::connected;
 
 const MOST_ROUNDS: usize = 12;
@@ -42,6 +43,19 @@ impl Default for KMeansParams {
             convex_share: 0.2,
             n_parts: None,
         }
+    }
+}
+
+impl KMeansParams {
+    /// Every problem at once, for people; empty where there is none.
+    pub fn problems(&self) -> Vec<String> {
+        let found = [
+            outside("n_faces", self.n_faces as f64, 500.0, 20_000.0),
+            outside("way_share", self.way_share, 0.0, 1.0),
+            outside("convex_share", self.convex_share, 0.0, 1.0),
+            no_parts(self.n_parts),
+        ];
+        found.into_iter().flatten().collect()
     }
 }
 

@@ -16,6 +16,7 @@ use shellock_geom::{TriMesh, Vec3};
 
 use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
+use crate::params::{no_parts, outside};
 use crate::parts::connected;
 
 /// Points that a fit looks at; of larger parts an even sample.
@@ -41,6 +42,18 @@ impl Default for PrimitivesParams {
             tolerance: 0.02,
             n_parts: None,
         }
+    }
+}
+
+impl PrimitivesParams {
+    /// Every problem at once, for people; empty where there is none.
+    pub fn problems(&self) -> Vec<String> {
+        let found = [
+            outside("n_faces", self.n_faces as f64, 200.0, 10_000.0),
+            outside("tolerance", self.tolerance, 0.0, 1.0),
+            no_parts(self.n_parts),
+        ];
+        found.into_iter().flatten().collect()
     }
 }
 

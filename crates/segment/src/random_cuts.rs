@@ -20,6 +20,7 @@ use crate::border::prices;
 use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
 use crate::max_flow::{FlowGraph, Terminal};
+use crate::params::{no_parts, outside};
 use crate::parts::connected;
 
 /// By how much a concavity of a radian makes the way over an edge longer, for the choice of seeds.
@@ -68,6 +69,21 @@ impl Default for RandomCutsParams {
             n_parts: None,
             seed: 0,
         }
+    }
+}
+
+impl RandomCutsParams {
+    /// Every problem at once, for people; empty where there is none.
+    pub fn problems(&self) -> Vec<String> {
+        let found = [
+            outside("n_faces", self.n_faces as f64, 500.0, 20_000.0),
+            outside("n_cuts", self.n_cuts as f64, 8.0, 1000.0),
+            outside("balance", self.balance, 0.0, 1.0),
+            outside("least_worth", self.least_worth, 0.0, 1.0),
+            outside("least_worth_share", self.least_worth_share, 0.0, 1.0),
+            no_parts(self.n_parts),
+        ];
+        found.into_iter().flatten().collect()
     }
 }
 
