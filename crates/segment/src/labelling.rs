@@ -76,3 +76,50 @@ fn expand_one(
     }
     has_changed
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use shellock_geom::{TriMesh, Vec3};
+
+    use super::*;
+
+    /// An octahedron: eight faces, each beside three.
+    fn octahedron() -> FaceGraph {
+        let (points, triangles) = shellock_testkit::plain::sphere(0, Vec3::ONE);
+        FaceGraph::new(&TriMesh { points, triangles })
+    }
+
+    #[test]
+    fn two_labels_cost_the_least_and_three_at_most_twice_that() {
+        let graph = octahedron();
+        let n = graph.n_faces();
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for n_labels in [2, 3] {
+            for _ in 0..20 {
+                let cost: Vec<f64> = (0..n * n_labels).map(|_| rng.random_range(0.0..3.0)).collect();
+                let weight: Vec<f64> = graph.creases.iter().map(|_| rng.random_range(0.0..1.5)).collect();
+                let energy = |labels: &[u32]| -> f64 {
+                    let own = labels
+                        .iter()
+                        .enumerate()
+                        .map(|(f, &l)| cost[f * n_labels + l as usize]);
+                    let cut = graph.creases.iter().zip(&weight);
+                    let cut = cut.filter(|(c, _)| labels[c.faces[0] as usize] != labels[c.faces[1] as usize]);
+                    own.sum::<f64>() + cut.map(|(_, w)| w).sum::<f64>()
+                };
+                let mut labels = vec![0; n];
+                expand(&graph, n_labels, &cost, &weight, &mut labels);
+                let least = (0..n_labels.pow(n as u32))
+                    .map(|code| {
+                        let digit = |f: usize| (code / n_labels.pow(f as u32) % n_labels) as u32;
+                        energy(&(0..n).map(digit).collect::<Vec<_>>())
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                let bound = if n_labels == 2 { least } else { 2.0 * least };
+                assert!(energy(&labels) <= bound + 1e-9);
+            }
+        }
+    }
+}

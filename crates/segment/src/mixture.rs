@@ -151,3 +151,18 @@ fn refine(values: &[f64], mut bells: Vec<Bell>) -> Vec<Bell> {
     bells.sort_by(|a, b| a.mean.total_cmp(&b.mean));
     bells
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_heaps_of_values_are_two_bells() {
+        let heap = |mean: f64, n: u32| (0..n).map(move |i| mean + 0.05 * (f64::from(i) / f64::from(n) - 0.5));
+        let values: Vec<f64> = heap(0.2, 300).chain(heap(0.7, 100)).collect();
+        let bells = fit(&values, 2, 0);
+        assert!((bells[0].mean - 0.2).abs() < 1e-3 && (bells[1].mean - 0.7).abs() < 1e-3);
+        assert!((bells[0].share - 0.75).abs() < 1e-3);
+        assert!(memberships(&bells, 0.21)[0] > 0.999);
+    }
+}

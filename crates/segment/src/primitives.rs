@@ -22,6 +22,12 @@ use crate::parts::connected;
 /// Points that a fit looks at; of larger parts an even sample.
 const MOST_POINTS: usize = 300;
 
+/// Triangles that may be a sphere or a cylinder: two across any edge lie on a sphere exactly.
+const LEAST_ROUND: usize = 8;
+
+/// How far a centre may be from the middle of what is fitted, in the reach of that.
+const FARTHEST_CENTER: f64 = 1e3;
+
 /// How primitives divide a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -178,9 +184,12 @@ impl<'a> Samples<'a> {
         let least = axis.eigenvalues.imin();
         let axis = axis.eigenvectors.column(least);
         let axis = Vec3::new(axis[0], axis[1], axis[2]);
-        let best = plane_error(&points)
-            .min(round_error(&points, None))
-            .min(round_error(&points, Some(axis)));
+        let mut best = plane_error(&points);
+        if a.len() + b.len() >= LEAST_ROUND {
+            best = best
+                .min(round_error(&points, None))
+                .min(round_error(&points, Some(axis)));
+        }
         best * area / sampled
     }
 }
@@ -223,6 +232,11 @@ fn round_error(points: &[(Vec3, f64)], axis: Option<Vec3>) -> f64 {
         return f64::INFINITY;
     };
     let center = solution.rows(0, n);
+    // Far centres are planes, and what is left of their distances is rounding.
+    let reach = points.iter().map(|p| p.0.length()).fold(0.0, f64::max);
+    if !(center.norm() < FARTHEST_CENTER * reach) {
+        return f64::INFINITY;
+    }
     let radius = (solution[n] + center.norm_squared()).max(0.0).sqrt();
     let error: f64 = points
         .iter()

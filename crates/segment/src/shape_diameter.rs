@@ -198,3 +198,21 @@ impl Window {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plate_is_as_thick_as_it_is() {
+        let (points, triangles) = shellock_testkit::plain::cuboid(Vec3::ZERO, Vec3::new(100.0, 100.0, 2.0));
+        let mesh = TriMesh { points, triangles };
+        let graph = FaceGraph::new(&mesh);
+        let found = diameters_mm(&mesh, &graph, 25);
+        let flat = (0..12).find(|&f| graph.normal[f].z.abs() > 0.5).unwrap();
+        // Rays lean by up to 60° and are averaged by angle: a plate seems a little thicker.
+        assert!(found[flat] > 2.0 && found[flat] < 4.0, "{}", found[flat]);
+        let spread = normalised(&[1.0, 3.0, 5.0]);
+        assert!(spread[0] == 0.0 && spread[1] > 0.5 && spread[2] == 1.0);
+    }
+}
