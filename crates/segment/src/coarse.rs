@@ -36,7 +36,7 @@ impl Coarse {
         let mut coarse = mesh.clone();
         let mut tolerance = FIRST_TOLERANCE * mesh.bounds().diagonal();
         for _ in 0..MOST_TOLERANCES {
-            if coarse.triangles.len() <= n_faces || !(tolerance > 0.0) {
+            if coarse.triangles.len() <= n_faces || tolerance <= 0.0 {
                 break;
             }
             let tolerances = vec![tolerance; coarse.points.len()];

@@ -175,7 +175,7 @@ impl<'a> Samples<'a> {
             points.extend(corners.map(|p| (p - self.middle, weight)));
         }
         let sampled: f64 = points.iter().map(|p| p.1).sum();
-        if !(sampled > 0.0) {
+        if sampled <= 0.0 || !sampled.is_finite() {
             return 0.0;
         }
         let mean = points.iter().map(|&(p, w)| p * w).sum::<Vec3>() / sampled;
@@ -234,7 +234,7 @@ fn round_error(points: &[(Vec3, f64)], axis: Option<Vec3>) -> f64 {
     let center = solution.rows(0, n);
     // Far centres are planes, and what is left of their distances is rounding.
     let reach = points.iter().map(|p| p.0.length()).fold(0.0, f64::max);
-    if !(center.norm() < FARTHEST_CENTER * reach) {
+    if !center.norm().is_finite() || center.norm() > FARTHEST_CENTER * reach {
         return f64::INFINITY;
     }
     let radius = (solution[n] + center.norm_squared()).max(0.0).sqrt();
