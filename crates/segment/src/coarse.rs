@@ -7,6 +7,7 @@ use shellock_geom::{TriMesh, Vec3};
 
 use crate::border::settle;
 use crate::face_graph::FaceGraph;
+use crate::parts::absorb_small;
 
 /// First tolerance of decimation, as a share of the box's diagonal.
 const FIRST_TOLERANCE: f64 = 2e-4;
@@ -16,6 +17,8 @@ const LOOSER: f64 = 1.6;
 const MOST_TOLERANCES: usize = 12;
 /// Decimation that overshoots below this share of what was asked for is done anew, keeping some points.
 const TOO_FEW: f64 = 0.4;
+/// What comes off a part on the way back and is smaller than this share of the whole area joins a neighbour.
+const CRUMB_SHARE: f64 = 2e-4;
 /// Width of the band in which borders settle on the fine mesh, in mean edges of the coarse one.
 const BAND_EDGES: f64 = 1.5;
 
@@ -67,6 +70,7 @@ impl Coarse {
             let n_edges = self.graph.creases.len().max(1) as f64;
             let mean = self.graph.creases.iter().map(|c| c.length_mm).sum::<f64>() / n_edges;
             settle(fine, BAND_EDGES * mean, &mut brought);
+            brought = absorb_small(fine, &brought, CRUMB_SHARE);
         }
         brought
     }

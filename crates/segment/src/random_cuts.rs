@@ -1,12 +1,21 @@
-//! Division by what random least cuts agree on.
+//! Division by the best of many random least cuts.
 //!
 //! [Golovinskiy, Funkhouser, *Randomized Cuts for 3D Mesh Analysis*, ACM TOG 27(5), 2008]: on a mesh of a few
 //! thousand triangles each part is cut in two many times, between random seeds that are kept apart by random
-//! margins. An edge's salience is the share of cuts that run over it (the partition function), and of all cuts
-//! of all parts the one with the highest mean salience is made, until there are parts enough.
+//! margins. How many cuts run over an edge (the partition function) says how far they agree on it. Of all cuts of all
+//! parts the best is made, and again, until there are parts enough.
 //!
-//! Deviations: cuts of one kind only (least cuts between two seeds), the one that the paper finds best; small
-//! parts cost.
+//! Deviations: least cuts between two seeds only, the kind that the paper finds best. The paper's best cut is the one
+//! on which most agree; here that counts little beside the cut's own shape:
+//!
+//! ```text
+//! score = agreement^¼ · (2 · smaller side / whole area)^0.3 · e^(−6 tightness − 2 mean price)
+//! ```
+//!
+//! where a millimetre's price is 1 on flat and convex edges and falls to 0.05 in concave creases, and the tightness is
+//! the cut's price in the length around a disk as large as its smaller side: small at a limb's root, near 1 on a
+//! plain. On every second model of the benchmark, with people's number of parts, agreement alone gives 0.21 (1 − Rand
+//! index), this 0.11.
 
 use std::f64::consts::PI;
 
