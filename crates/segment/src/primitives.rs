@@ -9,7 +9,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shellock_geom::{TriMesh, Vec3};
@@ -208,45 +208,39 @@ fn plane_error(points: &[(Vec3, f64)]) -> f64 {
 ///
 /// Centre c and radius r follow from |p|² = 2 c · p + (r² − |c|²), which is linear in c and the bracket.
 fn round_error(points: &[(Vec3, f64)], axis: Option<Vec3>) -> f64 {
-    let frame: Vec<Vec3> = match axis {
-        None => vec![Vec3::X, Vec3::Y, Vec3::Z],
+    let frame = match axis {
+        None => [Vec3::X, Vec3::Y, Vec3::Z],
         Some(axis) if axis.length_squared() > 0.5 => {
             let (u, v) = axis.normalize().any_orthonormal_pair();
-            vec![u, v]
+            [u, v, Vec3::ZERO]
         }
         Some(_) => return f64::INFINITY,
     };
-    let n = frame.len();
-    let mut normal = DMatrix::<f64>::zeros(n + 1, n + 1);
-    let mut right = DVector::<f64>::zeros(n + 1);
-    let row = |p: Vec3| -> DVector<f64> {
-        DVector::from_iterator(n + 1, frame.iter().map(|u| 2.0 * u.dot(p)).chain([1.0]))
-    };
+    let in_frame = |p: Vec3| Vector3::from(frame.map(|u| u.dot(p)));
+    let mut normal = Matrix4::zeros();
+    let mut right = Vector4::zeros();
     for &(p, w) in points {
-        let row = row(p);
-        let square: f64 = frame.iter().map(|u| u.dot(p).powi(2)).sum();
-        normal += &row * row.transpose() * w;
-        right += row * (square * w);
+        let p = in_frame(p);
+        let row = (2.0 * p).push(1.0);
+        normal += row * row.transpose() * w;
+        right += row * (p.norm_squared() * w);
+    }
+    if axis.is_some() {
+        normal[(2, 2)] = 1.0;
     }
     let Some(solution) = normal.lu().solve(&right) else {
         return f64::INFINITY;
     };
-    let center = solution.rows(0, n);
+    let center = solution.xyz();
     // Far centres are planes, and what is left of their distances is rounding.
     let reach = points.iter().map(|p| p.0.length()).fold(0.0, f64::max);
     if !center.norm().is_finite() || center.norm() > FARTHEST_CENTER * reach {
         return f64::INFINITY;
     }
-    let radius = (solution[n] + center.norm_squared()).max(0.0).sqrt();
+    let radius = (solution.w + center.norm_squared()).max(0.0).sqrt();
     let error: f64 = points
         .iter()
-        .map(|&(p, w)| {
-            let squares = frame
-                .iter()
-                .enumerate()
-                .map(|(i, u)| (u.dot(p) - center[i]).powi(2));
-            w * (squares.sum::<f64>().sqrt() - radius).powi(2)
-        })
+        .map(|&(p, w)| w * ((in_frame(p) - center).norm() - radius).powi(2))
         .sum();
     if error.is_finite() { error } else { f64::INFINITY }
 }

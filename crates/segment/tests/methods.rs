@@ -8,7 +8,7 @@ use shellock_segment::kmeans::{self, KMeansParams};
 use shellock_segment::primitives::{self, PrimitivesParams};
 use shellock_segment::random_cuts::{self, RandomCutsParams};
 use shellock_segment::sdf::{self, SdfParams};
-use shellock_segment::{face_graph::FaceGraph, parts};
+use shellock_segment::{border, coarse::Coarse, face_graph::FaceGraph, parts};
 
 /// A body of revolution about z of the outline (z, radius), bottom first, closed by a point on the axis at both
 /// ends.
@@ -202,6 +202,33 @@ fn broken_meshes_get_labels_and_no_panic() {
                 assert_eq!(labels.len(), mesh.triangles.len(), "{name}, {wanted:?}");
             }
         }
+    }
+}
+
+#[test]
+fn a_border_settles_in_the_crease_nearby() {
+    let mesh = dumbbell();
+    let graph = FaceGraph::new(&mesh);
+    let mut labels: Vec<u32> = graph.center.iter().map(|c| u32::from(c.z > 5.0)).collect();
+    border::settle(&graph, 6.0, &mut labels);
+    // The neck ends in a crease at 2.5; outlines are drawn in steps of 1.1.
+    for (center, &label) in graph.center.iter().zip(&labels) {
+        assert!((center.z - 2.5).abs() < 1.2 || label == u32::from(center.z > 2.5));
+    }
+}
+
+#[test]
+fn labels_come_back_from_a_coarse_mesh_to_where_they_were() {
+    let (points, triangles) = shellock_testkit::plain::sphere(5, Vec3::splat(10.0));
+    let mesh = TriMesh { points, triangles };
+    let fine = FaceGraph::new(&mesh);
+    let coarse = Coarse::new(&mesh, 1000);
+    assert!(coarse.graph.n_faces() <= 1000 && coarse.graph.n_faces() >= 400);
+    let labels: Vec<u32> = coarse.graph.center.iter().map(|c| u32::from(c.z > 0.0)).collect();
+    // On a ball shorter borders are everywhere, so they go as far as they may: one and a half coarse edges of 2.5.
+    let back = coarse.bring_back(&fine, &labels);
+    for (center, &label) in fine.center.iter().zip(&back) {
+        assert!(center.z.abs() < 6.0 || label == u32::from(center.z > 0.0));
     }
 }
 
