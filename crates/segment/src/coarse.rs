@@ -63,7 +63,8 @@ impl Coarse {
         }
     }
 
-    /// The labels of coarse triangles on those of the model, their borders settled into the model's creases.
+    /// The labels of coarse triangles on those of the model, their borders settled into the model's
+    /// creases, and crumbs given to neighbours. Numbers change, parts do not.
     pub fn bring_back(&self, fine: &FaceGraph, labels: &[u32]) -> Vec<u32> {
         let mut brought: Vec<u32> = self.of_face.iter().map(|&f| labels[f as usize]).collect();
         if self.graph.n_faces() < fine.n_faces() {
