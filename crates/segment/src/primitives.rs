@@ -35,7 +35,7 @@ pub struct PrimitivesParams {
     /// Triangles that the model is simplified to. [200, 10 000]; 2000.
     pub n_faces: usize,
     /// Least error of a merge that is not made where no number is asked for: root of the summed squared distances
-    /// times areas, as a share of what the whole model at its radius of gyration would have. [0, 1]; 0.02.
+    /// times areas, as a share of what the whole model at its radius of gyration would have. [0, 1]; 0.03.
     pub tolerance: f64,
     /// Parts wanted; `None`: what `tolerance` leaves.
     pub n_parts: Option<usize>,
@@ -45,7 +45,7 @@ impl Default for PrimitivesParams {
     fn default() -> Self {
         Self {
             n_faces: 2000,
-            tolerance: 0.02,
+            tolerance: 0.03,
             n_parts: None,
         }
     }

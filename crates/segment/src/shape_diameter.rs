@@ -146,6 +146,7 @@ fn smooth(graph: &FaceGraph, values: &[f64]) -> Vec<f64> {
     let n_rings = (values.len() as f64 / FACES_OF_A_RING).sqrt() as u32 + 1;
     (0..values.len() as u32)
         .into_par_iter()
+        .with_min_len(1024)
         .map_init(Window::default, |window, face| {
             window.fill(graph, face, n_rings);
             let here = values[face as usize];
@@ -175,15 +176,18 @@ fn smooth(graph: &FaceGraph, values: &[f64]) -> Vec<f64> {
 #[derive(Default)]
 struct Window {
     faces: Vec<(u32, u32)>,
-    seen: std::collections::HashSet<u32>,
+    /// For each face the last window that it was in, counted from 1.
+    seen: Vec<u32>,
+    n_windows: u32,
 }
 
 impl Window {
     fn fill(&mut self, graph: &FaceGraph, face: u32, n_rings: u32) {
         self.faces.clear();
-        self.seen.clear();
+        self.seen.resize(graph.n_faces(), 0);
+        self.n_windows += 1;
         self.faces.push((face, 0));
-        self.seen.insert(face);
+        self.seen[face as usize] = self.n_windows;
         let mut at = 0;
         while let Some(&(face, ring)) = self.faces.get(at) {
             at += 1;
@@ -191,7 +195,7 @@ impl Window {
                 break;
             }
             for &(other, _) in graph.arcs(face) {
-                if self.seen.insert(other) {
+                if std::mem::replace(&mut self.seen[other as usize], self.n_windows) != self.n_windows {
                     self.faces.push((other, ring + 1));
                 }
             }
