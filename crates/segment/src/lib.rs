@@ -19,8 +19,9 @@
 //! | [`primitives`] | 0.212 | 0.181 | 0.214 |
 //! | [`kmeans`] | 0.251 | 0.234 | 0.243 |
 //!
-//! The constants of the score of cuts, and when to stop, were chosen on the same models; other halves of these differ
-//! by 0.01.
+//! The constants of the score of cuts were chosen on every second of these models, those of when to stop on all: the
+//! former have 0.103 with [`auto`], the others 0.114. Other seeds and twice as many cuts change it by less than 0.001;
+//! simplifying to 5000 triangles in place of 3000 costs 0.01, as creases flatten.
 
 pub mod auto;
 pub mod border;
