@@ -1,0 +1,132 @@
+//! Where a border runs: least cuts within a band.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::face_graph::FaceGraph;
+use crate::max_flow::{FlowGraph, Terminal};
+
+/// Least cost of a millimetre of border: at sharp concave creases.
+const LEAST_PRICE: f64 = 0.05;
+/// What a millimetre costs falls by e for each such angle of concavity, 0.2 rad.
+const FALL_RAD: f64 = 0.2;
+
+/// What a border costs on each edge: its length, a twentieth of it in sharp concave creases.
+pub fn prices(graph: &FaceGraph) -> Vec<f64> {
+    graph
+        .creases
+        .iter()
+        .map(|c| c.length_mm * (LEAST_PRICE + (1.0 - LEAST_PRICE) * (-c.concavity_rad() / FALL_RAD).exp()))
+        .collect()
+}
+
+/// Moves the borders between labels to where they are cheapest ([`prices`]), by `band_mm` at most.
+///
+/// Pair by pair, in the order of the labels: faces of the two within the band are free, all others are not.
+pub fn settle(graph: &FaceGraph, band_mm: f64, labels: &mut [u32]) {
+    let price = prices(graph);
+    let mut seeds: BTreeMap<[u32; 2], BTreeSet<u32>> = BTreeMap::new();
+    for crease in &graph.creases {
+        let [a, b] = crease.faces.map(|f| labels[f as usize]);
+        if a != b {
+            seeds
+                .entry([a.min(b), a.max(b)])
+                .or_default()
+                .extend(crease.faces);
+        }
+    }
+    let mut distance = vec![f64::INFINITY; graph.n_faces()];
+    for (pair, seeds) in seeds {
+        settle_pair(graph, band_mm, &price, pair, &seeds, &mut distance, labels);
+    }
+}
+
+fn settle_pair(
+    graph: &FaceGraph,
+    band_mm: f64,
+    price: &[f64],
+    [a, b]: [u32; 2],
+    seeds: &BTreeSet<u32>,
+    distance: &mut [f64],
+    labels: &mut [u32],
+) {
+    let band = within(graph, seeds, band_mm, distance, |f| {
+        [a, b].contains(&labels[f as usize])
+    });
+    let node: BTreeMap<u32, u32> = band.iter().copied().zip(0..).collect();
+    let mut flow = FlowGraph::new(band.len());
+    for (&face, &here) in &node {
+        for &(other, crease) in graph.arcs(face) {
+            let w = price[crease as usize];
+            match node.get(&other) {
+                Some(&there) if face < other => flow.join(here, there, w, w),
+                Some(_) => {}
+                None if labels[other as usize] == a => flow.tie(here, w, 0.0),
+                None if labels[other as usize] == b => flow.tie(here, 0.0, w),
+                None => {}
+            }
+        }
+    }
+    // A part that lies all in the band keeps its inmost face.
+    for label in [a, b] {
+        let reaches_out = node.keys().any(|&face| {
+            labels[face as usize] == label
+                && graph
+                    .arcs(face)
+                    .iter()
+                    .any(|&(other, _)| labels[other as usize] == label && !node.contains_key(&other))
+        });
+        let inmost = band
+            .iter()
+            .filter(|&&f| labels[f as usize] == label)
+            .max_by(|&&f, &&g| distance[f as usize].total_cmp(&distance[g as usize]));
+        if let (false, Some(inmost)) = (reaches_out, inmost) {
+            let all = price.iter().sum::<f64>();
+            let (source, sink) = if label == a { (all, 0.0) } else { (0.0, all) };
+            flow.tie(node[inmost], source, sink);
+        }
+    }
+    let (_, sides) = flow.least_cut();
+    for (&face, &here) in &node {
+        labels[face as usize] = if sides[here as usize] == Terminal::Source {
+            a
+        } else {
+            b
+        };
+    }
+    for &face in &band {
+        distance[face as usize] = f64::INFINITY;
+    }
+}
+
+/// Faces within `band_mm` of `seeds` that `allowed` lets pass, in ascending order; their distances are left in
+/// `distance`, which is infinite elsewhere.
+fn within(
+    graph: &FaceGraph,
+    seeds: &BTreeSet<u32>,
+    band_mm: f64,
+    distance: &mut [f64],
+    allowed: impl Fn(u32) -> bool,
+) -> Vec<u32> {
+    let mut found = Vec::new();
+    let mut front: BTreeSet<(u64, u32)> = BTreeSet::new();
+    for &face in seeds.iter().filter(|&&f| allowed(f)) {
+        distance[face as usize] = 0.0;
+        front.insert((0, face));
+    }
+    while let Some((bits, face)) = front.pop_first() {
+        let so_far = f64::from_bits(bits);
+        if so_far > distance[face as usize] {
+            continue;
+        }
+        found.push(face);
+        for &(other, crease) in graph.arcs(face) {
+            let reached = so_far + graph.creases[crease as usize].step_mm;
+            if reached <= band_mm && reached < distance[other as usize] && allowed(other) {
+                distance[other as usize] = reached;
+                front.insert((reached.to_bits(), other));
+            }
+        }
+    }
+    found.sort_unstable();
+    found
+}

@@ -1,0 +1,141 @@
+//! Parts of a division: connected sets of faces of one label.
+
+use std::collections::BTreeMap;
+
+use crate::face_graph::FaceGraph;
+
+/// Labels 0 … n − 1 of the connected sets of equal `labels`, numbered by their lowest face, and n.
+pub fn connected(graph: &FaceGraph, labels: &[u32]) -> (Vec<u32>, usize) {
+    let mut part = vec![u32::MAX; labels.len()];
+    let mut n_parts = 0;
+    let mut stack = Vec::new();
+    for start in 0..labels.len() as u32 {
+        if part[start as usize] != u32::MAX {
+            continue;
+        }
+        part[start as usize] = n_parts;
+        stack.push(start);
+        while let Some(face) = stack.pop() {
+            for &(other, _) in graph.arcs(face) {
+                if part[other as usize] == u32::MAX && labels[other as usize] == labels[face as usize] {
+                    part[other as usize] = n_parts;
+                    stack.push(other);
+                }
+            }
+        }
+        n_parts += 1;
+    }
+    (part, n_parts as usize)
+}
+
+/// Sum of `of_face` over each part.
+pub fn sums(part: &[u32], n_parts: usize, of_face: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; n_parts];
+    for (&p, x) in part.iter().zip(of_face) {
+        sum[p as usize] += x;
+    }
+    sum
+}
+
+/// Merges neighbouring parts of `labels`, the cheapest pair first, while `cost` has a price for a pair; the
+/// parts that remain, connected and numbered by their lowest face.
+///
+/// `cost` is given the pair, the sum of `weight` (one an edge) along their border, its length (mm), the areas
+/// of both (mm²), and how many parts there are. It is asked again only where something changed, except for
+/// the number of parts, by which alone it may say `None`.
+pub fn merge(
+    graph: &FaceGraph,
+    labels: &[u32],
+    weight: &[f64],
+    cost: impl Fn(&Border) -> Option<f64>,
+) -> Vec<u32> {
+    let (mut part, n_parts) = connected(graph, labels);
+    let mut area = sums(&part, n_parts, &graph.area_mm2);
+    let mut borders: Vec<BTreeMap<u32, [f64; 2]>> = vec![BTreeMap::new(); n_parts];
+    for (crease, &w) in graph.creases.iter().zip(weight) {
+        let [a, b] = crease.faces.map(|f| part[f as usize]);
+        if a != b {
+            for (x, y) in [(a, b), (b, a)] {
+                let border = borders[x as usize].entry(y).or_default();
+                border[0] += w;
+                border[1] += crease.length_mm;
+            }
+        }
+    }
+    let mut into: Vec<u32> = (0..n_parts as u32).collect();
+    let mut n_left = n_parts;
+    loop {
+        let mut best: Option<(f64, u32, u32)> = None;
+        for a in 0..n_parts as u32 {
+            for (&b, &[weight, length_mm]) in borders[a as usize].range(a + 1..) {
+                let border = Border {
+                    pair: [a, b],
+                    weight,
+                    length_mm,
+                    area_mm2: [area[a as usize], area[b as usize]],
+                    n_parts: n_left,
+                };
+                if let Some(price) = cost(&border)
+                    && best.is_none_or(|(least, ..)| price < least)
+                {
+                    best = Some((price, a, b));
+                }
+            }
+        }
+        let Some((_, a, b)) = best else { break };
+        into[b as usize] = a;
+        area[a as usize] += area[b as usize];
+        for (other, border) in std::mem::take(&mut borders[b as usize]) {
+            borders[other as usize].remove(&b);
+            if other != a {
+                for (x, y) in [(a, other), (other, a)] {
+                    let sum = borders[x as usize].entry(y).or_default();
+                    *sum = [sum[0] + border[0], sum[1] + border[1]];
+                }
+            }
+        }
+        n_left -= 1;
+    }
+    for p in &mut part {
+        while into[*p as usize] != *p {
+            *p = into[*p as usize];
+        }
+    }
+    connected(graph, &part).0
+}
+
+/// What two neighbouring parts share.
+#[derive(Clone, Copy, Debug)]
+pub struct Border {
+    /// The parts, lower number first.
+    pub pair: [u32; 2],
+    /// Sum of the weights of its edges.
+    pub weight: f64,
+    /// Its length, mm.
+    pub length_mm: f64,
+    /// Areas of both parts, mm².
+    pub area_mm2: [f64; 2],
+    /// Parts that are left.
+    pub n_parts: usize,
+}
+
+/// Merges parts smaller than `share` of the whole area into the neighbour with the longest border.
+pub fn absorb_small(graph: &FaceGraph, labels: &[u32], share: f64) -> Vec<u32> {
+    let limit = share * graph.total_area_mm2();
+    let length: Vec<f64> = graph.creases.iter().map(|c| c.length_mm).collect();
+    merge(graph, labels, &length, |border| {
+        let [a, b] = border.area_mm2;
+        (a.min(b) < limit).then_some(-border.length_mm / a.min(b).max(f64::MIN_POSITIVE))
+    })
+}
+
+/// Merges down to `n_parts`, each time the pair with the least share of the border's weight in the area of the
+/// smaller part.
+pub fn merge_to(graph: &FaceGraph, labels: &[u32], n_parts: usize, salience: &[f64]) -> Vec<u32> {
+    let total = graph.total_area_mm2();
+    merge(graph, labels, salience, |border| {
+        let small = border.area_mm2[0].min(border.area_mm2[1]) / total;
+        let mean = border.weight / border.length_mm.max(f64::MIN_POSITIVE);
+        (border.n_parts > n_parts).then_some((mean + 1e-3) * small.max(1e-9).sqrt())
+    })
+}
