@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use shellock::connector::ConnectorParams;
 use shellock::coupon::N_FITS;
 use shellock::design::{self, KeySource, Params};
 use shellock::piece::LabelParams;
+use shellock::segmentation::Method;
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
 use shellock_print::Printer;
@@ -401,8 +403,20 @@ pub struct Options {
         conflicts_with = "labels"
     )]
     pub labels_from: LabelsFrom,
-    /// About how many pieces to make where there are no labels [default: from the size, 10 for a 150 mm
-    /// figure]
+    /// How pieces are found where there are no labels: creases, of similar size with seams in creases; auto,
+    /// where people would divide, by the best cuts of the others; random-cuts, the cuts that most of many
+    /// agree on; sdf, by thickness; primitives, by what planes, spheres and cylinders fit; kmeans, by
+    /// distance and turning
+    #[arg(
+        long,
+        value_name = "METHOD",
+        default_value = Method::default().name(),
+        value_parser = PossibleValuesParser::new(Method::ALL.map(Method::name)).map(|name| Method::named(&name).expect("it is one of all")),
+        help_heading = "Pieces"
+    )]
+    pub method: Method,
+    /// About how many pieces to make where there are no labels [default: what the method finds; in creases
+    /// from the size, 10 for a 150 mm figure]
     #[arg(long, value_name = "N", help_heading = "Pieces")]
     pub pieces: Option<usize>,
     /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
@@ -534,6 +548,7 @@ impl Options {
     pub fn params(&self, printer: &Printer) -> Params {
         let mut p = Params::default();
         p.seed = self.seed;
+        p.method = self.method;
         p.n_pieces = self.pieces;
         p.up = self.up.unit();
         p.key = match self.key {

@@ -13,7 +13,7 @@ use std::io::Write as _;
 use shellock_formats as io;
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
-use shellock_mechanics::solid::{Answer, Hold, Push, SolidModel, SolidParams, Spot};
+use shellock_mechanics::solid::{Answer, Hold, Push, SolidModel, SolidParams, Spot, Touch};
 
 type Any<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -24,83 +24,143 @@ const SAMPLE_MM: f64 = 0.7;
 /// One place in each box of that edge is held, or pushed, for all of the surface there, mm.
 const BOX_MM: f64 = 0.8;
 
+/// What is done to which pieces.
+struct Case {
+    files: Vec<String>,
+    pieces: Vec<Solid>,
+    hold: Vec<f64>,
+    holds: Vec<Hold>,
+    pushes: Vec<Push>,
+}
+
 fn main() -> Any<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [cells, hold, push, files @ ..] = &args[..] else {
         return Err("CELLS HOLD PUSH PIECE…".into());
     };
-    let pieces: Vec<Solid> = files.iter().map(|f| piece(f)).collect::<Any<_>>()?;
-    let (held_part, held) = within(&pieces, &numbers(hold)?)?;
-    let of_push = numbers(push)?;
-    let (pushed_part, pushed) = within(&pieces, &of_push)?;
-    let force_n = Vec3::from_slice(of_push.get(5..8).ok_or("PUSH has eight numbers")?);
-    let holds: Vec<Hold> = held
-        .iter()
-        .map(|&(at, area_mm2)| Hold {
-            part: held_part as u32,
-            at,
-            area_mm2,
-        })
-        .collect();
-    let area_mm2: f64 = pushed.iter().map(|p| p.1).sum();
-    let pushes: Vec<Push> = pushed
-        .iter()
-        .map(|&(at, own)| Push {
-            part: pushed_part as u32,
-            at,
-            force_n: force_n * (own / area_mm2),
-        })
-        .collect();
-
+    let case = case(hold, push, files)?;
     let mut runs = Vec::new();
     let mut touches = Vec::new();
     for cell_mm in numbers(cells)? {
-        let params = SolidParams {
-            cell_mm,
-            ..SolidParams::default()
-        };
-        let mut model = SolidModel::new(&params, &pieces, &holds, &|_| false, &|| false)?;
-        if touches.is_empty() {
-            touches = model.touches().to_vec();
-        }
-        let spots: Vec<Option<Spot>> = pushes.iter().map(|p| model.spot(p.part, p.at)).collect();
-        let ends: Vec<[Option<Spot>; 2]> = touches
-            .iter()
-            .map(|t| [0, 1].map(|i| model.spot(t.parts[i], t.at[i])))
-            .collect();
-        for friction in FRICTION {
-            let moved = model.under_load(&pushes, Answer::Held, friction, &|| false)?;
-            for (load, motion) in [
-                (0.01, &(|s: &Spot| moved.settled_mm(s)) as &dyn Fn(&Spot) -> Vec3),
-                (1.0, &|s: &Spot| moved.moved_mm(s)),
-            ] {
-                let at = |spot: &Option<Spot>| spot.as_ref().map_or([f64::NAN; 3], |s| motion(s).to_array());
-                let mut run = format!(
-                    "{{\"cell_mm\": {cell_mm:?}, \"friction\": {friction:?}, \"load\": {load:?}, \"off\": {:?},",
-                    moved.friction_off
-                );
-                list(&mut run, "pushed_mm", &spots.iter().map(at).collect::<Vec<_>>())?;
-                list(&mut run, "ends_mm", &ends.iter().map(|e| [at(&e[0]), at(&e[1])]).collect::<Vec<_>>())?;
-                run.pop();
-                runs.push(run + "}");
-            }
+        solve(&case, cell_mm, &mut touches, &mut runs)?;
+    }
+    let json = told(&case, &touches)?;
+    writeln!(std::io::stdout(), "{json}\"runs\": [{}]}}", runs.join(","))?;
+    Ok(())
+}
+
+fn case(hold: &str, push: &str, files: &[String]) -> Any<Case> {
+    let pieces: Vec<Solid> = files.iter().map(|f| piece(f)).collect::<Any<_>>()?;
+    let hold = numbers(hold)?;
+    let (held_part, held) = within(&pieces, &hold)?;
+    let push = numbers(push)?;
+    let (pushed_part, pushed) = within(&pieces, &push)?;
+    let force_n = Vec3::from_slice(push.get(5..8).ok_or("PUSH has eight numbers")?);
+    let area_mm2: f64 = pushed.iter().map(|p| p.1).sum();
+    let to_hold = |&(at, area_mm2): &(Vec3, f64)| Hold {
+        part: held_part as u32,
+        at,
+        area_mm2,
+    };
+    let to_push = |&(at, own): &(Vec3, f64)| Push {
+        part: pushed_part as u32,
+        at,
+        force_n: force_n * (own / area_mm2),
+    };
+    Ok(Case {
+        files: files.to_vec(),
+        holds: held.iter().map(to_hold).collect(),
+        pushes: pushed.iter().map(to_push).collect(),
+        pieces,
+        hold,
+    })
+}
+
+/// Solves with cells of that edge; what touches is that of the first.
+fn solve(case: &Case, cell_mm: f64, touches: &mut Vec<Touch>, runs: &mut Vec<String>) -> Any<()> {
+    let params = SolidParams {
+        cell_mm,
+        ..SolidParams::default()
+    };
+    let mut model = SolidModel::new(&params, &case.pieces, &case.holds, &|_| false, &|| false)?;
+    if touches.is_empty() {
+        *touches = model.touches().to_vec();
+    }
+    let spots: Vec<Option<Spot>> = case.pushes.iter().map(|p| model.spot(p.part, p.at)).collect();
+    let ends: Vec<[Option<Spot>; 2]> = touches
+        .iter()
+        .map(|t| [0, 1].map(|i| model.spot(t.parts[i], t.at[i])))
+        .collect();
+    for friction in FRICTION {
+        let moved = model.under_load(&case.pushes, Answer::Held, friction, &|| false)?;
+        for (load, motion) in [
+            (0.01, &(|s: &Spot| moved.settled_mm(s)) as &dyn Fn(&Spot) -> Vec3),
+            (1.0, &|s: &Spot| moved.moved_mm(s)),
+        ] {
+            let at = |spot: &Option<Spot>| spot.as_ref().map_or([f64::NAN; 3], |s| motion(s).to_array());
+            let mut run = format!(
+                "{{\"cell_mm\": {cell_mm:?}, \"friction\": {friction:?}, \"load\": {load:?}, \"off\": {:?},",
+                moved.friction_off
+            );
+            list(&mut run, "pushed_mm", &spots.iter().map(at).collect::<Vec<_>>())?;
+            list(
+                &mut run,
+                "ends_mm",
+                &ends.iter().map(|e| [at(&e[0]), at(&e[1])]).collect::<Vec<_>>(),
+            )?;
+            run.pop();
+            runs.push(run + "}");
         }
     }
+    Ok(())
+}
 
+/// The case as JSON that goes on.
+fn told(case: &Case, touches: &[Touch]) -> Any<String> {
+    let Case {
+        files, hold, pushes, ..
+    } = case;
     let params = SolidParams::default();
+    let pushed_part = pushes[0].part;
     let mut json = format!(
         "{{\"youngs_modulus_mpa\": {:?}, \"poissons_ratio\": {:?}, \"pieces\": {files:?},",
         params.material.youngs_modulus_mpa, params.material.poissons_ratio
     );
-    write!(json, "\"hold\": {:?}, \"pushed_part\": {pushed_part},", numbers(hold)?)?;
-    list(&mut json, "pushed_at", &pushes.iter().map(|p| p.at.to_array()).collect::<Vec<_>>())?;
-    list(&mut json, "forces_n", &pushes.iter().map(|p| p.force_n.to_array()).collect::<Vec<_>>())?;
-    list(&mut json, "parts", &touches.iter().map(|t| t.parts).collect::<Vec<_>>())?;
-    list(&mut json, "gaps_mm", &touches.iter().map(|t| t.gap_mm).collect::<Vec<_>>())?;
-    list(&mut json, "fast", &touches.iter().map(|t| t.is_fast).collect::<Vec<_>>())?;
-    list(&mut json, "ends_at", &touches.iter().map(|t| t.at.map(|p| p.to_array())).collect::<Vec<_>>())?;
-    writeln!(std::io::stdout(), "{json}\"runs\": [{}]}}", runs.join(","))?;
-    Ok(())
+    write!(json, "\"hold\": {hold:?}, \"pushed_part\": {pushed_part},")?;
+    list(
+        &mut json,
+        "pushed_at",
+        &pushes.iter().map(|p| p.at.to_array()).collect::<Vec<_>>(),
+    )?;
+    list(
+        &mut json,
+        "forces_n",
+        &pushes.iter().map(|p| p.force_n.to_array()).collect::<Vec<_>>(),
+    )?;
+    list(
+        &mut json,
+        "parts",
+        &touches.iter().map(|t| t.parts).collect::<Vec<_>>(),
+    )?;
+    list(
+        &mut json,
+        "gaps_mm",
+        &touches.iter().map(|t| t.gap_mm).collect::<Vec<_>>(),
+    )?;
+    list(
+        &mut json,
+        "fast",
+        &touches.iter().map(|t| t.is_fast).collect::<Vec<_>>(),
+    )?;
+    list(
+        &mut json,
+        "ends_at",
+        &touches
+            .iter()
+            .map(|t| t.at.map(|p| p.to_array()))
+            .collect::<Vec<_>>(),
+    )?;
+    Ok(json)
 }
 
 fn numbers(text: &str) -> Any<Vec<f64>> {

@@ -5,28 +5,30 @@
 //! paper, which takes the labels as given: without refining most labelled models have no plan that locks (see
 //! [`crate::seam::graph`]).
 
-mod auto;
 mod changes;
+mod creases;
 mod cut;
 mod dual_graph;
+mod halve;
+mod method;
 mod refine;
 mod smooth;
 mod split;
 mod user;
 
 use serde::{Deserialize, Serialize};
-use shellock_geom::subdivide::halve_edges;
-use shellock_geom::topology::{components, ends};
+use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology};
 
-pub use auto::auto_labels;
 pub use changes::tell;
+pub use method::{Method, automatic_labels};
 pub use refine::refine;
 pub use smooth::smooth_and_cut;
 pub use split::split_piece;
 pub use user::user_labels;
 
 use changes::Changes;
+use halve::halve_long_edges;
 use refine::{Ground, refine_on};
 
 use crate::{Cancelled, Ctx, PatchId, SegmentedSurface};
@@ -38,8 +40,10 @@ pub const MOST_PIECES: usize = 128;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationParams {
-    /// Patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]]; `None`: from
-    /// the area, 10 for a 150 mm figure.
+    /// How patches are found where there are no labels; in creases.
+    pub method: Method,
+    /// Patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]]; `None`: what
+    /// the method finds, and in creases from the area, 10 for a 150 mm figure.
     pub n_pieces: Option<usize>,
     /// Seed of all random choices; 0.
     pub seed: u64,
@@ -67,6 +71,7 @@ pub struct SegmentationParams {
 impl Default for SegmentationParams {
     fn default() -> Self {
         Self {
+            method: Method::default(),
             n_pieces: None,
             seed: 0,
             smoothing_mm2: 7.0,
@@ -237,9 +242,6 @@ const MAX_MEND_ROUNDS: usize = 4;
 /// How much stricter each repetition is.
 const STRICTER: f64 = 1.15;
 
-/// How many clusterings automatic segmentation tries before it is content with the best so far.
-const MAX_AUTOMATIC_TRIES: u64 = 4;
-
 /// Limits that contacts are held against in turn, from `min_contact_mm` down to `least_contact_mm`.
 const N_CONTACT_LIMITS: usize = 3;
 
@@ -272,12 +274,12 @@ pub fn segment(
         }
         None => {
             let mut best: Option<(f64, SegmentedSurface)> = None;
-            for attempt in 0..MAX_AUTOMATIC_TRIES {
+            for attempt in 0..params.method.n_tries() {
                 let reseeded = SegmentationParams {
                     seed: params.seed.wrapping_add(attempt << 32),
                     ..params.clone()
                 };
-                let labels = auto_labels(ctx, &reseeded, &fine)?;
+                let labels = automatic_labels(ctx, &reseeded, &fine)?;
                 let origin = LabelOrigin::Automatic;
                 let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
                 best = best_contacts(ctx, params, &ground, &labels, origin, limit)?.or(best);
@@ -531,74 +533,6 @@ fn changed(
         .iter_mut()
         .for_each(|f| *f = surface.source_face[*f as usize]);
     Ok(Some(next))
-}
-
-/// Halves edges until none is longer than the limit, which grows with models far larger than 300 mm to bound
-/// their triangles.
-fn halve_long_edges(params: &SegmentationParams, solid: &Solid) -> (Solid, Vec<u32>) {
-    let limit_mm = params.max_edge_mm.max((solid.mesh().area() / 20_000.0).sqrt());
-    let mut fine = solid.clone();
-    let mut source_face: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
-    loop {
-        let mesh = fine.mesh();
-        let is_long = |a: u32, b: u32| mesh.points[a as usize].distance(mesh.points[b as usize]) > limit_mm;
-        if !mesh
-            .triangles
-            .iter()
-            .any(|&[a, b, c]| is_long(a, b) || is_long(b, c) || is_long(c, a))
-        {
-            return (fine, source_face);
-        }
-        let (next, parent) = halve_edges(&fine, &Topology::new(&fine), is_long);
-        source_face = parent.iter().map(|&f| source_face[f as usize]).collect();
-        fine = next;
-    }
-}
-
-/// Halves edges near seams so that curves have points enough to be smooth.
-fn halve_edges_near_seams(
-    solid: &Solid,
-    labels: &FaceLabels,
-    limit_mm: f64,
-) -> (Solid, FaceLabels, Vec<u32>) {
-    /// Rings of triangles beside the seam that are refined; the smoothed seam stays within them.
-    const N_RINGS: usize = 2;
-    let (mut fine, mut fine_labels) = (solid.clone(), labels.clone());
-    let mut source_face: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
-    loop {
-        let (mesh, topology) = (fine.mesh(), Topology::new(&fine));
-        let mut is_near = vec![false; mesh.points.len()];
-        for h in 0..topology.n_half_edges() as u32 {
-            let (f, g) = (h as usize / 3, topology.opposite(h) as usize / 3);
-            is_near[ends(mesh, h).0 as usize] |= fine_labels.patch_of_face[f] != fine_labels.patch_of_face[g];
-        }
-        for _ in 0..N_RINGS {
-            let before = is_near.clone();
-            for t in mesh
-                .triangles
-                .iter()
-                .filter(|t| t.iter().any(|&v| before[v as usize]))
-            {
-                t.iter().for_each(|&v| is_near[v as usize] = true);
-            }
-        }
-        let wants = |a: u32, b: u32| {
-            is_near[a as usize]
-                && is_near[b as usize]
-                && mesh.points[a as usize].distance(mesh.points[b as usize]) > limit_mm
-        };
-        if !mesh
-            .triangles
-            .iter()
-            .any(|&[a, b, c]| wants(a, b) || wants(b, c) || wants(c, a))
-        {
-            return (fine, fine_labels, source_face);
-        }
-        let (next, parent) = halve_edges(&fine, &topology, wants);
-        source_face = parent.iter().map(|&f| source_face[f as usize]).collect();
-        fine_labels = fine_labels.inherited(&parent);
-        fine = next;
-    }
 }
 
 #[cfg(test)]

@@ -37,14 +37,18 @@ const ASSEMBLY: [&str; 10] = [
 ];
 
 /// Crates from the ground up, each with those that its product may name.
-const FLOORS: [(&str, &[&str]); 11] = [
+const FLOORS: [(&str, &[&str]); 12] = [
     ("geom", &[]),
     ("formats", &["geom"]),
     ("check", &[]),
     ("mechanics", &["geom"]),
+    ("segment", &["geom"]),
     ("assembly", &["geom", "mechanics"]),
     ("render", &["geom", "assembly"]),
-    ("shellock", &["geom", "mechanics", "assembly", "render"]),
+    (
+        "shellock",
+        &["geom", "mechanics", "segment", "assembly", "render"],
+    ),
     ("print", &["geom", "mechanics", "assembly", "render"]),
     ("kit", &["geom", "assembly", "shellock", "print"]),
     (

@@ -15,6 +15,7 @@ mod model;
 mod pictures;
 mod savings;
 mod search;
+mod segmentations;
 mod statistics;
 mod strength;
 mod study;

@@ -13,6 +13,7 @@ use crate::hours::{self, HoursOptions};
 use crate::loads::{self, LoadsOptions};
 use crate::metrics::{self, MetricsOptions};
 use crate::search::{self, SearchOptions};
+use crate::segmentations::{self, SegmentationsOptions};
 use crate::statistics::{band, kendall, spearman};
 use crate::strength::{self, StrengthOptions};
 use crate::table::{Table, markdown};
@@ -38,6 +39,8 @@ enum Study {
     Worse(WorseOptions),
     /// How fast plans of a model are found, and what its segmentations allow
     Search(SearchOptions),
+    /// What the divisions of a model by each method allow: plan, seams, time
+    Segmentations(SegmentationsOptions),
     /// What the thickness of a model's wall depends on: analysis mesh, peaks, falls
     Strength(StrengthOptions),
     /// What kits of many models cost: time by stage, kits made in vain
@@ -71,6 +74,7 @@ pub fn run(options: &Options) -> Result<Vec<PathBuf>, Failure> {
         Study::Loads(loads) => loads::run(loads, &options.out),
         Study::Worse(worse) => worse::run(worse, &options.out),
         Study::Search(search) => search::run(search, &options.out),
+        Study::Segmentations(segmentations) => segmentations::run(segmentations, &options.out),
         Study::Strength(strength) => strength::run(strength, &options.out),
         Study::Effort(effort) => effort::run(effort, &options.out),
         Study::Hours(hours) => hours::run(hours, &options.out),

@@ -4,6 +4,7 @@ use shellock_mechanics::Material;
 
 use crate::connector::ConnectorParams;
 use crate::piece::LabelParams;
+use crate::segmentation::Method;
 
 /// Everything that a user may set, each once; what stages are given follows from it, see
 /// [`Settings`](super::Settings).
@@ -18,8 +19,10 @@ use crate::piece::LabelParams;
 pub struct Params {
     /// Seed of all random choices: the same seed gives the same kit. 0.
     pub seed: u64,
-    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: from the area, 10 for a figure of
-    /// 150 mm.
+    /// How pieces are found where there are no labels; in creases.
+    pub method: Method,
+    /// Pieces that automatic segmentation begins with. [2, 128]; `None`: what the method finds, and in creases
+    /// from the area, 10 for a figure of 150 mm.
     pub n_pieces: Option<usize>,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
@@ -55,6 +58,7 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             seed: 0,
+            method: Method::default(),
             n_pieces: None,
             up: [0.0, 0.0, 1.0],
             thickness: Thickness::default(),

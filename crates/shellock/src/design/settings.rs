@@ -144,6 +144,7 @@ pub(super) fn problems(params: &Params) -> Vec<String> {
 /// What the user says of the division.
 fn segmentation(params: &Params) -> SegmentationParams {
     SegmentationParams {
+        method: params.method,
         n_pieces: params.n_pieces,
         seed: params.seed,
         ..SegmentationParams::default()

@@ -8,7 +8,8 @@ use shellock_geom::sparse::{Cholesky, SparseSymmetric};
 use shellock_geom::{Solid, TriMesh};
 
 use super::cut::cut_along_ties;
-use super::{FaceLabels, SegmentationError, SegmentationParams, halve_edges_near_seams};
+use super::halve::halve_edges_near_seams;
+use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::{Ctx, PatchId, SegmentedSurface};
 
 /// Longest edge near a seam, in roots of the diffusion: the soft labels bend on that scale and are taken as

@@ -192,7 +192,12 @@ impl Seen<'_> {
     }
 
     fn opening_mm(&self, station: usize, lost: &[u32]) -> f64 {
-        if self.model.pieces_at(station).iter().any(|piece| lost.contains(&piece.0)) {
+        if self
+            .model
+            .pieces_at(station)
+            .iter()
+            .any(|piece| lost.contains(&piece.0))
+        {
             f64::INFINITY
         } else {
             self.widest_mm(station, &|spot| self.moved.moved_mm(spot))
@@ -203,7 +208,10 @@ impl Seen<'_> {
     fn key_slides_mm(&self) -> f64 {
         let moved = |spot: &Spot| self.moved.moved_mm(spot);
         let slides = (0..self.meetings.len()).flat_map(|i| {
-            let slid: Vec<f64> = self.apart(i, &moved).map(|apart| self.slid_mm(i, apart)).collect();
+            let slid: Vec<f64> = self
+                .apart(i, &moved)
+                .map(|apart| self.slid_mm(i, apart))
+                .collect();
             slid
         });
         slides.fold(0.0, f64::max)

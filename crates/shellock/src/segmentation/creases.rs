@@ -34,7 +34,7 @@ type Seed = (u32, f64);
 ///
 /// Each patch is connected; disks only after [`super::refine`]. Fails where the model has fewer triangles than
 /// patches are wanted; 0.2 s for 60 000 triangles.
-pub fn auto_labels(
+pub(super) fn crease_labels(
     ctx: &Ctx,
     params: &SegmentationParams,
     solid: &Solid,

@@ -1,0 +1,140 @@
+//! Where nobody labelled: patches by one of several methods.
+
+use serde::{Deserialize, Serialize};
+use shellock_geom::{Solid, TriMesh};
+use shellock_segment::auto::AutoParams;
+use shellock_segment::kmeans::KMeansParams;
+use shellock_segment::primitives::PrimitivesParams;
+use shellock_segment::random_cuts::RandomCutsParams;
+use shellock_segment::sdf::SdfParams;
+use shellock_segment::{auto, kmeans, primitives, random_cuts, sdf};
+
+use super::creases::crease_labels;
+use super::user::user_labels;
+use super::{FaceLabels, SegmentationError, SegmentationParams};
+use crate::Ctx;
+
+/// Parts with less than this share of the surface join a neighbour: curls and claws are no pieces.
+const LEAST_SHARE: f64 = 0.012;
+
+/// How a surface is divided where nobody labelled it. What each is worth: [`shellock_segment`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// The best cuts that all methods propose.
+    Auto,
+    /// The cuts that most of many random ones agree on.
+    RandomCuts,
+    /// Parts of one thickness each.
+    Sdf,
+    /// Parts that planes, spheres and cylinders fit.
+    Primitives,
+    /// Parts around representatives, by distance and turning.
+    Kmeans,
+    /// Patches of similar size with their seams in creases.
+    #[default]
+    Creases,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Auto,
+        Self::RandomCuts,
+        Self::Sdf,
+        Self::Primitives,
+        Self::Kmeans,
+        Self::Creases,
+    ];
+
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::RandomCuts => "random-cuts",
+            Self::Sdf => "sdf",
+            Self::Primitives => "primitives",
+            Self::Kmeans => "kmeans",
+            Self::Creases => "creases",
+        }
+    }
+
+    /// The method of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|method| method.name() == name)
+    }
+
+    /// How often it is worth trying with another seed.
+    pub(super) fn n_tries(self) -> u64 {
+        /// Clusterings, until one is easily mended.
+        const CLUSTERINGS: u64 = 4;
+        if self == Self::Creases { CLUSTERINGS } else { 1 }
+    }
+
+    /// A part for each face; `None` for patches in creases, which are not found on meshes alone.
+    fn parts(self, n_parts: Option<usize>, seed: u64, mesh: &TriMesh) -> Option<Vec<u32>> {
+        let cuts = RandomCutsParams {
+            n_parts,
+            seed,
+            ..RandomCutsParams::default()
+        };
+        Some(match self {
+            Self::Auto => auto::divide(&AutoParams { cuts }, mesh),
+            Self::RandomCuts => random_cuts::divide(&cuts, mesh),
+            Self::Sdf => {
+                let params = SdfParams {
+                    n_parts,
+                    seed,
+                    ..SdfParams::default()
+                };
+                sdf::divide(&params, mesh)
+            }
+            Self::Primitives => {
+                let params = PrimitivesParams {
+                    n_parts,
+                    ..PrimitivesParams::default()
+                };
+                primitives::divide(&params, mesh)
+            }
+            Self::Kmeans => {
+                let params = KMeansParams {
+                    n_parts,
+                    ..KMeansParams::default()
+                };
+                kmeans::divide(&params, mesh)
+            }
+            Self::Creases => return None,
+        })
+    }
+}
+
+/// Patches by the method of `params`: connected, none too small; the same for the same seed.
+///
+/// Where the method finds nothing to divide, as on a ball, patches in creases, which is noted.
+pub fn automatic_labels(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    solid: &Solid,
+) -> Result<FaceLabels, SegmentationError> {
+    let Some(parts) = params.method.parts(params.n_pieces, params.seed, solid.mesh()) else {
+        return crease_labels(ctx, params, solid);
+    };
+    ctx.check()?;
+    let labels: Vec<i64> = parts.into_iter().map(i64::from).collect();
+    let large = SegmentationParams {
+        min_piece_mm2: params.min_piece_mm2.max(LEAST_SHARE * solid.mesh().area()),
+        ..params.clone()
+    };
+    // What is too small is merged, which is told of labels that people gave.
+    match user_labels(&ctx.fork(), &large, solid, &labels) {
+        Err(SegmentationError::Cancelled(cancelled)) => Err(cancelled.into()),
+        Err(_) => {
+            let method = params.method.name();
+            ctx.note(&format!(
+                "{method} finds no place to divide: pieces of similar size instead"
+            ));
+            crease_labels(ctx, params, solid)
+        }
+        found => found,
+    }
+}
