@@ -1,5 +1,7 @@
 //! What can be said on the command line.
 
+mod blows;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -13,6 +15,8 @@ use shellock::segmentation::Method;
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
 use shellock_print::Printer;
+
+pub use blows::{Blows, Place};
 
 use crate::stress;
 
@@ -138,45 +142,6 @@ pub enum Command {
         #[arg(long, value_name = "FILE")]
         labels: Option<PathBuf>,
     },
-}
-
-/// Where a punch lands.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Place {
-    Top,
-    Middle,
-}
-
-/// What is done to a kit.
-#[derive(Args)]
-pub struct Blows {
-    /// Force of the punch
-    #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true, value_parser = stress::newtons)]
-    pub punch: f64,
-    /// Where it presses: on the highest place 15 mm wide or wider, or on the highest place above the middle
-    #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
-    pub at: Place,
-    /// Height of the fall: m, cm or mm
-    #[arg(long, value_name = "HEIGHT", default_value = "2m", allow_hyphen_values = true,
-          value_parser = stress::metres)]
-    pub drop: f64,
-    /// What the pieces are printed of: sla-resin, pla, petg or pa12 [default: as the kit was built]
-    #[arg(long, value_name = "NAME", value_parser = stress::material)]
-    pub material: Option<Material>,
-    /// Edge of the cells that finished pieces are cut into, mm, 0.5 to 20; smaller ones take longer and more memory
-    #[arg(long, value_name = "MM", default_value_t = 2.5)]
-    pub cell: f64,
-    /// Compare the kit's plan with connectors of half the size and with a plan of half the score, as walls and
-    /// connectors without gaps
-    #[arg(long)]
-    pub compare: bool,
-    /// Length of the edges of the mesh that forces act on, and of the comparison's, as a share of the usual one, 0.2
-    /// to 5
-    #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
-    pub edges: f64,
-    /// Which axis points up [default: as the kit was built]
-    #[arg(long, value_enum)]
-    pub up: Option<Axis>,
 }
 
 /// Where a kit goes.

@@ -290,3 +290,43 @@ fn default_parameters_have_no_problems_and_all_problems_are_listed() {
     };
     assert_eq!(bad.problems().len(), 2);
 }
+
+fn by(method: Method, solid: &Solid) -> FaceLabels {
+    let params = SegmentationParams {
+        method,
+        ..SegmentationParams::default()
+    };
+    with_ctx(|ctx| automatic_labels(ctx, &params, solid)).unwrap()
+}
+
+#[test]
+fn people_s_methods_make_a_part_of_each_arm() {
+    let solid = limbed();
+    let arm_of_face = arm_labels(&solid);
+    for method in [Method::Auto, Method::RandomCuts, Method::Sdf] {
+        let found = by(method, &solid);
+        let mut parts = std::collections::BTreeSet::new();
+        for arm in [-3, 100, 12, 13] {
+            // The tip of the arm: its farthest face.
+            let tip = (0..arm_of_face.len())
+                .filter(|f| arm_of_face[*f] == arm)
+                .max_by(|a, b| {
+                    let far = |f: &usize| solid.mesh().face_center(*f).length();
+                    far(a).total_cmp(&far(b))
+                })
+                .unwrap();
+            parts.insert(found.as_slice()[tip]);
+        }
+        assert_eq!(parts.len(), 4, "{method:?}");
+        assert!(found.n_patches() >= 5, "{method:?}: the body is a part, too");
+    }
+}
+
+#[test]
+fn a_ball_is_divided_by_every_method() {
+    let ball = Solid::new(sphere(4, 60.0 * Vec3::ONE)).unwrap();
+    for method in Method::ALL {
+        assert!(by(method, &ball).n_patches() >= 2, "{method:?}");
+        assert_eq!(Method::named(method.name()), Some(method));
+    }
+}
