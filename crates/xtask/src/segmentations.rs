@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use shellock::Ctx;
 use shellock::design::{Params, Settings};
 use shellock::plan::{PlanConstraints, PlanOutcome, search};
 use shellock::segmentation::Method;
+use shellock::{Ctx, Seam};
 
 use crate::failure::Failure;
 use crate::model::{Divided, Model, ModelOptions, divide, load, with_ctx};
@@ -36,8 +36,6 @@ struct Row {
 struct Plan {
     n_pieces: usize,
     seam_mm: f64,
-    /// Share of the seams' length where the surface is concave.
-    concave_share: f64,
     cost: f64,
     lower_bound: f64,
 }
@@ -68,12 +66,11 @@ pub fn run(options: &SegmentationsOptions, out: &Path) -> Result<Vec<PathBuf>, F
     })
 }
 
-const HEAD: [&str; 9] = [
+const HEAD: [&str; 8] = [
     "method",
     "asked",
     "pieces",
     "seams, mm",
-    "in concave places",
     "cost of the best plan",
     "proven lower bound",
     "locks",
@@ -108,46 +105,12 @@ fn plan(ctx: &Ctx<'_>, params: &Params, divided: &Divided) -> Result<Plan, Strin
         PlanOutcome::Found(found) => found,
         PlanOutcome::Infeasible { reason, .. } => return Err(reason),
     };
-    let (seam_mm, concave_mm) = seams(divided);
     Ok(Plan {
         n_pieces: divided.surface.n_patches,
-        seam_mm,
-        concave_share: concave_mm / seam_mm.max(f64::MIN_POSITIVE),
+        seam_mm: divided.surface.seams().iter().map(Seam::length).sum(),
         cost: found.score.worst,
         lower_bound: found.lower_bound,
     })
-}
-
-/// Length of all seams, and of what of them lies in concave places, mm.
-fn seams(divided: &Divided) -> (f64, f64) {
-    /// How far from flat a place counts as concave: the sine of three degrees.
-    const CONCAVE: f64 = 0.05;
-    let mesh = &divided.surface.mesh;
-    let patch = &divided.surface.patch_of_face;
-    let mut beside = std::collections::BTreeMap::new();
-    for (face, corners) in mesh.triangles.iter().enumerate() {
-        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-            beside.insert((corners[a], corners[b]), face);
-        }
-    }
-    let (mut all_mm, mut concave_mm) = (0.0, 0.0);
-    for (&(a, b), &face) in &beside {
-        let Some(&other) = beside.get(&(b, a)).filter(|_| a < b) else {
-            continue;
-        };
-        if patch[face] == patch[other] {
-            continue;
-        }
-        let length_mm = mesh.points[a as usize].distance(mesh.points[b as usize]);
-        let normal = |face: usize| mesh.area_vector_doubled(face).normalize_or_zero();
-        let apart = mesh.face_center(other) - mesh.face_center(face);
-        let rises = (normal(other) - normal(face)).dot(apart.normalize_or_zero());
-        all_mm += length_mm;
-        if rises < -CONCAVE {
-            concave_mm += length_mm;
-        }
-    }
-    (all_mm, concave_mm)
 }
 
 fn asked_of(asked: Option<usize>) -> String {
@@ -160,13 +123,12 @@ fn cells(row: &Row) -> Vec<String> {
         Ok(plan) => cells.extend([
             plan.n_pieces.to_string(),
             format!("{:.0}", plan.seam_mm),
-            format!("{:.2}", plan.concave_share),
             format!("{:.3}", plan.cost),
             format!("{:.3}", plan.lower_bound),
             "yes".to_owned(),
         ]),
         Err(why) => {
-            cells.extend(std::iter::repeat_n(String::new(), 5));
+            cells.extend(std::iter::repeat_n(String::new(), 4));
             cells.push(format!("no: {why}"));
         }
     }
@@ -181,7 +143,6 @@ fn table(rows: &[Row]) -> Table {
         "asked",
         "pieces",
         "seams [mm]",
-        "concave share",
         "cost",
         "lower bound",
         "s",
@@ -198,7 +159,6 @@ fn table(rows: &[Row]) -> Table {
             row.asked.unwrap_or_default() as f64,
             plan.n_pieces as f64,
             plan.seam_mm,
-            plan.concave_share,
             plan.cost,
             plan.lower_bound,
             row.seconds,
