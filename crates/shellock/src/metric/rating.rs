@@ -17,7 +17,7 @@ use super::PlanModel;
 use crate::handling::{Borne, Deed, Handling, LoadCase, borne, load_cases};
 use crate::plan::{LatticePlan, RankedPlan};
 
-/// Loads that are borne that many times over are not worth a move: as many times as changes aim at (`design::strengthen`).
+/// Loads that are borne that many times over are not worth a move.
 pub const ENOUGH: f64 = 1.5;
 
 /// What goals are for, most important first.
