@@ -286,3 +286,25 @@ fn what_cannot_be_tested_is_refused() {
         })
     );
 }
+
+#[test]
+fn a_pin_touches_the_bottom_of_its_channel_all_over_and_from_either_side() {
+    // The sides are nearer to the pin's rim than the bottom is.
+    let pin = upright([0.0, 0.0, 0.0], [4.0, 4.0, 4.0]);
+    let outer = Volume::hull(&corners([-3.0, -3.0, -3.0], [7.0, 7.0, 3.0]));
+    let inner = Volume::hull(&corners([-0.15, -0.15, -0.5], [4.15, 4.15, 5.0]));
+    let channel = Solid::new(outer.subtract(&inner).to_mesh()).unwrap();
+    let touches = super::touch::touches(&[pin, channel], 0.8, 1.0);
+    for (parts, down) in [([0, 1], -1.0), ([1, 0], 1.0)] {
+        let below = touches
+            .iter()
+            .filter(|t| t.parts == parts && t.normal.z * down > 0.99);
+        let area_mm2: f64 = below.map(|t| t.area_mm2).sum();
+        // Half of the pin's face of 16 mm², and half of the bottom that lies before it.
+        assert!((7.9..9.3).contains(&area_mm2), "{parts:?}: {area_mm2}");
+    }
+}
+
+fn corners(min: [f64; 3], max: [f64; 3]) -> Vec<Vec3> {
+    plain::cuboid(min.into(), max.into()).0
+}

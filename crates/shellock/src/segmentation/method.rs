@@ -127,8 +127,11 @@ pub fn automatic_labels(
     };
     // What is too small is merged, which is told of labels that people gave.
     match user_labels(&ctx.fork(), &large, solid, &labels) {
-        Err(SegmentationError::Cancelled(cancelled)) => Err(cancelled.into()),
-        Err(_) => {
+        Err(
+            SegmentationError::OneLabel { .. }
+            | SegmentationError::TooManyLabels { .. }
+            | SegmentationError::AllTooSmall { .. },
+        ) => {
             let method = params.method.name();
             ctx.note(&format!(
                 "{method} finds no place to divide: pieces of similar size instead"
