@@ -24,6 +24,8 @@ mod strengthen;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
+
 use shellock_geom::Solid;
 
 use crate::key::Turn;
@@ -35,7 +37,7 @@ use crate::{
 };
 use attempt::{Attempt, Failure, Next, Planning};
 pub use budget::Effort;
-use budget::{Budget, Levers, Pace, THICKER_WALLS};
+use budget::{ASKED, Budget, Levers, Pace, THICKER_WALLS};
 use candidate::Candidate;
 use division::{Division, WallGrid, revised};
 use handover::Handover;
@@ -48,23 +50,83 @@ use strengthen::{Remedy, Thicker};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or
 /// the rounds are used up; then the best of them is returned, its failures told.
+///
+/// A kit is asked first to bear what people do with a reserve; where none passes with what that takes (a
+/// thicker wall, larger connectors), it is asked to bear it once.
 pub fn design(
     ctx: &Ctx,
     params: &Params,
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<DesignOutcome, DesignError> {
-    let mut wall = Wall::decide(ctx, params, model)?;
-    let (mut n_left, mut effort) = (THICKER_WALLS, Effort::default());
-    loop {
-        let job = Job::new(ctx, params, model, labels, &wall, n_left > 0)?;
-        match with_wall(ctx, &job, &mut effort)? {
-            Walled::Done(outcome) => return Ok(outcome),
-            Walled::Thicker(thicker) => {
-                n_left -= 1;
-                wall = wall.thicker(ctx, params, model, &thicker)?;
-            }
+    let thinnest = Wall::decide(ctx, params, model)?;
+    let mut effort = Effort::default();
+    let [most, least] = ASKED;
+    let Asked {
+        outcome: first,
+        has_changed,
+        is_late,
+    } = asking(ctx, params, model, labels, (&thinnest, most), &mut effort);
+    let passed = |outcome: &DesignOutcome| outcome.kit().is_some_and(|kit| kit.verification.passed());
+    let is_stop = matches!(first, Err(DesignError::Cancelled(_)));
+    if first.as_ref().is_ok_and(passed) || is_stop || !has_changed || is_late {
+        return first;
+    }
+    ctx.note("no kit passes that bears what people do with a reserve: without one");
+    let second = asking(ctx, params, model, labels, (&thinnest, least), &mut effort);
+    match (first, second.outcome) {
+        (_, Err(stop @ DesignError::Cancelled(_))) => Err(stop),
+        (Ok(first), second) if !second.as_ref().is_ok_and(|second| second.is_better_than(&first)) => {
+            Ok(first)
         }
+        (_, second) => second,
+    }
+}
+
+/// How a job ended that asks so much of a kit.
+struct Asked {
+    outcome: Result<DesignOutcome, DesignError>,
+    /// Whether something was changed for the sake of use.
+    has_changed: bool,
+    /// Whether the time is over for another kit.
+    is_late: bool,
+}
+
+/// The job from `thinnest`, where a kit is asked to bear so many times what people do to it.
+fn asking(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    labels: Option<&[i64]>,
+    (thinnest, asked): (&Wall, f64),
+    effort: &mut Effort,
+) -> Asked {
+    let mut wall = Cow::Borrowed(thinnest);
+    let (mut n_left, mut is_late) = (THICKER_WALLS, false);
+    let outcome = loop {
+        let job = Job::new(ctx, params, model, labels, (&wall, asked), n_left > 0);
+        let walled = job.and_then(|job| {
+            let walled = with_wall(ctx, &job, effort);
+            is_late = job.pace.is_late(ctx);
+            walled
+        });
+        match walled {
+            Ok(Walled::Done(outcome)) => break Ok(outcome),
+            Ok(Walled::Thicker(thicker)) => {
+                n_left -= 1;
+                match wall.thicker(ctx, params, model, &thicker) {
+                    Ok(next) => wall = Cow::Owned(next),
+                    Err(e) => break Err(e),
+                }
+            }
+            Err(e) => break Err(e),
+        }
+    };
+    let has_changed = n_left < THICKER_WALLS || outcome.as_ref().is_ok_and(DesignOutcome::is_changed_for_use);
+    Asked {
+        outcome,
+        has_changed,
+        is_late,
     }
 }
 
@@ -80,7 +142,8 @@ fn with_wall(ctx: &Ctx, job: &Job<'_>, effort: &mut Effort) -> Result<Walled<Des
     let mut best = Best::after(*effort);
     let places = candidate::places(ctx, job)?;
     for (i, place) in places.iter().enumerate() {
-        if best.is_enough(place.as_ref()) || (i > 0 && job.pace.is_late(ctx)) {
+        let has_ended = job.is_trial() && best.has_kit();
+        if has_ended || best.is_enough(place.as_ref()) || (i > 0 && job.pace.is_late(ctx)) {
             continue;
         }
         if let Some(site) = place {
@@ -304,7 +367,7 @@ pub fn plan(
     let mut wall = Wall::decide(ctx, params, model)?;
     let mut n_left = THICKER_WALLS;
     loop {
-        let job = Job::new(ctx, params, model, labels, &wall, n_left > 0)?;
+        let job = Job::new(ctx, params, model, labels, (&wall, ASKED[0]), n_left > 0)?;
         match plan_with_wall(ctx, &job)? {
             Walled::Done(planned) => return Ok(planned),
             Walled::Thicker(thicker) => {
@@ -383,6 +446,8 @@ struct Job<'a> {
     model: &'a Solid,
     labels: Option<&'a [i64]>,
     wall: &'a Wall,
+    /// How many times a kit is to bear what people do to it.
+    asked: f64,
     /// Whether it may begin anew with a thicker wall.
     may_thicken: bool,
     pace: Pace,
@@ -399,7 +464,7 @@ impl<'a> Job<'a> {
         params: &'a Params,
         model: &'a Solid,
         labels: Option<&'a [i64]>,
-        wall: &'a Wall,
+        (wall, asked): (&'a Wall, f64),
         may_thicken: bool,
     ) -> Result<Self, DesignError> {
         let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
@@ -409,12 +474,31 @@ impl<'a> Job<'a> {
             model,
             labels,
             wall,
+            asked,
             may_thicken,
             pace: Pace::default(),
             stress,
             key_faces: key_faces(params.key, model, labels, &surface)?,
             surface,
         })
+    }
+
+    /// Whether its wall is as thick as it is for a reserve alone: then one kit is made, and where that fails the
+    /// job goes back to the wall that it needs.
+    fn is_trial(&self) -> bool {
+        let [_, once] = ASKED;
+        let is_thicker = |w: &Warning| matches!(w.cause, Cause::WallForUse { .. });
+        self.asked > once && self.wall.warnings.iter().any(is_thicker)
+    }
+
+    /// How many kits may be made.
+    fn rounds(&self) -> Rounds {
+        let one = Rounds {
+            kits: 1,
+            refinements: 0,
+            kits_in_all: 1,
+        };
+        if self.is_trial() { one } else { self.params.rounds }
     }
 
     /// The patch that has most of what the user wants the key to have.
@@ -469,6 +553,7 @@ fn key_faces(
 }
 
 /// The wall's thickness in what stages are given, what it bears, and what to tell of it.
+#[derive(Clone)]
 struct Wall {
     settings: Settings,
     strength: Option<Strength>,

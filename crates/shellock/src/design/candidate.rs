@@ -51,13 +51,18 @@ impl<'a> Candidate<'a> {
     /// The `i`-th of the places. The model is turned so that a key that is cut slides along a lattice
     /// direction; `None` where rounding leaves no solid.
     pub fn new(job: &Job<'a>, i: usize, place: Option<&KeySite>) -> Option<Self> {
-        let levers = Levers::of(job.params, job.labels.is_some(), job.may_thicken && i == 0);
+        let levers = Levers::of(
+            job.params,
+            job.labels.is_some(),
+            job.may_thicken && i == 0,
+            job.asked,
+        );
         let as_it_lies = Self {
             turn: Turn::default(),
             model: Cow::Borrowed(job.model),
             surface: job.surface.clone(),
             key: None,
-            budget: Budget::of_piece(&job.params.rounds).with_levers(levers),
+            budget: Budget::of_piece(&job.rounds()).with_levers(levers),
         };
         let Some(site) = place else {
             return Some(as_it_lies);
@@ -70,7 +75,7 @@ impl<'a> Candidate<'a> {
         });
         let mut turned = Self {
             key,
-            budget: Budget::of_cut_key(&job.params.rounds, i).with_levers(levers),
+            budget: Budget::of_cut_key(&job.rounds(), i).with_levers(levers),
             ..as_it_lies
         };
         if !turn.is_none() {

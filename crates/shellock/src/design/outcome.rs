@@ -65,6 +65,32 @@ pub enum DesignOutcome {
     },
 }
 
+impl DesignOutcome {
+    pub(super) fn kit(&self) -> Option<&Kit> {
+        match self {
+            Self::Made(design) => Some(&design.kit),
+            Self::NoPlan { .. } => None,
+        }
+    }
+
+    /// Whether it has a kit where the other has none, or a better one.
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        let is_better = |kit: &Kit| other.kit().is_none_or(|other| kit.is_better_than(other));
+        self.kit().is_some_and(is_better)
+    }
+
+    /// Whether something was changed so that it bears more.
+    pub(super) fn is_changed_for_use(&self) -> bool {
+        let is_change = |w: &Warning| {
+            matches!(
+                w.cause,
+                Cause::WallForUse { .. } | Cause::ConnectorsForUse { .. } | Cause::JoinedForUse { .. }
+            )
+        };
+        matches!(self, Self::Made(design) if design.warnings.iter().any(is_change))
+    }
+}
+
 /// The best kit so far, and why the keys that were cut did not do.
 #[derive(Default)]
 pub(super) struct Best<'a> {
@@ -91,6 +117,10 @@ impl<'a> Best<'a> {
             effort,
             ..Self::default()
         }
+    }
+
+    pub fn has_kit(&self) -> bool {
+        self.kit.is_some()
     }
 
     /// Whether a key at `place` need not be tried. A piece as it is rattles no less as the key than one that

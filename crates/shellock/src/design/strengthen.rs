@@ -13,11 +13,10 @@ use crate::plan::{PlanParams, RankedPlan};
 use crate::sizes::ChosenSizes;
 use crate::{Cause, Ctx, PatchId, SegmentedSurface, Warning, segmentation, strength};
 
-/// Load factor that changes aim at: the plan that is found with them is another, and the solid model opens seams
-/// a tenth wider than the surface model that is asked here (docs/notes/metrics.md).
-const WANTED: f64 = 1.1;
-/// Below this a kit does not bear its load.
-const ASKED: f64 = 1.0;
+/// Changes aim at so much more than the load factor that is asked: the plan that is found with them is another.
+const AIM: f64 = 0.1;
+/// Below this a kit does not bear its load: only then pieces become one.
+const ONCE: f64 = 1.0;
 /// A change that lets a kit bear less than this many times as much is not worth it.
 const GAIN: f64 = 1.05;
 /// Rounds in which connectors grow: where one seam no longer gives way another does.
@@ -54,7 +53,7 @@ pub(super) fn remedy(
     left: &Levers,
 ) -> Result<Option<Remedy>, DesignError> {
     let division = planning.division;
-    let Some(weakest) = weak(&holding.bears) else {
+    let Some(weakest) = weak(&holding.bears, left.asked) else {
         return Ok(None);
     };
     ctx.stage("what would let it bear more", 0)?;
@@ -62,12 +61,13 @@ pub(super) fn remedy(
         division,
         handling,
         plan: chosen,
+        asked: left.asked,
     };
     let mut sizes = division.chosen.clone();
     let mut least = factor(weakest);
     if left.connectors > 0 {
         (sizes, least) = trial.larger_connectors(&holding.bears)?;
-        if least >= WANTED {
+        if least >= left.asked + AIM {
             return Ok(Some(Remedy::Connectors(sizes)));
         }
     }
@@ -83,19 +83,19 @@ pub(super) fn remedy(
     if least >= GAIN * factor(weakest) {
         return Ok(Some(Remedy::Connectors(sizes)));
     }
-    if left.weak_joinings > 0 {
+    if left.weak_joinings > 0 && factor(weakest) < ONCE {
         return joined(ctx, division, chosen.plan.key(), weakest);
     }
     Ok(None)
 }
 
 /// The use of which least is borne, where that is less than asked.
-fn weak(uses: &[LoadBorne]) -> Option<&LoadBorne> {
+fn weak(uses: &[LoadBorne], asked: f64) -> Option<&LoadBorne> {
     let worst = uses
         .iter()
         .filter(|b| b.deed.is_use() && b.first.is_some())
         .min_by(|a, b| factor(a).total_cmp(&factor(b)))?;
-    (factor(worst) < ASKED).then_some(worst)
+    (factor(worst) < asked).then_some(worst)
 }
 
 fn factor(load: &LoadBorne) -> f64 {
@@ -112,6 +112,7 @@ struct Trial<'a> {
     division: &'a Division,
     handling: &'a Handling,
     plan: &'a RankedPlan,
+    asked: f64,
 }
 
 impl Trial<'_> {
@@ -132,10 +133,11 @@ impl Trial<'_> {
     /// Connectors as large as fit between all pieces that part under a use that is not borne, until no other
     /// use fails for another; the sizes of the best round, and what is borne with them.
     fn larger_connectors(&self, bears: &[LoadBorne]) -> Result<(ChosenSizes, f64), DesignError> {
+        let aim = self.asked + AIM;
         let mut best = (self.division.chosen.clone(), least(bears));
         let (mut sizes, mut uses) = (best.0.clone(), bears.to_vec());
         for _ in 0..MOST_ROUNDS {
-            let failing = uses.iter().filter(|b| b.deed.is_use() && factor(b) < WANTED);
+            let failing = uses.iter().filter(|b| b.deed.is_use() && factor(b) < aim);
             let parting: Vec<(&LoadBorne, [PatchId; 2])> =
                 failing.filter_map(|b| Some((b, b.first?.between))).collect();
             let mut has_grown = false;
@@ -149,7 +151,7 @@ impl Trial<'_> {
             if least(&uses) > best.1 {
                 best = (sizes.clone(), least(&uses));
             }
-            if best.1 >= WANTED {
+            if best.1 >= aim {
                 break;
             }
         }
@@ -171,7 +173,7 @@ impl Trial<'_> {
         for _ in 0..MOST_WALLS {
             // Plates bend with the cube of their thickness, but openings grow with less than that.
             // What is planned anew with it bears more than this plan does.
-            let wanted_mm = wall_mm * (ASKED / borne.max(0.1)).sqrt();
+            let wanted_mm = wall_mm * (self.asked / borne.max(0.1)).sqrt();
             let stepped_mm = (wanted_mm * WALLS_A_MM).ceil() / WALLS_A_MM;
             let next_mm = stepped_mm.max(wall_mm + 1.0 / WALLS_A_MM).min(most_mm);
             if next_mm <= wall_mm + 0.5 / WALLS_A_MM || !is_hollow(next_mm) {
@@ -179,7 +181,7 @@ impl Trial<'_> {
             }
             wall_mm = next_mm;
             borne = least(&self.uses(wall_mm, sizes)?);
-            if borne >= ASKED {
+            if borne >= self.asked {
                 break;
             }
         }

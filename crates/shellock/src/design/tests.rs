@@ -382,6 +382,7 @@ impl Ball {
     fn job(&self) -> Job<'_> {
         let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
         Job {
+            asked: 1.0,
             may_thicken: true,
             pace: Pace::default(),
             params: &self.params,
