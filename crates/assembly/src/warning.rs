@@ -85,6 +85,7 @@ pub enum Cause {
         to_mm: f64,
     },
     WeakGraph,
+    DividedOtherwise,
     // The key
     KeyNotFlat {
         flat_share: f64,
@@ -462,6 +463,12 @@ impl Warning {
                      simulation, without a print to compare; handle it with care there, print it larger, or choose fewer pieces \
                      (--pieces)"
                 ),
+            ),
+            Cause::DividedOtherwise => (
+                "divided-otherwise",
+                "no kit of pieces that are cut where a person would cut holds together; these are of similar size, and their seams \
+                 may run through a face: your own labels, or another number of pieces (--pieces), may do better"
+                    .to_owned(),
             ),
             Cause::WallForUse { from_mm, to_mm, done } => (
                 "wall-for-use",

@@ -23,21 +23,19 @@ mod settings;
 mod strengthen;
 #[cfg(test)]
 mod tests;
-
-use std::borrow::Cow;
+mod wall;
+mod ways;
 
 use shellock_geom::Solid;
 
 use crate::key::Turn;
 use crate::metric::{Chosen, Holding};
 use crate::plan::{PlanConstraints, PlanProof, survey};
-use crate::strength::{Strength, StrengthError, StressMap};
-use crate::{
-    Cause, Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation, strength,
-};
+use crate::strength::StressMap;
+use crate::{Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation};
 use attempt::{Attempt, Failure, Next, Planning};
 pub use budget::Effort;
-use budget::{ASKED, Budget, Levers, Pace, THICKER_WALLS};
+use budget::{Budget, Levers, Pace, RESERVE, ROUNDS_BESIDE_OTHERS, THICKER_WALLS};
 use candidate::Candidate;
 use division::{Division, WallGrid, revised};
 use handover::Handover;
@@ -47,12 +45,15 @@ pub use outcome::{Design, DesignError, DesignOutcome, PrintedFit};
 pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
 use strengthen::{Remedy, Thicker};
+use wall::Wall;
+use ways::{Ask, Ended, Input, with_reserve};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or
 /// the rounds are used up; then the best of them is returned, its failures told.
 ///
-/// A kit is asked first to bear what people do with a reserve; where none passes with what that takes (a
-/// thicker wall, larger connectors), it is asked to bear it once.
+/// Where a person would cut comes first (`auto`); where no kit of such pieces passes, fewer pieces do, then pieces
+/// of similar size. Of each a kit is asked to bear what people do with a reserve; where none passes with the wall
+/// that this takes, walls stay as thin as a fall allows, and what is borne too little is warned of.
 pub fn design(
     ctx: &Ctx,
     params: &Params,
@@ -61,73 +62,31 @@ pub fn design(
 ) -> Result<DesignOutcome, DesignError> {
     let thinnest = Wall::decide(ctx, params, model)?;
     let mut effort = Effort::default();
-    let [most, least] = ASKED;
-    let Asked {
-        outcome: first,
-        has_changed,
-        is_late,
-    } = asking(ctx, params, model, labels, (&thinnest, most), &mut effort);
-    let passed = |outcome: &DesignOutcome| outcome.kit().is_some_and(|kit| kit.verification.passed());
-    let is_stop = matches!(first, Err(DesignError::Cancelled(_)));
-    if first.as_ref().is_ok_and(passed) || is_stop || !has_changed || is_late {
-        return first;
-    }
-    ctx.note("no kit passes that bears what people do with a reserve: without one");
-    let second = asking(ctx, params, model, labels, (&thinnest, least), &mut effort);
-    match (first, second.outcome) {
-        (_, Err(stop @ DesignError::Cancelled(_))) => Err(stop),
-        (Ok(first), second) if !second.as_ref().is_ok_and(|second| second.is_better_than(&first)) => {
-            Ok(first)
-        }
-        (_, second) => second,
-    }
-}
-
-/// How a job ended that asks so much of a kit.
-struct Asked {
-    outcome: Result<DesignOutcome, DesignError>,
-    /// Whether something was changed for the sake of use.
-    has_changed: bool,
-    /// Whether the time is over for another kit.
-    is_late: bool,
-}
-
-/// The job from `thinnest`, where a kit is asked to bear so many times what people do to it.
-fn asking(
-    ctx: &Ctx,
-    params: &Params,
-    model: &Solid,
-    labels: Option<&[i64]>,
-    (thinnest, asked): (&Wall, f64),
-    effort: &mut Effort,
-) -> Asked {
-    let mut wall = Cow::Borrowed(thinnest);
-    let (mut n_left, mut is_late) = (THICKER_WALLS, false);
-    let outcome = loop {
-        let job = Job::new(ctx, params, model, labels, (&wall, asked), n_left > 0);
-        let walled = job.and_then(|job| {
-            let walled = with_wall(ctx, &job, effort);
-            is_late = job.pace.is_late(ctx);
-            walled
-        });
-        match walled {
-            Ok(Walled::Done(outcome)) => break Ok(outcome),
-            Ok(Walled::Thicker(thicker)) => {
-                n_left -= 1;
-                match wall.thicker(ctx, params, model, &thicker) {
-                    Ok(next) => wall = Cow::Owned(next),
-                    Err(e) => break Err(e),
-                }
-            }
-            Err(e) => break Err(e),
-        }
+    let input = Input {
+        params,
+        model,
+        labels,
     };
-    let has_changed = n_left < THICKER_WALLS || outcome.as_ref().is_ok_and(DesignOutcome::is_changed_for_use);
-    Asked {
-        outcome,
-        has_changed,
-        is_late,
+    let ways = ways::ways(&input);
+    let mut best: Option<Ended> = None;
+    for (i, &way) in ways.iter().enumerate() {
+        if i > 0 {
+            ctx.note(&format!("no kit of these pieces passes; now {}", way.words()));
+        }
+        let is_last = i + 1 == ways.len();
+        let few = params.rounds.least(&ROUNDS_BESIDE_OTHERS);
+        let rounds = if is_last { params.rounds } else { few };
+        let ended = with_reserve(ctx, &input, &thinnest.divided(way), rounds, &mut effort);
+        let ended = match best {
+            Some(before) => before.or(ended),
+            None => ended,
+        };
+        if ended.is_enough() || ended.is_late {
+            return ended.outcome;
+        }
+        best = Some(ended);
     }
+    best.expect("there is at least one way").outcome
 }
 
 /// How a job with one wall ended.
@@ -142,7 +101,7 @@ fn with_wall(ctx: &Ctx, job: &Job<'_>, effort: &mut Effort) -> Result<Walled<Des
     let mut best = Best::after(*effort);
     let places = candidate::places(ctx, job)?;
     for (i, place) in places.iter().enumerate() {
-        let has_ended = job.is_trial() && best.has_kit();
+        let has_ended = job.wall.is_thicker() && best.has_kit();
         if has_ended || best.is_enough(place.as_ref()) || (i > 0 && job.pace.is_late(ctx)) {
             continue;
         }
@@ -283,11 +242,7 @@ fn strengthened(
 ) -> Result<Walled<Division>, DesignError> {
     let next = match remedy {
         Remedy::Wall(thicker) => {
-            ctx.note(&format!(
-                "it would give way where it is {}: walls of {:.1} mm",
-                thicker.weakest.deed.done(),
-                thicker.thickness_mm
-            ));
+            ctx.note(&thicker.words());
             return Ok(Walled::Thicker(thicker));
         }
         Remedy::Connectors(chosen) => {
@@ -364,15 +319,26 @@ pub fn plan(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<Result<Planned, String>, DesignError> {
-    let mut wall = Wall::decide(ctx, params, model)?;
-    let mut n_left = THICKER_WALLS;
+    let input = Input {
+        params,
+        model,
+        labels,
+    };
+    let ask = Ask {
+        factor: RESERVE,
+        rounds: params.rounds,
+        n_thicker: THICKER_WALLS,
+    };
+    let wall = Wall::decide(ctx, params, model)?;
+    let mut wall = wall.divided(ways::ways(&input)[0]);
+    let mut n_left = ask.n_thicker;
     loop {
-        let job = Job::new(ctx, params, model, labels, (&wall, ASKED[0]), n_left > 0)?;
+        let job = Job::new(ctx, &input, &wall, ask, n_left > 0)?;
         match plan_with_wall(ctx, &job)? {
             Walled::Done(planned) => return Ok(planned),
             Walled::Thicker(thicker) => {
                 n_left -= 1;
-                wall = wall.thicker(ctx, params, model, &thicker)?;
+                wall = wall.thicker(ctx, &input, &thicker)?;
             }
         }
     }
@@ -446,8 +412,7 @@ struct Job<'a> {
     model: &'a Solid,
     labels: Option<&'a [i64]>,
     wall: &'a Wall,
-    /// How many times a kit is to bear what people do to it.
-    asked: f64,
+    ask: Ask,
     /// Whether it may begin anew with a thicker wall.
     may_thicken: bool,
     pace: Pace,
@@ -461,12 +426,16 @@ impl<'a> Job<'a> {
     /// Divides the model.
     fn new(
         ctx: &Ctx,
-        params: &'a Params,
-        model: &'a Solid,
-        labels: Option<&'a [i64]>,
-        (wall, asked): (&'a Wall, f64),
+        input: &Input<'a>,
+        wall: &'a Wall,
+        ask: Ask,
         may_thicken: bool,
     ) -> Result<Self, DesignError> {
+        let &Input {
+            params,
+            model,
+            labels,
+        } = input;
         let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
         let stress = wall.strength.as_ref().map(StressMap::new);
         Ok(Self {
@@ -474,7 +443,7 @@ impl<'a> Job<'a> {
             model,
             labels,
             wall,
-            asked,
+            ask,
             may_thicken,
             pace: Pace::default(),
             stress,
@@ -483,22 +452,19 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Whether its wall is as thick as it is for a reserve alone: then one kit is made, and where that fails the
-    /// job goes back to the wall that it needs.
-    fn is_trial(&self) -> bool {
-        let [_, once] = ASKED;
-        let is_thicker = |w: &Warning| matches!(w.cause, Cause::WallForUse { .. });
-        self.asked > once && self.wall.warnings.iter().any(is_thicker)
-    }
-
-    /// How many kits may be made.
+    /// How many kits may be made: one with a wall that is thicker for the sake of use, as the job then goes back to
+    /// the wall as it was.
     fn rounds(&self) -> Rounds {
         let one = Rounds {
             kits: 1,
             refinements: 0,
             kits_in_all: 1,
         };
-        if self.is_trial() { one } else { self.params.rounds }
+        if self.wall.is_thicker() {
+            one
+        } else {
+            self.ask.rounds
+        }
     }
 
     /// The patch that has most of what the user wants the key to have.
@@ -549,88 +515,5 @@ fn key_faces(
         Err(DesignError::NoLabelOfKey(name))
     } else {
         Err(DesignError::NoPieceOfKey(name, surface.n_patches))
-    }
-}
-
-/// The wall's thickness in what stages are given, what it bears, and what to tell of it.
-#[derive(Clone)]
-struct Wall {
-    settings: Settings,
-    strength: Option<Strength>,
-    warnings: Vec<Warning>,
-}
-
-impl Wall {
-    /// The same model with a thicker wall, for the sake of what people do to the kit.
-    fn thicker(
-        &self,
-        ctx: &Ctx,
-        params: &Params,
-        model: &Solid,
-        thicker: &Thicker,
-    ) -> Result<Self, DesignError> {
-        let thickness = Thickness::Mm(thicker.thickness_mm);
-        let mut wall = Self::decide(
-            ctx,
-            &Params {
-                thickness,
-                ..params.clone()
-            },
-            model,
-        )?;
-        // The thinnest wall of those before stays the one that a fall asks for.
-        let is_told = |w: &&Warning| matches!(w.cause, Cause::WallForUse { .. });
-        let from_mm = match self.warnings.iter().find(is_told).map(|w| &w.cause) {
-            Some(Cause::WallForUse { from_mm, .. }) => *from_mm,
-            _ => self.settings.body.thickness_mm,
-        };
-        wall.warnings.push(thicker.warning(from_mm));
-        Ok(wall)
-    }
-
-    fn decide(ctx: &Ctx, params: &Params, model: &Solid) -> Result<Self, DesignError> {
-        let nominal = Settings::resolve(params);
-        if !params.allows_thin {
-            let thinnest_mm = match params.thickness {
-                Thickness::Mm(mm) => mm,
-                Thickness::Auto => nominal.strength.least_mm,
-            };
-            strength::is_hollow(model, thinnest_mm)?;
-        }
-        let ctx = &ctx.fork();
-        let found = match params.thickness {
-            Thickness::Mm(mm) => strength::stress(ctx, &nominal.strength, model, mm),
-            Thickness::Auto => strength::thickness(ctx, &nominal.strength, model),
-        };
-        match found {
-            Ok(strength) => {
-                if !params.allows_thin {
-                    strength::is_hollow(model, strength.thickness_mm)?;
-                }
-                let settings = Settings::with_thickness(params, strength.thickness_mm);
-                let warnings = strength.warnings(&nominal.strength);
-                Ok(Self {
-                    settings,
-                    strength: Some(strength),
-                    warnings,
-                })
-            }
-            Err(StrengthError::Shell(e)) => {
-                let warning = Warning {
-                    cause: Cause::StrengthUnknown {
-                        error: e.to_string(),
-                        thickness_mm: nominal.body.thickness_mm,
-                    },
-                    pieces: Vec::new(),
-                    at: None,
-                };
-                Ok(Self {
-                    settings: nominal,
-                    strength: None,
-                    warnings: vec![warning],
-                })
-            }
-            Err(e) => Err(e.into()),
-        }
     }
 }

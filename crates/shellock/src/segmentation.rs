@@ -9,6 +9,7 @@ mod changes;
 mod creases;
 mod cut;
 mod dual_graph;
+mod fewer;
 mod halve;
 mod method;
 mod refine;
@@ -21,6 +22,7 @@ use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology};
 
 pub use changes::tell;
+pub(crate) use creases::usual_n_pieces;
 pub use method::{Method, automatic_labels};
 pub use refine::refine;
 pub use smooth::smooth_and_cut;
@@ -28,6 +30,8 @@ pub use split::split_piece;
 pub use user::user_labels;
 
 use changes::Changes;
+use creases::crease_labels;
+use fewer::{disagreement, with_fewer_parts};
 use halve::halve_long_edges;
 use refine::{Ground, refine_on};
 
@@ -251,6 +255,8 @@ const N_CONTACT_LIMITS: usize = 3;
 const FAULT_COST: f64 = 100.0;
 const LOST_LABEL_COST: f64 = 8.0;
 const SHORTER_COST: f64 = 2.0;
+/// What is paid where all of a drawn division is another, in pieces beyond what is welcome.
+const DISAGREEMENT_COST: f64 = 30.0;
 
 /// The whole stage: labels (the user's, or automatic ones), refined, smoothed and cut; `source_face` names
 /// triangles of `solid`.
@@ -272,24 +278,8 @@ pub fn segment(
             let found = best_contacts(ctx, params, &ground, &labels, LabelOrigin::User, f64::INFINITY)?;
             found.expect("nothing is dearer than that").1
         }
-        None => {
-            let mut best: Option<(f64, SegmentedSurface)> = None;
-            for attempt in 0..params.method.n_tries() {
-                let reseeded = SegmentationParams {
-                    seed: params.seed.wrapping_add(attempt << 32),
-                    ..params.clone()
-                };
-                let labels = automatic_labels(ctx, &reseeded, &fine)?;
-                let origin = LabelOrigin::Automatic;
-                let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
-                best = best_contacts(ctx, params, &ground, &labels, origin, limit)?.or(best);
-                let enough = origin.good_cost(labels.n_patches());
-                if best.as_ref().is_some_and(|b| b.0 <= enough) {
-                    break;
-                }
-            }
-            best.expect("there is at least one try").1
-        }
+        None if params.method == Method::Creases => clustered(ctx, params, &ground)?,
+        None => proposed(ctx, params, &ground)?,
     };
     surface
         .source_face
@@ -299,15 +289,72 @@ pub fn segment(
     Ok(surface)
 }
 
-/// Whose patches are changed: a user wants to find the labels again, an automatic choice should have the
-/// number of pieces asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum LabelOrigin {
-    User,
-    Automatic,
+/// Clusterings until one is easily mended; the one that cost least.
+fn clustered(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    ground: &Ground<'_>,
+) -> Result<SegmentedSurface, SegmentationError> {
+    /// How often it is worth trying with another seed.
+    const CLUSTERINGS: u64 = 4;
+    let mut best: Option<(f64, SegmentedSurface)> = None;
+    for attempt in 0..CLUSTERINGS {
+        let reseeded = SegmentationParams {
+            seed: params.seed.wrapping_add(attempt << 32),
+            ..params.clone()
+        };
+        let labels = crease_labels(ctx, &reseeded, ground.solid)?;
+        let origin = LabelOrigin::Automatic;
+        let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+        best = best_contacts(ctx, params, ground, &labels, origin, limit)?.or(best);
+        let enough = origin.good_cost(labels.n_patches());
+        if best.as_ref().is_some_and(|b| b.0 <= enough) {
+            break;
+        }
+    }
+    Ok(best.expect("there is at least one try").1)
 }
 
-impl LabelOrigin {
+/// The division by the method of `params`, or one with fewer parts where too many pieces would come of it; that
+/// which cost least.
+fn proposed(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    ground: &Ground<'_>,
+) -> Result<SegmentedSurface, SegmentationError> {
+    let Some(drawn) = automatic_labels(ctx, params, ground.solid)? else {
+        return clustered(ctx, params, ground);
+    };
+    let wanted = params
+        .n_pieces
+        .unwrap_or_else(|| usual_n_pieces(ground.solid.mesh().area()));
+    let origin = LabelOrigin::Drawn {
+        labels: &drawn,
+        wanted,
+    };
+    let mut best: Option<(f64, SegmentedSurface)> = None;
+    for labels in with_fewer_parts(ground.solid, &drawn, wanted) {
+        ctx.check()?;
+        let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+        best = best_contacts(ctx, params, ground, &labels, origin, limit)?.or(best);
+    }
+    Ok(best.expect("nothing is dearer than the first").1)
+}
+
+/// Whose patches are changed: a user wants to find the labels again, an automatic choice should have the
+/// number of pieces asked for.
+#[derive(Clone, Copy, Debug)]
+enum LabelOrigin<'a> {
+    User,
+    Automatic,
+    /// By a method that cuts where people would; few enough pieces are to come of it.
+    Drawn {
+        labels: &'a FaceLabels,
+        wanted: usize,
+    },
+}
+
+impl LabelOrigin<'_> {
     /// What the changes from `labels` to `surface` cost, in pieces.
     fn cost(self, labels: &FaceLabels, surface: &SegmentedSurface) -> f64 {
         let (before, after) = (labels.n_patches() as f64, surface.n_patches as f64);
@@ -317,6 +364,9 @@ impl LabelOrigin {
             Self::User => {
                 let n_lost = Changes::between(labels, surface).n_lost() as f64;
                 LOST_LABEL_COST * n_lost + (after + n_lost - before)
+            }
+            Self::Drawn { labels, wanted } => {
+                DISAGREEMENT_COST * disagreement(labels, surface) + excess(surface.n_patches, wanted)
             }
         }
     }
@@ -328,6 +378,7 @@ impl LabelOrigin {
         match self {
             Self::Automatic => (after - before).max(2.0 * (before - after)),
             Self::User => (after - before).max(0.0),
+            Self::Drawn { wanted, .. } => excess(mended.n_patches(), wanted),
         }
     }
 
@@ -336,8 +387,16 @@ impl LabelOrigin {
         match self {
             Self::Automatic => 2.0 + 0.25 * n as f64,
             Self::User => f64::max(4.0, 0.5 * n as f64),
+            Self::Drawn { .. } => 0.5 * SHORTER_COST,
         }
     }
+}
+
+/// Pieces beyond what is welcome where `wanted` are.
+fn excess(n: usize, wanted: usize) -> f64 {
+    /// As many more, as a share, do no harm.
+    const WELCOME: f64 = 1.2;
+    (n as f64 - WELCOME * wanted as f64).max(0.0)
 }
 
 /// The limits that contacts are held against in turn, mm.

@@ -268,6 +268,28 @@ pub(super) struct Planning<'a> {
     pub constraints: &'a PlanConstraints,
 }
 
+impl Planning<'_> {
+    /// How the kit is handled, in the space of the division.
+    pub fn handling(&self) -> Handling {
+        let up = self.turn.apply(Vec3::from_array(self.params.up)).to_array();
+        let thickness_mm = self.division.settings.body.thickness_mm;
+        Handling::new(up, thickness_mm, self.params.material)
+    }
+
+    /// What plans are compared by.
+    pub fn choice<'b>(&'b self, handling: &'b Handling) -> Choice<'b> {
+        Choice {
+            params: &self.division.settings.plan,
+            surface: &self.division.surface,
+            sizes: &self.division.chosen.sizes,
+            survey: self.survey,
+            constraints: self.constraints,
+            handling,
+            climb: ClimbParams::default(),
+        }
+    }
+}
+
 /// The next plan of a division to make.
 pub(super) fn next_plan(
     ctx: &Ctx,
@@ -277,17 +299,13 @@ pub(super) fn next_plan(
 ) -> Result<Next, DesignError> {
     let &Planning {
         params,
-        turn,
         division,
         survey,
         constraints,
         ..
     } = planning;
     let Division {
-        surface,
-        settings,
-        chosen,
-        ..
+        surface, settings, ..
     } = division;
     let found = match plan::search(ctx, &settings.plan, survey, constraints)? {
         PlanOutcome::Found(found) => found,
@@ -308,17 +326,8 @@ pub(super) fn next_plan(
             }));
         }
     };
-    let up = turn.apply(Vec3::from_array(params.up)).to_array();
-    let handling = Handling::new(up, settings.body.thickness_mm, params.material);
-    let choice = Choice {
-        params: &settings.plan,
-        surface,
-        sizes: &chosen.sizes,
-        survey,
-        constraints,
-        handling: &handling,
-        climb: ClimbParams::default(),
-    };
+    let handling = planning.handling();
+    let choice = planning.choice(&handling);
     ctx.stage("what would rattle", 0)?;
     let foresight = Foresight::of(&choice, &found);
     if may_join && let Some((plan, excess)) = foresight.steadiest() {

@@ -30,9 +30,15 @@ pub(super) const BLOCKED_PLANS: usize = 8;
 /// costs a search for a plan and no kit.
 const LARGER_CONNECTORS: usize = 2;
 const WEAK_JOININGS: usize = 1;
-/// How many times a kit is to bear what people do to it, by the surface model, which knows no play: first with a
-/// reserve for that (docs/notes/stress-test.md), and once where no kit passes with what the reserve takes.
-pub(super) const ASKED: [f64; 2] = [1.4, 1.0];
+/// How many times a kit is to bear what people do to it, by the surface model, which knows no play: a reserve for
+/// that (docs/notes/stress-test.md). Where no kit passes with the wall that it takes, once will do.
+pub(super) const RESERVE: f64 = 1.4;
+/// What is tried with pieces that are cut where a person would before pieces of similar size are.
+pub(super) const ROUNDS_BESIDE_OTHERS: Rounds = Rounds {
+    kits: 1,
+    refinements: 1,
+    kits_in_all: 2,
+};
 /// How often a job begins anew with a thicker wall for the same reason.
 pub(super) const THICKER_WALLS: usize = 2;
 

@@ -55,7 +55,7 @@ impl<'a> Candidate<'a> {
             job.params,
             job.labels.is_some(),
             job.may_thicken && i == 0,
-            job.asked,
+            job.ask.factor,
         );
         let as_it_lies = Self {
             turn: Turn::default(),

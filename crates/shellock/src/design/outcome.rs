@@ -78,17 +78,6 @@ impl DesignOutcome {
         let is_better = |kit: &Kit| other.kit().is_none_or(|other| kit.is_better_than(other));
         self.kit().is_some_and(is_better)
     }
-
-    /// Whether something was changed so that it bears more.
-    pub(super) fn is_changed_for_use(&self) -> bool {
-        let is_change = |w: &Warning| {
-            matches!(
-                w.cause,
-                Cause::WallForUse { .. } | Cause::ConnectorsForUse { .. } | Cause::JoinedForUse { .. }
-            )
-        };
-        matches!(self, Self::Made(design) if design.warnings.iter().any(is_change))
-    }
 }
 
 /// The best kit so far, and why the keys that were cut did not do.

@@ -125,6 +125,17 @@ pub struct Rounds {
     pub kits_in_all: usize,
 }
 
+impl Rounds {
+    /// No more of anything than `other` allows.
+    pub fn least(&self, other: &Self) -> Self {
+        Self {
+            kits: self.kits.min(other.kits),
+            refinements: self.refinements.min(other.refinements),
+            kits_in_all: self.kits_in_all.min(other.kits_in_all),
+        }
+    }
+}
+
 impl Default for Rounds {
     fn default() -> Self {
         Self {

@@ -212,6 +212,12 @@ fn joined(
 }
 
 impl Thicker {
+    /// In words, for people.
+    pub fn words(&self) -> String {
+        let (done, wall_mm) = (self.weakest.deed.done(), self.thickness_mm);
+        format!("it would give way where it is {done}: walls of {wall_mm:.1} mm")
+    }
+
     /// What is told of it.
     pub fn warning(&self, from_mm: f64) -> Warning {
         Warning {

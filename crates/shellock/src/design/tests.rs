@@ -382,7 +382,11 @@ impl Ball {
     fn job(&self) -> Job<'_> {
         let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
         Job {
-            asked: 1.0,
+            ask: Ask {
+                factor: 1.0,
+                rounds: self.params.rounds,
+                n_thicker: 1,
+            },
             may_thicken: true,
             pace: Pace::default(),
             params: &self.params,

@@ -40,7 +40,7 @@ pub(super) fn crease_labels(
     solid: &Solid,
 ) -> Result<FaceLabels, SegmentationError> {
     let mesh = solid.mesh();
-    let n_pieces = params.n_pieces.unwrap_or_else(|| default_n_pieces(mesh.area()));
+    let n_pieces = params.n_pieces.unwrap_or_else(|| usual_n_pieces(mesh.area()));
     if n_pieces > mesh.triangles.len() {
         return Err(SegmentationError::TooManyPieces {
             n_pieces,
@@ -88,7 +88,7 @@ pub(super) fn crease_labels(
 
 /// How many pieces a surface of `area_mm2` gets: 10 for a 150 mm figure, as the paper's 9 to 13, growing as
 /// the figure's height does to the power of two thirds.
-fn default_n_pieces(area_mm2: f64) -> usize {
+pub(crate) fn usual_n_pieces(area_mm2: f64) -> usize {
     (10.0 * (area_mm2 / 45_000.0).cbrt()).round().clamp(6.0, 24.0) as usize
 }
 

@@ -22,6 +22,7 @@ const LEAST_SHARE: f64 = 0.012;
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The best cuts that all methods propose.
+    #[default]
     Auto,
     /// The cuts that most of many random ones agree on.
     RandomCuts,
@@ -32,7 +33,6 @@ pub enum Method {
     /// Parts around representatives, by distance and turning.
     Kmeans,
     /// Patches of similar size with their seams in creases.
-    #[default]
     Creases,
 }
 
@@ -62,13 +62,6 @@ impl Method {
     /// The method of that name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|method| method.name() == name)
-    }
-
-    /// How often it is worth trying with another seed.
-    pub(super) fn n_tries(self) -> u64 {
-        /// Clusterings, until one is easily mended.
-        const CLUSTERINGS: u64 = 4;
-        if self == Self::Creases { CLUSTERINGS } else { 1 }
     }
 
     /// A part for each face; `None` for patches in creases, which are not found on meshes alone.
@@ -110,14 +103,14 @@ impl Method {
 
 /// Patches by the method of `params`: connected, none too small; the same for the same seed.
 ///
-/// Where the method finds nothing to divide, as on a ball, patches in creases, which is noted.
+/// `None`, which is noted, where the method finds nothing to divide, as on a ball.
 pub fn automatic_labels(
     ctx: &Ctx,
     params: &SegmentationParams,
     solid: &Solid,
-) -> Result<FaceLabels, SegmentationError> {
+) -> Result<Option<FaceLabels>, SegmentationError> {
     let Some(parts) = params.method.parts(params.n_pieces, params.seed, solid.mesh()) else {
-        return crease_labels(ctx, params, solid);
+        return crease_labels(ctx, params, solid).map(Some);
     };
     ctx.check()?;
     let labels: Vec<i64> = parts.into_iter().map(i64::from).collect();
@@ -136,8 +129,8 @@ pub fn automatic_labels(
             ctx.note(&format!(
                 "{method} finds no place to divide: pieces of similar size instead"
             ));
-            crease_labels(ctx, params, solid)
+            Ok(None)
         }
-        found => found,
+        found => found.map(Some),
     }
 }

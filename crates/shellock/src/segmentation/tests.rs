@@ -296,7 +296,9 @@ fn by(method: Method, solid: &Solid) -> FaceLabels {
         method,
         ..SegmentationParams::default()
     };
-    with_ctx(|ctx| automatic_labels(ctx, &params, solid)).unwrap()
+    with_ctx(|ctx| automatic_labels(ctx, &params, solid))
+        .unwrap()
+        .expect("it divides")
 }
 
 #[test]

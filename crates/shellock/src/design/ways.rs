@@ -1,0 +1,164 @@
+//! The divisions that kits are made of in turn: cut where a person would, finer or coarser, or of similar size; and
+//! what is asked of each.
+
+use std::borrow::Cow;
+
+use shellock_geom::Solid;
+
+use super::budget::{RESERVE, THICKER_WALLS};
+use super::wall::Wall;
+use super::{DesignError, DesignOutcome, Effort, Job, Params, Rounds, Walled, with_wall};
+use crate::Ctx;
+use crate::segmentation::{Method, usual_n_pieces};
+
+/// How a model is divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Way {
+    pub method: Method,
+    pub n_pieces: Option<usize>,
+}
+
+/// Pieces of a coarser division where none are asked for, as a share of the usual.
+const COARSER: f64 = 0.7;
+
+impl Way {
+    /// In words, for people.
+    pub fn words(self) -> String {
+        let n = self.n_pieces.map_or_else(String::new, |n| format!("about {n} "));
+        match self.method {
+            Method::Creases => format!("{n}pieces of similar size"),
+            _ => format!("{n}pieces cut where a person would"),
+        }
+    }
+}
+
+/// Ways to divide in the order in which kits are made of them: one where the user says how.
+pub(super) fn ways(input: &Input<'_>) -> Vec<Way> {
+    let params = input.params;
+    let own = Way {
+        method: params.method,
+        n_pieces: params.n_pieces,
+    };
+    if params.method != Method::Auto || input.labels.is_some() {
+        return vec![own];
+    }
+    let n_coarser = COARSER * usual_n_pieces(input.model.mesh().area()) as f64;
+    let coarser = Way {
+        n_pieces: Some((n_coarser.round() as usize).max(2)),
+        ..own
+    };
+    let similar = Way {
+        method: Method::Creases,
+        ..own
+    };
+    let ways = [
+        Some(own),
+        params.n_pieces.is_none().then_some(coarser),
+        Some(similar),
+    ];
+    ways.into_iter().flatten().collect()
+}
+
+/// What is asked for.
+pub(super) struct Input<'a> {
+    pub params: &'a Params,
+    pub model: &'a Solid,
+    pub labels: Option<&'a [i64]>,
+}
+
+/// How a job ended.
+pub(super) struct Ended {
+    pub outcome: Result<DesignOutcome, DesignError>,
+    /// Whether its wall was thicker for the sake of use.
+    was_thicker: bool,
+    /// Whether the time is over for another kit.
+    pub is_late: bool,
+}
+
+impl Ended {
+    /// Whether nothing else is to be tried.
+    pub fn is_enough(&self) -> bool {
+        match &self.outcome {
+            Ok(outcome) => outcome.kit().is_some_and(|kit| kit.verification.passed()),
+            Err(e) => matches!(e, DesignError::Cancelled(_)),
+        }
+    }
+
+    /// This, or what was tried after it, if that is better.
+    pub fn or(self, later: Self) -> Self {
+        let is_worse = match (&self.outcome, &later.outcome) {
+            (_, Err(DesignError::Cancelled(_))) => false,
+            (Ok(outcome), Ok(other)) => !other.is_better_than(outcome),
+            (Ok(_), Err(_)) => true,
+            (Err(_), _) => false,
+        };
+        if is_worse { self } else { later }
+    }
+}
+
+/// The job from the wall `thinnest`, which may grow so that more is borne; where no kit passes then, with that wall.
+pub(super) fn with_reserve(
+    ctx: &Ctx,
+    input: &Input<'_>,
+    thinnest: &Wall,
+    rounds: Rounds,
+    effort: &mut Effort,
+) -> Ended {
+    let ask = Ask {
+        factor: RESERVE,
+        rounds,
+        n_thicker: THICKER_WALLS,
+    };
+    let first = asking(ctx, input, thinnest, ask, effort);
+    if first.is_enough() || !first.was_thicker || first.is_late {
+        return first;
+    }
+    ctx.note("no kit with walls so thick passes: walls as thin as a fall allows");
+    let ask = Ask {
+        factor: 1.0,
+        rounds,
+        n_thicker: 0,
+    };
+    let second = asking(ctx, input, thinnest, ask, effort);
+    first.or(second)
+}
+
+/// What is asked of a kit, and what it may cost.
+#[derive(Clone, Copy)]
+pub(super) struct Ask {
+    /// How many times it is to bear what people do to it.
+    pub factor: f64,
+    pub rounds: Rounds,
+    /// How often its wall may grow for that.
+    pub n_thicker: usize,
+}
+
+/// The job from the wall `thinnest`, which grows where less than what is asked is borne.
+fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut Effort) -> Ended {
+    let mut wall = Cow::Borrowed(thinnest);
+    let (mut n_left, mut is_late) = (ask.n_thicker, false);
+    let outcome = loop {
+        let job = Job::new(ctx, input, &wall, ask, n_left > 0);
+        let walled = job.and_then(|job| {
+            let walled = with_wall(ctx, &job, effort);
+            is_late = job.pace.is_late(ctx);
+            walled
+        });
+        match walled {
+            Ok(Walled::Done(outcome)) => break Ok(outcome),
+            Ok(Walled::Thicker(thicker)) => {
+                n_left -= 1;
+                match wall.thicker(ctx, input, &thicker) {
+                    Ok(next) => wall = Cow::Owned(next),
+                    Err(e) => break Err(e),
+                }
+            }
+            Err(e) => break Err(e),
+        }
+    };
+    Ended {
+        outcome,
+        was_thicker: wall.is_thicker(),
+        is_late,
+    }
+}
