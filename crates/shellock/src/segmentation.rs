@@ -9,6 +9,7 @@ mod changes;
 mod creases;
 mod cut;
 mod dual_graph;
+pub mod figures;
 mod halve;
 mod method;
 mod refine;
