@@ -27,7 +27,7 @@ pub use cone::Cone;
 pub use mirror::Mirror;
 
 use super::split::euler_characteristics;
-use crate::{ContactGraph, PatchId, SegmentedSurface};
+use crate::{Adjacency, ContactGraph, PatchId, SegmentedSurface};
 
 /// What figures depend on beside the division. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -160,9 +160,7 @@ pub fn figures(params: &FigureParams, surface: &SegmentedSurface) -> DivisionFig
         n_pieces: surface.n_patches,
         area_mm2: Spread::of(areas),
         seams: seams::seam_figures(params.up, surface, &topology, &bvh),
-        contacts: ContactFigures::of(
-            &surface.contact_graph_below(params.wall_mm, params.min_contact_mm),
-        ),
+        contacts: ContactFigures::of(&surface.contact_graph_below(params.wall_mm, params.min_contact_mm)),
         pieces,
         mirrored_share: params.mirror.as_ref().map(mirrored),
     }
@@ -185,7 +183,8 @@ impl Spread {
 
 impl ContactFigures {
     fn of(graph: &ContactGraph) -> Self {
-        let (counted, short): (Vec<_>, Vec<_>) = graph.contacts().iter().partition(|c| graph.counts(c));
+        let (counted, short): (Vec<&Adjacency>, Vec<_>) =
+            graph.contacts().iter().partition(|c| graph.counts(c));
         Self {
             n_contacts: counted.len(),
             shortest_mm: counted.iter().map(|c| c.longest_mm).min_by(f64::total_cmp),

@@ -54,7 +54,9 @@ pub(super) fn narrowest(skin: &[(Vec3, f64)]) -> Cone {
     for step in STEPS_RAD {
         for _ in 0..MOST_STEPS {
             let around = tilted(best.0, step).map(|axis| (axis, least_dot(axis)));
-            let next = around.into_iter().fold(best, |b, a| if a.1 > b.1 { a } else { b });
+            let next = around
+                .into_iter()
+                .fold(best, |b, a| if a.1 > b.1 { a } else { b });
             if next.1 <= best.1 {
                 break;
             }

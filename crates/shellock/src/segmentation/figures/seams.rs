@@ -101,9 +101,8 @@ impl Eye<'_> {
     /// From which views `at`, where the surface faces `outward`, is seen.
     fn sees(&self, at: Vec3, outward: Vec3) -> [bool; N_VIEWS] {
         let above = at + LIFT_MM * outward;
-        self.views.map(|view| {
-            outward.dot(view) > GRAZING && self.bvh.first_hit(above, view, self.far_mm).is_none()
-        })
+        self.views
+            .map(|view| outward.dot(view) > GRAZING && self.bvh.first_hit(above, view, self.far_mm).is_none())
     }
 }
 
@@ -173,5 +172,8 @@ fn n_triple_points(mesh: &TriMesh, seam: &[HalfEdge]) -> usize {
         .flat_map(|&h| <[u32; 2]>::from(ends(mesh, h)))
         .collect();
     touched.sort_unstable();
-    touched.chunk_by(|u, v| u == v).filter(|same| same.len() > 2).count()
+    touched
+        .chunk_by(|u, v| u == v)
+        .filter(|same| same.len() > 2)
+        .count()
 }

@@ -17,7 +17,9 @@ fn ball() -> TriMesh {
 fn cube() -> TriMesh {
     let cube = cuboid([0.0; 3], [40.0; 3]).to_mesh();
     let params = SegmentationParams::default();
-    halve_long_edges(&params, &Solid::new(cube).unwrap()).0.into_mesh()
+    halve_long_edges(&params, &Solid::new(cube).unwrap())
+        .0
+        .into_mesh()
 }
 
 /// Two balls of 30 mm, their middles 48 mm apart, that meet in a circle of 18 mm: a band of each around z.
@@ -44,7 +46,10 @@ fn figures_of(surface: &SegmentedSurface) -> DivisionFigures {
 }
 
 fn assert_near(value: f64, expected: f64, most: f64) {
-    assert!((value - expected).abs() <= most, "{value} is not {expected} ± {most}");
+    assert!(
+        (value - expected).abs() <= most,
+        "{value} is not {expected} ± {most}"
+    );
 }
 
 #[test]
@@ -68,11 +73,17 @@ fn a_half_ball_faces_one_way_and_a_whole_one_does_not() {
     let tilt = Vec3::new(1.0, 2.0, 3.0).normalize();
     let found = figures_of(&label(ball(), 2, |p| u32::from(p.dot(tilt) > 0.0)));
     let faces = found.pieces[1].faces;
-    assert!(faces.is_one_way() && Vec3::from(faces.axis).dot(tilt) > 0.99, "{faces:?}");
+    assert!(
+        faces.is_one_way() && Vec3::from(faces.axis).dot(tilt) > 0.99,
+        "{faces:?}"
+    );
     assert_near(faces.half_angle_deg, 0.05f64.acos().to_degrees(), 1.5);
     let whole = figures_of(&label(ball(), 1, |_| 0));
     assert!(!whole.pieces[0].faces.is_one_way() && !whole.pieces[0].is_disk);
-    assert_eq!((whole.seams, whole.contacts.shortest_mm), (SeamFigures::default(), None));
+    assert_eq!(
+        (whole.seams, whole.contacts.shortest_mm),
+        (SeamFigures::default(), None)
+    );
 }
 
 #[test]
@@ -136,7 +147,10 @@ fn a_ring_is_no_disk_and_its_inner_seam_is_seen_by_nobody_who_looks_level() {
     let found = figures_of(&quarters);
     assert!(found.pieces.iter().all(|p| p.is_disk), "{:?}", found.pieces);
     assert_eq!(found.seams.n_triple_points, 4);
-    assert_eq!((found.contacts.n_faults, &found.contacts.hold_alone[..]), (0, &[][..]));
+    assert_eq!(
+        (found.contacts.n_faults, &found.contacts.hold_alone[..]),
+        (0, &[][..])
+    );
 }
 
 /// Three slices of a ball: the one in the middle alone holds the others.
@@ -163,7 +177,9 @@ fn halves_mirror_each_other_or_themselves_and_a_cap_on_one_side_does_not() {
             }),
             ..FigureParams::default()
         };
-        figures(&params, &label(ball(), 2, patch_at)).mirrored_share.unwrap()
+        figures(&params, &label(ball(), 2, patch_at))
+            .mirrored_share
+            .unwrap()
     };
     assert_near(mirrored(&|p| u32::from(p.x > 0.0)), 1.0, 0.01);
     assert_near(mirrored(&|p| u32::from(p.z > 0.0)), 1.0, 0.01);
