@@ -111,7 +111,7 @@ impl Division {
                 "  in creases",
                 format!("{} of their length", percent(seams.concave_share)),
             ),
-            ("  on the smooth", format!("{}", percent(seams.flat_share))),
+            ("  where smooth", format!("{}", percent(seams.flat_share))),
             ("  over edges", format!("{}", percent(seams.convex_share))),
             (
                 "  in sight",
