@@ -1,8 +1,11 @@
 //! A division into pieces in figures: what `inspect --segment` says of it.
 
 use shellock::design::{DesignError, Settings};
-use shellock::segmentation::figures::{DivisionFigures, FigureParams, PieceFigures, figures};
+use shellock::segmentation::figures::{
+    ContactFigures, DivisionFigures, FigureParams, PieceFigures, SeamFigures, figures,
+};
 use shellock::segmentation::{self, SegmentationParams};
+use shellock::verify::words::PlaceWords;
 use shellock::{Ctx, PatchId, Warning};
 
 use crate::Session;
@@ -64,27 +67,9 @@ impl Division {
         lines
     }
 
-    fn of_whole(&self) -> Vec<(&'static str, String)> {
-        let DivisionFigures {
-            area_mm2,
-            seams,
-            contacts,
-            pieces,
-            ..
-        } = &self.figures;
-        let percent = |share: f64| format!("{:3.0} %", 100.0 * share);
-        let SegmentationParams {
-            min_contact_mm,
-            wall_mm,
-            ..
-        } = self.params;
-        let shortest = contacts
-            .shortest_mm
-            .map_or_else(String::new, |mm| format!(", the shortest {mm:.1} mm"));
-        let short = match contacts.n_short {
-            0 => String::new(),
-            n => format!("; {n} more shorter than {min_contact_mm:.1} mm, which hold nothing"),
-        };
+    /// What is told of the whole, each with its name.
+    fn of_whole(&self) -> Vec<Line> {
+        let DivisionFigures { area_mm2, pieces, .. } = &self.figures;
         let n_one_way = pieces.iter().filter(|p| p.faces.is_one_way()).count();
         let odd: Vec<PatchId> = pieces.iter().filter(|p| !p.is_disk).map(|p| p.piece).collect();
         let disks = if odd.is_empty() {
@@ -92,64 +77,78 @@ impl Division {
         } else {
             format!("all but {}", listed(&odd))
         };
-        vec![
-            (
-                "pieces",
-                format!(
-                    "{}, of {:.0} to {:.0} mm², the middle one {:.0} mm²",
-                    self.figures.n_pieces, area_mm2.least, area_mm2.largest, area_mm2.median
-                ),
-            ),
-            (
-                "seams",
-                format!(
-                    "{:.0} mm, {} points where three or more pieces meet",
-                    seams.length_mm, seams.n_triple_points
-                ),
-            ),
-            (
-                "  in creases",
-                format!("{} of their length", percent(seams.concave_share)),
-            ),
-            ("  where smooth", format!("{}", percent(seams.flat_share))),
-            ("  over edges", format!("{}", percent(seams.convex_share))),
-            (
-                "  in sight",
-                format!(
-                    "{}, the mean of eight views around the model",
-                    percent(seams.visible_share)
-                ),
-            ),
-            (
-                "  on the front",
-                format!(
-                    "{}: in sight from the front, and in no crease",
-                    percent(seams.front_share)
-                ),
-            ),
-            (
-                "contacts",
-                format!(
-                    "{} at a depth of {wall_mm:.1} mm{shortest}{short}",
-                    contacts.n_contacts
-                ),
-            ),
-            ("held", held(contacts.n_faults, &contacts.hold_alone)),
-            ("disks", disks),
-            (
-                "one way out",
-                format!(
-                    "{n_one_way} of {} pieces: 95 % of their skin within 90° of one direction",
-                    pieces.len()
-                ),
-            ),
-        ]
+        let n = pieces.len();
+        let areas = format!(
+            "{n}, of {:.0} to {:.0} mm², the middle one {:.0} mm²",
+            area_mm2.least, area_mm2.largest, area_mm2.median
+        );
+        let one_way = format!("{n_one_way} of {n} pieces: 95 % of their skin within 90° of one direction");
+        let of_all = [
+            vec![("pieces", areas)],
+            of_seams(&self.figures.seams),
+            of_contacts(&self.figures.contacts, &self.params),
+            vec![("disks", disks), ("one way out", one_way)],
+        ];
+        of_all.concat()
     }
+}
+
+/// A name and what is told of it.
+type Line = (&'static str, String);
+
+fn of_seams(seams: &SeamFigures) -> Vec<Line> {
+    let percent = |share: f64| format!("{:3.0} %", 100.0 * share);
+    let SeamFigures {
+        length_mm,
+        concave_share,
+        flat_share,
+        convex_share,
+        visible_share,
+        front_share,
+        n_triple_points,
+    } = *seams;
+    vec![
+        (
+            "seams",
+            format!("{length_mm:.0} mm, {n_triple_points} points where three or more pieces meet"),
+        ),
+        ("  in creases", percent(concave_share) + " of their length"),
+        ("  where smooth", percent(flat_share)),
+        ("  over edges", percent(convex_share)),
+        (
+            "  in sight",
+            percent(visible_share) + ", the mean of eight views around the model",
+        ),
+        (
+            "  on the front",
+            percent(front_share) + ": in sight from the front, and in no crease",
+        ),
+    ]
+}
+
+fn of_contacts(contacts: &ContactFigures, params: &SegmentationParams) -> Vec<Line> {
+    let SegmentationParams {
+        min_contact_mm,
+        wall_mm,
+        ..
+    } = params;
+    let mut told = format!("{} at a depth of {wall_mm:.1} mm", contacts.n_contacts);
+    if let Some(mm) = contacts.shortest_mm {
+        told += &format!(", the shortest {mm:.1} mm");
+    }
+    if contacts.n_short > 0 {
+        let n = contacts.n_short;
+        told += &format!("; {n} more shorter than {min_contact_mm:.1} mm, which hold nothing");
+    }
+    vec![
+        ("contacts", told),
+        ("held", held(contacts.n_faults, &contacts.hold_alone)),
+    ]
 }
 
 fn held(n_faults: usize, hold_alone: &[PatchId]) -> String {
     match (n_faults, hold_alone) {
-        (0, _) => "every piece by two others at least".to_owned(),
+        (0, _) => "no piece alone holds others".to_owned(),
         (n, []) => format!("not together: {n} faults"),
         (n, [one]) => format!("piece {one} alone holds others: {n} faults"),
         (n, several) => format!("pieces {} alone hold others: {n} faults", listed(several)),
@@ -165,7 +164,6 @@ fn listed(pieces: &[PatchId]) -> String {
 }
 
 fn of_piece(piece: &PieceFigures, standing: &Standing) -> String {
-    use shellock::verify::words::PlaceWords;
     let is_disk = if piece.is_disk { "yes" } else { "no" };
     format!(
         "{:>5}  {:>9.0}  {is_disk:5}  {:>5.0}°  {}",

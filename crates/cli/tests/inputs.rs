@@ -386,7 +386,8 @@ fn a_division_is_told_in_figures_and_is_the_one_that_segment_makes() {
         String::from_utf8_lossy(&o.stdout).into_owned()
     };
     fs::write(dir.path().join("ball.ply"), ply(&ball(Vec3::ZERO))).unwrap();
-    let json = |args: &[&str]| -> Value { serde_json::from_str(&run(&[args, &["--json"]].concat())).unwrap() };
+    let json =
+        |args: &[&str]| -> Value { serde_json::from_str(&run(&[args, &["--json"]].concat())).unwrap() };
     let made = json(&["segment", "ball.ply", "--pieces", "6", "-o", "parts.ply"]);
     let division = json(&["inspect", "ball.ply", "--pieces", "6", "--segment"])["division"].clone();
     assert_eq!(division["n_pieces"], made["pieces"]);
