@@ -7,7 +7,7 @@ use clap::Args;
 use shellock::Ctx;
 use shellock::design::{Params, Settings};
 use shellock::handling::Handling;
-use shellock::metric::{Choice, ClimbParams, Foresight, bears_with};
+use shellock::metric::{Choice, ClimbParams, Foresight, choose};
 use shellock::plan::study::Technique;
 use shellock::plan::{FoundPlan, PlanConstraints, PlanOutcome, PlanParams, search};
 use shellock::segmentation::Method;
@@ -56,7 +56,8 @@ struct Plan {
     lower_bound: f64,
     /// How far the loosest piece of the steadiest plan is foreseen to go, as a share of what it may.
     play: f64,
-    /// How many times that plan bears the use it bears least, before any climb.
+    /// How many times the plan bears the use it bears least that is climbed to from the steady ones, with nothing made
+    /// thicker or larger for it.
     least_use: Option<f64>,
     /// How the best cost falls with work.
     runs: Runs,
@@ -180,22 +181,24 @@ fn plan(
         seeds,
         options.evaluations,
     );
-    let (play, least_use) = held(&settings, params, divided, &found)?;
+    let (cost, lower_bound) = (found.score.worst, found.lower_bound);
+    let (play, least_use) = held(ctx, &settings, params, divided, found)?;
     Ok(Plan {
-        cost: found.score.worst,
-        lower_bound: found.lower_bound,
+        cost,
+        lower_bound,
         play,
         least_use,
         runs: runs.map_err(|e| e.to_string())?,
     })
 }
 
-/// Play and least use of the steadiest of the plans that were found.
+/// What is foreseen of the steadiest plan that was found, and what the plan bears that is climbed to from there.
 fn held(
+    ctx: &Ctx<'_>,
     settings: &Settings,
     params: &Params,
     divided: &Divided,
-    found: &FoundPlan,
+    found: FoundPlan,
 ) -> Result<(f64, Option<f64>), String> {
     let handling = Handling::new(params.up, settings.plan.wall_mm, params.material);
     let Divided {
@@ -212,14 +215,14 @@ fn held(
         handling: &handling,
         climb: ClimbParams::default(),
     };
-    let foresight = Foresight::of(&choice, found);
+    let foresight = Foresight::of(&choice, &found);
     let (plan, excess) = foresight.steadiest().ok_or("no plan is cheap enough")?;
     let key = usize::from(plan.plan.key());
     let of_others = excess.iter().enumerate().filter(|(piece, _)| *piece != key);
     let play = of_others.map(|(_, share)| *share).fold(0.0, f64::max);
-    let bears = bears_with(&settings.plan, surface, sizes, &handling, plan).map_err(|e| e.to_string())?;
-    let factors = bears.iter().filter(|b| b.deed.is_use()).filter_map(|b| b.factor);
-    Ok((play, factors.min_by(f64::total_cmp)))
+    let chosen = choose(&ctx.fork(), &choice, &foresight, found).map_err(|e| e.to_string())?;
+    let least_use = chosen.holding.weakest_use().and_then(|worst| worst.factor);
+    Ok((play, least_use))
 }
 
 fn asked_of(asked: Option<usize>) -> String {
