@@ -145,7 +145,7 @@ fn walk(mesh: &TriMesh, topology: &Topology, start: HalfEdge, at: Vec3, along: V
         let share = height(u) / (height(u) - height(v));
         let there = mesh.points[u as usize].lerp(mesh.points[v as usize], share);
         let step_mm = here.distance(there);
-        if !(step_mm < left_mm) {
+        if step_mm >= left_mm {
             return here.lerp(there, left_mm / step_mm);
         }
         left_mm -= step_mm;
