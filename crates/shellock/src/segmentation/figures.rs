@@ -1,7 +1,7 @@
 //! A division of a surface in figures: how large its pieces are, where its seams run, who sees them, and whether
 //! its pieces hold each other. Nothing is planned for it.
 //!
-//! Seams are looked at in samples of at most [`seams::STEP_MM`]. What a seam lies in is read off the section
+//! Seams are looked at in samples of at most a millimetre. What a seam lies in is read off the section
 //! across it:
 //!
 //! ```text
@@ -87,7 +87,7 @@ pub struct Spread {
 pub struct SeamFigures {
     /// Length of all seams, mm.
     pub length_mm: f64,
-    /// In concave creases: the surface bends inwards by more than [`seams::CREASE_DEG`] within 3 mm on each side.
+    /// In concave creases: the surface bends inwards by more than 10° within 3 mm on each side.
     pub concave_share: f64,
     /// Where it bends by less either way.
     pub flat_share: f64,
