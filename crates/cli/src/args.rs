@@ -127,6 +127,10 @@ pub enum Command {
         model: PathBuf,
         #[command(flatten)]
         options: Options,
+        /// Also divide the surface, by its labels or else by --method, and say where the seams run, who sees them
+        /// and how pieces hold each other
+        #[arg(long, help_heading = "Pieces")]
+        segment: bool,
     },
     /// Write one of the figures that come with the program
     Figure {

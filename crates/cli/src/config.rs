@@ -82,11 +82,13 @@ fn file_of(given: &ArgMatches) -> Option<PathBuf> {
 }
 
 fn own_printers(command: &mut args::Command) -> Option<&mut Vec<Printer>> {
-    use args::Command::{Build, Coupon, Demo, Plan, Segment};
+    use args::Command::{Build, Coupon, Demo, Inspect, Plan, Segment};
     match command {
-        Build { options, .. } | Demo { options, .. } | Segment { options, .. } | Plan { options, .. } => {
-            Some(&mut options.own_printers)
-        }
+        Build { options, .. }
+        | Demo { options, .. }
+        | Segment { options, .. }
+        | Plan { options, .. }
+        | Inspect { options, .. } => Some(&mut options.own_printers),
         Coupon(options) => Some(&mut options.own_printers),
         _ => None,
     }

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
 use shellock::strength::StrengthParams;
 use shellock_formats::Loaded;
-use shellock_geom::check::inspect as inspection;
+use shellock_geom::check::{Inspection, inspect as inspection};
 use shellock_geom::repair::repair;
 use shellock_geom::thin::{ThinPlace, thin_places};
 use shellock_geom::weld::weld;
@@ -13,40 +13,30 @@ use shellock_kit::plan_file::RepairEntry;
 
 use crate::Session;
 use crate::args::{Options, Thickness};
+use crate::build::print_warnings;
+use crate::division::{Division, divide};
 use crate::failure::Failure;
 use crate::input::{Model, load, model_of, repair_mode};
+use crate::place::Standing;
 
 /// Thin places that are told one by one.
 const N_TOLD: usize = 3;
 
+/// What is asked about a model.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Wanted {
+    /// What its file holds.
+    File,
+    /// Its division, too.
+    Division,
+}
+
 /// `shellock inspect`.
-pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
+pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted) -> Result<u8, Failure> {
     let (loaded, bytes) = session.during("reading", || load(file))?;
-    let size = loaded.mesh.bounds().size();
     let found = inspection(&weld(&loaded.mesh).mesh);
-    let labellings: Vec<String> = loaded.labellings.iter().map(|l| l.source.to_string()).collect();
     if !session.is_json {
-        let n = found.bodies.len();
-        let bodies = if n == 1 { "body" } else { "bodies" };
-        println!(
-            "{} file, {} faces, {n} {bodies}",
-            loaded.format,
-            loaded.n_file_faces()
-        );
-        println!(
-            "size {:.4} × {:.4} × {:.4} file units{}",
-            size.x,
-            size.y,
-            size.z,
-            unit(&loaded)
-        );
-        println!(
-            "{} open edges, {} edges of more than two faces",
-            found.edges.open.count, found.edges.shared.count
-        );
-        if !labellings.is_empty() {
-            println!("divided by {}", labellings.join(", "));
-        }
+        print_file(&loaded, &found);
     }
     let (model, thin) = session.during("looking for what is wrong", || {
         let model = model_of(file, &loaded, &bytes, options);
@@ -56,23 +46,50 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
             .unwrap_or_default();
         (model, thin)
     });
+    let division = match (&model, wanted) {
+        (Ok(model), Wanted::Division) => Some(divide(session, model, options)?),
+        _ => None,
+    };
     if session.is_json {
-        let is_sound = repair(&loaded.mesh, repair_mode(true, false)).is_ok();
-        let (repairs, notes): (Vec<RepairEntry>, &[String]) = model.as_ref().map_or_else(
-            |_| (Vec::new(), &[][..]),
-            |m| (m.repairs.iter().map(RepairEntry::of).collect(), &m.notes),
-        );
-        let error = model.as_ref().err().map(ToString::to_string);
-        let value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
-            "size": size.to_array(), "unit_mm": loaded.unit_mm, "open_edges": found.edges.open.count,
-            "shared_edges": found.edges.shared.count, "has_labels": loaded.face_labels().is_some(),
-            "divided_by": labellings, "is_sound": is_sound, "repairs": repairs, "notes": notes, "warnings": thin,
-            "can_be_made": model.is_ok(), "error": error });
-        println!("{value}");
+        println!("{}", told(&loaded, &found, &model, &thin, division.as_ref()));
         // Why not is in what was printed.
         return Ok(model.err().map_or(0, |failure| failure.exit_code()));
     }
-    let model = model?;
+    print_model(&model?, &thin, division.as_ref(), options);
+    Ok(0)
+}
+
+/// What the file holds, for people.
+fn print_file(loaded: &Loaded, found: &Inspection) {
+    let (n, size) = (found.bodies.len(), loaded.mesh.bounds().size());
+    let bodies = if n == 1 { "body" } else { "bodies" };
+    println!(
+        "{} file, {} faces, {n} {bodies}",
+        loaded.format,
+        loaded.n_file_faces()
+    );
+    println!(
+        "size {:.4} × {:.4} × {:.4} file units{}",
+        size.x,
+        size.y,
+        size.z,
+        unit(loaded)
+    );
+    println!(
+        "{} open edges, {} edges of more than two faces",
+        found.edges.open.count, found.edges.shared.count
+    );
+    if !loaded.labellings.is_empty() {
+        println!("divided by {}", labellings(loaded).join(", "));
+    }
+}
+
+fn labellings(loaded: &Loaded) -> Vec<String> {
+    loaded.labellings.iter().map(|l| l.source.to_string()).collect()
+}
+
+/// What would be made of it, for people.
+fn print_model(model: &Model, thin: &[String], division: Option<&Division>, options: &Options) {
     model.notes.iter().for_each(|note| println!("note: {note}"));
     thin.iter().for_each(|warning| println!("warning: {warning}"));
     let made = model.solid.mesh().bounds().size();
@@ -85,7 +102,40 @@ pub fn inspect(session: &Session, file: &Path, options: &Options) -> Result<u8, 
         "{state}: it can be made, {:.1} × {:.1} × {:.1} mm",
         made.x, made.y, made.z
     );
-    Ok(0)
+    if let Some(division) = division {
+        let standing = Standing::of(options.up, model.solid.mesh());
+        print_warnings(&division.warnings, &standing);
+        division
+            .lines(&standing)
+            .iter()
+            .for_each(|line| println!("{line}"));
+    }
+}
+
+/// All of it, for machines.
+fn told(
+    loaded: &Loaded,
+    found: &Inspection,
+    model: &Result<Model, Failure>,
+    thin: &[String],
+    division: Option<&Division>,
+) -> Value {
+    let is_sound = repair(&loaded.mesh, repair_mode(true, false)).is_ok();
+    let (repairs, notes): (Vec<RepairEntry>, &[String]) = model.as_ref().map_or_else(
+        |_| (Vec::new(), &[][..]),
+        |m| (m.repairs.iter().map(RepairEntry::of).collect(), &m.notes),
+    );
+    let error = model.as_ref().err().map(ToString::to_string);
+    let mut value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
+        "size": loaded.mesh.bounds().size().to_array(), "unit_mm": loaded.unit_mm, "open_edges": found.edges.open.count,
+        "shared_edges": found.edges.shared.count, "has_labels": loaded.face_labels().is_some(),
+        "divided_by": labellings(loaded), "is_sound": is_sound, "repairs": repairs, "notes": notes, "warnings": thin,
+        "can_be_made": model.is_ok(), "error": error });
+    if let Some(division) = division {
+        value["division"] = json!(division.figures);
+        value["division"]["warnings"] = json!(division.warnings);
+    }
+    value
 }
 
 fn unit(loaded: &Loaded) -> String {

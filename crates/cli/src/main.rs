@@ -5,6 +5,7 @@ mod bears;
 mod build;
 mod config;
 mod coupon;
+mod division;
 mod failure;
 mod input;
 mod inspect;
@@ -147,6 +148,7 @@ fn shown(cli: &args::Cli) -> progress::Shown {
 }
 
 fn run(session: &Session, command: Command) -> Result<u8, Failure> {
+    use inspect::Wanted;
     match command {
         Command::Build { model, options, out } => build::build(session, &model, &options, out),
         Command::Demo { figure, options, out } => build::demo(session, &figure, &options, out),
@@ -162,7 +164,14 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
             model,
             closed_form,
         } => savings::report(session, &kit, model.as_deref(), closed_form),
-        Command::Inspect { model, options } => inspect::inspect(session, &model, &options),
+        Command::Inspect {
+            model,
+            options,
+            segment,
+        } => {
+            let wanted = if segment { Wanted::Division } else { Wanted::File };
+            inspect::inspect(session, &model, &options, wanted)
+        }
         Command::Coupon(options) => coupon::coupon(session, &options),
         Command::Completions { shell } => Ok(manual::completions(shell)),
         Command::Manual { folder } => manual::write(&folder),

@@ -9,7 +9,7 @@ use crate::output::standing;
 /// A model as it stands.
 pub struct Standing {
     up: Axis,
-    /// With z up; the front is towards −y, the left towards −x.
+    /// With z up; the front is towards −y, as [`shellock::segmentation::figures::front_of`] says, the left towards −x.
     bounds: Aabb,
 }
 
@@ -72,6 +72,8 @@ impl PlaceWords for Standing {
 
 #[cfg(test)]
 mod tests {
+    use shellock::segmentation::figures::front_of;
+
     use super::*;
 
     #[test]
@@ -89,5 +91,14 @@ mod tests {
         // With y up, what has the greatest z stands in front.
         let y_up = Standing::of(Axis::Y, &mesh);
         assert_eq!(y_up.words([45.0, 30.0, 99.0]), "at the front, 30 mm up");
+    }
+
+    /// [`front_of`] says where the front is; places are told, and pictures drawn, of models turned by [`standing`].
+    #[test]
+    fn the_front_is_where_the_library_has_it() {
+        for up in [Axis::X, Axis::Y, Axis::Z] {
+            let front = standing(up, Vec3::from(front_of(up.unit())));
+            assert_eq!(front + 0.0, Vec3::NEG_Y);
+        }
     }
 }

@@ -376,3 +376,32 @@ fn a_model_too_thin_to_be_hollow_is_refused_at_once_with_what_would_do() {
     assert_eq!(o.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&o.stderr).contains("time is -1 s"));
 }
+
+#[test]
+fn a_division_is_told_in_figures_and_is_the_one_that_segment_makes() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let o = shellock(dir.path(), args);
+        assert_eq!(o.status.code(), Some(0), "{}", String::from_utf8_lossy(&o.stderr));
+        String::from_utf8_lossy(&o.stdout).into_owned()
+    };
+    fs::write(dir.path().join("ball.ply"), ply(&ball(Vec3::ZERO))).unwrap();
+    let json =
+        |args: &[&str]| -> Value { serde_json::from_str(&run(&[args, &["--json"]].concat())).unwrap() };
+    let made = json(&["segment", "ball.ply", "--pieces", "6", "-o", "parts.ply"]);
+    let division = json(&["inspect", "ball.ply", "--pieces", "6", "--segment"])["division"].clone();
+    assert_eq!(division["n_pieces"], made["pieces"]);
+    let pieces = division["pieces"].as_array().unwrap();
+    assert_eq!(Some(pieces.len() as u64), made["pieces"].as_u64());
+    let seams = |what: &str| division["seams"][what].as_f64().unwrap();
+    assert_eq!(seams("concave_share"), 0.0);
+    assert!(seams("length_mm") > 100.0 && (0.2..0.6).contains(&seams("visible_share")));
+    let told = run(&["inspect", "ball.ply", "--pieces", "6", "--segment"]);
+    for words in ["on the front", "eight views", "held", "piece  area, mm²"] {
+        assert!(told.contains(words), "{told}");
+    }
+    // Of labels that are given, those.
+    let given = json(&["inspect", "parts.ply", "--segment"]);
+    assert_eq!(given["division"]["n_pieces"], made["pieces"]);
+    assert!(json(&["inspect", "ball.ply"])["division"].is_null());
+}

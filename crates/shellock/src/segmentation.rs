@@ -10,6 +10,7 @@ mod creases;
 mod cut;
 mod dual_graph;
 mod fewer;
+pub mod figures;
 mod halve;
 mod method;
 mod refine;

@@ -4,6 +4,7 @@
 //! `cargo xtask --help` lists them.
 
 mod chart;
+mod convergence;
 mod effort;
 mod failure;
 mod golden;

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use shellock::Ctx;
 use shellock::design::{Params, Settings};
-use shellock::plan::study::{Technique, convergence};
+use shellock::plan::study::Technique;
 use shellock::plan::{FoundPlan, PlanConstraints, PlanOutcome, PlanParams, search};
 
-use crate::chart::{Corner, Curve, Interval, Labels, bands, intervals};
+use crate::chart::{Interval, Labels, intervals};
+use crate::convergence::{Runs, convergence_sheets, runs};
 use crate::failure::Failure;
 use crate::model::{Divided, Model, ModelOptions, at_least_one, divide, load, with_ctx};
-use crate::statistics::band;
 use crate::study::{Sheet, write_all};
 use crate::table::{Table, markdown};
 
@@ -42,9 +42,6 @@ struct Subject {
     params: PlanParams,
     best: Box<FoundPlan>,
 }
-
-/// Runs of one search with several seeds: of each the improvements (evaluations, cost).
-type Runs = Vec<Vec<(f64, f64)>>;
 
 /// Runs the study; returns the files written.
 pub fn run(options: &SearchOptions, out: &Path) -> Result<Vec<PathBuf>, Failure> {
@@ -230,6 +227,7 @@ fn of_segmentations(
     ])
 }
 
+/// The runs of a technique on `subject`.
 fn runs_of(
     ctx: &Ctx<'_>,
     options: &SearchOptions,
@@ -237,75 +235,19 @@ fn runs_of(
     technique: Technique,
 ) -> Result<Runs, Failure> {
     eprintln!("{}, {}", subject.name, name_of(technique));
-    let run = |seed: u64| {
-        let params = PlanParams {
-            seed,
-            ..subject.params.clone()
-        };
-        let samples = convergence(
-            ctx,
-            &params,
-            &subject.divided.survey,
-            technique,
-            options.evaluations,
-        );
-        let problem = "the study was stopped".to_owned();
-        let samples = samples.map_err(|_| Failure::Model {
-            path: options.model.model.clone(),
-            problem,
-        })?;
-        Ok(samples
-            .iter()
-            .map(|s| (s.n_evaluations as f64, s.best_cost))
-            .collect())
-    };
-    (options.model.seed..).take(options.seeds).map(run).collect()
-}
-
-fn convergence_sheets(
-    file: &str,
-    title: &str,
-    runs: &[(String, Runs)],
-    optimum: Option<f64>,
-) -> Result<Vec<Sheet>, Failure> {
-    let mut table = Table {
-        columns: ["variant", "seed", "evaluations", "cost"]
-            .map(|n| (n.into(), vec![]))
-            .into(),
-    };
-    let (mut curves, mut rows) = (Vec::new(), Vec::new());
-    for (variant, (name, runs)) in runs.iter().enumerate() {
-        for (seed, &(evaluations, cost)) in runs
-            .iter()
-            .enumerate()
-            .flat_map(|(i, r)| r.iter().map(move |p| (i, p)))
-        {
-            let row = [variant as f64, seed as f64, evaluations, cost];
-            table.columns.iter_mut().zip(row).for_each(|(c, v)| c.1.push(v));
-        }
-        let points = band(runs);
-        if let Some(end) = points.last() {
-            let figures = [end.middle, end.low, end.high].map(|v| format!("{v:.4}"));
-            rows.push(std::iter::once(name.clone()).chain(figures).collect());
-        }
-        curves.push(Curve { name, points });
-    }
-    let labels = Labels {
-        title,
-        x: "plans looked at and costs of pieces asked for",
-        y: "cost of the best plan's worst piece",
-    };
-    Ok(vec![
-        (
-            format!("{file}.svg"),
-            bands(&labels, &curves, optimum, Corner::UpperRight)?,
-        ),
-        (format!("{file}.csv"), table.to_csv()),
-        (
-            format!("{file}.md"),
-            markdown(&["search", "median at the end", "least", "greatest"], &rows),
-        ),
-    ])
+    let seeds = (options.model.seed..).take(options.seeds);
+    let found = runs(
+        ctx,
+        &subject.params,
+        &subject.divided.survey,
+        technique,
+        seeds,
+        options.evaluations,
+    );
+    found.map_err(|_| Failure::Model {
+        path: options.model.model.clone(),
+        problem: "the study was stopped".to_owned(),
+    })
 }
 
 fn name_of(technique: Technique) -> &'static str {

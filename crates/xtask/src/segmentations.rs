@@ -1,17 +1,22 @@
-//! What each method's division of a model allows (Fig. 16).
+//! What each method's division of a model allows (Fig. 16): where its seams run, and the plans of it.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use shellock::Ctx;
 use shellock::design::{Params, Settings};
-use shellock::plan::{PlanConstraints, PlanOutcome, search};
+use shellock::handling::Handling;
+use shellock::metric::{Choice, ClimbParams, Foresight, choose};
+use shellock::plan::study::Technique;
+use shellock::plan::{FoundPlan, PlanConstraints, PlanOutcome, PlanParams, search};
 use shellock::segmentation::Method;
-use shellock::{Ctx, Seam};
+use shellock::segmentation::figures::{DivisionFigures, FigureParams, figures};
 
+use crate::convergence::{Runs, convergence_sheets, runs};
 use crate::failure::Failure;
-use crate::model::{Divided, Model, ModelOptions, divide, load, with_ctx};
-use crate::study::write_all;
+use crate::model::{Divided, Model, ModelOptions, at_least_one, divide, load, with_ctx};
+use crate::study::{Sheet, write_all};
 use crate::table::{Table, markdown};
 
 /// Of which model.
@@ -22,22 +27,40 @@ pub struct SegmentationsOptions {
     /// Numbers of pieces asked of each method besides its own, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "8")]
     pieces: Vec<usize>,
+    /// Runs of the search on each division, with different seeds
+    #[arg(long, default_value_t = 3, value_parser = at_least_one)]
+    seeds: usize,
+    /// Work of each run: costs of pieces asked for, and plans looked at
+    #[arg(long, default_value_t = 30_000, value_parser = at_least_one)]
+    evaluations: usize,
 }
 
-/// One division of the model.
+/// One division of the model, or why there is none.
 struct Row {
     method: Method,
     asked: Option<usize>,
     seconds: f64,
-    found: Result<Plan, String>,
+    made: Result<Made, String>,
 }
 
-/// Its best plan.
+/// A division, and its best plan or why there is none.
+struct Made {
+    figures: DivisionFigures,
+    plan: Result<Plan, String>,
+}
+
+/// What the plans of a division are worth.
 struct Plan {
-    n_pieces: usize,
-    seam_mm: f64,
+    /// Of the best plan that was found.
     cost: f64,
     lower_bound: f64,
+    /// How far the loosest piece of the steadiest plan is foreseen to go, as a share of what it may.
+    play: f64,
+    /// How many times the plan bears the use it bears least that is climbed to from the steady ones, with nothing made
+    /// thicker or larger for it.
+    least_use: Option<f64>,
+    /// How the best cost falls with work.
+    runs: Runs,
 }
 
 /// Runs the study; returns the files written.
@@ -45,37 +68,49 @@ pub fn run(options: &SegmentationsOptions, out: &Path) -> Result<Vec<PathBuf>, F
     let model = load(&options.model)?;
     let name = options.model.name();
     with_ctx(|ctx| {
-        let mut rows = Vec::new();
-        for method in Method::ALL {
-            for asked in std::iter::once(None).chain(options.pieces.iter().copied().map(Some)) {
-                rows.push(row(ctx, options, &model, method, asked));
-                let row = &rows[rows.len() - 1];
-                let answer = row.found.as_ref();
-                let said = answer.map_or_else(Clone::clone, |p| format!("cost {:.3}", p.cost));
-                eprintln!("{} {}: {said}", method.name(), asked_of(asked));
-            }
+        let (mut rows, mut sheets) = (Vec::new(), Vec::new());
+        for asked in std::iter::once(None).chain(options.pieces.iter().copied().map(Some)) {
+            let of_number: Vec<Row> = Method::ALL
+                .into_iter()
+                .map(|method| row(ctx, options, &model, method, asked))
+                .collect();
+            sheets.extend(curves(&name, options, asked, &of_number)?);
+            rows.extend(of_number);
         }
-        let sheets = [
-            ("methods.csv".to_owned(), table(&rows).to_csv()),
-            (
-                "methods.md".to_owned(),
-                markdown(&HEAD, &rows.iter().map(cells).collect::<Vec<_>>()),
-            ),
-        ];
+        sheets.push(("methods.csv".to_owned(), table(&rows).to_csv()));
+        let cells: Vec<Vec<String>> = rows.iter().map(cells).collect();
+        sheets.push(("methods.md".to_owned(), markdown(&HEAD, &cells)));
         write_all(out, &format!("{name}/segmentations"), &sheets)
     })
 }
 
-const HEAD: [&str; 8] = [
-    "method",
-    "asked",
-    "pieces",
-    "seams, mm",
-    "cost of the best plan",
-    "proven lower bound",
-    "locks",
-    "s",
-];
+/// Chart and tables of how fast plans of each division get better.
+fn curves(
+    name: &str,
+    options: &SegmentationsOptions,
+    asked: Option<usize>,
+    rows: &[Row],
+) -> Result<Vec<Sheet>, Failure> {
+    let curve = |row: &Row| {
+        let made = row.made.as_ref().ok()?;
+        let plan = made.plan.as_ref().ok()?;
+        let label = format!("{}, {} pieces", row.method.name(), made.figures.n_pieces);
+        (!plan.runs.iter().any(Vec::is_empty)).then(|| (label, plan.runs.clone()))
+    };
+    let named: Vec<(String, Runs)> = rows.iter().filter_map(curve).collect();
+    let (file, divisions) = match asked {
+        None => (
+            "search-own".to_owned(),
+            "divisions into each method's own number".to_owned(),
+        ),
+        Some(n) => (format!("search-{n}"), format!("divisions into about {n} pieces")),
+    };
+    let title = format!(
+        "Plans of {name}, {divisions}: median and range of {} seeds",
+        options.seeds
+    );
+    convergence_sheets(&file, &title, &named, None)
+}
 
 fn row(
     ctx: &Ctx<'_>,
@@ -89,42 +124,155 @@ fn row(
     params.n_pieces = asked;
     let begun = Instant::now();
     let divided = divide(ctx, &params, model, &options.model.model).map_err(|e| e.to_string());
-    let found = divided.and_then(|divided| plan(ctx, &params, &divided));
-    Row {
+    let made = divided.map(|divided| Made {
+        figures: figures_of(&params, &divided),
+        plan: plan(ctx, options, &params, &divided),
+    });
+    let row = Row {
         method,
         asked,
         seconds: begun.elapsed().as_secs_f64(),
-        found,
-    }
+        made,
+    };
+    eprintln!("{}", cells(&row).join(" | "));
+    row
 }
 
-fn plan(ctx: &Ctx<'_>, params: &Params, divided: &Divided) -> Result<Plan, String> {
-    let params = Settings::resolve(params).plan;
-    let outcome = search(&ctx.fork(), &params, &divided.survey, &PlanConstraints::default());
+fn figures_of(params: &Params, divided: &Divided) -> DivisionFigures {
+    let settings = Settings::resolve(params).segmentation;
+    let of = FigureParams {
+        up: params.up,
+        wall_mm: settings.wall_mm,
+        min_contact_mm: settings.min_contact_mm,
+        mirror: None,
+    };
+    figures(&of, &divided.surface)
+}
+
+fn plan(
+    ctx: &Ctx<'_>,
+    options: &SegmentationsOptions,
+    params: &Params,
+    divided: &Divided,
+) -> Result<Plan, String> {
+    let settings = Settings::resolve(params);
+    let outcome = search(
+        &ctx.fork(),
+        &settings.plan,
+        &divided.survey,
+        &PlanConstraints::default(),
+    );
     let found = match outcome.map_err(|e| e.to_string())? {
-        PlanOutcome::Found(found) => found,
+        PlanOutcome::Found(found) => *found,
         PlanOutcome::Infeasible { reason, .. } => return Err(reason),
     };
+    // All runs look for plans with the same key.
+    let with_key = PlanParams {
+        key: Some(found.plan.key()),
+        occlusion_tolerance: found.tolerance,
+        ..settings.plan.clone()
+    };
+    let seeds = (options.model.seed..).take(options.seeds);
+    let runs = runs(
+        ctx,
+        &with_key,
+        &divided.survey,
+        Technique::Both,
+        seeds,
+        options.evaluations,
+    );
+    let (cost, lower_bound) = (found.score.worst, found.lower_bound);
+    let (play, least_use) = held(ctx, &settings, params, divided, found)?;
     Ok(Plan {
-        n_pieces: divided.surface.n_patches,
-        seam_mm: divided.surface.seams().iter().map(Seam::length).sum(),
-        cost: found.score.worst,
-        lower_bound: found.lower_bound,
+        cost,
+        lower_bound,
+        play,
+        least_use,
+        runs: runs.map_err(|e| e.to_string())?,
     })
+}
+
+/// What is foreseen of the steadiest plan that was found, and what the plan bears that is climbed to from there.
+fn held(
+    ctx: &Ctx<'_>,
+    settings: &Settings,
+    params: &Params,
+    divided: &Divided,
+    found: FoundPlan,
+) -> Result<(f64, Option<f64>), String> {
+    let handling = Handling::new(params.up, settings.plan.wall_mm, params.material);
+    let Divided {
+        surface,
+        sizes,
+        survey,
+    } = divided;
+    let choice = Choice {
+        params: &settings.plan,
+        surface,
+        sizes,
+        survey,
+        constraints: &PlanConstraints::default(),
+        handling: &handling,
+        climb: ClimbParams::default(),
+    };
+    let foresight = Foresight::of(&choice, &found);
+    let (plan, excess) = foresight.steadiest().ok_or("no plan is cheap enough")?;
+    let key = usize::from(plan.plan.key());
+    let of_others = excess.iter().enumerate().filter(|(piece, _)| *piece != key);
+    let play = of_others.map(|(_, share)| *share).fold(0.0, f64::max);
+    let chosen = choose(&ctx.fork(), &choice, &foresight, found).map_err(|e| e.to_string())?;
+    let least_use = chosen.holding.weakest_use().and_then(|worst| worst.factor);
+    Ok((play, least_use))
 }
 
 fn asked_of(asked: Option<usize>) -> String {
     asked.map_or_else(|| "its own".to_owned(), |n| n.to_string())
 }
 
+const HEAD: [&str; 14] = [
+    "method",
+    "asked",
+    "pieces",
+    "seams, mm",
+    "in creases, %",
+    "in sight, %",
+    "on the front, %",
+    "faults",
+    "cost of the best plan",
+    "proven lower bound",
+    "play foreseen of what is allowed, %",
+    "bears of the least use, times",
+    "locks",
+    "s",
+];
+
 fn cells(row: &Row) -> Vec<String> {
     let mut cells = vec![row.method.name().to_owned(), asked_of(row.asked)];
-    match &row.found {
+    let percent = |share: f64| format!("{:.0}", 100.0 * share);
+    let made = match &row.made {
+        Ok(made) => made,
+        Err(why) => {
+            cells.extend(std::iter::repeat_n(String::new(), 10));
+            cells.extend([format!("no: {why}"), format!("{:.1}", row.seconds)]);
+            return cells;
+        }
+    };
+    let DivisionFigures { seams, contacts, .. } = &made.figures;
+    cells.extend([
+        made.figures.n_pieces.to_string(),
+        format!("{:.0}", seams.length_mm),
+        percent(seams.concave_share),
+        percent(seams.visible_share),
+        percent(seams.front_share),
+        contacts.n_faults.to_string(),
+    ]);
+    match &made.plan {
         Ok(plan) => cells.extend([
-            plan.n_pieces.to_string(),
-            format!("{:.0}", plan.seam_mm),
             format!("{:.3}", plan.cost),
             format!("{:.3}", plan.lower_bound),
+            percent(plan.play),
+            plan.least_use
+                .map_or_else(String::new, |times| format!("{times:.2}")),
             "yes".to_owned(),
         ]),
         Err(why) => {
@@ -136,31 +284,42 @@ fn cells(row: &Row) -> Vec<String> {
     cells
 }
 
-/// What can be counted, where there is a plan; methods by their place in [`Method::ALL`].
+/// What can be counted, where there is a division; methods by their place in [`Method::ALL`].
 fn table(rows: &[Row]) -> Table {
     let names = [
         "method",
         "asked",
         "pieces",
         "seams [mm]",
+        "in creases",
+        "in sight",
+        "on the front",
+        "faults",
         "cost",
         "lower bound",
+        "play",
+        "least use",
         "s",
     ];
     let mut columns: Vec<(String, Vec<f64>)> = names.map(|n| (n.into(), Vec::new())).into();
     for row in rows {
-        let Ok(plan) = &row.found else { continue };
-        let place = Method::ALL
-            .iter()
-            .position(|m| *m == row.method)
-            .unwrap_or_default();
+        let Ok(made) = &row.made else { continue };
+        let method = Method::ALL.iter().position(|m| *m == row.method);
+        let DivisionFigures { seams, contacts, .. } = &made.figures;
+        let of_plan = |get: &dyn Fn(&Plan) -> f64| made.plan.as_ref().map_or(f64::NAN, get);
         let values = [
-            place as f64,
+            method.unwrap_or_default() as f64,
             row.asked.unwrap_or_default() as f64,
-            plan.n_pieces as f64,
-            plan.seam_mm,
-            plan.cost,
-            plan.lower_bound,
+            made.figures.n_pieces as f64,
+            seams.length_mm,
+            seams.concave_share,
+            seams.visible_share,
+            seams.front_share,
+            contacts.n_faults as f64,
+            of_plan(&|p| p.cost),
+            of_plan(&|p| p.lower_bound),
+            of_plan(&|p| p.play),
+            of_plan(&|p| p.least_use.unwrap_or(f64::NAN)),
             row.seconds,
         ];
         columns.iter_mut().zip(values).for_each(|(c, v)| c.1.push(v));

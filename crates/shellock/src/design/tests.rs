@@ -18,6 +18,7 @@ use crate::plan::key::KeyDirections;
 use crate::plan::{LatticePlan, PlanConstraints, PlanProof, ProofScope};
 use crate::play::{KitPlay, Slide};
 use crate::segmentation::{SegmentationError, SegmentationParams};
+use crate::strength::StrengthError;
 use crate::verify::{Check, Finding, Play, Verification};
 use crate::{Cancelled, Cause, ConnectorSizes, IdVec, LatticeDirection, PatchId, testing};
 

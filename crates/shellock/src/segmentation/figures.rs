@@ -1,0 +1,218 @@
+//! A division of a surface in figures: how large its pieces are, where its seams run, who sees them, and whether
+//! its pieces hold each other. Nothing is planned for it.
+//!
+//! Seams are looked at in samples of at most a millimetre. What a seam lies in is read off the section
+//! across it:
+//!
+//! ```text
+//!    \      |      /
+//!     \     | n   /         bend = the rise of both ends over the sample's tangent plane, as angles:
+//!  3 mm\    |    / 3 mm     > 0 in a hollow, 0 on a plane, < 0 over an edge
+//!       `---o---´
+//! ```
+
+mod cone;
+mod mirror;
+mod seams;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+use serde::Serialize;
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::topology::components;
+use shellock_geom::{Topology, Vec3};
+
+pub use cone::Cone;
+pub use mirror::Mirror;
+
+use super::split::euler_characteristics;
+use crate::{Adjacency, ContactGraph, PatchId, SegmentedSurface};
+
+/// What figures depend on beside the division. Lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureParams {
+    /// Upwards as the model stands, a unit vector; z.
+    pub up: [f64; 3],
+    /// Depth at which contacts are measured, where connectors are. [0, 10]; 0, the outer surface.
+    pub wall_mm: f64,
+    /// Shortest stretch of seam that counts as a contact. [0, 100]; 9, as pieces are divided for.
+    pub min_contact_mm: f64,
+    /// The plane that the model is alike on both sides of, if there is one.
+    pub mirror: Option<Mirror>,
+}
+
+impl Default for FigureParams {
+    fn default() -> Self {
+        Self {
+            up: [0.0, 0.0, 1.0],
+            wall_mm: 0.0,
+            min_contact_mm: 9.0,
+            mirror: None,
+        }
+    }
+}
+
+/// What there is to say of a division. Shares are in [0, 1].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DivisionFigures {
+    /// How many pieces there are.
+    pub n_pieces: usize,
+    /// Areas of the pieces' skins.
+    pub area_mm2: Spread,
+    /// Where seams run.
+    pub seams: SeamFigures,
+    /// What pieces hold each other by.
+    pub contacts: ContactFigures,
+    /// Each piece, by its number.
+    pub pieces: Vec<PieceFigures>,
+    /// Share of the surface whose mirror image belongs to the piece that is its piece's image; `None` without a
+    /// plane.
+    pub mirrored_share: Option<f64>,
+}
+
+/// Of several values; all 0 where there are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// The least.
+    pub least: f64,
+    /// The middle one, or the mean of the two in the middle.
+    pub median: f64,
+    /// The largest.
+    pub largest: f64,
+}
+
+/// Where seams run, as shares of their length; all 0 where there is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct SeamFigures {
+    /// Length of all seams, mm.
+    pub length_mm: f64,
+    /// In concave creases: the surface bends inwards by more than 10° within 3 mm on each side.
+    pub concave_share: f64,
+    /// Where it bends by less either way.
+    pub flat_share: f64,
+    /// Over convex edges: it bends outwards by more.
+    pub convex_share: f64,
+    /// In sight, in the mean of eight level views around the model, 45° apart.
+    pub visible_share: f64,
+    /// In sight from the front, and in no concave crease.
+    pub front_share: f64,
+    /// Points where three or more pieces meet.
+    pub n_triple_points: usize,
+}
+
+/// What pieces hold each other by: for each two that touch the longest stretch of seam between them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ContactFigures {
+    /// Pairs of pieces with a stretch that is long enough.
+    pub n_contacts: usize,
+    /// The shortest of those stretches, mm at the depth asked for; `None` where there is none.
+    pub shortest_mm: Option<f64>,
+    /// Pairs that touch, but by shorter stretches alone.
+    pub n_short: usize,
+    /// How far from "no piece holds others alone", in pieces; 0 where it is so.
+    pub n_faults: usize,
+    /// Pieces that alone hold others.
+    pub hold_alone: Vec<PatchId>,
+}
+
+/// One piece.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PieceFigures {
+    /// Which.
+    pub piece: PatchId,
+    /// Area of its skin, mm².
+    pub area_mm2: f64,
+    /// Whether its skin is connected, with one border and no handle.
+    pub is_disk: bool,
+    /// Where its skin faces.
+    pub faces: Cone,
+}
+
+/// Where a viewer stands who sees the front of a model that stands with `up` (a unit vector) upwards: a level unit
+/// vector from the model to them.
+///
+/// What has z up is looked at from −y, as 3D programs do; other models are first turned by the least angle that
+/// makes them stand. So what has y up has its front towards z. This is the one place that says so.
+pub fn front_of(up: [f64; 3]) -> [f64; 3] {
+    /// Upside down: every way to turn is as short.
+    const OPPOSITE: f64 = 1e-9;
+    let (up, z, front) = (Vec3::from(up), Vec3::Z, Vec3::NEG_Y);
+    let both = z + up;
+    if 1.0 + up.z < OPPOSITE {
+        return front.to_array();
+    }
+    // Rodrigues' formula for the turn from z to `up`, of a vector at right angles to z.
+    (front - both.dot(front) / (1.0 + up.z) * both).to_array()
+}
+
+/// The figures of `surface`.
+///
+/// # Panics
+/// Where its mesh is not closed, which a [`SegmentedSurface`] promises to be.
+pub fn figures(params: &FigureParams, surface: &SegmentedSurface) -> DivisionFigures {
+    let topology = Topology::of_mesh(&surface.mesh).expect("a segmented surface is closed");
+    let bvh = TriangleBvh::new(&surface.mesh);
+    let pieces = pieces(surface, &topology);
+    let areas: Vec<f64> = pieces.iter().map(|p| p.area_mm2).collect();
+    let mirrored = |mirror: &Mirror| mirror::mirrored_share(mirror, surface, &bvh);
+    DivisionFigures {
+        n_pieces: surface.n_patches,
+        area_mm2: Spread::of(areas),
+        seams: seams::seam_figures(params.up, surface, &topology, &bvh),
+        contacts: ContactFigures::of(&surface.contact_graph_below(params.wall_mm, params.min_contact_mm)),
+        pieces,
+        mirrored_share: params.mirror.as_ref().map(mirrored),
+    }
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let n = values.len();
+        if n == 0 {
+            return Self::default();
+        }
+        Self {
+            least: values[0],
+            median: 0.5 * (values[(n - 1) / 2] + values[n / 2]),
+            largest: values[n - 1],
+        }
+    }
+}
+
+impl ContactFigures {
+    fn of(graph: &ContactGraph) -> Self {
+        let (counted, short): (Vec<&Adjacency>, Vec<_>) =
+            graph.contacts().iter().partition(|c| graph.counts(c));
+        Self {
+            n_contacts: counted.len(),
+            shortest_mm: counted.iter().map(|c| c.longest_mm).min_by(f64::total_cmp),
+            n_short: short.len(),
+            n_faults: graph.n_faults(),
+            hold_alone: graph.articulation_pieces(),
+        }
+    }
+}
+
+fn pieces(surface: &SegmentedSurface, topology: &Topology) -> Vec<PieceFigures> {
+    let (mesh, n) = (&surface.mesh, surface.n_patches);
+    let label: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
+    let euler = euler_characteristics(mesh, topology, &label, n);
+    let (component, n_components) = components(topology, |f, g| label[f as usize] == label[g as usize]);
+    let mut n_parts = vec![0; n];
+    let mut is_counted = vec![false; n_components];
+    let mut skins = vec![Vec::new(); n];
+    for (face, &patch) in label.iter().enumerate() {
+        let is_known = std::mem::replace(&mut is_counted[component[face] as usize], true);
+        n_parts[patch as usize] += usize::from(!is_known);
+        skins[patch as usize].push((mesh.face_normal(face), mesh.face_area(face)));
+    }
+    let piece = |patch: usize| PieceFigures {
+        piece: PatchId::from(patch),
+        area_mm2: skins[patch].iter().map(|s| s.1).sum(),
+        is_disk: n_parts[patch] == 1 && euler[patch] == 1,
+        faces: cone::narrowest(&skins[patch]),
+    };
+    (0..n).into_par_iter().map(piece).collect()
+}
