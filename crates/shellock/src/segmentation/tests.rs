@@ -328,7 +328,26 @@ fn people_s_methods_make_a_part_of_each_arm() {
 fn a_ball_is_divided_by_every_method() {
     let ball = Solid::new(sphere(4, 60.0 * Vec3::ONE)).unwrap();
     for method in Method::ALL {
-        assert!(by(method, &ball).n_patches() >= 2, "{method:?}");
+        let params = SegmentationParams {
+            method,
+            ..SegmentationParams::default()
+        };
+        let surface = with_ctx(|ctx| segment(ctx, &params, &ball, None)).unwrap();
+        assert!(surface.n_patches >= 2, "{method:?}");
         assert_eq!(Method::named(method.name()), Some(method));
     }
+}
+
+#[test]
+fn of_a_limbed_body_few_enough_pieces_come_and_none_holds_others_alone() {
+    let solid = limbed();
+    let params = SegmentationParams {
+        method: Method::Auto,
+        ..SegmentationParams::default()
+    };
+    let surface = with_ctx(|ctx| segment(ctx, &params, &solid, None)).unwrap();
+    let most = 1.6 * usual_n_pieces(solid.mesh().area()) as f64;
+    assert!((surface.n_patches as f64) <= most, "{} pieces", surface.n_patches);
+    let graph = surface.contact_graph_below(params.wall_mm, params.least_contact_mm);
+    assert_eq!(graph.n_faults(), 0);
 }
