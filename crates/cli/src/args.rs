@@ -286,6 +286,39 @@ impl FromStr for Thickness {
     }
 }
 
+/// How many pieces are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pieces {
+    Auto,
+    Number(usize),
+    FitsBed,
+}
+
+impl Pieces {
+    /// Those that are asked for by number.
+    pub fn number(self) -> Option<usize> {
+        match self {
+            Self::Number(n) => Some(n),
+            Self::Auto | Self::FitsBed => None,
+        }
+    }
+}
+
+impl FromStr for Pieces {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.to_ascii_lowercase().as_str() {
+            "auto" => Ok(Self::Auto),
+            "fits-bed" => Ok(Self::FitsBed),
+            number => number
+                .parse()
+                .map(Self::Number)
+                .map_err(|_| "give a number of pieces, auto or fits-bed".to_owned()),
+        }
+    }
+}
+
 /// Where the key comes from.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Key {
@@ -384,10 +417,15 @@ pub struct Options {
         help_heading = "Pieces"
     )]
     pub method: Method,
-    /// About how many pieces to make where there are no labels [default: what the method finds; in creases
-    /// from the size, 10 for a 150 mm figure]
-    #[arg(long, value_name = "N", help_heading = "Pieces")]
-    pub pieces: Option<usize>,
+    /// About how many pieces to make where there are no labels: auto, what the method finds, about 10 for a 150 mm
+    /// figure; a number; or fits-bed, as few as fit the printer
+    #[arg(
+        long,
+        value_name = "auto|N|fits-bed",
+        default_value = "auto",
+        help_heading = "Pieces"
+    )]
+    pub pieces: Pieces,
     /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
     /// piece, the flattest piece that works, as it is; or a piece, by its label or by the number that
     /// `segment` gives it
@@ -518,7 +556,7 @@ impl Options {
         let mut p = Params::default();
         p.seed = self.seed;
         p.method = self.method;
-        p.n_pieces = self.pieces;
+        p.n_pieces = self.pieces.number();
         p.up = self.up.unit();
         p.key = match self.key {
             Key::Auto => KeySource::Cut,

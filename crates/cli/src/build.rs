@@ -17,12 +17,13 @@ use shellock::{Ctx, Warning, play};
 use crate::Session;
 use crate::args::{Options, Out};
 use crate::bears;
+use crate::bed::{fitted, too_large};
 use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::inspect::thin_warnings;
 use crate::output::{Destination, Summary, files};
 use crate::place::Standing;
-use crate::printing::{Printing, too_large};
+use crate::printing::Printing;
 use crate::progress::{Deadline, Display, PlanClock, Shown};
 use crate::stopwatch::StageTime;
 
@@ -88,6 +89,7 @@ fn make(
     to: &Destination,
 ) -> Result<u8, Failure> {
     let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+    let params = &fitted(session, params, options, model)?;
     let settings = &Settings::resolve(params);
     let mut notes = model.notes.clone();
     notes.extend(too_large(session, settings, &printer, model)?);
@@ -120,7 +122,7 @@ fn make(
             return Err(no_plan(&reason, &blockers));
         }
     };
-    if let Some(asked) = options.pieces.filter(|asked| made.kit.pieces.len() > asked + 1) {
+    if let Some(asked) = params.n_pieces.filter(|asked| made.kit.pieces.len() > asked + 1) {
         let note = format!(
             "{} pieces instead of {asked}: some were divided until every piece locks",
             made.kit.pieces.len()

@@ -10,6 +10,7 @@ use shellock::{Ctx, PatchId, Warning};
 
 use crate::Session;
 use crate::args::Options;
+use crate::bed::fitted;
 use crate::build::checked;
 use crate::failure::Failure;
 use crate::input::Model;
@@ -28,7 +29,8 @@ pub struct Division {
 
 /// Divides `model` as `segment` does, by its labels where it has any.
 pub fn divide(session: &Session, model: &Model, options: &Options) -> Result<Division, Failure> {
-    let params = Settings::resolve(&checked(options)?).segmentation;
+    let params = fitted(session, &checked(options)?, options, model)?;
+    let params = Settings::resolve(&params).segmentation;
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);

@@ -2,6 +2,7 @@
 
 mod args;
 mod bears;
+mod bed;
 mod build;
 mod config;
 mod coupon;

@@ -1,27 +1,19 @@
 //! A kit on the plates of a printer: files, figures, and what does not fit.
 
 use rayon::prelude::*;
-use shellock::design::{DesignError, Settings};
-use shellock::{Cause, Ctx, PatchId, SegmentedSurface, Warning, segmentation};
+use shellock::{Cause, PatchId, Warning};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Solid, TriMesh};
 use shellock_kit::plan_file::PrintingEntry;
 use shellock_print::load::Load;
-use shellock_print::plates::{Laid, Plates, Printable, fits, fits_whole, lay, lay_alone};
+use shellock_print::plates::{Laid, Plates, Printable, lay, lay_alone};
 use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
 
-use crate::Session;
-use crate::failure::Failure;
-use crate::input::Model;
-
 /// A face is part of the outer skin where its middle is so near to the model's surface, mm.
 const SKIN_MM: f64 = 0.05;
-/// Numbers of pieces that are tried where some are too large: each so many times the last.
-const MORE_PIECES: f64 = 1.5;
-const MOST_TRIES: u32 = 5;
 
 /// A kit, laid on plates.
 pub struct Printing {
@@ -178,75 +170,7 @@ fn printable<'a>(mesh: &'a TriMesh, skin: &TriangleBvh) -> Printable<'a> {
     }
 }
 
-fn described(printer: &Printer) -> String {
+pub fn described(printer: &Printer) -> String {
     let [width, depth, height] = printer.bed_mm;
     format!("\"{}\" ({width} × {depth} × {height} mm)", printer.name)
-}
-
-/// What to say before the work starts where pieces will not fit the printer: which, and how many pieces would
-/// do.
-///
-/// What fits the printer in one piece also does in several; only larger models are divided to see.
-pub fn too_large(
-    session: &Session,
-    settings: &Settings,
-    printer: &Printer,
-    model: &Model,
-) -> Result<Option<String>, Failure> {
-    if fits_whole(printer, model.solid.mesh().bounds()) {
-        return Ok(None);
-    }
-    let silent = |_: shellock::context::Progress<'_>| ();
-    let ctx = Ctx::new(&silent, &session.stop);
-    let wall_mm = settings.strength.least_mm.max(settings.body.thickness_mm);
-    let misfits = |n_pieces: Option<usize>, labels: Option<&[i64]>| {
-        let params = segmentation::SegmentationParams {
-            n_pieces,
-            ..settings.segmentation.clone()
-        };
-        let surface =
-            segmentation::segment(&ctx, &params, &model.solid, labels).map_err(DesignError::from)?;
-        let ids: Vec<u32> = (0..surface.n_patches as u32).collect();
-        let misfits: Vec<u32> = ids
-            .into_par_iter()
-            .filter(|&p| !fits(printer, &shell_of(&surface, PatchId(p), wall_mm)))
-            .collect();
-        Ok::<_, Failure>((surface.n_patches, misfits))
-    };
-    let (n, misfitting) = misfits(settings.segmentation.n_pieces, model.labels.as_deref())?;
-    if misfitting.is_empty() {
-        return Ok(None);
-    }
-    let mut enough = None;
-    let mut tried = n;
-    for _ in 0..MOST_TRIES {
-        tried = ((tried as f64 * MORE_PIECES).ceil() as usize).min(shellock::segmentation::MOST_PIECES);
-        if misfits(Some(tried), None)?.1.is_empty() {
-            enough = Some(tried);
-            break;
-        }
-    }
-    let remedy = match (enough, &model.labels) {
-        (Some(n), None) => format!("about {n} pieces would do (--pieces {n})"),
-        (Some(n), Some(_)) => format!("divide them further: about {n} pieces of even size would do"),
-        (None, _) => "make it smaller (--size), or choose another printer (--printer)".to_owned(),
-    };
-    let count = misfitting.len();
-    Ok(Some(format!(
-        "{count} of {n} pieces will not fit the printer {}; {remedy}",
-        described(printer)
-    )))
-}
-
-/// A patch with a wall behind it, as points: about the piece it becomes.
-fn shell_of(surface: &SegmentedSurface, patch: PatchId, wall_mm: f64) -> TriMesh {
-    let mut mesh = TriMesh::default();
-    for face in (0..surface.mesh.triangles.len()).filter(|&f| surface.patch_of_face[f] == patch) {
-        let first = mesh.points.len() as u32;
-        mesh.points.extend(surface.mesh.corners(face));
-        mesh.points
-            .push(surface.mesh.face_center(face) - wall_mm * surface.mesh.face_normal(face));
-        mesh.triangles.push([first, first + 1, first + 2]);
-    }
-    mesh
 }

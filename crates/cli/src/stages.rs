@@ -18,6 +18,7 @@ use shellock_kit::PlanFile;
 use crate::Session;
 use crate::args::{Axis, Options};
 use crate::bears;
+use crate::bed::fitted;
 use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
 use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
@@ -57,7 +58,7 @@ fn extension(path: &Path) -> String {
 
 /// `shellock segment`.
 pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) -> Result<u8, Failure> {
-    let settings = Settings::resolve(&checked(options)?);
+    let params = checked(options)?;
     let kind = extension(out);
     if !["ply", "3mf", "seg"].contains(&kind.as_str()) {
         return Err(Failure::Wrong(format!(
@@ -66,6 +67,7 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         )));
     }
     let model = input::model(session, file, options)?;
+    let settings = Settings::resolve(&fitted(session, &params, options, &model)?);
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
@@ -140,8 +142,8 @@ fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) ->
 
 /// `shellock plan`.
 pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Failure> {
-    let params = checked(options)?;
     let model = input::simple_model(session, file, options)?;
+    let params = fitted(session, &checked(options)?, options, &model)?;
     let display = Display::new(session.shown);
     let clock = PlanClock::new(options.plan_time);
     let report = |p: shellock::context::Progress<'_>| {
