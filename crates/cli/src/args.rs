@@ -11,7 +11,7 @@ use shellock::connector::ConnectorParams;
 use shellock::coupon::N_FITS;
 use shellock::design::{self, KeySource, Params};
 use shellock::piece::LabelParams;
-use shellock::segmentation::Method;
+use shellock::segmentation::{KeepWhole, Method};
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
 use shellock_print::Printer;
@@ -384,6 +384,16 @@ pub struct Options {
     /// from the size, 10 for a 150 mm figure]
     #[arg(long, value_name = "N", help_heading = "Pieces")]
     pub pieces: Option<usize>,
+    /// A region that no seam is to divide, such as a face: the surface within R mm of a place in the made
+    /// thing's space, or what has a label, where there are labels; may be given several times
+    #[arg(
+        long,
+        value_name = "X,Y,Z,R|LABEL",
+        value_parser = keep_whole,
+        allow_hyphen_values = true,
+        help_heading = "Pieces"
+    )]
+    pub keep_whole: Vec<KeepWhole>,
     /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
     /// piece, the flattest piece that works, as it is; or a piece, by its label or by the number that
     /// `segment` gives it
@@ -498,6 +508,22 @@ pub struct Options {
     pub seed: u64,
 }
 
+/// A region to keep whole, as it is said on the command line.
+fn keep_whole(text: &str) -> Result<KeepWhole, String> {
+    let wrong = || "give X,Y,Z,R in mm, such as 0,-30,120,25, or a label, such as 3".to_owned();
+    if let Ok(label) = text.trim().parse() {
+        return Ok(KeepWhole::Label(label));
+    }
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z, radius_mm]) if radius_mm > 0.0 => Ok(KeepWhole::Sphere {
+            center_mm: [x, y, z],
+            radius_mm,
+        }),
+        _ => Err(wrong()),
+    }
+}
+
 /// Work of the exact search in a second: measured on one core at 3 GHz, on models of 8 to 45 pieces.
 ///
 /// Plans depend on work and not on time, so that they are the same on every computer that is not far slower.
@@ -515,6 +541,7 @@ impl Options {
         p.seed = self.seed;
         p.method = self.method;
         p.n_pieces = self.pieces;
+        p.keep_whole = self.keep_whole.clone();
         p.up = self.up.unit();
         p.key = match self.key {
             Key::Auto => KeySource::Cut,

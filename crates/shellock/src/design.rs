@@ -59,6 +59,7 @@ pub fn design(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<DesignOutcome, DesignError> {
+    let params = &resolved(params, model, labels)?;
     let thinnest = Wall::decide(ctx, params, model)?;
     let mut effort = Effort::default();
     let [most, least] = ASKED;
@@ -81,6 +82,14 @@ pub fn design(
         }
         (_, second) => second,
     }
+}
+
+/// The same with regions to keep whole as triangles of the model, where labels name them.
+fn resolved(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<Params, DesignError> {
+    Ok(Params {
+        keep_whole: segmentation::resolved(&params.keep_whole, model, labels)?,
+        ..params.clone()
+    })
 }
 
 /// How a job ended that asks so much of a kit.
@@ -364,6 +373,7 @@ pub fn plan(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<Result<Planned, String>, DesignError> {
+    let params = &resolved(params, model, labels)?;
     let mut wall = Wall::decide(ctx, params, model)?;
     let mut n_left = THICKER_WALLS;
     loop {

@@ -10,6 +10,7 @@ mod creases;
 mod cut;
 mod dual_graph;
 mod halve;
+mod keep_whole;
 mod method;
 mod refine;
 mod smooth;
@@ -21,7 +22,10 @@ use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology};
 
 pub use changes::tell;
+pub use keep_whole::{KeepWhole, resolved};
+pub(crate) use keep_whole::whole;
 pub use method::{Method, automatic_labels};
+use method::automatic_on;
 pub use refine::refine;
 pub use smooth::smooth_and_cut;
 pub use split::split_piece;
@@ -45,6 +49,8 @@ pub struct SegmentationParams {
     /// Patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]]; `None`: what
     /// the method finds, and in creases from the area, 10 for a 150 mm figure.
     pub n_pieces: Option<usize>,
+    /// Regions that no seam is to divide; none.
+    pub keep_whole: Vec<KeepWhole>,
     /// Seed of all random choices; 0.
     pub seed: u64,
     /// Diffusion that smooths the seams, mm². [0, 100]; 7: rounds off what is narrower than its root, 2.6 mm,
@@ -73,6 +79,7 @@ impl Default for SegmentationParams {
         Self {
             method: Method::default(),
             n_pieces: None,
+            keep_whole: Vec::new(),
             seed: 0,
             smoothing_mm2: 7.0,
             min_contact_mm: 9.0,
@@ -107,6 +114,7 @@ impl SegmentationParams {
                 found.push(format!("{name} is {value}, but must be from {low} to {high}"));
             }
         }
+        found.extend(self.keep_whole.iter().filter_map(KeepWhole::problem));
         if self.max_splits > 500 {
             found.push(format!(
                 "max_splits is {}, but must be at most 500",
@@ -161,6 +169,33 @@ pub enum SegmentationError {
         /// The limit.
         min_piece_mm2: f64,
     },
+    /// A region to keep whole that has nothing of the surface.
+    #[error(
+        "keep-whole: {region} has nothing of the surface; the model reaches from {} to {} mm: name another place or a larger radius, or a label that the model has",
+        point(min_mm), point(max_mm)
+    )]
+    KeepWholeEmpty {
+        /// The region in words.
+        region: String,
+        /// Lowest coordinates of the model.
+        min_mm: [f64; 3],
+        /// Highest coordinates of the model.
+        max_mm: [f64; 3],
+    },
+    /// A region to keep whole that leaves too little to divide.
+    #[error(
+        "keep-whole: {region} is {:.0} % of the surface, but may be half of it at most: give a smaller radius, or a label of a smaller part",
+        100.0 * share
+    )]
+    KeepWholeTooLarge {
+        /// The region in words.
+        region: String,
+        /// Its share of the surface.
+        share: f64,
+    },
+    /// A label to keep whole of a model without labels.
+    #[error("keep-whole names label {0}, but the model has no labels: give a place and a radius, X,Y,Z,R in mm")]
+    KeepWholeNoLabels(i64),
     /// More patches than triangles.
     #[error("{n_pieces} pieces are wanted of {n_faces} triangles: ask for fewer pieces")]
     TooManyPieces {
@@ -182,6 +217,11 @@ pub enum SegmentationError {
     /// The smoothing matrix could not be factorised: coordinates far outside of any printer.
     #[error("seams cannot be smoothed: {0}; check the model's scale")]
     Solve(#[from] shellock_geom::sparse::SparseError),
+}
+
+/// A point in words.
+fn point([x, y, z]: &[f64; 3]) -> String {
+    format!("({x:.1}, {y:.1}, {z:.1})")
 }
 
 /// One patch for each triangle of a solid: ids 0 … n − 1, each patch connected across edges and not empty.
@@ -263,12 +303,17 @@ pub fn segment(
     labels: Option<&[i64]>,
 ) -> Result<SegmentedSurface, SegmentationError> {
     ctx.stage("segmentation", 0)?;
+    let params = &SegmentationParams {
+        keep_whole: resolved(&params.keep_whole, solid, labels)?,
+        ..params.clone()
+    };
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
     let (fine, source_face) = halve_long_edges(params, solid);
-    let ground = Ground::new(&fine);
+    let ground = Ground::keeping(params, &fine, &source_face);
     let mut surface = match given {
         Some(labels) => {
             let labels = labels.inherited(&source_face);
+            let labels = keep_whole::gathered(ctx, params, &fine, &ground.whole, labels)?;
             let found = best_contacts(ctx, params, &ground, &labels, LabelOrigin::User, f64::INFINITY)?;
             found.expect("nothing is dearer than that").1
         }
@@ -279,7 +324,7 @@ pub fn segment(
                     seed: params.seed.wrapping_add(attempt << 32),
                     ..params.clone()
                 };
-                let labels = automatic_labels(ctx, &reseeded, &fine)?;
+                let labels = automatic_on(ctx, &reseeded, &fine, &ground.whole)?;
                 let origin = LabelOrigin::Automatic;
                 let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
                 best = best_contacts(ctx, params, &ground, &labels, origin, limit)?.or(best);
@@ -440,7 +485,7 @@ pub fn divide(
     patch: PatchId,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
     changed(ctx, params, surface, |solid, labels| {
-        split_piece(solid, labels, patch)
+        split::split_keeping(&Ground::keeping(params, solid, &surface.source_face), labels, patch)
     })
 }
 
@@ -523,7 +568,8 @@ fn changed(
     let Some(changed) = change(&solid, &labels) else {
         return Ok(None);
     };
-    let refined = refine(ctx, &limited, &solid, &changed)?;
+    let ground = Ground::keeping(params, &solid, &surface.source_face);
+    let refined = refine_on(ctx, &limited, &ground, &changed)?;
     let mut next = match smooth_and_cut(ctx, params, &solid, &refined) {
         // Other pieces may do.
         Err(SegmentationError::PatchVanished { .. }) => return Ok(None),
