@@ -605,3 +605,21 @@ fn label(min_wall_mm: f64) -> LabelParams {
         ..usual
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_region_is_a_place_and_a_radius_or_a_label() {
+        let ball = KeepWhole::Sphere {
+            center_mm: [0.0, -30.0, 1.5],
+            radius_mm: 25.0,
+        };
+        assert_eq!(keep_whole("0, -30,1.5,25"), Ok(ball));
+        assert_eq!(keep_whole("-3"), Ok(KeepWhole::Label(-3)));
+        for wrong in ["", "1,2,3", "1,2,3,0", "1,2,3,-4", "a", "1,2,3,4,5"] {
+            assert!(keep_whole(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -23,8 +23,7 @@ impl Whole {
             let mut faces = set;
             met.sort_unstable();
             met.dedup();
-            met.iter()
-                .for_each(|&s| faces.append(&mut joined[s as usize]));
+            met.iter().for_each(|&s| faces.append(&mut joined[s as usize]));
             faces.sort_unstable();
             faces.dedup();
             faces

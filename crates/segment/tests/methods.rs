@@ -259,6 +259,9 @@ fn no_border_of_cuts_divides_what_is_kept_whole() {
     let by_auto = auto::divide_keeping(&AutoParams::default(), &mesh, &whole);
     let by_cuts = random_cuts::divide_keeping(&RandomCutsParams::default(), &mesh, &whole);
     for labels in [by_auto, by_cuts] {
-        assert!(neck.iter().all(|&f| labels[f as usize] == labels[neck[0] as usize]));
+        assert!(
+            neck.iter()
+                .all(|&f| labels[f as usize] == labels[neck[0] as usize])
+        );
     }
 }

@@ -22,10 +22,10 @@ use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology};
 
 pub use changes::tell;
-pub use keep_whole::{KeepWhole, resolved};
 pub(crate) use keep_whole::whole;
-pub use method::{Method, automatic_labels};
+pub use keep_whole::{KeepWhole, resolved};
 use method::automatic_on;
+pub use method::{Method, automatic_labels};
 pub use refine::refine;
 pub use smooth::smooth_and_cut;
 pub use split::split_piece;
@@ -172,7 +172,8 @@ pub enum SegmentationError {
     /// A region to keep whole that has nothing of the surface.
     #[error(
         "keep-whole: {region} has nothing of the surface; the model reaches from {} to {} mm: name another place or a larger radius, or a label that the model has",
-        point(min_mm), point(max_mm)
+        point(min_mm),
+        point(max_mm)
     )]
     KeepWholeEmpty {
         /// The region in words.
@@ -194,7 +195,9 @@ pub enum SegmentationError {
         share: f64,
     },
     /// A label to keep whole of a model without labels.
-    #[error("keep-whole names label {0}, but the model has no labels: give a place and a radius, X,Y,Z,R in mm")]
+    #[error(
+        "keep-whole names label {0}, but the model has no labels: give a place and a radius, X,Y,Z,R in mm"
+    )]
     KeepWholeNoLabels(i64),
     /// More patches than triangles.
     #[error("{n_pieces} pieces are wanted of {n_faces} triangles: ask for fewer pieces")]
@@ -485,7 +488,11 @@ pub fn divide(
     patch: PatchId,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
     changed(ctx, params, surface, |solid, labels| {
-        split::split_keeping(&Ground::keeping(params, solid, &surface.source_face), labels, patch)
+        split::split_keeping(
+            &Ground::keeping(params, solid, &surface.source_face),
+            labels,
+            patch,
+        )
     })
 }
 

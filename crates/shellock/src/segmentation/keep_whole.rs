@@ -72,7 +72,10 @@ impl KeepWhole {
     /// It in words, for people.
     fn words(&self) -> String {
         match self {
-            Self::Sphere { center_mm: [x, y, z], radius_mm } => {
+            Self::Sphere {
+                center_mm: [x, y, z],
+                radius_mm,
+            } => {
                 format!("the region within {radius_mm} mm of ({x:.1}, {y:.1}, {z:.1}) mm")
             }
             Self::Label(label) => format!("the region of label {label}"),
@@ -95,7 +98,10 @@ pub fn resolved(
         .map(|region| {
             let found = match (region, labels) {
                 (KeepWhole::Label(label), Some(labels)) => {
-                    let faces = own.iter().copied().filter(|&f| labels.get(f as usize) == Some(label));
+                    let faces = own
+                        .iter()
+                        .copied()
+                        .filter(|&f| labels.get(f as usize) == Some(label));
                     KeepWhole::Faces(faces.collect())
                 }
                 (KeepWhole::Label(label), None) => return Err(SegmentationError::KeepWholeNoLabels(*label)),
@@ -128,7 +134,11 @@ fn inner_area_mm2(region: &KeepWhole, mesh: &TriMesh, faces: &[u32]) -> f64 {
         }
         _ => true,
     };
-    faces.iter().filter(is_inner).map(|&f| mesh.face_area(f as usize)).sum()
+    faces
+        .iter()
+        .filter(is_inner)
+        .map(|&f| mesh.face_area(f as usize))
+        .sum()
 }
 
 /// The sets of faces of `mesh` that are to be of one patch each, balls larger by `margin_mm`; `source_face` names
@@ -156,7 +166,9 @@ fn parts(topology: &Topology, mesh: &TriMesh, faces: &[u32]) -> Vec<Vec<u32>> {
     faces.iter().for_each(|&f| is_in[f as usize] = true);
     let (component, n) = components(topology, |f, g| is_in[f as usize] == is_in[g as usize]);
     let mut parts = vec![Vec::new(); n];
-    faces.iter().for_each(|&f| parts[component[f as usize] as usize].push(f));
+    faces
+        .iter()
+        .for_each(|&f| parts[component[f as usize] as usize].push(f));
     parts.retain(|part| !part.is_empty());
     parts
 }
@@ -227,7 +239,9 @@ fn in_one_piece(surface: &SegmentedSurface, part: &[u32]) -> (f64, f64, Vec<Patc
     let mut pieces: Vec<(PatchId, f64)> = area.into_iter().collect();
     pieces.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let other = pieces.get(1).unwrap_or(&pieces[0]).0;
-    let place = part.iter().filter(|&&f| surface.patch_of_face[f as usize] == other);
+    let place = part
+        .iter()
+        .filter(|&&f| surface.patch_of_face[f as usize] == other);
     let largest = place.max_by(|&&f, &&g| mesh.face_area(f as usize).total_cmp(&mesh.face_area(g as usize)));
     let at = mesh.face_center(*largest.expect("the piece has a face of it") as usize);
     let all = pieces.iter().map(|p| p.1).sum();

@@ -350,7 +350,11 @@ fn share_in_one_piece(surface: &SegmentedSurface, center_mm: [f64; 3], radius_mm
 fn what_is_kept_whole_ends_in_one_piece_by_every_method() {
     let solid = limbed();
     // The end of an arm, a place on the body, and the root of an arm, where people would cut.
-    for (at, radius_mm) in [([-90.0, 0.0, 0.0], 25.0), ([0.0, 0.0, -30.0], 20.0), ([10.0, 32.0, 0.0], 14.0)] {
+    for (at, radius_mm) in [
+        ([-90.0, 0.0, 0.0], 25.0),
+        ([0.0, 0.0, -30.0], 20.0),
+        ([10.0, 32.0, 0.0], 14.0),
+    ] {
         for method in Method::ALL {
             let params = SegmentationParams {
                 method,
@@ -360,7 +364,10 @@ fn what_is_kept_whole_ends_in_one_piece_by_every_method() {
             let (surface, warnings) = with_warnings(|ctx| segment(ctx, &params, &solid, None).unwrap());
             let share = share_in_one_piece(&surface, at, radius_mm);
             assert!(share > 0.98, "{method:?} at {at:?}: {share}");
-            assert!(warnings.iter().all(|w| w.code() != "keep-whole-cut"), "{method:?}");
+            assert!(
+                warnings.iter().all(|w| w.code() != "keep-whole-cut"),
+                "{method:?}"
+            );
             assert!(surface.n_patches > 2, "{method:?}");
         }
     }
@@ -371,7 +378,8 @@ fn no_division_parts_what_is_kept_whole() {
     let solid = limbed();
     let own: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
     let labels =
-        with_ctx(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, &arm_labels(&solid))).unwrap();
+        with_ctx(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, &arm_labels(&solid)))
+            .unwrap();
     let params = SegmentationParams {
         keep_whole: vec![ball([0.0, 0.0, -30.0], 25.0), ball([90.0, 0.0, 0.0], 20.0)],
         ..SegmentationParams::default()
@@ -380,7 +388,10 @@ fn no_division_parts_what_is_kept_whole() {
     assert_eq!(ground.whole.sets().len(), 2);
     for patch in 0..labels.n_patches() {
         let halves = split::split_keeping(&ground, &labels, PatchId::from(patch)).unwrap();
-        let is_one = |set: &Vec<u32>| set.iter().all(|&f| halves.patch(f as usize) == halves.patch(set[0] as usize));
+        let is_one = |set: &Vec<u32>| {
+            set.iter()
+                .all(|&f| halves.patch(f as usize) == halves.patch(set[0] as usize))
+        };
         assert!(ground.whole.sets().iter().all(is_one), "patch {patch}");
     }
 }
@@ -398,7 +409,10 @@ fn a_region_across_labels_is_of_the_one_that_has_most_of_it() {
     assert!(share_in_one_piece(&surface, at, 14.0) > 0.98);
     let without = SegmentationParams::default();
     let surface = with_ctx(|ctx| segment(ctx, &without, &solid, Some(&labels))).unwrap();
-    assert!(share_in_one_piece(&surface, at, 14.0) < 0.9, "it is no theorem of its own");
+    assert!(
+        share_in_one_piece(&surface, at, 14.0) < 0.9,
+        "it is no theorem of its own"
+    );
 }
 
 #[test]
@@ -427,7 +441,10 @@ fn regions_that_cannot_be_kept_whole_are_refused_in_words() {
         resolved(&[region], &solid, labels).unwrap_err().to_string()
     };
     let outside = error(ball([500.0, 0.0, 0.0], 20.0), None);
-    assert!(outside.contains("(500.0, 0.0, 0.0)") && outside.contains("reaches from"), "{outside}");
+    assert!(
+        outside.contains("(500.0, 0.0, 0.0)") && outside.contains("reaches from"),
+        "{outside}"
+    );
     assert!(error(ball([0.0; 3], 200.0), None).contains("100 % of the surface"));
     assert!(error(KeepWhole::Label(4), Some(&labels)).contains("label 4 has nothing"));
     assert!(error(KeepWhole::Label(7), None).contains("no labels"));
