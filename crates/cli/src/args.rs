@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod blows;
+mod keep_whole;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -19,6 +20,7 @@ use shellock_print::Printer;
 pub use blows::{Blows, Place};
 
 use crate::stress;
+use keep_whole::keep_whole;
 
 /// Exit codes, shown in the help.
 const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
@@ -508,22 +510,6 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// A region to keep whole, as it is said on the command line.
-fn keep_whole(text: &str) -> Result<KeepWhole, String> {
-    let wrong = || "give X,Y,Z,R in mm, such as 0,-30,120,25, or a label, such as 3".to_owned();
-    if let Ok(label) = text.trim().parse() {
-        return Ok(KeepWhole::Label(label));
-    }
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, z, radius_mm]) if radius_mm > 0.0 => Ok(KeepWhole::Sphere {
-            center_mm: [x, y, z],
-            radius_mm,
-        }),
-        _ => Err(wrong()),
-    }
-}
-
 /// Work of the exact search in a second: measured on one core at 3 GHz, on models of 8 to 45 pieces.
 ///
 /// Plans depend on work and not on time, so that they are the same on every computer that is not far slower.
@@ -603,23 +589,5 @@ fn label(min_wall_mm: f64) -> LabelParams {
         stroke_mm: within(usual.stroke_mm, 2.0),
         least_wall_mm: within(usual.least_wall_mm, 5.0),
         ..usual
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_region_is_a_place_and_a_radius_or_a_label() {
-        let ball = KeepWhole::Sphere {
-            center_mm: [0.0, -30.0, 1.5],
-            radius_mm: 25.0,
-        };
-        assert_eq!(keep_whole("0, -30,1.5,25"), Ok(ball));
-        assert_eq!(keep_whole("-3"), Ok(KeepWhole::Label(-3)));
-        for wrong in ["", "1,2,3", "1,2,3,0", "1,2,3,-4", "a", "1,2,3,4,5"] {
-            assert!(keep_whole(wrong).is_err(), "{wrong}");
-        }
     }
 }
