@@ -316,7 +316,13 @@ pub fn segment(
     let mut surface = match given {
         Some(labels) => {
             let labels = labels.inherited(&source_face);
-            let labels = keep_whole::gathered(ctx, params, &fine, &ground.whole, labels)?;
+            let kept = keep_whole::gathered(ctx, params, &fine, &ground.whole, labels.clone())?;
+            if kept != labels {
+                ctx.note(
+                    "what is kept whole lies in several labels: it is given to the one that has most of it",
+                );
+            }
+            let labels = kept;
             let found = best_contacts(ctx, params, &ground, &labels, LabelOrigin::User, f64::INFINITY)?;
             found.expect("nothing is dearer than that").1
         }

@@ -2,7 +2,7 @@
 
 use shellock_geom::Solid;
 
-use super::keep_whole::tell_cut;
+use super::keep_whole::{place_in, tell_cut};
 use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, resolved, user_labels};
 use crate::{Cause, Ctx, PatchId, SegmentedSurface, Warning};
 
@@ -77,7 +77,8 @@ pub fn tell(
         tell_divided(ctx, &changes, &names, surface);
         tell_joined(ctx, &changes, &names, surface);
     }
-    tell_cut(ctx, &resolved(&params.keep_whole, solid, labels)?, surface);
+    let keep = resolved(&params.keep_whole, solid, labels)?;
+    tell_cut(ctx, &keep, surface);
     let limit_mm = kept_limit_mm(params, surface);
     if limit_mm < params.min_contact_mm {
         tell_short(ctx, params, surface, limit_mm);
@@ -85,10 +86,12 @@ pub fn tell(
     let graph = surface.contact_graph_below(params.wall_mm, limit_mm);
     if graph.n_faults() > 0 {
         let pieces = graph.articulation_pieces();
+        // What is kept whole may be why it could not be mended.
+        let at = place_in(&keep, surface, &pieces);
         ctx.warn(Warning {
             cause: Cause::WeakGraph,
             pieces,
-            at: None,
+            at,
         });
     }
     Ok(())

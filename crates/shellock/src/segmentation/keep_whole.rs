@@ -228,6 +228,20 @@ pub(super) fn tell_cut(ctx: &Ctx, keep: &[KeepWhole], surface: &SegmentedSurface
     }
 }
 
+/// A place of a region, resolved, that lies in one of `pieces`.
+pub(super) fn place_in(
+    keep: &[KeepWhole],
+    surface: &SegmentedSurface,
+    pieces: &[PatchId],
+) -> Option<[f64; 3]> {
+    let mesh = &surface.mesh;
+    let faces = keep
+        .iter()
+        .flat_map(|region| region.faces(mesh, &surface.source_face, 0.0));
+    let mut inside = faces.filter(|&f| pieces.contains(&surface.patch_of_face[f as usize]));
+    inside.next().map(|f| mesh.face_center(f as usize).to_array())
+}
+
 /// Of connected faces: the area in the piece that has most of it, all the area, mm², the pieces, largest first, and
 /// a place in what is not in the first.
 fn in_one_piece(surface: &SegmentedSurface, part: &[u32]) -> (f64, f64, Vec<PatchId>, Vec3) {
