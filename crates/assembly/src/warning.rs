@@ -86,6 +86,9 @@ pub enum Cause {
     },
     WeakGraph,
     DividedOtherwise,
+    KeepWholeCut {
+        share: f64,
+    },
     // The key
     KeyNotFlat {
         flat_share: f64,
@@ -347,6 +350,15 @@ impl Warning {
                     "{} alone hold{} others, which may come loose: give other labels, smaller connectors or a larger size",
                     in_words(&self.pieces),
                     if self.pieces.len() == 1 { "s" } else { "" }
+                ),
+            ),
+            Cause::KeepWholeCut { share } => (
+                "keep-whole-cut",
+                format!(
+                    "a region to keep whole is divided: {:.0} % of it is in one piece ({}); give a smaller region, or one that \
+                     ends in creases",
+                    100.0 * share,
+                    in_words(&self.pieces)
                 ),
             ),
             Cause::KeyNotFlat {

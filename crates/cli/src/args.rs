@@ -1,6 +1,8 @@
 //! What can be said on the command line.
 
 mod blows;
+mod keep_whole;
+mod pieces;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -11,14 +13,16 @@ use shellock::connector::ConnectorParams;
 use shellock::coupon::N_FITS;
 use shellock::design::{self, KeySource, Params};
 use shellock::piece::LabelParams;
-use shellock::segmentation::Method;
+use shellock::segmentation::{KeepWhole, Method};
 use shellock::sizes::SizeChoice;
 use shellock_mechanics::Material;
 use shellock_print::Printer;
 
 pub use blows::{Blows, Place};
+pub use pieces::Pieces;
 
 use crate::stress;
+use keep_whole::keep_whole;
 
 /// Exit codes, shown in the help.
 const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
@@ -286,39 +290,6 @@ impl FromStr for Thickness {
     }
 }
 
-/// How many pieces are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pieces {
-    Auto,
-    Number(usize),
-    FitsBed,
-}
-
-impl Pieces {
-    /// Those that are asked for by number.
-    pub fn number(self) -> Option<usize> {
-        match self {
-            Self::Number(n) => Some(n),
-            Self::Auto | Self::FitsBed => None,
-        }
-    }
-}
-
-impl FromStr for Pieces {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.to_ascii_lowercase().as_str() {
-            "auto" => Ok(Self::Auto),
-            "fits-bed" => Ok(Self::FitsBed),
-            number => number
-                .parse()
-                .map(Self::Number)
-                .map_err(|_| "give a number of pieces, auto or fits-bed".to_owned()),
-        }
-    }
-}
-
 /// Where the key comes from.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Key {
@@ -426,6 +397,16 @@ pub struct Options {
         help_heading = "Pieces"
     )]
     pub pieces: Pieces,
+    /// A region that no seam is to divide, such as a face: the surface within R mm of a place in the made
+    /// thing's space, or what has a label, where there are labels; may be given several times
+    #[arg(
+        long,
+        value_name = "X,Y,Z,R|LABEL",
+        value_parser = keep_whole,
+        allow_hyphen_values = true,
+        help_heading = "Pieces"
+    )]
+    pub keep_whole: Vec<KeepWhole>,
     /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
     /// piece, the flattest piece that works, as it is; or a piece, by its label or by the number that
     /// `segment` gives it
@@ -557,6 +538,7 @@ impl Options {
         p.seed = self.seed;
         p.method = self.method;
         p.n_pieces = self.pieces.number();
+        p.keep_whole = self.keep_whole.clone();
         p.up = self.up.unit();
         p.key = match self.key {
             Key::Auto => KeySource::Cut,

@@ -16,9 +16,10 @@ use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
 use crate::kmeans::{self, KMeansParams};
 use crate::parts::connected;
-use crate::random_cuts::{RandomCutsParams, hierarchy};
+use crate::random_cuts::{RandomCutsParams, hierarchy_keeping};
 use crate::sdf::{self, SdfParams};
 use crate::shape_diameter::{diameters_mm, normalised};
+use crate::whole::Whole;
 
 /// Levels of thickness, and weight of short borders, of the divisions that shape diameters propose.
 const LEVELS: [(usize, f64); 6] = [(2, 0.05), (2, 0.26), (3, 0.05), (3, 0.26), (5, 0.05), (5, 0.26)];
@@ -44,12 +45,23 @@ impl AutoParams {
 ///
 /// A mesh without a place where a cut is worth its while, as a ball, is one part.
 pub fn divide(params: &AutoParams, mesh: &TriMesh) -> Vec<u32> {
+    divide_keeping(params, mesh, &Whole::default())
+}
+
+/// The same where no border divides a set of `whole`.
+pub fn divide_keeping(params: &AutoParams, mesh: &TriMesh, whole: &Whole) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.cuts.n_faces);
-    let proposals = proposals(params, &coarse);
-    let found = hierarchy(&params.cuts, &coarse.graph, &proposals);
+    let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, coarse.graph.n_faces());
+    let mut proposals = proposals(params, &coarse);
+    for labels in &mut proposals {
+        on_coarse.gather(labels, &coarse.graph.area_mm2);
+    }
+    let found = hierarchy_keeping(&params.cuts, &coarse.graph, &proposals, &on_coarse);
     let labels = found.labels(&coarse.graph, found.n_steps(&params.cuts));
-    connected(&fine, &coarse.bring_back(&fine, &labels)).0
+    let mut labels = coarse.bring_back(&fine, &labels);
+    whole.gather(&mut labels, &fine.area_mm2);
+    connected(&fine, &labels).0
 }
 
 /// Divisions of the coarse mesh by other methods.

@@ -37,3 +37,4 @@ pub mod primitives;
 pub mod random_cuts;
 pub mod sdf;
 pub mod shape_diameter;
+pub mod whole;

@@ -31,6 +31,7 @@ use crate::face_graph::FaceGraph;
 use crate::max_flow::{FlowGraph, Terminal};
 use crate::params::{no_parts, outside};
 use crate::parts::connected;
+use crate::whole::Whole;
 
 /// By how much a concavity of a radian makes the way over an edge longer, for the choice of seeds.
 const DETOUR_A_RAD: f64 = 4.0;
@@ -98,10 +99,19 @@ impl RandomCutsParams {
 
 /// A part for each face of `mesh`, by random cuts.
 pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
+    divide_keeping(params, mesh, &Whole::default())
+}
+
+/// The same where no border divides a set of `whole`.
+pub fn divide_keeping(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);
-    let labels = divide_graph(params, &coarse.graph);
-    connected(&fine, &coarse.bring_back(&fine, &labels)).0
+    let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, coarse.graph.n_faces());
+    let found = hierarchy_keeping(params, &coarse.graph, &[], &on_coarse);
+    let labels = found.labels(&coarse.graph, found.n_steps(params));
+    let mut labels = coarse.bring_back(&fine, &labels);
+    whole.gather(&mut labels, &fine.area_mm2);
+    connected(&fine, &labels).0
 }
 
 /// A part for each face of `graph`, which is small.
@@ -194,11 +204,22 @@ impl Hierarchy {
 ///
 /// The borders of `proposals`, other divisions of `graph`, stand for election beside the random cuts.
 pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<u32>]) -> Hierarchy {
+    hierarchy_keeping(params, graph, proposals, &Whole::default())
+}
+
+/// The same where an edge within a set of `whole` costs more than all others, so that a cut over it has a score
+/// of 0 and is never made.
+pub fn hierarchy_keeping(
+    params: &RandomCutsParams,
+    graph: &FaceGraph,
+    proposals: &[Vec<u32>],
+    whole: &Whole,
+) -> Hierarchy {
     let cutter = Cutter {
         params,
         graph,
         proposals,
-        price: prices(graph),
+        price: prices_keeping(graph, whole),
         way: graph
             .creases
             .iter()
@@ -246,6 +267,20 @@ pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<
         n_components,
         steps,
     }
+}
+
+/// [`prices`], and within sets of `whole` a price that no cut can pay.
+fn prices_keeping(graph: &FaceGraph, whole: &Whole) -> Vec<f64> {
+    /// In prices of all edges together: e to the power of minus that is 0.
+    const UNPAYABLE: f64 = 1e4;
+    let mut price = prices(graph);
+    let unpayable = UNPAYABLE * price.iter().sum::<f64>();
+    for (price, crease) in price.iter_mut().zip(&graph.creases) {
+        if whole.has_both(crease.faces) {
+            *price = unpayable;
+        }
+    }
+    price
 }
 
 /// One side of a part cut in two.

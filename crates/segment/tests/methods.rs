@@ -8,6 +8,7 @@ use shellock_segment::kmeans::{self, KMeansParams};
 use shellock_segment::primitives::{self, PrimitivesParams};
 use shellock_segment::random_cuts::{self, RandomCutsParams};
 use shellock_segment::sdf::{self, SdfParams};
+use shellock_segment::whole::Whole;
 use shellock_segment::{border, coarse::Coarse, face_graph::FaceGraph, parts};
 
 /// A body of revolution about z of the outline (z, radius), bottom first, closed by a point on the axis at both
@@ -245,4 +246,22 @@ fn parameters_out_of_range_are_all_told_of() {
         ..SdfParams::default()
     };
     assert_eq!(params.problems().len(), 3);
+}
+
+#[test]
+fn no_border_of_cuts_divides_what_is_kept_whole() {
+    let mesh = dumbbell();
+    // Around the neck, where every cut would be.
+    let neck: Vec<u32> = (0..mesh.triangles.len() as u32)
+        .filter(|&f| mesh.face_center(f as usize).z.abs() < 4.0)
+        .collect();
+    let whole = Whole::new(mesh.triangles.len(), [neck.clone()]);
+    let by_auto = auto::divide_keeping(&AutoParams::default(), &mesh, &whole);
+    let by_cuts = random_cuts::divide_keeping(&RandomCutsParams::default(), &mesh, &whole);
+    for labels in [by_auto, by_cuts] {
+        assert!(
+            neck.iter()
+                .all(|&f| labels[f as usize] == labels[neck[0] as usize])
+        );
+    }
 }

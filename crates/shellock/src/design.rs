@@ -60,6 +60,7 @@ pub fn design(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<DesignOutcome, DesignError> {
+    let params = &resolved(params, model, labels)?;
     let thinnest = Wall::decide(ctx, params, model)?;
     let mut effort = Effort::default();
     let input = Input {
@@ -87,6 +88,14 @@ pub fn design(
         best = Some(ended);
     }
     best.expect("there is at least one way").outcome
+}
+
+/// The same with regions to keep whole as triangles of the model, where labels name them.
+fn resolved(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Result<Params, DesignError> {
+    Ok(Params {
+        keep_whole: segmentation::resolved(&params.keep_whole, model, labels)?,
+        ..params.clone()
+    })
 }
 
 /// How a job with one wall ended.
@@ -319,6 +328,7 @@ pub fn plan(
     model: &Solid,
     labels: Option<&[i64]>,
 ) -> Result<Result<Planned, String>, DesignError> {
+    let params = &resolved(params, model, labels)?;
     let input = Input {
         params,
         model,

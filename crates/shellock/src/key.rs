@@ -36,6 +36,8 @@ pub use prism::KeyPrism;
 pub use site::{KeySite, sites};
 pub use turn::Turn;
 
+use crate::segmentation::KeepWhole;
+
 /// What a key needs. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeyParams {
@@ -49,6 +51,8 @@ pub struct KeyParams {
     pub piece_mm2: f64,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
+    /// Regions, resolved, that no key is cut from; none.
+    pub keep_whole: Vec<KeepWhole>,
 }
 
 impl Default for KeyParams {
@@ -59,6 +63,7 @@ impl Default for KeyParams {
             size_mm: 2.5,
             piece_mm2: 4000.0,
             up: [0.0, 0.0, 1.0],
+            keep_whole: Vec::new(),
         }
     }
 }

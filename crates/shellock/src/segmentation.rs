@@ -9,9 +9,11 @@ mod changes;
 mod creases;
 mod cut;
 mod dual_graph;
+mod error;
 mod fewer;
 pub mod figures;
 mod halve;
+mod keep_whole;
 mod method;
 mod refine;
 mod smooth;
@@ -24,19 +26,22 @@ use shellock_geom::{Solid, Topology};
 
 pub use changes::tell;
 pub(crate) use creases::usual_n_pieces;
+pub use error::SegmentationError;
+pub(crate) use keep_whole::whole;
+pub use keep_whole::{KeepWhole, resolved};
 pub use method::{Method, automatic_labels};
+use method::{automatic_on, creases_on};
 pub use refine::refine;
 pub use smooth::smooth_and_cut;
 pub use split::split_piece;
 pub use user::user_labels;
 
 use changes::Changes;
-use creases::crease_labels;
 use fewer::{disagreement, with_fewer_parts};
 use halve::halve_long_edges;
 use refine::{Ground, refine_on};
 
-use crate::{Cancelled, Ctx, PatchId, SegmentedSurface};
+use crate::{Ctx, PatchId, SegmentedSurface};
 
 /// As many pieces as can be planned.
 pub const MOST_PIECES: usize = 128;
@@ -50,6 +55,8 @@ pub struct SegmentationParams {
     /// Patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]]; `None`: what
     /// the method finds, and in creases from the area, 10 for a 150 mm figure.
     pub n_pieces: Option<usize>,
+    /// Regions that no seam is to divide; none.
+    pub keep_whole: Vec<KeepWhole>,
     /// Seed of all random choices; 0.
     pub seed: u64,
     /// Diffusion that smooths the seams, mm². [0, 100]; 7: rounds off what is narrower than its root, 2.6 mm,
@@ -78,6 +85,7 @@ impl Default for SegmentationParams {
         Self {
             method: Method::default(),
             n_pieces: None,
+            keep_whole: Vec::new(),
             seed: 0,
             smoothing_mm2: 7.0,
             min_contact_mm: 9.0,
@@ -112,6 +120,7 @@ impl SegmentationParams {
                 found.push(format!("{name} is {value}, but must be from {low} to {high}"));
             }
         }
+        found.extend(self.keep_whole.iter().filter_map(KeepWhole::problem));
         if self.max_splits > 500 {
             found.push(format!(
                 "max_splits is {}, but must be at most 500",
@@ -120,73 +129,6 @@ impl SegmentationParams {
         }
         found
     }
-}
-
-/// Why there are no patches.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SegmentationError {
-    /// The user stopped.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-    /// A label is missing or left over.
-    #[error(
-        "there are {n_labels} labels for {n_faces} triangles: give one label for each triangle, in the order of the model file"
-    )]
-    LabelCount {
-        /// Labels given.
-        n_labels: usize,
-        /// Triangles of the model.
-        n_faces: usize,
-    },
-    /// Nothing to take apart.
-    #[error(
-        "all {n_faces} triangles have the label {label}: give at least two labels, or none for automatic patches"
-    )]
-    OneLabel {
-        /// The label.
-        label: i64,
-        /// Triangles of the model.
-        n_faces: usize,
-    },
-    /// Labels that number triangles rather than patches.
-    #[error(
-        "{n_faces} triangles have {n_labels} different labels: give patches of at least 3 triangles on average, at most 1000"
-    )]
-    TooManyLabels {
-        /// Different labels.
-        n_labels: usize,
-        /// Triangles of the model.
-        n_faces: usize,
-    },
-    /// Everything was merged away.
-    #[error(
-        "after merging patches below {min_piece_mm2} mm² only one is left: lower min_piece_mm2 or scale the model up"
-    )]
-    AllTooSmall {
-        /// The limit.
-        min_piece_mm2: f64,
-    },
-    /// More patches than triangles.
-    #[error("{n_pieces} pieces are wanted of {n_faces} triangles: ask for fewer pieces")]
-    TooManyPieces {
-        /// Pieces wanted.
-        n_pieces: usize,
-        /// Triangles of the model.
-        n_faces: usize,
-    },
-    /// The patch is smaller than the mesh can show, even unsmoothed.
-    #[error(
-        "patch {patch} of {area_mm2:.1} mm² vanishes when seams are smoothed: merge it with a neighbour or raise min_piece_mm2"
-    )]
-    PatchVanished {
-        /// The patch.
-        patch: PatchId,
-        /// Its area.
-        area_mm2: f64,
-    },
-    /// The smoothing matrix could not be factorised: coordinates far outside of any printer.
-    #[error("seams cannot be smoothed: {0}; check the model's scale")]
-    Solve(#[from] shellock_geom::sparse::SparseError),
 }
 
 /// One patch for each triangle of a solid: ids 0 … n − 1, each patch connected across edges and not empty.
@@ -270,12 +212,23 @@ pub fn segment(
     labels: Option<&[i64]>,
 ) -> Result<SegmentedSurface, SegmentationError> {
     ctx.stage("segmentation", 0)?;
+    let params = &SegmentationParams {
+        keep_whole: resolved(&params.keep_whole, solid, labels)?,
+        ..params.clone()
+    };
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
     let (fine, source_face) = halve_long_edges(params, solid);
-    let ground = Ground::new(&fine);
+    let ground = Ground::keeping(params, &fine, &source_face);
     let mut surface = match given {
         Some(labels) => {
             let labels = labels.inherited(&source_face);
+            let kept = keep_whole::gathered(ctx, params, &fine, &ground.whole, labels.clone())?;
+            if kept != labels {
+                ctx.note(
+                    "what is kept whole lies in several labels: it is given to the one that has most of it",
+                );
+            }
+            let labels = kept;
             let found = best_contacts(ctx, params, &ground, &labels, LabelOrigin::User, f64::INFINITY)?;
             found.expect("nothing is dearer than that").1
         }
@@ -304,7 +257,7 @@ fn clustered(
             seed: params.seed.wrapping_add(attempt << 32),
             ..params.clone()
         };
-        let labels = crease_labels(ctx, &reseeded, ground.solid)?;
+        let labels = creases_on(ctx, &reseeded, ground.solid, &ground.whole)?;
         let origin = LabelOrigin::Automatic;
         let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
         best = best_contacts(ctx, params, ground, &labels, origin, limit)?.or(best);
@@ -323,7 +276,7 @@ fn proposed(
     params: &SegmentationParams,
     ground: &Ground<'_>,
 ) -> Result<SegmentedSurface, SegmentationError> {
-    let Some(drawn) = automatic_labels(ctx, params, ground.solid)? else {
+    let Some(drawn) = automatic_on(ctx, params, ground.solid, &ground.whole)? else {
         return clustered(ctx, params, ground);
     };
     let wanted = params
@@ -500,7 +453,11 @@ pub fn divide(
     patch: PatchId,
 ) -> Result<Option<SegmentedSurface>, SegmentationError> {
     changed(ctx, params, surface, |solid, labels| {
-        split_piece(solid, labels, patch)
+        split::split_keeping(
+            &Ground::keeping(params, solid, &surface.source_face),
+            labels,
+            patch,
+        )
     })
 }
 
@@ -583,7 +540,8 @@ fn changed(
     let Some(changed) = change(&solid, &labels) else {
         return Ok(None);
     };
-    let refined = refine(ctx, &limited, &solid, &changed)?;
+    let ground = Ground::keeping(params, &solid, &surface.source_face);
+    let refined = refine_on(ctx, &limited, &ground, &changed)?;
     let mut next = match smooth_and_cut(ctx, params, &solid, &refined) {
         // Other pieces may do.
         Err(SegmentationError::PatchVanished { .. }) => return Ok(None),

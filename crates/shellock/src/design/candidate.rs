@@ -94,8 +94,9 @@ impl<'a> Candidate<'a> {
         job: &Job<'_>,
         surface: SegmentedSurface,
     ) -> Result<Option<Division>, DesignError> {
+        let given = self.settings(job);
         let Some(key) = &self.key else {
-            let mut settings = job.settings().clone();
+            let mut settings = given;
             settings.plan.key = job.key_of(&surface);
             let chosen = self.sizes(ctx, job, &settings, &surface)?;
             return Ok(Some(Division {
@@ -106,10 +107,10 @@ impl<'a> Candidate<'a> {
                 told: Vec::new(),
             }));
         };
-        let Some((surface, patch)) = key.imprinted(ctx, job.settings(), &surface)? else {
+        let Some((surface, patch)) = key.imprinted(ctx, &given, &surface)? else {
             return Ok(None);
         };
-        let settings = job.settings().with_key(patch, key.along);
+        let settings = given.with_key(patch, key.along);
         let mut chosen = self.sizes(ctx, job, &settings, &surface)?;
         // Its rails have as much room as it was cut for.
         chosen.cap(patch, settings.connector.size.usual_mm());
@@ -121,6 +122,15 @@ impl<'a> Candidate<'a> {
             grip,
             told: Vec::new(),
         }))
+    }
+
+    /// The job's settings with what is kept whole where it is in the turned model.
+    fn settings(&self, job: &Job<'_>) -> Settings {
+        let mut settings = job.settings().clone();
+        for region in &mut settings.segmentation.keep_whole {
+            *region = self.turn.region(region);
+        }
+        settings
     }
 
     /// Connector sizes, by the stress in the model as it was given.
@@ -196,6 +206,7 @@ fn key_params(job: &Job<'_>) -> KeyParams {
         size_mm: settings.connector.size.usual_mm(),
         piece_mm2: job.surface.mesh.area() / job.surface.n_patches as f64,
         up: settings.plan.up,
+        keep_whole: settings.segmentation.keep_whole.clone(),
     }
 }
 

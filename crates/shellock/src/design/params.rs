@@ -4,7 +4,7 @@ use shellock_mechanics::Material;
 
 use crate::connector::ConnectorParams;
 use crate::piece::LabelParams;
-use crate::segmentation::Method;
+use crate::segmentation::{KeepWhole, Method};
 
 /// Everything that a user may set, each once; what stages are given follows from it, see
 /// [`Settings`](super::Settings).
@@ -24,6 +24,8 @@ pub struct Params {
     /// Pieces that automatic segmentation begins with. [2, 128]; `None`: what the method finds, and in creases
     /// from the area, 10 for a figure of 150 mm.
     pub n_pieces: Option<usize>,
+    /// Regions that no seam is to divide; none.
+    pub keep_whole: Vec<KeepWhole>,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
     /// Where the wall's thickness comes from; 2 mm.
@@ -60,6 +62,7 @@ impl Default for Params {
             seed: 0,
             method: Method::default(),
             n_pieces: None,
+            keep_whole: Vec::new(),
             up: [0.0, 0.0, 1.0],
             thickness: Thickness::default(),
             material: Material::default(),

@@ -146,6 +146,7 @@ fn segmentation(params: &Params) -> SegmentationParams {
     SegmentationParams {
         method: params.method,
         n_pieces: params.n_pieces,
+        keep_whole: params.keep_whole.clone(),
         seed: params.seed,
         ..SegmentationParams::default()
     }

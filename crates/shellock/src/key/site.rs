@@ -9,7 +9,7 @@ use shellock_geom::{Topology, TriMesh, Vec3};
 
 use super::plane::{Plane, Spot};
 use super::{KeyParams, KeyPrism, Turn};
-use crate::{Cancelled, Ctx, SegmentedSurface};
+use crate::{Cancelled, Ctx, SegmentedSurface, segmentation};
 
 /// Faces looked at, so that a fine mesh costs no more than a coarse one.
 const MOST_SPOTS: usize = 20_000;
@@ -72,6 +72,8 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
         .par_iter()
         .flat_map_iter(|plane| on_plane(params, &spots, *plane))
         .collect();
+    let kept = kept(params, surface, &topology);
+    candidates.retain(|site| !overlaps(&site.prism, params.size_mm, &kept));
     ctx.check()?;
     let by_score = |a: &KeySite, b: &KeySite| b.score.total_cmp(&a.score);
     candidates.sort_by(by_score);
@@ -90,16 +92,29 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
         .collect();
     let mut found: Vec<KeySite> = Vec::new();
     for (site, _) in candidates.iter().zip(is_sound).filter(|(_, ok)| *ok) {
-        let overlaps = |other: &KeySite| {
+        let is_same = |other: &KeySite| {
             let near = 0.5 * other.prism.half_width_mm;
             other.prism.origin.distance(site.prism.origin) < near
                 && other.prism.slide.dot(site.prism.slide) > 0.9
         };
-        if found.len() < MOST_SITES && !found.iter().any(overlaps) {
+        if found.len() < MOST_SITES && !found.iter().any(is_same) {
             found.push(*site);
         }
     }
     Ok(found)
+}
+
+/// Middles of the faces of which no key is cut.
+fn kept(params: &KeyParams, surface: &SegmentedSurface, topology: &Topology) -> Vec<Vec3> {
+    let mesh = &surface.mesh;
+    let whole = segmentation::whole(&params.keep_whole, mesh, topology, &surface.source_face, 0.0);
+    let faces = whole.sets().iter().flatten();
+    faces.map(|&f| mesh.face_center(f as usize)).collect()
+}
+
+/// Whether one of `kept` is inside the prism, or nearer than `beside_mm` to it.
+fn overlaps(prism: &KeyPrism, beside_mm: f64, kept: &[Vec3]) -> bool {
+    kept.iter().any(|&p| prism.inside_mm(p) > -beside_mm)
 }
 
 /// Edge of an ordinary piece, mm.

@@ -179,3 +179,25 @@ fn every_patch_is_connected_after_a_key_cut_one_in_two_and_crumbs_joined_their_n
     let least = areas(&surface).into_iter().fold(f64::INFINITY, f64::min);
     assert!(least > 0.05 * surface.mesh.area() / 6.0, "{least}");
 }
+
+#[test]
+fn no_key_is_cut_from_what_is_kept_whole() {
+    let surface = footed_ball();
+    let best = sites_of(&surface)[0];
+    let at = best.prism.origin + 0.5 * best.prism.length_mm() * best.prism.slide;
+    let params = KeyParams {
+        keep_whole: vec![KeepWhole::Sphere {
+            center_mm: at.to_array(),
+            radius_mm: 8.0,
+        }],
+        ..params_of(&surface)
+    };
+    let others = sites(&Ctx::quiet(), &params, &surface).unwrap();
+    assert!(!others.is_empty(), "there is room elsewhere");
+    for face in 0..surface.mesh.triangles.len() {
+        let center = surface.mesh.face_center(face);
+        if center.distance(at) < 8.0 {
+            assert!(others.iter().all(|site| !site.prism.contains(center)));
+        }
+    }
+}

@@ -5,6 +5,7 @@ use shellock_geom::{NotSolid, Solid, TriMesh, Vec3, Volume};
 
 use super::{KeyPrism, KeySite};
 use crate::LatticeDirection;
+use crate::segmentation::KeepWhole;
 
 /// A smaller turn, rad, is none: over 300 mm it moves nothing by more than a thousandth of a millimetre.
 const LEAST_TURN: f64 = 3e-6;
@@ -80,6 +81,17 @@ impl Turn {
             volume.clone()
         } else {
             volume.rotate([self.0.x_axis, self.0.y_axis, self.0.z_axis])
+        }
+    }
+
+    /// A region to keep whole, turned.
+    pub fn region(&self, region: &KeepWhole) -> KeepWhole {
+        match region {
+            KeepWhole::Sphere { center_mm, radius_mm } => KeepWhole::Sphere {
+                center_mm: self.apply(Vec3::from(*center_mm)).to_array(),
+                radius_mm: *radius_mm,
+            },
+            by_face => by_face.clone(),
         }
     }
 

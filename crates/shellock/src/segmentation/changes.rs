@@ -2,7 +2,8 @@
 
 use shellock_geom::Solid;
 
-use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, user_labels};
+use super::keep_whole::{place_in, tell_cut};
+use super::{FaceLabels, SegmentationError, SegmentationParams, kept_limit_mm, resolved, user_labels};
 use crate::{Cause, Ctx, PatchId, SegmentedSurface, Warning};
 
 /// A label lies in a piece, or a piece in a label, with more than this share of its area; smoothing moves
@@ -60,8 +61,8 @@ impl Changes {
 }
 
 /// Warns of what the user should know about `surface`: labels that were cleaned (see [`user_labels`]),
-/// divided (`piece-split`) or joined (`piece-joined`), contacts shorter than wanted (`short-contacts`) and
-/// pieces that still hold others alone (`weak-graph`).
+/// divided (`piece-split`) or joined (`piece-joined`), regions to keep whole that are not (`keep-whole-cut`),
+/// contacts shorter than wanted (`short-contacts`) and pieces that still hold others alone (`weak-graph`).
 pub fn tell(
     ctx: &Ctx,
     params: &SegmentationParams,
@@ -76,6 +77,8 @@ pub fn tell(
         tell_divided(ctx, &changes, &names, surface);
         tell_joined(ctx, &changes, &names, surface);
     }
+    let keep = resolved(&params.keep_whole, solid, labels)?;
+    tell_cut(ctx, &keep, surface);
     let limit_mm = kept_limit_mm(params, surface);
     if limit_mm < params.min_contact_mm {
         tell_short(ctx, params, surface, limit_mm);
@@ -83,10 +86,12 @@ pub fn tell(
     let graph = surface.contact_graph_below(params.wall_mm, limit_mm);
     if graph.n_faults() > 0 {
         let pieces = graph.articulation_pieces();
+        // What is kept whole may be why it could not be mended.
+        let at = place_in(&keep, surface, &pieces);
         ctx.warn(Warning {
             cause: Cause::WeakGraph,
             pieces,
-            at: None,
+            at,
         });
     }
     Ok(())

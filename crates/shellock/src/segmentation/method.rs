@@ -7,9 +7,12 @@ use shellock_segment::kmeans::KMeansParams;
 use shellock_segment::primitives::PrimitivesParams;
 use shellock_segment::random_cuts::RandomCutsParams;
 use shellock_segment::sdf::SdfParams;
+use shellock_segment::whole::Whole;
 use shellock_segment::{auto, kmeans, primitives, random_cuts, sdf};
 
 use super::creases::crease_labels;
+use super::keep_whole::gathered;
+use super::refine::Ground;
 use super::user::user_labels;
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::Ctx;
@@ -65,15 +68,15 @@ impl Method {
     }
 
     /// A part for each face; `None` for patches in creases, which are not found on meshes alone.
-    fn parts(self, n_parts: Option<usize>, seed: u64, mesh: &TriMesh) -> Option<Vec<u32>> {
+    fn parts(self, n_parts: Option<usize>, seed: u64, mesh: &TriMesh, whole: &Whole) -> Option<Vec<u32>> {
         let cuts = RandomCutsParams {
             n_parts,
             seed,
             ..RandomCutsParams::default()
         };
         Some(match self {
-            Self::Auto => auto::divide(&AutoParams { cuts }, mesh),
-            Self::RandomCuts => random_cuts::divide(&cuts, mesh),
+            Self::Auto => auto::divide_keeping(&AutoParams { cuts }, mesh, whole),
+            Self::RandomCuts => random_cuts::divide_keeping(&cuts, mesh, whole),
             Self::Sdf => {
                 let params = SdfParams {
                     n_parts,
@@ -109,10 +112,37 @@ pub fn automatic_labels(
     params: &SegmentationParams,
     solid: &Solid,
 ) -> Result<Option<FaceLabels>, SegmentationError> {
-    let Some(parts) = params.method.parts(params.n_pieces, params.seed, solid.mesh()) else {
-        return crease_labels(ctx, params, solid).map(Some);
+    let own: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
+    automatic_on(ctx, params, solid, &Ground::keeping(params, solid, &own).whole)
+}
+
+/// Patches in creases of which none divides a set of `whole`.
+pub(super) fn creases_on(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    solid: &Solid,
+    whole: &Whole,
+) -> Result<FaceLabels, SegmentationError> {
+    gathered(ctx, params, solid, whole, crease_labels(ctx, params, solid)?)
+}
+
+/// The same where no patch divides a set of `whole`.
+pub(super) fn automatic_on(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    solid: &Solid,
+    whole: &Whole,
+) -> Result<Option<FaceLabels>, SegmentationError> {
+    let found = params
+        .method
+        .parts(params.n_pieces, params.seed, solid.mesh(), whole);
+    let Some(mut parts) = found else {
+        return creases_on(ctx, params, solid, whole).map(Some);
     };
     ctx.check()?;
+    let mesh = solid.mesh();
+    let area_mm2: Vec<f64> = (0..parts.len()).map(|f| mesh.face_area(f)).collect();
+    whole.gather(&mut parts, &area_mm2);
     let labels: Vec<i64> = parts.into_iter().map(i64::from).collect();
     let large = SegmentationParams {
         min_piece_mm2: params.min_piece_mm2.max(LEAST_SHARE * solid.mesh().area()),

@@ -7,8 +7,10 @@
 
 use rayon::prelude::*;
 use shellock_geom::{HalfEdge, Solid, Topology};
+use shellock_segment::whole::Whole;
 
 use super::dual_graph::{CreaseCost, DualGraph};
+use super::keep_whole::{margin_mm, whole};
 use super::split::{Divider, Division, euler_characteristics, raw_contact_graph};
 use super::{FaceLabels, SegmentationError, SegmentationParams};
 use crate::seam::graph::Adjacency;
@@ -45,15 +47,25 @@ pub fn refine(
 /// What refining asks of a surface, made once for all rounds.
 pub(super) struct Ground<'a> {
     pub solid: &'a Solid,
-    topology: Topology,
-    faces: DualGraph,
+    pub topology: Topology,
+    pub faces: DualGraph,
+    /// What no division parts.
+    pub whole: Whole,
 }
 
 impl<'a> Ground<'a> {
+    /// A surface of which nothing is kept whole.
     pub fn new(solid: &'a Solid) -> Self {
+        Self::keeping(&SegmentationParams::default(), solid, &[])
+    }
+
+    /// A surface with the regions, resolved, that `params` keep whole; `source_face` names the model's triangles.
+    pub fn keeping(params: &SegmentationParams, solid: &'a Solid, source_face: &[u32]) -> Self {
         let topology = Topology::new(solid);
+        let (keep, margin_mm) = (&params.keep_whole, margin_mm(params));
         Self {
             solid,
+            whole: whole(keep, solid.mesh(), &topology, source_face, margin_mm),
             faces: DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE),
             topology,
         }
@@ -71,6 +83,7 @@ pub(super) fn refine_on(
         mesh: ground.solid.mesh(),
         topology: &ground.topology,
         faces: &ground.faces,
+        whole: &ground.whole,
         min_piece_mm2: SPLIT_RESERVE * params.min_piece_mm2,
     };
     let mut work = Work {

@@ -9,9 +9,11 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
 use shellock_geom::topology::ends;
 use shellock_geom::{HalfEdge, Solid, Topology, TriMesh, Vec3};
+use shellock_segment::whole::Whole;
 
 use super::FaceLabels;
 use super::dual_graph::DualGraph;
+use super::refine::Ground;
 use crate::seam::{seam_half_edges, stretches};
 use crate::{ContactGraph, LatticeDirection, PatchId};
 
@@ -31,6 +33,8 @@ pub(super) struct Divider<'a> {
     pub mesh: &'a TriMesh,
     pub topology: &'a Topology,
     pub faces: &'a DualGraph,
+    /// What no division parts.
+    pub whole: &'a Whole,
     pub min_piece_mm2: f64,
 }
 
@@ -46,12 +50,16 @@ pub(super) struct Division {
 /// direction; the new half gets the number `labels.n_patches()`. `None` where the patch is one triangle, or
 /// is not there.
 pub fn split_piece(solid: &Solid, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
-    let topology = Topology::new(solid);
-    let faces = DualGraph::of_faces(solid.mesh(), &topology, super::dual_graph::CreaseCost::NONE);
+    split_keeping(&Ground::new(solid), labels, patch)
+}
+
+/// The same where no set that `ground` keeps whole is parted.
+pub(super) fn split_keeping(ground: &Ground<'_>, labels: &FaceLabels, patch: PatchId) -> Option<FaceLabels> {
     let divider = Divider {
-        mesh: solid.mesh(),
-        topology: &topology,
-        faces: &faces,
+        mesh: ground.solid.mesh(),
+        topology: &ground.topology,
+        faces: &ground.faces,
+        whole: &ground.whole,
         min_piece_mm2: 0.0,
     };
     let mut label = labels.as_slice().to_vec();
@@ -115,7 +123,12 @@ impl Divider<'_> {
         let members = region.faces;
         let area = area_of(members);
         moved.iter().for_each(|&f| label[f as usize] = halves[1]);
+        self.whole
+            .gather_among(label, &self.faces.area, |k| halves.contains(&k));
         self.join_islands(label, members, halves);
+        if self.whole.is_parted(label, halves) {
+            return None;
+        }
         let second = members
             .iter()
             .copied()

@@ -351,3 +351,127 @@ fn of_a_limbed_body_few_enough_pieces_come_and_none_holds_others_alone() {
     let graph = surface.contact_graph_below(params.wall_mm, params.least_contact_mm);
     assert_eq!(graph.n_faults(), 0);
 }
+
+fn ball(center_mm: [f64; 3], radius_mm: f64) -> KeepWhole {
+    KeepWhole::Sphere { center_mm, radius_mm }
+}
+
+/// The share of the area within a ball that is in one piece.
+fn share_in_one_piece(surface: &SegmentedSurface, center_mm: [f64; 3], radius_mm: f64) -> f64 {
+    let mut area = vec![0.0; surface.n_patches];
+    for (face, patch) in surface.patch_of_face.iter().enumerate() {
+        if surface.mesh.face_center(face).distance(Vec3::from(center_mm)) <= radius_mm {
+            area[usize::from(*patch)] += surface.mesh.face_area(face);
+        }
+    }
+    area.iter().copied().fold(0.0, f64::max) / area.iter().sum::<f64>()
+}
+
+#[test]
+fn what_is_kept_whole_ends_in_one_piece_by_every_method() {
+    let solid = limbed();
+    // The end of an arm, a place on the body, and the root of an arm, where people would cut.
+    for (at, radius_mm) in [
+        ([-90.0, 0.0, 0.0], 25.0),
+        ([0.0, 0.0, -30.0], 20.0),
+        ([10.0, 32.0, 0.0], 14.0),
+    ] {
+        for method in Method::ALL {
+            let params = SegmentationParams {
+                method,
+                keep_whole: vec![ball(at, radius_mm)],
+                ..SegmentationParams::default()
+            };
+            let (surface, warnings) = with_warnings(|ctx| segment(ctx, &params, &solid, None).unwrap());
+            let share = share_in_one_piece(&surface, at, radius_mm);
+            assert!(share > 0.98, "{method:?} at {at:?}: {share}");
+            assert!(
+                warnings.iter().all(|w| w.code() != "keep-whole-cut"),
+                "{method:?}"
+            );
+            assert!(surface.n_patches > 2, "{method:?}");
+        }
+    }
+}
+
+#[test]
+fn no_division_parts_what_is_kept_whole() {
+    let solid = limbed();
+    let own: Vec<u32> = (0..solid.mesh().triangles.len() as u32).collect();
+    let labels =
+        with_ctx(|ctx| user_labels(ctx, &SegmentationParams::default(), &solid, &arm_labels(&solid)))
+            .unwrap();
+    let params = SegmentationParams {
+        keep_whole: vec![ball([0.0, 0.0, -30.0], 25.0), ball([90.0, 0.0, 0.0], 20.0)],
+        ..SegmentationParams::default()
+    };
+    let ground = Ground::keeping(&params, &solid, &own);
+    assert_eq!(ground.whole.sets().len(), 2);
+    for patch in 0..labels.n_patches() {
+        let halves = split::split_keeping(&ground, &labels, PatchId::from(patch)).unwrap();
+        let is_one = |set: &Vec<u32>| {
+            set.iter()
+                .all(|&f| halves.patch(f as usize) == halves.patch(set[0] as usize))
+        };
+        assert!(ground.whole.sets().iter().all(is_one), "patch {patch}");
+    }
+}
+
+#[test]
+fn a_region_across_labels_is_of_the_one_that_has_most_of_it() {
+    let solid = limbed();
+    let at = [44.0, 0.0, 0.0];
+    let params = SegmentationParams {
+        keep_whole: vec![ball(at, 14.0)],
+        ..SegmentationParams::default()
+    };
+    let labels = arm_labels(&solid);
+    let surface = with_ctx(|ctx| segment(ctx, &params, &solid, Some(&labels))).unwrap();
+    assert!(share_in_one_piece(&surface, at, 14.0) > 0.98);
+    let without = SegmentationParams::default();
+    let surface = with_ctx(|ctx| segment(ctx, &without, &solid, Some(&labels))).unwrap();
+    assert!(
+        share_in_one_piece(&surface, at, 14.0) < 0.9,
+        "it is no theorem of its own"
+    );
+}
+
+#[test]
+fn a_label_that_is_kept_whole_stays_one_piece() {
+    let solid = limbed();
+    let labels = arm_labels(&solid);
+    let params = SegmentationParams {
+        keep_whole: vec![KeepWhole::Label(12)],
+        ..SegmentationParams::default()
+    };
+    let surface = with_ctx(|ctx| segment(ctx, &params, &solid, Some(&labels))).unwrap();
+    let mut area = vec![0.0; surface.n_patches];
+    for (face, patch) in surface.patch_of_face.iter().enumerate() {
+        if labels[surface.source_face[face] as usize] == 12 {
+            area[usize::from(*patch)] += surface.mesh.face_area(face);
+        }
+    }
+    assert!(area.iter().copied().fold(0.0, f64::max) > 0.95 * area.iter().sum::<f64>());
+}
+
+#[test]
+fn regions_that_cannot_be_kept_whole_are_refused_in_words() {
+    let solid = limbed();
+    let labels = arm_labels(&solid);
+    let error = |region: KeepWhole, labels: Option<&[i64]>| {
+        resolved(&[region], &solid, labels).unwrap_err().to_string()
+    };
+    let outside = error(ball([500.0, 0.0, 0.0], 20.0), None);
+    assert!(
+        outside.contains("(500.0, 0.0, 0.0)") && outside.contains("reaches from"),
+        "{outside}"
+    );
+    assert!(error(ball([0.0; 3], 200.0), None).contains("100 % of the surface"));
+    assert!(error(KeepWhole::Label(4), Some(&labels)).contains("label 4 has nothing"));
+    assert!(error(KeepWhole::Label(7), None).contains("no labels"));
+    let bad = SegmentationParams {
+        keep_whole: vec![ball([0.0; 3], -1.0)],
+        ..SegmentationParams::default()
+    };
+    assert_eq!(bad.problems().len(), 1);
+}
