@@ -19,7 +19,7 @@ use shellock_mechanics::Material;
 use shellock_print::Printer;
 
 pub use blows::{Blows, Place};
-pub use pieces::Pieces;
+pub use pieces::{Key, Pieces};
 
 use crate::stress;
 use keep_whole::keep_whole;
@@ -287,28 +287,6 @@ impl FromStr for Thickness {
         text.parse()
             .map(Self::Mm)
             .map_err(|_| "give millimetres, such as 2.4, or auto".to_owned())
-    }
-}
-
-/// Where the key comes from.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Key {
-    Auto,
-    Flattest,
-    Piece(i64),
-}
-
-impl FromStr for Key {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.to_ascii_lowercase().as_str() {
-            "auto" => Ok(Self::Auto),
-            "piece" => Ok(Self::Flattest),
-            number => number.parse().map(Self::Piece).map_err(|_| {
-                "give auto, piece, or the number of a piece (its label, where there are labels)".to_owned()
-            }),
-        }
     }
 }
 

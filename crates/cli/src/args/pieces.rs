@@ -1,4 +1,4 @@
-//! How many pieces are asked for.
+//! How many pieces are asked for, and which of them is the key.
 
 use std::str::FromStr;
 
@@ -31,6 +31,28 @@ impl FromStr for Pieces {
                 .parse()
                 .map(Self::Number)
                 .map_err(|_| "give a number of pieces, auto or fits-bed".to_owned()),
+        }
+    }
+}
+
+/// Where the key comes from.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Key {
+    Auto,
+    Flattest,
+    Piece(i64),
+}
+
+impl FromStr for Key {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.to_ascii_lowercase().as_str() {
+            "auto" => Ok(Self::Auto),
+            "piece" => Ok(Self::Flattest),
+            number => number.parse().map(Self::Piece).map_err(|_| {
+                "give auto, piece, or the number of a piece (its label, where there are labels)".to_owned()
+            }),
         }
     }
 }
