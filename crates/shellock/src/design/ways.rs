@@ -157,6 +157,9 @@ fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut 
             Err(e) => break Err(e),
         }
     };
+    if let Ok(DesignOutcome::Made(made)) = &outcome {
+        *effort = made.effort;
+    }
     Ended {
         outcome,
         was_thicker: wall.is_thicker(),
