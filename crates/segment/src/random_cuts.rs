@@ -29,8 +29,10 @@ use crate::border::prices;
 use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
 use crate::max_flow::{FlowGraph, Terminal};
+use crate::mirrored::Mirrored;
 use crate::params::{no_parts, outside};
 use crate::parts::connected;
+use crate::symmetry::Plane;
 use crate::whole::Whole;
 
 /// By how much a concavity of a radian makes the way over an edge longer, for the choice of seeds.
@@ -64,6 +66,8 @@ pub struct RandomCutsParams {
     pub balance: f64,
     /// Parts wanted; `None`: until no cut is worth it.
     pub n_parts: Option<usize>,
+    /// Whether the division is to be the same on both sides of the plane of symmetry, where the model has one; no.
+    pub symmetric: bool,
     /// Seed of all random choices; 0.
     pub seed: u64,
 }
@@ -77,6 +81,7 @@ impl Default for RandomCutsParams {
             least_worth_share: 0.2,
             balance: 0.3,
             n_parts: None,
+            symmetric: false,
             seed: 0,
         }
     }
@@ -97,21 +102,56 @@ impl RandomCutsParams {
     }
 }
 
-/// A part for each face of `mesh`, by random cuts.
-pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
-    divide_keeping(params, mesh, &Whole::default())
+/// A division, and what it is the same on both sides of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Divided {
+    /// A part for each face.
+    pub part_of_face: Vec<u32>,
+    /// The plane of symmetry; `None` where there is none, or none was asked for.
+    pub plane: Option<Plane>,
 }
 
-/// The same where no border divides a set of `whole`.
-pub fn divide_keeping(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Vec<u32> {
+/// A part for each face of `mesh`, by random cuts.
+pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
+    divide_keeping(params, mesh, &Whole::default()).part_of_face
+}
+
+/// The same where no border divides a set of `whole`, which goes before symmetry.
+pub fn divide_keeping(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Divided {
+    divide_among(params, mesh, whole, |_| Vec::new())
+}
+
+/// The same where divisions of the coarse mesh by other methods stand for election, too.
+pub(crate) fn divide_among(
+    params: &RandomCutsParams,
+    mesh: &TriMesh,
+    whole: &Whole,
+    proposals: impl Fn(&Coarse) -> Vec<Vec<u32>>,
+) -> Divided {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);
-    let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, coarse.graph.n_faces());
-    let found = hierarchy_keeping(params, &coarse.graph, &[], &on_coarse);
-    let labels = found.labels(&coarse.graph, found.n_steps(params));
+    let graph = &coarse.graph;
+    let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, graph.n_faces());
+    let mirrored = params.symmetric.then(|| Mirrored::new(&coarse)).flatten();
+    let mut proposals = proposals(&coarse);
+    for labels in &mut proposals {
+        on_coarse.gather(labels, &graph.area_mm2);
+    }
+    let mut price = prices(graph);
+    if let Some(mirrored) = &mirrored {
+        price = mirrored.prices(graph, &price);
+    }
+    let found = hierarchy_priced(params, graph, &proposals, unpayable_within(&on_coarse, graph, price));
+    let labels = match &mirrored {
+        Some(mirrored) => found.mirrored(params, graph, mirrored),
+        None => found.labels(graph, found.n_steps(params)),
+    };
     let mut labels = coarse.bring_back(&fine, &labels);
     whole.gather(&mut labels, &fine.area_mm2);
-    connected(&fine, &labels).0
+    Divided {
+        part_of_face: connected(&fine, &labels).0,
+        plane: mirrored.map(|m| m.plane),
+    }
 }
 
 /// A part for each face of `graph`, which is small.
@@ -198,28 +238,39 @@ impl Hierarchy {
             .collect();
         connected(graph, &labels).0
     }
+
+    /// The parts after as many cuts as `params` asks for, made the same on both sides; after fewer, where images
+    /// make them more than were asked for.
+    fn mirrored(&self, params: &RandomCutsParams, graph: &FaceGraph, mirrored: &Mirrored) -> Vec<u32> {
+        let most = params.n_parts.unwrap_or(usize::MAX).max(self.n_components);
+        let after = |n_steps: usize| mirrored.labels(graph, &self.labels(graph, n_steps));
+        let n_parts = |labels: &[u32]| labels.iter().max().map_or(0, |&l| l as usize + 1);
+        let mut fewer = (0..=self.n_steps(params)).rev().map(after);
+        fewer
+            .find(|labels| n_parts(labels) <= most)
+            .unwrap_or_else(|| after(0))
+    }
 }
 
 /// Cuts the best first, until there are parts enough or no cut is good enough.
 ///
 /// The borders of `proposals`, other divisions of `graph`, stand for election beside the random cuts.
 pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<u32>]) -> Hierarchy {
-    hierarchy_keeping(params, graph, proposals, &Whole::default())
+    hierarchy_priced(params, graph, proposals, prices(graph))
 }
 
-/// The same where an edge within a set of `whole` costs more than all others, so that a cut over it has a score
-/// of 0 and is never made.
-pub fn hierarchy_keeping(
+/// The same with prices of cuts (one an edge) in place of those of [`prices`].
+fn hierarchy_priced(
     params: &RandomCutsParams,
     graph: &FaceGraph,
     proposals: &[Vec<u32>],
-    whole: &Whole,
+    price: Vec<f64>,
 ) -> Hierarchy {
     let cutter = Cutter {
         params,
         graph,
         proposals,
-        price: prices_keeping(graph, whole),
+        price,
         way: graph
             .creases
             .iter()
@@ -269,11 +320,11 @@ pub fn hierarchy_keeping(
     }
 }
 
-/// [`prices`], and within sets of `whole` a price that no cut can pay.
-fn prices_keeping(graph: &FaceGraph, whole: &Whole) -> Vec<f64> {
+/// `price`, and within sets of `whole` a price that no cut can pay: a cut over such an edge has a score of 0 and is
+/// never made.
+fn unpayable_within(whole: &Whole, graph: &FaceGraph, mut price: Vec<f64>) -> Vec<f64> {
     /// In prices of all edges together: e to the power of minus that is 0.
     const UNPAYABLE: f64 = 1e4;
-    let mut price = prices(graph);
     let unpayable = UNPAYABLE * price.iter().sum::<f64>();
     for (price, crease) in price.iter_mut().zip(&graph.creases) {
         if whole.has_both(crease.faces) {
