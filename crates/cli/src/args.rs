@@ -376,7 +376,13 @@ pub struct Options {
     )]
     pub pieces: Pieces,
     /// Whether both sides of a symmetric model are divided alike, where the method is auto or random-cuts
-    #[arg(long, value_enum, default_value = "off", value_name = "on|off", help_heading = "Pieces")]
+    #[arg(
+        long,
+        value_enum,
+        default_value = "off",
+        value_name = "on|off",
+        help_heading = "Pieces"
+    )]
     pub symmetric: Symmetric,
     /// A region that no seam is to divide, such as a face: the surface within R mm of a place in the made
     /// thing's space, or what has a label, where there are labels; may be given several times

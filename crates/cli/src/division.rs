@@ -92,7 +92,10 @@ impl Division {
         );
         let one_way = format!("{n_one_way} of {n} pieces: 95 % of their skin within 90° of one direction");
         let mirrored = mirrored_share.map(|share| {
-            let told = format!("{:.0} % of the surface has its mirror image in its piece's image", 100.0 * share);
+            let told = format!(
+                "{:.0} % of the surface has its mirror image in its piece's image",
+                100.0 * share
+            );
             ("mirrored", told)
         });
         let of_all = [

@@ -31,7 +31,11 @@ fn main() {
         if method == "plane" {
             let simple = Coarse::new(&mesh, random_cuts::RandomCutsParams::default().n_faces).mesh;
             let start = Instant::now();
-            println!("{:.4?}, {:.2} s", nearest_plane(&simple), start.elapsed().as_secs_f64());
+            println!(
+                "{:.4?}, {:.2} s",
+                nearest_plane(&simple),
+                start.elapsed().as_secs_f64()
+            );
             return;
         }
         let (labels, seconds) = timed(method, params, &mesh);

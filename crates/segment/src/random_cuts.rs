@@ -32,7 +32,7 @@ use crate::max_flow::{FlowGraph, Terminal};
 use crate::mirrored::Mirrored;
 use crate::params::{no_parts, outside};
 use crate::parts::connected;
-use crate::symmetry::Plane;
+use crate::symmetry::{self, Plane};
 use crate::whole::Whole;
 
 /// By how much a concavity of a radian makes the way over an edge longer, for the choice of seeds.
@@ -132,25 +132,25 @@ pub(crate) fn divide_among(
     let coarse = Coarse::new(mesh, params.n_faces);
     let graph = &coarse.graph;
     let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, graph.n_faces());
-    let mirrored = params.symmetric.then(|| Mirrored::new(&coarse)).flatten();
+    let plane = params.symmetric.then(|| symmetry::plane(&coarse.mesh)).flatten();
     let mut proposals = proposals(&coarse);
     for labels in &mut proposals {
         on_coarse.gather(labels, &graph.area_mm2);
     }
-    let mut price = prices(graph);
-    if let Some(mirrored) = &mirrored {
-        price = mirrored.prices(graph, &price);
-    }
-    let found = hierarchy_priced(params, graph, &proposals, unpayable_within(&on_coarse, graph, price));
-    let labels = match &mirrored {
-        Some(mirrored) => found.mirrored(params, graph, mirrored),
-        None => found.labels(graph, found.n_steps(params)),
+    let found = hierarchy_keeping(params, graph, &proposals, &on_coarse);
+    let mut labels = match &plane {
+        Some(plane) => {
+            let mirrored = Mirrored::new(plane, &coarse.mesh, graph);
+            let labels = coarse.bring_back(&fine, &found.mirrored(params, graph, &mirrored));
+            // Borders have settled on each side by itself.
+            Mirrored::new(plane, mesh, &fine).labels(&fine, &labels)
+        }
+        None => coarse.bring_back(&fine, &found.labels(graph, found.n_steps(params))),
     };
-    let mut labels = coarse.bring_back(&fine, &labels);
     whole.gather(&mut labels, &fine.area_mm2);
     Divided {
         part_of_face: connected(&fine, &labels).0,
-        plane: mirrored.map(|m| m.plane),
+        plane,
     }
 }
 
@@ -256,21 +256,22 @@ impl Hierarchy {
 ///
 /// The borders of `proposals`, other divisions of `graph`, stand for election beside the random cuts.
 pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<u32>]) -> Hierarchy {
-    hierarchy_priced(params, graph, proposals, prices(graph))
+    hierarchy_keeping(params, graph, proposals, &Whole::default())
 }
 
-/// The same with prices of cuts (one an edge) in place of those of [`prices`].
-fn hierarchy_priced(
+/// The same where an edge within a set of `whole` costs more than all others, so that a cut over it has a score
+/// of 0 and is never made.
+pub fn hierarchy_keeping(
     params: &RandomCutsParams,
     graph: &FaceGraph,
     proposals: &[Vec<u32>],
-    price: Vec<f64>,
+    whole: &Whole,
 ) -> Hierarchy {
     let cutter = Cutter {
         params,
         graph,
         proposals,
-        price,
+        price: prices_keeping(graph, whole),
         way: graph
             .creases
             .iter()
@@ -320,11 +321,11 @@ fn hierarchy_priced(
     }
 }
 
-/// `price`, and within sets of `whole` a price that no cut can pay: a cut over such an edge has a score of 0 and is
-/// never made.
-fn unpayable_within(whole: &Whole, graph: &FaceGraph, mut price: Vec<f64>) -> Vec<f64> {
+/// [`prices`], and within sets of `whole` a price that no cut can pay.
+fn prices_keeping(graph: &FaceGraph, whole: &Whole) -> Vec<f64> {
     /// In prices of all edges together: e to the power of minus that is 0.
     const UNPAYABLE: f64 = 1e4;
+    let mut price = prices(graph);
     let unpayable = UNPAYABLE * price.iter().sum::<f64>();
     for (price, crease) in price.iter_mut().zip(&graph.creases) {
         if whole.has_both(crease.faces) {

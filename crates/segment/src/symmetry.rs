@@ -181,7 +181,14 @@ impl Figure {
             at: at + by * step_rad * self.radius_mm * normal,
             normal,
         };
-        [turned(u), turned(-u), turned(v), turned(-v), moved(1.0), moved(-1.0)]
+        [
+            turned(u),
+            turned(-u),
+            turned(v),
+            turned(-v),
+            moved(1.0),
+            moved(-1.0),
+        ]
     }
 }
 

@@ -32,7 +32,12 @@ fn flipped(p: Vec3) -> Vec3 {
 
 /// A rod bent twice, out of its plane, with arms of three lengths.
 fn bent() -> Vec<Capsule> {
-    let corners = [[-16.0, -10.0, -12.0], [18.0, -10.0, -12.0], [18.0, 14.0, -12.0], [18.0, 14.0, 34.0]];
+    let corners = [
+        [-16.0, -10.0, -12.0],
+        [18.0, -10.0, -12.0],
+        [18.0, 14.0, -12.0],
+        [18.0, 14.0, 34.0],
+    ];
     let corners = corners.map(Vec3::from);
     corners.windows(2).map(|ends| (ends[0], ends[1], 5.0)).collect()
 }
@@ -72,7 +77,13 @@ fn turns() -> [Quat; 3] {
 fn the_plane_of_a_figure_is_found_within_a_degree_however_it_is_turned() {
     for turn in turns() {
         let found = plane(&mesh(&figure(), turn)).expect("it has a plane");
-        let off_deg = found.normal.dot(turn * Vec3::X).abs().min(1.0).acos().to_degrees();
+        let off_deg = found
+            .normal
+            .dot(turn * Vec3::X)
+            .abs()
+            .min(1.0)
+            .acos()
+            .to_degrees();
         assert!(off_deg < 1.0, "{off_deg}°");
         assert!(found.height(Vec3::ZERO).abs() < 0.3, "{found:?}");
     }
@@ -102,7 +113,11 @@ fn mirrored_share(mesh: &TriMesh, plane: &Plane, part: &[u32]) -> f64 {
         let image = bvh.nearest(plane.image(mesh.face_center(face)), f64::INFINITY);
         common[part[face] as usize][part[image.unwrap().face as usize] as usize] += mesh.face_area(face);
     }
-    let image = |p: usize| (0..n).max_by(|&a, &b| common[p][a].total_cmp(&common[p][b])).unwrap();
+    let image = |p: usize| {
+        (0..n)
+            .max_by(|&a, &b| common[p][a].total_cmp(&common[p][b]))
+            .unwrap()
+    };
     let mirrored = (0..n).filter(|&p| image(image(p)) == p);
     mirrored.map(|p| common[p][image(p)]).sum::<f64>() / mesh.area()
 }
@@ -164,4 +179,28 @@ fn what_has_no_plane_is_divided_as_if_nothing_had_been_asked() {
     {
         assert!(asked == plain && asked.plane.is_none());
     }
+}
+
+#[test]
+fn a_limb_without_a_twin_stays_a_part_and_gets_no_image() {
+    let mut capsules = figure();
+    let (root, tip) = (Vec3::new(5.0, -5.0, -4.0), Vec3::new(10.0, -18.0, -4.0));
+    capsules.push((root, tip, 1.8));
+    let mesh = mesh(&capsules, Quat::IDENTITY);
+    let symmetric = RandomCutsParams {
+        symmetric: true,
+        ..RandomCutsParams::default()
+    };
+    let found = auto::divide_keeping(&AutoParams { cuts: symmetric }, &mesh, &Whole::default());
+    assert!(found.plane.is_some());
+    let bvh = TriangleBvh::new(&mesh);
+    let part = |p: Vec3| found.part_of_face[bvh.nearest(p, f64::INFINITY).unwrap().face as usize];
+    let body = part(flipped(root));
+    assert_ne!(part(tip), body);
+    // What is there lies across the plane.
+    let reaches = |side: f64| {
+        let mut faces = (0..found.part_of_face.len()).filter(|&f| found.part_of_face[f] == body);
+        faces.any(|f| side * mesh.face_center(f).x > 4.0)
+    };
+    assert!(reaches(1.0) && reaches(-1.0));
 }

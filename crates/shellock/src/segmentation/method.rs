@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Solid, TriMesh};
 use shellock_segment::auto::AutoParams;
+use shellock_segment::coarse::Coarse;
 use shellock_segment::kmeans::KMeansParams;
 use shellock_segment::primitives::PrimitivesParams;
 use shellock_segment::random_cuts::{Divided, RandomCutsParams};
-use shellock_segment::coarse::Coarse;
 use shellock_segment::sdf::SdfParams;
 use shellock_segment::symmetry::{self, Plane};
 use shellock_segment::whole::Whole;
