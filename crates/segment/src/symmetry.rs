@@ -34,6 +34,9 @@ impl Plane {
 }
 
 /// The plane is taken where mirror images are no farther from the surface, as a root mean square in the box's diagonal.
+///
+/// Koala, bust, armadillo and squirrel have 0.0006 to 0.009, a horse in mid-step 0.014, a statue 0.021; an open hand has
+/// 0.029, and a teddy that waves 0.033, so that no figure lets in the one without the other.
 const TOLERANCE: f64 = 0.025;
 /// Points of the surface whose images are looked at.
 const N_SAMPLES: usize = 1000;
