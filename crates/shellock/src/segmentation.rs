@@ -201,6 +201,8 @@ const N_CONTACT_LIMITS: usize = 3;
 const FAULT_COST: f64 = 100.0;
 const LOST_LABEL_COST: f64 = 8.0;
 const SHORTER_COST: f64 = 2.0;
+/// A drawn division that keeps regions whole has at least the pieces wanted over this many.
+const FEWEST_SHARE: usize = 2;
 /// What is paid where all of a drawn division is another, in pieces beyond what is welcome.
 const DISAGREEMENT_COST: f64 = 30.0;
 
@@ -299,7 +301,12 @@ fn proposed(
         let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0);
         best = best_contacts(ctx, params, ground, &labels, origin, limit)?.or(best);
     }
-    Ok(best.expect("nothing is dearer than the first").1)
+    let (_, drawn) = best.expect("nothing is dearer than the first");
+    if !params.keep_whole.is_empty() && drawn.n_patches * FEWEST_SHARE < wanted {
+        ctx.note("what is kept whole leaves few places to cut: pieces of similar size");
+        return clustered(ctx, params, ground);
+    }
+    Ok(drawn)
 }
 
 /// Whose patches are changed: a user wants to find the labels again, an automatic choice should have the

@@ -110,7 +110,8 @@ pub(super) fn with_reserve(
         n_thicker: THICKER_WALLS,
     };
     let first = asking(ctx, input, thinnest, ask, effort);
-    if first.is_enough() || !first.was_thicker || first.is_late {
+    // One kit with the thinnest wall is made though it is late: a thick one may be all that was wrong.
+    if first.is_enough() || !first.was_thicker {
         return first;
     }
     ctx.note("no kit with walls so thick passes: walls as thin as a fall allows");
