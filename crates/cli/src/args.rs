@@ -19,7 +19,7 @@ use shellock_mechanics::Material;
 use shellock_print::Printer;
 
 pub use blows::{Blows, Place};
-pub use pieces::{Key, Pieces};
+pub use pieces::{Key, Pieces, Symmetric};
 
 use crate::stress;
 use keep_whole::keep_whole;
@@ -375,6 +375,15 @@ pub struct Options {
         help_heading = "Pieces"
     )]
     pub pieces: Pieces,
+    /// Whether both sides of a symmetric model are divided alike, where the method is auto or random-cuts
+    #[arg(
+        long,
+        value_enum,
+        default_value = "off",
+        value_name = "on|off",
+        help_heading = "Pieces"
+    )]
+    pub symmetric: Symmetric,
     /// A region that no seam is to divide, such as a face: the surface within R mm of a place in the made
     /// thing's space, or what has a label, where there are labels; may be given several times
     #[arg(
@@ -517,6 +526,7 @@ impl Options {
         p.method = self.method;
         p.n_pieces = self.pieces.number();
         p.keep_whole = self.keep_whole.clone();
+        p.symmetric = self.symmetric == Symmetric::On;
         p.up = self.up.unit();
         p.key = match self.key {
             Key::Auto => KeySource::Cut,

@@ -38,11 +38,12 @@ pub fn divide(session: &Session, model: &Model, options: &Options) -> Result<Div
         .inspect_err(|_| display.finish())
         .map_err(DesignError::from)?;
     display.finish();
+    let mirror = segmentation::symmetry_plane(&params, &model.solid);
     let of_figures = FigureParams {
         up: options.up.unit(),
         wall_mm: params.wall_mm,
         min_contact_mm: params.min_contact_mm,
-        mirror: None,
+        mirror,
     };
     Ok(Division {
         figures: figures(&of_figures, &surface),
@@ -71,7 +72,12 @@ impl Division {
 
     /// What is told of the whole, each with its name.
     fn of_whole(&self) -> Vec<Line> {
-        let DivisionFigures { area_mm2, pieces, .. } = &self.figures;
+        let DivisionFigures {
+            area_mm2,
+            pieces,
+            mirrored_share,
+            ..
+        } = &self.figures;
         let n_one_way = pieces.iter().filter(|p| p.faces.is_one_way()).count();
         let odd: Vec<PatchId> = pieces.iter().filter(|p| !p.is_disk).map(|p| p.piece).collect();
         let disks = if odd.is_empty() {
@@ -85,11 +91,19 @@ impl Division {
             area_mm2.least, area_mm2.largest, area_mm2.median
         );
         let one_way = format!("{n_one_way} of {n} pieces: 95 % of their skin within 90° of one direction");
+        let mirrored = mirrored_share.map(|share| {
+            let told = format!(
+                "{:.0} % of the surface has its mirror image in its piece's image",
+                100.0 * share
+            );
+            ("mirrored", told)
+        });
         let of_all = [
             vec![("pieces", areas)],
             of_seams(&self.figures.seams),
             of_contacts(&self.figures.contacts, &self.params),
             vec![("disks", disks), ("one way out", one_way)],
+            mirrored.into_iter().collect(),
         ];
         of_all.concat()
     }

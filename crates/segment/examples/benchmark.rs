@@ -4,7 +4,7 @@
 //! ROOT has `off/<id>.off` and `seg/<id>/<id>_<k>.seg`, or is a single model, which is timed. Errors are 1 − Rand
 //! index by faces. `people` gives each model's median number of people's parts as `n_parts`; `only=N` takes each
 //! N-th model; `each` tells of every model; METHOD `trace` tells of every cut of `random_cuts` and the error before
-//! it.
+//! it; METHOD `plane` tells of a single model how far its best plane of symmetry is off, in the box's diagonal.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -14,6 +14,7 @@ use std::time::Instant;
 use serde_json::{Value, from_value, json};
 use shellock_geom::TriMesh;
 use shellock_segment::coarse::Coarse;
+use shellock_segment::symmetry::nearest_plane;
 use shellock_segment::{auto, kmeans, primitives, random_cuts, sdf};
 
 fn main() {
@@ -27,6 +28,16 @@ fn main() {
         .map_or(json!({}), |a| serde_json::from_str(a).expect("JSON"));
     if root.is_file() {
         let mesh = read(root);
+        if method == "plane" {
+            let simple = Coarse::new(&mesh, random_cuts::RandomCutsParams::default().n_faces).mesh;
+            let start = Instant::now();
+            println!(
+                "{:.4?}, {:.2} s",
+                nearest_plane(&simple),
+                start.elapsed().as_secs_f64()
+            );
+            return;
+        }
         let (labels, seconds) = timed(method, params, &mesh);
         println!(
             "{} faces, {} parts, {seconds:.2} s",

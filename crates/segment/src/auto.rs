@@ -13,10 +13,8 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::TriMesh;
 
 use crate::coarse::Coarse;
-use crate::face_graph::FaceGraph;
 use crate::kmeans::{self, KMeansParams};
-use crate::parts::connected;
-use crate::random_cuts::{RandomCutsParams, hierarchy_keeping};
+use crate::random_cuts::{Divided, RandomCutsParams, divide_among};
 use crate::sdf::{self, SdfParams};
 use crate::shape_diameter::{diameters_mm, normalised};
 use crate::whole::Whole;
@@ -45,23 +43,12 @@ impl AutoParams {
 ///
 /// A mesh without a place where a cut is worth its while, as a ball, is one part.
 pub fn divide(params: &AutoParams, mesh: &TriMesh) -> Vec<u32> {
-    divide_keeping(params, mesh, &Whole::default())
+    divide_keeping(params, mesh, &Whole::default()).part_of_face
 }
 
-/// The same where no border divides a set of `whole`.
-pub fn divide_keeping(params: &AutoParams, mesh: &TriMesh, whole: &Whole) -> Vec<u32> {
-    let fine = FaceGraph::new(mesh);
-    let coarse = Coarse::new(mesh, params.cuts.n_faces);
-    let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, coarse.graph.n_faces());
-    let mut proposals = proposals(params, &coarse);
-    for labels in &mut proposals {
-        on_coarse.gather(labels, &coarse.graph.area_mm2);
-    }
-    let found = hierarchy_keeping(&params.cuts, &coarse.graph, &proposals, &on_coarse);
-    let labels = found.labels(&coarse.graph, found.n_steps(&params.cuts));
-    let mut labels = coarse.bring_back(&fine, &labels);
-    whole.gather(&mut labels, &fine.area_mm2);
-    connected(&fine, &labels).0
+/// The same where no border divides a set of `whole`, which goes before symmetry.
+pub fn divide_keeping(params: &AutoParams, mesh: &TriMesh, whole: &Whole) -> Divided {
+    divide_among(&params.cuts, mesh, whole, |coarse| proposals(params, coarse))
 }
 
 /// Divisions of the coarse mesh by other methods.

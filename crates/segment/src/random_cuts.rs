@@ -29,8 +29,10 @@ use crate::border::prices;
 use crate::coarse::Coarse;
 use crate::face_graph::FaceGraph;
 use crate::max_flow::{FlowGraph, Terminal};
+use crate::mirrored::Mirrored;
 use crate::params::{no_parts, outside};
 use crate::parts::connected;
+use crate::symmetry::{self, Plane};
 use crate::whole::Whole;
 
 /// By how much a concavity of a radian makes the way over an edge longer, for the choice of seeds.
@@ -64,6 +66,8 @@ pub struct RandomCutsParams {
     pub balance: f64,
     /// Parts wanted; `None`: until no cut is worth it.
     pub n_parts: Option<usize>,
+    /// Whether the division is to be the same on both sides of the plane of symmetry, where the model has one; no.
+    pub symmetric: bool,
     /// Seed of all random choices; 0.
     pub seed: u64,
 }
@@ -77,6 +81,7 @@ impl Default for RandomCutsParams {
             least_worth_share: 0.2,
             balance: 0.3,
             n_parts: None,
+            symmetric: false,
             seed: 0,
         }
     }
@@ -97,21 +102,56 @@ impl RandomCutsParams {
     }
 }
 
-/// A part for each face of `mesh`, by random cuts.
-pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
-    divide_keeping(params, mesh, &Whole::default())
+/// A division, and what it is the same on both sides of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Divided {
+    /// A part for each face.
+    pub part_of_face: Vec<u32>,
+    /// The plane of symmetry; `None` where there is none, or none was asked for.
+    pub plane: Option<Plane>,
 }
 
-/// The same where no border divides a set of `whole`.
-pub fn divide_keeping(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Vec<u32> {
+/// A part for each face of `mesh`, by random cuts.
+pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
+    divide_keeping(params, mesh, &Whole::default()).part_of_face
+}
+
+/// The same where no border divides a set of `whole`, which goes before symmetry.
+pub fn divide_keeping(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Divided {
+    divide_among(params, mesh, whole, |_| Vec::new())
+}
+
+/// The same where divisions of the coarse mesh by other methods stand for election, too.
+pub(crate) fn divide_among(
+    params: &RandomCutsParams,
+    mesh: &TriMesh,
+    whole: &Whole,
+    proposals: impl Fn(&Coarse) -> Vec<Vec<u32>>,
+) -> Divided {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);
-    let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, coarse.graph.n_faces());
-    let found = hierarchy_keeping(params, &coarse.graph, &[], &on_coarse);
-    let labels = found.labels(&coarse.graph, found.n_steps(params));
-    let mut labels = coarse.bring_back(&fine, &labels);
+    let graph = &coarse.graph;
+    let on_coarse = whole.on_coarse(&coarse.of_face, &fine.area_mm2, graph.n_faces());
+    let plane = params.symmetric.then(|| symmetry::plane(&coarse.mesh)).flatten();
+    let mut proposals = proposals(&coarse);
+    for labels in &mut proposals {
+        on_coarse.gather(labels, &graph.area_mm2);
+    }
+    let found = hierarchy_keeping(params, graph, &proposals, &on_coarse);
+    let mut labels = match &plane {
+        Some(plane) => {
+            let mirrored = Mirrored::new(plane, &coarse.mesh, graph);
+            let labels = coarse.bring_back(&fine, &found.mirrored(params, graph, &mirrored));
+            // Borders have settled on each side by itself.
+            Mirrored::new(plane, mesh, &fine).labels(&fine, &labels)
+        }
+        None => coarse.bring_back(&fine, &found.labels(graph, found.n_steps(params))),
+    };
     whole.gather(&mut labels, &fine.area_mm2);
-    connected(&fine, &labels).0
+    Divided {
+        part_of_face: connected(&fine, &labels).0,
+        plane,
+    }
 }
 
 /// A part for each face of `graph`, which is small.
@@ -197,6 +237,18 @@ impl Hierarchy {
             })
             .collect();
         connected(graph, &labels).0
+    }
+
+    /// The parts after as many cuts as `params` asks for, made the same on both sides; after fewer, where images
+    /// make them more than were asked for.
+    fn mirrored(&self, params: &RandomCutsParams, graph: &FaceGraph, mirrored: &Mirrored) -> Vec<u32> {
+        let most = params.n_parts.unwrap_or(usize::MAX).max(self.n_components);
+        let after = |n_steps: usize| mirrored.labels(graph, &self.labels(graph, n_steps));
+        let n_parts = |labels: &[u32]| labels.iter().max().map_or(0, |&l| l as usize + 1);
+        let mut fewer = (0..=self.n_steps(params)).rev().map(after);
+        fewer
+            .find(|labels| n_parts(labels) <= most)
+            .unwrap_or_else(|| after(0))
     }
 }
 

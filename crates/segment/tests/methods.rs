@@ -256,8 +256,8 @@ fn no_border_of_cuts_divides_what_is_kept_whole() {
         .filter(|&f| mesh.face_center(f as usize).z.abs() < 4.0)
         .collect();
     let whole = Whole::new(mesh.triangles.len(), [neck.clone()]);
-    let by_auto = auto::divide_keeping(&AutoParams::default(), &mesh, &whole);
-    let by_cuts = random_cuts::divide_keeping(&RandomCutsParams::default(), &mesh, &whole);
+    let by_auto = auto::divide_keeping(&AutoParams::default(), &mesh, &whole).part_of_face;
+    let by_cuts = random_cuts::divide_keeping(&RandomCutsParams::default(), &mesh, &whole).part_of_face;
     for labels in [by_auto, by_cuts] {
         assert!(
             neck.iter()

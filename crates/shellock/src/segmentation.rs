@@ -29,7 +29,7 @@ pub(crate) use creases::usual_n_pieces;
 pub use error::SegmentationError;
 pub(crate) use keep_whole::whole;
 pub use keep_whole::{KeepWhole, resolved};
-pub use method::{Method, automatic_labels};
+pub use method::{Method, automatic_labels, symmetry_plane};
 use method::{automatic_on, creases_on};
 pub use refine::refine;
 pub use smooth::smooth_and_cut;
@@ -57,6 +57,8 @@ pub struct SegmentationParams {
     pub n_pieces: Option<usize>,
     /// Regions that no seam is to divide; none.
     pub keep_whole: Vec<KeepWhole>,
+    /// Whether [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry alike; no.
+    pub symmetric: bool,
     /// Seed of all random choices; 0.
     pub seed: u64,
     /// Diffusion that smooths the seams, mm². [0, 100]; 7: rounds off what is narrower than its root, 2.6 mm,
@@ -86,6 +88,7 @@ impl Default for SegmentationParams {
             method: Method::default(),
             n_pieces: None,
             keep_whole: Vec::new(),
+            symmetric: false,
             seed: 0,
             smoothing_mm2: 7.0,
             min_contact_mm: 9.0,
@@ -219,6 +222,10 @@ pub fn segment(
         ..params.clone()
     };
     let given = labels.map(|l| user_labels(ctx, params, solid, l)).transpose()?;
+    if given.is_none() && params.symmetric && !params.method.knows_symmetry() {
+        let method = params.method.name();
+        ctx.note(&format!("{method} knows no symmetry: auto and random-cuts do"));
+    }
     let (fine, source_face) = halve_long_edges(params, solid);
     let ground = Ground::keeping(params, &fine, &source_face);
     let mut surface = match given {

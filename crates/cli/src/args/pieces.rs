@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use clap::ValueEnum;
+
 /// How many pieces are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pieces {
@@ -33,6 +35,13 @@ impl FromStr for Pieces {
                 .map_err(|_| "give a number of pieces, auto or fits-bed".to_owned()),
         }
     }
+}
+
+/// Whether both sides are divided alike.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Symmetric {
+    On,
+    Off,
 }
 
 /// Where the key comes from.

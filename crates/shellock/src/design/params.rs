@@ -26,6 +26,8 @@ pub struct Params {
     pub n_pieces: Option<usize>,
     /// Regions that no seam is to divide; none.
     pub keep_whole: Vec<KeepWhole>,
+    /// Whether [`Method::Auto`] and [`Method::RandomCuts`] divide both sides of a model's plane of symmetry alike; no.
+    pub symmetric: bool,
     /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
     /// Where the wall's thickness comes from; 2 mm.
@@ -63,6 +65,7 @@ impl Default for Params {
             method: Method::default(),
             n_pieces: None,
             keep_whole: Vec::new(),
+            symmetric: false,
             up: [0.0, 0.0, 1.0],
             thickness: Thickness::default(),
             material: Material::default(),

@@ -147,6 +147,7 @@ fn segmentation(params: &Params) -> SegmentationParams {
         method: params.method,
         n_pieces: params.n_pieces,
         keep_whole: params.keep_whole.clone(),
+        symmetric: params.symmetric,
         seed: params.seed,
         ..SegmentationParams::default()
     }

@@ -24,7 +24,7 @@ use shellock_geom::topology::components;
 use shellock_geom::{Topology, Vec3};
 
 pub use cone::Cone;
-pub use mirror::Mirror;
+pub use shellock_segment::symmetry::Plane;
 
 use super::split::euler_characteristics;
 use crate::{Adjacency, ContactGraph, PatchId, SegmentedSurface};
@@ -39,7 +39,7 @@ pub struct FigureParams {
     /// Shortest stretch of seam that counts as a contact. [0, 100]; 9, as pieces are divided for.
     pub min_contact_mm: f64,
     /// The plane that the model is alike on both sides of, if there is one.
-    pub mirror: Option<Mirror>,
+    pub mirror: Option<Plane>,
 }
 
 impl Default for FigureParams {
@@ -155,7 +155,7 @@ pub fn figures(params: &FigureParams, surface: &SegmentedSurface) -> DivisionFig
     let bvh = TriangleBvh::new(&surface.mesh);
     let pieces = pieces(surface, &topology);
     let areas: Vec<f64> = pieces.iter().map(|p| p.area_mm2).collect();
-    let mirrored = |mirror: &Mirror| mirror::mirrored_share(mirror, surface, &bvh);
+    let mirrored = |plane: &Plane| mirror::mirrored_share(plane, surface, &bvh);
     DivisionFigures {
         n_pieces: surface.n_patches,
         area_mm2: Spread::of(areas),

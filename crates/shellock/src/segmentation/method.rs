@@ -3,14 +3,17 @@
 use serde::{Deserialize, Serialize};
 use shellock_geom::{Solid, TriMesh};
 use shellock_segment::auto::AutoParams;
+use shellock_segment::coarse::Coarse;
 use shellock_segment::kmeans::KMeansParams;
 use shellock_segment::primitives::PrimitivesParams;
-use shellock_segment::random_cuts::RandomCutsParams;
+use shellock_segment::random_cuts::{Divided, RandomCutsParams};
 use shellock_segment::sdf::SdfParams;
+use shellock_segment::symmetry::{self, Plane};
 use shellock_segment::whole::Whole;
 use shellock_segment::{auto, kmeans, primitives, random_cuts, sdf};
 
 use super::creases::crease_labels;
+use super::halve::halve_long_edges;
 use super::keep_whole::gathered;
 use super::refine::Ground;
 use super::user::user_labels;
@@ -67,16 +70,28 @@ impl Method {
         Self::ALL.into_iter().find(|method| method.name() == name)
     }
 
+    /// Whether it can divide both sides of a model alike.
+    pub fn knows_symmetry(self) -> bool {
+        matches!(self, Self::Auto | Self::RandomCuts)
+    }
+
     /// A part for each face; `None` for patches in creases, which are not found on meshes alone.
-    fn parts(self, n_parts: Option<usize>, seed: u64, mesh: &TriMesh, whole: &Whole) -> Option<Vec<u32>> {
+    fn parts(self, params: &SegmentationParams, mesh: &TriMesh, whole: &Whole) -> Option<Divided> {
+        let SegmentationParams {
+            n_pieces: n_parts,
+            seed,
+            symmetric,
+            ..
+        } = *params;
         let cuts = RandomCutsParams {
             n_parts,
+            symmetric,
             seed,
             ..RandomCutsParams::default()
         };
-        Some(match self {
-            Self::Auto => auto::divide_keeping(&AutoParams { cuts }, mesh, whole),
-            Self::RandomCuts => random_cuts::divide_keeping(&cuts, mesh, whole),
+        let part_of_face = match self {
+            Self::Auto => return Some(auto::divide_keeping(&AutoParams { cuts }, mesh, whole)),
+            Self::RandomCuts => return Some(random_cuts::divide_keeping(&cuts, mesh, whole)),
             Self::Sdf => {
                 let params = SdfParams {
                     n_parts,
@@ -100,8 +115,30 @@ impl Method {
                 kmeans::divide(&params, mesh)
             }
             Self::Creases => return None,
+        };
+        Some(Divided {
+            part_of_face,
+            plane: None,
         })
     }
+}
+
+/// The plane that `solid` is about the same on both sides of, which a division may be, too; `None` where there is
+/// none ([`symmetry::plane`]).
+pub fn symmetry_plane(params: &SegmentationParams, solid: &Solid) -> Option<Plane> {
+    let (fine, _) = halve_long_edges(params, solid);
+    symmetry::plane(&Coarse::new(fine.mesh(), RandomCutsParams::default().n_faces).mesh)
+}
+
+/// What a division that was to be the same on both sides is the same about.
+fn told(plane: Option<Plane>) -> String {
+    let Some(Plane { at, normal }) = plane else {
+        return "no plane of symmetry is found: both sides are divided as they are".to_owned();
+    };
+    format!(
+        "symmetric about the plane through ({:.1}, {:.1}, {:.1}) mm, normal ({:.3}, {:.3}, {:.3})",
+        at.x, at.y, at.z, normal.x, normal.y, normal.z
+    )
 }
 
 /// Patches by the method of `params`: connected, none too small; the same for the same seed.
@@ -133,13 +170,14 @@ pub(super) fn automatic_on(
     solid: &Solid,
     whole: &Whole,
 ) -> Result<Option<FaceLabels>, SegmentationError> {
-    let found = params
-        .method
-        .parts(params.n_pieces, params.seed, solid.mesh(), whole);
-    let Some(mut parts) = found else {
+    let Some(found) = params.method.parts(params, solid.mesh(), whole) else {
         return creases_on(ctx, params, solid, whole).map(Some);
     };
     ctx.check()?;
+    if params.symmetric && params.method.knows_symmetry() {
+        ctx.note(&told(found.plane));
+    }
+    let mut parts = found.part_of_face;
     let mesh = solid.mesh();
     let area_mm2: Vec<f64> = (0..parts.len()).map(|f| mesh.face_area(f)).collect();
     whole.gather(&mut parts, &area_mm2);

@@ -475,3 +475,34 @@ fn regions_that_cannot_be_kept_whole_are_refused_in_words() {
     };
     assert_eq!(bad.problems().len(), 1);
 }
+
+/// The arms are about the same on both sides of x = 0, and of the plane between y and z.
+#[test]
+fn a_symmetric_division_tells_its_plane_and_a_method_without_says_so() {
+    let solid = limbed();
+    let notes = |method: Method| {
+        let params = SegmentationParams {
+            method,
+            symmetric: true,
+            ..SegmentationParams::default()
+        };
+        let told = std::sync::Mutex::new(Vec::new());
+        let report = |p: crate::context::Progress<'_>| {
+            if let crate::context::Progress::Note(text) = p {
+                told.lock().unwrap().push(text.to_owned());
+            }
+        };
+        let stop = std::sync::atomic::AtomicBool::new(false);
+        segment(&Ctx::new(&report, &stop), &params, &solid, None).unwrap();
+        told.into_inner().unwrap().join("\n")
+    };
+    for method in [Method::Auto, Method::RandomCuts] {
+        assert!(
+            notes(method).contains("symmetric about the plane through"),
+            "{method:?}"
+        );
+    }
+    let other = notes(Method::Creases);
+    assert!(other.contains("creases knows no symmetry"), "{other}");
+    assert!(symmetry_plane(&SegmentationParams::default(), &solid).is_some());
+}

@@ -1,33 +1,17 @@
 //! Whether a division is as symmetric as its model.
 
 use rayon::prelude::*;
-use shellock_geom::Vec3;
 use shellock_geom::bvh::TriangleBvh;
+use shellock_segment::symmetry::Plane;
 
 use crate::SegmentedSurface;
 
-/// A plane that a model is alike on both sides of.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mirror {
-    /// A point of it, mm.
-    pub at: Vec3,
-    /// Its unit normal.
-    pub normal: Vec3,
-}
-
-impl Mirror {
-    /// The mirror image of a point.
-    pub fn image(&self, point: Vec3) -> Vec3 {
-        point - 2.0 * (point - self.at).dot(self.normal) * self.normal
-    }
-}
-
 /// Share of the area whose mirror image (the nearest point to it) lies in its piece's image: the piece that most of
 /// a piece's image lies in, where it is so the other way round, too.
-pub(super) fn mirrored_share(mirror: &Mirror, surface: &SegmentedSurface, bvh: &TriangleBvh) -> f64 {
+pub(super) fn mirrored_share(plane: &Plane, surface: &SegmentedSurface, bvh: &TriangleBvh) -> f64 {
     let (mesh, n) = (&surface.mesh, surface.n_patches);
     let beyond = |face: usize| {
-        let nearest = bvh.nearest(mirror.image(mesh.face_center(face)), f64::INFINITY);
+        let nearest = bvh.nearest(plane.image(mesh.face_center(face)), f64::INFINITY);
         nearest.map_or(face, |found| found.face as usize)
     };
     let images: Vec<usize> = (0..mesh.triangles.len()).into_par_iter().map(beyond).collect();

@@ -171,7 +171,7 @@ fn who_alone_holds_others_is_named() {
 fn halves_mirror_each_other_or_themselves_and_a_cap_on_one_side_does_not() {
     let mirrored = |patch_at: &dyn Fn(Vec3) -> u32| {
         let params = FigureParams {
-            mirror: Some(Mirror {
+            mirror: Some(Plane {
                 at: Vec3::ZERO,
                 normal: Vec3::X,
             }),
