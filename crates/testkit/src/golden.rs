@@ -93,7 +93,9 @@ pub const FIGURES: [Case; 5] = [
     },
     Case {
         name: "cat, failed",
-        args: &["demo", "--figure", "cat", "--size", "40", "--pieces", "40"],
+        args: &[
+            "demo", "--figure", "cat", "--size", "40", "--pieces", "40", "--method", "creases",
+        ],
     },
 ];
 
