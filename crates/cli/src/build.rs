@@ -15,7 +15,7 @@ use shellock::verify::words::PlaceWords;
 use shellock::{Ctx, Warning, play};
 
 use crate::Session;
-use crate::args::{Options, Out};
+use crate::args::{Options, Out, Pieces};
 use crate::bears;
 use crate::bed::{fitted, too_large};
 use crate::failure::Failure;
@@ -43,7 +43,12 @@ pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Res
 
 /// `shellock demo`.
 pub fn demo(session: &Session, figure: &str, options: &Options, out: Out) -> Result<u8, Failure> {
-    let params = checked(options)?;
+    /// Pieces of the squirrel where none are asked for: fewer than usual, which lock sooner.
+    const OF_SQUIRREL: usize = 7;
+    let mut params = checked(options)?;
+    if figure == "squirrel" && options.pieces == Pieces::Auto {
+        params.n_pieces = Some(OF_SQUIRREL);
+    }
     let to = Destination::new(
         out.out.unwrap_or_else(|| PathBuf::from("shellock-demo")),
         out.force,
