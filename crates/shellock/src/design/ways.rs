@@ -7,7 +7,7 @@ use shellock_geom::Solid;
 
 use super::budget::{RESERVE, THICKER_WALLS};
 use super::wall::Wall;
-use super::{DesignError, DesignOutcome, Effort, Job, Params, Rounds, Walled, with_wall};
+use super::{DesignError, DesignOutcome, Effort, Job, KeySource, Params, Rounds, Walled, with_wall};
 use crate::Ctx;
 use crate::segmentation::{Method, usual_n_pieces};
 
@@ -39,7 +39,9 @@ pub(super) fn ways(input: &Input<'_>) -> Vec<Way> {
         method: params.method,
         n_pieces: params.n_pieces,
     };
-    if params.method != Method::Auto || input.labels.is_some() {
+    // A piece that is named as the key has its number in this division alone.
+    let has_named_key = matches!(params.key, KeySource::Piece(_));
+    if params.method != Method::Auto || input.labels.is_some() || has_named_key {
         return vec![own];
     }
     let n_coarser = COARSER * usual_n_pieces(input.model.mesh().area()) as f64;
