@@ -23,20 +23,55 @@ pub fn prices(graph: &FaceGraph) -> Vec<f64> {
 ///
 /// Pair by pair, in the order of the labels: faces of the two within the band are free, all others are not.
 pub fn settle(graph: &FaceGraph, band_mm: f64, labels: &mut [u32]) {
-    let price = prices(graph);
-    let mut seeds: BTreeMap<[u32; 2], BTreeSet<u32>> = BTreeMap::new();
-    for crease in &graph.creases {
-        let [a, b] = crease.faces.map(|f| labels[f as usize]);
-        if a != b {
-            seeds
-                .entry([a.min(b), a.max(b)])
-                .or_default()
-                .extend(crease.faces);
+    Settler::new(graph).settle(band_mm, labels, |_, _| true);
+}
+
+/// A graph and what its borders cost.
+pub struct Settler<'a> {
+    graph: &'a FaceGraph,
+    price: Vec<f64>,
+}
+
+impl<'a> Settler<'a> {
+    /// With the prices of [`prices`].
+    pub fn new(graph: &'a FaceGraph) -> Self {
+        Self {
+            price: prices(graph),
+            graph,
         }
     }
-    let mut distance = vec![f64::INFINITY; graph.n_faces()];
-    for (pair, seeds) in seeds {
-        settle_pair(graph, band_mm, &price, pair, &seeds, &mut distance, labels);
+
+    /// The same as [`settle`]; a pair's border stays where `allows`, which is given the labels after the
+    /// move and the pair, does not allow it.
+    pub fn settle(&self, band_mm: f64, labels: &mut [u32], mut allows: impl FnMut(&[u32], [u32; 2]) -> bool) {
+        let mut seeds: BTreeMap<[u32; 2], BTreeSet<u32>> = BTreeMap::new();
+        for crease in &self.graph.creases {
+            let [a, b] = crease.faces.map(|f| labels[f as usize]);
+            if a != b {
+                seeds
+                    .entry([a.min(b), a.max(b)])
+                    .or_default()
+                    .extend(crease.faces);
+            }
+        }
+        let mut distance = vec![f64::INFINITY; self.graph.n_faces()];
+        let mut moved = labels.to_vec();
+        for (pair, seeds) in seeds {
+            settle_pair(
+                self.graph,
+                band_mm,
+                &self.price,
+                pair,
+                &seeds,
+                &mut distance,
+                &mut moved,
+            );
+            if allows(&moved, pair) {
+                labels.copy_from_slice(&moved);
+            } else {
+                moved.copy_from_slice(labels);
+            }
+        }
     }
 }
 

@@ -62,22 +62,27 @@ pub fn design(
 ) -> Result<DesignOutcome, DesignError> {
     let params = &resolved(params, model, labels)?;
     let thinnest = Wall::decide(ctx, params, model)?;
-    let mut effort = Effort::default();
     let input = Input {
         params,
         model,
         labels,
     };
-    let ways = ways::ways(&input);
+    one_way_or_another(ctx, &input, &thinnest)
+}
+
+/// The first kit that passes of all ways to divide the model in turn; the best where none does.
+fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<DesignOutcome, DesignError> {
+    let ways = ways::ways(input);
+    let mut effort = Effort::default();
     let mut best: Option<Ended> = None;
     for (i, &way) in ways.iter().enumerate() {
-        if i > 0 {
-            ctx.note(&format!("no kit of these pieces passes; now {}", way.words()));
+        if let Some(before) = &best {
+            ctx.note(&format!("{}; now {}", before.words(), way.words()));
         }
         let is_last = i + 1 == ways.len();
-        let few = params.rounds.least(&ROUNDS_BESIDE_OTHERS);
-        let rounds = if is_last { params.rounds } else { few };
-        let ended = with_reserve(ctx, &input, &thinnest.divided(way), rounds, &mut effort);
+        let few = input.params.rounds.least(&ROUNDS_BESIDE_OTHERS);
+        let rounds = if is_last { input.params.rounds } else { few };
+        let ended = with_reserve(ctx, input, &thinnest.divided(way), rounds, &mut effort);
         let ended = match best {
             Some(before) => before.or(ended),
             None => ended,

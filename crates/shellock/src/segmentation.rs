@@ -16,9 +16,12 @@ mod halve;
 mod keep_whole;
 mod method;
 mod refine;
+mod settle;
 mod smooth;
 mod split;
 mod user;
+
+use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::topology::components;
@@ -40,6 +43,7 @@ use changes::Changes;
 use fewer::{disagreement, with_fewer_parts};
 use halve::halve_long_edges;
 use refine::{Ground, refine_on};
+use settle::settled;
 
 use crate::{Ctx, PatchId, SegmentedSurface};
 
@@ -408,7 +412,9 @@ fn best_contacts(
         let shorter = SHORTER_COST * i as f64;
         let limit = best.as_ref().map_or(limit, |b| b.0);
         let is_too_dear = |mended: &FaceLabels| origin.least_cost(labels, mended) + shorter >= limit;
-        if let Some((faults, surface)) = held_twice(ctx, &limited, ground, labels.clone(), is_too_dear)? {
+        if let Some((faults, surface)) =
+            held_twice(ctx, &limited, ground, labels.clone(), origin, is_too_dear)?
+        {
             let cost = FAULT_COST * faults as f64 + origin.cost(labels, &surface) + shorter;
             if cost < limit {
                 best = Some((cost, surface));
@@ -431,6 +437,7 @@ fn held_twice(
     params: &SegmentationParams,
     ground: &Ground<'_>,
     mut labels: FaceLabels,
+    origin: LabelOrigin<'_>,
     is_too_dear: impl Fn(&FaceLabels) -> bool,
 ) -> Result<Option<(usize, SegmentedSurface)>, SegmentationError> {
     let mut strict = params.clone();
@@ -440,7 +447,11 @@ fn held_twice(
         if is_too_dear(&labels) {
             break;
         }
-        let surface = smooth_and_cut(ctx, params, ground.solid, &labels)?;
+        let settled = match origin {
+            LabelOrigin::Drawn { .. } => Cow::Owned(settled(&strict, ground, &labels)),
+            _ => Cow::Borrowed(&labels),
+        };
+        let surface = smooth_and_cut(ctx, params, ground.solid, &settled)?;
         let faults = surface
             .contact_graph_below(params.wall_mm, params.min_contact_mm)
             .n_faults();

@@ -86,6 +86,14 @@ impl Ended {
         }
     }
 
+    /// Why something else is to be tried, for people.
+    pub fn words(&self) -> String {
+        match &self.outcome {
+            Ok(_) => "no kit of these pieces passes".into(),
+            Err(e) => format!("these pieces cannot be made: {e}"),
+        }
+    }
+
     /// This, or what was tried after it, if that is better.
     pub fn or(self, later: Self) -> Self {
         let is_worse = match (&self.outcome, &later.outcome) {
@@ -166,5 +174,71 @@ fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut 
         outcome,
         was_thicker: wall.is_thicker(),
         is_late,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::Vec3;
+
+    use super::*;
+    use crate::testing::sphere;
+
+    fn ways_of(change: impl Fn(&mut Params), labels: Option<&[i64]>) -> Vec<Way> {
+        let model = Solid::new(sphere(3, Vec3::splat(50.0))).expect("closed");
+        let mut params = Params {
+            method: Method::Auto,
+            ..Params::default()
+        };
+        change(&mut params);
+        ways(&Input {
+            params: &params,
+            model: &model,
+            labels,
+        })
+    }
+
+    #[test]
+    fn fewer_pieces_come_second_and_pieces_of_similar_size_last() {
+        let ways = ways_of(|_| (), None);
+        let methods: Vec<Method> = ways.iter().map(|w| w.method).collect();
+        assert_eq!(methods, [Method::Auto, Method::Auto, Method::Creases]);
+        let usual = usual_n_pieces(4.0 * std::f64::consts::PI * 50.0 * 50.0);
+        assert_eq!(ways[0].n_pieces, None);
+        assert!(ways[1].n_pieces.is_some_and(|n| n < usual && n >= 2));
+    }
+
+    #[test]
+    fn a_number_of_pieces_that_is_asked_for_is_kept_by_every_way() {
+        let ways = ways_of(|p| p.n_pieces = Some(7), None);
+        assert_eq!(ways.len(), 2);
+        assert!(ways.iter().all(|w| w.n_pieces == Some(7)));
+    }
+
+    #[test]
+    fn what_the_user_says_of_the_division_is_the_only_way() {
+        assert_eq!(ways_of(|p| p.method = Method::Creases, None).len(), 1);
+        assert_eq!(ways_of(|p| p.key = KeySource::Piece(2), None).len(), 1);
+        assert_eq!(ways_of(|_| (), Some(&[0; 1280])).len(), 1);
+    }
+
+    #[test]
+    fn a_kit_stays_where_what_is_tried_after_it_cannot_be_made() {
+        let ended = |outcome| Ended {
+            outcome,
+            was_thicker: false,
+            is_late: false,
+        };
+        let no_plan = |reason: &str| {
+            ended(Ok(DesignOutcome::NoPlan {
+                reason: reason.into(),
+                blockers: Vec::new(),
+            }))
+        };
+        let error = || ended(Err(DesignError::NoLabelOfKey(3)));
+        assert!(no_plan("first").or(error()).outcome.is_ok());
+        assert!(error().or(no_plan("second")).outcome.is_ok());
+        let stopped = ended(Err(DesignError::Cancelled(crate::Cancelled)));
+        assert!(no_plan("first").or(stopped).outcome.is_err());
     }
 }

@@ -79,19 +79,7 @@ pub(super) fn refine_on(
     ground: &Ground<'_>,
     labels: &FaceLabels,
 ) -> Result<FaceLabels, SegmentationError> {
-    let divider = Divider {
-        mesh: ground.solid.mesh(),
-        topology: &ground.topology,
-        faces: &ground.faces,
-        whole: &ground.whole,
-        min_piece_mm2: SPLIT_RESERVE * params.min_piece_mm2,
-    };
-    let mut work = Work {
-        divider,
-        label: labels.as_slice().to_vec(),
-        n_patches: labels.n_patches(),
-        min_contact_mm: params.min_contact_mm * ZIGZAG,
-    };
+    let mut work = Work::new(params, ground, labels);
     let mut best = (work.n_faults(), work.labels());
     let mut n_idle = 0;
     for _ in 0..params.max_splits {
@@ -114,6 +102,11 @@ pub(super) fn refine_on(
         }
     }
     Ok(best.1)
+}
+
+/// What is wrong with `labels`: pieces that hold others alone, and patches that are no disks.
+pub(super) fn n_faults(params: &SegmentationParams, ground: &Ground<'_>, labels: &FaceLabels) -> usize {
+    Work::new(params, ground, labels).n_faults()
 }
 
 struct Work<'a> {
@@ -146,7 +139,22 @@ fn weakest_link(work: &Work, graph: &ContactGraph) -> Option<(u32, u32)> {
     Some((inner.0, outer.0))
 }
 
-impl Work<'_> {
+impl<'a> Work<'a> {
+    fn new(params: &SegmentationParams, ground: &'a Ground<'_>, labels: &FaceLabels) -> Self {
+        Self {
+            divider: Divider {
+                mesh: ground.solid.mesh(),
+                topology: &ground.topology,
+                faces: &ground.faces,
+                whole: &ground.whole,
+                min_piece_mm2: SPLIT_RESERVE * params.min_piece_mm2,
+            },
+            label: labels.as_slice().to_vec(),
+            n_patches: labels.n_patches(),
+            min_contact_mm: params.min_contact_mm * ZIGZAG,
+        }
+    }
+
     fn labels(&self) -> FaceLabels {
         FaceLabels {
             patch_of_face: self.label.clone(),
