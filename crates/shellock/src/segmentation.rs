@@ -21,8 +21,6 @@ mod smooth;
 mod split;
 mod user;
 
-use std::borrow::Cow;
-
 use serde::{Deserialize, Serialize};
 use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology};
@@ -447,11 +445,10 @@ fn held_twice(
         if is_too_dear(&labels) {
             break;
         }
-        let settled = match origin {
-            LabelOrigin::Drawn { .. } => Cow::Owned(settled(&strict, ground, &labels)),
-            _ => Cow::Borrowed(&labels),
+        let surface = match origin {
+            LabelOrigin::Drawn { .. } => settled_surface(ctx, &strict, ground, &labels)?,
+            _ => smooth_and_cut(ctx, params, ground.solid, &labels)?,
         };
-        let surface = smooth_and_cut(ctx, params, ground.solid, &settled)?;
         let faults = surface
             .contact_graph_below(params.wall_mm, params.min_contact_mm)
             .n_faults();
@@ -464,6 +461,20 @@ fn held_twice(
         strict.min_contact_mm *= STRICTER;
     }
     Ok(best)
+}
+
+/// The surface with its seams settled and smooth, or smooth alone where a patch would vanish.
+fn settled_surface(
+    ctx: &Ctx,
+    params: &SegmentationParams,
+    ground: &Ground<'_>,
+    labels: &FaceLabels,
+) -> Result<SegmentedSurface, SegmentationError> {
+    let settled = settled(params, ground, labels);
+    match smooth_and_cut(ctx, params, ground.solid, &settled) {
+        Err(SegmentationError::PatchVanished { .. }) => smooth_and_cut(ctx, params, ground.solid, labels),
+        made => made,
+    }
 }
 
 /// The same surface with `patch` divided in two, refined and smoothed again; `None` where it cannot be

@@ -11,6 +11,8 @@ use super::{FaceLabels, SegmentationParams};
 
 /// How far seams may move, mm, one round after the other.
 const BANDS_MM: [f64; 2] = [8.0, 4.0];
+/// Share of its area that a piece keeps: where there are no creases the shortest seam is around nothing.
+const LEAST_KEPT: f64 = 0.7;
 
 /// `labels` with their seams settled, but for those whose move would cost a piece or a region that is kept whole, or
 /// add a fault.
@@ -18,10 +20,21 @@ pub(super) fn settled(params: &SegmentationParams, ground: &Ground<'_>, labels: 
     let graph = FaceGraph::new(ground.solid.mesh());
     let settler = border::Settler::new(&graph);
     let mut label = labels.as_slice().to_vec();
+    let areas = |label: &[u32], of: [u32; 2]| {
+        let area = |k: u32| {
+            (0..label.len())
+                .filter(|&f| label[f] == k)
+                .map(|f| graph.area_mm2[f])
+                .sum::<f64>()
+        };
+        of.map(area)
+    };
     let mut n_before = n_faults(params, ground, labels);
     for band_mm in BANDS_MM {
         settler.settle(band_mm, &mut label, |moved, pair| {
-            if ground.whole.is_parted(moved, pair) {
+            let (first, now) = (areas(labels.as_slice(), pair), areas(moved, pair));
+            let is_worn = (0..2).any(|side| now[side] < LEAST_KEPT * first[side]);
+            if is_worn || ground.whole.is_parted(moved, pair) {
                 return false;
             }
             let connected = FaceLabels::from_connected(&ground.topology, moved);
