@@ -31,6 +31,7 @@ const MOSTLY: f64 = 0.5;
 const CRUMB_SHARE: f64 = 0.004;
 
 /// Which face is whose mirror image.
+#[derive(Debug)]
 pub struct Mirrored {
     /// The face on which the image of each face's centre lies; `None` where the surface is far from it.
     image: Vec<Option<u32>>,

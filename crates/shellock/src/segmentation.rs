@@ -14,6 +14,7 @@ mod fewer;
 pub mod figures;
 mod halve;
 mod keep_whole;
+mod mend;
 mod method;
 mod refine;
 mod settle;
@@ -24,6 +25,7 @@ mod user;
 use serde::{Deserialize, Serialize};
 use shellock_geom::topology::components;
 use shellock_geom::{Solid, Topology};
+use shellock_segment::mirrored::Mirrored;
 
 pub use changes::tell;
 pub(crate) use creases::usual_n_pieces;
@@ -40,8 +42,8 @@ pub use user::user_labels;
 use changes::Changes;
 use fewer::{disagreement, with_fewer_parts};
 use halve::halve_long_edges;
+use mend::{held_twice, mirror_images};
 use refine::{Ground, refine_on};
-use settle::settled;
 
 use crate::{Ctx, PatchId, SegmentedSurface};
 
@@ -189,11 +191,6 @@ impl FaceLabels {
     }
 }
 
-/// How often refining is repeated with a stricter limit when smoothing shortened a contact below the limit.
-const MAX_MEND_ROUNDS: usize = 4;
-/// How much stricter each repetition is.
-const STRICTER: f64 = 1.15;
-
 /// Limits that contacts are held against in turn, from `min_contact_mm` down to `least_contact_mm`.
 const N_CONTACT_LIMITS: usize = 3;
 
@@ -293,9 +290,11 @@ fn proposed(
     let wanted = params
         .n_pieces
         .unwrap_or_else(|| usual_n_pieces(ground.solid.mesh().area()));
+    let mirrored = mirror_images(params, ground);
     let origin = LabelOrigin::Drawn {
         labels: &drawn,
         wanted,
+        mirrored: mirrored.as_ref(),
     };
     let mut best: Option<(f64, SegmentedSurface)> = None;
     for labels in with_fewer_parts(ground.solid, &drawn, wanted) {
@@ -321,10 +320,19 @@ enum LabelOrigin<'a> {
     Drawn {
         labels: &'a FaceLabels,
         wanted: usize,
+        /// Which triangle is whose mirror image, where both sides are to be divided alike.
+        mirrored: Option<&'a Mirrored>,
     },
 }
 
 impl LabelOrigin<'_> {
+    fn mirrored(&self) -> Option<&Mirrored> {
+        match self {
+            Self::Drawn { mirrored, .. } => *mirrored,
+            _ => None,
+        }
+    }
+
     /// What the changes from `labels` to `surface` cost, in pieces.
     fn cost(self, labels: &FaceLabels, surface: &SegmentedSurface) -> f64 {
         let (before, after) = (labels.n_patches() as f64, surface.n_patches as f64);
@@ -335,7 +343,7 @@ impl LabelOrigin<'_> {
                 let n_lost = Changes::between(labels, surface).n_lost() as f64;
                 LOST_LABEL_COST * n_lost + (after + n_lost - before)
             }
-            Self::Drawn { labels, wanted } => {
+            Self::Drawn { labels, wanted, .. } => {
                 DISAGREEMENT_COST * disagreement(labels, surface) + excess(surface.n_patches, wanted)
             }
         }
@@ -410,9 +418,7 @@ fn best_contacts(
         let shorter = SHORTER_COST * i as f64;
         let limit = best.as_ref().map_or(limit, |b| b.0);
         let is_too_dear = |mended: &FaceLabels| origin.least_cost(labels, mended) + shorter >= limit;
-        if let Some((faults, surface)) =
-            held_twice(ctx, &limited, ground, labels.clone(), origin, is_too_dear)?
-        {
+        if let Some((faults, surface)) = held_twice(ctx, &limited, ground, labels, origin, is_too_dear)? {
             let cost = FAULT_COST * faults as f64 + origin.cost(labels, &surface) + shorter;
             if cost < limit {
                 best = Some((cost, surface));
@@ -426,55 +432,6 @@ fn best_contacts(
         }
     }
     Ok(best)
-}
-
-/// Mends, smooths and cuts until the smooth seams hold every piece twice; the best round and its faults where
-/// none does. Ends before it cuts what `is_too_dear`.
-fn held_twice(
-    ctx: &Ctx,
-    params: &SegmentationParams,
-    ground: &Ground<'_>,
-    mut labels: FaceLabels,
-    origin: LabelOrigin<'_>,
-    is_too_dear: impl Fn(&FaceLabels) -> bool,
-) -> Result<Option<(usize, SegmentedSurface)>, SegmentationError> {
-    let mut strict = params.clone();
-    let mut best: Option<(usize, SegmentedSurface)> = None;
-    for _ in 0..MAX_MEND_ROUNDS {
-        labels = refine_on(ctx, &strict, ground, &labels)?;
-        if is_too_dear(&labels) {
-            break;
-        }
-        let surface = match origin {
-            LabelOrigin::Drawn { .. } => settled_surface(ctx, &strict, ground, &labels)?,
-            _ => smooth_and_cut(ctx, params, ground.solid, &labels)?,
-        };
-        let faults = surface
-            .contact_graph_below(params.wall_mm, params.min_contact_mm)
-            .n_faults();
-        if best.as_ref().is_none_or(|b| faults < b.0) {
-            best = Some((faults, surface));
-        }
-        if faults == 0 {
-            break;
-        }
-        strict.min_contact_mm *= STRICTER;
-    }
-    Ok(best)
-}
-
-/// The surface with its seams settled and smooth, or smooth alone where a patch would vanish.
-fn settled_surface(
-    ctx: &Ctx,
-    params: &SegmentationParams,
-    ground: &Ground<'_>,
-    labels: &FaceLabels,
-) -> Result<SegmentedSurface, SegmentationError> {
-    let settled = settled(params, ground, labels);
-    match smooth_and_cut(ctx, params, ground.solid, &settled) {
-        Err(SegmentationError::PatchVanished { .. }) => smooth_and_cut(ctx, params, ground.solid, labels),
-        made => made,
-    }
 }
 
 /// The same surface with `patch` divided in two, refined and smoothed again; `None` where it cannot be

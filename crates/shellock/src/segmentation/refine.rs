@@ -5,8 +5,11 @@
 //! [`crate::seam::graph`] for why. Where no division helps, because the seam is too short for two contacts,
 //! what hangs on a piece is joined to it.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 use shellock_geom::{HalfEdge, Solid, Topology};
+use shellock_segment::face_graph::FaceGraph;
 use shellock_segment::whole::Whole;
 
 use super::dual_graph::{CreaseCost, DualGraph};
@@ -51,6 +54,7 @@ pub(super) struct Ground<'a> {
     pub faces: DualGraph,
     /// What no division parts.
     pub whole: Whole,
+    graph: OnceLock<FaceGraph>,
 }
 
 impl<'a> Ground<'a> {
@@ -68,7 +72,13 @@ impl<'a> Ground<'a> {
             whole: whole(keep, solid.mesh(), &topology, source_face, margin_mm),
             faces: DualGraph::of_faces(solid.mesh(), &topology, CreaseCost::NONE),
             topology,
+            graph: OnceLock::new(),
         }
+    }
+
+    /// The triangles and their creases, as methods see them.
+    pub fn graph(&self) -> &FaceGraph {
+        self.graph.get_or_init(|| FaceGraph::new(self.solid.mesh()))
     }
 }
 

@@ -4,7 +4,6 @@
 //! and runs where it is cheapest: its length, less in concave creases ([`border::prices`]).
 
 use shellock_segment::border;
-use shellock_segment::face_graph::FaceGraph;
 
 use super::refine::{Ground, n_faults};
 use super::{FaceLabels, SegmentationParams};
@@ -17,8 +16,8 @@ const LEAST_KEPT: f64 = 0.7;
 /// `labels` with their seams settled, but for those whose move would cost a piece or a region that is kept whole, or
 /// add a fault.
 pub(super) fn settled(params: &SegmentationParams, ground: &Ground<'_>, labels: &FaceLabels) -> FaceLabels {
-    let graph = FaceGraph::new(ground.solid.mesh());
-    let settler = border::Settler::new(&graph);
+    let graph = ground.graph();
+    let settler = border::Settler::new(graph);
     let mut label = labels.as_slice().to_vec();
     let areas = |label: &[u32], of: [u32; 2]| {
         let area = |k: u32| {

@@ -506,3 +506,25 @@ fn a_symmetric_division_tells_its_plane_and_a_method_without_says_so() {
     assert!(other.contains("creases knows no symmetry"), "{other}");
     assert!(symmetry_plane(&SegmentationParams::default(), &solid).is_some());
 }
+
+#[test]
+fn pieces_of_a_symmetric_division_are_more_of_them_each_others_images() {
+    let solid = limbed();
+    let share = |symmetric: bool| {
+        let params = SegmentationParams {
+            method: Method::Auto,
+            symmetric,
+            ..SegmentationParams::default()
+        };
+        let surface = with_ctx(|ctx| segment(ctx, &params, &solid, None)).unwrap();
+        let asked = figures::FigureParams {
+            mirror: symmetry_plane(&params, &solid),
+            ..Default::default()
+        };
+        let found = figures::figures(&asked, &surface);
+        assert_eq!(found.contacts.n_faults, 0);
+        found.mirrored_share.expect("there is a plane")
+    };
+    let (without, with) = (share(false), share(true));
+    assert!(with > 0.85 && with > without + 0.05, "{without} {with}");
+}
