@@ -212,12 +212,18 @@ impl Volume {
         }
     }
 
-    /// Connected boundary surfaces, largest volume first; a cavity comes out as a component of negative
-    /// volume.
+    /// Connected boundary surfaces, largest volume first; a cavity comes out as a component that faces inwards
+    /// ([`signed_volume`](Self::signed_volume)).
     pub fn components(&self) -> Vec<Self> {
         let mut parts: Vec<Self> = self.0.decompose().into_iter().map(Self).collect();
         parts.sort_by(|a, b| b.volume().total_cmp(&a.volume()));
         parts
+    }
+
+    /// Volume enclosed, mm³, negative where the surface faces inwards, as that of a cavity on its own does;
+    /// [`volume`](Self::volume) has no sign.
+    pub fn signed_volume(&self) -> f64 {
+        self.to_mesh().signed_volume()
     }
 
     /// The region bounded by those connected boundary surfaces whose points `keep` accepts.
@@ -434,6 +440,14 @@ mod tests {
         let (inside, outside) = a.split(&b);
         assert!((inside.volume() + outside.volume() - 8.0).abs() < 1e-12);
         assert!((Volume::union_all(vec![a, b, Volume::empty()]).volume() - union).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_cavity_is_a_component_of_negative_volume() {
+        let (block, hole) = (cube(Vec3::ZERO, 4.0), cube(Vec3::splat(1.0), 1.0));
+        let parts = block.subtract(&hole).components();
+        let signed: Vec<f64> = parts.iter().map(Volume::signed_volume).collect();
+        assert_eq!(signed, [64.0, -1.0]);
     }
 
     #[test]

@@ -337,21 +337,17 @@ fn gap_mm(params: &BodyParams, key_side: Option<&[f32]>, n: usize) -> f32 {
     own.unwrap_or(params.seam_gap_mm) as f32
 }
 
-/// The largest connected part of `body`.
+/// The largest connected part of `body`, its cavities filled.
 fn whole_body(ctx: &Ctx, p: PatchId, body: &Volume) -> Volume {
     let parts = body.components();
-    // Cavities come as parts of negative volume; a wall body has none unless the model has.
-    let dropped: f64 = parts
-        .iter()
-        .skip(1)
-        .map(Volume::volume)
-        .filter(|v| *v > 0.0)
-        .sum();
-    if dropped > CHIP_MM3 {
+    // Cavities of their own, as in the knee of a leg, are filled: nothing could run out of them.
+    let chips = || parts.iter().skip(1).filter(|c| c.signed_volume() > 0.0);
+    let dropped_mm3: f64 = chips().map(Volume::volume).sum();
+    if dropped_mm3 > CHIP_MM3 {
         ctx.warn(Warning {
-            cause: Cause::BodyInParts { dropped_mm3: dropped },
+            cause: Cause::BodyInParts { dropped_mm3 },
             pieces: vec![p],
-            at: parts.get(1).map(|c| c.bounds().center().to_array()),
+            at: chips().next().map(|c| c.bounds().center().to_array()),
         });
     }
     parts.into_iter().next().unwrap_or_else(Volume::empty)
