@@ -49,4 +49,4 @@ pub use press_fit::{PressFit, PressFitKind};
 pub use sequence::{InstallationPlan, InstallationStep};
 pub use verdict::{Verdict, verify};
 pub use verify::{Assembly, VerifyParams};
-pub use warning::{Cause, Warning};
+pub use warning::{Cause, Severity, Warning};

@@ -40,6 +40,9 @@ pub struct Cli {
     /// Show no progress; a kit that is made says nothing but what is wrong with it
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// Tell all: every check, note and figure of the plan
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    pub verbose: bool,
     /// Threads to use; the result does not depend on it [default: all]
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,

@@ -6,17 +6,10 @@ use std::sync::atomic::Ordering;
 use serde_json::json;
 use shellock::context::Progress;
 use shellock::design::{Design, DesignOutcome, Params, Settings, design};
-use shellock::metric::Holding;
-use shellock::plan::key::KeyDirections;
-use shellock::plan::{PlanProof, ProofScope};
-use shellock::strength::{Strength, StrengthParams};
-use shellock::verify::Verification;
-use shellock::verify::words::PlaceWords;
-use shellock::{Ctx, Warning, play};
+use shellock::{Ctx, Warning};
 
 use crate::Session;
 use crate::args::{Options, Out, Pieces};
-use crate::bears;
 use crate::bed::{fitted, too_large};
 use crate::failure::Failure;
 use crate::input::{self, Model};
@@ -26,6 +19,7 @@ use crate::place::Standing;
 use crate::printing::Printing;
 use crate::progress::{Deadline, Display, PlanClock, Shown};
 use crate::stopwatch::StageTime;
+use crate::told::{Finished, print_failures, print_warnings};
 
 /// `shellock build`.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {
@@ -164,11 +158,19 @@ fn make(
         };
         print_json(to, &course, &made, &summary, &warnings, &printing, code);
     } else if session.shown == Shown::Nothing {
+        print_warnings(session, &warnings, &standing);
         print_failures(&made.kit.verification, &standing);
-        print_warnings(&warnings, &standing);
     } else {
-        print_text(to, &made, settings, &summary, &warnings, &standing);
-        println!("{}", printing.words());
+        let finished = Finished {
+            to,
+            made: &made,
+            settings,
+            summary: &summary,
+            warnings: &warnings,
+            standing: &standing,
+            printing: &printing,
+        };
+        finished.print(session);
     }
     Ok(code)
 }
@@ -216,197 +218,4 @@ fn print_json(
         "warnings": warnings, "exit_code": code,
     });
     println!("{value}");
-}
-
-fn print_text(
-    to: &Destination,
-    made: &Design,
-    settings: &Settings,
-    summary: &Summary,
-    warnings: &[Warning],
-    standing: &Standing,
-) {
-    println!(
-        "{} pieces, the last is piece {}; walls {:.2} mm; material {:.0} % of the solid model",
-        made.kit.pieces.len(),
-        made.kit.plan.key(),
-        made.kit.thickness_mm,
-        100.0 * summary.volume_ratio
-    );
-    if let Some(strength) = &made.strength {
-        println!("{}", bearing(strength, settings, standing));
-    }
-    println!("{}", quality(&made.kit.proof));
-    bears::lines(&made.kit.holding, standing)
-        .into_iter()
-        .for_each(|line| println!("{line}"));
-    weakest(&made.kit.holding, standing)
-        .into_iter()
-        .for_each(|line| println!("{line}"));
-    println!("pieces sit {}", play::words(&made.kit.play));
-    println!(
-        "connectors on {:.0} % of the seam length that fits any",
-        100.0 * summary.connector_share
-    );
-    if let Some(line) = fits(made) {
-        println!("{line}");
-    }
-    print_verdict(&made.kit.verification, standing);
-    print_warnings(warnings, standing);
-    println!(
-        "written to {}: open report.html in a browser, print plates.3mf",
-        to.folder().display()
-    );
-}
-
-/// What the wall bears, in words.
-pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) -> String {
-    let StrengthParams { drop_m, material, .. } = &settings.strength;
-    let hollow = 100.0 * (1.0 - strength.solid_share());
-    // Hardly anything was judged where hardly anything is hollow.
-    let judged = if hollow < 80.0 {
-        format!(" (judged on the {hollow:.0} % of the surface that are hollow)")
-    } else {
-        String::new()
-    };
-    format!(
-        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the material bears ({})",
-        strength.stress_mpa,
-        material.strength_mpa,
-        standing.words(strength.at.to_array())
-    )
-}
-
-/// How good a plan is, in words.
-pub fn quality(proof: &PlanProof) -> String {
-    let PlanProof {
-        cost,
-        lower_bound,
-        gap,
-        least_cost,
-        key_lower_bound,
-        ..
-    } = proof;
-    let scope = scope(proof);
-    // Bounds that meet the least known cost are proofs; what is left is rounding.
-    let is_met = |bound: &f64| *bound >= least_cost * (1.0 - 1e-9);
-    let chosen = match least_cost < cost {
-        true => {
-            format!("{cost:.3}, chosen since it holds better than those from {least_cost:.3} on; that is")
-        }
-        false => format!("{cost:.3},"),
-    };
-    if is_met(lower_bound) {
-        return format!("plan: its worst piece costs {chosen} proven to be the least with {scope}");
-    }
-    let of_key = if is_met(key_lower_bound) {
-        " the least with its key;"
-    } else {
-        " not proven to be the least;"
-    };
-    let percent = 100.0 * gap;
-    format!(
-        "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} ({percent:.1} % below)"
-    )
-}
-
-/// For which plans a proof holds, in words.
-pub fn scope(proof: &PlanProof) -> String {
-    let ProofScope {
-        keys,
-        slides,
-        n_lessons,
-    } = &proof.proven_for;
-    let who = match &keys[..] {
-        [key] => format!("piece {key} as the key"),
-        all if all.len() == proof.piece_costs.len() => "any piece as the key".into(),
-        some => {
-            let mut names: Vec<String> = some.iter().map(ToString::to_string).collect();
-            let last = names.pop().unwrap_or_default();
-            format!("piece {} or {last} as the key", names.join(", "))
-        }
-    };
-    let how = match slides {
-        KeyDirections::WithinPlane => "within its plane",
-        KeyDirections::OutOfPlane => "out of its plane",
-    };
-    let lessons = match n_lessons {
-        0 => String::new(),
-        1 => ", and what one lesson of failed kits leaves".into(),
-        n => format!(", and what {n} lessons of failed kits leave"),
-    };
-    format!("{who}, sliding {how}{lessons}")
-}
-
-/// Where a plan is weakest: a seam, or each piece that comes apart.
-pub fn weakest(holding: &Holding, standing: &Standing) -> Vec<String> {
-    let seam = holding.seams.first().map(|s| {
-        let (later, earlier, opening_mm) = (s.later, s.earlier, s.opening_mm);
-        let at = standing.words(s.at);
-        format!(
-            "weakest seam ({at}): pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m: {}",
-            s.reason
-        )
-    });
-    let loose = holding.loose.iter().map(|l| {
-        format!(
-            "comes apart at 10 N/m: piece {}, {}",
-            l.piece,
-            standing.words(l.at)
-        )
-    });
-    seam.into_iter().chain(loose).collect()
-}
-
-/// How exact a printer must be; nothing where surfaces cross, which is warned of.
-pub fn fits(made: &Design) -> Option<String> {
-    let within_mm = made.fit.within_mm.filter(|mm| *mm > 0.0)?;
-    let least_mm = 2.0 * within_mm;
-    let as_drawn = |piece| made.kit.play.estimates[piece].map_or(f64::INFINITY, |play| play.translation_mm);
-    let thin = match made.fit.loosest {
-        Some((piece, play)) if play.translation_mm.is_finite() => format!(
-            "; where all stand back by as much, piece {piece} rattles about {:.1} mm instead of {:.1} mm",
-            play.translation_mm,
-            as_drawn(piece)
-        ),
-        Some((piece, _)) => format!("; where all stand back by as much, piece {piece} comes loose"),
-        None => String::new(),
-    };
-    Some(format!(
-        "fits if printed faces stand out by no more than {within_mm:.2} mm: the least gap is {least_mm:.2} mm, at rest and on every way out{thin}"
-    ))
-}
-
-/// Each on a line, with its place.
-pub fn print_warnings(warnings: &[Warning], standing: &Standing) {
-    for w in warnings {
-        let place =
-            w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
-        println!("warning: {w}{place}");
-    }
-}
-
-/// Each check on a line, and loudly what failed and where.
-pub fn print_verdict(verdict: &Verification, words: &dyn PlaceWords) {
-    for c in &verdict.checks {
-        println!(
-            "{}  {:52} {}",
-            if c.ok { "ok  " } else { "FAIL" },
-            c.name,
-            c.figure
-        );
-    }
-    print_failures(verdict, words);
-}
-
-/// What failed and where, if something did.
-fn print_failures(verdict: &Verification, words: &dyn PlaceWords) {
-    if !verdict.passed() {
-        eprintln!(
-            "FAILED: this kit does not hold together as it should; do not print it. What failed, and where:"
-        );
-        for finding in &verdict.findings {
-            eprintln!("  {}", finding.told(words));
-        }
-    }
 }

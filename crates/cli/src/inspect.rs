@@ -13,11 +13,11 @@ use shellock_kit::plan_file::RepairEntry;
 
 use crate::Session;
 use crate::args::{Options, Thickness};
-use crate::build::print_warnings;
 use crate::division::{Division, divide};
 use crate::failure::Failure;
 use crate::input::{Model, load, model_of, repair_mode};
 use crate::place::Standing;
+use crate::told::print_warnings;
 
 /// Thin places that are told one by one.
 const N_TOLD: usize = 3;
@@ -55,7 +55,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
         // Why not is in what was printed.
         return Ok(model.err().map_or(0, |failure| failure.exit_code()));
     }
-    print_model(&model?, &thin, division.as_ref(), options);
+    print_model(session, &model?, &thin, division.as_ref(), options);
     Ok(0)
 }
 
@@ -89,7 +89,13 @@ fn labellings(loaded: &Loaded) -> Vec<String> {
 }
 
 /// What would be made of it, for people.
-fn print_model(model: &Model, thin: &[String], division: Option<&Division>, options: &Options) {
+fn print_model(
+    session: &Session,
+    model: &Model,
+    thin: &[String],
+    division: Option<&Division>,
+    options: &Options,
+) {
     model.notes.iter().for_each(|note| println!("note: {note}"));
     thin.iter().for_each(|warning| println!("warning: {warning}"));
     let made = model.solid.mesh().bounds().size();
@@ -104,7 +110,7 @@ fn print_model(model: &Model, thin: &[String], division: Option<&Division>, opti
     );
     if let Some(division) = division {
         let standing = Standing::of(options.up, model.solid.mesh());
-        print_warnings(&division.warnings, &standing);
+        print_warnings(session, &division.warnings, &standing);
         division
             .lines(&standing)
             .iter()

@@ -24,6 +24,7 @@ mod savings;
 mod stages;
 mod stopwatch;
 mod stress;
+mod told;
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -39,6 +40,8 @@ use failure::Failure;
 pub struct Session {
     /// Whether to print one JSON object instead of text.
     pub is_json: bool,
+    /// Whether to tell all.
+    pub is_verbose: bool,
     /// How progress is shown.
     pub shown: progress::Shown,
     /// Becomes true with Ctrl-C.
@@ -93,6 +96,7 @@ fn main() -> ExitCode {
     }));
     let session = Session {
         is_json: cli.json,
+        is_verbose: cli.verbose,
         shown: shown(&cli),
         stop: Arc::new(AtomicBool::new(false)),
         since: std::time::Instant::now(),

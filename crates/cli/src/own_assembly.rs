@@ -13,12 +13,12 @@ use shellock_geom::Vec3;
 use shellock_geom::weld::weld;
 
 use crate::Session;
-use crate::build::print_verdict;
 use crate::failure::Failure;
 use crate::input::{load, read, sha256};
 use crate::output::{CERTIFICATE, certificate_bytes};
 use crate::progress::Display;
 use crate::stages::write;
+use crate::told::print_verdict;
 
 /// The file that says how the pieces go together.
 pub const ASSEMBLY: &str = "assembly.json";

@@ -16,11 +16,11 @@ use shellock_render::{
 
 use crate::args::Options;
 use crate::bears;
-use crate::build::{bearing, scope};
 use crate::input::Model;
 use crate::loads;
 use crate::output::{Summary, connector_sizes, standing};
 use crate::place::Standing;
+use crate::told::{bearing, scope};
 
 /// Pieces are shown within this share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
 const SEEN: f64 = 3e-4;

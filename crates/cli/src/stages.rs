@@ -19,7 +19,7 @@ use crate::Session;
 use crate::args::{Axis, Options};
 use crate::bears;
 use crate::bed::fitted;
-use crate::build::{checked, print_verdict, print_warnings, quality, weakest};
+use crate::build::checked;
 use crate::failure::Failure;
 use crate::input::{self, load, read, sha256};
 use crate::interrupt::Writing;
@@ -27,6 +27,7 @@ use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
 use crate::place::Standing;
 use crate::progress::{Display, PlanClock};
+use crate::told::{print_verdict, print_warnings, quality, weakest};
 
 /// Writes one file: whole or not at all.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
@@ -102,7 +103,8 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         println!("{value}");
     } else {
         notes.iter().for_each(|n| println!("note: {n}"));
-        warnings.iter().for_each(|w| println!("warning: {w}"));
+        let standing = Standing::of(options.up, model.solid.mesh());
+        print_warnings(session, &warnings, &standing);
         println!("{} pieces, written to {}", surface.n_patches, out.display());
     }
     Ok(0)
@@ -194,7 +196,7 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     weakest(&holding, &standing)
         .iter()
         .for_each(|line| println!("{line}"));
-    print_warnings(&warnings, &standing);
+    print_warnings(session, &warnings, &standing);
     Ok(0)
 }
 

@@ -50,8 +50,8 @@ pub use design::{Design, DesignError, DesignOutcome, Kit, Params, Settings, desi
 pub use seam::graph::{Adjacency, ContactGraph};
 pub use shellock_assembly::{
     Cancelled, Cause, Ctx, Direction, IdVec, InstallationPlan, InstallationStep, LatticeDirection, PatchId,
-    PressFit, PressFitKind, Verdict, Warning, certificate, context, direction, ids, motion, params, play,
-    push, verify, warning,
+    PressFit, PressFitKind, Severity, Verdict, Warning, certificate, context, direction, ids, motion, params,
+    play, push, verify, warning,
 };
 pub use sizes::ConnectorSizes;
 pub use surface::{Seam, SegmentedSurface};

@@ -1,0 +1,284 @@
+//! What is said of a kit that was made: as much as a maker needs, or all of it.
+
+use shellock::design::{Design, Settings};
+use shellock::metric::Holding;
+use shellock::plan::key::KeyDirections;
+use shellock::plan::{PlanProof, ProofScope};
+use shellock::strength::{Strength, StrengthParams};
+use shellock::verify::Verification;
+use shellock::verify::words::PlaceWords;
+use shellock::{Severity, Warning, play};
+
+use crate::output::{Destination, Summary};
+use crate::place::Standing;
+use crate::printing::Printing;
+use crate::{Session, bears};
+
+/// So many warnings and notes are told, problems all; the rest where all is asked for.
+const MOST_TOLD: usize = 5;
+
+/// A finished kit, and what it is told with.
+pub struct Finished<'a> {
+    pub to: &'a Destination,
+    pub made: &'a Design,
+    pub settings: &'a Settings,
+    pub summary: &'a Summary,
+    pub warnings: &'a [Warning],
+    pub standing: &'a Standing,
+    pub printing: &'a Printing,
+}
+
+impl Finished<'_> {
+    /// The whole of it for people: figures, warnings, and one verdict at the end.
+    pub fn print(&self, session: &Session) {
+        let (made, standing) = (self.made, self.standing);
+        let verdict = &made.kit.verification;
+        println!(
+            "{} pieces, piece {} is the key; walls {:.1} mm; {:.0} % of the solid model's material",
+            made.kit.pieces.len(),
+            made.kit.plan.key(),
+            made.kit.thickness_mm,
+            100.0 * self.summary.volume_ratio
+        );
+        if verdict.passed() || session.is_verbose {
+            self.print_figures(session);
+        }
+        print_checks(verdict, session.is_verbose);
+        print_warnings(session, self.warnings, standing);
+        if verdict.passed() {
+            println!("{}", self.printing.words());
+            println!(
+                "written to {}: print plates.3mf; report.html shows how it goes together",
+                self.to.folder().display()
+            );
+        } else {
+            println!(
+                "written to {}, to look at: report.html",
+                self.to.folder().display()
+            );
+            print_failures(verdict, standing);
+            eprintln!(
+                "What may help: another number of pieces (--pieces), a larger --size, labels of your own (--labels), more --time."
+            );
+        }
+    }
+
+    fn print_figures(&self, session: &Session) {
+        let (made, standing) = (self.made, self.standing);
+        bears::lines(&made.kit.holding, standing)
+            .into_iter()
+            .for_each(|line| println!("{line}"));
+        println!("pieces sit {}", play::words(&made.kit.play));
+        if let Some(line) = fits(made) {
+            println!("{line}");
+        }
+        if !session.is_verbose {
+            return;
+        }
+        if let Some(strength) = &made.strength {
+            println!("{}", bearing(strength, self.settings, standing));
+        }
+        println!("{}", quality(&made.kit.proof));
+        weakest(&made.kit.holding, standing)
+            .into_iter()
+            .for_each(|line| println!("{line}"));
+        println!(
+            "connectors on {:.0} % of the seam length that fits any",
+            100.0 * self.summary.connector_share
+        );
+    }
+}
+
+/// What the wall bears, in words.
+pub fn bearing(strength: &Strength, settings: &Settings, standing: &Standing) -> String {
+    let StrengthParams { drop_m, material, .. } = &settings.strength;
+    let hollow = 100.0 * (1.0 - strength.solid_share());
+    // Hardly anything was judged where hardly anything is hollow.
+    let judged = if hollow < 80.0 {
+        format!(" (judged on the {hollow:.0} % of the surface that are hollow)")
+    } else {
+        String::new()
+    };
+    format!(
+        "in a fall from {drop_m} m the wall's stress{judged} reaches {:.0} MPa of the {:.0} that the material bears ({})",
+        strength.stress_mpa,
+        material.strength_mpa,
+        standing.words(strength.at.to_array())
+    )
+}
+
+/// How good a plan is, in words.
+pub fn quality(proof: &PlanProof) -> String {
+    let PlanProof {
+        cost,
+        lower_bound,
+        gap,
+        least_cost,
+        key_lower_bound,
+        ..
+    } = proof;
+    let scope = scope(proof);
+    // Bounds that meet the least known cost are proofs; what is left is rounding.
+    let is_met = |bound: &f64| *bound >= least_cost * (1.0 - 1e-9);
+    let chosen = match least_cost < cost {
+        true => {
+            format!("{cost:.3}, chosen since it holds better than those from {least_cost:.3} on; that is")
+        }
+        false => format!("{cost:.3},"),
+    };
+    if is_met(lower_bound) {
+        return format!("plan: its worst piece costs {chosen} proven to be the least with {scope}");
+    }
+    let of_key = if is_met(key_lower_bound) {
+        " the least with its key;"
+    } else {
+        " not proven to be the least;"
+    };
+    let percent = 100.0 * gap;
+    format!(
+        "plan: its worst piece costs {chosen}{of_key} none with {scope} costs less than {lower_bound:.3} ({percent:.1} % below)"
+    )
+}
+
+/// For which plans a proof holds, in words.
+pub fn scope(proof: &PlanProof) -> String {
+    let ProofScope {
+        keys,
+        slides,
+        n_lessons,
+    } = &proof.proven_for;
+    let who = match &keys[..] {
+        [key] => format!("piece {key} as the key"),
+        all if all.len() == proof.piece_costs.len() => "any piece as the key".into(),
+        some => {
+            let mut names: Vec<String> = some.iter().map(ToString::to_string).collect();
+            let last = names.pop().unwrap_or_default();
+            format!("piece {} or {last} as the key", names.join(", "))
+        }
+    };
+    let how = match slides {
+        KeyDirections::WithinPlane => "within its plane",
+        KeyDirections::OutOfPlane => "out of its plane",
+    };
+    let lessons = match n_lessons {
+        0 => String::new(),
+        1 => ", and what one lesson of failed kits leaves".into(),
+        n => format!(", and what {n} lessons of failed kits leave"),
+    };
+    format!("{who}, sliding {how}{lessons}")
+}
+
+/// Where a plan is weakest: a seam, or each piece that comes apart.
+pub fn weakest(holding: &Holding, standing: &Standing) -> Vec<String> {
+    let seam = holding.seams.first().map(|s| {
+        let (later, earlier, opening_mm) = (s.later, s.earlier, s.opening_mm);
+        let at = standing.words(s.at);
+        format!(
+            "weakest seam ({at}): pieces {later} and {earlier} open by {opening_mm:.2} mm at 10 N/m: {}",
+            s.reason
+        )
+    });
+    let loose = holding.loose.iter().map(|l| {
+        format!(
+            "comes apart at 10 N/m: piece {}, {}",
+            l.piece,
+            standing.words(l.at)
+        )
+    });
+    seam.into_iter().chain(loose).collect()
+}
+
+/// How exact a printer must be; nothing where surfaces cross, which is warned of.
+pub fn fits(made: &Design) -> Option<String> {
+    let within_mm = made.fit.within_mm.filter(|mm| *mm > 0.0)?;
+    let least_mm = 2.0 * within_mm;
+    let as_drawn = |piece| made.kit.play.estimates[piece].map_or(f64::INFINITY, |play| play.translation_mm);
+    let thin = match made.fit.loosest {
+        Some((piece, play)) if play.translation_mm.is_finite() => format!(
+            "; where all stand back by as much, piece {piece} rattles about {:.1} mm instead of {:.1} mm",
+            play.translation_mm,
+            as_drawn(piece)
+        ),
+        Some((piece, _)) => format!("; where all stand back by as much, piece {piece} comes loose"),
+        None => String::new(),
+    };
+    Some(format!(
+        "goes together where printed faces stand out by {within_mm:.2} mm at most (the least gap is {least_mm:.2} mm){thin}"
+    ))
+}
+
+/// What is told of `warnings`: those that matter most, each with its place, and how many more there are.
+pub fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing) -> Vec<String> {
+    let ranked = Warning::ranked(warnings);
+    let n_problems = ranked.partition_point(|w| w.severity() == Severity::Problem);
+    let n_told = if is_verbose {
+        ranked.len()
+    } else {
+        n_problems.max(MOST_TOLD).min(ranked.len())
+    };
+    let line = |w: &Warning| {
+        let place =
+            w.at.map_or_else(String::new, |at| format!(" [{}]", standing.words(at)));
+        format!("{}: {w}{place}", w.severity())
+    };
+    let mut lines: Vec<String> = ranked[..n_told].iter().map(line).collect();
+    let n_notes = ranked[n_told..]
+        .iter()
+        .filter(|w| w.severity() == Severity::Note)
+        .count();
+    let counted = |n: usize, what: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {what}")),
+        n => Some(format!("{n} {what}s")),
+    };
+    let rest = [
+        counted(ranked.len() - n_told - n_notes, "warning"),
+        counted(n_notes, "note"),
+    ];
+    let rest: Vec<String> = rest.into_iter().flatten().collect();
+    if !rest.is_empty() {
+        lines.push(format!("and {} more: --verbose, or the page", rest.join(" and ")));
+    }
+    lines
+}
+
+/// [`warning_lines`], on standard output.
+pub fn print_warnings(session: &Session, warnings: &[Warning], standing: &Standing) {
+    warning_lines(warnings, session.is_verbose, standing)
+        .iter()
+        .for_each(|line| println!("{line}"));
+}
+
+/// Each check on a line where all is told; else those that failed, or that none did.
+fn print_checks(verdict: &Verification, is_verbose: bool) {
+    if verdict.passed() && !is_verbose {
+        println!("all {} checks passed", verdict.checks.len());
+        return;
+    }
+    for c in verdict.checks.iter().filter(|c| is_verbose || !c.ok) {
+        println!(
+            "{}  {:52} {}",
+            if c.ok { "ok  " } else { "FAIL" },
+            c.name,
+            c.figure
+        );
+    }
+}
+
+/// Each check on a line, and loudly what failed and where.
+pub fn print_verdict(verdict: &Verification, words: &dyn PlaceWords) {
+    print_checks(verdict, true);
+    print_failures(verdict, words);
+}
+
+/// What failed and where, if something did.
+pub fn print_failures(verdict: &Verification, words: &dyn PlaceWords) {
+    if !verdict.passed() {
+        eprintln!(
+            "FAILED: this kit does not hold together as it should; do not print it. What failed, and where:"
+        );
+        for finding in &verdict.findings {
+            eprintln!("  {}", finding.told(words));
+        }
+    }
+}
