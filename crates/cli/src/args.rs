@@ -2,27 +2,23 @@
 
 mod blows;
 mod keep_whole;
+mod options;
 mod pieces;
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use shellock::connector::ConnectorParams;
+use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use shellock::coupon::N_FITS;
-use shellock::design::{self, KeySource, Params};
 use shellock::piece::LabelParams;
-use shellock::segmentation::{KeepWhole, Method};
-use shellock::sizes::SizeChoice;
-use shellock_mechanics::Material;
 use shellock_print::Printer;
 
 pub use blows::{Blows, Place};
-pub use pieces::{Key, Pieces, Symmetric};
+pub use options::Options;
+pub use pieces::Pieces;
 
-use crate::stress;
-use keep_whole::keep_whole;
+use crate::names::no_such;
+use crate::units;
 
 /// Exit codes, shown in the help.
 const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
@@ -30,14 +26,20 @@ const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made
 
 /// Turns a closed 3D model into hollow pieces that lock each other without glue.
 #[derive(Parser)]
-#[command(name = "shellock", version, about, after_help = EXIT_CODES)]
+#[command(name = "shellock", version, about, after_help = EXIT_CODES, disable_help_flag = true)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
-    /// Print one JSON object on standard output instead of text, and progress as JSON lines on standard error
+    /// Print help
+    #[arg(short, long, global = true, action = ArgAction::HelpShort)]
+    pub help: Option<bool>,
+    /// Print help with every option, its range and what it is for
+    #[arg(long, global = true, action = ArgAction::HelpLong)]
+    pub help_all: Option<bool>,
+    /// Print JSON: the result, and progress on standard error
     #[arg(long, global = true)]
     pub json: bool,
-    /// Show no progress; a kit that is made says nothing but what is wrong with it
+    /// Say nothing but what is wrong
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Tell all: every check, note and figure of the plan
@@ -147,7 +149,7 @@ pub enum Command {
         #[arg(short, long, value_name = "FILE")]
         out: PathBuf,
         /// Longest side, mm
-        #[arg(long, default_value_t = 150.0, value_name = "MM")]
+        #[arg(long, default_value_t = 150.0, value_name = "MM", value_parser = units::length_mm)]
         size: f64,
         /// Also write the limb of each triangle there, for `build --labels` (fish and arms)
         #[arg(long, value_name = "FILE")]
@@ -155,10 +157,80 @@ pub enum Command {
     },
 }
 
+/// Examples at the end of a command's help.
+const EXAMPLES: [(&str, &str); 6] = [
+    (
+        "build",
+        "Examples:\n  shellock build dragon.stl --size 15cm --printer fdm\n  shellock build dragon.stl --keep-whole 0,-40,120,25 --pieces 8",
+    ),
+    ("demo", "Example:\n  shellock demo --figure teddy --size 10cm"),
+    (
+        "segment",
+        "Example:\n  shellock segment dragon.stl --size 15cm --out dragon.3mf   (repaint it in a slicer, give it back to build)",
+    ),
+    ("plan", "Example:\n  shellock plan dragon.stl --size 15cm"),
+    (
+        "inspect",
+        "Example:\n  shellock inspect dragon.stl --size 15cm --segment",
+    ),
+    (
+        "test",
+        "Example:\n  shellock test dragon-kit --punch 7kg --drop 2m",
+    ),
+];
+
+/// What dividing alone has no use for.
+const NOT_TO_DIVIDE: [&str; 21] = [
+    "key",
+    "time",
+    "plan_time",
+    "thickness",
+    "material",
+    "drop",
+    "connector",
+    "clearance",
+    "key_clearance",
+    "detent",
+    "key_ribs",
+    "play_together",
+    "allow_thin",
+    "key_grip",
+    "no_labels",
+    "no_booklet",
+    "seam_gap",
+    "min_wall",
+    "grid",
+    "config",
+    "resolution",
+];
+/// What planning alone has no use for.
+const NOT_TO_PLAN: [&str; 5] = [
+    "key_grip",
+    "no_labels",
+    "no_booklet",
+    "play_together",
+    "allow_thin",
+];
+
+/// All commands, each with the options that it has a use for in its help, and examples.
+pub fn command() -> clap::Command {
+    let without = |command: clap::Command, unused: &[&str]| {
+        unused
+            .iter()
+            .fold(command, |c, name| c.mut_arg(*name, |arg| arg.hide(true)))
+    };
+    let command = Cli::command()
+        .mut_subcommand("segment", |c| without(c, &NOT_TO_DIVIDE))
+        .mut_subcommand("plan", |c| without(c, &NOT_TO_PLAN));
+    EXAMPLES.into_iter().fold(command, |all, (name, examples)| {
+        all.mut_subcommand(name, |c| c.after_help(examples))
+    })
+}
+
 /// Where a kit goes.
 #[derive(Args)]
 pub struct Out {
-    /// Folder to write [default: the model's name with "-kit", or "shellock-demo"]
+    /// Folder to write [default: the model's name with -kit]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace the folder if it holds an earlier kit
@@ -287,277 +359,9 @@ impl FromStr for Thickness {
         if text.eq_ignore_ascii_case("auto") {
             return Ok(Self::Auto);
         }
-        text.parse()
+        units::length_mm(text)
             .map(Self::Mm)
             .map_err(|_| "give millimetres, such as 2.4, or auto".to_owned())
-    }
-}
-
-#[derive(Args)]
-pub struct Options {
-    /// What it is printed on: sla, fdm, fdm-petg, sls, or a printer of the configuration file; its
-    /// clearances, walls and material are used where nothing else is said
-    #[arg(long, value_name = "NAME", default_value = "sla", help_heading = "Printer")]
-    pub printer: String,
-    /// Options and printers, in TOML; what is said on the command line goes before it [default:
-    /// shellock.toml, if there is one here]
-    #[arg(long, value_name = "FILE", help_heading = "Printer")]
-    pub config: Option<PathBuf>,
-    /// The printers of the configuration file.
-    #[arg(skip)]
-    pub own_printers: Vec<Printer>,
-    /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Size", conflicts_with_all = ["height", "scale"])]
-    pub size: Option<f64>,
-    /// Height of the made thing along --up, mm
-    #[arg(
-        long,
-        value_name = "MM",
-        allow_hyphen_values = true,
-        help_heading = "Size",
-        conflicts_with = "scale"
-    )]
-    pub height: Option<f64>,
-    /// Millimetres a file unit
-    #[arg(long, value_name = "F", allow_hyphen_values = true, help_heading = "Size")]
-    pub scale: Option<f64>,
-    /// Unit of the file's lengths [default: the file's own, as 3MF has one, else mm where that gives a
-    /// sensible size]
-    #[arg(long, value_enum, help_heading = "Size", conflicts_with_all = ["size", "height", "scale"])]
-    pub unit: Option<Unit>,
-    /// Which axis of the file points up
-    #[arg(long, value_enum, default_value = "z", help_heading = "Size")]
-    pub up: Axis,
-    /// Refuse a surface that needs repair instead of mending it
-    #[arg(long, help_heading = "Surface", conflicts_with = "largest")]
-    pub no_repair: bool,
-    /// Of several bodies apart from each other make the largest
-    #[arg(long, help_heading = "Surface")]
-    pub largest: bool,
-    /// Detail to keep of a surface with more than 100 000 triangles, mm, 0 to 0.1: it is described by fewer,
-    /// none farther from it than this; 0 keeps all, as `segment` does
-    #[arg(
-        long,
-        value_name = "MM",
-        default_value_t = 0.015,
-        allow_hyphen_values = true,
-        help_heading = "Surface"
-    )]
-    pub resolution: f64,
-    /// One label a face: a .seg file (one integer a line) or a .ply with a face property; a label is a piece
-    #[arg(long, value_name = "FILE", help_heading = "Pieces")]
-    pub labels: Option<PathBuf>,
-    /// What of the model's own file divides it into pieces
-    #[arg(
-        long,
-        value_enum,
-        default_value = "auto",
-        value_name = "WHAT",
-        help_heading = "Pieces",
-        conflicts_with = "labels"
-    )]
-    pub labels_from: LabelsFrom,
-    /// How pieces are found where there are no labels: creases, of similar size with seams in creases; auto,
-    /// where people would divide, by the best cuts of the others; random-cuts, the cuts that most of many
-    /// agree on; sdf, by thickness; primitives, by what planes, spheres and cylinders fit; kmeans, by
-    /// distance and turning
-    #[arg(
-        long,
-        value_name = "METHOD",
-        default_value = Method::default().name(),
-        value_parser = PossibleValuesParser::new(Method::ALL.map(Method::name)).map(|name| Method::named(&name).expect("it is one of all")),
-        help_heading = "Pieces"
-    )]
-    pub method: Method,
-    /// About how many pieces to make where there are no labels: auto, what the method finds, about 10 for a 150 mm
-    /// figure; a number; or fits-bed, as few as fit the printer
-    #[arg(
-        long,
-        value_name = "auto|N|fits-bed",
-        default_value = "auto",
-        help_heading = "Pieces"
-    )]
-    pub pieces: Pieces,
-    /// Whether both sides of a symmetric model are divided alike, where the method is auto or random-cuts
-    #[arg(
-        long,
-        value_enum,
-        default_value = "off",
-        value_name = "on|off",
-        help_heading = "Pieces"
-    )]
-    pub symmetric: Symmetric,
-    /// A region that no seam is to divide, such as a face: the surface within R mm of a place in the made
-    /// thing's space, or what has a label, where there are labels; may be given several times
-    #[arg(
-        long,
-        value_name = "X,Y,Z,R|LABEL",
-        value_parser = keep_whole,
-        allow_hyphen_values = true,
-        help_heading = "Pieces"
-    )]
-    pub keep_whole: Vec<KeepWhole>,
-    /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
-    /// piece, the flattest piece that works, as it is; or a piece, by its label or by the number that
-    /// `segment` gives it
-    #[arg(
-        long,
-        value_name = "auto|piece|N",
-        default_value = "auto",
-        help_heading = "Pieces"
-    )]
-    pub key: Key,
-    /// Seconds for the whole job: no further kit is begun that would end later, and the best so far is finished; 0
-    /// takes the time it takes
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        allow_hyphen_values = true,
-        default_value_t = 60.0,
-        help_heading = "Pieces"
-    )]
-    pub time: f64,
-    /// Work spent on proving that no plan is better, in seconds of an ordinary computer; a slower one ends
-    /// after twice that
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        allow_hyphen_values = true,
-        default_value_t = 10.0,
-        help_heading = "Pieces"
-    )]
-    pub plan_time: f64,
-    /// Wall thickness, mm, 0.8 to 10, or auto: the least from 1.6 (or four times --min-wall, if that is more)
-    /// to 3 mm that bears a fall
-    #[arg(
-        long,
-        value_name = "auto|MM",
-        allow_hyphen_values = true,
-        default_value = "auto",
-        help_heading = "Make"
-    )]
-    pub thickness: Thickness,
-    /// What it is printed of: what it bears decides how thick walls must be [default: the printer's]
-    #[arg(long, value_name = "NAME", value_parser = stress::material, help_heading = "Make")]
-    pub material: Option<Material>,
-    /// Height of the fall that walls must bear, 0.01 to 20 m
-    #[arg(long, value_name = "HEIGHT", default_value_t = Params::default().drop_m, allow_hyphen_values = true,
-          value_parser = stress::metres, help_heading = "Make")]
-    pub drop: f64,
-    /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by
-    /// what fits
-    #[arg(
-        long,
-        value_name = "auto|MM",
-        allow_hyphen_values = true,
-        default_value = "auto",
-        help_heading = "Make"
-    )]
-    pub connector: SizeChoice,
-    /// Gap between mating faces of connectors, mm, 0.03 to 0.6: 0.05 to 0.15 for resin, 0.15 to 0.3 for
-    /// filament [default: the printer's]
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
-    pub clearance: Option<f64>,
-    /// The same on the rails of the key, mm, 0.03 to 0.8 [default: the printer's]
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
-    pub key_clearance: Option<f64>,
-    /// Height of a bump on each rail that the key clicks past, mm, 0 to 0.4; 0 makes none
-    #[arg(
-        long,
-        value_name = "MM",
-        allow_hyphen_values = true,
-        default_value_t = 0.0,
-        help_heading = "Make"
-    )]
-    pub detent: f64,
-    /// How far ribs on a key without rails press on the pieces around it, mm, 0 to 0.3; 0 makes none
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, default_value_t = Params::default().connector.key_rib_mm, help_heading = "Make")]
-    pub key_ribs: f64,
-    /// Also look for a proof of how far pieces move within the gaps while all others but one move too; closes
-    /// for small kits only, and takes some seconds to a minute
-    #[arg(long, help_heading = "Make")]
-    pub play_together: bool,
-    /// Make pieces though hardly anything of the model can be hollow; they are mostly solid, with few connectors
-    #[arg(long, help_heading = "Make")]
-    pub allow_thin: bool,
-    /// Cut a notch for a fingernail into the key, 0.45 mm deep
-    #[arg(long, help_heading = "Make")]
-    pub key_grip: bool,
-    /// Leave the pieces' numbers off their inner sides
-    #[arg(long, help_heading = "Make")]
-    pub no_labels: bool,
-    /// Leave out instructions.pdf, which takes about a second
-    #[arg(long, help_heading = "Make")]
-    pub no_booklet: bool,
-    /// How far each side of a seam stays back, mm, 0 to 0.4; less for those who sand [default: the printer's
-    /// tolerance]
-    #[arg(
-        long,
-        alias = "wall-gap",
-        value_name = "MM",
-        allow_hyphen_values = true,
-        help_heading = "Make"
-    )]
-    pub seam_gap: Option<f64>,
-    /// Thinnest wall that the printer makes, mm, 0.1 to 2; thinner parts are reported [default: the
-    /// printer's]
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
-    pub min_wall: Option<f64>,
-    /// Spacing of the grid behind the walls, mm [default: thickness / 2.5]
-    #[arg(long, value_name = "MM", allow_hyphen_values = true, help_heading = "Make")]
-    pub grid: Option<f64>,
-    /// Seed of all random choices: the same seed gives the same kit
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Make")]
-    pub seed: u64,
-}
-
-/// Work of the exact search in a second: measured on one core at 3 GHz, on models of 8 to 45 pieces.
-///
-/// Plans depend on work and not on time, so that they are the same on every computer that is not far slower.
-const REVISIONS_PER_SECOND: f64 = 20_000.0;
-
-impl Options {
-    /// The printer that is named: of the user's own, or of those that come with the program.
-    pub fn chosen_printer(&self) -> Result<Printer, String> {
-        printer_called(&self.printer, &self.own_printers)
-    }
-
-    /// The library's parameters for pieces made on `printer`.
-    pub fn params(&self, printer: &Printer) -> Params {
-        let mut p = Params::default();
-        p.seed = self.seed;
-        p.method = self.method;
-        p.n_pieces = self.pieces.number();
-        p.keep_whole = self.keep_whole.clone();
-        p.symmetric = self.symmetric == Symmetric::On;
-        p.up = self.up.unit();
-        p.key = match self.key {
-            Key::Auto => KeySource::Cut,
-            Key::Flattest => KeySource::Flattest,
-            Key::Piece(id) => KeySource::Piece(id),
-        };
-        p.has_grip = self.key_grip;
-        p.thickness = match self.thickness {
-            Thickness::Auto => design::Thickness::Auto,
-            Thickness::Mm(mm) => design::Thickness::Mm(mm),
-        };
-        p.material = self.material.unwrap_or(printer.material);
-        p.drop_m = self.drop;
-        p.seam_gap_mm = self.seam_gap.unwrap_or(printer.tolerance_mm);
-        p.cell_mm = self.grid;
-        p.connector = ConnectorParams {
-            size: self.connector,
-            clearance_mm: self.clearance.unwrap_or(printer.clearance_mm),
-            key_clearance_mm: self.key_clearance.unwrap_or(printer.key_clearance_mm),
-            detent_mm: self.detent,
-            key_rib_mm: self.key_ribs,
-            min_wall_mm: self.min_wall.unwrap_or(printer.min_wall_mm),
-        };
-        p.label = (!self.no_labels).then(|| label(p.connector.min_wall_mm));
-        p.proof_budget = (self.plan_time * REVISIONS_PER_SECOND).clamp(0.0, 1e9) as usize;
-        p.is_play_together = self.play_together;
-        p.allows_thin = self.allow_thin;
-        p
     }
 }
 
@@ -565,14 +369,8 @@ impl Options {
 fn printer_called(name: &str, own: &[Printer]) -> Result<Printer, String> {
     let known: Vec<Printer> = own.iter().cloned().chain(Printer::presets()).collect();
     let found = known.iter().find(|p| p.name.eq_ignore_ascii_case(name)).cloned();
-    let names = || {
-        known
-            .iter()
-            .map(|p| p.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
-    found.ok_or_else(|| format!("there is no printer \"{name}\"; choose one of {}", names()))
+    let names: Vec<&str> = known.iter().map(|p| p.name.as_str()).collect();
+    found.ok_or_else(|| no_such("printer", name, &names))
 }
 
 /// How numbers are engraved: strokes of two lines, and a wall behind them that the printer makes.

@@ -12,8 +12,14 @@ const N_PER_KG: f64 = 9.80665;
 /// Less than this share of a load is no load: hardly anything holds.
 const HARDLY: f64 = 0.05;
 
+/// A force as the weight that presses as much.
 fn newtons(n: f64) -> String {
-    format!("{n:.0} N ({:.1} kg)", n / N_PER_KG)
+    let kg = n / N_PER_KG;
+    if kg < 9.95 {
+        format!("{kg:.1} kg")
+    } else {
+        format!("{kg:.0} kg")
+    }
 }
 
 fn metres(m: f64) -> String {

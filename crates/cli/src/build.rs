@@ -100,7 +100,7 @@ fn make(
             .iter()
             .for_each(|w| println!("warning: {w}"));
     }
-    let display = Display::new(session.shown);
+    let display = Display::of_kit(session.shown);
     let clock = PlanClock::new(options.plan_time);
     let report = |p: Progress<'_>| {
         clock.see(&p);

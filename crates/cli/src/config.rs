@@ -19,7 +19,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
-use clap::{ArgMatches, Command, CommandFactory, Parser};
+use clap::{ArgMatches, Command, FromArgMatches, Parser};
 use serde::Deserialize;
 use shellock_print::{Printer, Process};
 
@@ -41,10 +41,10 @@ pub enum Refusal {
 
 /// The command that these arguments and the configuration file ask for.
 pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
-    let matches = Cli::command()
+    let matches = args::command()
         .try_get_matches_from(&arguments)
         .map_err(Refusal::Arguments)?;
-    let mut cli = Cli::try_parse_from(&arguments).map_err(Refusal::Arguments)?;
+    let mut cli = Cli::from_arg_matches(&matches).map_err(Refusal::Arguments)?;
     let Some((name, given)) = matches.subcommand() else {
         return Ok(cli);
     };
@@ -60,7 +60,7 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     }
     let refused = |problem: String| Refusal::File(format!("{}: {problem}", path.display()));
     let Config { options, printers } = read(&path).map_err(refused)?;
-    let extra = extra_arguments(&Cli::command(), name, given, &options).map_err(refused)?;
+    let extra = extra_arguments(&args::command(), name, given, &options).map_err(refused)?;
     if !extra.is_empty() {
         let mut all = arguments;
         let at = all.iter().position(|a| a == name).map_or(all.len(), |at| at + 1);

@@ -13,6 +13,7 @@ use shellock_geom::{Aabb, Solid, Vec3};
 use crate::Session;
 use crate::args::{LabelsFrom, Options};
 use crate::failure::Failure;
+use crate::names::no_such;
 
 /// Larger files are refused, bytes: everything is read into memory.
 const MAX_FILE_BYTES: u64 = 2 << 30;
@@ -277,10 +278,7 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Fa
     const CELLS: f64 = 94.0;
     let figure = shellock::figure::Figure::named(name).ok_or_else(|| {
         let all: Vec<&str> = shellock::figure::Figure::ALL.iter().map(|f| f.name()).collect();
-        Failure::Wrong(format!(
-            "there is no figure \"{name}\"; choose one of {}",
-            all.join(", ")
-        ))
+        Failure::Wrong(no_such("figure", name, &all))
     })?;
     check_size(size_mm)?;
     Ok(shellock::figure::make_with_limbs(

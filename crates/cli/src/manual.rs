@@ -4,16 +4,14 @@ use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-use clap::CommandFactory;
-
-use crate::args::Cli;
+use crate::args;
 use crate::failure::Failure;
 use crate::stages::write as write_file;
 
 /// `shellock completions`.
 pub fn completions(shell: clap_complete::Shell) -> u8 {
     let mut bytes = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "shellock", &mut bytes);
+    clap_complete::generate(shell, &mut args::command(), "shellock", &mut bytes);
     let mut out = std::io::stdout();
     // A reader that closes the pipe has seen enough.
     u8::from(
@@ -26,7 +24,7 @@ pub fn completions(shell: clap_complete::Shell) -> u8 {
 /// `shellock manual`: `shellock.1` and a page for each command.
 pub fn write(folder: &Path) -> Result<u8, Failure> {
     fs::create_dir_all(folder).map_err(Failure::unwritable(folder))?;
-    let mut root = Cli::command();
+    let mut root = args::command();
     root.build();
     for command in std::iter::once(&root).chain(root.get_subcommands().filter(|c| c.get_name() != "help")) {
         let page = clap_mangen::Man::new(command.clone());

@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use shellock::context::Progress;
 
+use crate::course::{Course, Stand};
 use crate::stopwatch::{StageTime, Stopwatch};
 
 /// How progress is shown.
@@ -15,8 +16,8 @@ use crate::stopwatch::{StageTime, Stopwatch};
 pub enum Shown {
     /// A bar on a terminal, plain lines elsewhere.
     ForPeople,
-    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, `{"event": "note", "text",
-    /// "seconds"}`; at last `{"event": "effort", "stages": [{"name", "seconds", "cpu_seconds", "rounds"}], "seconds"}`.
+    /// One JSON object a line: `{"event": "stage", "name", "n_steps", "seconds"}`, of a kit's also `number`, `n_stages`
+    /// and `seconds_left` (null at first); `{"event": "note", "text", "seconds"}`; at last `{"event": "effort", "stages": [{"name", "seconds", "cpu_seconds", "rounds"}], "seconds"}`.
     Events,
     /// Not at all.
     Nothing,
@@ -29,6 +30,7 @@ pub struct Display {
     shown: Shown,
     since: Instant,
     watch: Stopwatch,
+    course: Option<Mutex<Course>>,
 }
 
 impl Display {
@@ -40,7 +42,25 @@ impl Display {
             shown,
             since: Instant::now(),
             watch: Stopwatch::new(),
+            course: None,
         }
+    }
+
+    /// The same for the making of a kit, whose stages are counted.
+    pub fn of_kit(shown: Shown) -> Self {
+        Self {
+            course: Some(Mutex::new(Course::new())),
+            ..Self::new(shown)
+        }
+    }
+
+    fn stand(&self, name: &str) -> Option<Stand> {
+        let mut course = self
+            .course
+            .as_ref()?
+            .lock()
+            .expect("no holder of this lock panics");
+        course.begin(name, Instant::now())
     }
 
     /// What each stage took until now.
@@ -64,10 +84,14 @@ impl Display {
         let seconds = (1000.0 * self.since.elapsed().as_secs_f64()).round() / 1000.0;
         match progress {
             Progress::Stage { name, n_steps } => {
-                eprintln!(
-                    "{}",
-                    json!({ "event": "stage", "name": name, "n_steps": n_steps, "seconds": seconds })
-                );
+                let mut event =
+                    json!({ "event": "stage", "name": name, "n_steps": n_steps, "seconds": seconds });
+                if let Some(stand) = self.stand(name) {
+                    event["number"] = stand.number.into();
+                    event["n_stages"] = stand.of.into();
+                    event["seconds_left"] = stand.left.map(|left| left.as_secs_f64().round()).into();
+                }
+                eprintln!("{event}");
             }
             Progress::Note(text) => {
                 eprintln!("{}", json!({ "event": "note", "text": text, "seconds": seconds }))
@@ -83,9 +107,9 @@ impl Display {
                 if let Some(old) = bar.take() {
                     old.finish_and_clear();
                 }
-                *bar = Some(stage_bar(name, n_steps));
+                *bar = Some(stage_bar(&self.named(name), n_steps));
             }
-            Progress::Stage { name, .. } => eprintln!("{name} …"),
+            Progress::Stage { name, .. } => eprintln!("{} …", self.named(name)),
             Progress::Step => {
                 if let Some(bar) = bar.as_ref() {
                     bar.inc(1);
@@ -96,6 +120,12 @@ impl Display {
                 None => eprintln!("{text}"),
             },
         }
+    }
+
+    /// A stage's name with its number, where it has one.
+    fn named(&self, name: &str) -> String {
+        self.stand(name)
+            .map_or_else(|| name.to_owned(), |stand| stand.words(name))
     }
 
     /// Takes the last bar away, and says what the stages took to machines.

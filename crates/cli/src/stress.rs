@@ -20,34 +20,10 @@ use crate::Session;
 use crate::args::{Axis, Blows, Place};
 use crate::failure::Failure;
 use crate::input::load;
+use crate::names::no_such;
 use crate::output::PLAN;
 use crate::progress::Display;
 use crate::stages::{broken, plan_of, write};
-
-/// A force in N: "70N", "0.07 kN" or "70".
-pub fn newtons(text: &str) -> Result<f64, String> {
-    let said = || format!("\"{text}\" is no force above 0 N; write for example 70N");
-    with_unit(text, &[("kn", 1000.0), ("n", 1.0), ("", 1.0)]).ok_or_else(said)
-}
-
-/// A height in m: "2m", "200cm", "2000 mm" or "2".
-pub fn metres(text: &str) -> Result<f64, String> {
-    let said = || format!("\"{text}\" is no height above 0; write for example 2m, 150cm or 500mm");
-    with_unit(text, &[("mm", 0.001), ("cm", 0.01), ("m", 1.0), ("", 1.0)]).ok_or_else(said)
-}
-
-/// A number above 0 times that of the first unit it ends in.
-fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
-    let text = text.trim().to_ascii_lowercase();
-    let (number, factor) = units
-        .iter()
-        .find_map(|(unit, factor)| Some((text.strip_suffix(unit)?.trim(), factor)))?;
-    Some(positive(number)? * factor)
-}
-
-fn positive(text: &str) -> Option<f64> {
-    text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0)
-}
 
 /// The material of that name.
 pub fn material(name: &str) -> Result<Material, String> {
@@ -55,8 +31,7 @@ pub fn material(name: &str) -> Result<Material, String> {
         .into_iter()
         .find(|(preset, _)| preset.eq_ignore_ascii_case(name))
         .map(|(_, material)| material);
-    let names = || Material::PRESETS.map(|(preset, _)| preset).join(", ");
-    found.ok_or_else(|| format!("there is no material \"{name}\"; choose one of {}", names()))
+    found.ok_or_else(|| no_such("material", name, &Material::PRESETS.map(|(preset, _)| preset)))
 }
 
 /// `shellock test`.
@@ -292,21 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantities_have_units() {
-        assert_eq!(
-            (newtons("70N"), newtons("7.5 n"), newtons("0.07kN"), newtons("70")),
-            (Ok(70.0), Ok(7.5), Ok(0.07 * 1000.0), Ok(70.0))
-        );
-        assert_eq!(
-            (metres("2m"), metres("150 cm"), metres("2")),
-            (Ok(2.0), Ok(1.5), Ok(2.0))
-        );
-        for wrong in ["", "N", "-3N", "infN", "3kg"] {
-            assert!(newtons(wrong).is_err(), "{wrong}");
-        }
-        for wrong in ["", "m", "-2m", "nanm", "2 km", "0"] {
-            assert!(metres(wrong).is_err(), "{wrong}");
-        }
+    fn materials_have_names() {
         assert!(material("pla").is_ok() && material("wood").is_err());
     }
 }

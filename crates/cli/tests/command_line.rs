@@ -446,7 +446,7 @@ fn blows_that_are_none_are_refused() {
     for (option, value) in [
         ("--punch", "0N"),
         ("--punch", "-70N"),
-        ("--punch", "70kg"),
+        ("--punch", "70stone"),
         ("--drop", "-2m"),
         ("--drop", "0m"),
         ("--drop", "2km"),

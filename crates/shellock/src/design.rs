@@ -198,7 +198,9 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                 match candidate.division(ctx, job, fewer)? {
                     Some(next) => {
                         let n = next.surface.n_patches;
-                        ctx.note(&format!("pieces would rattle: {n} pieces instead of {n_pieces}"));
+                        ctx.note(&format!(
+                            "pieces would rattle: trying {n} pieces instead of {n_pieces}"
+                        ));
                         division = next;
                     }
                     None => budget.foreseen_joinings = 0,
@@ -236,7 +238,7 @@ fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explor
                     });
                 };
                 ctx.note(&format!(
-                    "another segmentation: {} pieces instead of {n_pieces}",
+                    "trying other pieces: {} instead of {n_pieces}",
                     next.surface.n_patches
                 ));
                 division = next;
@@ -261,7 +263,7 @@ fn strengthened(
         }
         Remedy::Connectors(chosen) => {
             levers.connectors -= 1;
-            ctx.note("it would give way where it is used: larger connectors there");
+            ctx.note("seams would open where it is used: larger connectors there");
             Division { chosen, ..division }
         }
         Remedy::Joined(surface, told) => {

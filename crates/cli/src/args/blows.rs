@@ -5,6 +5,7 @@ use shellock_mechanics::Material;
 
 use super::Axis;
 use crate::stress;
+use crate::units;
 
 /// Where a punch lands.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -17,14 +18,14 @@ pub enum Place {
 #[derive(Args)]
 pub struct Blows {
     /// Force of the punch
-    #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true, value_parser = stress::newtons)]
+    #[arg(long, value_name = "FORCE", default_value = "70N", allow_hyphen_values = true, value_parser = units::newtons)]
     pub punch: f64,
     /// Where it presses: on the highest place 15 mm wide or wider, or on the highest place above the middle
     #[arg(long, value_enum, default_value = "top", value_name = "WHERE")]
     pub at: Place,
     /// Height of the fall: m, cm or mm
     #[arg(long, value_name = "HEIGHT", default_value = "2m", allow_hyphen_values = true,
-          value_parser = stress::metres)]
+          value_parser = units::metres)]
     pub drop: f64,
     /// What the pieces are printed of: sla-resin, pla, petg or pa12 [default: as the kit was built]
     #[arg(long, value_name = "NAME", value_parser = stress::material)]

@@ -180,7 +180,7 @@ impl Learned {
 
     /// A plan was given up since a piece could not take its wall along.
     fn give_up(&mut self, ctx: &Ctx, lesson: Lesson) {
-        ctx.note(&format!("another plan: {lesson}"));
+        ctx.note(&format!("{lesson}: trying another plan"));
         self.failure.blamed.extend(lesson.blamed());
         lesson.teach(&mut self.constraints);
         self.n_blocked += 1;
@@ -210,7 +210,7 @@ impl Learned {
         self.failure.loose = lessons.iter().flat_map(Lesson::loose).collect();
         for lesson in &lessons {
             if self.n_kits < most_kits {
-                ctx.note(&format!("another plan: {lesson}"));
+                ctx.note(&format!("{lesson}: trying another plan"));
             }
             lesson.teach(&mut self.constraints);
         }

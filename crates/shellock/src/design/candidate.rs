@@ -212,14 +212,9 @@ fn key_params(job: &Job<'_>) -> KeyParams {
 
 /// A place in words.
 pub(super) fn words(site: &KeySite) -> String {
-    let (s, [x, y, z]) = (site.prism.slide, site.prism.origin.to_array());
+    let [x, y, z] = site.prism.origin.to_array();
     format!(
-        "a key of {:.0} mm² cut at ({x:.0}, {y:.0}, {z:.0}) mm, sliding along ({:.2}, {:.2}, {:.2}), {:.0} % flat, straight along its sides for {:.0} mm",
-        site.area_mm2,
-        s.x,
-        s.y,
-        s.z,
-        100.0 * site.flat_share,
-        site.rail_mm
+        "a key of {:.1} cm² at ({x:.0}, {y:.0}, {z:.0}) mm",
+        site.area_mm2 / 100.0
     )
 }

@@ -152,23 +152,22 @@ impl std::fmt::Display for Lesson {
                 against,
                 travel_mm,
                 thickness_mm,
-                volume_mm3,
                 ..
             } => write!(
                 f,
-                "piece {piece} rubs on its way in: {travel_mm:.1} mm from its place it meets piece {against} by {volume_mm3:.1} mm³, {thickness_mm:.2} mm thick"
+                "piece {piece} would rub on piece {against} on its way in, {travel_mm:.1} mm before it sits, {thickness_mm:.2} mm deep"
             ),
             Self::Blocked { piece, kept, .. } => {
                 write!(
                     f,
-                    "piece {piece} could take only {:.0} % of its wall along",
+                    "piece {piece} could take only {:.0} % of its wall along on its way out",
                     100.0 * kept
                 )
             }
             Self::SkinLost { piece, at, .. } => {
                 write!(
                     f,
-                    "piece {piece} loses outer surface on its way out, at {at:.0} mm"
+                    "piece {piece} would lose outer surface on its way out, at {at:.0} mm"
                 )
             }
             Self::FailedPlan { loose, .. } if loose.is_empty() => {
@@ -178,7 +177,7 @@ impl std::fmt::Display for Lesson {
                 let list: Vec<String> = loose.iter().map(ToString::to_string).collect();
                 write!(
                     f,
-                    "{} {} came out loose",
+                    "{} {} would come loose",
                     if list.len() == 1 { "piece" } else { "pieces" },
                     list.join(", ")
                 )

@@ -156,11 +156,11 @@ impl<'a> Best<'a> {
         let words = candidate::words(site);
         let reason = match explored {
             Err(DesignError::Cancelled(stop)) => return Err(stop.into()),
-            Err(e) => format!("with {words} it cannot be made: {e}"),
+            Err(e) => format!("{words} cannot be made: {e}"),
             Ok(Explored {
                 kit: None, failure, ..
             }) => {
-                format!("with {words} there is no plan: {}", failure.reason)
+                format!("{words}: no plan, as {}", failure.reason)
             }
             Ok(Explored { kit: Some(kit), .. }) => {
                 let failed = kit.failures();
@@ -172,7 +172,7 @@ impl<'a> Best<'a> {
                 if failed.is_empty() {
                     return Ok(());
                 }
-                format!("with {words} it fails: {}", failed.join(", "))
+                format!("{words}: {}", plainly(&failed))
             }
         };
         ctx.note(&reason);
@@ -413,4 +413,42 @@ from_stage! {
     BodyError => Body,
     ChoiceError => Choice,
     PieceError => Piece,
+}
+
+/// What is wrong with a kit that fails these checks, in words: each once.
+fn plainly(checks: &[String]) -> String {
+    let mut words: Vec<&str> = Vec::new();
+    for check in checks {
+        let word = match check.as_str() {
+            "pieces sit within their play" => "a piece would rattle",
+            "every piece but the key is blocked"
+            | "no cluster but the key slides (translations)"
+            | "nothing but the key moves (6 dof)"
+            | "no piece can be worked out by hand" => "pieces would come loose",
+            "outer surface kept" => "some of the outer surface would be lost",
+            "every installation path is free" => "a piece would rub on its way in",
+            "assembled pieces do not overlap" => "pieces would overlap",
+            other => other,
+        };
+        if !words.contains(&word) {
+            words.push(word);
+        }
+    }
+    words.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plainly;
+
+    #[test]
+    fn checks_that_mean_the_same_are_told_once() {
+        let failed = [
+            "every piece but the key is blocked",
+            "nothing but the key moves (6 dof)",
+            "a new one",
+        ];
+        let failed: Vec<String> = failed.map(String::from).into();
+        assert_eq!(plainly(&failed), "pieces would come loose, a new one");
+    }
 }
