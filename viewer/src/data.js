@@ -1,17 +1,26 @@
-// Reads what the page carries: a JSON header, and one block of base64 with all arrays.
+// Reads what the page carries: a JSON header, and one block of base64 with all arrays, deflated (zlib).
 //
-// header.meshes[i].points    = { offset, count, min, max }: 3 × uint16 a point, 0 … 65535 from min to max
-// header.meshes[i].triangles = { offset, count, bytes }: 3 × uint16 or uint32 a triangle
-// header.meshes[i].draft     = { points, triangles }: the same, coarser, for what moves on slow machines; may be missing
+// header.meshes[i].packed    = { offset, points, triangles, bytes, min, max }: coordinates 0 … 65535 from min to max, each less that of the
+//                              point before; then corners of `bytes` bytes: the first less that of the triangle before, the others less the
+//                              first. Of all these numbers the lowest byte of each, then the next of each.
+// header.meshes[i].draft     = the same, coarser, for what moves on slow machines; may be missing
+// header.meshes[i].look      = from where it is seen as it arrives, from the viewer to the scene; may be missing
+// header.tabs                = pages of tables, texts, pictures and files: see panel.js; may be missing
+// carriers: points           = { offset, count, min, max }: 3 × uint16 a point, 0 … 65535 from min to max
+//           triangles        = { offset, count, bytes }: 3 × uint16 or uint32 a triangle
 // header.quantities[j]       = { name, unit, values }: one number or null a mesh, to colour meshes by
 // header.motions             = what moves how: see motion.js; may be missing
 // header.loads              = what loads do to meshes: see sway.js; may be missing
 // Offsets count bytes. Everything else in the header is text and numbers to show.
 
+import { unzlibSync } from "fflate";
+
 export function readPage(document) {
   const header = JSON.parse(document.getElementById("header").textContent);
-  const buffer = bytesFromBase64(document.getElementById("arrays").textContent.trim()).buffer;
-  const meshes = header.meshes.map((m) => ({ ...m, ...arrays(m, buffer), draft: m.draft && arrays(m.draft, buffer) }));
+  const bytes = unzlibSync(bytesFromBase64(document.getElementById("arrays").textContent.trim()));
+  // A copy, so that arrays begin where the offsets say.
+  const buffer = bytes.slice().buffer;
+  const meshes = header.meshes.map((m) => ({ ...m, ...unpacked(m.packed, buffer), draft: m.draft && unpacked(m.draft, buffer) }));
   return { header, meshes, ...loadArrays(header.loads, buffer) };
 }
 
@@ -29,6 +38,29 @@ function bytesFromBase64(text) {
   const bytes = new Uint8Array(binary.length);
   for (let i = 0; i < binary.length; i++) bytes[i] = binary.charCodeAt(i);
   return bytes;
+}
+
+/** A packed mesh: positions and indices. */
+export function unpacked({ offset, points, triangles, bytes, min, max }, buffer) {
+  const [n, m] = [3 * points, 3 * triangles];
+  const low = new Uint8Array(buffer, offset, n);
+  const high = new Uint8Array(buffer, offset + n, n);
+  const positions = new Float32Array(n);
+  const step = [0, 0, 0];
+  for (let i = 0; i < n; i++) {
+    const axis = i % 3;
+    step[axis] = (step[axis] + low[i] + 256 * high[i]) & 65535;
+    positions[i] = min[axis] + (step[axis] / 65535) * (max[axis] - min[axis]);
+  }
+  const corners = new Uint8Array(buffer, offset + 2 * n, bytes * m);
+  const indices = bytes === 2 ? new Uint16Array(m) : new Uint32Array(m);
+  let first = 0;
+  for (let i = 0; i < m; i++) {
+    let value = 0;
+    for (let b = 0; b < bytes; b++) value += corners[b * m + i] * 2 ** (8 * b);
+    if (i % 3 === 0) { first += value; indices[i] = first; } else indices[i] = first + value;
+  }
+  return { positions, indices };
 }
 
 function arrays({ points, triangles }, buffer) {

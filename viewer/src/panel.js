@@ -47,14 +47,22 @@ export function buildPanel(header, meshes, order, on) {
   view.append(turn, button("Reset", "Reset the view", on.home));
   tools.append(modes, apart.holder, steps.holder, cut.holder, paint.holder, ...motions.holders, sway.holder, view);
   panel.append(element("h1", "", header.title), summary(header));
-  if (loads.holder) panel.append(loads.holder);
   const list = meshList(header, meshes, order, on);
-  panel.append(list.holder);
-  if (header.notes.length) panel.append(noteList(header, on));
-  if (header.facts.length) panel.append(section("Facts", table(header.facts)));
-  if (header.checks.length) panel.append(section("Checks", checkTable(header.checks)));
-  for (const figure of header.figures ?? []) panel.append(section(figure.title, picture(figure)));
+  const figures = (header.figures ?? []).map((figure) => section(figure.title, picture(figure)));
+  const play = playTab(header);
+  const pages = [
+    { name: header.meshes_title, parts: [list.holder, header.notes.length && noteList(header, on)] },
+    { name: "Strength", parts: [loads.holder, ...figures] },
+    { name: "Play", parts: play },
+    ...(header.tabs ?? []).map((tab) => ({ name: tab.name, parts: tab.parts.map(part) })),
+    { name: "Checks", parts: [header.facts.length && section("Facts", table(header.facts)), header.checks.length && section("Checks", checkTable(header.checks))] },
+  ].map(({ name, parts }) => ({ name, parts: parts.filter(Boolean) })).filter(({ parts }) => parts.length);
+  const tabs = tabbed(pages);
+  panel.append(tabs.holder);
+  const look = lookControls(on);
+  tools.insertBefore(look.holder, view);
   return {
+    open: tabs.open,
     update(state, flying) {
       MODES.forEach(([mode], i) => modeButtons[i].setAttribute("aria-pressed", state.mode === mode));
       apart.holder.hidden = state.mode !== "apart";
@@ -67,6 +75,88 @@ export function buildPanel(header, meshes, order, on) {
       loads.update(state);
       steps.update(state, flying === undefined ? "" : meshes[flying].name);
       list.update(state, flying);
+      look.update(state);
+    },
+  };
+}
+
+// Pages of which one shows; arrows go from button to button.
+function tabbed(pages) {
+  const holder = element("div");
+  const bar = element("div", "tabs");
+  bar.setAttribute("role", "tablist");
+  const sheets = pages.map(({ name, parts }, i) => {
+    const sheet = element("div", "sheet");
+    Object.assign(sheet, { id: `sheet-${i}` });
+    sheet.setAttribute("role", "tabpanel");
+    sheet.setAttribute("aria-label", name);
+    sheet.append(...parts);
+    return sheet;
+  });
+  const buttons = pages.map(({ name }, i) => {
+    const b = button(name, name, () => open(i));
+    b.setAttribute("role", "tab");
+    b.setAttribute("aria-controls", `sheet-${i}`);
+    return b;
+  });
+  function open(i) {
+    sheets.forEach((sheet, k) => { sheet.hidden = k !== i; });
+    buttons.forEach((b, k) => { b.setAttribute("aria-selected", k === i); b.tabIndex = k === i ? 0 : -1; });
+  }
+  bar.addEventListener("keydown", (e) => {
+    const by = { ArrowRight: 1, ArrowLeft: -1 }[e.key];
+    if (!by) return;
+    e.preventDefault();
+    e.stopPropagation();
+    const next = (buttons.indexOf(document.activeElement) + by + buttons.length) % buttons.length;
+    open(next);
+    buttons[next].focus();
+  });
+  bar.append(...buttons);
+  open(0);
+  if (pages.length > 1) holder.append(bar);
+  holder.append(...sheets);
+  return { holder, open: (i) => pages[i] && open(i) };
+}
+
+// A part of a page: { table | text | picture | files: [title, content] }.
+function part(of) {
+  const [kind, [title, content]] = Object.entries(of)[0];
+  if (kind === "table") return section(title, table(content));
+  if (kind === "text") return section(title, ...content.map((line) => element("p", "line", line)));
+  if (kind === "picture") return section(title, picture({ title, source: content }));
+  const list = element("ul", "files");
+  for (const [name, what] of content) {
+    const item = element("li");
+    const link = element("a", "", name);
+    link.href = encodeURI(name);
+    link.download = "";
+    item.append(link, element("span", "", what));
+    list.append(item);
+  }
+  return section(title, list);
+}
+
+// How far meshes move within their gaps, in words and figures.
+function playTab(header) {
+  const played = (header.quantities ?? []).filter((q) => /play/.test(q.name) && q.values.some((v) => v !== null));
+  const rows = played.map((q) => [`most ${q.name}`, `${Math.max(...q.values.filter((v) => v !== null)).toFixed(1)} ${q.unit}`]);
+  if (!rows.length && !(header.motions ?? []).length) return [];
+  const words = "Pieces have gaps so that they go together, so each can be wiggled a little while the others rest. \"shake\" below the model shows how far.";
+  return [section("Play", element("p", "line", words), table(rows))];
+}
+
+// Numbers on meshes, and measuring.
+function lookControls(on) {
+  const holder = element("div", "modes");
+  const numbers = button("Numbers", "Show numbers on pieces", on.numbers);
+  const measure = button("Measure", "Measure between two clicks", on.measure);
+  holder.append(numbers, measure);
+  return {
+    holder,
+    update(state) {
+      numbers.setAttribute("aria-pressed", state.numbers);
+      measure.setAttribute("aria-pressed", state.measuring);
     },
   };
 }
@@ -77,7 +167,10 @@ function summary({ checks, notes }) {
   if (checks.length) {
     line.append(element("span", failed ? "pill bad" : "pill good", failed ? `${failed} of ${checks.length} checks FAIL` : `${checks.length} checks ok`));
   }
-  if (notes.length) line.append(element("span", "pill warn", notes.length === 1 ? "1 warning" : `${notes.length} warnings`));
+  for (const [severity, look] of [["problem", "bad"], ["warning", "warn"], ["note", "plain"]]) {
+    const n = notes.filter((note) => (note.severity ?? "warning") === severity).length;
+    if (n) line.append(element("span", `pill ${look}`, `${n} ${severity}${n === 1 ? "" : "s"}`));
+  }
   return line;
 }
 
@@ -274,6 +367,10 @@ function meshList(header, meshes, order, on) {
     const only = button("Only this", `Show only ${m.name}`, on.alone);
     details.append(table(m.facts), only, button("From inside", `Look at the inner side of ${m.name}`, on.inside));
     row.append(pick, eye, details);
+    row.addEventListener("pointerenter", () => on.hover(i));
+    row.addEventListener("pointerleave", () => on.hover(-1));
+    pick.addEventListener("focus", () => on.hover(i));
+    pick.addEventListener("blur", () => on.hover(-1));
     list.append(row);
     rows.set(i, { row, eye, dot });
   }
@@ -287,6 +384,7 @@ function meshList(header, meshes, order, on) {
         if (chosen && !row.classList.contains("chosen")) row.scrollIntoView?.({ block: "nearest" });
         row.classList.toggle("chosen", chosen);
         row.classList.toggle("flying", flying === i);
+        row.classList.toggle("hovered", state.hovered === i);
         row.classList.toggle("gone", state.hidden.has(i));
         eye.textContent = state.hidden.has(i) ? "show" : "hide";
       }
@@ -297,11 +395,12 @@ function meshList(header, meshes, order, on) {
 function noteList(header, on) {
   const list = element("ul", "notes");
   for (const note of header.notes) {
-    const item = element("li");
+    const item = element("li", note.severity ?? "warning");
     const b = button("", note.at ? "Show the place" : note.title, () => on.note(note));
-    b.append(element("strong", "", note.title), element("span", "", note.text));
+    const { severity = "warning" } = note;
+    b.append(element("strong", "", `${severity[0].toUpperCase()}${severity.slice(1)}: ${note.title}`), element("span", "", note.text));
     item.append(b);
     list.append(item);
   }
-  return section("Warnings", list);
+  return section("Warnings and notes", list);
 }

@@ -156,6 +156,7 @@ export class Stage {
       this.#pace(now);
       this.#bend();
       this.renderer.render(this.scene, this.camera);
+      this.#drawInset();
       this.afterDraw?.();
       // While it turns, this asks for the next frame.
       if (this.controls.autoRotate) this.controls.update();
@@ -174,6 +175,7 @@ export class Stage {
       if (this.pending) { this.rest = setTimeout(settle, REST_MS); return; }
       this.last = -Infinity;
       if (this.isDraft) { this.#show(false); this.draw(); }
+      this.afterRest?.();
     };
     this.rest = setTimeout(settle, REST_MS);
   }
@@ -185,17 +187,112 @@ export class Stage {
     for (const { group, fine, draft } of this.items) for (const mesh of group.children) mesh.geometry = isDraft ? draft : fine;
   }
 
-  lookFrom(direction, center = this.center, size = this.size) {
+  // From how far what is so large fills the free part of the canvas.
+  #distance(size) {
     const half = (this.camera.fov * Math.PI) / 360;
     const free = 1 - this.room / (this.holder.clientHeight || 1);
-    const narrow = Math.min(free, this.camera.aspect);
+    return (0.49 * size) / Math.sin(half) / Math.min(free, this.camera.aspect);
+  }
+
+  lookFrom(direction, center = this.center, size = this.size) {
+    cancelAnimationFrame(this.turning);
     this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(direction.clone().normalize(), (0.49 * size) / Math.sin(half) / narrow);
+    this.camera.position.copy(center).addScaledVector(direction.clone().normalize(), this.#distance(size));
     this.camera.near = this.size / 500;
     this.camera.far = this.size * 60;
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.draw();
+  }
+
+  /** What holds meshes where they are assembled, and mesh `i` also `back` along its way: its middle and its size. */
+  around(meshes, i, back) {
+    const box = new Box3();
+    for (const k of meshes) box.union(this.items[k].box);
+    box.union(this.items[i].box).union(this.items[i].box.clone().translate(this.items[i].travel.clone().multiplyScalar(-back)));
+    return { center: box.getCenter(new Vector3()), size: box.getSize(new Vector3()).length() };
+  }
+
+  /** Turns the camera to look along `direction` at `center`, as near as `size` allows, in `ms`; at once for 0. */
+  turnTo(direction, { center, size }, ms) {
+    cancelAnimationFrame(this.turning);
+    const { target } = this.controls;
+    const from = this.camera.position.clone().sub(target);
+    const [near, far] = [from.length(), this.#distance(size)];
+    const start = target.clone();
+    const angles = (v) => [Math.atan2(v.y, v.x), Math.asin(Math.max(-0.999, Math.min(0.999, v.z)))];
+    const [a0, b0] = angles(from.normalize());
+    let [a1, b1] = angles(direction.clone().normalize().negate());
+    // The shorter way round.
+    a1 = a0 + Math.atan2(Math.sin(a1 - a0), Math.cos(a1 - a0));
+    const look = (share) => {
+      const [a, b] = [a0 + share * (a1 - a0), b0 + share * (b1 - b0)];
+      const distance = near + share * (far - near);
+      target.lerpVectors(start, center, share);
+      this.camera.position.set(Math.cos(a) * Math.cos(b), Math.sin(a) * Math.cos(b), Math.sin(b)).multiplyScalar(distance).add(target);
+      this.controls.update();
+      this.draw();
+    };
+    if (!ms) return look(1);
+    const begin = performance.now();
+    const frame = (now) => {
+      const share = Math.min(1, Math.max(0, (now - begin) / ms));
+      look(share * share * (3 - 2 * share));
+      if (share < 1) this.turning = requestAnimationFrame(frame);
+    };
+    this.turning = requestAnimationFrame(frame);
+  }
+
+  /** A second, small view from the other side, `width` CSS pixels wide at the top right; none for 0. */
+  inset(width) {
+    this.insetWidth = width;
+    this.draw();
+  }
+
+  #drawInset() {
+    const width = this.insetWidth ?? 0;
+    if (!width) return;
+    const height = Math.round(0.8 * width);
+    const { clientWidth: w, clientHeight: h } = this.holder;
+    this.other ??= new PerspectiveCamera(32, 1, 1, 1e5);
+    const { other, renderer } = this;
+    const target = this.controls.target;
+    const away = this.camera.position.clone().sub(target);
+    other.up.copy(UP);
+    other.position.copy(target).add(new Vector3(-away.x, -away.y, away.z).multiplyScalar(Math.min(1, w / h)));
+    other.aspect = width / height;
+    other.near = this.camera.near;
+    other.far = this.camera.far;
+    other.lookAt(target);
+    other.updateProjectionMatrix();
+    // Lights hang on the camera: they go along for this picture.
+    const lights = this.camera.children.slice();
+    other.add(...lights);
+    this.scene.add(other);
+    renderer.setScissorTest(true);
+    renderer.setScissor(w - width - 12, h - height - 12, width, height);
+    renderer.setViewport(w - width - 12, h - height - 12, width, height);
+    renderer.clear();
+    renderer.render(this.scene, other);
+    renderer.setScissorTest(false);
+    renderer.setViewport(0, 0, w, h);
+    this.camera.add(...lights);
+  }
+
+  /** Whether most of mesh `i` is hidden by what shows, as the camera looks. */
+  isHidden(i) {
+    const { group, draft } = this.items[i];
+    const points = draft.attributes.position;
+    const ray = new Raycaster();
+    const others = this.items.filter((item, k) => k !== i && item.group.visible).map((item) => new Mesh(item.draft, item.skin));
+    this.items.filter((item, k) => k !== i && item.group.visible).forEach((item, k) => { others[k].matrixWorld.copy(item.group.matrixWorld); });
+    const some = [...Array(16).keys()].map((k) => new Vector3().fromBufferAttribute(points, Math.floor((k * points.count) / 16)).add(group.position));
+    const hidden = some.filter((p) => {
+      const way = this.camera.position.clone().sub(p);
+      ray.set(p.clone().addScaledVector(way.normalize(), 0.01 * this.size), way);
+      return ray.intersectObjects(others).length > 0;
+    });
+    return hidden.length > 0.6 * some.length;
   }
 
   /** Turns the scene on and on, or no more. */
@@ -427,18 +524,28 @@ export class Stage {
 
   /** The visible mesh under a point of the window, or −1. */
   pick(clientX, clientY) {
+    return this.hit(clientX, clientY).i;
+  }
+
+  /** The visible mesh and place under a point of the window: `{ i, point }`, i = −1 for none. */
+  hit(clientX, clientY) {
     const r = this.renderer.domElement.getBoundingClientRect();
     const at = new Vector2(((clientX - r.left) / r.width) * 2 - 1, 1 - ((clientY - r.top) / r.height) * 2);
     const ray = new Raycaster();
     ray.setFromCamera(at, this.camera);
-    let best = { distance: Infinity, i: -1 };
+    let best = { distance: Infinity, i: -1, point: null };
     this.items.forEach(({ group }, i) => {
       if (!group.visible) return;
       for (const hit of ray.intersectObject(group.children[0])) {
-        if (hit.distance < best.distance && this.clip.distanceToPoint(hit.point) >= 0) best = { distance: hit.distance, i };
+        if (hit.distance < best.distance && this.clip.distanceToPoint(hit.point) >= 0) best = { distance: hit.distance, i, point: hit.point };
       }
     });
-    return best.i;
+    return best;
+  }
+
+  /** The middle of mesh `i` where it is now. */
+  middle(i) {
+    return this.items[i].center.clone().add(this.items[i].group.position);
   }
 
   /** Where a place stands on the canvas, in CSS pixels; `null` behind the viewer. */

@@ -11,6 +11,12 @@ const FLIGHT_MS = 1100;
 const REST_MS = 350;
 const LARGE = 5;
 const LOAD_AIR = 1.12;
+const TURN_MS = 700;
+// How far a mesh comes, in sizes of the whole.
+const WAY = 0.55;
+// What is in place already, while one goes in.
+const THERE = [190, 190, 188];
+const HOVER_MS = 90;
 
 function start() {
   const { header, meshes, carriers, loads } = readPage(document);
@@ -23,7 +29,7 @@ function start() {
   }
   const order = meshes.map((_, i) => i).sort((a, b) => meshes[a].step - meshes[b].step);
   // apart: 0 … 1 · step: how many have arrived, with the share of the one on its way
-  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null, turning: false, motion: -1, magnified: false, load: -1, isWeakest: false };
+  const state = { mode: "together", apart: 0.8, step: meshes.length, playing: false, hidden: new Set(), alone: false, chosen: -1, cutAxis: 1, cut: 0, paint: -1, shades: null, turning: false, motion: -1, magnified: false, load: -1, isWeakest: false, numbers: false, measuring: false, measured: [], hovered: -1, seen: -1 };
   const player = new Player(header.motions ?? [], () => update());
   const swayer = new Swayer(loads, () => update());
   const caption = element("p", "caption");
@@ -46,6 +52,9 @@ function start() {
     choose,
     toggle: (i) => { state.hidden.has(i) ? state.hidden.delete(i) : state.hidden.add(i); update(); },
     inside,
+    numbers: () => { Object.assign(state, { numbers: !state.numbers, seenNumbers: null }); stage?.draw(); update(); },
+    measure: () => { Object.assign(state, { measuring: !state.measuring, measured: [] }); stage?.draw(); update(); },
+    hover: (i) => { if (state.hovered !== i) { state.hovered = i; update(); } },
     turn: () => { state.turning = !state.turning; stage?.turn(state.turning); update(); },
     alone: () => { state.alone = !state.alone && state.chosen >= 0; update(); },
     showAll: () => { state.hidden.clear(); state.alone = false; choose(-1); },
@@ -61,8 +70,44 @@ function start() {
     update();
   }
 
+  const isStill = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+  // Turns to where the mesh that goes in, its place and its way are seen; what is hidden there shows from the other side, too.
+  function lookAtStep(i) {
+    const look = meshes[i]?.look;
+    if (!stage || state.seen === i) return;
+    state.seen = i;
+    const before = state.below;
+    state.below = Boolean(look && look[2] > 0.05);
+    state.isTurned = before !== undefined && before !== state.below;
+    const there = order.slice(0, order.indexOf(i));
+    if (look) stage.turnTo(new Vector3(...look), stage.around(there, i, there.length ? 0.5 * WAY * stage.size : 0), isStill() ? 0 : TURN_MS);
+    clearTimeout(state.later);
+    state.later = setTimeout(() => {
+      const isHidden = state.mode === "steps" && state.seen === i && stage.isHidden(i);
+      stage.inset(isHidden ? Math.min(260, 0.3 * holder.clientWidth) : 0);
+    }, isStill() ? 0 : TURN_MS + 60);
+  }
+
+  // What to read while a mesh goes in.
+  function stepCaption(i) {
+    if (i === undefined) return "";
+    const { name, step, badge } = meshes[i];
+    const what = step === 0 ? `Begin with ${name}` : `Put ${name} in along the arrow${badge ? `: it is the ${badge} and locks all` : ""}`;
+    const turn = state.isTurned ? (state.below ? " – turn it over: seen from below" : " – turn it back: seen from above") : state.below ? " – seen from below" : "";
+    return `Step ${step + 1} of ${meshes.length}: ${what}${turn}`;
+  }
+
   function fit() {
     stage?.fit(state.mode === "apart" ? state.apart : 0, state.mode === "steps" ? 1.3 : 1);
+  }
+
+  // Of two clicks on what shows: how far apart they are.
+  function measure({ point }) {
+    if (!point) return;
+    state.measured = state.measured.length === 2 ? [point] : [...state.measured, point];
+    stage.mark(point);
+    update();
   }
 
   function choose(i) {
@@ -83,8 +128,13 @@ function start() {
   function paint(quantity) {
     const chosen = header.quantities?.[quantity];
     Object.assign(state, { paint: chosen ? quantity : -1, shades: chosen?.values.some((v) => v !== null) ? shades(chosen) : null });
-    meshes.forEach((m, i) => stage?.paint(i, state.shades?.colors[i] ?? m.color));
     update();
+  }
+
+  // Colours: of a quantity, or its own; grey for what is in place while another goes in.
+  function paintAll(flying) {
+    const isThere = (i) => state.mode === "steps" && flying !== undefined && i !== flying && meshes[i].look;
+    meshes.forEach((m, i) => stage.paint(i, state.shades?.colors[i] ?? (isThere(i) ? THERE : m.color)));
   }
 
   // Plays a motion of assembled meshes, or puts them back; shows its next pose instead to who wants no animation.
@@ -162,6 +212,7 @@ function start() {
     else { state.step = Math.max(0, Math.min(meshes.length, step)); update(); }
   }
 
+  // Steps begin with the first, and go on from where they were.
   function enterSteps() {
     if (state.mode === "steps") return;
     state.mode = "steps";
@@ -207,17 +258,24 @@ function start() {
   function update() {
     Object.assign(state, { motion: player.index, load: swayer.index, amount: swayer.amount, swaying: swayer.isPlaying });
     const flying = state.mode === "steps" ? order[Math.ceil(state.step) - 1] : undefined;
-    if (stage) arrange(flying);
+    if (stage) {
+      paintAll(flying);
+      arrange(flying);
+      if (flying !== undefined) lookAtStep(flying);
+      else if (state.seen >= 0) { Object.assign(state, { seen: -1, below: undefined, isTurned: false }); stage.inset(0); }
+    }
     panel.update(state, flying);
-    const text = player.caption() || swayer.caption();
+    const text = player.caption() || swayer.caption() || (state.measuring ? measureCaption() : "") || stepCaption(flying);
     // Said once, not with every frame.
     if (caption.textContent !== text) caption.textContent = text;
-    document.getElementById("tools").classList.toggle("loaded", state.load >= 0 || state.isWeakest);
+    const { classList } = document.getElementById("tools");
+    classList.toggle("loaded", state.load >= 0 || state.isWeakest);
+    classList.toggle("stepping", state.mode === "steps");
   }
 
   function arrange(flying) {
     const travelled = state.step - Math.ceil(state.step) + 1;
-    const way = 0.55 * stage.size;
+    const way = WAY * stage.size;
     const places = player.places();
     meshes.forEach((m, i) => {
       const arrived = state.mode !== "steps" || order.indexOf(i) < Math.ceil(state.step);
@@ -226,7 +284,7 @@ function start() {
       if (i === flying) offset.set(...m.travel).multiplyScalar(-(1 - eased(travelled)) * way);
       places.has(i) ? stage.pose(i, places.get(i)) : stage.place(i, offset);
       const hidden = !arrived || state.hidden.has(i) || (state.alone && state.chosen !== i);
-      stage.show(i, { hidden, faint: places.size > 0 && !places.has(i), lit: state.chosen === i && !state.alone });
+      stage.show(i, { hidden, faint: places.size > 0 && !places.has(i), lit: (state.chosen === i || state.hovered === i) && !state.alone });
       stage.showWay(i, state.mode === "apart" && !hidden ? offset : null);
     });
     if (flying !== undefined && travelled < 1) stage.showArrow(flying, way);
@@ -235,8 +293,28 @@ function start() {
     stage.sway(swayer.load?.moved ?? null, swayer.amount);
   }
 
-  // Words at places: of what a load is, and where it gives way.
+  function measureCaption() {
+    const [a, b] = state.measured;
+    if (b) return `${a.distanceTo(b).toFixed(1)} mm between the two places`;
+    return a ? "Click a second place" : "Click two places to measure between them";
+  }
+
+  const isShown = (i) => !state.hidden.has(i) && !(state.alone && state.chosen !== i) && (state.mode !== "steps" || order.indexOf(i) < Math.ceil(state.step));
+
+  // Numbers on meshes, the name of what is pointed at, and words at places: of what a load is, and where it gives way.
   function labels() {
+    const own = placeLabels();
+    if (own.length) return own;
+    if (state.measured.length === 2) {
+      const [a, b] = state.measured;
+      return [{ text: `${a.distanceTo(b).toFixed(1)} mm`, at: a.clone().add(b).multiplyScalar(0.5).toArray() }];
+    }
+    if (state.numbers && state.seenNumbers) return meshes.map((m, i) => ({ text: m.name.replace(/^\D+/, "") || m.name, at: stage.middle(i).toArray(), i })).filter(({ i }) => isShown(i) && state.seenNumbers.has(i));
+    if (state.hovered >= 0 && isShown(state.hovered)) return [{ text: meshes[state.hovered].name, at: stage.middle(state.hovered).toArray() }];
+    return [];
+  }
+
+  function placeLabels() {
     if (state.isWeakest) return [{ text: header.loads.weakest.place.name, at: header.loads.weakest.place.at }];
     if (state.note?.at) return [{ text: state.note.title, at: state.note.at }];
     const { arrows = [], place = null } = swayer.load ?? {};
@@ -259,6 +337,12 @@ function start() {
     fit();
     holder.append(caption);
     const shown = [];
+    stage.afterRest = () => {
+      if (!state.numbers) return;
+      // Of what is seen; what hides it has its own.
+      state.seenNumbers = new Set(meshes.map((_, i) => i).filter((i) => isShown(i) && !stage.isHidden(i)));
+      stage.afterDraw();
+    };
     stage.afterDraw = () => {
       const wanted = labels();
       while (shown.length < wanted.length) { shown.push(element("div", "label")); holder.append(shown.at(-1)); }
@@ -273,10 +357,15 @@ function start() {
         label.style.transform = `translate(${placed(at, tip, label, room, taken).map((x) => `${x}px`)})`;
       });
     };
-    clicks(holder.querySelector("canvas"), (x, y) => choose(stage.pick(x, y)));
+    const canvas = holder.querySelector("canvas");
+    clicks(canvas, (x, y) => (state.measuring ? measure(stage.hit(x, y)) : choose(stage.pick(x, y))));
+    hovers(canvas, (x, y) => {
+      const i = x === null ? -1 : stage.pick(x, y);
+      if (state.hovered !== i) { state.hovered = i; update(); }
+    });
   }
-  keys({ next: () => goTo(Math.floor(state.step) + 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => { if (swayer.load) { swayer.isPlaying ? swayer.pause() : swayer.play(); update(); } else state.playing ? stop() : play(); }, escape: () => { if (player.motion || swayer.load || state.isWeakest) stop(); choose(-1); } });
-  fromAddress(location.hash, { state, setMode, update, choose, inside, paint, motion, load: (i) => load(i), weakest, amount: (share) => { swayer.show(share); update(); }, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
+  keys({ next: () => goTo(state.mode === "steps" ? Math.ceil(state.step) + 1 : 1), back: () => goTo(Math.ceil(state.step) - 1), play: () => { if (swayer.load) { swayer.isPlaying ? swayer.pause() : swayer.play(); update(); } else state.playing ? stop() : play(); }, escape: () => { if (player.motion || swayer.load || state.isWeakest) stop(); choose(-1); } });
+  fromAddress(location.hash, { panel, state, setMode, update, choose, inside, paint, motion, load: (i) => load(i), weakest, amount: (share) => { swayer.show(share); update(); }, note: (i) => { state.note = header.notes[i]; lookAtNote(); }, cut: (share) => stage?.cutAt(1, share) });
   update();
   document.documentElement.dataset.ready = "true";
 }
@@ -307,17 +396,30 @@ function clicks(canvas, then) {
   });
 }
 
+// Where a mouse rests, now and then; null once it leaves or turns the camera.
+function hovers(canvas, then) {
+  let timer = 0;
+  canvas.addEventListener("pointermove", (e) => {
+    clearTimeout(timer);
+    if (e.pointerType !== "mouse" || e.buttons) return;
+    timer = setTimeout(() => then(e.clientX, e.clientY), HOVER_MS);
+  });
+  canvas.addEventListener("pointerleave", () => { clearTimeout(timer); then(null); });
+}
+
 function keys({ next, back, play, escape }) {
   const actions = { ArrowRight: next, ArrowLeft: back, " ": play, Escape: escape };
   addEventListener("keydown", (e) => {
-    if (/INPUT|BUTTON|SELECT/.test(e.target.tagName) || !actions[e.key]) return;
+    // A button that has the focus keeps the space bar, and what has a value its arrows.
+    const holds = e.key === " " ? /INPUT|BUTTON|SELECT|SUMMARY/ : /INPUT|SELECT/;
+    if (holds.test(e.target.tagName) || !actions[e.key]) return;
     e.preventDefault();
     actions[e.key]();
   });
 }
 
-// #apart, #apart=0.5, #step=3.4, #choose=2, #inside=2, #cut=0.5, #note=0, #paint=1, #motion=0, #load=0, #load=0&amount=1, #weakest show that view at once: for links and for pictures.
-function fromAddress(hash, { state, setMode, update, choose, inside, paint, motion, load, weakest, amount, note, cut }) {
+// #apart, #apart=0.5, #step=3.4, #choose=2, #inside=2, #cut=0.5, #note=0, #paint=1, #motion=0, #load=0, #load=0&amount=1, #weakest, #numbers, #tab=2 show that view at once: for links and for pictures.
+function fromAddress(hash, { state, setMode, update, choose, inside, paint, motion, load, weakest, amount, note, cut, panel }) {
   for (const [key, text] of new URLSearchParams(hash.slice(1))) {
     const value = Number(text);
     if (!Number.isFinite(value)) continue;
@@ -332,6 +434,8 @@ function fromAddress(hash, { state, setMode, update, choose, inside, paint, moti
     if (key === "load") load(value);
     if (key === "amount") amount(value);
     if (key === "weakest") weakest();
+    if (key === "numbers") state.numbers = true;
+    if (key === "tab") panel.open(value);
   }
   state.step = Math.min(state.step, document.querySelectorAll(".mesh").length);
   update();

@@ -189,8 +189,9 @@ test("choosing a load moves points, tells the factor and shows where it acts", {
   assert.deepEqual([m.nothing.caption, m.nothing.signs, m.nothing.labels, m.nothing.pressed], ["Nothing gives way", [], [], ["false", "true", "false"]]);
   for (const back of [m.escaped, m.steps]) {
     assert.ok(near(back.points, rest));
-    assert.deepEqual([back.caption, back.signs, back.labels, back.hasSlider, back.pressed], ["", [], [], false, ["false", "false", "false"]]);
+    assert.deepEqual([back.signs, back.labels, back.hasSlider, back.pressed], [[], [], false, ["false", "false", "false"]]);
   }
+  assert.deepEqual([m.escaped.caption, m.steps.caption], ["", "Step 1 of 2: Begin with mesh 0 <b>"]);
   assert.deepEqual([m.weakest.signs, m.weakest.labels, m.weakest.pressed], [["TubeGeometry", "TubeGeometry"], ["opens here <b>"], ["false", "false", "true"]]);
   assert.ok(!dom.includes("<b>"), "text stays text");
 });
@@ -203,4 +204,21 @@ test("who wants no animation sees a load at its full, still, and has the slider"
   assert.ok(near(m.full.points, full) && near(m["back at rest"].points, full), "nothing moves by itself");
   assert.deepEqual([m.full.isPlaying, m.full.amount, m.full.caption], [false, 1, "Pressed <b> (4 times exaggerated)"]);
   assert.ok(near(m.half.points, [still, [x, y, z - 1]]));
+});
+
+test("a step turns the camera to where it is seen, in grey what is there; numbers, names and places are told", { skip: withoutBrowser }, async () => {
+  const { dom, data } = await opened(await samplePage({ script: scripts.walk }));
+  const { steps, numbers, measured, hovered, sheets } = JSON.parse(decodeURIComponent(atob(data("walk"))));
+  // mesh 0 is looked at from above, mesh 1 from below: [0, 1, ∓0.5].
+  const close = (a, b) => a.every((x, k) => Math.abs(x - b[k]) < 0.02);
+  const unit = (v) => v.map((x) => x / Math.hypot(...v));
+  assert.ok(close(steps[0].look, unit([0, 1, -0.5])) && close(steps[1].look, unit([0, 1, 0.5])), JSON.stringify(steps));
+  assert.deepEqual(steps.map((s) => s.caption), ["Step 1 of 2: Begin with mesh 0 <b>", "Step 2 of 2: Put mesh 1 <b> in along the arrow: it is the last and locks all – turn it over: seen from below"]);
+  const [red, green, blue] = steps[1].colors[0];
+  assert.ok(Math.abs(red - green) < 0.02 && Math.abs(green - blue) < 0.03, "what is there is grey");
+  assert.deepEqual(numbers, ["0 <b>", "1 <b>"]);
+  assert.match(measured, /^1[12]\.\d mm between the two places$/, "12 mm, as near as a pixel is");
+  assert.equal(hovered, "mesh hovered");
+  assert.deepEqual(sheets, ["Meshes", "Print <b>", "Checks"]);
+  assert.match(dom, /<a href="a%20b.3mf" download="">a b.3mf<\/a>/);
 });

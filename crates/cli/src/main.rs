@@ -26,6 +26,7 @@ mod savings;
 mod stages;
 mod stopwatch;
 mod stress;
+mod tabs;
 mod told;
 mod units;
 

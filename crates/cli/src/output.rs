@@ -235,7 +235,15 @@ pub fn files(
         )
     };
     let ((archive, plates), (page, picture, booklet)) = rayon::join(archives, || {
-        page::report(model, options, settings, design, warnings, &summary, figures)
+        page::report(
+            model,
+            options,
+            settings,
+            design,
+            warnings,
+            &summary,
+            (figures, printing),
+        )
     });
     let mut archives = vec![("assembly.3mf".to_owned(), archive)];
     archives.extend(plates);

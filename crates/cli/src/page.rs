@@ -8,7 +8,7 @@ use shellock::verify::{Finding, Play};
 use shellock::{Cause, IdVec, PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
-use shellock_print::booklet::{Booklet, Borne, WeakPlace};
+use shellock_print::booklet::{Booklet, Borne, WeakPlace, looks};
 use shellock_render::{
     ReportCheck, ReportData, ReportMotion, ReportMove, ReportPiece, ReportPlace, ReportQuantity, html,
     palette, pieces_picture,
@@ -20,6 +20,8 @@ use crate::input::Model;
 use crate::loads;
 use crate::output::{Summary, connector_sizes, standing};
 use crate::place::Standing;
+use crate::printing::Printing;
+use crate::tabs;
 use crate::told::{bearing, scope};
 
 /// Pieces are shown within this share of the model's diagonal, in the mean: 0.07 mm on 240 mm.
@@ -34,7 +36,7 @@ pub fn report(
     design: &Design,
     warnings: &[Warning],
     summary: &Summary,
-    figures: Vec<(String, String)>,
+    (figures, printing): (Vec<(String, String)>, &Printing),
 ) -> (Vec<u8>, Vec<u8>, Option<Vec<u8>>) {
     let stand = |v: Vec3| standing(options.up, v);
     let shown = shown(design, stand);
@@ -74,6 +76,18 @@ pub fn report(
         })
         .collect();
     let quantities = quantities(design);
+    let looks = looks(&pieces);
+    let has_passed = design.kit.verification.passed();
+    // What failed is not to be printed.
+    let tabs = if has_passed {
+        let made = design.kit.pieces.as_slice();
+        vec![
+            tabs::print(printing, made, !options.no_booklet),
+            tabs::care(printing.printer()),
+        ]
+    } else {
+        Vec::new()
+    };
     let data = ReportData {
         title: model.name.clone(),
         facts,
@@ -84,6 +98,8 @@ pub fn report(
         quantities,
         motions: motions(design, stand),
         loads: loads::loads(design, &standing, stand),
+        looks,
+        tabs,
     };
     let booklet = Booklet {
         title: title(&model.name),

@@ -4,16 +4,21 @@ use rayon::prelude::*;
 use shellock::{Cause, PatchId, Warning};
 use shellock_formats::{NamedObject, write_3mf};
 use shellock_geom::bvh::TriangleBvh;
-use shellock_geom::{Solid, TriMesh};
+use shellock_geom::decimate::decimate;
+use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_kit::plan_file::PrintingEntry;
 use shellock_print::load::Load;
 use shellock_print::plates::{Laid, Plates, Printable, lay, lay_alone};
 use shellock_print::time::{Cost, whole, whole_words};
 use shellock_print::{Printer, Process};
 use shellock_render::palette;
+use shellock_render::stills::{Camera, Painted, render};
 
 /// A face is part of the outer skin where its middle is so near to the model's surface, mm.
 const SKIN_MM: f64 = 0.05;
+
+/// Colour of a plate in pictures.
+const BED: [u8; 3] = [226, 228, 232];
 
 /// A kit, laid on plates.
 pub struct Printing {
@@ -113,6 +118,71 @@ impl Printing {
         }
     }
 
+    /// What it is printed on.
+    pub fn printer(&self) -> &Printer {
+        &self.printer
+    }
+
+    /// In figures, for the page.
+    pub fn figures(&self) -> Vec<(String, String)> {
+        let n = self.plates.n_plates;
+        let outer_mm2: f64 = self.plates.laid.iter().map(|l| l.outer_support_mm2).sum();
+        let mut figures = vec![
+            ("printer".to_owned(), described(&self.printer)),
+            ("plates".to_owned(), n.to_string()),
+            ("all plates, about".to_owned(), self.cost.words()),
+        ];
+        if let Some(whole) = self.whole {
+            let name = format!("the whole model {}", whole_words(self.printer.process));
+            figures.push((name, whole.words()));
+        }
+        if self.printer.process != Process::Sls {
+            let supports = format!("{:.1} cm² of the outer skin", outer_mm2 / 100.0);
+            figures.push(("supports stand on".to_owned(), supports));
+        }
+        figures
+    }
+
+    /// Each plate from above, as PNG.
+    pub fn pictures(&self, pieces: &[TriMesh]) -> Vec<Vec<u8>> {
+        (0..self.plates.n_plates)
+            .into_par_iter()
+            .map(|plate| self.picture(plate, pieces))
+            .collect()
+    }
+
+    fn picture(&self, plate: usize, pieces: &[TriMesh]) -> Vec<u8> {
+        const WIDTH: usize = 640;
+        let [width, depth, _] = self.printer.bed_mm;
+        let laid: Vec<(usize, TriMesh)> = self
+            .plates
+            .laid
+            .iter()
+            .filter(|l| l.plate == plate)
+            .map(|l| (l.piece, as_laid(l, &pieces[l.piece])))
+            .collect();
+        let bed = TriMesh {
+            points: [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]]
+                .map(|[x, y]| Vec3::new(x, y, -0.5))
+                .into(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let painted = |mesh, color| Painted {
+            mesh,
+            color,
+            face_colors: None,
+            normals: None,
+            shift: Vec3::ZERO,
+        };
+        let mut scene = vec![painted(&bed, BED)];
+        scene.extend(
+            laid.iter()
+                .map(|(piece, mesh)| painted(mesh, palette::color(*piece))),
+        );
+        let height = (WIDTH as f64 * (depth / width).clamp(0.3, 3.0)).round() as usize;
+        render(&scene, &Camera::along(-Vec3::Z, Vec3::Y), WIDTH, height).png()
+    }
+
     /// For plan.json.
     pub fn entry(&self) -> PrintingEntry {
         PrintingEntry::of(&self.printer, &self.plates, self.cost, self.whole)
@@ -158,6 +228,16 @@ impl Printing {
             .into_par_iter()
             .map(|(name, objects)| (name, write_3mf(&objects)))
             .collect()
+    }
+}
+
+/// A piece as it lies, coarse enough for a picture.
+fn as_laid(laid: &Laid, piece: &TriMesh) -> TriMesh {
+    const SEEN_MM: f64 = 0.15;
+    let coarse = decimate(piece.clone(), &vec![SEEN_MM; piece.points.len()]);
+    TriMesh {
+        points: coarse.points.iter().map(|&p| laid.place(p)).collect(),
+        triangles: coarse.triangles,
     }
 }
 

@@ -61,6 +61,18 @@ pub struct Step {
     pub seen: (String, bool),
 }
 
+/// From where each of `pieces` is seen best as it goes in, in their order: unit vectors from the viewer to the scene.
+pub fn looks(pieces: &[ReportPiece<'_>]) -> Vec<[f64; 3]> {
+    let mut order: Vec<usize> = (0..pieces.len()).collect();
+    order.sort_by_key(|&i| pieces[i].order);
+    let in_order: Vec<&ReportPiece<'_>> = order.iter().map(|&i| &pieces[i]).collect();
+    let mut looks = vec![[0.0; 3]; pieces.len()];
+    for (sight, &i) in sights(&in_order).iter().zip(&order) {
+        looks[i] = sight.direction.to_array();
+    }
+    looks
+}
+
 /// A piece with what is drawn of it more than once.
 struct Drawn<'a> {
     piece: &'a ReportPiece<'a>,

@@ -4,6 +4,7 @@
 //! arrows and points with labels; what they mean for shells is said here.
 
 mod loads;
+mod packed;
 mod page;
 pub mod palette;
 mod pictures;
@@ -40,6 +41,35 @@ pub struct ReportData<'a> {
     pub motions: Vec<ReportMotion>,
     /// What loads do to the pieces; may be empty.
     pub loads: ReportLoads,
+    /// From where each piece is seen best as it goes in, in the order of `pieces`: unit vectors from the viewer to the
+    /// scene. Empty where nobody says.
+    pub looks: Vec<[f64; 3]>,
+    /// Pages of text and pictures beside the lists.
+    pub tabs: Vec<ReportTab>,
+}
+
+/// A page beside the lists, such as how to print.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReportTab {
+    /// A word for its button.
+    pub name: String,
+    /// What is on it.
+    pub parts: Vec<ReportPart>,
+}
+
+/// Something under a heading.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReportPart {
+    /// Name and value.
+    Table(String, Vec<(String, String)>),
+    /// Sentences, each a paragraph.
+    Text(String, Vec<String>),
+    /// A picture: what it shows, and PNG bytes.
+    #[serde(serialize_with = "page::as_address")]
+    Picture(String, Vec<u8>),
+    /// Files beside the page: name, and what each is for.
+    Files(String, Vec<(String, String)>),
 }
 
 /// One piece in assembled position.

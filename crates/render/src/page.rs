@@ -1,15 +1,20 @@
 //! The page: a template, a JSON header, and all arrays as one block of base64.
 
+use std::io::Write;
+
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use shellock_assembly::{PatchId, Warning};
 use shellock_geom::decimate::decimate;
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use super::loads::LoadsHeader;
-use super::{ReportCheck, ReportData, ReportMotion, ReportPiece, ReportQuantity, exploded_shifts};
+use super::packed::{self, PackedMesh};
+use super::{ReportCheck, ReportData, ReportMotion, ReportPiece, ReportQuantity, ReportTab, exploded_shifts};
 
 const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("../viewer/viewer.css");
@@ -20,26 +25,36 @@ const DRAFT: f64 = 1.2e-3;
 
 /// The page as one text that needs nothing else; equal data give equal bytes.
 ///
-/// Positions are kept in 1/65 535 of each piece's box, some micrometres. About 11 bytes a triangle and 0.6 MB
+/// Positions are kept in 1/65 535 of each piece's box, some micrometres. About 6 bytes a triangle and 0.6 MB
 /// for the viewer.
 pub fn html(data: &ReportData<'_>) -> String {
     let mut arrays = Vec::new();
     let shifts = exploded_shifts(&data.pieces);
     let drafts = drafts(&data.pieces);
-    let meshes = data.pieces.iter().zip(&drafts).zip(shifts);
+    let looks = data
+        .looks
+        .iter()
+        .copied()
+        .map(Some)
+        .chain(std::iter::repeat(None));
+    let meshes = data.pieces.iter().zip(&drafts).zip(shifts).zip(looks);
     let header = Header {
         title: &data.title,
         meshes_title: "Pieces",
         meshes: meshes
-            .map(|((p, draft), shift)| MeshHeader::new(p, draft, shift, &mut arrays))
+            .map(|(((p, draft), shift), look)| MeshHeader::new(p, draft, shift, look, &mut arrays))
             .collect(),
         facts: &data.facts,
         checks: &data.checks,
-        notes: data.warnings.iter().map(|w| note(w, &data.pieces)).collect(),
+        notes: Warning::ranked(data.warnings)
+            .iter()
+            .map(|w| note(w, &data.pieces))
+            .collect(),
         figures: data.figures.iter().map(Figure::new).collect(),
         quantities: &data.quantities,
         motions: &data.motions,
         loads: LoadsHeader::new(&data.loads, &mut arrays),
+        tabs: &data.tabs,
     };
     let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
     // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
@@ -50,7 +65,7 @@ pub fn html(data: &ReportData<'_>) -> String {
             ("title", &escaped(&data.title)),
             ("style", STYLE),
             ("header", &json),
-            ("arrays", &STANDARD.encode(&arrays)),
+            ("arrays", &STANDARD.encode(deflated(&arrays))),
             ("viewer", VIEWER),
         ],
     )
@@ -83,6 +98,8 @@ struct Header<'a> {
     motions: &'a [ReportMotion],
     #[serde(skip_serializing_if = "Option::is_none")]
     loads: Option<LoadsHeader<'a>>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    tabs: &'a [ReportTab],
 }
 
 /// A picture with a title.
@@ -114,16 +131,12 @@ struct MeshHeader<'a> {
     /// Where it goes in the exploded view, mm.
     shift: [f64; 3],
     facts: &'a [(String, String)],
-    points: PointArray,
-    triangles: TriangleArray,
-    draft: Draft,
-}
-
-/// A coarser mesh, for what moves on slow machines.
-#[derive(Serialize)]
-struct Draft {
-    points: PointArray,
-    triangles: TriangleArray,
+    /// From where it is seen as it arrives, from the viewer to the scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    look: Option<[f64; 3]>,
+    packed: PackedMesh,
+    /// Coarser, for what moves on slow machines.
+    draft: PackedMesh,
 }
 
 #[derive(Serialize)]
@@ -145,6 +158,8 @@ pub(crate) struct TriangleArray {
 /// A point with a label, or a label alone.
 #[derive(Serialize)]
 struct Note {
+    /// "note", "warning" or "problem".
+    severity: String,
     title: String,
     text: String,
     at: Option<[f64; 3]>,
@@ -162,6 +177,7 @@ fn note(warning: &Warning, pieces: &[ReportPiece<'_>]) -> Note {
         format!("{} · {}", warning.code(), names.join(", "))
     };
     Note {
+        severity: warning.severity().to_string(),
         title,
         text: warning.to_string(),
         at: warning.at,
@@ -170,7 +186,13 @@ fn note(warning: &Warning, pieces: &[ReportPiece<'_>]) -> Note {
 
 impl<'a> MeshHeader<'a> {
     /// Appends the arrays of the piece to `arrays`.
-    fn new(piece: &'a ReportPiece<'_>, draft: &TriMesh, shift: Vec3, arrays: &mut Vec<u8>) -> Self {
+    fn new(
+        piece: &'a ReportPiece<'_>,
+        draft: &TriMesh,
+        shift: Vec3,
+        look: Option<[f64; 3]>,
+        arrays: &mut Vec<u8>,
+    ) -> Self {
         Self {
             name: &piece.name,
             badge: piece.is_key.then_some("key"),
@@ -179,12 +201,9 @@ impl<'a> MeshHeader<'a> {
             travel: piece.installation_direction,
             shift: shift.to_array(),
             facts: &piece.facts,
-            points: append_points(piece.mesh, arrays),
-            triangles: append_triangles(piece.mesh, arrays),
-            draft: Draft {
-                points: append_points(draft, arrays),
-                triangles: append_triangles(draft, arrays),
-            },
+            look,
+            packed: packed::append(piece.mesh, arrays),
+            draft: packed::append(draft, arrays),
         }
     }
 }
@@ -225,6 +244,20 @@ pub(crate) fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> Triangle
         count: mesh.triangles.len(),
         bytes,
     }
+}
+
+/// As zlib's deflate has it, the same bytes each time.
+fn deflated(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
+    encoder
+        .write_all(bytes)
+        .and_then(|()| encoder.finish())
+        .expect("memory takes all bytes")
+}
+
+/// A picture's title and its `data:` address.
+pub(crate) fn as_address<S: Serializer>(title: &str, png: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+    (title, format!("data:image/png;base64,{}", STANDARD.encode(png))).serialize(serializer)
 }
 
 /// Typed arrays begin at multiples of their element size.
@@ -278,7 +311,7 @@ mod tests {
     use shellock_assembly::Cause;
 
     use super::*;
-    use crate::{ReportLoad, ReportLoads, ReportMove, ReportPlace};
+    use crate::{ReportLoad, ReportLoads, ReportMove, ReportPart, ReportPlace};
 
     const HOSTILE: &str = "</script><script>alert('x')</script>{{arrays}}<!--";
 
@@ -327,6 +360,15 @@ mod tests {
             }],
             motions,
             loads: loads(&mesh),
+            looks: vec![[0.0, 1.0, 0.0]],
+            tabs: vec![ReportTab {
+                name: HOSTILE.into(),
+                parts: vec![
+                    ReportPart::Text(HOSTILE.into(), vec![HOSTILE.into()]),
+                    ReportPart::Picture(HOSTILE.into(), vec![1, 2]),
+                    ReportPart::Files(HOSTILE.into(), vec![hostile()]),
+                ],
+            }],
         })
     }
 

@@ -60,7 +60,7 @@ fn main() -> std::io::Result<()> {
             values,
         }],
         motions,
-        loads: Default::default(),
+        ..ReportData::default()
     };
     std::fs::write(folder.join("report.html"), html(&data))
 }
