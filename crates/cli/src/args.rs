@@ -12,6 +12,7 @@ use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use shellock::coupon::N_FITS;
 use shellock::piece::LabelParams;
 use shellock_print::Printer;
+use shellock_print::booklet::Paper;
 
 pub use blows::{Blows, Place};
 pub use options::Options;
@@ -180,7 +181,7 @@ const EXAMPLES: [(&str, &str); 6] = [
 ];
 
 /// What dividing alone has no use for.
-const NOT_TO_DIVIDE: [&str; 21] = [
+const NOT_TO_DIVIDE: [&str; 22] = [
     "key",
     "time",
     "plan_time",
@@ -196,6 +197,7 @@ const NOT_TO_DIVIDE: [&str; 21] = [
     "allow_thin",
     "key_grip",
     "no_labels",
+    "paper",
     "no_booklet",
     "seam_gap",
     "min_wall",
@@ -204,9 +206,10 @@ const NOT_TO_DIVIDE: [&str; 21] = [
     "resolution",
 ];
 /// What planning alone has no use for.
-const NOT_TO_PLAN: [&str; 5] = [
+const NOT_TO_PLAN: [&str; 6] = [
     "key_grip",
     "no_labels",
+    "paper",
     "no_booklet",
     "play_together",
     "allow_thin",
@@ -320,6 +323,22 @@ impl Unit {
             Self::Inch => 25.4,
             Self::Foot => 304.8,
             Self::M => 1000.0,
+        }
+    }
+}
+
+/// What the booklet is printed on.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PaperSize {
+    A4,
+    Letter,
+}
+
+impl From<PaperSize> for Paper {
+    fn from(size: PaperSize) -> Self {
+        match size {
+            PaperSize::A4 => Self::A4,
+            PaperSize::Letter => Self::Letter,
         }
     }
 }

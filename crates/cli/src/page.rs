@@ -106,6 +106,9 @@ pub fn report(
         lines: cover_lines(&shown),
         bears: borne(design, &data.loads.weakest),
         pieces: data.pieces.clone(),
+        before: tabs::before(printing),
+        after: tabs::after(has_passed),
+        paper: options.paper.into(),
     };
     let (page, (picture, booklet)) = rayon::join(
         || html(&data).into_bytes(),

@@ -2,6 +2,7 @@
 
 use shellock::PatchId;
 use shellock_geom::TriMesh;
+use shellock_print::booklet::Section;
 use shellock_print::{Printer, Process};
 use shellock_render::{ReportPart, ReportTab};
 
@@ -67,6 +68,57 @@ fn file_list(n_plates: usize, n_pieces: usize, has_booklet: bool) -> Vec<(String
     files
 }
 
+/// The booklet's page before the first step.
+pub fn before(printing: &Printing) -> Vec<Section> {
+    let printer = printing.printer();
+    let line = |(what, much): (String, String)| format!("{what}: {much}");
+    let takes = Section {
+        title: "Print".into(),
+        lines: printing
+            .figures()
+            .into_iter()
+            .map(line)
+            .chain(settings(printer))
+            .collect(),
+    };
+    let of_care = care(printer).parts.into_iter().filter_map(section);
+    std::iter::once(takes).chain(of_care.take(4)).collect()
+}
+
+/// The booklet's page after the last step.
+pub fn after(has_passed: bool) -> Vec<Section> {
+    let apart = section(taking_apart());
+    let worth = if has_passed {
+        "What it bears and how far pieces can be wiggled is computed, not tried on a print; printers differ. Handle it as what it is: a \
+         hollow thing held by small connectors. No warranty of any kind comes with it."
+    } else {
+        "This kit failed its checks and is not meant to be printed."
+    };
+    apart
+        .into_iter()
+        .chain([Section {
+            title: "What all this is worth".into(),
+            lines: vec![worth.into()],
+        }])
+        .collect()
+}
+
+fn section(part: ReportPart) -> Option<Section> {
+    match part {
+        ReportPart::Text(title, lines) => Some(Section { title, lines }),
+        _ => None,
+    }
+}
+
+fn taking_apart() -> ReportPart {
+    ReportPart::Text(
+        "Taking it apart".into(),
+        vec![
+            "The key goes out first, the way it came in; then the pieces from the last to the first. No other piece comes out before.".into(),
+        ],
+    )
+}
+
 /// What to do with it after printing.
 pub fn care(printer: &Printer) -> ReportTab {
     let clean: Vec<&str> = match printer.process {
@@ -110,12 +162,7 @@ pub fn care(printer: &Printer) -> ReportTab {
                     "If all pieces rattle, make the kit again with a smaller --clearance, 0.03 mm at a time.",
                 ],
             ),
-            text(
-                "Taking it apart",
-                &[
-                    "The key goes out first, the way it came in; then the pieces from the last to the first. No other piece comes out before.",
-                ],
-            ),
+            taking_apart(),
         ],
     }
 }

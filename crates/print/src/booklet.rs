@@ -13,9 +13,10 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_render::stills::{Camera, Image, Painted, crease_normals, projection, render};
 use shellock_render::{ReportPiece, exploded_shifts, from_inside};
 
-pub use crate::pdf::Color;
+pub use crate::pdf::{Color, Paper};
 use crate::pdf::{PAGE_MM, Page, Style, document, width_mm};
 pub use bears::{Borne, WeakPlace};
+use bears::{plain, wrapped};
 use view::{Sight, side, sights};
 
 /// Free rim of a page, mm.
@@ -36,6 +37,7 @@ const ARROW: Color = [206, 44, 30];
 const WHITE: Color = [255; 3];
 
 /// What the booklet is about.
+#[derive(Default)]
 pub struct Booklet<'a> {
     /// Heading of the cover.
     pub title: String,
@@ -45,6 +47,21 @@ pub struct Booklet<'a> {
     pub bears: Option<Borne>,
     /// Standing on its feet: z is up, and it looks along −y. In any order.
     pub pieces: Vec<ReportPiece<'a>>,
+    /// What to do before the first step; no page where empty.
+    pub before: Vec<Section>,
+    /// What to know after the last; no page where empty.
+    pub after: Vec<Section>,
+    /// What it is printed on.
+    pub paper: Paper,
+}
+
+/// Sentences under a heading.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Section {
+    /// The heading.
+    pub title: String,
+    /// A paragraph each.
+    pub lines: Vec<String>,
 }
 
 /// A step, as it is drawn in the booklet.
@@ -127,10 +144,16 @@ fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2])
 impl Booklet<'_> {
     /// The booklet as a PDF file; the same for the same pieces.
     pub fn pdf(&self) -> Vec<u8> {
+        document(&self.title, self.pages(), self.paper)
+    }
+
+    fn pages(&self) -> Vec<Page> {
         let drawn = self.drawn();
         let mut pages = vec![self.cover(&drawn)];
+        pages.extend(text_pages("Before you begin", &self.before));
         pages.extend(pieces_pages(&drawn));
         pages.extend(steps_pages(&drawn, self.bears.as_ref()));
+        pages.extend(text_pages("Afterwards", &self.after));
         let n_pages = pages.len();
         for (i, page) in pages.iter_mut().enumerate().skip(1) {
             let foot = format!("{}  –  {} of {n_pages}", self.title, i + 1);
@@ -139,7 +162,7 @@ impl Booklet<'_> {
             let left = PAGE_MM[0] - RIM_MM - width_mm(style, &foot).min(room_mm);
             page.text_within([left, PAGE_MM[1] - 8.0], room_mm, style, &foot);
         }
-        document(&self.title, pages)
+        pages
     }
 
     /// Its steps alone, in order, for what is no PDF.
@@ -214,6 +237,40 @@ impl Booklet<'_> {
     }
 }
 
+/// Sections one under the other, on as many pages as they take.
+fn text_pages(title: &str, sections: &[Section]) -> Vec<Page> {
+    const LINE_MM: f64 = 5.6;
+    const TOP_MM: f64 = 36.0;
+    let (room_mm, bottom_mm) = (PAGE_MM[0] - 2.0 * RIM_MM, PAGE_MM[1] - RIM_MM - 8.0);
+    let style = Style {
+        size_mm: 4.2,
+        ..plain(INK)
+    };
+    let mut pages = Vec::new();
+    let mut down = f64::INFINITY;
+    for section in sections {
+        let lines: Vec<Vec<String>> = section.lines.iter().map(|l| wrapped(l, style, room_mm)).collect();
+        let n_lines: usize = lines.iter().map(Vec::len).sum();
+        let height = LINE_MM * (n_lines as f64 + 0.4 * lines.len() as f64 + 3.0);
+        if down + height > bottom_mm {
+            pages.push(headed(title, ""));
+            down = TOP_MM;
+        }
+        let Some(page) = pages.last_mut() else { break };
+        page.text_within([RIM_MM, down], room_mm, bold(5.0, INK), &section.title);
+        down += 0.4 * LINE_MM;
+        for line in lines {
+            for part in line {
+                down += LINE_MM;
+                page.text_within([RIM_MM, down], room_mm, style, &part);
+            }
+            down += 0.4 * LINE_MM;
+        }
+        down += 2.0 * LINE_MM;
+    }
+    pages
+}
+
 /// All pieces by number, each from inside.
 fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let middle = drawn
@@ -285,9 +342,18 @@ fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
     let sights = sights(&pieces);
     let cell = cell_mm(STEPS, 0.0);
     let (picture_mm, size) = (step_mm(), step_pixels());
+    let beside = [OTHER_MM, OTHER_MM].map(|mm| (mm * STEP_DENSITY) as usize);
+    let others: Vec<Option<Image>> = (0..drawn.len())
+        .into_par_iter()
+        .map(|i| {
+            sights[i]
+                .other
+                .map(|direction| in_place(drawn, i, direction, beside))
+        })
+        .collect();
     let step_pictures: Vec<(Image, Option<[[f64; 2]; 2]>)> = (0..drawn.len())
         .into_par_iter()
-        .map(|i| step_picture(drawn, i, &sights[i], size))
+        .map(|i| step_picture(drawn, i, &sights[i], room_beside(&sights[i], size)))
         .collect();
     let together = vec![Vec3::ZERO; drawn.len()];
     let finished = (!drawn.is_empty()).then(|| (all_pieces(drawn, &together, size), None));
@@ -309,7 +375,12 @@ fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
             page.polygon(&arrow(way.map(on_page)), ARROW, 0.7, WHITE);
         }
         match drawn.get(i) {
-            Some(d) => step_heading(page, [x, y], d.piece, &sights, i),
+            Some(d) => {
+                step_heading(page, [x, y], d.piece, &sights, i);
+                if let Some(picture) = others[i].clone() {
+                    other_view(page, [x, y], &sights[i], picture);
+                }
+            }
             None => finish_heading(page, [x, y], drawn),
         }
     }
@@ -319,6 +390,42 @@ fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
         bears::fill(&mut pages[at], corner_mm(i, STEPS, cell, 0.0), drawn, bears);
     }
     pages
+}
+
+/// Side of a second view, mm.
+const OTHER_MM: f64 = 34.0;
+
+/// Pixels of a step's picture, less what a second view below it takes.
+fn room_beside(sight: &Sight, [width, height]: [usize; 2]) -> [usize; 2] {
+    let less = sight.other.map_or(0, |_| (OTHER_MM * STEP_DENSITY) as usize);
+    [width, height - less]
+}
+
+/// What is there after step `i` with the new piece in its place, along another direction.
+fn in_place(drawn: &[Drawn<'_>], i: usize, direction: Vec3, size: [usize; 2]) -> Image {
+    let camera = Camera::along(direction, Vec3::Z);
+    let facing: Vec<Facing> = drawn[..=i].iter().map(|d| d.facing(direction)).collect();
+    let mut scene: Vec<Painted<'_>> = facing.iter().map(|f| f.painted(GREY, Vec3::ZERO)).collect();
+    scene[i] = facing[i].painted(drawn[i].piece.color, Vec3::ZERO);
+    render(&scene, &camera, size[0], size[1])
+}
+
+/// The second view below a step's picture, with its words.
+fn other_view(page: &mut Page, [x, y]: [f64; 2], sight: &Sight, picture: Image) {
+    let Some(direction) = sight.other else { return };
+    let [width, height] = step_mm();
+    let top = y + 20.0 + height - OTHER_MM;
+    page.picture([x + 2.0 + width - OTHER_MM, top], OTHER_MM, picture);
+    let room_mm = width - OTHER_MM - 4.0;
+    let words = format!("its place, seen from {}", view::side(-direction));
+    for (k, line) in wrapped(&words, small(FAINT), room_mm).iter().enumerate() {
+        page.text_within(
+            [x + 2.0, top + 14.0 + 5.0 * k as f64],
+            room_mm,
+            small(FAINT),
+            line,
+        );
+    }
 }
 
 fn step_heading(page: &mut Page, [x, y]: [f64; 2], piece: &ReportPiece<'_>, sights: &[Sight], i: usize) {

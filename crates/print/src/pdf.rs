@@ -9,8 +9,27 @@ use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 use rayon::prelude::*;
 use shellock_render::stills::Image;
 
-/// A4, mm.
+/// What pages are laid out for, mm: A4.
 pub(crate) const PAGE_MM: [f64; 2] = [210.0, 297.0];
+
+/// What pages are printed on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Paper {
+    /// 210 × 297 mm.
+    #[default]
+    A4,
+    /// 8.5 × 11 inches: pages are 6 % smaller than on A4, in the middle.
+    Letter,
+}
+
+impl Paper {
+    fn size_mm(self) -> [f64; 2] {
+        match self {
+            Self::A4 => PAGE_MM,
+            Self::Letter => [215.9, 279.4],
+        }
+    }
+}
 const POINTS_PER_MM: f64 = 72.0 / 25.4;
 /// Share of its height from a line's foot to the middle of its digits.
 const MIDDLE_OF_DIGITS: f64 = 0.36;
@@ -35,19 +54,50 @@ pub(crate) struct Style {
 pub(crate) struct Page {
     content: Content,
     pictures: Vec<Image>,
+    #[cfg(test)]
+    texts: Vec<TextBox>,
 }
+
+/// Where a line of text stands, mm.
+#[cfg(test)]
+#[derive(Clone, Debug)]
+pub(crate) struct TextBox {
+    pub min: [f64; 2],
+    pub max: [f64; 2],
+    pub text: String,
+}
+
+/// Shares of its size that a line reaches above its foot and below.
+#[cfg(test)]
+const ASCENT: f64 = 0.74;
+#[cfg(test)]
+const DESCENT: f64 = 0.22;
 
 impl Page {
     pub fn new() -> Self {
         Self {
             content: Content::new(),
             pictures: Vec::new(),
+            #[cfg(test)]
+            texts: Vec::new(),
         }
+    }
+
+    /// Where its lines of text stand.
+    #[cfg(test)]
+    pub fn texts(&self) -> &[TextBox] {
+        &self.texts
     }
 
     /// Text with the left end of its foot at `at`.
     pub fn text(&mut self, at: [f64; 2], style: Style, text: &str) {
         let [x, y] = on_paper(at);
+        #[cfg(test)]
+        self.texts.push(TextBox {
+            min: [at[0], at[1] - ASCENT * style.size_mm],
+            max: [at[0] + width_mm(style, text), at[1] + DESCENT * style.size_mm],
+            text: text.to_owned(),
+        });
         self.fill_color(style.color);
         let font = Name(if style.is_bold { b"Bold" } else { b"Plain" });
         let size = (style.size_mm * POINTS_PER_MM) as f32;
@@ -118,7 +168,7 @@ impl Page {
 }
 
 /// The pages as a file; the same for the same pages.
-pub(crate) fn document(title: &str, pages: Vec<Page>) -> Vec<u8> {
+pub(crate) fn document(title: &str, pages: Vec<Page>, paper: Paper) -> Vec<u8> {
     let (catalog, tree, information) = (Ref::new(1), Ref::new(2), Ref::new(3));
     let fonts = [
         (Ref::new(4), &b"Plain"[..], &b"Helvetica"[..]),
@@ -152,7 +202,9 @@ pub(crate) fn document(title: &str, pages: Vec<Page>) -> Vec<u8> {
             .base_font(Name(face))
             .encoding_predefined(Name(b"WinAnsiEncoding"));
     }
-    let [right, top] = PAGE_MM.map(|mm| (mm * POINTS_PER_MM) as f32);
+    let size_mm = paper.size_mm();
+    let [right, top] = size_mm.map(|mm| (mm * POINTS_PER_MM) as f32);
+    let placed = placed(size_mm);
     for ((page_id, content_id, picture_ids), page) in ids.into_iter().zip(pages) {
         let mut written = pdf.page(page_id);
         written
@@ -172,7 +224,8 @@ pub(crate) fn document(title: &str, pages: Vec<Page>) -> Vec<u8> {
         named.finish();
         resources.finish();
         written.finish();
-        pdf.stream(content_id, &compress_to_vec_zlib(&page.content.finish(), EFFORT))
+        let content = [&placed[..], &page.content.finish()].concat();
+        pdf.stream(content_id, &compress_to_vec_zlib(&content, EFFORT))
             .filter(Filter::FlateDecode);
         let compressed: Vec<Vec<u8>> = page.pictures.par_iter().map(compressed).collect();
         for ((id, picture), bytes) in picture_ids.into_iter().zip(&page.pictures).zip(&compressed) {
@@ -191,6 +244,21 @@ pub(crate) fn document(title: &str, pages: Vec<Page>) -> Vec<u8> {
         }
     }
     pdf.finish()
+}
+
+/// What puts a page in the middle of paper of another size, as large as that has room for; nothing for its own size.
+fn placed(size_mm: [f64; 2]) -> Vec<u8> {
+    if size_mm == PAGE_MM {
+        return Vec::new();
+    }
+    let scale = (size_mm[0] / PAGE_MM[0]).min(size_mm[1] / PAGE_MM[1]);
+    let [x, y] = [0, 1].map(|k| (0.5 * (size_mm[k] - scale * PAGE_MM[k]) * POINTS_PER_MM) as f32);
+    let scale = scale as f32;
+    let mut content = Content::new();
+    content.transform([scale, 0.0, 0.0, scale, x, y]);
+    let mut bytes = content.finish().to_vec();
+    bytes.push(b'\n');
+    bytes
 }
 
 /// Differences to the row above, as PNG's second filter has them, on white.
@@ -312,7 +380,7 @@ mod tests {
                 },
             );
             page.disc([50.0, 50.0], 5.0, [255, 0, 0]);
-            document("a (title", vec![page, Page::new()])
+            document("a (title", vec![page, Page::new()], Paper::Letter)
         };
         let bytes = made();
         assert!(bytes.starts_with(b"%PDF-1.7") && bytes.ends_with(b"%%EOF"));

@@ -13,7 +13,7 @@ use shellock_print::Printer;
 
 use super::keep_whole::keep_whole;
 use super::pieces::{Key, Pieces, Symmetric};
-use super::{Axis, LabelsFrom, Thickness, Unit, label, printer_called};
+use super::{Axis, LabelsFrom, PaperSize, Thickness, Unit, label, printer_called};
 use crate::{stress, units};
 
 #[derive(Args)]
@@ -287,6 +287,16 @@ pub struct Options {
     /// Leave the pieces' numbers off their inner sides
     #[arg(long, help_heading = "Make")]
     pub no_labels: bool,
+    /// Paper of the booklet
+    #[arg(
+        long,
+        value_enum,
+        default_value = "a4",
+        value_name = "a4|letter",
+        hide_possible_values = true,
+        help_heading = "Make"
+    )]
+    pub paper: PaperSize,
     /// Leave out instructions.pdf
     ///
     /// Leave out instructions.pdf, which takes about a second

@@ -137,7 +137,7 @@ fn stroke(page: &mut Page, [from, to]: [[f64; 2]; 2]) {
     page.polygon(&corners, ARROW, 0.0, ARROW);
 }
 
-fn plain(color: Color) -> Style {
+pub(super) fn plain(color: Color) -> Style {
     Style {
         size_mm: 3.4,
         is_bold: false,
@@ -146,7 +146,7 @@ fn plain(color: Color) -> Style {
 }
 
 /// Lines of whole words that have room.
-fn wrapped(text: &str, style: Style, room_mm: f64) -> Vec<String> {
+pub(super) fn wrapped(text: &str, style: Style, room_mm: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {

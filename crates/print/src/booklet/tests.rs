@@ -71,6 +71,7 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
             bears,
             lines: vec!["3 pieces".into()],
             pieces,
+            ..Booklet::default()
         }
         .pdf()
     };
@@ -105,16 +106,7 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
 
 #[test]
 fn no_pieces_make_a_booklet_without_steps() {
-    assert!(
-        Booklet {
-            title: String::new(),
-            bears: None,
-            lines: Vec::new(),
-            pieces: Vec::new()
-        }
-        .pdf()
-        .starts_with(b"%PDF")
-    );
+    assert!(Booklet::default().pdf().starts_with(b"%PDF"));
 }
 
 #[test]
@@ -140,4 +132,85 @@ fn a_place_is_looked_at_from_where_it_is_seen() {
         );
         assert!(!lookout.is_seen(at, -direction));
     }
+}
+
+/// Boxes on a tower: `n` pieces, each from above.
+fn tower(n: usize) -> Vec<TriMesh> {
+    (0..n)
+        .map(|i| {
+            let z = 4.0 * i as f64;
+            cuboid([-10.0, -10.0, z], [10.0, 10.0, z + 4.0]).to_mesh()
+        })
+        .collect()
+}
+
+#[test]
+fn no_text_stands_on_another_or_off_the_page_with_any_number_of_pieces_and_any_names() {
+    let long = "Прапорщик ".repeat(20) + &"a very long name of a figure ".repeat(6);
+    let section = |n: usize| Section {
+        title: long.clone(),
+        lines: vec![long.clone(); n],
+    };
+    for n in [2, 5, 11, 24, 60] {
+        let meshes = tower(n);
+        let mut pieces: Vec<ReportPiece<'_>> =
+            (0..n).map(|i| piece(&meshes[i], i, [0.0, 0.0, -1.0])).collect();
+        pieces.iter_mut().for_each(|p| p.is_key = p.order + 1 == n);
+        let booklet = Booklet {
+            title: long.clone(),
+            lines: vec![long.clone(), format!("{n} pieces")],
+            bears: Some(Borne {
+                figures: vec![(long.clone(), long.clone()); 6],
+                note: long.clone(),
+                weakest: Some(WeakPlace {
+                    words: long.clone(),
+                    at: Vec3::ZERO,
+                    lines: Vec::new(),
+                    between: [1, 2],
+                }),
+            }),
+            pieces,
+            before: vec![section(3), section(1)],
+            after: vec![section(2)],
+            paper: Paper::A4,
+        };
+        for (k, page) in booklet.pages().iter().enumerate() {
+            let texts = page.texts();
+            for (i, a) in texts.iter().enumerate() {
+                let is_inside = a.min[0] >= 5.0
+                    && a.min[1] >= 5.0
+                    && a.max[0] <= PAGE_MM[0] - 5.0
+                    && a.max[1] <= PAGE_MM[1] - 5.0;
+                assert!(is_inside, "{n} pieces, page {k}: {a:?}");
+                for b in &texts[..i] {
+                    let is_over = (0..2).all(|d| a.min[d] < b.max[d] - 0.05 && b.min[d] < a.max[d] - 0.05);
+                    assert!(!is_over, "{n} pieces, page {k}: {a:?} over {b:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_place_that_is_hidden_is_shown_from_elsewhere_too() {
+    // A niche that is open to the front alone; the piece comes in from above, behind a wall of the front's height.
+    let well = [
+        cuboid([-30.0, -10.0, 0.0], [30.0, -6.0, 60.0]).to_mesh(),
+        cuboid([-30.0, 6.0, 0.0], [30.0, 10.0, 60.0]).to_mesh(),
+        cuboid([-4.0, -4.0, 0.0], [4.0, 4.0, 8.0]).to_mesh(),
+    ];
+    let pieces: Vec<ReportPiece<'_>> = (0..3).map(|i| piece(&well[i], i, [0.0, 0.0, -1.0])).collect();
+    let sights = sights(&pieces.iter().collect::<Vec<_>>());
+    assert!(sights[0].other.is_none(), "the first hides nothing");
+    let bytes = |pieces| {
+        Booklet {
+            pieces,
+            ..Booklet::default()
+        }
+        .pdf()
+    };
+    let n_other = sights.iter().filter(|s| s.other.is_some()).count();
+    let pdf = bytes(pieces.clone());
+    let n_pictures = pdf.windows(15).filter(|w| *w == b"/Subtype /Image").count();
+    assert_eq!(n_pictures, 2 + 3 + 3 + 1 + n_other);
 }

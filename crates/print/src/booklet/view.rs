@@ -20,6 +20,8 @@ pub(super) struct Sight {
     pub direction: Vec3,
     /// How far the new piece stands back from its place, mm.
     pub travel_mm: f64,
+    /// From where its place is seen, where it is hidden along `direction`.
+    pub other: Option<Vec3>,
 }
 
 impl Sight {
@@ -33,16 +35,21 @@ pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
     let trees: Vec<TriangleBvh> = pieces.par_iter().map(|p| TriangleBvh::new(p.mesh)).collect();
     let all = pieces.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
     let directions = directions();
-    let seen: Vec<(f64, Vec<f64>)> = (0..pieces.len())
+    let seen: Vec<(f64, Vec<f64>, Vec<f64>)> = (0..pieces.len())
         .into_par_iter()
         .map(|i| {
             let travel_mm = travel_mm(pieces[i], all.diagonal());
             let step = Step::new(pieces[i], &trees[..i], travel_mm, all.diagonal());
-            (travel_mm, directions.iter().map(|d| step.seen(*d)).collect())
+            let places = directions.iter().map(|d| step.place_seen(*d)).collect();
+            (
+                travel_mm,
+                directions.iter().map(|d| step.seen(*d)).collect(),
+                places,
+            )
         })
         .collect();
     let mut made: Vec<Sight> = Vec::with_capacity(pieces.len());
-    for (travel_mm, seen) in seen {
+    for (travel_mm, seen, places) in seen {
         let last = made.last().map_or(directions[0], |sight: &Sight| sight.direction);
         let worth = |k: usize| {
             seen[k] + preference(directions[k]) + if directions[k] == last { STAYING } else { 0.0 }
@@ -51,13 +58,23 @@ pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
             .rev()
             .max_by(|&a, &b| worth(a).total_cmp(&worth(b)))
             .unwrap_or(0);
+        let clearest = (0..directions.len())
+            .rev()
+            .max_by(|&a, &b| places[a].total_cmp(&places[b]))
+            .unwrap_or(0);
+        let is_worth_it = places[best] < HIDDEN && places[clearest] > places[best] + CLEARER;
         made.push(Sight {
             direction: directions[best],
             travel_mm,
+            other: is_worth_it.then_some(directions[clearest]),
         });
     }
     made
 }
+
+/// A place of which less than this share is seen is shown from elsewhere, too, where so much more is seen.
+const HIDDEN: f64 = 0.3;
+const CLEARER: f64 = 0.15;
 
 /// Turning the thing in one's hands is worth this much of what is seen.
 const STAYING: f64 = 0.5;
@@ -163,21 +180,28 @@ impl<'a> Step<'a> {
         }
     }
 
+    /// How much of the place is seen along `direction`, [0, 1]: half of a closed surface faces the viewer.
+    fn place_seen(&self, direction: Vec3) -> f64 {
+        self.share(direction, Vec3::ZERO)
+    }
+
+    /// How much of the piece is seen along `direction` where it is shifted, [0, 1].
+    fn share(&self, direction: Vec3, shift: Vec3) -> f64 {
+        let free = self
+            .points
+            .iter()
+            .filter(|(_, normal)| normal.dot(direction) < 0.0)
+            .filter(|(p, _)| self.is_free(*p + shift - OFF_MM * direction, -direction));
+        (2.0 * free.count() as f64 / self.points.len().max(1) as f64).min(1.0)
+    }
+
     /// How much is seen along `direction`: of the piece, of its place and of its way.
     fn seen(&self, direction: Vec3) -> f64 {
         let back = -self.travel_mm * self.along;
-        let facing = self
-            .points
-            .iter()
-            .filter(|(_, normal)| normal.dot(direction) < 0.0);
-        let share = |shift: Vec3| {
-            let free = facing
-                .clone()
-                .filter(|(p, _)| self.is_free(*p + shift - OFF_MM * direction, -direction));
-            2.0 * free.count() as f64 / self.points.len().max(1) as f64
-        };
         let sine = self.along.cross(direction).length();
-        share(back).min(1.0) + 0.8 * share(Vec3::ZERO).min(1.0) + 0.8 * (sine / SIN_WELL).min(1.0)
+        self.share(direction, back)
+            + 0.8 * self.share(direction, Vec3::ZERO)
+            + 0.8 * (sine / SIN_WELL).min(1.0)
     }
 
     /// Whether a point is seen by somebody far away.

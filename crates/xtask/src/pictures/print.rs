@@ -84,9 +84,8 @@ fn bed(printer: &Printer) -> TriMesh {
 pub fn booklet(kit: &Kit) -> Vec<u8> {
     let booklet = Booklet {
         title: "squirrel".into(),
-        bears: None,
-        lines: Vec::new(),
         pieces: kit.report_pieces(),
+        ..Booklet::default()
     };
     let steps = booklet.steps();
     let first = (steps.len() / 2).saturating_sub(2);
