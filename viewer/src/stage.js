@@ -243,9 +243,10 @@ export class Stage {
     this.turning = requestAnimationFrame(frame);
   }
 
-  /** A second, small view from the other side, `width` CSS pixels wide at the top right; none for 0. */
-  inset(width) {
+  /** A second, small view from the other side, `width` CSS pixels wide at the right, `top` below the top; none for 0. */
+  inset(width, top = 12) {
     this.insetWidth = width;
+    this.insetTop = top;
     this.draw();
   }
 
@@ -270,8 +271,8 @@ export class Stage {
     other.add(...lights);
     this.scene.add(other);
     renderer.setScissorTest(true);
-    renderer.setScissor(w - width - 12, h - height - 12, width, height);
-    renderer.setViewport(w - width - 12, h - height - 12, width, height);
+    renderer.setScissor(w - width - 12, h - height - this.insetTop, width, height);
+    renderer.setViewport(w - width - 12, h - height - this.insetTop, width, height);
     renderer.clear();
     renderer.render(this.scene, other);
     renderer.setScissorTest(false);

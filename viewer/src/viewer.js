@@ -37,7 +37,7 @@ function start() {
   const panel = buildPanel(header, meshes, order, {
     mode: (mode) => { setMode(mode); },
     apart: (share) => { state.apart = share; update(); },
-    step: (by) => { goTo(Math.round(state.step) + by); },
+    step: (by) => { goTo(Math.ceil(state.step) + by); },
     goTo,
     scrub: (step) => { stop(); enterSteps(); state.step = step; update(); },
     play: () => { state.playing ? stop() : play(); },
@@ -85,7 +85,7 @@ function start() {
     clearTimeout(state.later);
     state.later = setTimeout(() => {
       const isHidden = state.mode === "steps" && state.seen === i && stage.isHidden(i);
-      stage.inset(isHidden ? Math.min(260, 0.3 * holder.clientWidth) : 0);
+      stage.inset(isHidden ? Math.min(260, 0.3 * holder.clientWidth) : 0, caption.offsetTop + caption.offsetHeight + 8);
     }, isStill() ? 0 : TURN_MS + 60);
   }
 

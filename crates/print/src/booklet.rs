@@ -546,11 +546,10 @@ fn numbered(page: &mut Page, middle: [f64; 2], radius_mm: f64, color: Color, num
 fn headed(title: &str, note: &str) -> Page {
     let mut page = Page::new();
     page.text([RIM_MM, RIM_MM + 6.0], bold(7.0, INK), title);
-    page.text(
-        [RIM_MM + 6.0 + width_mm(bold(7.0, INK), title), RIM_MM + 6.0],
-        small(FAINT),
-        note,
-    );
+    if !note.is_empty() {
+        let left = RIM_MM + 6.0 + width_mm(bold(7.0, INK), title);
+        page.text([left, RIM_MM + 6.0], small(FAINT), note);
+    }
     page
 }
 
