@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use serde_json::json;
 use shellock::context::Progress;
 use shellock::design::{Design, DesignOutcome, Params, Settings, design};
-use shellock::{Ctx, Warning};
+use shellock::{Ctx, Severity, Warning};
 
 use crate::Session;
 use crate::args::{Options, Out, Pieces};
@@ -158,6 +158,7 @@ fn make(
         };
         print_json(to, &course, &made, &summary, &warnings, &printing, code);
     } else if session.shown == Shown::Nothing {
+        warnings.retain(|w| w.severity() > Severity::Note);
         print_warnings(session, &warnings, &standing);
         print_failures(&made.kit.verification, &standing);
     } else {
