@@ -184,7 +184,7 @@ fn no_text_stands_on_another_or_off_the_page_with_any_number_of_pieces_and_any_n
                 assert!(is_inside, "{n} pieces, page {k}: {a:?}");
                 for b in &texts[..i] {
                     let is_over = (0..2).all(|d| a.min[d] < b.max[d] - 0.05 && b.min[d] < a.max[d] - 0.05);
-                    assert!(!is_over, "{n} pieces, page {k}: {a:?} over {b:?}");
+                    assert!(!is_over, "{n} pieces, page {k}: {} over {}", a.text, b.text);
                 }
             }
         }
