@@ -72,14 +72,19 @@ impl Course {
 }
 
 impl Stand {
-    /// "stage 5 of 19: gaps, about 20 s left".
+    /// "stage 5 of 19: gaps".
     pub fn words(&self, name: &str) -> String {
+        format!("stage {} of {}: {name}", self.number, self.of)
+    }
+
+    /// The same with the time left, which is another each time.
+    pub fn timed_words(&self, name: &str) -> String {
         const STEP_S: f64 = 5.0;
         let left = self.left.map_or_else(String::new, |left| {
             let s = ((left.as_secs_f64() / STEP_S).ceil() * STEP_S).max(STEP_S);
             format!(", about {s:.0} s left if it passes")
         });
-        format!("stage {} of {}: {name}{left}", self.number, self.of)
+        self.words(name) + &left
     }
 }
 

@@ -107,9 +107,9 @@ impl Display {
                 if let Some(old) = bar.take() {
                     old.finish_and_clear();
                 }
-                *bar = Some(stage_bar(&self.named(name), n_steps));
+                *bar = Some(stage_bar(&self.named(name, Stand::timed_words), n_steps));
             }
-            Progress::Stage { name, .. } => eprintln!("{} …", self.named(name)),
+            Progress::Stage { name, .. } => eprintln!("{} …", self.named(name, Stand::words)),
             Progress::Step => {
                 if let Some(bar) = bar.as_ref() {
                     bar.inc(1);
@@ -123,9 +123,9 @@ impl Display {
     }
 
     /// A stage's name with its number, where it has one.
-    fn named(&self, name: &str) -> String {
+    fn named(&self, name: &str, words: impl Fn(&Stand, &str) -> String) -> String {
         self.stand(name)
-            .map_or_else(|| name.to_owned(), |stand| stand.words(name))
+            .map_or_else(|| name.to_owned(), |stand| words(&stand, name))
     }
 
     /// Takes the last bar away, and says what the stages took to machines.

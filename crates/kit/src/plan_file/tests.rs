@@ -48,7 +48,7 @@ const WHOLE: &str = r#"{
         "loosest_if_thin": { "piece": 1, "translation_mm": 0.5, "rotation_deg": null } },
     "verification": { "passed": false, "checks": [{ "name": "pieces are closed", "ok": false, "figure": "2 is not" }],
         "findings": [{ "kind": "not-closed", "piece": 2 }] },
-    "warnings": [{ "code": "key-ribs", "message": "file them", "pieces": [2], "at": null }],
+    "warnings": [{ "code": "key-ribs", "severity": "warning", "message": "file them", "pieces": [2], "at": null }],
     "printing": { "printer": "sla", "process": "sla", "bed": [192.0, 120.0, 200.0], "layer": 0.05, "plates": 1,
         "laid": [{ "piece": 1, "plate": 1, "size": [20.0, 20.0, 5.0], "turned": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0],
             [0.0, 0.0, 1.0]], "moved": [4.0, 4.0, 0.0], "support_mm2": 10.5, "outer_support_mm2": 0.5 }],

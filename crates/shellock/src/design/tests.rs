@@ -499,7 +499,7 @@ fn a_key_that_cannot_be_cut_is_a_reason_and_no_end() {
         .find(|w| w.code() == "key-not-cut")
         .expect("it is told");
     assert!(
-        told.to_string().contains("it cannot be made"),
+        told.to_string().contains("cannot be made"),
         "{}",
         told.to_string()
     );
