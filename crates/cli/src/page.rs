@@ -106,7 +106,11 @@ pub fn report(
         lines: cover_lines(&shown),
         bears: borne(design, &data.loads.weakest),
         pieces: data.pieces.clone(),
-        before: tabs::before(printing),
+        before: if has_passed {
+            tabs::before(printing)
+        } else {
+            vec![tabs::failed()]
+        },
         after: tabs::after(has_passed),
         paper: options.paper.into(),
     };

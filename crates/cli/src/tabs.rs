@@ -85,6 +85,16 @@ pub fn before(printing: &Printing) -> Vec<Section> {
     std::iter::once(takes).chain(of_care.take(4)).collect()
 }
 
+/// Instead of it, where the kit failed.
+pub fn failed() -> Section {
+    Section {
+        title: "Do not print this kit".into(),
+        lines: vec![
+            "It failed its checks: pieces would come loose, rub or rattle. The page (report.html) says which and where.".into(),
+        ],
+    }
+}
+
 /// The booklet's page after the last step.
 pub fn after(has_passed: bool) -> Vec<Section> {
     let apart = section(taking_apart());
