@@ -69,7 +69,7 @@ const PICTURES: [Picture; 16] = [
     },
     Picture {
         file: "docs/pictures/kit.png",
-        make: |source| Ok(assembly::kit(source.kit()?)),
+        make: |_| Ok(assembly::kit(&Kit::of_demo()?)),
     },
     Picture {
         file: "docs/pictures/steps.svg",

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use shellock::connector::ConnectorParams;
 use shellock::design::{Params, Settings, Thickness};
 use shellock::figure::{self, Figure};
+use shellock::segmentation::Method;
 use shellock::sizes::{SizeChoice, SizeRange};
 use shellock::{Design, DesignOutcome, PatchId, design};
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -20,7 +21,10 @@ use crate::model::with_ctx;
 const SIZE_MM: f64 = 150.0;
 const CELLS: f64 = 94.0;
 
-/// The options that `shellock demo` has where none is given.
+/// Pieces that `shellock demo` asks for.
+const OF_DEMO: usize = 7;
+
+/// The options of `shellock demo`, but for how it divides.
 fn params() -> Params {
     let printer = Printer::sla();
     let mut params = Params::default();
@@ -52,21 +56,32 @@ pub struct Kit {
 }
 
 impl Kit {
-    /// The squirrel of `shellock demo`.
+    /// The squirrel of `shellock demo`: cut where a person would, of few pieces.
+    pub fn of_demo() -> Result<Self, Failure> {
+        let mut params = params();
+        params.method = Method::Auto;
+        params.n_pieces = Some(OF_DEMO);
+        Self::made(&params)
+    }
+
+    /// A squirrel of pieces of similar size, with joints of all kinds, for close views.
     pub fn squirrel() -> Result<Self, Failure> {
+        Self::made(&params())
+    }
+
+    fn made(params: &Params) -> Result<Self, Failure> {
         let fault = |problem: String| Failure::Model {
             path: PathBuf::from("squirrel"),
             problem,
         };
         let model = figure::make(Figure::Squirrel, SIZE_MM, SIZE_MM / CELLS);
-        let params = params();
-        let outcome = with_ctx(|ctx| design(ctx, &params, &model, None)).map_err(|e| fault(e.to_string()))?;
+        let outcome = with_ctx(|ctx| design(ctx, params, &model, None)).map_err(|e| fault(e.to_string()))?;
         let design = match outcome {
             DesignOutcome::Made(design) if design.kit.verification.passed() => *design,
             DesignOutcome::Made(_) => return Err(fault("its kit fails a check".into())),
             DesignOutcome::NoPlan { reason, .. } => return Err(fault(reason)),
         };
-        let settings = Settings::with_thickness(&params, design.kit.thickness_mm);
+        let settings = Settings::with_thickness(params, design.kit.thickness_mm);
         let meshes: Vec<TriMesh> = design.kit.pieces.as_slice().to_vec();
         let normals = meshes.par_iter().map(crease_normals).collect();
         Ok(Self {
