@@ -46,6 +46,9 @@ pub struct Cli {
     /// Tell all: every check, note and figure of the plan
     #[arg(long, short, global = true, conflicts_with = "quiet")]
     pub verbose: bool,
+    /// End as with Ctrl-C where standard input ends.
+    #[arg(long, global = true, hide = true)]
+    pub stop_with_stdin: bool,
     /// Threads to use; the result does not depend on it [default: all]
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,
@@ -121,6 +124,8 @@ pub enum Command {
     /// Make a small plate of pins, channels, keys and rails at five clearances, to find those that fit on your
     /// printer; then keep them as a printer of your own
     Coupon(CouponOptions),
+    /// Open a window in the browser, on this machine alone: choose, paint the pieces, place the key, make the kit
+    Studio(StudioOptions),
     /// Print what a shell needs to complete commands and options, for example `shellock completions bash`
     Completions {
         /// The shell
@@ -158,8 +163,24 @@ pub enum Command {
     },
 }
 
+/// Where the studio is, and what it opens.
+#[derive(Args)]
+pub struct StudioOptions {
+    /// 3MF, STL, OBJ, PLY, OFF, glTF or GLB file of a closed surface; it is copied into the project
+    pub model: Option<PathBuf>,
+    /// Folder of the project: all that the studio writes is in it [default: the model's name with -studio]
+    #[arg(long, value_name = "DIR")]
+    pub project: Option<PathBuf>,
+    /// Port on 127.0.0.1 [default: any that is free]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub port: u16,
+    /// Only print the address
+    #[arg(long)]
+    pub no_open: bool,
+}
+
 /// Examples at the end of a command's help.
-const EXAMPLES: [(&str, &str); 6] = [
+const EXAMPLES: [(&str, &str); 7] = [
     (
         "build",
         "Examples:\n  shellock build dragon.stl --size 15cm --printer fdm\n  shellock build dragon.stl --keep-whole 0,-40,120,25 --pieces 8",
@@ -168,6 +189,10 @@ const EXAMPLES: [(&str, &str); 6] = [
     (
         "segment",
         "Example:\n  shellock segment dragon.stl --size 15cm --out dragon.3mf   (repaint it in a slicer, give it back to build)",
+    ),
+    (
+        "studio",
+        "Examples:\n  shellock studio dragon.stl\n  shellock studio --project dragon-studio   (goes on where you stopped)",
     ),
     ("plan", "Example:\n  shellock plan dragon.stl --size 15cm"),
     (

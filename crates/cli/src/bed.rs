@@ -141,7 +141,7 @@ pub fn fitted(
 }
 
 /// A patch with a wall behind it, as points: about the piece it becomes.
-fn shell_of(surface: &SegmentedSurface, patch: PatchId, wall_mm: f64) -> TriMesh {
+pub fn shell_of(surface: &SegmentedSurface, patch: PatchId, wall_mm: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     for face in (0..surface.mesh.triangles.len()).filter(|&f| surface.patch_of_face[f] == patch) {
         let first = mesh.points.len() as u32;

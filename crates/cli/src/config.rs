@@ -19,11 +19,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
-use clap::{ArgMatches, Command, FromArgMatches, Parser};
+use clap::{ArgAction, ArgMatches, Command, FromArgMatches, Parser};
 use serde::Deserialize;
 use shellock_print::{Printer, Process};
 
-use crate::args::{self, Cli};
+use crate::args::{self, Cli, Options};
+use crate::project::{self, ModelOf};
 use crate::stress;
 
 /// The file that is read without being named.
@@ -40,6 +41,8 @@ pub enum Refusal {
 }
 
 /// The command that these arguments and the configuration file ask for.
+///
+/// A project file stands for its model, and for the configuration file where none is named.
 pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     let matches = args::command()
         .try_get_matches_from(&arguments)
@@ -48,7 +51,8 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     let Some((name, given)) = matches.subcommand() else {
         return Ok(cli);
     };
-    let Some(path) = file_of(given) else {
+    let project = project_of(given)?;
+    let Some(path) = project.clone().or_else(|| file_of(given)) else {
         return Ok(cli);
     };
     // What is saved there may be the first of it.
@@ -59,7 +63,15 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
         return Ok(cli);
     }
     let refused = |problem: String| Refusal::File(format!("{}: {problem}", path.display()));
-    let Config { options, printers } = read(&path).map_err(refused)?;
+    let Config {
+        mut options,
+        printers,
+        model,
+    } = read(&path).map_err(refused)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if project.is_some() {
+        lay_beside(&mut options, folder).map_err(refused)?;
+    }
     let extra = extra_arguments(&args::command(), name, given, &options).map_err(refused)?;
     if !extra.is_empty() {
         let mut all = arguments;
@@ -70,7 +82,51 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     if let Some(own) = own_printers(&mut cli.command) {
         *own = printers;
     }
+    if project.is_some() {
+        let model = model
+            .ok_or_else(|| refused("it names no model: write [model] with file and sha256".to_owned()))?;
+        let file = model.path(folder).map_err(refused)?;
+        if let Some((path, options)) = model_of(&mut cli.command) {
+            *path = file;
+            options.model_sha256 = Some(model.sha256);
+        }
+    }
     Ok(cli)
+}
+
+/// The project file that is given instead of a model; fails where a configuration file is named, too.
+fn project_of(given: &ArgMatches) -> Result<Option<PathBuf>, Refusal> {
+    let model = given.try_get_one::<PathBuf>("model").ok().flatten();
+    let is_configured = given
+        .try_get_one::<PathBuf>("config")
+        .is_ok_and(|path| path.is_some());
+    match model.filter(|path| given.try_contains_id("config").is_ok() && project::is_project(path)) {
+        Some(path) if is_configured => Err(Refusal::File(format!(
+            "{} is a project with options of its own: leave out --config",
+            path.display()
+        ))),
+        path => Ok(path.cloned()),
+    }
+}
+
+/// Files that a project's options name lie beside it.
+fn lay_beside(options: &mut toml::Table, folder: &Path) -> Result<(), String> {
+    if let Some(toml::Value::String(labels)) = options.get_mut("labels") {
+        *labels = project::beside(folder, labels)?.to_string_lossy().into_owned();
+    }
+    Ok(())
+}
+
+/// The model of a command, and how it is made.
+fn model_of(command: &mut args::Command) -> Option<(&mut PathBuf, &mut Options)> {
+    use args::Command::{Build, Inspect, Plan, Segment};
+    match command {
+        Build { model, options, .. }
+        | Segment { model, options, .. }
+        | Plan { model, options }
+        | Inspect { model, options, .. } => Some((model, options)),
+        _ => None,
+    }
 }
 
 /// The file that was named, or the usual one where it exists; `None` for commands that take none.
@@ -98,6 +154,8 @@ fn own_printers(command: &mut args::Command) -> Option<&mut Vec<Printer>> {
 struct Config {
     options: toml::Table,
     printers: Vec<Printer>,
+    /// Of a project.
+    model: Option<ModelOf>,
 }
 
 /// A printer as the file has it.
@@ -124,6 +182,18 @@ fn read(path: &Path) -> Result<Config, String> {
     parse(&fs::read_to_string(path).map_err(|e| e.to_string())?)
 }
 
+/// `[printers]` of the usual file as it stands there; nothing where there is no such file, or one that cannot be read.
+pub fn usual_printers() -> Option<toml_edit::Item> {
+    let text = fs::read_to_string(USUAL).ok()?;
+    let file: toml_edit::DocumentMut = text.parse().ok()?;
+    file.get("printers").cloned()
+}
+
+/// The model that a project file names.
+pub fn project_model(text: &str) -> Result<Option<ModelOf>, String> {
+    Ok(parse(text)?.model)
+}
+
 /// The printers of a configuration.
 pub fn printers_of(text: &str) -> Result<Vec<Printer>, String> {
     Ok(parse(text)?.printers)
@@ -139,7 +209,13 @@ fn parse(text: &str) -> Result<Config, String> {
             .collect::<Result<_, _>>()?,
         Some(_) => return Err("\"printers\" must be a table; write for example [printers.mine]".to_owned()),
     };
-    Ok(Config { options, printers })
+    let model = options.remove("model").map(toml::Value::try_into).transpose();
+    let model = model.map_err(|e: toml::de::Error| format!("[model]: {}", e.message()))?;
+    Ok(Config {
+        options,
+        printers,
+        model,
+    })
 }
 
 fn own_printer(name: String, value: toml::Value) -> Result<Printer, String> {
@@ -221,6 +297,14 @@ fn extra_arguments(
             (toml::Value::String(text), true) => extra.push(format!("--{key}={text}")),
             (toml::Value::Integer(number), true) => extra.push(format!("--{key}={number}")),
             (toml::Value::Float(number), true) => extra.push(format!("--{key}={number}")),
+            (toml::Value::Array(several), true) if matches!(argument.get_action(), ArgAction::Append) => {
+                for one in several {
+                    let one = one
+                        .as_str()
+                        .ok_or_else(|| format!("\"{key}\" must be a list of texts"))?;
+                    extra.push(format!("--{key}={one}"));
+                }
+            }
             _ => return Err(format!("\"{key}\" must be a number or a text")),
         }
     }

@@ -115,7 +115,11 @@ pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model,
 
 /// The same, described by fewer triangles where it has very many.
 pub fn simple_model(session: &Session, path: &Path, options: &Options) -> Result<Model, Failure> {
-    let model = model(session, path, options)?;
+    simple(session, model(session, path, options)?, options)
+}
+
+/// `model` described by fewer triangles where it has very many.
+pub fn simple(session: &Session, model: Model, options: &Options) -> Result<Model, Failure> {
     let n_triangles = model.solid.mesh().triangles.len();
     if n_triangles <= MANY_TRIANGLES || options.resolution == 0.0 {
         return Ok(model);
@@ -149,6 +153,14 @@ fn simplified(mut model: Model, resolution_mm: f64) -> Result<Model, Failure> {
 
 /// The model in what was read from `path`.
 pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -> Result<Model, Failure> {
+    let sha256 = sha256(bytes);
+    if options.model_sha256.as_ref().is_some_and(|of| *of != sha256) {
+        return Err(Failure::Wrong(format!(
+            "{} is not the file that the project was made for (its SHA-256 is {sha256}): put that file back, or open this one in \
+             `shellock studio`",
+            path.display()
+        )));
+    }
     let Repaired {
         solid,
         source_face,
@@ -176,7 +188,7 @@ pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -
     made.labels = labels;
     made.n_file_faces = loaded.n_file_faces();
     made.file_face = file_face;
-    made.sha256 = sha256(bytes);
+    made.sha256 = sha256;
     made.notes = notes;
     made.repairs = repairs;
     Ok(made)

@@ -31,21 +31,32 @@ impl Drop for Writing {
 }
 
 /// Sets `stop` with Ctrl-C; a moment later `end` tells it, and the program ends with code 130.
-pub fn watch(stop: &Arc<AtomicBool>, end: impl Fn() + Send + Sync + 'static) {
-    let (stop, end) = (Arc::clone(stop), Arc::new(end));
+pub fn watch(stop: &Arc<AtomicBool>, end: impl Fn() + Send + Copy + 'static) {
+    let stop = Arc::clone(stop);
     // Without a handler Ctrl-C would still end the program, only less tidily.
-    let _ = ctrlc::set_handler(move || {
-        if stop.swap(true, Ordering::Relaxed) {
-            return;
+    let _ = ctrlc::set_handler(move || stop_soon(&stop, end));
+}
+
+/// The same where standard input ends: a program that started this one wants no more of it, or is gone.
+pub fn watch_stdin(stop: &Arc<AtomicBool>, end: impl Fn() + Send + Copy + 'static) {
+    let stop = Arc::clone(stop);
+    std::thread::spawn(move || {
+        // An error is an end, too.
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        stop_soon(&stop, end);
+    });
+}
+
+fn stop_soon(stop: &Arc<AtomicBool>, end: impl Fn() + Send + 'static) {
+    if stop.swap(true, Ordering::Relaxed) {
+        return;
+    }
+    std::thread::spawn(move || {
+        std::thread::sleep(PATIENCE);
+        while N_WRITING.load(Ordering::SeqCst) > 0 {
+            std::thread::sleep(LOOK);
         }
-        let end = Arc::clone(&end);
-        std::thread::spawn(move || {
-            std::thread::sleep(PATIENCE);
-            while N_WRITING.load(Ordering::SeqCst) > 0 {
-                std::thread::sleep(LOOK);
-            }
-            end();
-            std::process::exit(130);
-        });
+        end();
+        std::process::exit(130);
     });
 }

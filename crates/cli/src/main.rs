@@ -22,10 +22,12 @@ mod paint;
 mod place;
 mod printing;
 mod progress;
+mod project;
 mod savings;
 mod stages;
 mod stopwatch;
 mod stress;
+mod studio;
 mod tabs;
 mod told;
 mod units;
@@ -106,10 +108,14 @@ fn main() -> ExitCode {
         since: std::time::Instant::now(),
     };
     let is_json = session.is_json;
-    interrupt::watch(&session.stop, move || {
+    let told = move || {
         let stopped = Failure::Stopped;
         refuse(is_json, &stopped.to_string(), stopped.exit_code());
-    });
+    };
+    interrupt::watch(&session.stop, told);
+    if cli.stop_with_stdin {
+        interrupt::watch_stdin(&session.stop, told);
+    }
     if let Some(n) = cli.threads
         && let Err(e) = rayon::ThreadPoolBuilder::new()
             .num_threads(n.clamp(1, MOST_THREADS))
@@ -182,6 +188,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
             inspect::inspect(session, &model, &options, wanted)
         }
         Command::Coupon(options) => coupon::coupon(session, &options),
+        Command::Studio(options) => studio::studio(session, &options),
         Command::Completions { shell } => Ok(manual::completions(shell)),
         Command::Manual { folder } => manual::write(&folder),
         Command::Figure {

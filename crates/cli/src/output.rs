@@ -408,3 +408,12 @@ pub fn standing(up: Axis, v: Vec3) -> Vec3 {
         Axis::Z => v,
     }
 }
+
+/// Turned back: `lying(up, standing(up, v))` is `v`.
+pub fn lying(up: Axis, v: Vec3) -> Vec3 {
+    match up {
+        Axis::X => Vec3::new(v.z, v.y, -v.x),
+        Axis::Y => Vec3::new(v.x, v.z, -v.y),
+        Axis::Z => v,
+    }
+}

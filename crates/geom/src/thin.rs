@@ -25,16 +25,13 @@ pub struct ThinPlace {
     pub at: Vec3,
 }
 
-/// The places where the solid is thinner than `below_mm`, the largest first.
-///
-/// Thickness is measured from the middle of each triangle straight inwards, where a surface facing away
-/// within 30° is met; so triangles should be smaller than what is looked for. O(n log n), the same on any
-/// number of threads.
-pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
+/// How thick the solid is at each triangle where that is less than `below_mm`, mm; `None` elsewhere, as
+/// [`thin_places`] measures it.
+pub fn thin_faces(solid: &Solid, below_mm: f64) -> Vec<Option<f64>> {
     let mesh = solid.mesh();
     let bvh = TriangleBvh::new(mesh);
     let start = START_SHARE * below_mm;
-    let thickness_mm: Vec<Option<f64>> = (0..mesh.triangles.len())
+    (0..mesh.triangles.len())
         .into_par_iter()
         .map(|face| {
             let inwards = -mesh.face_normal(face);
@@ -45,7 +42,17 @@ pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
             )?;
             (mesh.face_normal(other as usize).dot(inwards) >= COS_WALL).then_some(distance + start)
         })
-        .collect();
+        .collect()
+}
+
+/// The places where the solid is thinner than `below_mm`, the largest first.
+///
+/// Thickness is measured from the middle of each triangle straight inwards, where a surface facing away
+/// within 30° is met; so triangles should be smaller than what is looked for. O(n log n), the same on any
+/// number of threads.
+pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
+    let mesh = solid.mesh();
+    let thickness_mm = thin_faces(solid, below_mm);
     let is_thin = |face: u32| thickness_mm[face as usize].is_some();
     let topology = Topology::new(solid);
     let (place_of_face, n_places) = components(&topology, |a, b| is_thin(a) == is_thin(b));

@@ -53,6 +53,8 @@ pub struct KeyParams {
     pub up: [f64; 3],
     /// Regions, resolved, that no key is cut from; none.
     pub keep_whole: Vec<KeepWhole>,
+    /// Where the middle of its outer side is wanted; anywhere.
+    pub near: Option<[f64; 3]>,
 }
 
 impl Default for KeyParams {
@@ -64,6 +66,7 @@ impl Default for KeyParams {
             piece_mm2: 4000.0,
             up: [0.0, 0.0, 1.0],
             keep_whole: Vec::new(),
+            near: None,
         }
     }
 }

@@ -32,7 +32,7 @@ pub(crate) use creases::usual_n_pieces;
 pub use error::SegmentationError;
 pub(crate) use keep_whole::whole;
 pub use keep_whole::{KeepWhole, resolved};
-pub use method::{Method, automatic_labels, symmetry_plane};
+pub use method::{Method, automatic_labels, mirrored_labels, symmetry_plane};
 use method::{automatic_on, creases_on};
 pub use refine::refine;
 pub use smooth::smooth_and_cut;

@@ -37,7 +37,7 @@ const ASSEMBLY: [&str; 10] = [
 ];
 
 /// Crates from the ground up, each with those that its product may name.
-const FLOORS: [(&str, &[&str]); 12] = [
+const FLOORS: [(&str, &[&str]); 13] = [
     ("geom", &[]),
     ("formats", &["geom"]),
     ("check", &[]),
@@ -51,6 +51,7 @@ const FLOORS: [(&str, &[&str]); 12] = [
     ),
     ("print", &["geom", "mechanics", "assembly", "render"]),
     ("kit", &["geom", "assembly", "shellock", "print"]),
+    ("studio", &[]),
     (
         "cli",
         &[
@@ -62,6 +63,7 @@ const FLOORS: [(&str, &[&str]); 12] = [
             "shellock",
             "print",
             "kit",
+            "studio",
         ],
     ),
     ("testkit", &["geom"]),

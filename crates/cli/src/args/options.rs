@@ -33,6 +33,9 @@ pub struct Options {
     /// The printers of the configuration file.
     #[arg(skip)]
     pub own_printers: Vec<Printer>,
+    /// What the model's file must hash to, as a project says.
+    #[arg(skip)]
+    pub model_sha256: Option<String>,
     /// Longest side of the made thing
     ///
     /// Longest side of the made thing, mm [default: the file's own size if that is 20 to 1000, else 150]
@@ -170,11 +173,12 @@ pub struct Options {
     /// Goes in last: cut, the flattest piece, or piece N
     ///
     /// What goes in last and can be taken out again: auto, a key on rails that is cut where it slides best;
-    /// piece, the flattest piece that works, as it is; or a piece, by its label or by the number that
-    /// `segment` gives it
+    /// X,Y,Z, the same near that place in the made thing's space; piece, the flattest piece that works, as it
+    /// is; or a piece, by its label or by the number that `segment` gives it
     #[arg(
         long,
-        value_name = "auto|piece|N",
+        value_name = "auto|piece|N|X,Y,Z",
+        allow_hyphen_values = true,
         default_value = "auto",
         help_heading = "Pieces"
     )]
@@ -356,6 +360,7 @@ impl Options {
             Key::Auto => KeySource::Cut,
             Key::Flattest => KeySource::Flattest,
             Key::Piece(id) => KeySource::Piece(id),
+            Key::Near(place) => KeySource::CutNear(place),
         };
         p.has_grip = self.key_grip;
         p.thickness = match self.thickness {

@@ -50,6 +50,8 @@ pub enum Key {
     Auto,
     Flattest,
     Piece(i64),
+    /// Cut near a place, mm.
+    Near([f64; 3]),
 }
 
 impl FromStr for Key {
@@ -59,9 +61,35 @@ impl FromStr for Key {
         match text.to_ascii_lowercase().as_str() {
             "auto" => Ok(Self::Auto),
             "piece" => Ok(Self::Flattest),
-            number => number.parse().map(Self::Piece).map_err(|_| {
-                "give auto, piece, or the number of a piece (its label, where there are labels)".to_owned()
-            }),
+            number => {
+                let piece = number.parse().ok().map(Self::Piece);
+                piece.or_else(|| place(number).map(Self::Near)).ok_or_else(|| {
+                    "give auto, piece, the number of a piece (its label, where there are labels), or a place X,Y,Z in mm".to_owned()
+                })
+            }
+        }
+    }
+}
+
+/// `X,Y,Z`, finite.
+fn place(text: &str) -> Option<[f64; 3]> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let place: [f64; 3] = numbers.ok()?.try_into().ok()?;
+    place.iter().all(|x| x.is_finite()).then_some(place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_a_word_a_number_or_a_place() {
+        let key = |text: &str| text.parse::<Key>().ok();
+        assert!(key("auto") == Some(Key::Auto) && key("piece") == Some(Key::Flattest));
+        assert!(key("-3") == Some(Key::Piece(-3)));
+        assert!(key("1, -2.5,3e1") == Some(Key::Near([1.0, -2.5, 30.0])));
+        for wrong in ["", "1,2", "1,2,3,4", "a,b,c", "1,2,inf", "1.5"] {
+            assert!(key(wrong).is_none(), "{wrong}");
         }
     }
 }

@@ -5,7 +5,7 @@ use super::division::{Division, WallGrid, joined};
 use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
 use super::strengthen::{Remedy, remedy};
-use super::{DesignError, Job, KeySource, Kit, Params};
+use super::{DesignError, Job, Kit, Params};
 use crate::body::{BodyError, GridError, PatchDistances};
 use crate::handling::Handling;
 use crate::key::Turn;
@@ -349,7 +349,7 @@ pub(super) fn next_plan(
 
 /// Says which conditions a key breaks that was not cut to meet them.
 fn warn_of_key(ctx: &Ctx, params: &Params, division: &Division, plan: &LatticePlan) {
-    let may_be_cut = params.key != KeySource::Cut;
+    let may_be_cut = !params.key.is_cut();
     let Some(last) = plan.steps.last() else { return };
     if let Some(found) = key::conditions(&division.surface, last.piece, last.separation.unit()) {
         let largest_mm = division.chosen.sizes.largest_mm();

@@ -34,17 +34,18 @@ pub(super) struct Candidate<'a> {
 
 /// Where a key can be: places to cut it, best first; at last, one of the pieces.
 pub(super) fn places(ctx: &Ctx, job: &Job<'_>) -> Result<Vec<Option<KeySite>>, DesignError> {
-    let sites = if job.params.key == KeySource::Cut {
+    let sites = if job.params.key.is_cut() {
         key::sites(ctx, &key_params(job), &job.surface)?
     } else {
         Vec::new()
     };
-    Ok(sites
-        .into_iter()
-        .take(KITS_OF_CUT_KEYS.len())
-        .map(Some)
-        .chain([None])
-        .collect())
+    Ok(in_turn(sites))
+}
+
+/// Those of `sites` that kits are made with, best first; at last, one of the pieces.
+pub(super) fn in_turn(sites: Vec<KeySite>) -> Vec<Option<KeySite>> {
+    let few = sites.into_iter().take(KITS_OF_CUT_KEYS.len());
+    few.map(Some).chain([None]).collect()
 }
 
 impl<'a> Candidate<'a> {
@@ -198,7 +199,7 @@ impl CutKey {
     }
 }
 
-fn key_params(job: &Job<'_>) -> KeyParams {
+pub(super) fn key_params(job: &Job<'_>) -> KeyParams {
     let settings = job.settings();
     KeyParams {
         seed: settings.segmentation.seed,
@@ -207,6 +208,10 @@ fn key_params(job: &Job<'_>) -> KeyParams {
         piece_mm2: job.surface.mesh.area() / job.surface.n_patches as f64,
         up: settings.plan.up,
         keep_whole: settings.segmentation.keep_whole.clone(),
+        near: match job.params.key {
+            KeySource::CutNear(place) => Some(place),
+            _ => None,
+        },
     }
 }
 

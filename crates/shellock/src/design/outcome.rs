@@ -224,9 +224,15 @@ impl<'a> Best<'a> {
         warnings.extend(thin_in_all(&thin));
         match &key {
             Some(key) if kit.rails_mm() <= 0.0 => warnings.push(without_rails(&kit, key)),
-            None if job.params.key == KeySource::Cut => {
+            None if job.params.key.is_cut() => {
                 if reasons.is_empty() {
-                    reasons.push("nowhere is the surface flat, free and thick enough to cut one".into());
+                    reasons.push(match job.params.key {
+                        KeySource::CutNear(_) => {
+                            "the surface is not flat, free and thick enough near the place that you chose"
+                                .into()
+                        }
+                        _ => "nowhere is the surface flat, free and thick enough to cut one".into(),
+                    });
                 }
                 warnings.push(not_cut(&kit, reasons));
             }

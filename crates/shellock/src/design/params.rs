@@ -107,17 +107,26 @@ impl Default for Thickness {
 }
 
 /// Where the key comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum KeySource {
     /// It is cut out of the surface where it slides best, see [`crate::key`]; where no such kit passes, as
     /// with `Flattest`.
     #[default]
     Cut,
+    /// The same as near as can be to a place in the model's space, mm.
+    CutNear([f64; 3]),
     /// The flattest piece that works.
     Flattest,
     /// The piece with this label, where labels are given; else the one that has this number, from 1, once the
     /// model is divided (as `shellock segment` numbers them).
     Piece(i64),
+}
+
+impl KeySource {
+    /// Whether the key is cut out of the surface.
+    pub fn is_cut(self) -> bool {
+        matches!(self, Self::Cut | Self::CutNear(_))
+    }
 }
 
 /// Bounds of the feedback loop.

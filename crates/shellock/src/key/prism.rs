@@ -41,6 +41,11 @@ impl KeyPrism {
         2.0 * self.half_width_mm
     }
 
+    /// The middle of what it takes of the plane.
+    pub fn middle(&self) -> Vec3 {
+        self.origin + 0.5 * self.length_mm() * self.slide
+    }
+
     /// Half the width so far along the slide, mm.
     pub fn half_width_at(&self, along_mm: f64) -> f64 {
         self.half_width_mm + FLARE * along_mm

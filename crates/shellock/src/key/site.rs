@@ -37,6 +37,8 @@ const MOST_CANDIDATES: usize = 60;
 const MOST_SITES: usize = 6;
 /// A key or the rest counts as one component where all others have less than this share of its area.
 const CRUMBS: f64 = 0.02;
+/// A key that is wanted somewhere is liked half as much so far from there, in edges of an ordinary piece.
+const NEAR_SHARE: f64 = 0.05;
 /// Least share of the places along its sides under which there is room for the grooves.
 const LEAST_ROOM: f64 = 0.7;
 
@@ -67,11 +69,28 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
     };
     let n_faces = mesh.triangles.len();
     let spots = Spot::sample(mesh, 0..n_faces, n_faces.div_ceil(MOST_SPOTS).max(1));
-    let planes = planes(params, mesh, &spots);
+    let mut planes = planes(params, mesh, &spots);
+    if let Some(place) = params.near.map(Vec3::from) {
+        let reach_mm = piece_edge_mm(params);
+        let near: Vec<Spot> = spots
+            .iter()
+            .copied()
+            .filter(|s| s.center.distance(place) < reach_mm)
+            .collect();
+        planes.extend(self::planes(params, mesh, &near));
+    }
     let mut candidates: Vec<KeySite> = planes
         .par_iter()
         .flat_map_iter(|plane| on_plane(params, &spots, *plane))
         .collect();
+    if let Some(place) = params.near.map(Vec3::from) {
+        let edge_mm = piece_edge_mm(params);
+        candidates.retain_mut(|site| {
+            let off_mm = site.prism.middle().distance(place);
+            site.score /= 1.0 + (off_mm / (NEAR_SHARE * edge_mm)).powi(2);
+            off_mm < edge_mm
+        });
+    }
     let kept = kept(params, surface, &topology);
     candidates.retain(|site| !overlaps(&site.prism, params.size_mm, &kept));
     ctx.check()?;

@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 use shellock_geom::{Solid, TriMesh};
 use shellock_segment::auto::AutoParams;
 use shellock_segment::coarse::Coarse;
+use shellock_segment::face_graph::FaceGraph;
 use shellock_segment::kmeans::KMeansParams;
+use shellock_segment::mirrored::Mirrored;
 use shellock_segment::primitives::PrimitivesParams;
 use shellock_segment::random_cuts::{Divided, RandomCutsParams};
 use shellock_segment::sdf::SdfParams;
@@ -128,6 +130,14 @@ impl Method {
 pub fn symmetry_plane(params: &SegmentationParams, solid: &Solid) -> Option<Plane> {
     let (fine, _) = halve_long_edges(params, solid);
     symmetry::plane(&Coarse::new(fine.mesh(), RandomCutsParams::default().n_faces).mesh)
+}
+
+/// `labels` of a symmetric solid made the same on both sides, after the side that has more parts; `None` where
+/// there is no plane of symmetry.
+pub fn mirrored_labels(params: &SegmentationParams, solid: &Solid, labels: &[u32]) -> Option<Vec<u32>> {
+    let plane = symmetry_plane(params, solid)?;
+    let graph = FaceGraph::new(solid.mesh());
+    Some(Mirrored::new(&plane, solid.mesh(), &graph).labels(&graph, labels))
 }
 
 /// What a division that was to be the same on both sides is the same about.

@@ -1,0 +1,527 @@
+//! What the studio's page works on: one project, its model and its pieces.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Instant;
+
+use serde_json::{Map, Value, json};
+use shellock::design::Settings;
+use shellock::segmentation::{self, MOST_PIECES};
+use shellock::{Ctx, figure::Figure as Sample};
+use shellock_formats::write_stl_binary;
+use shellock_geom::Vec3;
+use shellock_print::Printer;
+use shellock_studio::{Refusal, Task, Workshop};
+
+use super::choices::{self, Choices};
+use super::figure::Figure;
+use super::judgement::{Judged, judge};
+use super::store::{Found, Store};
+use crate::Session;
+use crate::args::Options;
+use crate::bed::fitted;
+use crate::build::checked;
+use crate::config;
+use crate::failure::Failure;
+use crate::input::{read, shellock_figure};
+use crate::output::{lying, standing};
+use crate::progress::Shown;
+use crate::project::ModelOf;
+
+/// Options that make another solid of the model's file.
+const OF_MODEL: [&str; 9] = [
+    "size",
+    "height",
+    "scale",
+    "unit",
+    "up",
+    "no-repair",
+    "largest",
+    "resolution",
+    "labels-from",
+];
+/// Longest side of the figures that come with the program, mm.
+const SAMPLE_MM: f64 = 120.0;
+
+/// One project, open.
+pub struct Bench {
+    store: Store,
+    printers: Vec<Printer>,
+    state: Mutex<State>,
+}
+
+struct State {
+    /// Grows with every change.
+    revision: u64,
+    model: Option<ModelOf>,
+    choices: Choices,
+    options: Arc<Options>,
+    figure: Option<Arc<Figure>>,
+    /// Whether a model is being opened, and why the last one could not be.
+    is_opening: bool,
+    problem: Option<String>,
+    pieces: Option<Pieces>,
+    /// One label a face of the file, until the model is open.
+    file_labels: Option<Vec<u32>>,
+    judged: Option<Arc<Judged>>,
+    /// Stops the judgement that runs.
+    judging: Arc<AtomicBool>,
+    /// What the kit in the making is made of.
+    making: Option<String>,
+}
+
+/// The pieces as the page shows them.
+#[derive(Clone)]
+struct Pieces {
+    /// One for each triangle that is shown, from 0.
+    labels: Arc<Vec<u32>>,
+    /// Whether a person changed them; else `build` divides by itself.
+    is_painted: bool,
+    notes: Vec<String>,
+}
+
+impl Pieces {
+    fn n(&self) -> usize {
+        self.labels.iter().collect::<BTreeSet<_>>().len()
+    }
+}
+
+/// Nothing is shown, and it ends with `stop`.
+fn silent(stop: &Arc<AtomicBool>) -> Session {
+    Session {
+        is_json: false,
+        is_verbose: false,
+        shown: Shown::Nothing,
+        stop: Arc::clone(stop),
+        since: Instant::now(),
+    }
+}
+
+impl Bench {
+    /// The project in `folder`, which may be new; its model is not open yet.
+    pub fn open(folder: PathBuf) -> Result<Self, Failure> {
+        let (
+            store,
+            Found {
+                model,
+                choices,
+                labels,
+            },
+        ) = Store::open(folder)?;
+        let text = store.printers().map(|printers| {
+            let mut file = toml_edit::DocumentMut::new();
+            file["printers"] = printers.clone();
+            file.to_string()
+        });
+        let printers = text.map(|text| config::printers_of(&text)).transpose();
+        let printers = printers.map_err(Failure::Wrong)?.unwrap_or_default();
+        let options = choices::options(&choices, &printers).map_err(|e| Failure::Wrong(e.to_string()))?;
+        let state = State {
+            revision: 0,
+            model,
+            choices,
+            options: Arc::new(options),
+            figure: None,
+            is_opening: false,
+            problem: None,
+            pieces: None,
+            file_labels: labels,
+            judged: None,
+            judging: Arc::default(),
+            making: None,
+        };
+        Ok(Self {
+            store,
+            printers,
+            state: Mutex::new(state),
+        })
+    }
+
+    /// Opens the model that the project names, if it names one.
+    pub fn load(&self) {
+        let Some(model) = self.lock().model.clone() else {
+            return;
+        };
+        if let Err(refusal) = self.show(model) {
+            self.lock().problem = Some(refusal.to_string());
+        }
+    }
+
+    /// Takes a copy of the user's file into the project, where it is another than the project's; it is opened by
+    /// [`Self::load`].
+    pub fn take(&self, path: &Path) -> Result<(), Failure> {
+        let name = path
+            .file_name()
+            .map_or_else(|| "model".into(), |n| n.to_string_lossy());
+        let bytes = read(path)?;
+        let model = self.store.keep(&name, &bytes)?;
+        let mut state = self.lock();
+        if state.model.as_ref() != Some(&model) {
+            (state.model, state.file_labels) = (Some(model), None);
+            self.store.save(state.model.as_ref(), &state.choices, None)?;
+        }
+        Ok(())
+    }
+
+    /// Opens a model of the folder.
+    fn show(&self, model: ModelOf) -> Result<(), Refusal> {
+        self.lock().is_opening = true;
+        let opened = self.opened(&model, &self.lock().options.clone());
+        let mut state = self.lock();
+        state.is_opening = false;
+        let figure = opened?;
+        let painted = state.file_labels.take();
+        let labels = painted.and_then(|labels| figure.from_file_labels(&labels));
+        (state.problem, state.model) = (None, Some(model));
+        state.figure = Some(Arc::new(figure));
+        state.pieces = labels.map(|labels| Pieces {
+            labels: Arc::new(labels),
+            is_painted: true,
+            notes: Vec::new(),
+        });
+        self.changed(&mut state)
+    }
+
+    fn opened(&self, model: &ModelOf, options: &Options) -> Result<Figure, Refusal> {
+        let path = self.store.model_path(model).map_err(|e| self.refused(&e))?;
+        Figure::open(&silent(&Arc::default()), &path, options).map_err(|e| self.refused(&e))
+    }
+
+    /// The state is another: what was judged is of another, and the project is written.
+    fn changed(&self, state: &mut State) -> Result<(), Refusal> {
+        state.revision += 1;
+        state.judged = None;
+        state.judging.store(true, Ordering::Relaxed);
+        let painted = state.pieces.as_ref().filter(|pieces| pieces.is_painted);
+        let labels = state.figure.as_ref().zip(painted).map(|(figure, pieces)| {
+            let of_file = figure.file_labels(&pieces.labels);
+            of_file.into_iter().map(|label| label + 1).collect::<Vec<u32>>()
+        });
+        let saved = self
+            .store
+            .save(state.model.as_ref(), &state.choices, labels.as_deref());
+        saved.map_err(|e| self.refused(&e))
+    }
+
+    /// New pieces for the state of `revision`; refuses where it is another by now.
+    fn set_pieces(&self, revision: u64, pieces: Pieces) -> Result<Value, Refusal> {
+        let mut state = self.lock();
+        if state.revision != revision {
+            return Err(Refusal::overtaken());
+        }
+        let (n_pieces, notes, method) = (pieces.n(), pieces.notes.clone(), state.options.method.name());
+        state.pieces = Some(pieces);
+        self.changed(&mut state)?;
+        Ok(json!({ "revision": state.revision, "n_pieces": n_pieces, "method": method, "notes": notes }))
+    }
+
+    /// What is needed to work on the model while the page goes on.
+    fn snapshot(&self) -> Result<Snapshot, Refusal> {
+        let state = self.lock();
+        let figure = state.figure.clone();
+        Ok(Snapshot {
+            revision: state.revision,
+            options: Arc::clone(&state.options),
+            figure: figure.ok_or_else(|| Refusal::missing("no model is open"))?,
+            pieces: state.pieces.clone(),
+        })
+    }
+
+    /// Words for the page, which knows nothing of folders.
+    fn refused(&self, failure: &Failure) -> Refusal {
+        let folder = format!("{}/", self.store.folder().display());
+        let words = failure.to_string().replace(&folder, "");
+        match failure {
+            Failure::Unwritable { .. } => Refusal::unable(words),
+            _ => Refusal::wrong(words),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().expect("no holder of this lock panics")
+    }
+}
+
+struct Snapshot {
+    revision: u64,
+    options: Arc<Options>,
+    figure: Arc<Figure>,
+    pieces: Option<Pieces>,
+}
+
+impl Snapshot {
+    fn pieces(&self) -> Result<&Pieces, Refusal> {
+        self.pieces
+            .as_ref()
+            .ok_or_else(|| Refusal::missing("the model is not divided yet"))
+    }
+}
+
+impl Workshop for Bench {
+    fn folder(&self) -> &Path {
+        self.store.folder()
+    }
+
+    fn kit_folder(&self) -> PathBuf {
+        self.store.kit_folder()
+    }
+
+    fn project(&self) -> Value {
+        let state = self.lock();
+        let model = state.figure.as_ref().map(|figure| {
+            let model = &figure.model;
+            let size = standing(state.options.up, model.solid.mesh().bounds().size()).abs();
+            json!({ "name": model.name, "n_triangles": figure.n_faces(), "size_mm": size.to_array(), "notes": model.notes,
+                "warnings": figure.warnings, "thin_share": figure.thin_share(), "view_triangles": figure.n_faces(),
+                "is_exact": figure.is_exact() })
+        });
+        let division = state.pieces.as_ref().map(|pieces| {
+            let origin = if pieces.is_painted { "painted" } else { "automatic" };
+            json!({ "n_pieces": pieces.n(), "origin": origin, "method": state.options.method.name(), "notes": pieces.notes })
+        });
+        let figures = Sample::ALL.map(|figure| figure.name());
+        json!({ "name": self.store.folder().file_name().map(|n| n.to_string_lossy()), "folder": self.store.folder(),
+            "revision": state.revision, "is_opening": state.is_opening, "problem": state.problem, "model": model,
+            "division": division, "kit": self.store.kit(), "figures": figures, "program": env!("CARGO_PKG_VERSION") })
+    }
+
+    fn options(&self) -> Value {
+        choices::told(&self.lock().choices, &self.printers)
+    }
+
+    fn choose(&self, changes: &Map<String, Value>) -> Result<(), Refusal> {
+        let (choices, model, figure) = {
+            let state = self.lock();
+            (state.choices.clone(), state.model.clone(), state.figure.clone())
+        };
+        let choices = choices::changed(&choices, changes)?;
+        let options = Arc::new(choices::options(&choices, &self.printers)?);
+        let is_other = changes.keys().any(|name| OF_MODEL.contains(&&name[..]));
+        let opened = match model.filter(|_| is_other && figure.is_some()) {
+            Some(model) => Some(self.opened(&model, &options)?),
+            None => None,
+        };
+        let mut state = self.lock();
+        (state.choices, state.options) = (choices, options);
+        if let Some(next) = opened {
+            let painted = state.pieces.take().filter(|pieces| pieces.is_painted);
+            let of_file = figure
+                .zip(painted)
+                .map(|(before, pieces)| before.file_labels(&pieces.labels));
+            state.pieces = of_file
+                .and_then(|labels| next.from_file_labels(&labels))
+                .map(|labels| Pieces {
+                    labels: Arc::new(labels),
+                    is_painted: true,
+                    notes: Vec::new(),
+                });
+            state.figure = Some(Arc::new(next));
+        }
+        self.changed(&mut state)
+    }
+
+    fn open(&self, name: &str, file: &Path) -> Result<(), Refusal> {
+        let bytes = read(file).map_err(|e| self.refused(&e))?;
+        // What cannot be read is not kept.
+        let extension = Path::new(name).extension().and_then(|e| e.to_str());
+        shellock_formats::read_mesh(&bytes, extension).map_err(|e| Refusal::wrong(format!("{name}: {e}")))?;
+        let model = self.store.keep(name, &bytes).map_err(|e| self.refused(&e))?;
+        drop(bytes);
+        let before = {
+            let mut state = self.lock();
+            state.file_labels.take()
+        };
+        self.show(model).inspect_err(|_| self.lock().file_labels = before)
+    }
+
+    fn open_figure(&self, name: &str) -> Result<(), Refusal> {
+        let (solid, _) = shellock_figure(name, SAMPLE_MM).map_err(|e| self.refused(&e))?;
+        let bytes = write_stl_binary(solid.mesh());
+        let model = self
+            .store
+            .keep(&format!("{name}.stl"), &bytes)
+            .map_err(|e| self.refused(&e))?;
+        self.lock().file_labels = None;
+        self.show(model)
+    }
+
+    fn mesh(&self) -> Result<Vec<u8>, Refusal> {
+        let of = self.snapshot()?;
+        Ok(of.figure.bytes(&of.options))
+    }
+
+    fn divide(&self) -> Result<Value, Refusal> {
+        let of = self.snapshot()?;
+        let pieces = divided(&of).map_err(|e| self.refused(&e))?;
+        self.set_pieces(of.revision, pieces)
+    }
+
+    fn labels(&self) -> Result<Vec<u8>, Refusal> {
+        let of = self.snapshot()?;
+        Ok(of
+            .pieces()?
+            .labels
+            .iter()
+            .flat_map(|label| label.to_le_bytes())
+            .collect())
+    }
+
+    fn paint(&self, labels: &[u8]) -> Result<Value, Refusal> {
+        let of = self.snapshot()?;
+        let (numbers, rest) = labels.as_chunks::<4>();
+        if numbers.len() != of.figure.n_faces() || !rest.is_empty() {
+            let n = of.figure.n_faces();
+            return Err(Refusal::wrong(format!(
+                "{} bytes are no labels of {n} triangles",
+                labels.len()
+            )));
+        }
+        let painted: Vec<u32> = numbers.iter().map(|b| u32::from_le_bytes(*b)).collect();
+        if painted.iter().any(|&label| label as usize >= 8 * MOST_PIECES) {
+            return Err(Refusal::wrong(format!(
+                "more than {MOST_PIECES} pieces cannot be made"
+            )));
+        }
+        let of_file = of.figure.file_labels(&painted);
+        let kept = of
+            .figure
+            .from_file_labels(&of_file)
+            .unwrap_or_else(|| painted.clone());
+        // A face of the file is of one piece.
+        let is_changed = kept != painted;
+        let mut told = self.set_pieces(of.revision, painted_by_hand(kept))?;
+        told["is_changed"] = is_changed.into();
+        Ok(told)
+    }
+
+    fn judge(&self) -> Result<Value, Refusal> {
+        let of = self.snapshot()?;
+        let pieces = of.pieces()?;
+        let stop = Arc::new(AtomicBool::new(false));
+        {
+            let mut state = self.lock();
+            if let Some(judged) = state.judged.as_ref().filter(|_| state.revision == of.revision) {
+                return Ok(judged.told.clone());
+            }
+            state.judging.store(true, Ordering::Relaxed);
+            state.judging = Arc::clone(&stop);
+        }
+        let labels = pieces.is_painted.then_some(&pieces.labels[..]);
+        let judged = judge(&silent(&stop), &of.figure, &of.options, &pieces.labels, labels);
+        let mut state = self.lock();
+        if state.revision != of.revision || stop.load(Ordering::Relaxed) {
+            return Err(Refusal::overtaken());
+        }
+        let mut judged = judged.map_err(|e| self.refused(&e))?;
+        judged.told["revision"] = of.revision.into();
+        let told = judged.told.clone();
+        state.judged = Some(Arc::new(judged));
+        Ok(told)
+    }
+
+    fn mend(&self) -> Result<Value, Refusal> {
+        let (revision, judged) = {
+            let state = self.lock();
+            (state.revision, state.judged.clone())
+        };
+        let judged = match judged {
+            Some(judged) => judged,
+            None => {
+                self.judge()?;
+                self.lock().judged.clone().ok_or_else(Refusal::overtaken)?
+            }
+        };
+        self.set_pieces(revision, painted_by_hand(judged.mended.clone()))
+    }
+
+    fn mirror(&self) -> Result<Value, Refusal> {
+        let of = self.snapshot()?;
+        let params = checked(&of.options).map_err(|e| self.refused(&e))?;
+        let params = Settings::resolve(&params).segmentation;
+        let labels = segmentation::mirrored_labels(&params, &of.figure.model.solid, &of.pieces()?.labels);
+        let labels =
+            labels.ok_or_else(|| Refusal::wrong("the model is not the same on both sides of any plane"))?;
+        self.set_pieces(of.revision, painted_by_hand(labels))
+    }
+
+    fn place_key(&self, at: [f64; 3]) -> Result<(), Refusal> {
+        let place = lying(self.snapshot()?.options.up, Vec3::from(at)) + 0.0;
+        let [x, y, z] = place.to_array().map(|mm| format!("{mm:.2}"));
+        let changes = Map::from_iter([("key".to_owned(), json!(format!("{x},{y},{z}")))]);
+        self.choose(&changes)
+    }
+
+    fn task(&self) -> Result<Task, Refusal> {
+        let mut state = self.lock();
+        if state.figure.is_none() {
+            return Err(Refusal::missing("no model is open"));
+        }
+        state.making = Some(self.store.state());
+        let program = std::env::current_exe().map_err(|e| Refusal::unable(e.to_string()))?;
+        let project = self.store.project_file();
+        let kit = self.store.kit_folder();
+        Ok(Task {
+            program,
+            arguments: vec![
+                "build".into(),
+                project.into(),
+                "--out".into(),
+                kit.into(),
+                "--force".into(),
+                "--json".into(),
+                "--stop-with-stdin".into(),
+            ],
+        })
+    }
+
+    fn ended(&self, code: Option<i32>, output: &str) {
+        let made_of = self.lock().making.take();
+        let result: Value = serde_json::from_str(output).unwrap_or_default();
+        if let (Some(made_of), Some(code @ (0 | 1))) = (made_of, code) {
+            // The kit is there though nobody may know of what it was made.
+            let _ = self.store.note_kit(&made_of, code, &result);
+        }
+    }
+}
+
+fn painted_by_hand(labels: Vec<u32>) -> Pieces {
+    Pieces {
+        labels: Arc::new(labels),
+        is_painted: true,
+        notes: Vec::new(),
+    }
+}
+
+/// The pieces that `segment` would make.
+fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
+    let stop = Arc::default();
+    let session = silent(&stop);
+    let model = &of.figure.model;
+    let params = fitted(&session, &checked(&of.options)?, &of.options, model)?;
+    let settings = Settings::resolve(&params);
+    let notes: Mutex<Vec<String>> = Mutex::default();
+    let report = |progress: shellock::context::Progress<'_>| {
+        if let shellock::context::Progress::Note(text) = progress {
+            notes
+                .lock()
+                .expect("no holder of this lock panics")
+                .push(text.to_owned());
+        }
+    };
+    let ctx = Ctx::new(&report, &stop);
+    let surface = segmentation::segment(
+        &ctx,
+        &settings.segmentation,
+        &model.solid,
+        model.labels.as_deref(),
+    )
+    .map_err(shellock::design::DesignError::from)?;
+    drop(ctx);
+    Ok(Pieces {
+        labels: Arc::new(of.figure.labels_of(&surface)),
+        is_painted: false,
+        notes: notes.into_inner().expect("no holder of this lock panics"),
+    })
+}

@@ -1,0 +1,308 @@
+//! What is said of pieces before they are made: whether they lock, who is in whose way, what will be mended, and where
+//! a key can be.
+
+use serde_json::{Value, json};
+use shellock::design::{Verdict, outlook};
+use shellock::key::KeySite;
+use shellock::{Cause, Ctx, PatchId, SegmentedSurface, Severity, Warning};
+use shellock_geom::{TriMesh, Vec3};
+use shellock_print::plates::{fits, fits_whole};
+
+use super::figure::Figure;
+use crate::Session;
+use crate::args::{Axis, Options};
+use crate::bed::{fitted, shell_of};
+use crate::build::checked;
+use crate::failure::Failure;
+use crate::output::standing;
+use crate::place::Standing;
+
+/// How far ghosts of keys stand off the surface, mm.
+const OFF_MM: f64 = 0.6;
+
+/// A judgement.
+pub struct Judged {
+    /// As the page reads it.
+    pub told: Value,
+    /// The pieces as they would be mended, one for each triangle that is shown.
+    pub mended: Vec<u32>,
+}
+
+/// Judges the pieces `shown`; `painted` are those that a person changed.
+pub fn judge(
+    session: &Session,
+    figure: &Figure,
+    options: &Options,
+    shown: &[u32],
+    painted: Option<&[u32]>,
+) -> Result<Judged, Failure> {
+    let model = &figure.model;
+    let given: Option<Vec<i64>> = painted.map(|labels| labels.iter().map(|&l| i64::from(l) + 1).collect());
+    let labels = given.as_deref().or(model.labels.as_deref());
+    let checked = checked(options)?;
+    // What is painted says how many pieces there are.
+    let params = if labels.is_none() {
+        fitted(session, &checked, options, model)?
+    } else {
+        checked
+    };
+    let quiet = |_: shellock::context::Progress<'_>| ();
+    let ctx = Ctx::new(&quiet, &session.stop);
+    let outlook = outlook(&ctx, &params, &model.solid, labels)?;
+    let view = View {
+        up: options.up,
+        standing: Standing::of(options.up, model.solid.mesh()),
+        shown,
+    };
+    let mended = figure.labels_of(&outlook.divided);
+    let mut told = view.verdict(&outlook.verdict, outlook.divided.n_patches);
+    let chosen = match &outlook.verdict {
+        Verdict::Locks { key, .. } => *key,
+        Verdict::Blocked { .. } => None,
+    };
+    let mut advice: Vec<Value> = outlook.warnings.iter().map(|w| view.advice(w)).collect();
+    let pieces = pieces(figure, options, &view, &mut advice)?;
+    told["is_mended"] = advice.iter().any(|a| a["mends"] == true).into();
+    told["advice"] = advice.into();
+    told["pieces"] = pieces;
+    told["seams"] = view.seams(&outlook.divided);
+    told["keys"] = view.keys(&outlook.keys, chosen);
+    Ok(Judged { told, mended })
+}
+
+/// How places and pieces are told to the page: standing, and by the labels that it shows.
+struct View<'a> {
+    up: Axis,
+    standing: Standing,
+    shown: &'a [u32],
+}
+
+impl View<'_> {
+    fn at(&self, place: [f64; 3]) -> [f64; 3] {
+        standing(self.up, Vec3::from(place)).to_array()
+    }
+
+    /// For each patch the label that most of it has on the page.
+    fn labels(&self, surface: &SegmentedSurface) -> Vec<u32> {
+        let mut areas = vec![std::collections::BTreeMap::<u32, f64>::new(); surface.n_patches];
+        for (face, &source) in surface.source_face.iter().enumerate() {
+            let label = self.shown[source as usize];
+            *areas[usize::from(surface.patch_of_face[face])]
+                .entry(label)
+                .or_default() += surface.mesh.face_area(face);
+        }
+        let most = |of: &std::collections::BTreeMap<u32, f64>| {
+            of.iter().max_by(|a, b| a.1.total_cmp(b.1)).map(|m| *m.0)
+        };
+        areas.iter().map(|of| most(of).unwrap_or_default()).collect()
+    }
+
+    fn verdict(&self, verdict: &Verdict, n_mended: usize) -> Value {
+        match verdict {
+            Verdict::Locks { surface, plan, key } => {
+                let labels = self.labels(surface);
+                let order: Vec<u32> = plan.steps.iter().map(|s| labels[usize::from(s.piece)]).collect();
+                let ways: Vec<[f64; 3]> = plan
+                    .steps
+                    .iter()
+                    .map(|s| self.at((-s.separation.unit()).to_array()))
+                    .collect();
+                let key = match key {
+                    Some(site) => format!("cut {}", self.standing.words(site.prism.middle().to_array())),
+                    None => format!("piece {}", order.last().map_or(0, |label| label + 1)),
+                };
+                let words = format!("It locks: {} pieces, the key is {key}.", surface.n_patches);
+                json!({ "locks": true, "words": words, "n_pieces": n_mended, "order": order, "ways": ways, "blockers": [] })
+            }
+            Verdict::Blocked {
+                reason,
+                blockers,
+                surface,
+            } => {
+                let labels = self.labels(surface);
+                let number = |p: PatchId| labels.get(usize::from(p)).map_or(0, |label| label + 1);
+                let blockers: Vec<Value> = blockers
+                    .iter()
+                    .map(|b| {
+                        let (piece, by, share) = (number(b.piece), number(b.by), 100.0 * b.occluded);
+                        let place = self.standing.words(b.at);
+                        let words = format!(
+                            "piece {by} is in the way of piece {piece} ({place}): it hides {share:.0} % of it"
+                        );
+                        json!({ "piece": piece, "by": by, "words": words, "at": self.at(b.at) })
+                    })
+                    .collect();
+                let words = format!("It does not lock yet: {reason}");
+                json!({ "locks": false, "words": words, "n_pieces": n_mended, "order": [], "ways": [], "blockers": blockers })
+            }
+        }
+    }
+
+    fn advice(&self, warning: &Warning) -> Value {
+        let mends = matches!(
+            warning.cause,
+            Cause::LabelSplit { .. }
+                | Cause::LabelIslands { .. }
+                | Cause::LabelMerged { .. }
+                | Cause::LabelsDivided { .. }
+                | Cause::LabelsJoined { .. }
+        );
+        json!({ "severity": warning.severity(), "words": warning.to_string(), "at": warning.at.map(|at| self.at(at)), "mends": mends })
+    }
+
+    /// The smooth lines between pieces.
+    fn seams(&self, surface: &SegmentedSurface) -> Value {
+        let line = |points: &[Vec3]| -> Vec<f32> {
+            let standing = points.iter().flat_map(|&p| standing(self.up, p).to_array());
+            standing.map(|x| (100.0 * x).round() as f32 / 100.0).collect()
+        };
+        surface
+            .seams()
+            .iter()
+            .map(|seam| json!(line(&seam.points)))
+            .collect()
+    }
+
+    fn keys(&self, sites: &[KeySite], chosen: Option<KeySite>) -> Value {
+        // One that was asked for near a place may be none of those that are best anywhere.
+        let own = chosen.filter(|key| !sites.iter().any(|site| site.prism == key.prism));
+        let all = own.iter().chain(sites);
+        all.map(|site| self.key(site, chosen.is_some_and(|key| key.prism == site.prism)))
+            .collect()
+    }
+
+    fn key(&self, site: &KeySite, is_chosen: bool) -> Value {
+        let prism = &site.prism;
+        let corner = |along: f64, side: f64| {
+            let across = side * prism.half_width_at(along);
+            let p = prism.origin + along * prism.slide + across * prism.across() + OFF_MM * prism.normal;
+            self.at(p.to_array())
+        };
+        let length = prism.length_mm();
+        let outline =
+            [(0.0, -1.0), (0.0, 1.0), (length, 1.0), (length, -1.0)].map(|(along, side)| corner(along, side));
+        let place = self.standing.words(prism.middle().to_array());
+        let words = format!(
+            "{place}: {:.1} cm², rails of {:.0} mm, {:.0} % flat",
+            site.area_mm2 / 100.0,
+            site.rail_mm,
+            100.0 * site.flat_share
+        );
+        json!({ "at": self.at(prism.middle().to_array()), "slide": self.at(prism.slide.to_array()),
+            "normal": self.at(prism.normal.to_array()), "outline": outline, "area_mm2": site.area_mm2, "score": site.score,
+            "words": words, "is_chosen": is_chosen })
+    }
+}
+
+/// Each piece that is shown; advice where one is in several parts of the printer's bed or has one neighbour.
+fn pieces(
+    figure: &Figure,
+    options: &Options,
+    view: &View<'_>,
+    advice: &mut Vec<Value>,
+) -> Result<Value, Failure> {
+    let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+    let mesh = figure.model.solid.mesh();
+    let surface = as_shown(mesh, view.shown);
+    let neighbours = neighbours(mesh, view.shown, surface.n_patches);
+    let is_small = fits_whole(&printer, mesh.bounds());
+    let params = checked(options)?;
+    let wall_mm = shellock::design::Settings::resolve(&params).body.thickness_mm;
+    let mut told = Vec::new();
+    for piece in 0..surface.n_patches as u32 {
+        let faces: Vec<usize> = (0..mesh.triangles.len())
+            .filter(|&f| view.shown[f] == piece)
+            .collect();
+        if faces.is_empty() {
+            continue;
+        }
+        let area: f64 = faces.iter().map(|&f| mesh.face_area(f)).sum();
+        let middle = middle(mesh, &faces);
+        let fits_bed = is_small || fits(&printer, &shell_of(&surface, PatchId(piece), wall_mm));
+        let mut say = |severity: Severity, words: String| {
+            advice.push(json!({ "severity": severity, "words": words, "at": view.at(middle.to_array()), "mends": false }));
+        };
+        if !fits_bed {
+            let words = format!(
+                "piece {} does not fit the printer: split it, or make the model smaller",
+                piece + 1
+            );
+            say(Severity::Problem, words);
+        }
+        let n_neighbours = neighbours[piece as usize];
+        if n_neighbours == 1 {
+            let words = format!(
+                "piece {} touches one piece only: it will be joined or held by another",
+                piece + 1
+            );
+            say(Severity::Note, words);
+        }
+        told.push(
+            json!({ "piece": piece, "area_mm2": area, "fits_bed": fits_bed, "n_neighbours": n_neighbours,
+            "at": view.at(middle.to_array()) }),
+        );
+    }
+    Ok(told.into())
+}
+
+/// The pieces that are shown, with jagged seams.
+fn as_shown(mesh: &TriMesh, shown: &[u32]) -> SegmentedSurface {
+    SegmentedSurface {
+        mesh: mesh.clone(),
+        patch_of_face: shown.iter().map(|&label| PatchId(label)).collect(),
+        source_face: (0..mesh.triangles.len() as u32).collect(),
+        n_patches: shown.iter().max().map_or(0, |&most| most as usize + 1),
+    }
+}
+
+/// A place on the piece near its middle.
+fn middle(mesh: &TriMesh, faces: &[usize]) -> Vec3 {
+    let (mut sum, mut area) = (Vec3::ZERO, 0.0);
+    for &f in faces {
+        sum += mesh.face_area(f) * mesh.face_center(f);
+        area += mesh.face_area(f);
+    }
+    let mean = sum / area.max(f64::MIN_POSITIVE);
+    let nearest = faces.iter().map(|&f| mesh.face_center(f));
+    nearest
+        .min_by(|a, b| a.distance(mean).total_cmp(&b.distance(mean)))
+        .unwrap_or(mean)
+}
+
+/// How many pieces each touches along an edge.
+fn neighbours(mesh: &TriMesh, shown: &[u32], n: usize) -> Vec<usize> {
+    let mut owner = std::collections::HashMap::with_capacity(mesh.triangles.len() * 3 / 2);
+    let mut pairs = std::collections::BTreeSet::new();
+    for (f, t) in mesh.triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (t[k], t[(k + 1) % 3]);
+            if let Some(&other) = owner.get(&(b, a)) {
+                let (p, q): (u32, u32) = (shown[f], other);
+                if p != q {
+                    pairs.insert((p.min(q), p.max(q)));
+                }
+            }
+            owner.insert((a, b), shown[f]);
+        }
+    }
+    let mut count = vec![0; n];
+    for (p, q) in pairs {
+        count[p as usize] += 1;
+        count[q as usize] += 1;
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::lying;
+
+    #[test]
+    fn lying_is_where_it_was_before_it_stood() {
+        let v = Vec3::new(1.0, 2.0, 3.0);
+        for up in [Axis::X, Axis::Y, Axis::Z] {
+            assert_eq!(lying(up, standing(up, v)), v);
+        }
+    }
+}

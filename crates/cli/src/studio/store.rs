@@ -1,0 +1,276 @@
+//! A project's folder: the project file, the model as it was given, the labels, and the kit that was made last.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use shellock_formats::{read_labels, write_labels};
+use toml_edit::Item;
+
+use super::choices::Choices;
+use crate::config;
+use crate::failure::Failure;
+use crate::input::{read, sha256};
+use crate::output::PLAN;
+use crate::project::{Choice, ModelOf, Project, beside};
+use crate::stages::write;
+
+/// The project file.
+const PROJECT: &str = "figure.shellock.toml";
+/// One label a face of the model's file.
+const LABELS: &str = "figure.labels.seg";
+/// What came of the kit that was made last, and of what it was made.
+const LAST: &str = "figure.kit.json";
+/// The folder of that kit.
+const KIT: &str = "kit";
+/// Longest name of a model's file that is kept, characters.
+const LONGEST_NAME: usize = 100;
+
+/// The folder.
+pub struct Store {
+    folder: PathBuf,
+    /// Printers of the user's own, as their configuration has them.
+    printers: Option<Item>,
+}
+
+/// A project as it was found.
+#[derive(Default)]
+pub struct Found {
+    pub model: Option<ModelOf>,
+    pub choices: Choices,
+    /// What was painted, one a face of the file.
+    pub labels: Option<Vec<u32>>,
+}
+
+impl Store {
+    /// Makes the folder where there is none, and reads the project in it where there is one.
+    pub fn open(folder: PathBuf) -> Result<(Self, Found), Failure> {
+        fs::create_dir_all(&folder).map_err(Failure::unwritable(&folder))?;
+        let folder = folder.canonicalize().map_err(Failure::unwritable(&folder))?;
+        let (mut printers, mut found) = (config::usual_printers(), Found::default());
+        let path = folder.join(PROJECT);
+        if path.is_file() {
+            let wrong = |problem: String| Failure::Wrong(format!("{}: {problem}", path.display()));
+            let text = fs::read_to_string(&path).map_err(|e| wrong(e.to_string()))?;
+            let file: toml_edit::DocumentMut = text
+                .parse()
+                .map_err(|e: toml_edit::TomlError| wrong(e.to_string()))?;
+            printers = file.get("printers").cloned().or(printers);
+            found.model = config::project_model(&text).map_err(&wrong)?;
+            let (choices, is_labelled) = choices_of(&file).map_err(wrong)?;
+            found.choices = choices;
+            if is_labelled {
+                found.labels = Some(labels_in(&folder.join(LABELS))?);
+            }
+        }
+        Ok((Self { folder, printers }, found))
+    }
+
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    pub fn kit_folder(&self) -> PathBuf {
+        self.folder.join(KIT)
+    }
+
+    pub fn project_file(&self) -> PathBuf {
+        self.folder.join(PROJECT)
+    }
+
+    /// The printers that the project brings along.
+    pub fn printers(&self) -> Option<&Item> {
+        self.printers.as_ref()
+    }
+
+    /// Where the model is.
+    pub fn model_path(&self, model: &ModelOf) -> Result<PathBuf, Failure> {
+        model.path(&self.folder).map_err(Failure::Wrong)
+    }
+
+    /// Writes all of it: labels first, as the project file names them.
+    pub fn save(
+        &self,
+        model: Option<&ModelOf>,
+        choices: &Choices,
+        labels: Option<&[u32]>,
+    ) -> Result<(), Failure> {
+        let mut choices = choices.clone();
+        if let Some(labels) = labels {
+            write(&self.folder.join(LABELS), &write_labels(labels))?;
+            choices.push(("labels".to_owned(), Choice::Text(LABELS.to_owned())));
+        }
+        let project = Project {
+            model,
+            choices: &choices,
+            printers: self.printers.as_ref(),
+        };
+        write(&self.project_file(), project.to_toml().as_bytes())
+    }
+
+    /// Keeps a model's file, by a name like `name` that no other file of the folder has.
+    pub fn keep(&self, name: &str, bytes: &[u8]) -> Result<ModelOf, Failure> {
+        let hash = sha256(bytes);
+        let is_free = |name: &str| {
+            let path = self.folder.join(name);
+            !path.exists() || path.is_file() && read(&path).is_ok_and(|there| there == bytes)
+        };
+        let file = names_like(name)
+            .find(|name| is_free(name))
+            .expect("numbers do not end");
+        let path = beside(&self.folder, &file).map_err(Failure::Wrong)?;
+        if !path.exists() {
+            write(&path, bytes)?;
+        }
+        Ok(ModelOf { file, sha256: hash })
+    }
+
+    /// What a kit is made of, as one number.
+    pub fn state(&self) -> String {
+        let bytes = |name: &str| fs::read(self.folder.join(name)).unwrap_or_default();
+        sha256(&[bytes(PROJECT), bytes(LABELS)].concat())
+    }
+
+    /// Notes what came of a kit that was made of `state`.
+    pub fn note_kit(&self, state: &str, code: i32, result: &Value) -> Result<(), Failure> {
+        let noted = json!({ "made_of": state, "passed": code == 0, "summary": result });
+        write(&self.folder.join(LAST), noted.to_string().as_bytes())
+    }
+
+    /// The kit that was made last, and whether it is of the project as it is; `null` where there is none.
+    pub fn kit(&self) -> Value {
+        if !self.kit_folder().join(PLAN).is_file() {
+            return Value::Null;
+        }
+        let noted = fs::read(self.folder.join(LAST)).ok();
+        let noted: Value = noted
+            .and_then(|bytes| serde_json::from_slice(&bytes).ok())
+            .unwrap_or_default();
+        let is_current = noted["made_of"] == self.state();
+        json!({ "passed": noted["passed"] == true, "is_current": is_current, "summary": noted["summary"] })
+    }
+}
+
+/// The options that a project file sets, and whether it has labels.
+fn choices_of(file: &toml_edit::DocumentMut) -> Result<(Choices, bool), String> {
+    let mut choices = Choices::new();
+    let mut is_labelled = false;
+    for (name, item) in file
+        .iter()
+        .filter(|(name, _)| !["model", "printers"].contains(name))
+    {
+        if name == "labels" {
+            is_labelled = true;
+            continue;
+        }
+        let text = |value: &toml_edit::Value| match value {
+            toml_edit::Value::String(text) => Some(text.value().clone()),
+            toml_edit::Value::Integer(number) => Some(number.value().to_string()),
+            toml_edit::Value::Float(number) => Some(number.value().to_string()),
+            _ => None,
+        };
+        let choice = match item.as_value() {
+            Some(toml_edit::Value::Boolean(is_on)) if !*is_on.value() => continue,
+            Some(toml_edit::Value::Boolean(_)) => Some(Choice::On),
+            Some(toml_edit::Value::Array(all)) => {
+                all.iter().map(text).collect::<Option<_>>().map(Choice::Many)
+            }
+            Some(value) => text(value).map(Choice::Text),
+            None => None,
+        };
+        let choice =
+            choice.ok_or_else(|| format!("\"{name}\" must be a text, a number, true or a list of texts"))?;
+        choices.push((name.to_owned(), choice));
+    }
+    Ok((choices, is_labelled))
+}
+
+fn labels_in(path: &Path) -> Result<Vec<u32>, Failure> {
+    let labels = read_labels(&read(path)?).map_err(|source| Failure::NotAMesh {
+        path: path.to_owned(),
+        source,
+    })?;
+    let wrong = || Failure::Wrong(format!("{}: labels must be whole numbers from 0", path.display()));
+    labels
+        .into_iter()
+        .map(|l| u32::try_from(l).map_err(|_| wrong()))
+        .collect()
+}
+
+/// Names for a model's file: like `name`, without what file systems or projects have another use for; then with
+/// numbers.
+fn names_like(name: &str) -> impl Iterator<Item = String> {
+    let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
+    let is_plain = |c: &char| c.is_alphanumeric() || " ._-()".contains(*c);
+    let plain: String = last.chars().map(|c| if is_plain(&c) { c } else { '_' }).collect();
+    let plain = plain.trim_start_matches(['.', ' ']).trim_end_matches(['.', ' ']);
+    let (stem, extension) = plain.rsplit_once('.').unwrap_or((plain, ""));
+    let stem: String = stem.chars().take(LONGEST_NAME).collect();
+    let extension: String = extension.chars().take(8).collect();
+    let is_taken = stem.is_empty() || stem == KIT || plain.starts_with("figure.");
+    let stem = if is_taken { format!("model-{stem}") } else { stem };
+    let numbered = move |i: usize| {
+        let stem = if i == 0 {
+            stem.clone()
+        } else {
+            format!("{stem}-{}", i + 1)
+        };
+        if extension.is_empty() {
+            stem
+        } else {
+            format!("{stem}.{extension}")
+        }
+    };
+    (0..).map(numbered)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_models_name_stays_within_the_folder() {
+        let first = |name: &str| names_like(name).next().unwrap();
+        assert_eq!(first("dragon.stl"), "dragon.stl");
+        assert_eq!(first("../../etc/passwd"), "passwd");
+        assert_eq!(first("C:\\x\\a:b.obj"), "a_b.obj");
+        assert_eq!(first("figure.shellock.toml"), "model-figure.shellock.toml");
+        assert_eq!(first(".hidden"), "hidden");
+        assert_eq!(first("kit"), "model-kit");
+        for odd in ["", "..", "/", "...", " "] {
+            assert!(first(odd).starts_with("model-"), "{odd}: {}", first(odd));
+        }
+        assert_eq!(names_like("a.stl").nth(1).unwrap(), "a-2.stl");
+    }
+
+    #[test]
+    fn a_project_is_read_as_it_was_saved() {
+        let dir = tempfile::tempdir().unwrap();
+        let (store, found) = Store::open(dir.path().join("new")).unwrap();
+        assert!(found.model.is_none() && found.choices.is_empty());
+        let model = store.keep("a.stl", b"solid").unwrap();
+        let choices: Choices = vec![
+            ("size".into(), Choice::Text("150".into())),
+            ("keep-whole".into(), Choice::Many(vec!["1,2,3,4".into()])),
+            ("key-grip".into(), Choice::On),
+        ];
+        store.save(Some(&model), &choices, Some(&[1, 2, 2])).unwrap();
+        let (again, found) = Store::open(dir.path().join("new")).unwrap();
+        assert_eq!(
+            (found.model, found.choices, found.labels),
+            (Some(model), choices, Some(vec![1, 2, 2]))
+        );
+        assert_eq!(store.state(), again.state());
+        assert_eq!(again.kit(), Value::Null);
+    }
+
+    #[test]
+    fn no_file_of_the_folder_is_replaced_by_a_model() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("a.stl"), "mine").unwrap();
+        let (store, _) = Store::open(dir.path().to_owned()).unwrap();
+        assert_eq!(store.keep("a.stl", b"yours").unwrap().file, "a-2.stl");
+        assert_eq!(store.keep("a.stl", b"mine").unwrap().file, "a.stl");
+        assert_eq!(fs::read(dir.path().join("a.stl")).unwrap(), b"mine");
+    }
+}

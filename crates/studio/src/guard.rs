@@ -1,0 +1,150 @@
+//! Who may ask for what: the page that this server opened, and nobody else.
+//!
+//! A foreign page in the same browser can send requests to this port, and a foreign name can be made to lead here; so
+//! the host and the origin must be ours, and what is more than the page itself needs the token. How many requests come
+//! is bounded.
+
+use std::sync::Mutex;
+use std::time::Instant;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderValue, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use crate::routes::Studio;
+use crate::{Address, Refusal};
+
+/// Bytes of a token: nobody guesses 256 bits.
+const TOKEN_BYTES: usize = 32;
+/// Requests that may come at once, and how many more a second.
+const MOST_AT_ONCE: f64 = 200.0;
+const MOST_PER_SECOND: f64 = 100.0;
+/// The page asks for nothing beside what this server has.
+const PAGE_POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; frame-src 'self'; \
+                           object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
+/// A kit's own page has all it needs in itself.
+const KIT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; \
+                          font-src data:; frame-ancestors 'self'";
+
+/// A token that nobody knows.
+pub fn token() -> std::io::Result<String> {
+    let mut bytes = [0; TOKEN_BYTES];
+    getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
+    Ok(bytes.iter().map(|b| format!("{b:02x}")).collect())
+}
+
+/// Whether the two are equal, in a time that does not say where they differ.
+pub fn is_token(address: &Address, given: &str) -> bool {
+    let (a, b) = (address.token.as_bytes(), given.as_bytes());
+    a.len() == b.len() && a.iter().zip(b).fold(0, |differs, (x, y)| differs | (x ^ y)) == 0
+}
+
+/// How many requests came lately.
+pub struct Rate(Mutex<(f64, Instant)>);
+
+impl Rate {
+    pub fn new() -> Self {
+        Self(Mutex::new((MOST_AT_ONCE, Instant::now())))
+    }
+
+    /// Counts one more; false where it is one too many.
+    fn admits(&self) -> bool {
+        let mut state = self.0.lock().expect("no holder of this lock panics");
+        let now = Instant::now();
+        let (left, since) = *state;
+        let left = (left + MOST_PER_SECOND * (now - since).as_secs_f64()).min(MOST_AT_ONCE);
+        let is_admitted = left >= 1.0;
+        *state = (if is_admitted { left - 1.0 } else { left }, now);
+        is_admitted
+    }
+}
+
+/// Lets through what may be asked, and says to browsers what the answers may do.
+pub async fn guard(State(studio): State<Studio>, request: Request, next: Next) -> Response {
+    let path = request.uri().path().to_owned();
+    let mut response = match refusal(&studio, &request) {
+        Some(refusal) => refusal.into_response(),
+        None => next.run(request).await,
+    };
+    let policy = if path.starts_with("/kit/") {
+        KIT_POLICY
+    } else {
+        PAGE_POLICY
+    };
+    let headers = response.headers_mut();
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, policy),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::CACHE_CONTROL, "no-store"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+fn refusal(studio: &Studio, request: &Request) -> Option<Refusal> {
+    let headers = request.headers();
+    if !is_own(&studio.address, headers.get(header::HOST), "") {
+        return Some(Refusal::stranger("this server answers to 127.0.0.1 only"));
+    }
+    if headers.contains_key(header::ORIGIN)
+        && !is_own(&studio.address, headers.get(header::ORIGIN), "http://")
+    {
+        return Some(Refusal::stranger("this server answers to its own page only"));
+    }
+    if !studio.rate.admits() {
+        return Some(Refusal::too_many());
+    }
+    let needs_token = request.uri().path().starts_with("/api/");
+    if needs_token && !given_token(request, headers).is_some_and(|given| is_token(&studio.address, given)) {
+        return Some(Refusal::no_token());
+    }
+    None
+}
+
+/// Whether a header names this server.
+fn is_own(address: &Address, value: Option<&HeaderValue>, scheme: &str) -> bool {
+    let given = value.and_then(|v| v.to_str().ok());
+    let own = |name: &str| format!("{scheme}{name}:{}", address.port);
+    given.is_some_and(|given| given == own("127.0.0.1") || given == own("localhost"))
+}
+
+/// From the header, or from the address where no header can be set.
+fn given_token<'a>(request: &'a Request, headers: &'a HeaderMap) -> Option<&'a str> {
+    let bearer = headers.get(header::AUTHORIZATION).and_then(|v| v.to_str().ok());
+    let in_header = bearer.and_then(|v| v.strip_prefix("Bearer "));
+    let in_query = || {
+        let query = request.uri().query()?;
+        query.split('&').find_map(|pair| pair.strip_prefix("token="))
+    };
+    in_header.or_else(in_query)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tokens_are_long_and_new_each_time() {
+        let (a, b) = (token().unwrap(), token().unwrap());
+        assert_eq!(a.len(), 2 * TOKEN_BYTES);
+        assert_ne!(a, b);
+        let address = Address {
+            port: 1,
+            token: a.clone(),
+        };
+        assert!(is_token(&address, &a));
+        for wrong in [&b[..], "", &a[1..], &format!("{a}0")] {
+            assert!(!is_token(&address, wrong));
+        }
+    }
+
+    #[test]
+    fn a_burst_is_admitted_and_no_more() {
+        let rate = Rate::new();
+        let admitted = (0..1000).filter(|_| rate.admits()).count();
+        assert!((200..300).contains(&admitted), "{admitted}");
+    }
+}

@@ -1,0 +1,368 @@
+//! Kits in the making: one process runs, others wait, each can be stopped.
+//!
+//! A process is the program itself with `--json`: its progress comes as a line of JSON each on standard error, the
+//! result on standard output. It ends where its standard input does, so none outlives this server.
+
+use std::collections::VecDeque;
+use std::process::Stdio;
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+use serde::Serialize;
+use serde_json::Value;
+use tokio::io::{AsyncBufReadExt, AsyncReadExt, BufReader};
+use tokio::process::{Child, ChildStdin, Command};
+use tokio::sync::{Notify, broadcast};
+
+use crate::{Refusal, Task, Workshop};
+
+/// Notes of a job that are kept, the latest.
+const MOST_NOTES: usize = 200;
+/// Jobs that are remembered, and those that may wait.
+const MOST_KEPT: usize = 50;
+const MOST_WAITING: usize = 8;
+/// Events that a slow page may miss; it then asks anew.
+const MOST_EVENTS: usize = 256;
+
+/// How far a job is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    Waiting,
+    Running,
+    /// It was made and passes.
+    Verified,
+    /// It was made, but a check failed.
+    Failed,
+    /// Nothing was made.
+    Error,
+    Stopped,
+}
+
+/// A job as the page sees it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Job {
+    pub id: u64,
+    pub state: State,
+    /// The stage that runs, its number from 1, and how many there are; 0 where that is not known.
+    pub stage: String,
+    pub number: u64,
+    pub n_stages: u64,
+    pub seconds_left: Option<f64>,
+    /// Since it began to run.
+    pub seconds: f64,
+    /// What was tried and given up, and why.
+    pub notes: Vec<String>,
+    pub error: Option<String>,
+    pub exit_code: Option<i32>,
+    #[serde(skip)]
+    since: Option<Instant>,
+    /// Open as long as it is to run.
+    #[serde(skip)]
+    stdin: Option<Arc<Mutex<Option<ChildStdin>>>>,
+}
+
+impl Job {
+    fn new(id: u64) -> Self {
+        Self {
+            id,
+            state: State::Waiting,
+            stage: String::new(),
+            number: 0,
+            n_stages: 0,
+            seconds_left: None,
+            seconds: 0.0,
+            notes: Vec::new(),
+            error: None,
+            exit_code: None,
+            since: None,
+            stdin: None,
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        !matches!(self.state, State::Waiting | State::Running)
+    }
+
+    fn told(&self) -> Self {
+        let seconds = match self.since {
+            Some(since) if !self.is_over() => since.elapsed().as_secs_f64(),
+            _ => self.seconds,
+        };
+        Self {
+            seconds,
+            ..self.clone()
+        }
+    }
+
+    /// A line of the process.
+    fn hear(&mut self, line: &str) {
+        let Ok(event) = serde_json::from_str::<Value>(line) else {
+            return;
+        };
+        match event["event"].as_str() {
+            Some("stage") => {
+                self.stage = event["name"].as_str().unwrap_or_default().to_owned();
+                if let (Some(number), Some(of)) = (event["number"].as_u64(), event["n_stages"].as_u64()) {
+                    (self.number, self.n_stages) = (number, of);
+                    self.seconds_left = event["seconds_left"].as_f64();
+                }
+            }
+            Some("note") => {
+                self.notes.extend(event["text"].as_str().map(str::to_owned));
+                let excess = self.notes.len().saturating_sub(MOST_NOTES);
+                self.notes.drain(..excess);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What the page is told without asking.
+#[derive(Clone, Debug)]
+pub enum Event {
+    Job(Box<Job>),
+    /// The project has changed.
+    Project,
+}
+
+/// All jobs of this server.
+pub struct Jobs {
+    workshop: Arc<dyn Workshop>,
+    all: Mutex<VecDeque<Job>>,
+    work: Notify,
+    events: broadcast::Sender<Event>,
+}
+
+impl Jobs {
+    /// None yet; [`Self::run`] runs them.
+    pub fn new(workshop: Arc<dyn Workshop>) -> Arc<Self> {
+        Arc::new(Self {
+            workshop,
+            all: Mutex::default(),
+            work: Notify::new(),
+            events: broadcast::channel(MOST_EVENTS).0,
+        })
+    }
+
+    /// What happens from now on.
+    pub fn events(&self) -> broadcast::Receiver<Event> {
+        self.events.subscribe()
+    }
+
+    /// Tells all pages that the project has changed.
+    pub fn tell_project(&self) {
+        // Nobody may listen.
+        let _ = self.events.send(Event::Project);
+    }
+
+    /// All of them, the oldest first.
+    pub fn list(&self) -> Vec<Job> {
+        self.lock().iter().map(Job::told).collect()
+    }
+
+    /// One more kit; refuses where too many wait.
+    pub fn add(&self) -> Result<Job, Refusal> {
+        let mut all = self.lock();
+        if all.iter().filter(|job| job.state == State::Waiting).count() >= MOST_WAITING {
+            return Err(Refusal::too_many());
+        }
+        let job = Job::new(all.back().map_or(1, |last| last.id + 1));
+        all.push_back(job.clone());
+        if all.len() > MOST_KEPT && all[0].is_over() {
+            all.pop_front();
+        }
+        drop(all);
+        self.tell(job.id);
+        self.work.notify_one();
+        Ok(job)
+    }
+
+    /// Stops a job, which may still wait.
+    pub fn stop(&self, id: u64) -> Result<Job, Refusal> {
+        self.change(id, |job| {
+            if !job.is_over() {
+                job.seconds = job.told().seconds;
+                job.state = State::Stopped;
+                if let Some(stdin) = job.stdin.take() {
+                    stdin.lock().expect("no holder of this lock panics").take();
+                }
+            }
+        })
+        .ok_or_else(|| Refusal::missing("there is no such job"))
+    }
+
+    /// Runs job after job, for ever.
+    pub async fn run(self: Arc<Self>) {
+        loop {
+            let next = self
+                .lock()
+                .iter()
+                .find(|job| job.state == State::Waiting)
+                .map(|job| job.id);
+            match next {
+                Some(id) => self.run_one(id).await,
+                None => self.work.notified().await,
+            }
+        }
+    }
+
+    async fn run_one(&self, id: u64) {
+        let started = self.workshop.task().and_then(|task| {
+            spawned(&task).map_err(|e| Refusal::unable(format!("the program could not be started: {e}")))
+        });
+        let mut child = match started {
+            Ok(child) => child,
+            Err(refusal) => {
+                self.change(id, |job| {
+                    (job.state, job.error) = (State::Error, Some(refusal.to_string()));
+                });
+                return;
+            }
+        };
+        let stdin = Arc::new(Mutex::new(child.stdin.take()));
+        let is_wanted = self.change(id, |job| {
+            if job.state == State::Waiting {
+                (job.state, job.since) = (State::Running, Some(Instant::now()));
+                job.stdin = Some(Arc::clone(&stdin));
+            }
+        });
+        if is_wanted.is_none_or(|job| job.state != State::Running) {
+            stdin.lock().expect("no holder of this lock panics").take();
+        }
+        drop(stdin);
+        let (output, errors) = self.heard(id, &mut child).await;
+        let code = child.wait().await.ok().and_then(|status| status.code());
+        self.workshop.ended(code, &output);
+        self.change(id, |job| job.end(code, &output, errors));
+        self.tell_project();
+    }
+
+    /// Listens until the process has said all; what it printed, and what of its errors is no event.
+    async fn heard(&self, id: u64, child: &mut Child) -> (String, String) {
+        let (mut output, mut errors) = (Vec::new(), String::new());
+        let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+        let print = async {
+            if let Some(mut stdout) = stdout {
+                // Half an answer is no JSON, and is told as that.
+                let _ = stdout.read_to_end(&mut output).await;
+            }
+        };
+        let progress = async {
+            let Some(stderr) = stderr else { return };
+            let mut lines = BufReader::new(stderr).lines();
+            while let Ok(Some(line)) = lines.next_line().await {
+                if line.starts_with('{') {
+                    self.change(id, |job| job.hear(&line));
+                } else {
+                    errors += &line;
+                    errors.push('\n');
+                }
+            }
+        };
+        tokio::join!(print, progress);
+        (String::from_utf8_lossy(&output).into_owned(), errors)
+    }
+
+    fn change(&self, id: u64, change: impl FnOnce(&mut Job)) -> Option<Job> {
+        let changed = self.lock().iter_mut().find(|job| job.id == id).map(|job| {
+            change(job);
+            job.told()
+        });
+        self.tell(id);
+        changed
+    }
+
+    fn tell(&self, id: u64) {
+        let job = self.lock().iter().find(|job| job.id == id).map(Job::told);
+        if let Some(job) = job {
+            // Nobody may listen.
+            let _ = self.events.send(Event::Job(Box::new(job)));
+        }
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, VecDeque<Job>> {
+        self.all.lock().expect("no holder of this lock panics")
+    }
+}
+
+impl Job {
+    /// The process has ended.
+    fn end(&mut self, code: Option<i32>, output: &str, errors: String) {
+        if self.state == State::Running {
+            self.seconds = self.told().seconds;
+            self.state = match code {
+                Some(0) => State::Verified,
+                Some(1) => State::Failed,
+                _ => State::Error,
+            };
+        }
+        (self.exit_code, self.seconds_left, self.stdin) = (code, None, None);
+        if self.state == State::Error {
+            let told = serde_json::from_str::<Value>(output).ok();
+            let told = told.and_then(|value| value["error"].as_str().map(str::to_owned));
+            let words = || match errors.trim() {
+                "" => "the program ended without a word".to_owned(),
+                errors => errors.to_owned(),
+            };
+            self.error = Some(told.unwrap_or_else(words));
+        }
+    }
+}
+
+fn spawned(task: &Task) -> std::io::Result<Child> {
+    Command::new(&task.program)
+        .args(&task.arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .kill_on_drop(true)
+        .spawn()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_hears_its_stage_and_keeps_the_latest_notes() {
+        let mut job = Job::new(1);
+        job.hear(
+            r#"{"event":"stage","name":"bodies","n_steps":0,"number":12,"n_stages":19,"seconds_left":7.0}"#,
+        );
+        assert_eq!(
+            (&job.stage[..], job.number, job.n_stages, job.seconds_left),
+            ("bodies", 12, 19, Some(7.0))
+        );
+        job.hear(r#"{"event":"stage","name":"reading","n_steps":0}"#);
+        assert_eq!((&job.stage[..], job.number), ("reading", 12));
+        (0..300).for_each(|i| job.hear(&format!(r#"{{"event":"note","text":"note {i}"}}"#)));
+        job.hear("no JSON");
+        assert_eq!(
+            (job.notes.len(), &job.notes[MOST_NOTES - 1][..]),
+            (MOST_NOTES, "note 299")
+        );
+    }
+
+    #[test]
+    fn how_a_job_ended_is_told_by_its_code_and_its_own_words() {
+        let ended = |code, output: &str, errors: &str| {
+            let mut job = Job::new(1);
+            job.state = State::Running;
+            job.end(code, output, errors.to_owned());
+            job
+        };
+        assert_eq!(ended(Some(0), "{}", "").state, State::Verified);
+        assert_eq!(ended(Some(1), "{}", "").state, State::Failed);
+        let wrong = ended(Some(2), r#"{"error":"too thin"}"#, "");
+        assert_eq!(
+            (wrong.state, wrong.error.as_deref()),
+            (State::Error, Some("too thin"))
+        );
+        assert_eq!(ended(None, "", "killed\n").error.as_deref(), Some("killed"));
+        let mut stopped = Job::new(1);
+        stopped.state = State::Stopped;
+        stopped.end(Some(130), "", String::new());
+        assert_eq!((stopped.state, stopped.error), (State::Stopped, None));
+    }
+}

@@ -1,0 +1,70 @@
+//! What is answered where something is refused.
+
+use axum::Json;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use serde_json::json;
+
+/// Why something was not done, in a maker's words.
+#[derive(Debug, thiserror::Error)]
+#[error("{words}")]
+pub struct Refusal {
+    status: StatusCode,
+    words: String,
+}
+
+impl Refusal {
+    fn new(status: StatusCode, words: impl Into<String>) -> Self {
+        Self {
+            status,
+            words: words.into(),
+        }
+    }
+
+    /// What was asked for cannot be done with what was given.
+    pub fn wrong(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, words)
+    }
+
+    /// There is no such thing, or not yet.
+    pub fn missing(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::NOT_FOUND, words)
+    }
+
+    /// Something else was asked for meanwhile.
+    pub fn overtaken() -> Self {
+        Self::new(StatusCode::CONFLICT, "the pieces have changed meanwhile")
+    }
+
+    /// The machine does not let it be done, such as a full disk.
+    pub fn unable(words: impl Into<String>) -> Self {
+        Self::new(StatusCode::INTERNAL_SERVER_ERROR, words)
+    }
+
+    pub(crate) fn stranger(words: &str) -> Self {
+        Self::new(StatusCode::FORBIDDEN, words)
+    }
+
+    pub(crate) fn no_token() -> Self {
+        let words = "this needs the token of the address that `shellock studio` printed";
+        Self::new(StatusCode::UNAUTHORIZED, words)
+    }
+
+    pub(crate) fn too_large() -> Self {
+        let words = format!("files of more than {} MB are not taken", crate::MOST_BYTES >> 20);
+        Self::new(StatusCode::PAYLOAD_TOO_LARGE, words)
+    }
+
+    pub(crate) fn too_many() -> Self {
+        Self::new(
+            StatusCode::TOO_MANY_REQUESTS,
+            "too many requests at once: wait a moment",
+        )
+    }
+}
+
+impl IntoResponse for Refusal {
+    fn into_response(self) -> Response {
+        (self.status, Json(json!({ "error": self.words }))).into_response()
+    }
+}

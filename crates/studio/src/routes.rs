@@ -1,0 +1,248 @@
+//! What can be asked of the server.
+
+use std::convert::Infallible;
+use std::io::Write;
+use std::sync::Arc;
+
+use axum::body::{Body, Bytes};
+use axum::extract::{DefaultBodyLimit, Path, Query, State};
+use axum::http::header;
+use axum::middleware::from_fn_with_state;
+use axum::response::sse::{self, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{delete, get, post};
+use axum::{Json, Router};
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+use tokio_stream::wrappers::BroadcastStream;
+use tokio_stream::{Stream, StreamExt};
+
+use crate::guard::{Rate, guard, is_token};
+use crate::jobs::{Event, Job, Jobs};
+use crate::{Address, MOST_BYTES, Refusal, Workshop, kit, page};
+
+/// Longest body but for models: labels of four million triangles, bytes.
+const MOST_OTHER_BYTES: usize = 16 << 20;
+
+/// What every handler gets.
+#[derive(Clone)]
+pub struct Studio {
+    pub address: Arc<Address>,
+    pub rate: Arc<Rate>,
+    workshop: Arc<dyn Workshop>,
+    jobs: Arc<Jobs>,
+}
+
+type Answer = Result<Json<Value>, Refusal>;
+
+/// All routes, behind the guard.
+pub fn app(address: &Address, workshop: Arc<dyn Workshop>) -> Router {
+    let jobs = Jobs::new(Arc::clone(&workshop));
+    tokio::spawn(Arc::clone(&jobs).run());
+    let studio = Studio {
+        address: Arc::new(address.clone()),
+        rate: Arc::new(Rate::new()),
+        workshop,
+        jobs,
+    };
+    Router::new()
+        .route("/", get(page::index))
+        .route("/{name}", get(page::file))
+        .route("/api/project", get(project))
+        .route("/api/options", get(options).put(choose))
+        .route("/api/model", post(open).layer(DefaultBodyLimit::disable()))
+        .route("/api/figure", post(open_figure))
+        .route("/api/mesh", get(mesh))
+        .route("/api/divide", post(divide))
+        .route("/api/labels", get(labels).put(paint))
+        .route("/api/judge", post(judge))
+        .route("/api/mend", post(mend))
+        .route("/api/mirror", post(mirror))
+        .route("/api/key", post(place_key))
+        .route("/api/make", post(make))
+        .route("/api/jobs/{id}", delete(stop))
+        .route("/api/events", get(events))
+        .route("/api/kit.zip", get(archive))
+        .route("/kit/{token}/{*name}", get(kit_file))
+        .fallback(async || Refusal::missing("there is no such thing here"))
+        .layer(DefaultBodyLimit::max(MOST_OTHER_BYTES))
+        .layer(from_fn_with_state(studio.clone(), guard))
+        .with_state(studio)
+}
+
+/// Does what takes its time beside the server.
+async fn apart<T: Send + 'static>(
+    studio: &Studio,
+    work: impl FnOnce(&dyn Workshop) -> Result<T, Refusal> + Send + 'static,
+) -> Result<T, Refusal> {
+    let workshop = Arc::clone(&studio.workshop);
+    let done = tokio::task::spawn_blocking(move || work(&*workshop)).await;
+    done.unwrap_or_else(|_| {
+        Err(Refusal::unable(
+            "the program made a mistake there; what you did before is kept",
+        ))
+    })
+}
+
+/// The same, after which other pages are told that the project is another.
+async fn changing<T: Send + 'static>(
+    studio: &Studio,
+    work: impl FnOnce(&dyn Workshop) -> Result<T, Refusal> + Send + 'static,
+) -> Result<T, Refusal> {
+    let done = apart(studio, work).await?;
+    studio.jobs.tell_project();
+    Ok(done)
+}
+
+async fn project(State(studio): State<Studio>) -> Answer {
+    let jobs = studio.jobs.list();
+    apart(&studio, move |workshop| {
+        let mut project = workshop.project();
+        if let Some(made) = project["kit"].as_object_mut() {
+            made.insert("files".into(), kit::list(&workshop.kit_folder()).into());
+        }
+        project["job"] = json!(jobs.last());
+        project["jobs"] = json!(jobs);
+        Ok(Json(project))
+    })
+    .await
+}
+
+async fn options(State(studio): State<Studio>) -> Answer {
+    apart(&studio, |workshop| Ok(Json(workshop.options()))).await
+}
+
+async fn choose(State(studio): State<Studio>, Json(changes): Json<Map<String, Value>>) -> Answer {
+    changing(&studio, move |workshop| {
+        workshop.choose(&changes)?;
+        Ok(Json(workshop.options()))
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct Named {
+    name: String,
+}
+
+async fn open(State(studio): State<Studio>, Query(named): Query<Named>, body: Body) -> Answer {
+    let file = kept(&studio, body).await?;
+    changing(&studio, move |workshop| workshop.open(&named.name, file.path())).await?;
+    project(State(studio)).await
+}
+
+/// The body as a file in the project's folder, which goes with it.
+async fn kept(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Refusal> {
+    let unwritable = |e: std::io::Error| Refusal::unable(format!("the file could not be kept: {e}"));
+    let mut file = tempfile::Builder::new()
+        .prefix(".upload-")
+        .tempfile_in(studio.workshop.folder())
+        .map_err(unwritable)?;
+    let (mut chunks, mut n_bytes) = (body.into_data_stream(), 0);
+    while let Some(chunk) = chunks.next().await {
+        let chunk = chunk.map_err(|_| Refusal::wrong("the file did not come whole"))?;
+        n_bytes += chunk.len() as u64;
+        if n_bytes > MOST_BYTES {
+            return Err(Refusal::too_large());
+        }
+        file.write_all(&chunk).map_err(unwritable)?;
+    }
+    file.flush().map_err(unwritable)?;
+    Ok(file)
+}
+
+async fn open_figure(State(studio): State<Studio>, Json(named): Json<Named>) -> Answer {
+    changing(&studio, move |workshop| workshop.open_figure(&named.name)).await?;
+    project(State(studio)).await
+}
+
+fn bytes(bytes: Vec<u8>) -> Response {
+    ([(header::CONTENT_TYPE, "application/octet-stream")], bytes).into_response()
+}
+
+async fn mesh(State(studio): State<Studio>) -> Result<Response, Refusal> {
+    apart(&studio, |workshop| workshop.mesh()).await.map(bytes)
+}
+
+async fn divide(State(studio): State<Studio>) -> Answer {
+    changing(&studio, |workshop| workshop.divide()).await.map(Json)
+}
+
+async fn labels(State(studio): State<Studio>) -> Result<Response, Refusal> {
+    apart(&studio, |workshop| workshop.labels()).await.map(bytes)
+}
+
+async fn paint(State(studio): State<Studio>, body: Bytes) -> Answer {
+    changing(&studio, move |workshop| workshop.paint(&body))
+        .await
+        .map(Json)
+}
+
+async fn judge(State(studio): State<Studio>) -> Answer {
+    apart(&studio, |workshop| workshop.judge()).await.map(Json)
+}
+
+async fn mend(State(studio): State<Studio>) -> Answer {
+    changing(&studio, |workshop| workshop.mend()).await.map(Json)
+}
+
+async fn mirror(State(studio): State<Studio>) -> Answer {
+    changing(&studio, |workshop| workshop.mirror()).await.map(Json)
+}
+
+#[derive(Deserialize)]
+struct Place {
+    at: [f64; 3],
+}
+
+async fn place_key(State(studio): State<Studio>, Json(place): Json<Place>) -> Answer {
+    changing(&studio, move |workshop| {
+        workshop.place_key(place.at)?;
+        Ok(Json(workshop.options()))
+    })
+    .await
+}
+
+async fn make(State(studio): State<Studio>) -> Result<Json<Job>, Refusal> {
+    apart(&studio, |workshop| workshop.task().map(|_| ())).await?;
+    studio.jobs.add().map(Json)
+}
+
+async fn stop(State(studio): State<Studio>, Path(id): Path<u64>) -> Result<Json<Job>, Refusal> {
+    studio.jobs.stop(id).map(Json)
+}
+
+async fn events(State(studio): State<Studio>) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
+    let told = BroadcastStream::new(studio.jobs.events()).map(|event| {
+        Ok(match event {
+            Ok(Event::Job(job)) => sse::Event::default().event("job").data(json!(job).to_string()),
+            // Some were missed: the page asks for all of it.
+            Ok(Event::Project) | Err(_) => sse::Event::default().event("project").data("{}"),
+        })
+    });
+    Sse::new(told).keep_alive(KeepAlive::default())
+}
+
+async fn archive(State(studio): State<Studio>) -> Result<Response, Refusal> {
+    let packed = apart(&studio, |workshop| kit::archive(&workshop.kit_folder())).await?;
+    let headers = [
+        (header::CONTENT_TYPE, "application/zip"),
+        (header::CONTENT_DISPOSITION, "attachment; filename=\"kit.zip\""),
+    ];
+    Ok((headers, packed).into_response())
+}
+
+async fn kit_file(
+    State(studio): State<Studio>,
+    Path((token, name)): Path<(String, String)>,
+) -> Result<Response, Refusal> {
+    if !is_token(&studio.address, &token) {
+        return Err(Refusal::no_token());
+    }
+    let kind = kit::kind(&name);
+    let read = apart(&studio, move |workshop| {
+        let path = kit::file(&workshop.kit_folder(), &name)?;
+        std::fs::read(path).map_err(|e| Refusal::unable(format!("the file cannot be read: {e}")))
+    });
+    Ok(([(header::CONTENT_TYPE, kind)], read.await?).into_response())
+}
