@@ -23,11 +23,29 @@ export async function bundle() {
   return result.outputFiles;
 }
 
+/** The studio's page: its files and their texts. */
+export async function studio() {
+  const notices = await Promise.all(["three", "three-mesh-bvh"].map(async (name) => `${name}\n${(await readFile(path(`node_modules/${name}/LICENSE`), "utf8")).trim()}`));
+  const result = await esbuild.build({
+    entryPoints: { studio: path("src/studio/main.js") },
+    outdir: path("../crates/studio/page"),
+    banner: { js: `/*! ${notices.join("\n\n")}\n*/` },
+    bundle: true,
+    minify: true,
+    format: "iife",
+    target: "es2022",
+    write: false,
+  });
+  const beside = await Promise.all(["index.html", "studio.css"].map(async (name) => ({ path: path(`../crates/studio/page/${name}`), text: await readFile(path(`src/studio/${name}`), "utf8") })));
+  return [...result.outputFiles, ...beside];
+}
+
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
   const { mkdir, writeFile } = await import("node:fs/promises");
   await mkdir(path("../crates/render/viewer"), { recursive: true });
-  for (const file of await bundle()) {
+  await mkdir(path("../crates/studio/page"), { recursive: true });
+  for (const file of [...(await bundle()), ...(await studio())]) {
     await writeFile(file.path, file.text);
-    console.log(`${file.path}: ${(file.contents.length / 1024).toFixed(0)} kB`);
+    console.log(`${file.path}: ${(file.text.length / 1024).toFixed(0)} kB`);
   }
 }
