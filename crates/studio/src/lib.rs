@@ -62,6 +62,8 @@ pub trait Workshop: Send + Sync + 'static {
     fn paint(&self, labels: &[u8]) -> Result<Value, Refusal>;
     /// Whether the pieces lock, and what to mend; a later call ends an earlier one.
     fn judge(&self) -> Result<Value, Refusal>;
+    /// The surface as it was judged, cut along smooth seams, and after it a piece for each of its triangles.
+    fn cut(&self) -> Result<Vec<u8>, Refusal>;
     /// Takes the pieces as the program would mend them.
     fn mend(&self) -> Result<Value, Refusal>;
     /// Divides both sides of a symmetric model alike.

@@ -31,9 +31,10 @@ impl Refusal {
         Self::new(StatusCode::NOT_FOUND, words)
     }
 
-    /// Something else was asked for meanwhile.
+    /// Something else was asked for meanwhile: no fault of anybody's, so the status is that of success and the answer
+    /// is `{"overtaken": true}`; the page asks again.
     pub fn overtaken() -> Self {
-        Self::new(StatusCode::CONFLICT, "the pieces have changed meanwhile")
+        Self::new(StatusCode::OK, "the pieces have changed meanwhile")
     }
 
     /// The machine does not let it be done, such as a full disk.
@@ -65,6 +66,10 @@ impl Refusal {
 
 impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
-        (self.status, Json(json!({ "error": self.words }))).into_response()
+        let told = match self.status {
+            StatusCode::OK => json!({ "overtaken": true }),
+            _ => json!({ "error": self.words }),
+        };
+        (self.status, Json(told)).into_response()
     }
 }

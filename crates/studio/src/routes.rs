@@ -56,6 +56,7 @@ pub fn app(address: &Address, workshop: Arc<dyn Workshop>) -> Router {
         .route("/api/divide", post(divide))
         .route("/api/labels", get(labels).put(paint))
         .route("/api/judge", post(judge))
+        .route("/api/cut", get(cut))
         .route("/api/mend", post(mend))
         .route("/api/mirror", post(mirror))
         .route("/api/key", post(place_key))
@@ -180,6 +181,10 @@ async fn paint(State(studio): State<Studio>, body: Bytes) -> Answer {
 
 async fn judge(State(studio): State<Studio>) -> Answer {
     apart(&studio, |workshop| workshop.judge()).await.map(Json)
+}
+
+async fn cut(State(studio): State<Studio>) -> Result<Response, Refusal> {
+    apart(&studio, |workshop| workshop.cut()).await.map(bytes)
 }
 
 async fn mend(State(studio): State<Studio>) -> Answer {

@@ -30,8 +30,18 @@ async function ask(method, path, { body, type, signal } = {}) {
   throw new Refused(answer.status, told.error ?? `${answer.status} ${answer.statusText}`);
 }
 
-const json = async (answer) => (await answer).json();
-const bytes = async (answer) => (await answer).arrayBuffer();
+// Something else came in between: asked again, it will do.
+const OVERTAKEN = 409;
+async function json(answer) {
+  const told = await (await answer).json();
+  if (told.overtaken) throw new Refused(OVERTAKEN, "");
+  return told;
+}
+async function bytes(answer) {
+  const got = await answer;
+  if (got.headers.get("Content-Type") !== "application/octet-stream") throw new Refused(OVERTAKEN, "");
+  return got.arrayBuffer();
+}
 const send = (method, path, value = {}, signal) => json(ask(method, path, { body: JSON.stringify(value), type: "application/json", signal }));
 
 export const api = {
@@ -45,6 +55,7 @@ export const api = {
   paint: (labels) => json(ask("PUT", "labels", { body: labels, type: "application/octet-stream" })),
   divide: () => send("POST", "divide"),
   judge: (signal) => send("POST", "judge", {}, signal),
+  cut: (signal) => bytes(ask("GET", "cut", { signal })),
   mend: () => send("POST", "mend"),
   mirror: () => send("POST", "mirror"),
   placeKey: (at) => send("POST", "key", { at }),

@@ -4,7 +4,7 @@ import { api, kitUrl, listen } from "./api.js";
 import { button, element, slider } from "./dom.js";
 import { History } from "./history.js";
 import * as screens from "./screens.js";
-import { readMesh, unused } from "./surface.js";
+import { readCut, readMesh, unused } from "./surface.js";
 import { Tools } from "./tools.js";
 import { View } from "./view.js";
 import { words } from "./words.js";
@@ -23,6 +23,16 @@ let [judging, saving, isMine] = [null, Promise.resolve(), 0];
 const guarded = (work) => async (...args) => {
   try { return await work(...args); } catch (e) { if (e.name !== "AbortError" && e.status !== 409) say(e.message, true); return undefined; }
 };
+
+// What came too late since something else changed meanwhile (409) is asked again, as long as it is wanted.
+async function insist(work, isWanted = () => true) {
+  for (let i = 0; ; i++) {
+    try { return await work(); } catch (e) {
+      if (e.status !== 409 || i === 20 || !isWanted()) throw e;
+      await new Promise((done) => setTimeout(done, 100));
+    }
+  }
+}
 
 function say(text, isBad = false) {
   const line = $("told");
@@ -131,7 +141,7 @@ async function divide() {
   busy(words.working.dividing);
   draw();
   try {
-    await asMine(api.divide);
+    await asMine(() => insist(api.divide));
     base = null;
     await takeLabels();
     await refresh();
@@ -154,7 +164,7 @@ function save() {
   draw();
   const labels = history.labels.slice();
   saving = saving.then(guarded(async () => {
-    const { is_changed: isChanged, n_pieces: n } = await asMine(() => api.paint(labels));
+    const { is_changed: isChanged, n_pieces: n } = await asMine(() => insist(() => api.paint(labels)));
     state.project.division = { ...state.project.division, n_pieces: n, origin: "painted" };
     if (isChanged) { history.labels.set(await api.labels()); view.paint(history.labels); counted(); }
     await judge();
@@ -169,9 +179,12 @@ const judge = guarded(async () => {
   state.isJudging = true;
   draw();
   try {
-    const judged = await api.judge(mine.signal);
-    if (judging !== mine) return;
+    // Both of the same state.
+    const both = async () => [await api.judge(mine.signal), readCut(await api.cut(mine.signal))];
+    const [judged, cut] = await insist(both, () => judging === mine);
+    if (judging !== mine || tools.stroke) return;
     state.judged = judged;
+    view.showCut(cut);
     view.smoothSeams(judged.seams);
   } finally {
     if (judging === mine) { state.isJudging = false; draw(); }
@@ -198,10 +211,10 @@ const act = {
     judge();
   }),
   divide: guarded(async () => { await divide(); draw(); judge(); }),
-  mend: guarded(async () => { await asMine(api.mend); await takeLabels(); await refresh(); draw(); judge(); }),
+  mend: guarded(async () => { await asMine(() => insist(api.mend)); await takeLabels(); await refresh(); draw(); judge(); }),
   mirror: guarded(async () => {
     busy(words.working.mirror);
-    try { await asMine(api.mirror); await takeLabels(); await refresh(); draw(); judge(); } finally { busy(""); }
+    try { await asMine(() => insist(api.mirror)); await takeLabels(); await refresh(); draw(); judge(); } finally { busy(""); }
   }),
   placeKey: guarded(async (at) => { state.options = await asMine(() => api.placeKey(at)); draw(); judge(); }),
   make: guarded(async () => { await saving; state.job = await api.make(); draw(); }),

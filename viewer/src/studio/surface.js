@@ -13,6 +13,15 @@ export function readMesh(buffer) {
   return new Surface(points, corners, thin);
 }
 
+/** The surface as it will be cut, and a piece for each of its triangles. */
+export function readCut(buffer) {
+  const [, , nPoints, nFaces] = new Uint32Array(buffer, 0, 4);
+  const points = new Float32Array(buffer, 16, 3 * nPoints);
+  const corners = new Uint32Array(buffer, 16 + 12 * nPoints, 3 * nFaces);
+  const labels = new Uint32Array(buffer, buffer.byteLength - 4 * nFaces, nFaces);
+  return { points, corners, labels };
+}
+
 export class Surface {
   constructor(points, corners, thin = new Uint8Array(corners.length / 3)) {
     this.points = points;
@@ -23,22 +32,8 @@ export class Surface {
     this.beside = neighbours(corners);
   }
 
-  // Middles, unit normals and areas of all triangles.
   #measure() {
-    const { points, corners, n } = this;
-    this.middles = new Float32Array(3 * n);
-    this.normals = new Float32Array(3 * n);
-    this.areas = new Float32Array(n);
-    for (let f = 0; f < n; f++) {
-      const [a, b, c] = [3 * corners[3 * f], 3 * corners[3 * f + 1], 3 * corners[3 * f + 2]];
-      for (let k = 0; k < 3; k++) this.middles[3 * f + k] = (points[a + k] + points[b + k] + points[c + k]) / 3;
-      const [ux, uy, uz] = [points[b] - points[a], points[b + 1] - points[a + 1], points[b + 2] - points[a + 2]];
-      const [vx, vy, vz] = [points[c] - points[a], points[c + 1] - points[a + 1], points[c + 2] - points[a + 2]];
-      const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
-      const length = Math.hypot(x, y, z);
-      this.areas[f] = length / 2;
-      if (length > 0) this.normals.set([x / length, y / length, z / length], 3 * f);
-    }
+    Object.assign(this, measured(this.points, this.corners));
   }
 
   /** Squared distance of the middle of triangle `f` from a place. */
@@ -193,6 +188,25 @@ export class Surface {
     this.points.forEach((x, i) => { least[i % 3] = Math.min(least[i % 3], x); greatest[i % 3] = Math.max(greatest[i % 3], x); });
     return [least, greatest];
   }
+}
+
+/** Middles, unit normals and areas of all triangles. */
+export function measured(points, corners) {
+  const n = corners.length / 3;
+  const middles = new Float32Array(3 * n);
+  const normals = new Float32Array(3 * n);
+  const areas = new Float32Array(n);
+  for (let f = 0; f < n; f++) {
+    const [a, b, c] = [3 * corners[3 * f], 3 * corners[3 * f + 1], 3 * corners[3 * f + 2]];
+    for (let k = 0; k < 3; k++) middles[3 * f + k] = (points[a + k] + points[b + k] + points[c + k]) / 3;
+    const [ux, uy, uz] = [points[b] - points[a], points[b + 1] - points[a + 1], points[b + 2] - points[a + 2]];
+    const [vx, vy, vz] = [points[c] - points[a], points[c + 1] - points[a + 1], points[c + 2] - points[a + 2]];
+    const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+    const length = Math.hypot(x, y, z);
+    areas[f] = length / 2;
+    if (length > 0) normals.set([x / length, y / length, z / length], 3 * f);
+  }
+  return { middles, normals, areas };
 }
 
 // For each edge of each triangle (corner k to k + 1) the triangle beyond it; -1 where there is none. Edges are sorted by their lower point,

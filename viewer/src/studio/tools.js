@@ -29,6 +29,7 @@ export class Tools {
   choose(tool) {
     this.tool = tool;
     this.first = null;
+    this.view.cursor(null, 0);
     this.view.turns(tool === "turn");
     this.view.renderer.domElement.style.cursor = tool === "turn" ? "grab" : "crosshair";
     this.on.hint(tool === "merge" ? words.hints.mergeFirst : "");
@@ -50,6 +51,7 @@ export class Tools {
     const isLine = this.tool === "lasso" || this.tool === "knife";
     if (!hit && !isLine) { this.view.turns(true); this.wasOutside = true; return; }
     e.preventDefault();
+    this.view.renderer.domElement.setPointerCapture(e.pointerId);
     this.stroke = { points: [[e.clientX, e.clientY]], last: hit };
     if (PAINTS.has(this.tool)) this.#dab(hit);
   }

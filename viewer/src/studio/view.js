@@ -8,6 +8,7 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { MeshBVH } from "three-mesh-bvh";
 import { colour } from "./colours.js";
 import { element } from "./dom.js";
+import { measured } from "./surface.js";
 
 const BODY = [188, 184, 178];
 const INK = 0x1e1c24;
@@ -73,10 +74,38 @@ export class View {
     this.paint(null);
   }
 
+  /** Shows the surface as it will be cut instead, until something is painted; nothing for null. */
+  showCut(cut) {
+    if (this.cut) { this.scene.remove(this.cut); this.cut.geometry.dispose(); this.cut.material.dispose(); this.cut = null; }
+    if (cut) {
+      const geometry = new BufferGeometry();
+      const { points, corners, labels } = cut;
+      geometry.setAttribute("position", new BufferAttribute(spread(points, corners), 3));
+      geometry.setAttribute("normal", new BufferAttribute(spread(pointNormals({ points, corners, ...measured(points, corners), n: labels.length }), corners), 3));
+      const colours = new Uint8Array(9 * labels.length);
+      labels.forEach((label, f) => { const c = colour(label); for (let k = 0; k < 9; k++) colours[9 * f + k] = c[k % 3]; });
+      geometry.setAttribute("color", new BufferAttribute(colours, 3, true));
+      this.cut = new Mesh(geometry, new MeshLambertMaterial({ vertexColors: true, polygonOffset: true, polygonOffsetFactor: 1.5, polygonOffsetUnits: 1.5 }));
+      this.scene.add(this.cut);
+    }
+    this.#choose();
+  }
+
+  // Where the cut surface is known it is shown, but for stripes and strokes.
+  #choose() {
+    if (!this.mesh) return;
+    const isCut = Boolean(this.cut) && !this.showsThin;
+    this.mesh.visible = !isCut;
+    if (this.cut) this.cut.visible = isCut;
+    this.seams.visible = !isCut && this.seams.geometry.attributes.position?.count > 0;
+    this.draw();
+  }
+
   /** Colours triangles by their pieces: `faces`, or all. Without labels all is one body. */
   paint(labels, faces) {
     if (!this.surface) return;
     this.labels = labels;
+    if (this.cut) this.showCut(null);
     const colours = this.colours.array;
     const one = (f) => { const c = labels ? colour(labels[f]) : BODY; for (let k = 0; k < 9; k++) colours[9 * f + k] = c[k % 3]; };
     let [first, last] = [0, this.surface.n - 1];
@@ -97,10 +126,10 @@ export class View {
     const edges = labels ? this.surface.seams(labels) : new Float32Array();
     setLines(this.seams, edges);
     this.#tag(labels ? this.surface.pieces(labels) : []);
-    this.draw();
+    this.#choose();
   }
 
-  /** Smooth seams as they will be cut; those of triangles are faint then. */
+  /** Smooth seams as they will be cut. */
   smoothSeams(seams) {
     const pairs = seams.flatMap((line) => {
       const out = [];
@@ -108,9 +137,6 @@ export class View {
       return out;
     });
     setLines(this.smooth, new Float32Array(pairs));
-    this.seams.material.transparent = pairs.length > 0;
-    this.seams.material.opacity = pairs.length > 0 ? 0.25 : 1;
-    this.seams.material.needsUpdate = true;
     this.draw();
   }
 
@@ -118,7 +144,7 @@ export class View {
   stripes(isOn) {
     this.showsThin = isOn;
     if (this.shader) this.shader.uniforms.showsThin.value = isOn ? 1 : 0;
-    this.draw();
+    this.#choose();
   }
 
   /** Places for a key as ghosts that slide out along arrows. */

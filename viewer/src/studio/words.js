@@ -24,7 +24,7 @@ export const words = {
     several: "one a line",
     next: "On to the pieces",
   },
-  option: { size: "Longest side, mm", up: "Up", printer: "Printer", material: "Material", method: "Divided by", pieces: "About how many", symmetric: "Both sides alike" },
+  option: { size: "Longest side, mm", up: "Up", printer: "Printer", material: "Material", method: "Divided by", pieces: "How many", symmetric: "Both sides alike" },
   pieces: {
     title: "Pieces",
     again: "Divide anew",

@@ -349,7 +349,7 @@ impl Workshop for Bench {
 
     fn mesh(&self) -> Result<Vec<u8>, Refusal> {
         let of = self.snapshot()?;
-        Ok(of.figure.bytes(&of.options))
+        Ok(of.figure.bytes(of.options.up))
     }
 
     fn divide(&self) -> Result<Value, Refusal> {
@@ -419,6 +419,12 @@ impl Workshop for Bench {
         let told = judged.told.clone();
         state.judged = Some(Arc::new(judged));
         Ok(told)
+    }
+
+    fn cut(&self) -> Result<Vec<u8>, Refusal> {
+        let judged = self.lock().judged.clone();
+        let cut = judged.map(|judged| judged.cut.clone());
+        cut.ok_or_else(Refusal::overtaken)
     }
 
     fn mend(&self) -> Result<Value, Refusal> {

@@ -9,7 +9,7 @@ use shellock_geom::thin::thin_faces;
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::Session;
-use crate::args::{Options, Thickness};
+use crate::args::{Axis, Options, Thickness};
 use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::inspect::thin_warnings;
@@ -75,22 +75,8 @@ impl Figure {
     }
 
     /// The surface as the page reads it: header, points (32-bit), corners, a byte a triangle for what is thin.
-    pub fn bytes(&self, options: &Options) -> Vec<u8> {
-        let mesh = self.model.solid.mesh();
-        let n = [mesh.points.len(), mesh.triangles.len()].map(|n| n as u32);
-        let mut bytes: Vec<u8> = [MAGIC, VERSION, n[0], n[1]]
-            .iter()
-            .flat_map(|x| x.to_le_bytes())
-            .collect();
-        let shown = mesh
-            .points
-            .iter()
-            .flat_map(|&p| standing(options.up, p).to_array());
-        bytes.extend(shown.flat_map(|x| (x as f32).to_le_bytes()));
-        bytes.extend(mesh.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()));
-        bytes.extend(self.is_thin.iter().map(|&thin| u8::from(thin)));
-        bytes.resize(bytes.len().next_multiple_of(4), 0);
-        bytes
+    pub fn bytes(&self, up: Axis) -> Vec<u8> {
+        shown(self.model.solid.mesh(), up, self.is_thin.iter().copied())
     }
 
     /// For each triangle that is shown, the patch that has most of it.
@@ -132,6 +118,19 @@ impl Figure {
                 .collect()
         })
     }
+}
+
+/// A mesh as the page reads it, standing.
+pub fn shown(mesh: &TriMesh, up: Axis, is_thin: impl Iterator<Item = bool>) -> Vec<u8> {
+    let n = [mesh.points.len(), mesh.triangles.len()].map(|n| n as u32);
+    let header = [MAGIC, VERSION, n[0], n[1]];
+    let mut bytes: Vec<u8> = header.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let points = mesh.points.iter().flat_map(|&p| standing(up, p).to_array());
+    bytes.extend(points.flat_map(|x| (x as f32).to_le_bytes()));
+    bytes.extend(mesh.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()));
+    bytes.extend(is_thin.map(u8::from));
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    bytes
 }
 
 /// The label that has more than half of some areas, where one has.

@@ -8,7 +8,7 @@ use shellock::{Cause, Ctx, PatchId, SegmentedSurface, Severity, Warning};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_print::plates::{fits, fits_whole};
 
-use super::figure::Figure;
+use super::figure::{Figure, shown};
 use crate::Session;
 use crate::args::{Axis, Options};
 use crate::bed::{fitted, shell_of};
@@ -26,14 +26,16 @@ pub struct Judged {
     pub told: Value,
     /// The pieces as they would be mended, one for each triangle that is shown.
     pub mended: Vec<u32>,
+    /// The surface cut along its seams, and a piece of the page for each of its triangles.
+    pub cut: Vec<u8>,
 }
 
-/// Judges the pieces `shown`; `painted` are those that a person changed.
+/// Judges the pieces `labels_shown`; `painted` are those that a person changed.
 pub fn judge(
     session: &Session,
     figure: &Figure,
     options: &Options,
-    shown: &[u32],
+    labels_shown: &[u32],
     painted: Option<&[u32]>,
 ) -> Result<Judged, Failure> {
     let model = &figure.model;
@@ -52,7 +54,7 @@ pub fn judge(
     let view = View {
         up: options.up,
         standing: Standing::of(options.up, model.solid.mesh()),
-        shown,
+        shown: labels_shown,
     };
     let mended = figure.labels_of(&outlook.divided);
     let mut told = view.verdict(&outlook.verdict, outlook.divided.n_patches);
@@ -67,7 +69,8 @@ pub fn judge(
     told["pieces"] = pieces;
     told["seams"] = view.seams(&outlook.divided);
     told["keys"] = view.keys(&outlook.keys, chosen);
-    Ok(Judged { told, mended })
+    let cut = view.cut(&outlook.divided);
+    Ok(Judged { told, mended, cut })
 }
 
 /// How places and pieces are told to the page: standing, and by the labels that it shows.
@@ -95,6 +98,22 @@ impl View<'_> {
             of.iter().max_by(|a, b| a.1.total_cmp(b.1)).map(|m| *m.0)
         };
         areas.iter().map(|of| most(of).unwrap_or_default()).collect()
+    }
+
+    fn cut(&self, surface: &SegmentedSurface) -> Vec<u8> {
+        let labels = self.labels(surface);
+        let mut bytes = shown(
+            &surface.mesh,
+            self.up,
+            surface.patch_of_face.iter().map(|_| false),
+        );
+        bytes.extend(
+            surface
+                .patch_of_face
+                .iter()
+                .flat_map(|&p| labels[usize::from(p)].to_le_bytes()),
+        );
+        bytes
     }
 
     fn verdict(&self, verdict: &Verdict, n_mended: usize) -> Value {

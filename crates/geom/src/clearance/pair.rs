@@ -1,5 +1,6 @@
 //! Two triangles: least distance at rest, and over all travels of one along z.
 
+use super::TOUCH_MM;
 use crate::bvh::nearest_on_triangle;
 use crate::{Aabb, Vec3};
 
@@ -234,8 +235,15 @@ fn height_over([a, b, c]: [Vec3; 3], p: Vec3) -> Option<f64> {
         .iter()
         .map(|(p, q)| (*p - *q).truncate().length_squared())
         .fold(0.0, f64::max);
-    (is_over && doubled_area * doubled_area > FLAT * longest_sq * longest_sq)
-        .then(|| (wa * a.z + wb * b.z + wc * c.z) / doubled_area)
+    let is_wide = doubled_area * doubled_area > FLAT * longest_sq * longest_sq;
+    let over = (is_over && is_wide).then(|| (wa * a + wb * b + wc * c) / doubled_area);
+    // Of a triangle that is upright but for rounding, signs and weights say nothing.
+    over.filter(|x| is_same_shadow(*x, p)).map(|x| x.z)
+}
+
+/// Whether two points are one as seen along z, to a rounding of coordinates.
+fn is_same_shadow(p: Vec3, q: Vec3) -> bool {
+    (p - q).truncate().length_squared() <= TOUCH_MM * TOUCH_MM
 }
 
 /// Where the shadows of `pq` and `rs` along z cross, as parameters of both.
@@ -243,8 +251,10 @@ fn flat_crossing(p: Vec3, q: Vec3, r: Vec3, s: Vec3) -> Option<(f64, f64)> {
     let cross = |u: Vec3, v: Vec3| u.x * v.y - u.y * v.x;
     let (p_side, q_side) = (cross(s - r, p - r), cross(s - r, q - r));
     let (r_side, s_side) = (cross(q - p, r - p), cross(q - p, s - p));
-    (p_side * q_side < 0.0 && r_side * s_side < 0.0)
-        .then(|| (p_side / (p_side - q_side), r_side / (r_side - s_side)))
+    let is_crossing = p_side * q_side < 0.0 && r_side * s_side < 0.0;
+    let crossing = is_crossing.then(|| (p_side / (p_side - q_side), r_side / (r_side - s_side)));
+    // Shadows that lie on one line but for rounding seem to cross anywhere.
+    crossing.filter(|&(u, v)| is_same_shadow(p.lerp(q, u), r.lerp(s, v)))
 }
 
 /// Parameter in [0, 1] of the point of `ab` nearest to `q`; 0 where the ends are one.

@@ -440,3 +440,43 @@ fn nearest_points_of_triangles_with_area_are_those_of_the_bvh() {
         assert_eq!(pair::nearest_on(t, q), nearest_on_triangle(t, q).0);
     }
 }
+
+/// Two keys' undersides that slide within one plane: their shadows lie on a line, but for rounding.
+#[test]
+fn where_triangles_in_one_plane_come_nearest_both_of_them_are() {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for case in 0..20_000 {
+        let size = 10f64.powf(1.0 - 4.0 * rng.random::<f64>());
+        let along = (random_point(&mut rng) - 0.5 * Vec3::ONE).normalize();
+        let (x, y) = along.any_orthonormal_pair();
+        // Not along an axis, where rounding would do no harm.
+        let (sin, cos) = rng.random::<f64>().sin_cos();
+        let x = cos * x + sin * y;
+        let origin = 100.0 * random_point(&mut rng);
+        let mut corner = || origin + size * (rng.random::<f64>() * along + rng.random::<f64>() * x);
+        let (a, mut b) = ([0; 3].map(|_| corner()), [0; 3].map(|_| corner()));
+        // Beside the way, behind, or in it; near or far.
+        let off_mm = size * 10f64.powi(case % 5 - 1);
+        b = moved(
+            b,
+            off_mm * (f64::from(case % 4) - 1.0) * along + off_mm * f64::from(case % 3) * x,
+        );
+        let axes = axes_along(along);
+        let seen = |t: [Vec3; 3]| t.map(|p| Vec3::from(axes.map(|axis| axis.dot(p))));
+        let (a, b) = (seen(a), seen(b));
+        let Some(found) = pair::swept(a, b, [0.0, 50.0], f64::INFINITY) else {
+            panic!("there is no limit");
+        };
+        let there = moved(a, found.travel_mm * Vec3::Z);
+        let off = |t: [Vec3; 3], p: Vec3| nearest_on_triangle(t, p).0.distance(p);
+        assert!(
+            off(there, found.on_a) < 1e-6 && off(b, found.on_b) < 1e-6,
+            "case {case}: {found:?}"
+        );
+        let told = found.distance_sq.sqrt();
+        assert!(
+            (found.on_a.distance(found.on_b) - told).abs() < 1e-6,
+            "case {case}: {found:?}"
+        );
+    }
+}
