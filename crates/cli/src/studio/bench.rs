@@ -173,7 +173,7 @@ impl Bench {
         state.is_opening = false;
         let figure = opened?;
         let painted = state.file_labels.take();
-        let labels = painted.and_then(|labels| figure.from_file_labels(&labels));
+        let labels = painted.and_then(|labels| figure.shown_labels(&labels));
         (state.problem, state.model) = (None, Some(model));
         state.figure = Some(Arc::new(figure));
         state.pieces = labels.map(|labels| Pieces {
@@ -311,7 +311,7 @@ impl Workshop for Bench {
                 .zip(painted)
                 .map(|(before, pieces)| before.file_labels(&pieces.labels));
             state.pieces = of_file
-                .and_then(|labels| next.from_file_labels(&labels))
+                .and_then(|labels| next.shown_labels(&labels))
                 .map(|labels| Pieces {
                     labels: Arc::new(labels),
                     is_painted: true,
@@ -387,7 +387,7 @@ impl Workshop for Bench {
         let of_file = of.figure.file_labels(&painted);
         let kept = of
             .figure
-            .from_file_labels(&of_file)
+            .shown_labels(&of_file)
             .unwrap_or_else(|| painted.clone());
         // A face of the file is of one piece.
         let is_changed = kept != painted;

@@ -108,7 +108,7 @@ impl Figure {
     }
 
     /// The labels of the triangles shown, from one a face of the file.
-    pub fn from_file_labels(&self, of_file: &[u32]) -> Option<Vec<u32>> {
+    pub fn shown_labels(&self, of_file: &[u32]) -> Option<Vec<u32>> {
         let is_fitting = of_file.len() == self.model.n_file_faces;
         is_fitting.then(|| {
             self.model
