@@ -43,7 +43,7 @@ use handover::Handover;
 pub use kit::Kit;
 use outcome::Best;
 pub use outcome::{Design, DesignError, DesignOutcome, PrintedFit};
-pub use outlook::{Outlook, Verdict, outlook};
+pub use outlook::{Outlook, Verdict, first_division, outlook};
 pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
 use strengthen::{Remedy, Thicker};
@@ -450,12 +450,24 @@ impl<'a> Job<'a> {
         ask: Ask,
         may_thicken: bool,
     ) -> Result<Self, DesignError> {
+        let &Input { model, labels, .. } = input;
+        let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
+        Self::of(input, wall, ask, may_thicken, surface)
+    }
+
+    /// The model as it is divided already.
+    fn of(
+        input: &Input<'a>,
+        wall: &'a Wall,
+        ask: Ask,
+        may_thicken: bool,
+        surface: SegmentedSurface,
+    ) -> Result<Self, DesignError> {
         let &Input {
             params,
             model,
             labels,
         } = input;
-        let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
         let stress = wall.strength.as_ref().map(StressMap::new);
         Ok(Self {
             params,

@@ -15,15 +15,22 @@ const INK = 0x1e1c24;
 const GHOST = 0x2f6fdb;
 const CHOSEN = 0xd33c2f;
 const HALF_FOV = (16 * Math.PI) / 180;
-const NUMBERS_REST_MS = 120;
+const REST_MS = 250;
+// Where frames take longer than this, the picture is coarser as long as it changes.
+const SLOW_MS = 55;
+const COARSE = 0.6;
+// Smooth edges by the renderer cost a software renderer half of its frames: it draws still pictures finer instead.
+const FINER = 1.5;
 // Rays that look for where numbers are seen.
 const GRID_RAYS = 2500;
 
 export class View {
   constructor(holder) {
     this.holder = holder;
-    this.renderer = new WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    const isSoftware = rendersInSoftware();
+    this.renderer = new WebGLRenderer({ antialias: !isSoftware, alpha: true });
+    this.fine = isSoftware ? FINER : Math.min(2, devicePixelRatio);
+    this.renderer.setPixelRatio(this.fine);
     this.renderer.domElement.tabIndex = 0;
     this.renderer.domElement.setAttribute("role", "img");
     holder.prepend(this.renderer.domElement);
@@ -246,12 +253,37 @@ export class View {
   }
 
   draw() {
-    this.pending ??= requestAnimationFrame(() => {
+    this.pending ??= requestAnimationFrame((now) => {
       this.pending = undefined;
+      this.#pace(now);
       this.renderer.render(this.scene, this.camera);
       this.frames = (this.frames ?? 0) + 1;
       this.#placeTags();
+      clearTimeout(this.rest);
+      this.rest = setTimeout(() => this.#settle(), REST_MS);
     });
+  }
+
+  // Frames that follow one another tell how long one takes.
+  #pace(now) {
+    const gap = now - (this.last ?? -Infinity);
+    this.last = now;
+    if (gap > 2 * REST_MS) this.slow = 0;
+    else if (gap > SLOW_MS) this.slow += 1;
+    if (this.slow > 2) this.#coarsen(COARSE);
+  }
+
+  // At rest the picture is as fine as it can be, and numbers stand where they are seen best.
+  #settle() {
+    if (this.#coarsen(1)) this.renderer.render(this.scene, this.camera);
+    this.#seekTags();
+  }
+
+  #coarsen(factor) {
+    const ratio = factor * this.fine;
+    if (this.renderer.getPixelRatio() === ratio) return false;
+    this.renderer.setPixelRatio(ratio);
+    return true;
   }
 
   #resize() {
@@ -271,15 +303,13 @@ export class View {
     }));
   }
 
-  // Numbers go with their places at once; where each is seen best is looked for when the view rests.
+  // Numbers go with their places at once.
   #placeTags() {
     for (const tag of this.tags.children) {
       if (!tag.at) continue;
       const { x, y } = this.project(tag.at);
       tag.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
     }
-    clearTimeout(this.rest);
-    this.rest = setTimeout(() => this.#seekTags(), NUMBERS_REST_MS);
   }
 
   // Rays on a grid find what is seen of each piece; its number stands on the one nearest to their middle.
@@ -314,6 +344,14 @@ export class View {
     }
     return found;
   }
+}
+
+function rendersInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
 
 // A value of each corner of each triangle, three after another.

@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
 
 use serde_json::{Map, Value, json};
-use shellock::design::Settings;
+use shellock::design::{Settings, first_division};
 use shellock::segmentation::{self, MOST_PIECES};
-use shellock::{Ctx, figure::Figure as Sample};
+use shellock::{Ctx, SegmentedSurface, figure::Figure as Sample};
 use shellock_formats::write_stl_binary;
 use shellock_geom::Vec3;
 use shellock_print::Printer;
@@ -74,11 +74,13 @@ struct State {
 
 /// The pieces as the page shows them.
 #[derive(Clone)]
-struct Pieces {
+pub(super) struct Pieces {
     /// One for each triangle that is shown, from 0.
-    labels: Arc<Vec<u32>>,
+    pub labels: Arc<Vec<u32>>,
     /// Whether a person changed them; else `build` divides by itself.
-    is_painted: bool,
+    pub is_painted: bool,
+    /// The division that they show, as long as it is what the options make.
+    pub divided: Option<Arc<SegmentedSurface>>,
     notes: Vec<String>,
 }
 
@@ -176,11 +178,7 @@ impl Bench {
         let labels = painted.and_then(|labels| figure.shown_labels(&labels));
         (state.problem, state.model) = (None, Some(model));
         state.figure = Some(Arc::new(figure));
-        state.pieces = labels.map(|labels| Pieces {
-            labels: Arc::new(labels),
-            is_painted: true,
-            notes: Vec::new(),
-        });
+        state.pieces = labels.map(painted_by_hand);
         self.changed(&mut state)
     }
 
@@ -305,6 +303,12 @@ impl Workshop for Bench {
         };
         let mut state = self.lock();
         (state.choices, state.options) = (choices, options);
+        // Others may divide otherwise, but for the key: it is cut out of what is divided.
+        if let Some(pieces) = &mut state.pieces
+            && changes.keys().any(|name| name != "key")
+        {
+            pieces.divided = None;
+        }
         if let Some(next) = opened {
             let painted = state.pieces.take().filter(|pieces| pieces.is_painted);
             let of_file = figure
@@ -312,11 +316,7 @@ impl Workshop for Bench {
                 .map(|(before, pieces)| before.file_labels(&pieces.labels));
             state.pieces = of_file
                 .and_then(|labels| next.shown_labels(&labels))
-                .map(|labels| Pieces {
-                    labels: Arc::new(labels),
-                    is_painted: true,
-                    notes: Vec::new(),
-                });
+                .map(painted_by_hand);
             state.figure = Some(Arc::new(next));
         }
         self.changed(&mut state)
@@ -408,8 +408,7 @@ impl Workshop for Bench {
             state.judging.store(true, Ordering::Relaxed);
             state.judging = Arc::clone(&stop);
         }
-        let labels = pieces.is_painted.then_some(&pieces.labels[..]);
-        let judged = judge(&silent(&stop), &of.figure, &of.options, &pieces.labels, labels);
+        let judged = judge(&silent(&stop), &of.figure, &of.options, pieces);
         let mut state = self.lock();
         if state.revision != of.revision || stop.load(Ordering::Relaxed) {
             return Err(Refusal::overtaken());
@@ -496,6 +495,7 @@ fn painted_by_hand(labels: Vec<u32>) -> Pieces {
     Pieces {
         labels: Arc::new(labels),
         is_painted: true,
+        divided: None,
         notes: Vec::new(),
     }
 }
@@ -506,7 +506,6 @@ fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
     let session = silent(&stop);
     let model = &of.figure.model;
     let params = fitted(&session, &checked(&of.options)?, &of.options, model)?;
-    let settings = Settings::resolve(&params);
     let notes: Mutex<Vec<String>> = Mutex::default();
     let report = |progress: shellock::context::Progress<'_>| {
         if let shellock::context::Progress::Note(text) = progress {
@@ -517,17 +516,12 @@ fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
         }
     };
     let ctx = Ctx::new(&report, &stop);
-    let surface = segmentation::segment(
-        &ctx,
-        &settings.segmentation,
-        &model.solid,
-        model.labels.as_deref(),
-    )
-    .map_err(shellock::design::DesignError::from)?;
+    let surface = first_division(&ctx, &params, &model.solid, model.labels.as_deref())?;
     drop(ctx);
     Ok(Pieces {
         labels: Arc::new(of.figure.labels_of(&surface)),
         is_painted: false,
+        divided: Some(Arc::new(surface)),
         notes: notes.into_inner().expect("no holder of this lock panics"),
     })
 }

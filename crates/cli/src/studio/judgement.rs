@@ -8,6 +8,7 @@ use shellock::{Cause, Ctx, PatchId, SegmentedSurface, Severity, Warning};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_print::plates::{fits, fits_whole};
 
+use super::bench::Pieces;
 use super::figure::{Figure, shown};
 use crate::Session;
 use crate::args::{Axis, Options};
@@ -30,16 +31,18 @@ pub struct Judged {
     pub cut: Vec<u8>,
 }
 
-/// Judges the pieces `labels_shown`; `painted` are those that a person changed.
+/// Judges `pieces`.
 pub fn judge(
     session: &Session,
     figure: &Figure,
     options: &Options,
-    labels_shown: &[u32],
-    painted: Option<&[u32]>,
+    pieces: &Pieces,
 ) -> Result<Judged, Failure> {
     let model = &figure.model;
-    let given: Option<Vec<i64>> = painted.map(|labels| labels.iter().map(|&l| i64::from(l) + 1).collect());
+    let labels_shown = &pieces.labels[..];
+    let given: Option<Vec<i64>> = pieces
+        .is_painted
+        .then(|| labels_shown.iter().map(|&l| i64::from(l) + 1).collect());
     let labels = given.as_deref().or(model.labels.as_deref());
     let checked = checked(options)?;
     // What is painted says how many pieces there are.
@@ -50,7 +53,7 @@ pub fn judge(
     };
     let quiet = |_: shellock::context::Progress<'_>| ();
     let ctx = Ctx::new(&quiet, &session.stop);
-    let outlook = outlook(&ctx, &params, &model.solid, labels)?;
+    let outlook = outlook(&ctx, &params, &model.solid, labels, pieces.divided.as_deref().cloned())?;
     let view = View {
         up: options.up,
         standing: Standing::of(options.up, model.solid.mesh()),
@@ -63,10 +66,10 @@ pub fn judge(
         Verdict::Blocked { .. } => None,
     };
     let mut advice: Vec<Value> = outlook.warnings.iter().map(|w| view.advice(w)).collect();
-    let pieces = pieces(figure, options, &view, &mut advice)?;
+    let told_pieces = told_pieces(figure, options, &view, &mut advice)?;
     told["is_mended"] = advice.iter().any(|a| a["mends"] == true).into();
     told["advice"] = advice.into();
-    told["pieces"] = pieces;
+    told["pieces"] = told_pieces;
     told["seams"] = view.seams(&outlook.divided);
     told["keys"] = view.keys(&outlook.keys, chosen);
     let cut = view.cut(&outlook.divided);
@@ -214,7 +217,7 @@ impl View<'_> {
 }
 
 /// Each piece that is shown; advice where one is in several parts of the printer's bed or has one neighbour.
-fn pieces(
+fn told_pieces(
     figure: &Figure,
     options: &Options,
     view: &View<'_>,

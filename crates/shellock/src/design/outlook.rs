@@ -46,8 +46,22 @@ pub enum Verdict {
     },
 }
 
+/// The first division that [`design`](super::design) would make kits of: what [`outlook`] judges.
+pub fn first_division(
+    ctx: &Ctx,
+    params: &Params,
+    model: &Solid,
+    labels: Option<&[i64]>,
+) -> Result<SegmentedSurface, DesignError> {
+    let params = &resolved(params, model, labels)?;
+    let wall = wall(params, model, labels);
+    let divided = segmentation::segment(ctx, &wall.settings.segmentation, model, labels)?;
+    Ok(divided)
+}
+
 /// The outlook of the first division that [`design`](super::design) would make kits of, with the wall as thick as
-/// `params` say or of usual thickness, with connectors of usual size.
+/// `params` say or of usual thickness, with connectors of usual size. `divided` is what [`first_division`] gave for the
+/// same, where that is known: then it is not divided again.
 ///
 /// Nothing is simulated: what locks here may still rattle or bear too little, and then pieces are joined or walls
 /// grow. Plans are searched, not proven.
@@ -56,6 +70,7 @@ pub fn outlook(
     params: &Params,
     model: &Solid,
     labels: Option<&[i64]>,
+    divided: Option<SegmentedSurface>,
 ) -> Result<Outlook, DesignError> {
     let params = &Params {
         proof_budget: 0,
@@ -66,18 +81,16 @@ pub fn outlook(
         model,
         labels,
     };
-    let wall = Wall {
-        settings: Settings::resolve(params),
-        strength: None,
-        warnings: Vec::new(),
-    };
-    let wall = wall.divided(ways::ways(&input)[0]);
+    let wall = wall(params, model, labels);
     let ask = Ask {
         factor: RESERVE,
         rounds: params.rounds,
         n_thicker: 0,
     };
-    let job = Job::new(ctx, &input, &wall, ask, false)?;
+    let job = match divided {
+        Some(surface) => Job::of(&input, &wall, ask, false, surface)?,
+        None => Job::new(ctx, &input, &wall, ask, false)?,
+    };
     let told = ctx.fork();
     segmentation::tell(&told, &wall.settings.segmentation, model, labels, &job.surface)?;
     let anywhere = KeyParams {
@@ -96,6 +109,21 @@ pub fn outlook(
         warnings: told.into_warnings(),
         divided: job.surface,
     })
+}
+
+/// The wall as thick as `params` say, of the first way to divide.
+fn wall(params: &Params, model: &Solid, labels: Option<&[i64]>) -> Wall {
+    let input = Input {
+        params,
+        model,
+        labels,
+    };
+    let wall = Wall {
+        settings: Settings::resolve(params),
+        strength: None,
+        warnings: Vec::new(),
+    };
+    wall.divided(ways::ways(&input)[0])
 }
 
 /// Plans for the places in turn until there is one; what was in the way at the first where there is none.
