@@ -4,7 +4,7 @@ import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import test from "node:test";
-import { bundle } from "../build.js";
+import { bundle, studio } from "../build.js";
 import { shaded, shades } from "../src/data.js";
 import { duration, momentAt, Player, poseAt } from "../src/motion.js";
 import { poseMatrix } from "../src/stage.js";
@@ -17,7 +17,7 @@ const withoutBrowser = browser ? false : "NOT TESTED IN A BROWSER: set SHELLOCK_
 if (withoutBrowser) console.warn(`\n*** ${withoutBrowser} ***\n`);
 
 test("the committed bundle is what the sources give", async () => {
-  for (const file of await bundle()) {
+  for (const file of [...(await bundle()), ...(await studio())]) {
     assert.equal(await readFile(file.path, "utf8"), file.text, `${file.path} is stale: npm run build`);
   }
 });

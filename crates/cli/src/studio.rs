@@ -1,8 +1,10 @@
 //! `studio`: a page in the browser, and what the program does for it.
 
+mod advice;
 mod bench;
 mod choices;
 mod figure;
+mod finer;
 mod judgement;
 mod store;
 

@@ -10,13 +10,14 @@ use serde_json::{Map, Value, json};
 use shellock::design::{Settings, first_division};
 use shellock::segmentation::{self, MOST_PIECES};
 use shellock::{Ctx, SegmentedSurface, figure::Figure as Sample};
-use shellock_formats::write_stl_binary;
+use shellock_formats::{Loaded, write_stl_binary};
 use shellock_geom::Vec3;
 use shellock_print::Printer;
 use shellock_studio::{Refusal, Task, Workshop};
 
 use super::choices::{self, Choices};
 use super::figure::Figure;
+use super::finer::{self, finer};
 use super::judgement::{Judged, judge};
 use super::store::{Found, Store};
 use crate::Session;
@@ -158,13 +159,26 @@ impl Bench {
             .file_name()
             .map_or_else(|| "model".into(), |n| n.to_string_lossy());
         let bytes = read(path)?;
-        let model = self.store.keep(&name, &bytes)?;
+        let extension = path.extension().and_then(|e| e.to_str());
+        // What cannot be read is told of when it is opened.
+        let model = match shellock_formats::read_mesh(&bytes, extension) {
+            Ok(loaded) => self.kept(&name, &loaded, &bytes)?,
+            Err(_) => self.store.keep(&name, &bytes)?,
+        };
         let mut state = self.lock();
         if state.model.as_ref() != Some(&model) {
             (state.model, state.file_labels) = (Some(model), None);
             self.store.save(state.model.as_ref(), &state.choices, None)?;
         }
         Ok(())
+    }
+
+    /// Keeps a model's file, or one of the same shape that can be painted.
+    fn kept(&self, name: &str, loaded: &Loaded, bytes: &[u8]) -> Result<ModelOf, Failure> {
+        match finer(name, loaded) {
+            Some((name, bytes)) => self.store.keep(&name, &bytes),
+            None => self.store.keep(name, bytes),
+        }
     }
 
     /// Opens a model of the folder.
@@ -270,8 +284,10 @@ impl Workshop for Bench {
         let state = self.lock();
         let model = state.figure.as_ref().map(|figure| {
             let model = &figure.model;
+            let finer = state.model.as_ref().and_then(|of| finer::note(&of.file));
+            let notes: Vec<String> = finer.into_iter().chain(model.notes.clone()).collect();
             let size = standing(state.options.up, model.solid.mesh().bounds().size()).abs();
-            json!({ "name": model.name, "n_triangles": figure.n_faces(), "size_mm": size.to_array(), "notes": model.notes,
+            json!({ "name": model.name, "n_triangles": figure.n_faces(), "size_mm": size.to_array(), "notes": notes,
                 "warnings": figure.warnings, "thin_share": figure.thin_share(), "view_triangles": figure.n_faces(),
                 "is_exact": figure.is_exact() })
         });
@@ -326,9 +342,10 @@ impl Workshop for Bench {
         let bytes = read(file).map_err(|e| self.refused(&e))?;
         // What cannot be read is not kept.
         let extension = Path::new(name).extension().and_then(|e| e.to_str());
-        shellock_formats::read_mesh(&bytes, extension).map_err(|e| Refusal::wrong(format!("{name}: {e}")))?;
-        let model = self.store.keep(name, &bytes).map_err(|e| self.refused(&e))?;
-        drop(bytes);
+        let loaded = shellock_formats::read_mesh(&bytes, extension)
+            .map_err(|e| Refusal::wrong(format!("{name}: {e}")))?;
+        let model = self.kept(name, &loaded, &bytes).map_err(|e| self.refused(&e))?;
+        drop((bytes, loaded));
         let before = {
             let mut state = self.lock();
             state.file_labels.take()

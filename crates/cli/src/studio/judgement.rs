@@ -4,10 +4,11 @@
 use serde_json::{Value, json};
 use shellock::design::{Verdict, outlook};
 use shellock::key::KeySite;
-use shellock::{Cause, Ctx, PatchId, SegmentedSurface, Severity, Warning};
+use shellock::{Ctx, PatchId, SegmentedSurface, Severity, Warning};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_print::plates::{fits, fits_whole};
 
+use super::advice;
 use super::bench::Pieces;
 use super::figure::{Figure, shown};
 use crate::Session;
@@ -53,7 +54,13 @@ pub fn judge(
     };
     let quiet = |_: shellock::context::Progress<'_>| ();
     let ctx = Ctx::new(&quiet, &session.stop);
-    let outlook = outlook(&ctx, &params, &model.solid, labels, pieces.divided.as_deref().cloned())?;
+    let outlook = outlook(
+        &ctx,
+        &params,
+        &model.solid,
+        labels,
+        pieces.divided.as_deref().cloned(),
+    )?;
     let view = View {
         up: options.up,
         standing: Standing::of(options.up, model.solid.mesh()),
@@ -65,7 +72,12 @@ pub fn judge(
         Verdict::Locks { key, .. } => *key,
         Verdict::Blocked { .. } => None,
     };
-    let mut advice: Vec<Value> = outlook.warnings.iter().map(|w| view.advice(w)).collect();
+    let labels_of = view.labels(&outlook.divided);
+    let mut advice: Vec<Value> = outlook
+        .warnings
+        .iter()
+        .map(|w| view.advice(w, &labels_of))
+        .collect();
     let told_pieces = told_pieces(figure, options, &view, &mut advice)?;
     told["is_mended"] = advice.iter().any(|a| a["mends"] == true).into();
     told["advice"] = advice.into();
@@ -160,16 +172,10 @@ impl View<'_> {
         }
     }
 
-    fn advice(&self, warning: &Warning) -> Value {
-        let mends = matches!(
-            warning.cause,
-            Cause::LabelSplit { .. }
-                | Cause::LabelIslands { .. }
-                | Cause::LabelMerged { .. }
-                | Cause::LabelsDivided { .. }
-                | Cause::LabelsJoined { .. }
-        );
-        json!({ "severity": warning.severity(), "words": warning.to_string(), "at": warning.at.map(|at| self.at(at)), "mends": mends })
+    fn advice(&self, warning: &Warning, labels: &[u32]) -> Value {
+        let number = |p: PatchId| labels.get(usize::from(p)).copied().unwrap_or_default();
+        json!({ "severity": warning.severity(), "words": advice::words(warning, number), "at": warning.at.map(|at| self.at(at)),
+            "mends": advice::is_mended(warning) })
     }
 
     /// The smooth lines between pieces.
