@@ -176,3 +176,82 @@ fn verdict(ctx: &Ctx, job: &Job<'_>, places: &[Option<KeySite>]) -> Result<Verdi
         surface: job.surface.clone(),
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::{Figure, make};
+    use crate::segmentation::Method;
+    use crate::testing::{sphere, voronoi};
+
+    fn params(n_pieces: usize) -> Params {
+        let mut params = Params::default();
+        (params.method, params.n_pieces) = (Method::Creases, Some(n_pieces));
+        params
+    }
+
+    /// Whether it locks, and what it says.
+    fn told(outlook: &Outlook) -> (bool, usize) {
+        match &outlook.verdict {
+            Verdict::Locks { surface, plan, .. } => {
+                assert_eq!(plan.steps.len(), surface.n_patches);
+                (true, surface.n_patches)
+            }
+            Verdict::Blocked { reason, .. } => {
+                assert!(!reason.is_empty());
+                (false, 0)
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_divided_already_is_judged_as_if_it_were_divided_anew() {
+        let vase = make(Figure::Vase, 90.0, 2.0);
+        let (ctx, params) = (Ctx::quiet(), params(6));
+        let divided = first_division(&ctx, &params, &vase, None).unwrap();
+        let anew = outlook(&ctx, &params, &vase, None, None).unwrap();
+        let known = outlook(&ctx, &params, &vase, None, Some(divided.clone())).unwrap();
+        assert_eq!(anew.divided.mesh, divided.mesh);
+        assert_eq!(anew.divided.patch_of_face, divided.patch_of_face);
+        assert_eq!(told(&anew), told(&known));
+        assert_eq!(anew.keys, known.keys);
+        assert!(told(&anew).0);
+    }
+
+    #[test]
+    fn a_key_that_is_wanted_at_a_place_is_the_one_of_the_plan() {
+        let vase = make(Figure::Vase, 90.0, 2.0);
+        let (ctx, mut params) = (Ctx::quiet(), params(6));
+        let best = outlook(&ctx, &params, &vase, None, None).unwrap();
+        let other = best.keys.last().expect("a vase has places").prism.middle();
+        params.key = KeySource::CutNear(other.to_array());
+        let wanted = outlook(&ctx, &params, &vase, None, None).unwrap();
+        let Verdict::Locks { key: Some(key), .. } = wanted.verdict else {
+            panic!("it has a plan");
+        };
+        assert!(key.prism.middle().distance(other) < 15.0, "{key:?}");
+        assert_eq!(wanted.keys, best.keys, "places are told whatever is chosen");
+    }
+
+    #[test]
+    fn what_was_changed_of_labels_is_told() {
+        let ball = voronoi(sphere(5, Vec3::splat(45.0)), 7, 3);
+        let mut labels: Vec<i64> = ball.patch_of_face.iter().map(|p| i64::from(p.0) + 1).collect();
+        // A label on the far side of its piece.
+        let far = (0..labels.len())
+            .max_by(|&a, &b| ball.mesh.face_center(a).z.total_cmp(&ball.mesh.face_center(b).z));
+        let far = far.expect("it has triangles");
+        let lowest = (0..labels.len())
+            .min_by(|&a, &b| ball.mesh.face_center(a).z.total_cmp(&ball.mesh.face_center(b).z));
+        labels[far] = labels[lowest.expect("it has triangles")];
+        let solid = Solid::new(ball.mesh).unwrap();
+        let outlook = outlook(&Ctx::quiet(), &Params::default(), &solid, Some(&labels), None).unwrap();
+        let islands = |w: &&Warning| matches!(w.cause, crate::Cause::LabelIslands { n: 1, .. });
+        assert_eq!(
+            outlook.warnings.iter().filter(islands).count(),
+            1,
+            "{:?}",
+            outlook.warnings
+        );
+    }
+}

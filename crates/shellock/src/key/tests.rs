@@ -96,6 +96,31 @@ fn the_best_key_of_a_ball_with_a_foot_is_in_the_foot_and_slides_level() {
 }
 
 #[test]
+fn a_key_that_is_wanted_somewhere_is_cut_there_and_not_where_one_would_be_best() {
+    let ball = footed_ball();
+    let edge_mm = params_of(&ball).piece_mm2.sqrt();
+    for place in [
+        Vec3::new(0.0, 0.0, 50.0),
+        Vec3::new(0.0, -50.0, 0.0),
+        Vec3::new(35.4, 0.0, 35.4),
+    ] {
+        let params = KeyParams {
+            near: Some(place.to_array()),
+            ..params_of(&ball)
+        };
+        let found = sites(&Ctx::quiet(), &params, &ball).unwrap();
+        let best = found.first().expect("a ball has a place everywhere");
+        let off_mm = best.prism.middle().distance(place);
+        assert!(off_mm < 0.5 * edge_mm, "{off_mm} mm from {place}");
+        assert!(
+            found
+                .iter()
+                .all(|site| site.prism.middle().distance(place) < edge_mm)
+        );
+    }
+}
+
+#[test]
 fn a_plain_ball_and_an_egg_have_a_place_for_a_key_too_and_a_thin_plate_has_none() {
     for radii in [Vec3::splat(50.0), Vec3::new(45.0, 45.0, 70.0)] {
         let found = sites_of(&voronoi(sphere(6, radii), 9, 1));
