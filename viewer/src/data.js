@@ -101,7 +101,7 @@ export function shaded(positions, indices) {
 }
 
 /** A normal for each corner of each triangle. */
-function cornerNormals(positions, indices) {
+export function cornerNormals(positions, indices) {
   const nFaces = indices.length / 3;
   const area = new Float32Array(3 * nFaces); // face normal × twice the area
   const unit = new Float32Array(3 * nFaces);

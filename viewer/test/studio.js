@@ -204,12 +204,13 @@ async function make(page, name, server, address, folder) {
   assert.deepEqual([...page.faults, ...second.faults], [], name);
   await second.close();
   // The server is killed and comes again: all is there.
-  const before = await page.evaluate(() => ({ n: window.studio.state.project.division.n_pieces, kit: window.studio.state.project.kit.files.length }));
+  const before = await page.evaluate(() => ({ n: window.studio.state.project.division.n_pieces, kit: window.studio.state.project.kit.files.length, isCurrent: window.studio.state.project.kit.is_current, labels: Array.from(window.studio.history.labels) }));
+  assert.ok(before.isCurrent, `${name}: the kit is of what is shown`);
   await page.close();
   server.kill("SIGKILL");
   const again = await serve(folder);
   const back = await pageAt(again.address);
-  const after = await back.evaluate(() => ({ n: window.studio.state.project.division.n_pieces, kit: window.studio.state.project.kit.files.length }));
+  const after = await back.evaluate(() => ({ n: window.studio.state.project.division.n_pieces, kit: window.studio.state.project.kit.files.length, isCurrent: window.studio.state.project.kit.is_current, labels: Array.from(window.studio.history.labels) }));
   assert.deepEqual(after, before, `${name}: killed and begun again`);
   await back.close();
   again.server.kill("SIGINT");

@@ -24,7 +24,7 @@ const MADE_MM: std::ops::RangeInclusive<f64> = 10.0..=2000.0;
 /// Share by which scaling to a length may miss it.
 const ROUNDING: f64 = 1e-9;
 /// Surfaces with more triangles are described by fewer: most take twice the time with twice as many.
-const MANY_TRIANGLES: usize = 100_000;
+pub const MANY_TRIANGLES: usize = 100_000;
 /// Longest side of everything else, mm.
 const DEFAULT_SIZE_MM: f64 = 150.0;
 

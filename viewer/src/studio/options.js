@@ -5,8 +5,11 @@ import { words } from "./words.js";
 
 const usual = ({ default: value, choices }) => (value !== null ? words.open.usual(value) : choices.length ? words.open.ofPrinter : "");
 
+// "key-grip" as "Key grip".
+const spoken = (name) => { const plain = name.replaceAll("-", " "); return plain[0].toUpperCase() + plain.slice(1); };
+
 /** One option as a field; `choose` is called with `{name: value}`. */
-export function optionField(option, choose, label = option.name) {
+export function optionField(option, choose, label = words.option[option.name] ?? spoken(option.name)) {
   const { name, kind, value, help } = option;
   const set = (v) => choose({ [name]: v === "" ? null : v });
   let control;
@@ -28,12 +31,13 @@ export function optionField(option, choose, label = option.name) {
   return field(label, control, help);
 }
 
-/** All options in their groups, finer ones folded away. */
-export function allOptions(options, choose) {
+/** All options but those named in `shown`, in their groups, finer ones folded away. */
+export function allOptions(options, choose, shown = []) {
   const holder = element("details", "all");
   holder.append(element("summary", "", words.open.all));
   for (const group of new Set(options.map((o) => o.group))) {
-    const of = options.filter((o) => o.group === group);
+    const of = options.filter((o) => o.group === group && !shown.includes(o.name));
+    if (!of.length) continue;
     const section = element("section");
     section.append(element("h3", "", group), ...of.filter((o) => !o.is_advanced).map((o) => optionField(o, choose)));
     const fine = of.filter((o) => o.is_advanced);

@@ -16,6 +16,9 @@ const link = (href, name, isDownload) => {
 };
 const next = (text, action) => button(text, action, { className: "next" });
 
+// Options that a person meets first.
+const MAIN = ["size", "up", "printer", "material"];
+
 /** Screen 1: a file, how it is taken, and how it is to be made. */
 export function openScreen({ project, options }, act) {
   const w = words.open;
@@ -29,10 +32,11 @@ export function openScreen({ project, options }, act) {
   const { model } = project;
   if (model) {
     parts.push(element("h3", "", model.name), paragraph(w.size(model.size_mm)), paragraph(model.is_exact ? w.exact(model.n_triangles) : w.fewer(model.n_triangles), "soft"));
-    if (model.thin_share > 0.005) parts.push(paragraph(w.thin(model.thin_share), "warning"));
+    if (model.thin_share > 0) parts.push(paragraph(w.thin(model.thin_share), "soft"));
     parts.push(...model.warnings.map((line) => paragraph(line, "warning")), ...model.notes.map((line) => paragraph(line, "soft")));
-    const main = ["size", "up", "printer", "material"].map((name) => options.find((o) => o.name === name)).filter(Boolean);
-    parts.push(element("h3", "", w.settings), ...main.map((o) => optionField(o, act.choose, words.option[o.name])), allOptions(options, act.choose), next(w.next, () => act.step("pieces")));
+    const main = MAIN.map((name) => options.find((o) => o.name === name)).filter(Boolean);
+    const asItIs = (o) => (o.name === "size" ? { ...o, value_name: Math.max(...model.size_mm).toFixed(0) } : o);
+    parts.push(element("h3", "", w.settings), ...main.map((o) => optionField(asItIs(o), act.choose)), allOptions(options, act.choose, MAIN), next(w.next, () => act.step("pieces")));
   }
   const figures = element("details", "figures");
   figures.open = !model;
@@ -53,7 +57,7 @@ export function piecesScreen(state, act) {
   const row = element("div", "row");
   for (const name of ["method", "pieces", "symmetric"]) {
     const option = options.find((o) => o.name === name);
-    if (option) row.append(optionField({ ...option, help: "" }, act.chooseDivision, words.option[name]));
+    if (option) row.append(optionField({ ...option, help: "" }, act.chooseDivision));
   }
   const again = button(w.again, act.divide, { title: w.anewHelp });
   parts.push(row, again, paragraph(w.faceHint, "soft"), pieceList(state, act), advice(state, act), next(w.next, () => act.step("key")));

@@ -7,8 +7,8 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { MeshBVH } from "three-mesh-bvh";
 import { colour } from "./colours.js";
+import { cornerNormals } from "../data.js";
 import { element } from "./dom.js";
-import { measured } from "./surface.js";
 
 const BODY = [188, 184, 178];
 const INK = 0x1e1c24;
@@ -66,7 +66,7 @@ export class View {
     if (this.mesh) { this.scene.remove(this.mesh); this.mesh.geometry.dispose(); this.mesh.material.dispose(); }
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(spread(surface.points, surface.corners), 3));
-    geometry.setAttribute("normal", new BufferAttribute(spread(pointNormals(surface), surface.corners), 3));
+    geometry.setAttribute("normal", new BufferAttribute(cornerNormals(surface.points, surface.corners), 3));
     this.colours = new BufferAttribute(new Uint8Array(9 * surface.n), 3, true);
     geometry.setAttribute("color", this.colours);
     geometry.setAttribute("thin", new BufferAttribute(Float32Array.from({ length: 3 * surface.n }, (_, v) => surface.thin[Math.floor(v / 3)]), 1));
@@ -88,7 +88,7 @@ export class View {
       const geometry = new BufferGeometry();
       const { points, corners, labels } = cut;
       geometry.setAttribute("position", new BufferAttribute(spread(points, corners), 3));
-      geometry.setAttribute("normal", new BufferAttribute(spread(pointNormals({ points, corners, ...measured(points, corners), n: labels.length }), corners), 3));
+      geometry.setAttribute("normal", new BufferAttribute(cornerNormals(points, corners), 3));
       const colours = new Uint8Array(9 * labels.length);
       labels.forEach((label, f) => { const c = colour(label); for (let k = 0; k < 9; k++) colours[9 * f + k] = c[k % 3]; });
       geometry.setAttribute("color", new BufferAttribute(colours, 3, true));
@@ -359,17 +359,6 @@ function spread(values, corners) {
   const out = new Float32Array(3 * corners.length);
   for (let v = 0; v < corners.length; v++) for (let k = 0; k < 3; k++) out[3 * v + k] = values[3 * corners[v] + k];
   return out;
-}
-
-// Mean normals by area.
-function pointNormals({ points, corners, normals, areas, n }) {
-  const sums = new Float32Array(points.length);
-  for (let f = 0; f < n; f++) for (let c = 0; c < 3; c++) for (let k = 0; k < 3; k++) sums[3 * corners[3 * f + c] + k] += areas[f] * normals[3 * f + k];
-  for (let v = 0; v < sums.length; v += 3) {
-    const length = Math.hypot(sums[v], sums[v + 1], sums[v + 2]) || 1;
-    for (let k = 0; k < 3; k++) sums[v + k] /= length;
-  }
-  return sums;
 }
 
 // Lit, with stripes where triangles are thin.

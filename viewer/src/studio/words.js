@@ -13,7 +13,7 @@ export const words = {
     formats: "3MF, STL, OBJ, PLY, OFF, glTF or GLB; a closed surface, or one that can be mended",
     figures: "Or begin with a figure",
     size: (s) => `${s.map((x) => x.toFixed(0)).join(" × ")} mm, wide, deep and high`,
-    thin: (share) => `${(100 * share).toFixed(1)} % of the surface is too thin to be hollow: striped. It stays solid there.`,
+    thin: (share) => `Striped: ${share < 0.001 ? "less than 0.1" : (100 * share).toFixed(1)} % of the surface, too thin to be hollow. It stays solid there.`,
     exact: (n) => `${n.toLocaleString("en")} triangles`,
     fewer: (n) => `${n.toLocaleString("en")} triangles are shown; the kit is made of the model as it was given`,
     settings: "How it is made",

@@ -207,10 +207,11 @@ impl Bench {
         state.judged = None;
         state.judging.store(true, Ordering::Relaxed);
         let painted = state.pieces.as_ref().filter(|pieces| pieces.is_painted);
-        let labels = state.figure.as_ref().zip(painted).map(|(figure, pieces)| {
-            let of_file = figure.file_labels(&pieces.labels);
-            of_file.into_iter().map(|label| label + 1).collect::<Vec<u32>>()
-        });
+        let labels = state
+            .figure
+            .as_ref()
+            .zip(painted)
+            .map(|(figure, pieces)| figure.file_labels(&pieces.labels));
         let saved = self
             .store
             .save(state.model.as_ref(), &state.choices, labels.as_deref());

@@ -71,7 +71,8 @@ impl Figure {
     pub fn thin_share(&self) -> f64 {
         let mesh = self.model.solid.mesh();
         let thin = (0..self.n_faces()).filter(|&f| self.is_thin[f]);
-        thin.map(|f| mesh.face_area(f)).sum::<f64>() / mesh.area()
+        // An empty sum is -0.
+        thin.map(|f| mesh.face_area(f)).sum::<f64>() / mesh.area() + 0.0
     }
 
     /// The surface as the page reads it: header, points (32-bit), corners, a byte a triangle for what is thin.

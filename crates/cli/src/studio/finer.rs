@@ -7,14 +7,16 @@ use shellock_geom::repair::{RepairMode, repair};
 use shellock_geom::subdivide::halve_edges;
 use shellock_geom::{Solid, Topology};
 
-/// Longest edge that is left, as a share of the model's diagonal: 2 to 3 mm on a figure of 150 mm.
-const LONGEST_SHARE: f64 = 1.0 / 90.0;
+use crate::input::MANY_TRIANGLES;
+
+/// Longest edge that is left, as a share of the model's diagonal: 3 to 4 mm on a figure of 150 mm.
+const LONGEST_SHARE: f64 = 1.0 / 60.0;
 /// Edges so many times as long are too long to paint between.
 const COARSE: f64 = 2.0;
 /// Share of the surface in such triangles from which it matters.
 const LEAST_COARSE: f64 = 0.15;
-/// Most triangles; halving goes on as long as there are fewer.
-const MANY: usize = 200_000;
+/// Halving goes on as long as there are fewer triangles: with four times as many a model is still shown as it is.
+const MANY: usize = MANY_TRIANGLES / 4;
 /// How the name of a file ends that was made so.
 const ENDING: &str = "-fine.ply";
 

@@ -4,6 +4,7 @@
 use serde_json::{Value, json};
 use shellock::design::{Verdict, outlook};
 use shellock::key::KeySite;
+use shellock::verify::words::PlaceWords;
 use shellock::{Ctx, PatchId, SegmentedSurface, Severity, Warning};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_print::plates::{fits, fits_whole};
@@ -211,7 +212,8 @@ impl View<'_> {
             [(0.0, -1.0), (0.0, 1.0), (length, 1.0), (length, -1.0)].map(|(along, side)| corner(along, side));
         let place = self.standing.words(prism.middle().to_array());
         let words = format!(
-            "{place}: {:.1} cm², rails of {:.0} mm, {:.0} % flat",
+            "{place}: slides out {}; {:.1} cm², rails of {:.0} mm, {:.0} % flat",
+            self.standing.way(prism.slide.to_array()),
             site.area_mm2 / 100.0,
             site.rail_mm,
             100.0 * site.flat_share

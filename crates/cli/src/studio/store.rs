@@ -38,7 +38,7 @@ pub struct Store {
 pub struct Found {
     pub model: Option<ModelOf>,
     pub choices: Choices,
-    /// What was painted, one a face of the file.
+    /// What was painted, one a face of the file, from 0.
     pub labels: Option<Vec<u32>>,
 }
 
@@ -88,7 +88,7 @@ impl Store {
         model.path(&self.folder).map_err(Failure::Wrong)
     }
 
-    /// Writes all of it: labels first, as the project file names them.
+    /// Writes all of it: labels first, as the project file names them. In files pieces count from 1, as people do.
     pub fn save(
         &self,
         model: Option<&ModelOf>,
@@ -97,7 +97,8 @@ impl Store {
     ) -> Result<(), Failure> {
         let mut choices = choices.clone();
         if let Some(labels) = labels {
-            write(&self.folder.join(LABELS), &write_labels(labels))?;
+            let counted: Vec<u32> = labels.iter().map(|label| label + 1).collect();
+            write(&self.folder.join(LABELS), &write_labels(&counted))?;
             choices.push(("labels".to_owned(), Choice::Text(LABELS.to_owned())));
         }
         let project = Project {
@@ -191,9 +192,11 @@ fn labels_in(path: &Path) -> Result<Vec<u32>, Failure> {
         source,
     })?;
     let wrong = || Failure::Wrong(format!("{}: labels must be whole numbers from 0", path.display()));
+    // Somebody else's may count from 0.
+    let first = labels.iter().copied().min().unwrap_or_default().min(1);
     labels
         .into_iter()
-        .map(|l| u32::try_from(l).map_err(|_| wrong()))
+        .map(|l| u32::try_from(l - first).map_err(|_| wrong()))
         .collect()
 }
 
@@ -257,10 +260,14 @@ mod tests {
         store.save(Some(&model), &choices, Some(&[1, 2, 2])).unwrap();
         let (again, found) = Store::open(dir.path().join("new")).unwrap();
         assert_eq!(
-            (found.model, found.choices, found.labels),
-            (Some(model), choices, Some(vec![1, 2, 2]))
+            (&found.model, &found.choices, &found.labels),
+            (&Some(model), &choices, &Some(vec![1, 2, 2]))
         );
-        assert_eq!(store.state(), again.state());
+        let before = store.state();
+        again
+            .save(found.model.as_ref(), &found.choices, found.labels.as_deref())
+            .unwrap();
+        assert_eq!(again.state(), before, "opening a project does not change it");
         assert_eq!(again.kit(), Value::Null);
     }
 

@@ -217,9 +217,10 @@ pub(super) fn key_params(job: &Job<'_>) -> KeyParams {
 
 /// A place in words.
 pub(super) fn words(site: &KeySite) -> String {
-    let [x, y, z] = site.prism.origin.to_array();
-    format!(
-        "a key of {:.1} cm² at ({x:.0}, {y:.0}, {z:.0}) mm",
-        site.area_mm2 / 100.0
-    )
+    let place = match site.shown {
+        below if below < 0.2 => "underneath",
+        beside if beside < 0.8 => "at the side",
+        _ => "on top",
+    };
+    format!("a key of {:.1} cm² {place}", site.area_mm2 / 100.0)
 }

@@ -445,6 +445,7 @@ fn site() -> KeySite {
         side_share: 1.0,
         rail_mm: 0.0,
         area_mm2: 100.0,
+        shown: 0.0,
         score: 1.0,
     }
 }

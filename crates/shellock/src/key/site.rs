@@ -55,6 +55,8 @@ pub struct KeySite {
     pub rail_mm: f64,
     /// Its surface, mm².
     pub area_mm2: f64,
+    /// How much of it one sees from above, in [0, 1]: 0 underneath, 1 on top.
+    pub shown: f64,
     /// How well it is liked; larger is better.
     pub score: f64,
 }
@@ -345,6 +347,7 @@ fn scored(
         side_share,
         rail_mm: 0.0,
         area_mm2: area,
+        shown,
         score,
     })
 }
