@@ -126,6 +126,8 @@ pub enum Command {
     Coupon(CouponOptions),
     /// Open a window in the browser, on this machine alone: choose, paint the pieces, place the key, make the kit
     Studio(StudioOptions),
+    /// Make kits of all models in a folder; what is made already stays, so that it can be stopped and go on
+    Batch(Box<BatchOptions>),
     /// Print what a shell needs to complete commands and options, for example `shellock completions bash`
     Completions {
         /// The shell
@@ -180,7 +182,7 @@ pub struct StudioOptions {
 }
 
 /// Examples at the end of a command's help.
-const EXAMPLES: [(&str, &str); 7] = [
+const EXAMPLES: [(&str, &str); 8] = [
     (
         "build",
         "Examples:\n  shellock build dragon.stl --size 15cm --printer fdm\n  shellock build dragon.stl --keep-whole 0,-40,120,25 --pieces 8",
@@ -193,6 +195,10 @@ const EXAMPLES: [(&str, &str); 7] = [
     (
         "studio",
         "Examples:\n  shellock studio dragon.stl\n  shellock studio --project dragon-studio   (goes on where you stopped)",
+    ),
+    (
+        "batch",
+        "Example:\n  shellock batch models --out kits --size 15cm --printer fdm",
     ),
     ("plan", "Example:\n  shellock plan dragon.stl --size 15cm"),
     (
@@ -240,6 +246,9 @@ const NOT_TO_PLAN: [&str; 6] = [
     "allow_thin",
 ];
 
+/// What is of one model.
+const NOT_TO_MANY: [&str; 2] = ["labels", "keep_whole"];
+
 /// All commands, each with the options that it has a use for in its help, and examples.
 pub fn command() -> clap::Command {
     let without = |command: clap::Command, unused: &[&str]| {
@@ -249,10 +258,32 @@ pub fn command() -> clap::Command {
     };
     let command = Cli::command()
         .mut_subcommand("segment", |c| without(c, &NOT_TO_DIVIDE))
+        .mut_subcommand("batch", |c| without(c, &NOT_TO_MANY))
         .mut_subcommand("plan", |c| without(c, &NOT_TO_PLAN));
     EXAMPLES.into_iter().fold(command, |all, (name, examples)| {
         all.mut_subcommand(name, |c| c.after_help(examples))
     })
+}
+
+/// Which models, and how many at a time.
+#[derive(Args)]
+pub struct BatchOptions {
+    /// Folder of models; those in folders within it, too
+    pub folder: PathBuf,
+    /// Folder for the kits, one a model, with batch.html and batch.csv
+    #[arg(short, long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Kits at a time [default: one a core]
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
+    /// Memory for all kits at a time, GB [default: four fifths of what is free]
+    #[arg(long, value_name = "GB")]
+    pub memory: Option<f64>,
+    /// A model that takes longer than this is stopped; seconds, or with a unit
+    #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = units::seconds)]
+    pub patience: f64,
+    #[command(flatten)]
+    pub options: Options,
 }
 
 /// Where a kit goes.

@@ -94,6 +94,47 @@ pub fn command_line(arguments: Vec<OsString>) -> Result<Cli, Refusal> {
     Ok(cli)
 }
 
+/// Of the arguments of `batch` those that are options of `build`, as they were given.
+pub fn build_arguments(arguments: Vec<OsString>) -> Vec<String> {
+    let all = args::command();
+    let Ok(matches) = all.clone().try_get_matches_from(arguments) else {
+        return Vec::new();
+    };
+    let (Some(build), Some((_, given))) = (all.find_subcommand("build"), matches.subcommand()) else {
+        return Vec::new();
+    };
+    let mut options = Vec::new();
+    for arg in build.get_arguments() {
+        let id = arg.get_id().as_str();
+        let is_shared = given.try_contains_id(id).is_ok_and(|is_there| is_there);
+        let is_own = [
+            "model",
+            "out",
+            "force",
+            "help",
+            "help_all",
+            "json",
+            "quiet",
+            "verbose",
+            "threads",
+            "stop_with_stdin",
+        ];
+        let (Some(name), true) = (arg.get_long(), is_shared && !is_own.contains(&id)) else {
+            continue;
+        };
+        if given.value_source(id) != Some(ValueSource::CommandLine) {
+            continue;
+        }
+        if matches!(arg.get_action(), ArgAction::SetTrue) {
+            options.push(format!("--{name}"));
+        } else {
+            let values = given.get_raw(id).into_iter().flatten();
+            options.extend(values.map(|value| format!("--{name}={}", value.to_string_lossy())));
+        }
+    }
+    options
+}
+
 /// The project file that is given instead of a model; fails where a configuration file is named, too.
 fn project_of(given: &ArgMatches) -> Result<Option<PathBuf>, Refusal> {
     let model = given.try_get_one::<PathBuf>("model").ok().flatten();
@@ -138,13 +179,14 @@ fn file_of(given: &ArgMatches) -> Option<PathBuf> {
 }
 
 fn own_printers(command: &mut args::Command) -> Option<&mut Vec<Printer>> {
-    use args::Command::{Build, Coupon, Demo, Inspect, Plan, Segment};
+    use args::Command::{Batch, Build, Coupon, Demo, Inspect, Plan, Segment};
     match command {
         Build { options, .. }
         | Demo { options, .. }
         | Segment { options, .. }
         | Plan { options, .. }
         | Inspect { options, .. } => Some(&mut options.own_printers),
+        Batch(options) => Some(&mut options.options.own_printers),
         Coupon(options) => Some(&mut options.own_printers),
         _ => None,
     }

@@ -1,6 +1,7 @@
 //! The command line of Shellock: arguments → parameters → library → files.
 
 mod args;
+mod batch;
 mod bears;
 mod bed;
 mod build;
@@ -189,6 +190,7 @@ fn run(session: &Session, command: Command) -> Result<u8, Failure> {
         }
         Command::Coupon(options) => coupon::coupon(session, &options),
         Command::Studio(options) => studio::studio(session, &options),
+        Command::Batch(options) => batch::batch(session, &options),
         Command::Completions { shell } => Ok(manual::completions(shell)),
         Command::Manual { folder } => manual::write(&folder),
         Command::Figure {

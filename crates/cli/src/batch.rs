@@ -1,0 +1,252 @@
+//! `batch`: kits of a folder of models, each made by a process of its own; what is there already is not made again.
+
+mod record;
+mod run;
+mod table;
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::sync::{Condvar, Mutex};
+use std::time::Duration;
+
+use serde_json::json;
+
+use crate::Session;
+use crate::args::BatchOptions;
+use crate::batch::record::{Record, Status};
+use crate::batch::run::{Job, Run};
+use crate::failure::Failure;
+use crate::progress::Shown;
+
+/// How the names of models end.
+const ENDINGS: [&str; 9] = ["stl", "obj", "ply", "off", "3mf", "glb", "gltf", "gz", "zip"];
+/// Folder of the records within the one for kits.
+const RECORDS: &str = ".batch";
+/// Share of what is free at the beginning that kits may take.
+const MEMORY_SHARE: f64 = 0.8;
+/// How often a worker looks whether there is room.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// `shellock batch`.
+pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
+    crate::build::checked(&options.options)?;
+    let models = models(&options.folder, &options.out)?;
+    if models.is_empty() {
+        return Err(Failure::Wrong(format!(
+            "{} holds no model: names end in {}",
+            options.folder.display(),
+            ENDINGS.join(", ")
+        )));
+    }
+    let records = options.out.join(RECORDS);
+    fs::create_dir_all(&records).map_err(Failure::unwritable(&records))?;
+    let run = Run::new(options)?;
+    let shop = Shop::new(session, &run, models, memory_mb(options));
+    std::thread::scope(|scope| {
+        for _ in 0..run.n_workers {
+            scope.spawn(|| shop.work());
+        }
+    });
+    let records = shop.done.into_inner().expect("no worker panics");
+    if session.stop.load(Ordering::Relaxed) {
+        return Err(Failure::Stopped);
+    }
+    if let Some(problem) = records.iter().find_map(|r| r.unwritten.clone()) {
+        return Err(Failure::Wrong(problem));
+    }
+    table::write(&options.out, &records)?;
+    told(session, options, &records);
+    Ok(u8::from(records.iter().any(|r| r.status != Status::Verified)))
+}
+
+/// All models below `folder` but for what lies in `out`, by their paths within it, each with the name of its kit.
+fn models(folder: &Path, out: &Path) -> Result<VecDeque<(PathBuf, PathBuf)>, Failure> {
+    let out = out.canonicalize().ok();
+    let mut found = BTreeSet::new();
+    let mut left = vec![PathBuf::new()];
+    while let Some(below) = left.pop() {
+        let here = folder.join(&below);
+        let unreadable = |source| Failure::Unreadable {
+            path: here.clone(),
+            source,
+        };
+        for entry in fs::read_dir(&here).map_err(unreadable)? {
+            let entry = entry.map_err(unreadable)?;
+            let (name, path) = (below.join(entry.file_name()), entry.path());
+            let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
+            // Links to folders could lead around for ever.
+            let kind = entry.file_type().map_err(unreadable)?;
+            if is_hidden || out.is_some() && path.canonicalize().ok() == out {
+                continue;
+            }
+            if kind.is_dir() {
+                left.push(name);
+            } else if is_model(&name) && path.is_file() {
+                found.insert(name);
+            }
+        }
+    }
+    let mut stems: BTreeMap<PathBuf, usize> = BTreeMap::new();
+    for name in &found {
+        *stems.entry(name.with_extension("")).or_default() += 1;
+    }
+    let kit = |name: &PathBuf| {
+        let stem = name.with_extension("");
+        let file = name.file_name().unwrap_or_default().to_string_lossy();
+        if stems[&stem] == 1 {
+            stem
+        } else {
+            name.with_file_name(file.replace('.', "-"))
+        }
+    };
+    Ok(found.iter().map(|name| (name.clone(), kit(name))).collect())
+}
+
+fn is_model(name: &Path) -> bool {
+    let extension = name.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    extension.is_some_and(|e| ENDINGS.contains(&&e[..]))
+}
+
+/// What all kits together may take, MB.
+fn memory_mb(options: &BatchOptions) -> f64 {
+    let free = || run::available_mb().map_or(f64::INFINITY, |mb| MEMORY_SHARE * mb);
+    options.memory.map_or_else(free, |gb| 1e3 * gb)
+}
+
+/// What workers share.
+struct Shop<'a> {
+    session: &'a Session,
+    run: &'a Run,
+    n_models: usize,
+    left: Mutex<Waiting>,
+    has_room: Condvar,
+    done: Mutex<Vec<Record>>,
+}
+
+struct Waiting {
+    models: VecDeque<(PathBuf, PathBuf)>,
+    free_mb: f64,
+    n_running: usize,
+}
+
+impl<'a> Shop<'a> {
+    fn new(session: &'a Session, run: &'a Run, models: VecDeque<(PathBuf, PathBuf)>, free_mb: f64) -> Self {
+        Self {
+            session,
+            run,
+            n_models: models.len(),
+            left: Mutex::new(Waiting {
+                models,
+                free_mb,
+                n_running: 0,
+            }),
+            has_room: Condvar::new(),
+            done: Mutex::default(),
+        }
+    }
+
+    fn work(&self) {
+        while let Some((job, needs_mb)) = self.next() {
+            let record = self.run.record(self.session, &job);
+            {
+                let mut left = self.left.lock().expect("no worker panics");
+                left.free_mb += needs_mb;
+                left.n_running -= 1;
+            }
+            self.has_room.notify_all();
+            let mut done = self.done.lock().expect("no worker panics");
+            let at = done.partition_point(|other| other.model < record.model);
+            self.tell(&record, done.len() + 1);
+            done.insert(at, record);
+        }
+    }
+
+    /// The next model, once there is room for it; one always has room.
+    fn next(&self) -> Option<(Job, f64)> {
+        let mut left = self.left.lock().expect("no worker panics");
+        loop {
+            if self.session.stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            let (model, _) = left.models.front()?;
+            let needs_mb = self.run.needs_mb(model);
+            if left.n_running == 0 || needs_mb <= left.free_mb {
+                let (model, kit) = left.models.pop_front().expect("it was there");
+                left.free_mb -= needs_mb;
+                left.n_running += 1;
+                return Some((Job { model, kit }, needs_mb));
+            }
+            left = self
+                .has_room
+                .wait_timeout(left, LOOK)
+                .expect("no worker panics")
+                .0;
+        }
+    }
+
+    fn tell(&self, record: &Record, number: usize) {
+        match self.session.shown {
+            Shown::Nothing => {}
+            Shown::Events => eprintln!(
+                "{}",
+                json!({ "event": "model", "number": number, "of": self.n_models, "record": record })
+            ),
+            Shown::ForPeople => println!("{number}/{} {}", self.n_models, record.line()),
+        }
+    }
+}
+
+fn told(session: &Session, options: &BatchOptions, records: &[Record]) {
+    let n = |status| records.iter().filter(|r| r.status == status).count();
+    let verified = n(Status::Verified);
+    if session.is_json {
+        let all: BTreeMap<&str, usize> = Status::ALL.iter().map(|&s| (s.name(), n(s))).collect();
+        println!(
+            "{}",
+            json!({ "status": if verified == records.len() { "verified" } else { "failed" }, "models": records.len(), "by_status": all, "out": options.out, "exit_code": u8::from(verified < records.len()) })
+        );
+    } else if session.shown == Shown::ForPeople {
+        println!(
+            "{verified} of {} models have a kit that passes every check: {}",
+            records.len(),
+            options.out.join(table::PAGE).display()
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_model_has_a_kit_of_its_own_and_what_is_no_model_has_none() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in [
+            "a.stl",
+            "a.obj",
+            "b.STL",
+            "c/a.ply",
+            "c/.hidden.stl",
+            "notes.txt",
+            "out/d.stl",
+        ] {
+            let path = dir.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        let found: Vec<(String, String)> = models(dir.path(), &dir.path().join("out"))
+            .unwrap()
+            .into_iter()
+            .map(|(model, kit)| (model.display().to_string(), kit.display().to_string()))
+            .collect();
+        let expected = [
+            ("a.obj", "a-obj"),
+            ("a.stl", "a-stl"),
+            ("b.STL", "b"),
+            ("c/a.ply", "c/a"),
+        ];
+        assert_eq!(found, expected.map(|(m, k)| (m.to_owned(), k.to_owned())));
+    }
+}

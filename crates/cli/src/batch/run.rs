@@ -1,0 +1,244 @@
+//! One model, made by a process: its memory is its own, and what goes wrong in it does not reach the others.
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use super::RECORDS;
+use super::record::{Record, Status};
+use crate::Session;
+use crate::args::BatchOptions;
+use crate::config;
+use crate::failure::Failure;
+use crate::input::{read, sha256};
+
+/// What a kit takes at least, and for each MB of its model's file, MB: bunny_955k has 18 MB and takes 700.
+const LEAST_MB: f64 = 600.0;
+const MB_PER_MB: f64 = 12.0;
+/// How often it is looked how far a process is.
+const LOOK: Duration = Duration::from_millis(40);
+/// How long a process that is to stop has for it.
+const TO_STOP: Duration = Duration::from_secs(10);
+/// How much of what a process said in its own words is kept, lines.
+const KEPT_LINES: usize = 5;
+
+/// A model and its kit, within their folders.
+pub struct Job {
+    pub model: PathBuf,
+    pub kit: PathBuf,
+}
+
+/// What is the same for all models.
+pub struct Run {
+    folder: PathBuf,
+    out: PathBuf,
+    program: PathBuf,
+    /// Options of `build`, as they were given.
+    arguments: Vec<String>,
+    /// All that kits depend on but for their models.
+    made_with: String,
+    patience: Duration,
+    pub n_workers: usize,
+    n_threads: usize,
+}
+
+impl Run {
+    pub fn new(options: &BatchOptions) -> Result<Self, Failure> {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let n_workers = options.jobs.unwrap_or(cores).clamp(1, 256);
+        let arguments = config::build_arguments(std::env::args_os().collect());
+        let file = options
+            .options
+            .config
+            .clone()
+            .unwrap_or_else(|| PathBuf::from(config::USUAL));
+        let config = fs::read(file).unwrap_or_default();
+        let made_with = [
+            env!("CARGO_PKG_VERSION").as_bytes(),
+            arguments.join("\n").as_bytes(),
+            &config[..],
+        ]
+        .map(|part: &[u8]| sha256(part))
+        .concat();
+        Ok(Self {
+            folder: options.folder.clone(),
+            out: options.out.clone(),
+            program: std::env::current_exe()
+                .map_err(|e| Failure::Wrong(format!("the program does not find itself: {e}")))?,
+            arguments,
+            made_with,
+            patience: Duration::from_secs_f64(options.patience),
+            n_workers,
+            n_threads: cores.div_ceil(n_workers),
+        })
+    }
+
+    /// What a model's kit may take, MB.
+    pub fn needs_mb(&self, model: &Path) -> f64 {
+        let bytes = fs::metadata(self.folder.join(model)).map_or(0, |m| m.len());
+        LEAST_MB + MB_PER_MB * bytes as f64 / 1e6
+    }
+
+    /// Makes the kit, unless it is there.
+    pub fn record(&self, session: &Session, job: &Job) -> Record {
+        let model = self.folder.join(&job.model);
+        let kit = self.out.join(&job.kit);
+        let mut record = Record {
+            made_of: String::new(),
+            model: job.model.to_string_lossy().into_owned(),
+            kit: job.kit.to_string_lossy().into_owned(),
+            status: Status::Refused,
+            seconds: 0.0,
+            peak_mb: None,
+            pieces: None,
+            volume_ratio: None,
+            n_warnings: 0,
+            n_problems: 0,
+            said: Vec::new(),
+            is_old: false,
+            unwritten: None,
+        };
+        match read(&model) {
+            Ok(bytes) => record.made_of = sha256((sha256(&bytes) + &self.made_with).as_bytes()),
+            Err(e) => {
+                record.said.push(e.to_string());
+                return record;
+            }
+        }
+        let noted = self.out.join(RECORDS).join(job.kit.with_extension("json"));
+        if let Some(old) = Record::read(&noted, &record.made_of, &kit) {
+            return old;
+        }
+        let record = self.made(session, record, &model, &kit);
+        if session.stop.load(Ordering::Relaxed) {
+            return record;
+        }
+        let unwritten = record.write(&noted).err().map(|e| e.to_string());
+        Record { unwritten, ..record }
+    }
+
+    fn made(&self, session: &Session, mut record: Record, model: &Path, kit: &Path) -> Record {
+        let since = Instant::now();
+        let ended = self
+            .command(model, kit)
+            .spawn()
+            .map(|child| self.watched(session, child));
+        record.seconds = since.elapsed().as_secs_f64();
+        match ended {
+            Ok(ended) => {
+                record.status = if ended.is_late {
+                    Status::TooLong
+                } else {
+                    Status::of_code(ended.code)
+                };
+                record.peak_mb = ended.peak_mb;
+                record = record.of_output(&ended.output);
+                if record.status == Status::Crashed {
+                    record.said.extend(ended.last_words);
+                }
+            }
+            Err(e) => {
+                record.status = Status::Crashed;
+                record.said.push(e.to_string());
+            }
+        }
+        record
+    }
+
+    fn command(&self, model: &Path, kit: &Path) -> Command {
+        let mut command = Command::new(&self.program);
+        command
+            .arg("build")
+            .arg(model)
+            .arg("--out")
+            .arg(kit)
+            .args(["--force", "--json", "--stop-with-stdin", "--threads"])
+            .arg(self.n_threads.to_string())
+            .args(&self.arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    }
+
+    /// Waits for the end; stops what takes too long, or is not wanted any more.
+    fn watched(&self, session: &Session, mut child: Child) -> Ended {
+        let (output, errors) = (collected(child.stdout.take()), collected(child.stderr.take()));
+        let since = Instant::now();
+        let mut ended = Ended::default();
+        let mut asked: Option<Instant> = None;
+        let status = loop {
+            if let Some(status) = child.try_wait().transpose() {
+                break status;
+            }
+            ended.peak_mb = peak_mb(child.id()).or(ended.peak_mb);
+            let is_late = since.elapsed() > self.patience;
+            if asked.is_none() && (is_late || session.stop.load(Ordering::Relaxed)) {
+                ended.is_late = is_late;
+                asked = Some(Instant::now());
+                drop(child.stdin.take());
+            }
+            if asked.is_some_and(|at| at.elapsed() > TO_STOP) {
+                let _ = child.kill();
+            }
+            std::thread::sleep(LOOK);
+        };
+        ended.code = status.ok().and_then(|status| status.code());
+        ended.output = output.join().unwrap_or_default();
+        let errors = errors.join().unwrap_or_default();
+        let words: Vec<&str> = errors.lines().filter(|line| !line.starts_with('{')).collect();
+        ended.last_words = words
+            .iter()
+            .rev()
+            .take(KEPT_LINES)
+            .rev()
+            .map(|l| (*l).to_owned())
+            .collect();
+        ended
+    }
+}
+
+/// How a process ended.
+#[derive(Default)]
+struct Ended {
+    /// `None` where a signal ended it.
+    code: Option<i32>,
+    is_late: bool,
+    peak_mb: Option<f64>,
+    output: String,
+    last_words: Vec<String>,
+}
+
+/// All that comes out of a pipe, which would block the process if nobody took it.
+fn collected(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        if let Some(mut pipe) = pipe {
+            // What came before an error counts.
+            let _ = pipe.read_to_end(&mut bytes);
+        }
+        String::from_utf8_lossy(&bytes).into_owned()
+    })
+}
+
+/// Most memory that a process had so far, where the system tells it.
+fn peak_mb(process: u32) -> Option<f64> {
+    kilobytes(
+        &fs::read_to_string(format!("/proc/{process}/status")).ok()?,
+        "VmHWM:",
+    )
+}
+
+/// Memory that is free, where the system tells it.
+pub fn available_mb() -> Option<f64> {
+    kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")
+}
+
+fn kilobytes(text: &str, name: &str) -> Option<f64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    let number: f64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(number / 1e3)
+}
