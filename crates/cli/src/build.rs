@@ -7,6 +7,7 @@ use serde_json::json;
 use shellock::context::Progress;
 use shellock::design::{Design, DesignOutcome, Params, Settings, design};
 use shellock::{Ctx, Severity, Warning};
+use shellock_print::Printer;
 
 use crate::Session;
 use crate::args::{Options, Out, Pieces};
@@ -80,6 +81,118 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
     }
 }
 
+/// A kit that is made, but not written.
+pub struct Made {
+    /// With the plan's settings.
+    pub settings: Settings,
+    pub design: Box<Design>,
+    /// What was done with the model and the wishes.
+    pub notes: Vec<String>,
+    /// Of the kit and its plates.
+    pub warnings: Vec<Warning>,
+    pub printing: Printing,
+    /// All files of the kit, by their names in its folder.
+    pub files: Vec<(String, Vec<u8>)>,
+    pub summary: Summary,
+}
+
+impl Made {
+    /// Whether every check passes.
+    pub fn passed(&self) -> bool {
+        self.design.kit.verification.passed()
+    }
+}
+
+/// A job whose wishes are fitted to its model and printer.
+pub struct Begun<'a> {
+    model: &'a Model,
+    options: &'a Options,
+    params: Params,
+    settings: Settings,
+    printer: Printer,
+    notes: Vec<String>,
+}
+
+impl<'a> Begun<'a> {
+    /// What is to be made of `model`; refuses what cannot be.
+    pub fn new(
+        session: &Session,
+        model: &'a Model,
+        options: &'a Options,
+        params: &Params,
+    ) -> Result<Self, Failure> {
+        let printer = options.chosen_printer().map_err(Failure::Wrong)?;
+        let params = fitted(session, params, options, model)?;
+        let settings = Settings::resolve(&params);
+        let mut notes = model.notes.clone();
+        notes.extend(too_large(session, &settings, &printer, model)?);
+        Ok(Self {
+            model,
+            options,
+            params,
+            settings,
+            printer,
+            notes,
+        })
+    }
+
+    /// Makes it; what goes on is told to `show`.
+    pub fn made(self, session: &Session, show: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Made, Failure> {
+        let (model, options) = (self.model, self.options);
+        let clock = PlanClock::new(options.plan_time);
+        let report = |p: Progress<'_>| {
+            clock.see(&p);
+            show(p);
+        };
+        let is_time_up = || clock.is_up();
+        let deadline = Deadline::new(options.time, session.since);
+        let seconds_left = || deadline.seconds_left();
+        let ctx = Ctx::new(&report, &session.stop)
+            .with_time_limit(&is_time_up)
+            .with_deadline(&seconds_left);
+        let design = match design(&ctx, &self.params, &model.solid, model.labels.as_deref())? {
+            DesignOutcome::Made(made) => made,
+            DesignOutcome::NoPlan { reason, blockers } => return Err(no_plan(&reason, &blockers)),
+        };
+        let mut notes = self.notes;
+        if let Some(asked) = self
+            .params
+            .n_pieces
+            .filter(|asked| design.kit.pieces.len() > asked + 1)
+        {
+            notes.push(format!(
+                "{} pieces instead of {asked}: some were divided until every piece locks",
+                design.kit.pieces.len()
+            ));
+        }
+        show(Progress::Stage {
+            name: "files and pictures",
+            n_steps: 0,
+        });
+        let printing = Printing::of(
+            &self.printer,
+            design.kit.pieces.as_slice(),
+            &design.kit.surface.mesh,
+            &model.solid,
+        );
+        let mut warnings = design.warnings.clone();
+        warnings.extend(printing.warnings());
+        let (files, summary) = files(model, options, &self.settings, &design, &warnings, &printing);
+        if session.stop.load(Ordering::Relaxed) {
+            return Err(Failure::Stopped);
+        }
+        Ok(Made {
+            settings: self.settings,
+            design,
+            notes,
+            warnings,
+            printing,
+            files,
+            summary,
+        })
+    }
+}
+
 fn make(
     session: &Session,
     model: &Model,
@@ -87,89 +200,44 @@ fn make(
     params: &Params,
     to: &Destination,
 ) -> Result<u8, Failure> {
-    let printer = options.chosen_printer().map_err(Failure::Wrong)?;
-    let params = &fitted(session, params, options, model)?;
-    let settings = &Settings::resolve(params);
-    let mut notes = model.notes.clone();
-    notes.extend(too_large(session, settings, &printer, model)?);
-    if session.shown == Shown::ForPeople {
+    let begun = Begun::new(session, model, options, params)?;
+    let n_told = begun.notes.len();
+    let is_for_people = session.shown == Shown::ForPeople;
+    if is_for_people {
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
-        notes.iter().for_each(|n| println!("note: {n}"));
+        begun.notes.iter().for_each(|n| println!("note: {n}"));
         thin_warnings(model, options)
             .iter()
             .for_each(|w| println!("warning: {w}"));
     }
     let display = Display::of_kit(session.shown);
-    let clock = PlanClock::new(options.plan_time);
-    let report = |p: Progress<'_>| {
-        clock.see(&p);
-        display.show(p);
-    };
-    let is_time_up = || clock.is_up();
-    let deadline = Deadline::new(options.time, session.since);
-    let seconds_left = || deadline.seconds_left();
-    let ctx = Ctx::new(&report, &session.stop)
-        .with_time_limit(&is_time_up)
-        .with_deadline(&seconds_left);
-    let outcome =
-        design(&ctx, params, &model.solid, model.labels.as_deref()).inspect_err(|_| display.finish())?;
-    let made = match outcome {
-        DesignOutcome::Made(made) => made,
-        DesignOutcome::NoPlan { reason, blockers } => {
-            display.finish();
-            return Err(no_plan(&reason, &blockers));
-        }
-    };
-    if let Some(asked) = params.n_pieces.filter(|asked| made.kit.pieces.len() > asked + 1) {
-        let note = format!(
-            "{} pieces instead of {asked}: some were divided until every piece locks",
-            made.kit.pieces.len()
-        );
-        if session.shown == Shown::ForPeople {
-            println!("note: {note}");
-        }
-        notes.push(note);
-    }
-    let mut warnings = made.warnings.clone();
-    display.show(Progress::Stage {
-        name: "files and pictures",
-        n_steps: 0,
-    });
-    let printing = Printing::of(
-        &printer,
-        made.kit.pieces.as_slice(),
-        &made.kit.surface.mesh,
-        &model.solid,
-    );
-    warnings.extend(printing.warnings());
-    let (files, summary) = files(model, options, settings, &made, &warnings, &printing);
+    let made = begun.made(session, &|p| display.show(p));
     display.finish();
-    if session.stop.load(Ordering::Relaxed) {
-        return Err(Failure::Stopped);
+    let made = made?;
+    if is_for_people {
+        made.notes[n_told..].iter().for_each(|n| println!("note: {n}"));
     }
-    to.write(&files)?;
-    let code = u8::from(!made.kit.verification.passed());
+    to.write(&made.files)?;
+    let code = u8::from(!made.passed());
     let standing = Standing::of(options.up, model.solid.mesh());
     if session.is_json {
-        let course = Course {
-            notes: &notes,
-            stages: &display.stages(),
-        };
-        print_json(to, &course, &made, &summary, &warnings, &printing, code);
+        let stages = display.stages();
+        print_json(to, &made, &stages, code);
     } else if session.shown == Shown::Nothing {
+        let mut warnings = made.warnings.clone();
         warnings.retain(|w| w.severity() > Severity::Note);
         print_warnings(session, &warnings, &standing);
-        print_failures(&made.kit.verification, &standing);
+        print_failures(&made.design.kit.verification, &standing);
     } else {
         let finished = Finished {
             to,
-            made: &made,
-            settings,
-            summary: &summary,
-            warnings: &warnings,
+            made: &made.design,
+            settings: &made.settings,
+            summary: &made.summary,
+            warnings: &made.warnings,
             standing: &standing,
-            printing: &printing,
+            printing: &made.printing,
         };
         finished.print(session);
     }
@@ -189,34 +257,23 @@ fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> Failure {
     Failure::NoPlan(text)
 }
 
-/// How a job went.
-struct Course<'a> {
-    notes: &'a [String],
-    stages: &'a [StageTime],
-}
-
-fn print_json(
-    to: &Destination,
-    course: &Course<'_>,
-    made: &Design,
-    summary: &Summary,
-    warnings: &[Warning],
-    printing: &Printing,
-    code: u8,
-) {
+fn print_json(to: &Destination, made: &Made, stages: &[StageTime], code: u8) {
+    let (kit, strength) = (&made.design.kit, made.design.strength.as_ref());
+    let summary = &made.summary;
     let value = json!({
         "status": if code == 0 { "verified" } else { "failed" },
-        "out": to.folder(), "notes": course.notes,
-        "pieces": made.kit.pieces.len(), "key_piece": made.kit.plan.key(),
-        "volume_ratio": summary.volume_ratio, "grams": summary.grams, "print": printing.entry().time, "fits_within_mm": made.fit.within_mm, "connector_share": summary.connector_share,
-        "thin_share": summary.thin_share, "thickness_mm": made.kit.thickness_mm,
-        "stress_mpa": made.strength.as_ref().map(|s| s.stress_mpa),
-        "is_too_weak": made.strength.as_ref().map(|s| s.is_too_weak), "connector_size": made.kit.sizes.largest_mm(),
-        "key_slides_on_rails_mm": made.kit.rails_mm(),
-        "bears": made.kit.holding.summary(),
-        "checks": made.kit.verification.checks, "findings": made.kit.verification.findings,
-        "effort": made.effort, "stages": course.stages,
-        "warnings": warnings, "exit_code": code,
+        "out": to.folder(), "notes": made.notes,
+        "pieces": kit.pieces.len(), "key_piece": kit.plan.key(),
+        "volume_ratio": summary.volume_ratio, "grams": summary.grams, "print": made.printing.entry().time, "fits_within_mm": made.design.fit.within_mm,
+        "connector_share": summary.connector_share,
+        "thin_share": summary.thin_share, "thickness_mm": kit.thickness_mm,
+        "stress_mpa": strength.map(|s| s.stress_mpa),
+        "is_too_weak": strength.map(|s| s.is_too_weak), "connector_size": kit.sizes.largest_mm(),
+        "key_slides_on_rails_mm": kit.rails_mm(),
+        "bears": kit.holding.summary(),
+        "checks": kit.verification.checks, "findings": kit.verification.findings,
+        "effort": made.design.effort, "stages": stages,
+        "warnings": made.warnings, "exit_code": code,
     });
     println!("{value}");
 }

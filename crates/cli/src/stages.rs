@@ -9,7 +9,7 @@ use shellock::certificate::{OtherFile, PieceFile};
 use shellock::design::{self, DesignError, Planned, Settings};
 use shellock::verify::words::Coordinates;
 use shellock::verify::{Assembly, VerifyParams};
-use shellock::{Ctx, IdVec, InstallationPlan, PatchId, segmentation};
+use shellock::{Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, segmentation};
 use shellock_formats::{write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
@@ -59,7 +59,7 @@ fn extension(path: &Path) -> String {
 
 /// `shellock segment`.
 pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) -> Result<u8, Failure> {
-    let params = checked(options)?;
+    checked(options)?;
     let kind = extension(out);
     if !["ply", "3mf", "seg"].contains(&kind.as_str()) {
         return Err(Failure::Wrong(format!(
@@ -68,17 +68,10 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         )));
     }
     let model = input::model(session, file, options)?;
-    let settings = Settings::resolve(&fitted(session, &params, options, &model)?);
     let display = Display::new(session.shown);
     let report = |p: shellock::context::Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
-    let surface = segmentation::segment(
-        &ctx,
-        &settings.segmentation,
-        &model.solid,
-        model.labels.as_deref(),
-    )
-    .map_err(DesignError::from)?;
+    let surface = divided(session, &ctx, &model, options)?;
     display.finish();
     let mut notes = model.notes.clone();
     let bytes = match kind.as_str() {
@@ -110,8 +103,21 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
     Ok(0)
 }
 
+/// The surface of `model` as it is divided.
+pub fn divided(
+    session: &Session,
+    ctx: &Ctx,
+    model: &input::Model,
+    options: &Options,
+) -> Result<SegmentedSurface, Failure> {
+    let settings = Settings::resolve(&fitted(session, &checked(options)?, options, model)?);
+    let labels = model.labels.as_deref();
+    let surface = segmentation::segment(ctx, &settings.segmentation, &model.solid, labels);
+    Ok(surface.map_err(DesignError::from)?)
+}
+
 /// For each face of the file, the patch that has most of its area; faces that were dropped are of the first.
-fn labels_of_file(model: &input::Model, surface: &shellock::SegmentedSurface) -> Vec<u32> {
+pub fn labels_of_file(model: &input::Model, surface: &SegmentedSurface) -> Vec<u32> {
     let mut best = vec![(0.0f64, PatchId(0)); model.n_file_faces];
     let mut area = vec![0.0; surface.n_patches];
     let mut from = 0;

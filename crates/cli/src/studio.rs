@@ -2,7 +2,6 @@
 
 mod advice;
 mod bench;
-mod choices;
 mod figure;
 mod finer;
 mod judgement;

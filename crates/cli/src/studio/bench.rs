@@ -15,7 +15,6 @@ use shellock_geom::Vec3;
 use shellock_print::Printer;
 use shellock_studio::{Refusal, Task, Workshop};
 
-use super::choices::{self, Choices};
 use super::figure::Figure;
 use super::finer::{self, finer};
 use super::judgement::{Judged, judge};
@@ -24,6 +23,7 @@ use crate::Session;
 use crate::args::Options;
 use crate::bed::fitted;
 use crate::build::checked;
+use crate::choices::{self, Choices};
 use crate::config;
 use crate::failure::Failure;
 use crate::input::{read, shellock_figure};

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use shellock_formats::{read_labels, write_labels};
 use toml_edit::Item;
 
-use super::choices::Choices;
+use crate::choices::Choices;
 use crate::config;
 use crate::failure::Failure;
 use crate::input::{read, sha256};

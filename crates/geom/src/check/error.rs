@@ -149,6 +149,22 @@ pub enum InputError {
     NotSolid(NotSolid),
 }
 
+impl InputError {
+    /// The first place where something is wrong, in the mesh's units; `None` where it is no place.
+    pub fn at(&self) -> Option<Vec3> {
+        match *self {
+            Self::Shared { at, .. }
+            | Self::Turned { at, .. }
+            | Self::Open { at, .. }
+            | Self::Loose { at, .. }
+            | Self::Pinched { at, .. }
+            | Self::Crossing { at, .. }
+            | Self::OneSided { at, .. } => Some(at),
+            _ => None,
+        }
+    }
+}
+
 /// How many bodies a message lists.
 const N_LISTED: usize = 3;
 

@@ -1,0 +1,257 @@
+//! The jobs of the command line for programs that embed them: meshes and options in, kits out; no file, no standard output.
+//!
+//! Options have the names and words that they have on the command line, and mean the same: a kit has the bytes that
+//! `shellock build` would write of a PLY file with the same points, triangles and labels.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+use serde_json::{Map, Value, json};
+use shellock::context::Progress;
+use shellock::verify::{Assembly, VerifyParams};
+use shellock::{Ctx, Direction, InstallationPlan, PatchId};
+use shellock_formats::{read_mesh, write_ply};
+use shellock_geom::weld::weld;
+use shellock_geom::{TriMesh, Vec3};
+
+use crate::Session;
+use crate::args::Options;
+use crate::build::{Begun, checked};
+use crate::choices;
+use crate::course::Course;
+use crate::failure::Failure;
+use crate::input::{self, Model};
+use crate::output::Destination;
+use crate::progress::Shown;
+use crate::stages;
+
+/// Why there is no result.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// The exit code of the command line: 2 for what was given, 3 for no plan, 4 for what could not be written, 130 for stopped.
+    pub code: u8,
+    /// For people.
+    pub message: String,
+    /// Where, in the model's units.
+    pub at: Option<[f64; 3]>,
+}
+
+impl Problem {
+    /// Something that was given is wrong.
+    pub fn wrong(message: String) -> Self {
+        Self {
+            code: 2,
+            message,
+            at: None,
+        }
+    }
+}
+
+impl From<Failure> for Problem {
+    fn from(failure: Failure) -> Self {
+        let at = match &failure {
+            Failure::NotOneBody { source, .. } => source.at().map(|at| at.to_array()),
+            _ => None,
+        };
+        Self {
+            code: failure.exit_code(),
+            message: failure.to_string(),
+            at,
+        }
+    }
+}
+
+impl From<shellock_studio::Refusal> for Problem {
+    fn from(refusal: shellock_studio::Refusal) -> Self {
+        Self::wrong(refusal.to_string())
+    }
+}
+
+/// What goes on.
+pub enum News<'a> {
+    /// A stage begins: the `number`-th of `n`, where they are counted.
+    Stage {
+        /// Its name.
+        name: &'a str,
+        /// From 1; 0 where stages are not counted.
+        number: usize,
+        /// How many there are.
+        n: usize,
+    },
+    /// Something was decided.
+    Note(&'a str),
+}
+
+/// A closed surface and what is wanted of it.
+pub struct Request<'a> {
+    /// Points and triangles in file units, as of a PLY file.
+    pub mesh: &'a TriMesh,
+    /// One label a triangle, where pieces are given.
+    pub labels: Option<&'a [i32]>,
+    /// The model's name, as of a file without its ending.
+    pub name: &'a str,
+    /// Options by their long names on the command line: a text or a number each, `true` for a flag, a list where one may be given several times.
+    pub options: &'a Map<String, Value>,
+}
+
+/// A kit, made but not written.
+pub struct Kit {
+    /// All files of its folder, by their names there.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// The pieces in the order in which they go in, in place, mm.
+    pub pieces: Vec<TriMesh>,
+    /// Whether every check passes.
+    pub passed: bool,
+    /// `code`, `severity`, `message`, `pieces` and `at` of each warning, what matters most first.
+    pub warnings: Value,
+    /// What was done with the model and the wishes.
+    pub notes: Vec<String>,
+}
+
+impl Kit {
+    /// Writes all files to `folder`, whole or not at all; replaces an earlier kit if `may_replace`, and nothing else.
+    pub fn save(&self, folder: &Path, may_replace: bool) -> Result<(), Problem> {
+        let to = Destination::new(folder.to_owned(), may_replace)?;
+        Ok(to.write(&self.files)?)
+    }
+}
+
+/// Makes the kit that `shellock build` makes. `stop` ends it early.
+pub fn design(
+    request: &Request<'_>,
+    news: &(dyn Fn(News<'_>) + Sync),
+    stop: &Arc<AtomicBool>,
+) -> Result<Kit, Problem> {
+    let session = session(stop);
+    let options = options_of(request)?;
+    let params = checked(&options)?;
+    let model = input::simple(&session, model(request, &options)?, &options)?;
+    let course = Mutex::new(Course::new());
+    let made =
+        Begun::new(&session, &model, &options, &params)?.made(&session, &|p| tell(&course, news, &p))?;
+    let warnings = shellock::Warning::ranked(&made.warnings);
+    Ok(Kit {
+        passed: made.passed(),
+        pieces: made
+            .design
+            .kit
+            .pieces
+            .iter()
+            .map(|(_, mesh)| mesh.clone())
+            .collect(),
+        warnings: json!(warnings),
+        notes: made.notes,
+        files: made.files,
+    })
+}
+
+/// Divides the surface as `shellock segment` does: for each triangle the number of its piece, from 1.
+pub fn segment(
+    request: &Request<'_>,
+    news: &(dyn Fn(News<'_>) + Sync),
+    stop: &Arc<AtomicBool>,
+) -> Result<Vec<u32>, Problem> {
+    let session = session(stop);
+    let options = options_of(request)?;
+    let model = model(request, &options)?;
+    let course = Mutex::new(Course::new());
+    let report = |p: Progress<'_>| tell(&course, news, &p);
+    let surface = stages::divided(&session, &Ctx::new(&report, stop), &model, &options)?;
+    Ok(stages::labels_of_file(&model, &surface))
+}
+
+/// Judges any assembly of closed meshes in place, mm, as `shellock verify` does: whether it goes together in this order
+/// and nothing but the last comes out. `pulled_out_along` is the way out of each piece; the first needs none.
+pub fn verify(
+    pieces: &[TriMesh],
+    pulled_out_along: &[Option<[f64; 3]>],
+    clearance_mm: f64,
+    stop: &Arc<AtomicBool>,
+) -> Result<Value, Problem> {
+    let wrong = Problem::wrong;
+    if pieces.len() < 2 || pieces.len() != pulled_out_along.len() {
+        return Err(wrong(format!(
+            "{} pieces and {} ways out: an assembly has at least two pieces, and a way for each",
+            pieces.len(),
+            pulled_out_along.len()
+        )));
+    }
+    if !(0.0..=1.0).contains(&clearance_mm) {
+        return Err(wrong(format!(
+            "a clearance of {clearance_mm} mm is none; 0 to 1 mm are"
+        )));
+    }
+    let step = |(i, along): (usize, &Option<[f64; 3]>)| {
+        let along = along.or((i == 0).then_some([0.0, 0.0, 1.0]));
+        let way = along.and_then(|along| Direction::of(Vec3::from(along)));
+        let way = way.ok_or_else(|| {
+            wrong(format!(
+                "piece {} has no way out: three numbers, not all 0",
+                i + 1
+            ))
+        })?;
+        Ok((PatchId::from(i), way))
+    };
+    let steps: Result<Vec<_>, Problem> = pulled_out_along.iter().enumerate().map(step).collect();
+    let plan = InstallationPlan::new(steps?);
+    let pieces = pieces.iter().map(|mesh| weld(mesh).mesh).collect();
+    let assembly = Assembly {
+        model: None,
+        pieces: &pieces,
+        plan: &plan,
+        press_fits: &[],
+    };
+    let params = VerifyParams {
+        clearance_mm,
+        seed: 0,
+    };
+    let silent = |_: Progress<'_>| ();
+    let verdict = shellock::verify(&Ctx::new(&silent, stop), &params, &assembly).map_err(Failure::from)?;
+    let found = &verdict.verification;
+    Ok(json!({ "passed": found.passed(), "checks": found.checks, "findings": found.findings }))
+}
+
+/// All options: `name`, `group`, `help`, `kind`, `choices`, `default` and `is_many` of each.
+pub fn options() -> Value {
+    choices::told(&Vec::new(), &[])
+}
+
+fn session(stop: &Arc<AtomicBool>) -> Session {
+    Session {
+        is_json: false,
+        is_verbose: false,
+        shown: Shown::Nothing,
+        stop: Arc::clone(stop),
+        since: Instant::now(),
+    }
+}
+
+fn options_of(request: &Request<'_>) -> Result<Options, Problem> {
+    let chosen = choices::changed(&Vec::new(), request.options)?;
+    Ok(choices::options(&chosen, &[])?)
+}
+
+/// The model, by way of the bytes of its PLY file: what is written of them stands in the kit.
+fn model(request: &Request<'_>, options: &Options) -> Result<Model, Problem> {
+    let bytes = write_ply(request.mesh, request.labels);
+    let path = format!("{}.ply", request.name);
+    let loaded =
+        read_mesh(&bytes, Some("ply")).map_err(|e| Problem::wrong(format!("{}: {e}", request.name)))?;
+    Ok(input::model_of(Path::new(&path), &loaded, &bytes, options)?)
+}
+
+fn tell(course: &Mutex<Course>, news: &(dyn Fn(News<'_>) + Sync), progress: &Progress<'_>) {
+    match *progress {
+        Progress::Stage { name, .. } => {
+            let mut course = course.lock().expect("no holder of this lock panics");
+            let stand = course.begin(name, Instant::now());
+            drop(course);
+            let (number, n) = stand.map_or((0, 0), |stand| (stand.number, stand.of));
+            news(News::Stage { name, number, n });
+        }
+        Progress::Note(text) => news(News::Note(text)),
+        Progress::Step => {}
+    }
+}

@@ -1,0 +1,296 @@
+//! What `import shellock` calls: arrays in, kits out. The package in `shellock/` has the words for people.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use numpy::ndarray::Array2;
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use serde_json::{Map, Value};
+use shellock_check::{Finding, Verdict};
+use shellock_cli::embed::{self, News, Problem, Request};
+use shellock_geom::{TriMesh, Vec3};
+
+create_exception!(
+    _native,
+    Refused,
+    PyException,
+    "Code and message of what went wrong."
+);
+
+/// How often it is looked for Ctrl-C.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// A mesh as arrays: points (n, 3), triangles (m, 3).
+type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
+
+/// A kit that is made.
+#[pyclass(frozen, module = "shellock._native")]
+struct Kit(embed::Kit);
+
+#[pymethods]
+impl Kit {
+    #[getter]
+    fn passed(&self) -> bool {
+        self.0.passed
+    }
+
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.0.notes.clone()
+    }
+
+    fn warnings(&self) -> String {
+        self.0.warnings.to_string()
+    }
+
+    fn pieces<'py>(&self, py: Python<'py>) -> Vec<Arrays<'py>> {
+        self.0.pieces.iter().map(|mesh| arrays(py, mesh)).collect()
+    }
+
+    fn files<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for (name, bytes) in &self.0.files {
+            all.set_item(name, PyBytes::new(py, bytes))?;
+        }
+        Ok(all)
+    }
+
+    fn save(&self, py: Python<'_>, folder: std::path::PathBuf, force: bool) -> PyResult<()> {
+        py.detach(|| self.0.save(&folder, force)).map_err(raised)
+    }
+}
+
+/// Makes a kit. `options` is a JSON object; `progress` is called with a stage, its number, how many there are, and a note.
+#[pyfunction]
+#[pyo3(signature = (points, triangles, labels, name, options, progress))]
+fn design(
+    py: Python<'_>,
+    points: PyReadonlyArray2<'_, f64>,
+    triangles: PyReadonlyArray2<'_, u32>,
+    labels: Option<PyReadonlyArray1<'_, i32>>,
+    name: &str,
+    options: &str,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Kit> {
+    let input = Input::new(&points, &triangles, labels.as_ref(), options)?;
+    waited(py, progress, |news, stop| {
+        embed::design(&input.request(name), news, stop)
+    })
+    .map(Kit)
+}
+
+/// Divides a surface: for each triangle the number of its piece, from 1.
+#[pyfunction]
+#[pyo3(signature = (points, triangles, labels, options, progress))]
+fn segment(
+    py: Python<'_>,
+    points: PyReadonlyArray2<'_, f64>,
+    triangles: PyReadonlyArray2<'_, u32>,
+    labels: Option<PyReadonlyArray1<'_, i32>>,
+    options: &str,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Vec<u32>> {
+    let input = Input::new(&points, &triangles, labels.as_ref(), options)?;
+    waited(py, progress, |news, stop| {
+        embed::segment(&input.request("model"), news, stop)
+    })
+}
+
+/// Judges an assembly; a JSON object with `passed`, `checks` and `findings`.
+#[pyfunction]
+fn verify(
+    py: Python<'_>,
+    pieces: Vec<(PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, u32>)>,
+    pulled_out_along: Vec<Option<[f64; 3]>>,
+    clearance: f64,
+) -> PyResult<String> {
+    let meshes: PyResult<Vec<TriMesh>> = pieces.iter().map(|(p, t)| mesh(p, t)).collect();
+    let meshes = meshes?;
+    let told = waited(py, None, |_, stop| {
+        embed::verify(&meshes, &pulled_out_along, clearance, stop)
+    })?;
+    Ok(told.to_string())
+}
+
+/// Checks the certificate of a kit's folder: claim, verdict and figure of each finding.
+#[pyfunction]
+fn check(py: Python<'_>, folder: std::path::PathBuf) -> PyResult<Vec<(String, String, String)>> {
+    let found = py.detach(|| shellock_check::check(&folder));
+    let found = found.map_err(|message| raised(wrong(message)))?;
+    let word = |verdict| match verdict {
+        Verdict::Confirmed => "confirmed",
+        Verdict::Refuted => "refuted",
+        Verdict::Unproven => "unproven",
+    };
+    let told = |f: Finding| (f.claim, word(f.verdict).to_owned(), f.figure);
+    Ok(found.into_iter().map(told).collect())
+}
+
+/// All options, as a JSON list.
+#[pyfunction]
+fn options() -> String {
+    embed::options().to_string()
+}
+
+/// What is asked for, out of the interpreter's hands.
+struct Input {
+    mesh: TriMesh,
+    labels: Option<Vec<i32>>,
+    options: Map<String, Value>,
+}
+
+impl Input {
+    fn new(
+        points: &PyReadonlyArray2<'_, f64>,
+        triangles: &PyReadonlyArray2<'_, u32>,
+        labels: Option<&PyReadonlyArray1<'_, i32>>,
+        options: &str,
+    ) -> PyResult<Self> {
+        let options = serde_json::from_str(options);
+        Ok(Self {
+            mesh: mesh(points, triangles)?,
+            labels: labels.map(|labels| labels.as_array().to_vec()),
+            options: options.map_err(|e| raised(wrong(format!("options: {e}"))))?,
+        })
+    }
+
+    fn request<'a>(&'a self, name: &'a str) -> Request<'a> {
+        Request {
+            mesh: &self.mesh,
+            labels: self.labels.as_deref(),
+            name,
+            options: &self.options,
+        }
+    }
+}
+
+fn mesh(points: &PyReadonlyArray2<'_, f64>, triangles: &PyReadonlyArray2<'_, u32>) -> PyResult<TriMesh> {
+    let (points, triangles) = (points.as_array(), triangles.as_array());
+    if points.ncols() != 3 || triangles.ncols() != 3 {
+        return Err(raised(wrong(
+            "points and triangles have three columns each".into(),
+        )));
+    }
+    let n_points = points.nrows();
+    if triangles.iter().any(|&v| v as usize >= n_points) {
+        return Err(raised(wrong(format!(
+            "a triangle names a point that is none of the {n_points}"
+        ))));
+    }
+    Ok(TriMesh {
+        points: points
+            .rows()
+            .into_iter()
+            .map(|p| Vec3::new(p[0], p[1], p[2]))
+            .collect(),
+        triangles: triangles.rows().into_iter().map(|t| [t[0], t[1], t[2]]).collect(),
+    })
+}
+
+fn arrays<'py>(py: Python<'py>, mesh: &TriMesh) -> Arrays<'py> {
+    let points = Array2::from_shape_fn((mesh.points.len(), 3), |(i, k)| mesh.points[i][k]);
+    let triangles = Array2::from_shape_fn((mesh.triangles.len(), 3), |(i, k)| mesh.triangles[i][k]);
+    (points.to_pyarray(py), triangles.to_pyarray(py))
+}
+
+fn wrong(message: String) -> Problem {
+    Problem::wrong(message)
+}
+
+fn raised(problem: Problem) -> PyErr {
+    Refused::new_err((problem.code, problem.message, problem.at))
+}
+
+/// News that go to another thread.
+struct Event {
+    stage: String,
+    number: usize,
+    n: usize,
+    note: Option<String>,
+}
+
+/// Does `job` in a thread of its own, while this one hears of Ctrl-C and calls `progress`.
+fn waited<T: Send>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    job: impl FnOnce(&(dyn Fn(News<'_>) + Sync), &Arc<AtomicBool>) -> Result<T, Problem> + Send,
+) -> PyResult<T> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let (send, receive) = channel();
+    // Other threads of the interpreter may go on meanwhile; a receiver alone may not be shared with this one's pause.
+    let receive = Mutex::new(receive);
+    let mut interrupt = None;
+    let ended = std::thread::scope(|scope| {
+        let stop_of_job = Arc::clone(&stop);
+        let worker = scope.spawn(move || {
+            let send = Mutex::new(send);
+            let news = |news: News<'_>| {
+                let event = event(news);
+                // Nobody listens any more where the job is to stop.
+                let _ = send.lock().map(|send| send.send(event));
+            };
+            job(&news, &stop_of_job)
+        });
+        loop {
+            let event = py.detach(|| {
+                receive
+                    .lock()
+                    .map_or(Err(RecvTimeoutError::Disconnected), |r| r.recv_timeout(LOOK))
+            });
+            let heard = match event {
+                Ok(event) => told(py, progress.as_ref(), &event),
+                Err(RecvTimeoutError::Timeout) => py.check_signals(),
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
+            if let Err(e) = heard.and_then(|()| py.check_signals()) {
+                stop.store(true, Ordering::Relaxed);
+                interrupt.get_or_insert(e);
+            }
+        }
+        py.detach(|| worker.join())
+    });
+    match (interrupt, ended) {
+        (Some(e), _) => Err(e),
+        (None, Ok(result)) => result.map_err(raised),
+        (None, Err(_)) => Err(PyRuntimeError::new_err(
+            "the program failed where it never should: please report the model",
+        )),
+    }
+}
+
+fn event(news: News<'_>) -> Event {
+    match news {
+        News::Stage { name, number, n } => Event {
+            stage: name.to_owned(),
+            number,
+            n,
+            note: None,
+        },
+        News::Note(text) => Event {
+            stage: String::new(),
+            number: 0,
+            n: 0,
+            note: Some(text.to_owned()),
+        },
+    }
+}
+
+fn told(py: Python<'_>, progress: Option<&Py<PyAny>>, event: &Event) -> PyResult<()> {
+    let Some(progress) = progress else {
+        return Ok(());
+    };
+    progress.call1(py, (&event.stage, event.number, event.n, event.note.as_deref()))?;
+    Ok(())
+}
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::{Kit, Refused, check, design, options, segment, verify};
+}
