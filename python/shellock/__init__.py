@@ -16,14 +16,17 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from . import _native
 
+__version__: str = _native.VERSION
+
 __all__ = [
-    "Kit", "Warning", "Finding", "Progress", "design", "segment", "verify", "check", "options",
+    "Kit", "Warning", "Finding", "Progress", "build", "design", "segment", "verify", "check", "options",
     "ShellockError", "InputError", "NoPlanError", "WriteError",
 ]
 
@@ -115,6 +118,11 @@ class Kit:
         return json.loads(self.files["plan.json"])
 
     @property
+    def checks(self) -> List[Dict[str, Any]]:
+        """``name``, ``ok`` and ``figure`` of each check of the finished pieces."""
+        return self.plan["verification"]["checks"]
+
+    @property
     def warnings(self) -> List[Warning]:
         """What matters most first."""
         def one(w: Mapping[str, Any]) -> Warning:
@@ -158,8 +166,27 @@ def design(
     Raises :class:`InputError` for a model or option that is wrong, :class:`NoPlanError` where no plan is found.
     """
     points, triangles = _mesh(vertices, faces)
-    native = _asked(_native.design, points, triangles, _labels(labels, len(triangles)), name, _options(options), _listener(progress))
+    native = _asked(_native.design, points, triangles, _labels(labels, len(triangles)), f"{name}.ply", _options(options), _listener(progress))
     return Kit(native)
+
+
+def build(
+    file: Union[str, "os.PathLike[str]", bytes],
+    *,
+    name: Optional[str] = None,
+    progress: Optional[Callable[[Progress], Any]] = None,
+    **options: Any,
+) -> Kit:
+    """Makes the kit of a model's file (3MF, STL, OBJ, PLY, OFF, glTF, GLB), which may be given by its bytes and ``name``.
+
+    The kit has the bytes that ``shellock build`` writes of that file.
+    """
+    if isinstance(file, bytes):
+        data, name = file, name or "model"
+    else:
+        path = Path(file)
+        data, name = path.read_bytes(), name or path.name
+    return Kit(_asked(_native.build, data, name, _options(options), _listener(progress)))
 
 
 def segment(

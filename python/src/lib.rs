@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::{Map, Value};
 use shellock_check::{Finding, Verdict};
-use shellock_cli::embed::{self, News, Problem, Request};
+use shellock_cli::embed::{self, News, Problem, Request, Source};
 use shellock_geom::{TriMesh, Vec3};
 
 create_exception!(
@@ -85,6 +85,22 @@ fn design(
     .map(Kit)
 }
 
+/// Makes a kit of a file's bytes.
+#[pyfunction]
+#[pyo3(signature = (file, name, options, progress))]
+fn build(
+    py: Python<'_>,
+    file: &[u8],
+    name: &str,
+    options: &str,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Kit> {
+    let options = &chosen(options)?;
+    let model = Source::File(file);
+    let request = Request { model, name, options };
+    waited(py, progress, |news, stop| embed::design(&request, news, stop)).map(Kit)
+}
+
 /// Divides a surface: for each triangle the number of its piece, from 1.
 #[pyfunction]
 #[pyo3(signature = (points, triangles, labels, options, progress))]
@@ -98,7 +114,7 @@ fn segment(
 ) -> PyResult<Vec<u32>> {
     let input = Input::new(&points, &triangles, labels.as_ref(), options)?;
     waited(py, progress, |news, stop| {
-        embed::segment(&input.request("model"), news, stop)
+        embed::segment(&input.request("model.ply"), news, stop)
     })
 }
 
@@ -152,22 +168,24 @@ impl Input {
         labels: Option<&PyReadonlyArray1<'_, i32>>,
         options: &str,
     ) -> PyResult<Self> {
-        let options = serde_json::from_str(options);
         Ok(Self {
             mesh: mesh(points, triangles)?,
             labels: labels.map(|labels| labels.as_array().to_vec()),
-            options: options.map_err(|e| raised(wrong(format!("options: {e}"))))?,
+            options: chosen(options)?,
         })
     }
 
     fn request<'a>(&'a self, name: &'a str) -> Request<'a> {
         Request {
-            mesh: &self.mesh,
-            labels: self.labels.as_deref(),
+            model: Source::Mesh(&self.mesh, self.labels.as_deref()),
             name,
             options: &self.options,
         }
     }
+}
+
+fn chosen(options: &str) -> PyResult<Map<String, Value>> {
+    serde_json::from_str(options).map_err(|e| raised(wrong(format!("options: {e}"))))
 }
 
 fn mesh(points: &PyReadonlyArray2<'_, f64>, triangles: &PyReadonlyArray2<'_, u32>) -> PyResult<TriMesh> {
@@ -292,5 +310,7 @@ fn told(py: Python<'_>, progress: Option<&Py<PyAny>>, event: &Event) -> PyResult
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::{Kit, Refused, check, design, options, segment, verify};
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
+    #[pymodule_export]
+    use super::{Kit, Refused, build, check, design, options, segment, verify};
 }

@@ -93,7 +93,7 @@ def test_pieces_are_closed_and_the_plan_names_them(kit):
         edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
         assert (np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all()
     assert all(w.severity in ("note", "warning", "problem") and w.message for w in kit.warnings)
-    assert "Kit of" in repr(kit)
+    assert "Kit of" in repr(kit) and all(check["ok"] for check in kit.checks)
 
 
 def test_a_kit_outlives_what_it_was_made_of(vase):

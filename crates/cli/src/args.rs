@@ -7,6 +7,7 @@ mod pieces;
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use shellock::coupon::N_FITS;
@@ -25,9 +26,20 @@ use crate::units;
 const EXIT_CODES: &str = "Exit codes: 0 made and verified, or it holds · 1 made, but a check or test failed · 2 the input or an argument is wrong · \
 3 no plan could be found · 4 a file could not be written · 130 stopped with Ctrl-C (nothing is left behind)";
 
+/// The version, and the commit where a release was built of one (`scripts/release`).
+fn version() -> &'static str {
+    match option_env!("SHELLOCK_COMMIT") {
+        None => env!("CARGO_PKG_VERSION"),
+        Some(commit) => {
+            static WITH_COMMIT: OnceLock<String> = OnceLock::new();
+            WITH_COMMIT.get_or_init(|| format!("{} ({commit})", env!("CARGO_PKG_VERSION")))
+        }
+    }
+}
+
 /// Turns a closed 3D model into hollow pieces that lock each other without glue.
 #[derive(Parser)]
-#[command(name = "shellock", version, about, after_help = EXIT_CODES, disable_help_flag = true)]
+#[command(name = "shellock", version = version(), about, after_help = EXIT_CODES, disable_help_flag = true)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,

@@ -3,6 +3,7 @@
 //! Options have the names and words that they have on the command line, and mean the same: a kit has the bytes that
 //! `shellock build` would write of a PLY file with the same points, triangles and labels.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -49,7 +50,7 @@ impl Problem {
     }
 }
 
-impl From<Failure> for Problem {
+impl std::convert::From<Failure> for Problem {
     fn from(failure: Failure) -> Self {
         let at = match &failure {
             Failure::NotOneBody { source, .. } => source.at().map(|at| at.to_array()),
@@ -63,7 +64,7 @@ impl From<Failure> for Problem {
     }
 }
 
-impl From<shellock_studio::Refusal> for Problem {
+impl std::convert::From<shellock_studio::Refusal> for Problem {
     fn from(refusal: shellock_studio::Refusal) -> Self {
         Self::wrong(refusal.to_string())
     }
@@ -84,13 +85,19 @@ pub enum News<'a> {
     Note(&'a str),
 }
 
+/// Where a model comes from.
+pub enum Source<'a> {
+    /// Points and triangles in file units, as of a PLY file, and one label a triangle where pieces are given.
+    Mesh(&'a TriMesh, Option<&'a [i32]>),
+    /// The bytes of a file of any format that is read.
+    File(&'a [u8]),
+}
+
 /// A closed surface and what is wanted of it.
 pub struct Request<'a> {
-    /// Points and triangles in file units, as of a PLY file.
-    pub mesh: &'a TriMesh,
-    /// One label a triangle, where pieces are given.
-    pub labels: Option<&'a [i32]>,
-    /// The model's name, as of a file without its ending.
+    /// The surface.
+    pub model: Source<'a>,
+    /// The name of the model's file.
     pub name: &'a str,
     /// Options by their long names on the command line: a text or a number each, `true` for a flag, a list where one may be given several times.
     pub options: &'a Map<String, Value>,
@@ -233,13 +240,19 @@ fn options_of(request: &Request<'_>) -> Result<Options, Problem> {
     Ok(choices::options(&chosen, &[])?)
 }
 
-/// The model, by way of the bytes of its PLY file: what is written of them stands in the kit.
+/// The model, by way of the bytes of its file: what is written of them stands in the kit.
 fn model(request: &Request<'_>, options: &Options) -> Result<Model, Problem> {
-    let bytes = write_ply(request.mesh, request.labels);
-    let path = format!("{}.ply", request.name);
-    let loaded =
-        read_mesh(&bytes, Some("ply")).map_err(|e| Problem::wrong(format!("{}: {e}", request.name)))?;
-    Ok(input::model_of(Path::new(&path), &loaded, &bytes, options)?)
+    let path = Path::new(request.name);
+    let bytes = match request.model {
+        Source::Mesh(mesh, labels) => Cow::Owned(write_ply(mesh, labels)),
+        Source::File(bytes) => Cow::Borrowed(bytes),
+    };
+    let extension = path.extension().and_then(|e| e.to_str());
+    let loaded = read_mesh(&bytes, extension).map_err(|source| Failure::NotAMesh {
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok(input::model_of(path, &loaded, &bytes, options)?)
 }
 
 fn tell(course: &Mutex<Course>, news: &(dyn Fn(News<'_>) + Sync), progress: &Progress<'_>) {

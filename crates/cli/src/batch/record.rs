@@ -100,7 +100,7 @@ impl Record {
         let has_kit = !matches!(record.status, Status::Verified | Status::Failed)
             || kit.join(crate::output::PLAN).is_file();
         let is_same = record.made_of == made_of && record.status.is_final() && has_kit;
-        is_same.then(|| Self {
+        is_same.then_some(Self {
             is_old: true,
             ..record
         })
