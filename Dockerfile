@@ -1,0 +1,11 @@
+# docker build -t shellock . && docker run --rm -v "$PWD:/work" shellock build figure.stl
+FROM rust:1-slim AS build
+RUN apt-get update && apt-get install -y --no-install-recommends gcc musl-tools binutils git && rm -rf /var/lib/apt/lists/*
+WORKDIR /source
+COPY . .
+RUN scripts/release /dist && mkdir /release && tar -xzf /dist/*.tar.gz -C /release --strip-components=1
+
+FROM scratch
+COPY --from=build /release/shellock /release/shellock-check /bin/
+WORKDIR /work
+ENTRYPOINT ["/bin/shellock"]
