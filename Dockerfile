@@ -1,6 +1,6 @@
 # docker build -t shellock . && docker run --rm -v "$PWD:/work" shellock build figure.stl
 FROM rust:1-slim AS build
-RUN apt-get update && apt-get install -y --no-install-recommends gcc musl-tools binutils git && rm -rf /var/lib/apt/lists/*
+RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev binutils git && rm -rf /var/lib/apt/lists/*
 WORKDIR /source
 COPY . .
 RUN scripts/release /dist && mkdir /release && tar -xzf /dist/*.tar.gz -C /release --strip-components=1
