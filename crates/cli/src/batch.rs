@@ -156,6 +156,9 @@ impl<'a> Shop<'a> {
                 left.n_running -= 1;
             }
             self.has_room.notify_all();
+            if self.session.stop.load(Ordering::Relaxed) {
+                return;
+            }
             let mut done = self.done.lock().expect("no worker panics");
             let at = done.partition_point(|other| other.model < record.model);
             self.tell(&record, done.len() + 1);
