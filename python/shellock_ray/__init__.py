@@ -7,20 +7,17 @@ model, which is then made by another.
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
-import os
-import tempfile
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
+from shellock import _native
+
 __all__ = ["Record", "run"]
 
-ENDINGS = {".stl", ".obj", ".ply", ".off", ".3mf", ".glb", ".gltf", ".gz", ".zip"}
 #: What a kit takes at least, and for each byte of its model's file, bytes: Ray runs no more tasks at a time than have room.
 LEAST_BYTES = 700_000_000
 BYTES_PER_BYTE = 12
@@ -37,8 +34,11 @@ class Record:
     status: str
     made_of: str = ""
     seconds: float = 0.0
+    peak_mb: Optional[float] = None
     pieces: Optional[int] = None
-    warnings: int = 0
+    volume_ratio: Optional[float] = None
+    n_warnings: int = 0
+    n_problems: int = 0
     said: List[str] = field(default_factory=list)
     is_old: bool = False
 
@@ -46,6 +46,11 @@ class Record:
         pieces = f", {self.pieces} pieces" if self.pieces else ""
         why = f": {self.said[0]}" if self.said and self.status != "verified" else ""
         return f"{self.model} {self.status}{pieces}, {self.seconds:.0f} s{', as it was' if self.is_old else ''}{why}"
+
+
+def _program() -> str:
+    """What tells this program from any other: of two builds of one version, too."""
+    return hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
 
 
 class _TooLong(Exception):
@@ -67,9 +72,11 @@ def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, s
     try:
         kit = shellock.build(data, name=name, progress=watch, **options)
         told["status"] = "verified" if kit.passed else "failed"
-        told["pieces"] = len(kit.plan["pieces"])
+        plan = kit.plan
+        told["pieces"], told["volume_ratio"] = len(plan["pieces"]), plan["volume_ratio"]
         warnings = [w for w in kit.warnings if w.severity != "note"]
-        told["warnings"] = len(warnings)
+        told["n_problems"] = sum(w.severity == "problem" for w in warnings)
+        told["n_warnings"] = len(warnings) - told["n_problems"]
         failed = [f"{c['name']}: {c['figure']}" for c in kit.checks if not c["ok"]]
         told["said"] = failed + [w.message for w in warnings]
         files = kit.files
@@ -92,27 +99,12 @@ def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, s
     return told, files
 
 
-def models(folder: Path, out: Optional[Path]) -> List[Tuple[Path, Path]]:
-    """All models below ``folder`` but for what lies in ``out``, each with the path of its kit: as ``shellock batch`` names them."""
-    found = []
-    for path in sorted(folder.rglob("*")):
-        name = path.relative_to(folder)
-        is_hidden = any(part.startswith(".") for part in name.parts)
-        if path.is_file() and path.suffix.lower() in ENDINGS and not is_hidden and not (out and out in path.resolve().parents):
-            found.append(name)
-    stems = [name.with_suffix("") for name in found]
-    kit = lambda name: name.with_suffix("") if stems.count(name.with_suffix("")) == 1 else name.with_name(name.name.replace(".", "-"))
-    return [(name, kit(name)) for name in found]
-
-
 class _Folder:
-    """Kits in a folder of this machine: each appears whole or not at all."""
+    """Kits in a folder of this machine: each appears whole or not at all, and replaces an earlier kit and nothing else."""
 
     def __init__(self, out: str) -> None:
         self.out = Path(out)
-        (self.out / ".batch").mkdir(parents=True, exist_ok=True)
-
-    store = None
+        self.out.mkdir(parents=True, exist_ok=True)
 
     def kit(self, kit: Path) -> Optional[str]:
         return None
@@ -127,29 +119,10 @@ class _Folder:
     def write(self, name: str, content: bytes) -> None:
         path = self.out / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".shellock-")
-        with os.fdopen(handle, "wb") as to:
-            to.write(content)
-        os.replace(temporary, path)
+        _native.write_file(str(path), content)
 
     def keep(self, kit: Path, files: Mapping[str, bytes]) -> None:
-        import shutil
-
-        to = self.out / kit
-        to.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(dir=to.parent, prefix=".shellock-"))
-        try:
-            for name, content in files.items():
-                (temporary / name).parent.mkdir(parents=True, exist_ok=True)
-                (temporary / name).write_bytes(content)
-            temporary.chmod(0o755)
-            if to.exists():
-                if not (to / "plan.json").is_file():
-                    raise FileExistsError(f"{to} holds files that are no kit; choose another folder")
-                shutil.rmtree(to)
-            temporary.rename(to)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+        _native.save(list(files.items()), str(self.out / kit), True)
 
 
 class _Store:
@@ -193,20 +166,19 @@ def run(
     """Makes kits of all models below ``folder``; Ray must be initialised. Returns their records in the order of their names.
 
     ``options`` are those of ``shellock.build``. ``cpus`` are taken for each kit; ``patience`` is the longest time for one, s; a model whose worker is lost
-    is made again up to ``retries`` times. ``told`` hears of each record as it comes, with its number and how many there are. Writes ``batch.csv``.
+    is made again up to ``retries`` times. ``told`` hears of each record as it comes, with its number and how many there are. Writes ``batch.csv`` and ``batch.html``.
     """
     import ray
 
-    import shellock
-
     options = dict(options or {})
     kits = _Store(out) if "://" in out else _Folder(out)
-    made_with = hashlib.sha256(json.dumps([shellock.__version__, options], sort_keys=True).encode()).hexdigest()
+    made_with = hashlib.sha256(json.dumps([_program(), options], sort_keys=True).encode()).hexdigest()
     here = Path(folder)
-    jobs = models(here, None if "://" in out else Path(out).resolve())
+    jobs = _native.models(folder, None if "://" in out else out)
     # One pool of threads in each worker, as large as what it may take.
     task = ray.remote(num_cpus=cpus, max_retries=retries, runtime_env={"env_vars": {"RAYON_NUM_THREADS": str(cpus)}})(_make)
     slots = max(1, int(ray.cluster_resources().get("CPU", 1) // cpus))
+    most = int(max(node["Resources"].get("memory", LEAST_BYTES) for node in ray.nodes() if node["Alive"]))
     records: List[Record] = []
     pending: Dict[Any, Tuple[Record, Path]] = {}
 
@@ -222,7 +194,7 @@ def run(
                 setattr(record, name, value)
             if record.status in ("verified", "failed"):
                 kits.keep(kit, files)
-        except (ray.exceptions.WorkerCrashedError, ray.exceptions.OutOfMemoryError, ray.exceptions.RayTaskError) as e:
+        except ray.exceptions.RayError as e:
             record.status, record.said = "crashed", [str(e).strip().splitlines()[-1]]
         if record.status not in ("too-long", "crashed"):
             kits.write(f".batch/{kit.as_posix()}.ray.json", json.dumps(asdict(record)).encode())
@@ -242,7 +214,8 @@ def run(
         while len(pending) >= AHEAD * slots:
             for reference in ray.wait(list(pending), num_returns=1)[0]:
                 finish(reference)
-        needs = LEAST_BYTES + BYTES_PER_BYTE * len(data)
+        # What no machine has room for would wait for ever: it is tried alone on the largest.
+        needs = min(LEAST_BYTES + BYTES_PER_BYTE * len(data), most)
         reference = task.options(memory=needs).remote(name.name, data, options, patience, kits.kit(kit))
         pending[reference] = (Record(name.as_posix(), kit.as_posix(), "crashed", made_of), kit)
         del data
@@ -250,15 +223,6 @@ def run(
         for reference in ray.wait(list(pending), num_returns=1)[0]:
             finish(reference)
     records.sort(key=lambda r: r.model)
-    kits.write("batch.csv", _table(records))
+    for name, content in _native.tables(json.dumps([asdict(r) for r in records])):
+        kits.write(name, bytes(content))
     return records
-
-
-def _table(records: List[Record]) -> bytes:
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["model", "status", "kit", "pieces", "seconds", "warnings", "said"])
-    for r in records:
-        said = r.said[0].replace("\n", " ") if r.said else ""
-        table.writerow([r.model, r.status, r.kit, r.pieces or "", f"{r.seconds:.1f}", r.warnings, said])
-    return text.getvalue().encode()

@@ -1,5 +1,6 @@
 //! What `import shellock` calls: arrays in, kits out. The package in `shellock/` has the words for people.
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
@@ -61,7 +62,7 @@ impl Kit {
         Ok(all)
     }
 
-    fn save(&self, py: Python<'_>, folder: std::path::PathBuf, force: bool) -> PyResult<()> {
+    fn save(&self, py: Python<'_>, folder: PathBuf, force: bool) -> PyResult<()> {
         py.detach(|| self.0.save(&folder, force)).map_err(raised)
     }
 }
@@ -136,7 +137,7 @@ fn verify(
 
 /// Checks the certificate of a kit's folder: claim, verdict and figure of each finding.
 #[pyfunction]
-fn check(py: Python<'_>, folder: std::path::PathBuf) -> PyResult<Vec<(String, String, String)>> {
+fn check(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<(String, String, String)>> {
     let found = py.detach(|| shellock_check::check(&folder));
     let found = found.map_err(|message| raised(wrong(message)))?;
     let word = |verdict| match verdict {
@@ -146,6 +147,32 @@ fn check(py: Python<'_>, folder: std::path::PathBuf) -> PyResult<Vec<(String, St
     };
     let told = |f: Finding| (f.claim, word(f.verdict).to_owned(), f.figure);
     Ok(found.into_iter().map(told).collect())
+}
+
+/// Writes the files of a kit to a folder.
+#[pyfunction]
+fn save(py: Python<'_>, files: Vec<(String, Vec<u8>)>, folder: PathBuf, force: bool) -> PyResult<()> {
+    py.detach(|| embed::save(&files, &folder, force)).map_err(raised)
+}
+
+/// Writes one file, whole or not at all.
+#[pyfunction]
+fn write_file(path: PathBuf, content: &[u8]) -> PyResult<()> {
+    embed::write_file(&path, content).map_err(raised)
+}
+
+/// All models below a folder but for what lies in `out`, with the paths of their kits.
+#[pyfunction]
+fn models(folder: PathBuf, out: Option<PathBuf>) -> PyResult<Vec<(PathBuf, PathBuf)>> {
+    embed::models(&folder, out.as_deref()).map_err(raised)
+}
+
+/// The tables of a batch, by the names of their files, from a JSON list of records.
+#[pyfunction]
+fn tables<'py>(py: Python<'py>, records: &str) -> PyResult<Vec<(String, Bound<'py, PyBytes>)>> {
+    let files = embed::tables(records).map_err(raised)?;
+    let bytes = |(name, content): (String, Vec<u8>)| (name, PyBytes::new(py, &content));
+    Ok(files.into_iter().map(bytes).collect())
 }
 
 /// All options, as a JSON list.
@@ -312,5 +339,7 @@ mod _native {
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
     #[pymodule_export]
-    use super::{Kit, Refused, build, check, design, options, segment, verify};
+    use super::{
+        Kit, Refused, build, check, design, models, options, save, segment, tables, verify, write_file,
+    };
 }

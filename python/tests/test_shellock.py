@@ -1,6 +1,7 @@
 """The built wheel, in an environment of its own. SHELLOCK is the program, FIGURES a folder for figures that it makes."""
 
 import gc
+import json
 import os
 import signal
 import subprocess
@@ -137,19 +138,35 @@ def test_what_is_wrong_is_said_with_code_and_place():
         shellock.design(points)
 
 
-def test_two_boxes_that_lock_and_two_that_do_not():
-    def box(a, b):
-        a, b = np.array(a, float), np.array(b, float)
-        corner = np.array([[(b if (i >> k) & 1 else a)[k] for k in range(3)] for i in range(8)])
-        quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-        return corner, np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
+def box(x, y, z):
+    """A closed box between two numbers on each axis."""
+    corner = np.array([[(x, y, z)[k][i >> k & 1] for k in range(3)] for i in range(8)], float)
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return corner, np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
 
-    told = shellock.verify([box((0, 0, 0), (20, 20, 10)), box((0, 0, 10.1), (20, 20, 20))], [None, (0, 0, 1)], 0.1)
-    assert set(told) == {"passed", "checks", "findings"}
-    apart = shellock.verify([box((0, 0, 0), (9, 9, 9)), box((5, 5, 5), (14, 14, 14))], [None, (0, 0, 1)])
-    assert not apart["passed"]
-    with pytest.raises(shellock.InputError):
-        shellock.verify([box((0, 0, 0), (1, 1, 1))], [None])
+
+def test_an_assembly_is_judged_as_the_command_line_judges_it(kit, tmp_path):
+    def judged(pieces, ways, clearance=0.1):
+        for k, piece in enumerate(pieces):
+            write_ply(tmp_path / f"{k}.ply", *piece)
+        entries = [{"file": f"{k}.ply", **({"pulled_out_along": list(way)} if way else {})} for k, way in enumerate(ways)]
+        (tmp_path / "assembly.json").write_text(json.dumps({"clearance": clearance, "pieces": entries}))
+        theirs = json.loads(program("verify", ".", "--json", cwd=tmp_path, check=False).stdout)
+        mine = shellock.verify(pieces, ways, clearance)
+        assert mine == {key: theirs[key] for key in mine}
+        return mine
+
+    # A lid on a box: the box, which is no key, moves away as well as the lid.
+    loose = judged([box((0, 20), (0, 20), (0, 10)), box((0, 20), (0, 20), (10.1, 20))], [None, (0, 0, 1)])
+    assert not loose["passed"] and any(f["kind"] == "loose" and f["piece"] == 1 for f in loose["findings"])
+    # What a kit calls its pieces holds as an assembly of any other maker's.
+    ways = [[-x for x in piece["installation_direction"]] for piece in kit.plan["pieces"]]
+    assert judged(kit.pieces, ways, kit.plan["clearance"])["passed"]
+    stack = [box((0, 20), (0, 20), (z, z + 9.9)) for z in (0, 10)]
+    with pytest.raises(shellock.InputError, match="at least two"):
+        shellock.verify(stack[:1], [None])
+    with pytest.raises(shellock.InputError, match="pulled_out_along"):
+        shellock.verify(stack, [None, None])
 
 
 def test_options_are_those_of_the_program():

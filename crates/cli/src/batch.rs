@@ -1,6 +1,6 @@
 //! `batch`: kits of a folder of models, each made by a process of its own; what is there already is not made again.
 
-mod record;
+pub mod record;
 mod run;
 mod table;
 
@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::sync::{Condvar, Mutex};
+use std::sync::{Condvar, Mutex, OnceLock};
 use std::time::Duration;
 
 use serde_json::json;
@@ -18,7 +18,9 @@ use crate::args::BatchOptions;
 use crate::batch::record::{Record, Status};
 use crate::batch::run::{Job, Run};
 use crate::failure::Failure;
+use crate::input::sha256;
 use crate::progress::Shown;
+use crate::stages::write;
 
 /// How the names of models end.
 const ENDINGS: [&str; 9] = ["stl", "obj", "ply", "off", "3mf", "glb", "gltf", "gz", "zip"];
@@ -32,7 +34,12 @@ const LOOK: Duration = Duration::from_millis(100);
 /// `shellock batch`.
 pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     crate::build::checked(&options.options)?;
-    let models = models(&options.folder, &options.out)?;
+    if options.options.labels.is_some() {
+        return Err(Failure::Wrong(
+            "--labels is of one model; in a batch labels come from the models' files".to_owned(),
+        ));
+    }
+    let models = models(&options.folder, Some(&options.out))?;
     if models.is_empty() {
         return Err(Failure::Wrong(format!(
             "{} holds no model: names end in {}",
@@ -56,14 +63,16 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     if let Some(problem) = records.iter().find_map(|r| r.unwritten.clone()) {
         return Err(Failure::Wrong(problem));
     }
-    table::write(&options.out, &records)?;
+    for (name, bytes) in tables(&records) {
+        write(&options.out.join(name), &bytes)?;
+    }
     told(session, options, &records);
     Ok(u8::from(records.iter().any(|r| r.status != Status::Verified)))
 }
 
 /// All models below `folder` but for what lies in `out`, by their paths within it, each with the name of its kit.
-fn models(folder: &Path, out: &Path) -> Result<VecDeque<(PathBuf, PathBuf)>, Failure> {
-    let out = out.canonicalize().ok();
+pub fn models(folder: &Path, out: Option<&Path>) -> Result<VecDeque<(PathBuf, PathBuf)>, Failure> {
+    let out = out.and_then(|out| out.canonicalize().ok());
     let mut found = BTreeSet::new();
     let mut left = vec![PathBuf::new()];
     while let Some(below) = left.pop() {
@@ -102,6 +111,26 @@ fn models(folder: &Path, out: &Path) -> Result<VecDeque<(PathBuf, PathBuf)>, Fai
         }
     };
     Ok(found.iter().map(|name| (name.clone(), kit(name))).collect())
+}
+
+/// Where the record of a kit is kept.
+fn record_file(out: &Path, kit: &str) -> PathBuf {
+    out.join(RECORDS).join(format!("{kit}.json"))
+}
+
+/// The tables, by the names of their files.
+pub fn tables(records: &[Record]) -> Vec<(String, Vec<u8>)> {
+    table::files(records)
+}
+
+/// What tells this program from any other: of two builds of one version, too.
+fn program() -> String {
+    static OF_FILE: OnceLock<String> = OnceLock::new();
+    let hash = || {
+        let file = std::env::current_exe().ok().and_then(|path| fs::read(path).ok());
+        sha256(&file.unwrap_or_else(|| env!("CARGO_PKG_VERSION").into()))
+    };
+    OF_FILE.get_or_init(hash).clone()
 }
 
 fn is_model(name: &Path) -> bool {
@@ -234,12 +263,14 @@ mod tests {
             "c/.hidden.stl",
             "notes.txt",
             "out/d.stl",
+            "p.1.stl",
+            "p.2.stl",
         ] {
             let path = dir.path().join(name);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(path, "").unwrap();
         }
-        let found: Vec<(String, String)> = models(dir.path(), &dir.path().join("out"))
+        let found: Vec<(String, String)> = models(dir.path(), Some(&dir.path().join("out")))
             .unwrap()
             .into_iter()
             .map(|(model, kit)| (model.display().to_string(), kit.display().to_string()))
@@ -249,7 +280,14 @@ mod tests {
             ("a.stl", "a-stl"),
             ("b.STL", "b"),
             ("c/a.ply", "c/a"),
+            ("p.1.stl", "p.1"),
+            ("p.2.stl", "p.2"),
         ];
         assert_eq!(found, expected.map(|(m, k)| (m.to_owned(), k.to_owned())));
+        let records: BTreeSet<PathBuf> = found
+            .iter()
+            .map(|(_, kit)| record_file(dir.path(), kit))
+            .collect();
+        assert_eq!(records.len(), found.len(), "each has a record of its own");
     }
 }

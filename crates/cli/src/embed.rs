@@ -4,18 +4,17 @@
 //! `shellock build` would write of a PLY file with the same points, triangles and labels.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use serde_json::{Map, Value, json};
+use shellock::Ctx;
 use shellock::context::Progress;
-use shellock::verify::{Assembly, VerifyParams};
-use shellock::{Ctx, Direction, InstallationPlan, PatchId};
 use shellock_formats::{read_mesh, write_ply};
+use shellock_geom::TriMesh;
 use shellock_geom::weld::weld;
-use shellock_geom::{TriMesh, Vec3};
 
 use crate::Session;
 use crate::args::Options;
@@ -25,8 +24,8 @@ use crate::course::Course;
 use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::output::Destination;
-use crate::progress::Shown;
 use crate::stages;
+use crate::{batch, own_assembly};
 
 /// Why there is no result.
 #[derive(Clone, Debug)]
@@ -118,10 +117,9 @@ pub struct Kit {
 }
 
 impl Kit {
-    /// Writes all files to `folder`, whole or not at all; replaces an earlier kit if `may_replace`, and nothing else.
+    /// [`save`] of its files.
     pub fn save(&self, folder: &Path, may_replace: bool) -> Result<(), Problem> {
-        let to = Destination::new(folder.to_owned(), may_replace)?;
-        Ok(to.write(&self.files)?)
+        save(&self.files, folder, may_replace)
     }
 }
 
@@ -131,7 +129,7 @@ pub fn design(
     news: &(dyn Fn(News<'_>) + Sync),
     stop: &Arc<AtomicBool>,
 ) -> Result<Kit, Problem> {
-    let session = session(stop);
+    let session = Session::silent(stop);
     let options = options_of(request)?;
     let params = checked(&options)?;
     let model = input::simple(&session, model(request, &options)?, &options)?;
@@ -160,7 +158,7 @@ pub fn segment(
     news: &(dyn Fn(News<'_>) + Sync),
     stop: &Arc<AtomicBool>,
 ) -> Result<Vec<u32>, Problem> {
-    let session = session(stop);
+    let session = Session::silent(stop);
     let options = options_of(request)?;
     let model = model(request, &options)?;
     let course = Mutex::new(Course::new());
@@ -177,62 +175,56 @@ pub fn verify(
     clearance_mm: f64,
     stop: &Arc<AtomicBool>,
 ) -> Result<Value, Problem> {
-    let wrong = Problem::wrong;
-    if pieces.len() < 2 || pieces.len() != pulled_out_along.len() {
-        return Err(wrong(format!(
-            "{} pieces and {} ways out: an assembly has at least two pieces, and a way for each",
-            pieces.len(),
-            pulled_out_along.len()
+    if pieces.len() != pulled_out_along.len() {
+        let (n, n_ways) = (pieces.len(), pulled_out_along.len());
+        return Err(Problem::wrong(format!(
+            "{n} pieces and {n_ways} ways out: one for each is needed"
         )));
     }
-    if !(0.0..=1.0).contains(&clearance_mm) {
-        return Err(wrong(format!(
-            "a clearance of {clearance_mm} mm is none; 0 to 1 mm are"
-        )));
-    }
-    let step = |(i, along): (usize, &Option<[f64; 3]>)| {
-        let along = along.or((i == 0).then_some([0.0, 0.0, 1.0]));
-        let way = along.and_then(|along| Direction::of(Vec3::from(along)));
-        let way = way.ok_or_else(|| {
-            wrong(format!(
-                "piece {} has no way out: three numbers, not all 0",
-                i + 1
-            ))
-        })?;
-        Ok((PatchId::from(i), way))
-    };
-    let steps: Result<Vec<_>, Problem> = pulled_out_along.iter().enumerate().map(step).collect();
-    let plan = InstallationPlan::new(steps?);
+    let names: Vec<String> = (1..=pieces.len()).map(|i| format!("piece {i}")).collect();
+    let ways: Vec<(&str, Option<[f64; 3]>)> = names
+        .iter()
+        .map(|n| &n[..])
+        .zip(pulled_out_along.iter().copied())
+        .collect();
+    let plan = own_assembly::plan(&ways, clearance_mm).map_err(Problem::wrong)?;
     let pieces = pieces.iter().map(|mesh| weld(mesh).mesh).collect();
-    let assembly = Assembly {
-        model: None,
-        pieces: &pieces,
-        plan: &plan,
-        press_fits: &[],
-    };
-    let params = VerifyParams {
-        clearance_mm,
-        seed: 0,
-    };
+    let (assembly, params) = (
+        own_assembly::assembly(&pieces, &plan),
+        own_assembly::params(clearance_mm),
+    );
     let silent = |_: Progress<'_>| ();
     let verdict = shellock::verify(&Ctx::new(&silent, stop), &params, &assembly).map_err(Failure::from)?;
-    let found = &verdict.verification;
-    Ok(json!({ "passed": found.passed(), "checks": found.checks, "findings": found.findings }))
+    Ok(own_assembly::told(&verdict))
+}
+
+/// Writes a kit's files to `folder`, whole or not at all; replaces an earlier kit if `may_replace`, and nothing else.
+pub fn save(files: &[(String, Vec<u8>)], folder: &Path, may_replace: bool) -> Result<(), Problem> {
+    let to = Destination::new(folder.to_owned(), may_replace)?;
+    Ok(to.write(files)?)
+}
+
+/// Writes one file: whole or not at all.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
+    Ok(stages::write(path, bytes)?)
+}
+
+/// All models below `folder` but for what lies in `out`, by their paths within it, each with the path of its kit: as
+/// `shellock batch` takes them.
+pub fn models(folder: &Path, out: Option<&Path>) -> Result<Vec<(PathBuf, PathBuf)>, Problem> {
+    Ok(batch::models(folder, out)?.into())
+}
+
+/// The tables of a batch, by the names of their files, from a JSON list of records as `shellock batch` keeps them.
+pub fn tables(records: &str) -> Result<Vec<(String, Vec<u8>)>, Problem> {
+    let records: Vec<batch::record::Record> =
+        serde_json::from_str(records).map_err(|e| Problem::wrong(format!("records: {e}")))?;
+    Ok(batch::tables(&records))
 }
 
 /// All options: `name`, `group`, `help`, `kind`, `choices`, `default` and `is_many` of each.
 pub fn options() -> Value {
     choices::told(&Vec::new(), &[])
-}
-
-fn session(stop: &Arc<AtomicBool>) -> Session {
-    Session {
-        is_json: false,
-        is_verbose: false,
-        shown: Shown::Nothing,
-        stop: Arc::clone(stop),
-        since: Instant::now(),
-    }
 }
 
 fn options_of(request: &Request<'_>) -> Result<Options, Problem> {

@@ -61,6 +61,17 @@ pub struct Session {
 }
 
 impl Session {
+    /// Shows nothing, and ends with `stop`.
+    fn silent(stop: &Arc<AtomicBool>) -> Self {
+        Self {
+            is_json: false,
+            is_verbose: false,
+            shown: progress::Shown::Nothing,
+            stop: Arc::clone(stop),
+            since: std::time::Instant::now(),
+        }
+    }
+
     /// Shows that `name` goes on while `work` is done.
     pub fn during<T>(&self, name: &str, work: impl FnOnce() -> T) -> T {
         let display = progress::Display::new(self.shown);

@@ -8,9 +8,9 @@ use shellock::certificate::PieceFile;
 use shellock::context::Progress;
 use shellock::verify::words::Coordinates;
 use shellock::verify::{Assembly, VerifyParams};
-use shellock::{Ctx, Direction, InstallationPlan, PatchId, Verdict};
-use shellock_geom::Vec3;
+use shellock::{Ctx, Direction, IdVec, InstallationPlan, PatchId, Verdict};
 use shellock_geom::weld::weld;
+use shellock_geom::{TriMesh, Vec3};
 
 use crate::Session;
 use crate::failure::Failure;
@@ -59,16 +59,12 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
     let wrong = |what: String| Failure::Wrong(format!("{}: {what}", path.display()));
     let told: AssemblyFile =
         serde_json::from_slice(&read(&path)?).map_err(|e| wrong(format!("{e}; {HOW}")))?;
-    if !(0.0..=1.0).contains(&told.clearance) {
-        return Err(wrong(format!(
-            "a clearance of {} mm is none; 0 to 1 mm are",
-            told.clearance
-        )));
-    }
-    if told.pieces.len() < 2 {
-        return Err(wrong("an assembly has at least two pieces".into()));
-    }
-    let plan = plan(&told.pieces).map_err(wrong)?;
+    let ways: Vec<(&str, Option<[f64; 3]>)> = told
+        .pieces
+        .iter()
+        .map(|p| (&p.file[..], p.pulled_out_along))
+        .collect();
+    let plan = plan(&ways, told.clearance).map_err(wrong)?;
     let (mut files, mut meshes) = (Vec::new(), Vec::new());
     for (i, PieceEntry { file, .. }) in told.pieces.iter().enumerate() {
         if !Path::new(file)
@@ -97,16 +93,8 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
         meshes.push(weld(&loaded.mesh).mesh);
     }
     let pieces = meshes.into_iter().collect();
-    let assembly = Assembly {
-        model: None,
-        pieces: &pieces,
-        plan: &plan,
-        press_fits: &[],
-    };
-    let params = VerifyParams {
-        clearance_mm: told.clearance,
-        seed: 0,
-    };
+    let assembly = assembly(&pieces, &plan);
+    let params = params(told.clearance);
     let display = Display::new(session.shown);
     let report = |p: Progress<'_>| display.show(p);
     let ctx = Ctx::new(&report, &session.stop);
@@ -118,11 +106,16 @@ pub fn verify(session: &Session, folder: &Path, model: Option<&Path>) -> Result<
     Ok(print(session, &verdict))
 }
 
-/// The order and directions, or what is wrong with them.
-fn plan(pieces: &[PieceEntry]) -> Result<InstallationPlan, String> {
-    let step = |(i, piece): (usize, &PieceEntry)| {
-        let name = &piece.file;
-        let along = match piece.pulled_out_along {
+/// The order and directions of pieces by their names, or what is wrong with them or the clearance, mm.
+pub fn plan(pieces: &[(&str, Option<[f64; 3]>)], clearance_mm: f64) -> Result<InstallationPlan, String> {
+    if !(0.0..=1.0).contains(&clearance_mm) {
+        return Err(format!("a clearance of {clearance_mm} mm is none; 0 to 1 mm are"));
+    }
+    if pieces.len() < 2 {
+        return Err("an assembly has at least two pieces".to_owned());
+    }
+    let step = |(i, &(name, along)): (usize, &(&str, Option<[f64; 3]>))| {
+        let along = match along {
             Some(along) => Vec3::from_array(along),
             None if i == 0 => Vec3::Z,
             None => {
@@ -134,12 +127,32 @@ fn plan(pieces: &[PieceEntry]) -> Result<InstallationPlan, String> {
         let way = Direction::of(along).ok_or_else(|| format!("the way of {name} has no direction"))?;
         Ok((PatchId::from(i), way))
     };
-    pieces
-        .iter()
-        .enumerate()
-        .map(step)
-        .collect::<Result<Vec<_>, _>>()
-        .map(InstallationPlan::new)
+    let steps = pieces.iter().enumerate().map(step).collect::<Result<Vec<_>, _>>();
+    steps.map(InstallationPlan::new)
+}
+
+/// An assembly of pieces of no model, which press nowhere.
+pub fn assembly<'a>(pieces: &'a IdVec<PatchId, TriMesh>, plan: &'a InstallationPlan) -> Assembly<'a> {
+    Assembly {
+        model: None,
+        pieces,
+        plan,
+        press_fits: &[],
+    }
+}
+
+/// How it is judged.
+pub fn params(clearance_mm: f64) -> VerifyParams {
+    VerifyParams {
+        clearance_mm,
+        seed: 0,
+    }
+}
+
+/// The verdict for machines.
+pub fn told(verdict: &Verdict) -> serde_json::Value {
+    let found = &verdict.verification;
+    json!({ "passed": found.passed(), "checks": found.checks, "findings": found.findings })
 }
 
 /// Prints the verdict; the exit code.
@@ -147,9 +160,8 @@ fn print(session: &Session, verdict: &Verdict) -> u8 {
     let found = &verdict.verification;
     let code = u8::from(!found.passed());
     if session.is_json {
-        let value = json!({
-            "passed": found.passed(), "checks": found.checks, "findings": found.findings, "exit_code": code,
-        });
+        let mut value = told(verdict);
+        value["exit_code"] = code.into();
         println!("{value}");
     } else {
         print_verdict(found, &Coordinates);

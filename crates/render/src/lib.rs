@@ -17,7 +17,7 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_assembly::Warning;
 
 pub use loads::{ReportArrow, ReportLoad, ReportLoads, ReportPlace};
-pub use page::html;
+pub use page::{escaped, html};
 pub use pictures::{from_inside, pieces_picture};
 
 /// Everything the report says, filled by the caller.

@@ -279,7 +279,8 @@ fn percent_encoded(text: &str) -> String {
     out
 }
 
-fn escaped(text: &str) -> String {
+/// `text` as it stands in HTML, in attributes too.
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

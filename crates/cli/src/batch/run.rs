@@ -7,7 +7,6 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::RECORDS;
 use super::record::{Record, Status};
 use crate::Session;
 use crate::args::BatchOptions;
@@ -57,7 +56,7 @@ impl Run {
             .unwrap_or_else(|| PathBuf::from(config::USUAL));
         let config = fs::read(file).unwrap_or_default();
         let made_with = [
-            env!("CARGO_PKG_VERSION").as_bytes(),
+            super::program().as_bytes(),
             arguments.join("\n").as_bytes(),
             &config[..],
         ]
@@ -70,7 +69,7 @@ impl Run {
                 .map_err(|e| Failure::Wrong(format!("the program does not find itself: {e}")))?,
             arguments,
             made_with,
-            patience: Duration::from_secs_f64(options.patience),
+            patience: patience(options.patience)?,
             n_workers,
             n_threads: cores.div_ceil(n_workers),
         })
@@ -108,7 +107,7 @@ impl Run {
                 return record;
             }
         }
-        let noted = self.out.join(RECORDS).join(job.kit.with_extension("json"));
+        let noted = super::record_file(&self.out, &record.kit);
         if let Some(old) = Record::read(&noted, &record.made_of, &kit) {
             return old;
         }
@@ -199,6 +198,14 @@ impl Run {
             .collect();
         ended
     }
+}
+
+/// As long as that; for ever where it is infinite.
+fn patience(seconds: f64) -> Result<Duration, Failure> {
+    if seconds.is_nan() || seconds <= 0.0 {
+        return Err(Failure::Wrong(format!("--patience {seconds} s must be above 0")));
+    }
+    Ok(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
 }
 
 /// How a process ended.

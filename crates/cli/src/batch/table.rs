@@ -1,11 +1,10 @@
 //! The table of a batch: for machines and for people.
 
 use std::fmt::Write as _;
-use std::path::Path;
+
+use shellock_render::escaped;
 
 use super::record::{Record, Status};
-use crate::failure::Failure;
-use crate::stages::write as write_file;
 
 /// The table for machines.
 const TABLE: &str = "batch.csv";
@@ -17,10 +16,12 @@ table{border-collapse:collapse;background:#fff}td,th{padding:6px 10px;border-bot
 td.n{text-align:right;font-variant-numeric:tabular-nums}img{width:240px;display:block}.verified{color:#1d7a46}.failed,.no-plan,.too-long,.crashed{color:#c0322b}\
 .refused{color:#8a5a06}small{color:#68646f}@media(prefers-color-scheme:dark){body{background:#1d1c21;color:#ecebf0}table{background:#27262c}td,th{border-color:#3a3841}}";
 
-/// Writes both.
-pub fn write(out: &Path, records: &[Record]) -> Result<(), Failure> {
-    write_file(&out.join(TABLE), csv(records).as_bytes())?;
-    write_file(&out.join(PAGE), html(records).as_bytes())
+/// Both, by their names.
+pub fn files(records: &[Record]) -> Vec<(String, Vec<u8>)> {
+    let files = [(TABLE, csv(records)), (PAGE, html(records))];
+    files
+        .map(|(name, text)| (name.to_owned(), text.into_bytes()))
+        .to_vec()
 }
 
 fn csv(records: &[Record]) -> String {
@@ -86,13 +87,6 @@ fn html(records: &[Record]) -> String {
          </thead><tbody>{rows}</tbody></table></html>\n",
         records.len()
     )
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 /// A path within the folder as a relative address.

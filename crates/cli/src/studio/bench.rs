@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 use shellock::design::{Settings, first_division};
@@ -28,7 +27,6 @@ use crate::config;
 use crate::failure::Failure;
 use crate::input::{read, shellock_figure};
 use crate::output::{lying, standing};
-use crate::progress::Shown;
 use crate::project::ModelOf;
 
 /// Options that make another solid of the model's file.
@@ -88,17 +86,6 @@ pub(super) struct Pieces {
 impl Pieces {
     fn n(&self) -> usize {
         self.labels.iter().collect::<BTreeSet<_>>().len()
-    }
-}
-
-/// Nothing is shown, and it ends with `stop`.
-fn silent(stop: &Arc<AtomicBool>) -> Session {
-    Session {
-        is_json: false,
-        is_verbose: false,
-        shown: Shown::Nothing,
-        stop: Arc::clone(stop),
-        since: Instant::now(),
     }
 }
 
@@ -198,7 +185,7 @@ impl Bench {
 
     fn opened(&self, model: &ModelOf, options: &Options) -> Result<Figure, Refusal> {
         let path = self.store.model_path(model).map_err(|e| self.refused(&e))?;
-        Figure::open(&silent(&Arc::default()), &path, options).map_err(|e| self.refused(&e))
+        Figure::open(&Session::silent(&Arc::default()), &path, options).map_err(|e| self.refused(&e))
     }
 
     /// The state is another: what was judged is of another, and the project is written.
@@ -426,7 +413,7 @@ impl Workshop for Bench {
             state.judging.store(true, Ordering::Relaxed);
             state.judging = Arc::clone(&stop);
         }
-        let judged = judge(&silent(&stop), &of.figure, &of.options, pieces);
+        let judged = judge(&Session::silent(&stop), &of.figure, &of.options, pieces);
         let mut state = self.lock();
         if state.revision != of.revision || stop.load(Ordering::Relaxed) {
             return Err(Refusal::overtaken());
@@ -521,7 +508,7 @@ fn painted_by_hand(labels: Vec<u32>) -> Pieces {
 /// The pieces that `segment` would make.
 fn divided(of: &Snapshot) -> Result<Pieces, Failure> {
     let stop = Arc::default();
-    let session = silent(&stop);
+    let session = Session::silent(&stop);
     let model = &of.figure.model;
     let params = fitted(&session, &checked(&of.options)?, &of.options, model)?;
     let notes: Mutex<Vec<String>> = Mutex::default();
