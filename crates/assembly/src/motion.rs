@@ -42,7 +42,10 @@ pub struct Contact {
     pub area_mm2: f64,
 }
 
-/// How far a piece may rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in
+/// How many times farther than [`most_play`] a piece may go before it counts as loose.
+pub const LOOSE: f64 = 2.0;
+
+/// How far a piece may go before it is said to rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in
 /// proportion to the clearance; displacements also to the size of the model, but no less than for 75 mm;
 /// turns of pieces with a diagonal under 60 mm, whose rims move less, in inverse proportion to that, up to
 /// twice. docs/notes/certificate.md has the evidence.

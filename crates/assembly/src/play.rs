@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::InstallationPlan;
-use crate::motion::most_play;
+use crate::motion::{LOOSE, most_play};
 use crate::verify::{Check, Finding, Play};
 use crate::warning::EstimatedPlay;
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
@@ -313,42 +313,81 @@ fn slide(
     }
 }
 
-/// Whether no piece of a model of `size_mm` rattles farther than [`most_play`] says; findings are those of
-/// the loosest first.
-///
-/// Judged is the estimate for small motions: what is proven is more than the real play.
-pub fn check(
+/// A piece that goes farther than [`most_play`] says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rattle {
+    /// The piece.
+    pub piece: PatchId,
+    /// How far it goes, estimated for small motions: what is proven is more than the real play.
+    pub play: Play,
+    /// How far it may go before it is said to rattle, mm and degrees.
+    pub most: [f64; 2],
+    /// How many times as far it goes, > 1.
+    pub excess: f64,
+    /// Its middle.
+    pub at: [f64; 3],
+}
+
+/// The pieces of a model of `size_mm` that rattle, the loosest first.
+pub fn rattles(
     play: &KitPlay,
     pieces: &IdVec<PatchId, TriMesh>,
     size_mm: f64,
     clearance_mm: f64,
-) -> (Check, Vec<Finding>) {
-    let told = |(piece, play): (PatchId, &Option<Play>)| {
+) -> Vec<Rattle> {
+    let rattle = |(piece, play): (PatchId, &Option<Play>)| {
         let (play, mesh) = (play.unwrap_or(Play::ENDLESS), &pieces[piece]);
         let most = most_play(size_mm, clearance_mm, mesh.bounds().diagonal());
-        let excess = (play.translation_mm / most[0]).max(play.rotation_deg / most[1]);
-        (
-            excess,
-            Finding::PlayTooWide {
-                piece,
-                play,
-                most,
-                at: mesh.centroid().to_array(),
-            },
-        )
+        Rattle {
+            piece,
+            play,
+            most,
+            excess: (play.translation_mm / most[0]).max(play.rotation_deg / most[1]),
+            at: mesh.centroid().to_array(),
+        }
     };
-    let mut wide: Vec<(f64, Finding)> = play
-        .estimates
-        .iter()
-        .map(told)
-        .filter(|(excess, _)| *excess > 1.0)
+    let mut wide: Vec<Rattle> = play.estimates.iter().map(rattle).collect();
+    wide.retain(|r| r.excess > 1.0);
+    wide.sort_by(|a, b| b.excess.total_cmp(&a.excess));
+    wide
+}
+
+/// Whether no piece is loose: no one that rattles does so [`LOOSE`] times as far as it may.
+pub fn check(play: &KitPlay, rattles: &[Rattle]) -> (Check, Vec<Finding>) {
+    let loose = rattles.iter().filter(|r| r.excess > LOOSE);
+    let findings: Vec<Finding> = loose
+        .map(|r| Finding::PlayTooWide {
+            piece: r.piece,
+            play: r.play,
+            most: r.most.map(|most| LOOSE * most),
+            at: r.at,
+        })
         .collect();
-    wide.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let findings: Vec<Finding> = wide.into_iter().map(|w| w.1).collect();
+    let mut figure = words(play);
+    if !rattles.is_empty() {
+        let (n, s) = (rattles.len(), if rattles.len() == 1 { "s" } else { "" });
+        figure += &format!("; {n} rattle{s}");
+    }
     (
-        Check::new("pieces sit within their play", findings.is_empty(), words(play)),
+        Check::new("pieces sit within their play", findings.is_empty(), figure),
         findings,
     )
+}
+
+/// Says which pieces rattle though they are not loose.
+pub fn warning_of_rattles(rattles: &[Rattle]) -> Option<Warning> {
+    let told: Vec<&Rattle> = rattles.iter().filter(|r| r.excess <= LOOSE).collect();
+    let loosest = told.first()?;
+    Some(Warning {
+        cause: Cause::Rattles {
+            loosest: EstimatedPlay {
+                translation_mm: loosest.play.translation_mm,
+                rotation_deg: loosest.play.rotation_deg,
+            },
+        },
+        pieces: told.iter().map(|r| r.piece).collect(),
+        at: Some(loosest.at),
+    })
 }
 
 /// Whether no piece but the key was found to come out by hand; `None` where nobody looked.

@@ -65,7 +65,8 @@ fn played(
     };
     let mut measured = play::measure(ctx, &play_params, assembly.pieces, assembly.plan)?;
     let size_mm = assembly.bounds().size().max_element();
-    verification.add(play::check(&measured, assembly.pieces, size_mm, clearance_mm));
+    let rattles = play::rattles(&measured, assembly.pieces, size_mm, clearance_mm);
+    verification.add(play::check(&measured, &rattles));
     play::look_for_ways_out(ctx, clearance_mm, assembly.pieces, &mut measured)?;
     let ways_out = play::check_ways_out(&measured, assembly.pieces);
     ways_out.into_iter().for_each(|check| verification.add(check));

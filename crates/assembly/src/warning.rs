@@ -206,6 +206,9 @@ pub enum Cause {
         thickness_mm: f64,
         is_slot: bool,
     },
+    Rattles {
+        loosest: EstimatedPlay,
+    },
     NotProven {
         figures: Vec<EstimatedPlay>,
         is_searched: bool,

@@ -10,6 +10,7 @@ pub mod check;
 pub mod clearance;
 pub mod contour;
 pub mod decimate;
+pub mod grown;
 pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;

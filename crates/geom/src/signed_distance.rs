@@ -69,6 +69,14 @@ impl SignedDistance {
             point: near.point,
         })
     }
+
+    /// Whether the surface passes between `a` and `b`. Triangles that lie along the way do not count.
+    pub fn is_between(&self, a: Vec3, b: Vec3) -> bool {
+        let way = b - a;
+        self.bvh
+            .first_hit(a, way.normalize_or_zero(), way.length())
+            .is_some()
+    }
 }
 
 /// For each triangle of a closed mesh, the triangles across its three edges.

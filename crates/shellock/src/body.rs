@@ -19,7 +19,9 @@
 //! Where outer patches hide each other a little, only the seam shifts. The first-installed piece is what is
 //! left.
 
+mod chips;
 mod error;
+mod fragments;
 mod grid;
 mod separate;
 mod sheets;

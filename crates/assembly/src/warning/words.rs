@@ -400,6 +400,19 @@ impl Warning {
                     if *is_slot { "wide" } else { "thick" },
                 ),
             ),
+            Cause::Rattles { loosest } => warning(
+                "rattles",
+                format!(
+                    "{} {}, by up to {:.1} mm and {:.1}°, and {} in place; a smaller clearance, fewer pieces or a larger size make \
+                     {} firmer",
+                    in_words(&self.pieces),
+                    if self.pieces.len() == 1 { "rattles" } else { "rattle" },
+                    loosest.translation_mm,
+                    loosest.rotation_deg,
+                    if self.pieces.len() == 1 { "stays" } else { "stay" },
+                    if self.pieces.len() == 1 { "it" } else { "them" },
+                ),
+            ),
             Cause::NotProven { figures, is_searched } => {
                 note("not-proven", self.not_proven(figures, *is_searched))
             }
@@ -556,6 +569,12 @@ mod tests {
                 n_others: 14,
             },
             Cause::BodyInParts { dropped_mm3: 12.4 },
+            Cause::Rattles {
+                loosest: EstimatedPlay {
+                    translation_mm: 1.9,
+                    rotation_deg: 3.9,
+                },
+            },
             Cause::ThinPlaces {
                 n_sheets: 6,
                 n_slots: 4,

@@ -32,8 +32,13 @@ pub struct ShellGrid {
     pub thickness_mm: f64,
     /// Depth to which the band reaches, mm.
     pub reach_mm: f64,
+    /// The model.
+    pub(super) solid: Volume,
     /// The model less its cavity.
     pub wall: Volume,
+    /// Neighbouring nodes inside the model with a crack between them, of which no node tells: the lower one
+    /// first, sorted.
+    cracks: Vec<(u32, u32)>,
 }
 
 /// Why the wall cannot be made.
@@ -72,6 +77,7 @@ impl ShellGrid {
         let bounds = model.mesh().bounds();
         let (band, depth) = Band::along(&distance, bounds, cell, OUTSIDE_CELLS * cell, reach_mm, exact_mm)?;
         let thickness_mm = params.thickness_mm;
+        let cracks = cracks(&distance, &band, &depth);
         let (outer, cavity) = rayon::join(
             || Volume::from_solid(model),
             || deeper_than(&band, &depth, thickness_mm),
@@ -80,16 +86,26 @@ impl ShellGrid {
         if cavity.is_empty() {
             return Err(GridError::NoCavity { thickness_mm });
         }
-        let wall = outer
-            .map_err(|e| GridError::Surface(e.to_string()))?
-            .subtract(&cavity);
+        let solid = outer.map_err(|e| GridError::Surface(e.to_string()))?;
+        let wall = solid.subtract(&cavity);
         Ok(Self {
             band,
             depth,
             thickness_mm,
             reach_mm,
+            solid,
             wall,
+            cracks,
         })
+    }
+
+    /// The nodes next to `node` with nothing but the model in between, where both are inside of it.
+    pub(super) fn joined_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        let is_cut = move |other: u32| {
+            let pair = (node.min(other), node.max(other));
+            self.cracks.binary_search(&pair).is_ok()
+        };
+        self.band.face_neighbours(node).filter(move |&n| !is_cut(n))
     }
 
     /// Greatest absolute value kept in fields, mm.
@@ -101,6 +117,25 @@ impl ShellGrid {
     pub(super) fn is_below_wall(&self, node: usize) -> bool {
         f64::from(self.depth[node]) > self.thickness_mm + OUTSIDE_CELLS * self.band.cell_mm()
     }
+}
+
+/// See [`ShellGrid::cracks`].
+fn cracks(distance: &SignedDistance, band: &Band, depth: &[f32]) -> Vec<(u32, u32)> {
+    let cell = band.cell_mm() as f32;
+    let is_crack = |n: u32, m: u32| {
+        // Where the surface passes between two nodes, they are no farther from it than from each other.
+        let (a, b) = (depth[n as usize], depth[m as usize]);
+        let position = |n: u32| band.position(n as usize);
+        b > 0.0 && a + b <= 1.001 * cell && distance.is_between(position(n), position(m))
+    };
+    (0..band.len() as u32)
+        .into_par_iter()
+        .filter(|&n| (0.0..cell).contains(&depth[n as usize]))
+        .flat_map_iter(|n| {
+            let later = band.face_neighbours(n).filter(move |&m| m > n);
+            later.filter(move |&m| is_crack(n, m)).map(move |m| (n, m))
+        })
+        .collect::<Vec<_>>()
 }
 
 /// The region deeper than `depth_mm`, with few triangles.

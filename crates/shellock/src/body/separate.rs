@@ -10,10 +10,12 @@ use shellock_geom::marching_cubes::{Corners, OffBand, contour, contour_cutting};
 use shellock_geom::sweep::Sweeper;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 
+use super::chips::whole_bodies;
+use super::fragments::Fragments;
 use super::grid::{LocalField, PatchDistances, ShellGrid};
 use super::{BodyError, BodyParams};
 use crate::plan::LatticePlan;
-use crate::{Cancelled, Cause, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface, Warning};
+use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface};
 
 /// Outer skin of a piece that other pieces' paths must not take from it, in cells. [geometry notes: 1.5]
 const SKIN_CELLS: f64 = 1.5;
@@ -36,13 +38,10 @@ const COLLAR_CELLS: usize = 3;
 /// each side.
 const MOST_STRAY: usize = 10;
 /// Rounds of giving fragments to the other side of a cut; new ones can appear where p must keep out of the
-/// way of what it gave. A fragment that is given lies this far on the other side, in cells.
-const MOST_GIVINGS: usize = 3;
-const GIVEN_CELLS: f64 = 0.45;
+/// way of what it gave.
+const MOST_GIVINGS: usize = 4;
 /// A piece that could take less than this share of its wall along is not made.
 const LEAST_KEPT: f64 = 0.5;
-/// Fragments of a body up to this volume are dropped, mm³; more is worth a warning.
-const CHIP_MM3: f64 = 0.5;
 
 /// The separated bodies and what later stages need of the separation.
 pub struct ShellBodies {
@@ -129,11 +128,10 @@ pub fn build(
         &cuts,
     )?;
     parts.sort_by_key(|(p, _)| *p);
+    let apart_mm = 2.0 * params.seam_gap_mm.max(params.key_gap_mm.unwrap_or(0.0));
+    let parts = whole_bodies(ctx, grid, apart_mm, parts);
     Ok(ShellBodies {
-        bodies: parts
-            .into_iter()
-            .map(|(p, part)| whole_body(ctx, p, &part))
-            .collect(),
+        bodies: parts.into_iter().map(|(_, body)| body).collect(),
         inner: inner.finish(plan.steps.len()),
         blocked: of_every_piece(blocked),
         side: of_every_piece(side),
@@ -337,25 +335,10 @@ fn gap_mm(params: &BodyParams, key_side: Option<&[f32]>, n: usize) -> f32 {
     own.unwrap_or(params.seam_gap_mm) as f32
 }
 
-/// The largest connected part of `body`, its cavities filled.
-fn whole_body(ctx: &Ctx, p: PatchId, body: &Volume) -> Volume {
-    let parts = body.components();
-    // Cavities of their own, as in the knee of a leg, are filled: nothing could run out of them.
-    let chips = || parts.iter().skip(1).filter(|c| c.signed_volume() > 0.0);
-    let dropped_mm3: f64 = chips().map(Volume::volume).sum();
-    if dropped_mm3 > CHIP_MM3 {
-        ctx.warn(Warning {
-            cause: Cause::BodyInParts { dropped_mm3 },
-            pieces: vec![p],
-            at: chips().next().map(|c| c.bounds().center().to_array()),
-        });
-    }
-    parts.into_iter().next().unwrap_or_else(Volume::empty)
-}
-
 /// The state between two removals.
 struct Separation<'a> {
     grid: &'a ShellGrid,
+    fragments: Fragments<'a>,
     distances: &'a PatchDistances,
     sweeper: Sweeper<'a>,
     remains: Vec<bool>,
@@ -370,6 +353,7 @@ impl<'a> Separation<'a> {
         let cutoff = grid.cutoff_mm();
         Self {
             grid,
+            fragments: Fragments::new(grid),
             distances,
             sweeper: Sweeper::new(&grid.band),
             remains: vec![true; n_pieces],
@@ -413,10 +397,21 @@ impl<'a> Separation<'a> {
             .into_par_iter()
             .map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n]))
             .collect();
-        // What is given back stays, and p keeps out of its way too.
+        // What is given back stays, and p keeps out of its way too; what p gets leaves with all that is ahead
+        // of it.
         for _ in 0..MOST_GIVINGS {
-            if !self.give_fragments_back(&mut g) {
+            let Some(given) = self.fragments.give(&mut g, &self.rest) else {
                 break;
+            };
+            if let Some(mut gained) = given.gained(self.grid) {
+                gained
+                    .par_iter_mut()
+                    .enumerate()
+                    .for_each(|(n, f)| *f = at(n, *f).max(-cutoff));
+                let ahead = self.sweeper.max_ahead(&gained, along.map(|x| -x));
+                g.par_iter_mut()
+                    .zip(&ahead)
+                    .for_each(|(g, ahead)| *g = g.max(*ahead));
             }
             let staying: Vec<f32> = (0..g.len())
                 .into_par_iter()
@@ -440,24 +435,6 @@ impl<'a> Separation<'a> {
             .map(|n| (1usize, usize::from(g[n] > 0.0)))
             .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         kept as f64 / own.max(1) as f64
-    }
-
-    /// Gives each fragment of either side to the other side, which surrounds it. Returns whether there were
-    /// any.
-    fn give_fragments_back(&self, g: &mut [f32]) -> bool {
-        let away = GIVEN_CELLS as f32 * self.grid.band.cell_mm() as f32;
-        let fragments = |side: f32| {
-            let is_member = |n: usize| self.wall(n, 0.0) > 0.0 && self.rest[n] > 0.0 && side * g[n] > 0.0;
-            minor_components(&self.grid.band, is_member)
-        };
-        let (gained, lost) = rayon::join(|| fragments(1.0), || fragments(-1.0));
-        for (side, fragments) in [(1.0, &gained), (-1.0, &lost)] {
-            fragments
-                .iter()
-                .flatten()
-                .for_each(|&n| g[n as usize] = -side * away);
-        }
-        !(gained.is_empty() && lost.is_empty())
     }
 
     /// Takes p away; returns where p may have no connectors.
@@ -489,33 +466,6 @@ impl<'a> Separation<'a> {
             .for_each(|(w, a)| *w = w.max(*a));
         in_way
     }
-}
-
-/// Connected components of the nodes for which `is_member` holds, all but the largest; connected across cell
-/// edges.
-fn minor_components(band: &Band, is_member: impl Fn(usize) -> bool + Sync) -> Vec<Vec<u32>> {
-    let member: Vec<bool> = (0..band.len()).into_par_iter().map(&is_member).collect();
-    let mut seen = vec![false; band.len()];
-    let mut components: Vec<Vec<u32>> = Vec::new();
-    for seed in 0..band.len() {
-        if !member[seed] || seen[seed] {
-            continue;
-        }
-        seen[seed] = true;
-        let mut component = vec![seed as u32];
-        let mut next = 0;
-        while next < component.len() {
-            for node in band.face_neighbours(component[next]) {
-                if member[node as usize] && !std::mem::replace(&mut seen[node as usize], true) {
-                    component.push(node);
-                }
-            }
-            next += 1;
-        }
-        components.push(component);
-    }
-    components.sort_by_key(|c| std::cmp::Reverse(c.len()));
-    components.split_off(components.len().min(1))
 }
 
 /// The inner surface of the wall while its owners are found.

@@ -149,3 +149,64 @@ fn a_wall_as_thick_as_the_model_has_no_cavity() {
         Err(GridError::NoCavity { .. })
     ));
 }
+
+#[test]
+fn a_crack_thinner_than_a_cell_parts_the_nodes_on_its_sides() {
+    // Two thick plates that a web holds together at one end, 0.05 mm apart.
+    let plate = |z: [f64; 2], x: [f64; 2]| {
+        Volume::cuboid(Aabb {
+            min: Vec3::new(x[0], -10.0, z[0]),
+            max: Vec3::new(x[1], 10.0, z[1]),
+        })
+    };
+    let parts = vec![
+        plate([0.0, 12.0], [0.0, 30.0]),
+        plate([12.05, 24.0], [0.0, 30.0]),
+        plate([0.0, 24.0], [-6.0, 0.0]),
+    ];
+    let model = Solid::new(Volume::union_all(parts).to_mesh()).unwrap();
+    let grid = ShellGrid::new(&BodyParams::default(), &model, 4.0).unwrap();
+    let band = &grid.band;
+    let (mut n_cut, mut n_across) = (0, 0);
+    for n in 0..band.len() as u32 {
+        let is_inside = |m: u32| grid.depth[m as usize] > 0.0;
+        let at = band.position(n as usize);
+        for m in band.face_neighbours(n).filter(|&m| is_inside(n) && is_inside(m)) {
+            let other = band.position(m as usize);
+            let is_across = (at.z < 12.02) != (other.z < 12.02) && at.x > 0.0;
+            n_across += usize::from(is_across);
+            let is_cut = grid.joined_neighbours(n).all(|joined| joined != m);
+            n_cut += usize::from(is_cut);
+            assert_eq!(is_cut, is_across, "{at} {other}");
+        }
+    }
+    assert!(n_across > 1000 && n_cut == n_across);
+}
+
+#[test]
+fn what_came_off_a_body_with_skin_goes_to_the_body_beside_it() {
+    let (surface, plan) = octants();
+    let params = BodyParams::default();
+    let (grid, built) = built(&params, &surface, &plan);
+    let mut parts: Vec<(crate::PatchId, Volume)> = Vec::new();
+    for (i, body) in built.unwrap().bodies.as_slice().iter().enumerate() {
+        parts.push((i.into(), body.clone()));
+    }
+    // A block of the first octant's rim, of which a smaller one is left before the neighbour.
+    let block = |x: f64, y: [f64; 2]| {
+        Volume::cuboid(Aabb {
+            min: Vec3::new(x, y[0], -20.0),
+            max: Vec3::new(0.0, y[1], 0.0),
+        })
+    };
+    let gone = block(-1.3, [-9.6, -3.4]);
+    let chip = parts[0].1.intersect(&block(-0.7, [-9.0, -4.0]));
+    assert!(chip.volume() > 2.0, "{} mm³", chip.volume());
+    parts[0].1 = Volume::union_all(vec![parts[0].1.subtract(&gone), chip.clone()]);
+    assert_eq!(parts[0].1.components().len(), 2);
+    let neighbour_mm3 = parts[1].1.volume();
+    let whole = super::chips::whole_bodies(&Ctx::quiet(), &grid, 2.0 * params.seam_gap_mm, parts);
+    assert!(whole.iter().all(|(_, body)| body.components().len() == 1));
+    assert!(whole[1].1.volume() > neighbour_mm3 + chip.volume());
+    assert!(whole[0].1.intersect(&whole[1].1).volume() < 1e-6);
+}

@@ -189,8 +189,7 @@ impl Learned {
     /// A kit was made; how the attempt ends where no other plan can help.
     fn learn(&mut self, ctx: &Ctx, kit: &Kit, most_kits: usize) -> Option<Attempt> {
         self.n_kits += 1;
-        let lessons = lessons(kit);
-        if lessons.is_empty() {
+        if kit.is_firm() {
             return Some(Attempt::Passed);
         }
         if kit.only_rattles() {
@@ -204,6 +203,7 @@ impl Learned {
                 ..Failure::default()
             }));
         }
+        let lessons = lessons(kit);
         self.failure
             .blamed
             .extend(lessons.iter().flat_map(Lesson::blamed));

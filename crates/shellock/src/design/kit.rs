@@ -11,7 +11,7 @@ use crate::key::Turn;
 use crate::metric::{Chosen, Deformed, Holding};
 use crate::piece::{FinishParams, Finished, FinishedJoint, PressFit, PressFitKind};
 use crate::plan::{LatticePlan, PlanProof};
-use crate::play::{self, KitPlay};
+use crate::play::{self, KitPlay, Rattle};
 use crate::sizes::CONTACT_SIZES;
 use crate::verify::{self, Finding, Verification};
 use crate::{
@@ -52,6 +52,8 @@ pub struct Kit {
     pub touching: Vec<verify::contact::Contact>,
     /// How far the finished pieces move within their gaps.
     pub play: KitPlay,
+    /// The pieces that rattle, the loosest first.
+    pub rattles: Vec<Rattle>,
     /// What its stages warned of.
     pub warnings: Vec<Warning>,
     /// Which patches its pieces were made of.
@@ -78,32 +80,30 @@ impl Kit {
             .collect()
     }
 
-    /// Whether the only thing wrong with it is that pieces rattle.
+    /// Whether it passed and no piece rattles.
+    pub fn is_firm(&self) -> bool {
+        self.verification.passed() && self.rattles.is_empty()
+    }
+
+    /// Whether the only thing wrong with it is that pieces rattle, be they loose or not.
     pub fn only_rattles(&self) -> bool {
         let is_rattle = |f: &Finding| matches!(f, Finding::PlayTooWide { .. });
+        let n_failures = self.failures().len();
         let findings = &self.verification.findings;
-        self.failures().len() == 1 && !findings.is_empty() && findings.iter().all(is_rattle)
+        let is_all = n_failures == 0 || (n_failures == 1 && findings.iter().all(is_rattle));
+        is_all && !self.rattles.is_empty()
     }
 
     /// The pieces that rattle, the loosest first; the key, which is cut where there is room for it, is left
     /// out.
     pub fn rattling(&self) -> Vec<PatchId> {
-        let piece = |f: &Finding| match f {
-            Finding::PlayTooWide { piece, .. } if *piece != self.plan.key() => Some(*piece),
-            _ => None,
-        };
-        self.verification.findings.iter().filter_map(piece).collect()
+        let pieces = self.rattles.iter().map(|r| r.piece);
+        pieces.filter(|piece| *piece != self.plan.key()).collect()
     }
 
     /// Whether it has fewer failures, or as many and rattles less.
     pub fn is_better_than(&self, other: &Self) -> bool {
-        let excess = |finding: &Finding| match finding {
-            Finding::PlayTooWide { play, most, .. } => {
-                (play.translation_mm / most[0]).max(play.rotation_deg / most[1])
-            }
-            _ => 0.0,
-        };
-        let rattles = |k: &Self| k.verification.findings.iter().map(excess).fold(0.0, f64::max);
+        let rattles = |k: &Self| k.rattles.first().map_or(0.0, |r| r.excess);
         let (own, others) = (self.failures().len(), other.failures().len());
         own < others || (own == others && rattles(self) < rattles(other))
     }
@@ -168,10 +168,11 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
     let (finished, plan) = (handover.finished(made), handover.plan());
     // The verdict, from the finished meshes alone.
     let judging = ctx.fork();
-    let (verification, touching, play) = judged(&judging, settings, model, &finished, &plan)?;
+    let judged = judged(&judging, settings, model, &finished, &plan)?;
     let mut warnings = handover.warnings(ctx.into_warnings());
     warnings.extend(judging.into_warnings());
-    warnings.extend(play::warning(&play));
+    warnings.extend(play::warning_of_rattles(&judged.rattles));
+    warnings.extend(play::warning(&judged.play));
     Ok(Kit {
         surface: handover.surface(surface),
         sizes: handover.sizes(sizes),
@@ -184,9 +185,10 @@ pub(super) fn make(ctx: Ctx<'_>, recipe: Recipe<'_>) -> Result<Kit, DesignError>
         joints: finished.joints,
         press_fits: finished.press_fits,
         contacts: handover.rooms(contacts),
-        verification,
-        touching,
-        play,
+        verification: judged.verification,
+        touching: judged.touching,
+        play: judged.play,
+        rattles: judged.rattles,
         warnings,
         handover,
     })
@@ -220,6 +222,14 @@ fn connectors(
     }
 }
 
+/// What finished meshes are worth.
+struct Judged {
+    verification: Verification,
+    touching: Vec<verify::contact::Contact>,
+    play: KitPlay,
+    rattles: Vec<Rattle>,
+}
+
 /// What the meshes are worth: the verdict with that on play, where they touch, and how far they move.
 fn judged(
     ctx: &Ctx,
@@ -227,7 +237,7 @@ fn judged(
     model: &Solid,
     finished: &Finished,
     plan: &InstallationPlan,
-) -> Result<(Verification, Vec<verify::contact::Contact>, KitPlay), DesignError> {
+) -> Result<Judged, DesignError> {
     let assembly = verify::Assembly {
         model: Some(model),
         pieces: &finished.meshes,
@@ -237,12 +247,8 @@ fn judged(
     let (mut verification, touching) = verify::examine(ctx, &settings.verify, &assembly)?;
     let mut measured = play::measure(ctx, &settings.play, &finished.meshes, plan)?;
     let size_mm = model.mesh().bounds().size().max_element();
-    verification.add(play::check(
-        &measured,
-        &finished.meshes,
-        size_mm,
-        settings.verify.clearance_mm,
-    ));
+    let rattles = play::rattles(&measured, &finished.meshes, size_mm, settings.verify.clearance_mm);
+    verification.add(play::check(&measured, &rattles));
     if verification.passed() {
         // It is slow; what fails already is not given out.
         play::look_for_ways_out(ctx, settings.verify.clearance_mm, &finished.meshes, &mut measured)?;
@@ -250,7 +256,12 @@ fn judged(
             .into_iter()
             .for_each(|check| verification.add(check));
     }
-    Ok((verification, touching, measured))
+    Ok(Judged {
+        verification,
+        touching,
+        play: measured,
+        rattles,
+    })
 }
 
 /// Says what the key must be pressed past, and what holds a key without rails.

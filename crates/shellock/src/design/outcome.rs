@@ -115,7 +115,7 @@ impl<'a> Best<'a> {
     /// Whether a key at `place` need not be tried. A piece as it is rattles no less as the key than one that
     /// was cut.
     pub fn is_enough(&self, place: Option<&KeySite>) -> bool {
-        let is_enough = |kit: &Kit| kit.verification.passed() || (place.is_none() && kit.only_rattles());
+        let is_enough = |kit: &Kit| kit.is_firm() || (place.is_none() && kit.only_rattles());
         let rattles = place.is_some() && self.n_rattling == RATTLING_KEYS;
         rattles || self.kit.as_ref().is_some_and(|kept| is_enough(&kept.kit))
     }

@@ -16,7 +16,7 @@ use crate::metric::{ChoiceError, Holding};
 use crate::piece::PieceError;
 use crate::plan::key::KeyDirections;
 use crate::plan::{LatticePlan, PlanConstraints, PlanProof, ProofScope};
-use crate::play::{KitPlay, Slide};
+use crate::play::{KitPlay, Rattle, Slide};
 use crate::segmentation::{SegmentationError, SegmentationParams};
 use crate::strength::StrengthError;
 use crate::verify::{Check, Finding, Play, Verification};
@@ -99,6 +99,7 @@ fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Findin
             findings,
         },
         touching: Vec::new(),
+        rattles: Vec::new(),
         play: KitPlay {
             slide,
             bearings: Vec::new(),
@@ -128,13 +129,26 @@ fn rattling(piece: u32, translation_mm: f64) -> Kit {
         rotation_deg: 0.0,
         is_proven: false,
     };
-    let finding = Finding::PlayTooWide {
-        piece: PatchId(piece),
+    let (piece, at) = (PatchId(piece), [0.0; 3]);
+    let rattle = Rattle {
+        piece,
         play,
         most: [1.0, 2.0],
-        at: [0.0; 3],
+        excess: translation_mm,
+        at,
     };
-    kit(&[("holds", true), ("sits", false)], vec![finding])
+    let finding = Finding::PlayTooWide {
+        piece,
+        play,
+        most: [2.0, 4.0],
+        at,
+    };
+    let is_loose = translation_mm > 2.0;
+    let findings = if is_loose { vec![finding] } else { Vec::new() };
+    Kit {
+        rattles: vec![rattle],
+        ..kit(&[("holds", true), ("sits", !is_loose)], findings)
+    }
 }
 
 fn loose(piece: u32) -> Kit {
@@ -205,14 +219,19 @@ fn the_best_kit_fails_least_then_rattles_least_then_is_the_earliest() {
         assert_eq!(best.as_ref().unwrap().thickness_mm == 9.0, keeps);
     }
     let mut best = Some(rattling(1, 3.0));
-    attempt::keep(&mut best, rattling(0, 2.0));
+    attempt::keep(&mut best, rattling(0, 2.5));
     assert_eq!(best.unwrap().rattling(), [PatchId(0)]);
 }
 
 #[test]
 fn a_key_that_rattles_is_nobody_to_join() {
     assert_eq!(rattling(2, 3.0).rattling(), []);
-    assert!(rattling(2, 3.0).only_rattles() && !loose(1).only_rattles() && !good().only_rattles());
+    assert!(
+        rattling(2, 3.0).only_rattles()
+            && rattling(2, 1.5).only_rattles()
+            && !loose(1).only_rattles()
+            && !good().only_rattles()
+    );
 }
 
 #[test]
@@ -479,6 +498,17 @@ fn a_kit_that_passes_ends_the_job() {
         (1, 1),
         "only what was tried counts"
     );
+}
+
+#[test]
+fn a_kit_that_rattles_and_is_not_loose_passes_where_no_firm_one_is_found() {
+    let rattles = || (Some(site()), made(rattling(1, 1.5)));
+    let (needed, design) = Ball::new().outcome(vec![rattles(), (Some(site()), made(good()))]);
+    assert_eq!(needed, [true, true], "a firmer one is looked for");
+    assert!(design.unwrap().kit.is_firm());
+    let (_, design) = Ball::new().outcome(vec![rattles(), (None, made(loose(1)))]);
+    let kit = design.unwrap().kit;
+    assert!(kit.verification.passed() && !kit.is_firm());
 }
 
 #[test]

@@ -1,0 +1,136 @@
+//! Parts of a body that came off it: seams that meet in a sharp fold of the surface leave some smaller than a cell
+//! of the grid.
+//!
+//! One that carries outer skin is given to the body that it lies against, over a bridge in the gap between them;
+//! else there would be a hole. What hangs on nothing is dropped.
+
+use rayon::prelude::*;
+use shellock_geom::bvh::TriangleBvh;
+use shellock_geom::grown::grown;
+use shellock_geom::{Aabb, Vec3, Volume};
+
+use super::grid::ShellGrid;
+use crate::{Cause, Ctx, PatchId, Warning};
+
+/// Chips up to this volume are dropped, mm³; what is missing then is a scratch.
+const CRUMB_MM3: f64 = 0.2;
+/// What is dropped is told from this volume on, mm³.
+const TOLD_MM3: f64 = 0.5;
+/// A bridge reaches so much farther than both sides' gaps, mm: its neck is about as wide.
+const BRIDGE_MM: f64 = 0.3;
+
+/// A body in parts: the largest, its cavities filled, and what came off.
+struct Parts {
+    piece: PatchId,
+    body: Volume,
+    chips: Vec<Volume>,
+}
+
+impl Parts {
+    fn of((piece, part): (PatchId, Volume)) -> Self {
+        let mut parts = part.components().into_iter();
+        let body = parts.next().unwrap_or_else(Volume::empty);
+        // Cavities of their own, as in the knee of a leg, are filled: nothing could run out of them.
+        let chips = parts.filter(|c| c.signed_volume() > 0.0).collect();
+        Self { piece, body, chips }
+    }
+}
+
+/// One connected body for each piece. Those that come `gap_mm` near to each other stay apart.
+pub(super) fn whole_bodies(
+    ctx: &Ctx,
+    grid: &ShellGrid,
+    gap_mm: f64,
+    parts: Vec<(PatchId, Volume)>,
+) -> Vec<(PatchId, Volume)> {
+    let mut parts: Vec<Parts> = parts.into_par_iter().map(Parts::of).collect();
+    for from in 0..parts.len() {
+        let mut dropped: Vec<Volume> = Vec::new();
+        for chip in std::mem::take(&mut parts[from].chips) {
+            let is_worth = chip.volume() > CRUMB_MM3 && has_skin(grid, &chip);
+            if !is_worth || !give(grid, gap_mm, &mut parts, &chip) {
+                dropped.push(chip);
+            }
+        }
+        let dropped_mm3: f64 = dropped.iter().map(Volume::volume).sum();
+        if dropped_mm3 > TOLD_MM3 {
+            ctx.warn(Warning {
+                cause: Cause::BodyInParts { dropped_mm3 },
+                pieces: vec![parts[from].piece],
+                at: dropped.first().map(|c| c.bounds().center().to_array()),
+            });
+        }
+    }
+    parts.into_iter().map(|p| (p.piece, p.body)).collect()
+}
+
+/// Whether a chip reaches the surface of the model.
+fn has_skin(grid: &ShellGrid, chip: &Volume) -> bool {
+    let skin_mm = 0.5 * grid.band.cell_mm();
+    let depth = |p: &Vec3| grid.band.sample(&grid.depth, *p);
+    chip.to_mesh()
+        .points
+        .iter()
+        .any(|p| depth(p).is_some_and(|d| d < skin_mm))
+}
+
+/// Gives a chip to the body that it lies against most of those that it can be bridged to; whether there is one.
+fn give(grid: &ShellGrid, gap_mm: f64, parts: &mut [Parts], chip: &Volume) -> bool {
+    let reach_mm = gap_mm + BRIDGE_MM;
+    let Some(around) = grown(chip, reach_mm) else {
+        return false;
+    };
+    let around = around.intersect(&grid.solid);
+    let room = around.bounds().grown(2.0 * gap_mm);
+    let near: Vec<Volume> = parts.iter().map(|p| part_in(&p.body, room)).collect();
+    let mut takers: Vec<(usize, f64)> = (0..parts.len())
+        .map(|i| (i, contact_mm2(chip, &near[i], reach_mm)))
+        .filter(|(_, contact_mm2)| *contact_mm2 > 0.0)
+        .collect();
+    takers.sort_by(|a, b| b.1.total_cmp(&a.1));
+    for (taker, _) in takers {
+        let others = near.iter().enumerate().filter(|(i, _)| *i != taker);
+        let others = Volume::union_all(others.map(|(_, v)| v.clone()).collect());
+        let bridge = match grown(&others, gap_mm) {
+            Some(kept_free) => around.subtract(&kept_free),
+            None => around.clone(),
+        };
+        let joined = Volume::union_all(vec![parts[taker].body.clone(), bridge, chip.clone()]);
+        let whole = joined
+            .components()
+            .into_iter()
+            .next()
+            .unwrap_or_else(Volume::empty);
+        if whole.volume() > parts[taker].body.volume() + 0.9 * chip.volume() {
+            parts[taker].body = whole;
+            return true;
+        }
+    }
+    false
+}
+
+/// What of `body` lies in `room`.
+fn part_in(body: &Volume, room: Aabb) -> Volume {
+    if body.bounds().intersects(room) {
+        body.intersect(&Volume::cuboid(room))
+    } else {
+        Volume::empty()
+    }
+}
+
+/// How much of the chip's surface is no farther than `reach_mm` from `body`, mm².
+fn contact_mm2(chip: &Volume, body: &Volume, reach_mm: f64) -> f64 {
+    let (chip, body) = (chip.to_mesh(), body.to_mesh());
+    if body.triangles.is_empty() {
+        return 0.0;
+    }
+    let bvh = TriangleBvh::new(&body);
+    let is_near = |f: &usize| {
+        let [a, b, c] = chip.corners(*f);
+        bvh.nearest((a + b + c) / 3.0, reach_mm * reach_mm).is_some()
+    };
+    (0..chip.triangles.len())
+        .filter(is_near)
+        .map(|f| chip.face_area(f))
+        .sum()
+}

@@ -1,0 +1,85 @@
+//! Parts of a side of a cut that hang on nothing there.
+
+use rayon::prelude::*;
+
+use super::grid::ShellGrid;
+
+/// A fragment that is given lies this far on the other side, in cells.
+const GIVEN_CELLS: f64 = 0.45;
+
+/// Finds what hangs on nothing. Chips of the wall itself do so on any side: they do not count.
+pub(super) struct Fragments<'a> {
+    grid: &'a ShellGrid,
+    /// The nodes of the largest connected part of the wall.
+    wall: Vec<bool>,
+}
+
+impl<'a> Fragments<'a> {
+    pub fn new(grid: &'a ShellGrid) -> Self {
+        let is_wall = |n: usize| grid.depth[n] > 0.0 && grid.depth[n] < grid.thickness_mm as f32;
+        let mut wall: Vec<bool> = (0..grid.band.len()).into_par_iter().map(is_wall).collect();
+        for n in minor_components(grid, wall.clone()).into_iter().flatten() {
+            wall[n as usize] = false;
+        }
+        Self { grid, wall }
+    }
+
+    /// Gives each fragment of either side of the cut `g` through the `rest` to the other side, which surrounds
+    /// it. `None` where there are none.
+    pub fn give(&self, g: &mut [f32], rest: &[f32]) -> Option<Given> {
+        let away_mm = GIVEN_CELLS as f32 * self.grid.band.cell_mm() as f32;
+        let fragments = |side: f32| {
+            let is_member = |n: usize| self.wall[n] && rest[n] > 0.0 && side * g[n] > 0.0;
+            let member = (0..g.len()).into_par_iter().map(is_member).collect();
+            minor_components(self.grid, member).concat()
+        };
+        let (lost, gained) = rayon::join(|| fragments(1.0), || fragments(-1.0));
+        lost.iter().for_each(|&n| g[n as usize] = -away_mm);
+        gained.iter().for_each(|&n| g[n as usize] = away_mm);
+        (!lost.is_empty() || !gained.is_empty()).then_some(Given { gained, away_mm })
+    }
+}
+
+/// Fragments that changed sides.
+pub(super) struct Given {
+    /// Nodes of those that the piece which is cut off got.
+    gained: Vec<u32>,
+    away_mm: f32,
+}
+
+impl Given {
+    /// Positive in what the piece got, as far as a cell beyond it.
+    pub fn gained(&self, grid: &ShellGrid) -> Option<Vec<f32>> {
+        let mut field = vec![-grid.cutoff_mm(); grid.band.len()];
+        for &n in &self.gained {
+            field[n as usize] = self.away_mm;
+            for m in grid.joined_neighbours(n) {
+                field[m as usize] = self.away_mm;
+            }
+        }
+        (!self.gained.is_empty()).then_some(field)
+    }
+}
+
+/// Connected components of the member nodes, all but the largest; connected across cell edges.
+fn minor_components(grid: &ShellGrid, mut member: Vec<bool>) -> Vec<Vec<u32>> {
+    let mut components: Vec<Vec<u32>> = Vec::new();
+    for seed in 0..member.len() {
+        if !std::mem::take(&mut member[seed]) {
+            continue;
+        }
+        let mut component = vec![seed as u32];
+        let mut next = 0;
+        while next < component.len() {
+            for node in grid.joined_neighbours(component[next]) {
+                if std::mem::take(&mut member[node as usize]) {
+                    component.push(node);
+                }
+            }
+            next += 1;
+        }
+        components.push(component);
+    }
+    components.sort_by_key(|c| std::cmp::Reverse(c.len()));
+    components.split_off(components.len().min(1))
+}
