@@ -11,7 +11,7 @@ import shellock
 
 PROGRAM = os.environ.get("SHELLOCK", "shellock")
 GUIDE = Path(os.environ.get("SHELLOCK_GUIDE", Path(__file__).parents[2] / "docs/guide/python.md"))
-SOON = {"time": 0, "method": "creases", "pieces": 4, "thickness": "5mm"}
+SOON = {"time": 0, "method": "creases", "pieces": 4, "thickness": "3mm"}
 
 
 def test_every_program_of_the_guide_runs(tmp_path, monkeypatch):
