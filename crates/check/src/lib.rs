@@ -8,6 +8,7 @@ mod barrier;
 mod bearing;
 mod bounded;
 mod claims;
+mod former;
 mod gap;
 mod lock;
 mod mesh;
@@ -33,7 +34,6 @@ use vector::Vec3;
 
 /// What is read.
 const FORMAT: &str = "shellock-certificate";
-const VERSION: u64 = 4;
 /// Greater clearances are no joint, mm.
 const MOST_CLEARANCE_MM: f64 = 0.8;
 /// Most that a contact's faces may be apart beyond the clearance, mm.
@@ -222,12 +222,13 @@ struct Gap {
 /// Tests every claim of the kit in `folder`. An error means that there is no certificate to test.
 pub fn check(folder: &Path) -> Result<Vec<Finding>, String> {
     let certificate: Value = read_json(&folder.join("certificate.json"))?;
-    let (format, version) = (&certificate["format"], &certificate["version"]);
-    if (format.as_str(), version.as_u64()) != (Some(FORMAT), Some(VERSION)) {
-        return Err(format!("format {format} version {version} is not known"));
+    let format = &certificate["format"];
+    if format != FORMAT {
+        return Err(format!("format {format} is not known"));
     }
+    let certificate = former::certificate(certificate)?;
     let certificate = serde_json::from_value(certificate).map_err(|e| format!("certificate.json: {e}"))?;
-    let plan: Value = read_json(&folder.join("plan.json"))?;
+    let plan = former::plan(read_json(&folder.join("plan.json"))?)?;
     Ok(findings(folder, &certificate, &plan))
 }
 
@@ -500,8 +501,20 @@ mod tests {
             fs::write(folder.path().join("certificate.json"), text).unwrap();
             check(folder.path()).unwrap_err()
         };
-        let older = why(r#"{ "format": "shellock-certificate", "version": 3 }"#);
-        assert!(older.ends_with("version 3 is not known"), "{older}");
+        let version = |version: &str| {
+            why(&format!(
+                r#"{{ "format": "shellock-certificate", "version": {version} }}"#
+            ))
+        };
+        let older = version("2");
+        assert!(older.contains("version 2, which claims less"), "{older}");
+        let later = version("5");
+        assert!(
+            later.contains("version 5, and this program reads 3 and 4"),
+            "{later}"
+        );
+        assert!(version("0").ends_with("version 0 is not known"));
+        assert!(version("\"4\"").ends_with("version \"4\" is not known"));
         assert!(why(r#"{ "format": "another", "version": 4 }"#).ends_with("is not known"));
         let empty = why(r#"{ "format": "shellock-certificate", "version": 4 }"#);
         assert!(

@@ -12,6 +12,7 @@ use std::sync::OnceLock;
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use shellock::coupon::N_FITS;
 use shellock::piece::LabelParams;
+use shellock::sizes::SizeChoice;
 use shellock_print::Printer;
 use shellock_print::booklet::Paper;
 
@@ -452,6 +453,13 @@ impl FromStr for Thickness {
     }
 }
 
+/// The size of all connectors, a length, or `auto`.
+fn connector_size(text: &str) -> Result<SizeChoice, String> {
+    let length = |_| units::length_mm(text).map(SizeChoice::Fixed);
+    let size = text.to_ascii_lowercase().parse().or_else(length);
+    size.map_err(|_: String| "give millimetres, such as 2.5, or auto".to_owned())
+}
+
 /// The printer of that name: one of the user's `own`, or of those that come with the program.
 fn printer_called(name: &str, own: &[Printer]) -> Result<Printer, String> {
     let known: Vec<Printer> = own.iter().cloned().chain(Printer::presets()).collect();
@@ -476,5 +484,19 @@ fn label(min_wall_mm: f64) -> LabelParams {
         stroke_mm: within(usual.stroke_mm, 2.0),
         least_wall_mm: within(usual.least_wall_mm, 5.0),
         ..usual
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn connectors_have_a_length_or_a_size_by_stress() {
+        for (text, mm) in [("4", 4.0), ("4mm", 4.0), ("0.3 cm", 3.0)] {
+            assert_eq!(connector_size(text), Ok(SizeChoice::Fixed(mm)), "{text}");
+        }
+        assert!(matches!(connector_size("Auto"), Ok(SizeChoice::Auto(_))));
+        assert!(connector_size("large").is_err_and(|why| why.contains("2.5, or auto")));
     }
 }

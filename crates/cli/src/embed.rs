@@ -28,7 +28,8 @@ use crate::stages;
 use crate::{batch, own_assembly};
 
 /// Why there is no result.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{message}")]
 pub struct Problem {
     /// The exit code of the command line: 2 for what was given, 3 for no plan, 4 for what could not be written, 130 for stopped.
     pub code: u8,

@@ -46,6 +46,11 @@ use serde_json::json;
 use args::Command;
 use failure::Failure;
 
+/// The guide's programs, compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/library.md")]
+struct Guide;
+
 /// What every command gets.
 pub struct Session {
     /// Whether to print one JSON object instead of text.

@@ -122,10 +122,13 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
         path: path.to_owned(),
         source,
     })?;
+    // Kits of program 0.1 number pieces from 0 here as in their plans.
+    let first = i64::from(!labels.contains(&0));
     let patch = |&face: &u32| {
-        let number = u32::try_from(labels[face as usize]).ok();
-        number
-            .and_then(PatchId::numbered)
+        let place = labels[face as usize].checked_sub(first);
+        place
+            .and_then(|place| u32::try_from(place).ok())
+            .map(PatchId)
             .filter(|&piece| usize::from(piece) < n_pieces)
             .ok_or_else(|| wrong("a face has a label that is no piece of plan.json"))
     };

@@ -1,14 +1,14 @@
 //! `plan.json`: pieces, order, directions and figures of a kit.
 //!
 //! There is one type for each object of the file, and fields have the file's names. Places and directions are
-//! in assembly space, lengths in mm. What a kit of an earlier version may lack is optional; parts that no
-//! command reads and that were written in another way once ([`PlanFile::plan`], [`PlanFile::holding`]) are left
-//! out instead of refused.
+//! in assembly space, lengths in mm. What a kit of an earlier version may lack is optional. Files of former versions
+//! are converted before they are read, those of later versions are refused.
 
 mod checked;
 mod entries;
 mod error;
 mod fill;
+mod former;
 #[cfg(test)]
 mod tests;
 
@@ -31,8 +31,8 @@ pub use fill::{Source, Told, piece_file};
 
 /// What `format` says.
 pub const FORMAT: &str = "shellock-plan";
-/// What `version` says.
-pub const VERSION: u64 = 1;
+/// What `version` says. It grows where a reader of before would misunderstand what is written now.
+pub const VERSION: u64 = 2;
 
 /// The whole file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -79,14 +79,11 @@ pub struct PlanFile {
     pub pieces: Vec<PieceEntry>,
     /// Their ids, first to last.
     pub installation_order: Vec<PatchId>,
-    /// How good the plan is; `None` where an earlier version told it in another way.
-    #[serde(default, deserialize_with = "if_readable")]
+    /// How good the plan is; `None` where version 1 told it in another way.
     pub plan: Option<PlanProof>,
-    /// How the plan holds by simulation; `None` where an earlier version told it in another way.
-    #[serde(default, deserialize_with = "if_readable")]
+    /// How the plan holds by simulation; `None` where version 1 told it in another way.
     pub holding: Option<Holding>,
-    /// What the kit bears, in short; `None` in kits of earlier versions.
-    #[serde(default, deserialize_with = "if_readable")]
+    /// What the kit bears, in short; `None` in kits of version 1.
     pub bears: Option<Bears>,
     /// Material of all pieces over the solid model's.
     pub volume_ratio: Option<f64>,
@@ -119,11 +116,7 @@ impl PlanFile {
         if !value.is_object() {
             return Err(PlanFileError::NotAnObject);
         }
-        let is_other = |field: &str, ours: Value| value.get(field).is_some_and(|said| *said != ours);
-        if is_other("format", FORMAT.into()) || is_other("version", VERSION.into()) {
-            return Err(PlanFileError::OtherFormat);
-        }
-        serde_path_to_error::deserialize(value)
+        serde_path_to_error::deserialize(former::converted(value)?)
             .map_err(|e| PlanFileError::of_field(&e.path().to_string(), &e.inner().to_string()))
     }
 

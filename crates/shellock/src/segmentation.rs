@@ -54,7 +54,7 @@ pub const MOST_PIECES: usize = 128;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationParams {
-    /// How patches are found where there are no labels; in creases.
+    /// How patches are found where there are no labels; where people would divide ([`Method::Auto`]).
     pub method: Method,
     /// Patches that automatic segmentation begins with; refining adds some. [2, [`MOST_PIECES`]]; `None`: what
     /// the method finds, and in creases from the area, 10 for a 150 mm figure.

@@ -13,7 +13,7 @@ use shellock_print::Printer;
 
 use super::keep_whole::keep_whole;
 use super::pieces::{Key, Pieces, Symmetric};
-use super::{Axis, LabelsFrom, PaperSize, Thickness, Unit, label, printer_called};
+use super::{Axis, LabelsFrom, PaperSize, Thickness, Unit, connector_size, label, printer_called};
 use crate::{stress, units};
 
 #[derive(Args)]
@@ -235,6 +235,7 @@ pub struct Options {
     /// Connector size: 1.5 to 6 mm for all seams, or "auto": 2 to 4 mm, by the stress at each seam and by
     /// what fits
     #[arg(
+        value_parser = connector_size,
         long,
         value_name = "auto|MM",
         allow_hyphen_values = true,

@@ -42,8 +42,7 @@ pub struct RepairEntry {
 /// What the walls bear.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StrengthEntry {
-    /// What they are made of; `None` where it is told in another way.
-    #[serde(default, deserialize_with = "if_readable")]
+    /// What they are made of; `None` where version 1 told it in another way.
     pub material: Option<Material>,
     /// Height of the falls, m.
     pub drop_m: f64,
@@ -240,8 +239,8 @@ pub struct VerdictEntry {
     /// All checks, in the order they were made.
     #[serde(default)]
     pub checks: Vec<Check>,
-    /// What failed, in the same order; `None` where an earlier version told it in another way, or where play
-    /// without end is among it, which JSON has no number for.
+    /// What failed, in the same order; `None` where play without end is among it, which JSON has no number
+    /// for, or where version 1 told it in another way.
     #[serde(default, deserialize_with = "if_readable")]
     pub findings: Option<Vec<Finding>>,
 }

@@ -10,8 +10,17 @@ pub enum PlanFileError {
     #[error("not a plan: it holds no object, which begins with {{")]
     NotAnObject,
     /// It says that it is something else.
-    #[error("\"format\" and \"version\" are not \"shellock-plan\" and 1; build the kit again")]
+    #[error("\"format\" and \"version\" are not \"shellock-plan\" and a number; build the kit again")]
     OtherFormat,
+    /// A later program wrote it.
+    #[error(
+        "it is of version {version}, and this program reads 1 to {}: use the program that made the kit, or a later one",
+        super::VERSION
+    )]
+    Later {
+        /// What it says.
+        version: u64,
+    },
     /// A field is not there.
     #[error("{}", missing(field))]
     Missing {

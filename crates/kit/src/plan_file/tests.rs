@@ -5,7 +5,7 @@ use super::*;
 
 /// A plan of two pieces, with something in every field.
 const WHOLE: &str = r#"{
-    "format": "shellock-plan", "version": 1, "units": "mm", "program": "0.1.0",
+    "format": "shellock-plan", "version": 2, "units": "mm", "program": "0.2.0",
     "input": { "file": "box.stl", "sha256": "ab12", "transform": [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
         0.0, 0.0, 0.0, 0.0, 1.0], "largest_only": true,
         "repairs": [{ "kind": "left-out", "count": 1, "at": [0.0, 1.0, 2.0], "message": "1 body was left out" }] },
@@ -190,7 +190,13 @@ fn what_is_no_plan_is_refused() {
     assert!(said(b"{ \"pieces\": [").starts_with("not a plan: "));
     assert!(said(b"[]").starts_with("not a plan: "));
     assert!(said(&[0xff, 0xfe]).starts_with("not a plan: "));
-    assert!(complaint("/version", Some(json!(2))).contains("build the kit again"));
+    assert!(complaint("/version", Some(json!(0))).contains("build the kit again"));
+    assert!(complaint("/version", Some(json!("2"))).contains("build the kit again"));
+    let later = complaint("/version", Some(json!(3)));
+    assert!(
+        later.starts_with("it is of version 3, and this program reads 1 to 2"),
+        "{later}"
+    );
     assert!(complaint("/format", Some(json!("x"))).contains("build the kit again"));
 }
 
@@ -209,12 +215,64 @@ fn kits_of_earlier_versions_are_read() {
     assert!(plan.sizes().unwrap_err().to_string().contains("connector_size"));
 
     let mut other = whole();
+    other["version"] = json!(1);
     other["holding"] = json!({ "quality_mm": 1.0 });
     other["plan"] = json!("good");
     other["press_fits"] = json!(null);
     other["something_else"] = json!(3);
     let plan = read(&other).unwrap();
     assert!(plan.holding.is_none() && plan.plan.is_none() && plan.press_fits.is_empty());
+    assert_eq!(plan.version, Some(VERSION));
+    other["version"] = json!(VERSION);
+    assert!(read(&other).unwrap_err().contains("\"holding"));
+}
+
+/// [`WHOLE`] as program 0.1 wrote it.
+fn numbered_from_0() -> Value {
+    let mut plan = whole();
+    plan["version"] = json!(1);
+    plan["program"] = json!("0.1.0");
+    plan["installation_order"] = json!([0, 1]);
+    plan["key_piece"] = json!(1);
+    plan["connector_sizes"][0]["pieces"] = json!([0, 1]);
+    plan["press_fits"][0]["piece"] = json!(1);
+    for (place, other) in [(0, 1), (1, 0)] {
+        plan["pieces"][place]["id"] = json!(place);
+        plan["pieces"][place]["neighbors"] = json!([other]);
+        plan["pieces"][place]["file"] = json!(format!("pieces/piece-0{place}.stl"));
+    }
+    plan["key"]["turned_degrees"] = json!(12.5);
+    plan["plan"]["proven_for"]["keys"] = json!([1]);
+    (plan["joints"][0]["male"], plan["joints"][0]["female"]) = (json!(0), json!(1));
+    (plan["contacts"][0]["later"], plan["contacts"][0]["earlier"]) = (json!(1), json!(0));
+    plan["gaps"].as_object_mut().unwrap().remove("loosest_if_thin");
+    plan["verification"]["findings"][0]["piece"] = json!(1);
+    plan["warnings"][0]["pieces"] = json!([1]);
+    plan["warnings"][0].as_object_mut().unwrap().remove("severity");
+    (
+        plan["printing"]["laid"][0]["piece"],
+        plan["printing"]["too_large"],
+    ) = (json!(0), json!([1]));
+    let plan_fields = plan.as_object_mut().unwrap();
+    plan_fields.remove("bears");
+    plan_fields.insert(
+        "holding".into(),
+        json!({ "quality_mm": -0.5, "loose": [], "seams": [] }),
+    );
+    plan
+}
+
+#[test]
+fn a_plan_numbered_from_0_reads_as_it_would_be_written_now() {
+    let former = read(&numbered_from_0()).unwrap();
+    let mut now = read(&whole()).unwrap();
+    (now.program, now.bears, now.holding) = (former.program.clone(), None, None);
+    now.gaps.as_mut().unwrap().loosest_if_thin = None;
+    for place in 0..2 {
+        now.pieces[place].file = Some(format!("pieces/piece-0{place}.stl"));
+    }
+    assert_eq!(former, now);
+    assert!(PlanFile::read(&former.to_bytes()).is_ok_and(|again| again == former));
 }
 
 #[test]

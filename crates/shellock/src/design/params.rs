@@ -19,7 +19,7 @@ use crate::segmentation::{KeepWhole, Method};
 pub struct Params {
     /// Seed of all random choices: the same seed gives the same kit. 0.
     pub seed: u64,
-    /// How pieces are found where there are no labels; in creases.
+    /// How pieces are found where there are no labels; where people would divide ([`Method::Auto`]).
     pub method: Method,
     /// Pieces that automatic segmentation begins with. [2, 128]; `None`: what the method finds, and in creases
     /// from the area, 10 for a figure of 150 mm.

@@ -1,0 +1,179 @@
+//! Every command of the guides runs: one that no longer exists, or whose options have other names, fails here.
+//!
+//! The `sh` blocks of a guide are run in order in a folder of its own, with figures made by code in place of a
+//! reader's files. What makes a kit gets options that make it soon, but for those that the guide names. Python's
+//! blocks run in python/tests.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// Commands that are not run, by how they begin, and why.
+const NOT_RUN: [(&str, &str); 6] = [
+    ("cargo install ", "builds the program once more"),
+    ("scripts/test", "runs this test"),
+    (
+        "pip install maturin",
+        "fetches from the registry; scripts/test does it",
+    ),
+    (
+        "maturin build ",
+        "needs maturin; scripts/test builds the same wheel",
+    ),
+    ("pip install dist/", "needs that wheel; scripts/test installs it"),
+    (
+        "python -m shellock_ray ",
+        "needs a cluster; python/tests has one of two workers",
+    ),
+];
+
+/// What is added to a command that does not say otherwise: few pieces, soon.
+const SOON: [(&str, &str); 4] = [
+    ("--time", "0"),
+    ("--method", "creases"),
+    ("--pieces", "4"),
+    ("--plan-time", "1"),
+];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The guides and the README, by name.
+fn guides() -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> = fs::read_dir(root().join("docs/guide"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "md"))
+        .collect();
+    all.push(root().join("README.md"));
+    all.sort();
+    all
+}
+
+/// The commands of a guide's `sh` blocks, without comments.
+fn commands(guide: &str) -> Vec<String> {
+    let mut is_shell = false;
+    let mut found = Vec::new();
+    for line in guide.lines() {
+        if let Some(language) = line.trim_start().strip_prefix("```") {
+            is_shell = language == "sh";
+        } else if is_shell {
+            let code = line.split(" #").next().unwrap_or_default();
+            found.extend(code.split("&&").map(|command| command.trim().to_owned()));
+        }
+    }
+    found.retain(|command| !command.is_empty() && !command.starts_with('#'));
+    found
+}
+
+/// What is added to the arguments of the program.
+fn added(args: &[&str]) -> Vec<String> {
+    let has = |option: &str| args.contains(&option);
+    let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    match args[0] {
+        "build" | "demo" | "batch" => {
+            let mut more = words(if has("--size") {
+                "--thickness 5mm"
+            } else {
+                "--thickness 2mm"
+            });
+            if args[0] == "demo" {
+                more.extend(words("--figure torus --size 60"));
+            }
+            let unsaid = SOON.iter().filter(|(option, _)| !has(option));
+            more.extend(unsaid.flat_map(|&(option, value)| [option.to_owned(), value.to_owned()]));
+            more
+        }
+        "test" => words("--cell 8"),
+        "report" => words("--closed-form"),
+        "studio" => words("--no-open --stop-with-stdin"),
+        _ => Vec::new(),
+    }
+}
+
+/// The files that guides speak of.
+fn prepare(folder: &Path, torus: &[u8]) {
+    fs::create_dir(folder.join("models")).unwrap();
+    for file in ["figure.stl", "dragon.stl", "models/figure.stl"] {
+        fs::write(folder.join(file), torus).unwrap();
+    }
+}
+
+/// Runs a command in `folder`; what went wrong.
+fn run(folder: &Path, command: &str) -> Result<(), String> {
+    let program = command
+        .strip_prefix("cargo run --release -- ")
+        .or(command.strip_prefix("shellock "));
+    let Some(args) = program else {
+        return match command.strip_prefix("shellock-check ") {
+            // A program of another crate.
+            Some(kit) => shellock_check::check(&folder.join(kit)).map(drop),
+            None => Err("no command of this program, and not among those that are not run".into()),
+        };
+    };
+    let args: Vec<&str> = args.split_whitespace().collect();
+    let output = Command::new(env!("CARGO_BIN_EXE_shellock"))
+        .current_dir(folder)
+        .args(&args)
+        .args(added(&args))
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    // With 1 it ran, and the kit fails a check: whether kits pass is not asked here.
+    if matches!(output.status.code(), Some(0 | 1)) {
+        return Ok(());
+    }
+    let said = [output.stdout, output.stderr].concat();
+    Err(format!("{}\n{}", output.status, String::from_utf8_lossy(&said)))
+}
+
+/// Slow (150 s of processor time): seven kits.
+#[test]
+fn every_command_of_the_guides_runs() {
+    let made = tempfile::tempdir().unwrap();
+    run(made.path(), "shellock figure torus -o torus.stl --size 60").unwrap();
+    let torus = fs::read(made.path().join("torus.stl")).unwrap();
+    let (wrong, passed_over) = (Mutex::new(Vec::new()), Mutex::new(BTreeSet::new()));
+    let follow = |guide: &Path| {
+        let folder = tempfile::tempdir().unwrap();
+        prepare(folder.path(), &torus);
+        for command in commands(&fs::read_to_string(guide).unwrap()) {
+            if let Some((start, _)) = NOT_RUN.iter().find(|(start, _)| command.starts_with(start)) {
+                passed_over.lock().unwrap().insert(*start);
+                continue;
+            }
+            let since = Instant::now();
+            if let Err(why) = run(folder.path(), &command) {
+                wrong
+                    .lock()
+                    .unwrap()
+                    .push(format!("{}: {command}: {why}", guide.display()));
+            }
+            println!("{:4.0} s  {command}", since.elapsed().as_secs_f64());
+        }
+    };
+    std::thread::scope(|scope| {
+        for guide in guides() {
+            scope.spawn(move || follow(&guide));
+        }
+    });
+    let wrong = wrong.into_inner().unwrap();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let listed: BTreeSet<&str> = NOT_RUN.iter().map(|(start, _)| *start).collect();
+    assert_eq!(
+        passed_over.into_inner().unwrap(),
+        listed,
+        "the list names what no guide has"
+    );
+}
+
+#[test]
+fn commands_are_the_lines_of_sh_blocks_without_comments() {
+    let guide =
+        "shellock a\n```sh\nshellock b --c 1     # why\n# all of it\nd && e\n\n```\n```toml\nf = 1\n```\n";
+    assert_eq!(commands(guide), ["shellock b --c 1", "d", "e"]);
+}
