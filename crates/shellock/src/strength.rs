@@ -74,6 +74,11 @@ const MOST_FINE: usize = 5;
 /// Least share of the surface with a cavity below: a model with less is as good as solid, and no wall to be
 /// computed.
 const LEAST_HOLLOW: f64 = 0.1;
+/// No wall is so thick that it leaves less than this share of the surface room for connectors that the thinnest one
+/// leaves: thin legs would be solid and hold nothing, for the sake of a fall that they hardly bear anyway.
+const LEAST_LEFT_ROOM: f64 = 0.6;
+/// Depth of the cavity below a wall that is room for a connector, mm.
+const ROOM_MM: f64 = 1.5;
 
 /// What a wall must bear. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,18 +121,20 @@ impl Default for StrengthParams {
 }
 
 impl StrengthParams {
-    /// The same with no wall so thick that it leaves hardly any cavity; `None` where the thinnest is.
+    /// The same with no wall so thick that it leaves hardly any cavity, or connectors too little room; `None` where the thinnest is.
     fn leaving_cavity(&self, falls: &Falls) -> Option<Self> {
         /// Rounds of bisection: to a hundredth of a millimetre.
         const ROUNDS: usize = 8;
-        let is_hollow =
-            |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>() >= LEAST_HOLLOW * falls.mesh.area();
-        if is_hollow(self.most_mm) {
-            return Some(self.clone());
-        }
+        let hollow_mm2 = |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>();
         let (mut low, mut high) = (self.least_mm, self.most_mm);
-        if !is_hollow(low) {
+        let least_mm2 = LEAST_HOLLOW * falls.mesh.area();
+        if hollow_mm2(low) < least_mm2 {
             return None;
+        }
+        let room_mm2 = LEAST_LEFT_ROOM * hollow_mm2(low + ROOM_MM);
+        let is_hollow = |mm: f64| hollow_mm2(mm) >= least_mm2 && hollow_mm2(mm + ROOM_MM) >= room_mm2;
+        if is_hollow(high) {
+            return Some(self.clone());
         }
         for _ in 0..ROUNDS {
             let middle = 0.5 * (low + high);
