@@ -77,6 +77,7 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
     let ways = ways::ways(input);
     let mut effort = Effort::default();
     let mut best: Option<Ended> = None;
+    let total_s = ctx.seconds_left();
     for (i, &way) in ways.iter().enumerate() {
         if let Some(before) = &best {
             ctx.note(&format!("{}; now {}", before.words(), way.words()));
@@ -84,12 +85,16 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
         let is_last = i + 1 == ways.len();
         let few = input.params.rounds.least(&ROUNDS_BESIDE_OTHERS);
         let rounds = if is_last { input.params.rounds } else { few };
-        let ended = with_reserve(ctx, input, &thinnest.divided(way), rounds, &mut effort);
+        let reserved_s = ways::reserved_s(total_s, i, ways.len());
+        let seconds_left = || ctx.seconds_left() - reserved_s;
+        let in_time = ctx.fork().with_deadline(&seconds_left);
+        let ended = with_reserve(&in_time, input, &thinnest.divided(way), rounds, &mut effort);
+        in_time.into_warnings().into_iter().for_each(|w| ctx.warn(w));
         let ended = match best {
             Some(before) => before.or(ended),
             None => ended,
         };
-        if ended.is_enough() || ended.is_late {
+        if ended.is_enough() || ended.is_late(ctx) {
             return ended.outcome;
         }
         best = Some(ended);

@@ -74,9 +74,9 @@ const MOST_FINE: usize = 5;
 /// Least share of the surface with a cavity below: a model with less is as good as solid, and no wall to be
 /// computed.
 const LEAST_HOLLOW: f64 = 0.1;
-/// No wall is so thick that it leaves less than this share of the surface room for connectors that the thinnest one
-/// leaves: thin legs would be solid and hold nothing, for the sake of a fall that they hardly bear anyway.
-const LEAST_LEFT_ROOM: f64 = 0.6;
+/// No wall is so thick that it leaves less than this share of what the thinnest one leaves, of the cavity or of the
+/// room for connectors: thin legs would be solid and hold nothing, for the sake of a fall that they hardly bear.
+const LEAST_LEFT: f64 = 0.6;
 /// Depth of the cavity below a wall that is room for a connector, mm.
 const ROOM_MM: f64 = 1.5;
 
@@ -127,12 +127,13 @@ impl StrengthParams {
         const ROUNDS: usize = 8;
         let hollow_mm2 = |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>();
         let (mut low, mut high) = (self.least_mm, self.most_mm);
-        let least_mm2 = LEAST_HOLLOW * falls.mesh.area();
-        if hollow_mm2(low) < least_mm2 {
+        let (most_mm2, least_mm2) = (hollow_mm2(low), LEAST_HOLLOW * falls.mesh.area());
+        if most_mm2 < least_mm2 {
             return None;
         }
-        let room_mm2 = LEAST_LEFT_ROOM * hollow_mm2(low + ROOM_MM);
-        let is_hollow = |mm: f64| hollow_mm2(mm) >= least_mm2 && hollow_mm2(mm + ROOM_MM) >= room_mm2;
+        let cavity_mm2 = least_mm2.max(LEAST_LEFT * most_mm2);
+        let room_mm2 = LEAST_LEFT * hollow_mm2(low + ROOM_MM);
+        let is_hollow = |mm: f64| hollow_mm2(mm) >= cavity_mm2 && hollow_mm2(mm + ROOM_MM) >= room_mm2;
         if is_hollow(high) {
             return Some(self.clone());
         }
@@ -200,6 +201,8 @@ pub struct Tried {
 pub struct Strength {
     /// The least thickness in the limits whose stress stays below the strength, mm.
     pub thickness_mm: f64,
+    /// The thickest wall that was allowed, mm: none that leaves connectors too little room.
+    pub most_mm: f64,
     /// The stress that counts with it, MPa.
     pub stress_mpa: f64,
     /// Whether no wall in the limits bears its stress, by more than the search resolves; the thickness is
@@ -360,7 +363,11 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
         stress_mpa: ratio * t.stress_mpa,
         ..*t
     };
-    Ok(fine.strength(found, is_too_weak, tried.iter().map(corrected).collect()))
+    let found = fine.strength(found, is_too_weak, tried.iter().map(corrected).collect());
+    Ok(Strength {
+        most_mm: params.most_mm,
+        ..found
+    })
 }
 
 /// The thickness that the coarse mesh asks for where stresses above `limit_mpa` are too much, with its stress

@@ -103,10 +103,19 @@ impl Pace {
         }
     }
 
+    /// The slowest kit so far, s.
+    pub fn slowest_s(&self) -> f64 {
+        f64::from_bits(self.slowest.load(Relaxed))
+    }
+
+    /// Whether a kit that takes as long as the slowest would end too late.
+    pub fn is_over(ctx: &Ctx, slowest_s: f64) -> bool {
+        ctx.seconds_left() < Self::MORE * slowest_s || ctx.seconds_left() <= 0.0
+    }
+
     /// Whether another kit would end too late. Before the first, only whether the time is over.
     pub fn is_late(&self, ctx: &Ctx) -> bool {
-        let slowest_s = f64::from_bits(self.slowest.load(Relaxed));
-        let is_late = ctx.seconds_left() < Self::MORE * slowest_s || ctx.seconds_left() <= 0.0;
+        let is_late = Self::is_over(ctx, self.slowest_s());
         if is_late {
             self.is_cut_short.store(true, Relaxed);
         }

@@ -58,6 +58,7 @@ impl Wall {
             wall.settings.segmentation.method,
             wall.settings.segmentation.n_pieces,
         ) = (way.method, way.n_pieces);
+        wall.settings.strength.most_mm = self.settings.strength.most_mm;
         let is_other = |w: &&Warning| matches!(w.cause, Cause::DividedOtherwise);
         wall.warnings.extend(self.warnings.iter().find(is_other).cloned());
         // The thinnest wall of those before stays the one that a fall asks for.
@@ -89,7 +90,8 @@ impl Wall {
                 if !params.allows_thin {
                     strength::is_hollow(model, strength.thickness_mm)?;
                 }
-                let settings = Settings::with_thickness(params, strength.thickness_mm);
+                let mut settings = Settings::with_thickness(params, strength.thickness_mm);
+                settings.strength.most_mm = strength.most_mm;
                 let warnings = strength.warnings(&nominal.strength);
                 Ok(Self {
                     settings,

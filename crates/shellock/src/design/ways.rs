@@ -7,6 +7,7 @@ use shellock_geom::Solid;
 
 use super::budget::{RESERVE, THICKER_WALLS};
 use super::wall::Wall;
+use super::budget::Pace;
 use super::{DesignError, DesignOutcome, Effort, Job, KeySource, Params, Rounds, Walled, with_wall};
 use crate::Ctx;
 use crate::segmentation::{Method, usual_n_pieces};
@@ -18,8 +19,8 @@ pub(super) struct Way {
     pub n_pieces: Option<usize>,
 }
 
-/// Pieces of a coarser division where none are asked for, as a share of the usual.
-const COARSER: f64 = 0.7;
+/// Pieces of coarser divisions where none are asked for, as shares of the usual: thin bars hold by few seams.
+const COARSER: [f64; 2] = [0.7, 0.35];
 
 impl Way {
     /// In words, for people.
@@ -44,21 +45,26 @@ pub(super) fn ways(input: &Input<'_>) -> Vec<Way> {
     if params.method != Method::Auto || input.labels.is_some() || has_named_key {
         return vec![own];
     }
-    let n_coarser = COARSER * usual_n_pieces(input.model.mesh().area()) as f64;
-    let coarser = Way {
-        n_pieces: Some((n_coarser.round() as usize).max(2)),
+    let usual = usual_n_pieces(input.model.mesh().area()) as f64;
+    let coarser = COARSER.map(|share| Way {
+        n_pieces: Some(((share * usual).round() as usize).max(2)),
         ..own
-    };
+    });
     let similar = Way {
         method: Method::Creases,
         ..own
     };
-    let ways = [
-        Some(own),
-        params.n_pieces.is_none().then_some(coarser),
-        Some(similar),
-    ];
-    ways.into_iter().flatten().collect()
+    let coarser = coarser.into_iter().filter(|_| params.n_pieces.is_none());
+    [own].into_iter().chain(coarser).chain([similar]).collect()
+}
+
+/// How much of `total_s` the ways after the `i`-th of `n` shall have: the first has twice as much as each other.
+pub(super) fn reserved_s(total_s: f64, i: usize, n: usize) -> f64 {
+    if i + 1 == n || total_s.is_infinite() {
+        0.0
+    } else {
+        total_s * (n - 1 - i) as f64 / (n + 1) as f64
+    }
 }
 
 /// What is asked for.
@@ -73,8 +79,8 @@ pub(super) struct Ended {
     pub outcome: Result<DesignOutcome, DesignError>,
     /// Whether its wall was thicker for the sake of use.
     was_thicker: bool,
-    /// Whether the time is over for another kit.
-    pub is_late: bool,
+    /// The slowest of its kits, s.
+    slowest_s: f64,
 }
 
 impl Ended {
@@ -84,6 +90,12 @@ impl Ended {
             Ok(outcome) => outcome.kit().is_some_and(|kit| kit.verification.passed()),
             Err(e) => matches!(e, DesignError::Cancelled(_)),
         }
+    }
+
+    /// Whether the job's time is over for kits of another division, which take less time where it is coarser.
+    pub fn is_late(&self, ctx: &Ctx) -> bool {
+        const LESS: f64 = 0.5;
+        Pace::is_over(ctx, LESS * self.slowest_s)
     }
 
     /// Why something else is to be tried, for people.
@@ -147,12 +159,12 @@ pub(super) struct Ask {
 /// The job from the wall `thinnest`, which grows where less than what is asked is borne.
 fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut Effort) -> Ended {
     let mut wall = Cow::Borrowed(thinnest);
-    let (mut n_left, mut is_late) = (ask.n_thicker, false);
+    let (mut n_left, mut slowest_s) = (ask.n_thicker, 0.0f64);
     let outcome = loop {
         let job = Job::new(ctx, input, &wall, ask, n_left > 0);
         let walled = job.and_then(|job| {
             let walled = with_wall(ctx, &job, effort);
-            is_late = job.pace.is_late(ctx);
+            slowest_s = slowest_s.max(job.pace.slowest_s());
             walled
         });
         match walled {
@@ -173,7 +185,7 @@ fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut 
     Ended {
         outcome,
         was_thicker: wall.is_thicker(),
-        is_late,
+        slowest_s,
     }
 }
 
@@ -199,13 +211,22 @@ mod tests {
     }
 
     #[test]
-    fn fewer_pieces_come_second_and_pieces_of_similar_size_last() {
+    fn fewer_pieces_come_second_and_third_and_pieces_of_similar_size_last() {
         let ways = ways_of(|_| (), None);
         let methods: Vec<Method> = ways.iter().map(|w| w.method).collect();
-        assert_eq!(methods, [Method::Auto, Method::Auto, Method::Creases]);
+        assert_eq!(methods, [Method::Auto, Method::Auto, Method::Auto, Method::Creases]);
         let usual = usual_n_pieces(4.0 * std::f64::consts::PI * 50.0 * 50.0);
         assert_eq!(ways[0].n_pieces, None);
-        assert!(ways[1].n_pieces.is_some_and(|n| n < usual && n >= 2));
+        let n = |i: usize| ways[i].n_pieces.unwrap();
+        assert!(n(1) < usual && n(2) < n(1) && n(2) >= 2);
+    }
+
+    #[test]
+    fn the_first_way_has_twice_the_time_of_each_other() {
+        let ends: Vec<f64> = (0..4).map(|i| 50.0 - reserved_s(50.0, i, 4)).collect();
+        assert_eq!(ends, [20.0, 30.0, 40.0, 50.0]);
+        assert_eq!(reserved_s(f64::INFINITY, 0, 4), 0.0);
+        assert_eq!(reserved_s(50.0, 0, 1), 0.0);
     }
 
     #[test]
@@ -227,7 +248,7 @@ mod tests {
         let ended = |outcome| Ended {
             outcome,
             was_thicker: false,
-            is_late: false,
+            slowest_s: 0.0,
         };
         let no_plan = |reason: &str| {
             ended(Ok(DesignOutcome::NoPlan {

@@ -95,6 +95,7 @@ impl Falls {
         Strength {
             largest_mpa: (0..self.mesh.triangles.len()).map(largest).collect(),
             thickness_mm: worst.tried.thickness_mm,
+            most_mm: worst.tried.thickness_mm,
             stress_mpa: worst.tried.stress_mpa,
             is_too_weak,
             tried,
