@@ -1,12 +1,13 @@
 //! `batch`: kits of a folder of models, each made by a process of its own; what is there already is not made again.
 
+mod names;
 pub mod record;
 mod run;
 mod table;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Condvar, Mutex, OnceLock};
 use std::time::Duration;
@@ -15,6 +16,8 @@ use serde_json::json;
 
 use crate::Session;
 use crate::args::BatchOptions;
+pub use crate::batch::names::models;
+use crate::batch::names::{ENDINGS, RECORDS};
 use crate::batch::record::{Record, Status};
 use crate::batch::run::{Job, Run};
 use crate::failure::Failure;
@@ -22,10 +25,6 @@ use crate::input::sha256;
 use crate::progress::Shown;
 use crate::stages::write;
 
-/// How the names of models end.
-const ENDINGS: [&str; 9] = ["stl", "obj", "ply", "off", "3mf", "glb", "gltf", "gz", "zip"];
-/// Folder of the records within the one for kits.
-const RECORDS: &str = ".batch";
 /// Share of what is free at the beginning that kits may take.
 const MEMORY_SHARE: f64 = 0.8;
 /// How often a worker looks whether there is room.
@@ -60,62 +59,14 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     if session.stop.load(Ordering::Relaxed) {
         return Err(Failure::Stopped);
     }
-    if let Some(problem) = records.iter().find_map(|r| r.unwritten.clone()) {
-        return Err(Failure::Wrong(problem));
-    }
     for (name, bytes) in tables(&records) {
         write(&options.out.join(name), &bytes)?;
     }
+    if let Some(problem) = records.iter().find_map(|r| r.unwritten.clone()) {
+        return Err(Failure::Wrong(problem));
+    }
     told(session, options, &records);
     Ok(u8::from(records.iter().any(|r| r.status != Status::Verified)))
-}
-
-/// All models below `folder` but for what lies in `out`, by their paths within it, each with the name of its kit.
-pub fn models(folder: &Path, out: Option<&Path>) -> Result<VecDeque<(PathBuf, PathBuf)>, Failure> {
-    let out = out.and_then(|out| out.canonicalize().ok());
-    let mut found = BTreeSet::new();
-    let mut left = vec![PathBuf::new()];
-    while let Some(below) = left.pop() {
-        let here = folder.join(&below);
-        let unreadable = |source| Failure::Unreadable {
-            path: here.clone(),
-            source,
-        };
-        for entry in fs::read_dir(&here).map_err(unreadable)? {
-            let entry = entry.map_err(unreadable)?;
-            let (name, path) = (below.join(entry.file_name()), entry.path());
-            let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
-            // Links to folders could lead around for ever.
-            let kind = entry.file_type().map_err(unreadable)?;
-            if is_hidden || out.is_some() && path.canonicalize().ok() == out {
-                continue;
-            }
-            if kind.is_dir() {
-                left.push(name);
-            } else if is_model(&name) && path.is_file() {
-                found.insert(name);
-            }
-        }
-    }
-    let mut stems: BTreeMap<PathBuf, usize> = BTreeMap::new();
-    for name in &found {
-        *stems.entry(name.with_extension("")).or_default() += 1;
-    }
-    let kit = |name: &PathBuf| {
-        let stem = name.with_extension("");
-        let file = name.file_name().unwrap_or_default().to_string_lossy();
-        if stems[&stem] == 1 {
-            stem
-        } else {
-            name.with_file_name(file.replace('.', "-"))
-        }
-    };
-    Ok(found.iter().map(|name| (name.clone(), kit(name))).collect())
-}
-
-/// Where the record of a kit is kept.
-fn record_file(out: &Path, kit: &str) -> PathBuf {
-    out.join(RECORDS).join(format!("{kit}.json"))
 }
 
 /// The tables, by the names of their files.
@@ -131,11 +82,6 @@ fn program() -> String {
         sha256(&file.unwrap_or_else(|| env!("CARGO_PKG_VERSION").into()))
     };
     OF_FILE.get_or_init(hash).clone()
-}
-
-fn is_model(name: &Path) -> bool {
-    let extension = name.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    extension.is_some_and(|e| ENDINGS.contains(&&e[..]))
 }
 
 /// What all kits together may take, MB.
@@ -245,49 +191,5 @@ fn told(session: &Session, options: &BatchOptions, records: &[Record]) {
             records.len(),
             options.out.join(table::PAGE).display()
         );
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_model_has_a_kit_of_its_own_and_what_is_no_model_has_none() {
-        let dir = tempfile::tempdir().unwrap();
-        for name in [
-            "a.stl",
-            "a.obj",
-            "b.STL",
-            "c/a.ply",
-            "c/.hidden.stl",
-            "notes.txt",
-            "out/d.stl",
-            "p.1.stl",
-            "p.2.stl",
-        ] {
-            let path = dir.path().join(name);
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(path, "").unwrap();
-        }
-        let found: Vec<(String, String)> = models(dir.path(), Some(&dir.path().join("out")))
-            .unwrap()
-            .into_iter()
-            .map(|(model, kit)| (model.display().to_string(), kit.display().to_string()))
-            .collect();
-        let expected = [
-            ("a.obj", "a-obj"),
-            ("a.stl", "a-stl"),
-            ("b.STL", "b"),
-            ("c/a.ply", "c/a"),
-            ("p.1.stl", "p.1"),
-            ("p.2.stl", "p.2"),
-        ];
-        assert_eq!(found, expected.map(|(m, k)| (m.to_owned(), k.to_owned())));
-        let records: BTreeSet<PathBuf> = found
-            .iter()
-            .map(|(_, kit)| record_file(dir.path(), kit))
-            .collect();
-        assert_eq!(records.len(), found.len(), "each has a record of its own");
     }
 }

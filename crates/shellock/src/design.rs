@@ -79,6 +79,9 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
     let mut best: Option<Ended> = None;
     let total_s = ctx.seconds_left();
     for (i, &way) in ways.iter().enumerate() {
+        if best.as_ref().is_some_and(|before| before.is_late(ctx, way)) {
+            continue;
+        }
         if let Some(before) = &best {
             ctx.note(&format!("{}; now {}", before.words(), way.words()));
         }
@@ -94,7 +97,7 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
             Some(before) => before.or(ended),
             None => ended,
         };
-        if ended.is_enough() || ended.is_late(ctx) {
+        if ended.is_enough() {
             return ended.outcome;
         }
         best = Some(ended);

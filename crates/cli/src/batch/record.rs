@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::failure::Failure;
+use crate::input::sha256;
+use crate::output::PLAN;
 use crate::stages::write;
 
 /// How a model ended.
@@ -59,6 +61,11 @@ impl Status {
         }
     }
 
+    /// Whether there is a kit, be it good or not.
+    pub fn has_kit(self) -> bool {
+        matches!(self, Self::Verified | Self::Failed)
+    }
+
     /// Whether the same inputs would end so again.
     fn is_final(self) -> bool {
         !matches!(self, Self::TooLong | Self::Crashed)
@@ -84,6 +91,9 @@ pub struct Record {
     pub n_problems: usize,
     /// What was said, the most severe first.
     pub said: Vec<String>,
+    /// What tells its kit from any other that lies there later; `None` where there is none.
+    #[serde(default)]
+    pub kit_is: Option<String>,
     /// Whether it was there already.
     #[serde(skip)]
     pub is_old: bool,
@@ -92,13 +102,36 @@ pub struct Record {
     pub unwritten: Option<String>,
 }
 
+/// The files of a kit with their sizes, and what its plan says, in one word; `None` where nothing lies there.
+pub fn kit_is(folder: &Path) -> Option<String> {
+    let mut told: Vec<String> = Vec::new();
+    let mut left = vec![folder.to_owned()];
+    while let Some(here) = left.pop() {
+        for entry in fs::read_dir(here).ok()?.flatten() {
+            let (path, data) = (entry.path(), entry.metadata().ok()?);
+            if data.is_dir() {
+                left.push(path);
+            } else {
+                told.push(format!(
+                    "{} {}",
+                    path.strip_prefix(folder).ok()?.display(),
+                    data.len()
+                ));
+            }
+        }
+    }
+    told.sort_unstable();
+    told.push(sha256(&fs::read(folder.join(PLAN)).unwrap_or_default()));
+    Some(sha256(told.join("\n").as_bytes()))
+}
+
 impl Record {
-    /// The one at `path`, where it is of the same inputs, final, and its kit is there.
+    /// The one at `path`, where it is of the same inputs, final, and its kit is as it was: none where there was none, as
+    /// what lay there may have been why.
     pub fn read(path: &Path, made_of: &str, kit: &Path) -> Option<Self> {
         let bytes = fs::read(path).ok()?;
         let record: Self = serde_json::from_slice(&bytes).ok()?;
-        let has_kit = !matches!(record.status, Status::Verified | Status::Failed)
-            || kit.join(crate::output::PLAN).is_file();
+        let has_kit = record.kit_is == kit_is(kit) && record.kit_is.is_some() == record.status.has_kit();
         let is_same = record.made_of == made_of && record.status.is_final() && has_kit;
         is_same.then_some(Self {
             is_old: true,

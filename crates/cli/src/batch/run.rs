@@ -7,7 +7,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::record::{Record, Status};
+use super::names::record_file;
+use super::record::{Record, Status, kit_is};
 use crate::Session;
 use crate::args::BatchOptions;
 use crate::config;
@@ -97,6 +98,7 @@ impl Run {
             n_warnings: 0,
             n_problems: 0,
             said: Vec::new(),
+            kit_is: None,
             is_old: false,
             unwritten: None,
         };
@@ -107,11 +109,12 @@ impl Run {
                 return record;
             }
         }
-        let noted = super::record_file(&self.out, &record.kit);
+        let noted = record_file(&self.out, &record.kit);
         if let Some(old) = Record::read(&noted, &record.made_of, &kit) {
             return old;
         }
-        let record = self.made(session, record, &model, &kit);
+        let mut record = self.made(session, record, &model, &kit);
+        record.kit_is = kit_is(&kit).filter(|_| record.status.has_kit());
         if session.stop.load(Ordering::Relaxed) {
             return record;
         }
@@ -134,9 +137,20 @@ impl Run {
                     Status::of_code(ended.code)
                 };
                 record.peak_mb = ended.peak_mb;
-                record = record.of_output(&ended.output);
+                if record.status == Status::TooLong {
+                    let seconds = self.patience.as_secs_f64();
+                    record
+                        .said
+                        .push(format!("it took longer than {seconds:.0} s (--patience)"));
+                } else {
+                    record = record.of_output(&ended.output);
+                }
                 if record.status == Status::Crashed {
                     record.said.extend(ended.last_words);
+                }
+                if record.status == Status::Crashed && ended.code.is_none() {
+                    let killed = "it was killed, as systems do where memory runs out: fewer at a time (--jobs, --memory)";
+                    record.said.push(killed.to_owned());
                 }
             }
             Err(e) => {

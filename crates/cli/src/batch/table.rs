@@ -7,7 +7,7 @@ use shellock_render::escaped;
 use super::record::{Record, Status};
 
 /// The table for machines.
-const TABLE: &str = "batch.csv";
+pub const TABLE: &str = "batch.csv";
 /// The same with pictures.
 pub const PAGE: &str = "batch.html";
 

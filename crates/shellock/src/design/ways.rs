@@ -5,9 +5,9 @@ use std::borrow::Cow;
 
 use shellock_geom::Solid;
 
+use super::budget::Pace;
 use super::budget::{RESERVE, THICKER_WALLS};
 use super::wall::Wall;
-use super::budget::Pace;
 use super::{DesignError, DesignOutcome, Effort, Job, KeySource, Params, Rounds, Walled, with_wall};
 use crate::Ctx;
 use crate::segmentation::{Method, usual_n_pieces};
@@ -92,10 +92,14 @@ impl Ended {
         }
     }
 
-    /// Whether the job's time is over for kits of another division, which take less time where it is coarser.
-    pub fn is_late(&self, ctx: &Ctx) -> bool {
-        const LESS: f64 = 0.5;
-        Pace::is_over(ctx, LESS * self.slowest_s)
+    /// Whether the job's time is over for a kit of another division, which takes less time where it is coarser.
+    pub fn is_late(&self, ctx: &Ctx, next: Way) -> bool {
+        let kit = self.outcome.as_ref().ok().and_then(DesignOutcome::kit);
+        let share = match (kit, next.n_pieces) {
+            (Some(kit), Some(n)) => (n as f64 / kit.pieces.len() as f64).min(1.0),
+            _ => 1.0,
+        };
+        Pace::is_over(ctx, share * self.slowest_s)
     }
 
     /// Why something else is to be tried, for people.
@@ -214,7 +218,10 @@ mod tests {
     fn fewer_pieces_come_second_and_third_and_pieces_of_similar_size_last() {
         let ways = ways_of(|_| (), None);
         let methods: Vec<Method> = ways.iter().map(|w| w.method).collect();
-        assert_eq!(methods, [Method::Auto, Method::Auto, Method::Auto, Method::Creases]);
+        assert_eq!(
+            methods,
+            [Method::Auto, Method::Auto, Method::Auto, Method::Creases]
+        );
         let usual = usual_n_pieces(4.0 * std::f64::consts::PI * 50.0 * 50.0);
         assert_eq!(ways[0].n_pieces, None);
         let n = |i: usize| ways[i].n_pieces.unwrap();
