@@ -192,8 +192,8 @@ mod tests {
             ("a-stl.ply", "a-stl"),
             ("a.obj", "a-obj"),
             ("a.stl", "a-stl-2"),
-            ("b.stl", "b-stl"),
             ("b/c.stl", "b/c"),
+            ("b.stl", "b-stl"),
             ("batch.html.stl", "batch-html-stl"),
         ];
         assert_eq!(kits(&names), pairs(&expected));
