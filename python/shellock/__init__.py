@@ -8,12 +8,14 @@ True
 
 Meshes are closed surfaces: ``points`` (n, 3) and ``triangles`` (m, 3) with indices from 0, counter-clockwise seen from outside; or a
 ``trimesh.Trimesh``. Options are those of ``shellock build`` (:func:`options` lists them), with ``_`` for ``-``; lengths are mm or texts with a
-unit. A kit has the bytes that ``shellock build`` writes of a PLY file with the same points, triangles and labels.
+unit. A tuple of numbers is one value (``key=(0, 0, 50)``), a list is several. A kit has the bytes that ``shellock build`` writes of a PLY
+file with the same points, triangles and labels.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +27,9 @@ from . import _native
 
 __version__: str = _native.VERSION
 
+# Without ``Warning``, which would hide Python's own from who imports all.
 __all__ = [
-    "Kit", "Warning", "Finding", "Progress", "build", "design", "segment", "verify", "check", "options",
+    "Kit", "Finding", "Progress", "build", "design", "segment", "verify", "check", "options",
     "ShellockError", "InputError", "NoPlanError", "WriteError",
 ]
 
@@ -38,6 +41,10 @@ class ShellockError(Exception):
         Exception.__init__(self, message)
         self.code = code
         self.at = at
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        # Else an error of a worker could not be sent, and its pool would wait for ever.
+        return type(self), (str(self), self.code, self.at), self.__dict__
 
 
 class InputError(ShellockError, ValueError):
@@ -166,7 +173,7 @@ def design(
     Raises :class:`InputError` for a model or option that is wrong, :class:`NoPlanError` where no plan is found.
     """
     points, triangles = _mesh(vertices, faces)
-    native = _asked(_native.design, points, triangles, _labels(labels, len(triangles)), f"{name}.ply", _options(options), _listener(progress))
+    native = _computed(_native.design, points, triangles, _labels(labels, len(triangles)), f"{name}.ply", _options(options), _listener(progress))
     return Kit(native)
 
 
@@ -186,7 +193,7 @@ def build(
     else:
         path = Path(file)
         data, name = path.read_bytes(), name or path.name
-    return Kit(_asked(_native.build, data, name, _options(options), _listener(progress)))
+    return Kit(_computed(_native.build, data, name, _options(options), _listener(progress)))
 
 
 def segment(
@@ -199,7 +206,7 @@ def segment(
 ) -> np.ndarray:
     """Divides the surface: for each face the number of its piece, (m,) uint32 from 1. Same arguments as :func:`design`."""
     points, triangles = _mesh(vertices, faces)
-    found = _asked(_native.segment, points, triangles, _labels(labels, len(triangles)), _options(options), _listener(progress))
+    found = _computed(_native.segment, points, triangles, _labels(labels, len(triangles)), _options(options), _listener(progress))
     return np.asarray(found, dtype=np.uint32)
 
 
@@ -211,7 +218,7 @@ def verify(pieces: Sequence[Any], pulled_out_along: Sequence[Optional[Sequence[f
     """
     meshes = [_mesh(*p) if isinstance(p, (tuple, list)) else _mesh(p, None) for p in pieces]
     ways = [None if way is None else [float(x) for x in way] for way in pulled_out_along]
-    return json.loads(_asked(_native.verify, meshes, ways, float(clearance)))
+    return json.loads(_computed(_native.verify, meshes, ways, float(clearance)))
 
 
 def check(folder: Union[str, "os.PathLike[str]"]) -> List[Finding]:
@@ -257,14 +264,36 @@ def _labels(labels: Optional[Sequence[int]], n: int) -> Optional[np.ndarray]:
 
 
 def _options(options: Mapping[str, Any]) -> str:
-    def plain(value: Any) -> Any:
-        if isinstance(value, np.generic):
-            return value.item()
-        if isinstance(value, (tuple, list)):
-            return [plain(v) for v in value]
-        return value
+    return json.dumps({name.replace("_", "-"): _plain(name, value) for name, value in options.items()}, sort_keys=True)
 
-    return json.dumps({name.replace("_", "-"): plain(value) for name, value in options.items()})
+
+def _plain(name: str, value: Any) -> Any:
+    """What JSON has for a value of an option; a tuple or an array of numbers is one value, with commas."""
+    if isinstance(value, np.ndarray):
+        value = value.item() if value.ndim == 0 else [tuple(row) for row in value] if value.ndim == 2 else tuple(value)
+    for kind, plain in ((np.bool_, bool), (np.integer, int), (np.floating, float), (np.str_, str)):
+        if isinstance(value, kind):
+            value = plain(value)
+    if value is None or isinstance(value, (bool, int, str)) or isinstance(value, float) and math.isfinite(value):
+        return value
+    if isinstance(value, (tuple, list)):
+        parts = [_plain(name, v) for v in value]
+        is_one = isinstance(value, tuple) and parts and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in parts)
+        return ",".join(map(str, parts)) if is_one else parts
+    raise InputError(f"{name}: this cannot be a value of it: {value!r}", 2)
+
+
+def _refuse_options(options: str) -> None:
+    """Raises what any model would be refused for with these options."""
+    def said(options: str) -> Any:
+        try:
+            return _native.build(b"", "model.ply", options, None)
+        except _native.Refused as refused:
+            return refused.args
+
+    # Options are looked at before the model, which is refused as nothing is in it.
+    if said(options) != said("{}"):
+        _asked(_native.build, b"", "model.ply", options, None)
 
 
 def _listener(progress: Optional[Callable[[Progress], Any]]) -> Optional[Callable[..., None]]:
@@ -279,3 +308,25 @@ def _asked(ask: Callable[..., Any], *arguments: Any) -> Any:
     except _native.Refused as refused:
         code, message, at = refused.args
         raise _KINDS.get(code, ShellockError)(message, code, at) from None
+
+
+_was_used = False
+_is_forked = False
+
+
+def _after_fork() -> None:
+    global _is_forked
+    _is_forked = _was_used
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
+def _computed(ask: Callable[..., Any], *arguments: Any) -> Any:
+    """:func:`_asked`, of what shares its work among threads: they are not there in a forked process, which would wait for them for ever."""
+    global _was_used
+    if _is_forked:
+        raise ShellockError('this process was forked after shellock was used; start workers with multiprocessing.get_context("spawn")', 1)
+    _was_used = True
+    return _asked(ask, *arguments)

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import re
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
+import shellock
 from shellock import _native
 
 __all__ = ["Record", "run"]
@@ -21,6 +24,11 @@ __all__ = ["Record", "run"]
 #: What a kit takes at least, and for each byte of its model's file, bytes: Ray runs no more tasks at a time than have room.
 LEAST_BYTES = 700_000_000
 BYTES_PER_BYTE = 12
+#: Files of a kit, of any version: what else lies in its folder is not touched.
+KIT_FILES = re.compile(
+    r"(plan|certificate|savings|stress)\.json|(assembly|plates|segmentation)\.3mf|segmentation\.ply|report\.html|pieces\.png"
+    r"|instructions\.pdf|(strength|stress)\.svg|pieces/piece-[0-9]+\.stl|plates/plate-[0-9]+\.3mf"
+)
 #: Models that are read and sent ahead, for each that can be made at a time.
 AHEAD = 2
 
@@ -48,6 +56,24 @@ class Record:
         return f"{self.model} {self.status}{pieces}, {self.seconds:.0f} s{', as it was' if self.is_old else ''}{why}"
 
 
+def _path_of_record(kit: str) -> str:
+    return f".batch/{kit}.ray.json"
+
+
+def _old(content: Optional[bytes], new: Record) -> Optional[Record]:
+    """The record that was kept, where it is one, of the same model and made of the same."""
+    if content is None:
+        return None
+    try:
+        record = Record(**json.loads(content))
+        # The table is as strict as it must be on what may stand in a record.
+        _native.tables(json.dumps([asdict(record)]))
+    except (ValueError, TypeError, RecursionError, _native.Refused):
+        return None
+    is_same = (record.model, record.kit, record.made_of) == (new.model, new.kit, new.made_of)
+    return record if is_same else None
+
+
 def _program() -> str:
     """What tells this program from any other: of two builds of one version, too."""
     return hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
@@ -57,10 +83,8 @@ class _TooLong(Exception):
     pass
 
 
-def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, store: Optional[str]) -> Tuple[Dict[str, Any], Dict[str, bytes]]:
+def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, store: Optional[str], kit_name: str) -> Tuple[Dict[str, Any], Dict[str, bytes]]:
     """On a worker: the record's fields, and the kit's files where they are not in the store."""
-    import shellock
-
     began = time.monotonic()
 
     def watch(_: Any) -> None:
@@ -90,11 +114,7 @@ def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, s
         told.update(status="crashed", said=[str(e)])
     told["seconds"] = time.monotonic() - began
     if store is not None and files:
-        import fsspec
-
-        for file, content in files.items():
-            with fsspec.open(f"{store}/{file}", "wb") as to:
-                to.write(content)
+        _Store(store).replace(kit_name, files)
         files = {}
     return told, files
 
@@ -102,55 +122,114 @@ def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, s
 class _Folder:
     """Kits in a folder of this machine: each appears whole or not at all, and replaces an earlier kit and nothing else."""
 
+    #: Where workers write to: nowhere.
+    store: Optional[str] = None
+
     def __init__(self, out: str) -> None:
         self.out = Path(out)
-        self.out.mkdir(parents=True, exist_ok=True)
+        try:
+            self.out.mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise shellock.WriteError(f"{out}: {e.strerror}", 4) from None
 
-    def kit(self, kit: Path) -> Optional[str]:
-        return None
-
-    def has(self, kit: Path) -> bool:
-        return (self.out / kit / "plan.json").is_file()
+    def has(self, name: str) -> bool:
+        return (self.out / name).is_file()
 
     def read(self, name: str) -> Optional[bytes]:
-        path = self.out / name
-        return path.read_bytes() if path.is_file() else None
+        try:
+            return (self.out / name).read_bytes()
+        except OSError:
+            return None
 
     def write(self, name: str, content: bytes) -> None:
         path = self.out / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _native.write_file(str(path), content)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise shellock.WriteError(f"{path.parent}: {e.strerror}", 4) from None
+        shellock._asked(_native.write_file, str(path), content)
 
-    def keep(self, kit: Path, files: Mapping[str, bytes]) -> None:
-        _native.save(list(files.items()), str(self.out / kit), True)
+    def keep(self, kit: str, files: Mapping[str, bytes]) -> None:
+        # First: the record of an earlier kit must not vouch for this one.
+        try:
+            (self.out / _path_of_record(kit)).unlink()
+        except OSError:
+            pass
+        shellock._asked(_native.save, list(files.items()), str(self.out / kit), True)
 
 
 class _Store:
     """Kits in an object store: a kit is there once its record is."""
 
     def __init__(self, out: str) -> None:
-        import fsspec
+        try:
+            import fsspec
 
-        self.out = out.rstrip("/")
-        self.system, self.root = fsspec.core.url_to_fs(self.out)
+            self.system, self.root = fsspec.core.url_to_fs(out.rstrip("/"))
+        except (ImportError, ValueError) as e:
+            raise shellock.InputError(f"{out}: {e}", 2) from None
+        self.store = out
 
-    def kit(self, kit: Path) -> Optional[str]:
-        return f"{self.out}/{kit.as_posix()}"
-
-    def has(self, kit: Path) -> bool:
-        return self.system.exists(f"{self.root}/{kit.as_posix()}/plan.json")
+    def has(self, name: str) -> bool:
+        return self.system.exists(f"{self.root}/{name}")
 
     def read(self, name: str) -> Optional[bytes]:
         path = f"{self.root}/{name}"
-        return self.system.cat_file(path) if self.system.exists(path) else None
+        return self.system.cat_file(path) if self.system.isfile(path) else None
 
     def write(self, name: str, content: bytes) -> None:
         path = f"{self.root}/{name}"
-        self.system.makedirs(path.rsplit("/", 1)[0], exist_ok=True)
-        self.system.pipe_file(path, content)
+        try:
+            self.system.makedirs(path.rsplit("/", 1)[0], exist_ok=True)
+            self.system.pipe_file(path, content)
+        except OSError as e:
+            raise shellock.WriteError(f"{path}: {e}", 4) from None
 
-    def keep(self, kit: Path, files: Mapping[str, bytes]) -> None:
+    def keep(self, kit: str, files: Mapping[str, bytes]) -> None:
         """The worker wrote them."""
+
+    def replace(self, kit: str, files: Mapping[str, bytes]) -> None:
+        """Writes a kit in the place of an earlier one, whose record and files go first.
+
+        The plan is the last that goes and the first that comes: a worker that is lost meanwhile leaves a folder that is known for a kit.
+        """
+        self.system.invalidate_cache()
+        record = _path_of_record(kit)
+        if self.has(record) or self.has(f"{kit}/plan.json"):
+            if self.has(record):
+                self.system.rm_file(f"{self.root}/{record}")
+            for name in sorted(self._files(kit), key=lambda name: (name == f"{kit}/plan.json", name)):
+                self.system.rm_file(f"{self.root}/{name}")
+        for file in sorted(files, key=lambda file: (file != "plan.json", file)):
+            self.write(f"{kit}/{file}", files[file])
+
+    def _files(self, kit: str) -> List[str]:
+        """Files of a kit in its folder; the kit of another model may lie below it."""
+        folder = f"{self.root}/{kit}/"
+        within = (path[len(folder):] for path in self.system.find(folder) if path.startswith(folder))
+        return [f"{kit}/{name}" for name in within if KIT_FILES.fullmatch(name)]
+
+
+def _printable(name: Path) -> str:
+    return os.fsencode(name.as_posix()).decode("utf-8", "replace")
+
+
+def _checked(options: Mapping[str, Any], cpus: int, patience: float) -> Dict[str, Any]:
+    """``options`` as JSON has them; refuses what every model would be refused for."""
+    if not cpus >= 1:
+        raise shellock.InputError(f"cpus: {cpus} cores are too few for a kit; give 1 or more", 2)
+    if not patience > 0:
+        raise shellock.InputError(f"patience: {patience} s are too few for a kit; give more than 0", 2)
+    text = shellock._options(options)
+    shellock._refuse_options(text)
+    return json.loads(text)
+
+
+def _jobs(folder: str, out: Optional[str]) -> List[Tuple[Path, Path]]:
+    jobs = shellock._asked(_native.models, folder, out)
+    if not jobs:
+        raise shellock.InputError(f"{folder} holds no model", 2)
+    return jobs
 
 
 def run(
@@ -167,62 +246,77 @@ def run(
 
     ``options`` are those of ``shellock.build``. ``cpus`` are taken for each kit; ``patience`` is the longest time for one, s; a model whose worker is lost
     is made again up to ``retries`` times. ``told`` hears of each record as it comes, with its number and how many there are. Writes ``batch.csv`` and ``batch.html``.
+
+    Raises ``shellock.InputError`` before anything is sent where the folder holds no model or an option is wrong, and ``shellock.WriteError`` where records
+    cannot be written. What goes wrong with one model is said in its record.
     """
+    options = _checked(options or {}, cpus, patience)
+    jobs = _jobs(folder, None if "://" in out else out)
     import ray
 
-    options = dict(options or {})
-    kits = _Store(out) if "://" in out else _Folder(out)
+    kits: Any = _Store(out) if "://" in out else _Folder(out)
     made_with = hashlib.sha256(json.dumps([_program(), options], sort_keys=True).encode()).hexdigest()
     here = Path(folder)
-    jobs = _native.models(folder, None if "://" in out else out)
     # One pool of threads in each worker, as large as what it may take.
     task = ray.remote(num_cpus=cpus, max_retries=retries, runtime_env={"env_vars": {"RAYON_NUM_THREADS": str(cpus)}})(_make)
     slots = max(1, int(ray.cluster_resources().get("CPU", 1) // cpus))
     most = int(max(node["Resources"].get("memory", LEAST_BYTES) for node in ray.nodes() if node["Alive"]))
     records: List[Record] = []
-    pending: Dict[Any, Tuple[Record, Path]] = {}
+    pending: Dict[Any, Record] = {}
 
     def ended(record: Record) -> None:
         records.append(record)
         told(record, len(records), len(jobs))
 
     def finish(reference: Any) -> None:
-        record, kit = pending.pop(reference)
+        record, is_kept = pending.pop(reference), True
         try:
             fields, files = ray.get(reference)
+            if fields["status"] in ("verified", "failed"):
+                kits.keep(record.kit, files)
             for name, value in fields.items():
                 setattr(record, name, value)
-            if record.status in ("verified", "failed"):
-                kits.keep(kit, files)
         except ray.exceptions.RayError as e:
-            record.status, record.said = "crashed", [str(e).strip().splitlines()[-1]]
-        if record.status not in ("too-long", "crashed"):
-            kits.write(f".batch/{kit.as_posix()}.ray.json", json.dumps(asdict(record)).encode())
+            record.said = (str(e).strip().splitlines() or [type(e).__name__])[-1:]
+        except shellock.ShellockError as e:
+            # Of the place for the kit, not of the model: another time it may be free.
+            record.status, record.said, is_kept = "refused" if e.code == 2 else "crashed", [str(e)], False
+        if is_kept and record.status not in ("too-long", "crashed"):
+            kits.write(_path_of_record(record.kit), json.dumps(asdict(record)).encode())
         ended(record)
 
     for name, kit in jobs:
-        data = (here / name).read_bytes()
-        made_of = hashlib.sha256(hashlib.sha256(data).hexdigest().encode() + made_with.encode()).hexdigest()
-        old = kits.read(f".batch/{kit.as_posix()}.ray.json")
-        if old is not None:
-            record = Record(**json.loads(old))
-            if record.made_of == made_of and (record.status not in ("verified", "failed") or kits.has(kit)):
-                record.is_old = True
-                ended(record)
-                continue
+        record = Record(_printable(name), _printable(kit), "refused")
+        if record.model != name.as_posix():
+            record.said = ["its name is no UTF-8; rename it"]
+            ended(record)
+            continue
+        try:
+            data = (here / name).read_bytes()
+        except OSError as e:
+            record.said = [f"it cannot be read: {e.strerror}"]
+            ended(record)
+            continue
+        record.made_of = hashlib.sha256(hashlib.sha256(data).hexdigest().encode() + made_with.encode()).hexdigest()
+        old = _old(kits.read(_path_of_record(record.kit)), record)
+        if old is not None and (old.status not in ("verified", "failed") or kits.has(f"{old.kit}/plan.json")):
+            old.is_old = True
+            ended(old)
+            continue
+        record.status = "crashed"
         # No more are sent than can soon be made: models wait here, not in the store's memory.
         while len(pending) >= AHEAD * slots:
             for reference in ray.wait(list(pending), num_returns=1)[0]:
                 finish(reference)
         # What no machine has room for would wait for ever: it is tried alone on the largest.
         needs = min(LEAST_BYTES + BYTES_PER_BYTE * len(data), most)
-        reference = task.options(memory=needs).remote(name.name, data, options, patience, kits.kit(kit))
-        pending[reference] = (Record(name.as_posix(), kit.as_posix(), "crashed", made_of), kit)
+        reference = task.options(memory=needs).remote(name.name, data, options, patience, kits.store, record.kit)
+        pending[reference] = record
         del data
     while pending:
         for reference in ray.wait(list(pending), num_returns=1)[0]:
             finish(reference)
     records.sort(key=lambda r: r.model)
-    for name, content in _native.tables(json.dumps([asdict(r) for r in records])):
+    for name, content in shellock._asked(_native.tables, json.dumps([asdict(r) for r in records])):
         kits.write(name, bytes(content))
     return records

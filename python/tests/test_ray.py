@@ -4,10 +4,12 @@ import csv
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ray = pytest.importorskip("ray")
@@ -91,3 +93,30 @@ def test_an_object_store_has_the_same_files(folder, cluster, tmp_path):
     assert [r.status for r in records].count("verified") >= 2
     assert (tmp_path / "store" / "batch.csv").is_file()
     assert {p.parent.name for p in (tmp_path / "store").rglob("plan.json")} == set(FIGURES)
+
+
+def test_what_is_wrong_with_one_model_is_told_in_its_row(folder, cluster, tmp_path):
+    models, out = tmp_path / "models", tmp_path / "kits"
+    models.mkdir()
+    for name in ("foreign", "good"):
+        (models / f"{name}.stl").write_bytes((folder / "torus.stl").read_bytes())
+    names = ["foreign.stl", "good.stl"]
+    (out / "foreign").mkdir(parents=True)
+    (out / "foreign" / "notes.txt").write_text("mine")
+    (out / ".batch").mkdir()
+    (out / ".batch" / "good.ray.json").write_text('{"model": "go')
+    if sys.platform == "linux":
+        Path(os.fsdecode(os.fsencode(models) + b"/na\xffme.stl")).write_bytes(b"solid nothing\n")
+        names.append("na\ufffdme.stl")
+    if hasattr(os, "geteuid") and os.geteuid() != 0:
+        (models / "secret.stl").write_bytes(b"")
+        (models / "secret.stl").chmod(0)
+        names.append("secret.stl")
+    records = shellock_ray.run(str(models), str(out), {**OPTIONS, "pieces": np.int64(5)})
+    assert [r.model for r in records] == names
+    assert [r.status for r in records] == ["refused", "verified"] + ["refused"] * (len(names) - 2) and all(r.said for r in records if r.status == "refused")
+    assert (out / "batch.csv").is_file() and (out / "foreign" / "notes.txt").read_text() == "mine"
+    # Once the place is free, it is made.
+    (out / "foreign" / "notes.txt").unlink()
+    again = shellock_ray.run(str(models), str(out), OPTIONS)
+    assert [(r.status, r.is_old) for r in again[:2]] == [("verified", False), ("verified", True)]

@@ -1,13 +1,16 @@
 """The built wheel, in an environment of its own. SHELLOCK is the program, FIGURES a folder for figures that it makes."""
 
+import copy
 import gc
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import threading
 import time
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -214,3 +217,54 @@ def test_an_interrupt_ends_it(vase):
     with pytest.raises(KeyboardInterrupt):
         shellock.design(*vase, **{**FAST, "size": "150mm", "method": "auto"})
     assert time.time() - began < 10
+
+
+@pytest.mark.parametrize("kind", [shellock.ShellockError, shellock.InputError, shellock.NoPlanError, shellock.WriteError])
+def test_errors_can_be_sent_and_copied(kind):
+    error = kind("no", 2, (1.0, 2.0, 3.0))
+    for again in (pickle.loads(pickle.dumps(error)), copy.copy(error), copy.deepcopy(error)):
+        assert type(again) is kind and (str(again), again.code, again.at) == ("no", 2, (1.0, 2.0, 3.0))
+
+
+POOL = """
+import multiprocessing, sys
+import shellock
+def wrong(size):
+    return shellock.build(b"solid nothing\\n", name="a.stl", size=size)
+if __name__ == "__main__":
+    how, is_used = sys.argv[1], sys.argv[2] == "used"
+    if is_used:
+        try:
+            wrong(3)
+        except shellock.InputError:
+            pass
+    with multiprocessing.get_context(how).Pool(1) as pool:
+        try:
+            pool.apply(wrong, (3,))
+        except shellock.ShellockError as e:
+            print(type(e).__name__, e)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.parametrize("how, used, says", [("fork", "used", "ShellockError this process was forked"), ("fork", "unused", "InputError a.stl"), ("spawn", "used", "InputError a.stl")])
+def test_a_worker_says_what_is_wrong_and_does_not_hang(how, used, says, tmp_path):
+    (tmp_path / "pool.py").write_text(POOL)
+    told = subprocess.run([sys.executable, tmp_path / "pool.py", how, used], capture_output=True, text=True, timeout=60)
+    assert told.stdout.startswith(says), told.stderr
+
+
+def test_values_of_options_may_be_of_numpy_and_are_else_refused_by_name():
+    plain = lambda **options: json.loads(shellock._options(options))
+    assert plain(size=np.float32(60), seed=np.array(3), key_grip=np.bool_(True)) == {"size": 60.0, "seed": 3, "key-grip": True}
+    assert plain(key=(1, 2, 3.5)) == {"key": "1,2,3.5"} and plain(key=np.array([1, 2, 3])) == {"key": "1,2,3"}
+    assert plain(keep_whole=[(0, 0, 9, 5), 3]) == {"keep-whole": ["0,0,9,5", 3]}
+    for value in (Path("a"), Decimal(3), b"60", float("nan"), np.float64("inf"), {"a": 1}, np.array("2020", "M8")):
+        with pytest.raises(shellock.InputError, match="size: this cannot be"):
+            shellock.build(b"solid nothing\n", name="a.stl", size=value)
+
+
+def test_python_keeps_its_own_warning():
+    names = {}
+    exec("from shellock import *", names)
+    assert "Warning" not in names and "design" in names and shellock.Warning.__module__ == "shellock"
