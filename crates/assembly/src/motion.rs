@@ -45,8 +45,8 @@ pub struct Contact {
 /// How many times farther than [`most_play`] a piece may go before it counts as loose.
 pub const LOOSE: f64 = 2.0;
 
-/// How far a piece may go before it is said to rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of 0.12 mm, in
-/// proportion to the clearance; displacements also to the size of the model, but no less than for 75 mm;
+/// How far a piece may go before it is said to rattle, mm and degrees: 1 mm and 2° at 150 mm and a clearance of
+/// 0.12 mm, in proportion to the clearance; displacements also to the size of the model, but no less than for 75 mm;
 /// turns of pieces with a diagonal under 60 mm, whose rims move less, in inverse proportion to that, up to
 /// twice. docs/notes/certificate.md has the evidence.
 pub fn most_play(size_mm: f64, clearance_mm: f64, piece_mm: f64) -> [f64; 2] {

@@ -187,6 +187,9 @@ pub enum Cause {
     BodyInParts {
         dropped_mm3: f64,
     },
+    PartGiven {
+        given_mm3: f64,
+    },
     SeamWithoutConnector {
         length_mm: f64,
     },

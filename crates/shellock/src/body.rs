@@ -15,8 +15,9 @@
 //!
 //! so that along every line in direction s all remaining material comes before p: p leaves freely by
 //! construction. Fragments that a cut leaves on either side are given to the other one (`fragments`): the piece
-//! keeps out of the way of what it gave, and takes along what is ahead of what it got. What comes off a body all the
-//! same, smaller than the grid sees, goes to the body beside it (`chips`). The two sides of a cut keep a small gap, the same from the inner side to the outer rim.
+//! keeps out of the way of what it gave, and takes along what is ahead of what it got. What comes off a body all
+//! the same, smaller than the grid sees, goes to the body beside it (`chips`). The two sides of a cut keep a small
+//! gap, the same from the inner side to the outer rim.
 //! Where outer patches hide each other a little, only the seam shifts. The first-installed piece is what is
 //! left.
 

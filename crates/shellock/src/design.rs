@@ -80,6 +80,7 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
     let total_s = ctx.seconds_left();
     for (i, &way) in ways.iter().enumerate() {
         if best.as_ref().is_some_and(|before| before.is_late(ctx, way)) {
+            ctx.note(&format!("no time is left for {}", way.words()));
             continue;
         }
         if let Some(before) = &best {

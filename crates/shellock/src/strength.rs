@@ -121,7 +121,8 @@ impl Default for StrengthParams {
 }
 
 impl StrengthParams {
-    /// The same with no wall so thick that it leaves hardly any cavity, or connectors too little room; `None` where the thinnest is.
+    /// The same with no wall so thick that it leaves hardly any cavity, or connectors too little room; `None`
+    /// where the thinnest leaves hardly any.
     fn leaving_cavity(&self, falls: &Falls) -> Option<Self> {
         /// Rounds of bisection: to a hundredth of a millimetre.
         const ROUNDS: usize = 8;

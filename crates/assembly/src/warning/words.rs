@@ -356,6 +356,16 @@ impl Warning {
                      model otherwise there"
                 ),
             ),
+            Cause::PartGiven { given_mm3 } => {
+                let to = self.pieces.get(1).map_or_else(String::new, |to| format!(" and went to piece {to}"));
+                warning(
+                    "part-given",
+                    format!(
+                        "{given_mm3:.0} mm³ of piece {first} came off it where seams meet{to}, though colours show it as piece {first}'s; \
+                         see that they fit there"
+                    ),
+                )
+            }
             Cause::SeamWithoutConnector { length_mm } => note(
                 "seam-without-connector",
                 format!(
@@ -569,6 +579,7 @@ mod tests {
                 n_others: 14,
             },
             Cause::BodyInParts { dropped_mm3: 12.4 },
+            Cause::PartGiven { given_mm3: 1293.0 },
             Cause::Rattles {
                 loosest: EstimatedPlay {
                     translation_mm: 1.9,

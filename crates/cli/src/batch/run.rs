@@ -47,7 +47,8 @@ pub struct Run {
 
 impl Run {
     pub fn new(options: &BatchOptions) -> Result<Self, Failure> {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        // All cores, or --threads.
+        let cores = rayon::current_num_threads();
         let n_workers = options.jobs.unwrap_or(cores).clamp(1, 256);
         let arguments = config::build_arguments(std::env::args_os().collect());
         let file = options

@@ -14,8 +14,9 @@ use crate::{Cause, Ctx, PatchId, Warning};
 
 /// Chips up to this volume are dropped, mm³; what is missing then is a scratch.
 const CRUMB_MM3: f64 = 0.2;
-/// What is dropped is told from this volume on, mm³.
+/// What is dropped is told from this volume on, mm³, and what is given from this one.
 const TOLD_MM3: f64 = 0.5;
+const GIVEN_TOLD_MM3: f64 = 5.0;
 /// A bridge reaches so much farther than both sides' gaps, mm: its neck is about as wide.
 const BRIDGE_MM: f64 = 0.3;
 
@@ -48,8 +49,16 @@ pub(super) fn whole_bodies(
         let mut dropped: Vec<Volume> = Vec::new();
         for chip in std::mem::take(&mut parts[from].chips) {
             let is_worth = chip.volume() > CRUMB_MM3 && has_skin(grid, &chip);
-            if !is_worth || !give(grid, gap_mm, &mut parts, &chip) {
-                dropped.push(chip);
+            match is_worth.then(|| give(grid, gap_mm, &mut parts, &chip)).flatten() {
+                Some(to) if to != from && chip.volume() > GIVEN_TOLD_MM3 => ctx.warn(Warning {
+                    cause: Cause::PartGiven {
+                        given_mm3: chip.volume(),
+                    },
+                    pieces: vec![parts[from].piece, parts[to].piece],
+                    at: Some(chip.bounds().center().to_array()),
+                }),
+                Some(_) => {}
+                None => dropped.push(chip),
             }
         }
         let dropped_mm3: f64 = dropped.iter().map(Volume::volume).sum();
@@ -74,13 +83,10 @@ fn has_skin(grid: &ShellGrid, chip: &Volume) -> bool {
         .any(|p| depth(p).is_some_and(|d| d < skin_mm))
 }
 
-/// Gives a chip to the body that it lies against most of those that it can be bridged to; whether there is one.
-fn give(grid: &ShellGrid, gap_mm: f64, parts: &mut [Parts], chip: &Volume) -> bool {
+/// Gives a chip to the body that it lies against most of those that it can be bridged to; which, if any.
+fn give(grid: &ShellGrid, gap_mm: f64, parts: &mut [Parts], chip: &Volume) -> Option<usize> {
     let reach_mm = gap_mm + BRIDGE_MM;
-    let Some(around) = grown(chip, reach_mm) else {
-        return false;
-    };
-    let around = around.intersect(&grid.solid);
+    let around = grown(chip, reach_mm)?.intersect(&grid.solid);
     let room = around.bounds().grown(2.0 * gap_mm);
     let near: Vec<Volume> = parts.iter().map(|p| part_in(&p.body, room)).collect();
     let mut takers: Vec<(usize, f64)> = (0..parts.len())
@@ -103,10 +109,10 @@ fn give(grid: &ShellGrid, gap_mm: f64, parts: &mut [Parts], chip: &Volume) -> bo
             .unwrap_or_else(Volume::empty);
         if whole.volume() > parts[taker].body.volume() + 0.9 * chip.volume() {
             parts[taker].body = whole;
-            return true;
+            return Some(taker);
         }
     }
-    false
+    None
 }
 
 /// What of `body` lies in `room`.

@@ -205,7 +205,11 @@ fn what_came_off_a_body_with_skin_goes_to_the_body_beside_it() {
     parts[0].1 = Volume::union_all(vec![parts[0].1.subtract(&gone), chip.clone()]);
     assert_eq!(parts[0].1.components().len(), 2);
     let neighbour_mm3 = parts[1].1.volume();
-    let whole = super::chips::whole_bodies(&Ctx::quiet(), &grid, 2.0 * params.seam_gap_mm, parts);
+    let ctx = Ctx::quiet();
+    let whole = super::chips::whole_bodies(&ctx, &grid, 2.0 * params.seam_gap_mm, parts);
+    let told = ctx.into_warnings();
+    assert!(chip.volume() > 5.0 && told.len() == 1 && told[0].code() == "part-given");
+    assert_eq!(told[0].pieces, [0.into(), 1.into()]);
     assert!(whole.iter().all(|(_, body)| body.components().len() == 1));
     assert!(whole[1].1.volume() > neighbour_mm3 + chip.volume());
     assert!(whole[0].1.intersect(&whole[1].1).volume() < 1e-6);
