@@ -162,6 +162,11 @@ pub enum Cause {
         asked: String,
         gives_way: String,
     },
+    /// The wall is thinner than usual, as thicker ones leave connectors too little room.
+    WallThinForRoom {
+        thickness_mm: f64,
+        usual_mm: f64,
+    },
     // What was changed so that a kit bears more
     WallForUse {
         from_mm: f64,

@@ -27,6 +27,8 @@ mod tests;
 mod wall;
 mod ways;
 
+use std::borrow::Cow;
+
 use shellock_geom::Solid;
 
 use crate::key::Turn;
@@ -48,14 +50,15 @@ pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
 use strengthen::{Remedy, Thicker};
 use wall::Wall;
-use ways::{Ask, Ended, Input, with_reserve};
+use ways::{Ask, Ended, Input, Walls, with_reserve};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or
 /// the rounds are used up; then the best of them is returned, its failures told.
 ///
-/// Where a person would cut comes first (`auto`); where no kit of such pieces passes, fewer pieces do, then pieces
-/// of similar size. Of each a kit is asked to bear what people do with a reserve; where none passes with the wall
-/// that this takes, walls stay as thin as a fall allows, and what is borne too little is warned of.
+/// Where a person would cut comes first (`auto`). Such a kit is asked to bear what people do with a reserve; where
+/// none passes with the wall that this takes, its wall is as thin as a fall allows, and what is borne too little is
+/// warned of. Where none passes at all, fewer pieces are tried, then still fewer with walls as thin as are made, then
+/// pieces of similar size with such walls: that a kit locks comes before what it bears.
 pub fn design(
     ctx: &Ctx,
     params: &Params,
@@ -77,6 +80,7 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
     let ways = ways::ways(input);
     let mut effort = Effort::default();
     let mut best: Option<Ended> = None;
+    let mut thin: Option<Cow<'_, Wall>> = None;
     let total_s = ctx.seconds_left();
     for (i, &way) in ways.iter().enumerate() {
         if best.as_ref().is_some_and(|before| before.is_late(ctx, way)) {
@@ -92,7 +96,12 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
         let reserved_s = ways::reserved_s(total_s, i, ways.len());
         let seconds_left = || ctx.seconds_left() - reserved_s;
         let in_time = ctx.fork().with_deadline(&seconds_left);
-        let ended = with_reserve(&in_time, input, &thinnest.divided(way), rounds, &mut effort);
+        let wall = match &mut thin {
+            _ if way.walls != Walls::Thin => thinnest,
+            Some(thin) => thin,
+            none => none.insert(thinnest.thin(&in_time, input)?),
+        };
+        let ended = with_reserve(&in_time, input, &wall.divided(way), way.ask(rounds), &mut effort);
         in_time.into_warnings().into_iter().for_each(|w| ctx.warn(w));
         let ended = match best {
             Some(before) => before.or(ended),
@@ -400,6 +409,7 @@ fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, Str
                 division: &current,
                 survey: &survey,
                 constraints: &none,
+                begun_s: job.begun_s,
             };
             division = match attempt::next_plan(&ctx, &planning, n_joinings > 0, &levers)? {
                 Next::Plan(chosen) => {
@@ -444,6 +454,8 @@ struct Job<'a> {
     /// Whether it may begin anew with a thicker wall.
     may_thicken: bool,
     pace: Pace,
+    /// What was left of the time when it began, s.
+    begun_s: f64,
     stress: Option<StressMap<'a>>,
     surface: SegmentedSurface,
     /// Which triangles of the model the user wants the key to have; `None` where that is left to us.
@@ -460,8 +472,10 @@ impl<'a> Job<'a> {
         may_thicken: bool,
     ) -> Result<Self, DesignError> {
         let &Input { model, labels, .. } = input;
+        let begun_s = ctx.seconds_left();
         let surface = segmentation::segment(&ctx.fork(), &wall.settings.segmentation, model, labels)?;
-        Self::of(input, wall, ask, may_thicken, surface)
+        let job = Self::of(input, wall, ask, may_thicken, surface)?;
+        Ok(Self { begun_s, ..job })
     }
 
     /// The model as it is divided already.
@@ -486,6 +500,7 @@ impl<'a> Job<'a> {
             ask,
             may_thicken,
             pace: Pace::default(),
+            begun_s: 0.0,
             stress,
             key_faces: key_faces(params.key, model, labels, &surface)?,
             surface,

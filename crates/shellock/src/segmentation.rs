@@ -465,7 +465,7 @@ pub fn refined_again(
 }
 
 /// The same surface with each of `patches` joined to the neighbour it has the longest seam with, refined and
-/// smoothed again; `None` where there would be one piece left, or nothing is joined.
+/// smoothed again; `None` where there would be too few pieces left to lock, or nothing is joined.
 ///
 /// The feedback loop asks for this where dividing did not help. Patches may be renumbered.
 pub fn unite(
@@ -488,7 +488,7 @@ pub fn unite(
     changed(ctx, params, surface, |solid, labels| {
         let label: Vec<u32> = labels.as_slice().iter().map(|&k| number[k as usize]).collect();
         let joined = FaceLabels::from_connected(&Topology::new(solid), &label);
-        (1 < joined.n_patches() && joined.n_patches() < surface.n_patches).then_some(joined)
+        enough_left(joined, surface)
     })
 }
 
@@ -506,8 +506,16 @@ pub fn unite_two(
             .map(|&k| if k == b.0 { a.0 } else { k })
             .collect();
         let joined = FaceLabels::from_connected(&Topology::new(solid), &label);
-        (1 < joined.n_patches() && joined.n_patches() < surface.n_patches).then_some(joined)
+        enough_left(joined, surface)
     })
+}
+
+/// What has fewer patches than `surface` and still enough: of two pieces each leaves the other.
+fn enough_left(joined: FaceLabels, surface: &SegmentedSurface) -> Option<FaceLabels> {
+    const FEWEST: usize = 3;
+    (FEWEST..surface.n_patches)
+        .contains(&joined.n_patches())
+        .then_some(joined)
 }
 
 /// Whether some of the contacts that hold `surface` together are shorter than wanted.

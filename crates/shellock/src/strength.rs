@@ -76,9 +76,13 @@ const MOST_FINE: usize = 5;
 const LEAST_HOLLOW: f64 = 0.1;
 /// No wall is so thick that it leaves less than this share of what the thinnest one leaves, of the cavity or of the
 /// room for connectors: thin legs would be solid and hold nothing, for the sake of a fall that they hardly bear.
-const LEAST_LEFT: f64 = 0.6;
+const LEAST_LEFT: f64 = 0.75;
 /// Depth of the cavity below a wall that is room for a connector, mm.
 const ROOM_MM: f64 = 1.5;
+/// Share of the surface that has such room below the wall of a model that is not thin.
+const ROOMY: f64 = 0.8;
+/// A wall that is thinner than the usual least one by more is told, mm.
+const TOLD_THINNER_MM: f64 = 0.1;
 
 /// What a wall must bear. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,9 +95,12 @@ pub struct StrengthParams {
     pub n_cases: usize,
     /// Seed of the orientations.
     pub seed: u64,
-    /// Thinnest wall to look at. [0.4, 5]; 1.6, four lines of an ordinary nozzle: a seam's two sides need two
-    /// each.
+    /// Thinnest wall of a model with room for connectors. [0.4, 5]; 1.6, four lines of an ordinary nozzle: a seam's
+    /// two sides need two each.
     pub least_mm: f64,
+    /// Thinnest wall of a model with bars or sheets so thin that `least_mm` leaves connectors little room. [0.4,
+    /// `least_mm`]; 1.2, three lines.
+    pub thin_mm: f64,
     /// Thickest wall to look at. [`least_mm`, 20]; 3. The paper looks up to 10 mm and finds 1.9 to 2.8;
     /// thicker walls leave a figure of 150 mm little cavity, and where 3 mm do not bear the stress, 10 hardly
     /// do (docs/notes/strength.md).
@@ -113,6 +120,7 @@ impl Default for StrengthParams {
             n_cases: 12,
             seed,
             least_mm: 1.6,
+            thin_mm: 1.2,
             most_mm: 3.0,
             peak_share: 0.005,
             refinement: 1.0,
@@ -121,33 +129,27 @@ impl Default for StrengthParams {
 }
 
 impl StrengthParams {
-    /// The same with no wall so thick that it leaves hardly any cavity, or connectors too little room; `None`
-    /// where the thinnest leaves hardly any.
+    /// The same with no wall so thick that it leaves hardly any cavity, or connectors too little room, and as thin a
+    /// least wall as they need; `None` where the thinnest leaves hardly any cavity.
     fn leaving_cavity(&self, falls: &Falls) -> Option<Self> {
-        /// Rounds of bisection: to a hundredth of a millimetre.
-        const ROUNDS: usize = 8;
         let hollow_mm2 = |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>();
-        let (mut low, mut high) = (self.least_mm, self.most_mm);
-        let (most_mm2, least_mm2) = (hollow_mm2(low), LEAST_HOLLOW * falls.mesh.area());
+        let room_mm2 = |mm: f64| hollow_mm2(mm + ROOM_MM);
+        let total_mm2 = falls.mesh.area();
+        let least_mm = thickest(self.thin_mm, self.least_mm, |mm| {
+            room_mm2(mm) >= ROOMY * total_mm2
+        });
+        let (most_mm2, least_mm2) = (hollow_mm2(least_mm), LEAST_HOLLOW * total_mm2);
         if most_mm2 < least_mm2 {
             return None;
         }
-        let cavity_mm2 = least_mm2.max(LEAST_LEFT * most_mm2);
-        let room_mm2 = LEAST_LEFT * hollow_mm2(low + ROOM_MM);
-        let is_hollow = |mm: f64| hollow_mm2(mm) >= cavity_mm2 && hollow_mm2(mm + ROOM_MM) >= room_mm2;
-        if is_hollow(high) {
-            return Some(self.clone());
-        }
-        for _ in 0..ROUNDS {
-            let middle = 0.5 * (low + high);
-            if is_hollow(middle) {
-                low = middle
-            } else {
-                high = middle
-            }
-        }
+        let cavity_left_mm2 = least_mm2.max(LEAST_LEFT * most_mm2);
+        let room_left_mm2 = LEAST_LEFT * room_mm2(least_mm);
+        let most_mm = thickest(least_mm, self.most_mm, |mm| {
+            hollow_mm2(mm) >= cavity_left_mm2 && room_mm2(mm) >= room_left_mm2
+        });
         Some(Self {
-            most_mm: low,
+            least_mm,
+            most_mm,
             ..self.clone()
         })
     }
@@ -158,6 +160,13 @@ impl StrengthParams {
             ParamProblem::unless_within("drop height", "m", self.drop_m, 0.01, 20.0),
             ParamProblem::unless_within("number of falls", "", self.n_cases as f64, 1.0, 200.0),
             ParamProblem::unless_within("thinnest wall", "mm", self.least_mm, 0.4, 5.0),
+            ParamProblem::unless_within(
+                "thinnest wall of a thin model",
+                "mm",
+                self.thin_mm,
+                0.4,
+                self.least_mm,
+            ),
             ParamProblem::unless_within("thickest wall", "mm", self.most_mm, self.least_mm, 20.0),
             ParamProblem::unless_within("share of peaks", "", self.peak_share, 0.0, 0.2),
             ParamProblem::unless_within("refinement", "", self.refinement, 0.1, 20.0),
@@ -166,6 +175,26 @@ impl StrengthParams {
         .flatten()
         .collect()
     }
+}
+
+/// The thickest wall between `low_mm` and `high_mm` that `does`, where every thinner one does, too; `low_mm` where
+/// none does.
+fn thickest(low_mm: f64, high_mm: f64, does: impl Fn(f64) -> bool) -> f64 {
+    /// Rounds of bisection: to a hundredth of a millimetre.
+    const ROUNDS: usize = 8;
+    if does(high_mm) {
+        return high_mm;
+    }
+    let (mut low_mm, mut high_mm) = (low_mm, high_mm);
+    for _ in 0..ROUNDS {
+        let middle_mm = 0.5 * (low_mm + high_mm);
+        if does(middle_mm) {
+            low_mm = middle_mm;
+        } else {
+            high_mm = middle_mm;
+        }
+    }
+    low_mm
 }
 
 /// Why there is no stress to speak of.
@@ -258,7 +287,7 @@ impl Strength {
                 drop_m: params.drop_m,
                 stress_mpa: self.stress_mpa,
                 strength_mpa: params.material.strength_mpa,
-                most_mm: params.most_mm,
+                most_mm: self.most_mm,
             },
             pieces: Vec::new(),
             at: Some(self.at.to_array()),
@@ -276,6 +305,19 @@ impl Strength {
             at: Some(largest.at),
         });
         weak.into_iter().chain(solid).collect()
+    }
+
+    /// That the wall found is thinner than the usual least one, for the sake of connectors; nothing where it is not.
+    pub fn told_thinner(&self, params: &StrengthParams) -> Option<Warning> {
+        let (thickness_mm, usual_mm) = (self.thickness_mm, params.least_mm);
+        (thickness_mm < usual_mm - TOLD_THINNER_MM).then_some(Warning {
+            cause: Cause::WallThinForRoom {
+                thickness_mm,
+                usual_mm,
+            },
+            pieces: Vec::new(),
+            at: None,
+        })
     }
 }
 
@@ -314,7 +356,7 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
     let params = &params
         .leaving_cavity(&coarse)
         .ok_or(StrengthError::NothingHollow {
-            wall_mm: params.least_mm,
+            wall_mm: params.thin_mm,
         })?;
     let strength_mpa = params.material.strength_mpa;
     let middle_mm = (params.least_mm * params.most_mm).sqrt();

@@ -66,6 +66,11 @@ impl Warning {
                 strength_mpa,
                 most_mm,
             } => {
+                let thicker = if most_mm > thickness_mm {
+                    format!(", and walls up to {most_mm:.1} mm help little")
+                } else {
+                    String::new()
+                };
                 let tell = if stress_mpa >= &(MUCH_TOO_WEAK * strength_mpa) {
                     problem
                 } else {
@@ -75,7 +80,7 @@ impl Warning {
                     "wall-too-weak",
                     format!(
                         "the wall of {thickness_mm:.1} mm breaks in a fall from {drop_m} m: its stress is {:.1} times what the \
-                         material bears, and walls up to {most_mm:.1} mm help little; print it larger, or do not drop it",
+                         material bears{thicker}; print it larger, or do not drop it",
                         stress_mpa / strength_mpa
                     ),
                 )
@@ -92,6 +97,16 @@ impl Warning {
                      between walls of {thickness_mm:.2} mm",
                     100.0 * share,
                     if *n_places == 1 { "place" } else { "places" }
+                ),
+            ),
+            Cause::WallThinForRoom {
+                thickness_mm,
+                usual_mm,
+            } => note(
+                "wall-thin-for-room",
+                format!(
+                    "walls are {thickness_mm:.1} mm thick and not {usual_mm:.1}, as connectors have little room in a model so thin; a \
+                     larger --size has room for both"
                 ),
             ),
             Cause::WallForUse { from_mm, to_mm, done } => note(

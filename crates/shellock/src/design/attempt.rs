@@ -100,6 +100,7 @@ pub(super) fn plans(
                     division,
                     survey: &survey,
                     constraints: &learned.constraints,
+                    begun_s: job.begun_s,
                 };
                 next_plan(&kit_ctx, &planning, may_join, &levers)
             },
@@ -219,6 +220,15 @@ impl Learned {
 }
 
 impl Failure {
+    /// Where the key leaves one way, the other piece leaves the opposite way: it is held by nothing.
+    fn of_two() -> Self {
+        Self {
+            reason: "two pieces come apart whichever of them is pulled; three can lock".into(),
+            blamed: vec![PatchId(0), PatchId(1)],
+            ..Self::default()
+        }
+    }
+
     /// The failure of a later plan, which is to blame first, with what was blamed before.
     fn after(self, later: Self) -> Self {
         let blamed = later.blamed.into_iter().chain(self.blamed).collect();
@@ -266,9 +276,16 @@ pub(super) struct Planning<'a> {
     pub division: &'a Division,
     pub survey: &'a PlanSurvey,
     pub constraints: &'a PlanConstraints,
+    /// What was left of the time when the job with this wall began, s.
+    pub begun_s: f64,
 }
 
 impl Planning<'_> {
+    /// Whether the job may begin anew: as much time is left as it has taken.
+    pub fn may_begin_anew(&self, ctx: &Ctx) -> bool {
+        2.0 * ctx.seconds_left() >= self.begun_s
+    }
+
     /// How the kit is handled, in the space of the division.
     pub fn handling(&self) -> Handling {
         let up = self.turn.apply(Vec3::from_array(self.params.up)).to_array();
@@ -307,6 +324,9 @@ pub(super) fn next_plan(
     let Division {
         surface, settings, ..
     } = division;
+    if surface.n_patches == 2 {
+        return Ok(Next::None(Failure::of_two()));
+    }
     let found = match plan::search(ctx, &settings.plan, survey, constraints)? {
         PlanOutcome::Found(found) => found,
         PlanOutcome::Infeasible {

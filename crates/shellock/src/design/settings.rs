@@ -169,19 +169,24 @@ fn plan(params: &Params) -> PlanParams {
     }
 }
 
-/// What the wall must bear. Two lines stand on either side of a seam's pin.
+/// What the wall must bear. Two lines stand on either side of a seam's pin; three in all where the model is thin.
 fn strength(params: &Params) -> StrengthParams {
     const LEAST_WALLS: f64 = 4.0;
+    const THIN_WALLS: f64 = 3.0;
     let usual = StrengthParams::default();
-    let least_mm = (LEAST_WALLS * params.connector.min_wall_mm)
-        .max(0.8)
-        .max(2.0 * params.cell_mm.unwrap_or(0.0));
-    let least_mm = least_mm.min(5.0);
+    let walls_mm = |n: f64| {
+        (n * params.connector.min_wall_mm)
+            .max(0.8)
+            .max(2.0 * params.cell_mm.unwrap_or(0.0))
+            .min(5.0)
+    };
+    let least_mm = walls_mm(LEAST_WALLS);
     StrengthParams {
         material: params.material,
         drop_m: params.drop_m,
         seed: params.seed,
         least_mm,
+        thin_mm: walls_mm(THIN_WALLS),
         most_mm: usual.most_mm.max(least_mm),
         ..usual
     }

@@ -74,11 +74,16 @@ pub(super) fn remedy(
     if left.wall
         && let Some(thickness_mm) = trial.thicker_wall(planning, &sizes, least)?
     {
-        let weakest = weakest.clone();
-        return Ok(Some(Remedy::Wall(Thicker {
-            thickness_mm,
-            weakest,
-        })));
+        if planning.may_begin_anew(ctx) {
+            let weakest = weakest.clone();
+            return Ok(Some(Remedy::Wall(Thicker {
+                thickness_mm,
+                weakest,
+            })));
+        }
+        ctx.note(&format!(
+            "no time is left for walls of {thickness_mm:.1} mm, which would bear more"
+        ));
     }
     if least >= GAIN * factor(weakest) {
         return Ok(Some(Remedy::Connectors(sizes)));

@@ -409,6 +409,7 @@ impl Ball {
             },
             may_thicken: true,
             pace: Pace::default(),
+            begun_s: 0.0,
             params: &self.params,
             model: &self.model,
             labels: None,

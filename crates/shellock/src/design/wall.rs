@@ -1,5 +1,7 @@
 //! The wall that a kit is made with: as thick as a fall asks for, or thicker for the sake of use.
 
+use std::borrow::Cow;
+
 use shellock_geom::Solid;
 
 use super::strengthen::Thicker;
@@ -35,6 +37,30 @@ impl Wall {
             at: None,
         }));
         wall
+    }
+
+    /// The same model with a wall as thin as is made, where that is ours to say: connectors have the most room.
+    pub fn thin(
+        &self,
+        ctx: &Ctx,
+        &Input { params, model, .. }: &Input<'_>,
+    ) -> Result<Cow<'_, Self>, DesignError> {
+        let thin_mm = self.settings.strength.thin_mm;
+        if params.thickness != Thickness::Auto || self.settings.body.thickness_mm <= thin_mm {
+            return Ok(Cow::Borrowed(self));
+        }
+        let thickness = Thickness::Mm(thin_mm);
+        let params = Params {
+            thickness,
+            ..params.clone()
+        };
+        let mut wall = Self::decide(ctx, &params, model)?;
+        let told = wall
+            .strength
+            .as_ref()
+            .map(|s| s.told_thinner(&wall.settings.strength));
+        wall.warnings.extend(told.flatten());
+        Ok(Cow::Owned(wall))
     }
 
     /// The same model with a thicker wall, for the sake of what people do to the kit.
@@ -76,7 +102,7 @@ impl Wall {
         if !params.allows_thin {
             let thinnest_mm = match params.thickness {
                 Thickness::Mm(mm) => mm,
-                Thickness::Auto => nominal.strength.least_mm,
+                Thickness::Auto => nominal.strength.thin_mm,
             };
             strength::is_hollow(model, thinnest_mm)?;
         }
@@ -92,7 +118,13 @@ impl Wall {
                 }
                 let mut settings = Settings::with_thickness(params, strength.thickness_mm);
                 settings.strength.most_mm = strength.most_mm;
-                let warnings = strength.warnings(&nominal.strength);
+                let mut warnings = strength.warnings(&nominal.strength);
+                let is_ours = params.thickness == Thickness::Auto;
+                warnings.extend(
+                    is_ours
+                        .then(|| strength.told_thinner(&nominal.strength))
+                        .flatten(),
+                );
                 Ok(Self {
                     settings,
                     strength: Some(strength),

@@ -17,18 +17,48 @@ use crate::segmentation::{Method, usual_n_pieces};
 pub(super) struct Way {
     pub method: Method,
     pub n_pieces: Option<usize>,
+    pub walls: Walls,
 }
 
-/// Pieces of coarser divisions where none are asked for, as shares of the usual: thin bars hold by few seams.
-const COARSER: [f64; 2] = [0.7, 0.35];
+/// How thick walls are: that a kit locks comes before what it bears.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Walls {
+    /// As a fall asks for; thicker for the sake of use, where such a kit passes.
+    ForUse,
+    /// As a fall asks for.
+    ForFalls,
+    /// As thin as they are made, so that connectors have the most room.
+    Thin,
+}
+
+/// Pieces of coarser divisions where none are asked for, as shares of the usual, since thin bars hold by few seams;
+/// with their walls.
+const COARSER: [(f64, Walls); 2] = [(0.7, Walls::ForFalls), (0.35, Walls::Thin)];
 
 impl Way {
+    /// What is asked of its kits, of which so many may be made.
+    pub fn ask(self, rounds: Rounds) -> Ask {
+        Ask {
+            factor: RESERVE,
+            rounds,
+            n_thicker: match self.walls {
+                Walls::ForUse => THICKER_WALLS,
+                Walls::ForFalls | Walls::Thin => 0,
+            },
+        }
+    }
+
     /// In words, for people.
     pub fn words(self) -> String {
         let n = self.n_pieces.map_or_else(String::new, |n| format!("about {n} "));
+        let walls = if self.walls == Walls::Thin {
+            ", thin walls"
+        } else {
+            ""
+        };
         match self.method {
-            Method::Creases => format!("{n}pieces of similar size"),
-            _ => format!("{n}pieces cut where a person would"),
+            Method::Creases => format!("{n}pieces of similar size{walls}"),
+            _ => format!("{n}pieces cut where a person would{walls}"),
         }
     }
 }
@@ -39,6 +69,7 @@ pub(super) fn ways(input: &Input<'_>) -> Vec<Way> {
     let own = Way {
         method: params.method,
         n_pieces: params.n_pieces,
+        walls: Walls::ForUse,
     };
     // A piece that is named as the key has its number in this division alone.
     let has_named_key = matches!(params.key, KeySource::Piece(_));
@@ -46,12 +77,14 @@ pub(super) fn ways(input: &Input<'_>) -> Vec<Way> {
         return vec![own];
     }
     let usual = usual_n_pieces(input.model.mesh().area()) as f64;
-    let coarser = COARSER.map(|share| Way {
+    let coarser = COARSER.map(|(share, walls)| Way {
         n_pieces: Some(((share * usual).round() as usize).max(2)),
+        walls,
         ..own
     });
     let similar = Way {
         method: Method::Creases,
+        walls: Walls::Thin,
         ..own
     };
     let coarser = coarser.into_iter().filter(|_| params.n_pieces.is_none());
@@ -127,14 +160,9 @@ pub(super) fn with_reserve(
     ctx: &Ctx,
     input: &Input<'_>,
     thinnest: &Wall,
-    rounds: Rounds,
+    ask: Ask,
     effort: &mut Effort,
 ) -> Ended {
-    let ask = Ask {
-        factor: RESERVE,
-        rounds,
-        n_thicker: THICKER_WALLS,
-    };
     let first = asking(ctx, input, thinnest, ask, effort);
     // One kit with the thinnest wall is made though it is late: a thick one may be all that was wrong.
     if first.is_enough() || !first.was_thicker {
@@ -143,8 +171,8 @@ pub(super) fn with_reserve(
     ctx.note("no kit with walls so thick passes: walls as thin as a fall allows");
     let ask = Ask {
         factor: 1.0,
-        rounds,
         n_thicker: 0,
+        ..ask
     };
     let second = asking(ctx, input, thinnest, ask, effort);
     first.or(second)

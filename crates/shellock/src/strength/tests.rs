@@ -13,6 +13,7 @@ fn quick(drop_m: f64) -> StrengthParams {
         n_cases: 3,
         refinement: 0.1,
         least_mm: 0.5,
+        thin_mm: 0.5,
         ..StrengthParams::default()
     }
 }
@@ -125,6 +126,7 @@ fn a_plate_ends_with_a_wall_that_leaves_a_cavity_or_with_a_sentence() {
     }
     let params = StrengthParams {
         least_mm: 1.6,
+        thin_mm: 1.6,
         ..params
     };
     let refused = thickness(&Ctx::quiet(), &params, &plate(1.2));
