@@ -379,3 +379,65 @@ fn warn_of_key(ctx: &Ctx, params: &Params, division: &Division, plan: &LatticePl
             .for_each(|problem| ctx.warn(problem));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::division::revised;
+    use super::super::wall::Wall;
+    use super::super::ways::{Ask, Input};
+    use super::super::{Candidate, Settings};
+    use super::*;
+    use crate::testing;
+
+    #[test]
+    fn no_kit_is_made_of_two_pieces_and_one_of_them_is_divided() {
+        let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
+        let params = Params::default();
+        let halves = testing::voronoi(model.mesh().clone(), 2, 1);
+        assert_eq!(halves.n_patches, 2);
+        let wall = Wall {
+            settings: Settings::resolve(&params),
+            strength: None,
+            warnings: Vec::new(),
+        };
+        let input = Input {
+            params: &params,
+            model: &model,
+            labels: None,
+        };
+        let ask = Ask {
+            factor: 1.0,
+            rounds: params.rounds,
+            n_thicker: 0,
+        };
+        let ctx = Ctx::quiet();
+        let job = Job::of(&input, &wall, ask, false, halves).expect("no key is named");
+        let candidate = Candidate::new(&job, 0, None).expect("as it lies");
+        let division = candidate.division(&ctx, &job, candidate.surface.clone());
+        let division = division.expect("sizes").expect("no key is cut");
+        let survey = plan::survey(
+            &ctx,
+            &division.settings.plan,
+            &division.surface,
+            &division.surface.seams(),
+            &division.chosen.sizes,
+        );
+        let planning = Planning {
+            params: &params,
+            model: &model,
+            turn: &candidate.turn,
+            division: &division,
+            survey: &survey.expect("not stopped"),
+            constraints: &PlanConstraints::default(),
+            begun_s: 0.0,
+        };
+        let next = next_plan(&ctx, &planning, false, &Levers::default()).expect("not stopped");
+        let Next::None(failure) = next else {
+            panic!("two pieces never lock")
+        };
+        let mut budget = candidate.budget;
+        let next = revised(&ctx, &division, &failure, false, &mut budget);
+        let revised = next.expect("not stopped").expect("a half can be divided");
+        assert!(revised.n_patches > 2, "{}", revised.n_patches);
+    }
+}

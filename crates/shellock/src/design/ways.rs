@@ -254,6 +254,13 @@ mod tests {
         assert_eq!(ways[0].n_pieces, None);
         let n = |i: usize| ways[i].n_pieces.unwrap();
         assert!(n(1) < usual && n(2) < n(1) && n(2) >= 2);
+        let may_grow: Vec<bool> = ways
+            .iter()
+            .map(|w| w.ask(Rounds::default()).n_thicker > 0)
+            .collect();
+        assert_eq!(may_grow, [true, false, false, false]);
+        let is_thin: Vec<bool> = ways.iter().map(|w| w.walls == Walls::Thin).collect();
+        assert_eq!(is_thin, [false, false, true, true]);
     }
 
     #[test]

@@ -134,6 +134,21 @@ fn a_plate_ends_with_a_wall_that_leaves_a_cavity_or_with_a_sentence() {
 }
 
 #[test]
+fn a_thin_model_gets_a_thin_wall_with_room_for_connectors_and_a_bulky_one_does_not() {
+    let params = StrengthParams {
+        n_cases: 3,
+        refinement: 0.1,
+        ..StrengthParams::default()
+    };
+    let lens = Solid::new(sphere(4, Vec3::new(50.0, 40.0, 3.5))).unwrap();
+    let thin = found(&params, &lens);
+    assert!((params.thin_mm..params.least_mm - TOLD_THINNER_MM).contains(&thin.thickness_mm));
+    assert_eq!(thin.told_thinner(&params).unwrap().code(), "wall-thin-for-room");
+    let bulky = found(&params, &ball(60.0));
+    assert!(bulky.thickness_mm >= params.least_mm && bulky.told_thinner(&params).is_none());
+}
+
+#[test]
 fn a_stop_is_heard_while_the_thickness_is_sought() {
     let stop = AtomicBool::new(true);
     let stopped = thickness(&Ctx::new(&|_| {}, &stop), &quick(1.275), &ball(30.0));
