@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -24,11 +23,6 @@ __all__ = ["Record", "run"]
 #: What a kit takes at least, and for each byte of its model's file, bytes: Ray runs no more tasks at a time than have room.
 LEAST_BYTES = 700_000_000
 BYTES_PER_BYTE = 12
-#: Files of a kit, of any version: what else lies in its folder is not touched.
-KIT_FILES = re.compile(
-    r"(plan|certificate|savings|stress)\.json|(assembly|plates|segmentation)\.3mf|segmentation\.ply|report\.html|pieces\.png"
-    r"|instructions\.pdf|(strength|stress)\.svg|pieces/piece-[0-9]+\.stl|plates/plate-[0-9]+\.3mf"
-)
 #: Models that are read and sent ahead, for each that can be made at a time.
 AHEAD = 2
 
@@ -54,10 +48,6 @@ class Record:
         pieces = f", {self.pieces} pieces" if self.pieces else ""
         why = f": {self.said[0]}" if self.said and self.status != "verified" else ""
         return f"{self.model} {self.status}{pieces}, {self.seconds:.0f} s{', as it was' if self.is_old else ''}{why}"
-
-
-def _path_of_record(kit: str) -> str:
-    return f".batch/{kit}.ray.json"
 
 
 def _old(content: Optional[bytes], new: Record) -> Optional[Record]:
@@ -152,7 +142,7 @@ class _Folder:
     def keep(self, kit: str, files: Mapping[str, bytes]) -> None:
         # First: the record of an earlier kit must not vouch for this one.
         try:
-            (self.out / _path_of_record(kit)).unlink()
+            (self.out / _native.record_path(kit)).unlink()
         except OSError:
             pass
         shellock._asked(_native.save, list(files.items()), str(self.out / kit), True)
@@ -194,7 +184,7 @@ class _Store:
         The plan is the last that goes and the first that comes: a worker that is lost meanwhile leaves a folder that is known for a kit.
         """
         self.system.invalidate_cache()
-        record = _path_of_record(kit)
+        record = _native.record_path(kit)
         if self.has(record) or self.has(f"{kit}/plan.json"):
             if self.has(record):
                 self.system.rm_file(f"{self.root}/{record}")
@@ -204,10 +194,10 @@ class _Store:
             self.write(f"{kit}/{file}", files[file])
 
     def _files(self, kit: str) -> List[str]:
-        """Files of a kit in its folder; the kit of another model may lie below it."""
+        """Files of a kit, of any version, in its folder; the kit of another model may lie below it, and what else is there is not touched."""
         folder = f"{self.root}/{kit}/"
         within = (path[len(folder):] for path in self.system.find(folder) if path.startswith(folder))
-        return [f"{kit}/{name}" for name in within if KIT_FILES.fullmatch(name)]
+        return [f"{kit}/{name}" for name in within if _native.is_of_kit(name)]
 
 
 def _printable(name: Path) -> str:
@@ -282,7 +272,7 @@ def run(
             # Of the place for the kit, not of the model: another time it may be free.
             record.status, record.said, is_kept = "refused" if e.code == 2 else "crashed", [str(e)], False
         if is_kept and record.status not in ("too-long", "crashed"):
-            kits.write(_path_of_record(record.kit), json.dumps(asdict(record)).encode())
+            kits.write(_native.record_path(record.kit), json.dumps(asdict(record)).encode())
         ended(record)
 
     for name, kit in jobs:
@@ -298,7 +288,7 @@ def run(
             ended(record)
             continue
         record.made_of = hashlib.sha256(hashlib.sha256(data).hexdigest().encode() + made_with.encode()).hexdigest()
-        old = _old(kits.read(_path_of_record(record.kit)), record)
+        old = _old(kits.read(_native.record_path(record.kit)), record)
         if old is not None and (old.status not in ("verified", "failed") or kits.has(f"{old.kit}/plan.json")):
             old.is_old = True
             ended(old)

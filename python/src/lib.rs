@@ -175,6 +175,18 @@ fn tables<'py>(py: Python<'py>, records: &str) -> PyResult<Vec<(String, Bound<'p
     Ok(files.into_iter().map(bytes).collect())
 }
 
+/// Where the record of a kit that is made on Ray is kept, within the folder for kits.
+#[pyfunction]
+fn record_path(kit: &str) -> String {
+    embed::record_path(kit, "ray")
+}
+
+/// Whether a file with this name, within a kit's folder, is of the kit.
+#[pyfunction]
+fn is_of_kit(name: &str) -> bool {
+    embed::is_of_kit(name)
+}
+
 /// All options, as a JSON list.
 #[pyfunction]
 fn options() -> String {
@@ -340,6 +352,7 @@ mod _native {
     const VERSION: &str = env!("CARGO_PKG_VERSION");
     #[pymodule_export]
     use super::{
-        Kit, Refused, build, check, design, models, options, save, segment, tables, verify, write_file,
+        Kit, Refused, build, check, design, is_of_kit, models, options, record_path, save, segment, tables,
+        verify, write_file,
     };
 }

@@ -15,6 +15,7 @@ import pytest
 ray = pytest.importorskip("ray")
 
 import shellock_ray  # noqa: E402
+from shellock import _native  # noqa: E402
 
 PROGRAM = os.environ.get("SHELLOCK", "shellock")
 OPTIONS = {"size": "60mm", "time": 0, "method": "creases", "pieces": 5, "thickness": "2mm"}
@@ -104,7 +105,7 @@ def test_what_is_wrong_with_one_model_is_told_in_its_row(folder, cluster, tmp_pa
     (out / "foreign").mkdir(parents=True)
     (out / "foreign" / "notes.txt").write_text("mine")
     (out / ".batch").mkdir()
-    (out / ".batch" / "good.ray.json").write_text('{"model": "go')
+    (out / _native.record_path("good")).write_text('{"model": "go')
     if sys.platform == "linux":
         Path(os.fsdecode(os.fsencode(models) + b"/na\xffme.stl")).write_bytes(b"solid nothing\n")
         names.append("na\ufffdme.stl")

@@ -15,6 +15,7 @@ from shellock import _native
 from shellock_ray import __main__ as program
 
 RECORD = shellock_ray.Record("a.stl", "a", "verified", "inputs", pieces=4)
+OF_A = _native.record_path("a")
 
 
 def content(record):
@@ -39,12 +40,12 @@ def test_a_store_has_no_file_of_an_earlier_kit(tmp_path):
     store = shellock_ray._Store(f"file://{tmp_path}")
     earlier = {"plan.json": b"1", "pieces/piece-01.stl": b"1", "pieces/piece-07.stl": b"1", "stress.svg": b"1"}
     store.replace("a", earlier)
-    store.write(".batch/a.ray.json", content(RECORD))
+    store.write(OF_A, content(RECORD))
     # A kit of another model below it, and what is of no kit.
     store.replace("a/b", earlier)
     (tmp_path / "a" / "notes.txt").write_text("mine")
     below = {f"a/b/{name}" for name in earlier} | {"a/notes.txt"}
-    assert names(tmp_path) == below | {f"a/{name}" for name in earlier} | {".batch/a.ray.json"}
+    assert names(tmp_path) == below | {f"a/{name}" for name in earlier} | {OF_A}
     store.replace("a", {"plan.json": b"2", "pieces/piece-01.stl": b"2"})
     assert names(tmp_path) == below | {"a/plan.json", "a/pieces/piece-01.stl"}
     assert (tmp_path / "a" / "plan.json").read_bytes() == b"2"
@@ -80,22 +81,25 @@ def test_a_lost_writer_leaves_a_folder_that_is_known_for_a_kit(tmp_path, monkeyp
     assert names(tmp_path) == {"a/plan.json"}
 
 
-def test_names_of_a_kit_are_those_of_the_program(tmp_path):
-    """The program replaces a folder of files with these names, and of no others."""
-    words = ["plan.json", "certificate.json", "savings.json", "stress.json", "assembly.3mf", "plates.3mf", "segmentation.3mf", "segmentation.ply", "report.html",
-             "pieces.png", "instructions.pdf", "strength.svg", "stress.svg", "pieces/piece-12.stl", "plates/plate-1.3mf"]
-    assert all(shellock_ray.KIT_FILES.fullmatch(word) for word in words)
+def test_records_of_any_kits_have_short_names_of_their_own():
+    kits = ["a/b", "a-b", "a b", "ä", "a" * 300, "a" * 301, "x/" * 200]
+    paths = {_native.record_path(kit) for kit in kits}
+    assert len(paths) == len(kits) and all(len(path.split("/")) == 2 and len(path) < 100 for path in paths)
+
+
+def test_a_kit_takes_the_place_of_an_earlier_one_and_of_no_other_files(tmp_path):
+    words = ["plan.json", "stress.json", "assembly.3mf", "pieces/piece-12.stl", "plates/plate-1.3mf"]
+    assert all(_native.is_of_kit(word) for word in words) and not _native.is_of_kit("notes.txt")
     for word in words:
         (tmp_path / "a" / word).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "a" / word).write_bytes(b"")
     folder = shellock_ray._Folder(str(tmp_path))
-    folder.write(".batch/a.ray.json", content(RECORD))
+    folder.write(OF_A, content(RECORD))
     folder.keep("a", {"plan.json": b"2"})
     assert names(tmp_path) == {"a/plan.json"}
     (tmp_path / "a" / "notes.txt").write_text("mine")
     with pytest.raises(shellock.InputError, match="notes.txt"):
         folder.keep("a", {"plan.json": b"3"})
-    assert not shellock_ray.KIT_FILES.fullmatch("notes.txt")
 
 
 def test_options_given_several_times_are_a_list_and_flags_are_booleans():

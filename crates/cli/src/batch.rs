@@ -16,8 +16,8 @@ use serde_json::json;
 
 use crate::Session;
 use crate::args::BatchOptions;
-pub use crate::batch::names::models;
-use crate::batch::names::{ENDINGS, RECORDS};
+use crate::batch::names::ENDINGS;
+pub use crate::batch::names::{RECORDS, models, record_name};
 use crate::batch::record::{Record, Status};
 use crate::batch::run::{Job, Run};
 use crate::failure::Failure;

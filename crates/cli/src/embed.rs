@@ -23,7 +23,7 @@ use crate::choices;
 use crate::course::Course;
 use crate::failure::Failure;
 use crate::input::{self, Model};
-use crate::output::Destination;
+use crate::output::{Destination, is_of_kits};
 use crate::stages;
 use crate::{batch, own_assembly};
 
@@ -221,6 +221,17 @@ pub fn tables(records: &str) -> Result<Vec<(String, Vec<u8>)>, Problem> {
     let records: Vec<batch::record::Record> =
         serde_json::from_str(records).map_err(|e| Problem::wrong(format!("records: {e}")))?;
     Ok(batch::tables(&records))
+}
+
+/// Where another program than `shellock batch` keeps its record of a kit, within the folder for kits; `kind` tells whose
+/// it is.
+pub fn record_path(kit: &str, kind: &str) -> String {
+    format!("{}/{}.{kind}.json", batch::RECORDS, batch::record_name(kit))
+}
+
+/// Whether a file with this name, within a kit's folder, is one that commands write there.
+pub fn is_of_kit(name: &str) -> bool {
+    is_of_kits(name)
 }
 
 /// All options: `name`, `group`, `help`, `kind`, `choices`, `default` and `is_many` of each.

@@ -162,7 +162,8 @@ fn foreign_file(folder: &Path) -> Option<PathBuf> {
         .find(|name| !is_of_kits(&name.to_string_lossy()))
 }
 
-fn is_of_kits(name: &str) -> bool {
+/// Whether a file with this name, of a kit's folder, is written by commands, of this version or an earlier one.
+pub fn is_of_kits(name: &str) -> bool {
     let numbered = |prefix: &str, end: &str| {
         let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(end));
         number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))

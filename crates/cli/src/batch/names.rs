@@ -108,12 +108,16 @@ fn named(models: BTreeSet<PathBuf>) -> VecDeque<(PathBuf, PathBuf)> {
         .collect()
 }
 
-/// Where the record of a kit is kept: a name of its own, and not too long, for any kit's.
+/// Where the record of a kit is kept.
 pub fn record_file(out: &Path, kit: &str) -> PathBuf {
+    out.join(RECORDS).join(format!("{}.json", record_name(kit)))
+}
+
+/// What the record of a kit is called: a name of its own, and not too long, for any kit's.
+pub fn record_name(kit: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
     let told: String = kit.chars().take(TOLD_LETTERS).map(plain).collect();
-    out.join(RECORDS)
-        .join(format!("{told}-{}.json", &sha256(kit.as_bytes())[..12]))
+    format!("{told}-{}", &sha256(kit.as_bytes())[..12])
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use crate::args::BatchOptions;
 use crate::config;
 use crate::failure::Failure;
 use crate::input::{read, sha256};
+use crate::output::PLAN;
 
 /// What a kit takes at least, and for each MB of its model's file, MB: bunny_955k has 18 MB and takes 700.
 const LEAST_MB: f64 = 600.0;
@@ -22,6 +23,8 @@ const MB_PER_MB: f64 = 12.0;
 const LOOK: Duration = Duration::from_millis(40);
 /// How long a process that is to stop has for it.
 const TO_STOP: Duration = Duration::from_secs(10);
+/// Said where no kit came of a model and its folder has one.
+const OLD_KIT: &str = "the kit in its folder is of an earlier run";
 /// How much of what a process said in its own words is kept, lines.
 const KEPT_LINES: usize = 5;
 
@@ -116,6 +119,9 @@ impl Run {
         }
         let mut record = self.made(session, record, &model, &kit);
         record.kit_is = kit_is(&kit).filter(|_| record.status.has_kit());
+        if !record.status.has_kit() && kit.join(PLAN).is_file() {
+            record.said.push(OLD_KIT.to_owned());
+        }
         if session.stop.load(Ordering::Relaxed) {
             return record;
         }
