@@ -7,6 +7,7 @@
 use std::cell::LazyCell;
 
 use rayon::prelude::*;
+use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{Aabb, Vec3, Volume};
 
 use super::body::Body;
@@ -23,9 +24,13 @@ const LEVELS: [(f64, f64); 2] = [(0.5, 6.0), (0.2, 1.2)];
 /// error.
 const SURELY_LOOSE_MM3: f64 = 0.1;
 /// Overlap told by contacts from which a piece is held, mm³: ten times the limit. Each contact counts with
-/// its area and the depth to which it is pushed, up to this many mm, which no wall is thinner than.
+/// its area and the depth to which both sides overlap there, up to this many mm.
 const CONTACTS_HOLD_MM3: f64 = 5.5;
 const CONTACT_DEPTH_MM: f64 = 0.4;
+/// Rays into a side start so far below its surface, mm, and for each mm of gap that the nearest place may be nearer than
+/// the one ahead.
+const START_MM: f64 = 0.005;
+const START_SHARE: f64 = 0.12;
 /// Most rays across the longer side of a piece's shadow; larger prints get wider spacings.
 const MOST_PIXELS: f64 = 1200.0;
 /// Rays parallel to no face of a common model.
@@ -46,12 +51,19 @@ pub fn check(
         .iter()
         .map(|(_, b)| b.mesh.points.iter().map(|&p| frame.project(p)).collect())
         .collect();
+    let all: Vec<&Body> = bodies.iter().map(|(_, body)| body).collect();
+    let trees: Vec<TriangleBvh> = all.into_par_iter().map(|b| TriangleBvh::new(&b.mesh)).collect();
+    let trees: IdVec<PatchId, TriangleBvh> = trees.into_iter().collect();
     let ids: Vec<PatchId> = bodies.ids().filter(|&id| id != key).collect();
     let loose: Vec<Option<Finding>> = ids
         .into_par_iter()
         .map(|piece| {
             ctx.check()?;
-            let own: Vec<&Contact> = contacts.iter().filter(|c| c.a == piece).collect();
+            let own: Vec<Meeting> = contacts
+                .iter()
+                .filter(|c| c.a == piece)
+                .map(|c| Meeting::new(c, &trees, step_mm))
+                .collect();
             let doubtful: Vec<Vec3> = directions
                 .iter()
                 .copied()
@@ -76,11 +88,58 @@ pub fn check(
     ))
 }
 
+/// A contact, and how thick both sides are there.
+struct Meeting {
+    normal: Vec3,
+    area_mm2: f64,
+    gap_mm: f64,
+    own_mm: f64,
+    other_mm: f64,
+}
+
+impl Meeting {
+    /// Of sides that are thicker than a push is long it is only known that they are as thick as that.
+    fn new(contact: &Contact, trees: &IdVec<PatchId, TriangleBvh>, push_mm: f64) -> Self {
+        let Contact {
+            a,
+            b,
+            point,
+            normal,
+            gap_mm,
+            area_mm2,
+        } = *contact;
+        let thickness_mm = |piece: PatchId, surface: Vec3, inwards: Vec3, start_mm: f64| {
+            let hit = trees[piece].first_hit(surface + start_mm * inwards, inwards, push_mm);
+            hit.map_or(push_mm, |(_, mm)| mm)
+        };
+        Self {
+            normal,
+            area_mm2,
+            gap_mm,
+            own_mm: thickness_mm(a, point, -normal, START_MM),
+            other_mm: thickness_mm(
+                b,
+                point + gap_mm * normal,
+                normal,
+                START_MM + START_SHARE * gap_mm,
+            ),
+        }
+    }
+
+    /// How deep both sides overlap after a push by `step`, mm: a blade can be past another.
+    fn depth_mm(&self, step: Vec3) -> f64 {
+        let pushed_mm = self.normal.dot(step);
+        let front_mm = pushed_mm.min(self.gap_mm + self.other_mm);
+        let back_mm = (pushed_mm - self.own_mm).max(self.gap_mm);
+        front_mm - back_mm
+    }
+}
+
 /// Whether the contacts of a piece alone show that a push by `step` is held.
-fn contacts_hold(contacts: &[&Contact], step: Vec3) -> bool {
+fn contacts_hold(contacts: &[Meeting], step: Vec3) -> bool {
     let overlap_mm3: f64 = contacts
         .iter()
-        .map(|c| c.area_mm2 * (c.normal.dot(step) - c.gap_mm).clamp(0.0, CONTACT_DEPTH_MM))
+        .map(|c| c.area_mm2 * c.depth_mm(step).clamp(0.0, CONTACT_DEPTH_MM))
         .sum();
     overlap_mm3 >= CONTACTS_HOLD_MM3
 }
@@ -152,4 +211,26 @@ fn is_held_exactly(moved: &Volume, others: &[(PatchId, &Volume)]) -> bool {
         sum += rounded(moved.intersect(other).volume());
         sum >= HOLD_MM3
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blades_overlap_until_they_are_past_each_other_and_thick_walls_ever_more() {
+        let meeting = |thickness_mm: f64| Meeting {
+            normal: Vec3::Z,
+            area_mm2: 100.0,
+            gap_mm: 0.1,
+            own_mm: thickness_mm,
+            other_mm: thickness_mm,
+        };
+        let depth_mm = |thickness_mm: f64, push_mm: f64| meeting(thickness_mm).depth_mm(push_mm * Vec3::Z);
+        assert!((depth_mm(0.3, 0.4) - 0.3).abs() < 1e-12);
+        assert!((depth_mm(2.0, 0.96) - 0.86).abs() < 1e-12);
+        assert!(depth_mm(0.3, 0.96) < 0.0 && depth_mm(2.0, -0.5) < 0.0);
+        assert!(contacts_hold(&[meeting(2.0)], 0.96 * Vec3::Z));
+        assert!(!contacts_hold(&[meeting(0.3)], 0.96 * Vec3::Z));
+    }
 }
