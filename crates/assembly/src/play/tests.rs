@@ -54,6 +54,26 @@ fn under_lips(lip_mm: f64, gap_mm: f64) -> Kit {
     Kit::new(brick(ALL, ALL, ALL), &[base, plate, key], &[Vec3::X; 3])
 }
 
+/// A kit's check and that of its files, whose readers number points anew, look for ways out alike.
+#[test]
+fn a_way_out_is_sought_from_the_same_points_however_they_are_numbered() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for mesh in under_lips(1.0, 0.1).pieces.as_slice() {
+        let mut number: Vec<u32> = (0..mesh.points.len() as u32).collect();
+        for i in 1..number.len() {
+            number.swap(i, rng.random_range(0..=i));
+        }
+        let mut renumbered = mesh.clone();
+        for (&new, &point) in number.iter().zip(&mesh.points) {
+            renumbered.points[new as usize] = point;
+        }
+        let corners = renumbered.triangles.iter_mut().flatten();
+        corners.for_each(|v| *v = number[*v as usize]);
+        assert_ne!(mesh.points, renumbered.points);
+        assert_eq!(way_out::as_met(mesh), way_out::as_met(&renumbered));
+    }
+}
+
 #[test]
 fn a_cube_in_a_cage_is_proven_to_go_hardly_farther_than_its_gap() {
     let play = measured(&caged(0.1), 0.1);

@@ -168,7 +168,7 @@ impl<'a> Walk<'a> {
                 .into_iter()
                 .map(|s| s.point);
             // Corners are what meets others first.
-            let points = thinned(mesh.points.clone()).into_iter().chain(samples);
+            let points = thinned(as_met(mesh)).into_iter().chain(samples);
             let is_near = |p: &Vec3| surfaces.nearest(*p, JOINT_MM, b).is_some();
             points.filter(is_near).collect()
         };
@@ -560,6 +560,15 @@ fn bounds(radius_mm: f64) -> impl Iterator<Item = Contact> {
             .map(move |way| limit(arm * radius_mm, way, STEP_MM / 3f64.sqrt()))
     };
     WAYS.into_iter().chain([Vec3::ZERO]).flat_map(at)
+}
+
+/// The points of a mesh as its triangles come to them: the same however they are numbered, as they are anew by readers of
+/// files.
+pub(super) fn as_met(mesh: &TriMesh) -> Vec<Vec3> {
+    let mut is_new = vec![true; mesh.points.len()];
+    let corners = mesh.triangles.iter().flatten().map(|&v| v as usize);
+    let first = corners.filter(|&v| std::mem::take(&mut is_new[v]));
+    first.map(|v| mesh.points[v]).collect()
 }
 
 /// Every k-th of too many points.

@@ -59,10 +59,10 @@ pub fn check(
         .into_par_iter()
         .map(|piece| {
             ctx.check()?;
-            let own: Vec<Meeting> = contacts
+            let own: Vec<TwoSides> = contacts
                 .iter()
                 .filter(|c| c.a == piece)
-                .map(|c| Meeting::new(c, &trees, step_mm))
+                .map(|c| TwoSides::new(c, &trees, step_mm))
                 .collect();
             let doubtful: Vec<Vec3> = directions
                 .iter()
@@ -89,7 +89,7 @@ pub fn check(
 }
 
 /// A contact, and how thick both sides are there.
-struct Meeting {
+struct TwoSides {
     normal: Vec3,
     area_mm2: f64,
     gap_mm: f64,
@@ -97,7 +97,7 @@ struct Meeting {
     other_mm: f64,
 }
 
-impl Meeting {
+impl TwoSides {
     /// Of sides that are thicker than a push is long it is only known that they are as thick as that.
     fn new(contact: &Contact, trees: &IdVec<PatchId, TriangleBvh>, push_mm: f64) -> Self {
         let Contact {
@@ -136,7 +136,7 @@ impl Meeting {
 }
 
 /// Whether the contacts of a piece alone show that a push by `step` is held.
-fn contacts_hold(contacts: &[Meeting], step: Vec3) -> bool {
+fn contacts_hold(contacts: &[TwoSides], step: Vec3) -> bool {
     let overlap_mm3: f64 = contacts
         .iter()
         .map(|c| c.area_mm2 * c.depth_mm(step).clamp(0.0, CONTACT_DEPTH_MM))
@@ -219,18 +219,18 @@ mod tests {
 
     #[test]
     fn blades_overlap_until_they_are_past_each_other_and_thick_walls_ever_more() {
-        let meeting = |thickness_mm: f64| Meeting {
+        let sides = |thickness_mm: f64| TwoSides {
             normal: Vec3::Z,
             area_mm2: 100.0,
             gap_mm: 0.1,
             own_mm: thickness_mm,
             other_mm: thickness_mm,
         };
-        let depth_mm = |thickness_mm: f64, push_mm: f64| meeting(thickness_mm).depth_mm(push_mm * Vec3::Z);
+        let depth_mm = |thickness_mm: f64, push_mm: f64| sides(thickness_mm).depth_mm(push_mm * Vec3::Z);
         assert!((depth_mm(0.3, 0.4) - 0.3).abs() < 1e-12);
         assert!((depth_mm(2.0, 0.96) - 0.86).abs() < 1e-12);
         assert!(depth_mm(0.3, 0.96) < 0.0 && depth_mm(2.0, -0.5) < 0.0);
-        assert!(contacts_hold(&[meeting(2.0)], 0.96 * Vec3::Z));
-        assert!(!contacts_hold(&[meeting(0.3)], 0.96 * Vec3::Z));
+        assert!(contacts_hold(&[sides(2.0)], 0.96 * Vec3::Z));
+        assert!(!contacts_hold(&[sides(0.3)], 0.96 * Vec3::Z));
     }
 }

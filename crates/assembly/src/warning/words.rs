@@ -595,6 +595,10 @@ mod tests {
             },
             Cause::BodyInParts { dropped_mm3: 12.4 },
             Cause::PartGiven { given_mm3: 1293.0 },
+            Cause::WallThinForRoom {
+                thickness_mm: 1.23,
+                usual_mm: 1.6,
+            },
             Cause::Rattles {
                 loosest: EstimatedPlay {
                     translation_mm: 1.9,

@@ -86,8 +86,16 @@ impl Run {
         LEAST_MB + MB_PER_MB * bytes as f64 / 1e6
     }
 
-    /// Makes the kit, unless it is there.
+    /// Makes the kit, unless it is there; says so where no kit came of the model and its folder has an earlier one.
     pub fn record(&self, session: &Session, job: &Job) -> Record {
+        let mut record = self.kept_or_made(session, job);
+        if !record.status.has_kit() && self.out.join(&job.kit).join(PLAN).is_file() {
+            record.said.push(OLD_KIT.to_owned());
+        }
+        record
+    }
+
+    fn kept_or_made(&self, session: &Session, job: &Job) -> Record {
         let model = self.folder.join(&job.model);
         let kit = self.out.join(&job.kit);
         let mut record = Record {
@@ -119,9 +127,6 @@ impl Run {
         }
         let mut record = self.made(session, record, &model, &kit);
         record.kit_is = kit_is(&kit).filter(|_| record.status.has_kit());
-        if !record.status.has_kit() && kit.join(PLAN).is_file() {
-            record.said.push(OLD_KIT.to_owned());
-        }
         if session.stop.load(Ordering::Relaxed) {
             return record;
         }

@@ -148,7 +148,7 @@ fn warn_of_short_joints(ctx: &Ctx<'_>, shortest_mm: f64) {
 
 fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
     match n_pieces {
-        0 | 1 => Some("one piece has nothing to interlock with; segment into at least two".into()),
+        0 | 1 => Some("one piece has nothing to interlock with; segment into at least three".into()),
         n if n > PieceSet::MAX_PIECES => Some(format!(
             "{n} pieces are more than the {} that can be planned; segment coarser",
             PieceSet::MAX_PIECES
