@@ -102,9 +102,33 @@ impl Volume {
         Self(Manifold::cube(v(b.size()), false).translate(v(b.min)))
     }
 
-    /// Union of all `parts`; cost follows their mutual overlap.
+    /// Union of all `parts`; cost follows their mutual overlap. Parts near each other are united first, halves of
+    /// them at once, so that what most operations see is small.
     pub fn union_all(parts: Vec<Self>) -> Self {
-        let mut parts: Vec<Self> = parts.into_iter().filter(|p| !p.is_empty()).collect();
+        let parts: Vec<(Aabb, Self)> = parts
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .map(|part| (part.bounds(), part))
+            .collect();
+        Self::united(parts)
+    }
+
+    fn united(mut parts: Vec<(Aabb, Self)>) -> Self {
+        /// So many are united one by one.
+        const FEW: usize = 16;
+        if parts.len() <= FEW {
+            return Self::united_at_once(parts.into_iter().map(|(_, part)| part).collect());
+        }
+        let middles = Aabb::around(parts.iter().map(|(around, _)| around.center()));
+        let axis = middles.size().to_array();
+        let axis = (0..3).fold(0, |most, i| if axis[i] > axis[most] { i } else { most });
+        parts.sort_by(|(a, _), (b, _)| a.center()[axis].total_cmp(&b.center()[axis]));
+        let rest = parts.split_off(parts.len() / 2);
+        let (a, b) = rayon::join(|| Self::united(parts), || Self::united(rest));
+        a.union(&b)
+    }
+
+    fn united_at_once(mut parts: Vec<Self>) -> Self {
         match parts.len() {
             0 => Self::empty(),
             1 => parts.remove(0),
