@@ -1,6 +1,7 @@
 //! `batch`: kits of a folder of models, each made by a process of its own; what is there already is not made again.
 
 mod names;
+mod queue;
 pub mod record;
 mod run;
 mod table;
@@ -18,8 +19,9 @@ use crate::Session;
 use crate::args::BatchOptions;
 use crate::batch::names::ENDINGS;
 pub use crate::batch::names::{RECORDS, models, record_name};
+use crate::batch::queue::{Next, Queue, Task};
 use crate::batch::record::{Record, Status};
-use crate::batch::run::{Job, Run};
+use crate::batch::run::Run;
 use crate::failure::Failure;
 use crate::input::sha256;
 use crate::progress::Shown;
@@ -95,15 +97,9 @@ struct Shop<'a> {
     session: &'a Session,
     run: &'a Run,
     n_models: usize,
-    left: Mutex<Waiting>,
+    queue: Mutex<Queue>,
     has_room: Condvar,
     done: Mutex<Vec<Record>>,
-}
-
-struct Waiting {
-    models: VecDeque<(PathBuf, PathBuf)>,
-    free_mb: f64,
-    n_running: usize,
 }
 
 impl<'a> Shop<'a> {
@@ -112,53 +108,47 @@ impl<'a> Shop<'a> {
             session,
             run,
             n_models: models.len(),
-            left: Mutex::new(Waiting {
-                models,
-                free_mb,
-                n_running: 0,
-            }),
+            queue: Mutex::new(Queue::new(models, free_mb)),
             has_room: Condvar::new(),
             done: Mutex::default(),
         }
     }
 
     fn work(&self) {
-        while let Some((job, needs_mb)) = self.next() {
-            let record = self.run.record(self.session, &job);
-            {
-                let mut left = self.left.lock().expect("no worker panics");
-                left.free_mb += needs_mb;
-                left.n_running -= 1;
-            }
+        while let Some(task) = self.next() {
+            let record = match &task.first {
+                None => self.run.record(self.session, &task.job),
+                Some(first) => self.run.again(self.session, &task.job, first),
+            };
+            let record = self.queue.lock().expect("no worker panics").ended(task, record);
             self.has_room.notify_all();
             if self.session.stop.load(Ordering::Relaxed) {
                 return;
             }
-            let mut done = self.done.lock().expect("no worker panics");
-            let at = done.partition_point(|other| other.model < record.model);
-            self.tell(&record, done.len() + 1);
-            done.insert(at, record);
+            if let Some(record) = record {
+                let mut done = self.done.lock().expect("no worker panics");
+                let at = done.partition_point(|other| other.model < record.model);
+                self.tell(&record, done.len() + 1);
+                done.insert(at, record);
+            }
         }
     }
 
-    /// The next model, once there is room for it; one always has room.
-    fn next(&self) -> Option<(Job, f64)> {
-        let mut left = self.left.lock().expect("no worker panics");
+    /// The next model, once there is room for it.
+    fn next(&self) -> Option<Task> {
+        let mut queue = self.queue.lock().expect("no worker panics");
         loop {
             if self.session.stop.load(Ordering::Relaxed) {
                 return None;
             }
-            let (model, _) = left.models.front()?;
-            let needs_mb = self.run.needs_mb(model);
-            if left.n_running == 0 || needs_mb <= left.free_mb {
-                let (model, kit) = left.models.pop_front().expect("it was there");
-                left.free_mb -= needs_mb;
-                left.n_running += 1;
-                return Some((Job { model, kit }, needs_mb));
+            match queue.next(|model| self.run.needs_mb(model)) {
+                Next::Make(task) => return Some(task),
+                Next::Go => return None,
+                Next::Wait => {}
             }
-            left = self
+            queue = self
                 .has_room
-                .wait_timeout(left, LOOK)
+                .wait_timeout(queue, LOOK)
                 .expect("no worker panics")
                 .0;
         }

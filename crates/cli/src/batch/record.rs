@@ -6,10 +6,14 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::run::Job;
 use crate::failure::Failure;
 use crate::input::sha256;
 use crate::output::PLAN;
 use crate::stages::write;
+
+/// The code of the warning that the time was over.
+const TIME_UP: &str = "time-up";
 
 /// How a model ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,6 +98,9 @@ pub struct Record {
     /// What tells its kit from any other that lies there later; `None` where there is none.
     #[serde(default)]
     pub kit_is: Option<String>,
+    /// Whether the time was over before a kit passed, beside others: alone it may.
+    #[serde(default)]
+    pub lacks_time: bool,
     /// Whether it was there already.
     #[serde(skip)]
     pub is_old: bool,
@@ -126,13 +133,35 @@ pub fn kit_is(folder: &Path) -> Option<String> {
 }
 
 impl Record {
+    /// Of a model of which nothing came yet.
+    pub fn blank(job: &Job, made_of: String) -> Self {
+        Self {
+            made_of,
+            model: job.model.to_string_lossy().into_owned(),
+            kit: job.kit.to_string_lossy().into_owned(),
+            status: Status::Refused,
+            seconds: 0.0,
+            peak_mb: None,
+            pieces: None,
+            volume_ratio: None,
+            n_warnings: 0,
+            n_problems: 0,
+            said: Vec::new(),
+            kit_is: None,
+            lacks_time: false,
+            is_old: false,
+            unwritten: None,
+        }
+    }
+
     /// The one at `path`, where it is of the same inputs, final, and its kit is as it was: none where there was none, as
     /// what lay there may have been why.
     pub fn read(path: &Path, made_of: &str, kit: &Path) -> Option<Self> {
         let bytes = fs::read(path).ok()?;
         let record: Self = serde_json::from_slice(&bytes).ok()?;
         let has_kit = record.kit_is == kit_is(kit) && record.kit_is.is_some() == record.status.has_kit();
-        let is_same = record.made_of == made_of && record.status.is_final() && has_kit;
+        let is_final = record.status.is_final() && !record.lacks_time;
+        let is_same = record.made_of == made_of && is_final && has_kit;
         is_same.then_some(Self {
             is_old: true,
             ..record
@@ -160,6 +189,7 @@ impl Record {
         let warnings = told["warnings"].as_array().cloned().unwrap_or_default();
         let with = |severity: &str| warnings.iter().filter(|w| w["severity"] == severity).count();
         (self.n_warnings, self.n_problems) = (with("warning"), with("problem"));
+        self.lacks_time = warnings.iter().any(|w| w["code"] == TIME_UP);
         self.said.extend(text(&told["error"]));
         let failed = told["checks"].as_array().into_iter().flatten();
         let failed = failed.filter(|check| check["ok"] == false);

@@ -23,6 +23,9 @@ const MB_PER_MB: f64 = 12.0;
 const LOOK: Duration = Duration::from_millis(40);
 /// How long a process that is to stop has for it.
 const TO_STOP: Duration = Duration::from_secs(10);
+/// Said of what was made twice.
+const AGAIN: &str =
+    "made again alone on all cores, as the time was over (--time) beside others before a kit passed";
 /// Said where no kit came of a model and its folder has one.
 const OLD_KIT: &str = "the kit in its folder is of an earlier run";
 /// How much of what a process said in its own words is kept, lines.
@@ -45,7 +48,7 @@ pub struct Run {
     made_with: String,
     patience: Duration,
     pub n_workers: usize,
-    n_threads: usize,
+    cores: usize,
 }
 
 impl Run {
@@ -76,7 +79,7 @@ impl Run {
             made_with,
             patience: patience(options.patience)?,
             n_workers,
-            n_threads: cores.div_ceil(n_workers),
+            cores,
         })
     }
 
@@ -95,49 +98,51 @@ impl Run {
         record
     }
 
+    /// Makes a kit again that had not time enough beside others: alone, on all cores.
+    pub fn again(&self, session: &Session, job: &Job, first: &Record) -> Record {
+        let blank = Record::blank(job, first.made_of.clone());
+        let mut record = self.made(session, blank, job, self.cores);
+        record.seconds += first.seconds;
+        record.peak_mb = [record.peak_mb, first.peak_mb]
+            .into_iter()
+            .flatten()
+            .reduce(f64::max);
+        record.said.push(AGAIN.to_owned());
+        self.noted(session, record, job)
+    }
+
     fn kept_or_made(&self, session: &Session, job: &Job) -> Record {
-        let model = self.folder.join(&job.model);
-        let kit = self.out.join(&job.kit);
-        let mut record = Record {
-            made_of: String::new(),
-            model: job.model.to_string_lossy().into_owned(),
-            kit: job.kit.to_string_lossy().into_owned(),
-            status: Status::Refused,
-            seconds: 0.0,
-            peak_mb: None,
-            pieces: None,
-            volume_ratio: None,
-            n_warnings: 0,
-            n_problems: 0,
-            said: Vec::new(),
-            kit_is: None,
-            is_old: false,
-            unwritten: None,
-        };
-        match read(&model) {
+        let mut record = Record::blank(job, String::new());
+        match read(&self.folder.join(&job.model)) {
             Ok(bytes) => record.made_of = sha256((sha256(&bytes) + &self.made_with).as_bytes()),
             Err(e) => {
                 record.said.push(e.to_string());
                 return record;
             }
         }
-        let noted = record_file(&self.out, &record.kit);
-        if let Some(old) = Record::read(&noted, &record.made_of, &kit) {
+        let file = record_file(&self.out, &record.kit);
+        if let Some(old) = Record::read(&file, &record.made_of, &self.out.join(&job.kit)) {
             return old;
         }
-        let mut record = self.made(session, record, &model, &kit);
-        record.kit_is = kit_is(&kit).filter(|_| record.status.has_kit());
+        let record = self.made(session, record, job, self.cores.div_ceil(self.n_workers));
+        self.noted(session, record, job)
+    }
+
+    /// Kept for the next run, unless this one is stopped.
+    fn noted(&self, session: &Session, mut record: Record, job: &Job) -> Record {
+        record.kit_is = kit_is(&self.out.join(&job.kit)).filter(|_| record.status.has_kit());
         if session.stop.load(Ordering::Relaxed) {
             return record;
         }
-        let unwritten = record.write(&noted).err().map(|e| e.to_string());
+        let written = record.write(&record_file(&self.out, &record.kit));
+        let unwritten = written.err().map(|e| e.to_string());
         Record { unwritten, ..record }
     }
 
-    fn made(&self, session: &Session, mut record: Record, model: &Path, kit: &Path) -> Record {
+    fn made(&self, session: &Session, mut record: Record, job: &Job, n_threads: usize) -> Record {
         let since = Instant::now();
         let ended = self
-            .command(model, kit)
+            .command(job, n_threads)
             .spawn()
             .map(|child| self.watched(session, child));
         record.seconds = since.elapsed().as_secs_f64();
@@ -157,6 +162,7 @@ impl Run {
                 } else {
                     record = record.of_output(&ended.output);
                 }
+                record.lacks_time &= record.status == Status::Failed && n_threads < self.cores;
                 if record.status == Status::Crashed {
                     record.said.extend(ended.last_words);
                 }
@@ -173,15 +179,15 @@ impl Run {
         record
     }
 
-    fn command(&self, model: &Path, kit: &Path) -> Command {
+    fn command(&self, job: &Job, n_threads: usize) -> Command {
         let mut command = Command::new(&self.program);
         command
             .arg("build")
-            .arg(model)
+            .arg(self.folder.join(&job.model))
             .arg("--out")
-            .arg(kit)
+            .arg(self.out.join(&job.kit))
             .args(["--force", "--json", "--stop-with-stdin", "--threads"])
-            .arg(self.n_threads.to_string())
+            .arg(n_threads.to_string())
             .args(&self.arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
