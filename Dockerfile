@@ -1,4 +1,4 @@
-# docker build -t shellock . && docker run --rm -v "$PWD:/work" shellock build figure.stl
+# docker build -t shellock . && docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/work" shellock build figure.stl
 FROM rust:1-slim AS build
 RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev binutils git && rm -rf /var/lib/apt/lists/*
 WORKDIR /source

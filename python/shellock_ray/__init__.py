@@ -10,10 +10,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import signal
+import threading
 import time
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Tuple
 
 import shellock
 from shellock import _native
@@ -25,6 +28,8 @@ LEAST_BYTES = 700_000_000
 BYTES_PER_BYTE = 12
 #: Models that are read and sent ahead, for each that can be made at a time.
 AHEAD = 2
+#: Alarms count seconds in what may be 32 bits.
+MOST_ALARM = 2e9
 
 
 @dataclass
@@ -73,18 +78,36 @@ class _TooLong(Exception):
     pass
 
 
-def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, store: Optional[str], kit_name: str) -> Tuple[Dict[str, Any], Dict[str, bytes]]:
-    """On a worker: the record's fields, and the kit's files where they are not in the store."""
+@contextmanager
+def _within(patience: float) -> Iterator[Callable[[Any], None]]:
+    """Raises ``_TooLong`` after so many seconds: by an alarm where this is the main thread, as in Ray's tasks, and where what it gives is called."""
     began = time.monotonic()
 
-    def watch(_: Any) -> None:
+    def watch(*_: Any) -> None:
         if time.monotonic() - began > patience:
             raise _TooLong
 
+    has_alarm = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread() and patience < MOST_ALARM
+    if not has_alarm:
+        yield watch
+        return
+    before = signal.signal(signal.SIGALRM, watch)
+    signal.setitimer(signal.ITIMER_REAL, patience + 0.01, 1.0)
+    try:
+        yield watch
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _make(name: str, data: bytes, options: Mapping[str, Any], patience: float, store: Optional[str], kit_name: str) -> Tuple[Dict[str, Any], Dict[str, bytes]]:
+    """On a worker: the record's fields, and the kit's files where they are not in the store."""
+    began = time.monotonic()
     told: Dict[str, Any] = {"said": []}
     files: Dict[str, bytes] = {}
     try:
-        kit = shellock.build(data, name=name, progress=watch, **options)
+        with _within(patience) as watch:
+            kit = shellock.build(data, name=name, progress=watch, **options)
         told["status"] = "verified" if kit.passed else "failed"
         plan = kit.plan
         told["pieces"], told["volume_ratio"] = len(plan["pieces"]), plan["volume_ratio"]
@@ -161,11 +184,17 @@ class _Store:
         self.store = out
 
     def has(self, name: str) -> bool:
-        return self.system.exists(f"{self.root}/{name}")
+        return self._read(lambda path: self.system.exists(path), name)
 
     def read(self, name: str) -> Optional[bytes]:
+        return self._read(lambda path: self.system.cat_file(path) if self.system.isfile(path) else None, name)
+
+    def _read(self, how: Callable[[str], Any], name: str) -> Any:
         path = f"{self.root}/{name}"
-        return self.system.cat_file(path) if self.system.isfile(path) else None
+        try:
+            return how(path)
+        except OSError as e:
+            raise shellock.WriteError(f"{path}: {e}", 4) from None
 
     def write(self, name: str, content: bytes) -> None:
         path = f"{self.root}/{name}"

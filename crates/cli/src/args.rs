@@ -302,7 +302,7 @@ pub struct BatchOptions {
 /// Where a kit goes.
 #[derive(Args)]
 pub struct Out {
-    /// Folder to write [default: the model's name with -kit]
+    /// Folder to write [default: the model's name with -kit; shellock-demo]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace the folder if it holds an earlier kit

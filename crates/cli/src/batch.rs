@@ -40,6 +40,9 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
             "--labels is of one model; in a batch labels come from the models' files".to_owned(),
         ));
     }
+    if options.memory.is_some_and(f64::is_nan) {
+        return Err(Failure::Wrong("--memory must be a number of GB".to_owned()));
+    }
     let models = models(&options.folder, Some(&options.out))?;
     if models.is_empty() {
         return Err(Failure::Wrong(format!(
@@ -50,7 +53,7 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     }
     let records = options.out.join(RECORDS);
     fs::create_dir_all(&records).map_err(Failure::unwritable(&records))?;
-    let run = Run::new(options)?;
+    let run = Run::new(options, models.len())?;
     let shop = Shop::new(session, &run, models, memory_mb(options));
     std::thread::scope(|scope| {
         for _ in 0..run.n_workers {
@@ -59,7 +62,7 @@ pub fn batch(session: &Session, options: &BatchOptions) -> Result<u8, Failure> {
     });
     let records = shop.done.into_inner().expect("no worker panics");
     if session.stop.load(Ordering::Relaxed) {
-        return Err(Failure::Stopped);
+        return Err(Failure::BatchStopped);
     }
     for (name, bytes) in tables(&records) {
         write(&options.out.join(name), &bytes)?;
@@ -120,6 +123,7 @@ impl<'a> Shop<'a> {
                 None => self.run.record(self.session, &task.job),
                 Some(first) => self.run.again(self.session, &task.job, first),
             };
+            let model = task.job.model.display().to_string();
             let record = self.queue.lock().expect("no worker panics").ended(task, record);
             self.has_room.notify_all();
             if self.session.stop.load(Ordering::Relaxed) {
@@ -130,6 +134,8 @@ impl<'a> Shop<'a> {
                 let at = done.partition_point(|other| other.model < record.model);
                 self.tell(&record, done.len() + 1);
                 done.insert(at, record);
+            } else {
+                self.tell_of_another_time(&model);
             }
         }
     }
@@ -151,6 +157,18 @@ impl<'a> Shop<'a> {
                 .wait_timeout(queue, LOOK)
                 .expect("no worker panics")
                 .0;
+        }
+    }
+
+    fn tell_of_another_time(&self, model: &str) {
+        match self.session.shown {
+            Shown::Nothing => {}
+            Shown::Events => eprintln!("{}", json!({ "event": "again", "model": model })),
+            Shown::ForPeople => {
+                println!(
+                    "{model}: the time was over before a kit passed; made again alone when all others are there"
+                );
+            }
         }
     }
 

@@ -58,6 +58,12 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
     let params = options.params(&printer);
     let mut problems = params.problems();
     problems.extend(printer.problems().iter().map(ToString::to_string));
+    for (option, mm) in [("size", options.size), ("height", options.height)] {
+        problems.extend(
+            mm.and_then(|mm| input::length(option, mm).err())
+                .map(|e| e.to_string()),
+        );
+    }
     // An infinite time is one: until the proof is closed.
     if options.time.is_nan() || options.time < 0.0 {
         problems.push(format!("time is {} s; it must be 0 or more", options.time));
@@ -152,7 +158,14 @@ impl<'a> Begun<'a> {
             .with_deadline(&seconds_left);
         let design = match design(&ctx, &self.params, &model.solid, model.labels.as_deref())? {
             DesignOutcome::Made(made) => made,
-            DesignOutcome::NoPlan { reason, blockers } => return Err(no_plan(&reason, &blockers)),
+            DesignOutcome::NoPlan {
+                reason,
+                blockers,
+                is_cut_short,
+            } => {
+                let told = no_plan(&reason, &blockers);
+                return Err(Failure::NoPlan { told, is_cut_short });
+            }
         };
         let mut notes = self.notes;
         if let Some(asked) = self
@@ -244,7 +257,7 @@ fn make(
     Ok(code)
 }
 
-fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> Failure {
+fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> String {
     let mut text = format!("no plan was found: {reason}");
     for b in blockers {
         let [x, y, z] = b.at;
@@ -254,7 +267,7 @@ fn no_plan(reason: &str, blockers: &[shellock::plan::Blocker]) -> Failure {
             b.by, b.piece
         );
     }
-    Failure::NoPlan(text)
+    text
 }
 
 fn print_json(to: &Destination, made: &Made, stages: &[StageTime], code: u8) {

@@ -7,6 +7,9 @@ use shellock::stress_test::StressError;
 use shellock_formats::ReadError;
 use shellock_geom::check::InputError;
 
+/// The code of the warning, or failure, that the time was over.
+pub const TIME_UP: &str = "time-up";
+
 /// Why a command failed; each message says what to do where something can be done.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
@@ -18,8 +21,8 @@ pub enum Failure {
     NotOneBody { path: PathBuf, source: InputError },
     #[error("{0}")]
     Wrong(String),
-    #[error("{0}")]
-    NoPlan(String),
+    #[error("{told}")]
+    NoPlan { told: String, is_cut_short: bool },
     #[error("{}: {source}; nothing was written", path.display())]
     Unwritable { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
@@ -28,6 +31,8 @@ pub enum Failure {
     Stress(#[from] StressError),
     #[error("stopped; nothing was written")]
     Stopped,
+    #[error("stopped; kits that are made stay, and the same command goes on from here")]
+    BatchStopped,
 }
 
 /// The option that helps, where there is one.
@@ -50,12 +55,25 @@ impl Failure {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Stopped
+            | Self::BatchStopped
             | Self::Stress(StressError::Cancelled(_))
             | Self::Design(DesignError::Cancelled(_)) => 130,
-            Self::NoPlan(_) => 3,
+            Self::NoPlan { .. } => 3,
             Self::Unwritable { .. } | Self::Design(DesignError::Piece(_)) => 4,
             _ => 2,
         }
+    }
+
+    /// What programs know it by, where they need to: as of a warning.
+    pub fn code(&self) -> Option<&'static str> {
+        matches!(
+            self,
+            Self::NoPlan {
+                is_cut_short: true,
+                ..
+            }
+        )
+        .then_some(TIME_UP)
     }
 
     /// A file that could not be written.

@@ -300,22 +300,24 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Fa
     ))
 }
 
+/// A number that can be a length, or a scale.
+pub fn length(what: &str, mm: f64) -> Result<f64, Failure> {
+    if mm.is_finite() && mm > 0.0 {
+        Ok(mm)
+    } else {
+        Err(Failure::Wrong(format!("{what} is {mm}; it must be more than 0")))
+    }
+}
+
 /// Millimetres a file unit.
 fn scale(options: &Options, loaded: &Loaded, bounds: Aabb, notes: &mut Vec<String>) -> Result<f64, Failure> {
     let longest = bounds.size().max_element();
     let along_up = bounds.size()[options.up.index()];
-    let positive = |what: &str, mm: f64| {
-        if mm.is_finite() && mm > 0.0 {
-            Ok(mm)
-        } else {
-            Err(Failure::Wrong(format!("{what} is {mm}; it must be more than 0")))
-        }
-    };
     let own_mm = loaded.unit_mm.unwrap_or(1.0);
     let scale = match (options.size, options.height, options.scale, options.unit) {
-        (Some(size), ..) => positive("size", size)? / longest,
-        (_, Some(height), ..) => positive("height", height)? / along_up,
-        (_, _, Some(scale), _) => positive("scale", scale)?,
+        (Some(size), ..) => length("size", size)? / longest,
+        (_, Some(height), ..) => length("height", height)? / along_up,
+        (_, _, Some(scale), _) => length("scale", scale)?,
         (.., Some(unit)) => unit.mm(),
         _ if PLAUSIBLE_MM.contains(&(own_mm * longest)) => own_mm,
         _ => {

@@ -129,8 +129,13 @@ pub fn command_line() -> ExitCode {
         since: std::time::Instant::now(),
     };
     let is_json = session.is_json;
+    let is_batch = matches!(cli.command, Command::Batch(_));
     let told = move || {
-        let stopped = Failure::Stopped;
+        let stopped = if is_batch {
+            Failure::BatchStopped
+        } else {
+            Failure::Stopped
+        };
         refuse(is_json, &stopped.to_string(), stopped.exit_code());
     };
     interrupt::watch(&session.stop, told);
@@ -147,8 +152,17 @@ pub fn command_line() -> ExitCode {
     match run(&session, cli.command) {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
-            let code = failure.exit_code();
-            refuse(session.is_json, &failure.to_string(), code)
+            let exit_code = failure.exit_code();
+            match failure.code().filter(|_| session.is_json) {
+                None => refuse(session.is_json, &failure.to_string(), exit_code),
+                Some(code) => {
+                    println!(
+                        "{}",
+                        json!({ "status": "error", "error": failure.to_string(), "code": code, "exit_code": exit_code })
+                    );
+                    ExitCode::from(exit_code)
+                }
+            }
         }
     }
 }

@@ -171,7 +171,10 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
         holding,
         warnings,
         ..
-    } = planned.map_err(|reason| Failure::NoPlan(format!("no plan was found: {reason}")))?;
+    } = planned.map_err(|reason| Failure::NoPlan {
+        told: format!("no plan was found: {reason}"),
+        is_cut_short: false,
+    })?;
     let steps = &plan.steps;
     if session.is_json {
         let order: Vec<PatchId> = steps.iter().map(|s| s.piece).collect();

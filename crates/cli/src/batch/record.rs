@@ -7,13 +7,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::run::Job;
-use crate::failure::Failure;
+use crate::failure::{Failure, TIME_UP};
 use crate::input::sha256;
 use crate::output::PLAN;
 use crate::stages::write;
-
-/// The code of the warning that the time was over.
-const TIME_UP: &str = "time-up";
 
 /// How a model ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -98,7 +95,7 @@ pub struct Record {
     /// What tells its kit from any other that lies there later; `None` where there is none.
     #[serde(default)]
     pub kit_is: Option<String>,
-    /// Whether the time was over before a kit passed, beside others: alone it may.
+    /// Whether the time was over before a kit passed, with a share of the cores: alone it may, and is made again.
     #[serde(default)]
     pub lacks_time: bool,
     /// Whether it was there already.
@@ -160,8 +157,7 @@ impl Record {
         let bytes = fs::read(path).ok()?;
         let record: Self = serde_json::from_slice(&bytes).ok()?;
         let has_kit = record.kit_is == kit_is(kit) && record.kit_is.is_some() == record.status.has_kit();
-        let is_final = record.status.is_final() && !record.lacks_time;
-        let is_same = record.made_of == made_of && is_final && has_kit;
+        let is_same = record.made_of == made_of && record.status.is_final() && has_kit;
         is_same.then_some(Self {
             is_old: true,
             ..record
@@ -189,7 +185,7 @@ impl Record {
         let warnings = told["warnings"].as_array().cloned().unwrap_or_default();
         let with = |severity: &str| warnings.iter().filter(|w| w["severity"] == severity).count();
         (self.n_warnings, self.n_problems) = (with("warning"), with("problem"));
-        self.lacks_time = warnings.iter().any(|w| w["code"] == TIME_UP);
+        self.lacks_time = told["code"] == TIME_UP || warnings.iter().any(|w| w["code"] == TIME_UP);
         self.said.extend(text(&told["error"]));
         let failed = told["checks"].as_array().into_iter().flatten();
         let failed = failed.filter(|check| check["ok"] == false);

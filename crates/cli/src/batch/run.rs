@@ -24,8 +24,7 @@ const LOOK: Duration = Duration::from_millis(40);
 /// How long a process that is to stop has for it.
 const TO_STOP: Duration = Duration::from_secs(10);
 /// Said of what was made twice.
-const AGAIN: &str =
-    "made again alone on all cores, as the time was over (--time) beside others before a kit passed";
+const AGAIN: &str = "made twice: beside others the time (--time) was over before a kit passed";
 /// Said where no kit came of a model and its folder has one.
 const OLD_KIT: &str = "the kit in its folder is of an earlier run";
 /// How much of what a process said in its own words is kept, lines.
@@ -52,10 +51,10 @@ pub struct Run {
 }
 
 impl Run {
-    pub fn new(options: &BatchOptions) -> Result<Self, Failure> {
+    pub fn new(options: &BatchOptions, n_models: usize) -> Result<Self, Failure> {
         // All cores, or --threads.
         let cores = rayon::current_num_threads();
-        let n_workers = options.jobs.unwrap_or(cores).clamp(1, 256);
+        let n_workers = options.jobs.unwrap_or(cores).min(n_models).clamp(1, 256);
         let arguments = config::build_arguments(std::env::args_os().collect());
         let file = options
             .options
@@ -101,13 +100,28 @@ impl Run {
     /// Makes a kit again that had not time enough beside others: alone, on all cores.
     pub fn again(&self, session: &Session, job: &Job, first: &Record) -> Record {
         let blank = Record::blank(job, first.made_of.clone());
-        let mut record = self.made(session, blank, job, self.cores);
-        record.seconds += first.seconds;
+        let mut record = self.made(session, blank, job, true);
+        let second = (record.status, record.said.first().cloned().unwrap_or_default());
+        let seconds = record.seconds + first.seconds;
+        let is_worse = first.status.has_kit() && !record.status.has_kit();
+        if is_worse {
+            // Its kit lies there as it was; the next run tries again.
+            record = first.clone();
+            record.said.push(format!(
+                "made again it ended as {}: {}",
+                second.0.name(),
+                second.1
+            ));
+        } else {
+            // After what is wrong, before what is warned of.
+            let at = usize::from(record.status != Status::Verified).min(record.said.len());
+            record.said.insert(at, AGAIN.to_owned());
+        }
+        record.seconds = seconds;
         record.peak_mb = [record.peak_mb, first.peak_mb]
             .into_iter()
             .flatten()
             .reduce(f64::max);
-        record.said.push(AGAIN.to_owned());
         self.noted(session, record, job)
     }
 
@@ -124,7 +138,7 @@ impl Run {
         if let Some(old) = Record::read(&file, &record.made_of, &self.out.join(&job.kit)) {
             return old;
         }
-        let record = self.made(session, record, job, self.cores.div_ceil(self.n_workers));
+        let record = self.made(session, record, job, self.n_workers == 1);
         self.noted(session, record, job)
     }
 
@@ -139,7 +153,12 @@ impl Run {
         Record { unwritten, ..record }
     }
 
-    fn made(&self, session: &Session, mut record: Record, job: &Job, n_threads: usize) -> Record {
+    fn made(&self, session: &Session, mut record: Record, job: &Job, is_alone: bool) -> Record {
+        let n_threads = if is_alone {
+            self.cores
+        } else {
+            self.cores.div_ceil(self.n_workers)
+        };
         let since = Instant::now();
         let ended = self
             .command(job, n_threads)
@@ -162,7 +181,9 @@ impl Run {
                 } else {
                     record = record.of_output(&ended.output);
                 }
-                record.lacks_time &= record.status == Status::Failed && n_threads < self.cores;
+                // What was made alone had all that there is.
+                let may_pass = matches!(record.status, Status::Failed | Status::NoPlan);
+                record.lacks_time &= may_pass && !is_alone;
                 if record.status == Status::Crashed {
                     record.said.extend(ended.last_words);
                 }

@@ -62,6 +62,8 @@ pub enum DesignOutcome {
         reason: String,
         /// Who is in whose way.
         blockers: Vec<Blocker>,
+        /// Whether the time was over before all was tried: with more of it one may be found.
+        is_cut_short: bool,
     },
 }
 
@@ -190,12 +192,17 @@ impl<'a> Best<'a> {
             ..
         } = self;
         let Some(Kept { kit, candidate }) = kit else {
-            let reason = if job.pace.is_cut_short() {
-                format!("the time was over (--time); {reason}")
-            } else {
-                reason
+            let is_cut_short = job.pace.is_cut_short();
+            let reason = match (is_cut_short, &reason[..]) {
+                (false, _) => reason,
+                (true, "") => "the time was over (--time)".to_owned(),
+                (true, reason) => format!("the time was over (--time); {reason}"),
             };
-            return Ok(DesignOutcome::NoPlan { reason, blockers });
+            return Ok(DesignOutcome::NoPlan {
+                reason,
+                blockers,
+                is_cut_short,
+            });
         };
         let key = candidate.key.map(|key| key.given);
         let gaps = kit_gaps(

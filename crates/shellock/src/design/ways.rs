@@ -296,6 +296,7 @@ mod tests {
             ended(Ok(DesignOutcome::NoPlan {
                 reason: reason.into(),
                 blockers: Vec::new(),
+                is_cut_short: false,
             }))
         };
         let error = || ended(Err(DesignError::NoLabelOfKey(3)));
