@@ -267,7 +267,7 @@ def run(
     is made again up to ``retries`` times. ``told`` hears of each record as it comes, with its number and how many there are. Writes ``batch.csv`` and ``batch.html``.
 
     Raises ``shellock.InputError`` before anything is sent where the folder holds no model or an option is wrong, and ``shellock.WriteError`` where records
-    cannot be written. What goes wrong with one model is said in its record.
+    cannot be written, or a store does not let them be read. What goes wrong with one model is said in its record.
     """
     options = _checked(options or {}, cpus, patience)
     jobs = _jobs(folder, None if "://" in out else out)
