@@ -67,6 +67,11 @@ pub struct WarningEntry {
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the sentences in `words` say what each figure is")]
 pub enum Cause {
+    /// The model's file, in the words of the program that read it.
+    Input {
+        code: &'static str,
+        sentence: String,
+    },
     // The wall
     StrengthUnknown {
         error: String,

@@ -421,12 +421,14 @@ pub enum LabelsFrom {
     Labels,
     /// Multi-material paint of a slicer (3MF)
     Paint,
-    /// Colours of faces (STL, PLY, OFF, 3MF)
+    /// Colours of faces or points (STL, PLY, OBJ, OFF, 3MF, glTF)
     Colors,
     /// Materials (OBJ, 3MF, glTF)
     Materials,
     /// Groups (OBJ)
     Groups,
+    /// Named sets of triangles (3MF)
+    Sets,
     /// Objects, solids or nodes
     Objects,
     /// Nothing: pieces are found automatically

@@ -188,7 +188,8 @@ impl<'a> Begun<'a> {
             &design.kit.surface.mesh,
             &model.solid,
         );
-        let mut warnings = design.warnings.clone();
+        let mut warnings = model.warnings.clone();
+        warnings.extend(design.warnings.iter().cloned());
         warnings.extend(printing.warnings());
         let (files, summary) = files(model, options, &self.settings, &design, &warnings, &printing);
         if session.stop.load(Ordering::Relaxed) {
@@ -220,6 +221,9 @@ fn make(
         let s = model.solid.mesh().bounds().size();
         println!("{}: {:.1} × {:.1} × {:.1} mm", model.name, s.x, s.y, s.z);
         begun.notes.iter().for_each(|n| println!("note: {n}"));
+    }
+    print_input_warnings(session, model);
+    if is_for_people {
         thin_warnings(model, options)
             .iter()
             .for_each(|w| println!("warning: {w}"));
@@ -234,11 +238,13 @@ fn make(
     to.write(&made.files)?;
     let code = u8::from(!made.passed());
     let standing = Standing::of(options.up, model.solid.mesh());
+    // Those of the model stand on the first lines already.
+    let mut warnings = made.warnings.clone();
+    warnings.retain(|w| !model.warnings.contains(w));
     if session.is_json {
         let stages = display.stages();
         print_json(to, &made, &stages, code);
     } else if session.shown == Shown::Nothing {
-        let mut warnings = made.warnings.clone();
         warnings.retain(|w| w.severity() > Severity::Note);
         print_warnings(session, &warnings, &standing);
         print_failures(&made.design.kit.verification, &standing);
@@ -248,7 +254,7 @@ fn make(
             made: &made.design,
             settings: &made.settings,
             summary: &made.summary,
-            warnings: &made.warnings,
+            warnings: &warnings,
             standing: &standing,
             printing: &made.printing,
         };

@@ -12,7 +12,7 @@ use std::time::Instant;
 use serde_json::{Map, Value, json};
 use shellock::Ctx;
 use shellock::context::Progress;
-use shellock_formats::{read_mesh, write_ply};
+use shellock_formats::{read_selected, write_ply};
 use shellock_geom::TriMesh;
 use shellock_geom::weld::weld;
 
@@ -252,10 +252,11 @@ fn model(request: &Request<'_>, options: &Options) -> Result<Model, Problem> {
         Source::File(bytes) => Cow::Borrowed(bytes),
     };
     let extension = path.extension().and_then(|e| e.to_str());
-    let loaded = read_mesh(&bytes, extension).map_err(|source| Failure::NotAMesh {
-        path: path.to_owned(),
-        source,
-    })?;
+    let loaded =
+        read_selected(&bytes, extension, &input::selection(options)).map_err(|source| Failure::NotAMesh {
+            path: path.to_owned(),
+            source,
+        })?;
     Ok(input::model_of(path, &loaded, &bytes, options)?)
 }
 

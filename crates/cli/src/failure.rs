@@ -17,8 +17,13 @@ pub enum Failure {
     Unreadable { path: PathBuf, source: std::io::Error },
     #[error("{}: {source}", path.display())]
     NotAMesh { path: PathBuf, source: ReadError },
-    #[error("{}: {source}{}", path.display(), hint(source))]
-    NotOneBody { path: PathBuf, source: InputError },
+    #[error("{}: {source}{}", path.display(), hint(source, objects))]
+    NotOneBody {
+        path: PathBuf,
+        source: InputError,
+        /// Names of the file's objects, where it has several.
+        objects: Vec<String>,
+    },
     #[error("{0}")]
     Wrong(String),
     #[error("{told}")]
@@ -36,12 +41,28 @@ pub enum Failure {
 }
 
 /// The option that helps, where there is one.
-fn hint(error: &InputError) -> &'static str {
-    if matches!(error, InputError::Bodies(_)) {
-        " (--largest keeps the largest)"
+fn hint(error: &InputError, objects: &[String]) -> String {
+    /// Names that a message lists.
+    const N_LISTED: usize = 8;
+    if !matches!(error, InputError::Bodies(_)) {
+        return String::new();
+    }
+    if objects.is_empty() {
+        return " (--largest keeps the largest)".to_owned();
+    }
+    let more = match objects.len().saturating_sub(N_LISTED) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    let listed = objects[..objects.len().min(N_LISTED)].join(", ");
+    let plate = if listed.contains("(plate ") {
+        " or --plate N"
     } else {
         ""
-    }
+    };
+    format!(
+        "; the file's objects are {listed}{more}: choose one with --object NAME{plate}, or --largest keeps the largest body"
+    )
 }
 
 impl From<shellock::Cancelled> for Failure {

@@ -1,32 +1,31 @@
 //! From a file to a solid in millimetres, with its labels.
 
+mod size;
+
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use shellock_formats::{LabelSource, Loaded, read_labels, read_mesh};
+use shellock::Warning;
+use shellock_formats::{LabelSource, Loaded, Selection, read_labels, read_selected};
 use shellock_geom::repair::{Repair, RepairMode, Repaired, repair};
 use shellock_geom::simplify::simplify;
-use shellock_geom::{Aabb, Solid, Vec3};
+use shellock_geom::{Solid, Vec3};
 
 use crate::Session;
 use crate::args::{LabelsFrom, Options};
 use crate::failure::Failure;
 use crate::names::no_such;
 
+pub use size::length;
+use size::{DEFAULT_SIZE_MM, check_size, scale};
+
 /// Larger files are refused, bytes: everything is read into memory.
 const MAX_FILE_BYTES: u64 = 2 << 30;
-/// A file whose longest side lies in this range, in its own units, is taken to be in millimetres.
-const PLAUSIBLE_MM: std::ops::RangeInclusive<f64> = 20.0..=1000.0;
-/// Longest side of what is made, mm: a torus of 2000 mm already takes 8 GB and more than three minutes.
-const MADE_MM: std::ops::RangeInclusive<f64> = 10.0..=2000.0;
-/// Share by which scaling to a length may miss it.
-const ROUNDING: f64 = 1e-9;
 /// Surfaces with more triangles are described by fewer: most take twice the time with twice as many.
 pub const MANY_TRIANGLES: usize = 100_000;
-/// Longest side of everything else, mm.
-const DEFAULT_SIZE_MM: f64 = 150.0;
 
 /// A model ready to be made.
 pub struct Model {
@@ -46,6 +45,10 @@ pub struct Model {
     pub sha256: String,
     /// What a person should know about how the file was taken.
     pub notes: Vec<String>,
+    /// What may be wrong with how it was taken.
+    pub warnings: Vec<Warning>,
+    /// Which part of the file was taken.
+    pub selection: Selection,
     /// What was changed to make one body of it.
     pub repairs: Vec<Repair>,
 }
@@ -79,13 +82,26 @@ pub fn sha256(bytes: &[u8]) -> String {
 
 /// The mesh in a file.
 pub fn load(path: &Path) -> Result<(Loaded, Vec<u8>), Failure> {
+    load_selected(path, &Selection::default())
+}
+
+/// The part of the mesh in a file that `selection` names.
+pub fn load_selected(path: &Path, selection: &Selection) -> Result<(Loaded, Vec<u8>), Failure> {
     let bytes = read(path)?;
     let extension = path.extension().and_then(|e| e.to_str());
-    let loaded = read_mesh(&bytes, extension).map_err(|source| Failure::NotAMesh {
+    let loaded = read_selected(&bytes, extension, selection).map_err(|source| Failure::NotAMesh {
         path: path.to_owned(),
         source,
     })?;
     Ok((loaded, bytes))
+}
+
+/// The part of a file that is asked for.
+pub fn selection(options: &Options) -> Selection {
+    Selection {
+        object: options.object.clone(),
+        plate: options.plate.clone(),
+    }
 }
 
 /// What may be done to a surface that is no body.
@@ -102,13 +118,34 @@ pub fn repaired(path: &Path, loaded: &Loaded, mode: RepairMode) -> Result<Repair
     repair(&loaded.mesh, mode).map_err(|source| Failure::NotOneBody {
         path: path.to_owned(),
         source,
+        objects: objects(loaded),
     })
+}
+
+/// What the file calls its objects, and where they lie; nothing where there is one alone.
+fn objects(loaded: &Loaded) -> Vec<String> {
+    let n_plates = loaded
+        .objects
+        .iter()
+        .filter_map(|object| Some(object.plate.as_ref()?.number))
+        .collect::<BTreeSet<u32>>()
+        .len();
+    let mut all: Vec<String> = loaded
+        .objects
+        .iter()
+        .map(|object| match &object.plate {
+            Some(plate) if n_plates > 1 => format!("\"{}\" (plate {})", object.title(), plate.number),
+            _ => format!("\"{}\"", object.title()),
+        })
+        .collect();
+    all.dedup();
+    if all.len() > 1 { all } else { Vec::new() }
 }
 
 /// The model in a file, scaled, with the labels that go with it.
 pub fn model(session: &Session, path: &Path, options: &Options) -> Result<Model, Failure> {
     session.during("reading", || {
-        let (loaded, bytes) = load(path)?;
+        let (loaded, bytes) = load_selected(path, &selection(options))?;
         model_of(path, &loaded, &bytes, options)
     })
 }
@@ -183,13 +220,15 @@ pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -
             own.map(|labels| source_face.iter().map(|&k| labels[k as usize]).collect())
         }
     };
-    let scale = scale(options, loaded, solid.mesh().bounds(), &mut notes)?;
+    let (scale, doubt) = scale(options, loaded, solid.mesh().bounds())?;
     let mut made = made_of(solid, scale, path)?;
     made.labels = labels;
     made.n_file_faces = loaded.n_file_faces();
     made.file_face = file_face;
     made.sha256 = sha256;
     made.notes = notes;
+    made.warnings.extend(doubt);
+    made.selection = selection(options);
     made.repairs = repairs;
     Ok(made)
 }
@@ -227,6 +266,7 @@ fn own_labels<'a>(
         LabelsFrom::Colors => LabelSource::Color,
         LabelsFrom::Materials => LabelSource::Material,
         LabelsFrom::Groups => LabelSource::Group,
+        LabelsFrom::Sets => LabelSource::Set,
         LabelsFrom::Objects => LabelSource::Object,
     };
     let has: Vec<String> = loaded.labellings.iter().map(|l| l.source.to_string()).collect();
@@ -271,6 +311,8 @@ fn made_of(solid: Solid, scale: f64, path: &Path) -> Result<Model, Failure> {
         name,
         sha256: String::new(),
         notes: Vec::new(),
+        warnings: Vec::new(),
+        selection: Selection::default(),
         repairs: Vec::new(),
     })
 }
@@ -298,75 +340,6 @@ pub fn shellock_figure(name: &str, size_mm: f64) -> Result<(Solid, Vec<u32>), Fa
         size_mm,
         size_mm / CELLS,
     ))
-}
-
-/// A number that can be a length, or a scale.
-pub fn length(what: &str, mm: f64) -> Result<f64, Failure> {
-    if mm.is_finite() && mm > 0.0 {
-        Ok(mm)
-    } else {
-        Err(Failure::Wrong(format!("{what} is {mm}; it must be more than 0")))
-    }
-}
-
-/// Millimetres a file unit.
-fn scale(options: &Options, loaded: &Loaded, bounds: Aabb, notes: &mut Vec<String>) -> Result<f64, Failure> {
-    let longest = bounds.size().max_element();
-    let along_up = bounds.size()[options.up.index()];
-    let own_mm = loaded.unit_mm.unwrap_or(1.0);
-    let scale = match (options.size, options.height, options.scale, options.unit) {
-        (Some(size), ..) => length("size", size)? / longest,
-        (_, Some(height), ..) => length("height", height)? / along_up,
-        (_, _, Some(scale), _) => length("scale", scale)?,
-        (.., Some(unit)) => unit.mm(),
-        _ if PLAUSIBLE_MM.contains(&(own_mm * longest)) => own_mm,
-        _ => {
-            notes.push(guess(loaded.unit_mm, longest));
-            DEFAULT_SIZE_MM / longest
-        }
-    };
-    check_size(scale * longest)?;
-    Ok(scale)
-}
-
-fn check_size(longest_mm: f64) -> Result<(), Failure> {
-    let (least, most) = (MADE_MM.start(), MADE_MM.end());
-    // A model scaled to an end of the range may miss it by rounding.
-    if (least * (1.0 - ROUNDING)..=most * (1.0 + ROUNDING)).contains(&longest_mm) {
-        return Ok(());
-    }
-    let told = if (0.001..1e6).contains(&longest_mm) {
-        format!("{}", (1000.0 * longest_mm).round() / 1000.0)
-    } else {
-        format!("{longest_mm:.4e}")
-    };
-    Err(Failure::Wrong(format!(
-        "the longest side would be {told} mm; it must lie between {least} and {most} mm: choose with --size"
-    )))
-}
-
-/// What to say of a size that is no figure's.
-fn guess(unit_mm: Option<f64>, longest: f64) -> String {
-    let what = match unit_mm {
-        Some(mm) => format!(
-            "by the file's unit the longest side is {:.4} mm, which is hardly meant",
-            mm * longest
-        ),
-        None => format!("the file's longest side is {longest:.4} units, which cannot be millimetres"),
-    };
-    let units = [("m", 1000.0), ("cm", 10.0), ("inch", 25.4)].map(|(name, mm)| (name, mm * longest));
-    let fitting = units.iter().filter(|(_, size)| PLAUSIBLE_MM.contains(size));
-    let others: Vec<String> = fitting
-        .map(|(name, size)| format!("{size:.0} mm with --unit {name}"))
-        .collect();
-    let others = if others.is_empty() {
-        String::new()
-    } else {
-        format!("; it would be {}", others.join(", "))
-    };
-    format!(
-        "{what}; it is made {DEFAULT_SIZE_MM} mm long{others} (choose with --unit, --size, --height or --scale)"
-    )
 }
 
 /// The labels in `file`, one a triangle of the solid.
@@ -420,20 +393,6 @@ mod tests {
         );
         model.file_face = (0..n_faces as u32).collect();
         model
-    }
-
-    /// 2000 mm asked for may come out as 2000.0000000000002.
-    #[test]
-    fn both_ends_of_the_range_of_sizes_are_made_whatever_rounding_does() {
-        for mm in [10.0_f64, 2000.0] {
-            for made in [mm.next_down(), mm, mm.next_up()] {
-                assert!(check_size(made).is_ok(), "{made:e}");
-            }
-        }
-        let told = |mm: f64| check_size(mm).unwrap_err().to_string();
-        assert!(told(2000.04).contains("2000.04 mm"), "{}", told(2000.04));
-        assert!(told(9.0).contains("be 9 mm"), "{}", told(9.0));
-        assert!(told(1e30).contains("1.0000e30 mm"), "{}", told(1e30));
     }
 
     #[test]

@@ -282,6 +282,8 @@ fn plan_file(
             file: &model.name,
             sha256: &model.sha256,
             transform: model.transform,
+            object: model.selection.object.as_deref(),
+            plate: model.selection.plate.as_deref(),
             repairs: &model.repairs,
         },
         warnings,

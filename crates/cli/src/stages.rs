@@ -10,7 +10,7 @@ use shellock::design::{self, DesignError, Planned, Settings};
 use shellock::verify::words::Coordinates;
 use shellock::verify::{Assembly, VerifyParams};
 use shellock::{Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, segmentation};
-use shellock_formats::{write_labels, write_ply, write_stl_binary};
+use shellock_formats::{Selection, write_labels, write_ply, write_stl_binary};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_kit::PlanFile;
@@ -21,7 +21,7 @@ use crate::bears;
 use crate::bed::fitted;
 use crate::build::checked;
 use crate::failure::Failure;
-use crate::input::{self, load, read, sha256};
+use crate::input::{self, load, load_selected, read, sha256};
 use crate::interrupt::Writing;
 use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
@@ -293,7 +293,11 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
             input.file
         )));
     }
-    let (loaded, _) = load(&model_path)?;
+    let selection = Selection {
+        object: input.object.clone(),
+        plate: input.plate.clone(),
+    };
+    let (loaded, _) = load_selected(&model_path, &selection)?;
     let solid = input::repaired(
         &model_path,
         &loaded,

@@ -9,6 +9,7 @@ use shellock::verify::Verification;
 use shellock::verify::words::PlaceWords;
 use shellock::{Severity, Warning, play};
 
+use crate::input::Model;
 use crate::output::{Destination, Summary};
 use crate::place::Standing;
 use crate::printing::Printing;
@@ -240,6 +241,18 @@ pub fn warning_lines(warnings: &[Warning], is_verbose: bool, standing: &Standing
         lines.push(format!("and {} more: --verbose, or the page", rest.join(" and ")));
     }
     lines
+}
+
+/// Warnings of how the model's file was taken, before anything else goes on: on standard output, or on the error
+/// output where nothing else is shown. Where events go with JSON they stand in its result.
+pub fn print_input_warnings(session: &Session, model: &Model) {
+    for warning in &model.warnings {
+        match session.shown {
+            Shown::ForPeople => println!("{}: {warning}", warning.severity()),
+            Shown::Nothing if !session.is_json => eprintln!("{}: {warning}", warning.severity()),
+            _ => {}
+        }
+    }
 }
 
 /// [`warning_lines`], on standard output.

@@ -9,37 +9,43 @@ const MAX_OCCURRENCES: u64 = 100_000;
 /// Triangles of all occurrences.
 const MAX_TRIANGLES: u64 = 20_000_000;
 
-/// A part: triangles of its own, or others that are put together.
-pub(super) struct Part {
+/// A part: triangles of its own, or others that are put together. `T` is said of each place where a part goes.
+pub(super) struct Part<T> {
     /// Its id in the file, for messages.
     pub(super) id: String,
     /// How many triangles it has of its own.
     pub(super) n_triangles: usize,
-    /// Other parts, by index, and where they go.
-    pub(super) children: Vec<(usize, DAffine3)>,
+    /// Other parts in their places.
+    pub(super) children: Vec<Occurrence<T>>,
 }
 
-/// Where a part with triangles occurs.
+/// A part in its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Occurrence {
+pub(super) struct Occurrence<T> {
+    /// Index of the part.
     pub(super) part: usize,
+    /// Where it goes, in what it is put into.
     pub(super) placed: DAffine3,
+    /// What is said of it there.
+    pub(super) said: T,
 }
 
-/// All places of parts with triangles below `roots`, in file order.
+/// All places of parts with triangles below `roots`, in file order. `join` makes of what is said of a place and
+/// of a place within it what holds there.
 ///
 /// Refuses parts that contain themselves, and more triangles or places than are made; the work is bounded by
 /// that.
-pub(super) fn occurrences(
-    parts: &[Part],
-    roots: &[(usize, DAffine3)],
+pub(super) fn occurrences<T: Copy>(
+    parts: &[Part<T>],
+    roots: &[Occurrence<T>],
     kind: &'static str,
-) -> Result<Vec<Occurrence>, ReadError> {
+    join: impl Fn(T, T) -> T,
+) -> Result<Vec<Occurrence<T>>, ReadError> {
     let sizes = sizes(parts, kind)?;
-    let total = roots.iter().fold((0_u64, 0_u64), |sum, &(root, _)| {
+    let total = roots.iter().fold((0_u64, 0_u64), |sum, root| {
         (
-            sum.0.saturating_add(sizes[root].0),
-            sum.1.saturating_add(sizes[root].1),
+            sum.0.saturating_add(sizes[root.part].0),
+            sum.1.saturating_add(sizes[root.part].1),
         )
     });
     if total.0 > MAX_OCCURRENCES || total.1 > MAX_TRIANGLES {
@@ -49,24 +55,23 @@ pub(super) fn occurrences(
         });
     }
     let mut found = Vec::new();
-    let mut todo: Vec<(usize, DAffine3)> = roots.iter().rev().copied().collect();
-    while let Some((part, placed)) = todo.pop() {
-        if parts[part].n_triangles > 0 {
-            found.push(Occurrence { part, placed });
+    let mut todo: Vec<Occurrence<T>> = roots.iter().rev().copied().collect();
+    while let Some(around) = todo.pop() {
+        let part = &parts[around.part];
+        if part.n_triangles > 0 {
+            found.push(around);
         }
-        todo.extend(
-            parts[part]
-                .children
-                .iter()
-                .rev()
-                .map(|&(child, at)| (child, placed * at)),
-        );
+        todo.extend(part.children.iter().rev().map(|child| Occurrence {
+            part: child.part,
+            placed: around.placed * child.placed,
+            said: join(around.said, child.said),
+        }));
     }
     Ok(found)
 }
 
 /// For each part the number of parts and of triangles below it, itself included; refuses cycles.
-fn sizes(parts: &[Part], kind: &'static str) -> Result<Vec<(u64, u64)>, ReadError> {
+fn sizes<T>(parts: &[Part<T>], kind: &'static str) -> Result<Vec<(u64, u64)>, ReadError> {
     #[derive(Clone, Copy, PartialEq)]
     enum State {
         New,
@@ -88,17 +93,17 @@ fn sizes(parts: &[Part], kind: &'static str) -> Result<Vec<(u64, u64)>, ReadErro
                     id: parts[part].id.clone(),
                 });
             }
-            if let Some(&(child, _)) = parts[part].children.get(next) {
+            if let Some(child) = parts[part].children.get(next) {
                 path.push((part, next + 1));
-                path.push((child, 0));
+                path.push((child.part, 0));
                 continue;
             }
             state[part] = State::Done;
             let own = (1, parts[part].n_triangles as u64);
-            sizes[part] = parts[part].children.iter().fold(own, |sum, &(child, _)| {
+            sizes[part] = parts[part].children.iter().fold(own, |sum, child| {
                 (
-                    sum.0.saturating_add(sizes[child].0),
-                    sum.1.saturating_add(sizes[child].1),
+                    sum.0.saturating_add(sizes[child.part].0),
+                    sum.1.saturating_add(sizes[child.part].1),
                 )
             });
         }
@@ -111,16 +116,28 @@ mod tests {
     use super::*;
     use glam::DVec3;
 
-    fn part(n_triangles: usize, children: &[(usize, f64)]) -> Part {
-        let children = children
-            .iter()
-            .map(|&(c, x)| (c, DAffine3::from_translation(DVec3::X * x)))
-            .collect();
+    /// A part whose children are moved along x; what is said is the product along the way.
+    fn part(n_triangles: usize, children: &[(usize, f64)]) -> Part<f64> {
+        let children = children.iter().map(|&(c, x)| placed(c, x)).collect();
         Part {
             id: String::new(),
             n_triangles,
             children,
         }
+    }
+
+    fn placed(part: usize, x: f64) -> Occurrence<f64> {
+        Occurrence {
+            part,
+            placed: DAffine3::from_translation(DVec3::X * x),
+            said: x,
+        }
+    }
+
+    fn found(parts: &[Part<f64>], root: usize) -> Result<Vec<Occurrence<f64>>, ReadError> {
+        occurrences(parts, &[placed(root, 0.0)], "object", |around, own| {
+            around + 2.0 * own
+        })
     }
 
     #[test]
@@ -130,20 +147,20 @@ mod tests {
             part(0, &[(0, 1.0), (0, 10.0)]),
             part(1, &[(1, 100.0)]),
         ];
-        let found = occurrences(&parts, &[(2, DAffine3::IDENTITY)], "object").unwrap();
-        let places: Vec<_> = found.iter().map(|o| (o.part, o.placed.translation.x)).collect();
-        assert_eq!(places, [(2, 0.0), (0, 101.0), (0, 110.0)]);
+        let found = found(&parts, 2).unwrap();
+        let places: Vec<_> = found
+            .iter()
+            .map(|o| (o.part, o.placed.translation.x, o.said))
+            .collect();
+        assert_eq!(places, [(2, 0.0, 0.0), (0, 101.0, 202.0), (0, 110.0, 220.0)]);
     }
 
     #[test]
     fn cycles_and_multiplication_are_refused_without_unrolling_them() {
         let cycle = [part(1, &[(1, 0.0)]), part(0, &[(0, 0.0)])];
-        assert!(matches!(
-            occurrences(&cycle, &[(0, DAffine3::IDENTITY)], "object"),
-            Err(ReadError::Cycle { .. })
-        ));
+        assert!(matches!(found(&cycle, 0), Err(ReadError::Cycle { .. })));
         // Ten times ten times …: 10³⁰ triangles.
-        let laughs: Vec<Part> = (0..31)
+        let laughs: Vec<Part<f64>> = (0..31)
             .map(|i| {
                 if i == 0 {
                     part(1, &[])
@@ -152,7 +169,6 @@ mod tests {
                 }
             })
             .collect();
-        let refused = occurrences(&laughs, &[(30, DAffine3::IDENTITY)], "object");
-        assert!(matches!(refused, Err(ReadError::TooManyCopies { .. })));
+        assert!(matches!(found(&laughs, 30), Err(ReadError::TooManyCopies { .. })));
     }
 }

@@ -91,6 +91,59 @@ pub enum ReadError {
         /// What stands there, shortened.
         found: String,
     },
+    /// A 3MF that requires an extension which is not read: its shape would be wrong without.
+    #[error(
+        "the file requires the 3MF extension \"{name}\", which is not read; export it as a plain mesh: 3MF without \
+         extensions, or STL"
+    )]
+    Extension {
+        /// Its name for people, or its namespace.
+        name: String,
+    },
+    /// An object whose shape is given in a way that is not read.
+    #[error(
+        "{object} is not given by a mesh alone, but by \"{shape}\", which is not read; export it as a plain mesh: 3MF \
+         without extensions, or STL"
+    )]
+    Shape {
+        /// The object, with its name or number.
+        object: String,
+        /// The extension, or the element.
+        shape: String,
+    },
+    /// Tool paths for a printer instead of a model.
+    #[error(
+        "this is a sliced file: it holds G-code for a printer and no model; give the project that it was sliced from (.3mf)"
+    )]
+    Sliced,
+    /// A file of which nothing is to be printed.
+    #[error(
+        "the file has nothing but {what} ({names}), which are left out; give a file with the model itself"
+    )]
+    NothingPrinted {
+        /// What there is.
+        what: &'static str,
+        /// Its names.
+        names: String,
+    },
+    /// A part that is to be cut out, and cannot be.
+    #[error("the negative volume {name} cannot be cut out: {reason}")]
+    Cut {
+        /// The part.
+        name: String,
+        /// Why.
+        reason: String,
+    },
+    /// No object, or no plate, of the name asked for.
+    #[error("the file has no {what} \"{wanted}\"; it has {has}")]
+    NoSuchPart {
+        /// "object" or "plate".
+        what: &'static str,
+        /// The name asked for.
+        wanted: String,
+        /// The names that there are.
+        has: String,
+    },
     /// A part of a 3MF package that is not what it should be.
     #[error("{part}, {at}: {reason}; export the model again")]
     Xml {

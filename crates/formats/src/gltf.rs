@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use base64::Engine as _;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 
-use super::assembly::{Part, occurrences};
+use super::assembly::{Occurrence, Part, occurrences};
 use super::polygons::divides;
 use super::{Format, LabelSource, Labelling, Loaded, Place, ReadError};
 use document::{Accessor, Buffer, Document, Node, Primitive};
@@ -84,7 +84,7 @@ fn read(json: &[u8], data: Option<&[u8]>, format: Format) -> Result<Loaded, Read
         buffers,
     };
     let parts = reader.parts()?;
-    let found = occurrences(&parts, &reader.roots()?, "node")?;
+    let found = occurrences(&parts, &reader.roots()?, "node", |(), ()| ())?;
 
     let mut mesh = TriMesh::default();
     let (mut material, mut object) = (Vec::new(), Vec::new());
@@ -112,6 +112,9 @@ fn read(json: &[u8], data: Option<&[u8]>, format: Format) -> Result<Loaded, Read
         mesh,
         format,
         unit_mm: Some(UNIT_MM),
+        unit_is_stated: false,
+        objects: Vec::new(),
+        cutters: Vec::new(),
         notes: vec!["in glTF y points up: give --up y".to_owned()],
     })
 }
@@ -222,7 +225,7 @@ impl Values<'_> {
 
 impl Reader<'_> {
     /// The nodes, with the triangles that their meshes have.
-    fn parts(&self) -> Result<Vec<Part>, ReadError> {
+    fn parts(&self) -> Result<Vec<Part<()>>, ReadError> {
         let n_triangles = self.document.meshes.iter().map(|mesh| {
             mesh.primitives
                 .iter()
@@ -239,7 +242,7 @@ impl Reader<'_> {
                     .nodes
                     .get(child)
                     .ok_or_else(|| missing("node", child))?;
-                Ok((child, placed(to)))
+                Ok(in_place(child, to))
             });
             let children = children.collect::<Result<_, ReadError>>()?;
             Ok(Part {
@@ -252,7 +255,7 @@ impl Reader<'_> {
     }
 
     /// The nodes of the scene that is shown; all that are no child where there is none.
-    fn roots(&self) -> Result<Vec<(usize, DAffine3)>, ReadError> {
+    fn roots(&self) -> Result<Vec<Occurrence<()>>, ReadError> {
         let nodes = &self.document.nodes;
         let shown = self.document.scenes.get(self.document.scene.unwrap_or_default());
         let roots = shown.map_or_else(
@@ -269,7 +272,7 @@ impl Reader<'_> {
         let root = |n: usize| {
             nodes
                 .get(n)
-                .map(|node| (n, placed(node)))
+                .map(|node| in_place(n, node))
                 .ok_or_else(|| missing("node", n))
         };
         roots.into_iter().map(root).collect()
@@ -407,6 +410,15 @@ impl Reader<'_> {
             FAN => (2..n_corners).try_for_each(|i| add([0, i - 1, i])),
             _ => (0..n_corners / 3).try_for_each(|i| add([3 * i, 3 * i + 1, 3 * i + 2])),
         }
+    }
+}
+
+/// A node in its place within its parent.
+fn in_place(part: usize, node: &Node) -> Occurrence<()> {
+    Occurrence {
+        part,
+        placed: placed(node),
+        said: (),
     }
 }
 

@@ -6,7 +6,7 @@
 //! | OBJ | text; groups, objects, materials | |
 //! | PLY | ASCII, binary of both byte orders, strips, face labels and colours | binary, face labels |
 //! | OFF | text, face colours | |
-//! | 3MF | units, components, transforms, several files, materials, paint | pieces, coloured; one body, painted |
+//! | 3MF | units, components, transforms, several files, materials, paint, roles of parts, negative volumes | pieces, coloured; one body, painted |
 //! | glTF, GLB | nodes, all modes of triangles, materials | |
 //! | `.seg` | one label a line | the same |
 //!
@@ -18,6 +18,7 @@
 //! [`shellock_geom::weld`]; whether the surface is a body is [`shellock_geom::check`].
 
 mod assembly;
+mod carve;
 mod container;
 mod error;
 mod gltf;
@@ -28,6 +29,7 @@ mod paint;
 mod ply;
 mod polygons;
 mod recognise;
+mod select;
 mod stl;
 mod text;
 mod threemf;
@@ -37,6 +39,7 @@ use std::fmt;
 pub use error::ReadError;
 pub use labels::{read_labels, write_labels};
 pub use ply::write_ply;
+pub use select::Selection;
 pub use stl::write_stl_binary;
 pub use threemf::{NamedObject, write_3mf, write_painted_3mf};
 
@@ -56,6 +59,13 @@ pub struct Loaded {
     pub format: Format,
     /// Length of a file unit, mm, where the format has one.
     pub unit_mm: Option<f64>,
+    /// Whether the file states that unit itself; else it is what the format prescribes, which many programs
+    /// ignore.
+    pub unit_is_stated: bool,
+    /// Objects of the file, by the labels of [`LabelSource::Object`]; empty where the format has no names.
+    pub objects: Vec<FileObject>,
+    /// Parts that are still to be cut out of others; [`read_mesh`] has done it.
+    pub cutters: Vec<Cutter>,
     /// What a person should know about how the bytes were taken.
     pub notes: Vec<String>,
 }
@@ -82,6 +92,39 @@ impl Loaded {
     }
 }
 
+/// An object of a file, or a part of one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileObject {
+    /// What the file calls the object.
+    pub name: Option<String>,
+    /// What the file calls the part, where the object is made of several.
+    pub part: Option<String>,
+    /// Number of the object, from 0; its parts share it.
+    pub item: u32,
+    /// Where the object lies in the slicer's project.
+    pub plate: Option<FilePlate>,
+}
+
+/// A plate of a slicer's project.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FilePlate {
+    /// From 1.
+    pub number: u32,
+    /// What the project calls it.
+    pub name: Option<String>,
+}
+
+/// A part that is cut out of an object ("negative volume").
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cutter {
+    /// For messages.
+    pub name: String,
+    /// [`FileObject::item`] of what it is cut out of.
+    pub item: u32,
+    /// In the same place as the object, file units.
+    pub mesh: TriMesh,
+}
+
 /// One label for each triangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labelling {
@@ -105,6 +148,8 @@ pub enum LabelSource {
     Material,
     /// Groups (OBJ).
     Group,
+    /// Named sets of triangles (3MF).
+    Set,
     /// Objects, solids or nodes (OBJ, STL, 3MF, glTF).
     Object,
 }
@@ -117,6 +162,7 @@ impl fmt::Display for LabelSource {
             Self::Color => "colors",
             Self::Material => "materials",
             Self::Group => "groups",
+            Self::Set => "sets",
             Self::Object => "objects",
         })
     }
@@ -179,9 +225,24 @@ impl fmt::Display for Place {
 /// Reads a mesh; the content decides what it is, and `extension` ("stl", ".OBJ") only where the content
 /// leaves it open.
 ///
-/// Guarantees: at least one triangle, all points finite, all indices in range. Not promised: anything about
-/// the surface.
+/// Guarantees: at least one triangle, all points finite, all indices in range; what the file says is cut out
+/// is cut out. Not promised: anything about the surface.
 pub fn read_mesh(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
+    read_selected(bytes, extension, &Selection::default())
+}
+
+/// Reads the part of a mesh file that `selection` names; otherwise as [`read_mesh`].
+pub fn read_selected(
+    bytes: &[u8],
+    extension: Option<&str>,
+    selection: &Selection,
+) -> Result<Loaded, ReadError> {
+    let loaded = read_whole(bytes, extension)?;
+    carve::carve(select::select(loaded, selection)?)
+}
+
+/// All that a file holds, as it stands there.
+fn read_whole(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
     let (bytes, name) = container::unpack(bytes)?;
     let inner = name
         .as_deref()

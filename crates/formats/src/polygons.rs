@@ -111,6 +111,9 @@ impl Polygons {
             file_face,
             format,
             unit_mm: None,
+            unit_is_stated: false,
+            objects: Vec::new(),
+            cutters: Vec::new(),
             notes: Vec::new(),
         })
     }

@@ -76,6 +76,9 @@ fn every_format_gives_the_tetrahedron_back() {
                 file_face,
                 format,
                 unit_mm: None,
+                unit_is_stated: false,
+                objects: Vec::new(),
+                cutters: Vec::new(),
                 notes
             }
         );

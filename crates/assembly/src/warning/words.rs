@@ -52,6 +52,7 @@ impl Warning {
     pub(super) fn told(&self) -> Told {
         let (first, second) = (self.id(0), self.id(1));
         match &self.cause {
+            Cause::Input { code, sentence } => warning(code, sentence.clone()),
             // The wall
             Cause::StrengthUnknown { error, thickness_mm } => warning(
                 "strength-unknown",

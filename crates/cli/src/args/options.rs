@@ -80,6 +80,16 @@ pub struct Options {
         help_heading = "Size"
     )]
     pub up: Axis,
+    /// Make one object of the file, by its name
+    ///
+    /// Which object of the file is made, where it has several: its name, or "object 2" where it has none
+    #[arg(long, value_name = "NAME", help_heading = "Surface")]
+    pub object: Option<String>,
+    /// Make one plate of a slicer's project
+    ///
+    /// Which plate of a slicer's project is made, by its number or its name
+    #[arg(long, value_name = "N|NAME", help_heading = "Surface")]
+    pub plate: Option<String>,
     /// Refuse a surface that needs repair
     ///
     /// Refuse a surface that needs repair instead of mending it

@@ -1,154 +1,276 @@
-//! What slicers note beside the model: which extruder prints what, and which volumes are no part of it.
+//! Notes of slicers beside the model: names, plates, extruders, and volumes that are no part of the model.
+
+use std::collections::BTreeMap;
 
 use quick_xml::events::BytesStart;
 
-use super::Package;
+use super::package::Package;
+use super::role::{Role, Usage};
 use super::xml::{Elements, Next, number};
 
-/// Where PrusaSlicer and SuperSlicer, and where Bambu Studio and OrcaSlicer have it.
-pub(super) const FILES: [&str; 2] = [
-    "Metadata/Slic3r_PE_model.config",
-    "Metadata/model_settings.config",
-];
-/// Volumes that are material; all others change or hold up what is printed.
-const BODY_KINDS: [&str; 2] = ["ModelPart", "normal_part"];
+/// How the names end under which PrusaSlicer and SuperSlicer, and Bambu Studio and OrcaSlicer have them.
+const FILE_ENDS: [&str; 2] = ["_model.config", "model_settings.config"];
 /// Volumes that have the same triangle at most; further ones are hostile and are passed over.
 const MAX_OVERLAP: usize = 8;
-/// What prints where nothing else is said.
-const FIRST_EXTRUDER: u32 = 1;
 
-/// Extruders and volumes.
+/// All that slicers note.
 #[derive(Default)]
 pub(super) struct Settings {
+    /// By the ids of the root part's objects.
+    objects: BTreeMap<u32, ObjectSettings>,
+    /// In the order of the file.
+    plates: Vec<Plate>,
+    /// The plate of an object's item in the build, by the object's id and the item's number among its own.
+    plate_of: BTreeMap<(u32, u32), usize>,
+}
+
+/// Notes on an object of the root part.
+#[derive(Default)]
+pub(super) struct ObjectSettings {
+    pub(super) name: Option<String>,
+    /// From 1; `None` where nothing is said.
+    pub(super) extruder: Option<u32>,
     volumes: Vec<Volume>,
 }
 
-/// An object, or a part of one.
+/// A part of an object.
 struct Volume {
-    /// The object of the model file that has the triangles.
-    object: u32,
-    /// Which of its triangles, first and last; all where the file does not say.
-    faces: (u32, u32),
-    is_body: bool,
+    of: Of,
+    name: Option<String>,
+    role: Role,
     extruder: Option<u32>,
 }
 
+/// What a volume is made of.
+#[derive(Clone, Copy)]
+enum Of {
+    /// Triangles of the object itself, first and last.
+    Faces(u32, u32),
+    /// The component that names the object of this id, or the object itself.
+    Part(u32),
+}
+
+/// A plate of the slicer's project.
+#[derive(Default)]
+pub(super) struct Plate {
+    pub(super) number: u32,
+    pub(super) name: Option<String>,
+}
+
+/// Which elements are open.
+#[derive(Default)]
+struct Open {
+    object: Option<u32>,
+    in_volume: bool,
+    plate: Option<Plate>,
+    /// The object and item of a plate's `model_instance`.
+    instance: Option<(Option<u32>, u32)>,
+}
+
 impl Settings {
-    /// Adds what `name` holds; a file that cannot be read adds nothing, since models come without it as well.
-    pub(super) fn read(&mut self, name: &str, package: &mut Package) {
-        let Ok(Some(text)) = package.text(name) else {
-            return;
-        };
-        let mut elements = Elements::of(name, &text);
-        // The object that is open, its entry, and whether a part of it is open.
-        let (mut object, mut entry, mut in_part) = (None, 0, false);
-        while let Ok(Some(next)) = elements.next() {
-            match next {
-                Next::Begin(element) => match element.local_name().as_ref().as_bytes() {
-                    b"object" => {
-                        object = attribute(&elements, &element, "id");
-                        entry = self.volumes.len();
-                        self.begin(object, (0, u32::MAX), true);
-                    }
-                    // A range of the object's triangles.
-                    b"volume" => {
-                        let of = |name| attribute(&elements, &element, name);
-                        self.begin(
-                            object,
-                            (of("firstid").unwrap_or(0), of("lastid").unwrap_or(u32::MAX)),
-                            true,
-                        );
-                        in_part = true;
-                    }
-                    // An object of its own, put into this one.
-                    b"part" => {
-                        let kind: Option<String> = attribute(&elements, &element, "subtype");
-                        let is_body = kind.is_none_or(|kind| BODY_KINDS.contains(&kind.as_str()));
-                        let inherited = self.volumes.get(entry).and_then(|v| v.extruder);
-                        self.begin(attribute(&elements, &element, "id"), (0, u32::MAX), is_body);
-                        self.set_extruder(inherited);
-                        in_part = true;
-                    }
-                    b"metadata" if object.is_some() => self.note(&elements, &element, in_part),
-                    _ => {}
-                },
-                Next::End(name) => match &name[..] {
-                    b"object" => (object, in_part) = (None, false),
-                    b"volume" | b"part" => in_part = false,
-                    _ => {}
-                },
+    /// What the package holds of them. A file that cannot be read adds nothing, since models come without it
+    /// as well.
+    pub(super) fn read(package: &mut Package) -> Self {
+        let mut settings = Self::default();
+        for name in package.names(|name| FILE_ENDS.iter().any(|end| name.ends_with(end))) {
+            if let Ok(Some(text)) = package.text(&name) {
+                settings.read_file(&name, &text);
             }
         }
-        // Stable, so that later entries stay after what they are about.
-        self.volumes.sort_by_key(|v| v.object);
+        settings
     }
 
-    fn begin(&mut self, object: Option<u32>, faces: (u32, u32), is_body: bool) {
-        self.volumes.extend(object.map(|object| Volume {
-            object,
-            faces,
-            is_body,
-            extruder: None,
-        }));
+    pub(super) fn object(&self, id: u32) -> Option<&ObjectSettings> {
+        self.objects.get(&id)
     }
 
-    fn set_extruder(&mut self, extruder: Option<u32>) {
-        if let Some(volume) = self.volumes.last_mut() {
-            // 0 means: as the object.
-            volume.extruder = extruder.filter(|&e| e > 0).or(volume.extruder);
+    /// The plate on which the `instance`-th item of an object lies.
+    pub(super) fn plate(&self, object: u32, instance: u32) -> Option<&Plate> {
+        self.plate_of
+            .get(&(object, instance))
+            .and_then(|&plate| self.plates.get(plate))
+    }
+
+    fn read_file(&mut self, name: &str, text: &str) {
+        let mut elements = Elements::of(name, text);
+        let mut open = Open::default();
+        while let Ok(Some(next)) = elements.next() {
+            match next {
+                Next::Begin(element) => self.begin(&elements, &element, &mut open),
+                Next::Text(_) => {}
+                Next::End(name) => self.end(&name, &mut open),
+            }
         }
     }
 
-    fn note(&mut self, elements: &Elements, element: &BytesStart, in_part: bool) {
-        let key: String = attribute(elements, element, "key").unwrap_or_default();
-        let value: String = attribute(elements, element, "value").unwrap_or_default();
-        match key.as_str() {
-            "extruder" => self.set_extruder(value.parse().ok()),
-            "volume_type" if in_part => self.set_body(BODY_KINDS.contains(&value.as_str())),
-            // Before volumes had types.
-            "modifier" if in_part && value == "1" => self.set_body(false),
+    fn begin(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) {
+        let attribute = |name| attribute(elements, element, name);
+        match element.local_name().as_ref() {
+            "object" => {
+                open.object = attribute("id");
+                if let Some(id) = open.object {
+                    self.objects.entry(id).or_default();
+                }
+            }
+            // A range of the object's triangles.
+            "volume" => {
+                let first = attribute("firstid").unwrap_or(0);
+                let last = attribute("lastid").unwrap_or(u32::MAX);
+                self.begin_volume(Of::Faces(first, last), Role::Body, open);
+            }
+            // An object of its own, put into this one.
+            "part" => {
+                let kind: Option<String> = attribute_text(elements, element, "subtype");
+                let role = kind.map_or(Role::Body, |kind| Role::of_volume(&kind));
+                if let Some(id) = attribute("id") {
+                    self.begin_volume(Of::Part(id), role, open);
+                }
+            }
+            "plate" => open.plate = Some(Plate::default()),
+            "model_instance" => open.instance = Some((None, 0)),
+            "metadata" => self.note(elements, element, open),
             _ => {}
         }
     }
 
-    fn set_body(&mut self, is_body: bool) {
-        if let Some(volume) = self.volumes.last_mut() {
-            volume.is_body = is_body;
+    fn begin_volume(&mut self, of: Of, role: Role, open: &mut Open) {
+        let Some(object) = open.object.and_then(|id| self.objects.get_mut(&id)) else {
+            return;
+        };
+        object.volumes.push(Volume {
+            of,
+            name: None,
+            role,
+            extruder: None,
+        });
+        open.in_volume = true;
+    }
+
+    fn end(&mut self, name: &str, open: &mut Open) {
+        match name {
+            "object" => (open.object, open.in_volume) = (None, false),
+            "volume" | "part" => open.in_volume = false,
+            "plate" => self.plates.extend(open.plate.take()),
+            "model_instance" => {
+                if let (Some(_), Some((Some(object), instance))) = (&open.plate, open.instance.take()) {
+                    self.plate_of.insert((object, instance), self.plates.len());
+                }
+            }
+            _ => {}
         }
     }
 
-    /// The extruder of each of `n_triangles` triangles of an object where they have no paint; `None` for what
-    /// is no part of the model.
-    pub(super) fn extruders(&self, object: u32, n_triangles: usize) -> Vec<Option<u32>> {
-        let mut extruders = vec![Some(FIRST_EXTRUDER); n_triangles];
-        let from = self.volumes.partition_point(|v| v.object < object);
+    fn note(&mut self, elements: &Elements, element: &BytesStart, open: &mut Open) {
+        let key = attribute_text(elements, element, "key").unwrap_or_default();
+        let value = attribute_text(elements, element, "value").unwrap_or_default();
+        if let Some(plate) = &mut open.plate {
+            plate.note(&key, &value, &mut open.instance);
+            return;
+        }
+        let Some(object) = open.object.and_then(|id| self.objects.get_mut(&id)) else {
+            return;
+        };
+        // 0 means: as the object.
+        let extruder = || value.parse().ok().filter(|&e: &u32| e > 0);
+        let name = || Some(value.clone()).filter(|name| !name.is_empty());
+        match (key.as_str(), object.volumes.last_mut().filter(|_| open.in_volume)) {
+            ("extruder", Some(volume)) => volume.extruder = extruder(),
+            ("extruder", None) => object.extruder = extruder(),
+            ("name", Some(volume)) => volume.name = name(),
+            ("name", None) => object.name = name(),
+            ("volume_type", Some(volume)) => volume.role = Role::of_volume(&value),
+            // Before volumes had types.
+            ("modifier", Some(volume)) if value == "1" => volume.role = Role::Modifier,
+            _ => {}
+        }
+    }
+}
+
+impl Plate {
+    fn note(&mut self, key: &str, value: &str, instance: &mut Option<(Option<u32>, u32)>) {
+        match (key, instance) {
+            ("plater_id", _) => self.number = value.parse().unwrap_or(0),
+            ("plater_name", _) => self.name = Some(value.to_owned()).filter(|name| !name.is_empty()),
+            ("object_id", Some((object, _))) => *object = value.parse().ok(),
+            ("instance_id", Some((_, instance))) => *instance = value.parse().unwrap_or(0),
+            _ => {}
+        }
+    }
+}
+
+impl ObjectSettings {
+    /// How each of an object's components is used; `ids` are those of the objects that they name.
+    ///
+    /// Ids begin anew in each file of a package, so several components may have the same: volumes of that id
+    /// are for them in order.
+    pub(super) fn of_components(&self, ids: &[u32]) -> Vec<Usage<'_>> {
+        let mut usages = vec![Usage::PLAIN; ids.len()];
+        let mut places: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (place, &id) in ids.iter().enumerate().rev() {
+            places.entry(id).or_default().push(place);
+        }
+        for volume in &self.volumes {
+            let Of::Part(id) = volume.of else { continue };
+            if let Some(place) = places.get_mut(&id).and_then(Vec::pop) {
+                usages[place] = volume.usage();
+            }
+        }
+        usages
+    }
+
+    /// The volume that each of the object's own `n_triangles` triangles belongs to, for [`Self::usage`];
+    /// nothing where no volume says so.
+    pub(super) fn of_triangles(&self, id: u32, n_triangles: usize) -> Vec<u16> {
+        let mut volume_of = Vec::new();
         // Volumes of an object share no triangles, but for the one that is the object itself.
         let mut work_left = MAX_OVERLAP * n_triangles;
-        // Later entries are about parts of what earlier ones are about.
-        for volume in self.volumes[from..].iter().take_while(|v| v.object == object) {
-            let end = (volume.faces.1 as usize).saturating_add(1).min(n_triangles);
-            let begin = (volume.faces.0 as usize).min(end);
+        for (number, volume) in (1_u16..=u16::MAX).zip(&self.volumes) {
+            let (first, last) = match volume.of {
+                Of::Faces(first, last) => (first, last),
+                Of::Part(part) if part == id => (0, u32::MAX),
+                Of::Part(_) => continue,
+            };
+            let end = (last as usize).saturating_add(1).min(n_triangles);
+            let begin = (first as usize).min(end);
             let Some(left) = work_left.checked_sub(end - begin) else {
                 break;
             };
             work_left = left;
-            for extruder in &mut extruders[begin..end] {
-                *extruder = if volume.is_body {
-                    volume.extruder.or(*extruder)
-                } else {
-                    None
-                };
-            }
+            volume_of.resize(n_triangles, 0);
+            volume_of[begin..end].fill(number);
         }
-        extruders
+        volume_of
+    }
+
+    /// How a volume of [`Self::of_triangles`] is used.
+    pub(super) fn usage(&self, volume: u16) -> Usage<'_> {
+        let place = usize::from(volume).checked_sub(1);
+        place
+            .and_then(|place| self.volumes.get(place))
+            .map_or(Usage::PLAIN, Volume::usage)
+    }
+}
+
+impl Volume {
+    fn usage(&self) -> Usage<'_> {
+        Usage {
+            role: self.role,
+            extruder: self.extruder,
+            name: self.name.as_deref(),
+            ..Usage::PLAIN
+        }
     }
 }
 
 fn attribute<T: std::str::FromStr>(elements: &Elements, element: &BytesStart, wanted: &str) -> Option<T> {
+    attribute_text(elements, element, wanted).and_then(|value| number(wanted, &value).ok())
+}
+
+fn attribute_text(elements: &Elements, element: &BytesStart, wanted: &str) -> Option<String> {
     let mut found = None;
     let all = elements.attributes(element, |name, value| {
         if name == wanted {
-            found = number(name, value).ok();
+            found = Some(value.to_owned());
         }
         Ok(())
     });

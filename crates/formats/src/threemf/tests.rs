@@ -1,11 +1,17 @@
 use std::io::{Cursor, Write as _};
 
 use super::super::tests::assert_told;
-use super::super::{LabelSource, Loaded, ReadError, read_mesh};
+use super::super::{Format, LabelSource, Loaded, ReadError, read_mesh};
+use super::package::USUAL_ROOT;
 use super::*;
 use shellock_geom::Vec3;
 use shellock_geom::check::into_solid;
 
+mod roles;
+
+/// Where PrusaSlicer, and where Bambu Studio have their settings.
+const PRUSA: &str = "Metadata/Slic3r_PE_model.config";
+const BAMBU: &str = "Metadata/model_settings.config";
 const HEAD: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <m:model unit="inch" xmlns:m="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" xmlns:p="x"><m:resources>"#;
 const TETRAHEDRON: &str = r#"<mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="1"
@@ -181,20 +187,9 @@ fn extruders_colour_what_is_unpainted_and_modifiers_are_left_out() {
         &format!("<object id=\"1\">{twice}</object>"),
         r#"<item objectid="1"/>"#,
     );
-    let loaded = read_mesh(
-        &package(&[(USUAL_ROOT, &root), (settings::FILES[0], prusa)]),
-        None,
-    )
-    .unwrap();
+    let loaded = read_mesh(&package(&[(USUAL_ROOT, &root), (PRUSA, prusa)]), None).unwrap();
     assert_eq!(loaded.face_labels(), Some(&[3, 2, 3, 3][..]));
-    assert!(
-        loaded
-            .notes
-            .iter()
-            .any(|n| n.starts_with("2 triangles of object 1")),
-        "{:?}",
-        loaded.notes
-    );
+    assert_told(&loaded, "left out as modifiers of the slicer: object 1");
 
     let parts = format!(
         r#"{}{}<object id="3"><components><component objectid="1"/><component objectid="2"/></components></object>"#,
@@ -202,13 +197,9 @@ fn extruders_colour_what_is_unpainted_and_modifiers_are_left_out() {
         tetrahedron(2)
     );
     let bambu = r#"<config><object id="3"><metadata key="extruder" value="4"/><part id="1" subtype="normal_part"/>
-        <part id="2" subtype="negative_part"/></object></config>"#;
+        <part id="2" subtype="modifier_part"/></object></config>"#;
     let root = model(&parts, r#"<item objectid="3"/>"#);
-    let loaded = read_mesh(
-        &package(&[(USUAL_ROOT, &root), (settings::FILES[1], bambu)]),
-        None,
-    )
-    .unwrap();
+    let loaded = read_mesh(&package(&[(USUAL_ROOT, &root), (BAMBU, bambu)]), None).unwrap();
     assert_eq!((loaded.mesh.triangles.len(), loaded.labellings.len()), (4, 0));
 }
 

@@ -1,4 +1,8 @@
-//! The little of XML that 3MF needs: elements with their attributes, and where they stand.
+//! The little of XML that 3MF needs: elements with their attributes and text, and where they stand.
+//!
+//! Elements and attributes are known by their local names: a prefix is the file's choice.
+
+use std::collections::BTreeMap;
 
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
@@ -26,8 +30,10 @@ const MAX_DEPTH: usize = 64;
 pub(super) enum Next<'a> {
     /// An element begins; one without content ends at once.
     Begin(BytesStart<'a>),
+    /// Text within the open element, without the blanks around it.
+    Text(String),
     /// The element of this local name ends.
-    End(Vec<u8>),
+    End(String),
 }
 
 impl<'a> Elements<'a> {
@@ -41,7 +47,7 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// The next begin or end; `None` at the end of the text.
+    /// The next begin, text or end; `None` at the end of the part.
     pub(super) fn next(&mut self) -> Result<Option<Next<'a>>, ReadError> {
         loop {
             match self.reader.read_event() {
@@ -54,7 +60,13 @@ impl<'a> Elements<'a> {
                 }
                 Ok(Event::End(end)) => {
                     self.depth -= 1;
-                    return Ok(Some(Next::End(end.local_name().as_ref().as_bytes().to_vec())));
+                    return Ok(Some(Next::End(end.local_name().as_ref().to_owned())));
+                }
+                Ok(Event::Text(text)) => {
+                    let text = text.into_inner();
+                    if !text.trim().is_empty() {
+                        return Ok(Some(Next::Text(text.trim().to_owned())));
+                    }
                 }
                 Ok(Event::Eof) if self.depth > 0 => return Err(self.error("it ends within an element")),
                 Ok(Event::Eof) => return Ok(None),
@@ -64,9 +76,44 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// Hands each attribute of `element` to `take`, with the name as it stands there, and refuses two of the
-    /// same name.
+    /// Hands each attribute of `element` to `take` by its local name, and refuses two of the same full name.
+    /// Declarations of namespaces are no attributes.
     pub(super) fn attributes(
+        &self,
+        element: &BytesStart,
+        mut take: impl FnMut(&str, &str) -> Result<(), String>,
+    ) -> Result<(), ReadError> {
+        self.raw_attributes(element, |name, value| match declared_prefix(name) {
+            Some(_) => Ok(()),
+            None => take(local(name), value),
+        })
+    }
+
+    /// The namespaces that `element` declares, by prefix; the default one has the prefix "".
+    pub(super) fn namespaces(&self, element: &BytesStart) -> Result<BTreeMap<String, String>, ReadError> {
+        let mut found = BTreeMap::new();
+        self.raw_attributes(element, |name, value| {
+            if let Some(prefix) = declared_prefix(name) {
+                found.insert(prefix.to_owned(), value.trim().to_owned());
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
+    /// The attribute of this local name as text; nothing where it is not there.
+    pub(super) fn string(&self, element: &BytesStart, wanted: &str) -> Result<String, ReadError> {
+        let mut found = String::new();
+        self.attributes(element, |name, value| {
+            if name == wanted {
+                value.clone_into(&mut found);
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
+    fn raw_attributes(
         &self,
         element: &BytesStart,
         mut take: impl FnMut(&str, &str) -> Result<(), String>,
@@ -96,6 +143,19 @@ impl<'a> Elements<'a> {
     }
 }
 
+/// A name without its prefix.
+pub(super) fn local(name: &str) -> &str {
+    name.rsplit_once(':').map_or(name, |(_, local)| local)
+}
+
+/// The prefix that an attribute declares, where it is the declaration of a namespace.
+fn declared_prefix(name: &str) -> Option<&str> {
+    match name.strip_prefix("xmlns")? {
+        "" => Some(""),
+        rest => rest.strip_prefix(':'),
+    }
+}
+
 /// The value of an attribute as a number.
 pub(super) fn number<T: std::str::FromStr>(name: &str, value: &str) -> Result<T, String> {
     value.trim().parse().map_err(|_| {
@@ -109,18 +169,18 @@ pub(super) fn relation_target(relations: &str, kind: &str) -> Option<String> {
     let mut elements = Elements::of("_rels/.rels", relations);
     while let Ok(Some(next)) = elements.next() {
         let Next::Begin(element) = next else { continue };
-        let (mut is_it, mut target) = (false, None);
+        let (mut is_wanted, mut target) = (false, None);
         elements
             .attributes(&element, |name, value| {
                 match name {
-                    "Type" => is_it = value.ends_with(kind),
+                    "Type" => is_wanted = value.ends_with(kind),
                     "Target" => target = Some(value.to_owned()),
                     _ => {}
                 }
                 Ok(())
             })
             .ok()?;
-        if is_it {
+        if is_wanted {
             return target;
         }
     }

@@ -11,6 +11,7 @@
 //! bit.
 
 mod crossing;
+mod cut;
 mod faces;
 mod fans;
 mod holes;
@@ -21,6 +22,7 @@ mod shells;
 
 pub(crate) use crossing::crossing_faces;
 pub use crossing::{Crossings, crossings};
+pub use cut::{Cut, CutError, CutFace, cut_out};
 pub use report::{Repair, RepairKind};
 
 use crate::check::{InputError, check_points, inspect, inspect_edges, into_solid, refuse};
@@ -99,6 +101,21 @@ pub fn repair(mesh: &TriMesh, mode: RepairMode) -> Result<Repaired, InputError> 
     if mode == RepairMode::Refuse {
         as_read?;
     }
+    let (draft, repairs, n_collapsed) = close_up(mesh)?;
+    let repaired = check_edges(&draft).and_then(|()| finish(draft, repairs, mode));
+    // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
+    match repaired {
+        Err(_) if 100 * n_collapsed > n_faces => Err(InputError::Collapsed {
+            count: n_collapsed,
+            n_faces,
+        }),
+        repaired => repaired,
+    }
+}
+
+/// Closes a surface as far as that needs no decision: the draft, what was changed, and how many triangles
+/// collapsed.
+fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
     let welded = close(mesh);
     let mut draft = Draft {
         mesh: welded.mesh,
@@ -107,7 +124,6 @@ pub fn repair(mesh: &TriMesh, mode: RepairMode) -> Result<Repaired, InputError> 
     if draft.mesh.triangles.is_empty() {
         return Err(InputError::Empty);
     }
-    let n_collapsed = welded.n_collapsed;
     let mut repairs = Vec::new();
     // Cracks first, since they hide all else; holes last, since what closes them should not close a crack.
     for stage in [
@@ -119,15 +135,19 @@ pub fn repair(mesh: &TriMesh, mode: RepairMode) -> Result<Repaired, InputError> 
     ] {
         repairs.extend(stage(&mut draft));
     }
-    let repaired = check_edges(&draft).and_then(|()| finish(draft, repairs, mode));
-    // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
-    match repaired {
-        Err(_) if 100 * n_collapsed > n_faces => Err(InputError::Collapsed {
-            count: n_collapsed,
-            n_faces,
-        }),
-        repaired => repaired,
+    Ok((draft, repairs, welded.n_collapsed))
+}
+
+/// A closed surface of any number of bodies, made of a mesh as read; repaired as by [`repair`].
+pub(crate) fn closed(mesh: &TriMesh) -> Result<TriMesh, InputError> {
+    check_points(mesh)?;
+    let mut draft = close_up(mesh)?.0;
+    check_edges(&draft)?;
+    resolve(&mut draft)?;
+    if draft.mesh.triangles.is_empty() {
+        return Err(InputError::Empty);
     }
+    Ok(draft.mesh)
 }
 
 /// Refuses what is open or one-sided after all. Edges with more than two triangles may still bound a volume.
@@ -149,10 +169,7 @@ fn check_edges(draft: &Draft) -> Result<(), InputError> {
 
 /// From a closed surface to one body.
 fn finish(mut draft: Draft, mut repairs: Vec<Repair>, mode: RepairMode) -> Result<Repaired, InputError> {
-    repairs.extend(shells::drop_specks(&mut draft));
-    repairs.extend(shells::turn_outwards(&mut draft));
-    repairs.extend(crossing::resolve(&mut draft)?);
-    repairs.extend(fans::part(&mut draft));
+    repairs.extend(resolve(&mut draft)?);
     repairs.extend(shells::drop_specks(&mut draft));
     repairs.extend(shells::fill_cavities(&mut draft));
     if mode == RepairMode::KeepLargest {
@@ -165,6 +182,16 @@ fn finish(mut draft: Draft, mut repairs: Vec<Repair>, mode: RepairMode) -> Resul
         source_face,
         repairs,
     })
+}
+
+/// Makes a closed surface bound a volume: it faces outwards, crosses itself nowhere and is not pinched.
+fn resolve(draft: &mut Draft) -> Result<Vec<Repair>, InputError> {
+    let mut repairs = Vec::new();
+    repairs.extend(shells::drop_specks(draft));
+    repairs.extend(shells::turn_outwards(draft));
+    repairs.extend(crossing::resolve(draft)?);
+    repairs.extend(fans::part(draft));
+    Ok(repairs)
 }
 
 impl Draft {

@@ -21,6 +21,12 @@ pub struct InputEntry {
     /// Whether only the largest body of the file was taken.
     #[serde(default)]
     pub largest_only: bool,
+    /// The object of the file that was taken, where one was chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
+    /// The plate of the slicer's project that was taken, where one was chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plate: Option<String>,
     /// What was changed to make one body of it.
     #[serde(default)]
     pub repairs: Vec<RepairEntry>,

@@ -27,6 +27,10 @@ pub struct Source<'a> {
     pub sha256: &'a str,
     /// The model in mm, from the file's coordinates: 4 × 4, row by row.
     pub transform: [f64; 16],
+    /// The object of the file that was taken, where one was chosen.
+    pub object: Option<&'a str>,
+    /// The plate of the slicer's project that was taken, where one was chosen.
+    pub plate: Option<&'a str>,
     /// What was changed to make one body of it.
     pub repairs: &'a [Repair],
 }
@@ -174,6 +178,8 @@ impl InputEntry {
             sha256: source.sha256.to_owned(),
             transform: source.transform,
             largest_only: source.repairs.iter().any(|r| r.kind == RepairKind::LeftOut),
+            object: source.object.map(str::to_owned),
+            plate: source.plate.map(str::to_owned),
             repairs: source.repairs.iter().map(RepairEntry::of).collect(),
         }
     }

@@ -1,0 +1,136 @@
+//! Choosing one object, or one plate, of a file that has several.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::polygons::divides;
+use super::{FileObject, LabelSource, Loaded, ReadError};
+
+/// Which part of a file is wanted; all of it where nothing is said.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Name of an object, or of a part of one; the case of letters does not count.
+    pub object: Option<String>,
+    /// Number of a plate of a slicer's project, from 1, or its name.
+    pub plate: Option<String>,
+}
+
+impl FileObject {
+    /// What people can call it by: its name, else its number from 1.
+    pub fn title(&self) -> String {
+        self.name
+            .clone()
+            .unwrap_or_else(|| format!("object {}", self.item + 1))
+    }
+
+    fn is_called(&self, wanted: &str) -> bool {
+        let is_same = |name: &str| name.to_lowercase() == wanted.trim().to_lowercase();
+        is_same(&self.title()) || self.part.as_deref().is_some_and(is_same)
+    }
+
+    fn is_on(&self, wanted: &str) -> bool {
+        self.plate.as_ref().is_some_and(|plate| {
+            plate.number.to_string() == wanted.trim()
+                || plate
+                    .name
+                    .as_ref()
+                    .is_some_and(|name| name.to_lowercase() == wanted.trim().to_lowercase())
+        })
+    }
+}
+
+/// The part of `loaded` that is wanted.
+pub(super) fn select(loaded: Loaded, selection: &Selection) -> Result<Loaded, ReadError> {
+    let mut is_wanted = vec![true; loaded.objects.len()];
+    for (what, wanted, fits) in [
+        (
+            "plate",
+            &selection.plate,
+            FileObject::is_on as fn(&FileObject, &str) -> bool,
+        ),
+        ("object", &selection.object, FileObject::is_called),
+    ] {
+        let Some(wanted) = wanted else { continue };
+        for (object, is_wanted) in loaded.objects.iter().zip(&mut is_wanted) {
+            *is_wanted &= fits(object, wanted);
+        }
+        if !is_wanted.contains(&true) {
+            return Err(ReadError::NoSuchPart {
+                what,
+                wanted: wanted.clone(),
+                has: titles(&loaded.objects, what),
+            });
+        }
+    }
+    if is_wanted.contains(&false) {
+        Ok(keep(loaded, &is_wanted))
+    } else {
+        Ok(loaded)
+    }
+}
+
+/// Names of all objects, or of all plates, as they can be asked for.
+fn titles(objects: &[FileObject], what: &str) -> String {
+    let title = |object: &FileObject| match what {
+        "plate" => object.plate.as_ref().map(|plate| match &plate.name {
+            Some(name) => format!("{} \"{name}\"", plate.number),
+            None => plate.number.to_string(),
+        }),
+        _ => Some(format!("\"{}\"", object.title())),
+    };
+    let all: BTreeSet<String> = objects.iter().filter_map(title).collect();
+    if all.is_empty() {
+        return format!("no {what}s with names");
+    }
+    all.into_iter().collect::<Vec<_>>().join(", ")
+}
+
+/// The objects that are wanted, with their faces numbered anew.
+fn keep(mut loaded: Loaded, is_wanted: &[bool]) -> Loaded {
+    let object_of = loaded.object_of_triangle();
+    let is_kept: Vec<bool> = object_of.iter().map(|&object| is_wanted[object]).collect();
+    retain(&mut loaded.mesh.triangles, &is_kept);
+    retain(&mut loaded.file_face, &is_kept);
+    let mut number = BTreeMap::new();
+    for face in &mut loaded.file_face {
+        let next = number.len() as u32;
+        *face = *number.entry(*face).or_insert(next);
+    }
+    let new_label: Vec<i64> = is_wanted
+        .iter()
+        .scan(0, |next, &wanted| {
+            *next += i64::from(wanted);
+            Some(*next - 1)
+        })
+        .collect();
+    for labelling in &mut loaded.labellings {
+        retain(&mut labelling.labels, &is_kept);
+        if labelling.source == LabelSource::Object {
+            for label in &mut labelling.labels {
+                *label = new_label[*label as usize];
+            }
+        }
+    }
+    loaded
+        .labellings
+        .retain(|l| l.source == LabelSource::Property || divides(&l.labels));
+    retain(&mut loaded.objects, is_wanted);
+    let items: BTreeSet<u32> = loaded.objects.iter().map(|object| object.item).collect();
+    loaded.cutters.retain(|cutter| items.contains(&cutter.item));
+    loaded.mesh = loaded.mesh.without_unused_points();
+    loaded
+}
+
+fn retain<T>(all: &mut Vec<T>, is_kept: &[bool]) {
+    let mut kept = is_kept.iter();
+    all.retain(|_| kept.next() == Some(&true));
+}
+
+impl Loaded {
+    /// For each triangle the object that it belongs to, a place in [`Loaded::objects`].
+    pub(super) fn object_of_triangle(&self) -> Vec<usize> {
+        self.labels(LabelSource::Object).map_or_else(
+            || vec![0; self.mesh.triangles.len()],
+            |labels| labels.iter().map(|&label| label as usize).collect(),
+        )
+    }
+}

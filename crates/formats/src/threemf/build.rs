@@ -1,0 +1,464 @@
+//! What the build of a model holds: its objects in their places, each part by its role.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DAffine3;
+
+use super::super::assembly::{Occurrence, Part, occurrences};
+use super::super::paint::{self, Painted};
+use super::super::polygons::{Numbering, divides};
+use super::super::{Cutter, FileObject, FilePlate, Format, LabelSource, Labelling, Loaded, Place, ReadError};
+use super::model::{Model, Object, Property};
+use super::role::{Role, Usage};
+use super::settings::{ObjectSettings, Settings};
+use shellock_geom::{TriMesh, Vec3};
+
+/// The extruder that prints where nothing else is said.
+const FIRST_EXTRUDER: u32 = 1;
+/// Names that a note lists.
+const N_LISTED: usize = 5;
+
+/// Puts the parts of the build together.
+pub(super) fn read(model: &Model, settings: &Settings) -> Result<Loaded, ReadError> {
+    let build = Build::new(model, settings)?;
+    let (roots, mut notes) = build.roots()?;
+    let found = occurrences(&build.parts()?, &roots, "object", Usage::with)?;
+    let mut flat = Flat::default();
+    for occurrence in &found {
+        flat.add(&build, occurrence)?;
+    }
+    notes.splice(0..0, model.notes.iter().cloned());
+    notes.extend(flat.notes(&build));
+    flat.finish(model, notes)
+}
+
+/// Objects ready to be put in place.
+struct Build<'a> {
+    model: &'a Model,
+    bodies: Vec<Body<'a>>,
+    /// Place of an object in the model, by the part it stands in and its id.
+    place_of: BTreeMap<(&'a str, u32), usize>,
+    /// Where each item of the build lies.
+    plates: Vec<Option<FilePlate>>,
+}
+
+/// An object with its paint made real, and what slicers note on it.
+struct Body<'a> {
+    object: &'a Object,
+    settings: Option<&'a ObjectSettings>,
+    painted: Painted,
+    /// The volume of each triangle of the object.
+    volume_of: Vec<u16>,
+    /// The set of each triangle of the object, none where it is −1; empty where there are no sets.
+    set_of: Vec<i64>,
+}
+
+impl<'a> Build<'a> {
+    fn new(model: &'a Model, settings: &'a Settings) -> Result<Self, ReadError> {
+        let root = model.parts.first().map_or("", String::as_str);
+        let bodies = model.objects.iter().map(|object| {
+            // Slicers note the ids of the root part alone.
+            let of_root = (object.path == root).then(|| settings.object(object.id));
+            Body::new(object, of_root.flatten())
+        });
+        let place_of = model.objects.iter().enumerate();
+        let mut n_items: BTreeMap<(&str, u32), u32> = BTreeMap::new();
+        let plates = model.items.iter().map(|item| {
+            let (path, id) = (&item.component.path[..], item.component.id);
+            let instance = n_items.entry((path, id)).or_default();
+            *instance += 1;
+            let plate = settings.plate(id, *instance - 1).filter(|_| path == root)?;
+            Some(FilePlate {
+                number: plate.number,
+                name: plate.name.clone(),
+            })
+        });
+        Ok(Self {
+            model,
+            plates: plates.collect(),
+            bodies: bodies.collect::<Result<_, _>>()?,
+            place_of: place_of.map(|(i, o)| ((&o.path[..], o.id), i)).collect(),
+        })
+    }
+
+    fn find(&self, path: &str, id: u32) -> Result<usize, ReadError> {
+        let missing = || ReadError::MissingPart {
+            kind: "object",
+            id: id.to_string(),
+        };
+        self.place_of.get(&(path, id)).copied().ok_or_else(missing)
+    }
+
+    /// The objects as parts, with how their components are used.
+    fn parts(&self) -> Result<Vec<Part<Usage<'_>>>, ReadError> {
+        self.bodies.iter().map(|body| self.part(body)).collect()
+    }
+
+    fn part<'b>(&'b self, body: &'b Body<'a>) -> Result<Part<Usage<'b>>, ReadError> {
+        let components = &body.object.components;
+        let ids: Vec<u32> = components.iter().map(|c| c.id).collect();
+        let usages = body.settings.map_or_else(
+            || vec![Usage::PLAIN; ids.len()],
+            |settings| settings.of_components(&ids),
+        );
+        let child = |(component, usage): (&super::model::Component, Usage<'b>)| {
+            let part = self.find(&component.path, component.id)?;
+            Ok(Occurrence {
+                part,
+                placed: component.placed,
+                // A name that a slicer shows goes before that of the object.
+                said: self.bodies[part].usage().with(usage),
+            })
+        };
+        let children = components.iter().zip(usages).map(child);
+        Ok(Part {
+            id: body.object.id.to_string(),
+            n_triangles: body.n_triangles(),
+            children: children.collect::<Result<_, ReadError>>()?,
+        })
+    }
+
+    /// The objects that are built, and a note where the file does not say which.
+    fn roots(&self) -> Result<(Vec<Occurrence<Usage<'_>>>, Vec<String>), ReadError> {
+        let root = |part: usize, placed: DAffine3, item: usize| Occurrence {
+            part,
+            placed,
+            said: Usage {
+                item: item as u32,
+                ..self.bodies[part].usage()
+            },
+        };
+        let mut roots = Vec::new();
+        for (number, item) in self.model.items.iter().enumerate() {
+            let part = self.find(&item.component.path, item.component.id)?;
+            let mut of_item = root(part, item.component.placed, number);
+            of_item.said = of_item.said.with(Usage {
+                role: item.role.unwrap_or(Role::Body),
+                extruder: item.extruder,
+                ..Usage::PLAIN
+            });
+            roots.push(of_item);
+        }
+        if !roots.is_empty() {
+            return Ok((roots, Vec::new()));
+        }
+        let mut is_child = vec![false; self.bodies.len()];
+        for component in self.model.objects.iter().flat_map(|o| &o.components) {
+            is_child[self.find(&component.path, component.id)?] = true;
+        }
+        let tops = (0..self.bodies.len()).filter(|&i| !is_child[i]);
+        let roots = tops
+            .enumerate()
+            .map(|(number, part)| root(part, DAffine3::IDENTITY, number));
+        let note = "nothing is on the build plate; all objects were read".to_owned();
+        Ok((roots.collect(), vec![note]))
+    }
+}
+
+impl<'a> Body<'a> {
+    fn new(object: &'a Object, settings: Option<&'a ObjectSettings>) -> Result<Self, ReadError> {
+        let n_triangles = object.mesh.triangles.len();
+        let mut painted = paint::apply(&object.mesh, &object.paint_codes())?;
+        // Each occurrence costs its points: those of no triangle would be free to multiply.
+        painted.mesh = painted.mesh.without_unused_points();
+        Ok(Self {
+            object,
+            settings,
+            painted,
+            volume_of: settings.map_or_else(Vec::new, |s| s.of_triangles(object.id, n_triangles)),
+            set_of: sets(object),
+        })
+    }
+
+    /// How the object is used wherever it occurs.
+    fn usage(&self) -> Usage<'_> {
+        let of_slicer = self.settings.and_then(|s| s.name.as_deref());
+        let own = Some(&self.object.name[..]).filter(|name| !name.is_empty());
+        Usage {
+            role: self.object.role.unwrap_or(Role::Body),
+            extruder: self.settings.and_then(|s| s.extruder).or(self.object.extruder),
+            item: 0,
+            name: of_slicer.or(own),
+        }
+    }
+
+    /// How a triangle of the object is used within it.
+    fn usage_of(&self, source: u32) -> Usage<'_> {
+        match (self.settings, self.volume_of.get(source as usize)) {
+            (Some(settings), Some(&volume)) => settings.usage(volume),
+            _ => Usage::PLAIN,
+        }
+    }
+
+    /// How many triangles it has; an object whose shape is not read counts as one, so that it is met.
+    fn n_triangles(&self) -> usize {
+        let is_met = self.unread_shape().is_some();
+        self.painted.mesh.triangles.len().max(usize::from(is_met))
+    }
+
+    /// The name of a shape in it that is not read.
+    fn unread_shape(&self) -> Option<&str> {
+        let object = self.object;
+        let is_bare = object.mesh.triangles.is_empty() && object.components.is_empty();
+        let unknown = object.unknown.as_deref().filter(|_| is_bare);
+        object.unread.or(unknown)
+    }
+}
+
+/// The named set of each triangle of an object; none where it is −1, the first where there are several.
+fn sets(object: &Object) -> Vec<i64> {
+    /// Sets that have the same triangle at most; further ones are hostile and are passed over.
+    const MAX_OVERLAP: usize = 8;
+    if object.sets.is_empty() {
+        return Vec::new();
+    }
+    let n_triangles = object.mesh.triangles.len();
+    let mut set_of = vec![-1; n_triangles];
+    let mut work_left = MAX_OVERLAP * n_triangles;
+    for &(first, last, set) in &object.sets {
+        let end = (last as usize).saturating_add(1).min(n_triangles);
+        let begin = (first as usize).min(end);
+        let Some(left) = work_left.checked_sub(end - begin) else {
+            break;
+        };
+        work_left = left;
+        for of in set_of[begin..end].iter_mut().filter(|of| **of < 0) {
+            *of = i64::from(set);
+        }
+    }
+    set_of
+}
+
+/// The triangles of all occurrences so far, with every way in which the file divides them.
+#[derive(Default)]
+struct Flat {
+    mesh: TriMesh,
+    file_face: Vec<u32>,
+    n_faces: u32,
+    paint: Vec<i64>,
+    color: Vec<i64>,
+    material: Vec<i64>,
+    set: Vec<i64>,
+    object: Vec<i64>,
+    colors: Numbering<Option<Option<String>>>,
+    materials: Numbering<Option<Property>>,
+    set_numbers: Numbering<Option<(usize, i64)>>,
+    objects: Vec<FileObject>,
+    cutters: Vec<Cutter>,
+    /// Parts that are no part of the model, by role.
+    left_out: BTreeMap<Role, BTreeSet<String>>,
+    /// Triangles of colours or materials that are not there.
+    n_unnamed: usize,
+    has_textures: bool,
+    /// Elements of objects that no specification names.
+    unknown: BTreeSet<String>,
+}
+
+impl Flat {
+    /// Adds the triangles of an occurrence.
+    fn add(&mut self, build: &Build, occurrence: &Occurrence<Usage>) -> Result<(), ReadError> {
+        let Occurrence { part, placed, said } = *occurrence;
+        let body = &build.bodies[part];
+        let is_solid = matches!(said.role, Role::Body | Role::Negative);
+        if let Some(shape) = body.unread_shape().filter(|_| is_solid) {
+            return Err(ReadError::Shape {
+                object: name_of(said, body.object),
+                shape: shape.to_owned(),
+            });
+        }
+        self.unknown
+            .extend(body.object.unknown.clone().filter(|_| is_solid));
+        let points = moved(build.model, &body.painted.mesh, placed)?;
+        let is_mirror = placed.matrix3.determinant() < 0.0;
+        let (mut of_body, mut last_source) = (Vec::new(), None);
+        let mut of_cutters: BTreeMap<String, Vec<[u32; 3]>> = BTreeMap::new();
+        for (place, &[a, b, c]) in body.painted.mesh.triangles.iter().enumerate() {
+            let source = body.painted.source[place];
+            let usage = said.with(body.usage_of(source));
+            let triangle = if is_mirror { [a, c, b] } else { [a, b, c] };
+            match usage.role {
+                Role::Body => {
+                    self.n_faces += u32::from(last_source.replace(source) != Some(source));
+                    of_body.push(triangle);
+                    self.divide(build, part, place, usage);
+                }
+                Role::Negative => {
+                    let name = name_of(usage, body.object);
+                    of_cutters.entry(name).or_default().push(triangle);
+                }
+                role => {
+                    let names = self.left_out.entry(role).or_default();
+                    names.insert(name_of(usage, body.object));
+                }
+            }
+        }
+        if !of_body.is_empty() {
+            append(&mut self.mesh, part_of(&points, of_body));
+            self.objects.push(FileObject {
+                name: build.item_name(said.item),
+                part: said.name.map(str::to_owned),
+                item: said.item,
+                plate: build.plates.get(said.item as usize).cloned().flatten(),
+            });
+        }
+        self.cutters
+            .extend(of_cutters.into_iter().map(|(name, triangles)| Cutter {
+                name,
+                item: said.item,
+                mesh: part_of(&points, triangles),
+            }));
+        Ok(())
+    }
+
+    /// Notes what the file says of the triangle at `place` of a body, which was just added.
+    fn divide(&mut self, build: &Build, part: usize, place: usize, usage: Usage) {
+        let (model, body) = (build.model, &build.bodies[part]);
+        let source = body.painted.source[place];
+        self.file_face.push(self.n_faces - 1);
+        let property = body.object.property(source);
+        self.n_unnamed += usize::from(property.is_some_and(|p| !model.has(p)));
+        self.has_textures |= property.is_some_and(|p| model.textures.contains(&p.group()));
+        let (of_color, of_material) = match property {
+            Some(property) if model.color_groups.contains_key(&property.group()) => (Some(property), None),
+            other => (None, other),
+        };
+        let value = |p: Property| model.color_groups[&p.group()].get(p.index as usize).cloned();
+        let extruder = match body.painted.colors[place] {
+            0 => usage.extruder.unwrap_or(FIRST_EXTRUDER),
+            color => color,
+        };
+        let set = body.set_of.get(source as usize).filter(|set| **set >= 0);
+        self.paint.push(i64::from(extruder));
+        self.color.push(self.colors.number(of_color.map(value)));
+        self.material.push(self.materials.number(of_material));
+        self.set
+            .push(self.set_numbers.number(set.map(|&set| (part, set))));
+        self.object.push(self.objects.len() as i64);
+    }
+
+    /// Everything that a person should know of what was read and what was not.
+    fn notes(&self, build: &Build) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.objects.len() > 1 {
+            let n = self.objects.len();
+            let names: BTreeSet<String> = self.objects.iter().filter_map(|o| o.name.clone()).collect();
+            let named = if names.is_empty() {
+                String::new()
+            } else {
+                format!(": {}", listed(&names))
+            };
+            notes.push(format!("the file has {n} objects or parts; all were read{named}"));
+        }
+        for (role, names) in &self.left_out {
+            notes.push(format!("left out as {}: {}", role.words(), listed(names)));
+        }
+        if self.n_unnamed > 0 {
+            notes.push(format!(
+                "{} triangle(s) have a colour or material that the file does not have; those of the same missing \
+                 one are taken as one",
+                self.n_unnamed
+            ));
+        }
+        if self.has_textures {
+            notes.push("the file's texture is not used: it divides nothing".to_owned());
+        }
+        if !self.unknown.is_empty() {
+            notes.push(format!("elements that are not read: {}", listed(&self.unknown)));
+        }
+        if build.model.objects.is_empty() {
+            notes.push("the file has no objects".to_owned());
+        }
+        notes
+    }
+
+    fn finish(self, model: &Model, notes: Vec<String>) -> Result<Loaded, ReadError> {
+        if self.mesh.triangles.is_empty() {
+            if let Some((role, names)) = self.left_out.first_key_value() {
+                return Err(ReadError::NothingPrinted {
+                    what: role.words(),
+                    names: listed(names),
+                });
+            }
+            return Err(ReadError::NoTriangles {
+                format: Format::ThreeMf,
+                n_points: model.objects.iter().map(|o| o.mesh.points.len()).sum(),
+            });
+        }
+        let all = [
+            (LabelSource::Paint, self.paint),
+            (LabelSource::Color, self.color),
+            (LabelSource::Material, self.material),
+            (LabelSource::Set, self.set),
+            (LabelSource::Object, self.object),
+        ];
+        let labellings = all.into_iter().filter(|(_, labels)| divides(labels));
+        Ok(Loaded {
+            mesh: self.mesh,
+            labellings: labellings
+                .map(|(source, labels)| Labelling { source, labels })
+                .collect(),
+            file_face: self.file_face,
+            format: Format::ThreeMf,
+            unit_mm: Some(model.unit_mm),
+            unit_is_stated: model.unit_is_stated,
+            objects: self.objects,
+            cutters: self.cutters,
+            notes,
+        })
+    }
+}
+
+impl Build<'_> {
+    /// What the object of an item is called.
+    fn item_name(&self, item: u32) -> Option<String> {
+        let component = &self.model.items.get(item as usize)?.component;
+        let part = self.find(&component.path, component.id).ok()?;
+        self.bodies[part].usage().name.map(str::to_owned)
+    }
+}
+
+/// The points of an object in their place.
+fn moved(model: &Model, mesh: &TriMesh, placed: DAffine3) -> Result<Vec<Vec3>, ReadError> {
+    let points: Vec<Vec3> = mesh.points.iter().map(|&p| placed.transform_point3(p)).collect();
+    if points.iter().all(|p| p.is_finite()) {
+        return Ok(points);
+    }
+    Err(ReadError::Xml {
+        part: model.parts.first().cloned().unwrap_or_default(),
+        at: Place::Byte(0),
+        reason: "moving an object takes its points out of all numbers".to_owned(),
+    })
+}
+
+/// The mesh of some triangles, with the points that they use.
+fn part_of(points: &[Vec3], triangles: Vec<[u32; 3]>) -> TriMesh {
+    TriMesh {
+        points: points.to_vec(),
+        triangles,
+    }
+    .without_unused_points()
+}
+
+fn append(mesh: &mut TriMesh, more: TriMesh) {
+    let first = mesh.points.len() as u32;
+    mesh.points.extend(more.points);
+    mesh.triangles
+        .extend(more.triangles.iter().map(|t| t.map(|v| v + first)));
+}
+
+/// What a part is called where it is used.
+fn name_of(usage: Usage, object: &Object) -> String {
+    usage
+        .name
+        .map_or_else(|| format!("object {}", object.id), |name| format!("\"{name}\""))
+}
+
+/// The first names of a list, and how many more there are.
+fn listed(names: &BTreeSet<String>) -> String {
+    let first: Vec<&str> = names.iter().take(N_LISTED).map(String::as_str).collect();
+    let more = match names.len().saturating_sub(N_LISTED) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    format!("{}{more}", first.join(", "))
+}

@@ -1,0 +1,116 @@
+//! Extensions of 3MF: which are read, and by which names people know the others.
+//!
+//! The core specification (1.3, section 2.3) lets a file demand extensions by the prefixes of their
+//! namespaces in `requiredextensions`; a reader that does not know one of them must not read the file.
+
+use std::collections::BTreeMap;
+
+use super::super::ReadError;
+
+/// Parts of namespaces whose content is read or changes no shape.
+const KNOWN: [&str; 10] = [
+    "/3dmanufacturing/core/",
+    "/3dmanufacturing/material/",
+    "/3dmanufacturing/production/",
+    "/3dmanufacturing/trianglesets/",
+    "/markup-compatibility/",
+    "schemas.slic3r.org",
+    "schemas.prusa3d.com",
+    "schemas.bambulab.com",
+    "software.ultimaker.com",
+    "www.w3.org",
+];
+
+/// Parts of namespaces that are not read, and their names for people.
+const UNREAD: [(&str, &str); 9] = [
+    ("/beamlattice/", "beam lattice"),
+    ("/slice/", "slices"),
+    ("/booleanoperations/", "boolean operations"),
+    ("/displacement/", "displacement"),
+    ("/volumetric/", "volumetric"),
+    ("/implicit/", "implicit functions"),
+    ("/securecontent/", "encryption"),
+    ("/productionalternatives/", "production alternatives"),
+    ("/toolpath/", "tool paths"),
+];
+
+/// Elements of objects that give a shape which is not read, by local name, and their extensions.
+const SHAPES: [(&str, &str); 4] = [
+    ("beamlattice", "beam lattice"),
+    ("booleanshape", "boolean operations"),
+    ("displacementmesh", "displacement"),
+    ("levelset", "volumetric"),
+];
+
+/// The extension whose slices stand for an object's shape.
+pub(super) const SLICES: &str = "slices";
+
+/// The extension of a shape that an element of this local name gives.
+pub(super) fn of_shape(element: &str) -> Option<&'static str> {
+    SHAPES
+        .iter()
+        .find(|(name, _)| *name == element)
+        .map(|(_, extension)| *extension)
+}
+
+/// Refuses a part that demands an extension that is not read.
+///
+/// `required` holds prefixes, `namespaces` what they stand for.
+pub(super) fn check_required(required: &str, namespaces: &BTreeMap<String, String>) -> Result<(), ReadError> {
+    for prefix in required.split_whitespace() {
+        // Some programs give the namespace itself.
+        let namespace = namespaces.get(prefix).map_or(prefix, String::as_str);
+        let folded = namespace.to_ascii_lowercase();
+        if KNOWN.iter().any(|known| folded.contains(known)) {
+            continue;
+        }
+        let name = UNREAD
+            .iter()
+            .find(|(part, _)| folded.contains(part))
+            .map_or_else(|| shown(namespace), |(_, name)| (*name).to_owned());
+        return Err(ReadError::Extension { name });
+    }
+    Ok(())
+}
+
+/// A namespace in a message.
+fn shown(namespace: &str) -> String {
+    const MOST_CHARS: usize = 80;
+    namespace.chars().take(MOST_CHARS).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_demands_is_known_or_refused_by_its_name_for_people() {
+        let namespaces: BTreeMap<String, String> = [
+            (
+                "p",
+                "http://schemas.microsoft.com/3dmanufacturing/production/2015/06",
+            ),
+            (
+                "b",
+                "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02",
+            ),
+            (
+                "bo",
+                "http://schemas.3mf.io/3dmanufacturing/booleanoperations/2023/07",
+            ),
+            ("x", "http://example.org/own"),
+        ]
+        .map(|(prefix, namespace)| (prefix.to_owned(), namespace.to_owned()))
+        .into();
+        let name = |required: &str| match check_required(required, &namespaces) {
+            Err(ReadError::Extension { name }) => Some(name),
+            _ => None,
+        };
+        assert_eq!(name(" p  p "), None);
+        assert_eq!(name("p b").as_deref(), Some("beam lattice"));
+        assert_eq!(name("bo").as_deref(), Some("boolean operations"));
+        assert_eq!(name("x").as_deref(), Some("http://example.org/own"));
+        assert_eq!(name("undeclared").as_deref(), Some("undeclared"));
+        assert_eq!(name(&namespaces["b"]).as_deref(), Some("beam lattice"));
+    }
+}
