@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use shellock_formats::{read_labels, read_mesh};
-use shellock_geom::repair::{Mending, mend};
+use shellock_geom::repair::{RepairMode, repair};
 
 const READERS: [&str; 6] = ["stl", "obj", "ply", "off", "gltf", ""];
 
@@ -32,7 +32,7 @@ fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
         assert!(loaded.mesh.points.iter().all(|p| p.is_finite()));
         assert!(loaded.mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < loaded.mesh.points.len()));
         if n_triangles <= MOST_TRIANGLES
-            && let Ok(mended) = mend(&loaded.mesh, Mending::KeepLargest)
+            && let Ok(mended) = repair(&loaded.mesh, RepairMode::KeepLargest)
         {
             assert_eq!(mended.solid.mesh().triangles.len(), mended.source_face.len());
         }

@@ -6,7 +6,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use shellock_geom::repair::{Mending, mend};
+use shellock_geom::repair::{RepairMode, repair};
 use shellock_geom::{TriMesh, Vec3};
 
 // Panics that are caught and become an error are none: without this the first one would end the process.
@@ -24,7 +24,7 @@ fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
     }
     let triangles = corners.as_chunks::<3>().0.iter().map(|t| t.map(|corner| u32::from(corner % n))).collect();
     let mesh = TriMesh { points, triangles };
-    let Ok(mended) = mend(&mesh, Mending::KeepLargest) else { return };
+    let Ok(mended) = repair(&mesh, RepairMode::KeepLargest) else { return };
     assert!(mended.solid.volume() > 0.0);
     assert_eq!(mended.source_face.len(), mended.solid.mesh().triangles.len());
     assert!(mended.source_face.iter().all(|&face| (face as usize) < mesh.triangles.len()));

@@ -20,7 +20,7 @@ use crate::place::Standing;
 use crate::printing::Printing;
 use crate::progress::{Deadline, Display, PlanClock, Shown};
 use crate::stopwatch::StageTime;
-use crate::told::{Finished, print_failures, print_warnings};
+use crate::told::{Finished, print_failures, print_input_warnings, print_warnings};
 
 /// `shellock build`.
 pub fn build(session: &Session, file: &Path, options: &Options, out: Out) -> Result<u8, Failure> {

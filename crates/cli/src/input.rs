@@ -123,7 +123,7 @@ pub fn repaired(path: &Path, loaded: &Loaded, mode: RepairMode) -> Result<Repair
 }
 
 /// What the file calls its objects, and where they lie; nothing where there is one alone.
-fn objects(loaded: &Loaded) -> Vec<String> {
+pub fn objects(loaded: &Loaded) -> Vec<String> {
     let n_plates = loaded
         .objects
         .iter()

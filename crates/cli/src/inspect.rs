@@ -15,7 +15,7 @@ use crate::Session;
 use crate::args::{Options, Thickness};
 use crate::division::{Division, divide};
 use crate::failure::Failure;
-use crate::input::{Model, load, model_of, repair_mode};
+use crate::input::{Model, load_selected, model_of, objects, repair_mode, selection};
 use crate::place::Standing;
 use crate::told::print_warnings;
 
@@ -33,7 +33,7 @@ pub enum Wanted {
 
 /// `shellock inspect`.
 pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted) -> Result<u8, Failure> {
-    let (loaded, bytes) = session.during("reading", || load(file))?;
+    let (loaded, bytes) = session.during("reading", || load_selected(file, &selection(options)))?;
     let found = inspection(&weld(&loaded.mesh).mesh);
     if !session.is_json {
         print_file(&loaded, &found);
@@ -55,13 +55,14 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
         // Why not is in what was printed.
         return Ok(model.err().map_or(0, |failure| failure.exit_code()));
     }
-    print_model(session, &model?, &thin, division.as_ref(), options);
+    let model = model.inspect_err(|_| loaded.notes.iter().for_each(|note| println!("note: {note}")))?;
+    print_model(session, &model, &thin, division.as_ref(), options);
     Ok(0)
 }
 
 /// What the file holds, for people.
 fn print_file(loaded: &Loaded, found: &Inspection) {
-    let (n, size) = (found.bodies.len(), loaded.mesh.bounds().size());
+    let (n, size) = (found.bodies.len(), loaded.bounds().size());
     let bodies = if n == 1 { "body" } else { "bodies" };
     println!(
         "{} file, {} faces, {n} {bodies}",
@@ -79,6 +80,10 @@ fn print_file(loaded: &Loaded, found: &Inspection) {
         "{} open edges, {} edges of more than two faces",
         found.edges.open.count, found.edges.shared.count
     );
+    let objects = objects(loaded);
+    if !objects.is_empty() {
+        println!("objects {}", objects.join(", "));
+    }
     if !loaded.labellings.is_empty() {
         println!("divided by {}", labellings(loaded).join(", "));
     }
@@ -97,6 +102,10 @@ fn print_model(
     options: &Options,
 ) {
     model.notes.iter().for_each(|note| println!("note: {note}"));
+    model
+        .warnings
+        .iter()
+        .for_each(|warning| println!("warning: {warning}"));
     thin.iter().for_each(|warning| println!("warning: {warning}"));
     let made = model.solid.mesh().bounds().size();
     let state = if model.repairs.is_empty() {
@@ -132,10 +141,19 @@ fn told(
         |m| (m.repairs.iter().map(RepairEntry::of).collect(), &m.notes),
     );
     let error = model.as_ref().err().map(ToString::to_string);
+    // What was read is worth knowing where it cannot be made, too.
+    let notes = if model.is_ok() { notes } else { &loaded.notes[..] };
+    let of_model = model.iter().flat_map(|m| &m.warnings).map(ToString::to_string);
+    let warnings: Vec<String> = of_model.chain(thin.iter().cloned()).collect();
+    let size_mm = model.as_ref().map_or_else(
+        |_| loaded.unit_mm.map(|mm| mm * loaded.bounds().size()),
+        |m| Some(m.solid.mesh().bounds().size()),
+    );
     let mut value = json!({ "format": loaded.format.to_string(), "faces": loaded.n_file_faces(), "bodies": found.bodies.len(),
-        "size": loaded.mesh.bounds().size().to_array(), "unit_mm": loaded.unit_mm, "open_edges": found.edges.open.count,
+        "size": loaded.bounds().size().to_array(), "unit_mm": loaded.unit_mm, "unit_is_stated": loaded.unit_is_stated,
+        "volume_mm3": model.as_ref().ok().map(|m| m.solid.volume()), "size_mm": size_mm.map(|size| size.to_array()), "objects": objects(loaded), "open_edges": found.edges.open.count,
         "shared_edges": found.edges.shared.count, "has_labels": loaded.face_labels().is_some(),
-        "divided_by": labellings(loaded), "is_sound": is_sound, "repairs": repairs, "notes": notes, "warnings": thin,
+        "divided_by": labellings(loaded), "is_sound": is_sound, "repairs": repairs, "notes": notes, "warnings": warnings,
         "can_be_made": model.is_ok(), "error": error });
     if let Some(division) = division {
         value["division"] = json!(division.figures);

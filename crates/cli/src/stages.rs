@@ -27,7 +27,7 @@ use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
 use crate::place::Standing;
 use crate::progress::{Display, PlanClock};
-use crate::told::{print_verdict, print_warnings, quality, weakest};
+use crate::told::{print_input_warnings, print_verdict, print_warnings, quality, weakest};
 
 /// Writes one file: whole or not at all.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
@@ -90,7 +90,11 @@ pub fn segment(session: &Session, file: &Path, options: &Options, out: &Path) ->
         _ => write_labels(&labels_of_file(&model, &surface)),
     };
     write(out, &bytes)?;
-    let warnings = ctx.into_warnings();
+    print_input_warnings(session, &model);
+    let mut warnings = ctx.into_warnings();
+    if session.is_json {
+        warnings.splice(0..0, model.warnings.iter().cloned());
+    }
     if session.is_json {
         let value = json!({ "status": "done", "out": out, "pieces": surface.n_patches, "notes": notes, "warnings": warnings });
         println!("{value}");
@@ -160,6 +164,7 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     };
     let is_time_up = || clock.is_up();
     let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
+    print_input_warnings(session, &model);
     let planned = design::plan(&ctx, &params, &model.solid, model.labels.as_deref())
         .inspect_err(|_| display.finish())?;
     display.finish();
@@ -177,6 +182,7 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
     })?;
     let steps = &plan.steps;
     if session.is_json {
+        let warnings: Vec<_> = model.warnings.iter().chain(&warnings).collect();
         let order: Vec<PatchId> = steps.iter().map(|s| s.piece).collect();
         let steps: Vec<Value> = steps
             .iter()

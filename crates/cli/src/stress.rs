@@ -103,7 +103,13 @@ fn pieces_of(kit: &Path, plan: &PlanFile) -> Result<Vec<Solid>, Failure> {
         let path = kit.join(file.ok_or_else(missing)?);
         let (loaded, _) = load(&path)?;
         let solid = into_solid(&loaded.mesh);
-        Ok(solid.map_err(|source| Failure::NotOneBody { path, source })?.0)
+        Ok(solid
+            .map_err(|source| Failure::NotOneBody {
+                path,
+                source,
+                objects: Vec::new(),
+            })?
+            .0)
     };
     (1..)
         .zip(plan.pieces.iter().map(|entry| entry.file.as_ref()))
@@ -121,6 +127,7 @@ fn surface_of(path: &Path, n_pieces: usize) -> Result<SegmentedSurface, Failure>
     let (solid, kept) = into_solid(&loaded.mesh).map_err(|source| Failure::NotOneBody {
         path: path.to_owned(),
         source,
+        objects: Vec::new(),
     })?;
     // Kits of program 0.1 number pieces from 0 here as in their plans.
     let first = i64::from(!labels.contains(&0));

@@ -13,6 +13,7 @@ use crate::input::Model;
 use crate::output::{Destination, Summary};
 use crate::place::Standing;
 use crate::printing::Printing;
+use crate::progress::Shown;
 use crate::{Session, bears};
 
 /// So many warnings and notes are told, problems all; the rest where all is asked for.

@@ -51,13 +51,11 @@ fn carve_item(mut loaded: Loaded, item: u32, cutters: &[Cutter]) -> Result<Loade
         reason: e.to_string(),
     })?;
     for (cutter, is_met) in cutters.iter().zip(&cut.is_met) {
+        let name = &cutter.name;
         loaded.notes.push(if *is_met {
-            format!("the negative volume {} is cut out of {title}", cutter.name)
+            format!("cut out as a negative volume: {name}")
         } else {
-            format!(
-                "the negative volume {} does not meet {title}: nothing is cut out",
-                cutter.name
-            )
+            format!("the negative volume {name} does not meet {title}: nothing is cut out")
         });
     }
     let n_faces = loaded.n_file_faces() as u32;

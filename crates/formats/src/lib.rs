@@ -44,7 +44,7 @@ pub use stl::write_stl_binary;
 pub use threemf::{NamedObject, write_3mf, write_painted_3mf};
 
 use recognise::recognise;
-use shellock_geom::TriMesh;
+use shellock_geom::{Aabb, TriMesh};
 
 /// A mesh as its file has it, polygons cut into triangles.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +75,13 @@ impl Loaded {
     pub fn n_file_faces(&self) -> usize {
         // No reader drops a face, so the last triangle belongs to the last face.
         self.file_face.last().map_or(0, |&face| face as usize + 1)
+    }
+
+    /// The box around the triangles, file units; points that none of them uses do not count.
+    pub fn bounds(&self) -> Aabb {
+        (0..self.mesh.triangles.len()).fold(Aabb::EMPTY, |bounds, face| {
+            bounds.union(Aabb::around(self.mesh.corners(face)))
+        })
     }
 
     /// One label for each triangle as `source` has them; `None` where the file has none.

@@ -50,7 +50,12 @@ impl Figure {
             .map(|mm| mm.is_some())
             .collect();
         Ok(Self {
-            warnings: thin_warnings(&model, options),
+            warnings: model
+                .warnings
+                .iter()
+                .map(ToString::to_string)
+                .chain(thin_warnings(&model, options))
+                .collect(),
             model,
             full,
             is_thin,

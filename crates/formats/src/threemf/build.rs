@@ -190,6 +190,19 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// What the part that a triangle belongs to is called, where the object is used as `said`.
+    fn name_of(&self, said: Usage, source: u32) -> String {
+        let is_range = self
+            .volume_of
+            .get(source as usize)
+            .is_some_and(|&volume| volume > 0);
+        match self.usage_of(source).name {
+            Some(name) => format!("\"{name}\""),
+            None if is_range => format!("a part of {}", name_of(said, self.object)),
+            None => name_of(said, self.object),
+        }
+    }
+
     /// How many triangles it has; an object whose shape is not read counts as one, so that it is met.
     fn n_triangles(&self) -> usize {
         let is_met = self.unread_shape().is_some();
@@ -283,12 +296,12 @@ impl Flat {
                     self.divide(build, part, place, usage);
                 }
                 Role::Negative => {
-                    let name = name_of(usage, body.object);
+                    let name = body.name_of(said, source);
                     of_cutters.entry(name).or_default().push(triangle);
                 }
                 role => {
                     let names = self.left_out.entry(role).or_default();
-                    names.insert(name_of(usage, body.object));
+                    names.insert(body.name_of(said, source));
                 }
             }
         }

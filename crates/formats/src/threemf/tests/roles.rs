@@ -99,7 +99,7 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
         "{}",
         volume(&loaded)
     );
-    assert_told(&loaded, "\"hole\" is cut out of block");
+    assert_told(&loaded, "cut out as a negative volume: \"hole\"");
     assert!(loaded.file_face.is_sorted() && loaded.n_file_faces() > 24);
     assert_eq!(loaded.file_face.len(), loaded.mesh.triangles.len());
     // A range of an object's triangles, as PrusaSlicer has it.
