@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
 
 /// The extensions of an element, by their names.
 pub(super) type Names = BTreeMap<String, IgnoredAny>;
@@ -16,7 +17,8 @@ pub(super) struct Document {
     pub nodes: Vec<Node>,
     pub meshes: Vec<Mesh>,
     pub skins: Vec<Skin>,
-    pub materials: Vec<Material>,
+    /// As they are: a fault in them is no reason to refuse a shape.
+    pub materials: Vec<Value>,
     pub animations: Vec<IgnoredAny>,
     pub accessors: Vec<Accessor>,
     pub buffer_views: Vec<BufferView>,
@@ -29,13 +31,7 @@ pub(super) struct Document {
 #[serde(default)]
 pub(super) struct DocumentExtensions {
     #[serde(rename = "KHR_materials_variants")]
-    pub variants: Option<Variants>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-pub(super) struct Variants {
-    pub variants: Vec<IgnoredAny>,
+    pub variants: Option<IgnoredAny>,
 }
 
 #[derive(Default, Deserialize)]
@@ -104,34 +100,6 @@ pub(super) struct Primitive {
 pub(super) struct Skin {
     pub inverse_bind_matrices: Option<usize>,
     pub joints: Vec<usize>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-pub(super) struct Material {
-    pub pbr_metallic_roughness: Surface,
-    pub extensions: MaterialExtensions,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-pub(super) struct Surface {
-    pub base_color_factor: Option<Vec<f64>>,
-    pub base_color_texture: Option<IgnoredAny>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-pub(super) struct MaterialExtensions {
-    #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
-    pub specular_glossiness: Option<SpecularGlossiness>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-pub(super) struct SpecularGlossiness {
-    pub diffuse_factor: Option<Vec<f64>>,
-    pub diffuse_texture: Option<IgnoredAny>,
 }
 
 #[derive(Default, Deserialize)]

@@ -71,7 +71,7 @@ pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
         at: Place::Byte(bytes.len()),
         within: "the header",
     })?;
-    read(json, data, Format::Glb)
+    read(super::text::without_bom(json), data, Format::Glb)
 }
 
 fn read(json: &[u8], data: Option<&[u8]>, format: Format) -> Result<Loaded, ReadError> {
@@ -156,8 +156,8 @@ impl Scene {
     }
 
     fn note(&self) -> Option<String> {
-        let n = self.n_without_triangles;
-        (n > 0).then(|| format!("{n} sets of lines or points are left out"))
+        let (one, several) = ("set of lines or points is", "sets of lines or points are");
+        left_out(self.n_without_triangles, one, several)
     }
 }
 
@@ -194,22 +194,24 @@ fn loaded(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
 /// What of the document as a whole is left out.
 fn notes(document: &Document, nodes: &Nodes) -> Vec<String> {
     let mut notes = vec!["in glTF y points up: give --up y".to_owned()];
-    if nodes.n_hidden > 0 {
-        notes.push(format!("{} hidden meshes are left out", nodes.n_hidden));
-    }
-    if document.scenes.len() > 1 {
-        notes.push(format!("{} other scenes are left out", document.scenes.len() - 1));
-    }
+    notes.extend(left_out(nodes.n_hidden, "hidden mesh is", "hidden meshes are"));
+    let n_others = document.scenes.len().saturating_sub(1);
+    notes.extend(left_out(n_others, "other scene is", "other scenes are"));
     if !document.animations.is_empty() {
         notes.push("the file is animated; its pose at rest is used".to_owned());
     } else if !document.skins.is_empty() {
         notes.push("the file has a skeleton; its pose at rest is used".to_owned());
     }
-    let variants = document.extensions.variants.as_ref();
-    if variants.is_some_and(|v| !v.variants.is_empty()) {
+    if document.extensions.variants.is_some() {
         notes.push("the file has variants of its materials; the default ones are used".to_owned());
     }
     notes
+}
+
+/// A note on `n` things; `one` and `several` name them.
+fn left_out(n: usize, one: &str, several: &str) -> Option<String> {
+    let what = if n == 1 { one } else { several };
+    (n > 0).then(|| format!("{n} {what} left out"))
 }
 
 /// The first of `extensions` that compresses data.

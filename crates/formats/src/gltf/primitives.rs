@@ -1,10 +1,11 @@
 //! Primitives of meshes: their triangles, and the points and colours of those.
 
 use glam::DVec3;
+use serde_json::Value;
 
 use super::super::ReadError;
 use super::super::point_colors::{Color, eight_bits};
-use super::document::{Material, Mesh, Primitive};
+use super::document::{Mesh, Primitive};
 use super::values::{Accessors, Shape, Values};
 use super::{compression, error, is_compressed};
 
@@ -12,6 +13,9 @@ use super::{compression, error, is_compressed};
 const TRIANGLES: u32 = 4;
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
+/// Where materials of an older kind have their colour and their texture.
+const GLOSSINESS_COLOR: &str = "/extensions/KHR_materials_pbrSpecularGlossiness/diffuseFactor";
+const GLOSSINESS_TEXTURE: &str = "/extensions/KHR_materials_pbrSpecularGlossiness/diffuseTexture";
 /// The colour of points where a file gives none, and the factor that changes nothing.
 const WHITE: [f64; 4] = [1.0; 4];
 
@@ -147,23 +151,17 @@ impl Accessors<'_> {
 
     /// Whether a picture colours the primitive.
     pub(super) fn has_texture(&self, primitive: &Primitive) -> bool {
+        let textures = ["/pbrMetallicRoughness/baseColorTexture", GLOSSINESS_TEXTURE];
         let material = primitive.material.and_then(|m| self.document.materials.get(m));
-        material.is_some_and(|material| {
-            let other = material.extensions.specular_glossiness.as_ref();
-            material.pbr_metallic_roughness.base_color_texture.is_some()
-                || other.is_some_and(|other| other.diffuse_texture.is_some())
-        })
+        material.is_some_and(|material| textures.iter().any(|at| material.pointer(at).is_some()))
     }
 }
 
-/// The colour that a material multiplies those of points by.
-fn base_color(material: &Material) -> [f64; 4] {
-    let other = material.extensions.specular_glossiness.as_ref();
-    let factor = match other {
-        Some(other) => other.diffuse_factor.as_ref(),
-        None => material.pbr_metallic_roughness.base_color_factor.as_ref(),
-    };
-    std::array::from_fn(|c| factor.and_then(|f| f.get(c)).copied().unwrap_or(1.0))
+/// The colour that a material multiplies those of points by; numbers that are missing are 1.
+fn base_color(material: &Value) -> [f64; 4] {
+    let factors = ["/pbrMetallicRoughness/baseColorFactor", GLOSSINESS_COLOR];
+    let factor = factors.iter().find_map(|at| material.pointer(at));
+    std::array::from_fn(|c| factor.and_then(|f| f.get(c)?.as_f64()).unwrap_or(1.0))
 }
 
 /// Triangles of a mode by rows of points, all less than `n_rows`.

@@ -59,6 +59,22 @@ fn colours_that_cannot_be_read_are_told_and_the_shape_is_read() {
 }
 
 #[test]
+fn faults_of_materials_are_no_reason_to_refuse_a_shape() {
+    let mut file = File::tetrahedron();
+    let white = file.shares(&[[255; 3]; 4]);
+    file.attributes()["COLOR_0"] = json!(white);
+    file.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    let colored = file.read().unwrap();
+    for materials in [
+        json!([3]),
+        json!([{ "pbrMetallicRoughness": { "baseColorFactor": ["red"] } }]),
+    ] {
+        file.json["materials"] = materials;
+        assert_eq!(file.read().as_ref(), Ok(&colored));
+    }
+}
+
+#[test]
 fn each_thing_left_out_is_told_once() {
     let plain = File::tetrahedron().read().unwrap();
     assert_eq!(plain.notes.len(), 1);
@@ -75,7 +91,7 @@ fn each_thing_left_out_is_told_once() {
     assert_eq!(loaded.mesh, plain.mesh);
     let told = [
         "2 sets of lines or points are left out",
-        "1 other scenes are left out",
+        "1 other scene is left out",
         "animated",
         "texture",
         "variants",
@@ -98,7 +114,7 @@ fn hidden_nodes_and_those_below_are_left_out() {
     file.json["extensionsRequired"] = json!(["KHR_node_visibility"]);
     let loaded = file.read().unwrap();
     assert_eq!(loaded.mesh, File::tetrahedron().read().unwrap().mesh);
-    assert_told(&loaded, "1 hidden meshes are left out");
+    assert_told(&loaded, "1 hidden mesh is left out");
 }
 
 #[test]
