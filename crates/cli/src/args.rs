@@ -421,7 +421,7 @@ pub enum LabelsFrom {
     Labels,
     /// Multi-material paint of a slicer (3MF)
     Paint,
-    /// Colours of faces or points (STL, PLY, OBJ, OFF, 3MF, glTF)
+    /// Colours of faces (STL, PLY, OFF, 3MF) or of points (PLY, OBJ, OFF, glTF)
     Colors,
     /// Materials (OBJ, 3MF, glTF)
     Materials,

@@ -42,27 +42,32 @@ pub enum Failure {
 
 /// The option that helps, where there is one.
 fn hint(error: &InputError, objects: &[String]) -> String {
-    /// Names that a message lists.
-    const N_LISTED: usize = 8;
     if !matches!(error, InputError::Bodies(_)) {
         return String::new();
     }
     if objects.is_empty() {
         return " (--largest keeps the largest)".to_owned();
     }
-    let more = match objects.len().saturating_sub(N_LISTED) {
-        0 => String::new(),
-        n => format!(" and {n} more"),
-    };
-    let listed = objects[..objects.len().min(N_LISTED)].join(", ");
+    let listed = listed(objects);
     let plate = if listed.contains("(plate ") {
         " or --plate N"
     } else {
         ""
     };
     format!(
-        "; the file's objects are {listed}{more}: choose one with --object NAME{plate}, or --largest keeps the largest body"
+        "; the file's objects are {listed}: choose one with --object NAME{plate}, or --largest keeps the largest body"
     )
+}
+
+/// The first of some names, and how many more there are.
+pub fn listed(names: &[String]) -> String {
+    /// Names that a message lists.
+    const N_LISTED: usize = 8;
+    let first = names[..names.len().min(N_LISTED)].join(", ");
+    match names.len().saturating_sub(N_LISTED) {
+        0 => first,
+        n => format!("{first} and {n} more"),
+    }
 }
 
 impl From<shellock::Cancelled> for Failure {

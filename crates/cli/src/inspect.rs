@@ -14,7 +14,7 @@ use shellock_kit::plan_file::RepairEntry;
 use crate::Session;
 use crate::args::{Options, Thickness};
 use crate::division::{Division, divide};
-use crate::failure::Failure;
+use crate::failure::{Failure, listed};
 use crate::input::{Model, load_selected, model_of, objects, repair_mode, selection};
 use crate::place::Standing;
 use crate::told::print_warnings;
@@ -82,7 +82,7 @@ fn print_file(loaded: &Loaded, found: &Inspection) {
     );
     let objects = objects(loaded);
     if !objects.is_empty() {
-        println!("objects {}", objects.join(", "));
+        println!("objects {}", listed(&objects));
     }
     if !loaded.labellings.is_empty() {
         println!("divided by {}", labellings(loaded).join(", "));

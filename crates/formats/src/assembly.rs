@@ -48,12 +48,7 @@ pub(super) fn occurrences<T: Copy>(
             sum.1.saturating_add(sizes[root.part].1),
         )
     });
-    if total.0 > MAX_OCCURRENCES || total.1 > MAX_TRIANGLES {
-        return Err(ReadError::TooManyCopies {
-            what: "putting its parts together",
-            limit: MAX_TRIANGLES,
-        });
-    }
+    check_limits(total.0, total.1)?;
     let mut found = Vec::new();
     let mut todo: Vec<Occurrence<T>> = roots.iter().rev().copied().collect();
     while let Some(around) = todo.pop() {
@@ -68,6 +63,17 @@ pub(super) fn occurrences<T: Copy>(
         }));
     }
     Ok(found)
+}
+
+/// Refuses more places of parts, or more triangles of all of them, than are made.
+pub(super) fn check_limits(n_occurrences: u64, n_triangles: u64) -> Result<(), ReadError> {
+    if n_occurrences > MAX_OCCURRENCES || n_triangles > MAX_TRIANGLES {
+        return Err(ReadError::TooManyCopies {
+            what: "putting its parts together",
+            limit: MAX_TRIANGLES,
+        });
+    }
+    Ok(())
 }
 
 /// For each part the number of parts and of triangles below it, itself included; refuses cycles.

@@ -160,6 +160,14 @@ pub enum ReadError {
         /// What is wrong.
         reason: String,
     },
+    /// glTF that has or needs something that is not read.
+    #[error("the glTF {what}; {remedy}")]
+    GltfUnsupported {
+        /// What it has or needs.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// Paint of a triangle that is no code of PrusaSlicer or Bambu Studio.
     #[error(
         "the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove the paint"

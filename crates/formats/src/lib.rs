@@ -3,11 +3,11 @@
 //! | format | read | written |
 //! |---|---|---|
 //! | STL | binary, ASCII, colours of both dialects | binary |
-//! | OBJ | text; groups, objects, materials | |
-//! | PLY | ASCII, binary of both byte orders, strips, face labels and colours | binary, face labels |
-//! | OFF | text, face colours | |
-//! | 3MF | units, components, transforms, several files, materials, paint, roles of parts, negative volumes | pieces, coloured; one body, painted |
-//! | glTF, GLB | nodes, all modes of triangles, materials | |
+//! | OBJ | text; groups, objects, materials, colours of points | |
+//! | PLY | ASCII, binary of both byte orders, strips, face labels, colours of faces and points | binary, face labels |
+//! | OFF | text, colours of faces and points | |
+//! | 3MF | units, components, transforms, several files, materials, paint, roles of parts, negative volumes, named sets | pieces, coloured; one body, painted |
+//! | glTF, GLB | nodes, skins, morph targets, instances, all modes of triangles, materials, colours of points | |
 //! | `.seg` | one label a line | the same |
 //!
 //! Any of them may be packed by gzip, lie alone in a zip archive, be stored as UTF-16 or have a wrong name.
@@ -27,6 +27,7 @@ mod obj;
 mod off;
 mod paint;
 mod ply;
+mod point_colors;
 mod polygons;
 mod recognise;
 mod select;
@@ -149,7 +150,7 @@ pub enum LabelSource {
     Property,
     /// Multi-material paint of PrusaSlicer, Bambu Studio and OrcaSlicer (3MF).
     Paint,
-    /// Colours of faces (STL, PLY, OFF, 3MF).
+    /// Colours of faces (STL, PLY, OFF, 3MF) or, where those do not divide it, of points (PLY, OBJ, OFF, glTF).
     Color,
     /// Materials (OBJ, 3MF, glTF).
     Material,

@@ -1,9 +1,10 @@
-//! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces; normals, texture, lines and
-//! curves are passed over.
+//! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces and the colours of points;
+//! normals, texture, lines and curves are passed over.
 
+use super::point_colors::{self, Channels};
 use super::polygons::{Numbering, Polygons};
-use super::text::{Lines, point, whole, without_comment, words};
-use super::{Format, LabelSource, Loaded, Place, ReadError};
+use super::text::{Lines, coordinate, point, whole, without_comment, words};
+use super::{FileObject, Format, LabelSource, Loaded, Place, ReadError};
 
 /// What divides the faces, as it stands in a statement.
 const DIVISIONS: [(&[u8], LabelSource); 3] = [
@@ -11,6 +12,9 @@ const DIVISIONS: [(&[u8], LabelSource); 3] = [
     (b"g", LabelSource::Group),
     (b"o", LabelSource::Object),
 ];
+
+/// The division by objects, which have names.
+const OBJECTS: usize = 2;
 
 /// Reads an OBJ; faces may name points that come later, and count backwards from the last one with negative
 /// indices.
@@ -20,16 +24,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut statement = Vec::new();
     let mut corners = Vec::new();
     let mut divisions = DIVISIONS.map(|_| Division::default());
+    let mut extras = Extras::default();
+    let (mut names_materials, mut has_texture) = (false, false);
     while let Some(at) = next_statement(&mut lines, &mut statement) {
         match statement.split_first() {
             Some((&b"v", rest)) => {
                 polygons.add_point(point(&mut rest.iter().copied(), at)?, at)?;
+                extras.add(&rest[3..]);
             }
+            Some((&b"mtllib", _)) => names_materials = true,
             // "fo" is an old name of "f".
             Some((&(b"f" | b"fo"), rest)) => {
                 corners.clear();
                 for &word in rest {
                     corners.push(corner(&polygons, word, at)?);
+                    has_texture = has_texture || names_texture(word);
                 }
                 polygons.add_polygon(&corners, at)?;
             }
@@ -42,17 +51,78 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
         }
     }
     let n_faces = polygons.n_faces();
+    let objects = divisions[OBJECTS].objects();
     let labels = DIVISIONS
         .iter()
         .zip(divisions)
         .filter_map(|((_, source), d)| Some((*source, d.labels(n_faces)?)));
-    polygons.finish(Format::Obj, labels.collect())
+    let mut loaded = polygons.finish(Format::Obj, labels.collect())?;
+    let labels = loaded.labels(LabelSource::Object);
+    if labels.is_some_and(|labels| labels.iter().all(|label| *label >= 0)) {
+        loaded.objects = objects;
+    }
+    if names_materials && has_texture {
+        let note = "the file's texture, if it has one, is not used";
+        loaded.notes.push(note.to_owned());
+    }
+    if let Some(channels) = extras.channels() {
+        point_colors::divide(&mut loaded, &channels.colors());
+    }
+    Ok(loaded)
+}
+
+/// Numbers after the coordinates of points: a weight, a colour, or both.
+#[derive(Default)]
+struct Extras {
+    rows: Vec<[f32; 4]>,
+    /// How many numbers the rows have; `None` before the first.
+    n: Option<usize>,
+    /// Whether some point has no colour, or another number of numbers than the others.
+    is_mixed: bool,
+}
+
+impl Extras {
+    fn add(&mut self, words: &[&[u8]]) {
+        let n = *self.n.get_or_insert(words.len());
+        self.is_mixed |= n != words.len() || !(3..=4).contains(&n);
+        if self.is_mixed {
+            return;
+        }
+        let mut row = [0.0; 4];
+        for (number, word) in row.iter_mut().zip(words) {
+            // Numbers below 0 are a normal's.
+            match coordinate(Some(word), Place::Line(0)) {
+                Ok(value) if value >= 0.0 => *number = value as f32,
+                _ => self.is_mixed = true,
+            }
+        }
+        self.rows.push(row);
+    }
+
+    /// The colours, where all points have one: three numbers, or four with alpha last or the weight first. The
+    /// weight is first where it is 1 for all points and the last number is not.
+    fn channels(mut self) -> Option<Channels> {
+        if self.is_mixed || self.rows.is_empty() {
+            return None;
+        }
+        let is_one = |column: usize| self.rows.iter().all(|row| row[column] == 1.0);
+        if self.n == Some(4) && is_one(0) && !is_one(3) {
+            let unweighted = |[_, red, green, blue]: [f32; 4]| [red, green, blue, 0.0];
+            self.rows.iter_mut().for_each(|row| *row = unweighted(*row));
+        }
+        Some(Channels {
+            rows: self.rows,
+            are_whole: false,
+        })
+    }
 }
 
 /// Names that hold for the faces after them.
 #[derive(Default)]
 struct Division<'a> {
     numbering: Numbering<Vec<&'a [u8]>>,
+    /// By label.
+    names: Vec<Vec<&'a [u8]>>,
     /// The first face of each stretch and its label.
     begins: Vec<(usize, i64)>,
 }
@@ -60,7 +130,21 @@ struct Division<'a> {
 impl<'a> Division<'a> {
     fn begin(&mut self, name: &[&'a [u8]], face: usize) {
         let label = self.numbering.number(name.to_vec());
+        if label == self.names.len() as i64 {
+            self.names.push(name.to_vec());
+        }
         self.begins.push((face, label));
+    }
+
+    /// The names, by label.
+    fn objects(&self) -> Vec<FileObject> {
+        let named = (0..).zip(&self.names).map(|(item, words)| FileObject {
+            name: Some(String::from_utf8_lossy(&words.join(&b' ')).into_owned()).filter(|n| !n.is_empty()),
+            part: None,
+            item,
+            plate: None,
+        });
+        named.collect()
     }
 
     /// One label for each of `n_faces` faces; `None` where nothing was named.
@@ -92,6 +176,13 @@ fn next_statement<'a>(lines: &mut Lines<'a>, statement: &mut Vec<&'a [u8]>) -> O
             None => return Some(at),
         }
     }
+}
+
+/// Whether a corner has a point of the texture: `7/1`, `7/1/3`.
+fn names_texture(word: &[u8]) -> bool {
+    word.split(|&b| b == b'/')
+        .nth(1)
+        .is_some_and(|texture| !texture.is_empty())
 }
 
 /// The point of a corner `7`, `7/1`, `7//3`, `7/1/3` or `-1`, counted from 0.

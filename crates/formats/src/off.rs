@@ -1,8 +1,8 @@
-//! OFF: points and polygons as text, with the colours of faces. Normals and colours of points are passed
-//! over.
+//! OFF: points and polygons as text, with the colours of faces and points. Normals are passed over.
 
+use super::point_colors::{self, Channels};
 use super::polygons::{Numbering, Polygons};
-use super::text::{Lines, malformed, point, whole, without_bom, without_comment, words};
+use super::text::{Lines, coordinate, malformed, point, whole, without_bom, without_comment, words};
 use super::{Format, LabelSource, Loaded, Place, ReadError};
 
 /// Fewest bytes a point takes: `0 0 0` and a line end.
@@ -13,16 +13,25 @@ const FACE_BYTES: u64 = 8;
 /// Reads an OFF of three dimensions, one point or face a line; the first word may be missing.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut lines = Lines::of(without_bom(bytes));
-    let (n_points, n_faces) = read_counts(&mut lines)?;
+    let Header {
+        n_points,
+        n_faces,
+        color_at,
+    } = read_header(&mut lines)?;
 
     let mut polygons = Polygons::counted_from(0);
     polygons.reserve(n_points, n_faces);
+    let mut of_points = Vec::new();
     for _ in 0..n_points {
         let (at, line) = next_line(&mut lines).ok_or(ReadError::CutOff {
             at: lines.place(),
             within: "the points",
         })?;
-        polygons.add_point(point(&mut words(line), at)?, at)?;
+        let mut words = words(line);
+        polygons.add_point(point(&mut words, at)?, at)?;
+        if let Some(color) = color_at.and_then(|n_before| color(words.skip(n_before))) {
+            of_points.push(color);
+        }
     }
     let mut corners = Vec::new();
     let (mut numbering, mut colors) = (Numbering::default(), Vec::with_capacity(n_faces));
@@ -41,19 +50,48 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
         polygons.add_polygon(&corners, at)?;
         colors.push(numbering.number(words.map(<[u8]>::to_vec).collect::<Vec<_>>()));
     }
-    polygons.finish(Format::Off, vec![(LabelSource::Color, colors)])
+    let mut loaded = polygons.finish(Format::Off, vec![(LabelSource::Color, colors)])?;
+    let channels = Channels {
+        rows: of_points,
+        are_whole: false,
+    };
+    // Where some points have no colour, there are fewer colours than points, which divide nothing.
+    point_colors::divide(&mut loaded, &channels.colors());
+    Ok(loaded)
 }
 
-/// The counts of points and faces, on the line of the first word or the next; what the bytes cannot back is
-/// refused.
-fn read_counts(lines: &mut Lines) -> Result<(usize, usize), ReadError> {
+/// The colour of a point: three or four numbers.
+fn color<'a>(words: impl Iterator<Item = &'a [u8]>) -> Option<[f32; 4]> {
+    let (mut color, mut n) = ([0.0; 4], 0);
+    for (channel, word) in color.iter_mut().zip(words) {
+        *channel = coordinate(Some(word), Place::Line(0)).ok()? as f32;
+        n += 1;
+    }
+    (n >= 3).then_some(color)
+}
+
+/// The first lines.
+struct Header {
+    n_points: usize,
+    n_faces: usize,
+    /// How many numbers stand between the coordinates of a point and its colour; `None` without colours.
+    color_at: Option<usize>,
+}
+
+/// The header: the counts of points and faces are on the line of the first word or the next; what the bytes
+/// cannot back is refused.
+fn read_header(lines: &mut Lines) -> Result<Header, ReadError> {
     let cut_off = |lines: &Lines| ReadError::CutOff {
         at: lines.place(),
         within: "the header",
     };
     let (mut at, mut line) = next_line(lines).ok_or_else(|| cut_off(lines))?;
     let first = words(line).next().unwrap_or_default().to_ascii_lowercase();
+    let mut color_at = None;
     if let Some(prefix) = first.strip_suffix(b"off") {
+        color_at = prefix
+            .contains(&b'c')
+            .then_some(if prefix.contains(&b'n') { 3 } else { 0 });
         if prefix.contains(&b'4') || prefix.contains(&b'n') && prefix != b"n" && !prefix.ends_with(b"cn") {
             return Err(ReadError::Unsupported {
                 what: "an OFF file of more than three dimensions",
@@ -91,7 +129,11 @@ fn read_counts(lines: &mut Lines) -> Result<(usize, usize), ReadError> {
     };
     let n_points = count("points", "the number of points", POINT_BYTES)?;
     let n_faces = count("faces", "the number of faces", FACE_BYTES)?;
-    Ok((n_points, n_faces))
+    Ok(Header {
+        n_points,
+        n_faces,
+        color_at,
+    })
 }
 
 /// The next line that says something.

@@ -134,3 +134,46 @@ impl Loaded {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{read_mesh, read_selected};
+    use super::*;
+
+    const TWO: &[u8] =
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\no left hand\nf 1 2 3\nf 1 2 4\no right\nf 2 3 4\n";
+
+    fn select(bytes: &[u8], object: &str) -> Result<Loaded, ReadError> {
+        let selection = Selection {
+            object: Some(object.to_owned()),
+            plate: None,
+        };
+        read_selected(bytes, None, &selection)
+    }
+
+    #[test]
+    fn an_object_is_chosen_by_its_name_and_its_faces_count_from_0() {
+        let right = select(TWO, " RIGHT").unwrap();
+        assert_eq!((right.mesh.triangles.len(), right.file_face), (1, vec![0]));
+        assert_eq!(right.mesh.points.len(), 3);
+        assert_eq!(select(TWO, "left hand").unwrap().file_face, [0, 1]);
+        let refused = select(TWO, "foot").unwrap_err().to_string();
+        assert!(
+            refused.contains("no object \"foot\"; it has \"left hand\", \"right\""),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn a_file_without_names_says_so_and_nothing_is_chosen_where_nothing_is_asked() {
+        let nameless = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        assert!(
+            select(nameless, "left")
+                .unwrap_err()
+                .to_string()
+                .contains("no objects with names")
+        );
+        let whole = read_mesh(TWO, None).unwrap();
+        assert_eq!((whole.mesh.triangles.len(), whole.objects.len()), (3, 2));
+    }
+}

@@ -1,6 +1,13 @@
-//! The parts of a glTF document that describe triangles.
+//! The parts of a glTF document that describe triangles and where they are.
+
+use std::collections::BTreeMap;
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::Value;
+
+/// The extensions of an element, by their names.
+pub(super) type Names = BTreeMap<String, IgnoredAny>;
 
 #[derive(Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
@@ -9,10 +16,22 @@ pub(super) struct Document {
     pub scenes: Vec<Scene>,
     pub nodes: Vec<Node>,
     pub meshes: Vec<Mesh>,
+    pub skins: Vec<Skin>,
+    /// As they are: a fault in them is no reason to refuse a shape.
+    pub materials: Vec<Value>,
+    pub animations: Vec<IgnoredAny>,
     pub accessors: Vec<Accessor>,
     pub buffer_views: Vec<BufferView>,
     pub buffers: Vec<Buffer>,
     pub extensions_required: Vec<String>,
+    pub extensions: DocumentExtensions,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct DocumentExtensions {
+    #[serde(rename = "KHR_materials_variants")]
+    pub variants: Option<IgnoredAny>,
 }
 
 #[derive(Default, Deserialize)]
@@ -24,34 +43,64 @@ pub(super) struct Scene {
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Node {
+    pub name: Option<String>,
     pub mesh: Option<usize>,
+    pub skin: Option<usize>,
+    pub weights: Option<Vec<f64>>,
     pub children: Vec<usize>,
     pub matrix: Option<[f64; 16]>,
     pub translation: Option<[f64; 3]>,
     pub rotation: Option<[f64; 4]>,
     pub scale: Option<[f64; 3]>,
+    pub extensions: NodeExtensions,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct NodeExtensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub instancing: Option<Instancing>,
+    #[serde(rename = "KHR_node_visibility")]
+    pub visibility: Option<Visibility>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Instancing {
+    pub attributes: BTreeMap<String, usize>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Visibility {
+    pub visible: Option<bool>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Mesh {
     pub primitives: Vec<Primitive>,
+    pub weights: Vec<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Primitive {
-    pub attributes: Attributes,
+    /// The accessor of each property of the points.
+    pub attributes: BTreeMap<String, usize>,
     pub indices: Option<usize>,
     pub mode: Option<u32>,
-    pub material: Option<u32>,
+    pub material: Option<usize>,
+    /// The accessors of each morph target, by property.
+    pub targets: Vec<BTreeMap<String, usize>>,
+    pub extensions: Names,
 }
 
 #[derive(Default, Deserialize)]
-#[serde(default)]
-pub(super) struct Attributes {
-    #[serde(rename = "POSITION")]
-    pub position: Option<usize>,
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Skin {
+    pub inverse_bind_matrices: Option<usize>,
+    pub joints: Vec<usize>,
 }
 
 #[derive(Default, Deserialize)]
@@ -64,7 +113,24 @@ pub(super) struct Accessor {
     pub count: usize,
     #[serde(rename = "type")]
     pub kind: String,
-    pub sparse: Option<serde::de::IgnoredAny>,
+    pub sparse: Option<Sparse>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Sparse {
+    pub count: usize,
+    pub indices: SparsePart,
+    pub values: SparsePart,
+}
+
+/// A place in the buffers; the type of number is that of indices only.
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct SparsePart {
+    pub buffer_view: usize,
+    pub byte_offset: usize,
+    pub component_type: u32,
 }
 
 #[derive(Default, Deserialize)]
@@ -74,6 +140,7 @@ pub(super) struct BufferView {
     pub byte_offset: usize,
     pub byte_length: usize,
     pub byte_stride: Option<usize>,
+    pub extensions: Names,
 }
 
 #[derive(Default, Deserialize)]

@@ -14,6 +14,8 @@ pub(super) enum Encoding {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// Whether a comment names a picture, as MeshLab writes it.
+    pub(super) has_texture: bool,
 }
 
 /// `count` rows of the same properties.
@@ -88,10 +90,15 @@ impl Header {
         }
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
+        let mut has_texture = false;
         while let Some((at, line)) = lines.next() {
             let mut words = words(line);
             match words.next() {
-                None | Some(b"comment" | b"obj_info") => {}
+                None | Some(b"obj_info") => {}
+                Some(b"comment") => {
+                    let first = words.next().unwrap_or_default();
+                    has_texture |= first.eq_ignore_ascii_case(b"TextureFile");
+                }
                 Some(b"format") => encoding = Some(read_encoding(words.next(), at)?),
                 Some(b"element") => {
                     let element = read_element(words, at)?;
@@ -108,7 +115,12 @@ impl Header {
                 }
                 Some(b"end_header") => {
                     let encoding = encoding.ok_or_else(|| malformed(at, "a \"format\" line before", line))?;
-                    return Ok((Self { encoding, elements }, lines));
+                    let header = Self {
+                        encoding,
+                        elements,
+                        has_texture,
+                    };
+                    return Ok((header, lines));
                 }
                 Some(_) => return Err(malformed(at, "a line of a PLY header", line)),
             }

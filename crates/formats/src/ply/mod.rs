@@ -1,5 +1,5 @@
-//! PLY: points, polygons or strips, and for each face a whole-number label or a colour. Everything else is
-//! skipped.
+//! PLY: points, polygons or strips, for each face a whole-number label or a colour, for each point a colour.
+//! Everything else is skipped.
 //!
 //! A file is a text header that declares elements (`vertex`, `face`, others) with their properties, then the
 //! values of all elements in order, as words or as bytes.
@@ -7,10 +7,11 @@
 mod header;
 mod source;
 
+use super::point_colors::{self, Channels};
 use super::polygons::{Numbering, Polygons};
 use super::text::whole_of;
 use super::{Format, LabelSource, Loaded, ReadError};
-use header::{Element, Encoding, Header, Kind, Property, Scalar};
+use header::{Element, Encoding, Header, Kind, Scalar};
 use shellock_geom::TriMesh;
 use source::{Binary, Source, Words};
 
@@ -35,8 +36,12 @@ const LABEL_NAMES: [&str; 17] = [
     "group_id",
 ];
 
-/// Channels of the colour of a face, the first three of them needed.
-const COLOR_NAMES: [&str; 4] = ["red", "green", "blue", "alpha"];
+/// Channels of a colour, the first three of them needed; the first names of which all three are there count.
+const COLOR_NAMES: [[&str; 4]; 3] = [
+    ["red", "green", "blue", "alpha"],
+    ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"],
+    ["r", "g", "b", "a"],
+];
 
 /// Reads a PLY of any encoding.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
@@ -59,9 +64,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
 fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
     let mut labels = FaceLabels::default();
+    let mut colors = Channels::default();
     for element in &header.elements {
         match element.name.as_str() {
-            "vertex" => read_points(element, &mut source, &mut polygons)?,
+            "vertex" => colors = read_points(element, &mut source, &mut polygons)?,
             "face" => labels = read_faces(element, &mut source, &mut polygons)?,
             "tristrips" => read_strips(element, &mut source, &mut polygons)?,
             // Rows without properties have no bytes, so their count is backed by nothing.
@@ -81,7 +87,25 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
     found.retain(|(_, labels)| labels.len() == polygons.n_faces());
     let mut loaded = polygons.finish(Format::Ply, found)?;
     loaded.notes.extend(labels.note);
+    if header.has_texture {
+        loaded.notes.push("the file's texture is not used".to_owned());
+    }
+    point_colors::divide(&mut loaded, &colors.colors());
     Ok(loaded)
+}
+
+/// The properties of the channels of a colour; `None` where red, green or blue lacks.
+fn color_properties(element: &Element) -> Option<[Option<usize>; 4]> {
+    let found = COLOR_NAMES.map(|names| names.map(|name| scalar_named(element, name)));
+    found
+        .into_iter()
+        .find(|channels| channels[..3].iter().all(Option::is_some))
+}
+
+/// The property of one number that is called `name`.
+fn scalar_named(element: &Element, name: &str) -> Option<usize> {
+    let mut properties = element.properties.iter();
+    properties.position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
 }
 
 /// What divides the faces, and what a person should know about that.
@@ -91,17 +115,14 @@ struct FaceLabels {
     note: Option<String>,
 }
 
+/// Adds the points; returns their colours, none where they have none.
 fn read_points(
     element: &Element,
     source: &mut impl Source,
     polygons: &mut Polygons,
-) -> Result<(), ReadError> {
+) -> Result<Channels, ReadError> {
     for name in ["x", "y", "z"] {
-        if !element
-            .properties
-            .iter()
-            .any(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
-        {
+        if scalar_named(element, name).is_none() {
             return Err(ReadError::Unsupported {
                 what: "a PLY file whose points lack x, y or z",
                 at: element.at,
@@ -109,24 +130,35 @@ fn read_points(
         }
     }
     let axis_of = |name: &str| ["x", "y", "z"].iter().position(|&axis| axis == name);
-    let columns: Vec<_> = element
-        .properties
-        .iter()
-        .map(|p| (p.kind, axis_of(&p.name)))
+    let channels = color_properties(element);
+    let channel_of = |i: usize| channels?.iter().position(|&property| property == Some(i));
+    let columns: Vec<_> = (0..)
+        .zip(&element.properties)
+        .map(|(i, p)| (p.kind, axis_of(&p.name), channel_of(i)))
         .collect();
+    let mut colors = Channels {
+        rows: Vec::new(),
+        are_whole: columns.iter().any(|(kind, _, channel)| {
+            channel.is_some() && !matches!(kind, Kind::Scalar(Scalar::F32 | Scalar::F64))
+        }),
+    };
     polygons.reserve(element.count, 0);
     for _ in 0..element.count {
         let at = source.place();
-        let mut coordinates = [0.0; 3];
-        for &(kind, axis) in &columns {
-            match (kind, axis) {
-                (Kind::Scalar(scalar), Some(axis)) => coordinates[axis] = source.next(scalar)?,
+        let (mut coordinates, mut color) = ([0.0; 3], [0.0; 4]);
+        for &(kind, axis, channel) in &columns {
+            match (kind, axis, channel) {
+                (Kind::Scalar(scalar), Some(axis), _) => coordinates[axis] = source.next(scalar)?,
+                (Kind::Scalar(scalar), _, Some(channel)) => color[channel] = source.next(scalar)? as f32,
                 _ => skip(kind, source)?,
             }
         }
         polygons.add_point(coordinates, at)?;
+        if channels.is_some() {
+            colors.rows.push(color);
+        }
     }
-    Ok(())
+    Ok(colors)
 }
 
 /// Adds the polygons; returns one label each where a property has a name for it, and one for each colour.
@@ -136,13 +168,9 @@ fn read_faces(
     polygons: &mut Polygons,
 ) -> Result<FaceLabels, ReadError> {
     let corners_property = corners_property(element, "a PLY file whose faces lack vertex_indices")?;
-    let scalar_named = |name: &str| {
-        let is_it = |p: &Property| p.name == name && matches!(p.kind, Kind::Scalar(_));
-        element.properties.iter().position(is_it)
-    };
-    let label_property = LABEL_NAMES.iter().find_map(|name| scalar_named(name));
-    let color_properties = COLOR_NAMES.map(scalar_named);
-    let has_colors = color_properties[..3].iter().all(Option::is_some);
+    let label_property = LABEL_NAMES.iter().find_map(|name| scalar_named(element, name));
+    let channels = color_properties(element);
+    let channel_of = |i: usize| channels?.iter().position(|&property| property == Some(i));
 
     polygons.reserve(0, element.count);
     let (mut labels, mut colors, mut numbering) = (Vec::new(), Vec::new(), Numbering::default());
@@ -161,18 +189,15 @@ fn read_faces(
                 Kind::Scalar(scalar) if Some(i) == label_property => {
                     labels.push(whole_of(source.next(scalar)?));
                 }
-                Kind::Scalar(scalar) if has_colors && color_properties.contains(&Some(i)) => {
-                    let channel = color_properties
-                        .iter()
-                        .position(|c| *c == Some(i))
-                        .unwrap_or_default();
-                    color[channel] = source.next(scalar)?.to_bits();
-                }
+                kind @ Kind::Scalar(scalar) => match channel_of(i) {
+                    Some(channel) => color[channel] = source.next(scalar)?.to_bits(),
+                    None => skip(kind, source)?,
+                },
                 kind => skip(kind, source)?,
             }
         }
         polygons.add_polygon(&corners, at)?;
-        if has_colors {
+        if channels.is_some() {
             colors.push(numbering.number(color));
         }
     }
@@ -182,7 +207,7 @@ fn read_faces(
         note = label_note(&element.properties[property].name, whole.as_deref());
         found.extend(whole.map(|labels| (LabelSource::Property, labels)));
     }
-    found.extend(has_colors.then_some((LabelSource::Color, colors)));
+    found.extend(channels.map(|_| (LabelSource::Color, colors)));
     Ok(FaceLabels { found, note })
 }
 

@@ -189,7 +189,7 @@ fn extruders_colour_what_is_unpainted_and_modifiers_are_left_out() {
     );
     let loaded = read_mesh(&package(&[(USUAL_ROOT, &root), (PRUSA, prusa)]), None).unwrap();
     assert_eq!(loaded.face_labels(), Some(&[3, 2, 3, 3][..]));
-    assert_told(&loaded, "left out as modifiers of the slicer: object 1");
+    assert_told(&loaded, "left out as modifiers of the slicer: a part of object 1");
 
     let parts = format!(
         r#"{}{}<object id="3"><components><component objectid="1"/><component objectid="2"/></components></object>"#,
