@@ -15,6 +15,7 @@ use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
 use shellock_render::palette;
+use shellock_studio::name_in_kit;
 
 use crate::args::{Axis, Options};
 use crate::failure::Failure;
@@ -82,8 +83,7 @@ impl Destination {
         }
         if let Some(foreign) = foreign_file(&folder) {
             return refuse(&format!(
-                "holds {}, which is not of the kit and would be lost; move it away, or choose another folder with -o",
-                foreign.display()
+                "holds {foreign}, which is not of the kit and would be lost; move it away, or choose another folder with -o"
             ));
         }
         let made = Self {
@@ -185,24 +185,22 @@ fn replace(made: &Path, place: &Path, earlier: &Path) -> Result<(), NotReplaced>
     })
 }
 
-/// A file in the folder of a kit that no command of this program writes.
-fn foreign_file(folder: &Path) -> Option<PathBuf> {
-    let mut names: Vec<PathBuf> = Vec::new();
+/// Name of a file in the folder of a kit that no command of this program writes.
+fn foreign_file(folder: &Path) -> Option<String> {
+    let mut names: Vec<String> = Vec::new();
     let mut left = vec![PathBuf::new()];
     while let Some(within) = left.pop() {
         for entry in fs::read_dir(folder.join(&within)).into_iter().flatten().flatten() {
-            let name = within.join(entry.file_name());
+            let path = within.join(entry.file_name());
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-                left.push(name)
+                left.push(path);
             } else {
-                names.push(name)
+                names.push(name_in_kit(&path));
             }
         }
     }
     names.sort();
-    names
-        .into_iter()
-        .find(|name| !is_of_kits(&name.to_string_lossy()))
+    names.into_iter().find(|name| !is_of_kits(name))
 }
 
 /// Whether a file with this name, of a kit's folder, is written by commands, of this version or an earlier one.
@@ -536,5 +534,27 @@ mod tests {
         let failed = replace(&made, &place, &earlier);
         assert!(matches!(failed, Err(NotReplaced::Lost(_))));
         assert!(earlier.is_dir() && place.is_file());
+    }
+
+    #[test]
+    fn every_file_of_a_kit_may_be_replaced_and_no_other() {
+        let dir = tempfile::tempdir().unwrap();
+        let put = |name: &str| {
+            let path = name
+                .split('/')
+                .fold(dir.path().to_owned(), |path, part| path.join(part));
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        };
+        KIT_FILES.into_iter().for_each(put);
+        ["pieces/piece-1.stl", "pieces/piece-12.stl", "plates/plate-1.3mf"]
+            .into_iter()
+            .for_each(put);
+        assert_eq!(foreign_file(dir.path()), None);
+        put("pieces/more/piece-2.stl");
+        assert_eq!(
+            foreign_file(dir.path()).as_deref(),
+            Some("pieces/more/piece-2.stl")
+        );
     }
 }
