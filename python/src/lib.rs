@@ -272,7 +272,8 @@ struct Event {
     note: Option<String>,
 }
 
-/// Does `job` in a thread of its own, while this one hears of Ctrl-C and calls `progress`.
+/// Does `job` in a thread of its own, while this one hears of Ctrl-C and calls `progress`. The first exception stops the
+/// job and is raised when it has ended; `progress` is not called after it.
 fn waited<T: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -301,6 +302,7 @@ fn waited<T: Send>(
                     .map_or(Err(RecvTimeoutError::Disconnected), |r| r.recv_timeout(LOOK))
             });
             let heard = match event {
+                Ok(_) if interrupt.is_some() => Ok(()),
                 Ok(event) => told(py, progress.as_ref(), &event),
                 Err(RecvTimeoutError::Timeout) => py.check_signals(),
                 Err(RecvTimeoutError::Disconnected) => break,

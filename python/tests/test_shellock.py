@@ -198,15 +198,22 @@ def test_other_threads_go_on_and_progress_is_told_in_this_one(vase):
     assert any(p.number > 10 and p.count >= p.number for p, _ in heard)
 
 
-def test_what_progress_raises_ends_the_job(vase):
+def test_what_progress_raises_ends_the_job_and_progress_is_not_called_again():
     class Enough(Exception):
         pass
 
-    def enough(_):
-        raise Enough
+    calls = []
 
-    with pytest.raises(Enough):
-        shellock.design(*vase, progress=enough, **FAST)
+    def enough(_):
+        calls.append(time.time())
+        # Long enough for the job to report further stages, which wait for their turn.
+        time.sleep(0.5)
+        raise Enough(len(calls))
+
+    with pytest.raises(Enough, match="^1$"):
+        shellock.design(*ball(), progress=enough, **{**FAST, "method": "auto", "pieces": 9})
+    assert len(calls) == 1
+    assert time.time() - calls[0] < 30, "the job stopped"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

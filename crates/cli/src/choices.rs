@@ -26,6 +26,9 @@ const ITS_OWN: [&str; 12] = [
     "version",
 ];
 
+/// Options whose values may be labels of faces.
+const OF_LABELS: [&str; 2] = ["key", "keep-whole"];
+
 /// Chosen options by their long names, in the order of their declaration.
 pub type Choices = Vec<(String, Choice)>;
 
@@ -114,6 +117,29 @@ pub fn changed(choices: &Choices, changes: &Map<String, Value>) -> Result<Choice
     let place = |name: &str| offered.iter().position(|a| a.get_long() == Some(name));
     next.sort_by_key(|(name, _)| place(name));
     Ok(next)
+}
+
+/// `choices` for faces with other labels: each label that they name is replaced by its new one. A label without a new one
+/// stays, and so does all that is no label, such as a place.
+pub fn relabelled(choices: &Choices, new_label: impl Fn(i64) -> Option<i64>) -> Choices {
+    let relabel = |text: &String| {
+        let label = text.trim().parse().ok();
+        label
+            .and_then(&new_label)
+            .map_or_else(|| text.clone(), |label| label.to_string())
+    };
+    let mut choices = choices.clone();
+    for (_, choice) in choices
+        .iter_mut()
+        .filter(|(name, _)| OF_LABELS.contains(&&name[..]))
+    {
+        *choice = match &*choice {
+            Choice::On => Choice::On,
+            Choice::Text(text) => Choice::Text(relabel(text)),
+            Choice::Many(texts) => Choice::Many(texts.iter().map(relabel).collect()),
+        };
+    }
+    choices
 }
 
 fn choice(arg: &Arg, value: &Value) -> Result<Option<Choice>, Refusal> {
@@ -248,6 +274,22 @@ mod tests {
         )
         .unwrap();
         assert_eq!(without.len(), 1);
+    }
+
+    #[test]
+    fn labels_that_options_name_are_replaced_and_nothing_else() {
+        let chosen = changes(r#"{"pieces":"2","key":"2","keep-whole":["2","5","2,2,2,2"],"seed":"2"}"#);
+        let chosen = changed(&Vec::new(), &chosen).unwrap();
+        let new_label = |label: i64| (label == 2).then_some(7);
+        let expected = changes(r#"{"pieces":"2","key":"7","keep-whole":["7","5","2,2,2,2"],"seed":"2"}"#);
+        assert_eq!(
+            relabelled(&chosen, new_label),
+            changed(&Vec::new(), &expected).unwrap()
+        );
+        for key in ["auto", "piece", "1,2,3"] {
+            let chosen = vec![("key".to_owned(), Choice::Text(key.to_owned()))];
+            assert_eq!(relabelled(&chosen, |_| Some(7)), chosen);
+        }
     }
 
     #[test]

@@ -28,6 +28,7 @@ mod printing;
 mod progress;
 mod project;
 mod savings;
+mod shares;
 mod stages;
 mod stopwatch;
 mod stress;

@@ -1,6 +1,7 @@
 //! A finished kit as files.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -14,6 +15,7 @@ use shellock_formats::{NamedObject, write_3mf, write_ply, write_stl_binary};
 use shellock_geom::{TriMesh, Vec3};
 use shellock_kit::plan_file::{PlanFile, Source, Told, piece_file};
 use shellock_render::palette;
+use shellock_studio::name_in_kit;
 
 use crate::args::{Axis, Options};
 use crate::failure::Failure;
@@ -81,8 +83,7 @@ impl Destination {
         }
         if let Some(foreign) = foreign_file(&folder) {
             return refuse(&format!(
-                "holds {}, which is not of the kit and would be lost; move it away, or choose another folder with -o",
-                foreign.display()
+                "holds {foreign}, which is not of the kit and would be lost; move it away, or choose another folder with -o"
             ));
         }
         let made = Self {
@@ -117,6 +118,8 @@ impl Destination {
     }
 
     /// Writes all files; the folder appears whole or not at all.
+    ///
+    /// Where the new kit cannot take its place, an earlier one stays as it was.
     pub fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
         let _writing = Writing::begin();
         let temporary = self.temporary()?;
@@ -128,38 +131,76 @@ impl Destination {
             }
             fs::write(&path, bytes).map_err(Failure::unwritable(&path))?;
         }
-        if self.folder.exists() {
-            // The earlier kit steps aside until the new one stands.
-            let aside = temporary.path().join("earlier");
-            let is_kit = self.folder.join(PLAN).is_file();
-            if self.may_replace && is_kit {
-                fs::rename(&self.folder, &aside).map_err(Failure::unwritable(&self.folder))?;
-            } else {
-                fs::remove_dir(&self.folder).map_err(Failure::unwritable(&self.folder))?;
+        if !self.folder.exists() {
+            return fs::rename(&made, &self.folder).map_err(Failure::unwritable(&self.folder));
+        }
+        let earlier = temporary.path().join("earlier");
+        self.set_aside(&earlier)
+            .map_err(Failure::unwritable(&self.folder))?;
+        match replace(&made, &self.folder, &earlier) {
+            Ok(()) => Ok(()),
+            Err(NotReplaced::Back(source)) => Err(Failure::unwritable(&self.folder)(source)),
+            Err(NotReplaced::Lost(source)) => {
+                // Else it would vanish with the temporary folder.
+                let kept = temporary.keep().join("earlier");
+                let words = format!("{source}; the kit that was there is now in {}", kept.display());
+                Err(Failure::unwritable(&self.folder)(io::Error::new(
+                    source.kind(),
+                    words,
+                )))
             }
         }
-        fs::rename(&made, &self.folder).map_err(Failure::unwritable(&self.folder))
+    }
+
+    /// Moves what is in the folder's place to `earlier`: a kit, or nothing at all.
+    fn set_aside(&self, earlier: &Path) -> io::Result<()> {
+        let is_kit = self.folder.join(PLAN).is_file();
+        if self.may_replace && is_kit {
+            fs::rename(&self.folder, earlier)
+        } else {
+            // Fails where there is anything in it.
+            fs::remove_dir(&self.folder)?;
+            fs::create_dir(earlier)
+        }
     }
 }
 
-/// A file in the folder of a kit that no command of this program writes.
-fn foreign_file(folder: &Path) -> Option<PathBuf> {
-    let mut names: Vec<PathBuf> = Vec::new();
+/// Why a kit is not in its place.
+#[derive(Debug)]
+enum NotReplaced {
+    /// The earlier one is back in its place.
+    Back(io::Error),
+    /// The earlier one could not be put back.
+    Lost(io::Error),
+}
+
+/// Moves the folder `made` to `place`, or else the folder `earlier`, which was there before.
+fn replace(made: &Path, place: &Path, earlier: &Path) -> Result<(), NotReplaced> {
+    let Err(source) = fs::rename(made, place) else {
+        return Ok(());
+    };
+    Err(match fs::rename(earlier, place) {
+        Ok(()) => NotReplaced::Back(source),
+        Err(_) => NotReplaced::Lost(source),
+    })
+}
+
+/// Name of a file in the folder of a kit that no command of this program writes.
+fn foreign_file(folder: &Path) -> Option<String> {
+    let mut names: Vec<String> = Vec::new();
     let mut left = vec![PathBuf::new()];
     while let Some(within) = left.pop() {
         for entry in fs::read_dir(folder.join(&within)).into_iter().flatten().flatten() {
-            let name = within.join(entry.file_name());
+            let path = within.join(entry.file_name());
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-                left.push(name)
+                left.push(path);
             } else {
-                names.push(name)
+                names.push(name_in_kit(&path));
             }
         }
     }
     names.sort();
-    names
-        .into_iter()
-        .find(|name| !is_of_kits(&name.to_string_lossy()))
+    names.into_iter().find(|name| !is_of_kits(name))
 }
 
 /// Whether a file with this name, of a kit's folder, is written by commands, of this version or an earlier one.
@@ -418,5 +459,104 @@ pub fn lying(up: Axis, v: Vec3) -> Vec3 {
         Axis::X => Vec3::new(v.z, v.y, -v.x),
         Axis::Y => Vec3::new(v.x, v.z, -v.y),
         Axis::Z => v,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder with an earlier kit of one piece, and the way to replace it.
+    fn earlier_kit(dir: &Path) -> Destination {
+        let folder = dir.join("kit");
+        fs::create_dir_all(folder.join("pieces")).unwrap();
+        fs::write(folder.join(PLAN), "earlier").unwrap();
+        fs::write(folder.join("pieces/piece-1.stl"), "earlier").unwrap();
+        Destination::new(folder, true).unwrap()
+    }
+
+    fn files(names: &[&str]) -> Vec<(String, Vec<u8>)> {
+        names
+            .iter()
+            .map(|name| ((*name).to_owned(), b"new".to_vec()))
+            .collect()
+    }
+
+    #[test]
+    fn an_earlier_kit_is_replaced_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        let to = earlier_kit(dir.path());
+        to.write(&files(&[PLAN])).unwrap();
+        assert_eq!(fs::read(to.folder().join(PLAN)).unwrap(), b"new");
+        assert!(!to.folder().join("pieces").exists());
+        assert_eq!(
+            fs::read_dir(dir.path()).unwrap().count(),
+            1,
+            "nothing else is left"
+        );
+    }
+
+    #[test]
+    fn an_earlier_kit_comes_back_where_the_new_one_cannot_take_its_place() {
+        let dir = tempfile::tempdir().unwrap();
+        let to = earlier_kit(dir.path());
+        // No files make no folder, so that the last rename has nothing to move.
+        assert!(matches!(to.write(&[]), Err(Failure::Unwritable { .. })));
+        for name in [PLAN, "pieces/piece-1.stl"] {
+            assert_eq!(fs::read(to.folder().join(name)).unwrap(), b"earlier", "{name}");
+        }
+        assert_eq!(
+            fs::read_dir(dir.path()).unwrap().count(),
+            1,
+            "nothing else is left"
+        );
+    }
+
+    #[test]
+    fn an_empty_folder_stays_where_no_kit_can_take_its_place() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("kit");
+        fs::create_dir(&folder).unwrap();
+        let to = Destination::new(folder, false).unwrap();
+        assert!(matches!(to.write(&[]), Err(Failure::Unwritable { .. })));
+        assert!(to.folder().is_dir());
+        to.write(&files(&[PLAN])).unwrap();
+        assert_eq!(fs::read(to.folder().join(PLAN)).unwrap(), b"new");
+    }
+
+    #[test]
+    fn an_earlier_kit_that_cannot_be_put_back_is_not_deleted() {
+        let dir = tempfile::tempdir().unwrap();
+        let [made, place, earlier] = ["made", "place", "earlier"].map(|name| dir.path().join(name));
+        // A file in the place: no folder can be moved there.
+        fs::write(&place, "").unwrap();
+        for folder in [&made, &earlier] {
+            fs::create_dir(folder).unwrap();
+        }
+        let failed = replace(&made, &place, &earlier);
+        assert!(matches!(failed, Err(NotReplaced::Lost(_))));
+        assert!(earlier.is_dir() && place.is_file());
+    }
+
+    #[test]
+    fn every_file_of_a_kit_may_be_replaced_and_no_other() {
+        let dir = tempfile::tempdir().unwrap();
+        let put = |name: &str| {
+            let path = name
+                .split('/')
+                .fold(dir.path().to_owned(), |path, part| path.join(part));
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        };
+        KIT_FILES.into_iter().for_each(put);
+        ["pieces/piece-1.stl", "pieces/piece-12.stl", "plates/plate-1.3mf"]
+            .into_iter()
+            .for_each(put);
+        assert_eq!(foreign_file(dir.path()), None);
+        put("pieces/more/piece-2.stl");
+        assert_eq!(
+            foreign_file(dir.path()).as_deref(),
+            Some("pieces/more/piece-2.stl")
+        );
     }
 }

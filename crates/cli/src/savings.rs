@@ -1,11 +1,12 @@
 //! `report`: what a kit saves over the solid model, as the paper's Table 1 tells it.
 //!
 //! Time and material are PrusaSlicer's own estimates where it is installed, else closed forms, with supports and
-//! the same settings for both. Pieces are laid on plates anew for either process; the whole model is printed as
+//! the same settings for both. Where PrusaSlicer is installed and gives no estimate, `note` says why. Pieces are laid on plates anew for either process; the whole model is printed as
 //! people print it (filament at 15 % infill, resin hollowed) in the pose that takes the least.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::io::Read;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
@@ -36,6 +37,8 @@ const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsup
     fill_density = 15%\n";
 /// The whole model of resin.
 const HOLLOWED: &str = "hollowing_enable = 1\nhollowing_min_thickness = 2\n";
+/// Longest `config.ini` that is read of an archive for a resin printer, bytes: PrusaSlicer 2.5 writes less than 1 kB.
+const MOST_CONFIG_BYTES: u64 = 1 << 20;
 /// Instead of 15 %.
 const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 
@@ -50,31 +53,31 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
         let bed_mm = plan.printing.as_ref().map_or(printer.bed_mm, |p| p.bed);
         let printer = Printer { bed_mm, ..printer };
         let printing = Printing::of(&printer, pieces.as_slice(), solid.mesh(), &solid);
-        let sliced = match &slicer {
-            Some(slicer) => slicer.costs(&printer, printing.files(pieces.as_slice()), &solid)?,
-            None => None,
-        };
-        let by = if sliced.is_some() {
+        let sliced = slicer
+            .as_ref()
+            .map(|slicer| slicer.costs(&printer, printing.files(pieces.as_slice()), &solid));
+        let by = if matches!(sliced, Some(Ok(_))) {
             "PrusaSlicer"
         } else {
             "closed form"
         };
-        let (cost, whole) = printing.costs();
         let Costs {
             pieces,
             whole,
             filled,
-        } = sliced.unwrap_or(Costs {
-            pieces: cost,
-            whole: whole.unwrap_or_default(),
-            filled: None,
-        });
+            note,
+        } = match sliced {
+            Some(Ok(costs)) => costs,
+            Some(Err(NoEstimate::Failed(failure))) => return Err(failure),
+            Some(Err(NoEstimate::Because(why))) => Costs::closed_form(&printing, Some(why)),
+            None => Costs::closed_form(&printing, None),
+        };
         let over = |whole: f64, ours: f64| ours / whole.max(f64::MIN_POSITIVE);
         let filled_s = filled.map(|f| f.seconds);
         let told = json!({ "by": by, "pieces_s": pieces.seconds, "solid_s": whole.seconds,
             "ratio": over(whole.seconds, pieces.seconds), "pieces_g": pieces.grams, "solid_g": whole.grams,
             "material_ratio": over(whole.grams, pieces.grams), "solid_as": whole_words(printer.process),
-            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(|s| over(s, pieces.seconds)) });
+            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(|s| over(s, pieces.seconds)), "note": note });
         times.insert(printer.name, told);
     }
     let volume: f64 = pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
@@ -122,10 +125,13 @@ fn print(told: &Value) {
                 hours(&time["filled_solid_s"])
             );
         }
+        if let Some(note) = time["note"].as_str() {
+            println!("note: {name}: {note}");
+        }
     }
 }
 
-/// By the slicer.
+/// Costs of a kit and of its model.
 struct Costs {
     /// All plates.
     pieces: Cost,
@@ -133,6 +139,35 @@ struct Costs {
     whole: Cost,
     /// The whole model, filled, where that is another.
     filled: Option<Cost>,
+    /// Why some or all of it is not the slicer's estimate, though the slicer is installed.
+    note: Option<String>,
+}
+
+impl Costs {
+    fn closed_form(printing: &Printing, note: Option<String>) -> Self {
+        let (pieces, whole) = printing.costs();
+        Self {
+            pieces,
+            whole: whole.unwrap_or_default(),
+            filled: None,
+            note,
+        }
+    }
+}
+
+/// Why there is no estimate of the slicer.
+#[derive(Debug)]
+enum NoEstimate {
+    /// The slicer refuses something, or its answer cannot be read.
+    Because(String),
+    /// A file could not be written.
+    Failed(Failure),
+}
+
+impl From<Failure> for NoEstimate {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
 }
 
 /// PrusaSlicer, and a folder for its files.
@@ -158,16 +193,17 @@ impl Slicer {
         Ok(Some(Self { folder, _writing }))
     }
 
-    /// All plates among `files`, and the solid; `None` where the slicer refuses something.
+    /// All plates among `files`, and the solid.
     fn costs(
         &self,
         printer: &Printer,
         files: Vec<(String, Vec<u8>)>,
         solid: &Solid,
-    ) -> Result<Option<Costs>, Failure> {
-        let Some(laid) = lay_alone(printer, solid.mesh()) else {
-            return Ok(None);
-        };
+    ) -> Result<Costs, NoEstimate> {
+        const WHOLE: &str = "the whole model";
+        let laid = lay_alone(printer, solid.mesh());
+        let laid =
+            laid.ok_or_else(|| NoEstimate::Because(format!("no pose to print {WHOLE} in was found")))?;
         let object = NamedObject {
             name: "solid",
             color: [200; 3],
@@ -176,36 +212,31 @@ impl Slicer {
             moved_mm: laid.moved_mm,
         };
         let is_single = files.len() == 1;
-        let plates = files
-            .into_iter()
-            .filter(|(name, _)| is_single || name.starts_with("plates/"))
-            .map(|(_, bytes)| bytes);
+        let is_plate = |name: &str| is_single || name.starts_with("plates/");
         let mut pieces = Cost::default();
-        for bytes in plates {
-            let Some(plate) = self.cost_of(printer, &bytes, "")? else {
-                return Ok(None);
-            };
-            pieces = pieces.and(plate);
+        for (name, bytes) in files.iter().filter(|(name, _)| is_plate(name)) {
+            pieces = pieces.and(self.cost_of(printer, name, bytes, "")?);
         }
         let model = write_3mf(&[object]);
         let is_filament = printer.process == Process::Fdm;
-        let Some(whole) = self.cost_of(printer, &model, if is_filament { "" } else { HOLLOWED })? else {
-            return Ok(None);
+        let whole = self.cost_of(printer, WHOLE, &model, if is_filament { "" } else { HOLLOWED })?;
+        let filled = is_filament.then(|| self.cost_of(printer, WHOLE, &model, FILLED));
+        let (filled, note) = match filled {
+            Some(Ok(cost)) => (Some(cost), None),
+            Some(Err(NoEstimate::Because(why))) => (None, Some(format!("filled to 100 %: {why}"))),
+            Some(Err(failed)) => return Err(failed),
+            None => (None, None),
         };
-        let filled = if is_filament {
-            self.cost_of(printer, &model, FILLED)?
-        } else {
-            None
-        };
-        Ok(Some(Costs {
+        Ok(Costs {
             pieces,
             whole,
             filled,
-        }))
+            note,
+        })
     }
 
-    /// What a 3MF file holds; `more` settings stand last.
-    fn cost_of(&self, printer: &Printer, bytes: &[u8], more: &str) -> Result<Option<Cost>, Failure> {
+    /// Cost of the 3MF file `bytes`, which people know as `name`; `more` settings stand last.
+    fn cost_of(&self, printer: &Printer, name: &str, bytes: &[u8], more: &str) -> Result<Cost, NoEstimate> {
         let [model, settings, out] =
             ["job.3mf", "job.ini", "job.out"].map(|name| self.folder.path().join(name));
         let (text, export) = match printer.process {
@@ -232,48 +263,85 @@ impl Slicer {
             .arg(&out)
             .arg(&model);
         let done = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
-        if !done.is_ok_and(|status| status.success()) {
-            return Ok(None);
+        let done = done.map_err(|e| NoEstimate::Because(format!("PrusaSlicer could not be started: {e}")))?;
+        if !done.success() {
+            return Err(NoEstimate::Because(format!(
+                "PrusaSlicer does not slice {name} ({done})"
+            )));
         }
-        Ok(told_cost(&out, printer))
+        estimate(&out, printer).map_err(|why| {
+            NoEstimate::Because(format!(
+                "the estimate of PrusaSlicer for {name} could not be read: {why}"
+            ))
+        })
     }
 }
 
-/// The time and the material that the slicer wrote into its result.
-fn told_cost(out: &PathBuf, printer: &Printer) -> Option<Cost> {
-    let grams = |cm3: f64| cm3 * printer.material.density_g_cm3;
-    match printer.process {
+/// Time and material that the slicer wrote into its result, the file `out`; or why they cannot be read.
+fn estimate(out: &Path, printer: &Printer) -> Result<Cost, String> {
+    let (seconds, cm3) = match printer.process {
         Process::Fdm => {
-            let code = fs::read_to_string(out).ok()?;
-            let told = |name: &str| Some(code.lines().find(|l| l.contains(name))?.split_once('=')?.1);
-            Some(Cost {
-                seconds: seconds_in(told("estimated printing time (normal mode)")?),
-                grams: grams(told("filament used [cm3]")?.trim().parse().ok()?),
-            })
+            let code = fs::read(out).map_err(|e| e.to_string())?;
+            filament_estimate(&String::from_utf8_lossy(&code))?
         }
-        Process::Sla | Process::Sls => {
-            let archive = Command::new("unzip")
-                .arg("-p")
-                .arg(out)
-                .arg("config.ini")
-                .output()
-                .ok()?;
-            let text = String::from_utf8_lossy(&archive.stdout).into_owned();
-            let told = |name: &str| {
-                let line = text.lines().find(|l| l.starts_with(name))?;
-                line.split_once('=')?.1.trim().parse().ok()
-            };
-            Some(Cost {
-                seconds: told("printTime")?,
-                grams: grams(told("usedMaterial")?),
-            })
-        }
-    }
+        Process::Sla | Process::Sls => resin_estimate(&config_of(out)?)?,
+    };
+    Ok(Cost {
+        seconds,
+        grams: cm3 * printer.material.density_g_cm3,
+    })
 }
 
-/// "1d 2h 3m 4s" in seconds.
-fn seconds_in(text: &str) -> f64 {
-    let unit = |word: &str| {
+/// Seconds and cm³ in the comments of G-code.
+fn filament_estimate(code: &str) -> Result<(f64, f64), String> {
+    let value = |name: &str| {
+        let line = code
+            .lines()
+            .find(|line| line.starts_with(';') && line.contains(name));
+        let value = line
+            .and_then(|line| line.split_once('='))
+            .map(|(_, value)| value.trim());
+        value.ok_or_else(|| format!("there is no \"{name}\""))
+    };
+    let time = value("estimated printing time (normal mode)")?;
+    let seconds = seconds_in(time).ok_or_else(|| format!("\"{time}\" is no time"))?;
+    Ok((seconds, number(value("filament used [cm3]")?)?))
+}
+
+/// Seconds and cm³ in the `config.ini` of an archive for resin printers.
+fn resin_estimate(config: &str) -> Result<(f64, f64), String> {
+    let value = |name: &str| {
+        let entries = config.lines().filter_map(|line| line.split_once('='));
+        let mut values = entries
+            .filter(|(key, _)| key.trim() == name)
+            .map(|(_, value)| value);
+        values.next().ok_or_else(|| format!("there is no \"{name}\""))
+    };
+    Ok((number(value("printTime")?)?, number(value("usedMaterial")?)?))
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    number.ok_or_else(|| format!("\"{}\" is no number", text.trim()))
+}
+
+/// The `config.ini` of the archive `out`.
+fn config_of(out: &Path) -> Result<String, String> {
+    const CONFIG: &str = "config.ini";
+    let file = fs::File::open(out).map_err(|e| e.to_string())?;
+    let mut archive = zip::ZipArchive::new(file).map_err(|e| e.to_string())?;
+    let config = archive.by_name(CONFIG).map_err(|e| format!("{CONFIG}: {e}"))?;
+    let mut text = Vec::new();
+    config
+        .take(MOST_CONFIG_BYTES)
+        .read_to_end(&mut text)
+        .map_err(|e| format!("{CONFIG}: {e}"))?;
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
+
+/// "1d 2h 3m 4s" in seconds; `None` where it is anything else.
+fn seconds_in(text: &str) -> Option<f64> {
+    let seconds = |word: &str| {
         let (number, unit) = word.split_at_checked(word.len().checked_sub(1)?)?;
         let factor = match unit {
             "d" => 86_400.0,
@@ -282,19 +350,81 @@ fn seconds_in(text: &str) -> f64 {
             "s" => 1.0,
             _ => return None,
         };
-        Some(number.parse::<f64>().ok()? * factor)
+        Some(f64::from(number.parse::<u32>().ok()?) * factor)
     };
-    text.split_whitespace().filter_map(unit).sum()
+    let words: Option<Vec<f64>> = text.split_whitespace().map(seconds).collect();
+    words
+        .filter(|words| !words.is_empty())
+        .map(|words| words.iter().sum())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::{Cursor, Write as _};
+
     use super::*;
 
     #[test]
     fn the_slicers_way_to_tell_time_is_read() {
-        assert_eq!(seconds_in(" 1d 2h 3m 4s"), 93_784.0);
-        assert_eq!(seconds_in(" 15m 30s "), 930.0);
-        assert_eq!(seconds_in(""), 0.0);
+        assert_eq!(seconds_in(" 1d 2h 3m 4s"), Some(93_784.0));
+        assert_eq!(seconds_in(" 15m 30s "), Some(930.0));
+        for wrong in ["", "soon", "4", "3x", "1h soon", "-3s"] {
+            assert_eq!(seconds_in(wrong), None, "{wrong}");
+        }
+    }
+
+    /// Reads a slicer's answer with these bytes.
+    fn read_estimate(printer: &Printer, bytes: &[u8]) -> Result<(f64, f64), String> {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("job.out");
+        fs::write(&out, bytes).unwrap();
+        let cost = estimate(&out, printer)?;
+        Ok((cost.seconds, cost.grams / printer.material.density_g_cm3))
+    }
+
+    fn archive(file: &str, text: &str) -> Vec<u8> {
+        let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        archive
+            .start_file(file, zip::write::SimpleFileOptions::default())
+            .unwrap();
+        archive.write_all(text.as_bytes()).unwrap();
+        archive.finish().unwrap().into_inner()
+    }
+
+    #[test]
+    fn the_slicers_archive_for_resin_is_read_or_it_is_said_why_not() {
+        let read = |bytes: &[u8]| read_estimate(&Printer::sla(), bytes);
+        let of = |config: &str| read(&archive("config.ini", config));
+        let (seconds, cm3) = of("action = print\nprintTime = 4183.5\nusedMaterial = 12.5\n").unwrap();
+        assert!(seconds == 4183.5 && (cm3 - 12.5).abs() < 1e-9);
+        let says = |read: Result<_, String>, word: &str| {
+            let why = read.unwrap_err();
+            assert!(why.contains(word), "{why}");
+        };
+        says(of("printTime = 4183.5\n"), "no \"usedMaterial\"");
+        says(of("printTimes = 1\nusedMaterial = 12.5\n"), "no \"printTime\"");
+        says(
+            of("printTime = nan\nusedMaterial = 12.5\n"),
+            "\"nan\" is no number",
+        );
+        says(read(&archive("other.ini", "printTime = 1")), "config.ini");
+        says(read(b"no archive"), "rchive");
+    }
+
+    #[test]
+    fn the_slicers_code_for_filament_is_read_or_it_is_said_why_not() {
+        let read = |code: &str| read_estimate(&Printer::fdm(), code.as_bytes());
+        let used = "; filament used [cm3] = 12.5\n";
+        let time = "; estimated printing time (normal mode) = 1h 2m 3s\n";
+        let (seconds, cm3) = read(&format!("G1 X0\n{used}{time}")).unwrap();
+        assert!(seconds == 3723.0 && (cm3 - 12.5).abs() < 1e-9);
+        assert!(read(used).unwrap_err().contains("no \"estimated printing time"));
+        assert!(read(time).unwrap_err().contains("no \"filament used [cm3]\""));
+        let soon = time.replace("1h 2m 3s", "soon");
+        assert!(
+            read(&format!("{used}{soon}"))
+                .unwrap_err()
+                .contains("\"soon\" is no time")
+        );
     }
 }

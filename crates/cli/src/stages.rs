@@ -27,6 +27,7 @@ use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
 use crate::place::Standing;
 use crate::progress::{Display, PlanClock};
+use crate::shares::largest_shares;
 use crate::told::{print_input_warnings, print_verdict, print_warnings, quality, weakest};
 
 /// Writes one file: whole or not at all.
@@ -122,34 +123,18 @@ pub fn divided(
 
 /// For each face of the file, the patch that has most of its area; faces that were dropped are of the first.
 pub fn labels_of_file(model: &input::Model, surface: &SegmentedSurface) -> Vec<u32> {
-    let mut best = vec![(0.0f64, PatchId(0)); model.n_file_faces];
-    let mut area = vec![0.0; surface.n_patches];
-    let mut from = 0;
-    let mut order: Vec<usize> = (0..surface.mesh.triangles.len()).collect();
-    order.sort_by_key(|&f| surface.source_face[f]);
-    while from < order.len() {
-        let source = surface.source_face[order[from]];
-        let to = from
-            + order[from..]
-                .iter()
-                .take_while(|&&f| surface.source_face[f] == source)
-                .count();
-        area.iter_mut().for_each(|a| *a = 0.0);
-        for &f in &order[from..to] {
-            area[surface.patch_of_face[f].0 as usize] += surface.mesh.face_area(f);
-        }
-        let (patch, &share) = area
-            .iter()
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(b.1))
-            .expect("there is at least one patch");
-        let entry = &mut best[model.file_face[source as usize] as usize];
-        if share > entry.0 {
-            *entry = (share, patch.into());
-        }
-        from = to;
-    }
-    best.into_iter().map(|b| b.1.number()).collect()
+    labels_of_faces(model.n_file_faces, &model.file_face, surface)
+}
+
+fn labels_of_faces(n_file_faces: usize, file_face: &[u32], surface: &SegmentedSurface) -> Vec<u32> {
+    let patches = surface.source_face.iter().zip(&surface.patch_of_face).enumerate();
+    let parts = patches.map(|(face, (&source, patch))| {
+        let area = surface.mesh.face_area(face);
+        (file_face[source as usize], patch.number(), area)
+    });
+    let dropped = PatchId(0).number();
+    let most = largest_shares(n_file_faces, parts);
+    most.into_iter().map(|label| label.unwrap_or(dropped)).collect()
 }
 
 /// `shellock plan`.
@@ -401,4 +386,40 @@ pub fn figure(name: &str, out: &Path, size_mm: f64, labels: Option<&Path>) -> Re
         out.display()
     );
     Ok(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles apart from each other, each of a patch, of a triangle of the model and of an area.
+    fn surface(parts: &[(u32, u32, f64)]) -> SegmentedSurface {
+        let mut mesh = TriMesh::default();
+        for (i, (_, _, area)) in parts.iter().enumerate() {
+            let (at, z) = (3 * i as u32, i as f64);
+            mesh.points.extend([
+                Vec3::new(0.0, 0.0, z),
+                Vec3::new(2.0 * area, 0.0, z),
+                Vec3::new(0.0, 1.0, z),
+            ]);
+            mesh.triangles.push([at, at + 1, at + 2]);
+        }
+        SegmentedSurface {
+            mesh,
+            patch_of_face: parts.iter().map(|part| PatchId(part.0)).collect(),
+            source_face: parts.iter().map(|part| part.1).collect(),
+            n_patches: 1 + parts.iter().map(|part| part.0 as usize).max().unwrap_or(0),
+        }
+    }
+
+    #[test]
+    fn a_face_of_the_file_has_the_patch_with_most_of_its_area_over_all_its_triangles() {
+        // A polygon of triangles 0 to 2: 5 of its area are of patch 0, 3 + 3 of patch 1.
+        let polygon = [(0, 0, 5.0), (1, 1, 3.0), (1, 2, 3.0)];
+        // A triangle that a seam cuts: the larger part decides, and so do two parts together.
+        let cut = [(2, 3, 1.0), (0, 3, 2.0), (2, 3, 1.5)];
+        let surface = surface(&[&polygon[..], &cut].concat());
+        let labels = labels_of_faces(3, &[0, 0, 0, 1], &surface);
+        assert_eq!(labels, [2, 3, 1], "the last face was dropped");
+    }
 }

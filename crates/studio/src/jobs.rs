@@ -1,17 +1,18 @@
 //! Kits in the making: one process runs, others wait, each can be stopped.
 //!
 //! A process is the program itself with `--json`: its progress comes as a line of JSON each on standard error, the
-//! result on standard output. It ends where its standard input does, so none outlives this server.
+//! result on standard output. It ends where its standard input does, so none outlives this server; one that is stopped
+//! and does not end is killed.
 
 use std::collections::VecDeque;
 use std::process::Stdio;
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use serde_json::Value;
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, BufReader};
-use tokio::process::{Child, ChildStdin, Command};
+use tokio::process::{Child, ChildStderr, ChildStdout, Command};
 use tokio::sync::{Notify, broadcast};
 
 use crate::{Refusal, Task, Workshop};
@@ -23,6 +24,10 @@ const MOST_KEPT: usize = 50;
 const MOST_WAITING: usize = 8;
 /// Events that a slow page may miss; it then asks anew.
 const MOST_EVENTS: usize = 256;
+/// Time that a stopped process has to end by itself before it is killed.
+///
+/// `build` ends 0.3 s after its standard input, or when the files that it is writing are complete: `batch` waits as long.
+const TO_STOP: Duration = Duration::from_secs(10);
 
 /// How far a job is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -57,9 +62,9 @@ pub struct Job {
     pub exit_code: Option<i32>,
     #[serde(skip)]
     since: Option<Instant>,
-    /// Open as long as it is to run.
+    /// Notified when its process is to stop.
     #[serde(skip)]
-    stdin: Option<Arc<Mutex<Option<ChildStdin>>>>,
+    stop: Arc<Notify>,
 }
 
 impl Job {
@@ -76,7 +81,14 @@ impl Job {
             error: None,
             exit_code: None,
             since: None,
-            stdin: None,
+            stop: Arc::default(),
+        }
+    }
+
+    /// Runs from now on, where it still waits.
+    fn begin(&mut self) {
+        if self.state == State::Waiting {
+            (self.state, self.since) = (State::Running, Some(Instant::now()));
         }
     }
 
@@ -126,9 +138,28 @@ pub enum Event {
     Project,
 }
 
+/// The part of a [`Workshop`] that makes kits.
+pub trait Maker: Send + Sync + 'static {
+    /// [`Workshop::task`].
+    fn task(&self) -> Result<Task, Refusal>;
+    /// [`Workshop::ended`].
+    fn ended(&self, code: Option<i32>, output: &str);
+}
+
+impl Maker for Arc<dyn Workshop> {
+    fn task(&self) -> Result<Task, Refusal> {
+        (**self).task()
+    }
+
+    fn ended(&self, code: Option<i32>, output: &str) {
+        (**self).ended(code, output);
+    }
+}
+
 /// All jobs of this server.
 pub struct Jobs {
-    workshop: Arc<dyn Workshop>,
+    maker: Box<dyn Maker>,
+    to_stop: Duration,
     all: Mutex<VecDeque<Job>>,
     work: Notify,
     events: broadcast::Sender<Event>,
@@ -136,9 +167,14 @@ pub struct Jobs {
 
 impl Jobs {
     /// None yet; [`Self::run`] runs them.
-    pub fn new(workshop: Arc<dyn Workshop>) -> Arc<Self> {
+    pub fn new(maker: impl Maker) -> Arc<Self> {
+        Self::with_time_to_stop(maker, TO_STOP)
+    }
+
+    fn with_time_to_stop(maker: impl Maker, to_stop: Duration) -> Arc<Self> {
         Arc::new(Self {
-            workshop,
+            maker: Box::new(maker),
+            to_stop,
             all: Mutex::default(),
             work: Notify::new(),
             events: broadcast::channel(MOST_EVENTS).0,
@@ -184,9 +220,7 @@ impl Jobs {
             if !job.is_over() {
                 job.seconds = job.told().seconds;
                 job.state = State::Stopped;
-                if let Some(stdin) = job.stdin.take() {
-                    stdin.lock().expect("no holder of this lock panics").take();
-                }
+                job.stop.notify_one();
             }
         })
         .ok_or_else(|| Refusal::missing("there is no such job"))
@@ -208,60 +242,32 @@ impl Jobs {
     }
 
     async fn run_one(&self, id: u64) {
-        let started = self.workshop.task().and_then(|task| {
+        let begun = self.change(id, Job::begin);
+        let Some(job) = begun.filter(|job| job.state == State::Running) else {
+            // It was stopped before it began.
+            return;
+        };
+        let started = self.maker.task().and_then(|task| {
             spawned(&task).map_err(|e| Refusal::unable(format!("the program could not be started: {e}")))
         });
-        let mut child = match started {
+        let child = match started {
             Ok(child) => child,
             Err(refusal) => {
                 self.change(id, |job| {
-                    (job.state, job.error) = (State::Error, Some(refusal.to_string()));
+                    if job.state == State::Running {
+                        (job.state, job.error) = (State::Error, Some(refusal.to_string()));
+                    }
                 });
                 return;
             }
         };
-        let stdin = Arc::new(Mutex::new(child.stdin.take()));
-        let is_wanted = self.change(id, |job| {
-            if job.state == State::Waiting {
-                (job.state, job.since) = (State::Running, Some(Instant::now()));
-                job.stdin = Some(Arc::clone(&stdin));
-            }
+        let ended = watch(child, &job.stop, self.to_stop, |line| {
+            self.change(id, |job| job.hear(line));
         });
-        if is_wanted.is_none_or(|job| job.state != State::Running) {
-            stdin.lock().expect("no holder of this lock panics").take();
-        }
-        drop(stdin);
-        let (output, errors) = self.heard(id, &mut child).await;
-        let code = child.wait().await.ok().and_then(|status| status.code());
-        self.workshop.ended(code, &output);
+        let Ended { code, output, errors } = ended.await;
+        self.maker.ended(code, &output);
         self.change(id, |job| job.end(code, &output, errors));
         self.tell_project();
-    }
-
-    /// Listens until the process has said all; what it printed, and what of its errors is no event.
-    async fn heard(&self, id: u64, child: &mut Child) -> (String, String) {
-        let (mut output, mut errors) = (Vec::new(), String::new());
-        let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
-        let print = async {
-            if let Some(mut stdout) = stdout {
-                // Half an answer is no JSON, and is told as that.
-                let _ = stdout.read_to_end(&mut output).await;
-            }
-        };
-        let progress = async {
-            let Some(stderr) = stderr else { return };
-            let mut lines = BufReader::new(stderr).lines();
-            while let Ok(Some(line)) = lines.next_line().await {
-                if line.starts_with('{') {
-                    self.change(id, |job| job.hear(&line));
-                } else {
-                    errors += &line;
-                    errors.push('\n');
-                }
-            }
-        };
-        tokio::join!(print, progress);
-        (String::from_utf8_lossy(&output).into_owned(), errors)
     }
 
     fn change(&self, id: u64, change: impl FnOnce(&mut Job)) -> Option<Job> {
@@ -297,7 +303,7 @@ impl Job {
                 _ => State::Error,
             };
         }
-        (self.exit_code, self.seconds_left, self.stdin) = (code, None, None);
+        (self.exit_code, self.seconds_left) = (code, None);
         if self.state == State::Error {
             let told = serde_json::from_str::<Value>(output).ok();
             let told = told.and_then(|value| value["error"].as_str().map(str::to_owned));
@@ -318,6 +324,76 @@ fn spawned(task: &Task) -> std::io::Result<Child> {
         .stderr(Stdio::piped())
         .kill_on_drop(true)
         .spawn()
+}
+
+/// How a process ended.
+#[derive(Default)]
+struct Ended {
+    /// `None` where a signal ended it.
+    code: Option<i32>,
+    /// Its standard output.
+    output: String,
+    /// Lines of its standard error that are no events.
+    errors: String,
+}
+
+/// Waits for the end of `child`, and passes its events to `hear`.
+///
+/// Once `stop` is notified, the standard input of `child` is closed. If `child` has not ended `to_stop` later, it is killed;
+/// a killed process has no output.
+async fn watch(mut child: Child, stop: &Notify, to_stop: Duration, hear: impl FnMut(&str)) -> Ended {
+    let stdin = child.stdin.take();
+    let overdue = async {
+        stop.notified().await;
+        drop(stdin);
+        tokio::time::sleep(to_stop).await;
+    };
+    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+    let listening = async {
+        let (output, errors) = tokio::join!(printed(stdout), progress(stderr, hear));
+        let status = child.wait().await;
+        Ended {
+            code: status.ok().and_then(|status| status.code()),
+            output,
+            errors,
+        }
+    };
+    // The pipes of a killed process may stay open in its own children, so nobody listens to them any more.
+    let ended = tokio::select! {
+        ended = listening => Some(ended),
+        () = overdue => None,
+    };
+    if ended.is_none() {
+        // It fails only where the process has ended by now.
+        let _ = child.kill().await;
+    }
+    ended.unwrap_or_default()
+}
+
+/// All that a process prints on its standard output.
+async fn printed(stdout: Option<ChildStdout>) -> String {
+    let mut output = Vec::new();
+    if let Some(mut stdout) = stdout {
+        // Half an answer is no JSON, and is told as that.
+        let _ = stdout.read_to_end(&mut output).await;
+    }
+    String::from_utf8_lossy(&output).into_owned()
+}
+
+/// Passes events on standard error to `hear`; returns the other lines.
+async fn progress(stderr: Option<ChildStderr>, mut hear: impl FnMut(&str)) -> String {
+    let mut errors = String::new();
+    let Some(stderr) = stderr else { return errors };
+    let mut lines = BufReader::new(stderr).lines();
+    while let Ok(Some(line)) = lines.next_line().await {
+        if line.starts_with('{') {
+            hear(&line);
+        } else {
+            errors += &line;
+            errors.push('\n');
+        }
+    }
+    errors
 }
 
 #[cfg(test)]
@@ -364,5 +440,77 @@ mod tests {
         stopped.state = State::Stopped;
         stopped.end(Some(130), "", String::new());
         assert_eq!((stopped.state, stopped.error), (State::Stopped, None));
+    }
+
+    /// Makes "kits" by shell scripts, one after the other.
+    #[cfg(unix)]
+    struct Scripts(Mutex<VecDeque<&'static str>>);
+
+    #[cfg(unix)]
+    impl Maker for Scripts {
+        fn task(&self) -> Result<Task, Refusal> {
+            let script = self.0.lock().unwrap().pop_front();
+            Ok(Task {
+                program: "sh".into(),
+                arguments: vec!["-c".into(), script.ok_or_else(Refusal::too_many)?.into()],
+            })
+        }
+
+        fn ended(&self, _: Option<i32>, _: &str) {}
+    }
+
+    /// The job, once it is in another state than these.
+    #[cfg(unix)]
+    async fn left(jobs: &Jobs, id: u64, states: &[State]) -> Job {
+        loop {
+            let job = jobs.list().into_iter().find(|job| job.id == id).unwrap();
+            if !states.contains(&job.state) {
+                return job;
+            }
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    }
+
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn a_stopped_job_that_does_not_end_holds_up_no_other() {
+        // The second leaves a process behind that keeps its pipes open.
+        for stuck in ["exec sleep 20", "sleep 20; true"] {
+            let scripts = Scripts(Mutex::new([stuck, "exit 1"].into()));
+            let jobs = Jobs::with_time_to_stop(scripts, Duration::from_millis(200));
+            let ids = [(); 2].map(|()| jobs.add().unwrap().id);
+            let running = tokio::spawn(Arc::clone(&jobs).run());
+            left(&jobs, ids[0], &[State::Waiting]).await;
+            jobs.stop(ids[0]).unwrap();
+            let next = left(&jobs, ids[1], &[State::Waiting, State::Running]);
+            let next = tokio::time::timeout(Duration::from_secs(10), next).await;
+            assert_eq!(next.expect("it runs").state, State::Failed, "{stuck}");
+            assert_eq!(jobs.list()[0].state, State::Stopped);
+            running.abort();
+        }
+    }
+
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn a_stopped_job_may_end_by_itself_and_its_notes_are_kept() {
+        let scripts = Scripts(Mutex::new(
+            [r#"cat; echo '{"event":"note","text":"tidied up"}' >&2; exit 130"#].into(),
+        ));
+        let jobs = Jobs::new(scripts);
+        let id = jobs.add().unwrap().id;
+        let running = tokio::spawn(Arc::clone(&jobs).run());
+        left(&jobs, id, &[State::Waiting]).await;
+        jobs.stop(id).unwrap();
+        let ended = async {
+            while jobs.list()[0].exit_code.is_none() {
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
+        };
+        let ended = tokio::time::timeout(Duration::from_secs(10), ended).await;
+        ended.expect("it ends with its standard input");
+        let job = &jobs.list()[0];
+        assert_eq!((job.state, job.exit_code), (State::Stopped, Some(130)));
+        assert_eq!(job.notes, ["tidied up"]);
+        running.abort();
     }
 }

@@ -9,6 +9,12 @@ use zip::write::SimpleFileOptions;
 
 use crate::Refusal;
 
+/// Name of the file at `path` within a kit: the parts of `path`, with `/` between them on every system.
+pub fn name_in_kit(path: &Path) -> String {
+    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
+    parts.join("/")
+}
+
 /// All files below `folder` by their names within it, sorted, with `/` between folders.
 pub fn names(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
@@ -18,10 +24,7 @@ pub fn names(folder: &Path) -> Vec<String> {
             let name = within.join(entry.file_name());
             match entry.file_type() {
                 Ok(kind) if kind.is_dir() => left.push(name),
-                Ok(kind) if kind.is_file() => {
-                    let parts: Vec<_> = name.iter().map(|part| part.to_string_lossy()).collect();
-                    names.push(parts.join("/"));
-                }
+                Ok(kind) if kind.is_file() => names.push(name_in_kit(&name)),
                 // Links lead elsewhere.
                 _ => {}
             }
@@ -126,6 +129,18 @@ mod tests {
             "pieces//../plan.json",
         ] {
             assert!(file(&folder, trick).is_err(), "{trick}");
+        }
+    }
+
+    #[test]
+    fn a_name_in_a_kit_has_slashes_between_its_parts_on_every_system() {
+        for parts in [
+            &["plan.json"][..],
+            &["pieces", "piece-1.stl"],
+            &["a", "b c", "ü.3mf"],
+        ] {
+            let path: PathBuf = parts.iter().collect();
+            assert_eq!(name_in_kit(&path), parts.join("/"));
         }
     }
 

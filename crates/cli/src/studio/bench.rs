@@ -1,6 +1,9 @@
 //! What the studio's page works on: one project, its model and its pieces.
 
-use std::collections::BTreeSet;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -17,7 +20,7 @@ use shellock_studio::{Refusal, Task, Workshop};
 use super::figure::Figure;
 use super::finer::{self, finer};
 use super::judgement::{Judged, judge};
-use super::store::{Found, Store};
+use super::store::{Found, N_LABELS, Store};
 use crate::Session;
 use crate::args::Options;
 use crate::bed::fitted;
@@ -71,6 +74,35 @@ struct State {
     making: Option<String>,
 }
 
+impl State {
+    /// The choices that mean the same faces with `pieces` as the present ones do without, where they have to change.
+    ///
+    /// Options name the labels that the model's file has, but the numbers of painted pieces once a person has painted.
+    fn relabelled(&self, pieces: &Pieces) -> Option<Choices> {
+        let model = &self.figure.as_ref()?.model;
+        let own = model.labels.as_deref()?;
+        let painted = self.pieces.as_ref().filter(|pieces| pieces.is_painted);
+        let (before, after) = match (painted, pieces.is_painted) {
+            (None, true) => (own.to_vec(), pieces.numbers()),
+            (Some(painted), false) => (painted.numbers(), own.to_vec()),
+            _ => return None,
+        };
+        let mesh = model.solid.mesh();
+        let new_label = |label| successor(label, &before, &after, |face| mesh.face_area(face));
+        Some(choices::relabelled(&self.choices, new_label))
+    }
+}
+
+/// The label in `after` that has most of the area of the faces with `label` in `before`; `None` where there are none.
+fn successor(label: i64, before: &[i64], after: &[i64], area: impl Fn(usize) -> f64) -> Option<i64> {
+    let mut areas: BTreeMap<i64, f64> = BTreeMap::new();
+    for (face, _) in before.iter().enumerate().filter(|(_, of)| **of == label) {
+        *areas.entry(after[face]).or_default() += area(face);
+    }
+    let largest = areas.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    largest.map(|(label, _)| label)
+}
+
 /// The pieces as the page shows them.
 #[derive(Clone)]
 pub(super) struct Pieces {
@@ -86,6 +118,11 @@ pub(super) struct Pieces {
 impl Pieces {
     fn n(&self) -> usize {
         self.labels.iter().collect::<BTreeSet<_>>().len()
+    }
+
+    /// The number of the piece of each triangle, from 1, as people and files know it.
+    fn numbers(&self) -> Vec<i64> {
+        self.labels.iter().map(|&label| i64::from(label) + 1).collect()
     }
 }
 
@@ -212,6 +249,10 @@ impl Bench {
             return Err(Refusal::overtaken());
         }
         let (n_pieces, notes, method) = (pieces.n(), pieces.notes.clone(), state.options.method.name());
+        if let Some(choices) = state.relabelled(&pieces) {
+            state.options = Arc::new(choices::options(&choices, &self.printers)?);
+            state.choices = choices;
+        }
         state.pieces = Some(pieces);
         self.changed(&mut state)?;
         Ok(json!({ "revision": state.revision, "n_pieces": n_pieces, "method": method, "notes": notes }))
@@ -384,7 +425,7 @@ impl Workshop for Bench {
             )));
         }
         let painted: Vec<u32> = numbers.iter().map(|b| u32::from_le_bytes(*b)).collect();
-        if painted.iter().any(|&label| label as usize >= 8 * MOST_PIECES) {
+        if painted.iter().any(|&label| label >= N_LABELS) {
             return Err(Refusal::wrong(format!(
                 "more than {MOST_PIECES} pieces cannot be made"
             )));

@@ -14,6 +14,7 @@ use crate::failure::Failure;
 use crate::input::{self, Model};
 use crate::inspect::thin_warnings;
 use crate::output::standing;
+use crate::shares::largest_shares;
 use shellock::strength::StrengthParams;
 
 /// How a mesh for the page begins: "SHMV", then the version.
@@ -87,30 +88,26 @@ impl Figure {
 
     /// For each triangle that is shown, the patch that has most of it.
     pub fn labels_of(&self, surface: &SegmentedSurface) -> Vec<u32> {
-        let mut most = vec![Majority::default(); self.n_faces()];
-        for (face, &source) in surface.source_face.iter().enumerate() {
-            let patch = surface.patch_of_face[face].0;
-            most[source as usize].add(patch, surface.mesh.face_area(face));
-        }
-        most.into_iter().map(|m| m.label).collect()
+        let patches = surface.source_face.iter().zip(&surface.patch_of_face).enumerate();
+        let parts = patches.map(|(face, (&source, patch))| (source, patch.0, surface.mesh.face_area(face)));
+        let most = largest_shares(self.n_faces(), parts);
+        most.into_iter().map(Option::unwrap_or_default).collect()
     }
 
     /// For each face of the file, the label that most of it has; 0 where nothing is left of a face.
     pub fn file_labels(&self, labels: &[u32]) -> Vec<u32> {
-        let mut most = vec![Majority::default(); self.model.n_file_faces];
-        if let Some(full) = &self.full {
-            for &(shown, face, area) in full {
-                most[face as usize].add(labels[shown as usize], area);
-            }
-        }
+        let n = self.model.n_file_faces;
+        let full = self.full.iter().flatten();
+        let most = largest_shares(
+            n,
+            full.map(|&(shown, face, area)| (face, labels[shown as usize], area)),
+        );
         let mesh = self.model.solid.mesh();
-        let mut own = vec![Majority::default(); self.model.n_file_faces];
-        for (f, &face) in self.model.file_face.iter().enumerate() {
-            own[face as usize].add(labels[f], mesh.face_area(f));
-        }
+        let own = self.model.file_face.iter().enumerate();
+        let own = largest_shares(n, own.map(|(f, &face)| (face, labels[f], mesh.face_area(f))));
         // A face that a triangle shown stands for has that one's label: it is where the program looks.
-        let of_face = |(most, own): (Majority, Majority)| if own.area > 0.0 { own.label } else { most.label };
-        most.into_iter().zip(own).map(of_face).collect()
+        let of_face = own.into_iter().zip(most).map(|(own, most)| own.or(most));
+        of_face.map(Option::unwrap_or_default).collect()
     }
 
     /// The labels of the triangles shown, from one a face of the file.
@@ -137,30 +134,6 @@ pub fn shown(mesh: &TriMesh, up: Axis, is_thin: impl Iterator<Item = bool>) -> V
     bytes.extend(is_thin.map(u8::from));
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     bytes
-}
-
-/// The label that has more than half of some areas, where one has.
-#[derive(Clone, Copy, Default)]
-struct Majority {
-    label: u32,
-    area: f64,
-}
-
-impl Majority {
-    fn add(&mut self, label: u32, area: f64) {
-        // Areas of 0 count, too, or a degenerate face would keep no label.
-        let area = area.max(f64::MIN_POSITIVE);
-        if label == self.label {
-            self.area += area;
-        } else if area > self.area {
-            *self = Self {
-                label,
-                area: area - self.area,
-            };
-        } else {
-            self.area -= area;
-        }
-    }
 }
 
 /// For each triangle of `full`, the one of `shown` that its middle is nearest to, its face and its area.

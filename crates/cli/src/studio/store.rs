@@ -1,13 +1,15 @@
 //! A project's folder: the project file, the model as it was given, the labels, and the kit that was made last.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
+use shellock::segmentation::MOST_PIECES;
 use shellock_formats::{read_labels, write_labels};
 use toml_edit::Item;
 
-use crate::choices::Choices;
+use crate::choices::{Choices, relabelled};
 use crate::config;
 use crate::failure::Failure;
 use crate::input::{read, sha256};
@@ -23,6 +25,9 @@ const LABELS: &str = "figure.labels.seg";
 const LAST: &str = "figure.kit.json";
 /// The folder of that kit.
 const KIT: &str = "kit";
+/// Labels that pieces on the page may have, from 0. The page gives a new piece a new label, so that there are more labels
+/// than pieces.
+pub const N_LABELS: u32 = 8 * MOST_PIECES as u32;
 /// Longest name of a model's file that is kept, characters.
 const LONGEST_NAME: usize = 100;
 
@@ -37,6 +42,7 @@ pub struct Store {
 #[derive(Default)]
 pub struct Found {
     pub model: Option<ModelOf>,
+    /// Pieces that they name count from 1.
     pub choices: Choices,
     /// What was painted, one a face of the file, from 0.
     pub labels: Option<Vec<u32>>,
@@ -60,7 +66,9 @@ impl Store {
             let (choices, is_labelled) = choices_of(&file).map_err(wrong)?;
             found.choices = choices;
             if is_labelled {
-                found.labels = Some(labels_in(&folder.join(LABELS))?);
+                let (labels, numbering) = labels_in(&folder.join(LABELS))?;
+                found.choices = relabelled(&found.choices, |label| numbering.number(label));
+                found.labels = Some(numbering.pieces(&labels));
             }
         }
         Ok((Self { folder, printers }, found))
@@ -186,18 +194,57 @@ fn choices_of(file: &toml_edit::DocumentMut) -> Result<(Choices, bool), String> 
     Ok((choices, is_labelled))
 }
 
-fn labels_in(path: &Path) -> Result<Vec<u32>, Failure> {
+/// The labels in the file at `path`, and the pieces that they become.
+fn labels_in(path: &Path) -> Result<(Vec<i64>, Numbering), Failure> {
     let labels = read_labels(&read(path)?).map_err(|source| Failure::NotAMesh {
         path: path.to_owned(),
         source,
     })?;
-    let wrong = || Failure::Wrong(format!("{}: labels must be whole numbers from 0", path.display()));
-    // Somebody else's may count from 0.
-    let first = labels.iter().copied().min().unwrap_or_default().min(1);
-    labels
-        .into_iter()
-        .map(|l| u32::try_from(l - first).map_err(|_| wrong()))
-        .collect()
+    let numbering = Numbering::of(&labels);
+    let n_labels = numbering.places.len();
+    if n_labels > N_LABELS as usize {
+        return Err(Failure::Wrong(format!(
+            "{}: {n_labels} labels, but at most {MOST_PIECES} pieces can be made: give faces of one piece the same label",
+            path.display(),
+        )));
+    }
+    Ok((labels, numbering))
+}
+
+/// Numbers of pieces, from 1, for labels of a file that this program may not have written: such labels may count from 0,
+/// or be far apart.
+struct Numbering {
+    /// What to add to a label; `None` where labels are far apart and numbered by their places.
+    shift: Option<i64>,
+    /// The place of each label in their order, from 1.
+    places: BTreeMap<i64, i64>,
+}
+
+impl Numbering {
+    /// Labels of this program keep their numbers.
+    fn of(labels: &[i64]) -> Self {
+        let all: BTreeSet<i64> = labels.iter().copied().collect();
+        let first = all.first().map_or(1, |&first| first.min(1));
+        let is_dense = all.last().is_none_or(|last| last - first < i64::from(N_LABELS));
+        Self {
+            shift: is_dense.then_some(1 - first),
+            places: all.into_iter().zip(1..).collect(),
+        }
+    }
+
+    /// The number of the piece with this label. A label that no face has is no piece's number, either.
+    fn number(&self, label: i64) -> Option<i64> {
+        match self.shift {
+            Some(shift) => label.checked_add(shift),
+            None => Some(self.places.get(&label).copied().unwrap_or(0)),
+        }
+    }
+
+    /// The piece of each face, from 0.
+    fn pieces(&self, labels: &[i64]) -> Vec<u32> {
+        let piece = |&label: &i64| self.number(label).map_or(0, |number| (number - 1) as u32);
+        labels.iter().map(piece).collect()
+    }
 }
 
 /// Names for a model's file: like `name`, without what file systems or projects have another use for; then with
@@ -279,5 +326,75 @@ mod tests {
         assert_eq!(store.keep("a.stl", b"yours").unwrap().file, "a-2.stl");
         assert_eq!(store.keep("a.stl", b"mine").unwrap().file, "a.stl");
         assert_eq!(fs::read(dir.path().join("a.stl")).unwrap(), b"mine");
+    }
+
+    /// A folder with a project of somebody else's: these lines, and these labels.
+    fn project_of(lines: &str, labels: &str) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(
+            dir.path().join(PROJECT),
+            format!("labels = \"{LABELS}\"\n{lines}\n"),
+        )
+        .unwrap();
+        fs::write(dir.path().join(LABELS), labels).unwrap();
+        dir
+    }
+
+    /// For each option that may name a label, the faces that have it, or else its own words.
+    fn meaning(folder: &Path) -> Vec<String> {
+        let labels = read_labels(&fs::read(folder.join(LABELS)).unwrap()).unwrap();
+        let faces = |text: String| match text.parse::<i64>() {
+            Ok(label) => format!("{:?}", labels.iter().map(|l| *l == label).collect::<Vec<_>>()),
+            Err(_) => text,
+        };
+        let file: toml::Table = fs::read_to_string(folder.join(PROJECT)).unwrap().parse().unwrap();
+        let text = |value: &toml::Value| {
+            let number = value.as_integer().map(|number| number.to_string());
+            number.unwrap_or_else(|| value.as_str().unwrap().to_owned())
+        };
+        let texts = ["key", "keep-whole"].map(|name| match &file[name] {
+            toml::Value::Array(all) => all.iter().map(text).collect(),
+            one => vec![text(one)],
+        });
+        texts.concat().into_iter().map(faces).collect()
+    }
+
+    #[test]
+    fn options_that_name_labels_mean_the_same_faces_after_a_project_is_saved() {
+        for labels in ["0\n1\n2\n2\n", "1\n2\n3\n3\n", "2\n5\n5\n9\n", "0\n2\n1\n70000\n"] {
+            for lines in [
+                "key = 2\nkeep-whole = [\"0\", \"1\", \"0,0,9,5\"]",
+                "key = \"2\"\nkeep-whole = 1",
+                "key = \"auto\"\nkeep-whole = [2]",
+                "key = \"1,2,3\"\nkeep-whole = \"2\"",
+            ] {
+                let dir = project_of(lines, labels);
+                let before = meaning(dir.path());
+                let (store, found) = Store::open(dir.path().to_owned()).unwrap();
+                store.save(None, &found.choices, found.labels.as_deref()).unwrap();
+                assert_eq!(meaning(dir.path()), before, "{lines} {labels:?}");
+                let (_, again) = Store::open(dir.path().to_owned()).unwrap();
+                assert_eq!((again.choices, again.labels), (found.choices, found.labels));
+            }
+        }
+    }
+
+    #[test]
+    fn labels_far_apart_are_numbered_and_more_than_can_be_painted_are_refused() {
+        let dir = project_of(
+            "key = 9\nkeep-whole = [7]",
+            "9\n4294967295\n9223372036854775807\n",
+        );
+        let (_, found) = Store::open(dir.path().to_owned()).unwrap();
+        assert_eq!(found.labels, Some(vec![0, 1, 2]));
+        let choices: Choices = vec![
+            ("key".into(), Choice::Text("1".into())),
+            ("keep-whole".into(), Choice::Many(vec!["0".into()])),
+        ];
+        assert_eq!(found.choices, choices, "no face has label 7");
+        let too_many: String = (0..=N_LABELS).map(|label| format!("{label}\n")).collect();
+        let dir = project_of("", &too_many);
+        let refused = Store::open(dir.path().to_owned()).err().expect("it is refused");
+        assert!(refused.to_string().contains("1025 labels"), "{refused}");
     }
 }

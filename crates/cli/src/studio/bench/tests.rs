@@ -1,0 +1,58 @@
+//! Tests of a project that changes.
+
+use super::*;
+use shellock_formats::{read_labels, write_ply};
+use shellock_testkit::shapes::torus;
+
+/// The key of the project as it is saved, and the labels that are saved with it.
+fn saved(bench: &Bench) -> (String, Option<Vec<i64>>) {
+    let file: toml::Table = std::fs::read_to_string(bench.store.project_file())
+        .unwrap()
+        .parse()
+        .unwrap();
+    let labels = file.get("labels").and_then(toml::Value::as_str);
+    let labels = labels.map(|name| read_labels(&read(&bench.store.folder().join(name)).unwrap()).unwrap());
+    (file["key"].as_str().unwrap().to_owned(), labels)
+}
+
+#[test]
+fn a_key_that_the_models_own_labels_name_is_the_same_after_painting_and_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let ring = torus(40.0, 12.0, [120, 48]);
+    let side = |f: usize| if ring.face_center(f).y > 0.0 { 10 } else { 20 };
+    let own: Vec<i32> = (0..ring.triangles.len()).map(side).collect();
+    let model = dir.path().join("ring.ply");
+    std::fs::write(&model, write_ply(&ring, Some(&own))).unwrap();
+    let bench = Bench::open(dir.path().join("project")).unwrap();
+    bench.take(&model).unwrap();
+    bench.load();
+    bench
+        .choose(&Map::from_iter([("key".to_owned(), json!("20"))]))
+        .unwrap();
+    bench.divide().unwrap();
+    assert_eq!(saved(&bench), ("20".to_owned(), None));
+    bench.paint(&bench.labels().unwrap()).unwrap();
+    let (key, labels) = saved(&bench);
+    let labels = labels.expect("they were painted");
+    let key: i64 = key.parse().unwrap();
+    let of_key: Vec<i32> = (0..own.len())
+        .filter(|&f| labels[f] == key)
+        .map(|f| own[f])
+        .collect();
+    let n_meant = of_key.iter().filter(|&&label| label == 20).count();
+    assert!(
+        10 * n_meant > 9 * of_key.len() && n_meant > 0,
+        "{n_meant} of {}",
+        of_key.len()
+    );
+    bench.divide().unwrap();
+    assert_eq!(saved(&bench), ("20".to_owned(), None));
+}
+
+#[test]
+fn the_successor_of_a_label_has_most_of_its_area() {
+    let areas = [1.0, 5.0, 2.0, 2.0, 9.0];
+    let (before, after) = ([7, 7, 7, 7, 8], [1, 2, 3, 3, 1]);
+    let of = |label| successor(label, &before, &after, |face| areas[face]);
+    assert_eq!((of(7), of(8), of(9)), (Some(2), Some(1), None));
+}
