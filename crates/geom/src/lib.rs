@@ -11,6 +11,7 @@ pub mod clearance;
 pub mod contour;
 pub mod decimate;
 pub mod grown;
+pub mod hollow;
 pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;
