@@ -23,6 +23,7 @@ pub mod rounding;
 mod samples;
 pub mod signed_distance;
 pub mod simplify;
+pub mod slit;
 pub mod solid;
 pub mod sparse;
 pub mod subdivide;
