@@ -124,6 +124,18 @@ pub enum InputError {
         /// Where the first is.
         at: Vec3,
     },
+    /// Bodies that are inside out, and overlap another.
+    #[error(
+        "{} inside out and {} another, first near {}: \
+         it is a hole or a part; export the model without it, cut it out or unite it in a modelling program",
+        plural(*count, "body is", "bodies are"), if *count == 1 { "overlaps" } else { "overlap" }, Coordinates(*at)
+    )]
+    Cutter {
+        /// How many bodies.
+        count: usize,
+        /// The middle of the first.
+        at: Vec3,
+    },
     /// No way to turn the triangles makes neighbours agree.
     #[error(
         "the surface has one side only, like a Möbius band: {} triangles that face opposite ways however they are turned, \
@@ -159,6 +171,7 @@ impl InputError {
             | Self::Loose { at, .. }
             | Self::Pinched { at, .. }
             | Self::Crossing { at, .. }
+            | Self::Cutter { at, .. }
             | Self::OneSided { at, .. } => Some(at),
             _ => None,
         }

@@ -13,7 +13,7 @@ use rayon::slice::ParallelSliceMut;
 
 use crate::weld::{Welded, close};
 use crate::{Aabb, NotSolid, Solid, TriMesh, Vec3};
-use groups::Groups;
+pub(crate) use groups::Groups;
 
 /// Farther from the origin, file units, products of six lengths, as exact unions form them, leave the range
 /// of numbers.

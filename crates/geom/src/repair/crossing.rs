@@ -4,7 +4,6 @@ use rayon::prelude::*;
 
 use super::{Draft, Repair, RepairKind};
 use crate::boolean;
-use crate::bvh::TriangleBvh;
 use crate::check::{InputError, inspect, inspect_edges};
 use crate::{Aabb, TriMesh, Vec3};
 
@@ -53,19 +52,34 @@ pub fn crossings(mesh: &TriMesh) -> Crossings {
     }
 }
 
-/// The triangles that [`crossings`] counts, each once, in order.
-pub(crate) fn crossing_faces(mesh: &TriMesh) -> Vec<u32> {
+/// The pairs of triangles that [`crossings`] counts, the same on any number of threads.
+pub(super) fn crossing_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let tree = Boxes::of(mesh);
     let of_leaf = |leaf: usize| {
-        let mut faces = Vec::new();
-        tree.crossings_of(mesh, leaf, |pair| faces.extend(pair));
-        faces
+        let mut pairs = Vec::new();
+        tree.crossings_of(mesh, leaf, |pair| pairs.push(pair));
+        pairs
     };
     let n_leaves = tree.order.len().div_ceil(LEAF);
-    let mut faces: Vec<u32> = (0..n_leaves).into_par_iter().flat_map_iter(of_leaf).collect();
+    (0..n_leaves).into_par_iter().flat_map_iter(of_leaf).collect()
+}
+
+/// The triangles that [`crossings`] counts, each once, in order.
+pub(crate) fn crossing_faces(mesh: &TriMesh) -> Vec<u32> {
+    let mut faces = crossing_pairs(mesh).into_flattened();
     faces.sort_unstable();
     faces.dedup();
     faces
+}
+
+/// One surface of what a closed surface encloses at least once; the same where it neither crosses nor touches
+/// itself. `None` where that is too much work, or cannot be made.
+pub(super) fn united(mesh: &TriMesh) -> Option<TriMesh> {
+    let n = crossings(mesh).count;
+    if n == 0 && inspect_edges(mesh).shared.count == 0 && matches!(touching(mesh), Ok(None)) {
+        return Some(mesh.clone());
+    }
+    (n <= MAX_RESOLVED).then(|| boolean::rebuild(mesh).ok()).flatten()
 }
 
 /// Makes one surface of what a surface encloses at least once, where it crosses itself, has edges of more
@@ -103,17 +117,6 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     if mesh.triangles.is_empty() {
         return Err(refused());
     }
-    // The library keeps no account of single triangles here; the nearest is the one that a triangle is a part
-    // of.
-    let tree = TriangleBvh::new(&draft.mesh);
-    let nearest = |face: usize| {
-        tree.nearest(mesh.face_center(face), f64::INFINITY)
-            .map_or(0, |n| n.face)
-    };
-    let source = (0..mesh.triangles.len())
-        .into_par_iter()
-        .map(|f| draft.source[nearest(f) as usize])
-        .collect();
     let kind = match kind {
         RepairKind::United { .. } => {
             let [before, after] = [&draft.mesh, &mesh].map(TriMesh::signed_volume);
@@ -121,7 +124,7 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
         }
         other => other,
     };
-    *draft = Draft { mesh, source };
+    draft.replace(mesh);
     Ok(Some(Repair { kind, count, at }))
 }
 

@@ -55,6 +55,28 @@ pub(super) fn close(draft: &mut Draft) -> Option<Repair> {
     })
 }
 
+/// The triangles that close all holes of `mesh`, hole by hole, each with a triangle beside it; `None` where one has
+/// too many edges or touches itself.
+pub(crate) fn cap_all(mesh: &TriMesh) -> Option<Vec<(Vec<[u32; 3]>, u32)>> {
+    /// Edges of a hole: the time goes with their cube, and for as many is a second.
+    const MAX_EDGES: usize = 1000;
+    let rims = Rims::of(mesh);
+    let loops = rims.loops();
+    let n_open = rims.opposite.iter().filter(|o| o.is_none()).count();
+    if loops.iter().map(|rim| rim.points.len()).sum::<usize>() != n_open {
+        return None;
+    }
+    let close = |rim: Rim| {
+        if rim.points.len() > MAX_EDGES || !is_simple(&rim.points) {
+            return None;
+        }
+        let points: Vec<Vec3> = rim.points.iter().map(|&p| mesh.points[p as usize]).collect();
+        let cap = cap(&rim.points, &points, |a, b| rims.has_edge(a, b))?;
+        Some((cap, rim.face))
+    };
+    loops.into_iter().map(close).collect()
+}
+
 fn is_simple(points: &[u32]) -> bool {
     let mut sorted = points.to_vec();
     sorted.sort_unstable();

@@ -2,9 +2,10 @@
 //!
 //! Repaired is what has one right answer: points and triangles that stand there twice, triangles turned the
 //! wrong way, cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or
-//! smaller than a hundredth of the size, points where the surface pinches itself, specks, closed surfaces
-//! within others, parts that overlap, a surface that crosses itself. What would need a decision about the
-//! shape is refused with its place: larger holes, one-sided surfaces, several bodies apart from each other.
+//! smaller than a hundredth of the size, points where the surface pinches itself, specks, walls inside a body,
+//! closed surfaces within others, parts that overlap, a surface that crosses itself. What would need a decision
+//! about the shape is refused with its place: larger holes, one-sided surfaces, several bodies apart from each
+//! other, and bodies that are inside out and overlap another, unless the owner says which of the two is meant.
 //!
 //! Each stage is a function from a draft to a draft and a [`Repair`] if it changed something. A mesh that is
 //! a solid as read, and does not cross itself, comes out as [`crate::check::into_solid`] makes it, bit by
@@ -12,6 +13,7 @@
 
 mod crossing;
 mod cut;
+mod cutters;
 mod faces;
 mod fans;
 mod holes;
@@ -19,12 +21,18 @@ mod junctions;
 mod near;
 mod report;
 mod shells;
+mod walls;
 
 pub(crate) use crossing::crossing_faces;
 pub use crossing::{Crossings, crossings};
 pub use cut::{Cut, CutError, CutFace, cut_out};
+pub use cutters::InsideOut;
+pub(crate) use holes::cap_all;
 pub use report::{Repair, RepairKind};
 
+use rayon::prelude::*;
+
+use crate::bvh::TriangleBvh;
 use crate::check::{InputError, check_points, inspect, inspect_edges, into_solid, refuse};
 use crate::weld::close;
 use crate::{Solid, TriMesh};
@@ -74,6 +82,11 @@ struct Draft {
 /// Refuses what cannot be repaired without guessing, by its state after what could be. O(n log n) but for
 /// overlaps, whose cost follows the pairs of triangles that cross.
 pub fn repair(mesh: &TriMesh, mode: RepairMode) -> Result<Repaired, InputError> {
+    repair_as(mesh, mode, InsideOut::Ask)
+}
+
+/// [`repair`], where the owner of the mesh has said what bodies that are inside out are there for.
+pub fn repair_as(mesh: &TriMesh, mode: RepairMode, inside_out: InsideOut) -> Result<Repaired, InputError> {
     check_points(mesh)?;
     let as_read = into_solid(mesh);
     let n_faces = mesh.triangles.len();
@@ -96,19 +109,21 @@ pub fn repair(mesh: &TriMesh, mode: RepairMode) -> Result<Repaired, InputError> 
             mesh: solid.into_mesh(),
             source: source_face,
         };
-        return finish(draft, Vec::new(), mode);
+        return finish(draft, Vec::new(), mode, inside_out);
     }
     if mode == RepairMode::Refuse {
         as_read?;
     }
     let (draft, repairs, n_collapsed) = close_up(mesh)?;
-    let repaired = check_edges(&draft).and_then(|()| finish(draft, repairs, mode));
+    let repaired = check_edges(&draft).and_then(|()| finish(draft, repairs, mode, inside_out));
     // A few collapsed triangles are usual and harmless; one in a hundred on a broken surface is the cause.
     match repaired {
-        Err(_) if 100 * n_collapsed > n_faces => Err(InputError::Collapsed {
-            count: n_collapsed,
-            n_faces,
-        }),
+        Err(error) if !matches!(error, InputError::Cutter { .. }) && 100 * n_collapsed > n_faces => {
+            Err(InputError::Collapsed {
+                count: n_collapsed,
+                n_faces,
+            })
+        }
         repaired => repaired,
     }
 }
@@ -125,13 +140,16 @@ fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
         return Err(InputError::Empty);
     }
     let mut repairs = Vec::new();
-    // Cracks first, since they hide all else; holes last, since what closes them should not close a crack.
+    // Cracks first, since they hide all else; holes after sheets and cracks, which they should not close; cells last,
+    // since they are those of a closed surface.
     for stage in [
         near::merge,
         faces::drop_copies,
         junctions::join,
         faces::turn,
+        walls::drop_sheets,
         holes::close,
+        walls::drop_partitions,
     ] {
         repairs.extend(stage(&mut draft));
     }
@@ -143,7 +161,7 @@ pub(crate) fn closed(mesh: &TriMesh) -> Result<TriMesh, InputError> {
     check_points(mesh)?;
     let mut draft = close_up(mesh)?.0;
     check_edges(&draft)?;
-    resolve(&mut draft)?;
+    resolve(&mut draft, InsideOut::Ask)?;
     if draft.mesh.triangles.is_empty() {
         return Err(InputError::Empty);
     }
@@ -168,8 +186,13 @@ fn check_edges(draft: &Draft) -> Result<(), InputError> {
 }
 
 /// From a closed surface to one body.
-fn finish(mut draft: Draft, mut repairs: Vec<Repair>, mode: RepairMode) -> Result<Repaired, InputError> {
-    repairs.extend(resolve(&mut draft)?);
+fn finish(
+    mut draft: Draft,
+    mut repairs: Vec<Repair>,
+    mode: RepairMode,
+    inside_out: InsideOut,
+) -> Result<Repaired, InputError> {
+    repairs.extend(resolve(&mut draft, inside_out)?);
     repairs.extend(shells::drop_specks(&mut draft));
     repairs.extend(shells::fill_cavities(&mut draft));
     if mode == RepairMode::KeepLargest {
@@ -185,9 +208,10 @@ fn finish(mut draft: Draft, mut repairs: Vec<Repair>, mode: RepairMode) -> Resul
 }
 
 /// Makes a closed surface bound a volume: it faces outwards, crosses itself nowhere and is not pinched.
-fn resolve(draft: &mut Draft) -> Result<Vec<Repair>, InputError> {
+fn resolve(draft: &mut Draft, inside_out: InsideOut) -> Result<Vec<Repair>, InputError> {
     let mut repairs = Vec::new();
     repairs.extend(shells::drop_specks(draft));
+    repairs.extend(cutters::settle(draft, inside_out)?);
     repairs.extend(shells::turn_outwards(draft));
     repairs.extend(crossing::resolve(draft)?);
     repairs.extend(fans::part(draft));
@@ -202,6 +226,20 @@ impl Draft {
         let mut kept = is_kept.iter();
         self.mesh.triangles.retain(|_| kept.next() == Some(&true));
         self.mesh = std::mem::take(&mut self.mesh).without_unused_points();
+    }
+
+    /// Takes `mesh` for this one, whose triangles it is made of: each is a part of the nearest.
+    fn replace(&mut self, mesh: TriMesh) {
+        let tree = TriangleBvh::new(&self.mesh);
+        let nearest = |face: usize| {
+            tree.nearest(mesh.face_center(face), f64::INFINITY)
+                .map_or(0, |n| n.face)
+        };
+        self.source = (0..mesh.triangles.len())
+            .into_par_iter()
+            .map(|face| self.source[nearest(face) as usize])
+            .collect();
+        self.mesh = mesh;
     }
 
     fn n_open(&self) -> usize {

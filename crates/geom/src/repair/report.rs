@@ -37,6 +37,13 @@ pub enum RepairKind {
     },
     /// Bodies that were inside out were turned.
     Everted,
+    /// Bodies that were inside out were cut out of those that they overlapped.
+    CutOut {
+        /// The volume that is enclosed no more.
+        volume: f64,
+    },
+    /// Walls inside the body were removed; the count is of triangles.
+    InnerWalls,
     /// Bodies much smaller than the model were left out.
     Specks {
         /// Length of the largest.
@@ -58,6 +65,11 @@ pub enum RepairKind {
         /// Their volume.
         volume: f64,
     },
+    /// Openings of a cavity were closed, which made the body solid: [`crate::hollow::fill`], where it is asked for.
+    Drained {
+        /// The cavity's volume.
+        volume: f64,
+    },
     /// Bodies apart from the largest were left out.
     LeftOut,
 }
@@ -72,11 +84,14 @@ impl RepairKind {
             Self::Turned => "triangles-turned",
             Self::Closed { .. } => "holes-closed",
             Self::Everted => "body-turned",
+            Self::CutOut { .. } => "bodies-cut-out",
+            Self::InnerWalls => "inner-walls-removed",
             Self::Specks { .. } => "specks-removed",
             Self::United { .. } => "parts-united",
             Self::Fused => "bodies-united",
             Self::Parted => "points-parted",
             Self::Filled { .. } => "cavities-filled",
+            Self::Drained { .. } => "openings-closed",
             Self::LeftOut => "bodies-left-out",
         }
     }
@@ -124,6 +139,19 @@ impl fmt::Display for Repair {
                 "{} inside out and turned",
                 plural(n, "body was", "bodies were")
             )?,
+            RepairKind::CutOut { volume } => {
+                let bodies = plural(n, "body that was", "bodies that were");
+                let volume = Short(volume);
+                write!(
+                    f,
+                    "{bodies} inside out left a hole of {volume} in what it overlapped"
+                )?;
+            }
+            RepairKind::InnerWalls => write!(
+                f,
+                "{} to walls inside the body and removed",
+                plural(n, "triangle belonged", "triangles belonged")
+            )?,
             RepairKind::Specks { longest } => {
                 let specks = plural(n, "speck was", "specks were");
                 write!(f, "{specks} left out, up to {} long", Short(longest))?;
@@ -152,6 +180,14 @@ impl fmt::Display for Repair {
                 write!(
                     f,
                     "{cavities} inside the body, {volume} in volume, left out: pieces are hollow anyway"
+                )?;
+            }
+            RepairKind::Drained { volume } => {
+                let openings = plural(n, "opening was", "openings were");
+                let volume = Short(volume);
+                write!(
+                    f,
+                    "{openings} closed, and the cavity behind filled, {volume} in volume"
                 )?;
             }
             RepairKind::LeftOut => write!(

@@ -75,21 +75,22 @@ pub(super) fn keep_largest(draft: &mut Draft) -> Option<Repair> {
 }
 
 /// Triangles connected over edges.
-struct Shell {
-    bounds: Aabb,
-    volume: f64,
+pub(super) struct Shell {
+    pub(super) bounds: Aabb,
+    pub(super) volume: f64,
     n_faces: usize,
     /// A corner of it.
     point: Vec3,
 }
 
-struct Shells {
-    all: Vec<Shell>,
-    of_face: Vec<u32>,
+/// The shells of a mesh, and which of them each triangle belongs to.
+pub(super) struct Shells {
+    pub(super) all: Vec<Shell>,
+    pub(super) of_face: Vec<u32>,
 }
 
 impl Shells {
-    fn of(mesh: &TriMesh) -> Self {
+    pub(super) fn of(mesh: &TriMesh) -> Self {
         let (of_face, n_shells) = components(mesh);
         let mut all: Vec<Option<Shell>> = (0..n_shells).map(|_| None).collect();
         for (face, &shell) in of_face.iter().enumerate() {
@@ -110,6 +111,19 @@ impl Shells {
             all: all.into_iter().flatten().collect(),
             of_face,
         }
+    }
+
+    /// The triangles of the shells that `has` accepts, with the points they use.
+    pub(super) fn part(&self, mesh: &TriMesh, has: impl Fn(usize) -> bool) -> TriMesh {
+        let of_part = mesh.triangles.iter().zip(&self.of_face);
+        TriMesh {
+            triangles: of_part
+                .filter(|(_, shell)| has(**shell as usize))
+                .map(|(t, _)| *t)
+                .collect(),
+            points: mesh.points.clone(),
+        }
+        .without_unused_points()
     }
 
     /// For each shell those around it, judged by one of its corners; `None` where that is too much work.
@@ -168,7 +182,7 @@ impl Shells {
 
 /// Signed solid angle of a triangle seen from `q`, in steradians, in [−2π, 2π]; over a closed mesh they sum
 /// to ±4π at a point inside and 0 outside. [VanOosterom1983]
-fn solid_angle(corners: [Vec3; 3], q: Vec3) -> f64 {
+pub(super) fn solid_angle(corners: [Vec3; 3], q: Vec3) -> f64 {
     let [a, b, c] = corners.map(|p| p - q);
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::samples::{ball, both, cube, flipped, unwelded};
+use crate::samples::{ball, both, cube, cuboid, flipped, unwelded};
 use crate::{Vec3, Volume};
 
 fn mended(mesh: &TriMesh) -> Repaired {
@@ -379,7 +379,11 @@ fn tetrahedra_on_whole_numbers_are_united() {
         [5, 6, 4],
         [4, 7, 6],
     ];
-    let repaired = mended(&TriMesh { points, triangles });
+    let mesh = TriMesh { points, triangles };
+    // The second is inside out, and 1/120 of it lies in the first.
+    let asked = repair(&mesh, RepairMode::Repair).unwrap_err();
+    assert!(matches!(asked, InputError::Cutter { count: 1, .. }), "{asked}");
+    let repaired = repair_as(&mesh, RepairMode::Repair, InsideOut::Unite).unwrap();
     let bounds = repaired.solid.mesh().bounds();
     assert_eq!((bounds.min, bounds.max), (Vec3::ZERO, Vec3::new(4.0, 3.0, 3.0)));
     // 2 and 2/3, of which 1/120 is common.
@@ -388,4 +392,146 @@ fn tetrahedra_on_whole_numbers_are_united() {
         "{}",
         repaired.solid.volume()
     );
+}
+
+/// A box as its 12 triangles, without those over `missing` sides: 0 and 1 for x, 2 and 3 for y, 4 and 5 for z.
+fn box_without(min: Vec3, max: Vec3, missing: &[usize]) -> TriMesh {
+    let mut mesh = crate::samples::cuboid(min, max).to_mesh();
+    let sides: Vec<usize> = (0..mesh.triangles.len())
+        .map(|face| {
+            let normal = mesh.face_normal(face);
+            let axis = (0..3).find(|&axis| normal[axis].abs() > 0.5).unwrap();
+            2 * axis + usize::from(normal[axis] > 0.0)
+        })
+        .collect();
+    let mut side = sides.iter();
+    mesh.triangles.retain(|_| !missing.contains(side.next().unwrap()));
+    mesh
+}
+
+#[test]
+fn walls_between_glued_boxes_are_removed() {
+    // Four rooms around an edge, each with its four outer walls, and one wall between each two.
+    let room = |x: f64, y: f64, missing: &[usize]| {
+        box_without(Vec3::new(x, y, 0.0), Vec3::new(x + 2.0, y + 3.0, 4.0), missing)
+    };
+    let two = both(room(0.0, 0.0, &[]), room(2.0, 0.0, &[0]));
+    assert_mended(&unwelded(&two), &[("inner-walls-removed", 2)], 48.0);
+    let four = [room(0.0, 3.0, &[2]), room(2.0, 3.0, &[0, 2])]
+        .into_iter()
+        .fold(two.clone(), both);
+    let repaired = assert_mended(&unwelded(&four), &[("inner-walls-removed", 8)], 96.0);
+    assert!(repaired.repairs[0].at.z.fract() != 0.0);
+    // Whichever way the walls face.
+    let turned = both(room(0.0, 0.0, &[1]), flipped(room(2.0, 0.0, &[])));
+    let repaired = mended(&unwelded(&turned));
+    assert!((repaired.solid.volume() - 48.0).abs() < 1e-12);
+}
+
+/// A ball divided by the disc within its equator, of which every point is one of the ball's, and the ball's equator.
+fn ball_with_disc() -> (TriMesh, Vec<u32>) {
+    let mut ball = ball(Vec3::ZERO, 10.0, 3);
+    let mut equator: Vec<u32> = (0..ball.points.len() as u32)
+        .filter(|&v| ball.points[v as usize].z.abs() < 1e-9)
+        .collect();
+    let angle = |v: u32| ball.points[v as usize].y.atan2(ball.points[v as usize].x);
+    equator.sort_by(|&a, &b| angle(a).total_cmp(&angle(b)));
+    for k in 1..equator.len() - 1 {
+        ball.triangles.push([equator[0], equator[k], equator[k + 1]]);
+    }
+    (ball, equator)
+}
+
+#[test]
+fn a_wall_across_a_body_is_removed_and_one_that_comes_out_is_refused() {
+    let whole = ball(Vec3::ZERO, 10.0, 3);
+    let (divided, equator) = ball_with_disc();
+    assert_mended(
+        &divided,
+        &[("inner-walls-removed", equator.len() - 2)],
+        whole.signed_volume(),
+    );
+    // A square that touches the cube's sides where they have no points, and one that comes out of them.
+    let sheet = |half: f64| TriMesh {
+        points: [(-half, -half), (half, -half), (half, half), (-half, half)]
+            .map(|(x, y)| Vec3::new(x, y, 0.3))
+            .to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let cube = cube(Vec3::splat(-5.0), 10.0);
+    for half in [5.0, 4.0, 5.0 + 1e-6] {
+        assert_mended(
+            &both(cube.clone(), sheet(half)),
+            &[("inner-walls-removed", 2)],
+            1000.0,
+        );
+    }
+    for half in [5.1, 9.0] {
+        let refused = repair(&both(cube.clone(), sheet(half)), RepairMode::Repair).unwrap_err();
+        assert!(
+            matches!(refused, InputError::Open { n_holes: 1, .. }),
+            "{refused}"
+        );
+        assert!((refused.at().unwrap().z - 0.3).abs() < 1e-9, "{refused}");
+    }
+    // Beside the cube, it bounds nothing either, but is no wall inside.
+    let mut beside = sheet(2.0);
+    beside.points.iter_mut().for_each(|p| p.x += 20.0);
+    assert!(repair(&both(cube, beside), RepairMode::Repair).is_err());
+}
+
+#[test]
+fn a_fin_of_a_body_is_refused_with_its_place() {
+    let mut fin = base();
+    let [a, b, _] = fin.triangles[7];
+    fin.points.push(Vec3::splat(20.0));
+    let tip = fin.points.len() as u32 - 1;
+    fin.triangles.push([a, b, tip]);
+    assert!(repair(&fin, RepairMode::Repair).unwrap_err().at().is_some());
+}
+
+#[test]
+fn a_body_inside_out_that_overlaps_another_is_asked_about_and_cut_or_united() {
+    let other = ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3);
+    let flush = cuboid([-2.0, -2.0, 4.0], [2.0, 2.0, 10.0]).to_mesh();
+    let block = cuboid([-10.0; 3], [10.0; 3]).to_mesh();
+    for (body, tool) in [(base(), other), (block, flush)] {
+        let cutter = both(body.clone(), flipped(tool.clone()));
+        for mode in [RepairMode::Repair, RepairMode::KeepLargest] {
+            let asked = repair(&cutter, mode).unwrap_err();
+            assert!(matches!(asked, InputError::Cutter { count: 1, .. }), "{asked}");
+            assert!(asked.at().unwrap().distance(tool.bounds().center()) < 1e-9);
+        }
+        let [whole, part] = [&body, &tool].map(|m| Volume::from_closed_mesh(m).unwrap());
+        for (wanted, volume, code) in [
+            (InsideOut::Cut, whole.subtract(&part).volume(), "bodies-cut-out"),
+            (InsideOut::Unite, whole.union(&part).volume(), "body-turned"),
+        ] {
+            let made = repair_as(&cutter, RepairMode::Repair, wanted).unwrap();
+            assert!((made.solid.volume() - volume).abs() < 1e-6 * volume, "{wanted:?}");
+            assert_eq!((made.repairs[0].kind.code(), made.repairs[0].count), (code, 1));
+            assert!(
+                made.source_face
+                    .iter()
+                    .all(|&f| (f as usize) < cutter.triangles.len())
+            );
+        }
+    }
+}
+
+#[test]
+fn a_body_inside_out_beside_another_or_within_it_is_no_cutter() {
+    let beside = both(base(), flipped(ball(Vec3::new(40.0, 0.0, 0.0), 6.0, 2)));
+    assert!(matches!(
+        repair(&beside, RepairMode::Repair),
+        Err(InputError::Bodies(_))
+    ));
+    let touching = both(
+        cube(Vec3::ZERO, 1.0),
+        flipped(cube(Vec3::new(1.0, 0.5, 0.0), 1.0)),
+    );
+    assert!((mended(&touching).solid.volume() - 2.0).abs() < 1e-12);
+    // All of it is inside out: it overlaps itself alone.
+    let all = flipped(both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3)));
+    assert_eq!(mended(&all).repairs[0].kind.code(), "body-turned");
 }

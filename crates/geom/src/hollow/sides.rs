@@ -1,0 +1,257 @@
+//! Which triangles of a hollow body bound its cavity, and the rims between them and the others.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+
+use rayon::prelude::*;
+
+use super::cut::Network;
+use super::grid::Grid;
+use super::rooms::Room;
+use crate::bvh::TriangleBvh;
+use crate::check::Groups;
+use crate::topology::{HalfEdge, Topology, components, ends};
+use crate::{TriMesh, Vec3};
+
+/// Where a triangle looks for a node that it sees: so many cells in front of it.
+const LOOKS_CELLS: [f64; 3] = [0.6, 0.25, 1.2];
+/// Where sight begins in front of a triangle, as a share of a cell: more than rounding, less than any gap.
+const START_SHARE: f64 = 1e-5;
+/// Connected triangles of less than this share of the area of all on their side belong to the other side: folds
+/// that no ball reaches.
+const ISLAND_SHARE: f64 = 0.02;
+/// An edge counts as longer by this share for each wall that it lies deeper in an opening, so that of rims of
+/// the same length the outer one is the shortest.
+const DEPTH_SHARE: f64 = 0.2;
+/// Convex edges of more than 30° count as shorter by this factor: drilled holes have such rims, and the cavity may
+/// have narrower places behind them.
+const CREASE_SHARE: f64 = 0.25;
+const COS_CREASE: f64 = 0.866_025_403_784_438_6;
+/// Steps of the capacities, a millimetre.
+const STEPS_PER_MM: f64 = 1e6;
+
+/// The surface, and which triangles bound the cavity.
+pub(super) struct Sides<'a> {
+    pub(super) mesh: &'a TriMesh,
+    pub(super) topology: &'a Topology,
+    pub(super) is_cavity: Vec<bool>,
+}
+
+/// A closed line between triangles of the cavity and others: half-edges of the others.
+pub(super) struct Rim {
+    pub(super) edges: Vec<HalfEdge>,
+    pub(super) center: Vec3,
+    /// Distance of the farthest point of the line from the centre, mm.
+    pub(super) radius_mm: f64,
+}
+
+impl<'a> Sides<'a> {
+    /// Each triangle has the room of a node that it sees, or that of its neighbours.
+    pub(super) fn new(
+        mesh: &'a TriMesh,
+        topology: &'a Topology,
+        tree: &TriangleBvh,
+        grid: &Grid,
+        rooms: &[Option<Room>],
+    ) -> Self {
+        let mut seen: Vec<Option<Room>> = (0..mesh.triangles.len())
+            .into_par_iter()
+            .map(|face| room_seen(mesh, face, tree, grid, rooms))
+            .collect();
+        let mut todo: VecDeque<u32> = (0..seen.len() as u32)
+            .filter(|&face| seen[face as usize].is_some())
+            .collect();
+        while let Some(face) = todo.pop_front() {
+            for other in topology.neighbours(face) {
+                if seen[other as usize].is_none() {
+                    seen[other as usize] = seen[face as usize];
+                    todo.push_back(other);
+                }
+            }
+        }
+        let mut sides = Self {
+            mesh,
+            topology,
+            is_cavity: seen.iter().map(|room| *room == Some(Room::Cavity)).collect(),
+        };
+        sides.flood_islands();
+        sides
+    }
+
+    /// Area of the triangles of the cavity, mm².
+    pub(super) fn cavity_mm2(&self) -> f64 {
+        let inner = (0..self.is_cavity.len()).filter(|&face| self.is_cavity[face]);
+        inner.map(|face| self.mesh.face_area(face)).sum()
+    }
+
+    fn flood_islands(&mut self) {
+        let is_same = |a: u32, b: u32| self.is_cavity[a as usize] == self.is_cavity[b as usize];
+        let (part, n_parts) = components(self.topology, is_same);
+        let (mut of_part, mut of_side) = (vec![0.0; n_parts], [0.0; 2]);
+        for (face, &part) in part.iter().enumerate() {
+            let area = self.mesh.face_area(face);
+            of_part[part as usize] += area;
+            of_side[usize::from(self.is_cavity[face])] += area;
+        }
+        for (face, &part) in part.iter().enumerate() {
+            let all = of_side[usize::from(self.is_cavity[face])];
+            self.is_cavity[face] ^= of_part[part as usize] < ISLAND_SHARE * all;
+        }
+    }
+
+    /// The lines between both sides; those that share a point count as one.
+    pub(super) fn rims(&self) -> Vec<Rim> {
+        let is_cavity = |h: HalfEdge| self.is_cavity[h as usize / 3];
+        let edges: Vec<HalfEdge> = (0..self.topology.n_half_edges() as u32)
+            .filter(|&h| !is_cavity(h) && is_cavity(self.topology.opposite(h)))
+            .collect();
+        let mut groups = Groups::of(self.mesh.points.len());
+        for &h in &edges {
+            let (from, to) = ends(self.mesh, h);
+            groups.unite(from, to);
+        }
+        let mut named: Vec<(u32, HalfEdge)> = edges
+            .into_iter()
+            .map(|h| (groups.find(ends(self.mesh, h).0), h))
+            .collect();
+        named.sort_unstable();
+        named
+            .chunk_by(|a, b| a.0 == b.0)
+            .map(|rim| self.rim(rim.iter().map(|&(_, h)| h).collect()))
+            .collect()
+    }
+
+    fn rim(&self, edges: Vec<HalfEdge>) -> Rim {
+        let (mut moment, mut length) = (Vec3::ZERO, 0.0);
+        for [a, b] in edges.iter().map(|&h| self.ends(h)) {
+            moment += 0.5 * a.distance(b) * (a + b);
+            length += a.distance(b);
+        }
+        let center = moment / length.max(f64::MIN_POSITIVE);
+        let away = edges.iter().map(|&h| self.ends(h)[0].distance(center));
+        Rim {
+            radius_mm: away.fold(0.0, f64::max),
+            center,
+            edges,
+        }
+    }
+
+    /// Where a half-edge begins and ends.
+    pub(super) fn ends(&self, h: HalfEdge) -> [Vec3; 2] {
+        let (from, to) = ends(self.mesh, h);
+        [from, to].map(|v| self.mesh.points[v as usize])
+    }
+
+    /// Moves each rim within its opening to where it is shortest, of such lines to the outermost. Openings are as
+    /// deep as a wall of `wall_mm`, or somewhat deeper.
+    pub(super) fn tighten(&mut self, wall_mm: f64, cell_mm: f64) {
+        let near: Vec<(Vec3, f64)> = self
+            .rims()
+            .iter()
+            .map(|rim| (rim.center, 2.0 * rim.radius_mm + 1.5 * wall_mm + 2.0 * cell_mm))
+            .collect();
+        let is_free: Vec<bool> = (0..self.is_cavity.len())
+            .map(|face| {
+                let corners = self.mesh.corners(face);
+                near.iter()
+                    .any(|&(center, mm)| corners.iter().all(|p| p.distance(center) <= mm))
+            })
+            .collect();
+        let depth_mm = self.depths(&is_free);
+        // Source and sink stand for all that is fixed.
+        let (source, sink) = (0, 1);
+        let mut node = vec![source; self.is_cavity.len()];
+        let mut n_nodes = 2;
+        for face in 0..node.len() {
+            if is_free[face] {
+                node[face] = n_nodes;
+                n_nodes += 1;
+            } else if self.is_cavity[face] {
+                node[face] = sink;
+            }
+        }
+        let mut network = Network::new(n_nodes as usize);
+        for h in 0..self.topology.n_half_edges() as u32 {
+            let [here, there] = [h, self.topology.opposite(h)].map(|h| h as usize / 3);
+            if h < self.topology.opposite(h) && node[here] != node[there] {
+                let deeper = 0.5 * (depth_mm[here] + depth_mm[there]) / (wall_mm + cell_mm);
+                let cost = STEPS_PER_MM * self.length(h) * (1.0 + DEPTH_SHARE * deeper);
+                network.join(node[here], node[there], cost as u64 + 1);
+            }
+        }
+        let is_open = network.near_source(source, sink);
+        for (face, &node) in node.iter().enumerate() {
+            if is_free[face] {
+                self.is_cavity[face] = !is_open[node as usize];
+            }
+        }
+    }
+
+    /// Length of an edge, mm, less where it is a crease.
+    fn length(&self, h: HalfEdge) -> f64 {
+        let [a, b] = self.ends(h);
+        let other = self.topology.opposite(h);
+        let [normal, next] = [h, other].map(|h| self.mesh.face_normal(h as usize / 3));
+        let tip = self.ends(Topology::next(other))[1];
+        let is_crease = normal.dot(next) < COS_CREASE && normal.dot(tip - a) < 0.0;
+        a.distance(b) * if is_crease { CREASE_SHARE } else { 1.0 }
+    }
+
+    /// How far each free triangle is along the surface from the fixed ones outside, mm; 0 for all that is fixed.
+    fn depths(&self, is_free: &[bool]) -> Vec<f64> {
+        let mut depth_mm = vec![f64::INFINITY; is_free.len()];
+        let mut todo = BinaryHeap::new();
+        for face in 0..is_free.len() {
+            if !is_free[face] {
+                depth_mm[face] = 0.0;
+                if !self.is_cavity[face] {
+                    todo.push(Reverse((0.0_f64.to_bits(), face)));
+                }
+            }
+        }
+        while let Some(Reverse((bits, face))) = todo.pop() {
+            let here = f64::from_bits(bits);
+            if here > depth_mm[face] {
+                continue;
+            }
+            for other in self.topology.neighbours(face as u32).map(|f| f as usize) {
+                let way = self.mesh.face_center(face).distance(self.mesh.face_center(other));
+                // From a large triangle outside the way begins at its border.
+                let there = if is_free[face] { here + way } else { 0.0 };
+                if is_free[other] && there < depth_mm[other] {
+                    depth_mm[other] = there;
+                    todo.push(Reverse((there.to_bits(), other)));
+                }
+            }
+        }
+        depth_mm
+            .into_iter()
+            .map(|mm| if mm.is_finite() { mm } else { 0.0 })
+            .collect()
+    }
+}
+
+/// The room of a node that triangle `face` sees from its outer side.
+fn room_seen(
+    mesh: &TriMesh,
+    face: usize,
+    tree: &TriangleBvh,
+    grid: &Grid,
+    rooms: &[Option<Room>],
+) -> Option<Room> {
+    let normal = mesh.face_normal(face);
+    let start = mesh.face_center(face) + START_SHARE * grid.cell_mm * normal;
+    let sees = |node: &usize| {
+        let way = grid.position(*node) - start;
+        way.dot(normal) > 0.0
+            && tree
+                .first_hit(start, way.normalize_or_zero(), way.length())
+                .is_none()
+    };
+    let looks = LOOKS_CELLS.map(|cells| start + cells * grid.cell_mm * normal);
+    let nodes = looks.into_iter().flat_map(|q| grid.corners_around(q));
+    nodes
+        .filter(|&node| rooms[node].is_some())
+        .find(sees)
+        .and_then(|node| rooms[node])
+}
