@@ -3,6 +3,10 @@
 //! One test writes them into a folder and reads that folder. The table of docs/guide/inputs.md says of each format
 //! what is read, left out and refused; every entry is proven by a case here, and every proof stands there.
 
+#[path = "reports/gltf.rs"]
+mod gltf;
+#[path = "reports/plain.rs"]
+mod plain;
 #[path = "reports/threemf.rs"]
 mod threemf;
 
@@ -89,7 +93,7 @@ fn moved(mesh: &TriMesh, by: Vec3) -> TriMesh {
 }
 
 fn cases() -> Vec<Case> {
-    threemf::cases()
+    [threemf::cases(), gltf::cases(), plain::cases()].concat()
 }
 
 /// What is wrong with what `inspect` says of the file of `case` in `folder`.

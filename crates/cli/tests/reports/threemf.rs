@@ -77,6 +77,9 @@ fn both([mut a, b]: [TriMesh; 2]) -> TriMesh {
 }
 
 const WHOLE: Claim = Size([60.0, 40.0, 30.0]);
+/// The body without what the smaller one of [`two`] cuts off at its end: both ellipsoids meet at x = 28.3, their
+/// facets a little before.
+const CUT: Claim = Size([58.22, 40.0, 30.0]);
 
 /// All cases of 3MF.
 pub fn cases() -> Vec<Case> {
@@ -121,12 +124,12 @@ fn negative() -> Vec<Case> {
         );
     vec![
         Case::new("negative_range.3mf", with(PRUSA, &range, &joined, ITEM))
-            .says(&[WHOLE, Note("cut out as a negative volume")]),
+            .says(&[CUT, Note("cut out as a negative volume")]),
         Case::new(
             "negative_part.3mf",
             with(BAMBU, part, &parts, "<item objectid=\"3\"/>"),
         )
-        .says(&[WHOLE, Note("cut out as a negative volume: \"hole\"")])
+        .says(&[CUT, Note("cut out as a negative volume: \"hole\"")])
         .proves("3MF", "read", "negative volumes"),
         Case::new(
             "negative_open.3mf",
