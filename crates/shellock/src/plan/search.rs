@@ -155,8 +155,7 @@ fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
         )),
         n => key.filter(|&k| usize::from(k) >= n).map(|k| {
             format!(
-                "piece {k} is to be the key, but there are only pieces 0 to {}; choose one of them",
-                n - 1
+                "piece {k} is to be the key, but there are only pieces 1 to {n}; choose one of them"
             )
         }),
     }
