@@ -144,14 +144,8 @@ impl<'a> Best<'a> {
                 explored => explored?,
             };
             self.failure = failure;
-            // Of equals a piece as it is.
-            let is_worse = |kit: &Kit| {
-                self.kit
-                    .as_ref()
-                    .is_some_and(|b| b.kit.failures().len() < kit.failures().len())
-            };
-            if let Some(kit) = kit.filter(|kit| !is_worse(kit)) {
-                self.kit = Some(Kept { kit, candidate });
+            if let Some(kit) = kit {
+                self.keep(kit, candidate);
             }
             return Ok(());
         };
@@ -168,9 +162,7 @@ impl<'a> Best<'a> {
                 let failed = kit.failures();
                 // Where other pieces than the key rattle, another key changes little.
                 self.n_rattling += usize::from(kit.only_rattles() && !kit.rattling().is_empty());
-                if self.kit.as_ref().is_none_or(|b| kit.is_better_than(&b.kit)) {
-                    self.kit = Some(Kept { kit, candidate });
-                }
+                self.keep(kit, candidate);
                 if failed.is_empty() {
                     return Ok(());
                 }
@@ -180,6 +172,13 @@ impl<'a> Best<'a> {
         ctx.note(&reason);
         self.reasons.push(reason);
         Ok(())
+    }
+
+    /// Keeps the kit where it is better than the best before; of equals the earlier stays.
+    fn keep(&mut self, kit: Kit, candidate: Candidate<'a>) {
+        if self.kit.as_ref().is_none_or(|b| kit.is_better_than(&b.kit)) {
+            self.kit = Some(Kept { kit, candidate });
+        }
     }
 
     /// The best kit with all that is known of it.

@@ -559,23 +559,37 @@ fn a_piece_that_cannot_be_the_key_throws_no_kit_away() {
     assert!(alone.is_err(), "without any kit the job cannot be done");
 }
 
+/// A kit that comes loose and whose pieces rattle by so much besides.
+fn loose_and_rattling(piece: u32, excess: f64) -> Kit {
+    let rattles = rattling(piece, excess).rattles;
+    Kit {
+        rattles,
+        ..loose(piece)
+    }
+}
+
 #[test]
-fn of_kits_that_fail_alike_the_piece_as_it_is_stays_and_a_worse_one_does_not() {
+fn the_better_of_two_kits_is_given_out_whichever_key_it_has_and_of_equals_the_earlier() {
     let ball = Ball::new();
-    let with_key = |own: Kit, piece: Kit| {
-        ball.outcome(vec![(Some(site()), made(own)), (None, made(piece))])
-            .1
-            .expect("a kit was made")
+    let given_out = |cut: Kit, piece: Kit| {
+        let tried = vec![(Some(site()), made(cut)), (None, made(piece))];
+        let kit = ball.outcome(tried).1.expect("a kit was made").kit;
+        kit.verification.findings
     };
-    assert_eq!(
-        with_key(loose(1), loose(0)).kit.verification.findings,
-        loose(0).verification.findings
-    );
-    let worse = kit(&[("holds", false), ("closed", false)], Vec::new());
-    assert_eq!(
-        with_key(loose(1), worse).kit.verification.findings,
-        loose(1).verification.findings
-    );
+    let first = |kit: Kit| kit.verification.findings;
+    let worse = || kit(&[("holds", false), ("closed", false)], Vec::new());
+    // As many failures: the one that rattles less, and of equals the earlier.
+    for (cut, piece, is_piece) in [
+        (loose(1), loose(0), false),
+        (loose_and_rattling(1, 1.5), loose_and_rattling(0, 2.5), false),
+        (loose_and_rattling(1, 2.5), loose_and_rattling(0, 1.5), true),
+        (loose(1), worse(), false),
+        (worse(), loose(0), true),
+    ] {
+        let better = first(if is_piece { piece.clone() } else { cut.clone() });
+        assert_eq!(piece.is_better_than(&cut), is_piece);
+        assert_eq!(given_out(cut, piece), better);
+    }
 }
 
 #[test]
