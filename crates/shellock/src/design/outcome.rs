@@ -5,7 +5,7 @@ use shellock_geom::TriMesh;
 use super::attempt::Failure;
 use super::budget::RATTLING_KEYS;
 use super::candidate::{self, Candidate};
-use super::{Effort, Explored, Job, KeySource, Kit};
+use super::{Effort, Explored, Job, KeySource, Kit, Settings};
 use crate::body::{BodyError, GridError};
 use crate::key::KeySite;
 use crate::metric::ChoiceError;
@@ -24,6 +24,9 @@ use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 pub struct Design {
     /// The pieces, their plan and the verdict on them.
     pub kit: Kit,
+    /// Parameters of the stages that made it, with the wall and the division that it has; those that a key which is
+    /// cut has of its own are left out.
+    pub settings: Settings,
     /// How its key was cut; `None` where the key is one of the pieces.
     pub key: Option<KeySite>,
     /// What the wall bears; `None` where the stress could not be computed, which is warned of.
@@ -250,6 +253,7 @@ impl<'a> Best<'a> {
         let strength = job.wall.strength.clone();
         Ok(DesignOutcome::Made(Box::new(Design {
             kit,
+            settings: job.settings().clone(),
             key,
             strength,
             gaps,

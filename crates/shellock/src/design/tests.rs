@@ -609,6 +609,16 @@ fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_given_out() {
 }
 
 #[test]
+fn the_settings_of_a_design_have_the_wall_that_was_decided() {
+    let mut ball = Ball::new();
+    ball.params.thickness = Thickness::Auto;
+    ball.wall.settings = Settings::with_thickness(&ball.params, 1.3);
+    assert_ne!(Settings::resolve(&ball.params), ball.wall.settings);
+    let (_, design) = ball.outcome(vec![(None, made(good()))]);
+    assert_eq!(design.unwrap().settings, ball.wall.settings);
+}
+
+#[test]
 fn without_any_plan_the_answer_is_why() {
     let failure = || Failure {
         reason: "all are in each other's way".into(),
