@@ -89,8 +89,6 @@ pub fn checked(options: &Options) -> Result<Params, Failure> {
 
 /// A kit that is made, but not written.
 pub struct Made {
-    /// With the plan's settings.
-    pub settings: Settings,
     pub design: Box<Design>,
     /// What was done with the model and the wishes.
     pub notes: Vec<String>,
@@ -114,7 +112,6 @@ pub struct Begun<'a> {
     model: &'a Model,
     options: &'a Options,
     params: Params,
-    settings: Settings,
     printer: Printer,
     notes: Vec<String>,
 }
@@ -136,7 +133,6 @@ impl<'a> Begun<'a> {
             model,
             options,
             params,
-            settings,
             printer,
             notes,
         })
@@ -191,12 +187,11 @@ impl<'a> Begun<'a> {
         let mut warnings = model.warnings.clone();
         warnings.extend(design.warnings.iter().cloned());
         warnings.extend(printing.warnings());
-        let (files, summary) = files(model, options, &self.settings, &design, &warnings, &printing);
+        let (files, summary) = files(model, options, &design.settings, &design, &warnings, &printing);
         if session.stop.load(Ordering::Relaxed) {
             return Err(Failure::Stopped);
         }
         Ok(Made {
-            settings: self.settings,
             design,
             notes,
             warnings,
@@ -252,7 +247,7 @@ fn make(
         let finished = Finished {
             to,
             made: &made.design,
-            settings: &made.settings,
+            settings: &made.design.settings,
             summary: &made.summary,
             warnings: &warnings,
             standing: &standing,

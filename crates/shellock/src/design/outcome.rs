@@ -5,7 +5,7 @@ use shellock_geom::TriMesh;
 use super::attempt::Failure;
 use super::budget::RATTLING_KEYS;
 use super::candidate::{self, Candidate};
-use super::{Effort, Explored, Job, KeySource, Kit};
+use super::{Effort, Explored, Job, KeySource, Kit, Settings};
 use crate::body::{BodyError, GridError};
 use crate::key::KeySite;
 use crate::metric::ChoiceError;
@@ -24,6 +24,9 @@ use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 pub struct Design {
     /// The pieces, their plan and the verdict on them.
     pub kit: Kit,
+    /// Parameters of the stages that made it, with the wall and the division that it has; those that a key which is
+    /// cut has of its own are left out.
+    pub settings: Settings,
     /// How its key was cut; `None` where the key is one of the pieces.
     pub key: Option<KeySite>,
     /// What the wall bears; `None` where the stress could not be computed, which is warned of.
@@ -34,7 +37,7 @@ pub struct Design {
     pub fit: PrintedFit,
     /// Where each piece is too thin to print well, the longest place first.
     pub thin: IdVec<PatchId, Vec<ThinFeature>>,
-    /// What it took to find it.
+    /// What the whole job cost, with all that was tried in vain.
     pub effort: Effort,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
@@ -92,7 +95,6 @@ pub(super) struct Best<'a> {
     n_rattling: usize,
     /// Why there is no plan where a piece is the key.
     failure: Failure,
-    effort: Effort,
 }
 
 /// A kit and what it was made for.
@@ -102,14 +104,6 @@ struct Kept<'a> {
 }
 
 impl<'a> Best<'a> {
-    /// Nothing yet, on top of an effort that was made.
-    pub fn after(effort: Effort) -> Self {
-        Self {
-            effort,
-            ..Self::default()
-        }
-    }
-
     pub fn has_kit(&self) -> bool {
         self.kit.is_some()
     }
@@ -131,9 +125,6 @@ impl<'a> Best<'a> {
         candidate: Candidate<'a>,
         explored: Result<Explored, DesignError>,
     ) -> Result<(), DesignError> {
-        if let Ok(explored) = &explored {
-            self.effort += explored.effort;
-        }
         let Some(site) = place else {
             let Explored { kit, failure, .. } = match explored {
                 Err(e) if self.kit.is_some() && !matches!(e, DesignError::Cancelled(_)) => {
@@ -144,14 +135,8 @@ impl<'a> Best<'a> {
                 explored => explored?,
             };
             self.failure = failure;
-            // Of equals a piece as it is.
-            let is_worse = |kit: &Kit| {
-                self.kit
-                    .as_ref()
-                    .is_some_and(|b| b.kit.failures().len() < kit.failures().len())
-            };
-            if let Some(kit) = kit.filter(|kit| !is_worse(kit)) {
-                self.kit = Some(Kept { kit, candidate });
+            if let Some(kit) = kit {
+                self.keep(kit, candidate);
             }
             return Ok(());
         };
@@ -168,9 +153,7 @@ impl<'a> Best<'a> {
                 let failed = kit.failures();
                 // Where other pieces than the key rattle, another key changes little.
                 self.n_rattling += usize::from(kit.only_rattles() && !kit.rattling().is_empty());
-                if self.kit.as_ref().is_none_or(|b| kit.is_better_than(&b.kit)) {
-                    self.kit = Some(Kept { kit, candidate });
-                }
+                self.keep(kit, candidate);
                 if failed.is_empty() {
                     return Ok(());
                 }
@@ -182,9 +165,15 @@ impl<'a> Best<'a> {
         Ok(())
     }
 
-    /// The best kit with all that is known of it.
-    pub fn finished(self, ctx: &Ctx, job: &Job<'_>) -> Result<DesignOutcome, DesignError> {
-        let effort = self.effort;
+    /// Keeps the kit where it is better than the best before; of equals the earlier stays.
+    fn keep(&mut self, kit: Kit, candidate: Candidate<'a>) {
+        if self.kit.as_ref().is_none_or(|b| kit.is_better_than(&b.kit)) {
+            self.kit = Some(Kept { kit, candidate });
+        }
+    }
+
+    /// The best kit with all that is known of it, after so much `effort`.
+    pub fn finished(self, ctx: &Ctx, job: &Job<'_>, effort: Effort) -> Result<DesignOutcome, DesignError> {
         let Self {
             kit,
             mut reasons,
@@ -251,6 +240,7 @@ impl<'a> Best<'a> {
         let strength = job.wall.strength.clone();
         Ok(DesignOutcome::Made(Box::new(Design {
             kit,
+            settings: job.settings().clone(),
             key,
             strength,
             gaps,

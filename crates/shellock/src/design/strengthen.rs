@@ -63,16 +63,22 @@ pub(super) fn remedy(
         plan: chosen,
         asked: left.asked,
     };
-    let mut sizes = division.chosen.clone();
-    let mut least = factor(weakest);
-    if left.connectors > 0 {
-        (sizes, least) = trial.larger_connectors(&holding.bears)?;
-        if least >= left.asked + AIM {
-            return Ok(Some(Remedy::Connectors(sizes)));
-        }
+    let before = factor(weakest);
+    let larger = (left.connectors > 0)
+        .then(|| trial.larger_connectors(&holding.bears))
+        .transpose()?;
+    if larger
+        .as_ref()
+        .is_some_and(|(_, borne)| *borne >= left.asked + AIM)
+    {
+        return Ok(larger.map(|(sizes, _)| Remedy::Connectors(sizes)));
     }
+    let (sizes, borne) = match &larger {
+        Some((sizes, borne)) => (sizes, *borne),
+        None => (&division.chosen, before),
+    };
     if left.wall
-        && let Some(thickness_mm) = trial.thicker_wall(planning, &sizes, least)?
+        && let Some(thickness_mm) = trial.thicker_wall(planning, sizes, borne)?
     {
         if planning.may_begin_anew(ctx) {
             let weakest = weakest.clone();
@@ -85,13 +91,21 @@ pub(super) fn remedy(
             "no time is left for walls of {thickness_mm:.1} mm, which would bear more"
         ));
     }
-    if least >= GAIN * factor(weakest) {
+    if let Some((sizes, borne)) = larger
+        && is_worth(before, borne)
+    {
         return Ok(Some(Remedy::Connectors(sizes)));
     }
-    if left.weak_joinings > 0 && factor(weakest) < ONCE {
+    if left.weak_joinings > 0 && before < ONCE {
         return joined(ctx, division, chosen.plan.key(), weakest);
     }
     Ok(None)
+}
+
+/// Whether a change is worth it that takes the least load factor from `before` to `after`. A plan that bears nothing
+/// has the factor 0, of which any multiple is 0.
+fn is_worth(before: f64, after: f64) -> bool {
+    after > before && after >= GAIN * before
 }
 
 /// The use of which least is borne, where that is less than asked.
@@ -190,7 +204,7 @@ impl Trial<'_> {
                 break;
             }
         }
-        Ok((wall_mm > self.handling.wall_mm && borne >= GAIN * before).then_some(wall_mm))
+        Ok((wall_mm > self.handling.wall_mm && is_worth(before, borne)).then_some(wall_mm))
     }
 }
 
@@ -234,5 +248,121 @@ impl Thicker {
             pieces: Vec::new(),
             at: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::{Solid, Vec3};
+
+    use super::*;
+    use crate::design::wall::Wall;
+    use crate::design::ways::{Ask, Input};
+    use crate::design::{Candidate, Job, Params, Settings};
+    use crate::handling::{Deed, Failure};
+    use crate::metric::GivesWay;
+    use crate::plan::{LatticePlan, PlanConstraints, PlanScore, survey};
+    use crate::{IdVec, LatticeDirection, testing};
+
+    const N: usize = 4;
+
+    /// A press on the top of which so much is borne.
+    fn pressed(factor: f64) -> LoadBorne {
+        LoadBorne {
+            deed: Deed::PressTop,
+            force_n: 70.0,
+            at: [0.0; 3],
+            factor: Some(factor),
+            first: Some(GivesWay {
+                how: Failure::Opens,
+                between: [PatchId(0), PatchId(1)],
+                at: [0.0; 3],
+            }),
+        }
+    }
+
+    /// Pieces that leave upwards, as they are numbered.
+    fn plan() -> RankedPlan {
+        let up = LatticeDirection::nearest(Vec3::Z);
+        RankedPlan {
+            plan: LatticePlan::new((0..N).map(|p| (PatchId::from(p), up))),
+            score: PlanScore {
+                worst: 1.0,
+                mean: 1.0,
+                pieces: IdVec::from_fn(N, |_: PatchId| 1.0),
+            },
+            loose: Vec::new(),
+        }
+    }
+
+    /// What is changed of a ball in four pieces that bears so much of a press on its top.
+    fn changed(borne: f64, left: &Levers) -> Option<Remedy> {
+        let (ctx, params) = (Ctx::quiet(), Params::default());
+        let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
+        let pieces = testing::voronoi(model.mesh().clone(), N, 1);
+        let wall = Wall {
+            settings: Settings::resolve(&params),
+            strength: None,
+            warnings: Vec::new(),
+        };
+        let input = Input {
+            params: &params,
+            model: &model,
+            labels: None,
+        };
+        let ask = Ask {
+            factor: left.asked,
+            rounds: params.rounds,
+            n_thicker: 0,
+        };
+        let job = Job::of(&input, &wall, ask, false, pieces).expect("no key is named");
+        let candidate = Candidate::new(&job, 0, None).expect("as it lies");
+        let division = candidate.division(&ctx, &job, candidate.surface.clone());
+        let division = division.expect("sizes").expect("no key is cut");
+        let (settings, surface) = (&division.settings.plan, &division.surface);
+        let sizes = &division.chosen.sizes;
+        let survey = survey(&ctx, settings, surface, &surface.seams(), sizes).expect("not stopped");
+        let planning = Planning {
+            params: &params,
+            model: &model,
+            turn: &candidate.turn,
+            division: &division,
+            survey: &survey,
+            constraints: &PlanConstraints::default(),
+            begun_s: 0.0,
+        };
+        let holding = Holding {
+            quality_mm: None,
+            loose: Vec::new(),
+            seams: Vec::new(),
+            n_compared: 1,
+            bears: vec![pressed(borne)],
+            foreseen_play: Vec::new(),
+            foreseen_excess: Vec::new(),
+        };
+        let plan = (&plan(), &holding);
+        remedy(&ctx, &planning, &planning.handling(), plan, left).expect("not stopped")
+    }
+
+    #[test]
+    fn nothing_is_changed_where_no_lever_is_left() {
+        let none = Levers {
+            asked: 1.4,
+            ..Levers::default()
+        };
+        for borne in [0.0, 0.5, 1.3] {
+            assert!(changed(borne, &none).is_none(), "{borne}");
+        }
+        let joins = Levers {
+            weak_joinings: 1,
+            ..none
+        };
+        assert!(matches!(changed(0.0, &joins), Some(Remedy::Joined(..))));
+    }
+    #[test]
+    fn a_change_that_gains_nothing_is_not_worth_it() {
+        assert!(!is_worth(0.0, 0.0), "a twentieth more than nothing is nothing");
+        assert!(is_worth(0.0, 0.1) && is_worth(1.0, GAIN));
+        assert!(!is_worth(1.0, 1.04) && !is_worth(1.0, 0.5));
     }
 }

@@ -119,11 +119,11 @@ fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Findin
     }
 }
 
-fn good() -> Kit {
+pub(super) fn good() -> Kit {
     kit(&[("holds", true)], Vec::new())
 }
 
-fn rattling(piece: u32, translation_mm: f64) -> Kit {
+pub(super) fn rattling(piece: u32, translation_mm: f64) -> Kit {
     let play = Play {
         translation_mm,
         rotation_deg: 0.0,
@@ -151,7 +151,7 @@ fn rattling(piece: u32, translation_mm: f64) -> Kit {
     }
 }
 
-fn loose(piece: u32) -> Kit {
+pub(super) fn loose(piece: u32) -> Kit {
     kit(
         &[("holds", false), ("sits", true)],
         vec![Finding::Loose {
@@ -370,14 +370,14 @@ fn cut_keys_cost_less_than_a_piece_that_is_the_key() {
 }
 
 /// A job on a ball, of which no kit is made.
-struct Ball {
-    model: Solid,
-    params: Params,
-    wall: Wall,
+pub(super) struct Ball {
+    pub model: Solid,
+    pub params: Params,
+    pub wall: Wall,
 }
 
 impl Ball {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let params = Params::default();
         let told = Warning {
             cause: Cause::StrengthUnknown {
@@ -399,7 +399,7 @@ impl Ball {
         }
     }
 
-    fn job(&self) -> Job<'_> {
+    pub fn job(&self) -> Job<'_> {
         let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
         Job {
             ask: Ask {
@@ -420,7 +420,7 @@ impl Ball {
         }
     }
 
-    fn candidate(&self) -> Candidate<'_> {
+    pub fn candidate(&self) -> Candidate<'_> {
         Candidate {
             turn: Turn::default(),
             model: Cow::Borrowed(&self.model),
@@ -431,7 +431,7 @@ impl Ball {
     }
 
     /// The outcome of kits that are made one after the other for these places.
-    fn outcome(
+    pub fn outcome(
         &self,
         tried: Vec<(Option<KeySite>, Result<Explored, DesignError>)>,
     ) -> (Vec<bool>, Option<Design>) {
@@ -443,14 +443,14 @@ impl Ball {
                     .unwrap();
             }
         }
-        match best.finished(&ctx, &self.job()).unwrap() {
+        match best.finished(&ctx, &self.job(), Effort::default()).unwrap() {
             DesignOutcome::Made(design) => (needed, Some(*design)),
             DesignOutcome::NoPlan { .. } => (needed, None),
         }
     }
 }
 
-fn site() -> KeySite {
+pub(super) fn site() -> KeySite {
     let prism = KeyPrism {
         origin: Vec3::ZERO,
         slide: Vec3::X,
@@ -470,20 +470,14 @@ fn site() -> KeySite {
     }
 }
 
-fn made(kit: Kit) -> Result<Explored, DesignError> {
+pub(super) fn made(kit: Kit) -> Result<Explored, DesignError> {
     Ok(Explored {
         kit: Some(kit),
-        failure: Failure::default(),
-        thicker: None,
-        effort: Effort {
-            keys: 1,
-            kits: 1,
-            ..Effort::default()
-        },
+        ..Explored::default()
     })
 }
 
-fn codes(design: &Design) -> Vec<&str> {
+pub(super) fn codes(design: &Design) -> Vec<&str> {
     design.warnings.iter().map(|w| w.code()).collect()
 }
 
@@ -492,13 +486,7 @@ fn a_kit_that_passes_ends_the_job() {
     let (needed, design) =
         Ball::new().outcome(vec![(Some(site()), made(good())), (Some(site()), made(good()))]);
     assert_eq!(needed, [true, false]);
-    let design = design.unwrap();
-    assert!(design.kit.verification.passed());
-    assert_eq!(
-        (design.effort.keys, design.effort.kits),
-        (1, 1),
-        "only what was tried counts"
-    );
+    assert!(design.unwrap().kit.verification.passed());
 }
 
 #[test]
@@ -559,23 +547,37 @@ fn a_piece_that_cannot_be_the_key_throws_no_kit_away() {
     assert!(alone.is_err(), "without any kit the job cannot be done");
 }
 
+/// A kit that comes loose and whose pieces rattle by so much besides.
+fn loose_and_rattling(piece: u32, excess: f64) -> Kit {
+    let rattles = rattling(piece, excess).rattles;
+    Kit {
+        rattles,
+        ..loose(piece)
+    }
+}
+
 #[test]
-fn of_kits_that_fail_alike_the_piece_as_it_is_stays_and_a_worse_one_does_not() {
+fn the_better_of_two_kits_is_given_out_whichever_key_it_has_and_of_equals_the_earlier() {
     let ball = Ball::new();
-    let with_key = |own: Kit, piece: Kit| {
-        ball.outcome(vec![(Some(site()), made(own)), (None, made(piece))])
-            .1
-            .expect("a kit was made")
+    let given_out = |cut: Kit, piece: Kit| {
+        let tried = vec![(Some(site()), made(cut)), (None, made(piece))];
+        let kit = ball.outcome(tried).1.expect("a kit was made").kit;
+        kit.verification.findings
     };
-    assert_eq!(
-        with_key(loose(1), loose(0)).kit.verification.findings,
-        loose(0).verification.findings
-    );
-    let worse = kit(&[("holds", false), ("closed", false)], Vec::new());
-    assert_eq!(
-        with_key(loose(1), worse).kit.verification.findings,
-        loose(1).verification.findings
-    );
+    let first = |kit: Kit| kit.verification.findings;
+    let worse = || kit(&[("holds", false), ("closed", false)], Vec::new());
+    // As many failures: the one that rattles less, and of equals the earlier.
+    for (cut, piece, is_piece) in [
+        (loose(1), loose(0), false),
+        (loose_and_rattling(1, 1.5), loose_and_rattling(0, 2.5), false),
+        (loose_and_rattling(1, 2.5), loose_and_rattling(0, 1.5), true),
+        (loose(1), worse(), false),
+        (worse(), loose(0), true),
+    ] {
+        let better = first(if is_piece { piece.clone() } else { cut.clone() });
+        assert_eq!(piece.is_better_than(&cut), is_piece);
+        assert_eq!(given_out(cut, piece), better);
+    }
 }
 
 #[test]
@@ -595,6 +597,16 @@ fn warnings_are_those_of_the_wall_and_of_the_kit_that_is_given_out() {
 }
 
 #[test]
+fn the_settings_of_a_design_have_the_wall_that_was_decided() {
+    let mut ball = Ball::new();
+    ball.params.thickness = Thickness::Auto;
+    ball.wall.settings = Settings::with_thickness(&ball.params, 1.3);
+    assert_ne!(Settings::resolve(&ball.params), ball.wall.settings);
+    let (_, design) = ball.outcome(vec![(None, made(good()))]);
+    assert_eq!(design.unwrap().settings, ball.wall.settings);
+}
+
+#[test]
 fn without_any_plan_the_answer_is_why() {
     let failure = || Failure {
         reason: "all are in each other's way".into(),
@@ -602,21 +614,16 @@ fn without_any_plan_the_answer_is_why() {
     };
     let none = || {
         Ok(Explored {
-            kit: None,
             failure: failure(),
-            thicker: None,
-            effort: Effort {
-                keys: 1,
-                kits: 1,
-                ..Effort::default()
-            },
+            ..Explored::default()
         })
     };
     let ball = Ball::new();
     let (ctx, mut best) = (Ctx::quiet(), Best::default());
     best.add(&ctx, Some(&site()), ball.candidate(), none()).unwrap();
     best.add(&ctx, None, ball.candidate(), none()).unwrap();
-    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job()).unwrap() else {
+    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job(), Effort::default()).unwrap()
+    else {
         panic!("no kit")
     };
     assert_eq!(reason, failure().reason);

@@ -42,6 +42,19 @@ pub(super) struct DrawLimits {
     pub max_tries: usize,
 }
 
+/// How far the draws with one key have come; they can be continued from here.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Draws {
+    /// Batches that were drawn. Each draw of each batch has its own random stream.
+    pub n_batches: usize,
+    /// Plans that were drawn.
+    pub n_plans: usize,
+    /// Batches since the best plan was found.
+    pub n_stale: usize,
+    /// Whether a draw had nothing left to try.
+    pub is_exhausted: bool,
+}
+
 struct Draw<'a> {
     space: &'a Space<'a>,
     key: &'a KeyChoice,

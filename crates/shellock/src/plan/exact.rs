@@ -23,6 +23,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::draw::Draws;
 use super::improve::improve;
 use super::key::KeyChoice;
 use super::local_cost::{Role, RoleSet};
@@ -78,6 +79,8 @@ pub(super) struct Candidate<'k> {
     pub pool: Pool,
     /// None costs less; infinite where there is none.
     pub lower_bound: f64,
+    /// How far the random draws have come.
+    pub draws: Draws,
     /// How often each piece was at fault: what one question teaches steers the next.
     weights: Vec<f64>,
 }
@@ -89,6 +92,7 @@ impl<'k> Candidate<'k> {
             key,
             pool: Pool::default(),
             lower_bound: 0.0,
+            draws: Draws::default(),
             weights: vec![1.0; n],
         }
     }

@@ -14,7 +14,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::draw::{DrawLimits, Drawn, draw};
+use super::draw::{DrawLimits, Drawn, Draws, draw};
 use super::exact::{Budget, Candidate, least_cost, lower_bound, prove, vary};
 use super::improve::{Improved, improve};
 use super::key::{KeyChoice, choices};
@@ -154,10 +154,7 @@ fn out_of_range(n_pieces: usize, key: Option<PatchId>) -> Option<String> {
             PieceSet::MAX_PIECES
         )),
         n => key.filter(|&k| usize::from(k) >= n).map(|k| {
-            format!(
-                "piece {k} is to be the key, but there are only pieces 0 to {}; choose one of them",
-                n - 1
-            )
+            format!("piece {k} is to be the key, but there are only pieces 1 to {n}; choose one of them")
         }),
     }
 }
@@ -181,16 +178,22 @@ fn with_any_key<'k>(
     let mut tries_left = params.max_tries;
     let mut stuck = space.all();
     let keys: Vec<&KeyChoice> = keys.iter().filter(|k| !k.directions.is_empty()).collect();
-    for &key in &keys {
+    let mut draws = vec![Draws::default(); keys.len()];
+    for (i, &key) in keys.iter().enumerate() {
         if tries_left == 0 {
             break;
         }
         let mut pool = Pool::default();
-        match draw_plans(ctx, params, space, key, &mut tries_left, &mut pool)? {
+        match draw_plans(ctx, params, space, key, &mut tries_left, &mut pool, &mut draws[i])? {
             None => {
-                let equals = keys.iter().filter(|k| k.is_as_good_as(key));
-                let candidate = |k: &&'k KeyChoice| Candidate::new(k, space.n);
-                let mut candidates: Vec<Candidate<'k>> = equals.map(candidate).collect();
+                let equals = keys.iter().zip(&draws).filter(|(k, _)| k.is_as_good_as(key));
+                let mut candidates: Vec<Candidate<'k>> = equals
+                    .map(|(k, draws)| {
+                        let mut candidate = Candidate::new(k, space.n);
+                        candidate.draws = *draws;
+                        candidate
+                    })
+                    .collect();
                 candidates
                     .iter_mut()
                     .filter(|c| c.key == key)
@@ -223,12 +226,13 @@ fn proven<'k>(
     let Candidate {
         key,
         mut pool,
+        mut draws,
         lower_bound: key_bound,
         ..
     } = candidates.swap_remove(best);
     if pool.len() < MOST_PLANS {
         // The exact search gave this key its best plan, but not the others that metrics choose from.
-        draw_plans(ctx, params, space, key, &mut tries_left, &mut pool)?;
+        draw_plans(ctx, params, space, key, &mut tries_left, &mut pool, &mut draws)?;
     }
     if params.proof_budget > 0 {
         vary(
@@ -266,7 +270,8 @@ fn proven<'k>(
     Ok((found, key))
 }
 
-/// Fills `pool` with plans drawn at random and improved; the least that was left where there is none.
+/// Fills `pool` with plans drawn at random and improved, from where `draws` ended; the least that was left where there
+/// is none.
 fn draw_plans(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -274,21 +279,25 @@ fn draw_plans(
     key: &KeyChoice,
     tries_left: &mut usize,
     pool: &mut Pool,
+    draws: &mut Draws,
 ) -> Result<Option<PieceSet>, Cancelled> {
     let mut stuck = space.all();
-    let (mut n_drawn, mut n_stale) = (0, 0);
-    for batch in 0..params.n_plans.div_ceil(BATCH) * 2 {
+    // A key that was not tried gets one batch whatever is left.
+    while may_find_more(params, space, pool, draws)
+        && (draws.n_batches == 0 || (*tries_left > 0 && !ctx.is_time_up()))
+    {
         ctx.check()?;
         let best_before = pool.least_cost();
         let limits = DrawLimits {
             bound: bound_of(pool),
             max_tries: TRIES_PER_PIECE * space.n,
         };
-        let drawn: Vec<Drawn> = (batch * BATCH..(batch + 1) * BATCH)
+        let first = draws.n_batches * BATCH;
+        let drawn: Vec<Drawn> = (first..first + BATCH)
             .into_par_iter()
             .map(|i| draw(space, key, stream(params.seed, i), i, limits))
             .collect();
-        let is_exhausted = drawn.iter().any(|d| d.plan.is_none() && d.is_exhausted);
+        draws.is_exhausted = drawn.iter().any(|d| d.plan.is_none() && d.is_exhausted);
         let mut plans = Vec::new();
         for d in drawn {
             *tries_left = tries_left.saturating_sub(d.n_tries);
@@ -297,40 +306,49 @@ fn draw_plans(
             }
             plans.extend(d.plan.map(|plan| (space.score(&plan), plan)));
         }
-        n_drawn += plans.len();
-        // The sort is stable: of equal plans the one drawn first wins.
-        plans.sort_by(|x, y| x.0.worst.total_cmp(&y.0.worst));
-        plans.dedup_by(|x, y| x.1 == y.1);
-        let cheapest: Vec<&LatticePlan> = plans.iter().take(N_IMPROVED).map(|x| &x.1).collect();
-        let improved: Vec<Improved> = cheapest
-            .into_par_iter()
-            .map(|plan| improve(space, key, plan.clone()))
-            .collect();
-        improved
-            .into_iter()
-            .for_each(|x| pool.add(space, x.score, x.plan));
-        plans
-            .into_iter()
-            .for_each(|(score, plan)| pool.add(space, score, plan));
-        n_stale = if pool.least_cost() < best_before {
+        draws.n_batches += 1;
+        draws.n_plans += plans.len();
+        add_with_improved(space, key, plans, pool);
+        draws.n_stale = if pool.least_cost() < best_before {
             0
         } else {
-            n_stale + 1
+            draws.n_stale + 1
         };
-        let gives_up = pool.len() == 0 && batch + 1 >= MAX_EMPTY_BATCHES;
-        let is_stale =
-            pool.len() == MOST_PLANS && n_stale >= LEAST_STALE_BATCHES + space.n / PIECES_PER_STALE_BATCH;
-        if is_exhausted
-            || gives_up
-            || is_stale
-            || n_drawn >= params.n_plans
-            || *tries_left == 0
-            || ctx.is_time_up()
-        {
-            break;
-        }
     }
     Ok((pool.len() == 0).then_some(stuck))
+}
+
+/// Whether another batch of draws may fill `pool` further or find a better plan.
+fn may_find_more(params: &PlanParams, space: &Space<'_>, pool: &Pool, draws: &Draws) -> bool {
+    let is_hopeless = pool.len() == 0 && draws.n_batches >= MAX_EMPTY_BATCHES;
+    let is_stale =
+        pool.len() == MOST_PLANS && draws.n_stale >= LEAST_STALE_BATCHES + space.n / PIECES_PER_STALE_BATCH;
+    let most_batches = params.n_plans.div_ceil(BATCH) * 2;
+    let is_done = draws.n_plans >= params.n_plans || draws.n_batches >= most_batches;
+    !(draws.is_exhausted || is_hopeless || is_stale || is_done)
+}
+
+/// Adds the plans of a batch, and first the cheapest of them improved.
+fn add_with_improved(
+    space: &Space<'_>,
+    key: &KeyChoice,
+    mut plans: Vec<(PlanScore, LatticePlan)>,
+    pool: &mut Pool,
+) {
+    // The sort is stable: of equal plans the one drawn first wins.
+    plans.sort_by(|x, y| x.0.worst.total_cmp(&y.0.worst));
+    plans.dedup_by(|x, y| x.1 == y.1);
+    let cheapest: Vec<&LatticePlan> = plans.iter().take(N_IMPROVED).map(|x| &x.1).collect();
+    let improved: Vec<Improved> = cheapest
+        .into_par_iter()
+        .map(|plan| improve(space, key, plan.clone()))
+        .collect();
+    improved
+        .into_iter()
+        .for_each(|x| pool.add(space, x.score, x.plan));
+    plans
+        .into_iter()
+        .for_each(|(score, plan)| pool.add(space, score, plan));
 }
 
 /// What plans may cost beyond those in the pool: nothing more than the best one, once there are enough.
@@ -347,4 +365,95 @@ pub(super) fn stream(seed: u64, i: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(FIRST_STREAM.wrapping_add(i as u64));
     rng
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use shellock_geom::Vec3;
+
+    use super::super::local_cost::{Role, Surroundings};
+    use super::super::survey;
+    use super::*;
+    use crate::ConnectorSizes;
+    use crate::testing::{seams, sphere, voronoi};
+
+    /// The default costs that count how often they are asked.
+    struct Counted {
+        costs: SeamCosts,
+        n_asked: Arc<AtomicUsize>,
+    }
+
+    impl PieceCosts for Counted {
+        fn bound(&self, piece: PatchId, role: Role, around: &Surroundings) -> f64 {
+            self.n_asked.fetch_add(1, Ordering::Relaxed);
+            self.costs.bound(piece, role, around)
+        }
+    }
+
+    /// Eight pieces of a ball, and how few plans of them are drawn: too few to fill the pool.
+    fn eight_pieces() -> (PlanSurvey, PlanParams) {
+        let params = PlanParams {
+            n_plans: 40,
+            proof_budget: 0,
+            ..PlanParams::default()
+        };
+        let ball = voronoi(sphere(4, Vec3::new(50.0, 55.0, 70.0)), 8, 1);
+        let sizes = ConnectorSizes::default();
+        let survey = survey(&Ctx::quiet(), &params, &ball, &seams(&ball), &sizes);
+        (survey.unwrap(), params)
+    }
+
+    #[test]
+    fn no_draw_is_made_twice() {
+        let (survey, params) = eight_pieces();
+        let (ctx, none, n_asked) = (Ctx::quiet(), PlanConstraints::default(), Arc::default());
+        let costs = Counted {
+            costs: SeamCosts::new(&survey, &none),
+            n_asked: Arc::clone(&n_asked),
+        };
+        let space = Space::with_costs(&survey, &none, params.relaxed_tolerance, Box::new(costs));
+        let keys = choices(&params, &survey);
+        let (_, key) = with_any_key(&ctx, &params, &space, &keys)
+            .unwrap()
+            .expect("a ball has a plan");
+        let first = keys.iter().find(|k| !k.directions.is_empty());
+        assert_eq!(Some(key), first, "no other key was drawn before");
+        let n_searched = n_asked.swap(0, Ordering::Relaxed);
+        let (mut pool, mut tries_left) = (Pool::default(), params.max_tries);
+        let draws = &mut Draws::default();
+        draw_plans(&ctx, &params, &space, key, &mut tries_left, &mut pool, draws).unwrap();
+        let n_drawn = n_asked.load(Ordering::Relaxed);
+        assert!(n_drawn > 0 && pool.len() < MOST_PLANS);
+        assert_eq!(n_searched, n_drawn, "without a proof a search is its draws");
+    }
+    #[test]
+    fn draws_that_were_cut_short_go_on_where_they_ended() {
+        let (survey, params) = eight_pieces();
+        let none = PlanConstraints::default();
+        let space = Space::new(&survey, &none, params.relaxed_tolerance);
+        let keys = choices(&params, &survey);
+        let key = keys
+            .iter()
+            .find(|k| !k.directions.is_empty())
+            .expect("one can leave");
+        let drawn = |ctx: &Ctx<'_>, draws: &mut Draws, pool: &mut Pool| {
+            let mut tries_left = params.max_tries;
+            draw_plans(ctx, &params, &space, key, &mut tries_left, pool, draws).unwrap();
+            draws.n_batches
+        };
+        let is_up = || true;
+        let (quiet, late) = (Ctx::quiet(), Ctx::quiet().with_time_limit(&is_up));
+        let (mut at_once, mut draws) = (Pool::default(), Draws::default());
+        let n_batches = drawn(&quiet, &mut draws, &mut at_once);
+        assert!(n_batches > 1);
+        let (mut in_two, mut draws) = (Pool::default(), Draws::default());
+        assert_eq!(drawn(&late, &mut draws, &mut in_two), 1);
+        assert_eq!(drawn(&late, &mut draws, &mut in_two), 1, "no time is left");
+        assert_eq!(drawn(&quiet, &mut draws, &mut in_two), n_batches);
+        let plans = |pool: &Pool| pool.plans().iter().map(|p| p.1.clone()).collect::<Vec<_>>();
+        assert_eq!(plans(&in_two), plans(&at_once));
+    }
 }

@@ -369,6 +369,7 @@ fn a_key_that_is_no_piece_is_named_and_not_blamed_on_the_pieces() {
             reason.contains(&format!("piece {} ", PatchId(key))) && blockers.is_empty(),
             "{reason}"
         );
+        assert!(reason.contains("pieces 1 to 2;"), "pieces count from 1: {reason}");
     }
 }
 

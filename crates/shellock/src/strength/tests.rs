@@ -7,6 +7,11 @@ fn ball(radius_mm: f64) -> Solid {
     Solid::new(sphere(4, Vec3::splat(radius_mm))).unwrap()
 }
 
+/// A model so thin that walls leave connectors little room.
+fn lens() -> Solid {
+    Solid::new(sphere(4, Vec3::new(50.0, 40.0, 3.5))).unwrap()
+}
+
 fn quick(drop_m: f64) -> StrengthParams {
     StrengthParams {
         drop_m,
@@ -93,6 +98,19 @@ fn what_no_wall_bears_is_told_and_gets_no_wall_that_does_not_help() {
 }
 
 #[test]
+fn a_thin_model_that_no_wall_saves_gets_the_thickest_wall_that_leaves_connectors_room() {
+    let mut params = StrengthParams {
+        n_cases: 3,
+        refinement: 0.1,
+        ..StrengthParams::default()
+    };
+    params.material.strength_mpa = 0.01;
+    let strength = found(&params, &lens());
+    assert!(strength.is_too_weak && strength.most_mm < USUAL_MM);
+    assert_eq!(strength.thickness_mm, strength.most_mm);
+}
+
+#[test]
 fn arms_thinner_than_two_walls_are_solid_and_a_ball_is_nowhere() {
     let mut params = quick(1.0);
     params.refinement = 1.0;
@@ -140,8 +158,7 @@ fn a_thin_model_gets_a_thin_wall_with_room_for_connectors_and_a_bulky_one_does_n
         refinement: 0.1,
         ..StrengthParams::default()
     };
-    let lens = Solid::new(sphere(4, Vec3::new(50.0, 40.0, 3.5))).unwrap();
-    let thin = found(&params, &lens);
+    let thin = found(&params, &lens());
     assert!((params.thin_mm..params.least_mm - TOLD_THINNER_MM).contains(&thin.thickness_mm));
     assert_eq!(thin.told_thinner(&params).unwrap().code(), "wall-thin-for-room");
     let bulky = found(&params, &ball(60.0));
