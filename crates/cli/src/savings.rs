@@ -1,8 +1,9 @@
 //! `report`: what a kit saves over the solid model, as the paper's Table 1 tells it.
 //!
 //! Time and material are PrusaSlicer's own estimates where it is installed, else closed forms, with supports and
-//! the same settings for both. Where PrusaSlicer is installed and gives no estimate, `note` says why. Pieces are laid on plates anew for either process; the whole model is printed as
-//! people print it (filament at 15 % infill, resin hollowed) in the pose that takes the least.
+//! the same settings for both. Where PrusaSlicer is installed and gives no estimate, `note` says why. Pieces are laid on
+//! plates anew for either process; the whole model is printed as people print it (filament at 15 % infill, resin
+//! hollowed) in the pose that takes the least.
 
 use std::fs;
 use std::io::Read;
@@ -26,6 +27,9 @@ use crate::stages::{Kit, model_of, pieces_of, plan_of, write};
 const SAVINGS: &str = "savings.json";
 /// The slicer's program.
 const SLICER: &str = "prusa-slicer";
+/// Longest `config.ini` that is read of an archive for a resin printer, bytes. It is a list of short entries; the bound is
+/// against archives that are broken.
+const MOST_CONFIG_BYTES: u64 = 1 << 20;
 
 /// Settings of both technologies, where they are not the slicer's defaults, on a bed that holds everything. The
 /// display of the resin printer is coarse: its pixels cost time here and change little.
@@ -37,8 +41,6 @@ const FDM_SETTINGS: &str = "printer_technology = FFF\nnozzle_diameter = 0.4\nsup
     fill_density = 15%\n";
 /// The whole model of resin.
 const HOLLOWED: &str = "hollowing_enable = 1\nhollowing_min_thickness = 2\n";
-/// Longest `config.ini` that is read of an archive for a resin printer, bytes: PrusaSlicer 2.5 writes less than 1 kB.
-const MOST_CONFIG_BYTES: u64 = 1 << 20;
 /// Instead of 15 %.
 const FILLED: &str = "fill_density = 100%\nfill_pattern = rectilinear\n";
 
@@ -56,29 +58,13 @@ pub fn report(session: &Session, kit: &Path, model: Option<&Path>, closed_form: 
         let sliced = slicer
             .as_ref()
             .map(|slicer| slicer.costs(&printer, printing.files(pieces.as_slice()), &solid));
-        let by = if matches!(sliced, Some(Ok(_))) {
-            "PrusaSlicer"
-        } else {
-            "closed form"
-        };
-        let Costs {
-            pieces,
-            whole,
-            filled,
-            note,
-        } = match sliced {
+        let costs = match sliced {
             Some(Ok(costs)) => costs,
             Some(Err(NoEstimate::Failed(failure))) => return Err(failure),
             Some(Err(NoEstimate::Because(why))) => Costs::closed_form(&printing, Some(why)),
             None => Costs::closed_form(&printing, None),
         };
-        let over = |whole: f64, ours: f64| ours / whole.max(f64::MIN_POSITIVE);
-        let filled_s = filled.map(|f| f.seconds);
-        let told = json!({ "by": by, "pieces_s": pieces.seconds, "solid_s": whole.seconds,
-            "ratio": over(whole.seconds, pieces.seconds), "pieces_g": pieces.grams, "solid_g": whole.grams,
-            "material_ratio": over(whole.grams, pieces.grams), "solid_as": whole_words(printer.process),
-            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(|s| over(s, pieces.seconds)), "note": note });
-        times.insert(printer.name, told);
+        times.insert(printer.name, costs.entry(printer.process));
     }
     let volume: f64 = pieces.as_slice().iter().map(TriMesh::signed_volume).sum();
     let told = json!({
@@ -133,6 +119,8 @@ fn print(told: &Value) {
 
 /// Costs of a kit and of its model.
 struct Costs {
+    /// Who says so.
+    by: &'static str,
     /// All plates.
     pieces: Cost,
     /// The whole model as people print it.
@@ -147,11 +135,23 @@ impl Costs {
     fn closed_form(printing: &Printing, note: Option<String>) -> Self {
         let (pieces, whole) = printing.costs();
         Self {
+            by: "closed form",
             pieces,
             whole: whole.unwrap_or_default(),
             filled: None,
             note,
         }
+    }
+
+    /// The entry of `savings.json`.
+    fn entry(&self, process: Process) -> Value {
+        let Self { pieces, whole, .. } = self;
+        let over = |whole: f64, ours: f64| ours / whole.max(f64::MIN_POSITIVE);
+        let filled_s = self.filled.as_ref().map(|filled| filled.seconds);
+        json!({ "by": self.by, "pieces_s": pieces.seconds, "solid_s": whole.seconds,
+            "ratio": over(whole.seconds, pieces.seconds), "pieces_g": pieces.grams, "solid_g": whole.grams,
+            "material_ratio": over(whole.grams, pieces.grams), "solid_as": whole_words(process),
+            "filled_solid_s": filled_s, "filled_ratio": filled_s.map(|s| over(s, pieces.seconds)), "note": self.note })
     }
 }
 
@@ -228,6 +228,7 @@ impl Slicer {
             None => (None, None),
         };
         Ok(Costs {
+            by: "PrusaSlicer",
             pieces,
             whole,
             filled,
