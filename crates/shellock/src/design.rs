@@ -13,6 +13,8 @@
 mod attempt;
 mod budget;
 mod candidate;
+#[cfg(test)]
+mod cost_tests;
 mod division;
 mod handover;
 mod kit;
@@ -38,7 +40,7 @@ use crate::strength::StressMap;
 use crate::{Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, Warning, segmentation};
 use attempt::{Attempt, Failure, Next, Planning};
 pub use budget::Effort;
-use budget::{Budget, Levers, Pace, RESERVE, ROUNDS_BESIDE_OTHERS, THICKER_WALLS};
+use budget::{Budget, Pace, RESERVE, ROUNDS_BESIDE_OTHERS, THICKER_WALLS};
 use candidate::Candidate;
 use division::{Division, WallGrid, revised};
 use handover::Handover;
@@ -108,11 +110,11 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
             None => ended,
         };
         if ended.is_enough() {
-            return ended.outcome;
+            return ended.concluded(effort);
         }
         best = Some(ended);
     }
-    best.expect("there is at least one way").outcome
+    best.expect("there is at least one way").concluded(effort)
 }
 
 /// The same with regions to keep whole as triangles of the model, where labels name them.
@@ -130,9 +132,9 @@ enum Walled<T> {
     Thicker(Thicker),
 }
 
-/// The job with the wall as thick as it is, on top of the `effort` that was made.
+/// The job with the wall as thick as it is. What it costs is added to `effort`, however it ends.
 fn with_wall(ctx: &Ctx, job: &Job<'_>, effort: &mut Effort) -> Result<Walled<DesignOutcome>, DesignError> {
-    let mut best = Best::after(*effort);
+    let mut best = Best::default();
     let places = candidate::places(ctx, job)?;
     for (i, place) in places.iter().enumerate() {
         let has_ended = job.wall.is_thicker() && best.has_kit();
@@ -143,23 +145,24 @@ fn with_wall(ctx: &Ctx, job: &Job<'_>, effort: &mut Effort) -> Result<Walled<Des
             ctx.note(&candidate::words(site));
         }
         if let Some(candidate) = Candidate::new(job, i, place.as_ref()) {
-            let explored = explore(ctx, job, &candidate);
+            let mut budget = candidate.budget;
+            let explored = explore(ctx, job, &candidate, &mut budget);
+            *effort += budget.spent;
             if let Ok(Explored {
                 thicker: Some(thicker),
-                effort: spent,
                 ..
             }) = explored
             {
-                *effort += spent;
                 return Ok(Walled::Thicker(thicker));
             }
             best.add(ctx, place.as_ref(), candidate, explored)?;
         }
     }
-    best.finished(ctx, job).map(Walled::Done)
+    best.finished(ctx, job, *effort).map(Walled::Done)
 }
 
 /// What came of one candidate.
+#[derive(Default)]
 struct Explored {
     /// The best of its kits.
     kit: Option<Kit>,
@@ -167,104 +170,102 @@ struct Explored {
     failure: Failure,
     /// The wall that it needs; nothing was made.
     thicker: Option<Thicker>,
-    effort: Effort,
 }
 
-/// Kits of one candidate until one passes or its budget is used up.
-fn explore(ctx: &Ctx, job: &Job<'_>, candidate: &Candidate<'_>) -> Result<Explored, DesignError> {
-    let mut budget: Budget = candidate.budget;
+/// Kits of one candidate until one passes or its budget is used up, which counts what they cost.
+fn explore(
+    ctx: &Ctx,
+    job: &Job<'_>,
+    candidate: &Candidate<'_>,
+    budget: &mut Budget,
+) -> Result<Explored, DesignError> {
     let mut wall = WallGrid::new(&job.settings().body, &candidate.model);
-    let mut kit = None;
+    let mut explored = Explored::default();
     let Some(mut division) = candidate.division(ctx, job, candidate.surface.clone())? else {
-        let failure = Failure {
-            reason: "the key falls apart".into(),
-            ..Failure::default()
-        };
-        return Ok(Explored {
-            kit,
-            failure,
-            thicker: None,
-            effort: budget.spent,
-        });
+        explored.failure.reason = "the key falls apart".into();
+        return Ok(explored);
     };
+    budget.spent.segmentations += 1;
     loop {
-        budget.spent.segmentations += 1;
         wall.make_room(
             division
                 .settings
                 .connector
                 .room_mm(division.chosen.sizes.largest_mm()),
         );
-        let n_pieces = division.surface.n_patches;
-        match attempt::plans(
-            ctx,
-            job,
-            &candidate.turn,
-            &mut wall,
-            &division,
-            &mut budget,
-            &mut kit,
-        )? {
-            Attempt::Passed => {
-                return Ok(Explored {
-                    kit,
-                    failure: Failure::default(),
-                    thicker: None,
-                    effort: budget.spent,
-                });
-            }
-            Attempt::Joined(fewer) => {
-                budget.foreseen_joinings -= 1;
-                match candidate.division(ctx, job, fewer)? {
-                    Some(next) => {
-                        let n = next.surface.n_patches;
-                        ctx.note(&format!(
-                            "pieces would rattle: trying {n} pieces instead of {n_pieces}"
-                        ));
-                        division = next;
-                    }
-                    None => budget.foreseen_joinings = 0,
+        let (turn, kit) = (&candidate.turn, &mut explored.kit);
+        division = match attempt::plans(ctx, job, turn, &mut wall, &division, budget, kit)? {
+            Attempt::Passed => return Ok(explored),
+            Attempt::Joined(fewer) => with_fewer(ctx, job, candidate, division, fewer, budget)?,
+            Attempt::Weak(remedy) => match strengthened(ctx, job, candidate, division, *remedy, budget)? {
+                Walled::Done(next) => next,
+                Walled::Thicker(thicker) => {
+                    explored.thicker = Some(thicker);
+                    return Ok(explored);
                 }
-            }
-            Attempt::Weak(remedy) => {
-                match strengthened(ctx, job, candidate, division, *remedy, &mut budget.levers)? {
-                    Walled::Done(next) => division = next,
-                    Walled::Thicker(thicker) => {
-                        return Ok(Explored {
-                            kit,
-                            failure: Failure::default(),
-                            thicker: Some(thicker),
-                            effort: budget.spent,
-                        });
-                    }
-                }
-            }
+            },
             Attempt::Failed(failure) => {
-                let next = if job.pace.is_late(ctx) {
-                    None
-                } else {
-                    revised(ctx, &division, &failure, kit.is_some(), &mut budget)?
-                };
-                let next = next
-                    .map(|surface| candidate.division(ctx, job, surface))
-                    .transpose()?
-                    .flatten();
-                let Some(next) = next else {
-                    return Ok(Explored {
-                        kit,
-                        failure,
-                        thicker: None,
-                        effort: budget.spent,
-                    });
-                };
-                ctx.note(&format!(
-                    "trying other pieces: {} instead of {n_pieces}",
-                    next.surface.n_patches
-                ));
-                division = next;
+                let has_kit = explored.kit.is_some();
+                match with_others(ctx, job, candidate, &division, &failure, has_kit, budget)? {
+                    Some(next) => next,
+                    None => {
+                        explored.failure = failure;
+                        return Ok(explored);
+                    }
+                }
             }
-        }
+        };
     }
+}
+
+/// The division with the `fewer` pieces of which none is foreseen to rattle; as it is where no key can be cut of them,
+/// and then no others are joined.
+fn with_fewer(
+    ctx: &Ctx,
+    job: &Job<'_>,
+    candidate: &Candidate<'_>,
+    division: Division,
+    fewer: SegmentedSurface,
+    budget: &mut Budget,
+) -> Result<Division, DesignError> {
+    budget.foreseen_joinings -= 1;
+    let Some(next) = candidate.division(ctx, job, fewer)? else {
+        budget.foreseen_joinings = 0;
+        return Ok(division);
+    };
+    budget.spent.segmentations += 1;
+    ctx.note(&format!(
+        "pieces would rattle: trying {} pieces instead of {}",
+        next.surface.n_patches, division.surface.n_patches
+    ));
+    Ok(next)
+}
+
+/// Other pieces after a failure; `None` where nothing is left to try.
+fn with_others(
+    ctx: &Ctx,
+    job: &Job<'_>,
+    candidate: &Candidate<'_>,
+    division: &Division,
+    failure: &Failure,
+    has_kit: bool,
+    budget: &mut Budget,
+) -> Result<Option<Division>, DesignError> {
+    if job.pace.is_late(ctx) {
+        return Ok(None);
+    }
+    let Some(surface) = revised(ctx, division, failure, has_kit, budget)? else {
+        return Ok(None);
+    };
+    let Some(next) = candidate.division(ctx, job, surface)? else {
+        return Ok(None);
+    };
+    budget.spent.segmentations += 1;
+    ctx.note(&format!(
+        "trying other pieces: {} instead of {}",
+        next.surface.n_patches, division.surface.n_patches
+    ));
+    Ok(Some(next))
 }
 
 /// The division with what lets it bear more; the lever that was used is used up.
@@ -274,7 +275,7 @@ fn strengthened(
     candidate: &Candidate<'_>,
     division: Division,
     remedy: Remedy,
-    levers: &mut Levers,
+    budget: &mut Budget,
 ) -> Result<Walled<Division>, DesignError> {
     let next = match remedy {
         Remedy::Wall(thicker) => {
@@ -282,20 +283,21 @@ fn strengthened(
             return Ok(Walled::Thicker(thicker));
         }
         Remedy::Connectors(chosen) => {
-            levers.connectors -= 1;
+            budget.levers.connectors -= 1;
             ctx.note("seams would open where it is used: larger connectors there");
             Division { chosen, ..division }
         }
         Remedy::Joined(surface, told) => {
-            levers.weak_joinings -= 1;
+            budget.levers.weak_joinings -= 1;
             match candidate.division(ctx, job, surface)? {
                 Some(next) => {
+                    budget.spent.segmentations += 1;
                     ctx.note(&format!("{told}: {} pieces", next.surface.n_patches));
                     let told = division.told.into_iter().chain([told]).collect();
                     Division { told, ..next }
                 }
                 None => {
-                    levers.weak_joinings = 0;
+                    budget.levers.weak_joinings = 0;
                     division
                 }
             }
@@ -388,8 +390,7 @@ fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, Str
         let Some(candidate) = Candidate::new(job, i, place.as_ref()) else {
             continue;
         };
-        let mut n_joinings = candidate.budget.foreseen_joinings;
-        let mut levers = candidate.budget.levers;
+        let mut budget = candidate.budget;
         let mut division = candidate.division(ctx, job, candidate.surface.clone())?;
         while let Some(current) = division {
             let ctx = ctx.fork();
@@ -411,28 +412,20 @@ fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, Str
                 constraints: &none,
                 begun_s: job.begun_s,
             };
-            division = match attempt::next_plan(&ctx, &planning, n_joinings > 0, &levers)? {
+            let may_join = budget.foreseen_joinings > 0;
+            division = match attempt::next_plan(&ctx, &planning, may_join, &budget.levers)? {
                 Next::Plan(chosen) => {
                     let own = (ctx.into_warnings(), job.wall.warnings.clone());
                     let planned = Planned::of(&candidate.turn, &current.surface, *chosen, own);
                     return Ok(Walled::Done(Ok(planned)));
                 }
                 Next::Weak(remedy) => {
-                    match strengthened(&ctx, job, &candidate, current, *remedy, &mut levers)? {
+                    match strengthened(&ctx, job, &candidate, current, *remedy, &mut budget)? {
                         Walled::Done(next) => Some(next),
                         Walled::Thicker(thicker) => return Ok(Walled::Thicker(thicker)),
                     }
                 }
-                Next::Joined(fewer) => {
-                    n_joinings -= 1;
-                    match candidate.division(&ctx, job, fewer)? {
-                        Some(next) => Some(next),
-                        None => {
-                            n_joinings = 0;
-                            Some(current)
-                        }
-                    }
-                }
+                Next::Joined(fewer) => Some(with_fewer(&ctx, job, &candidate, current, fewer, &mut budget)?),
                 Next::None(failure) => {
                     reason = failure.reason;
                     None

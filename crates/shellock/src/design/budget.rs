@@ -73,7 +73,7 @@ impl Levers {
 pub struct Effort {
     /// Places for a key that were tried; a piece as the key counts as one.
     pub keys: usize,
-    /// Divisions into pieces.
+    /// Divisions into pieces that plans were searched for; the same pieces with other connectors count once.
     pub segmentations: usize,
     /// Plans that were searched for.
     pub plans: usize,

@@ -37,7 +37,7 @@ pub struct Design {
     pub fit: PrintedFit,
     /// Where each piece is too thin to print well, the longest place first.
     pub thin: IdVec<PatchId, Vec<ThinFeature>>,
-    /// What it took to find it.
+    /// What the whole job cost, with all that was tried in vain.
     pub effort: Effort,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
@@ -95,7 +95,6 @@ pub(super) struct Best<'a> {
     n_rattling: usize,
     /// Why there is no plan where a piece is the key.
     failure: Failure,
-    effort: Effort,
 }
 
 /// A kit and what it was made for.
@@ -105,14 +104,6 @@ struct Kept<'a> {
 }
 
 impl<'a> Best<'a> {
-    /// Nothing yet, on top of an effort that was made.
-    pub fn after(effort: Effort) -> Self {
-        Self {
-            effort,
-            ..Self::default()
-        }
-    }
-
     pub fn has_kit(&self) -> bool {
         self.kit.is_some()
     }
@@ -134,9 +125,6 @@ impl<'a> Best<'a> {
         candidate: Candidate<'a>,
         explored: Result<Explored, DesignError>,
     ) -> Result<(), DesignError> {
-        if let Ok(explored) = &explored {
-            self.effort += explored.effort;
-        }
         let Some(site) = place else {
             let Explored { kit, failure, .. } = match explored {
                 Err(e) if self.kit.is_some() && !matches!(e, DesignError::Cancelled(_)) => {
@@ -184,9 +172,8 @@ impl<'a> Best<'a> {
         }
     }
 
-    /// The best kit with all that is known of it.
-    pub fn finished(self, ctx: &Ctx, job: &Job<'_>) -> Result<DesignOutcome, DesignError> {
-        let effort = self.effort;
+    /// The best kit with all that is known of it, after so much `effort`.
+    pub fn finished(self, ctx: &Ctx, job: &Job<'_>, effort: Effort) -> Result<DesignOutcome, DesignError> {
         let Self {
             kit,
             mut reasons,

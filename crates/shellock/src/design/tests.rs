@@ -119,11 +119,11 @@ fn handed_over(handover: Handover, checks: &[(&str, bool)], findings: Vec<Findin
     }
 }
 
-fn good() -> Kit {
+pub(super) fn good() -> Kit {
     kit(&[("holds", true)], Vec::new())
 }
 
-fn rattling(piece: u32, translation_mm: f64) -> Kit {
+pub(super) fn rattling(piece: u32, translation_mm: f64) -> Kit {
     let play = Play {
         translation_mm,
         rotation_deg: 0.0,
@@ -151,7 +151,7 @@ fn rattling(piece: u32, translation_mm: f64) -> Kit {
     }
 }
 
-fn loose(piece: u32) -> Kit {
+pub(super) fn loose(piece: u32) -> Kit {
     kit(
         &[("holds", false), ("sits", true)],
         vec![Finding::Loose {
@@ -370,14 +370,14 @@ fn cut_keys_cost_less_than_a_piece_that_is_the_key() {
 }
 
 /// A job on a ball, of which no kit is made.
-struct Ball {
-    model: Solid,
-    params: Params,
-    wall: Wall,
+pub(super) struct Ball {
+    pub model: Solid,
+    pub params: Params,
+    pub wall: Wall,
 }
 
 impl Ball {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let params = Params::default();
         let told = Warning {
             cause: Cause::StrengthUnknown {
@@ -399,7 +399,7 @@ impl Ball {
         }
     }
 
-    fn job(&self) -> Job<'_> {
+    pub fn job(&self) -> Job<'_> {
         let surface = testing::voronoi(self.model.mesh().clone(), N, 1);
         Job {
             ask: Ask {
@@ -420,7 +420,7 @@ impl Ball {
         }
     }
 
-    fn candidate(&self) -> Candidate<'_> {
+    pub fn candidate(&self) -> Candidate<'_> {
         Candidate {
             turn: Turn::default(),
             model: Cow::Borrowed(&self.model),
@@ -431,7 +431,7 @@ impl Ball {
     }
 
     /// The outcome of kits that are made one after the other for these places.
-    fn outcome(
+    pub fn outcome(
         &self,
         tried: Vec<(Option<KeySite>, Result<Explored, DesignError>)>,
     ) -> (Vec<bool>, Option<Design>) {
@@ -443,14 +443,14 @@ impl Ball {
                     .unwrap();
             }
         }
-        match best.finished(&ctx, &self.job()).unwrap() {
+        match best.finished(&ctx, &self.job(), Effort::default()).unwrap() {
             DesignOutcome::Made(design) => (needed, Some(*design)),
             DesignOutcome::NoPlan { .. } => (needed, None),
         }
     }
 }
 
-fn site() -> KeySite {
+pub(super) fn site() -> KeySite {
     let prism = KeyPrism {
         origin: Vec3::ZERO,
         slide: Vec3::X,
@@ -470,20 +470,14 @@ fn site() -> KeySite {
     }
 }
 
-fn made(kit: Kit) -> Result<Explored, DesignError> {
+pub(super) fn made(kit: Kit) -> Result<Explored, DesignError> {
     Ok(Explored {
         kit: Some(kit),
-        failure: Failure::default(),
-        thicker: None,
-        effort: Effort {
-            keys: 1,
-            kits: 1,
-            ..Effort::default()
-        },
+        ..Explored::default()
     })
 }
 
-fn codes(design: &Design) -> Vec<&str> {
+pub(super) fn codes(design: &Design) -> Vec<&str> {
     design.warnings.iter().map(|w| w.code()).collect()
 }
 
@@ -492,13 +486,7 @@ fn a_kit_that_passes_ends_the_job() {
     let (needed, design) =
         Ball::new().outcome(vec![(Some(site()), made(good())), (Some(site()), made(good()))]);
     assert_eq!(needed, [true, false]);
-    let design = design.unwrap();
-    assert!(design.kit.verification.passed());
-    assert_eq!(
-        (design.effort.keys, design.effort.kits),
-        (1, 1),
-        "only what was tried counts"
-    );
+    assert!(design.unwrap().kit.verification.passed());
 }
 
 #[test]
@@ -626,21 +614,16 @@ fn without_any_plan_the_answer_is_why() {
     };
     let none = || {
         Ok(Explored {
-            kit: None,
             failure: failure(),
-            thicker: None,
-            effort: Effort {
-                keys: 1,
-                kits: 1,
-                ..Effort::default()
-            },
+            ..Explored::default()
         })
     };
     let ball = Ball::new();
     let (ctx, mut best) = (Ctx::quiet(), Best::default());
     best.add(&ctx, Some(&site()), ball.candidate(), none()).unwrap();
     best.add(&ctx, None, ball.candidate(), none()).unwrap();
-    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job()).unwrap() else {
+    let DesignOutcome::NoPlan { reason, .. } = best.finished(&ctx, &ball.job(), Effort::default()).unwrap()
+    else {
         panic!("no kit")
     };
     assert_eq!(reason, failure().reason);

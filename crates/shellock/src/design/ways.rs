@@ -117,6 +117,15 @@ pub(super) struct Ended {
 }
 
 impl Ended {
+    /// A job that ended so, without a kit by which another's time could be told.
+    pub fn of(outcome: Result<DesignOutcome, DesignError>) -> Self {
+        Self {
+            outcome,
+            was_thicker: false,
+            slowest_s: 0.0,
+        }
+    }
+
     /// Whether nothing else is to be tried.
     pub fn is_enough(&self) -> bool {
         match &self.outcome {
@@ -152,6 +161,15 @@ impl Ended {
             (Err(_), _) => false,
         };
         if is_worse { self } else { later }
+    }
+
+    /// How the whole job ended, which cost so much.
+    pub fn concluded(self, effort: Effort) -> Result<DesignOutcome, DesignError> {
+        let mut outcome = self.outcome?;
+        if let DesignOutcome::Made(design) = &mut outcome {
+            design.effort = effort;
+        }
+        Ok(outcome)
     }
 }
 
@@ -189,7 +207,7 @@ pub(super) struct Ask {
 }
 
 /// The job from the wall `thinnest`, which grows where less than what is asked is borne.
-fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut Effort) -> Ended {
+pub(super) fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut Effort) -> Ended {
     let mut wall = Cow::Borrowed(thinnest);
     let (mut n_left, mut slowest_s) = (ask.n_thicker, 0.0f64);
     let outcome = loop {
@@ -211,9 +229,6 @@ fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut 
             Err(e) => break Err(e),
         }
     };
-    if let Ok(DesignOutcome::Made(made)) = &outcome {
-        *effort = made.effort;
-    }
     Ended {
         outcome,
         was_thicker: wall.is_thicker(),
@@ -287,22 +302,17 @@ mod tests {
 
     #[test]
     fn a_kit_stays_where_what_is_tried_after_it_cannot_be_made() {
-        let ended = |outcome| Ended {
-            outcome,
-            was_thicker: false,
-            slowest_s: 0.0,
-        };
         let no_plan = |reason: &str| {
-            ended(Ok(DesignOutcome::NoPlan {
+            Ended::of(Ok(DesignOutcome::NoPlan {
                 reason: reason.into(),
                 blockers: Vec::new(),
                 is_cut_short: false,
             }))
         };
-        let error = || ended(Err(DesignError::NoLabelOfKey(3)));
+        let error = || Ended::of(Err(DesignError::NoLabelOfKey(3)));
         assert!(no_plan("first").or(error()).outcome.is_ok());
         assert!(error().or(no_plan("second")).outcome.is_ok());
-        let stopped = ended(Err(DesignError::Cancelled(crate::Cancelled)));
+        let stopped = Ended::of(Err(DesignError::Cancelled(crate::Cancelled)));
         assert!(no_plan("first").or(stopped).outcome.is_err());
     }
 }
