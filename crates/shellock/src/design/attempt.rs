@@ -73,11 +73,12 @@ pub(super) fn plans(
     let mut distances: Option<PatchDistances> = None;
     let mut learned = Learned::default();
     let most_kits = budget.kits_each.min(budget.kits);
-    let is_first = |learned: &Learned| learned.n_kits + learned.n_blocked == 0;
-    while learned.n_kits < most_kits
-        && learned.n_blocked < BLOCKED_PLANS
-        && (is_first(&learned) || !job.pace.is_late(ctx))
-    {
+    while learned.n_kits < most_kits && learned.n_blocked < BLOCKED_PLANS {
+        let is_first = learned.n_kits + learned.n_blocked == 0;
+        if !is_first && job.pace.is_late(ctx) {
+            job.pace.skip(ctx, "another plan");
+            break;
+        }
         let left_s = ctx.seconds_left();
         // A kit that is given up takes its warnings with it.
         let kit_ctx = ctx.fork();
@@ -220,6 +221,11 @@ impl Learned {
 }
 
 impl Failure {
+    /// Whether nothing but pieces that rattle is wrong with the last kit.
+    pub fn rattles(&self) -> bool {
+        !self.rattling.is_empty()
+    }
+
     /// Where the key leaves one way, the other piece leaves the opposite way: it is held by nothing.
     fn of_two() -> Self {
         Self {
