@@ -404,6 +404,7 @@ fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, Str
                 survey: &survey,
                 constraints: &none,
                 begun_s: job.begun_s,
+                pace: &job.pace,
             };
             let may_join = budget.foreseen_joinings > 0;
             division = match attempt::next_plan(&ctx, &planning, may_join, &budget.levers)? {

@@ -1,6 +1,6 @@
 //! Plans and kits of one division, until one passes or nothing new can be tried.
 
-use super::budget::{BLOCKED_PLANS, Budget, Levers};
+use super::budget::{BLOCKED_PLANS, Budget, Levers, Pace};
 use super::division::{Division, WallGrid, joined};
 use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
@@ -102,6 +102,7 @@ pub(super) fn plans(
                     survey: &survey,
                     constraints: &learned.constraints,
                     begun_s: job.begun_s,
+                    pace: &job.pace,
                 };
                 next_plan(&kit_ctx, &planning, may_join, &levers)
             },
@@ -284,6 +285,8 @@ pub(super) struct Planning<'a> {
     pub constraints: &'a PlanConstraints,
     /// What was left of the time when the job with this wall began, s.
     pub begun_s: f64,
+    /// What is left out for want of time is recorded there.
+    pub pace: &'a Pace,
 }
 
 impl Planning<'_> {
@@ -436,6 +439,7 @@ mod tests {
             survey: &survey.expect("not stopped"),
             constraints: &PlanConstraints::default(),
             begun_s: 0.0,
+            pace: &job.pace,
         };
         let next = next_plan(&ctx, &planning, false, &Levers::default()).expect("not stopped");
         let Next::None(failure) = next else {

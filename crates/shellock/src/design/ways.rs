@@ -183,7 +183,7 @@ impl Ended {
         match self.outcome {
             Ok(DesignOutcome::Made(mut design)) => {
                 design.effort = effort;
-                if is_cut_short && !design.kit.verification.passed() {
+                if is_cut_short {
                     design.warnings.push(time_up(effort.kits));
                 }
                 Ok(DesignOutcome::Made(design))
@@ -293,7 +293,7 @@ pub(super) fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, ef
 mod tests {
     use shellock_geom::Vec3;
 
-    use super::super::tests::{Ball, codes, good, loose, made};
+    use super::super::tests::{Ball, codes, good, loose, made, rattling};
     use super::*;
     use crate::design::Kit;
     use crate::testing::sphere;
@@ -461,6 +461,17 @@ mod tests {
             assert!(!tells_time_up(first().or(second())));
             assert!(tells_time_up(first().or(cut_short(second()))));
             assert!(tells_time_up(cut_short(first()).or(second())));
+        }
+    }
+
+    #[test]
+    fn a_kit_that_passes_is_not_silent_about_what_was_left_out() {
+        for kit in [good, || rattling(1, 1.5)] {
+            assert!(kit().verification.passed() && !tells_time_up(of_kit(kit())));
+            assert!(tells_time_up(Ended {
+                is_cut_short: true,
+                ..of_kit(kit())
+            }));
         }
     }
 
