@@ -52,7 +52,7 @@ pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
 use strengthen::{Remedy, Thicker};
 use wall::Wall;
-use ways::{Ask, Ended, Input, Walls, with_reserve};
+use ways::{Ask, Ended, Input, Walls, in_turn, with_reserve};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or
 /// the rounds are used up; then the best of them is returned, its failures told.
@@ -80,20 +80,12 @@ pub fn design(
 /// The first kit that passes of all ways to divide the model in turn; the best where none does.
 fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<DesignOutcome, DesignError> {
     let ways = ways::ways(input);
-    let mut effort = Effort::default();
-    let mut best: Option<Ended> = None;
-    let mut thin: Option<Cow<'_, Wall>> = None;
+    let few = input.params.rounds.least(&ROUNDS_BESIDE_OTHERS);
     let total_s = ctx.seconds_left();
-    for (i, &way) in ways.iter().enumerate() {
-        if best.as_ref().is_some_and(|before| before.is_late(ctx, way)) {
-            ctx.note(&format!("no time is left for {}", way.words()));
-            continue;
-        }
-        if let Some(before) = &best {
-            ctx.note(&format!("{}; now {}", before.words(), way.words()));
-        }
+    let mut effort = Effort::default();
+    let mut thin: Option<Cow<'_, Wall>> = None;
+    let ended = in_turn(ctx, &ways, |i, way| {
         let is_last = i + 1 == ways.len();
-        let few = input.params.rounds.least(&ROUNDS_BESIDE_OTHERS);
         let rounds = if is_last { input.params.rounds } else { few };
         let reserved_s = ways::reserved_s(total_s, i, ways.len());
         let seconds_left = || ctx.seconds_left() - reserved_s;
@@ -101,20 +93,16 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
         let wall = match &mut thin {
             _ if way.walls != Walls::Thin => thinnest,
             Some(thin) => thin,
-            none => none.insert(thinnest.thin(&in_time, input)?),
+            none => match thinnest.thin(&in_time, input) {
+                Ok(wall) => none.insert(wall),
+                Err(e) => return Ended::of(Err(e)),
+            },
         };
         let ended = with_reserve(&in_time, input, &wall.divided(way), way.ask(rounds), &mut effort);
         in_time.into_warnings().into_iter().for_each(|w| ctx.warn(w));
-        let ended = match best {
-            Some(before) => before.or(ended),
-            None => ended,
-        };
-        if ended.is_enough() {
-            return ended.concluded(effort);
-        }
-        best = Some(ended);
-    }
-    best.expect("there is at least one way").concluded(effort)
+        ended
+    });
+    ended.concluded(effort)
 }
 
 /// The same with regions to keep whole as triangles of the model, where labels name them.
@@ -138,8 +126,12 @@ fn with_wall(ctx: &Ctx, job: &Job<'_>, effort: &mut Effort) -> Result<Walled<Des
     let places = candidate::places(ctx, job)?;
     for (i, place) in places.iter().enumerate() {
         let has_ended = job.wall.is_thicker() && best.has_kit();
-        if has_ended || best.is_enough(place.as_ref()) || (i > 0 && job.pace.is_late(ctx)) {
+        if has_ended || best.is_enough(place.as_ref()) {
             continue;
+        }
+        if i > 0 && job.pace.is_late(ctx) {
+            job.pace.skip(ctx, "another key");
+            break;
         }
         if let Some(site) = place {
             ctx.note(&candidate::words(site));
@@ -251,7 +243,8 @@ fn with_others(
     has_kit: bool,
     budget: &mut Budget,
 ) -> Result<Option<Division>, DesignError> {
-    if job.pace.is_late(ctx) {
+    if budget.may_revise(failure.rattles()) && job.pace.is_late(ctx) {
+        job.pace.skip(ctx, "other pieces");
         return Ok(None);
     }
     let Some(surface) = revised(ctx, division, failure, has_kit, budget)? else {
@@ -411,6 +404,7 @@ fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, Str
                 survey: &survey,
                 constraints: &none,
                 begun_s: job.begun_s,
+                pace: &job.pace,
             };
             let may_join = budget.foreseen_joinings > 0;
             division = match attempt::next_plan(&ctx, &planning, may_join, &budget.levers)? {

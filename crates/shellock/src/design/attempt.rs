@@ -1,6 +1,6 @@
 //! Plans and kits of one division, until one passes or nothing new can be tried.
 
-use super::budget::{BLOCKED_PLANS, Budget, Levers};
+use super::budget::{BLOCKED_PLANS, Budget, Levers, Pace};
 use super::division::{Division, WallGrid, joined};
 use super::kit::{Recipe, make};
 use super::lesson::{Lesson, lessons};
@@ -73,11 +73,12 @@ pub(super) fn plans(
     let mut distances: Option<PatchDistances> = None;
     let mut learned = Learned::default();
     let most_kits = budget.kits_each.min(budget.kits);
-    let is_first = |learned: &Learned| learned.n_kits + learned.n_blocked == 0;
-    while learned.n_kits < most_kits
-        && learned.n_blocked < BLOCKED_PLANS
-        && (is_first(&learned) || !job.pace.is_late(ctx))
-    {
+    while learned.n_kits < most_kits && learned.n_blocked < BLOCKED_PLANS {
+        let is_first = learned.n_kits + learned.n_blocked == 0;
+        if !is_first && job.pace.is_late(ctx) {
+            job.pace.skip(ctx, "another plan");
+            break;
+        }
         let left_s = ctx.seconds_left();
         // A kit that is given up takes its warnings with it.
         let kit_ctx = ctx.fork();
@@ -101,6 +102,7 @@ pub(super) fn plans(
                     survey: &survey,
                     constraints: &learned.constraints,
                     begun_s: job.begun_s,
+                    pace: &job.pace,
                 };
                 next_plan(&kit_ctx, &planning, may_join, &levers)
             },
@@ -220,6 +222,11 @@ impl Learned {
 }
 
 impl Failure {
+    /// Whether nothing but pieces that rattle is wrong with the last kit.
+    pub fn rattles(&self) -> bool {
+        !self.rattling.is_empty()
+    }
+
     /// Where the key leaves one way, the other piece leaves the opposite way: it is held by nothing.
     fn of_two() -> Self {
         Self {
@@ -278,6 +285,8 @@ pub(super) struct Planning<'a> {
     pub constraints: &'a PlanConstraints,
     /// What was left of the time when the job with this wall began, s.
     pub begun_s: f64,
+    /// What is left out for want of time is recorded there.
+    pub pace: &'a Pace,
 }
 
 impl Planning<'_> {
@@ -430,6 +439,7 @@ mod tests {
             survey: &survey.expect("not stopped"),
             constraints: &PlanConstraints::default(),
             begun_s: 0.0,
+            pace: &job.pace,
         };
         let next = next_plan(&ctx, &planning, false, &Levers::default()).expect("not stopped");
         let Next::None(failure) = next else {

@@ -86,7 +86,7 @@ pub struct Effort {
 pub(super) struct Pace {
     /// The slowest kit, s, as bits.
     slowest: AtomicU64,
-    /// Whether something was not begun for want of time.
+    /// Whether something was left out for want of time.
     is_cut_short: AtomicBool,
 }
 
@@ -115,14 +115,16 @@ impl Pace {
 
     /// Whether another kit would end too late. Before the first, only whether the time is over.
     pub fn is_late(&self, ctx: &Ctx) -> bool {
-        let is_late = Self::is_over(ctx, self.slowest_s());
-        if is_late {
-            self.is_cut_short.store(true, Relaxed);
-        }
-        is_late
+        Self::is_over(ctx, self.slowest_s())
     }
 
-    /// Whether something was not begun for want of time.
+    /// Records that `what` would have been tried next, but was left out for want of time.
+    pub fn skip(&self, ctx: &Ctx, what: &str) {
+        ctx.note(&format!("no time is left for {what}"));
+        self.is_cut_short.store(true, Relaxed);
+    }
+
+    /// Whether something was left out for want of time.
     pub fn is_cut_short(&self) -> bool {
         self.is_cut_short.load(Relaxed)
     }
@@ -193,6 +195,22 @@ impl Budget {
         }
     }
 
+    /// Whether pieces may be revised and a kit be made of them: joined where nothing is wrong but that they rattle, else
+    /// divided or united.
+    pub fn may_revise(&self, rattles: bool) -> bool {
+        let left = if rattles { self.joinings } else { self.revisions };
+        left > 0 && self.kits > 0
+    }
+
+    /// Takes off one revision of that kind.
+    pub fn revise(&mut self, rattles: bool) {
+        if rattles {
+            self.joinings -= 1;
+        } else {
+            self.revisions -= 1;
+        }
+    }
+
     /// Whether half of the revisions are gone.
     pub fn is_half_gone(&self) -> bool {
         2 * (self.revisions_at_first - self.revisions) >= self.revisions_at_first
@@ -215,8 +233,25 @@ mod tests {
         pace.made(&ctx, 60.0);
         assert!(!pace.is_late(&ctx));
         left_s.store(29, Relaxed);
-        assert!(!pace.is_cut_short());
-        assert!(pace.is_late(&ctx) && pace.is_cut_short());
+        assert!(pace.is_late(&ctx));
+        assert!(!pace.is_cut_short(), "a question changes nothing");
+        pace.skip(&ctx, "another kit");
+        assert!(pace.is_cut_short());
+    }
+
+    #[test]
+    fn pieces_are_revised_while_a_kit_and_a_revision_of_their_kind_are_left() {
+        let all = Budget::of_piece(&Rounds::default());
+        let none = Budget { kits: 0, ..all };
+        let (no_joinings, no_revisions) = (Budget { joinings: 0, ..all }, Budget { revisions: 0, ..all });
+        for (budget, may) in [
+            (all, [true, true]),
+            (none, [false, false]),
+            (no_joinings, [false, true]),
+            (no_revisions, [true, false]),
+        ] {
+            assert_eq!([true, false].map(|rattles| budget.may_revise(rattles)), may);
+        }
     }
 
     #[test]

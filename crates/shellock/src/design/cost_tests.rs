@@ -1,4 +1,4 @@
-//! What a job costs is counted, however it ends.
+//! What a job costs is counted, however it ends; what no time was left for is told.
 
 use shellock_geom::{Solid, Vec3};
 
@@ -10,7 +10,7 @@ use super::*;
 use crate::{Cause, testing};
 
 /// How a job on a ball ends whose labels are its two halves, which never lock, and what it cost.
-fn halves(params: &Params) -> (Result<DesignOutcome, DesignError>, Effort) {
+fn halves(ctx: &Ctx, params: &Params) -> (Result<DesignOutcome, DesignError>, Effort) {
     let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
     let mesh = model.mesh();
     let is_upper = |face| i64::from(mesh.face_center(face).z > 0.0);
@@ -31,8 +31,8 @@ fn halves(params: &Params) -> (Result<DesignOutcome, DesignError>, Effort) {
         n_thicker: 0,
     };
     let mut effort = Effort::default();
-    let ended = asking(&Ctx::quiet(), &input, &wall, ask, &mut effort);
-    (ended.outcome, effort)
+    let ended = asking(ctx, &input, &wall, ask, &mut effort);
+    (ended.concluded(effort), effort)
 }
 
 /// A piece is the key, and nothing is divided again.
@@ -53,7 +53,7 @@ const IN_VAIN: Effort = Effort {
 
 #[test]
 fn work_that_leads_to_no_plan_counts() {
-    let (outcome, effort) = halves(&at_once());
+    let (outcome, effort) = halves(&Ctx::quiet(), &at_once());
     assert!(matches!(outcome, Ok(DesignOutcome::NoPlan { .. })));
     assert_eq!(effort, IN_VAIN);
 }
@@ -64,7 +64,7 @@ fn work_that_ends_in_an_error_counts() {
         cell_mm: Some(1e-4),
         ..at_once()
     };
-    let (outcome, effort) = halves(&params);
+    let (outcome, effort) = halves(&Ctx::quiet(), &params);
     assert!(matches!(outcome, Err(DesignError::Grid(_))));
     assert_eq!(effort, IN_VAIN);
 }
@@ -99,8 +99,9 @@ fn counted(
 fn larger_connectors_are_no_other_division_and_joined_pieces_are_where_they_can_be_made() {
     let ball = Ball::new();
     let (piece, job) = (ball.candidate(), ball.job());
-    // Its key lies in the middle of the ball, where there is no surface to cut it from.
-    let no_key = Candidate::new(&job, 0, Some(&site())).expect("a turned ball is a solid");
+    let mut beside = site();
+    beside.prism.origin = Vec3::splat(1e3);
+    let no_key = Candidate::new(&job, 0, Some(&beside)).expect("a turned ball is a solid");
     let told = || Warning {
         cause: Cause::JoinedForUse {
             done: "pressed".into(),
@@ -127,4 +128,21 @@ fn larger_connectors_are_no_other_division_and_joined_pieces_are_where_they_can_
         });
         assert_eq!((for_use, foreseen), (n, n));
     }
+}
+
+#[test]
+fn pieces_that_are_not_divided_again_for_want_of_time_are_told() {
+    let none = || 0.0;
+    let late = Ctx::quiet().with_deadline(&none);
+    let is_cut_short = |ctx: &Ctx, refinements| {
+        let mut params = at_once();
+        params.rounds.refinements = refinements;
+        match halves(ctx, &params).0 {
+            Ok(DesignOutcome::NoPlan { is_cut_short, .. }) => is_cut_short,
+            _ => panic!("two halves never lock"),
+        }
+    };
+    assert!(is_cut_short(&late, 1));
+    assert!(!is_cut_short(&late, 0), "nothing was left to try");
+    assert!(!is_cut_short(&Ctx::quiet(), 0));
 }

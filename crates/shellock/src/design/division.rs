@@ -81,18 +81,12 @@ pub(super) fn revised(
     } = division;
     let params = &settings.segmentation;
     let ctx = &ctx.fork();
-    let rattles = !failure.rattling.is_empty();
     let is_hopeless = !has_kit && budget.is_half_gone();
-    let left = if rattles {
-        &mut budget.joinings
-    } else {
-        &mut budget.revisions
-    };
-    if *left == 0 || budget.kits == 0 {
+    if !budget.may_revise(failure.rattles()) {
         return Ok(None);
     }
-    *left -= 1;
-    Ok(if rattles {
+    budget.revise(failure.rattles());
+    Ok(if failure.rattles() {
         joined(ctx, params, surface, &failure.rattling)?
     } else if is_hopeless {
         first(&failure.blamed, |p| {

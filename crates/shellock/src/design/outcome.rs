@@ -59,7 +59,7 @@ pub struct PrintedFit {
 pub enum DesignOutcome {
     /// There is a kit. Whether it passed is in its verification.
     Made(Box<Design>),
-    /// No plan was found for any segmentation.
+    /// No plan was found for any division that was tried.
     NoPlan {
         /// Why, for people.
         reason: String,
@@ -181,16 +181,10 @@ impl<'a> Best<'a> {
             ..
         } = self;
         let Some(Kept { kit, candidate }) = kit else {
-            let is_cut_short = job.pace.is_cut_short();
-            let reason = match (is_cut_short, &reason[..]) {
-                (false, _) => reason,
-                (true, "") => "the time was over (--time)".to_owned(),
-                (true, reason) => format!("the time was over (--time); {reason}"),
-            };
             return Ok(DesignOutcome::NoPlan {
                 reason,
                 blockers,
-                is_cut_short,
+                is_cut_short: false,
             });
         };
         let key = candidate.key.map(|key| key.given);
@@ -234,9 +228,6 @@ impl<'a> Best<'a> {
             }
             _ => {}
         }
-        if job.pace.is_cut_short() && !kit.verification.passed() {
-            warnings.push(time_up(effort.kits));
-        }
         let strength = job.wall.strength.clone();
         Ok(DesignOutcome::Made(Box::new(Design {
             kit,
@@ -263,11 +254,19 @@ fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
 }
 
 /// Says that kits that were not made might be better.
-fn time_up(kits: usize) -> Warning {
+pub(super) fn time_up(kits: usize) -> Warning {
     Warning {
         cause: Cause::TimeUp { kits },
         pieces: Vec::new(),
         at: None,
+    }
+}
+
+/// Says why there is nothing, where more might have come of more time.
+pub(super) fn lacking_time(reason: &str) -> String {
+    match reason {
+        "" => "the time was over (--time)".to_owned(),
+        reason => format!("the time was over (--time); {reason}"),
     }
 }
 

@@ -87,9 +87,8 @@ pub(super) fn remedy(
                 weakest,
             })));
         }
-        ctx.note(&format!(
-            "no time is left for walls of {thickness_mm:.1} mm, which would bear more"
-        ));
+        let walls = format!("walls of {thickness_mm:.1} mm, which would bear more");
+        planning.pace.skip(ctx, &walls);
     }
     if let Some((sizes, borne)) = larger
         && is_worth(before, borne)
@@ -295,9 +294,10 @@ mod tests {
         }
     }
 
-    /// What is changed of a ball in four pieces that bears so much of a press on its top.
-    fn changed(borne: f64, left: &Levers) -> Option<Remedy> {
-        let (ctx, params) = (Ctx::quiet(), Params::default());
+    /// What is changed of a ball in four pieces that bears so much of a press on its top, and whether something is left
+    /// out for want of time.
+    fn changed(ctx: &Ctx, borne: f64, left: &Levers) -> (Option<Remedy>, bool) {
+        let params = Params::default();
         let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
         let pieces = testing::voronoi(model.mesh().clone(), N, 1);
         let wall = Wall {
@@ -317,11 +317,11 @@ mod tests {
         };
         let job = Job::of(&input, &wall, ask, false, pieces).expect("no key is named");
         let candidate = Candidate::new(&job, 0, None).expect("as it lies");
-        let division = candidate.division(&ctx, &job, candidate.surface.clone());
+        let division = candidate.division(ctx, &job, candidate.surface.clone());
         let division = division.expect("sizes").expect("no key is cut");
         let (settings, surface) = (&division.settings.plan, &division.surface);
         let sizes = &division.chosen.sizes;
-        let survey = survey(&ctx, settings, surface, &surface.seams(), sizes).expect("not stopped");
+        let survey = survey(ctx, settings, surface, &surface.seams(), sizes).expect("not stopped");
         let planning = Planning {
             params: &params,
             model: &model,
@@ -329,7 +329,8 @@ mod tests {
             division: &division,
             survey: &survey,
             constraints: &PlanConstraints::default(),
-            begun_s: 0.0,
+            begun_s: 100.0,
+            pace: &job.pace,
         };
         let holding = Holding {
             quality_mm: None,
@@ -341,7 +342,8 @@ mod tests {
             foreseen_excess: Vec::new(),
         };
         let plan = (&plan(), &holding);
-        remedy(&ctx, &planning, &planning.handling(), plan, left).expect("not stopped")
+        let remedy = remedy(ctx, &planning, &planning.handling(), plan, left);
+        (remedy.expect("not stopped"), job.pace.is_cut_short())
     }
 
     #[test]
@@ -351,13 +353,33 @@ mod tests {
             ..Levers::default()
         };
         for borne in [0.0, 0.5, 1.3] {
-            assert!(changed(borne, &none).is_none(), "{borne}");
+            let (remedy, is_cut_short) = changed(&Ctx::quiet(), borne, &none);
+            assert!(remedy.is_none() && !is_cut_short, "{borne}");
         }
         let joins = Levers {
             weak_joinings: 1,
             ..none
         };
-        assert!(matches!(changed(0.0, &joins), Some(Remedy::Joined(..))));
+        let (remedy, _) = changed(&Ctx::quiet(), 0.0, &joins);
+        assert!(matches!(remedy, Some(Remedy::Joined(..))));
+    }
+
+    #[test]
+    fn a_wall_that_no_time_is_left_for_is_told() {
+        let wall = Levers {
+            asked: 1.4,
+            wall: true,
+            ..Levers::default()
+        };
+        let remedy = |seconds_left: f64| {
+            let left = || seconds_left;
+            changed(&Ctx::quiet().with_deadline(&left), 0.2, &wall)
+        };
+        // It began with 100 s.
+        let (in_time, is_cut_short) = remedy(60.0);
+        assert!(matches!(in_time, Some(Remedy::Wall(_))) && !is_cut_short);
+        let (late, is_cut_short) = remedy(40.0);
+        assert!(late.is_none() && is_cut_short);
     }
     #[test]
     fn a_change_that_gains_nothing_is_not_worth_it() {

@@ -7,6 +7,7 @@ use shellock_geom::Solid;
 
 use super::budget::Pace;
 use super::budget::{RESERVE, THICKER_WALLS};
+use super::outcome::{lacking_time, time_up};
 use super::wall::Wall;
 use super::{DesignError, DesignOutcome, Effort, Job, KeySource, Params, Rounds, Walled, with_wall};
 use crate::Ctx;
@@ -114,6 +115,8 @@ pub(super) struct Ended {
     was_thicker: bool,
     /// The slowest of its kits, s.
     slowest_s: f64,
+    /// Whether something was left out for want of time.
+    is_cut_short: bool,
 }
 
 impl Ended {
@@ -123,6 +126,7 @@ impl Ended {
             outcome,
             was_thicker: false,
             slowest_s: 0.0,
+            is_cut_short: false,
         }
     }
 
@@ -152,25 +156,72 @@ impl Ended {
         }
     }
 
-    /// This, or what was tried after it, if that is better.
+    /// This, or what was tried after it, if that is better; cut short where either was.
     pub fn or(self, later: Self) -> Self {
+        let is_cut_short = self.is_cut_short || later.is_cut_short;
         let is_worse = match (&self.outcome, &later.outcome) {
             (_, Err(DesignError::Cancelled(_))) => false,
             (Ok(outcome), Ok(other)) => !other.is_better_than(outcome),
             (Ok(_), Err(_)) => true,
             (Err(_), _) => false,
         };
-        if is_worse { self } else { later }
+        let better = if is_worse { self } else { later };
+        Self {
+            is_cut_short,
+            ..better
+        }
     }
 
-    /// How the whole job ended, which cost so much.
+    /// How the whole job ended, which cost so much; says so where it was cut short.
     pub fn concluded(self, effort: Effort) -> Result<DesignOutcome, DesignError> {
-        let mut outcome = self.outcome?;
-        if let DesignOutcome::Made(design) = &mut outcome {
-            design.effort = effort;
+        let is_cut_short = self.is_cut_short;
+        let lacks_time = |reason: &str, blockers| DesignOutcome::NoPlan {
+            reason: lacking_time(reason),
+            blockers,
+            is_cut_short,
+        };
+        match self.outcome {
+            Ok(DesignOutcome::Made(mut design)) => {
+                design.effort = effort;
+                if is_cut_short {
+                    design.warnings.push(time_up(effort.kits));
+                }
+                Ok(DesignOutcome::Made(design))
+            }
+            Ok(DesignOutcome::NoPlan { reason, blockers, .. }) if is_cut_short => {
+                Ok(lacks_time(&reason, blockers))
+            }
+            // Other pieces that were left out might have been made.
+            Err(e) if is_cut_short && !matches!(e, DesignError::Cancelled(_)) => {
+                Ok(lacks_time(&e.to_string(), Vec::new()))
+            }
+            ended => ended,
         }
-        Ok(outcome)
     }
+}
+
+/// What came of the ways in turn until one is enough: the best. Ways that no time is left for are left out, and that is
+/// recorded.
+pub(super) fn in_turn(ctx: &Ctx, ways: &[Way], mut attempt: impl FnMut(usize, Way) -> Ended) -> Ended {
+    let mut best: Option<Ended> = None;
+    for (i, &way) in ways.iter().enumerate() {
+        best = Some(match best {
+            None => attempt(i, way),
+            Some(before) if before.is_enough() => return before,
+            Some(before) if before.is_late(ctx, way) => {
+                ctx.note(&format!("no time is left for {}", way.words()));
+                Ended {
+                    is_cut_short: true,
+                    ..before
+                }
+            }
+            Some(before) => {
+                ctx.note(&format!("{}; now {}", before.words(), way.words()));
+                before.or(attempt(i, way))
+            }
+        });
+    }
+    best.expect("there is at least one way")
 }
 
 /// The job from the wall `thinnest`, which may grow so that more is borne; where no kit passes then, with that wall.
@@ -209,12 +260,13 @@ pub(super) struct Ask {
 /// The job from the wall `thinnest`, which grows where less than what is asked is borne.
 pub(super) fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, effort: &mut Effort) -> Ended {
     let mut wall = Cow::Borrowed(thinnest);
-    let (mut n_left, mut slowest_s) = (ask.n_thicker, 0.0f64);
+    let (mut n_left, mut slowest_s, mut is_cut_short) = (ask.n_thicker, 0.0f64, false);
     let outcome = loop {
         let job = Job::new(ctx, input, &wall, ask, n_left > 0);
         let walled = job.and_then(|job| {
             let walled = with_wall(ctx, &job, effort);
             slowest_s = slowest_s.max(job.pace.slowest_s());
+            is_cut_short |= job.pace.is_cut_short();
             walled
         });
         match walled {
@@ -233,6 +285,7 @@ pub(super) fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, ef
         outcome,
         was_thicker: wall.is_thicker(),
         slowest_s,
+        is_cut_short,
     }
 }
 
@@ -240,7 +293,9 @@ pub(super) fn asking(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall, ask: Ask, ef
 mod tests {
     use shellock_geom::Vec3;
 
+    use super::super::tests::{Ball, codes, good, loose, made, rattling};
     use super::*;
+    use crate::design::Kit;
     use crate::testing::sphere;
 
     fn ways_of(change: impl Fn(&mut Params), labels: Option<&[i64]>) -> Vec<Way> {
@@ -314,5 +369,125 @@ mod tests {
         assert!(error().or(no_plan("second")).outcome.is_ok());
         let stopped = Ended::of(Err(DesignError::Cancelled(crate::Cancelled)));
         assert!(no_plan("first").or(stopped).outcome.is_err());
+    }
+    /// A job that ended with such a kit of three pieces, each of which took 30 s.
+    fn of_kit(kit: Kit) -> Ended {
+        let (_, design) = Ball::new().outcome(vec![(None, made(kit))]);
+        let outcome = DesignOutcome::Made(Box::new(design.expect("a kit was made")));
+        Ended {
+            slowest_s: 30.0,
+            ..Ended::of(Ok(outcome))
+        }
+    }
+
+    /// Whether people are told that the time was over.
+    fn tells_time_up(ended: Ended) -> bool {
+        match ended.concluded(Effort::default()).expect("no error is left") {
+            DesignOutcome::Made(design) => codes(&design).contains(&"time-up"),
+            DesignOutcome::NoPlan {
+                reason, is_cut_short, ..
+            } => {
+                assert_eq!(reason.contains("(--time)"), is_cut_short, "{reason}");
+                is_cut_short
+            }
+        }
+    }
+
+    fn way(n_pieces: Option<usize>) -> Way {
+        Way {
+            method: Method::Auto,
+            n_pieces,
+            walls: Walls::ForFalls,
+        }
+    }
+
+    /// The ways that are tried with so many seconds left, where each fails, and whether it is told that the time was
+    /// over.
+    fn tried(seconds_left: f64, pieces: &[Option<usize>]) -> (Vec<Option<usize>>, bool) {
+        let left = || seconds_left;
+        let ctx = Ctx::quiet().with_deadline(&left);
+        let ways: Vec<Way> = pieces.iter().map(|n| way(*n)).collect();
+        let mut tried = Vec::new();
+        let ended = in_turn(&ctx, &ways, |_, way| {
+            tried.push(way.n_pieces);
+            of_kit(loose(1))
+        });
+        (tried, tells_time_up(ended))
+    }
+
+    #[test]
+    fn ways_that_are_left_out_for_want_of_time_are_told() {
+        // A kit of three pieces takes 30 s, and half as much again must be left; of one piece a third of that.
+        let all = [None, Some(6), Some(1)];
+        assert_eq!(tried(60.0, &all), (all.to_vec(), false));
+        assert_eq!(tried(20.0, &all), (vec![None, Some(1)], true));
+        assert_eq!(tried(10.0, &all), (vec![None], true));
+        assert_eq!(tried(10.0, &all[..1]), (vec![None], false), "none was left");
+    }
+
+    #[test]
+    fn nothing_is_left_out_after_a_kit_that_passes() {
+        let none = || 0.0;
+        let (ctx, ways) = (Ctx::quiet().with_deadline(&none), [way(None), way(None)]);
+        let ended = in_turn(&ctx, &ways, |i, _| {
+            assert_eq!(i, 0);
+            of_kit(good())
+        });
+        assert!(!tells_time_up(ended));
+    }
+
+    #[test]
+    fn that_one_way_was_cut_short_is_told_with_the_kit_of_another() {
+        let no_plan = || {
+            Ended::of(Ok(DesignOutcome::NoPlan {
+                reason: "first".into(),
+                blockers: Vec::new(),
+                is_cut_short: false,
+            }))
+        };
+        let error = || Ended::of(Err(DesignError::NoLabelOfKey(3)));
+        let kit = || of_kit(loose(1));
+        let cut_short = |ended: Ended| Ended {
+            is_cut_short: true,
+            ..ended
+        };
+        for (first, second) in [
+            (&kit as &dyn Fn() -> Ended, &no_plan as &dyn Fn() -> Ended),
+            (&kit, &error),
+            (&no_plan, &kit),
+            (&error, &kit),
+            (&no_plan, &no_plan),
+        ] {
+            assert!(!tells_time_up(first().or(second())));
+            assert!(tells_time_up(first().or(cut_short(second()))));
+            assert!(tells_time_up(cut_short(first()).or(second())));
+        }
+    }
+
+    #[test]
+    fn a_kit_that_passes_is_not_silent_about_what_was_left_out() {
+        for kit in [good, || rattling(1, 1.5)] {
+            assert!(kit().verification.passed() && !tells_time_up(of_kit(kit())));
+            assert!(tells_time_up(Ended {
+                is_cut_short: true,
+                ..of_kit(kit())
+            }));
+        }
+    }
+
+    #[test]
+    fn an_error_is_the_last_word_only_where_nothing_was_left_out() {
+        let error = || Ended::of(Err(DesignError::NoLabelOfKey(3)));
+        assert!(error().concluded(Effort::default()).is_err());
+        let cut_short = Ended {
+            is_cut_short: true,
+            ..error()
+        };
+        assert!(tells_time_up(cut_short));
+        let stopped = Ended {
+            is_cut_short: true,
+            ..Ended::of(Err(DesignError::Cancelled(crate::Cancelled)))
+        };
+        assert!(stopped.concluded(Effort::default()).is_err());
     }
 }
