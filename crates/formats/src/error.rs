@@ -163,9 +163,9 @@ pub enum ReadError {
     /// glTF that has or needs something that is not read.
     #[error("the glTF {what}; {remedy}")]
     GltfUnsupported {
-        /// What it has or needs.
+        /// The feature that it has or needs.
         what: String,
-        /// What to do.
+        /// Advice.
         remedy: &'static str,
     },
     /// Paint of a triangle that is no code of PrusaSlicer or Bambu Studio.

@@ -75,9 +75,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
 #[derive(Default)]
 struct Extras {
     rows: Vec<[f32; 4]>,
-    /// How many numbers the rows have; `None` before the first.
+    /// Length of the rows; `None` before the first.
     n: Option<usize>,
-    /// Whether some point has no colour, or another number of numbers than the others.
+    /// True if some point has no colour, or more numbers than another.
     is_mixed: bool,
 }
 
@@ -178,7 +178,7 @@ fn next_statement<'a>(lines: &mut Lines<'a>, statement: &mut Vec<&'a [u8]>) -> O
     }
 }
 
-/// Whether a corner has a point of the texture: `7/1`, `7/1/3`.
+/// True if a corner has a point of the texture: `7/1`, `7/1/3`.
 fn names_texture(word: &[u8]) -> bool {
     word.split(|&b| b == b'/')
         .nth(1)

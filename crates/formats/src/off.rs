@@ -74,7 +74,7 @@ fn color<'a>(words: impl Iterator<Item = &'a [u8]>) -> Option<[f32; 4]> {
 struct Header {
     n_points: usize,
     n_faces: usize,
-    /// How many numbers stand between the coordinates of a point and its colour; `None` without colours.
+    /// Count of numbers between the coordinates of a point and its colour; `None` without colours.
     color_at: Option<usize>,
 }
 

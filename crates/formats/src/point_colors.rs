@@ -15,7 +15,7 @@ const MAX_COLORS: usize = 64;
 pub(super) struct Channels {
     /// Red, green, blue and alpha of each point; alpha is 0 where the file has none.
     pub(super) rows: Vec<[f32; 4]>,
-    /// Whether the numbers are whole by their type, so that 1 is nearly black.
+    /// True if the numbers are whole by their type, so that 1 is nearly black.
     pub(super) are_whole: bool,
 }
 
@@ -62,7 +62,7 @@ pub(super) fn divide(loaded: &mut Loaded, colors: &[Color]) {
     }
 }
 
-/// How many colours the corners of triangles have.
+/// Number of different colours at the corners of triangles.
 fn count_used(loaded: &Loaded, colors: &[Color]) -> usize {
     let mut is_used = vec![false; colors.len()];
     let corners = loaded.mesh.triangles.as_flattened();
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn more_colours_than_people_paint_with_divide_nothing_and_are_told() {
+    fn more_colours_than_people_paint_with_divide_nothing_and_are_noted() {
         let fan = |n_colors: usize| {
             let points = (0..100).map(|i| format!("v {i} {} 0 {} 0 0\n", i * i, i % n_colors));
             let faces = (2..100).map(|i| format!("f 1 {i} {}\n", i + 1));
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_texture_is_told_to_be_unused() {
+    fn an_unused_texture_is_noted() {
         let loaded = ply("comment TextureFile skin.png", [""; 5], NO_FACE_COLORS);
         assert_eq!(loaded.notes, ["the file's texture is not used"]);
         let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";

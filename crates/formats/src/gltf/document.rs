@@ -17,7 +17,7 @@ pub(super) struct Document {
     pub nodes: Vec<Node>,
     pub meshes: Vec<Mesh>,
     pub skins: Vec<Skin>,
-    /// As they are: a fault in them is no reason to refuse a shape.
+    /// Materials as plain JSON: a fault in one is no reason to refuse the shape.
     pub materials: Vec<Value>,
     pub animations: Vec<IgnoredAny>,
     pub accessors: Vec<Accessor>,

@@ -9,7 +9,7 @@ use super::nodes::moved;
 use super::values::{Accessors, Shape, Values};
 
 impl Accessors<'_> {
-    /// How many times the mesh of node `id` is shown.
+    /// Number of copies of the mesh of node `id` that are shown.
     pub(super) fn n_instances(&self, id: usize) -> Result<usize, ReadError> {
         let node = &self.document.nodes[id];
         let Some(instancing) = &node.extensions.instancing else {

@@ -98,7 +98,7 @@ fn read(json: &[u8], data: Option<&[u8]>, format: Format) -> Result<Loaded, Read
     Ok(loaded(surface, notes, format))
 }
 
-/// What is shown, counted before any of it is made.
+/// The shown part of a document, counted before any of it is made.
 struct Scene {
     figures: Vec<Figure>,
     /// Counts of those meshes that are shown.
@@ -131,6 +131,10 @@ impl Scene {
                 continue;
             }
             let n_instances = accessors.n_instances(node)?;
+            // Without a copy to count, the work on a mesh would have no limit.
+            if n_instances == 0 {
+                continue;
+            }
             let n = n_instances as u64;
             n_occurrences = n_occurrences.saturating_add(n);
             n_triangles = n_triangles.saturating_add(counts.n_triangles.saturating_mul(n));
@@ -194,7 +198,7 @@ fn loaded(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
     loaded
 }
 
-/// What of the document as a whole is left out.
+/// Notes on what the document as a whole has beyond the shown triangles.
 fn notes(document: &Document, nodes: &Nodes) -> Vec<String> {
     let mut notes = vec!["in glTF y points up: give --up y".to_owned()];
     notes.extend(left_out(nodes.n_hidden, "hidden mesh is", "hidden meshes are"));

@@ -8,7 +8,7 @@ use super::{error, missing};
 
 /// The nodes of a document, all placed.
 pub(super) struct Nodes {
-    /// From a node to the scene, for all nodes, shown or not.
+    /// Transform from each node to the scene, shown or not.
     pub(super) placed: Vec<DAffine3>,
     /// The nodes that are shown, each once, parents before children in the order of the file.
     pub(super) shown: Vec<usize>,
@@ -110,12 +110,12 @@ fn in_scene(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>
     Ok(found)
 }
 
-/// Whether KHR_node_visibility hides a node and all below it.
+/// True if KHR_node_visibility hides a node and all below it.
 fn hides(node: &Node) -> bool {
     node.extensions.visibility.as_ref().and_then(|v| v.visible) == Some(false)
 }
 
-/// From a node to its parent.
+/// Transform from a node to its parent.
 fn local(node: &Node) -> DAffine3 {
     match node.matrix {
         Some(columns) => DAffine3::from_mat4(DMat4::from_cols_array(&columns)),

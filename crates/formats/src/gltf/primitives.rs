@@ -13,7 +13,7 @@ use super::{compression, error, is_compressed};
 const TRIANGLES: u32 = 4;
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
-/// Where materials of an older kind have their colour and their texture.
+/// Colour and texture of materials of an older kind, as JSON pointers.
 const GLOSSINESS_COLOR: &str = "/extensions/KHR_materials_pbrSpecularGlossiness/diffuseFactor";
 const GLOSSINESS_TEXTURE: &str = "/extensions/KHR_materials_pbrSpecularGlossiness/diffuseTexture";
 /// The colour of points where a file gives none, and the factor that changes nothing.
@@ -34,7 +34,7 @@ pub(super) struct Counts {
 pub(super) struct Piece {
     /// The accessor of the points.
     pub(super) position: usize,
-    /// How many rows it has.
+    /// Number of rows in that accessor.
     pub(super) n_rows: usize,
     /// The rows that are used, ascending.
     pub(super) used: Vec<u32>,
@@ -47,7 +47,7 @@ pub(super) struct Piece {
 /// Colours of a primitive's points, one for each of those used.
 pub(super) struct Colors {
     pub(super) colors: Vec<Color>,
-    /// Whether the primitive has an accessor of colours, not its material's colour only.
+    /// True if the primitive has an accessor of colours, not its material's colour only.
     pub(super) are_own: bool,
 }
 
@@ -149,7 +149,7 @@ impl Accessors<'_> {
         })
     }
 
-    /// Whether a picture colours the primitive.
+    /// True if a picture colours the primitive.
     pub(super) fn has_texture(&self, primitive: &Primitive) -> bool {
         let textures = ["/pbrMetallicRoughness/baseColorTexture", GLOSSINESS_TEXTURE];
         let material = primitive.material.and_then(|m| self.document.materials.get(m));

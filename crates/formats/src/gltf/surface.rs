@@ -31,15 +31,15 @@ pub(super) struct Surface {
     pub(super) objects: Vec<FileObject>,
     /// A colour for each point.
     pub(super) colors: Vec<Color>,
-    /// Whether some primitive has colours of points.
+    /// True if some primitive has colours of points.
     pub(super) has_colors: bool,
-    /// Whether some primitive has colours of points that cannot be read.
+    /// True if some primitive has colours of points that cannot be read.
     pub(super) has_bad_colors: bool,
-    /// Whether a picture colours some primitive.
+    /// True if a picture colours some primitive.
     pub(super) has_texture: bool,
 }
 
-/// What all triangles of a copy of a primitive have in common.
+/// A copy of a primitive, with the labels that all its triangles have.
 struct Copy<'a> {
     piece: &'a Piece,
     colors: &'a [Color],

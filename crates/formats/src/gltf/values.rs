@@ -34,7 +34,7 @@ pub(super) struct Values<'a> {
     sparse: Option<Replaced<'a>>,
     component: Component,
     is_normalized: bool,
-    /// How many rows there are; with `base` absent, no byte backs this count.
+    /// Number of rows. No byte backs it where `base` is absent.
     pub(super) count: usize,
 }
 

@@ -14,7 +14,7 @@ pub(super) enum Encoding {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// Whether a comment names a picture, as MeshLab writes it.
+    /// True if a comment names a picture, as MeshLab writes it.
     pub(super) has_texture: bool,
 }
 

@@ -49,7 +49,7 @@ fn colours_of_points_are_those_of_the_material_too() {
 }
 
 #[test]
-fn colours_that_cannot_be_read_are_told_and_the_shape_is_read() {
+fn colours_that_cannot_be_read_are_noted_and_the_shape_is_read() {
     let mut file = File::tetrahedron();
     let few = file.shares(&[[255, 0, 0]; 3]);
     file.attributes()["COLOR_0"] = json!(few);
@@ -75,7 +75,7 @@ fn faults_of_materials_are_no_reason_to_refuse_a_shape() {
 }
 
 #[test]
-fn each_thing_left_out_is_told_once() {
+fn each_thing_left_out_is_noted_once() {
     let plain = File::tetrahedron().read().unwrap();
     assert_eq!(plain.notes.len(), 1);
     let mut file = File::tetrahedron();
@@ -89,15 +89,15 @@ fn each_thing_left_out_is_told_once() {
     file.json["extensions"] = json!({ "KHR_materials_variants": { "variants": [{ "name": "blue" }] } });
     let loaded = file.read().unwrap();
     assert_eq!(loaded.mesh, plain.mesh);
-    let told = [
+    let noted = [
         "2 sets of lines or points are left out",
         "1 other scene is left out",
         "animated",
         "texture",
         "variants",
     ];
-    told.iter().for_each(|words| assert_told(&loaded, words));
-    assert_eq!(loaded.notes.len(), 1 + told.len(), "{:?}", loaded.notes);
+    noted.iter().for_each(|words| assert_told(&loaded, words));
+    assert_eq!(loaded.notes.len(), 1 + noted.len(), "{:?}", loaded.notes);
 }
 
 #[test]

@@ -172,6 +172,15 @@ fn instances_are_copies_with_moves_of_their_own() {
 }
 
 #[test]
+fn a_mesh_of_no_instances_is_not_shown() {
+    let mut file = File::tetrahedron();
+    let none = file.floats::<3>(&[]);
+    let attributes = json!({ "TRANSLATION": none });
+    file.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+    assert!(matches!(file.read(), Err(ReadError::NoTriangles { .. })));
+}
+
+#[test]
 fn instances_do_not_move_the_children_of_their_node() {
     let mut file = File::tetrahedron();
     let by = file.floats(&[[10.0, 0.0, 0.0]; 2]);

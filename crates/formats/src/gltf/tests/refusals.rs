@@ -45,7 +45,7 @@ fn assert_compressed(file: &File, name: &str) {
 }
 
 #[test]
-fn data_that_is_only_compressed_is_told_to_be() {
+fn data_that_is_only_compressed_is_refused_as_such() {
     const DRACO: &str = "KHR_draco_mesh_compression";
     assert_compressed(&with_extension("extensionsRequired", DRACO), DRACO);
     let mut file = with_extension("extensionsUsed", DRACO);
@@ -67,7 +67,7 @@ fn data_that_is_only_compressed_is_told_to_be() {
 }
 
 #[test]
-fn a_fallback_buffer_without_data_is_told_to_be_compressed() {
+fn a_fallback_buffer_without_data_is_refused_as_compressed() {
     for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
         let mut file = with_extension("extensionsUsed", name);
         file.json["bufferViews"][0]["extensions"] = json!({ name: { "buffer": 0, "byteLength": 20 } });
@@ -83,7 +83,7 @@ fn a_fallback_buffer_without_data_is_told_to_be_compressed() {
 }
 
 #[test]
-fn lines_or_points_alone_are_told_to_be_no_surface() {
+fn lines_or_points_alone_are_refused_as_no_surface() {
     for mode in 0..4 {
         let mut file = File::tetrahedron();
         file.json["meshes"][0]["primitives"][0]["mode"] = json!(mode);
