@@ -236,6 +236,11 @@ fn extensions() -> Vec<Case> {
         .says(&[Refused("slices")])
         .proves("3MF", "refused", "slices"),
         Case::new("slices_not_demanded.3mf", plain(&slices, ITEM)).says(&[Refused("slices")]),
+        Case::new(
+            "slices_without_resolution.3mf",
+            plain(&slices.replace(" s:meshresolution=\"lowres\"", ""), ITEM),
+        )
+        .says(&[Refused("slices")]),
         Case::new("difference.3mf", plain(&difference, ITEM))
             .says(&[Refused("boolean operations")])
             .proves("3MF", "refused", "boolean operations"),

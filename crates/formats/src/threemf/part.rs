@@ -202,7 +202,7 @@ impl PartReader<'_, '_> {
             path: self.name.to_owned(),
             ..Object::default()
         };
-        let (mut kind, mut is_coarse) = (String::new(), false);
+        let (mut kind, mut is_sliced) = (String::new(), false);
         let (mut group, mut index) = (None, 0);
         self.elements.attributes(element, |name, value| {
             match name {
@@ -211,8 +211,9 @@ impl PartReader<'_, '_> {
                 "type" => kind = value.to_ascii_lowercase(),
                 "pid" => group = Some(number(name, value)?),
                 "pindex" => index = number(name, value)?,
-                // Slices are the shape then, and the mesh is for previews.
-                "meshresolution" => is_coarse = value == "lowres",
+                // Slices are the shape then. The mesh should be a stand-in only where `meshresolution` says so, but
+                // files of the format's own authors have a box for a sphere and do not.
+                "slicestackid" => is_sliced = true,
                 _ => {}
             }
             Ok(())
@@ -227,7 +228,7 @@ impl PartReader<'_, '_> {
                 .error(format!("object {id} is of the unknown type {kind:?}"))
         })?;
         object.role = Some(role).filter(|role| *role != Role::Body);
-        object.unread = is_coarse.then_some(extension::SLICES);
+        object.unread = is_sliced.then_some(extension::SLICES);
         object.whole = group.map(|group| self.property(group, index));
         Ok(object)
     }

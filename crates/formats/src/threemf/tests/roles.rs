@@ -200,7 +200,7 @@ fn extensions_that_are_not_read_are_refused_by_name_whether_or_not_the_file_dema
     let shape = "<object id=\"1\"><bo:booleanshape objectid=\"2\"/></object>".to_owned() + &cube(2, "");
     assert!(told(&shape).contains("boolean operations"));
     assert!(told("<object id=\"1\"><x:newshape/></object>").contains("newshape"));
-    assert!(told(&cube(1, "s:slicestackid=\"7\" s:meshresolution=\"lowres\"")).contains("slices"));
+    assert!(told(&cube(1, "s:slicestackid=\"7\"")).contains("slices"));
     // What is not built does not matter.
     let unused = with_beams.replace("object id=\"1\"", "object id=\"9\"") + &cube(1, "");
     assert_eq!(volume(&read_model(&unused, &items(&[1])).unwrap()), 1000.0);
