@@ -1,4 +1,4 @@
-//! Whatever the bytes are, reading and mending them ends in an answer: `cargo +nightly fuzz run readers`.
+//! Whatever the bytes are, reading and repairing them ends in an answer: `cargo +nightly fuzz run readers`.
 //!
 //! `READER=stl` (obj, ply, off, gltf, labels) gives the bytes to that reader alone; without it each has its
 //! turn.
@@ -32,9 +32,9 @@ fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
         assert!(loaded.mesh.points.iter().all(|p| p.is_finite()));
         assert!(loaded.mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < loaded.mesh.points.len()));
         if n_triangles <= MOST_TRIANGLES
-            && let Ok(mended) = repair(&loaded.mesh, RepairMode::KeepLargest)
+            && let Ok(repaired) = repair(&loaded.mesh, RepairMode::KeepLargest)
         {
-            assert_eq!(mended.solid.mesh().triangles.len(), mended.source_face.len());
+            assert_eq!(repaired.solid.mesh().triangles.len(), repaired.source_face.len());
         }
     }
 });

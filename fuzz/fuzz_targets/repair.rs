@@ -6,7 +6,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use shellock_geom::repair::{RepairMode, repair};
+use shellock_geom::hollow::{LEAST_SHARE, fill, find_hollow};
+use shellock_geom::repair::{InsideOut, RepairMode, repair_as};
+use shellock_geom::slit::slits;
 use shellock_geom::{TriMesh, Vec3};
 
 // Panics that are caught and become an error are none: without this the first one would end the process.
@@ -24,8 +26,16 @@ fuzz_target!(init: std::panic::take_hook(), |bytes: &[u8]| {
     }
     let triangles = corners.as_chunks::<3>().0.iter().map(|t| t.map(|corner| u32::from(corner % n))).collect();
     let mesh = TriMesh { points, triangles };
-    let Ok(mended) = repair(&mesh, RepairMode::KeepLargest) else { return };
-    assert!(mended.solid.volume() > 0.0);
-    assert_eq!(mended.source_face.len(), mended.solid.mesh().triangles.len());
-    assert!(mended.source_face.iter().all(|&face| (face as usize) < mesh.triangles.len()));
+    for inside_out in [InsideOut::Ask, InsideOut::Cut, InsideOut::Unite] {
+        let Ok(repaired) = repair_as(&mesh, RepairMode::KeepLargest, inside_out) else { continue };
+        assert!(repaired.solid.volume() > 0.0);
+        assert_eq!(repaired.source_face.len(), repaired.solid.mesh().triangles.len());
+        assert!(repaired.source_face.iter().all(|&face| (face as usize) < mesh.triangles.len()));
+        // Neither a cavity nor a slit is looked for in vain.
+        if let Some(hollow) = find_hollow(&repaired.solid, LEAST_SHARE) {
+            assert!(hollow.cavity_mm3 > 0.0);
+            let _ = fill(&repaired.solid, &hollow);
+        }
+        let _ = slits(&repaired.solid, 0.1);
+    }
 });

@@ -13,6 +13,7 @@ use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use shellock::coupon::N_FITS;
 use shellock::piece::LabelParams;
 use shellock::sizes::SizeChoice;
+use shellock_geom::repair::InsideOut;
 use shellock_print::Printer;
 use shellock_print::booklet::Paper;
 
@@ -408,6 +409,28 @@ impl From<PaperSize> for Paper {
         match size {
             PaperSize::A4 => Self::A4,
             PaperSize::Letter => Self::Letter,
+        }
+    }
+}
+
+/// What a body that is inside out and overlaps another is there for.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum InsideOutMeans {
+    /// Nobody knows: the model is refused
+    Ask,
+    /// A hole
+    Cut,
+    /// A part
+    Unite,
+}
+
+impl InsideOutMeans {
+    /// What the library calls it.
+    pub fn meant(self) -> InsideOut {
+        match self {
+            Self::Ask => InsideOut::Ask,
+            Self::Cut => InsideOut::Cut,
+            Self::Unite => InsideOut::Unite,
         }
     }
 }

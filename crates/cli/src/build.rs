@@ -14,11 +14,11 @@ use crate::args::{Options, Out, Pieces};
 use crate::bed::{fitted, too_large};
 use crate::failure::Failure;
 use crate::input::{self, Model};
-use crate::inspect::thin_warnings;
 use crate::output::{Destination, Summary, files};
 use crate::place::Standing;
 use crate::printing::Printing;
 use crate::progress::{Deadline, Display, PlanClock, Shown};
+use crate::shape::shape_warnings;
 use crate::stopwatch::StageTime;
 use crate::told::{Finished, print_failures, print_input_warnings, print_warnings};
 
@@ -219,7 +219,7 @@ fn make(
     }
     print_input_warnings(session, model);
     if is_for_people {
-        thin_warnings(model, options)
+        shape_warnings(model, options)
             .iter()
             .for_each(|w| println!("warning: {w}"));
     }

@@ -42,8 +42,12 @@ pub enum Failure {
 
 /// The option that helps, where there is one.
 fn hint(error: &InputError, objects: &[String]) -> String {
-    if !matches!(error, InputError::Bodies(_)) {
-        return String::new();
+    match error {
+        InputError::Bodies(_) => {}
+        InputError::Cutter { .. } => {
+            return " (--inside-out cut makes the hole, --inside-out unite the part)".to_owned();
+        }
+        _ => return String::new(),
     }
     if objects.is_empty() {
         return " (--largest keeps the largest)".to_owned();

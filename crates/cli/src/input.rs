@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 use shellock::Warning;
 use shellock_formats::{LabelSource, Loaded, Selection, read_labels, read_selected};
-use shellock_geom::repair::{Repair, RepairMode, Repaired, repair};
+use shellock_geom::repair::{InsideOut, Repair, RepairMode, Repaired, repair_as};
 use shellock_geom::simplify::simplify;
 use shellock_geom::{Solid, Vec3};
 
@@ -18,6 +18,7 @@ use crate::Session;
 use crate::args::{LabelsFrom, Options};
 use crate::failure::Failure;
 use crate::names::no_such;
+use crate::shape::settle_hollow;
 
 pub use size::length;
 use size::{DEFAULT_SIZE_MM, check_size, scale};
@@ -114,8 +115,13 @@ pub fn repair_mode(no_repair: bool, largest: bool) -> RepairMode {
 }
 
 /// The body in what was read from `path`.
-pub fn repaired(path: &Path, loaded: &Loaded, mode: RepairMode) -> Result<Repaired, Failure> {
-    repair(&loaded.mesh, mode).map_err(|source| Failure::NotOneBody {
+pub fn repaired(
+    path: &Path,
+    loaded: &Loaded,
+    mode: RepairMode,
+    inside_out: InsideOut,
+) -> Result<Repaired, Failure> {
+    repair_as(&loaded.mesh, mode, inside_out).map_err(|source| Failure::NotOneBody {
         path: path.to_owned(),
         source,
         objects: objects(loaded),
@@ -202,7 +208,12 @@ pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -
         solid,
         source_face,
         repairs,
-    } = repaired(path, loaded, repair_mode(options.no_repair, options.largest))?;
+    } = repaired(
+        path,
+        loaded,
+        repair_mode(options.no_repair, options.largest),
+        options.inside_out.meant(),
+    )?;
     let file_face: Vec<u32> = source_face
         .iter()
         .map(|&k| loaded.file_face[k as usize])
@@ -230,6 +241,7 @@ pub fn model_of(path: &Path, loaded: &Loaded, bytes: &[u8], options: &Options) -
     made.warnings.extend(doubt);
     made.selection = selection(options);
     made.repairs = repairs;
+    settle_hollow(&mut made, options)?;
     Ok(made)
 }
 

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use shellock::strength::StrengthParams;
 use shellock_formats::Loaded;
 use shellock_geom::check::{Inspection, inspect as inspection};
 use shellock_geom::repair::repair;
@@ -12,11 +11,12 @@ use shellock_geom::weld::weld;
 use shellock_kit::plan_file::RepairEntry;
 
 use crate::Session;
-use crate::args::{Options, Thickness};
+use crate::args::Options;
 use crate::division::{Division, divide};
 use crate::failure::{Failure, listed};
 use crate::input::{Model, load_selected, model_of, objects, repair_mode, selection};
 use crate::place::Standing;
+use crate::shape::{shape_warnings, wall_mm};
 use crate::told::print_warnings;
 
 /// Thin places that are told one by one.
@@ -42,7 +42,7 @@ pub fn inspect(session: &Session, file: &Path, options: &Options, wanted: Wanted
         let model = model_of(file, &loaded, &bytes, options);
         let thin = model
             .as_ref()
-            .map(|model| thin_warnings(model, options))
+            .map(|model| shape_warnings(model, options))
             .unwrap_or_default();
         (model, thin)
     });
@@ -170,10 +170,7 @@ fn unit(loaded: &Loaded) -> String {
 
 /// Where a model is too thin for a cavity between two walls, and how thin; nothing where it is thick enough.
 pub fn thin_warnings(model: &Model, options: &Options) -> Vec<String> {
-    let wall_mm = match options.thickness {
-        Thickness::Mm(mm) => mm,
-        Thickness::Auto => StrengthParams::default().least_mm,
-    };
+    let wall_mm = wall_mm(options);
     let places = thin_places(&model.solid, 2.0 * wall_mm);
     let area_mm2: f64 = places.iter().map(|p| p.area_mm2).sum();
     let percent = 100.0 * area_mm2 / model.solid.mesh().area();

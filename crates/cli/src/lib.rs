@@ -28,6 +28,7 @@ mod printing;
 mod progress;
 mod project;
 mod savings;
+mod shape;
 mod shares;
 mod stages;
 mod stopwatch;

@@ -11,6 +11,7 @@ use shellock::verify::words::Coordinates;
 use shellock::verify::{Assembly, VerifyParams};
 use shellock::{Ctx, IdVec, InstallationPlan, PatchId, SegmentedSurface, segmentation};
 use shellock_formats::{Selection, write_labels, write_ply, write_stl_binary};
+use shellock_geom::repair::{InsideOut, RepairKind};
 use shellock_geom::weld::weld;
 use shellock_geom::{Solid, TriMesh, Vec3};
 use shellock_kit::PlanFile;
@@ -27,6 +28,7 @@ use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
 use crate::place::Standing;
 use crate::progress::{Display, PlanClock};
+use crate::shape::filled_again;
 use crate::shares::largest_shares;
 use crate::told::{print_input_warnings, print_verdict, print_warnings, quality, weakest};
 
@@ -289,12 +291,15 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
         plate: input.plate.clone(),
     };
     let (loaded, _) = load_selected(&model_path, &selection)?;
-    let solid = input::repaired(
-        &model_path,
-        &loaded,
-        input::repair_mode(false, input.largest_only),
-    )?
-    .solid;
+    let repairs: Vec<&str> = input.repairs.iter().map(|r| r.kind.as_str()).collect();
+    // A kit that was made has an answer to what is asked of other files.
+    let inside_out = if repairs.contains(&RepairKind::CutOut { volume: 0.0 }.code()) {
+        InsideOut::Cut
+    } else {
+        InsideOut::Unite
+    };
+    let mode = input::repair_mode(false, input.largest_only);
+    let solid = input::repaired(&model_path, &loaded, mode, inside_out)?.solid;
     let t = input.transform;
     let mut mesh = solid.into_mesh();
     for p in &mut mesh.points {
@@ -302,7 +307,9 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
             t[4 * r] * p.x + t[4 * r + 1] * p.y + t[4 * r + 2] * p.z + t[4 * r + 3]
         }));
     }
-    Solid::new(mesh).map_err(|e| broken(kit)(format!("with its transform the model is no solid: {e}")))
+    Solid::new(mesh)
+        .map(|solid| filled_again(solid, &repairs))
+        .map_err(|e| broken(kit)(format!("with its transform the model is no solid: {e}")))
 }
 
 /// What a plan file names.

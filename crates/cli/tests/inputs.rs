@@ -405,3 +405,105 @@ fn a_division_is_told_in_figures_and_is_the_one_that_segment_makes() {
     assert_eq!(given["division"]["n_pieces"], made["pieces"]);
     assert!(json(&["inspect", "ball.ply"])["division"].is_null());
 }
+
+/// A ball of 60 mm with walls of 2.4 mm and a hole of 4 mm underneath.
+fn drained() -> TriMesh {
+    let [outer, inner] = [30.0, 27.6].map(|radius| {
+        let ball = shapes::ball(4, Vec3::ZERO, radius);
+        shellock_geom::Volume::from_closed_mesh(&ball).unwrap()
+    });
+    let ring = |z: f64| {
+        let point = |i: u32| {
+            let (s, c) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
+            Vec3::new(2.0 * c, 2.0 * s, z)
+        };
+        (0..24).map(point).collect()
+    };
+    let hole = shellock_geom::Volume::loft(&[ring(-40.0), ring(0.0)]);
+    outer.subtract(&inner).subtract(&hole).to_mesh()
+}
+
+#[test]
+fn a_hollow_model_is_told_with_its_wall_and_opening_and_filled_if_asked() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("drained.stl"), write_stl_binary(&drained())).unwrap();
+    for command in [
+        &["inspect", "drained.stl"][..],
+        &["build", "drained.stl", "-o", "kit"],
+    ] {
+        let o = shellock(dir.path(), command);
+        let why = String::from_utf8_lossy(&o.stderr).into_owned();
+        assert_eq!(o.status.code(), Some(2), "{why}");
+        for word in [
+            "hollow already",
+            "2.4 mm thick",
+            "(4.0 mm wide)",
+            "--fill",
+            "-29.9) mm",
+        ] {
+            assert!(why.contains(word), "no \"{word}\" in {why}");
+        }
+    }
+    assert!(!dir.path().join("kit").exists());
+    let told = |args: &[&str]| {
+        let o = shellock(dir.path(), &[&["inspect", "--json"], args].concat());
+        assert_eq!(o.status.code(), Some(0), "{}", String::from_utf8_lossy(&o.stderr));
+        serde_json::from_slice::<Value>(&o.stdout).unwrap()
+    };
+    let filled = told(&["drained.stl", "--fill", "--size", "120"]);
+    assert_eq!(filled["repairs"][0]["kind"], "openings-closed", "{filled}");
+    // In the file's units, where the note has the made thing's.
+    let z = filled["repairs"][0]["at"][2].as_f64().unwrap();
+    assert!((z + 29.9).abs() < 0.1, "{z}");
+    let note = filled["notes"].to_string();
+    assert!(note.contains("1 opening was closed, 8.0 mm wide near"), "{note}");
+    // Walls of 4.8 mm are made hollow, if those of the kit are thin.
+    let kept = told(&["drained.stl", "--size", "120", "--thickness", "0.8"]);
+    assert!(kept["notes"].to_string().contains("hollow already"), "{kept}");
+    fs::write(dir.path().join("ball.stl"), write_stl_binary(&ball(Vec3::ZERO))).unwrap();
+    let solid = told(&["ball.stl", "--fill"]);
+    assert!(solid["notes"].to_string().contains("is not hollow"), "{solid}");
+    assert_eq!(solid["repairs"], Value::Array(vec![]));
+}
+
+#[test]
+fn a_slit_is_told_with_its_width_and_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let cut = shapes::brick([12.0, 12.05], [-1.0, 41.0], [8.0, 31.0]);
+    let sawn = shapes::brick([0.0, 60.0], [0.0, 40.0], [0.0, 30.0]).subtract(&cut);
+    fs::write(dir.path().join("sawn.stl"), write_stl_binary(&sawn.to_mesh())).unwrap();
+    let o = shellock(dir.path(), &["inspect", "sawn.stl"]);
+    let told = String::from_utf8_lossy(&o.stdout).into_owned();
+    assert!(
+        told.contains("warning: 1 slit in the surface is narrower than 0.20 mm: 0.05 mm wide near (12.0, "),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_body_inside_out_that_overlaps_another_is_a_hole_or_a_part_as_its_owner_says() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut tool = ball(Vec3::new(31.0, 7.0, 3.0));
+    tool.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    fs::write(dir.path().join("cutter.ply"), ply(&both(ball(Vec3::ZERO), tool))).unwrap();
+    let o = shellock(dir.path(), &["inspect", "cutter.ply"]);
+    let why = String::from_utf8_lossy(&o.stderr).into_owned();
+    assert_eq!(o.status.code(), Some(2));
+    assert!(
+        why.contains("near (31, 7, 3)") && why.contains("--inside-out cut"),
+        "{why}"
+    );
+    for (way, kinds) in [
+        ("cut", &["bodies-cut-out"][..]),
+        ("unite", &["body-turned", "parts-united"]),
+    ] {
+        let o = shellock(
+            dir.path(),
+            &["inspect", "cutter.ply", "--inside-out", way, "--json"],
+        );
+        let told: Value = serde_json::from_slice(&o.stdout).unwrap();
+        let repairs = told["repairs"].as_array().unwrap();
+        let done: Vec<&str> = repairs.iter().filter_map(|r| r["kind"].as_str()).collect();
+        assert_eq!((o.status.code(), done), (Some(0), kinds.to_vec()), "{told}");
+    }
+}

@@ -11,7 +11,7 @@ import { words } from "./words.js";
 
 const STEPS = ["open", "pieces", "key", "make", "kit"];
 const SCREENS = { open: screens.openScreen, pieces: screens.piecesScreen, key: screens.keyScreen, make: screens.makeScreen, kit: screens.kitScreen };
-const OF_MODEL = new Set(["size", "height", "scale", "unit", "up", "no-repair", "largest", "resolution", "labels-from", "thickness"]);
+const OF_MODEL = new Set(["size", "height", "scale", "unit", "up", "no-repair", "largest", "object", "plate", "fill", "inside-out", "resolution", "labels-from", "thickness"]);
 const OF_DIVISION = new Set(["keep-whole", "seed"]);
 const $ = (id) => document.getElementById(id);
 

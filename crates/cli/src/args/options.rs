@@ -13,7 +13,9 @@ use shellock_print::Printer;
 
 use super::keep_whole::keep_whole;
 use super::pieces::{Key, Pieces, Symmetric};
-use super::{Axis, LabelsFrom, PaperSize, Thickness, Unit, connector_size, label, printer_called};
+use super::{
+    Axis, InsideOutMeans, LabelsFrom, PaperSize, Thickness, Unit, connector_size, label, printer_called,
+};
 use crate::{stress, units};
 
 #[derive(Args)]
@@ -100,6 +102,26 @@ pub struct Options {
     /// Of several bodies apart from each other make the largest
     #[arg(long, help_heading = "Surface")]
     pub largest: bool,
+    /// Close a hollow model's openings: it is made solid
+    ///
+    /// Close the openings of a model that is hollow already, as slicers for resin make it, and make the solid
+    /// figure of it
+    #[arg(long, help_heading = "Surface")]
+    pub fill: bool,
+    /// A body inside out that overlaps another: ask, cut or unite
+    ///
+    /// What a body is there for that is inside out and overlaps another: ask, the model is refused with its
+    /// place; cut, a hole; unite, a part
+    #[arg(
+        hide_short_help = true,
+        hide_possible_values = true,
+        long,
+        value_enum,
+        default_value = "ask",
+        value_name = "ask|cut|unite",
+        help_heading = "Surface"
+    )]
+    pub inside_out: InsideOutMeans,
     /// Detail to keep of a surface of very many triangles
     ///
     /// Detail to keep of a surface with more than 100 000 triangles, mm, 0 to 0.1: it is described by

@@ -33,7 +33,7 @@ use crate::output::{lying, standing};
 use crate::project::ModelOf;
 
 /// Options that make another solid of the model's file.
-const OF_MODEL: [&str; 9] = [
+const OF_MODEL: [&str; 13] = [
     "size",
     "height",
     "scale",
@@ -41,6 +41,10 @@ const OF_MODEL: [&str; 9] = [
     "up",
     "no-repair",
     "largest",
+    "object",
+    "plate",
+    "fill",
+    "inside-out",
     "resolution",
     "labels-from",
 ];

@@ -9,13 +9,12 @@ use shellock_geom::thin::thin_faces;
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::Session;
-use crate::args::{Axis, Options, Thickness};
+use crate::args::{Axis, Options};
 use crate::failure::Failure;
 use crate::input::{self, Model};
-use crate::inspect::thin_warnings;
 use crate::output::standing;
+use crate::shape::{shape_warnings, wall_mm};
 use crate::shares::largest_shares;
-use shellock::strength::StrengthParams;
 
 /// How a mesh for the page begins: "SHMV", then the version.
 const MAGIC: u32 = 0x564d_4853;
@@ -42,11 +41,7 @@ impl Figure {
         let model = input::simple(session, given, options)?;
         let is_same = model.solid.mesh().triangles.len() == before.0.triangles.len();
         let full = (!is_same).then(|| nearest(model.solid.mesh(), &before.0, &before.1));
-        let wall_mm = match options.thickness {
-            Thickness::Mm(mm) => mm,
-            Thickness::Auto => StrengthParams::default().least_mm,
-        };
-        let is_thin = thin_faces(&model.solid, 2.0 * wall_mm)
+        let is_thin = thin_faces(&model.solid, 2.0 * wall_mm(options))
             .into_iter()
             .map(|mm| mm.is_some())
             .collect();
@@ -55,7 +50,7 @@ impl Figure {
                 .warnings
                 .iter()
                 .map(ToString::to_string)
-                .chain(thin_warnings(&model, options))
+                .chain(shape_warnings(&model, options))
                 .collect(),
             model,
             full,

@@ -7,7 +7,7 @@ use shellock_geom::{TriMesh, Vec3, Volume};
 use shellock_testkit::shapes;
 
 use super::{Case, Claim, body, moved, scaled};
-use Claim::{Labels, Note, Refused, Size};
+use Claim::{Labels, Note, Refused, Size, Warning};
 
 const WHOLE: Claim = Size([60.0, 40.0, 30.0]);
 
@@ -122,12 +122,91 @@ fn stl(volume: &Volume) -> Vec<u8> {
     write_stl_binary(&volume.to_mesh())
 }
 
-fn volume(mesh: &TriMesh) -> Volume {
-    Volume::from_closed_mesh(mesh).expect("it is closed")
+/// The body, with walls of 2.4 mm and round holes of 4 mm at some places, each bored along z from there on.
+fn drained(holes: &[[f64; 3]]) -> Volume {
+    let volume = |mesh: &TriMesh| Volume::from_closed_mesh(mesh).expect("it is closed");
+    let outer = volume(&smooth(Vec3::new(30.0, 20.0, 15.0)));
+    let inner = volume(&smooth(Vec3::new(27.6, 17.6, 12.6)));
+    let ring = |[x, y, _]: [f64; 3], z: f64| {
+        let point = |i: u32| {
+            let (s, c) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
+            Vec3::new(x + 2.0 * c, y + 2.0 * s, z)
+        };
+        (0..24).map(point).collect::<Vec<Vec3>>()
+    };
+    holes.iter().fold(outer.subtract(&inner), |body, &hole| {
+        let [low, high] = if hole[2] < 0.0 { [-40.0, 0.0] } else { [0.0, 40.0] };
+        body.subtract(&Volume::loft(&[ring(hole, low), ring(hole, high)]))
+    })
+}
+
+/// An ellipsoid of 2048 triangles.
+fn smooth(half_axes: Vec3) -> TriMesh {
+    scaled(&shapes::ball(4, Vec3::ZERO, 1.0), half_axes)
+}
+
+/// A box with a slit of a width along its middle.
+fn slit(width: f64) -> Volume {
+    let block = shapes::cuboid([0.0; 3], [60.0, 40.0, 30.0]);
+    block.subtract(&shapes::cuboid([12.0, -1.0, 8.0], [12.0 + width, 41.0, 31.0]))
+}
+
+/// Two boxes side by side with the wall between them left in.
+fn with_wall(wall_mm: f64) -> TriMesh {
+    let mut mesh = shapes::cuboid([0.0; 3], [60.0, 40.0, 30.0]).to_mesh();
+    let first = mesh.points.len() as u32;
+    // A sheet across the whole box, which touches it all around.
+    let corners = [[0.0, 0.0], [40.0, 0.0], [40.0, 30.0], [0.0, 30.0]];
+    mesh.points.extend(corners.map(|[y, z]| Vec3::new(wall_mm, y, z)));
+    mesh.triangles
+        .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    mesh
+}
+
+/// The body, and a smaller one that is inside out and sticks out of it.
+fn inside_out() -> Vec<u8> {
+    let mut mesh = body();
+    let mut tool = scaled(&moved(&body(), Vec3::X * 90.0), Vec3::splat(1.0 / 3.0));
+    tool.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    let n = mesh.points.len() as u32;
+    mesh.points.extend(tool.points);
+    mesh.triangles
+        .extend(tool.triangles.iter().map(|t| t.map(|v| v + n)));
+    write_ply(&mesh, None)
 }
 
 /// Surfaces whose shape needs a decision of their owner.
 fn decisions() -> Vec<Case> {
-    let _ = (scaled, shapes::cuboid([0.0; 3], [1.0; 3]));
-    Vec::new()
+    let one = [[0.0, 0.0, -15.0]];
+    let two = [[0.0, 0.0, -15.0], [10.0, 0.0, 15.0]];
+    vec![
+        Case::new("drained.stl", stl(&drained(&one)))
+            .says(&[Refused("hollow already: its wall is 2.4 mm thick")])
+            .proves("all", "refused", "models that are hollow already"),
+        Case::new("drained_twice.stl", stl(&drained(&two))).says(&[Refused("2 openings near")]),
+        Case::new("drained_filled.stl", stl(&drained(&two)))
+            .with(&["--fill"])
+            .says(&[WHOLE, Note("2 openings were closed")])
+            .proves("all", "read", "models that are hollow already, with `--fill`"),
+        Case::new("slit.stl", stl(&slit(0.05))).says(&[WHOLE, Warning("1 slit in the surface")]),
+        Case::new("slit_wider.stl", stl(&slit(0.1))).says(&[WHOLE, Warning("0.10 mm wide near")]),
+        Case::new("wall.stl", write_stl_binary(&with_wall(20.0)))
+            .says(&[WHOLE, Note("repaired: ")])
+            .proves("all", "left out", "walls inside a body"),
+        Case::new("wall_elsewhere.ply", write_ply(&with_wall(45.0), None)).says(&[WHOLE, Note("repaired: ")]),
+        Case::new("inside_out.ply", inside_out())
+            .says(&[Refused("--inside-out cut")])
+            .proves("all", "refused", "bodies inside out that overlap others"),
+        Case::new("inside_out_cut.ply", inside_out())
+            .with(&["--inside-out", "cut"])
+            .says(&[Size([58.22, 40.0, 30.0])])
+            .proves(
+                "all",
+                "read",
+                "holes and parts that are inside out, with `--inside-out`",
+            ),
+        Case::new("inside_out_united.ply", inside_out())
+            .with(&["--inside-out", "unite"])
+            .says(&[Size([70.0, 40.0, 30.0])]),
+    ]
 }

@@ -9,7 +9,7 @@ use super::grid::Grid;
 use crate::bvh::TriangleBvh;
 
 /// The widest ball that is tried in an opening: its radius as a share of the longest side, so that openings up
-/// to a quarter of the size are found.
+/// to a fifth of the size are found.
 const WIDEST_SHARE: f64 = 0.125;
 /// A cavity is wider than its openings by this factor, at least. A hollow plate of 6 mm with walls of 2 mm has
 /// little more.

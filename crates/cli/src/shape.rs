@@ -1,0 +1,248 @@
+//! What of a model's shape stands in the way of a kit: a cavity that is there already, parts that are too thin, slits.
+
+use shellock::strength::StrengthParams;
+use shellock::verify::limits::LEAST_SLOT_MM;
+use shellock_geom::hollow::{Filled, HollowBody, LEAST_SHARE, Opening, fill, find_hollow};
+use shellock_geom::repair::{Repair, RepairKind};
+use shellock_geom::slit::{Slit, slits};
+use shellock_geom::{Solid, Vec3};
+
+use crate::args::{Options, Thickness};
+use crate::failure::Failure;
+use crate::input::Model;
+use crate::inspect::thin_warnings;
+
+/// Where it is asked for, smaller cavities are filled than those that make a model hollow: down to this share of the
+/// body.
+const LEAST_FILLED: f64 = 0.02;
+/// A wall that is thicker than this many walls of a kit has room for two of them and connectors between.
+const ROOM_WALLS: f64 = 4.0;
+/// Openings and slits that are told one by one.
+const N_TOLD: usize = 3;
+
+/// Sees to a model that is hollow already: fills it where that is asked for, else refuses it, or notes that it stays
+/// as it is where its wall is thick enough to be made hollow itself.
+pub fn settle_hollow(model: &mut Model, options: &Options) -> Result<(), Failure> {
+    let least_share = if options.fill { LEAST_FILLED } else { LEAST_SHARE };
+    let Some(hollow) = find_hollow(&model.solid, least_share) else {
+        if options.fill {
+            let note = "--fill: the model is not hollow, so nothing was filled";
+            model.notes.push(note.to_owned());
+        }
+        return Ok(());
+    };
+    if options.fill {
+        let filled = fill(&model.solid, &hollow)
+            .map_err(|e| Failure::Wrong(format!("{}: --fill: {e}", model.name)))?;
+        take(model, filled, &hollow);
+        return Ok(());
+    }
+    let told = format!(
+        "the model is hollow already: its wall is {:.1} mm thick, and {} into its cavity of {}",
+        hollow.wall_mm,
+        leads(&hollow.openings),
+        volume(hollow.cavity_mm3)
+    );
+    if hollow.wall_mm > ROOM_WALLS * wall_mm(options) {
+        model.notes.push(format!(
+            "{told}; the wall itself is made hollow (--fill closes the opening and makes the solid instead)"
+        ));
+        return Ok(());
+    }
+    Err(Failure::Wrong(format!(
+        "{}: {told}; give the solid figure, or close what leads in with --fill, which makes it solid",
+        model.name
+    )))
+}
+
+/// The filled body that a kit with these repairs was made from, where it was made from one.
+pub fn filled_again(solid: Solid, repairs: &[&str]) -> Solid {
+    let was_filled = repairs.contains(&RepairKind::Drained { volume: 0.0 }.code());
+    let found = if was_filled {
+        find_hollow(&solid, LEAST_FILLED)
+    } else {
+        None
+    };
+    match found.map(|hollow| fill(&solid, &hollow)) {
+        Some(Ok(filled)) => filled.solid,
+        _ => solid,
+    }
+}
+
+/// Makes `model` the filled body, with a word on it.
+fn take(model: &mut Model, filled: Filled, hollow: &HollowBody) {
+    let of_source = |values: &[u32]| filled.source_face.iter().map(|&f| values[f as usize]).collect();
+    model.file_face = of_source(&model.file_face);
+    model.labels = model
+        .labels
+        .take()
+        .map(|labels| filled.source_face.iter().map(|&f| labels[f as usize]).collect());
+    model.solid = filled.solid;
+    let openings = &hollow.openings;
+    let n = match openings.len() {
+        1 => "1 opening was".to_owned(),
+        n => format!("{n} openings were"),
+    };
+    model.notes.push(format!(
+        "{n} closed, {}, and the cavity of {} behind filled (--fill)",
+        places(openings, |o| format!(
+            "{:.1} mm wide near {}",
+            o.width_mm,
+            place(o.at)
+        )),
+        volume(hollow.cavity_mm3)
+    ));
+    // Repairs are told in the file's own units and coordinates.
+    let scale = model.transform[0];
+    let shift = Vec3::new(model.transform[3], model.transform[7], model.transform[11]);
+    model.repairs.push(Repair {
+        kind: RepairKind::Drained {
+            volume: hollow.cavity_mm3 / scale.powi(3),
+        },
+        count: openings.len(),
+        at: openings.first().map_or(Vec3::ZERO, |o| (o.at - shift) / scale),
+    });
+}
+
+/// What is worth a warning before a kit is made: thin parts and slits.
+pub fn shape_warnings(model: &Model, options: &Options) -> Vec<String> {
+    let mut warnings = thin_warnings(model, options);
+    warnings.extend(slit_warning(model, options));
+    warnings
+}
+
+/// Slits that are narrower than what a seam needs, or than printers leave open.
+fn slit_warning(model: &Model, options: &Options) -> Option<String> {
+    let tolerance_mm = options
+        .chosen_printer()
+        .map_or(0.0, |printer| printer.tolerance_mm);
+    let seam_mm = 2.0 * options.seam_gap.unwrap_or(tolerance_mm);
+    let below_mm = seam_mm.max(LEAST_SLOT_MM);
+    let found = slits(&model.solid, below_mm);
+    let n = match found.len() {
+        0 => return None,
+        1 => "1 slit in the surface is".to_owned(),
+        n => format!("{n} slits in the surface are"),
+    };
+    let told = |s: &Slit| {
+        format!(
+            "{:.2} mm wide near {}, {:.0} mm² large",
+            s.width_mm,
+            place(s.at),
+            s.area_mm2
+        )
+    };
+    Some(format!(
+        "{n} narrower than {below_mm:.2} mm: {}; pieces on both sides have less room than a seam needs, and prints fuse \
+         there: close it or make it wider in a modelling program",
+        places(&found, told)
+    ))
+}
+
+/// The wall that a kit has at least, mm.
+pub fn wall_mm(options: &Options) -> f64 {
+    match options.thickness {
+        Thickness::Mm(mm) => mm,
+        Thickness::Auto => StrengthParams::default().least_mm,
+    }
+}
+
+/// The openings, as what leads somewhere.
+fn leads(openings: &[Opening]) -> String {
+    let told = places(openings, |o| {
+        format!("near {} ({:.1} mm wide)", place(o.at), o.width_mm)
+    });
+    match openings.len() {
+        1 => format!("an opening {told} leads"),
+        n => format!("{n} openings {told} lead"),
+    }
+}
+
+/// The first of `all` in words, and how many more there are.
+fn places<T>(all: &[T], told: impl Fn(&T) -> String) -> String {
+    let first: Vec<String> = all.iter().take(N_TOLD).map(told).collect();
+    let rest = match all.len().saturating_sub(N_TOLD) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    format!("{}{rest}", first.join(", "))
+}
+
+fn place(at: Vec3) -> String {
+    // Adding 0 makes −0 a plain 0.
+    let [x, y, z] = at.to_array().map(|mm| (10.0 * mm).round() / 10.0 + 0.0);
+    format!("({x:.1}, {y:.1}, {z:.1}) mm")
+}
+
+/// A volume in cm³, or in mm³ where it is small.
+fn volume(mm3: f64) -> String {
+    if mm3 >= 1000.0 {
+        format!("{:.1} cm³", mm3 / 1000.0)
+    } else {
+        format!("{mm3:.0} mm³")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use shellock_geom::Volume;
+    use shellock_testkit::shapes::{ball, brick};
+
+    use super::*;
+
+    /// A hollow ball with a square hole of 4 mm underneath, labelled in two halves, at twice the file's size.
+    fn drained() -> Model {
+        let [outer, inner] = [30.0, 27.0].map(|r| Volume::from_closed_mesh(&ball(4, Vec3::ZERO, r)).unwrap());
+        let hole = brick([-2.0, 2.0], [-2.0, 2.0], [-40.0, 0.0]);
+        let solid = Solid::new(outer.subtract(&inner).subtract(&hole).to_mesh()).unwrap();
+        let n_faces = solid.mesh().triangles.len();
+        let labels = (0..n_faces).map(|f| i64::from(solid.mesh().face_center(f).z > 0.0));
+        let mut transform = [0.0; 16];
+        [0, 5, 10].into_iter().for_each(|i| transform[i] = 2.0);
+        (transform[11], transform[15]) = (6.0, 1.0);
+        Model {
+            labels: Some(labels.collect()),
+            file_face: (0..n_faces as u32).collect(),
+            n_file_faces: n_faces,
+            transform,
+            name: "drained.stl".to_owned(),
+            sha256: String::new(),
+            notes: Vec::new(),
+            warnings: Vec::new(),
+            selection: shellock_formats::Selection::default(),
+            repairs: Vec::new(),
+            solid,
+        }
+    }
+
+    #[test]
+    fn a_filled_model_keeps_labels_and_faces_and_tells_of_it_in_both_units() {
+        let mut model = drained();
+        let before = model.solid.clone();
+        let hollow = find_hollow(&model.solid, LEAST_SHARE).unwrap();
+        let filled = fill(&model.solid, &hollow).unwrap();
+        take(&mut model, filled, &hollow);
+        let mesh = model.solid.mesh();
+        let labels = model.labels.unwrap();
+        assert_eq!(
+            (labels.len(), model.file_face.len()),
+            (mesh.triangles.len(), mesh.triangles.len())
+        );
+        for (face, &label) in labels.iter().enumerate() {
+            assert_eq!(label, i64::from(mesh.face_center(face).z > 0.0));
+            let of = before.mesh().face_center(model.file_face[face] as usize);
+            assert!(of.distance(mesh.face_center(face)) < 5.0);
+        }
+        let [repair] = model.repairs[..] else {
+            panic!("one repair")
+        };
+        assert!((repair.at.z - (-30.0 - 6.0) / 2.0).abs() < 0.2, "{repair}");
+        assert!(
+            model.notes[0].contains("1 opening was closed, 4.5 mm wide near"),
+            "{:?}",
+            model.notes
+        );
+        // What was filled once is filled again the same way.
+        assert!(filled_again(before, &[repair.kind.code()]) == model.solid);
+    }
+}
