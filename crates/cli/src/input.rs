@@ -20,8 +20,8 @@ use crate::failure::Failure;
 use crate::names::no_such;
 use crate::shape::settle_hollow;
 
-pub use size::length;
 use size::{DEFAULT_SIZE_MM, check_size, scale};
+pub use size::{is_usual, length};
 
 /// Larger files are refused, bytes: everything is read into memory.
 const MAX_FILE_BYTES: u64 = 2 << 30;

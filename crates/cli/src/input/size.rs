@@ -36,13 +36,16 @@ pub(super) fn scale(
         (_, _, Some(scale), _) => (length("scale", scale)?, None),
         (.., Some(unit)) => (unit.mm(), None),
         _ if loaded.unit_is_stated => (own_mm, unusual(own_mm * longest)),
-        _ if USUAL_MM.contains(&(own_mm * longest)) && !is_normalised(loaded.format, longest) => {
-            (own_mm, None)
-        }
+        _ if is_usual(own_mm * longest) && !is_normalised(loaded.format, longest) => (own_mm, None),
         _ => (DEFAULT_SIZE_MM / longest, Some(guess(loaded, longest))),
     };
     check_size(scale * longest)?;
     Ok((scale, warning))
+}
+
+/// Whether nobody would ask about a model whose longest side is `longest_mm`.
+pub fn is_usual(longest_mm: f64) -> bool {
+    USUAL_MM.contains(&longest_mm)
 }
 
 /// A number that can be a length, or a scale.
@@ -78,7 +81,7 @@ fn is_normalised(format: Format, longest: f64) -> bool {
 
 /// A warning of a size that the file states and few people mean.
 fn unusual(longest_mm: f64) -> Option<Warning> {
-    (!USUAL_MM.contains(&longest_mm)).then(|| {
+    (!is_usual(longest_mm)).then(|| {
         let how = if longest_mm > *USUAL_MM.end() { "large" } else { "small" };
         warning(
             "size-unusual",

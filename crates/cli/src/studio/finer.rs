@@ -7,7 +7,7 @@ use shellock_geom::repair::{RepairMode, repair};
 use shellock_geom::subdivide::halve_edges;
 use shellock_geom::{Solid, Topology};
 
-use crate::input::MANY_TRIANGLES;
+use crate::input::{MANY_TRIANGLES, is_usual};
 
 /// Longest edge that is left, as a share of the model's diagonal: 3 to 4 mm on a figure of 150 mm.
 const LONGEST_SHARE: f64 = 1.0 / 60.0;
@@ -35,7 +35,10 @@ pub fn finer(name: &str, loaded: &Loaded) -> Option<(String, Vec<u8>)> {
         .labellings
         .iter()
         .all(|l| matches!(l.source, LabelSource::Property | LabelSource::Paint));
-    if !keeps_all || !is_coarse(loaded) {
+    let longest_mm = loaded.unit_mm.unwrap_or(1.0) * loaded.bounds().size().max_element();
+    // A size that only the file's own unit vouches for would be lost, too.
+    let keeps_size = !loaded.unit_is_stated || is_usual(longest_mm);
+    if !keeps_all || !keeps_size || !is_coarse(loaded) {
         return None;
     }
     let sound = repair(&loaded.mesh, RepairMode::Refuse).ok()?;

@@ -122,7 +122,7 @@ fn skins() -> Vec<Case> {
     // Joint and inverse bind matrix cancel: a model in centimetres that is shown in metres.
     let mut bound = Glb::of(&scaled(&metres(), Vec3::splat(100.0)));
     let mut inverse = IDENTITY;
-    [0, 5, 10].map(|k| inverse[k] = 0.01);
+    [0, 5, 10].into_iter().for_each(|k| inverse[k] = 0.01);
     skinned(&mut bound, inverse);
     bound.json["nodes"] = json!([{ "mesh": 0, "skin": 0 }, {}]);
     vec![
