@@ -2,7 +2,8 @@
 //! `cargo +nightly fuzz run gltf`.
 //!
 //! The bytes choose what a document has: meshes, nodes, skins, and for each of them the accessors that it names. What they choose
-//! seldom is wrong: another index, count, offset or type of number. The data of all accessors are the bytes that are left.
+//! seldom is wrong: another index, count, offset or type of number. The data of all accessors are the bytes that are left; in
+//! the second half of them, which has what should be indices, all are less than four.
 
 #![no_main]
 
@@ -61,13 +62,13 @@ impl Maker<'_, '_> {
         });
         let is_bare = self.is_so(40)?;
         if !is_bare {
-            accessor["bufferView"] = json!(self.number(0)?);
+            accessor["bufferView"] = json!(self.number(u64::from(component == 5121))?);
         }
         if is_bare || self.is_so(30)? {
             let n = self.u.int_in_range(0..=3)?;
             accessor["sparse"] = json!({
                 "count": self.number(n)?,
-                "indices": { "bufferView": self.number(1)?, "componentType": *self.u.choose(&[5121, 5123, 5125])? },
+                "indices": { "bufferView": self.number(1)?, "componentType": self.number(5121)? },
                 "values": { "bufferView": self.number(0)?, "byteOffset": self.number(8)? },
             });
         }
@@ -146,13 +147,13 @@ impl Maker<'_, '_> {
     fn document(&mut self) -> Result<Value> {
         let n = self.u.int_in_range(1..=5)?;
         let nodes: Vec<Value> = (0..n).map(|id| self.node(id, n)).collect::<Result<_>>()?;
-        let joints: Vec<u64> = (0..3).map(|_| self.u.int_in_range(0..=n)).collect::<Result<_>>()?;
+        let joints: Vec<u64> = (0..4).map(|_| self.u.int_in_range(0..=n - 1)).collect::<Result<_>>()?;
         let mut skin = json!({ "joints": joints });
         if self.is_so(200)? {
-            skin["inverseBindMatrices"] = self.accessor("MAT4", 5126, 3)?;
+            skin["inverseBindMatrices"] = self.accessor("MAT4", 5126, 4)?;
         }
         let mut document = json!({
-            "scenes": [{ "nodes": [0, self.number(1)?] }], "nodes": nodes, "skins": [skin],
+            "scenes": [{ "nodes": [0, self.number(n / 2)?] }], "nodes": nodes, "skins": [skin],
             "meshes": [self.mesh()?], "materials": [{ "pbrMetallicRoughness": { "baseColorFactor": self.floats(4)? } }],
             "buffers": [{}],
         });
@@ -169,14 +170,15 @@ fuzz_target!(init: drop(std::panic::take_hook()), |bytes: &[u8]| {
     let mut u = Unstructured::new(bytes);
     let mut maker = Maker { u: &mut u, accessors: Vec::new() };
     let Ok(mut document) = maker.document() else { return };
-    let data = u.take_rest();
+    let mut data = u.take_rest().to_vec();
     let half = data.len() / 2;
+    data[half..].iter_mut().for_each(|byte| *byte %= 4);
     document["bufferViews"] = json!([
         { "buffer": 0, "byteLength": data.len() },
         { "buffer": 0, "byteLength": data.len() - half, "byteOffset": half },
     ]);
     let mut file = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
-    for (kind, chunk) in [(b"JSON", document.to_string().as_bytes()), (b"BIN\0", data)] {
+    for (kind, chunk) in [(b"JSON", document.to_string().as_bytes()), (b"BIN\0", &data)] {
         file.extend((chunk.len() as u32).to_le_bytes());
         file.extend(kind);
         file.extend(chunk);
