@@ -28,7 +28,7 @@ mod thin;
 
 use std::f64::consts::{PI, TAU};
 
-pub use hollow::{TooThin, is_hollow};
+pub use hollow::{NoRoom, TooThin, has_room, is_hollow};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -5,7 +5,7 @@ use shellock_geom::TriMesh;
 use super::attempt::Failure;
 use super::budget::RATTLING_KEYS;
 use super::candidate::{self, Candidate};
-use super::{Effort, Explored, Job, KeySource, Kit, Settings};
+use super::{Effort, Explored, Job, KeySource, Kit, Planned, Settings};
 use crate::body::{BodyError, GridError};
 use crate::key::KeySite;
 use crate::metric::ChoiceError;
@@ -13,7 +13,7 @@ use crate::piece::PieceError;
 use crate::plan::Blocker;
 use crate::play;
 use crate::segmentation::{self, SegmentationError};
-use crate::strength::{Strength, StrengthError, TooThin};
+use crate::strength::{NoRoom, Strength, StrengthError, TooThin};
 use crate::verify::clearance::{KitGaps, kit_gaps};
 use crate::verify::limits::LEAST_SLOT_MM;
 use crate::verify::{Play, ThinFeature, ThinKind, thin_places};
@@ -68,6 +68,34 @@ pub enum DesignOutcome {
         /// Whether the time was over before all was tried: with more of it one may be found.
         is_cut_short: bool,
     },
+}
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct NoPlan {
+    /// Why, for people.
+    pub reason: String,
+    /// Whether the time was over before all keys were tried: with more of it one may be found.
+    pub is_cut_short: bool,
+}
+
+/// A plan, or why there is none, with a word on what was left out for want of time.
+pub(super) fn in_time(planned: Result<Planned, String>, is_cut_short: bool) -> Result<Planned, NoPlan> {
+    match planned {
+        Ok(mut planned) => {
+            planned.warnings.extend(is_cut_short.then(|| time_up(0)));
+            Ok(planned)
+        }
+        Err(reason) => Err(NoPlan {
+            reason: if is_cut_short {
+                lacking_time(&reason)
+            } else {
+                reason
+            },
+            is_cut_short,
+        }),
+    }
 }
 
 impl DesignOutcome {
@@ -253,7 +281,7 @@ fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
     }
 }
 
-/// Says that kits that were not made might be better.
+/// Says that kits that were not made, or before any kit plans that were not sought, might be better.
 pub(super) fn time_up(kits: usize) -> Warning {
     Warning {
         cause: Cause::TimeUp { kits },
@@ -384,6 +412,9 @@ pub enum DesignError {
     /// Hardly anything of it can be hollow.
     #[error(transparent)]
     TooThin(#[from] TooThin),
+    /// Connectors have no room behind the thinnest walls.
+    #[error(transparent)]
+    NoRoom(#[from] NoRoom),
     /// No triangle has the label that the key is to have.
     #[error("no part of the model has the label {0}, which the key is to have (--key)")]
     NoLabelOfKey(i64),

@@ -105,6 +105,7 @@ impl Wall {
                 Thickness::Auto => nominal.strength.thin_mm,
             };
             strength::is_hollow(model, thinnest_mm)?;
+            strength::has_room(model, thinnest_mm)?;
         }
         let ctx = &ctx.fork();
         let found = match params.thickness {
