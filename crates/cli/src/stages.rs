@@ -26,7 +26,7 @@ use crate::interrupt::Writing;
 use crate::output::{CERTIFICATE, PLAN, certificate_bytes};
 use crate::paint::painted;
 use crate::place::Standing;
-use crate::progress::{Display, PlanClock};
+use crate::progress::{Deadline, Display, PlanClock};
 use crate::told::{print_verdict, print_warnings, quality, weakest};
 
 /// Writes one file: whole or not at all.
@@ -159,7 +159,11 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
         display.show(p);
     };
     let is_time_up = || clock.is_up();
-    let ctx = Ctx::new(&report, &session.stop).with_time_limit(&is_time_up);
+    let deadline = Deadline::new(options.time, session.since);
+    let seconds_left = || deadline.seconds_left();
+    let ctx = Ctx::new(&report, &session.stop)
+        .with_time_limit(&is_time_up)
+        .with_deadline(&seconds_left);
     let planned = design::plan(&ctx, &params, &model.solid, model.labels.as_deref())
         .inspect_err(|_| display.finish())?;
     display.finish();
@@ -171,9 +175,9 @@ pub fn plan(session: &Session, file: &Path, options: &Options) -> Result<u8, Fai
         holding,
         warnings,
         ..
-    } = planned.map_err(|reason| Failure::NoPlan {
-        told: format!("no plan was found: {reason}"),
-        is_cut_short: false,
+    } = planned.map_err(|none| Failure::NoPlan {
+        told: format!("no plan was found: {}", none.reason),
+        is_cut_short: none.is_cut_short,
     })?;
     let steps = &plan.steps;
     if session.is_json {

@@ -33,7 +33,7 @@ use std::borrow::Cow;
 
 use shellock_geom::Solid;
 
-use crate::key::Turn;
+use crate::key::{KeySite, Turn};
 use crate::metric::{Chosen, Holding};
 use crate::plan::{PlanConstraints, PlanProof, survey};
 use crate::strength::StressMap;
@@ -46,7 +46,7 @@ use division::{Division, WallGrid, revised};
 use handover::Handover;
 pub use kit::Kit;
 use outcome::Best;
-pub use outcome::{Design, DesignError, DesignOutcome, PrintedFit};
+pub use outcome::{Design, DesignError, DesignOutcome, NoPlan, PrintedFit};
 pub use outlook::{Outlook, Verdict, first_division, outlook};
 pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
@@ -343,13 +343,13 @@ impl Planned {
 
 /// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and
 /// connector sizes. Where pieces have no plan it goes on with the next key, while [`design`] divides them anew
-/// first.
+/// first. No further key and no thicker wall is begun where the time is over ([`Ctx::seconds_left`]), which is told.
 pub fn plan(
     ctx: &Ctx,
     params: &Params,
     model: &Solid,
     labels: Option<&[i64]>,
-) -> Result<Result<Planned, String>, DesignError> {
+) -> Result<Result<Planned, NoPlan>, DesignError> {
     let params = &resolved(params, model, labels)?;
     let input = Input {
         params,
@@ -363,11 +363,16 @@ pub fn plan(
     };
     let wall = Wall::decide(ctx, params, model)?;
     let mut wall = wall.divided(ways::ways(&input)[0]);
-    let mut n_left = ask.n_thicker;
+    let (mut n_left, mut is_cut_short) = (ask.n_thicker, false);
     loop {
         let job = Job::new(ctx, &input, &wall, ask, n_left > 0)?;
-        match plan_with_wall(ctx, &job)? {
-            Walled::Done(planned) => return Ok(planned),
+        let places = candidate::places(ctx, &job)?;
+        let walled = first_with_a_plan(ctx, &job.pace, &places, |i, place| {
+            planned_with(ctx, &job, i, place)
+        })?;
+        is_cut_short |= job.pace.is_cut_short();
+        match walled {
+            Walled::Done(planned) => return Ok(outcome::in_time(planned, is_cut_short)),
             Walled::Thicker(thicker) => {
                 n_left -= 1;
                 wall = wall.thicker(ctx, &input, &thicker)?;
@@ -376,58 +381,81 @@ pub fn plan(
     }
 }
 
-/// The same with the wall as thick as it is.
-fn plan_with_wall(ctx: &Ctx, job: &Job<'_>) -> Result<Walled<Result<Planned, String>>, DesignError> {
+/// The plan with the first key that has one, or the thicker wall that it needs; else why the last key has none. Keys that
+/// no time is left for are left out, and that is recorded.
+fn first_with_a_plan<T>(
+    ctx: &Ctx,
+    pace: &Pace,
+    places: &[Option<KeySite>],
+    mut attempt: impl FnMut(usize, Option<&KeySite>) -> Result<Walled<Result<T, String>>, DesignError>,
+) -> Result<Walled<Result<T, String>>, DesignError> {
     let mut reason = String::new();
-    for (i, place) in candidate::places(ctx, job)?.iter().enumerate() {
-        let Some(candidate) = Candidate::new(job, i, place.as_ref()) else {
-            continue;
-        };
-        let mut budget = candidate.budget;
-        let mut division = candidate.division(ctx, job, candidate.surface.clone())?;
-        while let Some(current) = division {
-            let ctx = ctx.fork();
-            let Division {
-                surface,
-                settings,
-                chosen,
-                ..
-            } = &current;
-            current.tell(&ctx);
-            let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
-            let none = PlanConstraints::default();
-            let planning = Planning {
-                params: job.params,
-                model: job.model,
-                turn: &candidate.turn,
-                division: &current,
-                survey: &survey,
-                constraints: &none,
-                begun_s: job.begun_s,
-                pace: &job.pace,
-            };
-            let may_join = budget.foreseen_joinings > 0;
-            division = match attempt::next_plan(&ctx, &planning, may_join, &budget.levers)? {
-                Next::Plan(chosen) => {
-                    let own = (ctx.into_warnings(), job.wall.warnings.clone());
-                    let planned = Planned::of(&candidate.turn, &current.surface, *chosen, own);
-                    return Ok(Walled::Done(Ok(planned)));
-                }
-                Next::Weak(remedy) => {
-                    match strengthened(&ctx, job, &candidate, current, *remedy, &mut budget)? {
-                        Walled::Done(next) => Some(next),
-                        Walled::Thicker(thicker) => return Ok(Walled::Thicker(thicker)),
-                    }
-                }
-                Next::Joined(fewer) => Some(with_fewer(&ctx, job, &candidate, current, fewer, &mut budget)?),
-                Next::None(failure) => {
-                    reason = failure.reason;
-                    None
-                }
-            };
+    for (i, place) in places.iter().enumerate() {
+        if i > 0 && pace.is_late(ctx) {
+            pace.skip(ctx, "another key");
+            break;
+        }
+        match attempt(i, place.as_ref())? {
+            Walled::Done(Err(why)) if why.is_empty() => {}
+            Walled::Done(Err(why)) => reason = why,
+            ended => return Ok(ended),
         }
     }
     Ok(Walled::Done(Err(reason)))
+}
+
+/// The plan with the `i`-th key, or the thicker wall that it needs; else why there is none, in words or none.
+fn planned_with(
+    ctx: &Ctx,
+    job: &Job<'_>,
+    i: usize,
+    place: Option<&KeySite>,
+) -> Result<Walled<Result<Planned, String>>, DesignError> {
+    let no_plan = |reason| Ok(Walled::Done(Err(reason)));
+    let Some(candidate) = Candidate::new(job, i, place) else {
+        return no_plan(String::new());
+    };
+    let Some(mut division) = candidate.division(ctx, job, candidate.surface.clone())? else {
+        return no_plan(String::new());
+    };
+    let mut budget = candidate.budget;
+    loop {
+        let ctx = ctx.fork();
+        division.tell(&ctx);
+        let Division {
+            surface,
+            settings,
+            chosen,
+            ..
+        } = &division;
+        let survey = survey(&ctx, &settings.plan, surface, &surface.seams(), &chosen.sizes)?;
+        let planning = Planning {
+            params: job.params,
+            model: job.model,
+            turn: &candidate.turn,
+            division: &division,
+            survey: &survey,
+            constraints: &PlanConstraints::default(),
+            begun_s: job.begun_s,
+            pace: &job.pace,
+        };
+        let may_join = budget.foreseen_joinings > 0;
+        division = match attempt::next_plan(&ctx, &planning, may_join, &budget.levers)? {
+            Next::Plan(chosen) => {
+                let own = (ctx.into_warnings(), job.wall.warnings.clone());
+                let planned = Planned::of(&candidate.turn, surface, *chosen, own);
+                return Ok(Walled::Done(Ok(planned)));
+            }
+            Next::Weak(remedy) => {
+                match strengthened(&ctx, job, &candidate, division, *remedy, &mut budget)? {
+                    Walled::Done(next) => next,
+                    Walled::Thicker(thicker) => return Ok(Walled::Thicker(thicker)),
+                }
+            }
+            Next::Joined(fewer) => with_fewer(&ctx, job, &candidate, division, fewer, &mut budget)?,
+            Next::None(failure) => return no_plan(failure.reason),
+        };
+    }
 }
 
 /// What all kits of a job have in common.

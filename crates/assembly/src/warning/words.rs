@@ -243,6 +243,10 @@ impl Warning {
                     shortened(reasons)
                 ),
             ),
+            Cause::TimeUp { kits: 0 } => warning(
+                "time-up",
+                "the time was over (--time); with more time the plan may be another".into(),
+            ),
             Cause::TimeUp { kits } => warning(
                 "time-up",
                 format!(
@@ -651,6 +655,13 @@ mod tests {
             largest_mm2: 9.0,
         };
         assert_eq!(of(fact).severity(), Severity::Note);
+    }
+
+    #[test]
+    fn a_time_that_was_over_before_any_kit_speaks_of_the_plan_alone() {
+        let sentence = |kits| of(Cause::TimeUp { kits }).told().sentence;
+        assert!(!sentence(0).contains("kit"), "{}", sentence(0));
+        assert!(sentence(1).contains("after 1 kit,") && sentence(2).contains("after 2 kits,"));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What a job costs is counted, however it ends; what no time was left for is told.
+//! What a job may cost, and that it is counted, however it ends; what no time was left for is told.
 
 use shellock_geom::{Solid, Vec3};
 
@@ -145,4 +145,96 @@ fn pieces_that_are_not_divided_again_for_want_of_time_are_told() {
     assert!(is_cut_short(&late, 1));
     assert!(!is_cut_short(&late, 0), "nothing was left to try");
     assert!(!is_cut_short(&Ctx::quiet(), 0));
+}
+
+/// Keys that are tried for a plan with so many seconds left, where the second has one if `has_plan`; what came of it.
+fn keys_tried(seconds_left: f64, has_plan: bool) -> (usize, Result<(), String>, bool) {
+    let left = || seconds_left;
+    let (ctx, pace) = (Ctx::quiet().with_deadline(&left), Pace::default());
+    let mut n_tried = 0;
+    let walled = first_with_a_plan(&ctx, &pace, &[Some(site()), Some(site()), None], |i, _| {
+        n_tried += 1;
+        Ok(Walled::Done(if has_plan && i == 1 {
+            Ok(())
+        } else {
+            // A key that cannot be cut has nothing to say.
+            Err([format!("key {i}"), String::new()][i.min(1)].clone())
+        }))
+    });
+    let Ok(Walled::Done(planned)) = walled else {
+        panic!("no wall is too thin")
+    };
+    (n_tried, planned, pace.is_cut_short())
+}
+
+#[test]
+fn keys_that_no_time_is_left_to_plan_for_are_told() {
+    let reason = || Err("key 0".to_owned());
+    assert_eq!(keys_tried(1.0, true), (2, Ok(()), false));
+    assert_eq!(keys_tried(1.0, false), (3, reason(), false));
+    for has_plan in [true, false] {
+        assert_eq!(keys_tried(0.0, has_plan), (1, reason(), true));
+    }
+}
+
+#[test]
+fn a_plan_and_the_lack_of_one_tell_that_the_time_was_over() {
+    let planned = || {
+        let kit = good();
+        Planned {
+            surface: kit.surface,
+            plan: kit.plan,
+            proof: kit.proof,
+            mean_cost: 1.0,
+            n_plans: 1,
+            holding: kit.holding,
+            warnings: Vec::new(),
+        }
+    };
+    for is_cut_short in [false, true] {
+        let found = outcome::in_time(Ok(planned()), is_cut_short);
+        let codes: Vec<&str> = found
+            .as_ref()
+            .map_or(Vec::new(), |p| p.warnings.iter().map(|w| w.code()).collect());
+        assert_eq!(codes.contains(&"time-up"), is_cut_short);
+        let Err(none) = outcome::in_time(Err("why".to_owned()), is_cut_short) else {
+            panic!("there is no plan")
+        };
+        assert_eq!(none.is_cut_short, is_cut_short);
+        assert_eq!(none.reason == "why", !is_cut_short);
+        assert!(none.reason.contains("why"));
+    }
+}
+
+#[test]
+fn cut_keys_cost_less_than_a_piece_that_is_the_key() {
+    let rounds = Rounds::default();
+    let of_piece = Budget::of_piece(&rounds);
+    for i in 0..budget::KITS_OF_CUT_KEYS.len() {
+        let cut = Budget::of_cut_key(&rounds, i);
+        assert!(
+            cut.kits < of_piece.kits
+                && cut.kits_each < of_piece.kits_each
+                && cut.revisions < of_piece.revisions
+        );
+    }
+    let few = Budget::of_cut_key(
+        &Rounds {
+            kits: 1,
+            refinements: 0,
+            kits_in_all: 1,
+        },
+        0,
+    );
+    assert_eq!(
+        (few.kits_each, few.kits, few.revisions),
+        (1, 1, 0),
+        "the user's bounds are bounds"
+    );
+    let half_gone = |gone| {
+        let mut left = of_piece;
+        left.revisions -= gone;
+        left.is_half_gone()
+    };
+    assert_eq!([0, 1, 2, 3].map(half_gone), [false, false, true, true]);
 }

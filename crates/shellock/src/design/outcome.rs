@@ -5,7 +5,7 @@ use shellock_geom::TriMesh;
 use super::attempt::Failure;
 use super::budget::RATTLING_KEYS;
 use super::candidate::{self, Candidate};
-use super::{Effort, Explored, Job, KeySource, Kit, Settings};
+use super::{Effort, Explored, Job, KeySource, Kit, Planned, Settings};
 use crate::body::{BodyError, GridError};
 use crate::key::KeySite;
 use crate::metric::ChoiceError;
@@ -68,6 +68,34 @@ pub enum DesignOutcome {
         /// Whether the time was over before all was tried: with more of it one may be found.
         is_cut_short: bool,
     },
+}
+
+/// Why there is no plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct NoPlan {
+    /// Why, for people.
+    pub reason: String,
+    /// Whether the time was over before all keys were tried: with more of it one may be found.
+    pub is_cut_short: bool,
+}
+
+/// A plan, or why there is none, with a word on what was left out for want of time.
+pub(super) fn in_time(planned: Result<Planned, String>, is_cut_short: bool) -> Result<Planned, NoPlan> {
+    match planned {
+        Ok(mut planned) => {
+            planned.warnings.extend(is_cut_short.then(|| time_up(0)));
+            Ok(planned)
+        }
+        Err(reason) => Err(NoPlan {
+            reason: if is_cut_short {
+                lacking_time(&reason)
+            } else {
+                reason
+            },
+            is_cut_short,
+        }),
+    }
 }
 
 impl DesignOutcome {
@@ -253,7 +281,7 @@ fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
     }
 }
 
-/// Says that kits that were not made might be better.
+/// Says that kits that were not made, or before any kit plans that were not sought, might be better.
 pub(super) fn time_up(kits: usize) -> Warning {
     Warning {
         cause: Cause::TimeUp { kits },

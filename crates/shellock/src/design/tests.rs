@@ -336,39 +336,6 @@ fn joints_that_came_out_too_short_are_not_counted_on_again_where_something_is_lo
     );
 }
 
-#[test]
-fn cut_keys_cost_less_than_a_piece_that_is_the_key() {
-    let rounds = Rounds::default();
-    let of_piece = Budget::of_piece(&rounds);
-    for i in 0..budget::KITS_OF_CUT_KEYS.len() {
-        let cut = Budget::of_cut_key(&rounds, i);
-        assert!(
-            cut.kits < of_piece.kits
-                && cut.kits_each < of_piece.kits_each
-                && cut.revisions < of_piece.revisions
-        );
-    }
-    let few = Budget::of_cut_key(
-        &Rounds {
-            kits: 1,
-            refinements: 0,
-            kits_in_all: 1,
-        },
-        0,
-    );
-    assert_eq!(
-        (few.kits_each, few.kits, few.revisions),
-        (1, 1, 0),
-        "the user's bounds are bounds"
-    );
-    let half_gone = |gone| {
-        let mut left = of_piece;
-        left.revisions -= gone;
-        left.is_half_gone()
-    };
-    assert_eq!([0, 1, 2, 3].map(half_gone), [false, false, true, true]);
-}
-
 /// A job on a ball, of which no kit is made.
 pub(super) struct Ball {
     pub model: Solid,
