@@ -116,34 +116,21 @@ pub(super) fn plans(
         };
         let grid = wall.get()?;
         let distances = distances.as_ref().expect("they were measured beside the plan");
-        let kit = match make(
-            kit_ctx,
-            Recipe {
-                params,
-                division,
-                model: job.model,
-                turn,
-                grid,
-                distances,
-                chosen,
-            },
-        ) {
-            Err(DesignError::Body(BodyError::Blocked {
-                piece,
-                separation,
-                kept,
-            })) => {
-                learned.give_up(
-                    ctx,
-                    Lesson::Blocked {
-                        piece,
-                        separation,
-                        kept,
-                    },
-                );
+        let recipe = Recipe {
+            params,
+            division,
+            model: job.model,
+            turn,
+            grid,
+            distances,
+            chosen,
+        };
+        let kit = match unless_blocked(make(kit_ctx, recipe))? {
+            Ok(kit) => kit,
+            Err(lesson) => {
+                learned.give_up(ctx, lesson);
                 continue;
             }
-            made => made?,
         };
         job.pace.made(ctx, left_s);
         budget.kits -= 1;
@@ -159,6 +146,22 @@ pub(super) fn plans(
         reason,
         ..learned.failure
     }))
+}
+
+/// The kit, or the lesson of a piece that something stands in the way of.
+fn unless_blocked(made: Result<Kit, DesignError>) -> Result<Result<Kit, Lesson>, DesignError> {
+    match made {
+        Err(DesignError::Body(BodyError::Blocked {
+            piece,
+            separation,
+            kept,
+        })) => Ok(Err(Lesson::Blocked {
+            piece,
+            separation,
+            kept,
+        })),
+        made => made.map(Ok),
+    }
 }
 
 /// What the plans and kits of a division taught so far.
