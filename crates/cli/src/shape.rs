@@ -71,12 +71,10 @@ pub fn filled_again(solid: Solid, repairs: &[&str]) -> Solid {
 
 /// Makes `model` the filled body, with a word on it.
 fn take(model: &mut Model, filled: Filled, hollow: &HollowBody) {
-    let of_source = |values: &[u32]| filled.source_face.iter().map(|&f| values[f as usize]).collect();
-    model.file_face = of_source(&model.file_face);
-    model.labels = model
-        .labels
-        .take()
-        .map(|labels| filled.source_face.iter().map(|&f| labels[f as usize]).collect());
+    let source = &filled.source_face;
+    model.file_face = source.iter().map(|&f| model.file_face[f as usize]).collect();
+    let labels = model.labels.take();
+    model.labels = labels.map(|labels| source.iter().map(|&f| labels[f as usize]).collect());
     model.solid = filled.solid;
     let openings = &hollow.openings;
     let n = match openings.len() {
