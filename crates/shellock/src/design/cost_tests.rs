@@ -37,8 +37,10 @@ fn halves(ctx: &Ctx, params: &Params) -> (Result<DesignOutcome, DesignError>, Ef
 
 /// A piece is the key, and nothing is divided again.
 fn at_once() -> Params {
-    let mut params = Params::default();
-    params.key = KeySource::Flattest;
+    let mut params = Params {
+        key: KeySource::Flattest,
+        ..Params::default()
+    };
     params.rounds.refinements = 0;
     params
 }
