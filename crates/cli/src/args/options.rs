@@ -90,12 +90,17 @@ pub struct Options {
     /// Make one plate of a slicer's project
     ///
     /// Which plate of a slicer's project is made, by its number or its name
-    #[arg(long, value_name = "N|NAME", help_heading = "Surface")]
+    #[arg(hide_short_help = true, long, value_name = "N|NAME", help_heading = "Surface")]
     pub plate: Option<String>,
     /// Refuse a surface that needs repair
     ///
     /// Refuse a surface that needs repair instead of mending it
-    #[arg(long, help_heading = "Surface", conflicts_with = "largest")]
+    #[arg(
+        hide_short_help = true,
+        long,
+        help_heading = "Surface",
+        conflicts_with = "largest"
+    )]
     pub no_repair: bool,
     /// Of several bodies make the largest
     ///
@@ -106,7 +111,7 @@ pub struct Options {
     ///
     /// Close the openings of a model that is hollow already, as slicers for resin make it, and make the solid
     /// figure of it
-    #[arg(long, help_heading = "Surface")]
+    #[arg(hide_short_help = true, long, help_heading = "Surface")]
     pub fill: bool,
     /// A body inside out that overlaps another: ask, cut or unite
     ///
