@@ -55,18 +55,21 @@ pub fn settle_hollow(model: &mut Model, options: &Options) -> Result<(), Failure
     )))
 }
 
-/// The filled body that a kit with these repairs was made from, where it was made from one.
-pub fn filled_again(solid: Solid, repairs: &[&str]) -> Solid {
-    let was_filled = repairs.contains(&RepairKind::Drained { volume: 0.0 }.code());
-    let found = if was_filled {
-        find_hollow(&solid, LEAST_FILLED)
-    } else {
-        None
-    };
-    match found.map(|hollow| fill(&solid, &hollow)) {
-        Some(Ok(filled)) => filled.solid,
-        _ => solid,
+/// The body that a kit with these repairs was made from: filled again, where it was filled then.
+///
+/// Refuses a body that cannot be filled again, since a verdict on the hollow one would be of another shape.
+pub fn filled_again(solid: Solid, repairs: &[&str]) -> Result<Solid, String> {
+    if !repairs.contains(&RepairKind::Drained { volume: 0.0 }.code()) {
+        return Ok(solid);
     }
+    let hollow = find_hollow(&solid, LEAST_FILLED).ok_or_else(|| {
+        "the kit was made of a hollow model that was filled, but no cavity is found in this one: name the model that the \
+         kit was made from"
+            .to_owned()
+    })?;
+    fill(&solid, &hollow)
+        .map(|filled| filled.solid)
+        .map_err(|e| e.to_string())
 }
 
 /// Makes `model` the filled body, with a word on it.
@@ -241,6 +244,10 @@ mod tests {
             model.notes
         );
         // What was filled once is filled again the same way.
-        assert!(filled_again(before, &[repair.kind.code()]) == model.solid);
+        let kinds = [repair.kind.code()];
+        assert!(filled_again(before.clone(), &kinds).as_ref() == Ok(&model.solid));
+        assert!(filled_again(before.clone(), &[]).as_ref() == Ok(&before));
+        // Nothing is judged in place of what was filled.
+        assert!(filled_again(model.solid, &kinds).is_err());
     }
 }

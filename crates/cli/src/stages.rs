@@ -311,9 +311,9 @@ pub fn model_of(kit: &Path, plan: &PlanFile, model: Option<&Path>) -> Result<Sol
             t[4 * r] * p.x + t[4 * r + 1] * p.y + t[4 * r + 2] * p.z + t[4 * r + 3]
         }));
     }
-    Solid::new(mesh)
-        .map(|solid| filled_again(solid, &repairs))
-        .map_err(|e| broken(kit)(format!("with its transform the model is no solid: {e}")))
+    let solid = Solid::new(mesh)
+        .map_err(|e| broken(kit)(format!("with its transform the model is no solid: {e}")))?;
+    filled_again(solid, &repairs).map_err(broken(kit))
 }
 
 /// What a plan file names.

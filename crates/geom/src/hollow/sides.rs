@@ -27,6 +27,8 @@ const DEPTH_SHARE: f64 = 0.2;
 /// have narrower places behind them.
 const CREASE_SHARE: f64 = 0.25;
 const COS_CREASE: f64 = 0.866_025_403_784_438_6;
+/// An opening is no deeper than so many walls.
+const DEEPEST_WALLS: f64 = 1.5;
 /// Steps of the capacities, a millimetre.
 const STEPS_PER_MM: f64 = 1e6;
 
@@ -145,18 +147,7 @@ impl<'a> Sides<'a> {
     /// Moves each rim within its opening to where it is shortest, of such lines to the outermost. Openings are as
     /// deep as a wall of `wall_mm`, or somewhat deeper.
     pub(super) fn tighten(&mut self, wall_mm: f64, cell_mm: f64) {
-        let near: Vec<(Vec3, f64)> = self
-            .rims()
-            .iter()
-            .map(|rim| (rim.center, 2.0 * rim.radius_mm + 1.5 * wall_mm + 2.0 * cell_mm))
-            .collect();
-        let is_free: Vec<bool> = (0..self.is_cavity.len())
-            .map(|face| {
-                let corners = self.mesh.corners(face);
-                near.iter()
-                    .any(|&(center, mm)| corners.iter().all(|p| p.distance(center) <= mm))
-            })
-            .collect();
+        let is_free = self.near_rims(wall_mm, cell_mm);
         let depth_mm = self.depths(&is_free);
         // Source and sink stand for all that is fixed.
         let (source, sink) = (0, 1);
@@ -185,6 +176,23 @@ impl<'a> Sides<'a> {
                 self.is_cavity[face] = !is_open[node as usize];
             }
         }
+    }
+
+    /// For each triangle, whether it is so near a rim that it may lie in its opening: within the ball around the
+    /// rim's middle that holds a channel as wide as the rim and as deep as openings are.
+    fn near_rims(&self, wall_mm: f64, cell_mm: f64) -> Vec<bool> {
+        let reach_mm = |rim: &Rim| rim.radius_mm.hypot(DEEPEST_WALLS * wall_mm) + 2.0 * cell_mm;
+        let near: Vec<(Vec3, f64)> = self
+            .rims()
+            .iter()
+            .map(|rim| (rim.center, reach_mm(rim)))
+            .collect();
+        let is_near = |face: usize| {
+            let corners = self.mesh.corners(face);
+            near.iter()
+                .any(|&(center, mm)| corners.iter().all(|p| p.distance(center) <= mm))
+        };
+        (0..self.is_cavity.len()).map(is_near).collect()
     }
 
     /// Length of an edge, mm, less where it is a crease.
