@@ -80,13 +80,12 @@ impl Seam {
         out
     }
 
-    /// Points along the seam about `step_mm` apart on the outer surface, moved inwards by `depth_mm`: where a
-    /// wall of that thickness has its inner edge, up to the detail of the surface, which is smoothed away.
-    pub(crate) fn below(&self, depth_mm: f64, step_mm: f64) -> Vec<Vec3> {
+    /// `n` + 1 points at equal distances along the seam, moved inwards by `depth_mm`: where a wall of that
+    /// thickness has its inner edge, up to the detail of the surface, which is smoothed away.
+    pub(crate) fn below(&self, depth_mm: f64, n: usize) -> Vec<Vec3> {
         /// Rounds of averaging the normals with their neighbours: bumps narrower than some steps do not show
         /// inside.
         const ROUNDS: usize = 3;
-        let n = (self.length() / step_mm).ceil().max(1.0) as usize;
         let stations = self.resampled(n);
         let mut normals: Vec<Vec3> = stations.iter().map(|s| s.1).collect();
         for _ in 0..ROUNDS {
@@ -110,7 +109,8 @@ impl Seam {
         if depth_mm <= 0.0 {
             return self.length();
         }
-        self.below(depth_mm, STEP_MM)
+        let n = (self.length() / STEP_MM).ceil().max(1.0) as usize;
+        self.below(depth_mm, n)
             .windows(2)
             .map(|w| w[0].distance(w[1]))
             .sum()

@@ -6,6 +6,8 @@ mod made;
 
 use std::sync::LazyLock;
 
+use shellock::connector::Run;
+use shellock::plan::interface::contacts;
 use shellock::segmentation::{SegmentationParams, segment};
 use shellock::{Ctx, PatchId};
 use shellock_geom::bvh::TriangleBvh;
@@ -100,4 +102,28 @@ fn every_outer_triangle_lies_on_its_own_patch_of_the_model_and_together_they_are
         all < whole * (1.0 + 1e-6) && all > 0.98 * whole,
         "{all} of {whole} mm²"
     );
+}
+
+#[test]
+fn a_plan_expects_no_longer_runs_than_are_made() {
+    let kit = kit();
+    let found = contacts(&kit.settings.plan, &kit.surface, &kit.surface.seams(), &kit.sizes);
+    assert_eq!(found.len(), 12, "octants meet along twelve seams");
+    for contact in &found {
+        let later = [contact.a, contact.b]
+            .into_iter()
+            .max_by_key(|&p| kit.found.position(p))
+            .unwrap();
+        let expected_mm = contact.joint(later, kit.found.separation(later)).run_mm;
+        let is_of_pair = |run: &&Run| {
+            [run.male, run.female].contains(&contact.a) && [run.male, run.female].contains(&contact.b)
+        };
+        let made = kit.runs.iter().filter(is_of_pair).map(Run::length);
+        let longest_mm = made.fold(0.0, f64::max);
+        assert!(
+            expected_mm < longest_mm + 2.0,
+            "{:?}: {expected_mm} mm expected, {longest_mm} mm made",
+            [contact.a, contact.b]
+        );
+    }
 }

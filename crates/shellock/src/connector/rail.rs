@@ -9,7 +9,7 @@ use shellock_geom::Vec3;
 use super::ConnectorParams;
 use super::frame::Curve;
 use super::run::{RailPart, Run, RunShape, RunStation, has_room};
-use crate::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, end_gap_mm};
+use crate::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, SHORTEST_RAIL_SIZES, end_gap_mm};
 
 /// The seam may leave a straight line by this much across, and the wall's inner side by this much up and
 /// down, in connector sizes.
@@ -17,8 +17,6 @@ const MOST_ASIDE_SIZES: f64 = 0.16;
 const MOST_UNEVEN_SIZES: f64 = 0.3;
 /// What passes over a tongue is no farther across from the seam than this, in connector sizes.
 const REACH_SIZES: f64 = 1.2;
-/// Shortest rail, in connector sizes.
-const SHORTEST_SIZES: f64 = 2.0;
 /// Length of the narrow tip and of the stop, in connector sizes.
 const LEAD_IN_SIZES: f64 = 0.5;
 const STOP_SIZES: f64 = 0.45;
@@ -104,7 +102,7 @@ fn along_slide(curve: &Curve, slide: Vec3, size_mm: f64) -> Vec<(usize, usize)> 
     let mut from = 0;
     while from < curve.points.len() {
         let to = from + (from..curve.points.len()).take_while(|&i| is_along(i)).count();
-        if to > from + 1 && arc_mm[to - 1] - arc_mm[from] >= SHORTEST_SIZES * size_mm {
+        if to > from + 1 && arc_mm[to - 1] - arc_mm[from] >= SHORTEST_RAIL_SIZES * size_mm {
             found.push((from, to - 1));
         }
         from = to + 1;
@@ -120,7 +118,7 @@ fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Op
     let mut rest = &places[..];
     loop {
         let length = rest[rest.len() - 1][0] - rest[0][0];
-        if rest.len() < 3 || length < SHORTEST_SIZES * size_mm {
+        if rest.len() < 3 || length < SHORTEST_RAIL_SIZES * size_mm {
             return None;
         }
         let (middle, slope) = fitted(rest);
@@ -202,7 +200,7 @@ fn rail(
         .collect();
     let (from, to) = longest(&free)?;
     let (start, end) = (arc(from), arc(to));
-    if end - start < SHORTEST_SIZES * size_mm {
+    if end - start < SHORTEST_RAIL_SIZES * size_mm {
         return None;
     }
     let places = rail_places([start, end], size_mm, clearance_mm);

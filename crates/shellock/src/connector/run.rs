@@ -6,11 +6,10 @@ use super::frame::Curve;
 use super::rail::rails;
 use super::{ConnectorParams, Section};
 use crate::plan::LatticePlan;
-use crate::seam::rules::{MAX_ALONG_SEAM, MAX_BACKWARD_RAD, ROLE_HYSTERESIS, SHORTEST_RUN_SIZES, end_gap_mm};
+use crate::seam::later_is_male;
+use crate::seam::rules::{MAX_ALONG_SEAM, MAX_BACKWARD_RAD, SHARPEST_TURN, SHORTEST_RUN_SIZES, end_gap_mm};
 use crate::{ConnectorSizes, PatchId};
 
-/// Frames that turn by more than this between neighbouring points, rad, cannot be swept.
-const SHARPEST_TURN: f64 = 0.42;
 /// A cell of a run may leave its curve by this much, mm, turn by this much, rad, and be this long, mm.
 const CELL_SAG_MM: f64 = 0.03;
 const CELL_TURN: f64 = 0.12;
@@ -129,7 +128,7 @@ pub fn runs(
     let (mut runs, mut contacts) = (Vec::new(), Vec::new());
     for curve in curves {
         let separation = plan.separation(curve.later).unit();
-        let later_is_male = roles(curve, separation);
+        let later_is_male = later_is_male(curve.normals.iter().copied(), separation);
         let size_mm = sizes.of(curve.later, curve.earlier);
         let clearance_mm = params.clearance_of(slide.is_some() && curve.later == plan.key());
         let at = |i: usize| RunStation {
@@ -183,24 +182,6 @@ fn sides(curve: &Curve, later_is_male: bool) -> (PatchId, PatchId) {
     } else {
         (curve.earlier, curve.later)
     }
-}
-
-/// Whether the later piece carries the pin at each point: where it leaves outwards.
-fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
-    let outwards: Vec<f64> = curve.normals.iter().map(|n| n.dot(separation)).collect();
-    let mut role = outwards
-        .iter()
-        .find(|o| o.abs() > ROLE_HYSTERESIS)
-        .is_none_or(|o| *o > 0.0);
-    outwards
-        .iter()
-        .map(|&o| {
-            if o.abs() > ROLE_HYSTERESIS {
-                role = o > 0.0;
-            }
-            role
-        })
-        .collect()
 }
 
 fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_mm: f64) -> RunStation {

@@ -28,6 +28,12 @@ pub const COUNTED_RUN_SIZES: [f64; 3] = [2.5, 1.85, SHORTEST_RUN_SIZES];
 /// ones that came loose.
 pub const SHORTEST_RUN_SIZES: f64 = 1.2;
 
+/// Shortest rail that is made, in connector sizes D.
+pub const SHORTEST_RAIL_SIZES: f64 = 2.0;
+
+/// Frames that turn by more than this between neighbouring points of a line, rad, cannot be swept.
+pub const SHARPEST_TURN: f64 = 0.42;
+
 /// Room kept free at both ends of an open seam, where three pieces meet, in connector sizes D: least, most,
 /// and in between the share of the seam. The connectors of three seams have room side by side with the most;
 /// with the least they take a part of each other.

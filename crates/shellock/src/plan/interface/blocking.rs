@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use shellock_geom::Vec3;
 use shellock_mechanics::connector::{PIN_DEPTH, PIN_WIDTH};
 
-use super::{Sample, Way};
+use super::sample::{Line, Sample, Way};
 use crate::plan::PlanParams;
 use crate::push::{self, N_PUSHES};
 use crate::{LatticeDirection, PatchId};
@@ -49,7 +49,7 @@ impl BlockingTable {
         params: &PlanParams,
         size_mm: f64,
         pair: [PatchId; 2],
-        lines: &[(&[Sample], bool)],
+        lines: &[&Line],
         holds: impl Fn(usize, LatticeDirection) -> bool + Sync,
     ) -> Self {
         let pushes = push::directions();
@@ -62,8 +62,11 @@ impl BlockingTable {
             let side = if order == 0 { 1.0 } else { -1.0 };
             let way = Way::new(params, pair, side, s);
             if holds(order, s) {
-                for x in lines.iter().flat_map(|l| l.0).filter(|x| way.carries(x)) {
-                    add(params, size_mm, x, way, &pushes, &mut held);
+                for line in lines {
+                    let runs = line.runs(way).into_iter().filter(|run| run.is_made(size_mm));
+                    for i in runs.flat_map(|run| run.samples) {
+                        add(params, size_mm, &line.samples[i], way, &pushes, &mut held);
+                    }
                 }
             }
             held.map(|pushes| pushes.map(|mm3| mm3 as f32))

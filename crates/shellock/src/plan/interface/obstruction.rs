@@ -27,6 +27,10 @@ const BESIDE_SIZES: f64 = 0.5;
 const LOCAL_WALL: f64 = 1.3;
 /// Least cosine between a ray and the surface normal at which the ray leaves through the wall above.
 const LEAVES_ABOVE: f64 = 0.3;
+/// A point is below a wall with this share of its thickness above it, and no such point is near one that was
+/// moved so often from wall to wall.
+const ENOUGH_WALL: f64 = 0.95;
+const MOST_MOVES: usize = 8;
 /// Walls that a ray is followed through, and the step past each, mm.
 const MOST_WALLS: usize = 8;
 const PAST_WALL_MM: f64 = 0.01;
@@ -59,6 +63,23 @@ impl<'a> Obstructions<'a> {
             wall_mm: params.wall_mm,
             far_mm: surface.mesh.bounds().diagonal(),
         })
+    }
+
+    /// The point on the inner side of the wall next to `point`, which lies below one wall by its thickness but
+    /// may be nearer to another, as below an edge of the model. `None` where the walls leave no room.
+    pub fn at_depth(&self, mut point: Vec3) -> Option<Vec3> {
+        for _ in 0..MOST_MOVES {
+            let limit_mm = ENOUGH_WALL * self.wall_mm;
+            let Some(near) = self.bvh.nearest(point, limit_mm * limit_mm) else {
+                return Some(point);
+            };
+            let inwards = (point - near.point).try_normalize()?;
+            if inwards.dot(self.surface.mesh.face_normal(near.face as usize)) >= 0.0 {
+                return None;
+            }
+            point = near.point + self.wall_mm * inwards;
+        }
+        None
     }
 
     /// What obstructs a connector of `size_mm` between `a` and `b` below `point` of the outer surface; `across`

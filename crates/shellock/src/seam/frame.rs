@@ -1,0 +1,158 @@
+//! Smooth lines with a frame at every point: what a connector is swept along, and what a plan expects of it.
+
+use shellock_geom::Vec3;
+
+use super::rules::ROLE_HYSTERESIS;
+
+/// Distance between the points of a line, mm: half the finest connector, so that smoothing keeps the seam's
+/// shape.
+const STEP_MM: f64 = 1.0;
+/// Rounds of averaging with the neighbours. They take out the grid's ripple (period one to two cells) and
+/// little else.
+const SMOOTHING_ROUNDS: usize = 6;
+/// Shortest line that has points of its own, mm.
+const SHORTEST_MM: f64 = 4.0 * STEP_MM;
+
+/// A smooth line on the inner side of the wall.
+#[derive(Clone, Debug)]
+pub(crate) struct FramedLine {
+    /// Points about 1 mm apart. A loop's last point is its first.
+    pub points: Vec<Vec3>,
+    /// Unit tangents `u`.
+    pub tangents: Vec<Vec3>,
+    /// Outward unit normals `N`, perpendicular to `u`.
+    pub normals: Vec<Vec3>,
+}
+
+impl FramedLine {
+    /// The smooth line along `polyline`; `outward(at, point)` is the surface's outward normal where the point
+    /// lies, `at` counted in vertices of the polyline. `None` where it is too short, or its normals vanish.
+    pub fn along(polyline: &[Vec3], is_loop: bool, outward: impl Fn(f64, Vec3) -> Vec3) -> Option<Self> {
+        let length_mm: f64 = polyline.windows(2).map(|w| w[0].distance(w[1])).sum();
+        if length_mm < SHORTEST_MM {
+            return None;
+        }
+        let (at, points): (Vec<f64>, Vec<Vec3>) = resampled(polyline, STEP_MM).into_iter().unzip();
+        let points = smoothed(points, is_loop, SMOOTHING_ROUNDS);
+        let tangents = tangents(&points, is_loop);
+        let raw: Vec<Vec3> = at.iter().zip(&points).map(|(&at, &p)| outward(at, p)).collect();
+        let normals: Vec<Vec3> = smoothed(raw, is_loop, SMOOTHING_ROUNDS)
+            .into_iter()
+            .zip(&tangents)
+            .map(|(n, u)| (n - n.dot(*u) * *u).normalize_or_zero())
+            .collect();
+        (!normals.contains(&Vec3::ZERO)).then_some(Self {
+            points,
+            tangents,
+            normals,
+        })
+    }
+
+    /// Distance of each point from the first along the line, mm.
+    pub fn arcs_mm(&self) -> Vec<f64> {
+        let mut arcs = vec![0.0];
+        for w in self.points.windows(2) {
+            arcs.push(arcs[arcs.len() - 1] + w[0].distance(w[1]));
+        }
+        arcs
+    }
+}
+
+/// Whether the later piece, which leaves along `separation`, carries the pin at each place with these outward
+/// normals: where it leaves outwards.
+pub(crate) fn later_is_male(normals: impl Iterator<Item = Vec3> + Clone, separation: Vec3) -> Vec<bool> {
+    let outwards = normals.map(|n| n.dot(separation));
+    let mut role = outwards
+        .clone()
+        .find(|o| o.abs() > ROLE_HYSTERESIS)
+        .is_none_or(|o| o > 0.0);
+    outwards
+        .map(|o| {
+            if o.abs() > ROLE_HYSTERESIS {
+                role = o > 0.0;
+            }
+            role
+        })
+        .collect()
+}
+
+/// The polyline again with points at equal distances of about `step_mm` along it, ends kept: where each lies,
+/// counted in vertices of the polyline, and the point.
+fn resampled(line: &[Vec3], step_mm: f64) -> Vec<(f64, Vec3)> {
+    let mut at = vec![0.0];
+    for w in line.windows(2) {
+        at.push(at[at.len() - 1] + w[0].distance(w[1]));
+    }
+    let length = at[at.len() - 1];
+    let n = (length / step_mm).round().max(2.0) as usize;
+    let mut segment = 0;
+    (0..=n)
+        .map(|i| {
+            let s = length * i as f64 / n as f64;
+            while segment + 2 < at.len() && at[segment + 1] < s {
+                segment += 1;
+            }
+            let span = at[segment + 1] - at[segment];
+            let t = if span > 0.0 {
+                ((s - at[segment]) / span).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            (segment as f64 + t, line[segment].lerp(line[segment + 1], t))
+        })
+        .collect()
+}
+
+/// Repeated averaging ¼ ½ ¼ along a line; ends stay, a loop's first and last value stay equal.
+fn smoothed(mut values: Vec<Vec3>, is_loop: bool, rounds: usize) -> Vec<Vec3> {
+    let n = values.len();
+    for _ in 0..rounds {
+        let old = values.clone();
+        for i in 1..n - 1 {
+            values[i] = 0.5 * old[i] + 0.25 * (old[i - 1] + old[i + 1]);
+        }
+        if is_loop {
+            values[0] = 0.5 * old[0] + 0.25 * (old[n - 2] + old[1]);
+            values[n - 1] = values[0];
+        }
+    }
+    values
+}
+
+fn tangents(points: &[Vec3], is_loop: bool) -> Vec<Vec3> {
+    let n = points.len();
+    (0..n)
+        .map(|i| {
+            let before = if i > 0 {
+                i - 1
+            } else if is_loop {
+                n - 2
+            } else {
+                0
+            };
+            let after = if i + 1 < n {
+                i + 1
+            } else if is_loop {
+                1
+            } else {
+                n - 1
+            };
+            (points[after] - points[before]).normalize_or_zero()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resampling_keeps_ends_and_spacing() {
+        let line = [Vec3::ZERO, Vec3::X, 1.3 * Vec3::X, Vec3::new(1.3, 5.0, 0.0)];
+        let (at, points): (Vec<f64>, Vec<Vec3>) = resampled(&line, 1.0).into_iter().unzip();
+        assert_eq!((at[0], at[at.len() - 1]), (0.0, 3.0));
+        assert_eq!((points[0], points[points.len() - 1]), (line[0], line[3]));
+        let arcs: Vec<f64> = points.windows(2).map(|w| w[0].distance(w[1])).collect();
+        assert!(arcs.iter().all(|a| *a <= 6.3 / 6.0 + 1e-12 && *a > 0.6));
+    }
+}
