@@ -52,7 +52,7 @@ pub use params::{KeySource, Params, Rounds, Thickness};
 pub use settings::Settings;
 use strengthen::{Remedy, Thicker};
 use wall::Wall;
-use ways::{Ask, Ended, Input, Walls, in_turn, with_reserve};
+use ways::{Ask, Ended, Input, Walls, try_ways, with_reserve};
 
 /// Makes a kit of `model` (mm), from `labels` (one a triangle) where given. Kits are made until one passes or
 /// the rounds are used up; then the best of them is returned, its failures told.
@@ -84,7 +84,7 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
     let total_s = ctx.seconds_left();
     let mut effort = Effort::default();
     let mut thin: Option<Cow<'_, Wall>> = None;
-    let ended = in_turn(ctx, &ways, |i, way| {
+    let ended = try_ways(ctx, &ways, |i, way| {
         let is_last = i + 1 == ways.len();
         let rounds = if is_last { input.params.rounds } else { few };
         let reserved_s = ways::reserved_s(total_s, i, ways.len());
@@ -95,14 +95,14 @@ fn one_way_or_another(ctx: &Ctx, input: &Input<'_>, thinnest: &Wall) -> Result<D
             Some(thin) => thin,
             none => match thinnest.thin(&in_time, input) {
                 Ok(wall) => none.insert(wall),
-                Err(e) => return Ended::of(Err(e)),
+                Err(e) => return Ended::new(Err(e)),
             },
         };
         let ended = with_reserve(&in_time, input, &wall.divided(way), way.ask(rounds), &mut effort);
         in_time.into_warnings().into_iter().for_each(|w| ctx.warn(w));
         ended
     });
-    ended.concluded(effort)
+    ended.conclude(effort)
 }
 
 /// The same with regions to keep whole as triangles of the model, where labels name them.
@@ -120,7 +120,7 @@ enum Walled<T> {
     Thicker(Thicker),
 }
 
-/// The job with the wall as thick as it is. What it costs is added to `effort`, however it ends.
+/// Runs the job with the wall as thick as it is, and adds the cost to `effort`, however it ends.
 fn with_wall(ctx: &Ctx, job: &Job<'_>, effort: &mut Effort) -> Result<Walled<DesignOutcome>, DesignError> {
     let mut best = Best::default();
     let places = candidate::places(ctx, job)?;
@@ -164,7 +164,7 @@ struct Explored {
     thicker: Option<Thicker>,
 }
 
-/// Kits of one candidate until one passes or its budget is used up, which counts what they cost.
+/// Makes kits of one candidate until one passes or `budget`, which counts their cost, is used up.
 fn explore(
     ctx: &Ctx,
     job: &Job<'_>,
@@ -188,7 +188,7 @@ fn explore(
         let (turn, kit) = (&candidate.turn, &mut explored.kit);
         division = match attempt::plans(ctx, job, turn, &mut wall, &division, budget, kit)? {
             Attempt::Passed => return Ok(explored),
-            Attempt::Joined(fewer) => with_fewer(ctx, job, candidate, division, fewer, budget)?,
+            Attempt::Joined(fewer) => join_as_foreseen(ctx, job, candidate, division, fewer, budget)?,
             Attempt::Weak(remedy) => match strengthened(ctx, job, candidate, division, *remedy, budget)? {
                 Walled::Done(next) => next,
                 Walled::Thicker(thicker) => {
@@ -198,7 +198,7 @@ fn explore(
             },
             Attempt::Failed(failure) => {
                 let has_kit = explored.kit.is_some();
-                match with_others(ctx, job, candidate, &division, &failure, has_kit, budget)? {
+                match divide_anew(ctx, job, candidate, &division, &failure, has_kit, budget)? {
                     Some(next) => next,
                     None => {
                         explored.failure = failure;
@@ -210,9 +210,9 @@ fn explore(
     }
 }
 
-/// The division with the `fewer` pieces of which none is foreseen to rattle; as it is where no key can be cut of them,
-/// and then no others are joined.
-fn with_fewer(
+/// Replaces the division by the one with `fewer` pieces, where some are foreseen to rattle. Keeps it where no key can be
+/// cut of those pieces, and lets no others be joined then.
+fn join_as_foreseen(
     ctx: &Ctx,
     job: &Job<'_>,
     candidate: &Candidate<'_>,
@@ -233,8 +233,8 @@ fn with_fewer(
     Ok(next)
 }
 
-/// Other pieces after a failure; `None` where nothing is left to try.
-fn with_others(
+/// Revises the pieces after a failure; `None` where nothing is left to try, or no time.
+fn divide_anew(
     ctx: &Ctx,
     job: &Job<'_>,
     candidate: &Candidate<'_>,
@@ -343,7 +343,7 @@ impl Planned {
 
 /// The plan of `model` that [`design`] would make first, or why there is none: the same key, pieces and
 /// connector sizes. Where pieces have no plan it goes on with the next key, while [`design`] divides them anew
-/// first. No further key and no thicker wall is begun where the time is over ([`Ctx::seconds_left`]), which is told.
+/// first. No further key and no thicker wall is begun where the time is over ([`Ctx::seconds_left`]), which is reported.
 pub fn plan(
     ctx: &Ctx,
     params: &Params,
@@ -367,12 +367,12 @@ pub fn plan(
     loop {
         let job = Job::new(ctx, &input, &wall, ask, n_left > 0)?;
         let places = candidate::places(ctx, &job)?;
-        let walled = first_with_a_plan(ctx, &job.pace, &places, |i, place| {
-            planned_with(ctx, &job, i, place)
+        let walled = try_keys(ctx, &job.pace, &places, |i, place| {
+            plan_with_key(ctx, &job, i, place)
         })?;
         is_cut_short |= job.pace.is_cut_short();
         match walled {
-            Walled::Done(planned) => return Ok(outcome::in_time(planned, is_cut_short)),
+            Walled::Done(planned) => return Ok(outcome::conclude_plan(planned, is_cut_short)),
             Walled::Thicker(thicker) => {
                 n_left -= 1;
                 wall = wall.thicker(ctx, &input, &thicker)?;
@@ -381,9 +381,9 @@ pub fn plan(
     }
 }
 
-/// The plan with the first key that has one, or the thicker wall that it needs; else why the last key has none. Keys that
-/// no time is left for are left out, and that is recorded.
-fn first_with_a_plan<T>(
+/// Tries the keys in turn until one has a plan or needs a thicker wall; else gives the reason of the last key. Records
+/// keys that are left out for want of time.
+fn try_keys<T>(
     ctx: &Ctx,
     pace: &Pace,
     places: &[Option<KeySite>],
@@ -404,8 +404,9 @@ fn first_with_a_plan<T>(
     Ok(Walled::Done(Err(reason)))
 }
 
-/// The plan with the `i`-th key, or the thicker wall that it needs; else why there is none, in words or none.
-fn planned_with(
+/// Plans with the `i`-th key: a plan, a thicker wall that it needs, or the reason why there is none (empty for a key that
+/// cannot be cut).
+fn plan_with_key(
     ctx: &Ctx,
     job: &Job<'_>,
     i: usize,
@@ -452,7 +453,7 @@ fn planned_with(
                     Walled::Thicker(thicker) => return Ok(Walled::Thicker(thicker)),
                 }
             }
-            Next::Joined(fewer) => with_fewer(&ctx, job, &candidate, division, fewer, &mut budget)?,
+            Next::Joined(fewer) => join_as_foreseen(&ctx, job, &candidate, division, fewer, &mut budget)?,
             Next::None(failure) => return no_plan(failure.reason),
         };
     }

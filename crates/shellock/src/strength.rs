@@ -54,8 +54,8 @@ const RESOLUTION_MM: f64 = 0.05;
 const MOST_WITHOUT_BRACKET: usize = 4;
 /// Thicknesses after which the search bisects.
 const MOST_INTERPOLATED: usize = 6;
-/// Wall of a model that no wall saves, if thicker ones hardly help and none so thick is too thick, mm: what is printed
-/// where nothing is computed.
+/// Wall of a model that no wall saves, if thicker ones help little and the limits allow it, mm: the thickness that is
+/// printed where nothing is computed.
 const USUAL_MM: f64 = 2.0;
 /// Stress over the least there is that no thicker wall is worth avoiding.
 const WORTH_MORE_WALL: f64 = 1.05;
@@ -235,9 +235,9 @@ pub struct Strength {
     pub most_mm: f64,
     /// The stress that counts with it, MPa.
     pub stress_mpa: f64,
-    /// Whether the wall does not bear its stress. Where its thickness was sought, no wall in the limits does, by more
-    /// than the search resolves; the thickness is then the least that hardly any thicker one betters, but at least
-    /// 2 mm, or `most_mm` where that is less.
+    /// True where the stress exceeds the strength. Where the thickness was sought, the stress of every wall in the limits
+    /// does, by more than the search resolves. The thickness is then the least that no thicker one betters by much, but
+    /// at least 2 mm, or `most_mm` where that is less.
     pub is_too_weak: bool,
     /// All thicknesses that were looked at, ascending, with the fine mesh's stress as the coarse one lets
     /// expect it.

@@ -225,7 +225,7 @@ impl Learned {
 }
 
 impl Failure {
-    /// Whether nothing but pieces that rattle is wrong with the last kit.
+    /// True where nothing but pieces that rattle is wrong with the last kit.
     pub fn rattles(&self) -> bool {
         !self.rattling.is_empty()
     }
@@ -288,7 +288,7 @@ pub(super) struct Planning<'a> {
     pub constraints: &'a PlanConstraints,
     /// What was left of the time when the job with this wall began, s.
     pub begun_s: f64,
-    /// What is left out for want of time is recorded there.
+    /// Record of what is left out for want of time.
     pub pace: &'a Pace,
 }
 

@@ -86,7 +86,7 @@ pub struct Effort {
 pub(super) struct Pace {
     /// The slowest kit, s, as bits.
     slowest: AtomicU64,
-    /// Whether something was left out for want of time.
+    /// True where something was left out for want of time.
     is_cut_short: AtomicBool,
 }
 
@@ -118,13 +118,13 @@ impl Pace {
         Self::is_over(ctx, self.slowest_s())
     }
 
-    /// Records that `what` would have been tried next, but was left out for want of time.
+    /// Records that `what` is left out for want of time.
     pub fn skip(&self, ctx: &Ctx, what: &str) {
         ctx.note(&format!("no time is left for {what}"));
         self.is_cut_short.store(true, Relaxed);
     }
 
-    /// Whether something was left out for want of time.
+    /// True where something was left out for want of time.
     pub fn is_cut_short(&self) -> bool {
         self.is_cut_short.load(Relaxed)
     }
@@ -195,8 +195,8 @@ impl Budget {
         }
     }
 
-    /// Whether pieces may be revised and a kit be made of them: joined where nothing is wrong but that they rattle, else
-    /// divided or united.
+    /// True where pieces may be revised and a kit be made of them. Pieces that only rattle are joined, others are divided
+    /// or united.
     pub fn may_revise(&self, rattles: bool) -> bool {
         let left = if rattles { self.joinings } else { self.revisions };
         left > 0 && self.kits > 0

@@ -1,4 +1,4 @@
-//! What a job may cost, and that it is counted, however it ends; what no time was left for is told.
+//! The cost of a job is bounded and counted, however it ends, and a lack of time is reported.
 
 use shellock_geom::{Solid, Vec3};
 
@@ -9,7 +9,7 @@ use super::ways::{Ask, Input, asking};
 use super::*;
 use crate::{Cause, testing};
 
-/// How a job on a ball ends whose labels are its two halves, which never lock, and what it cost.
+/// Runs a job on a ball whose labels are its two halves, which never lock; the outcome and the cost.
 fn halves(ctx: &Ctx, params: &Params) -> (Result<DesignOutcome, DesignError>, Effort) {
     let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
     let mesh = model.mesh();
@@ -32,7 +32,7 @@ fn halves(ctx: &Ctx, params: &Params) -> (Result<DesignOutcome, DesignError>, Ef
     };
     let mut effort = Effort::default();
     let ended = asking(ctx, &input, &wall, ask, &mut effort);
-    (ended.concluded(effort), effort)
+    (ended.conclude(effort), effort)
 }
 
 /// A piece is the key, and nothing is divided again.
@@ -72,11 +72,11 @@ fn work_that_ends_in_an_error_counts() {
 }
 
 #[test]
-fn a_design_tells_the_effort_of_the_whole_job() {
+fn a_design_has_the_effort_of_the_whole_job() {
     let (_, design) = Ball::new().outcome(vec![(None, made(good()))]);
     let made = DesignOutcome::Made(Box::new(design.expect("a kit was made")));
     let effort = Effort { kits: 7, ..IN_VAIN };
-    let DesignOutcome::Made(design) = Ended::of(Ok(made)).concluded(effort).expect("it was made") else {
+    let DesignOutcome::Made(design) = Ended::new(Ok(made)).conclude(effort).expect("it was made") else {
         panic!("a kit was made")
     };
     assert_eq!(design.effort, effort);
@@ -125,7 +125,7 @@ fn larger_connectors_are_no_other_division_and_joined_pieces_are_where_they_can_
         });
         let foreseen = counted(&ball, candidate, |ctx, job, first, budget| {
             let fewer = job.surface.clone();
-            assert!(with_fewer(ctx, job, candidate, first, fewer, budget).is_ok());
+            assert!(join_as_foreseen(ctx, job, candidate, first, fewer, budget).is_ok());
             assert_eq!(budget.foreseen_joinings == 0, n == 0);
         });
         assert_eq!((for_use, foreseen), (n, n));
@@ -133,7 +133,7 @@ fn larger_connectors_are_no_other_division_and_joined_pieces_are_where_they_can_
 }
 
 #[test]
-fn pieces_that_are_not_divided_again_for_want_of_time_are_told() {
+fn pieces_that_are_not_divided_again_for_want_of_time_are_reported() {
     let none = || 0.0;
     let late = Ctx::quiet().with_deadline(&none);
     let is_cut_short = |ctx: &Ctx, refinements| {
@@ -149,12 +149,13 @@ fn pieces_that_are_not_divided_again_for_want_of_time_are_told() {
     assert!(!is_cut_short(&Ctx::quiet(), 0));
 }
 
-/// Keys that are tried for a plan with so many seconds left, where the second has one if `has_plan`; what came of it.
+/// Tries three keys with so many seconds left, of which the second has a plan if `has_plan`: the number of keys tried, the
+/// plan, and whether a key was left out.
 fn keys_tried(seconds_left: f64, has_plan: bool) -> (usize, Result<(), String>, bool) {
     let left = || seconds_left;
     let (ctx, pace) = (Ctx::quiet().with_deadline(&left), Pace::default());
     let mut n_tried = 0;
-    let walled = first_with_a_plan(&ctx, &pace, &[Some(site()), Some(site()), None], |i, _| {
+    let walled = try_keys(&ctx, &pace, &[Some(site()), Some(site()), None], |i, _| {
         n_tried += 1;
         Ok(Walled::Done(if has_plan && i == 1 {
             Ok(())
@@ -170,7 +171,7 @@ fn keys_tried(seconds_left: f64, has_plan: bool) -> (usize, Result<(), String>, 
 }
 
 #[test]
-fn keys_that_no_time_is_left_to_plan_for_are_told() {
+fn keys_that_no_time_is_left_to_plan_for_are_reported() {
     let reason = || Err("key 0".to_owned());
     assert_eq!(keys_tried(1.0, true), (2, Ok(()), false));
     assert_eq!(keys_tried(1.0, false), (3, reason(), false));
@@ -180,7 +181,7 @@ fn keys_that_no_time_is_left_to_plan_for_are_told() {
 }
 
 #[test]
-fn a_plan_and_the_lack_of_one_tell_that_the_time_was_over() {
+fn a_plan_and_the_lack_of_one_report_that_the_time_was_over() {
     let planned = || {
         let kit = good();
         Planned {
@@ -194,12 +195,12 @@ fn a_plan_and_the_lack_of_one_tell_that_the_time_was_over() {
         }
     };
     for is_cut_short in [false, true] {
-        let found = outcome::in_time(Ok(planned()), is_cut_short);
+        let found = outcome::conclude_plan(Ok(planned()), is_cut_short);
         let codes: Vec<&str> = found
             .as_ref()
             .map_or(Vec::new(), |p| p.warnings.iter().map(|w| w.code()).collect());
         assert_eq!(codes.contains(&"time-up"), is_cut_short);
-        let Err(none) = outcome::in_time(Err("why".to_owned()), is_cut_short) else {
+        let Err(none) = outcome::conclude_plan(Err("why".to_owned()), is_cut_short) else {
             panic!("there is no plan")
         };
         assert_eq!(none.is_cut_short, is_cut_short);

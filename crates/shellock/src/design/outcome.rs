@@ -24,8 +24,7 @@ use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 pub struct Design {
     /// The pieces, their plan and the verdict on them.
     pub kit: Kit,
-    /// Parameters of the stages that made it, with the wall and the division that it has; those that a key which is
-    /// cut has of its own are left out.
+    /// Parameters of the stages that made it, for its own wall and division. Those that only a cut key has are left out.
     pub settings: Settings,
     /// How its key was cut; `None` where the key is one of the pieces.
     pub key: Option<KeySite>,
@@ -37,7 +36,7 @@ pub struct Design {
     pub fit: PrintedFit,
     /// Where each piece is too thin to print well, the longest place first.
     pub thin: IdVec<PatchId, Vec<ThinFeature>>,
-    /// What the whole job cost, with all that was tried in vain.
+    /// Cost of the whole job, with all that was tried in vain.
     pub effort: Effort,
     /// What the user should know about this kit; kits that were given up keep their warnings to themselves.
     pub warnings: Vec<Warning>,
@@ -70,18 +69,18 @@ pub enum DesignOutcome {
     },
 }
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct NoPlan {
-    /// Why, for people.
+    /// Reason, for people.
     pub reason: String,
-    /// Whether the time was over before all keys were tried: with more of it one may be found.
+    /// True where the time was over before all keys were tried: with more of it one may be found.
     pub is_cut_short: bool,
 }
 
-/// A plan, or why there is none, with a word on what was left out for want of time.
-pub(super) fn in_time(planned: Result<Planned, String>, is_cut_short: bool) -> Result<Planned, NoPlan> {
+/// Adds to a plan, or to the reason why there is none, that the time was over.
+pub(super) fn conclude_plan(planned: Result<Planned, String>, is_cut_short: bool) -> Result<Planned, NoPlan> {
     match planned {
         Ok(mut planned) => {
             planned.warnings.extend(is_cut_short.then(|| time_up(0)));
@@ -89,7 +88,7 @@ pub(super) fn in_time(planned: Result<Planned, String>, is_cut_short: bool) -> R
         }
         Err(reason) => Err(NoPlan {
             reason: if is_cut_short {
-                lacking_time(&reason)
+                report_lateness(&reason)
             } else {
                 reason
             },
@@ -281,7 +280,7 @@ fn not_cut(kit: &Kit, reasons: Vec<String>) -> Warning {
     }
 }
 
-/// Says that kits that were not made, or before any kit plans that were not sought, might be better.
+/// Warns that the time was over after so many kits; after none, the warning speaks of the plan.
 pub(super) fn time_up(kits: usize) -> Warning {
     Warning {
         cause: Cause::TimeUp { kits },
@@ -290,8 +289,8 @@ pub(super) fn time_up(kits: usize) -> Warning {
     }
 }
 
-/// Says why there is nothing, where more might have come of more time.
-pub(super) fn lacking_time(reason: &str) -> String {
+/// Says in a reason that the time was over.
+pub(super) fn report_lateness(reason: &str) -> String {
     match reason {
         "" => "the time was over (--time)".to_owned(),
         reason => format!("the time was over (--time); {reason}"),

@@ -101,8 +101,8 @@ pub(super) fn remedy(
     Ok(None)
 }
 
-/// Whether a change is worth it that takes the least load factor from `before` to `after`. A plan that bears nothing
-/// has the factor 0, of which any multiple is 0.
+/// True where a change is worth it that raises the least load factor from `before` to `after`. A plan that holds under no
+/// load has the factor 0, of which any multiple is 0.
 fn is_worth(before: f64, after: f64) -> bool {
     after > before && after >= GAIN * before
 }
@@ -265,7 +265,7 @@ mod tests {
 
     const N: usize = 4;
 
-    /// A press on the top of which so much is borne.
+    /// A press on the top with this load factor.
     fn pressed(factor: f64) -> LoadBorne {
         LoadBorne {
             deed: Deed::PressTop,
@@ -294,8 +294,8 @@ mod tests {
         }
     }
 
-    /// What is changed of a ball in four pieces that bears so much of a press on its top, and whether something is left
-    /// out for want of time.
+    /// Seeks a remedy for a ball in four pieces with this load factor under a press on its top; the remedy, and whether
+    /// something is left out for want of time.
     fn changed(ctx: &Ctx, borne: f64, left: &Levers) -> (Option<Remedy>, bool) {
         let params = Params::default();
         let model = Solid::new(testing::sphere(3, Vec3::splat(40.0))).expect("closed");
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_that_no_time_is_left_for_is_told() {
+    fn a_wall_that_no_time_is_left_for_is_reported() {
         let wall = Levers {
             asked: 1.4,
             wall: true,
@@ -375,7 +375,7 @@ mod tests {
             let left = || seconds_left;
             changed(&Ctx::quiet().with_deadline(&left), 0.2, &wall)
         };
-        // It began with 100 s.
+        // The job began with 100 s.
         let (in_time, is_cut_short) = remedy(60.0);
         assert!(matches!(in_time, Some(Remedy::Wall(_))) && !is_cut_short);
         let (late, is_cut_short) = remedy(40.0);

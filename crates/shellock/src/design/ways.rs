@@ -7,7 +7,7 @@ use shellock_geom::Solid;
 
 use super::budget::Pace;
 use super::budget::{RESERVE, THICKER_WALLS};
-use super::outcome::{lacking_time, time_up};
+use super::outcome::{report_lateness, time_up};
 use super::wall::Wall;
 use super::{DesignError, DesignOutcome, Effort, Job, KeySource, Params, Rounds, Walled, with_wall};
 use crate::Ctx;
@@ -115,13 +115,13 @@ pub(super) struct Ended {
     was_thicker: bool,
     /// The slowest of its kits, s.
     slowest_s: f64,
-    /// Whether something was left out for want of time.
+    /// True where something was left out for want of time.
     is_cut_short: bool,
 }
 
 impl Ended {
-    /// A job that ended so, without a kit by which another's time could be told.
-    pub fn of(outcome: Result<DesignOutcome, DesignError>) -> Self {
+    /// An end with no figure for the time that a kit takes.
+    pub fn new(outcome: Result<DesignOutcome, DesignError>) -> Self {
         Self {
             outcome,
             was_thicker: false,
@@ -156,7 +156,7 @@ impl Ended {
         }
     }
 
-    /// This, or what was tried after it, if that is better; cut short where either was.
+    /// The better of this and of a later try, cut short where either was.
     pub fn or(self, later: Self) -> Self {
         let is_cut_short = self.is_cut_short || later.is_cut_short;
         let is_worse = match (&self.outcome, &later.outcome) {
@@ -172,11 +172,11 @@ impl Ended {
         }
     }
 
-    /// How the whole job ended, which cost so much; says so where it was cut short.
-    pub fn concluded(self, effort: Effort) -> Result<DesignOutcome, DesignError> {
+    /// Concludes the whole job with its `effort`, and reports where it was cut short.
+    pub fn conclude(self, effort: Effort) -> Result<DesignOutcome, DesignError> {
         let is_cut_short = self.is_cut_short;
         let lacks_time = |reason: &str, blockers| DesignOutcome::NoPlan {
-            reason: lacking_time(reason),
+            reason: report_lateness(reason),
             blockers,
             is_cut_short,
         };
@@ -200,9 +200,8 @@ impl Ended {
     }
 }
 
-/// What came of the ways in turn until one is enough: the best. Ways that no time is left for are left out, and that is
-/// recorded.
-pub(super) fn in_turn(ctx: &Ctx, ways: &[Way], mut attempt: impl FnMut(usize, Way) -> Ended) -> Ended {
+/// Tries the ways in turn until one is enough; the best end. Records ways that are left out for want of time.
+pub(super) fn try_ways(ctx: &Ctx, ways: &[Way], mut attempt: impl FnMut(usize, Way) -> Ended) -> Ended {
     let mut best: Option<Ended> = None;
     for (i, &way) in ways.iter().enumerate() {
         best = Some(match best {
@@ -358,31 +357,31 @@ mod tests {
     #[test]
     fn a_kit_stays_where_what_is_tried_after_it_cannot_be_made() {
         let no_plan = |reason: &str| {
-            Ended::of(Ok(DesignOutcome::NoPlan {
+            Ended::new(Ok(DesignOutcome::NoPlan {
                 reason: reason.into(),
                 blockers: Vec::new(),
                 is_cut_short: false,
             }))
         };
-        let error = || Ended::of(Err(DesignError::NoLabelOfKey(3)));
+        let error = || Ended::new(Err(DesignError::NoLabelOfKey(3)));
         assert!(no_plan("first").or(error()).outcome.is_ok());
         assert!(error().or(no_plan("second")).outcome.is_ok());
-        let stopped = Ended::of(Err(DesignError::Cancelled(crate::Cancelled)));
+        let stopped = Ended::new(Err(DesignError::Cancelled(crate::Cancelled)));
         assert!(no_plan("first").or(stopped).outcome.is_err());
     }
-    /// A job that ended with such a kit of three pieces, each of which took 30 s.
+    /// A job that ended with this kit of three pieces, which took 30 s.
     fn of_kit(kit: Kit) -> Ended {
         let (_, design) = Ball::new().outcome(vec![(None, made(kit))]);
         let outcome = DesignOutcome::Made(Box::new(design.expect("a kit was made")));
         Ended {
             slowest_s: 30.0,
-            ..Ended::of(Ok(outcome))
+            ..Ended::new(Ok(outcome))
         }
     }
 
-    /// Whether people are told that the time was over.
+    /// True where the outcome reports that the time was over.
     fn tells_time_up(ended: Ended) -> bool {
-        match ended.concluded(Effort::default()).expect("no error is left") {
+        match ended.conclude(Effort::default()).expect("no error is left") {
             DesignOutcome::Made(design) => codes(&design).contains(&"time-up"),
             DesignOutcome::NoPlan {
                 reason, is_cut_short, ..
@@ -401,14 +400,14 @@ mod tests {
         }
     }
 
-    /// The ways that are tried with so many seconds left, where each fails, and whether it is told that the time was
-    /// over.
+    /// Tries ways of so many pieces, all of which fail, with so many seconds left: the ways that were tried, and whether
+    /// the outcome reports that the time was over.
     fn tried(seconds_left: f64, pieces: &[Option<usize>]) -> (Vec<Option<usize>>, bool) {
         let left = || seconds_left;
         let ctx = Ctx::quiet().with_deadline(&left);
         let ways: Vec<Way> = pieces.iter().map(|n| way(*n)).collect();
         let mut tried = Vec::new();
-        let ended = in_turn(&ctx, &ways, |_, way| {
+        let ended = try_ways(&ctx, &ways, |_, way| {
             tried.push(way.n_pieces);
             of_kit(loose(1))
         });
@@ -416,7 +415,7 @@ mod tests {
     }
 
     #[test]
-    fn ways_that_are_left_out_for_want_of_time_are_told() {
+    fn ways_that_are_left_out_for_want_of_time_are_reported() {
         // A kit of three pieces takes 30 s, and half as much again must be left; of one piece a third of that.
         let all = [None, Some(6), Some(1)];
         assert_eq!(tried(60.0, &all), (all.to_vec(), false));
@@ -429,7 +428,7 @@ mod tests {
     fn nothing_is_left_out_after_a_kit_that_passes() {
         let none = || 0.0;
         let (ctx, ways) = (Ctx::quiet().with_deadline(&none), [way(None), way(None)]);
-        let ended = in_turn(&ctx, &ways, |i, _| {
+        let ended = try_ways(&ctx, &ways, |i, _| {
             assert_eq!(i, 0);
             of_kit(good())
         });
@@ -437,15 +436,15 @@ mod tests {
     }
 
     #[test]
-    fn that_one_way_was_cut_short_is_told_with_the_kit_of_another() {
+    fn that_one_way_was_cut_short_is_reported_with_the_kit_of_another() {
         let no_plan = || {
-            Ended::of(Ok(DesignOutcome::NoPlan {
+            Ended::new(Ok(DesignOutcome::NoPlan {
                 reason: "first".into(),
                 blockers: Vec::new(),
                 is_cut_short: false,
             }))
         };
-        let error = || Ended::of(Err(DesignError::NoLabelOfKey(3)));
+        let error = || Ended::new(Err(DesignError::NoLabelOfKey(3)));
         let kit = || of_kit(loose(1));
         let cut_short = |ended: Ended| Ended {
             is_cut_short: true,
@@ -465,7 +464,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kit_that_passes_is_not_silent_about_what_was_left_out() {
+    fn a_kit_that_passes_reports_what_was_left_out() {
         for kit in [good, || rattling(1, 1.5)] {
             assert!(kit().verification.passed() && !tells_time_up(of_kit(kit())));
             assert!(tells_time_up(Ended {
@@ -477,8 +476,8 @@ mod tests {
 
     #[test]
     fn an_error_is_the_last_word_only_where_nothing_was_left_out() {
-        let error = || Ended::of(Err(DesignError::NoLabelOfKey(3)));
-        assert!(error().concluded(Effort::default()).is_err());
+        let error = || Ended::new(Err(DesignError::NoLabelOfKey(3)));
+        assert!(error().conclude(Effort::default()).is_err());
         let cut_short = Ended {
             is_cut_short: true,
             ..error()
@@ -486,8 +485,8 @@ mod tests {
         assert!(tells_time_up(cut_short));
         let stopped = Ended {
             is_cut_short: true,
-            ..Ended::of(Err(DesignError::Cancelled(crate::Cancelled)))
+            ..Ended::new(Err(DesignError::Cancelled(crate::Cancelled)))
         };
-        assert!(stopped.concluded(Effort::default()).is_err());
+        assert!(stopped.conclude(Effort::default()).is_err());
     }
 }

@@ -42,16 +42,16 @@ pub(super) struct DrawLimits {
     pub max_tries: usize,
 }
 
-/// How far the draws with one key have come; they can be continued from here.
+/// State of the draws with one key, from which they can be continued.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Draws {
-    /// Batches that were drawn. Each draw of each batch has its own random stream.
+    /// Number of batches. Each draw of each batch has its own random stream.
     pub n_batches: usize,
-    /// Plans that were drawn.
+    /// Number of plans.
     pub n_plans: usize,
-    /// Batches since the best plan was found.
+    /// Number of batches since the best plan was found.
     pub n_stale: usize,
-    /// Whether a draw had nothing left to try.
+    /// True where a draw had nothing left to try.
     pub is_exhausted: bool,
 }
 

@@ -79,7 +79,7 @@ pub(super) struct Candidate<'k> {
     pub pool: Pool,
     /// None costs less; infinite where there is none.
     pub lower_bound: f64,
-    /// How far the random draws have come.
+    /// State of the random draws.
     pub draws: Draws,
     /// How often each piece was at fault: what one question teaches steers the next.
     weights: Vec<f64>,

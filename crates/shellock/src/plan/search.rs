@@ -270,8 +270,8 @@ fn proven<'k>(
     Ok((found, key))
 }
 
-/// Fills `pool` with plans drawn at random and improved, from where `draws` ended; the least that was left where there
-/// is none.
+/// Fills `pool` with plans drawn at random and improved, from where `draws` ended; the least that was left where it stays
+/// empty.
 fn draw_plans(
     ctx: &Ctx<'_>,
     params: &PlanParams,
@@ -308,7 +308,7 @@ fn draw_plans(
         }
         draws.n_batches += 1;
         draws.n_plans += plans.len();
-        add_with_improved(space, key, plans, pool);
+        add_improved(space, key, plans, pool);
         draws.n_stale = if pool.least_cost() < best_before {
             0
         } else {
@@ -318,7 +318,7 @@ fn draw_plans(
     Ok((pool.len() == 0).then_some(stuck))
 }
 
-/// Whether another batch of draws may fill `pool` further or find a better plan.
+/// True where another batch of draws may add a plan to `pool` or find a better one.
 fn may_find_more(params: &PlanParams, space: &Space<'_>, pool: &Pool, draws: &Draws) -> bool {
     let is_hopeless = pool.len() == 0 && draws.n_batches >= MAX_EMPTY_BATCHES;
     let is_stale =
@@ -328,8 +328,8 @@ fn may_find_more(params: &PlanParams, space: &Space<'_>, pool: &Pool, draws: &Dr
     !(draws.is_exhausted || is_hopeless || is_stale || is_done)
 }
 
-/// Adds the plans of a batch, and first the cheapest of them improved.
-fn add_with_improved(
+/// Improves the cheapest plans of a batch, then adds all to `pool`.
+fn add_improved(
     space: &Space<'_>,
     key: &KeyChoice,
     mut plans: Vec<(PlanScore, LatticePlan)>,
@@ -380,7 +380,7 @@ mod tests {
     use crate::ConnectorSizes;
     use crate::testing::{seams, sphere, voronoi};
 
-    /// The default costs that count how often they are asked.
+    /// The default costs with a counter of the questions.
     struct Counted {
         costs: SeamCosts,
         n_asked: Arc<AtomicUsize>,
@@ -393,7 +393,7 @@ mod tests {
         }
     }
 
-    /// Eight pieces of a ball, and how few plans of them are drawn: too few to fill the pool.
+    /// Eight pieces of a ball, and parameters that draw too few plans to fill the pool.
     fn eight_pieces() -> (PlanSurvey, PlanParams) {
         let params = PlanParams {
             n_plans: 40,
