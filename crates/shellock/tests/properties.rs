@@ -81,14 +81,8 @@ fn renumbered(surface: &SegmentedSurface, number: &[usize]) -> SegmentedSurface 
 }
 
 /// Asserts that `other` has the contacts and the flat pieces of the pebble as it was given, where piece `i` is
-/// called `number[i]` and all directions are turned; with runs of connectors if `has_runs`.
-fn assert_same_contacts(
-    other: &PlanSurvey,
-    turn: &LatticeTurn,
-    number: &[usize],
-    tolerance: f64,
-    has_runs: bool,
-) {
+/// called `number[i]` and all directions are turned.
+fn assert_same_contacts(other: &PlanSurvey, turn: &LatticeTurn, number: &[usize], tolerance: f64) {
     let given = survey_as_given();
     assert_eq!(other.contacts.len(), given.contacts.len());
     let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
@@ -109,9 +103,7 @@ fn assert_same_contacts(
             let (one, two) = (contact.joint(later, s), same.joint(new(later), turned));
             assert!(is_near(one.weight, two.weight), "{one:?} {two:?}");
             assert!(is_near(one.usable, two.usable), "{one:?} {two:?}");
-            if has_runs {
-                assert!(is_near(one.run_mm, two.run_mm), "{one:?} {two:?}");
-            }
+            assert!(is_near(one.run_mm, two.run_mm), "{one:?} {two:?}");
         }
     }
     for p in (0..N).map(PatchId::from) {
@@ -119,23 +111,6 @@ fn assert_same_contacts(
         let turned = turn.apply(given.mean_normal[p]);
         assert!(other.mean_normal[new(p)].distance(turned) < tolerance);
     }
-}
-
-/// Whether the joints of `plan` hold in both surveys or in none. The longest run is that of a walk along the
-/// seam, which goes the other way where the pair's numbers change order, and it may count other samples then.
-fn hold_alike(plan: &LatticePlan, other: &PlanSurvey, number: &[usize]) -> bool {
-    let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
-    survey_as_given().contacts.iter().all(|contact| {
-        let is_b_later = plan.position(contact.b) > plan.position(contact.a);
-        let later = if is_b_later { contact.b } else { contact.a };
-        let pair = [new(contact.a), new(contact.b)];
-        let same = other
-            .contacts
-            .iter()
-            .find(|c| pair.contains(&c.a) && pair.contains(&c.b));
-        let s = plan.separation(later);
-        same.is_some_and(|same| same.joint(new(later), s).holds == contact.joint(later, s).holds)
-    })
 }
 
 /// How much shares of what is in whose way differ at most.
@@ -203,7 +178,7 @@ proptest! {
         turned.mesh = turn.mesh(&turned.mesh, Vec3::ZERO);
         let survey = surveyed(&turned);
         let same = Vec::from_iter(0..N);
-        assert_same_contacts(&survey, &turn, &same, 1e-6, true);
+        assert_same_contacts(&survey, &turn, &same, 1e-6);
         // Pictures have pixels, and turn only nearly with what they show.
         let farthest = farthest_share(&survey, &turn, &same);
         prop_assert!(farthest < 0.01, "{}", farthest);
@@ -213,13 +188,10 @@ proptest! {
     fn a_plan_costs_the_same_however_its_pieces_are_numbered(number in orders(N), seed in 0..1000u64) {
         let survey = surveyed(&renumbered(as_given(), &number));
         let none = LatticeTurn::all()[0];
-        assert_same_contacts(&survey, &none, &number, 1e-9, false);
+        assert_same_contacts(&survey, &none, &number, 1e-9);
         prop_assert!(farthest_share(&survey, &none, &number) < 1e-9);
         let params = PlanParams { seed, ..PlanParams::default() };
-        let plans = random_plans(&params, survey_as_given(), 20);
-        let mut plans = plans.into_iter().filter(|plan| hold_alike(plan, &survey, &number)).peekable();
-        prop_assume!(plans.peek().is_some());
-        for plan in plans {
+        for plan in random_plans(&params, survey_as_given(), 20) {
             let new = |p: PatchId| PatchId::from(number[usize::from(p)]);
             let other = LatticePlan::new(plan.steps.iter().map(|s| (new(s.piece), s.separation)));
             let one = score(survey_as_given(), &PlanConstraints::default(), &plan);
@@ -230,14 +202,6 @@ proptest! {
             }
         }
     }
-}
-
-#[test]
-#[ignore = "fails: the longest run depends on the way that the seam is walked, so 23.5 mm become 18.6 mm"]
-fn the_longest_run_of_connectors_is_the_same_however_pieces_are_numbered() {
-    let number = [0, 1, 3, 2, 4, 6, 5];
-    let survey = surveyed(&renumbered(as_given(), &number));
-    assert_same_contacts(&survey, &LatticeTurn::all()[0], &number, 1e-9, true);
 }
 
 proptest! {

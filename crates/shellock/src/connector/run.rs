@@ -128,7 +128,7 @@ pub fn runs(
     let (mut runs, mut contacts) = (Vec::new(), Vec::new());
     for curve in curves {
         let separation = plan.separation(curve.later).unit();
-        let later_is_male = later_is_male(curve.normals.iter().copied(), separation);
+        let later_is_male = roles(curve, separation);
         let size_mm = sizes.of(curve.later, curve.earlier);
         let clearance_mm = params.clearance_of(slide.is_some() && curve.later == plan.key());
         let at = |i: usize| RunStation {
@@ -182,6 +182,16 @@ fn sides(curve: &Curve, later_is_male: bool) -> (PatchId, PatchId) {
     } else {
         (curve.earlier, curve.later)
     }
+}
+
+/// Whether the later piece carries the pin at each point.
+fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
+    let n = curve.normals.len() - usize::from(curve.is_loop);
+    let mut roles = later_is_male(&curve.normals[..n], separation, curve.is_loop);
+    if curve.is_loop {
+        roles.push(roles[0]);
+    }
+    roles
 }
 
 fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_mm: f64) -> RunStation {

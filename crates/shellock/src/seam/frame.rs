@@ -59,21 +59,31 @@ impl FramedLine {
 }
 
 /// Whether the later piece, which leaves along `separation`, carries the pin at each place with these outward
-/// normals: where it leaves outwards.
-pub(crate) fn later_is_male(normals: impl Iterator<Item = Vec3> + Clone, separation: Vec3) -> Vec<bool> {
-    let outwards = normals.map(|n| n.dot(separation));
-    let mut role = outwards
-        .clone()
-        .find(|o| o.abs() > ROLE_HYSTERESIS)
-        .is_none_or(|o| o > 0.0);
-    outwards
-        .map(|o| {
-            if o.abs() > ROLE_HYSTERESIS {
-                role = o > 0.0;
-            }
-            role
-        })
-        .collect()
+/// normals: where it leaves outwards. Places that do not say clearly which go with the nearest that do, so that
+/// roles do not flicker; the answer is the same whichever way the line is walked. A loop's first place comes once.
+pub(crate) fn later_is_male(normals: &[Vec3], separation: Vec3, is_loop: bool) -> Vec<bool> {
+    let outwards: Vec<f64> = normals.iter().map(|n| n.dot(separation)).collect();
+    let n = outwards.len();
+    let nearest = |ahead: &dyn Fn(usize, usize) -> Option<usize>, i: usize| {
+        (1..n)
+            .map_while(|k| Some((k, ahead(i, k)?)))
+            .find(|&(_, j)| outwards[j].abs() > ROLE_HYSTERESIS)
+    };
+    let after = |i: usize, k: usize| (is_loop || i + k < n).then(|| (i + k) % n);
+    let before = |i: usize, k: usize| (is_loop || i >= k).then(|| (i + n - k) % n);
+    let role = |i: usize| {
+        if outwards[i].abs() > ROLE_HYSTERESIS {
+            return outwards[i] > 0.0;
+        }
+        let is_out = |(_, j): (usize, usize)| outwards[j] > 0.0;
+        match (nearest(&before, i), nearest(&after, i)) {
+            (Some(b), Some(a)) if b.0 == a.0 && is_out(a) != is_out(b) => outwards[i] > 0.0,
+            (Some(b), Some(a)) => is_out(if a.0 < b.0 { a } else { b }),
+            (Some(one), None) | (None, Some(one)) => is_out(one),
+            (None, None) => outwards[i] > 0.0,
+        }
+    };
+    (0..n).map(role).collect()
 }
 
 /// The polyline again with points at equal distances of about `step_mm` along it, ends kept: where each lies,
@@ -145,6 +155,24 @@ fn tangents(points: &[Vec3], is_loop: bool) -> Vec<Vec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn roles_change_in_the_middle_of_what_is_not_clear_and_flicker_nowhere() {
+        let leans = |out: &[f64]| -> Vec<Vec3> { out.iter().map(|&z| Vec3::new(1.0, 0.0, z)).collect() };
+        let roles = |out: &[f64], is_loop| later_is_male(&leans(out), Vec3::Z, is_loop);
+        let turned = |out: &[f64]| out.iter().rev().copied().collect::<Vec<f64>>();
+        let line = [0.05, 0.5, -0.05, 0.5, -0.02, 0.03, 0.04, -0.5, 0.05];
+        assert_eq!(
+            roles(&line, false),
+            [true, true, true, true, true, true, false, false, false]
+        );
+        let mut back = roles(&turned(&line), false);
+        back.reverse();
+        assert_eq!(back, roles(&line, false));
+        // On a loop the first place has neighbours on both sides.
+        assert_eq!(roles(&[0.05, -0.5, -0.5, -0.5], true), [false; 4]);
+        assert_eq!(roles(&[-0.05, 0.05], true), [false, true]);
+    }
 
     #[test]
     fn resampling_keeps_ends_and_spacing() {

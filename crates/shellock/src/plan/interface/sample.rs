@@ -172,19 +172,21 @@ impl Line {
     /// turn, as nothing can be swept over them.
     fn kinds(&self, way: Way) -> Vec<Option<Kind>> {
         let n = self.samples.len();
-        let normals = self.samples.iter().map(|x| x.normal);
-        let later_is_male = later_is_male(normals, way.s.unit());
+        let normals: Vec<Vec3> = self.samples.iter().map(|x| x.normal).collect();
+        let later_is_male = later_is_male(&normals, way.s.unit(), self.is_loop);
         let facing: Vec<Vec3> = self.samples.iter().map(|x| way.facing(x)).collect();
-        let goes_on = |i: usize, j: usize| {
+        let fits = |i: usize, j: usize| {
             later_is_male[i] == later_is_male[j] && facing[i].dot(facing[j]) >= SHARPEST_TURN.cos()
         };
+        // Beyond the ends of an open line nothing turns.
+        let is_end = |i: usize| !self.is_loop && i == 0;
+        let goes_on = |i: usize| is_end(i % n) || fits((i + n - 1) % n, i % n);
         let kind = |i: usize| {
             let x = &self.samples[i];
             if way.has_rail(x) {
                 return Some(Kind::Rail);
             }
-            let is_smooth = (i == 0 || goes_on(i - 1, i)) && (i + 1 == n || goes_on(i, i + 1));
-            (is_smooth && way.has_pin(x)).then(|| Kind::Pin {
+            (goes_on(i) && goes_on(i + 1) && way.has_pin(x)).then(|| Kind::Pin {
                 later_is_male: later_is_male[i],
             })
         };
