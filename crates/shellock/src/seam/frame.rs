@@ -64,6 +64,7 @@ impl FramedLine {
 pub(crate) fn later_is_male(normals: &[Vec3], separation: Vec3, is_loop: bool) -> Vec<bool> {
     let outwards: Vec<f64> = normals.iter().map(|n| n.dot(separation)).collect();
     let n = outwards.len();
+    let in_all = outwards.iter().sum::<f64>();
     let nearest = |ahead: &dyn Fn(usize, usize) -> Option<usize>, i: usize| {
         (1..n)
             .map_while(|k| Some((k, ahead(i, k)?)))
@@ -80,7 +81,7 @@ pub(crate) fn later_is_male(normals: &[Vec3], separation: Vec3, is_loop: bool) -
             (Some(b), Some(a)) if b.0 == a.0 && is_out(a) != is_out(b) => outwards[i] > 0.0,
             (Some(b), Some(a)) => is_out(if a.0 < b.0 { a } else { b }),
             (Some(one), None) | (None, Some(one)) => is_out(one),
-            (None, None) => outwards[i] > 0.0,
+            (None, None) => in_all > 0.0,
         }
     };
     (0..n).map(role).collect()
@@ -171,7 +172,8 @@ mod tests {
         assert_eq!(back, roles(&line, false));
         // On a loop the first place has neighbours on both sides.
         assert_eq!(roles(&[0.05, -0.5, -0.5, -0.5], true), [false; 4]);
-        assert_eq!(roles(&[-0.05, 0.05], true), [false, true]);
+        // Where no place is clear, all are one.
+        assert_eq!(roles(&[-0.05, 0.06], true), [true; 2]);
     }
 
     #[test]
