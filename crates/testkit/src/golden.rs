@@ -31,7 +31,7 @@ pub const QUICK: [Case; 3] = [
         args: &["demo", "--figure", "vase", "--size", "60", "--pieces", "5"],
     },
     Case {
-        name: "dinosaur, a piece is the key, filament",
+        name: "dinosaur, a piece is the key, filament, failed",
         args: &[
             "demo",
             "--figure",
@@ -92,7 +92,7 @@ pub const FIGURES: [Case; 5] = [
         ],
     },
     Case {
-        name: "cat, failed",
+        name: "cat, many pieces asked",
         args: &[
             "demo", "--figure", "cat", "--size", "40", "--pieces", "40", "--method", "creases",
         ],
