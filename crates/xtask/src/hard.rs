@@ -28,6 +28,9 @@ pub fn family() -> Vec<Hard> {
         add(format!("goblet-{wall_mm}"), goblet(wall_mm));
         add(format!("open-box-{wall_mm}"), open_box(wall_mm));
     }
+    for bulge_mm in [0.0, 12.0] {
+        add(format!("two-handled-cup-{bulge_mm}"), two_handled_cup(bulge_mm));
+    }
     for n_holes in [5, 9, 15] {
         add(format!("pierced-statue-{n_holes}"), pierced_statue(n_holes));
     }
@@ -107,6 +110,37 @@ fn goblet(wall_mm: f64) -> Volume {
         [40.0 - wall_mm, 160.0],
     ];
     turned(&outer).subtract(&turned(&inner))
+}
+
+/// A solid cup with a foot, whose belly stands out by so much over its neck, and two round handles.
+fn two_handled_cup(bulge_mm: f64) -> Volume {
+    let body = [
+        [26.0, 0.0],
+        [22.0, 8.0],
+        [30.0 - bulge_mm, 14.0],
+        [40.0, 60.0],
+        [34.0 + bulge_mm, 85.0],
+        [40.0, 108.0],
+        [36.0 - bulge_mm, 122.0],
+        [36.0 - bulge_mm, 138.0],
+        [40.0, 150.0],
+    ];
+    let handles = [-40.0, 40.0].map(|x| ring(Vec3::new(x, 0.0, 98.0), 26.0, 6.5));
+    Volume::union_all([turned(&body)].into_iter().chain(handles).collect())
+}
+
+/// A round ring that stands upright, facing along y.
+fn ring(center: Vec3, radius_mm: f64, tube_mm: f64) -> Volume {
+    let section = |i: usize| {
+        let (sin, cos) = (TAU * i as f64 / N_ROUND as f64).sin_cos();
+        let out = Vec3::new(cos, 0.0, sin);
+        (0..24).map(move |j| {
+            let (s, c) = (TAU * f64::from(j) / 24.0).sin_cos();
+            center + (radius_mm + tube_mm * c) * out + tube_mm * s * Vec3::Y
+        })
+    };
+    let parts = (0..N_ROUND).map(|i| Volume::hull(&section(i).chain(section(i + 1)).collect::<Vec<_>>()));
+    Volume::union_all(parts.collect())
 }
 
 fn open_box(wall_mm: f64) -> Volume {
