@@ -1,9 +1,11 @@
 //! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces and the colours of points;
 //! normals, texture, lines and curves are passed over.
 
+use std::collections::BTreeMap;
+
 use super::point_colors::{self, Channels};
 use super::polygons::{Numbering, Polygons};
-use super::text::{Lines, coordinate, point, whole, without_comment, words};
+use super::text::{Lines, coordinate, point, quoted, whole, without_comment, words};
 use super::{FileObject, Format, LabelSource, Loaded, Place, ReadError};
 
 /// What divides the faces, as it stands in a statement.
@@ -12,6 +14,53 @@ const DIVISIONS: [(&[u8], LabelSource); 3] = [
     (b"g", LabelSource::Group),
     (b"o", LabelSource::Object),
 ];
+
+/// Statements that end with a name, which may have any characters.
+const TAKES_A_NAME: [&[u8]; 4] = [b"usemtl", b"g", b"o", b"mtllib"];
+
+/// Statements that say nothing of where the surface is, or belong to those of curves, which only `curv`, `curv2` and
+/// `surf` begin.
+const HARMLESS: [&[u8]; 36] = [
+    b"vn",
+    b"vt",
+    b"vp",
+    b"s",
+    b"l",
+    b"p",
+    b"mg",
+    b"lod",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"shadow_obj",
+    b"trace_obj",
+    b"ctech",
+    b"stech",
+    b"maplib",
+    b"usemap",
+    b"deg",
+    b"bmat",
+    b"step",
+    b"cstype",
+    b"parm",
+    b"trim",
+    b"hole",
+    b"scrv",
+    b"sp",
+    b"end",
+    b"con",
+    b"vs",
+    b"curv",
+    b"curv2",
+    b"mtllib",
+    b"usemtl",
+    b"g",
+    b"o",
+    b"csh",
+];
+
+/// Kinds of statements that the note on those that were passed over quotes at most.
+const QUOTED: usize = 4;
 
 /// The division by objects, which have names.
 const OBJECTS: usize = 2;
@@ -26,6 +75,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut divisions = DIVISIONS.map(|_| Division::default());
     let mut extras = Extras::default();
     let (mut names_materials, mut has_texture) = (false, false);
+    let mut passed_over: BTreeMap<&[u8], usize> = BTreeMap::new();
     while let Some(at) = next_statement(&mut lines, &mut statement) {
         match statement.split_first() {
             Some((&b"v", rest)) => {
@@ -45,6 +95,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
             Some((&word, rest)) => {
                 if let Some(which) = DIVISIONS.iter().position(|(name, _)| *name == word) {
                     divisions[which].begin(rest, polygons.n_faces());
+                } else if !HARMLESS.contains(&word) {
+                    *passed_over.entry(word).or_default() += 1;
                 }
             }
             None => {}
@@ -61,6 +113,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     if labels.is_some_and(|labels| labels.iter().all(|label| *label >= 0)) {
         loaded.objects = objects;
     }
+    loaded.notes.extend(note_of_others(&passed_over));
     if names_materials && has_texture {
         let note = "the file's texture, if it has one, is not used";
         loaded.notes.push(note.to_owned());
@@ -69,6 +122,19 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
         point_colors::divide(&mut loaded, &channels.colors());
     }
     Ok(loaded)
+}
+
+/// A note on statements that are not read.
+fn note_of_others(passed_over: &BTreeMap<&[u8], usize>) -> Option<String> {
+    let n: usize = passed_over.values().sum();
+    let shown = passed_over.keys().take(QUOTED).map(|word| quoted(word));
+    let more = if passed_over.len() > QUOTED { ", …" } else { "" };
+    (n > 0).then(|| {
+        format!(
+            "statements that are not read were passed over: {n}, by {}{more}; surfaces among them are missing",
+            shown.collect::<Vec<_>>().join(", ")
+        )
+    })
 }
 
 /// Numbers after the coordinates of points: a weight, a colour, or both.
@@ -165,7 +231,12 @@ fn next_statement<'a>(lines: &mut Lines<'a>, statement: &mut Vec<&'a [u8]>) -> O
     statement.clear();
     let (at, mut line) = lines.next()?;
     loop {
-        let text = without_comment(line).trim_ascii_end();
+        let is_name = words(line)
+            .next()
+            .is_some_and(|first| TAKES_A_NAME.contains(&first));
+        // Names may have "#" in them.
+        let text = if is_name { line } else { without_comment(line) };
+        let text = text.trim_ascii_end();
         let Some(continued) = text.strip_suffix(b"\\") else {
             statement.extend(words(text));
             return Some(at);
@@ -194,4 +265,25 @@ fn corner(polygons: &Polygons, word: &[u8], at: Place) -> Result<u32, ReadError>
         index - 1
     };
     polygons.corner(from_0, at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_may_have_a_number_sign_and_what_is_not_read_is_noted() {
+        let text = "o Part#1\nv 0 0 0 # a corner\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl Mat #1\nf 1 3 2\nf 1 2 4 # a face\n\
+                    o Part#2\nusemtl Mat #2\nf 2 3 4\nf 1 4 3\nF 1 2 3\nsurf 0 1 0 1 1 2\n";
+        let loaded = read(text.as_bytes()).unwrap();
+        assert_eq!(loaded.labels(LabelSource::Material), Some(&[0, 0, 1, 1][..]));
+        let names: Vec<Option<&str>> = loaded.objects.iter().map(|o| o.name.as_deref()).collect();
+        assert_eq!(names, [Some("Part#1"), Some("Part#2")]);
+        assert_eq!(loaded.notes.len(), 1);
+        assert!(
+            loaded.notes[0].contains("2, by \"F\", \"surf\""),
+            "{}",
+            loaded.notes[0]
+        );
+    }
 }

@@ -1,7 +1,7 @@
 //! Collects points and polygons while a file is read.
 
 use super::{Format, LabelSource, Labelling, Loaded, Place, ReadError};
-use shellock_geom::{TriMesh, Vec3};
+use shellock_geom::{TriMesh, Vec3, polygon};
 
 /// The mesh so far. Polygons may name points that come later; [`Polygons::finish`] settles that.
 pub(super) struct Polygons {
@@ -57,7 +57,7 @@ impl Polygons {
         u32::try_from(index).map_err(|_| self.missing(index, at))
     }
 
-    /// Adds a polygon as a fan around its first corner.
+    /// Adds a polygon, as a fan around its first corner until all points are known.
     pub(super) fn add_polygon(&mut self, corners: &[u32], at: Place) -> Result<(), ReadError> {
         let [first, rest @ ..] = corners else {
             return Err(ReadError::TooFewCorners { at, n_corners: 0 });
@@ -82,7 +82,7 @@ impl Polygons {
 
     /// The mesh, with `labels` of the file's faces handed on to the triangles.
     pub(super) fn finish(
-        self,
+        mut self,
         format: Format,
         labels: Vec<(LabelSource, Vec<i64>)>,
     ) -> Result<Loaded, ReadError> {
@@ -95,6 +95,7 @@ impl Polygons {
         {
             return Err(self.missing(i64::from(index), at));
         }
+        let n_folded = self.triangulate();
         let mut labellings: Vec<Labelling> = labels
             .into_iter()
             .filter(|(source, labels)| *source == LabelSource::Property || divides(labels))
@@ -114,8 +115,43 @@ impl Polygons {
             unit_is_stated: false,
             objects: Vec::new(),
             cutters: Vec::new(),
-            notes: Vec::new(),
+            notes: Vec::from_iter((n_folded > 0).then(|| {
+                format!(
+                    "{n_folded} of the file's polygons cross themselves or are far from flat; their triangles may \
+                     fold over each other, so export triangles instead if the surface is wrong there"
+                )
+            })),
         })
+    }
+
+    /// Cuts each polygon into triangles that do not fold, in place of its fan. Returns how many have none; they stay
+    /// fans.
+    fn triangulate(&mut self) -> usize {
+        let (points, faces) = (&self.mesh.points, &self.file_face);
+        let (mut from, mut n_folded) = (0, 0);
+        let mut corners = Vec::new();
+        while from < faces.len() {
+            let to = from + faces[from..].iter().take_while(|&&f| f == faces[from]).count();
+            let fan = &mut self.mesh.triangles[from..to];
+            from = to;
+            if fan.len() < 2 {
+                continue;
+            }
+            corners.clear();
+            corners.extend([fan[0][0], fan[0][1]]);
+            corners.extend(fan.iter().map(|t| t[2]));
+            let places: Vec<Vec3> = corners.iter().map(|&c| points[c as usize]).collect();
+            match polygon::triangulate(&places) {
+                Some(triangles) => fan
+                    .iter_mut()
+                    .zip(triangles)
+                    .for_each(|(t, of)| *t = of.map(|i| corners[i as usize])),
+                // A polygon without area folds nothing.
+                None if polygon::has_area(&places) => n_folded += 1,
+                None => {}
+            }
+        }
+        n_folded
     }
 
     fn missing(&self, index: i64, at: Place) -> ReadError {
@@ -142,5 +178,64 @@ impl<T: Ord> Numbering<T> {
     pub(super) fn number(&mut self, name: T) -> i64 {
         let next = self.0.len() as i64;
         *self.0.entry(name).or_insert(next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::super::{Format, read_mesh};
+
+    /// A prism over an outline, as polygons: two ends and the sides.
+    fn prism(outline: &[[f64; 2]]) -> (Vec<[f64; 3]>, Vec<Vec<usize>>) {
+        let n = outline.len();
+        let points = [0.0, 5.0]
+            .iter()
+            .flat_map(|&z| outline.iter().map(move |&[x, y]| [x, y, z]));
+        let mut faces = vec![(0..n).rev().collect(), (n..2 * n).collect()];
+        faces.extend((0..n).map(|i| vec![i, (i + 1) % n, n + (i + 1) % n, n + i]));
+        (points.collect(), faces)
+    }
+
+    #[test]
+    fn polygons_with_notches_do_not_fold_in_any_format() {
+        let u = [[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]].map(|p| p.map(f64::from));
+        let (points, faces) = prism(&u);
+        let mut obj = String::new();
+        let mut off = format!("OFF\n{} {} 0\n", points.len(), faces.len());
+        let mut ply = format!(
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+             element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+            points.len(),
+            faces.len()
+        );
+        for [x, y, z] in &points {
+            writeln!(obj, "v {x} {y} {z}").unwrap();
+            writeln!(off, "{x} {y} {z}").unwrap();
+            writeln!(ply, "{x} {y} {z}").unwrap();
+        }
+        for face in &faces {
+            let joined = |first: usize| face.iter().map(|i| format!(" {}", i + first)).collect::<String>();
+            writeln!(obj, "f{}", joined(1)).unwrap();
+            writeln!(off, "{}{}", face.len(), joined(0)).unwrap();
+            writeln!(ply, "{}{}", face.len(), joined(0)).unwrap();
+        }
+        for (text, format) in [(obj, Format::Obj), (off, Format::Off), (ply, Format::Ply)] {
+            let loaded = read_mesh(text.as_bytes(), None).unwrap();
+            assert_eq!(loaded.format, format);
+            // 2 ends of 7 squares, 16 units of outline 5 high.
+            assert!(
+                (loaded.mesh.area() - (14.0 + 16.0 * 5.0)).abs() < 1e-9,
+                "{format:?}"
+            );
+            assert_eq!(loaded.notes, Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn polygons_that_cross_themselves_are_noted() {
+        let crossed = "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 2 3 4\n";
+        assert_eq!(read_mesh(crossed.as_bytes(), Some("obj")).unwrap().notes.len(), 1);
     }
 }

@@ -18,25 +18,51 @@ pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
         .is_some_and(|n| n > 0 && bytes.len() as u64 == HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * n)
 }
 
-/// Reads a binary STL.
+/// Reads a binary STL, or several one after the other, as `cat` makes them.
 ///
-/// Its count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is
+/// A count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is
 /// taken where it looks like triangles, and passed over where it does not. A count that is too high is a file
 /// cut off.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
+    let mut polygons = Polygons::counted_from(0);
+    let (mut colors, mut notes) = (Colors::default(), Vec::new());
+    let (mut rest, mut n_files) = (bytes, 0);
+    while n_files == 0 || begins_a_file(rest) {
+        let base = bytes.len() - rest.len();
+        let n_triangles = add_binary(rest, base, &mut polygons, &mut colors, &mut notes)?;
+        rest = &rest[HEADER_BYTES + TRIANGLE_BYTES * n_triangles..];
+        n_files += 1;
+    }
+    if n_files > 1 {
+        notes.push(format!(
+            "the file is {n_files} STL files one after the other; all were read"
+        ));
+    }
+    let mut loaded = polygons.finish(Format::StlBinary, vec![(LabelSource::Color, colors.labels)])?;
+    loaded.notes.append(&mut notes);
+    Ok(loaded)
+}
+
+/// Adds the triangles of the STL with which `bytes` begins, `base` bytes into the file, and returns how many.
+fn add_binary(
+    bytes: &[u8],
+    base: usize,
+    polygons: &mut Polygons,
+    colors: &mut Colors,
+    notes: &mut Vec<String>,
+) -> Result<usize, ReadError> {
     let Some(promised) = promised(bytes) else {
         return Err(ReadError::CutOff {
-            at: Place::Byte(bytes.len()),
+            at: Place::Byte(base + bytes.len()),
             within: "the header",
         });
     };
-    let (body, mut notes) = (&bytes[HEADER_BYTES..], Vec::new());
-    let n_triangles = count(body, promised, &mut notes)?;
-    let mut polygons = Polygons::counted_from(0);
+    let body = &bytes[HEADER_BYTES..];
+    let n_triangles = count(body, promised, base, notes)?;
     polygons.reserve(3 * n_triangles, n_triangles);
-    let mut colors = Colors::of_header(&bytes[..HEADER_BYTES - 4]);
+    colors.begin(&bytes[..HEADER_BYTES - 4]);
     for (face, triangle) in body.chunks_exact(TRIANGLE_BYTES).take(n_triangles).enumerate() {
-        let at = HEADER_BYTES + TRIANGLE_BYTES * face;
+        let at = base + HEADER_BYTES + TRIANGLE_BYTES * face;
         let mut corners = [0; 3];
         for (k, corner) in corners.iter_mut().enumerate() {
             let from = 12 + 12 * k;
@@ -46,43 +72,70 @@ pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
         polygons.add_polygon(&corners, Place::Byte(at))?;
         colors.add(u16::from_le_bytes([triangle[48], triangle[49]]));
     }
-    let mut loaded = polygons.finish(Format::StlBinary, vec![(LabelSource::Color, colors.labels)])?;
-    loaded.notes = notes;
-    Ok(loaded)
+    Ok(n_triangles)
 }
 
-/// How many triangles to take of `body`.
-fn count(body: &[u8], promised: u64, notes: &mut Vec<String>) -> Result<usize, ReadError> {
+/// Number of triangles to take of `body`, which begins `base` bytes and a header into the file.
+fn count(body: &[u8], promised: u64, base: usize, notes: &mut Vec<String>) -> Result<usize, ReadError> {
     let held = body.len() / TRIANGLE_BYTES;
     let is_unknown = promised == 0 || promised == u64::from(u32::MAX);
-    let wrong = |held: usize| {
-        format!("the header promises {promised} triangles, the file holds {held}; all are read")
-    };
     if promised > held as u64 && !is_unknown {
-        let at = Place::Byte(HEADER_BYTES - 4);
         return Err(ReadError::TooFewBytes {
-            at,
+            at: Place::Byte(base + HEADER_BYTES - 4),
             what: "triangles",
             promised,
             room: held as u64,
         });
     }
     let n_promised = if is_unknown { 0 } else { promised as usize };
-    let is_like_triangles = body[TRIANGLE_BYTES * n_promised..]
-        .chunks_exact(TRIANGLE_BYTES)
-        .all(is_like_a_triangle);
-    if n_promised < held && (is_unknown || (is_like_triangles && body.len().is_multiple_of(TRIANGLE_BYTES))) {
-        notes.push(wrong(held));
+    let trailing = &body[TRIANGLE_BYTES * n_promised..];
+    if !is_unknown && begins_a_file(trailing) {
+        return Ok(n_promised);
+    }
+    if !is_unknown && trailing.len() >= TRIANGLE_BYTES && trailing.starts_with(b"solid") {
+        let at = Place::Byte(base + HEADER_BYTES + TRIANGLE_BYTES * n_promised);
+        return Err(malformed(
+            at,
+            "the end of the file, not a text after the triangles; give each STL as a file of its own",
+            trailing,
+        ));
+    }
+    // A rest that is no whole triangle is padding, if what comes before it cannot be.
+    let is_like = |bytes: &[u8]| {
+        is_like_a_triangle(bytes)
+            && (trailing.len().is_multiple_of(TRIANGLE_BYTES) || has_three_corners(bytes))
+    };
+    if n_promised < held && (is_unknown || trailing.chunks_exact(TRIANGLE_BYTES).all(is_like)) {
+        notes.push(format!(
+            "the header promises {promised} triangles, the file holds {held}; all are read"
+        ));
         return Ok(held);
     }
-    let n_trailing = body.len() - TRIANGLE_BYTES * n_promised;
     // Up to a triangle's length is padding.
-    if n_trailing >= TRIANGLE_BYTES {
+    if trailing.len() >= TRIANGLE_BYTES {
         notes.push(format!(
-            "{n_trailing} bytes after the last triangle are no triangles and were passed over"
+            "{} bytes after the last triangle are no triangles and were passed over",
+            trailing.len()
         ));
     }
     Ok(n_promised)
+}
+
+/// True if `bytes` start with a header whose count of triangles fits, and triangles follow.
+fn begins_a_file(bytes: &[u8]) -> bool {
+    let n = promised(bytes)
+        .and_then(|n| usize::try_from(n).ok())
+        .filter(|&n| n > 0);
+    let length = n.and_then(|n| n.checked_mul(TRIANGLE_BYTES));
+    length
+        .and_then(|length| bytes[HEADER_BYTES..].get(..length))
+        .is_some_and(|body| body.chunks_exact(TRIANGLE_BYTES).all(is_like_a_triangle))
+}
+
+/// True if the corners of a triangle are three different points.
+fn has_three_corners(bytes: &[u8]) -> bool {
+    let corner = |k: usize| &bytes[12 + 12 * k..24 + 12 * k];
+    corner(0) != corner(1) && corner(1) != corner(2) && corner(2) != corner(0)
 }
 
 /// Whether the normal is a unit vector or zero and the corners are finite.
@@ -94,6 +147,7 @@ fn is_like_a_triangle(bytes: &[u8]) -> bool {
 
 /// The colours in the last two bytes of triangles: 5 bits each of red, green and blue, and one that says
 /// whether they hold.
+#[derive(Default)]
 struct Colors {
     /// What the highest bit is where a triangle has a colour of its own: set in most programs, not set in
     /// Magics, whose headers have "COLOR=".
@@ -103,13 +157,10 @@ struct Colors {
 }
 
 impl Colors {
-    fn of_header(header: &[u8]) -> Self {
+    /// Starts with the triangles of a file with this header.
+    fn begin(&mut self, header: &[u8]) {
         let is_magics = header.windows(6).any(|w| w == b"COLOR=");
-        Self {
-            valid: u16::from(!is_magics),
-            numbering: Numbering::default(),
-            labels: Vec::new(),
-        }
+        self.valid = u16::from(!is_magics);
     }
 
     fn add(&mut self, bits: u16) {
@@ -205,4 +256,43 @@ fn promised(bytes: &[u8]) -> Option<u64> {
 
 fn float(bytes: &[u8]) -> f32 {
     f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::write_stl_binary;
+    use super::*;
+    use shellock_testkit::shapes::tetrahedron;
+
+    #[test]
+    fn files_one_after_the_other_are_all_read_and_text_after_triangles_is_refused() {
+        let one = write_stl_binary(&tetrahedron());
+        let three = read_binary(&one.repeat(3)).unwrap();
+        assert_eq!((three.mesh.triangles.len(), three.notes.len()), (12, 1));
+        let mixed = [
+            &one[..],
+            b"solid x\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n",
+        ]
+        .concat();
+        assert!(matches!(
+            read_binary(&mixed),
+            Err(ReadError::Malformed {
+                at: Place::Byte(284),
+                ..
+            })
+        ));
+    }
+
+    #[test]
+    fn triangles_beyond_a_count_that_is_too_low_are_read_before_padding_too() {
+        let mut bytes = write_stl_binary(&tetrahedron());
+        bytes[80..84].copy_from_slice(&2_u32.to_le_bytes());
+        bytes.extend([0; 7]);
+        let loaded = read_binary(&bytes).unwrap();
+        assert_eq!((loaded.mesh.triangles.len(), loaded.notes.len()), (4, 1));
+        // Zeros are no triangles.
+        let mut padded = write_stl_binary(&tetrahedron());
+        padded.extend([0; 120]);
+        assert_eq!(read_binary(&padded).unwrap().mesh.triangles.len(), 4);
+    }
 }

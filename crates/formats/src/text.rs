@@ -68,13 +68,23 @@ pub(super) fn without_comment(line: &[u8]) -> &[u8] {
     line.split(|&b| b == b'#').next().unwrap_or_default()
 }
 
-/// The error "expected … found …", with `found` shortened and made printable.
-pub(super) fn malformed(at: Place, expected: &'static str, found: &[u8]) -> ReadError {
-    let shown: String = String::from_utf8_lossy(&found[..found.len().min(4 * QUOTED_CHARS)])
+/// The start of `text`, made printable.
+fn shown(text: &[u8]) -> String {
+    String::from_utf8_lossy(&text[..text.len().min(4 * QUOTED_CHARS)])
         .chars()
         .take(QUOTED_CHARS)
         .map(|c| if c.is_control() { ' ' } else { c })
-        .collect();
+        .collect()
+}
+
+/// The start of a word in quotes, made printable.
+pub(super) fn quoted(word: &[u8]) -> String {
+    format!("\"{}\"", shown(word))
+}
+
+/// The error "expected … found …", with `found` shortened and made printable.
+pub(super) fn malformed(at: Place, expected: &'static str, found: &[u8]) -> ReadError {
+    let shown = shown(found);
     let ellipsis = if found.len() > shown.len() { "…" } else { "" };
     ReadError::Malformed {
         at,

@@ -8,8 +8,9 @@ use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use manifold_rust::csg_tree::CsgNode;
-use manifold_rust::linalg::{Mat3x4, Vec3 as V};
+use manifold_rust::linalg::{Mat3x4, Vec2, Vec3 as V};
 use manifold_rust::manifold::Manifold;
+use manifold_rust::polygon;
 use manifold_rust::types::{Error, MeshGL64, OpType, WindingRule};
 
 use crate::topology::{Topology, components};
@@ -28,6 +29,18 @@ pub struct NotAVolume {
 
 fn v(p: Vec3) -> V {
     V::new(p.x, p.y, p.z)
+}
+
+/// Triangles of the corners of a counter-clockwise polygon in the plane, by ears. Polygons that cross themselves
+/// give triangles that overlap.
+pub(crate) fn cut_by_ears(corners: &[[f64; 2]]) -> Vec<[u32; 3]> {
+    /// The library's own tolerance, from the size of the polygon.
+    const AUTOMATIC: f64 = -1.0;
+    let outline = corners.iter().map(|&[x, y]| Vec2::new(x, y)).collect();
+    polygon::triangulate(&vec![outline], AUTOMATIC, true)
+        .into_iter()
+        .map(|t| [t.x, t.y, t.z].map(|i| i as u32))
+        .collect()
 }
 
 impl Volume {

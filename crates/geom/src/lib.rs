@@ -16,6 +16,7 @@ pub mod laplacian;
 pub mod level_cut;
 pub mod marching_cubes;
 pub mod mesh;
+pub mod polygon;
 pub mod remesh;
 pub mod repair;
 pub mod rounding;
