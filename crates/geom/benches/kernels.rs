@@ -1,5 +1,5 @@
 //! Kernels on a ball of 100 000 triangles: distances, bands, sweeps, contours, booleans, remeshing,
-//! simplifying; clearances of two half shells of 26 000 triangles.
+//! simplifying. Clearances are those of two half shells of 26 000 triangles.
 
 use divan::{Bencher, black_box};
 use shellock_geom::band::Band;

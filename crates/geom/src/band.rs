@@ -1,29 +1,29 @@
-//! A sparse band of grid nodes along a surface, the home of all sampled fields.
+//! Narrow band: the grid nodes near a surface, on which all sampled fields are stored.
 //!
-//! A field is a `Vec<f32>` with one value a node. Memory and time follow the surface: only nodes within a
-//! given distance of it exist. Nodes are stored row by row (x fastest, then y, then z), in runs of
-//! consecutive x.
+//! A field is a `Vec<f32>` with one value per node. Only nodes within a given distance of the surface exist,
+//! so memory and time grow with the surface. Nodes are stored row by row (x fastest, then y, then z), in runs
+//! of consecutive x.
 
 use rayon::prelude::*;
 
 use crate::signed_distance::{SignedDistance, SurfaceDistance};
 use crate::{Aabb, Vec3};
 
-/// No such node.
+/// Marks a missing node.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Consecutive nodes of one row.
+/// Run of consecutive nodes of one row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
-    /// x index of the first node.
+    /// Grid index of the first node along x.
     pub(crate) i0: u32,
-    /// Its position in a field.
+    /// Index of the first node in a field.
     pub(crate) first: u32,
-    /// How many nodes.
+    /// Number of nodes in the run.
     pub(crate) len: u32,
 }
 
-/// Grid nodes near a surface.
+/// Narrow band of grid nodes near a surface.
 pub struct Band {
     pub(crate) origin: Vec3,
     pub(crate) cell_mm: f64,
@@ -32,11 +32,11 @@ pub struct Band {
     pub(crate) row_start: Vec<u32>,
     pub(crate) runs: Vec<Run>,
     pub(crate) coords: Vec<[u16; 3]>,
-    /// Neighbours at y − 1, y + 1, z − 1, z + 1 of each node.
+    /// Neighbours of each node at y − 1, y + 1, z − 1, z + 1.
     sides: Vec<[u32; 4]>,
 }
 
-/// Why no band can be laid.
+/// Error: the grid would have too many nodes along an axis.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "a grid of {cell_mm} mm along {size_mm:.1} mm has more than 65 000 steps; use a coarser grid or a smaller model"
@@ -47,9 +47,10 @@ pub struct GridTooFine {
 }
 
 impl Band {
-    /// The nodes with a signed distance in [−`outside_mm`, `inside_mm`] to the surface within `bounds`, and
-    /// that distance (positive inside) as a first field. Where a block of nodes lies deeper than `exact_mm`,
-    /// its distances are extrapolated from its middle to first order: deep nodes only need to exist.
+    /// Creates the band of nodes with a signed distance in [−`outside_mm`, `inside_mm`] to the surface within
+    /// `bounds`. Also returns that distance, positive inside, as a first field. Blocks of nodes that lie
+    /// deeper than `exact_mm` get distances extrapolated from their middle to first order, since the exact
+    /// depth of such nodes does not matter.
     pub fn along(
         surface: &SignedDistance,
         bounds: Aabb,
@@ -129,12 +130,12 @@ impl Band {
         band
     }
 
-    /// How many nodes there are.
+    /// Number of nodes in the band.
     pub fn len(&self) -> usize {
         self.coords.len()
     }
 
-    /// Whether there are none.
+    /// Returns true if the band has no nodes.
     pub fn is_empty(&self) -> bool {
         self.coords.is_empty()
     }
@@ -144,18 +145,18 @@ impl Band {
         self.cell_mm
     }
 
-    /// Where node `node` is, mm.
+    /// Position of node `node`, mm.
     pub fn position(&self, node: usize) -> Vec3 {
         let [i, j, k] = self.coords[node].map(f64::from);
         self.origin + self.cell_mm * Vec3::new(i, j, k)
     }
 
-    /// Which block of `edge`³ nodes of the whole grid `node` belongs to.
+    /// Index of the block of `edge`³ grid nodes that contains `node`, along each axis.
     pub fn block(&self, node: usize, edge: u16) -> [u16; 3] {
         self.coords[node].map(|x| x / edge)
     }
 
-    /// The node at grid coordinates `[i, j, k]`, if the band has it.
+    /// Node at grid coordinates `[i, j, k]`, if the band has it.
     pub(crate) fn node_at(&self, [i, j, k]: [i64; 3]) -> Option<u32> {
         let [nx, ny, nz] = self.dims.map(|n| n as i64);
         if i < 0 || j < 0 || k < 0 || i >= nx || j >= ny || k >= nz {
@@ -169,8 +170,8 @@ impl Band {
         (offset < i64::from(run.len)).then_some(run.first + offset as u32)
     }
 
-    /// The neighbour of `node` one step of −1, 0 or 1 along each axis away, if the band has it without a
-    /// detour out of it.
+    /// Neighbour of `node` at a step of −1, 0 or 1 along each axis. `None` if the band lacks it, or lacks a
+    /// node on the path there: first along y, then z, then x.
     pub(crate) fn neighbour(&self, node: u32, [dx, dy, dz]: [i32; 3]) -> Option<u32> {
         let mut at = node;
         if dy != 0 {
@@ -198,7 +199,7 @@ impl Band {
         Some(at)
     }
 
-    /// The up to six nodes next to `node` along the axes.
+    /// Nodes next to `node` along the axes, at most six.
     pub fn face_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
         let along_x = [-1, 1]
             .into_iter()
@@ -206,8 +207,8 @@ impl Band {
         along_x.chain(self.sides[node as usize].into_iter().filter(|&n| n != NONE))
     }
 
-    /// Trilinear value of `field` at `p`; corners outside the band do not count. `None` where all eight are
-    /// missing.
+    /// Interpolates `field` at `p` trilinearly, ignoring corners outside the band. `None` if all eight
+    /// corners are missing.
     pub fn sample(&self, field: &[f32], p: Vec3) -> Option<f64> {
         let q = (p - self.origin) / self.cell_mm;
         let base = q.floor();
@@ -220,7 +221,7 @@ impl Band {
                 continue;
             };
             let share = |bit: i64, t: f64| if bit == 1 { t } else { 1.0 - t };
-            // A corner with no weight still answers where all others are missing.
+            // A corner with zero weight still provides the value if all others are missing.
             let w = (share(a, t.x) * share(b, t.y) * share(d, t.z)).max(1e-9);
             sum += w * f64::from(field[node as usize]);
             weight += w;
@@ -228,8 +229,8 @@ impl Band {
         (weight > 0.0).then(|| sum / weight)
     }
 
-    /// Gradient of the trilinear interpolant's central differences at `p`, a unit of `field` per mm; zero off
-    /// the band.
+    /// Gradient of `field` at `p` by central differences of the trilinear interpolant, in units of `field`
+    /// per mm. A component is zero if a sample lies outside the band.
     pub fn gradient(&self, field: &[f32], p: Vec3) -> Vec3 {
         let h = 0.5 * self.cell_mm;
         Vec3::from_array([Vec3::X, Vec3::Y, Vec3::Z].map(|axis| {
@@ -240,7 +241,8 @@ impl Band {
         }))
     }
 
-    /// The part of the band in `room` as a band of its own, and which node of this one each of its nodes is.
+    /// Extracts the part of the band inside `room` as a new band. Also returns the old index of each new
+    /// node.
     pub fn part_in(&self, room: Aabb) -> (Self, Vec<u32>) {
         let index = |p: Vec3| ((p - self.origin) / self.cell_mm).to_array();
         let low = index(room.min).map(|x| x.ceil().max(0.0) as usize);
@@ -265,7 +267,7 @@ impl Band {
         (Self::from_keys(origin, self.cell_mm, dims, &keys), nodes)
     }
 
-    /// The nodes in `b`, ascending.
+    /// Nodes inside `b`, in ascending order.
     pub fn nodes_in(&self, b: Aabb) -> Vec<u32> {
         (0..self.len() as u32)
             .into_par_iter()
@@ -274,7 +276,7 @@ impl Band {
     }
 }
 
-/// Which nodes belong to a band.
+/// Rule that decides which nodes belong to a band.
 struct BandRule<'a> {
     surface: &'a SignedDistance,
     origin: Vec3,
@@ -285,7 +287,7 @@ struct BandRule<'a> {
     exact_mm: f64,
 }
 
-/// Nodes along an edge of a coarse block, and of the fine blocks it is refined into.
+/// Edge lengths, in nodes, of coarse blocks and of the fine blocks into which they are split.
 const COARSE: usize = 16;
 const FINE: usize = 4;
 
@@ -294,7 +296,7 @@ impl BandRule<'_> {
         self.origin + self.cell_mm * Vec3::from_array(ijk.map(|x| x as f64))
     }
 
-    /// Signed distance at the middle of a block where the block can contain nodes of the band.
+    /// Signed distance at the middle of a block; `None` if no node of the block can belong to the band.
     fn reach(&self, corner: [usize; 3], edge: usize) -> Option<SurfaceDistance> {
         let half = 0.5 * (edge - 1) as f64 * self.cell_mm;
         let radius = half * 3f64.sqrt();
@@ -320,7 +322,7 @@ impl BandRule<'_> {
             .collect()
     }
 
-    /// The block's nodes that belong, as (row-major key, signed distance).
+    /// Nodes of the block that belong to the band, as pairs of row-major key and signed distance.
     fn nodes_of(&self, corner: [usize; 3]) -> Vec<(u64, f32)> {
         let mut nodes = Vec::new();
         let Some(middle) = self.reach(corner, FINE) else {
@@ -338,7 +340,7 @@ impl BandRule<'_> {
                     let signed_mm = if is_deep {
                         middle.signed_mm + (p - center).dot(inwards)
                     } else {
-                        // Distance is 1-Lipschitz: the middle's answer bounds the search.
+                        // Distance is 1-Lipschitz, so the distance at the middle bounds the search.
                         let bound = (middle.signed_mm.abs() + p.distance(center)) * (1.0 + 1e-9) + 1e-9;
                         let Some(d) = self.surface.at(p, bound) else {
                             continue;
@@ -361,7 +363,7 @@ pub(crate) mod tests {
     use crate::Solid;
     use crate::samples::cuboid;
 
-    /// The band of the cube [0, 8]³ with h = 0.5, and its distance field.
+    /// Band of the cube [0, 8]³ with h = 0.5, and its distance field.
     pub(crate) fn cube_band() -> (Band, Vec<f32>) {
         let b = Aabb {
             min: Vec3::ZERO,

@@ -1,8 +1,8 @@
-//! Mesh booleans. The only file that names the boolean library.
+//! Mesh booleans. No other file names the boolean library.
 //!
-//! A [`Volume`] is a possibly empty region of space bounded by a manifold mesh; unions, intersections and
-//! differences of volumes are volumes, always. The library promises the topology of its results;
-//! [`Volume::to_mesh`] hands them on.
+//! A [`Volume`] is a possibly empty region of space bounded by a manifold mesh. Unions, intersections and
+//! differences of volumes are always volumes. The library guarantees the topology of its results, and
+//! [`Volume::to_mesh`] passes these on unchanged.
 
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,11 +16,11 @@ use manifold_rust::types::{Error, MeshGL64, OpType, WindingRule};
 use crate::topology::{Topology, components};
 use crate::{Aabb, Solid, TriMesh, Vec3};
 
-/// A region bounded by a manifold mesh; may be empty, may have several bodies, may have cavities.
+/// Region bounded by a manifold mesh. May be empty, have several bodies, and have cavities.
 #[derive(Clone)]
 pub struct Volume(Manifold);
 
-/// The boolean library refused a mesh.
+/// Error: the boolean library rejected a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("the mesh bounds no volume: {reason}")]
 pub struct NotAVolume {
@@ -44,19 +44,19 @@ pub(crate) fn cut_by_ears(corners: &[[f64; 2]]) -> Vec<[u32; 3]> {
 }
 
 impl Volume {
-    /// The region that contains nothing.
+    /// Creates the region that contains nothing.
     pub fn empty() -> Self {
         Self(Manifold::empty())
     }
 
-    /// The region inside a solid.
+    /// Creates the region inside a solid.
     ///
-    /// Fails where the solid's surface is pinched in a way that the library does not take.
+    /// Fails if the solid's surface is pinched in a way that the library rejects.
     pub fn from_solid(solid: &Solid) -> Result<Self, NotAVolume> {
         Self::from_closed_mesh(solid.mesh())
     }
 
-    /// The region inside a closed, oriented mesh, which may be empty or have cavities.
+    /// Creates the region inside a closed, oriented mesh, which may be empty or have cavities.
     pub fn from_closed_mesh(mesh: &TriMesh) -> Result<Self, NotAVolume> {
         if mesh.triangles.is_empty() {
             return Ok(Self::empty());
@@ -70,7 +70,7 @@ impl Volume {
         }
     }
 
-    /// Convex hull of `points`; empty where they lie in a plane.
+    /// Convex hull of `points`; empty if they lie in a plane.
     pub fn hull(points: &[Vec3]) -> Self {
         let points: Vec<V> = points.iter().map(|&p| v(p)).collect();
         let hull = Manifold::hull(&points);
@@ -81,9 +81,9 @@ impl Volume {
         }
     }
 
-    /// The region swept by a polygon that moves through `rings`: one closed loft with flat caps. All rings
-    /// have the same number of points, in the same order; the loft must not fold back through itself. Empty
-    /// for fewer than two rings.
+    /// Region swept by a polygon that moves through `rings`: one closed loft with flat caps. All rings must
+    /// have the same number of points, in the same order, and the loft must not fold back through itself.
+    /// Empty for fewer than two rings, and for rings of fewer than three points.
     pub fn loft(rings: &[Vec<Vec3>]) -> Self {
         if rings.len() < 2 || rings[0].len() < 3 {
             return Self::empty();
@@ -115,8 +115,8 @@ impl Volume {
         Self(Manifold::cube(v(b.size()), false).translate(v(b.min)))
     }
 
-    /// Union of all `parts`; cost follows their mutual overlap. Parts near each other are united first, halves of
-    /// them at once, so that what most operations see is small.
+    /// Union of all `parts`. The cost grows with their mutual overlap. Nearby parts are united first and
+    /// halves run in parallel, so that most operations have small operands.
     pub fn union_all(parts: Vec<Self>) -> Self {
         let parts: Vec<(Aabb, Self)> = parts
             .into_iter()
@@ -127,7 +127,7 @@ impl Volume {
     }
 
     fn united(mut parts: Vec<(Aabb, Self)>) -> Self {
-        /// So many are united one by one.
+        /// Number of parts up to which they are united in one operation.
         const FEW: usize = 16;
         if parts.len() <= FEW {
             return Self::united_at_once(parts.into_iter().map(|(_, part)| part).collect());
@@ -155,7 +155,7 @@ impl Volume {
         }
     }
 
-    /// What lies in either.
+    /// Union: the region in either volume.
     pub fn union(&self, other: &Self) -> Self {
         match (self.is_empty(), other.is_empty()) {
             (true, _) => other.clone(),
@@ -164,7 +164,7 @@ impl Volume {
         }
     }
 
-    /// What lies in both.
+    /// Intersection: the region in both volumes.
     pub fn intersect(&self, other: &Self) -> Self {
         if !self.boxes_meet(other) {
             return Self::empty();
@@ -172,7 +172,7 @@ impl Volume {
         Self(self.0.intersection(&other.0))
     }
 
-    /// What lies in `self` and not in `other`.
+    /// Difference: the region in `self` that is not in `other`.
     pub fn subtract(&self, other: &Self) -> Self {
         if !self.boxes_meet(other) {
             return self.clone();
@@ -180,7 +180,7 @@ impl Volume {
         Self(self.0.difference(&other.0))
     }
 
-    /// The part inside `cutter` and the part outside it: an exact partition.
+    /// Splits the region into the part inside `cutter` and the part outside it: an exact partition.
     pub fn split(&self, cutter: &Self) -> (Self, Self) {
         if !self.boxes_meet(cutter) {
             return (Self::empty(), self.clone());
@@ -189,12 +189,12 @@ impl Volume {
         (Self(inside), Self(outside))
     }
 
-    /// The region moved by `by` mm.
+    /// Moves the region by `by` mm.
     pub fn translate(&self, by: Vec3) -> Self {
         Self(self.0.translate(v(by)))
     }
 
-    /// The region turned about the origin by the rotation whose columns are where the axes go.
+    /// Rotates the region about the origin. The columns are the images of the axes.
     pub fn rotate(&self, columns: [Vec3; 3]) -> Self {
         let [x, y, z] = columns.map(v);
         Self(
@@ -203,17 +203,17 @@ impl Volume {
         )
     }
 
-    /// Fewer triangles for the same shape within `tolerance_mm`; stays manifold.
+    /// Reduces the number of triangles, keeping the shape within `tolerance_mm`. The result stays manifold.
     pub fn simplify(&self, tolerance_mm: f64) -> Self {
         Self(self.0.simplify(tolerance_mm))
     }
 
-    /// Enclosed volume, mm³.
+    /// Volume of the region, mm³.
     pub fn volume(&self) -> f64 {
         if self.is_empty() { 0.0 } else { self.0.volume() }
     }
 
-    /// Surface area, mm².
+    /// Surface area of the region, mm².
     pub fn area(&self) -> f64 {
         if self.is_empty() {
             0.0
@@ -222,22 +222,22 @@ impl Volume {
         }
     }
 
-    /// Whether there is nothing.
+    /// Returns true if the region is empty.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// How many triangles bound it.
+    /// Number of triangles on the boundary.
     pub fn n_triangles(&self) -> usize {
         self.0.num_tri()
     }
 
-    /// Euler genus of the whole boundary; meaningful for one body.
+    /// Euler genus of the whole boundary; only meaningful for one body.
     pub fn genus(&self) -> i32 {
         self.0.genus()
     }
 
-    /// The smallest box around it.
+    /// Bounding box of the region; [`Aabb::EMPTY`] if the region is empty.
     pub fn bounds(&self) -> Aabb {
         if self.is_empty() {
             return Aabb::EMPTY;
@@ -249,7 +249,7 @@ impl Volume {
         }
     }
 
-    /// Connected boundary surfaces, largest volume first; a cavity comes out as a component that faces inwards
+    /// Connected boundary surfaces, largest volume first. A cavity appears as a component that faces inwards
     /// ([`signed_volume`](Self::signed_volume)).
     pub fn components(&self) -> Vec<Self> {
         let mut parts: Vec<Self> = self.0.decompose().into_iter().map(Self).collect();
@@ -257,18 +257,18 @@ impl Volume {
         parts
     }
 
-    /// Volume enclosed, mm³, negative where the surface faces inwards, as that of a cavity on its own does;
+    /// Enclosed volume, mm³, negative if the surface faces inwards, as a cavity's surface on its own does.
     /// [`volume`](Self::volume) has no sign.
     pub fn signed_volume(&self) -> f64 {
         self.to_mesh().signed_volume()
     }
 
-    /// The region bounded by those connected boundary surfaces whose points `keep` accepts.
+    /// Region bounded by those connected boundary surfaces whose points `keep` accepts.
     pub fn retain(&self, keep: impl Fn(&mut dyn Iterator<Item = Vec3>) -> bool) -> Self {
         let mesh = self.to_mesh();
-        // The library's own decomposition copies all points for every part: gigabytes where a cut leaves many
-        // crumbs. It is asked only where parts share an edge, which a topology of half-edges cannot tell
-        // apart.
+        // The library's own decomposition copies all points for every part, which takes gigabytes if a cut
+        // leaves many fragments. It is needed only if parts share an edge, since half-edges cannot separate
+        // these.
         let Some(topology) = Topology::of_mesh(&mesh) else {
             return self.retain_decomposed(keep);
         };
@@ -323,9 +323,9 @@ impl Volume {
         }
     }
 
-    /// The boundary as a mesh; no points where empty. Its order follows from what it was made of alone: the
-    /// library's own export sorts triangles by when their sources were made, which varies where several threads
-    /// make them.
+    /// Boundary of the region as a mesh; no points if empty. The order depends only on how the region was
+    /// made. The library's own export instead sorts triangles by the time at which their sources were made,
+    /// which varies if several threads make them.
     pub fn to_mesh(&self) -> TriMesh {
         let made = self.0.as_impl();
         let index = |i: i32| u32::try_from(i).expect("edges of a made body have points");
@@ -346,11 +346,12 @@ impl Volume {
     }
 }
 
-/// The boundary of all that a closed mesh winds around at least once: parts that overlap become one, what
-/// lies within is dissolved, and the result neither crosses itself nor has edges of more than two triangles.
+/// Boundary of the region that a closed mesh winds around at least once. Overlapping parts become one and
+/// surfaces inside others vanish. The result does not cross itself and has no edge with more than two
+/// triangles.
 ///
-/// Cost follows the pairs of triangles that cross; it is exact arithmetic. Fails where the mesh is open or
-/// not oriented.
+/// Uses exact arithmetic; the cost grows with the number of crossing pairs of triangles. Fails if the mesh is
+/// open or not oriented.
 pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
     guarded(mesh, |mesh| {
         let soup = Manifold::from_mesh_gl64_robust(&as_gl(mesh));
@@ -370,10 +371,10 @@ pub fn rebuild(mesh: &TriMesh) -> Result<TriMesh, NotAVolume> {
     .and_then(|(rebuilt, turn)| Ok(turn.back(rebuilt?)))
 }
 
-/// Whether triangles of a closed mesh cross or lie upon each other: exact, where crossing in an edge counts
-/// too.
+/// Returns true if triangles of a closed mesh cross or overlap in a plane, decided exactly. Crossing in an
+/// edge counts, too.
 ///
-/// Fails where the library cannot tell.
+/// Fails if the library cannot decide.
 pub fn touches_itself(mesh: &TriMesh) -> Result<bool, NotAVolume> {
     guarded(mesh, |mesh| {
         Manifold::from_mesh_gl64_robust(&as_gl(mesh)).has_self_intersections()
@@ -381,17 +382,16 @@ pub fn touches_itself(mesh: &TriMesh) -> Result<bool, NotAVolume> {
     .map(|(touches, _)| touches)
 }
 
-/// How many threads are within [`guarded`].
+/// Number of threads inside [`guarded`].
 static N_GUARDED: AtomicUsize = AtomicUsize::new(0);
 
-/// Whether a panic now may be one of the library's that becomes an error, so that a panic hook need not tell
-/// it.
+/// Returns true if a panic now may come from the library and become an error. A panic hook need not report
+/// such a panic.
 pub fn is_guarded() -> bool {
     N_GUARDED.load(Ordering::Relaxed) > 0
 }
 
-/// A rotation that rounds no coordinate: the axes are passed on by some places, then half a turn about z or
-/// none.
+/// Rotation that rounds no coordinate: a cyclic permutation of the axes, then half a turn about z or none.
 #[derive(Clone, Copy)]
 struct Turn {
     n_places: usize,
@@ -432,10 +432,11 @@ impl Turn {
     }
 }
 
-/// What `work` makes of the mesh turned, and the turn.
+/// Runs `work` on the rotated mesh, trying one rotation after the other until `work` does not panic. Returns
+/// the result and the rotation.
 ///
-/// The library casts rays in a dozen directions, and panics where each of them meets an edge, as on meshes of
-/// whole numbers; turned they go elsewhere.
+/// The library casts rays in a dozen directions, and panics if every ray meets an edge, as happens for meshes
+/// with integer coordinates. In a rotated mesh the rays take other paths.
 fn guarded<T>(mesh: &TriMesh, work: impl Fn(&TriMesh) -> T) -> Result<(T, Turn), NotAVolume> {
     N_GUARDED.fetch_add(1, Ordering::Relaxed);
     let tried = |turn: Turn| {
@@ -519,7 +520,7 @@ mod tests {
         }
     }
 
-    /// Threads make volumes in any order.
+    /// Threads make volumes in any order, which must not show in the mesh.
     #[test]
     fn a_mesh_does_not_depend_on_which_part_was_made_first() {
         let slab = |x: f64| {

@@ -1,30 +1,31 @@
-//! A bounding-volume hierarchy over triangles: nearest points, and nearest distances by group.
+//! Bounding volume hierarchy over triangles, for nearest points and for nearest distances by group.
 
 use rayon::prelude::*;
 
 use crate::{Aabb, TriMesh, Vec3};
 
-/// Triangles a leaf holds at most. Four was the fastest of 1 … 8 on 200 k triangles (closest-point queries).
+/// Largest number of triangles in a leaf. Four was the fastest of 1 … 8 on 200 k triangles (closest-point
+/// queries).
 const LEAF_SIZE: usize = 4;
-/// Bins of the surface-area heuristic; more gave under 1 % fewer visits.
+/// Number of bins of the surface-area heuristic; more gave under 1 % fewer visits.
 const N_BINS: usize = 16;
-/// Below this depth nodes are halved, so that no mesh makes a tree deeper than the 64 entries of a query's
-/// stack: halving 2³² triangles takes 32 levels more, less the levels that any split saves.
+/// Depth below which nodes are halved, so that no tree gets deeper than the 64 entries of a query's stack.
+/// Halving 2³² triangles takes 32 more levels, less the levels that any split saves.
 const MAX_UNEVEN_DEPTH: u32 = 28;
 
 #[derive(Clone, Copy)]
 pub(crate) struct Node {
     pub(crate) bounds: Aabb,
-    /// First triangle of a leaf (in `order`), or index of the left child; the right child follows it.
+    /// First triangle of a leaf (in `order`), or index of the left child; the right child follows the left.
     pub(crate) first: u32,
-    /// Triangles of a leaf; 0 for an inner node.
+    /// Number of triangles in a leaf; 0 for an inner node.
     pub(crate) count: u32,
-    /// The group that all triangles below share, or [`MIXED`].
+    /// Group that all triangles below share, or [`MIXED`].
     group: u32,
 }
 
 impl Node {
-    /// The triangles of a leaf, as positions in leaf order.
+    /// Triangles of a leaf, as positions in leaf order.
     pub(crate) fn triangles(&self) -> std::ops::Range<usize> {
         self.first as usize..(self.first + self.count) as usize
     }
@@ -32,7 +33,7 @@ impl Node {
 
 const MIXED: u32 = u32::MAX;
 
-/// Triangles sorted into nested boxes. Built in O(n log n); every answer is exact.
+/// Hierarchy of bounding boxes over triangles. Built in O(n log n); every answer is exact.
 pub struct TriangleBvh {
     pub(crate) nodes: Vec<Node>,
     /// Corners in leaf order, so that a leaf reads memory in sequence.
@@ -41,38 +42,38 @@ pub struct TriangleBvh {
     groups: Vec<u32>,
 }
 
-/// Where the nearest point lies on its triangle.
+/// Part of a triangle on which its nearest point lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feature {
     /// On corner 0, 1 or 2.
     Corner(u8),
     /// On the edge that starts at corner 0, 1 or 2.
     Edge(u8),
-    /// Inside.
+    /// Inside the triangle, off its edges.
     Face,
 }
 
-/// The nearest point of a mesh.
+/// Point of a mesh nearest to a query point.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
-    /// Squared distance, mm².
+    /// Squared distance to the query point, mm².
     pub distance_sq: f64,
-    /// The triangle.
+    /// Index of the nearest triangle.
     pub face: u32,
-    /// The point on it.
+    /// Nearest point of that triangle, mm.
     pub point: Vec3,
-    /// Which part of the triangle the point is on.
+    /// Part of the triangle on which the point lies.
     pub feature: Feature,
 }
 
 impl TriangleBvh {
-    /// Sorts all triangles of `mesh`; one group.
+    /// Builds the hierarchy of all triangles of `mesh`, as a single group.
     pub fn new(mesh: &TriMesh) -> Self {
         Self::with_groups(mesh, &[])
     }
 
-    /// Sorts all triangles of `mesh`; `group_of_face` (one a triangle, or empty for a single group) serves
-    /// [`Self::nearest_by_group`].
+    /// Builds the hierarchy of all triangles of `mesh`. `group_of_face` (one per triangle, or empty for a
+    /// single group) is used by [`Self::nearest_by_group`].
     pub fn with_groups(mesh: &TriMesh, group_of_face: &[u32]) -> Self {
         let n = u32::try_from(mesh.triangles.len()).expect("faces are counted in 32 bits");
         let corners = |face: u32| mesh.corners(face as usize);
@@ -91,8 +92,8 @@ impl TriangleBvh {
         }
     }
 
-    /// The nearest point within `√limit_sq` mm of `q`, if there is one. Ties go to the triangle found first,
-    /// which depends on the mesh alone.
+    /// Finds the point nearest to `q` within `√limit_sq` mm, if there is one. Ties go to the triangle found
+    /// first, which depends only on the mesh.
     pub fn nearest(&self, q: Vec3, limit_sq: f64) -> Option<Nearest> {
         let mut best: Option<Nearest> = None;
         let mut limit = limit_sq;
@@ -134,8 +135,8 @@ impl TriangleBvh {
         best
     }
 
-    /// Squared distances, mm², from `q` to the groups that come within `√limit_sq` of it: (group, distance²),
-    /// sorted by group, each group once. `found` is cleared first and reused.
+    /// Finds the squared distance, mm², from `q` to each group within `√limit_sq` mm. Writes pairs (group,
+    /// distance²) to `found`, sorted by group, each group once. `found` is cleared first and reused.
     pub fn nearest_by_group(&self, q: Vec3, limit_sq: f64, found: &mut Vec<(u32, f64)>) {
         found.clear();
         let mut stack = [(0u32, 0.0f64); 64];
@@ -178,8 +179,9 @@ impl TriangleBvh {
         found.sort_unstable_by_key(|e| e.0);
     }
 
-    /// The first triangle that the ray from `origin` along the unit vector `direction` meets within
-    /// `limit_mm`, and how far that is, mm. Both sides count; triangles parallel to the ray do not.
+    /// First triangle that a ray meets within `limit_mm`, and the distance to it, mm. The ray starts at
+    /// `origin` and follows the unit vector `direction`. Both sides of triangles count; triangles parallel to
+    /// the ray do not.
     pub fn first_hit(&self, origin: Vec3, direction: Vec3, limit_mm: f64) -> Option<(u32, f64)> {
         let mut best: Option<(u32, f64)> = None;
         let mut limit = limit_mm;
@@ -229,7 +231,7 @@ fn ray_meets_box(b: Aabb, origin: Vec3, direction: Vec3, limit: f64) -> bool {
     from <= to + 1e-9 * (1.0 + to.abs())
 }
 
-/// Distance along the ray, ≥ 0. [MollerTrumbore1997]
+/// Distance along the ray, ≥ 0; `None` if the ray misses the triangle. [MollerTrumbore1997]
 fn ray_meets_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(ac);
@@ -245,10 +247,10 @@ fn ray_meets_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Op
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0).then_some(t)
 }
 
-/// Triangles from which a subtree is built on a thread of its own, at least.
+/// Smallest number of triangles for which a subtree is built on its own thread.
 const LEAST_APART: usize = 1 << 13;
 
-/// What a tree is built of.
+/// Input from which a tree is built.
 struct Builder<'a> {
     boxes: Vec<Aabb>,
     centers: Vec<Vec3>,
@@ -260,8 +262,8 @@ impl Builder<'_> {
         self.group_of_face.get(face as usize).copied().unwrap_or(0)
     }
 
-    /// The tree over `order`, whose first triangle is the `first` in leaf order; its root is node 0. Its shape is
-    /// the same on any number of threads.
+    /// Builds the tree over `order`, whose first triangle has position `first` in leaf order. The root is
+    /// node 0. The tree's shape is the same on any number of threads.
     fn tree(&self, order: &mut [u32], first: usize, depth: u32) -> Vec<Node> {
         if order.len() < LEAST_APART {
             let mut nodes = vec![self.node(order, first)];
@@ -276,7 +278,7 @@ impl Builder<'_> {
             || self.tree(right, first + middle, depth + 1),
         );
         (root.first, root.count) = (1, 0);
-        // Both roots follow, then what is below the left one, then what is below the right one.
+        // Both roots come first, then the nodes below the left root, then those below the right root.
         let moved = |node: &Node, by: usize| Node {
             first: if node.count == 0 {
                 node.first + by as u32
@@ -292,7 +294,7 @@ impl Builder<'_> {
         nodes
     }
 
-    /// A leaf of the triangles of `order`.
+    /// Makes a leaf of the triangles of `order`.
     fn node(&self, order: &[u32], first: usize) -> Node {
         let shared = order.first().map_or(0, |&f| self.group(f));
         Node {
@@ -324,8 +326,8 @@ impl Builder<'_> {
     }
 }
 
-/// Splits `faces` in place where the surface-area heuristic is least; returns how many go left (never 0 or
-/// all).
+/// Splits `faces` in place where the surface-area heuristic is least. Returns the number of faces that go
+/// left, never 0 or all.
 fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3], must_halve: bool) -> usize {
     let span = Aabb::around(faces.iter().map(|&f| centers[f as usize]));
     let size = span.size();
@@ -375,7 +377,7 @@ fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3], must_halve: bo
             half
         }
         Some((cut, _)) => {
-            // A stable partition keeps the order, and so the tree, a function of the mesh alone.
+            // A stable partition keeps the order, and with it the tree, a function of the mesh alone.
             let (left, right): (Vec<u32>, Vec<u32>) = faces.iter().partition(|&&f| bin_of(f) < cut);
             faces[..left.len()].copy_from_slice(&left);
             faces[left.len()..].copy_from_slice(&right);
@@ -384,7 +386,8 @@ fn partition(faces: &mut [u32], boxes: &[Aabb], centers: &[Vec3], must_halve: bo
     }
 }
 
-/// The point of triangle `abc` nearest to `q`, and where on the triangle it is. [Ericson2005, 5.1.5]
+/// Point of triangle `abc` nearest to `q`, and the part of the triangle on which it lies. [Ericson2005,
+/// 5.1.5]
 pub fn nearest_on_triangle([a, b, c]: [Vec3; 3], q: Vec3) -> (Vec3, Feature) {
     let (ab, ac, aq) = (b - a, c - a, q - a);
     let (d1, d2) = (ab.dot(aq), ac.dot(aq));

@@ -1,9 +1,8 @@
-//! Clearance: the least distance of two solids, at rest and over a whole translation, with its place and its
-//! sign.
+//! Clearance: the least signed distance of two solids and its place, at rest or over a whole translation.
 //!
-//! Nothing is sampled. Over a translation the distance of two triangles is a convex function of the travel,
-//! so the least one is that of their shadows along the motion, or that at an end of the travels; two trees of
-//! boxes, one drawn out along the motion, leave few pairs to look at.
+//! Nothing is sampled. Over a translation the distance of two triangles is a convex function of the travel.
+//! Its minimum is the distance of their shadows along the motion, or is reached at an end of the travels. Two
+//! bounding volume hierarchies, one of them extended along the motion, leave few pairs to test.
 //!
 //! ```text
 //!            far ┌ ─ ─ ┐
@@ -14,19 +13,18 @@
 //!                └─────┘  └───┘
 //! ```
 //!
-//! Where surfaces cross, the gap is negative: minus the *depth*, which is the greatest distance to the
+//! If the surfaces cross, the gap is negative: minus the *depth*. The depth is the greatest distance to the
 //! other's surface of a point that is inside the other and is
 //! - a corner of either mesh, at any of the travels, or
 //! - a point on an edge of either mesh, at the first travel.
 //!
-//! Two faceted faces that overlap by a little and are about parallel overlap most at such a point. Limits:
-//! faces that cross at a large angle can be deeper inside by their middle than by their edges, and edges
-//! alone that cross on the way touch with a depth of 0. How far apart the solids would have to be moved is
-//! not asked.
+//! Two faceted faces that overlap slightly and are nearly parallel overlap most at such a point. Limits: if
+//! faces cross at a large angle, their interiors can lie deeper than their edges. If only edges cross on the
+//! way, they touch with a depth of 0. The distance needed to separate the solids is not computed.
 //!
-//! Parts of a surface can be left out of account ([`Scope::WhatCounts`]): then distances are those of the
-//! parts that count, and points that count are looked at for their depth where parts that count cross; depths
-//! are measured to the other's whole surface.
+//! Parts of a surface can be ignored ([`Scope::WhatCounts`]). Distances are then those of the parts that
+//! count. Depths are then tested for points that count if parts that count cross, and are measured to the
+//! other's whole surface.
 
 mod depth;
 mod pair;
@@ -42,10 +40,11 @@ use crate::bvh::TriangleBvh;
 use crate::signed_distance::SignedDistance;
 use crate::{Aabb, Solid, TriMesh, Vec3};
 
-/// Surfaces that come nearer than this touch, mm: a hundred times the rounding of coordinates of some 100 mm.
+/// Distance below which surfaces count as touching, mm: a hundred times the rounding of coordinates near 100
+/// mm.
 const TOUCH_MM: f64 = 1e-9;
 
-/// A solid prepared for questions of clearance.
+/// A solid prepared for clearance queries.
 pub struct Shape {
     solid: Solid,
     distance: SignedDistance,
@@ -53,52 +52,52 @@ pub struct Shape {
     counts: Vec<bool>,
 }
 
-/// Where two solids come nearest. All points are where they are when the gap is least.
+/// Place where two solids come nearest. All points are positions at the travel of the least gap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gap {
-    /// Least distance, mm; 0 where surfaces only touch; minus the depth where they cross.
+    /// Least distance, mm; 0 if the surfaces only touch; minus the depth if they cross.
     pub gap_mm: f64,
-    /// Midway between the two surfaces.
+    /// Midpoint between the two surfaces, mm.
     pub at: Vec3,
-    /// The point of the first solid's surface.
+    /// Point on the first solid's surface, mm.
     pub on_a: Vec3,
-    /// The point of the second one's.
+    /// Point on the second solid's surface, mm.
     pub on_b: Vec3,
 }
 
-/// Where a moving solid comes nearest to one at rest.
+/// Place where a moving solid comes nearest to one at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweptGap {
-    /// Least distance over all travels, mm; 0 where surfaces only touch; minus the depth where they cross.
+    /// Least distance over all travels, mm; 0 if the surfaces only touch; minus the depth if they cross.
     pub gap_mm: f64,
-    /// A travel at which it is that small, mm.
+    /// A travel at which the distance is least, mm.
     pub travel_mm: f64,
-    /// Midway between the two surfaces then.
+    /// Midpoint between the two surfaces at that travel, mm.
     pub at: Vec3,
 }
 
-/// A translation, and the travels that matter, mm.
+/// A translation, and its range of travels, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Translation {
-    /// Direction, of any length; zero is no motion.
+    /// Direction, of any length; zero means no motion.
     pub along: Vec3,
-    /// First travel, mm; not finite is from ever.
+    /// First travel, mm; unbounded if not finite.
     pub from_mm: f64,
-    /// Last travel, mm; not finite is for ever.
+    /// Last travel, mm; unbounded if not finite.
     pub far_mm: f64,
 }
 
-/// Which parts of two surfaces a question is about.
+/// Parts of two surfaces that a query considers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// All of them.
+    /// All triangles of both shapes.
     Everything,
-    /// The triangles that count, of either shape.
+    /// Triangles that count, of either shape.
     WhatCounts,
 }
 
 impl Shape {
-    /// Prepares `solid`; O(n log n).
+    /// Prepares `solid` for queries; O(n log n).
     pub fn new(solid: &Solid) -> Self {
         Self {
             distance: SignedDistance::new(solid),
@@ -108,8 +107,7 @@ impl Shape {
         }
     }
 
-    /// The same solid, where only those triangles count for whose index `counts` holds:
-    /// [`Scope::WhatCounts`].
+    /// Restricts [`Scope::WhatCounts`] to the triangles whose index `counts` accepts.
     #[must_use]
     pub fn counting(mut self, counts: impl Fn(usize) -> bool) -> Self {
         (0..self.counts.len()).for_each(|f| self.counts[f] = counts(f));
@@ -117,8 +115,8 @@ impl Shape {
     }
 }
 
-/// Where `a` and `b` come nearest, if that is within `within_mm`. Distances are exact but for rounding,
-/// depths to 0.1 µm.
+/// Finds the place where `a` and `b` come nearest; `None` if that is farther than `within_mm`. Distances are
+/// exact up to rounding, depths to 0.1 µm.
 pub fn least_gap(a: &Shape, b: &Shape, scope: Scope, within_mm: f64) -> Option<Gap> {
     let rest = Translation {
         along: Vec3::ZERO,
@@ -128,9 +126,9 @@ pub fn least_gap(a: &Shape, b: &Shape, scope: Scope, within_mm: f64) -> Option<G
     Some(Encounter::new([a, b], &rest, scope, within_mm).nearest()?.0)
 }
 
-/// Where `moving` comes nearest to `fixed` over all travels of `motion`, if that is within `within_mm`.
-/// Distances are exact but for rounding, depths to 0.1 µm. With only one travel, 0, the answer is that of
-/// [`least_gap`].
+/// Finds the place where `moving` comes nearest to `fixed` over all travels of `motion`; `None` if that is
+/// farther than `within_mm`. Distances are exact up to rounding, depths to 0.1 µm. With the single travel 0,
+/// the result equals that of [`least_gap`].
 pub fn swept_gap(
     moving: &Shape,
     fixed: &Shape,
@@ -146,17 +144,17 @@ pub fn swept_gap(
     })
 }
 
-/// A triangle that something passes too near by.
+/// A triangle that a moving surface passes too closely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed {
-    /// Which triangle.
+    /// Index of the triangle.
     pub face: u32,
-    /// The box around those triangles of the moving surface, at travel 0, that come too near to it.
+    /// Bounding box, at travel 0, of the triangles of the moving surface that pass too closely.
     pub by: Aabb,
 }
 
-/// The triangles of `fixed` that come within `within_mm` of one of `moving` over all travels of `motion`,
-/// ascending. The surfaces need not be closed; distances are exact but for rounding.
+/// Finds the triangles of `fixed` within `within_mm` of a triangle of `moving` at any travel of `motion`, in
+/// ascending order. The surfaces need not be closed. Distances are exact up to rounding.
 pub fn faces_passed(moving: &TriMesh, fixed: &TriMesh, motion: &Translation, within_mm: f64) -> Vec<Passed> {
     let along = motion.along.normalize_or_zero();
     let axes = axes_along(along);
@@ -176,19 +174,19 @@ pub fn faces_passed(moving: &TriMesh, fixed: &TriMesh, motion: &Translation, wit
     passed.map(|(&face, by)| Passed { face, by }).collect()
 }
 
-/// Two shapes, one of which moves, as seen along its motion: z is the direction.
+/// Two shapes, one of which moves, in axes whose z is the direction of motion.
 struct Encounter<'a> {
     passage: Passage<'a>,
     axes: [Vec3; 3],
     limit_mm: f64,
-    /// What may come within the limit of the moving shape and of the fixed one.
+    /// Triangles that may come within the limit: of the moving shape, and of the fixed one.
     trees: [Tree; 2],
 }
 
 /// Some triangles of a shape, in the encounter's axes.
 struct Tree {
     bvh: TriangleBvh,
-    /// The shape's triangle behind each of the tree's; ascending.
+    /// Index in the shape of each triangle of the hierarchy; ascending.
     faces: Vec<u32>,
 }
 
@@ -214,7 +212,7 @@ impl<'a> Encounter<'a> {
         }
     }
 
-    /// The least gap and the travel at which it is.
+    /// Finds the least gap, and the travel at which it occurs.
     fn nearest(&self) -> Option<(Gap, f64)> {
         let approach = self.approach();
         let touches = approach.is_some_and(|a| a.distance_sq <= TOUCH_MM * TOUCH_MM);
@@ -232,7 +230,8 @@ impl<'a> Encounter<'a> {
         Some((gap_between(gap_mm, on_a, on_b), approach.travel_mm))
     }
 
-    /// Where the surfaces come nearest within the limit; the first place found where they meet.
+    /// Finds the nearest approach of the surfaces within the limit. If they meet, it is the first meeting
+    /// found.
     fn approach(&self) -> Option<Approach> {
         let ([a, b], travels) = (&self.trees, self.passage.travels);
         let mut best: Option<Approach> = None;
@@ -242,7 +241,7 @@ impl<'a> Encounter<'a> {
                 && best.is_none_or(|b| found.distance_sq < b.distance_sq)
             {
                 best = Some(found);
-                // Nothing is nearer than touching: no pair is looked at any more.
+                // Nothing is nearer than touching, so a negative limit ends the search.
                 *limit_sq = if found.distance_sq <= TOUCH_MM * TOUCH_MM {
                     -1.0
                 } else {
@@ -266,7 +265,7 @@ impl<'a> Encounter<'a> {
         crossings
     }
 
-    /// The deepest point of either shape in the other.
+    /// Finds the deepest point of either shape in the other.
     fn deepest(&self, touches: bool) -> Deepest {
         let Passage {
             moving,
@@ -287,7 +286,7 @@ impl<'a> Encounter<'a> {
         crossings.sort_unstable();
         self.passage.deepen(&self.trees[0].faces, &crossings, &mut best);
 
-        // The other way round: what is at rest moves backwards past the moving shape.
+        // Now with exchanged roles: the fixed shape moves backwards past the moving one.
         let mut flipped: Vec<(u32, u32)> = crossings.into_iter().map(|(a, b)| (b, a)).collect();
         flipped.sort_unstable();
         let backwards = Passage {
@@ -314,7 +313,7 @@ impl<'a> Encounter<'a> {
 }
 
 impl Tree {
-    /// The triangles of `mesh` that are in scope and meet `room`.
+    /// Builds the hierarchy of the triangles of `mesh` that are in scope and meet `room`.
     fn of(mesh: &TriMesh, room: Aabb, in_scope: impl Fn(usize) -> bool) -> Self {
         let is_near =
             |&f: &u32| in_scope(f as usize) && Aabb::around(mesh.corners(f as usize)).intersects(room);
@@ -330,7 +329,7 @@ impl Tree {
     }
 }
 
-/// The axes that a motion is seen in: z is its direction.
+/// Axes in which a motion runs along z.
 fn axes_along(along: Vec3) -> [Vec3; 3] {
     if along == Vec3::ZERO {
         return Vec3::AXES;
@@ -347,8 +346,8 @@ fn turned(mesh: &TriMesh, axes: [Vec3; 3]) -> TriMesh {
     }
 }
 
-/// The triangles of a moving and a fixed mesh that `counts`, given which mesh and which triangle, and that
-/// can come within `limit_mm` of the other.
+/// Hierarchies of the triangles of a moving and a fixed mesh that can come within `limit_mm` of the other
+/// mesh. `counts` is given the mesh and the triangle, and accepts those in scope.
 fn trees(
     meshes: &[TriMesh; 2],
     travels: [f64; 2],
@@ -364,7 +363,7 @@ fn trees(
     ]
 }
 
-/// The travels of `motion` that matter to two boxes, seen along it; 0 alone where it has no direction.
+/// Travels of `motion` that matter for two boxes in its axes; only 0 if it has no direction.
 fn travels_of(motion: &Translation, along: Vec3, bounds: [Aabb; 2]) -> [f64; 2] {
     if along == Vec3::ZERO {
         [0.0; 2]
@@ -373,8 +372,8 @@ fn travels_of(motion: &Translation, along: Vec3, bounds: [Aabb; 2]) -> [f64; 2] 
     }
 }
 
-/// The travels between which the least distance lies: before them and after them the boxes of both, seen
-/// along the motion, are past each other.
+/// Range of travels that contains the least distance. Before and after it, the two boxes are past each other
+/// along the motion.
 fn travels_that_matter([moving, fixed]: [Aabb; 2], [from, far]: [f64; 2]) -> [f64; 2] {
     let (reached, passed) = (fixed.min.z - moving.max.z, fixed.max.z - moving.min.z);
     let far = if far.is_finite() { far } else { passed };

@@ -1,10 +1,11 @@
-//! The zero surface of a function as a closed mesh of well-shaped triangles, for models made by code.
+//! Contouring: the zero surface of a function as a closed mesh of well-shaped triangles, for models made by
+//! code.
 //!
-//! Marching cubes whose triangles come from a face rule instead of a published table: on each face of a cell
-//! the surface cuts off the inside corners one by one, so neighbouring cells agree, and no triangle has a
-//! diagonal within a face. With one vertex for each crossed grid edge the result is manifold by construction
-//! [Lorensen1987, Montani1994]. Vertices are then spread out along the surface and pulled onto it by Newton
-//! steps, which the function must be smooth enough for.
+//! Marching cubes, but with triangles from a rule for faces instead of a published table. On each face of a
+//! cell the surface cuts off the inside corners one by one. Neighbouring cells therefore agree, and no
+//! triangle has a diagonal within a face. With one vertex per crossed grid edge the result is manifold by
+//! construction [Lorensen1987, Montani1994]. Vertices are then spread out along the surface and pulled onto
+//! it by Newton steps, for which the function must be smooth enough.
 //!
 //! The grid is dense: memory grows with the cube of the resolution. Features thinner than a cell are lost.
 
@@ -12,25 +13,26 @@ use rayon::prelude::*;
 
 use crate::{Aabb, TriMesh, Vec3};
 
-/// Least distance of a first vertex from the ends of its grid edge, as a share of the edge.
+/// Least distance of an initial vertex from the ends of its grid edge, as a share of the edge.
 ///
-/// Vertices of neighbouring edges meet at grid points otherwise, and the slivers this leaves survive any
+/// Without this margin, vertices of neighbouring edges meet at grid points. The resulting slivers survive any
 /// smoothing.
 const EDGE_MARGIN: f64 = 0.2;
 
-/// Rounds of moving each vertex towards the mean of its neighbours and back onto the surface.
+/// Number of rounds that move each vertex towards the mean of its neighbours and back onto the surface.
 ///
 /// After three rounds the least angle of a sphere is above 20°; further rounds change little.
 const N_SPREAD_ROUNDS: usize = 3;
 
-/// Longest Newton step, as a share of the cell: farther, the linear model is wrong or the vertex is beside a
-/// crease.
+/// Longest Newton step, as a share of the cell. For longer steps the linear model is wrong, or the vertex is
+/// beside a crease.
 const MAX_STEP_CELLS: f64 = 0.5;
 
-/// The surface where `field` is 0, oriented from positive (inside) to negative, as a closed manifold mesh.
+/// Contours the surface where `field` is 0 as a closed manifold mesh, oriented from positive (inside) to
+/// negative.
 ///
-/// `bounds` must contain the surface; where it does not, the solid ends at the grid's border. `field` is
-/// called about `(size / cell_mm)³` times, from several threads. Empty where the grid sees no positive value.
+/// `bounds` must contain the surface; otherwise the solid ends at the grid's border. `field` is called about
+/// `(size / cell_mm)³` times, from several threads. The mesh is empty if no grid point has a positive value.
 pub fn contour(bounds: Aabb, cell_mm: f64, field: impl Fn(Vec3) -> f64 + Sync) -> TriMesh {
     let grid = Grid::sample(bounds, cell_mm, &field);
     let (points, vertex_of_edge) = grid.crossings();
@@ -60,7 +62,7 @@ impl Grid {
         let n = (bounds.size() / cell_mm)
             .to_array()
             .map(|cells| cells.ceil() as usize + 3);
-        // One cell of air on all sides keeps the surface away from the border.
+        // One empty cell on all sides keeps the surface away from the border.
         let origin = bounds.min - cell_mm;
         let mut values = vec![0.0; n[0] * n[1] * n[2]];
         values
@@ -72,7 +74,7 @@ impl Grid {
                     let border = [i, j, k].iter().zip(n).any(|(&x, n)| x == 0 || x + 1 == n);
                     let p = origin + cell_mm * Vec3::new(i as f64, j as f64, k as f64);
                     let raw = field(p);
-                    // Values at the level would put several vertices on one grid point.
+                    // A value of exactly 0 would put several vertices on one grid point.
                     let nudged = if raw.abs() < 1e-9 * cell_mm {
                         1e-9 * cell_mm
                     } else {
@@ -102,14 +104,13 @@ impl Grid {
         self.origin + self.cell_mm * Vec3::new(i as f64, j as f64, k as f64)
     }
 
-    /// One vertex for each grid edge with a change of sign, and which it is: `3 · grid point + axis` →
-    /// vertex.
+    /// Vertices of all grid edges with a change of sign, and the vertex of each edge `3 · grid point + axis`.
     fn crossings(&self) -> (Vec<Vec3>, Vec<u32>) {
         let mut points = Vec::new();
         let mut vertex_of_edge = vec![NO_VERTEX; 3 * self.values.len()];
         for (at, &here) in self.values.iter().enumerate() {
             for (axis, stride) in self.strides().into_iter().enumerate() {
-                // Past the border this reads the next row, where all values are negative as here.
+                // Past the border this reads the next row, which also begins with negative values.
                 let Some(&there) = self.values.get(at + stride) else {
                     continue;
                 };
@@ -144,7 +145,8 @@ impl Grid {
     }
 }
 
-/// Edge number from an end corner and the axis: `4 · axis + position among the four parallel edges`.
+/// Number of the edge with an end at `corner` along `axis`: `4 · axis + position among the four parallel
+/// edges`.
 ///
 /// Corners are numbered by bits: bit `a` is set on the far side along axis `a`.
 fn edge_at(corner: usize, axis: usize) -> usize {
@@ -152,14 +154,14 @@ fn edge_at(corner: usize, axis: usize) -> usize {
     4 * axis + (corner >> u & 1) + 2 * (corner >> v & 1)
 }
 
-/// The lower corner of an edge, and its axis.
+/// Lower corner of an edge, and the edge's axis.
 fn edge_start(edge: usize) -> (usize, usize) {
     let (axis, position) = (edge / 4, edge % 4);
     let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
     ((position & 1) << u | (position >> 1) << v, axis)
 }
 
-/// Whether two edges lie in a common face of the cell.
+/// Returns true if two edges lie in a common face of the cell.
 fn share_face(a: usize, b: usize) -> bool {
     let sides = |edge: usize| {
         let (corner, axis) = edge_start(edge);
@@ -168,9 +170,10 @@ fn share_face(a: usize, b: usize) -> bool {
     sides(a).iter().any(|side| sides(b).contains(side))
 }
 
-/// The triangles of one of the 256 sign patterns; bit `c` of `case` says that corner `c` is inside.
+/// Triangles of one of the 256 sign patterns, as cell edges. Bit `c` of `case` is set if corner `c` is
+/// inside.
 fn triangles_of_case(case: usize) -> Vec<[usize; 3]> {
-    // On each face, one directed segment around each run of inside corners, which lie on its right seen from
+    // Each face has one directed segment around each run of inside corners, which lie on its right seen from
     // outside.
     let mut next = [None; 12];
     for axis in 0..3 {
@@ -198,7 +201,7 @@ fn triangles_of_case(case: usize) -> Vec<[usize; 3]> {
 
 fn face_segments(case: usize, axis: usize, side: usize) -> Vec<(usize, usize)> {
     let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
-    // Counter-clockwise seen from outside the cell.
+    // Corners in counter-clockwise order, seen from outside the cell.
     let mut ring = [0, 1 << u, 1 << u | 1 << v, 1 << v].map(|corner| corner | side << axis);
     if side == 0 {
         ring.reverse();
@@ -210,7 +213,7 @@ fn face_segments(case: usize, axis: usize, side: usize) -> Vec<(usize, usize)> {
     };
     let mut segments = Vec::new();
     for i in 0..4 {
-        // A run of inside corners begins after edge i; it ends before the next outside corner.
+        // A run of inside corners begins after edge i and ends before the next outside corner.
         if !inside(i) && inside(i + 1) {
             let end = (i + 1..i + 5)
                 .find(|&k| !inside(k + 1))
@@ -221,8 +224,7 @@ fn face_segments(case: usize, axis: usize, side: usize) -> Vec<(usize, usize)> {
     segments
 }
 
-/// Triangles of a polygon of cell edges without a diagonal that lies in a face; `None` where there is no such
-/// set.
+/// Triangulates a polygon of cell edges without any diagonal in a face; `None` if that is impossible.
 fn triangulate(polygon: &[usize]) -> Option<Vec<[usize; 3]>> {
     let last = polygon.len() - 1;
     if last < 2 {
@@ -240,10 +242,10 @@ fn triangulate(polygon: &[usize]) -> Option<Vec<[usize; 3]>> {
     })
 }
 
-/// Moves each point towards the mean of its neighbours.
+/// Moves each point halfway towards the mean of its neighbours.
 fn spread(mesh: &mut TriMesh) {
-    // Each neighbour is met twice, once in each of the two triangles at the common edge: the mean is the
-    // same.
+    // Each neighbour is counted twice, once for each triangle at the common edge, which leaves the mean
+    // unchanged.
     let mut sums = vec![(Vec3::ZERO, 0.0); mesh.points.len()];
     for &[a, b, c] in &mesh.triangles {
         for (at, [p, q]) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
@@ -257,7 +259,7 @@ fn spread(mesh: &mut TriMesh) {
     }
 }
 
-/// Two Newton steps along the gradient, which is taken by differences.
+/// Moves points by two Newton steps along the gradient, which is computed by differences.
 fn pull_to_surface(points: &mut [Vec3], cell_mm: f64, field: &(impl Fn(Vec3) -> f64 + Sync)) {
     let h = 1e-4 * cell_mm;
     points.par_iter_mut().for_each(|p| {
@@ -296,7 +298,7 @@ mod tests {
 
     #[test]
     fn noise_gives_a_solid_whatever_the_signs() {
-        // Every sign pattern occurs: a hash of the grid point decides.
+        // Signs from a hash of the grid point, so that every sign pattern occurs.
         let noise = |p: Vec3| {
             let q = (p * 2.0).round().as_i64vec3();
             let mix = ((q.x * 73_856_093) ^ (q.y * 19_349_663) ^ (q.z * 83_492_791))

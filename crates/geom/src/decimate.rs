@@ -1,9 +1,9 @@
-//! Fewer triangles for nearly the same surface.
+//! Decimation: fewer triangles for nearly the same surface.
 //!
-//! Edges collapse by quadric error [Garland and Heckbert 1997]. The quadric of a vertex sums, over the
-//! planes of all input triangles that it stands for, the squared distance times the triangle's share of a
-//! mean triangle. Divided by the sum of shares this is the mean square distance; beyond 30 shares the divisor
-//! stays the same, so that a bump in a wide plain is not averaged away.
+//! Edges collapse by quadric error [Garland and Heckbert 1997]. A vertex represents input triangles. Its
+//! quadric sums, over their planes, the squared distance times the triangle's area in mean triangle areas
+//! (its *share*). Divided by the sum of shares this is the mean square distance. Beyond 30 shares the divisor
+//! stays constant, so that a bump in a wide plain is not averaged away.
 
 use glam::DMat3;
 use rayon::prelude::*;
@@ -11,35 +11,35 @@ use rayon::prelude::*;
 use crate::topology::{HalfEdge, Topology};
 use crate::{TriMesh, Vec3};
 
-/// Mean triangles over which a squared distance is averaged at most: no vertex is farther than √30 tolerances
-/// from the plane of a triangle of mean size that it stands for.
+/// Largest sum of shares over which a squared distance is averaged. No vertex is farther than √30 tolerances
+/// from the plane of a represented triangle of mean size.
 const MOST_SHARES: f64 = 30.0;
-/// Pull towards the middle of the edge, against the weight of one mean triangle: settles where flat
-/// surroundings leave the place of the new vertex open.
+/// Pull towards the middle of the edge, relative to the weight of one mean triangle. Determines the new
+/// vertex where flat surroundings leave its position open.
 const PULL: f64 = 1e-3;
-/// Share of the squared edge length in the cost of a collapse, so that flat places lose short edges first.
+/// Share of the squared edge length in the cost of a collapse, so that flat regions lose short edges first.
 const SHORT_FIRST: f64 = 1e-5;
-/// What the first rounds may use of the squared tolerance: cheap collapses come before dear ones.
+/// Shares of the squared tolerance available to the first rounds, so that cheap collapses come first.
 const EARLY_SHARES: [f64; 3] = [0.1, 0.3, 0.6];
-/// A round that removes a smaller share of the vertices is the last.
+/// Share of vertices removed in a round, at or below which decimation stops.
 const WORTH_A_ROUND: f64 = 0.02;
-/// Twenty halvings are enough for any mesh.
+/// Largest number of rounds; twenty halvings are enough for any mesh.
 const MOST_ROUNDS: u32 = 20;
-/// No round is this late.
+/// Marks a merged vertex; no round has this number.
 const GONE: u32 = u32::MAX;
-/// A triangle's normal turns by less than 60° in one collapse.
+/// Least cosine between a triangle's normals before and after a collapse: 60°.
 const LEAST_COS: f64 = 0.5;
-/// No collapse makes a triangle whose height is a smaller share of its longest edge than this, unless it was
-/// worse before.
+/// Least height of a triangle after a collapse, as a share of its longest edge, unless the triangle was worse
+/// before.
 const LEAST_HEIGHT: f64 = 0.03;
 
-/// `mesh` with edges collapsed where the vertex that remains stays, in the mean, within the smaller
-/// `tolerance_mm` of both ends (mm, one a point; 0 keeps the point) of the planes of the triangles it stands
-/// for.
+/// Decimates `mesh` by collapsing edges. On average, each remaining vertex stays within tolerance of the
+/// planes of the triangles that it represents. `tolerance_mm` has one value per point, mm; 0 keeps the point.
+/// The smaller tolerance of both ends applies.
 ///
-/// For closed manifold meshes, and closed manifold is what comes out; anything else comes back unchanged. In
-/// each of some rounds every vertex takes part in one collapse at most, the cheapest of its edges: no queue,
-/// and even triangles. Sequential, so that the same mesh gives the same bytes.
+/// Closed manifold meshes stay closed manifold; other meshes are returned unchanged. In each round every
+/// vertex takes part in at most one collapse, along its cheapest edge. This needs no queue and gives even
+/// triangles. Sequential, so that the same mesh always gives the same bytes.
 pub fn decimate(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
     assert_eq!(mesh.points.len(), tolerance_mm.len(), "one tolerance a point");
     let Some(mut state) = Decimation::new(&mesh, tolerance_mm) else {
@@ -63,7 +63,7 @@ pub fn decimate(mesh: TriMesh, tolerance_mm: &[f64]) -> TriMesh {
     state.finish()
 }
 
-/// A symmetric 4 × 4 form: weighted squared distance to planes.
+/// Quadric, a symmetric 4 × 4 form: weighted squared distance to planes.
 #[derive(Clone, Copy)]
 struct Quadric {
     a: DMat3,
@@ -106,7 +106,7 @@ impl Quadric {
             / self.shares.clamp(f64::MIN_POSITIVE, MOST_SHARES)
     }
 
-    /// The minimum, drawn a little towards `middle`.
+    /// Minimum of the form, drawn slightly towards `middle`.
     fn least(&self, middle: Vec3) -> Vec3 {
         let a = self.a + DMat3::from_diagonal(Vec3::splat(PULL));
         middle - a.inverse() * (self.a * middle + self.b)
@@ -117,7 +117,7 @@ struct Decimation {
     /// Points relative to the middle of the mesh.
     points: Vec<Vec3>,
     middle: Vec3,
-    /// Start of each half-edge; meaningless for dead ones.
+    /// Start point of each half-edge; meaningless for dead half-edges.
     start: Vec<u32>,
     opposite: Vec<HalfEdge>,
     is_dead: Vec<bool>,
@@ -125,7 +125,7 @@ struct Decimation {
     out: Vec<HalfEdge>,
     quadrics: Vec<Quadric>,
     tolerance: Vec<f64>,
-    /// The last round in which a vertex took part in a collapse; [`GONE`] where it was merged into another.
+    /// Last round in which each vertex took part in a collapse; [`GONE`] if it was merged into another.
     round: Vec<u32>,
 }
 
@@ -170,7 +170,7 @@ impl Decimation {
         state.has_disks_only().then_some(state)
     }
 
-    /// Whether the triangles at each vertex form one fan.
+    /// Returns true if the triangles at each vertex form one fan.
     fn has_disks_only(&self) -> bool {
         let n_reached: usize = (0..self.points.len() as u32)
             .into_par_iter()
@@ -184,7 +184,7 @@ impl Decimation {
         [self.start[h as usize], self.start[Topology::next(h) as usize]]
     }
 
-    /// The half-edges out of `v`.
+    /// Half-edges that leave `v`.
     fn around(&self, v: u32) -> impl Iterator<Item = HalfEdge> + '_ {
         let first = self.out[v as usize];
         let mut next = Some(first);
@@ -200,8 +200,8 @@ impl Decimation {
         self.round[v as usize] != GONE
     }
 
-    /// Collapses the cheapest edge at `v` among those within `share` of the squared tolerance, if neither end
-    /// took part in a collapse of this round.
+    /// Collapses the cheapest edge at `v` within `share` of the squared tolerance. Edges whose ends took part
+    /// in a collapse of this round are excluded.
     fn collapse_cheapest(&mut self, v: u32, round: u32, share: f64) {
         if self.round[v as usize] >= round {
             return;
@@ -218,8 +218,8 @@ impl Decimation {
         }
     }
 
-    /// Where the ends of `h` would meet and what that costs; `None` where the error exceeds `share` of what
-    /// is tolerated.
+    /// Position at which the ends of `h` would merge, and the cost of the merge. `None` if the error exceeds
+    /// `share` of the squared tolerance.
     fn placed(&self, h: HalfEdge, share: f64) -> Option<(Vec3, f64)> {
         let [u, v] = self.ends(h).map(|x| x as usize);
         let limit = self.tolerance[u].min(self.tolerance[v]);
@@ -233,7 +233,7 @@ impl Decimation {
         (error <= share * limit * limit && at.is_finite()).then_some((at, cost))
     }
 
-    /// Whether the surface stays manifold and no triangle turns over or becomes a needle.
+    /// Returns true if the surface stays manifold and no triangle flips or becomes a needle.
     fn may_collapse(&self, h: HalfEdge, at: Vec3) -> bool {
         let [u, v] = self.ends(h);
         let sides = [h, self.opposite[h as usize]].map(|h| self.start[prev(h) as usize]);
@@ -270,7 +270,7 @@ impl Decimation {
         })
     }
 
-    /// Merges the end of `h` into its start, at `at`.
+    /// Merges the end of `h` into its start, which moves to `at`.
     fn collapse(&mut self, h: HalfEdge, at: Vec3, round: u32) {
         let [u, v] = self.ends(h);
         let fan: Vec<HalfEdge> = self.around(v).collect();

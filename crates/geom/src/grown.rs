@@ -1,15 +1,14 @@
-//! Bodies grown on all sides, for small ones: by the distance to their surface on a grid.
+//! Growing of small bodies on all sides, by the distance to their surface on a grid.
 
 use crate::band::Band;
 use crate::marching_cubes::{OffBand, contour};
 use crate::signed_distance::SignedDistance;
 use crate::{Solid, Volume};
 
-/// Cells of the grid along the way by which a body grows; its surface is right within about a tenth of one.
+/// Number of grid cells along the distance grown. The new surface is accurate to about a tenth of a cell.
 const CELLS: f64 = 2.0;
 
-/// All that is nearer than `by_mm` to `body` or in it; `None` where `body` is empty or too large for a grid that
-/// fine.
+/// Grows `body` by `by_mm` on all sides. `None` if `body` is empty or too large for such a fine grid.
 pub fn grown(body: &Volume, by_mm: f64) -> Option<Volume> {
     let solid = Solid::new(body.to_mesh()).ok()?;
     let cell_mm = by_mm / CELLS;

@@ -1,10 +1,10 @@
-//! Bodies that are hollow already: a cavity that a few narrow openings lead into, as slicers for resin make
-//! them, and the solid without it.
+//! Detection and filling of bodies that are already hollow: their cavity has a few narrow openings, such as
+//! slicers for resin make.
 //!
-//! Space outside the solid is divided by the largest balls that have room: a cavity is what a ball cannot leave
-//! that has more room inside than in any opening. Triangles that bound it are told from the others, and the
-//! shortest lines between both are the rims of the openings. So a mug, whose mouth is as wide as it is, is not
-//! hollow, nor is a cage, which is mostly openings.
+//! Space outside the solid is divided by the largest balls that fit. A cavity is a region that has more room
+//! inside than in any opening, so that a suitable ball cannot leave. Triangles that bound the cavity are
+//! separated from the others. The shortest lines between the two sets are the rims of the openings. A mug,
+//! whose mouth is as wide as the mug, is thus not hollow, and neither is a cage, which is mostly openings.
 
 mod cut;
 mod grid;
@@ -19,36 +19,36 @@ use grid::Grid;
 use rooms::rooms;
 use sides::{Rim, Sides};
 
-/// A body with a cavity of at least this share of what it encloses with it is hollow. Walls of 5 mm leave 42 % of
-/// a cube of 40 mm; the largest fold of the solid figures that were looked at has 3 %.
+/// Least share of the cavity in the volume of cavity and solid together, for a body to be hollow. Walls of 5
+/// mm leave 42 % of a cube of 40 mm. The largest fold of the solid figures that were examined has 3 %.
 pub const LEAST_SHARE: f64 = 0.1;
-/// Openings of more than this share of the cavity's surface are mouths: a bottle has 1 to 2 %, a vase whose mouth
-/// is half as wide as its belly 5 %, a mug 20 %.
+/// Largest share of the openings in the cavity's surface; beyond it, openings are mouths. A bottle has 1 to 2
+/// %, a vase whose mouth is half as wide as its belly 5 %, a mug 20 %.
 const MOST_OPEN_SHARE: f64 = 0.04;
-/// Nodes within a cavity may see out along an axis through its openings; this share of them does not.
+/// Least share of a cavity's nodes that are enclosed along all axes. The others see out through an opening.
 const LEAST_ENCLOSED: f64 = 0.4;
-/// Triangles at which the wall is measured.
+/// Number of triangles at which the wall is measured.
 const N_MEASURED: usize = 2000;
-/// Cosine of the greatest angle between the sides of a wall.
+/// Cosine of the greatest angle between the two sides of a wall.
 const COS_WALL: f64 = 0.5;
 
-/// A body that is hollow already.
+/// Description of a body that is already hollow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HollowBody {
-    /// Half of the cavity's surface has a wall behind it that is thinner than this, mm.
+    /// Median wall thickness over the cavity's surface, mm.
     pub wall_mm: f64,
-    /// The cavity's volume, mm³.
+    /// Volume of the cavity, mm³.
     pub cavity_mm3: f64,
-    /// The openings that lead into it, the widest first.
+    /// Openings that lead into the cavity, widest first.
     pub openings: Vec<Opening>,
-    /// For each triangle, whether it bounds the cavity.
+    /// True for each triangle that bounds the cavity.
     is_cavity: Vec<bool>,
 }
 
 /// An opening of a cavity, at its narrowest place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opening {
-    /// Its middle, mm.
+    /// Centre of the opening, mm.
     pub at: Vec3,
     /// Diameter of the circle of the same area, mm.
     pub width_mm: f64,
@@ -56,30 +56,31 @@ pub struct Opening {
     pub outwards: Vec3,
 }
 
-/// A hollow body made solid.
+/// A hollow body that was made solid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filled {
-    /// The body: the triangles outside as they were, and others over the openings.
+    /// Solid body: the unchanged outer triangles, and new ones over the openings.
     pub solid: Solid,
-    /// For each triangle the one of the hollow body that it is, or that it lies beside.
+    /// Triangle of the hollow body that each triangle is, or is next to.
     pub source_face: Vec<u32>,
 }
 
-/// Why an opening cannot be closed.
+/// Error: an opening cannot be closed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the opening near ({:.1}, {:.1}, {:.1}) mm is no plain hole that could be closed; close it in a modelling program",
     at.x, at.y, at.z
 )]
 pub struct CannotFill {
-    /// The widest opening, mm.
+    /// Position of the widest opening, mm.
     pub at: Vec3,
 }
 
-/// The cavity of `solid` that takes at least `least_share` of what it encloses, and its openings; `None` where
-/// there is none.
+/// Finds the cavity of `solid` and its openings. `None` unless the cavity takes at least `least_share` of the
+/// volume of cavity and solid together.
 ///
-/// For solid figures O(n); else a second for a hundred thousand triangles. The same on any number of threads.
+/// O(n) for solid figures; otherwise a second for a hundred thousand triangles. The same on any number of
+/// threads.
 pub fn find_hollow(solid: &Solid, least_share: f64) -> Option<HollowBody> {
     let grid = Grid::new(solid);
     let node_mm3 = grid.cell_mm.powi(3);
@@ -124,8 +125,8 @@ pub fn find_hollow(solid: &Solid, least_share: f64) -> Option<HollowBody> {
     })
 }
 
-/// `solid` without the cavity that [`find_hollow`] found in it: the openings are closed by triangles of least area
-/// between their rims, the rest stays as it is.
+/// Removes the cavity that [`find_hollow`] found in `solid`. The openings are closed by triangles of least
+/// area between their rims; the rest stays as it is.
 pub fn fill(solid: &Solid, hollow: &HollowBody) -> Result<Filled, CannotFill> {
     let mesh = solid.mesh();
     let refused = CannotFill {
@@ -155,13 +156,13 @@ pub fn fill(solid: &Solid, hollow: &HollowBody) -> Result<Filled, CannotFill> {
     }
 }
 
-/// Area of a surface over an opening, mm², times its normal out of the cavity.
+/// Area vector of a surface over an opening: area, mm², times the normal out of the cavity.
 fn cap_area(sides: &Sides, rim: &Rim) -> Vec3 {
     let part = |[from, to]: [Vec3; 2]| 0.5 * (to - rim.center).cross(from - rim.center);
     rim.edges.iter().map(|&h| part(sides.ends(h))).sum()
 }
 
-/// Volume behind the triangles of the cavity and flat caps over its openings, mm³.
+/// Volume enclosed by the cavity's triangles and flat caps over its openings, mm³.
 fn cavity(sides: &Sides, rims: &[Rim]) -> f64 {
     let origin = rims.first().map_or(Vec3::ZERO, |rim| rim.center);
     let volume = |corners: [Vec3; 3]| {
@@ -179,7 +180,7 @@ fn cavity(sides: &Sides, rims: &[Rim]) -> f64 {
     -(walls + caps.sum::<f64>())
 }
 
-/// Median thickness between the cavity and the outside, by area, mm; `None` where there is no cavity.
+/// Median thickness between the cavity and the outside, weighted by area, mm; `None` if there is no cavity.
 fn wall(sides: &Sides, tree: &TriangleBvh) -> Option<f64> {
     let mesh = sides.mesh;
     let inner: Vec<usize> = (0..mesh.triangles.len())

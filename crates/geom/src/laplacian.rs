@@ -1,14 +1,14 @@
-//! The cotangent Laplacian and the lumped mass of a triangle mesh.
+//! Cotangent Laplacian and lumped mass of a triangle mesh.
 
 use crate::{TriMesh, Vec3};
 
-/// Largest cotangent used, that of an angle of 1.1°.
+/// Largest cotangent used, which is that of an angle of 1.1°.
 ///
-/// A sliver's cotangents are unbounded and of either sign; clamped to [0, 50] the matrix stays an M-matrix,
-/// so that solutions obey the maximum principle, and its condition stays that of a decent mesh.
+/// Cotangents of a sliver are unbounded and of either sign. Clamped to [0, 50], the matrix stays an M-matrix,
+/// so that solutions obey the maximum principle, and is as well conditioned as for a decent mesh.
 const MAX_COTANGENT: f64 = 50.0;
 
-/// The weight of each edge of each triangle, half the cotangent of the angle across it: entry `c` belongs to
+/// Weights of a triangle's edges: half the cotangent of the angle opposite each edge. Entry `c` belongs to
 /// the edge from corner `c` to corner `c + 1`. An edge's weight in the Laplacian is the sum over its two
 /// triangles. Degenerate triangles give 0.
 pub fn half_cotangents(corners: [Vec3; 3]) -> [f64; 3] {
@@ -24,7 +24,7 @@ pub fn half_cotangents(corners: [Vec3; 3]) -> [f64; 3] {
     })
 }
 
-/// A third of the area of the triangles around each point, mm².
+/// Lumped mass of each point: a third of the area of the triangles around it, mm².
 pub fn lumped_mass(mesh: &TriMesh) -> Vec<f64> {
     let mut mass = vec![0.0; mesh.points.len()];
     for (face, t) in mesh.triangles.iter().enumerate() {

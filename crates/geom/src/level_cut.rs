@@ -1,34 +1,34 @@
-//! Cutting a triangle mesh along the zero line of a scalar given at its points.
+//! Cutting of a triangle mesh along the zero line of a scalar given at its points.
 
 use std::collections::HashMap;
 
 use crate::TriMesh;
 
-/// Which side of the zero line a triangle came to lie on.
+/// Side of the zero line on which a triangle lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The scalar is positive there.
+    /// Side where the scalar is positive or zero.
     Positive,
-    /// The scalar is negative there.
+    /// Side where the scalar is negative.
     Negative,
-    /// The triangle was not to be cut; it was only subdivided where a neighbour was.
+    /// Not to be cut; only subdivided where a neighbour was.
     Bystander,
 }
 
-/// A cut mesh.
+/// Result of cutting a mesh.
 #[derive(Clone, Debug)]
 pub struct Cut {
-    /// The same surface; old points keep their indices.
+    /// Mesh of the same surface; old points keep their indices.
     pub mesh: TriMesh,
-    /// The triangle each new triangle is a part of.
+    /// Source triangle of each new triangle.
     pub source_face: Vec<u32>,
-    /// The side of each new triangle.
+    /// Side of each new triangle.
     pub side: Vec<Side>,
 }
 
-/// Cuts the triangles of `mesh` for which `is_cut` holds along the zero line of `values` (one a point, linear
-/// on triangles). Zero counts as positive. Triangles that share a cut edge are subdivided with it, so a
-/// closed mesh stays closed.
+/// Cuts those triangles of `mesh` that `is_cut` accepts along the zero line of `values` (one per point,
+/// linear on triangles). Zero counts as positive. Triangles that share a cut edge are subdivided with it, so
+/// a closed mesh stays closed.
 pub fn cut_at_zero(mesh: &TriMesh, values: &[f64], is_cut: impl Fn(usize) -> bool) -> Cut {
     let positive = |v: u32| values[v as usize] >= 0.0;
     let mut points = mesh.points.clone();
@@ -75,7 +75,7 @@ pub fn cut_at_zero(mesh: &TriMesh, values: &[f64], is_cut: impl Fn(usize) -> boo
     cut
 }
 
-/// Subdivides a triangle by points on its edges; each part has corners on one side of the points only.
+/// Subdivides a triangle by points on its edges. Each part has corners on one side of these points only.
 fn parts_of(t: [u32; 3], split: [Option<u32>; 3]) -> Vec<[u32; 3]> {
     let n_split = split.iter().flatten().count();
     match n_split {
@@ -87,7 +87,7 @@ fn parts_of(t: [u32; 3], split: [Option<u32>; 3]) -> Vec<[u32; 3]> {
             vec![[a, m, c], [m, b, c]]
         }
         2 => {
-            // The corner between the split edges is cut off; the rest is a quadrilateral.
+            // The corner between the split edges is cut off, which leaves a quadrilateral.
             let whole = split.iter().position(Option::is_none).expect("one edge is whole");
             let [a, b, c] = [t[whole], t[(whole + 1) % 3], t[(whole + 2) % 3]];
             let (on_bc, on_ca) = (split[(whole + 1) % 3], split[(whole + 2) % 3]);

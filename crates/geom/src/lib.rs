@@ -1,7 +1,7 @@
-//! Geometry that cannot fail: meshes, solids, fields, contouring, booleans, distances and sparse solves.
+//! Robust geometry: meshes, solids, fields, contouring, booleans, distances and sparse solves.
 //!
-//! This crate knows no patch, piece, plan or printer. Lengths are millimetres unless a name says otherwise;
-//! fields are positive inside; triangles are counter-clockwise seen from outside.
+//! This crate does not know patches, pieces, plans or printers. Lengths are millimetres unless a name says
+//! otherwise. Fields are positive inside. Triangles are counter-clockwise seen from outside.
 
 pub mod band;
 pub mod boolean;

@@ -1,50 +1,50 @@
 //! Contouring of band fields into closed meshes.
 //!
-//! One vertex a crossed grid edge, and a triangulation that cuts positive corners apart on ambiguous faces
-//! and draws no diagonal inside a face of a cell: neighbouring cells then agree edge by edge, so every
-//! contour is a closed manifold.
+//! Each crossed grid edge has one vertex. On ambiguous faces the triangulation separates the positive
+//! corners, and it draws no diagonal inside a face of a cell. Neighbouring cells therefore agree edge by
+//! edge, so every contour is a closed manifold.
 
 use std::sync::OnceLock;
 
 use crate::band::Band;
 use crate::{TriMesh, Vec3};
 
-/// What nodes outside the band count as.
+/// Treatment of nodes outside the band.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OffBand {
     /// Outside the contoured region: the contour closes along the band's border.
     Outside,
-    /// On the same side as their neighbours in the band: cells that miss a corner are left out. Right only
-    /// for a level set that keeps inside the band.
+    /// On the same side as their neighbours in the band: cells that miss a corner are skipped. Only correct
+    /// for a level set that stays inside the band.
     LikeNeighbours,
 }
 
-/// Crossings keep this share of an edge away from its nodes, so that no triangle collapses; the surface moves
-/// by at most as much of a cell.
+/// Least distance of a vertex from the ends of its edge, as a share of the edge, so that no triangle
+/// collapses. Moves the surface by at most this share of a cell.
 const LEAST_SHARE: f64 = 2e-3;
 
-/// No vertex yet, or no value.
+/// Marks a missing vertex or value.
 const NONE: u32 = u32::MAX;
 
-/// The surface of the region where `field` is positive, oriented outwards (towards lower values).
+/// Contours the region where `field` is positive, oriented outwards (towards lower values).
 ///
-/// Closed where `off_band` is [`OffBand::Outside`], or where the level set keeps inside the band. Work and
-/// memory follow the band and two layers of its box.
+/// The mesh is closed if `off_band` is [`OffBand::Outside`], or if the level set stays inside the band. Work
+/// and memory are proportional to the band and two layers of its box.
 pub fn contour(band: &Band, field: &[f32], off_band: OffBand) -> TriMesh {
     contour_cutting(band, field, off_band, Corners::Positive)
 }
 
-/// Which corners are cut apart where a face of a cell leaves it open.
+/// Corners to separate on an ambiguous face of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Corners {
-    /// Those inside.
+    /// Corners inside the region.
     Positive,
-    /// Those outside: the contour of `f` then has the triangles of the contour of `−f`, turned over, so that
-    /// two fields that mean opposite sides of one surface agree on it.
+    /// Corners outside the region. The contour of `f` then has the triangles of the contour of `−f`, flipped,
+    /// so that two fields for opposite sides of one surface agree on it.
     Negative,
 }
 
-/// [`contour`] that cuts `apart` the corners on one side of the surface.
+/// Contours like [`contour`], separating the corners that `apart` names.
 pub fn contour_cutting(band: &Band, field: &[f32], off_band: OffBand, apart: Corners) -> TriMesh {
     let mut out = Contour {
         band,
@@ -61,14 +61,14 @@ pub fn contour_cutting(band: &Band, field: &[f32], off_band: OffBand, apart: Cor
     out.mesh
 }
 
-/// One z-layer of nodes with a border of missing ones, and the vertices on its grid edges.
+/// One z-layer of nodes, surrounded by missing nodes, and the vertices on its grid edges.
 struct Layer {
     width: usize,
-    /// Missing nodes are −∞.
+    /// Values of all nodes; −∞ for missing nodes.
     values: Vec<f32>,
-    /// Vertex on the edge from a node along x, y and (to the next layer) z.
+    /// Vertex on the edge from each node along x, y and (to the next layer) z.
     edges: [Vec<u32>; 3],
-    /// In each row, the x range of positive nodes: no cell off it is crossed. Empty where first > last.
+    /// Range of x of the positive nodes in each row; no cell outside it is crossed. Empty if first > last.
     spans: Vec<(usize, usize)>,
 }
 
@@ -130,7 +130,7 @@ struct Contour<'a> {
 }
 
 impl Contour<'_> {
-    /// All cells between layers `k` and `k + 1`.
+    /// Contours all cells between layers `k` and `k + 1`.
     fn slab(&mut self, k: i64, low: &mut Layer, high: &mut Layer) {
         let width = low.width;
         for j in 0..low.spans.len() - 1 {
@@ -205,7 +205,7 @@ impl Contour<'_> {
         u32::try_from(self.mesh.points.len() - 1).expect("contours have fewer than 2³² points")
     }
 
-    /// The vertex on edge `e` of the cell, made when first asked for.
+    /// Vertex on edge `e` of the cell, created on first use.
     fn vertex(
         &mut self,
         [i, j]: [usize; 2],
@@ -254,12 +254,12 @@ impl Contour<'_> {
 /// One polygon of a case, as cell edges in order.
 struct Polygon {
     edges: Vec<u8>,
-    /// Whether a fan from the first vertex draws no diagonal inside a face of the cell; otherwise a middle
+    /// True if a fan from the first vertex draws no diagonal inside a face of the cell; otherwise a middle
     /// vertex is used.
     fan: bool,
 }
 
-/// The two corners of edge `e`, lower first. Edges 4a … 4a + 3 run along axis a; corner bits are x, y, z.
+/// Corners of edge `e`, lower first. Edges 4a … 4a + 3 run along axis a; corner bits are x, y, z.
 fn edge_ends(e: u8) -> (usize, usize) {
     let (axis, rest) = (usize::from(e) / 4, usize::from(e) % 4);
     let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -287,7 +287,7 @@ fn faces() -> [[usize; 4]; 6] {
     })
 }
 
-/// The polygons of all 256 sign patterns.
+/// Polygons of all 256 sign patterns.
 fn table() -> &'static [Vec<Polygon>] {
     static TABLE: OnceLock<Vec<Vec<Polygon>>> = OnceLock::new();
     TABLE.get_or_init(|| (0..256).map(polygons_of).collect())
@@ -295,8 +295,8 @@ fn table() -> &'static [Vec<Polygon>] {
 
 fn polygons_of(case: usize) -> Vec<Polygon> {
     let positive = |corner: usize| case >> corner & 1 == 1;
-    // On each face, each run of positive corners is cut off by one segment, from where the run ends to where
-    // it begins.
+    // On each face, one segment cuts off each run of positive corners, from where the run begins to where it
+    // ends.
     let mut next = [u8::MAX; 12];
     for face in faces() {
         for start in 0..4 {
@@ -326,8 +326,7 @@ fn polygons_of(case: usize) -> Vec<Polygon> {
     polygons
 }
 
-/// Turns the polygon so that a fan from its first vertex draws no diagonal inside a face, where that is
-/// possible.
+/// Rotates the polygon so that a fan from its first vertex draws no diagonal inside a face, if possible.
 fn triangulable(edges: Vec<u8>) -> Polygon {
     let n = edges.len();
     let on_one_face = |a: u8, b: u8| {

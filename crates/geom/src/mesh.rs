@@ -1,18 +1,19 @@
-//! Triangle meshes as files have them, and boxes.
+//! Triangle meshes as read from files, and bounding boxes.
 
 use crate::Vec3;
 
-/// Points and the triangles between them; nothing is promised about closedness, orientation or finiteness.
+/// Points and triangles between them. May be open, inconsistently oriented, and have coordinates that are not
+/// finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
-    /// Positions, mm.
+    /// Positions of the points, mm.
     pub points: Vec<Vec3>,
     /// Corner indices into `points`, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl TriMesh {
-    /// The three corners of triangle `face`.
+    /// Positions of the three corners of triangle `face`.
     pub fn corners(&self, face: usize) -> [Vec3; 3] {
         self.triangles[face].map(|v| self.points[v as usize])
     }
@@ -39,12 +40,12 @@ impl TriMesh {
         (a + b + c) / 3.0
     }
 
-    /// Total area, mm².
+    /// Total area of all triangles, mm².
     pub fn area(&self) -> f64 {
         (0..self.triangles.len()).map(|f| self.face_area(f)).sum()
     }
 
-    /// Centre of the volume; that of the box where there is none.
+    /// Centroid of the volume; centre of the bounding box if the volume is not positive.
     pub fn centroid(&self) -> Vec3 {
         let origin = self.bounds().center();
         let (mut moment, mut volume) = (Vec3::ZERO, 0.0);
@@ -61,7 +62,7 @@ impl TriMesh {
         }
     }
 
-    /// Signed volume, mm³: positive where a closed mesh is oriented outwards.
+    /// Signed volume, mm³; positive if a closed mesh is oriented outwards.
     pub fn signed_volume(&self) -> f64 {
         let origin = self.points.first().copied().unwrap_or_default();
         let sixfold: f64 = (0..self.triangles.len())
@@ -73,7 +74,7 @@ impl TriMesh {
         sixfold / 6.0
     }
 
-    /// The same triangles with the points they use alone, in the order of the points.
+    /// Drops the points that no triangle uses, keeping the order of the others.
     #[must_use]
     pub fn without_unused_points(mut self) -> Self {
         let mut name = vec![u32::MAX; self.points.len()];
@@ -94,29 +95,29 @@ impl TriMesh {
         self
     }
 
-    /// The smallest box around all points; empty where there are none.
+    /// Bounding box of all points, used or not; empty if there are none.
     pub fn bounds(&self) -> Aabb {
         Aabb::around(self.points.iter().copied())
     }
 }
 
-/// An axis-aligned box, mm. Empty where `min > max`.
+/// Axis-aligned bounding box, mm. Empty if `min > max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
-    /// Least corner.
+    /// Corner with the least coordinates.
     pub min: Vec3,
-    /// Greatest corner.
+    /// Corner with the greatest coordinates.
     pub max: Vec3,
 }
 
 impl Aabb {
-    /// The box that contains nothing.
+    /// Empty box that contains no point.
     pub const EMPTY: Self = Self {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
     };
 
-    /// The smallest box around `points`.
+    /// Bounding box of `points`; empty if there are none.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, p| Self {
             min: b.min.min(p),
@@ -124,7 +125,7 @@ impl Aabb {
         })
     }
 
-    /// The box moved outwards by `by_mm` on all sides.
+    /// Box moved outwards by `by_mm` on all sides.
     pub fn grown(self, by_mm: f64) -> Self {
         Self {
             min: self.min - by_mm,
@@ -132,7 +133,7 @@ impl Aabb {
         }
     }
 
-    /// The smallest box around both.
+    /// Smallest box around both boxes.
     pub fn union(self, other: Self) -> Self {
         Self {
             min: self.min.min(other.min),
@@ -140,17 +141,17 @@ impl Aabb {
         }
     }
 
-    /// Whether the closed boxes share a point.
+    /// Returns true if the closed boxes share a point.
     pub fn intersects(self, other: Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
-    /// Whether `p` lies in the closed box.
+    /// Returns true if `p` lies in the closed box.
     pub fn contains(self, p: Vec3) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
-    /// Edge lengths, mm; zero where empty.
+    /// Edge lengths, mm; zero if the box is empty.
     pub fn size(self) -> Vec3 {
         (self.max - self.min).max(Vec3::ZERO)
     }
@@ -160,12 +161,12 @@ impl Aabb {
         self.size().length()
     }
 
-    /// Middle of the box.
+    /// Centre of the box, mm.
     pub fn center(self) -> Vec3 {
         0.5 * (self.min + self.max)
     }
 
-    /// Squared distance from `p` to the closed box; 0 inside.
+    /// Squared distance from `p` to the closed box, mm²; 0 inside.
     pub fn distance_sq(self, p: Vec3) -> f64 {
         (p - p.clamp(self.min, self.max)).length_squared()
     }

@@ -1,18 +1,18 @@
-//! Even triangles of a chosen size on a labelled surface.
+//! Remeshing: even triangles of a chosen size on a labelled surface.
 //!
-//! Isotropic remeshing [Botsch and Kobbelt 2004]: long edges are split, short ones merged, edges turned where
-//! that is nearer to Delaunay, points moved to the middle of their neighbours and back onto the input. Before
-//! that, fine input is coarsened by merging edges into one of their ends, shortest first, so that the rounds
-//! work on few triangles.
+//! Isotropic remeshing [Botsch and Kobbelt 2004]: long edges are split, short ones merged, and edges flipped
+//! where that is nearer to Delaunay. Points move to the middle of their neighbours and back onto the input.
+//! Before that, fine input is coarsened by merging edges into one of their ends, shortest first, so that the
+//! rounds work on few triangles.
 //!
-//! Lines between labels (*seams*) are kept: points on them move along the input's own line by its arc length,
+//! Lines between labels (*seams*) are kept. Points on them move along the input's own line by its arc length,
 //! and points where seams meet do not move. An edge that joins two seam points through the inside of a region
-//! (a *bridge*) is turned away or split: every triangle has a point inside its region, however narrow that
-//! is.
+//! (a *bridge*) is flipped or split, so that every triangle has a point inside its region, however narrow
+//! that is.
 //!
-//! Limits: the input's sharp edges are not features and get chamfered by up to an edge length unless a seam
-//! runs along them, what is thinner than an edge may stay finer than asked, because no triangle may face
-//! against the input, and corners much closer together than an edge keep thin triangles between them.
+//! Limits: sharp edges of the input are not features and get chamfered by up to an edge length, unless a seam
+//! runs along them. Features thinner than an edge may stay finer than requested, because no triangle may face
+//! against the input. Corners much closer together than an edge keep thin triangles between them.
 
 mod seams;
 mod surface;
@@ -25,62 +25,64 @@ use surface::{NO_SEAM, Place, Surface};
 use crate::bvh::TriangleBvh;
 use crate::{HalfEdge, TriMesh, Vec3};
 
-/// Longer edges are split and no merge makes one, in target lengths. [Botsch and Kobbelt 2004]
+/// Length above which edges are split, and which no merge exceeds, in target lengths. [Botsch and Kobbelt
+/// 2004]
 const LONGEST: f64 = 4.0 / 3.0;
-/// Shorter edges are merged, in target lengths. [Botsch and Kobbelt 2004]
+/// Length below which edges are merged, in target lengths. [Botsch and Kobbelt 2004]
 const SHORTEST: f64 = 4.0 / 5.0;
-/// Coarsening leaves edges of this many target lengths to the rounds, which see the input and place points
-/// better.
+/// Length from which coarsening leaves edges to the rounds, in target lengths. The rounds compare with the
+/// input and place points better.
 const COARSE: f64 = 0.6;
-/// No coarsening merge makes an edge of more target lengths.
+/// Largest edge length that a coarsening merge may make, in target lengths.
 const COARSE_LONGEST: f64 = 1.1;
-/// Cosine between a triangle's normal and the input's at the nearest point (and, while coarsening, at its
-/// corners): at least this.
+/// Least cosine between a triangle's normal and the input's at the nearest point (and, while coarsening, at
+/// the triangle's corners).
 const LEAST_COS: f64 = 0.2;
-/// No step makes a triangle whose height is a smaller share of its longest edge, unless it was worse before.
+/// Least height of a new triangle, as a share of its longest edge, unless the triangle was worse before.
 const LEAST_HEIGHT: f64 = 0.05;
-/// A bridge is turned away if that leaves triangles with more than this share, or no worse ones; else it is
-/// split.
+/// Height share above which new triangles justify flipping a bridge, unless the old ones were worse;
+/// otherwise the bridge is split.
 const LEAST_TURNED_HEIGHT: f64 = 0.25;
-/// An edge is not turned if that takes the surface farther off than this, in target lengths.
+/// Largest distance by which flipping an edge may take the surface off, in target lengths.
 const MOST_OFF: f64 = 0.3;
-/// Coarse triangles at a point that is smoothed face along their mean to this cosine, 18°.
+/// Least cosine, 18°, of coarse triangles' normals with their mean at a point that is smoothed.
 const MOST_BENT: f64 = 0.95;
-/// Coarsening and refining halve something in each pass, and 2⁻³⁰ of any model is below its precision.
+/// Largest number of passes. Each pass of coarsening or refining halves a quantity, and 2⁻³⁰ of any model is
+/// below its precision.
 const MOST_PASSES: u32 = 30;
-/// A coarsening pass that merges a smaller share of the points is the last.
+/// Share of points merged in a pass, at or below which coarsening stops.
 const WORTH_A_PASS: f64 = 0.02;
-/// Targets that need more triangles than this are raised: what is analysed on such a mesh would not end.
+/// Number of triangles above which the target is raised, since analyses on such a mesh would not end.
 const MOST_TRIANGLES: f64 = 1e6;
 /// Area of a triangle with three edges of length 1: √3 / 4.
 const UNIT_TRIANGLE: f64 = 0.433;
 
-/// How [`remesh`] works.
+/// Parameters of the function [`remesh`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RemeshParams {
-    /// Edge length wanted, mm, > 0. Most edges come out between 0.6 and 1.5 of it; raised where it would need
+    /// Target edge length, mm, > 0. Most edges come out between 0.6 and 1.5 of it. Raised if it would need
     /// more than a million triangles.
     pub target_edge_mm: f64,
-    /// Rounds of splitting, merging, turning and smoothing. The tests and the figures in these docs use 6.
+    /// Rounds of splitting, merging, flipping and smoothing. The tests and the figures in these docs use 6.
     pub n_rounds: u32,
 }
 
-/// What [`remesh`] returns.
+/// Result of [`remesh`], a labelled mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remeshed {
-    /// Closed and oriented like the input.
+    /// Closed mesh, oriented like the input.
     pub mesh: TriMesh,
-    /// The label of each triangle.
+    /// Label of each triangle.
     pub labels: Vec<u32>,
 }
 
-/// `mesh` with triangles of about `params.target_edge_mm`, labelled like the input (`labels`, one a
-/// triangle).
+/// Remeshes `mesh` with triangles of about `params.target_edge_mm`, labelled like the input (`labels`, one
+/// per triangle).
 ///
-/// For closed, consistently oriented meshes; others, and targets that are no positive number, come back
-/// unchanged. Kept are: closedness, orientation and genus; each connected region and so each label; the
-/// seams, by pairs of labels, on the input's lines; and where three or more meet, the point. Points lie on
-/// the input but for rare ones where projecting them would turn a triangle over. Sequential and
+/// For closed, consistently oriented meshes. Other meshes are returned unchanged, as are all meshes if the
+/// target is not a positive number. Kept are: closedness, orientation and genus; each connected region and so
+/// each label; the seams, by pairs of labels, on the input's lines; and each point where three or more labels
+/// meet. Points lie on the input, except rare ones where projection would flip a triangle. Sequential and
 /// deterministic; about 0.5 s for 100 000 triangles.
 pub fn remesh(params: &RemeshParams, mesh: &TriMesh, labels: &[u32]) -> Remeshed {
     assert_eq!(mesh.triangles.len(), labels.len(), "one label a triangle");
@@ -132,7 +134,7 @@ impl Remesher {
         }
     }
 
-    /// The input's point nearest to `p`, and its normal there.
+    /// Point of the input nearest to `p`, and the input's normal there.
     fn on_input(&self, p: Vec3) -> (Vec3, Vec3) {
         let nearest = self.input.nearest(p, f64::INFINITY);
         nearest.map_or((p, Vec3::ZERO), |n| {
@@ -140,12 +142,12 @@ impl Remesher {
         })
     }
 
-    /// Whether triangle `corners` faces the way the input does where it is nearest.
+    /// Returns true if triangle `corners` faces the same way as the input nearest to it.
     fn agrees(&self, corners: [Vec3; 3]) -> bool {
         self.cosine(corners) >= LEAST_COS
     }
 
-    /// Between the normals of triangle `corners` and of the input where it is nearest; 1 if one of them has
+    /// Cosine between the normals of triangle `corners` and of the input nearest to it; 1 if one of them has
     /// none.
     fn cosine(&self, [a, b, c]: [Vec3; 3]) -> f64 {
         let normals = [
@@ -159,7 +161,8 @@ impl Remesher {
         }
     }
 
-    /// Whether all triangles at `v` stay sound if it moves to `at`, but for those that it shares with `gone`.
+    /// Returns true if all triangles at `v` stay sound when `v` moves to `at`. Triangles shared with `gone`
+    /// are ignored.
     fn may_move(
         &self,
         v: u32,
@@ -176,18 +179,18 @@ impl Remesher {
         })
     }
 
-    /// Whether the triangle of `h` agrees with the input, or more than before, if its corners move to
-    /// `moved`.
+    /// Returns true if the triangle of `h`, moved to `moved`, faces the same way as the input, or no worse
+    /// than before.
     fn may_face(&self, h: HalfEdge, moved: [Vec3; 3]) -> bool {
         let cosine = self.cosine(moved);
         cosine >= LEAST_COS || cosine >= self.cosine(self.surface.corners(h))
     }
 
-    /// Merges short edges, in passes in which each point takes part once at most: no queue, and even
-    /// triangles.
+    /// Merges short edges in passes. Each point takes part in at most one merge per pass, which needs no
+    /// queue and gives even triangles.
     ///
-    /// Directions are compared with the input's normals at the corners, which are points of the input all the
-    /// while: a search for the nearest point costs more than all else here.
+    /// Normals are compared with the input's at the corners, since all points remain points of the input
+    /// here. A search for the nearest point would cost more than everything else.
     fn coarsen(&mut self) {
         let normals = self.point_normals();
         let n_points = self.surface.points.len();
@@ -230,7 +233,7 @@ impl Remesher {
         }
     }
 
-    /// Unit normals at the points, from the triangles around; zero where they cancel.
+    /// Unit normals at the points, from the triangles around them; zero where these cancel.
     fn point_normals(&self) -> Vec<Vec3> {
         let mut normals = vec![Vec3::ZERO; self.surface.points.len()];
         for h in (0..self.surface.start.len() as HalfEdge).step_by(3) {
@@ -242,7 +245,7 @@ impl Remesher {
         normals.iter().map(|n| n.normalize_or_zero()).collect()
     }
 
-    /// The edges out of `v` shorter than `below_mm`, shortest first.
+    /// Collects the edges out of `v` shorter than `below_mm`, shortest first.
     fn short_edges(&self, v: u32, below_mm: f64, found: &mut Vec<(f64, HalfEdge)>) {
         found.clear();
         let lengths = self.surface.around(v).map(|h| (self.surface.length_sq(h), h));
@@ -263,7 +266,7 @@ impl Remesher {
             && self.may_move(v, at, Some(u), faces_well)
     }
 
-    /// Halves what is far longer than the target, as coarse input has it.
+    /// Halves edges far longer than the target, as in coarse input.
     fn refine(&mut self) {
         for _ in 0..MOST_PASSES {
             let n_before = self.surface.points.len();
@@ -272,7 +275,7 @@ impl Remesher {
                 break;
             }
             self.turn_edges();
-            // By a crease the middle of such far neighbours lies off the surface.
+            // At a crease the middle of such distant neighbours lies off the surface.
             self.smooth(MOST_BENT);
         }
     }
@@ -287,8 +290,8 @@ impl Remesher {
         }
     }
 
-    /// Splits `h` in the middle: of its stretch of the seam, or moved onto the input unless that spoils a
-    /// triangle.
+    /// Splits `h` at the middle of its stretch of the seam, or at its midpoint. That midpoint is moved onto
+    /// the input unless this spoils a triangle.
     fn split(&mut self, h: HalfEdge) {
         let [u, v] = self.surface.ends(h).map(|v| self.surface.points[v as usize]);
         let middle = 0.5 * (u + v);
@@ -326,7 +329,7 @@ impl Remesher {
         }
     }
 
-    /// Turns edges whose opposite angles sum to more than π, and bridges.
+    /// Flips edges whose opposite angles sum to more than π, and bridges.
     fn turn_edges(&mut self) {
         for _ in 0..3 {
             let mut n_turned = 0;
@@ -347,7 +350,7 @@ impl Remesher {
         let [u, v, w] = s.corners(h);
         let x = s.points[s.apex(s.opposite[h as usize]) as usize];
         let turned = [[x, w, u], [w, x, v]];
-        // Over a crease of the input the surface would go from one side of this tetrahedron to the other.
+        // Over a crease of the input the surface would jump to the other side of this tetrahedron.
         if distance_of_lines([u, v], [w, x]) > MOST_OFF * self.target_mm {
             return false;
         }
@@ -370,12 +373,12 @@ impl Remesher {
             .all(|&t| height_share(t) > least_height && self.agrees(t))
     }
 
-    /// Splits the bridges that could not be turned, and triangles whose three edges are all on seams.
+    /// Splits the bridges that could not be flipped, and triangles whose three edges are all on seams.
     fn split_bridges(&mut self) {
         for h in self.surface.edges() {
             if self.surface.is_bridge(h) {
                 self.split(h);
-                // A bridge may run close by a seam, so that its middle makes needles.
+                // A bridge may run close to a seam, so that its midpoint makes needles.
                 let m = self.surface.points.len() as u32 - 1;
                 self.try_move(m, self.relaxed_inside(m, 1.0));
             }
@@ -391,10 +394,10 @@ impl Remesher {
     }
 
     /// Moves points to the middle of their neighbours: in the tangent plane and back onto the input, or along
-    /// the seam. Where the whole way spoils a triangle, half or a quarter of it may not.
+    /// the seam. If the full step spoils a triangle, half and a quarter of it are tried.
     ///
-    /// Left are points inside regions where the cosine of a triangle's normal and the mean one is less than
-    /// `least_cos`.
+    /// Points inside regions are skipped if the cosine between a triangle's normal and their mean is less
+    /// than `least_cos`.
     fn smooth(&mut self, least_cos: f64) {
         for v in 0..self.surface.points.len() as u32 {
             if matches!(self.surface.place[v as usize], Place::Inside) && self.is_bent(v, least_cos) {
@@ -429,7 +432,8 @@ impl Remesher {
             .any(|h| normal(h).normalize_or_zero().dot(mean) < least_cos)
     }
 
-    /// Where `v` is after this share of the way to the middle of its neighbours; `None` if it does not move.
+    /// Position of `v` after this share of the step to the middle of its neighbours; `None` if `v` does not
+    /// move.
     fn relaxed(&self, v: u32, share: f64) -> Option<(Vec3, Place)> {
         match self.surface.place[v as usize] {
             _ if !self.surface.is_alive(v) => None,
@@ -457,12 +461,14 @@ impl Remesher {
     }
 }
 
-/// Whether a triangle with this area vector faces along the unit vector `normal`; any does along zero.
+/// Returns true if a triangle with this area vector faces along the unit vector `normal`. Always true for
+/// zero.
 fn faces_along(area_vector: Vec3, normal: Vec3) -> bool {
     area_vector.dot(normal) >= LEAST_COS * area_vector.length() * normal.length()
 }
 
-/// Height over the longest edge as a share of it: 0.87 at most, 0 for a degenerate triangle.
+/// Height of a triangle over its longest edge as a share of that edge: at most 0.87, 0 for a degenerate
+/// triangle.
 fn height_share([a, b, c]: [Vec3; 3]) -> f64 {
     let longest_sq = a
         .distance_squared(b)
@@ -475,12 +481,12 @@ fn height_share([a, b, c]: [Vec3; 3]) -> f64 {
     }
 }
 
-/// Distance of two lines, each through two points; 0 where they are parallel.
+/// Distance of two lines, each through two points; 0 if they are parallel.
 fn distance_of_lines([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f64 {
     (b - a).cross(d - c).normalize_or_zero().dot(c - a).abs()
 }
 
-/// Whether the angles at `apexes` over the edge `ends` sum to more than π: the edge is not Delaunay.
+/// Returns true if the angles at `apexes` over the edge `ends` sum to more than π: the edge is not Delaunay.
 fn angles_exceed_pi([u, v]: [Vec3; 2], apexes: [Vec3; 2]) -> bool {
     let [(sin_w, cos_w), (sin_x, cos_x)] =
         apexes.map(|w| ((u - w).cross(v - w).length(), (u - w).dot(v - w)));

@@ -1,30 +1,31 @@
-//! From exact meshes to the 32-bit coordinates that files hold, without losing what makes them printable.
+//! Rounding of exact meshes to the 32-bit coordinates of files, without losing the properties that make them
+//! printable.
 
 use std::collections::HashMap;
 
 use crate::{Solid, TriMesh, Vec3, Volume};
 
-/// Edges shorter than this collapse before rounding, mm. A 32-bit coordinate of 150 mm has steps of 1.5e-5
-/// mm.
+/// Edge length below which edges collapse before rounding, mm. A 32-bit coordinate of 150 mm has steps of
+/// 1.5e-5 mm.
 const SHORT_MM: f64 = 1e-4;
-/// Points that would fall together without being joined by an edge are moved inwards by this much, mm: far
+/// Distance by which points move inwards if they would coincide without being joined by an edge, mm. Far
 /// above the steps of the format, far below what any printer resolves.
 const APART_MM: f64 = 2e-3;
-/// Rounds of collapsing and moving apart. On all test models three were enough.
+/// Largest number of rounds of collapsing and moving apart. On all test models three were enough.
 const MAX_ROUNDS: usize = 10;
 
-/// Why a region has no printable 32-bit mesh.
+/// Reason why a region has no printable 32-bit mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NotPrintable {
-    /// Nothing is left.
+    /// Nothing is left of the body.
     #[error("nothing is left of the body")]
     Empty,
-    /// Distinct points still fall together after all rounds.
+    /// Distinct points still coincide after all rounds.
     #[error("the surface still touches itself at {count} points after rounding, first at ({:.3}, {:.3}, {:.3})", at.x, at.y, at.z)]
     Touches {
-        /// How many.
+        /// Number of such places.
         count: usize,
-        /// The first.
+        /// Position of the first place, mm.
         at: Vec3,
     },
     /// The rounded mesh bounds no volume.
@@ -32,8 +33,8 @@ pub enum NotPrintable {
     NotSolid(String),
 }
 
-/// The boundary of `volume` with coordinates that 32-bit floats hold exactly, and no two points at the same
-/// place: a program that merges equal points, as slicers do, sees the same manifold.
+/// Boundary of `volume` with coordinates that 32-bit floats hold exactly, and no two points at the same
+/// place. A program that merges equal points, as slicers do, therefore sees the same manifold.
 ///
 /// Points move by at most a few µm, and only where the surface touches itself or has edges under 0.1 µm.
 pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
@@ -62,9 +63,8 @@ pub fn printable(volume: &Volume) -> Result<TriMesh, NotPrintable> {
         .map_err(|e| NotPrintable::NotSolid(e.to_string()))
 }
 
-/// As [`printable`], but of the largest part of `volume` alone, as one closed surface: chips that hang on
-/// nothing go, and slivers of hollow, which also arise where a surface that touched itself is moved apart,
-/// are filled.
+/// Makes the largest part of `volume` [`printable`] as one closed surface. Separate chips are dropped. Small
+/// cavities, which also arise where a surface that touched itself is moved apart, are filled.
 pub fn printable_body(volume: &Volume) -> Result<TriMesh, NotPrintable> {
     let largest = |volume: &Volume| {
         volume
@@ -97,8 +97,8 @@ fn rounded(mesh: &TriMesh) -> TriMesh {
     }
 }
 
-/// The same mesh with points sorted by coordinates and triangles by their corners, the lowest first: what a file
-/// holds depends on the surface alone, not on how it was made.
+/// Sorts points by coordinates and triangles by their corners, lowest first. The contents of a file then
+/// depend only on the surface, not on how it was made.
 fn in_canonical_order(mesh: &TriMesh) -> TriMesh {
     let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let key = |v: &u32| mesh.points[*v as usize].to_array();
@@ -146,8 +146,8 @@ fn coincident(mesh: &TriMesh) -> Vec<Vec<u32>> {
     groups
 }
 
-/// Moves every point of every group inwards, unless an edge joins it to its twin (then the edge is left to
-/// collapse).
+/// Moves the points of all groups inwards. A point joined to its twin by an edge stays, since the edge will
+/// collapse.
 fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
     let group_of: HashMap<u32, usize> = groups
         .iter()
@@ -167,7 +167,7 @@ fn move_apart(mesh: &mut TriMesh, groups: &[Vec<u32>], by_mm: f64) {
         for (rank, v) in members.iter().enumerate() {
             if !joined.get(v).copied().unwrap_or(false) {
                 let inwards = -normals.get(v).copied().unwrap_or_default().normalize_or_zero();
-                // Ranks differ, so that members with the same normal part too.
+                // Distances differ by rank, so that members with the same normal separate, too.
                 mesh.points[*v as usize] += inwards * by_mm * (1.0 + 0.5 * rank as f64);
             }
         }

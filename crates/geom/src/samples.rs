@@ -1,5 +1,5 @@
-//! The test kit's shapes as this crate's own types, of which the kit has other copies, and what is done to
-//! meshes to break them.
+//! Shapes of the test kit in this crate's own types, since the kit has separate ones, and functions that
+//! break meshes.
 
 use shellock_testkit::plain::{self, Plain};
 
@@ -9,34 +9,34 @@ fn mesh((points, triangles): Plain) -> TriMesh {
     TriMesh { points, triangles }
 }
 
-/// A corner of the unit cube, outwards.
+/// Corner of the unit cube, oriented outwards.
 pub fn tetrahedron() -> TriMesh {
     mesh(plain::tetrahedron())
 }
 
-/// An octahedron with each edge halved `n_splits` times, on the ellipsoid with half axes `radii_mm`.
+/// Octahedron with each edge halved `n_splits` times, on the ellipsoid with half axes `radii_mm`.
 pub fn ellipsoid(n_splits: usize, radii_mm: Vec3) -> TriMesh {
     mesh(plain::sphere(n_splits, radii_mm))
 }
 
-/// A ball of 8 · 4ⁿ triangles, outwards.
+/// Ball of 8 · 4ⁿ triangles, oriented outwards.
 pub fn ball(center: Vec3, radius: f64, n: usize) -> TriMesh {
     let mut ball = ellipsoid(n, Vec3::splat(radius));
     ball.points.iter_mut().for_each(|p| *p += center);
     ball
 }
 
-/// A cube of edge `size` with its least corner at `at`, outwards.
+/// Cube of edge `size` with its least corner at `at`, oriented outwards.
 pub fn cube(at: Vec3, size: f64) -> TriMesh {
     mesh(plain::cuboid(at, at + size))
 }
 
-/// A torus around z as a grid of `cells` around and across it.
+/// Torus around z as a grid of `cells` around and across it.
 pub fn torus(radius_mm: f64, tube_mm: f64, cells: [u32; 2]) -> TriMesh {
     mesh(plain::torus(radius_mm, tube_mm, cells))
 }
 
-/// A box between two corners.
+/// Box between two opposite corners.
 pub fn cuboid(min: impl Into<Vec3>, max: impl Into<Vec3>) -> Volume {
     Volume::cuboid(Aabb {
         min: min.into(),
@@ -44,7 +44,7 @@ pub fn cuboid(min: impl Into<Vec3>, max: impl Into<Vec3>) -> Volume {
     })
 }
 
-/// Two meshes as one.
+/// Joins two meshes into one, without merging points.
 pub fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
     let n = a.points.len() as u32;
     a.points.extend(b.points);
@@ -52,13 +52,13 @@ pub fn both(mut a: TriMesh, b: TriMesh) -> TriMesh {
     a
 }
 
-/// The same inside out.
+/// Turns the mesh inside out.
 pub fn flipped(mut mesh: TriMesh) -> TriMesh {
     mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     mesh
 }
 
-/// Each triangle with points of its own, as in an STL.
+/// Gives each triangle its own points, as in an STL.
 pub fn unwelded(mesh: &TriMesh) -> TriMesh {
     TriMesh {
         points: (0..mesh.triangles.len()).flat_map(|f| mesh.corners(f)).collect(),

@@ -3,30 +3,30 @@
 use crate::bvh::{Feature, TriangleBvh};
 use crate::{Solid, Vec3};
 
-/// Answers distance queries to one solid. The sign comes from angle-weighted pseudo-normals, which decide
-/// correctly for every nearest point of a surface that does not cross itself. [Bærentzen and Aanæs 2005]
+/// Signed distance queries for one solid. The sign comes from angle-weighted pseudo-normals, which are
+/// correct for every nearest point of a surface that does not cross itself. [Bærentzen and Aanæs 2005]
 pub struct SignedDistance {
     bvh: TriangleBvh,
     triangles: Vec<[u32; 3]>,
     face_normals: Vec<Vec3>,
     vertex_normals: Vec<Vec3>,
-    /// For each triangle, the triangle across the edge that starts at its corner 0, 1, 2.
+    /// Triangle across the edge that starts at each corner 0, 1, 2 of each triangle.
     across: Vec<[u32; 3]>,
 }
 
-/// A signed distance and where it was measured to.
+/// A signed distance, and the point of the surface nearest to the query.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceDistance {
     /// Distance, mm, positive inside the solid.
     pub signed_mm: f64,
-    /// The nearest triangle.
+    /// Index of the nearest triangle.
     pub face: u32,
-    /// The nearest point.
+    /// Nearest point of the surface, mm.
     pub point: Vec3,
 }
 
 impl SignedDistance {
-    /// Prepares queries to the surface of `solid`; O(n log n).
+    /// Prepares queries for the surface of `solid`; O(n log n).
     pub fn new(solid: &Solid) -> Self {
         let mesh = solid.mesh();
         let n = mesh.triangles.len();
@@ -52,7 +52,7 @@ impl SignedDistance {
         }
     }
 
-    /// Signed distance at `q` where the surface comes within `limit_mm`; `None` farther off.
+    /// Signed distance at `q`; `None` if the surface is farther than `limit_mm`.
     pub fn at(&self, q: Vec3, limit_mm: f64) -> Option<SurfaceDistance> {
         let near = self.bvh.nearest(q, limit_mm * limit_mm)?;
         let f = near.face as usize;
@@ -70,7 +70,7 @@ impl SignedDistance {
         })
     }
 
-    /// Whether the surface passes between `a` and `b`. Triangles that lie along the way do not count.
+    /// Returns true if the surface passes between `a` and `b`. Triangles parallel to the line do not count.
     pub fn is_between(&self, a: Vec3, b: Vec3) -> bool {
         let way = b - a;
         self.bvh
@@ -79,7 +79,7 @@ impl SignedDistance {
     }
 }
 
-/// For each triangle of a closed mesh, the triangles across its three edges.
+/// Triangles across the three edges of each triangle of a closed mesh.
 fn faces_across(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut edges: Vec<(u32, u32, u32)> = Vec::with_capacity(triangles.len() * 3);
     for (f, t) in triangles.iter().enumerate() {

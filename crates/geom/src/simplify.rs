@@ -1,7 +1,8 @@
-//! Fewer triangles within a stated distance of a solid: what no printer shows costs no time.
+//! Simplification: fewer triangles within a given distance of a solid, so that detail too fine for printing
+//! costs no time.
 //!
-//! [`decimate`] keeps a mean of squared distances small; here the distance itself is measured afterwards, both
-//! ways, and points that lost too much get their triangles back.
+//! [`decimate`] keeps a mean of squared distances small. Here the distance itself is measured afterwards,
+//! both ways, and the triangles around points that moved too far are restored.
 
 use rayon::prelude::*;
 
@@ -10,27 +11,28 @@ use crate::decimate::decimate;
 use crate::repair::crossing_faces;
 use crate::{Solid, TriMesh, Vec3};
 
-/// What of the distance the mean distance may use: of what comes out so, nearly all lies within the distance.
+/// Share of the distance used as tolerance of the mean distance: nearly all of such a result lies within the
+/// distance.
 const MEAN_SHARE: f64 = 0.4;
-/// How often points that lost too much are given back.
+/// Largest number of rounds of restoring points that moved too far.
 const MOST_ROUNDS: usize = 8;
 
 /// A solid with fewer triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simplified {
-    /// The solid.
+    /// Solid with fewer triangles than before.
     pub solid: Solid,
-    /// For each of its triangles the one of the solid before that is nearest to its middle.
+    /// Triangle of the original solid nearest to the centre of each new triangle.
     pub source_face: Vec<u32>,
-    /// The largest distance found, mm: of a point or a triangle's middle of one surface from the other.
+    /// Largest distance found, mm, of a point or a triangle's centre of one surface from the other.
     pub farthest_mm: f64,
 }
 
-/// `solid` with edges collapsed, such that points and middles of triangles of both surfaces stay within
-/// `within_mm` of the other surface. Points between triangles of different `labels` (one a triangle, or none)
-/// stay where they are.
+/// Simplifies `solid` by collapsing edges. Points and triangle centres of both surfaces stay within
+/// `within_mm` of the other surface. Points between triangles of different `labels` (one per triangle, or
+/// `None`) stay in place.
 ///
-/// `None` where that cannot be kept, or where the surface would cross itself. The same on any number of
+/// `None` if this distance cannot be kept, or if the surface would cross itself. The same on any number of
 /// threads.
 pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option<Simplified> {
     let mesh = solid.mesh();
@@ -60,7 +62,7 @@ pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option
                 farthest_mm: of_old.max(of_new),
             });
         }
-        // A triangle that crosses another may be large: its corners are given back, and its middle.
+        // A triangle that crosses another may be large, so its corners and its centre are all restored.
         let corners_and_middle = |&f: &u32| {
             few.corners(f as usize)
                 .into_iter()
@@ -76,7 +78,7 @@ pub fn simplify(solid: &Solid, labels: Option<&[i64]>, within_mm: f64) -> Option
     None
 }
 
-/// The points where triangles of different labels meet.
+/// Points where triangles of different labels meet.
 fn points_between(mesh: &TriMesh, labels: &[i64]) -> Vec<u32> {
     let mut seen: Vec<Option<i64>> = vec![None; mesh.points.len()];
     let mut between = Vec::new();
@@ -91,7 +93,7 @@ fn points_between(mesh: &TriMesh, labels: &[i64]) -> Vec<u32> {
     between
 }
 
-/// Points and middles of triangles of `mesh` farther than `within_mm` from `other`, and the largest distance of
+/// Points and triangle centres of `mesh` farther than `within_mm` from `other`, and the largest distance of
 /// the rest, mm.
 fn points_away(mesh: &TriMesh, other: &TriangleBvh, within_mm: f64) -> (Vec<Vec3>, f64) {
     let limit_sq = within_mm * within_mm;

@@ -1,4 +1,4 @@
-//! Narrow gaps between parts of a solid's surface that face each other: slits.
+//! Slits: narrow gaps between parts of a solid's surface that face each other.
 
 use rayon::prelude::*;
 
@@ -9,28 +9,28 @@ use crate::{Aabb, Solid, TriMesh, Vec3};
 
 /// Cosine of the greatest angle between both sides of a slit.
 const COS_SLIT: f64 = 0.866_025_403_784_438_6;
-/// Where a ray starts above the surface, as a share of the width asked for: more than rounding.
+/// Height above the surface at which a ray starts, as a share of the width requested: more than rounding.
 const START_SHARE: f64 = 1e-6;
-/// Points that are looked at besides the middles of triangles: large triangles have several, so that a slit of a
-/// hundredth of the size is met.
+/// Approximate number of test points, beside one per triangle. Large triangles have several, so that a slit
+/// of a hundredth of the size is found.
 const N_POINTS: f64 = 20_000.0;
-/// A slit is deeper than it may be wide by this factor: creases of 15° and more are less deep.
+/// Least ratio of a slit's depth to the width requested; creases of 15° and more are shallower.
 const LEAST_DEPTHS: f64 = 4.0;
-/// Smaller slits are scratches, mm²: less than a connector takes.
+/// Least area of a slit, mm²: smaller ones are scratches, less than a connector takes.
 const LEAST_MM2: f64 = 4.0;
 
 /// A slit in the surface of a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slit {
-    /// Area of one of its sides, mm².
+    /// Area of one side of the slit, mm².
     pub area_mm2: f64,
-    /// Half of it is narrower than this, mm.
+    /// Median width by area, mm.
     pub width_mm: f64,
-    /// The middle between both sides where it is so wide, mm.
+    /// Midpoint between both sides at a place of that width, mm.
     pub at: Vec3,
 }
 
-/// A point of the surface that another part of it faces.
+/// A point of the surface that faces another part of it.
 struct Facing {
     face: u32,
     other: u32,
@@ -39,10 +39,10 @@ struct Facing {
     at: Vec3,
 }
 
-/// The slits narrower than `below_mm`, the largest first.
+/// Finds the slits narrower than `below_mm`, largest first.
 ///
-/// Width is measured straight outwards to a surface that faces back within 30°. O(n log n), the same on any number
-/// of threads.
+/// Width is measured straight outwards to a surface that faces back within 30°. O(n log n); the same on any
+/// number of threads.
 pub fn slits(solid: &Solid, below_mm: f64) -> Vec<Slit> {
     let mesh = solid.mesh();
     let facing = facing(mesh, below_mm);
@@ -72,7 +72,7 @@ pub fn slits(solid: &Solid, below_mm: f64) -> Vec<Slit> {
     found
 }
 
-/// The slit that facing points make, which are sorted by width; `None` where it is a crease or a scratch.
+/// Combines facing points, sorted by width, into a slit; `None` if they are a crease or a scratch.
 fn joined(points: &[(u32, &Facing)], below_mm: f64) -> Option<Slit> {
     let both_mm2: f64 = points.iter().map(|(_, f)| f.area_mm2).sum();
     let area_mm2 = 0.5 * both_mm2;
@@ -92,7 +92,7 @@ fn joined(points: &[(u32, &Facing)], below_mm: f64) -> Option<Slit> {
     })
 }
 
-/// All points that another part of the surface faces within `below_mm`.
+/// Finds the points that face another part of the surface within `below_mm`.
 fn facing(mesh: &TriMesh, below_mm: f64) -> Vec<Facing> {
     let tree = TriangleBvh::new(mesh);
     let a_point_mm2 = mesh.area() / N_POINTS;
@@ -121,9 +121,9 @@ fn facing(mesh: &TriMesh, below_mm: f64) -> Vec<Facing> {
         .collect()
 }
 
-/// Point `k` of a sequence that fills a triangle evenly, from its middle on.
+/// Point `k` of a sequence that fills a triangle evenly, starting at its centre.
 fn point([a, b, c]: [Vec3; 3], k: usize) -> Vec3 {
-    /// Steps of the sequence: powers of the reciprocal of the plastic number.
+    /// Increments of the sequence: powers of the reciprocal of the plastic number.
     const STEPS: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053_3];
     let [u, v] = STEPS.map(|step| (1.0 / 3.0 + k as f64 * step).fract());
     let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };

@@ -1,65 +1,66 @@
-//! Closed meshes: the noun that carries the guarantee.
+//! Solids: closed meshes whose type carries the guarantee.
 
 use crate::{TriMesh, Vec3};
 
 /// A closed, consistently oriented triangle mesh of positive volume: each directed edge is used once and has
 /// its opposite.
 ///
-/// The only way to get one is [`Solid::new`]; what needs a volume takes a `Solid`, so nobody checks again.
-/// Not promised: faces may cross, vertices may be pinched, and there may be several bodies.
+/// The only way to get one is [`Solid::new`]. Functions that need a volume take a `Solid`, so none of them
+/// checks again. Not promised: faces may cross, vertices may be pinched, and there may be several bodies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid(TriMesh);
 
-/// Why a mesh bounds no volume.
+/// Reason why a mesh bounds no volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NotSolid {
-    /// There is nothing.
+    /// The mesh has no triangles.
     #[error("the mesh has no triangles")]
     Empty,
-    /// A triangle names a point that is not there.
+    /// A triangle names a point that does not exist.
     #[error("triangle {face} names point {vertex}, but there are only {n_points}")]
     MissingPoint {
-        /// The triangle.
+        /// Index of the triangle.
         face: usize,
-        /// The point it names.
+        /// Point that the triangle names.
         vertex: u32,
-        /// How many points there are.
+        /// Number of points in the mesh.
         n_points: usize,
     },
     /// A coordinate is NaN or infinite.
     #[error("{count} points have a coordinate that is not a number; the first is point {vertex}")]
     NotFinite {
-        /// The first such point.
+        /// First point with such a coordinate.
         vertex: usize,
-        /// How many there are.
+        /// Number of such points.
         count: usize,
     },
     /// Some directed edges have no opposite.
     #[error("the surface is open along {count} edges, first at ({:.3}, {:.3}, {:.3})", at.x, at.y, at.z)]
     Open {
-        /// How many edges.
+        /// Number of such edges.
         count: usize,
-        /// Middle of the first one.
+        /// Midpoint of the first such edge.
         at: Vec3,
     },
-    /// Some directed edges are used more than once: not manifold there, or faces turned against each other.
+    /// Some directed edges are used more than once: the mesh is not manifold there, or neighbouring faces
+    /// disagree.
     #[error("{count} edges are shared by more than two triangles or join triangles that face opposite ways, first at ({:.3}, {:.3}, {:.3})", at.x, at.y, at.z)]
     SharedEdge {
-        /// How many edges.
+        /// Number of such edges.
         count: usize,
-        /// Middle of the first one.
+        /// Midpoint of the first such edge.
         at: Vec3,
     },
-    /// Oriented inwards, or flat.
+    /// The mesh is oriented inwards, or flat.
     #[error("the enclosed volume is {volume_mm3:.3} mm³: the surface is inside out or flat")]
     NoVolume {
-        /// The signed volume.
+        /// Signed volume, mm³, ≤ 0 or not a number.
         volume_mm3: f64,
     },
 }
 
 impl Solid {
-    /// Checks `mesh` once; the error names the first trouble, how often it occurs and where.
+    /// Checks `mesh` once. The error has the first defect found, with its count and place.
     pub fn new(mesh: TriMesh) -> Result<Self, NotSolid> {
         check_points(&mesh)?;
         check_edges(&mesh)?;
@@ -71,12 +72,12 @@ impl Solid {
         }
     }
 
-    /// The mesh, to read.
+    /// Borrows the mesh of the solid.
     pub fn mesh(&self) -> &TriMesh {
         &self.0
     }
 
-    /// The mesh, to change: the guarantee ends here.
+    /// Returns the mesh for changes, which ends the guarantee.
     pub fn into_mesh(self) -> TriMesh {
         self.0
     }
@@ -112,8 +113,8 @@ fn check_points(mesh: &TriMesh) -> Result<(), NotSolid> {
 }
 
 fn check_edges(mesh: &TriMesh) -> Result<(), NotSolid> {
-    // Directed edges as (low, high, forwards) in sorted order: a closed manifold has each pair exactly once
-    // each way.
+    // Directed edges become (low, high, forwards) in sorted order: a closed manifold has each pair exactly
+    // once each way.
     let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(mesh.triangles.len() * 3);
     for &[a, b, c] in &mesh.triangles {
         for (from, to) in [(a, b), (b, c), (c, a)] {

@@ -1,7 +1,7 @@
-//! Sparse symmetric positive definite systems: factorised once, solved many times.
+//! Sparse symmetric positive definite systems, factorised once and solved many times.
 //!
-//! The only file that names the sparse solver. The order of elimination is approximate minimum degree: on the
-//! Laplacian of a surface it costs a tenth of nested dissection, which pays only where one pattern is
+//! No other file names the sparse solver. The order of elimination is approximate minimum degree. On the
+//! Laplacian of a surface this order costs a tenth of nested dissection, which only pays if one pattern is
 //! factorised often.
 
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Accum, Conj, Mat, MatMut, Par, Side};
 use rayon::prelude::*;
 
-/// A symmetric matrix by its upper triangle, in compressed columns.
+/// A symmetric matrix, stored as its upper triangle in compressed columns.
 #[derive(Clone, Debug)]
 pub struct SparseSymmetric {
     n: usize,
@@ -31,28 +31,28 @@ pub struct SparseSymmetric {
     value: Vec<f64>,
 }
 
-/// Why a matrix could not be factorised.
+/// Reason why a matrix could not be factorised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SparseError {
     /// A pivot was not positive, or not a number.
     #[error("the matrix of {n} rows is not positive definite")]
     NotPositiveDefinite {
-        /// Number of rows.
+        /// Number of rows of the matrix.
         n: usize,
     },
-    /// The factor needs more memory or larger indices than there are.
+    /// The factor needs more memory or larger indices than available.
     #[error("the factor of the matrix of {n} rows does not fit into memory")]
     TooLarge {
-        /// Number of rows.
+        /// Number of rows of the matrix.
         n: usize,
     },
 }
 
 impl SparseSymmetric {
-    /// The `n × n` matrix with the sums of `entries` (row, column, value), each off-diagonal pair given once
-    /// in any order.
+    /// Builds the `n × n` matrix with the sums of `entries` (row, column, value). Each off-diagonal pair is
+    /// given once, in either order.
     ///
-    /// Entries at the same place add up in the order given, so the result is the same bits on every run.
+    /// Entries at the same place add up in the order given, so the result has the same bits on every run.
     pub fn from_entries(n: usize, mut entries: Vec<(u32, u32, f64)>) -> Self {
         for e in &mut entries {
             if e.0 > e.1 {
@@ -77,11 +77,11 @@ impl SparseSymmetric {
         matrix
     }
 
-    /// The zero matrix with `block` rows a node and places between all nodes of each cell, as a mesh's
-    /// stiffness has them.
+    /// Builds a zero matrix with `block` rows per node and places between all nodes of each cell, like a
+    /// mesh's stiffness matrix.
     ///
     /// # Panics
-    /// Where a cell names a node that is not below `n_nodes`.
+    /// Panics if a cell names a node that is not below `n_nodes`.
     pub fn of_cells<const N: usize>(n_nodes: usize, block: usize, cells: &[[u32; N]]) -> Self {
         let pairs = cells
             .iter()
@@ -112,7 +112,7 @@ impl SparseSymmetric {
         matrix
     }
 
-    /// Places of the upper triangle that the pattern has.
+    /// Number of places in the pattern's upper triangle.
     pub fn n_places(&self) -> usize {
         self.value.len()
     }
@@ -126,8 +126,8 @@ impl SparseSymmetric {
         })
     }
 
-    /// Where the values of a place of the matrix are in [`values_mut`](Self::values_mut); `None` where it has
-    /// none.
+    /// Index in [`values_mut`](Self::values_mut) of the place at `row` and `column`, in either order; `None`
+    /// if the pattern has no such place.
     pub fn position(&self, row: u32, column: u32) -> Option<usize> {
         let (row, column) = (row.min(column), row.max(column) as usize);
         let (start, end) = (
@@ -137,7 +137,7 @@ impl SparseSymmetric {
         self.row[start..end].binary_search(&row).ok().map(|i| start + i)
     }
 
-    /// The values at all places, to be changed.
+    /// Mutable values at all places.
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.value
     }
@@ -146,10 +146,10 @@ impl SparseSymmetric {
         SymbolicSparseColMatRef::new_checked(self.n, self.n, &self.column_start, None, &self.row)
     }
 
-    /// The matrix times `x`.
+    /// Multiplies the matrix by `x`.
     ///
     /// # Panics
-    /// Where `x` has fewer numbers than the matrix rows.
+    /// Panics if `x` has fewer numbers than the matrix has rows.
     pub fn times(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; self.n];
         for (column, ends) in self.column_start.windows(2).enumerate() {
@@ -166,15 +166,15 @@ impl SparseSymmetric {
         y
     }
 
-    /// What remains of the last `n_kept` rows and columns when all others have been eliminated: the Schur
-    /// complement, dense, lower triangle by columns with zeros above.
+    /// Schur complement of the last `n_kept` rows and columns, after elimination of all others: dense, lower
+    /// triangle by columns, with zeros above.
     ///
     /// Costs one factorisation. The matrix need only be positive definite in the rows eliminated, and
     /// positive semidefinite as a whole.
     pub fn schur_complement(mut self, n_kept: usize) -> Result<Vec<f64>, SparseError> {
         let (n, first_kept) = (self.n, self.n - n_kept.min(self.n));
-        // The kept rows are eliminated as well, last, and multiplied back together: springs on their diagonal
-        // make them definite, and are taken away at the end.
+        // The kept rows are eliminated last, and multiplied back together. Springs on their diagonal make
+        // them definite, and are subtracted at the end.
         let mut spring = 0.0_f64;
         for column in first_kept..n {
             let last = self.column_start[column + 1] as usize - 1;
@@ -223,21 +223,21 @@ impl SparseSymmetric {
     }
 }
 
-/// The order of elimination of a pattern, for all matrices that have it.
+/// Order of elimination of a pattern, for all matrices that have that pattern.
 #[derive(Clone, Debug)]
 pub struct EliminationOrder(Arc<SymbolicCholesky<u32>>);
 
 impl EliminationOrder {
-    /// Looks at the places of `matrix` alone, not at its values.
+    /// Computes the order from the places of `matrix`; its values do not matter.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseError> {
         symbolic(matrix.pattern(), SymmetricOrdering::Amd).map(|s| Self(Arc::new(s)))
     }
 
-    /// As [`new`](Self::new), for a matrix of dense blocks of `block` rows and columns, which stay together:
-    /// the order is sought on the blocks, in a fraction of the time.
+    /// Computes the order like [`new`](Self::new), but for a matrix of dense blocks of `block` rows and
+    /// columns, which stay together. The order is sought on the blocks, in a fraction of the time.
     ///
     /// # Panics
-    /// Where the number of rows is not a multiple of `block`.
+    /// Panics if the number of rows is not a multiple of `block`.
     pub fn of_blocks(matrix: &SparseSymmetric, block: usize) -> Result<Self, SparseError> {
         assert!(
             matrix.n.is_multiple_of(block),
@@ -280,19 +280,19 @@ impl EliminationOrder {
     }
 }
 
-/// Columns that one thread works on: enough for dense products at full speed, and several panels in a front
-/// of a part.
+/// Number of columns that one thread works on: enough for dense products at full speed, and for several
+/// panels in a front of a part.
 const PANEL: usize = 192;
 
-/// Eliminates the first `n_eliminated` rows and columns of the dense symmetric `n × n` matrix whose lower
-/// triangle `values` holds by columns, and leaves, in that triangle, the factor L of what is eliminated, `B
-/// L⁻ᵀ` below it, and the Schur complement.
+/// Eliminates the first `n_eliminated` rows and columns of a dense symmetric `n × n` matrix. `values` has the
+/// lower triangle by columns. It is overwritten by the factor L of the eliminated block, `B L⁻ᵀ` below L, and
+/// the Schur complement.
 ///
-/// Only the eliminated block must be positive definite. The strict upper triangle of `values` is neither read
-/// nor of use afterwards.
+/// Only the eliminated block must be positive definite. The strict upper triangle of `values` is not read,
+/// and is meaningless afterwards.
 ///
 /// # Panics
-/// Where `values` has not `n²` entries or `n_eliminated` exceeds `n`.
+/// Panics if `values` does not have `n²` entries, or if `n_eliminated` exceeds `n`.
 pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> Result<(), SparseError> {
     let matrix = MatMut::from_column_major_slice_mut(values, n, n);
     let (mut pivot, _, mut below, rest) = matrix.split_at_mut(n_eliminated, n_eliminated);
@@ -329,8 +329,8 @@ pub fn eliminate_leading(values: &mut [f64], n: usize, n_eliminated: usize) -> R
     Ok(())
 }
 
-/// Calls `f` for panels of [`PANEL`] columns with the place of the first, several at once; the same panels on
-/// any number of threads.
+/// Calls `f` in parallel for panels of [`PANEL`] columns, with the index of the first column. The panels are
+/// the same on any number of threads.
 fn for_panels(columns: MatMut<'_, f64>, first: usize, f: &(impl Fn(usize, MatMut<'_, f64>) + Sync)) {
     let n_panels = columns.ncols().div_ceil(PANEL);
     if n_panels <= 1 {
@@ -356,7 +356,7 @@ fn symbolic(
         .map_err(|_| SparseError::TooLarge { n: pattern.nrows() })
 }
 
-/// The Cholesky factor of a matrix, kept for many right-hand sides.
+/// Cholesky factor of a matrix, kept for many right-hand sides.
 #[derive(Debug)]
 pub struct Cholesky {
     symbolic: Arc<SymbolicCholesky<u32>>,
@@ -364,7 +364,7 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// Factorises `matrix`; about 0.1 s for the Laplacian of a surface with 30 000 points.
+    /// Factorises `matrix`; takes about 0.1 s for the Laplacian of a surface with 30 000 points.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseError> {
         Self::in_order(&EliminationOrder::new(matrix)?, matrix)
     }
@@ -376,7 +376,7 @@ impl Cholesky {
         )
     }
 
-    /// Factorises `matrix`, which has the pattern that `order` was made for.
+    /// Factorises `matrix`, which must have the pattern that `order` was made for.
     pub fn in_order(order: &EliminationOrder, matrix: &SparseSymmetric) -> Result<Self, SparseError> {
         let n = matrix.n;
         let (pattern, symbolic) = (matrix.pattern(), order.0.clone());
@@ -398,7 +398,7 @@ impl Cholesky {
         Ok(Self { symbolic, values })
     }
 
-    /// The rows and columns of the factor from `first` on, in the order of elimination.
+    /// Rows and columns of the factor from `first` on, in the order of elimination.
     fn trailing(&self, first: usize) -> Result<Mat<f64>, SparseError> {
         let n = self.symbolic.nrows();
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
@@ -425,7 +425,7 @@ impl Cholesky {
         Ok(trailing)
     }
 
-    /// Rows of the matrix.
+    /// Number of rows of the matrix.
     pub fn n_rows(&self) -> usize {
         self.symbolic.nrows()
     }
@@ -433,7 +433,7 @@ impl Cholesky {
     /// Replaces the right-hand sides, `n` numbers each and one after the other, by their solutions.
     ///
     /// # Panics
-    /// Where the length of `sides` is not a multiple of the matrix's rows.
+    /// Panics if the length of `sides` is not a multiple of the matrix's rows.
     pub fn solve_in_place(&self, sides: &mut [f64]) {
         let n = self.symbolic.nrows();
         if n == 0 {
@@ -456,7 +456,8 @@ mod tests {
 
     #[test]
     fn a_chain_of_springs_is_solved_exactly() {
-        // −x'' = 1 with x = 0 just outside both ends: a parabola, and differences are exact for parabolas.
+        // The problem −x'' = 1 with x = 0 just outside both ends has a parabola as solution, for which
+        // differences are exact.
         let n = 50;
         let mut entries: Vec<(u32, u32, f64)> = (0..n).map(|i| (i, i, 2.0)).collect();
         entries.extend((1..n).map(|i| (i, i - 1, -1.0)));
@@ -470,7 +471,7 @@ mod tests {
         }
     }
 
-    /// A chain of springs between fixed ends, its ends kept.
+    /// A chain of springs between fixed ends, whose ends are kept.
     fn chain() -> (Vec<(u32, u32, f64)>, Vec<f64>) {
         let n = 12_u32;
         // Nodes 10 and 11 are the two free ends; the chain is 10 – 0 – 1 … 9 – 11 with springs of stiffness
@@ -493,7 +494,7 @@ mod tests {
 
     #[test]
     fn springs_in_a_row_condense_to_one_spring() {
-        // 11 springs of stiffness 2 in a row are one of 2/11, and the whole is singular.
+        // A row of 11 springs of stiffness 2 equals one of 2/11, and the whole is singular.
         let schur = SparseSymmetric::from_entries(12, chain().0)
             .schur_complement(2)
             .unwrap();
@@ -517,7 +518,7 @@ mod tests {
 
     #[test]
     fn blocks_of_a_mesh_are_solved_as_their_entries_are() {
-        // A strip of four triangles with two rows a node: one spring matrix in each cell, and one more on
+        // A strip of four triangles with two rows per node: one spring matrix in each cell, and one more on
         // each row.
         let cells = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]];
         let mut matrix = SparseSymmetric::of_cells(6, 2, &cells);
@@ -538,7 +539,7 @@ mod tests {
             let place = matrix.position(row, column).unwrap();
             matrix.values_mut()[place] += value;
         }
-        // Nodes 0 and 3 share no cell, so that their rows have no place in common.
+        // Nodes 0 and 3 share no cell, so their rows have no place in common.
         assert!(matrix.position(0, 6).is_none() && matrix.n_places() == matrix.places().count());
         let (mut x, mut y) = (vec![1.0; 12], vec![1.0; 12]);
         let order = EliminationOrder::of_blocks(&matrix, 2).unwrap();

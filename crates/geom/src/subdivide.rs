@@ -1,13 +1,12 @@
-//! Finer triangles on the same surface.
+//! Subdivision of triangles without a change of the surface.
 
 use crate::topology::{Topology, ends};
 use crate::{Solid, TriMesh, Vec3};
 
-/// The surface of `solid` with the chosen edges halved, and the triangle of `solid` that each new triangle is
-/// a part of.
+/// Halves the chosen edges of `solid`. Returns the new solid, and the source triangle of each new triangle.
 ///
-/// `wants_split` is asked once an edge, with its two end points; triangles between chosen edges are cut into
-/// 2 to 4 parts.
+/// `wants_split` is asked once per edge, with the edge's two end points. Triangles with chosen edges are cut
+/// into 2 to 4 parts.
 pub fn halve_edges(
     solid: &Solid,
     topology: &Topology,
@@ -43,10 +42,9 @@ pub fn halve_edges(
     (refined, source_face)
 }
 
-/// Appends the parts of triangle `t` whose edge `c` has the middle `m[c]`.
+/// Appends the parts of triangle `t`, whose edge `c` has the midpoint `m[c]`.
 fn cut_triangle(points: &[Vec3], t: [u32; 3], m: [Option<u32>; 3], out: &mut Vec<[u32; 3]>) {
-    // Turned so that the case needs no mirror: with one middle it is on edge 0, with two they are on edges 0
-    // and 1.
+    // Rotated so that no case needs a mirror image: one midpoint is on edge 0, two are on edges 0 and 1.
     let turn = (0..3)
         .find(|&r| m[r].is_some() && (m[(r + 2) % 3].is_none() || m.iter().all(Option::is_some)))
         .unwrap_or(0);
@@ -68,10 +66,11 @@ fn cut_triangle(points: &[Vec3], t: [u32; 3], m: [Option<u32>; 3], out: &mut Vec
     }
 }
 
-/// Appends the parts of a triangle with further points on its sides: `on_sides[k]` in order from corner `k`
-/// on.
+/// Appends the parts of a triangle with further points on its sides. `on_sides[k]` is in order from corner
+/// `k` on.
 ///
-/// Every point becomes a corner, no part has three points on one side, and the orientation stays; O(n log n).
+/// Every point becomes a corner, no part has three points on one side, and the orientation is kept; O(n log
+/// n).
 pub fn fill_triangle([a, b, c]: [u32; 3], on_sides: [&[u32]; 3], out: &mut Vec<[u32; 3]>) {
     let fullest = (0..3)
         .rev()
@@ -113,7 +112,7 @@ mod tests {
 
     #[test]
     fn a_triangle_with_points_on_its_sides_is_filled_without_gaps() {
-        // Points 3 and 4 on side 0, 5 on side 1, 6, 7 and 8 on side 2.
+        // Points 3 and 4 are on side 0, 5 is on side 1, and 6, 7 and 8 are on side 2.
         let points: Vec<Vec3> = [
             (0, 0),
             (12, 0),
@@ -129,7 +128,7 @@ mod tests {
         .to_vec();
         let mut triangles = Vec::new();
         fill_triangle([0, 1, 2], [&[3, 4], &[5], &[6, 7, 8]], &mut triangles);
-        // A polygon of nine corners.
+        // The result fills a polygon of nine corners.
         assert_eq!(triangles.len(), 7);
         let mesh = TriMesh { points, triangles };
         assert!((0..7).all(|face| mesh.area_vector_doubled(face).z > 0.0));

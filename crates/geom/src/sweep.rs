@@ -6,25 +6,25 @@ use rayon::prelude::*;
 
 use crate::band::Band;
 
-/// Interior samples between two nodes of a diagonal line. A diagonal step is up to √3 cells long, and a ridge
-/// between two nodes would be missed; along an axis the interpolant is linear, so nodes are enough.
+/// Number of samples between two nodes of a diagonal line. A diagonal step is up to √3 cells long, and a
+/// ridge between two nodes would be missed. Along an axis the interpolant is linear, so nodes are enough.
 const SUB_STEPS: usize = 3;
 
-/// The lines of a band in each of the 13 lattice line directions, found when first used and then kept.
+/// Lines of a band in each of the 13 lattice line directions, computed on first use and then kept.
 pub struct Sweeper<'a> {
     band: &'a Band,
     lines: [OnceLock<Lines>; 13],
 }
 
-/// All nodes sorted by line and, within a line, along it.
+/// All nodes, sorted by line and, within a line, along it.
 struct Lines {
     order: Vec<u32>,
-    /// Where each line begins in `order`, and one past the last.
+    /// Start of each line in `order`; the last entry is the end.
     start: Vec<u32>,
 }
 
 impl<'a> Sweeper<'a> {
-    /// Nothing is computed yet.
+    /// Creates a sweeper that has not computed any lines yet.
     pub fn new(band: &'a Band) -> Self {
         Self {
             band,
@@ -32,15 +32,16 @@ impl<'a> Sweeper<'a> {
         }
     }
 
-    /// `max over t ≥ 0 of field(x + t·step)` at every node x; `step` has components in {−1, 0, 1}, not all 0.
+    /// Computes `max over t ≥ 0 of field(x + t·step)` at every node x. `step` has components in {−1, 0, 1},
+    /// not all 0.
     ///
-    /// Off the band the field counts as −∞: a line may leave the band and come back. Between nodes the
+    /// Off the band the field counts as −∞, so a line may leave the band and come back. Between nodes the
     /// trilinear interpolant is sampled at three inner points of each diagonal step.
     pub fn max_ahead(&self, field: &[f32], step: [i32; 3]) -> Vec<f32> {
         let (line, forwards) = line_of(step);
         let lines = self.lines[line].get_or_init(|| Lines::new(self.band, positive(step)));
         let ahead = self.with_sub_steps(field, step);
-        // Each line writes its own stretch of `swept`; a gather brings the values back to their nodes.
+        // Each line writes to its own stretch of `swept`; the values are then copied back to their nodes.
         let mut swept: Vec<f32> = lines.order.par_iter().map(|&n| ahead[n as usize]).collect();
         let mut stretches: Vec<&mut [f32]> = Vec::with_capacity(lines.start.len());
         let mut rest = swept.as_mut_slice();
@@ -68,7 +69,7 @@ impl<'a> Sweeper<'a> {
         out
     }
 
-    /// The largest value on [x, x + step) of each node x.
+    /// Largest value on [x, x + step) at each node x.
     fn with_sub_steps(&self, field: &[f32], step: [i32; 3]) -> Vec<f32> {
         let axes: Vec<usize> = (0..3).filter(|&a| step[a] != 0).collect();
         if axes.len() == 1 {
@@ -117,13 +118,13 @@ impl<'a> Sweeper<'a> {
     }
 }
 
-/// The representative of a line direction: its last non-zero component (z, else y, else x) is +1.
+/// Representative of a line direction: its last non-zero component (z, else y, else x) is +1.
 fn positive(step: [i32; 3]) -> [i32; 3] {
     let leading = step.iter().rev().find(|&&s| s != 0).copied().unwrap_or(1);
     step.map(|s| s * leading)
 }
 
-/// Which of the 13 lines `step` runs along, and whether it runs along the representative.
+/// Index of the line direction of `step`, of 13, and true if `step` equals the direction's representative.
 fn line_of(step: [i32; 3]) -> (usize, bool) {
     assert!(
         step.iter().any(|&s| s != 0) && step.iter().all(|s| s.abs() <= 1),
@@ -136,12 +137,12 @@ fn line_of(step: [i32; 3]) -> (usize, bool) {
 }
 
 impl Lines {
-    /// Sorts by counting: storage order already ascends along z, then y, then x, so a stable sort by line
-    /// suffices.
+    /// Sorts nodes by line. Storage order already ascends along z, then y, then x, so a stable sort by line
+    /// is enough.
     fn new(band: &Band, step: [i32; 3]) -> Self {
         let [nx, ny, nz] = band.dims.map(|n| n as i64);
         let [sx, sy, sz] = step.map(i64::from);
-        // Coordinates of the line: where it meets the plane t = 0, shifted to be ≥ 0.
+        // Coordinates of the line: its intersection with the plane t = 0, shifted to be ≥ 0.
         let key = |&[i, j, k]: &[u16; 3]| {
             let [i, j, k] = [i, j, k].map(i64::from);
             let (a, b) = if sz != 0 {
@@ -159,7 +160,7 @@ impl Lines {
             .enumerate()
             .map(|(n, c)| (key(c), n as u32))
             .collect();
-        // Keys with the node as second component: unstable sorting gives the stable order.
+        // With the node as second component of the key, an unstable sort gives the stable order.
         keyed.par_sort_unstable();
         let mut start: Vec<u32> = Vec::new();
         let mut last = None;
@@ -191,7 +192,7 @@ mod tests {
     #[test]
     fn sweeping_agrees_with_walking_every_line() {
         let (band, phi) = cube_band();
-        // A field without symmetry.
+        // A field without any symmetry.
         let field: Vec<f32> = phi
             .iter()
             .enumerate()

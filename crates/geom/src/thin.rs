@@ -1,4 +1,4 @@
-//! Where a solid is thin.
+//! Detection of thin places of a solid.
 
 use rayon::prelude::*;
 
@@ -6,27 +6,26 @@ use crate::bvh::TriangleBvh;
 use crate::topology::{Topology, components};
 use crate::{Solid, Vec3};
 
-/// Cosine of the greatest angle between two sides that make a wall; beyond 30° they make an edge, which
-/// always is thin.
+/// Cosine of the greatest angle between two sides that form a wall. Beyond 30° they form an edge, which is
+/// always thin.
 const COS_WALL: f64 = 0.866_025_403_784_438_6;
-/// Where a ray starts below the surface, as a share of the thickness asked for: more than rounding, less than
-/// any wall.
+/// Depth below the surface at which a ray starts, as a share of the thickness requested: more than rounding,
+/// less than any wall.
 const START_SHARE: f64 = 1e-6;
 
-/// A connected part of the surface with another not far below it.
+/// A connected part of the surface with another part close below it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinPlace {
-    /// Its area, mm²; both sides of a wall that goes around an edge count.
+    /// Area of the place, mm²; both sides of a wall that ends in an edge count.
     pub area_mm2: f64,
-    /// Half of the area is thinner than this, mm: edges taper off to nothing, and the least thickness says
-    /// little.
+    /// Median thickness by area, mm. The least thickness says little, since edges taper off to nothing.
     pub thickness_mm: f64,
-    /// Where it is so thick, mm.
+    /// A point of the surface with that thickness, mm.
     pub at: Vec3,
 }
 
-/// How thick the solid is at each triangle where that is less than `below_mm`, mm; `None` elsewhere, as
-/// [`thin_places`] measures it.
+/// Thickness of the solid at each triangle, mm, measured as in [`thin_places`]; `None` where it is at least
+/// `below_mm`.
 pub fn thin_faces(solid: &Solid, below_mm: f64) -> Vec<Option<f64>> {
     let mesh = solid.mesh();
     let bvh = TriangleBvh::new(mesh);
@@ -45,10 +44,10 @@ pub fn thin_faces(solid: &Solid, below_mm: f64) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// The places where the solid is thinner than `below_mm`, the largest first.
+/// Finds the places where the solid is thinner than `below_mm`, largest first.
 ///
-/// Thickness is measured from the middle of each triangle straight inwards, where a surface facing away
-/// within 30° is met; so triangles should be smaller than what is looked for. O(n log n), the same on any
+/// Thickness is measured from the centre of each triangle straight inwards, to a surface that faces away
+/// within 30°. Triangles should therefore be smaller than the places sought. O(n log n); the same on any
 /// number of threads.
 pub fn thin_places(solid: &Solid, below_mm: f64) -> Vec<ThinPlace> {
     let mesh = solid.mesh();

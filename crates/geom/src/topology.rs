@@ -1,4 +1,4 @@
-//! Which triangle lies across which edge of a closed mesh, and walks over that neighbourhood.
+//! Adjacency of triangles across the edges of a closed mesh, and walks over it.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::{Solid, TriMesh};
 /// A half-edge: edge `corner` of a triangle, from that corner to the next, numbered `3 · face + corner`.
 pub type HalfEdge = u32;
 
-/// The opposite of each half-edge of a closed mesh.
+/// Opposite of each half-edge of a closed mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Topology {
     opposite: Vec<HalfEdge>,
@@ -19,7 +19,7 @@ impl Topology {
         Self::of_mesh(solid.mesh()).expect("a solid is closed")
     }
 
-    /// Pairs the half-edges of `mesh`; `None` where some have no opposite or several.
+    /// Pairs the half-edges of `mesh`; `None` if some have no opposite or several.
     pub fn of_mesh(mesh: &TriMesh) -> Option<Self> {
         let mut edges: Vec<(u64, HalfEdge)> = (0..mesh.triangles.len() as u32 * 3)
             .into_par_iter()
@@ -41,22 +41,22 @@ impl Topology {
         Some(Self { opposite })
     }
 
-    /// The same edge as seen from the triangle on its other side.
+    /// Half-edge of the same edge in the triangle on the other side.
     pub fn opposite(&self, half_edge: HalfEdge) -> HalfEdge {
         self.opposite[half_edge as usize]
     }
 
-    /// How many half-edges there are: three a triangle.
+    /// Number of half-edges: three per triangle.
     pub fn n_half_edges(&self) -> usize {
         self.opposite.len()
     }
 
-    /// The triangles across the three edges of `face`; one may occur twice.
+    /// Triangles across the three edges of `face`; one may occur twice.
     pub fn neighbours(&self, face: u32) -> [u32; 3] {
         [0, 1, 2].map(|corner| self.opposite(3 * face + corner) / 3)
     }
 
-    /// The next half-edge, counter-clockwise around the same triangle.
+    /// Next half-edge, counter-clockwise around the same triangle.
     pub fn next(half_edge: HalfEdge) -> HalfEdge {
         if half_edge % 3 == 2 {
             half_edge - 2
@@ -66,15 +66,15 @@ impl Topology {
     }
 }
 
-/// Tail and head of a half-edge of `mesh`.
+/// Start and end point of a half-edge of `mesh`.
 pub fn ends(mesh: &TriMesh, half_edge: HalfEdge) -> (u32, u32) {
     let t = mesh.triangles[half_edge as usize / 3];
     let corner = half_edge as usize % 3;
     (t[corner], t[(corner + 1) % 3])
 }
 
-/// The connected component of each triangle and their number, triangles joined across the edges where
-/// `joined` says so.
+/// Connected component of each triangle, and the number of components. Neighbours are connected if `joined`
+/// accepts the pair.
 ///
 /// Components are numbered by their lowest triangle.
 pub fn components(topology: &Topology, joined: impl Fn(u32, u32) -> bool) -> (Vec<u32>, usize) {

@@ -1,46 +1,47 @@
-//! Merging of equal points, so that triangles know their neighbours.
+//! Merging of points with equal coordinates, so that triangles know their neighbours.
 //!
-//! Only points of exactly equal coordinates are merged (−0 equals 0): an STL writes each corner of a triangle
-//! anew, bit for bit. Points that merely lie close together stay apart; closing such cracks is repair, not
-//! reading.
+//! Only points of exactly equal coordinates are merged (−0 equals 0), since an STL repeats the corners of
+//! each triangle bit for bit. Points that merely lie close together stay separate; closing such cracks
+//! belongs to repair, not to reading.
 
 use crate::check::inspect_edges;
 use crate::{TriMesh, Vec3};
 
-/// A mesh after merging.
+/// A mesh after merging of equal points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Welded {
-    /// Points in the order of their first appearance, all used; triangles in the old order.
+    /// Mesh whose points are all used. The order of points and triangles is kept.
     pub mesh: TriMesh,
-    /// For each triangle its number before; ascending.
+    /// Old index of each triangle; ascending.
     pub kept_face: Vec<u32>,
-    /// Triangles dropped because two of their corners became one.
+    /// Number of triangles dropped because two of their corners became one.
     pub n_collapsed: usize,
 }
 
-/// Merges points of equal coordinates, drops triangles that collapse thereby and points that no triangle
+/// Merges points of equal coordinates. Drops triangles that collapse as a result, and points that no triangle
 /// uses.
 ///
 /// The result is the same on every run. O(n log n) at worst, near O(n) on real meshes.
 ///
 /// # Panics
-/// Where a triangle names a missing point.
+/// Panics if a triangle names a missing point.
 pub fn weld(mesh: &TriMesh) -> Welded {
     reindex(mesh, &first_equal(&mesh.points))
 }
 
-/// The mesh with its own indexing where that is closed and manifold, else welded.
+/// Keeps the mesh's own indexing if that is closed and manifold; otherwise welds the mesh.
 ///
 /// Welding can break a mesh that is sound as indexed but touches itself: along a touching edge four triangles
-/// would meet. Unused points and triangles that name a point twice are dropped in any case. Where a triangle
-/// has two corners in the same place the file was rounded, not glued: its indexing is not trusted.
+/// would meet. Unused points, and triangles that name a point twice, are always dropped. If a triangle has
+/// two corners at the same place, the file was rounded, not deliberately joined, and its indexing is not
+/// trusted.
 ///
 /// # Panics
-/// Where a triangle names a missing point.
+/// Panics if a triangle names a missing point.
 pub fn close(mesh: &TriMesh) -> Welded {
     let as_indexed = reindex(mesh, &(0..mesh.points.len() as u32).collect::<Vec<_>>());
-    // In a closed mesh each point has at least two triangles: an STL, where it has one, need not be looked at
-    // further.
+    // In a closed mesh each point has at least two triangles. An STL has one per point, and need not be
+    // examined further.
     let may_be_closed = 2 * as_indexed.mesh.points.len() <= 3 * as_indexed.mesh.triangles.len();
     let has_collapsed = || {
         (0..as_indexed.mesh.triangles.len()).any(|face| {
@@ -55,12 +56,12 @@ pub fn close(mesh: &TriMesh) -> Welded {
     }
 }
 
-/// For each point the first one of equal coordinates.
+/// Index of the first point with equal coordinates, for each point.
 pub fn first_equal(points: &[Vec3]) -> Vec<u32> {
     // Adding 0 turns −0 into 0 and changes nothing else, so equal coordinates have equal bits.
     let bits = |i: u32| points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
-    // Equal points get into the same bucket by a hash, and within the few points of a bucket sorting finds
-    // them. Buckets that a hostile file overfills cost a sort, not a square.
+    // A hash puts equal points into the same bucket, and sorting the few points of a bucket finds them.
+    // Buckets overfilled by a hostile file cost a sort, not a square.
     let n_bits = points.len().next_power_of_two().ilog2().max(1);
     let bucket_of: Vec<u32> = (0..points.len() as u32)
         .map(|i| (hash(bits(i)) >> (64 - n_bits)) as u32)
@@ -92,7 +93,7 @@ pub fn first_equal(points: &[Vec3]) -> Vec<u32> {
 
 /// Spreads coordinates over 64 bits, the upper ones best.
 fn hash(bits: [u64; 3]) -> u64 {
-    /// 2⁶⁴ over the golden ratio, odd: the usual multiplier of multiplicative hashing.
+    /// Multiplier 2⁶⁴ over the golden ratio, odd, as usual in multiplicative hashing.
     const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
     bits.iter()
         .fold(0, |h: u64, &b| {
@@ -102,7 +103,7 @@ fn hash(bits: [u64; 3]) -> u64 {
         .wrapping_mul(MULTIPLIER)
 }
 
-/// Replaces each point by `stands_for` of it, then drops what collapses and what is unused.
+/// Replaces each point by its entry in `stands_for`, then drops collapsed triangles and unused points.
 pub(crate) fn reindex(mesh: &TriMesh, stands_for: &[u32]) -> Welded {
     let mut kept_face = Vec::with_capacity(mesh.triangles.len());
     let mut triangles = Vec::with_capacity(mesh.triangles.len());

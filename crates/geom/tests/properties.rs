@@ -1,4 +1,4 @@
-//! What holds of booleans and of measures whatever the bodies are.
+//! Properties of booleans and measures that hold for all bodies.
 
 use proptest::prelude::*;
 use shellock_geom::{Solid, Vec3, Volume};
@@ -29,7 +29,8 @@ fn bodies() -> impl Strategy<Value = Body> {
     ]
 }
 
-/// Volumes are sums of exact parts but for coordinates that were rounded where surfaces cross.
+/// Relative rounding error of volumes, which are exact except for coordinates that are rounded where surfaces
+/// cross.
 const ROUNDING: f64 = 1e-9;
 
 proptest! {

@@ -1,10 +1,11 @@
-//! Divides all models of a folder and compares with people:
-//! `benchmark ROOT METHOD ['{PARAMS}'] [people] [out=DIR] [only=N] [each]`.
+//! Divides all models of a folder and compares the results with people's divisions: `benchmark ROOT METHOD
+//! ['{PARAMS}'] [people] [out=DIR] [only=N] [each]`.
 //!
-//! ROOT has `off/<id>.off` and `seg/<id>/<id>_<k>.seg`, or is a single model, which is timed. Errors are 1 − Rand
-//! index by faces. `people` gives each model's median number of people's parts as `n_parts`; `only=N` takes each
-//! N-th model; `each` tells of every model; METHOD `trace` tells of every cut of `random_cuts` and the error before
-//! it; METHOD `plane` tells of a single model how far its best plane of symmetry is off, in the box's diagonal.
+//! ROOT has `off/<id>.off` and `seg/<id>/<id>_<k>.seg`, or is a single model, which is timed. Errors are 1 −
+//! Rand index by faces. `people` sets `n_parts` to the median number of people's parts of each model.
+//! `only=N` takes each N-th model. `each` reports every model. METHOD `trace` reports every cut of
+//! `random_cuts` and the error before it. METHOD `plane` reports the deviation of a single model's best plane
+//! of symmetry, as a share of the bounding box's diagonal.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -101,7 +102,7 @@ fn timed(method: &str, params: Value, mesh: &TriMesh) -> (Vec<u32>, f64) {
     (labels, start.elapsed().as_secs_f64())
 }
 
-/// What stopping before each cut would give.
+/// Prints the error of stopping before each cut.
 fn trace(id: usize, params: &Value, mesh: &TriMesh, people: &[Vec<u32>]) {
     let params: random_cuts::RandomCutsParams = from_value(params.clone()).expect("parameters");
     let coarse = Coarse::new(mesh, params.n_faces);
@@ -157,7 +158,7 @@ fn mean(rows: &[[f64; 4]]) -> [f64; 4] {
     [0, 1, 2, 3].map(|k| rows.iter().map(|r| r[k]).sum::<f64>() / rows.len() as f64)
 }
 
-/// The mean over people of the share of pairs of faces together in one division and apart in the other.
+/// Mean over people of the share of face pairs that are together in one division and apart in the other.
 fn error(labels: &[u32], people: &[Vec<u32>]) -> f64 {
     people.iter().map(|p| rand_error(labels, p)).sum::<f64>() / people.len() as f64
 }

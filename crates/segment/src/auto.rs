@@ -1,12 +1,12 @@
-//! The division to take where nobody says how: the cuts of all methods, the best of them made.
+//! Default division: candidate cuts from several methods, of which the best are made.
 //!
-//! Random least cuts, levels of the shape diameter and k-means all propose where to cut; what is cut, and when to
-//! stop, is decided as in [`crate::random_cuts`], by how many agree on a cut, how short it is for what it cuts off,
-//! and how concave.
+//! Random least cuts, levels of the shape diameter and k-means all propose cuts. [`crate::random_cuts`] then
+//! decides which cuts are made and when to stop. A cut scores well if many candidates agree on it, if it is
+//! short for the area that it cuts off, and if it is concave.
 //!
-//! On 152 models of the Princeton benchmark 1 − Rand index is 0.108, with 9 parts a model; people among each other
-//! have 0.103, with 8, and random cuts alone 0.110. Fitted primitives as proposals, too, gain nothing and cost more
-//! time than all else.
+//! On 152 models of the Princeton benchmark 1 − Rand index is 0.108, with 9 parts a model. People compared
+//! with each other have 0.103, with 8 parts; random cuts alone have 0.110. Adding fitted primitives as a
+//! fourth source of cuts gains nothing and takes more time than all other methods together.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -19,39 +19,39 @@ use crate::sdf::{self, SdfParams};
 use crate::shape_diameter::{diameters_mm, normalised};
 use crate::whole::Whole;
 
-/// Levels of thickness, and weight of short borders, of the divisions that shape diameters propose.
+/// Number of levels of thickness, and weight of short borders, of each division proposed by shape diameters.
 const LEVELS: [(usize, f64); 6] = [(2, 0.05), (2, 0.26), (3, 0.05), (3, 0.26), (5, 0.05), (5, 0.26)];
-/// Parts of the divisions that k-means proposes.
+/// Number of parts of each division proposed by k-means.
 const N_PROPOSED: [usize; 3] = [3, 6, 12];
 
-/// How a model is divided where nobody says how.
+/// Parameters of the default division.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AutoParams {
-    /// How cuts are drawn and judged; the number of parts, too.
+    /// Parameters of the cuts: how they are drawn and scored, and the number of parts.
     pub cuts: RandomCutsParams,
 }
 
 impl AutoParams {
-    /// Every problem at once, for people; empty where there is none.
+    /// Returns all problems at once, as messages for people; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         self.cuts.problems()
     }
 }
 
-/// A part for each face of `mesh`; about a second for 60 000 triangles on two busy cores.
+/// Divides `mesh`: the part of each face. Takes about a second for 60 000 triangles on two busy cores.
 ///
-/// A mesh without a place where a cut is worth its while, as a ball, is one part.
+/// A mesh without any cut worth making, such as a ball, is one part.
 pub fn divide(params: &AutoParams, mesh: &TriMesh) -> Vec<u32> {
     divide_keeping(params, mesh, &Whole::default()).part_of_face
 }
 
-/// The same where no border divides a set of `whole`, which goes before symmetry.
+/// Divides `mesh` without dividing a set of `whole`. Keeping these sets whole takes precedence over symmetry.
 pub fn divide_keeping(params: &AutoParams, mesh: &TriMesh, whole: &Whole) -> Divided {
     divide_among(&params.cuts, mesh, whole, |coarse| proposals(params, coarse))
 }
 
-/// Divisions of the coarse mesh by other methods.
+/// Divisions of the coarse mesh that the other methods propose.
 fn proposals(params: &AutoParams, coarse: &Coarse) -> Vec<Vec<u32>> {
     let graph = &coarse.graph;
     let values = normalised(&diameters_mm(&coarse.mesh, graph, SdfParams::default().n_rays));

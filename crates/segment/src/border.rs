@@ -1,16 +1,16 @@
-//! Where a border runs: least cuts within a band.
+//! Placing borders: least cuts within a band around the present border.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::face_graph::FaceGraph;
 use crate::max_flow::{FlowGraph, Terminal};
 
-/// Least cost of a millimetre of border: at sharp concave creases.
+/// Lowest price of a millimetre of border, reached in sharp concave creases.
 const LEAST_PRICE: f64 = 0.05;
-/// What a millimetre costs falls by e for each such angle of concavity, 0.2 rad.
+/// Concavity by which the price of a millimetre falls by a factor of e: 0.2 rad.
 const FALL_RAD: f64 = 0.2;
 
-/// What a border costs on each edge: its length, a twentieth of it in sharp concave creases.
+/// Price of a border on each edge, mm: the edge's length, reduced to a twentieth in sharp concave creases.
 pub fn prices(graph: &FaceGraph) -> Vec<f64> {
     graph
         .creases
@@ -21,19 +21,20 @@ pub fn prices(graph: &FaceGraph) -> Vec<f64> {
 
 /// Moves the borders between labels to where they are cheapest ([`prices`]), by `band_mm` at most.
 ///
-/// Pair by pair, in the order of the labels: faces of the two within the band are free, all others are not.
+/// Pairs of labels are processed one by one, in ascending order. For each pair, only faces of these two
+/// labels within the band may change.
 pub fn settle(graph: &FaceGraph, band_mm: f64, labels: &mut [u32]) {
     Settler::new(graph).settle(band_mm, labels, |_, _| true);
 }
 
-/// A graph and what its borders cost.
+/// A graph together with its prices of borders.
 pub struct Settler<'a> {
     graph: &'a FaceGraph,
     price: Vec<f64>,
 }
 
 impl<'a> Settler<'a> {
-    /// With the prices of [`prices`].
+    /// Computes the prices of `graph` with [`prices`].
     pub fn new(graph: &'a FaceGraph) -> Self {
         Self {
             price: prices(graph),
@@ -41,8 +42,8 @@ impl<'a> Settler<'a> {
         }
     }
 
-    /// The same as [`settle`]; a pair's border stays where `allows`, which is given the labels after the
-    /// move and the pair, does not allow it.
+    /// Moves borders like [`settle`], but keeps the old border of a pair if `allows` rejects the new one.
+    /// `allows` is given the labels after the move and the pair.
     pub fn settle(&self, band_mm: f64, labels: &mut [u32], mut allows: impl FnMut(&[u32], [u32; 2]) -> bool) {
         let mut seeds: BTreeMap<[u32; 2], BTreeSet<u32>> = BTreeMap::new();
         for crease in &self.graph.creases {
@@ -101,7 +102,7 @@ fn settle_pair(
             }
         }
     }
-    // A part that lies all in the band keeps its inmost face.
+    // A part that lies entirely in the band keeps its innermost face, so that it cannot vanish.
     for label in [a, b] {
         let reaches_out = node.keys().any(|&face| {
             labels[face as usize] == label
@@ -133,8 +134,8 @@ fn settle_pair(
     }
 }
 
-/// Faces within `band_mm` of `seeds` that `allowed` lets pass, in ascending order; their distances are left in
-/// `distance`, which is infinite elsewhere.
+/// Faces within `band_mm` of `seeds`, reached through faces that `allowed` accepts, in ascending order.
+/// Writes their distances to `distance`, which the caller has filled with infinity.
 fn within(
     graph: &FaceGraph,
     seeds: &BTreeSet<u32>,

@@ -1,4 +1,4 @@
-//! A mesh of few triangles to divide in place of the model's, and the way back.
+//! A simplified mesh that is divided in place of the model, and the transfer of labels back to the model.
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
@@ -9,32 +9,33 @@ use crate::border::settle;
 use crate::face_graph::FaceGraph;
 use crate::parts::absorb_small;
 
-/// First tolerance of decimation, as a share of the box's diagonal.
+/// First tolerance of decimation, as a share of the bounding box's diagonal.
 const FIRST_TOLERANCE: f64 = 2e-4;
-/// What the tolerance grows by until the triangles are few.
+/// Factor by which the tolerance grows until the mesh has few enough triangles.
 const LOOSER: f64 = 1.6;
-/// Tolerances tried at most: from 2·10⁻⁴ of the diagonal to a twentieth of it.
+/// Largest number of tolerances tried: from 2·10⁻⁴ of the diagonal to a twentieth of it.
 const MOST_TOLERANCES: usize = 12;
-/// Decimation that overshoots below this share of what was asked for is done anew, keeping some points.
+/// Share of the requested number of triangles below which a decimation step is repeated, keeping some points.
 const TOO_FEW: f64 = 0.4;
-/// What comes off a part on the way back and is smaller than this share of the whole area joins a neighbour.
+/// Fragments split off during the transfer back join a neighbour if smaller than this share of the whole
+/// area.
 const CRUMB_SHARE: f64 = 2e-4;
-/// Width of the band in which borders settle on the fine mesh, in mean edges of the coarse one.
+/// Width of the band in which borders settle on the fine mesh, in mean edge lengths of the coarse mesh.
 const BAND_EDGES: f64 = 1.5;
 
-/// A simplified mesh and which of its triangles each triangle of the model lies on.
+/// A simplified mesh, and the map from the model's triangles to its triangles.
 pub struct Coarse {
-    /// Fewer triangles.
+    /// Mesh with fewer triangles than the model.
     pub mesh: TriMesh,
-    /// Their graph.
+    /// Graph of the simplified triangles.
     pub graph: FaceGraph,
-    /// The nearest coarse triangle that faces the same way, for each of the model's.
+    /// Nearest simplified triangle of each of the model's triangles, preferably one that faces the same way.
     pub of_face: Vec<u32>,
 }
 
 impl Coarse {
-    /// `mesh` simplified to about `n_faces` triangles, seldom fewer than half; unchanged where it has no more, or
-    /// is not closed and manifold.
+    /// Simplifies `mesh` to about `n_faces` triangles, seldom to fewer than half of that. The mesh stays
+    /// unchanged if it has no more triangles than that, or is not closed and manifold.
     pub fn new(mesh: &TriMesh, n_faces: usize) -> Self {
         let mut coarse = mesh.clone();
         let mut tolerance = FIRST_TOLERANCE * mesh.bounds().diagonal();
@@ -63,8 +64,9 @@ impl Coarse {
         }
     }
 
-    /// The labels of coarse triangles on those of the model, their borders settled into the model's
-    /// creases, and crumbs given to neighbours. Numbers change, parts do not.
+    /// Transfers labels of the simplified triangles to the model's triangles, settles the borders into the
+    /// model's creases, and merges small fragments into neighbours. Labels may be renumbered; the parts
+    /// correspond.
     pub fn bring_back(&self, fine: &FaceGraph, labels: &[u32]) -> Vec<u32> {
         let mut brought: Vec<u32> = self.of_face.iter().map(|&f| labels[f as usize]).collect();
         if self.graph.n_faces() < fine.n_faces() {
@@ -77,8 +79,8 @@ impl Coarse {
     }
 }
 
-/// Decimated, but for about `n_points` of the points, evenly in their order: where all is flat, triangles become few
-/// and long at once, and borders have no edges to run along.
+/// Decimates `mesh`, but keeps about `n_points` of its points, evenly spaced in their order. Without these,
+/// flat models turn into few long triangles at once, which leaves borders no edges to run along.
 fn keeping_points(mesh: TriMesh, tolerance_mm: f64, n_points: usize) -> TriMesh {
     let step = (mesh.points.len() / n_points.max(1)).max(1);
     let kept = |point: usize| point.is_multiple_of(step);
@@ -88,10 +90,10 @@ fn keeping_points(mesh: TriMesh, tolerance_mm: f64, n_points: usize) -> TriMesh 
     decimate(mesh, &tolerances)
 }
 
-/// For each triangle of `mesh` the nearest of `coarse`; of those that face the same way, if one is about as
-/// near, so that labels do not leak through thin walls.
+/// Nearest triangle of `coarse` for each triangle of `mesh`. Prefers a triangle that faces the same way if
+/// one is about as near, so that labels do not leak through thin walls.
 fn nearest_faces(mesh: &TriMesh, coarse: &TriMesh) -> Vec<u32> {
-    /// How much farther a triangle that faces the same way may be, in squared distances.
+    /// Limit for a triangle that faces the same way, as a multiple of the nearest squared distance.
     const ABOUT_AS_NEAR: f64 = 16.0;
     let octant = |n: Vec3| {
         let a = n.abs();

@@ -1,4 +1,4 @@
-//! Triangles as nodes of a graph, the edges between them as its arcs: what every method runs on.
+//! Dual graph of a mesh, on which every method runs: triangles are nodes, edges between them are arcs.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,19 +8,19 @@ use shellock_geom::{TriMesh, Vec3};
 /// An edge between two triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crease {
-    /// The triangles on its sides, lower number first.
+    /// Triangles on both sides of the edge, lower number first.
     pub faces: [u32; 2],
-    /// Length, mm.
+    /// Length of the edge, mm.
     pub length_mm: f64,
-    /// Angle between the normals, (−π, π]: positive over a convex edge, negative in a concave one, 0 where flat
-    /// or where a triangle has no normal.
+    /// Angle between the normals, rad, in (−π, π]: positive over a convex edge, negative in a concave one. 0
+    /// where flat or where a triangle has no normal.
     pub turning_rad: f64,
-    /// Way from centre to centre over the edge's middle, mm.
+    /// Length of the path between the triangles' centres over the edge's midpoint, mm.
     pub step_mm: f64,
 }
 
 impl Crease {
-    /// How far the surface folds inwards here, [0, π]; 0 at convex edges.
+    /// Angle by which the surface folds inwards at the edge, rad, in [0, π]; 0 at convex edges.
     pub fn concavity_rad(&self) -> f64 {
         (-self.turning_rad).max(0.0)
     }
@@ -28,24 +28,24 @@ impl Crease {
 
 /// The triangles of a mesh and the edges that join them.
 ///
-/// Any mesh will do: triangles at an open edge have no neighbour there, those at an edge of more than two are
-/// joined in a row, in order of their numbers.
+/// Accepts any mesh. Triangles at an open edge have no neighbour there. Triangles at an edge of more than two
+/// are joined in a row, in the order of their numbers.
 #[derive(Clone, Debug)]
 pub struct FaceGraph {
     /// Area of each triangle, mm².
     pub area_mm2: Vec<f64>,
-    /// Mean of the corners of each triangle.
+    /// Centre of each triangle, mm: the mean of its corners.
     pub center: Vec<Vec3>,
-    /// Unit normal of each triangle; zero where it has no area.
+    /// Unit normal of each triangle; zero if it has no area.
     pub normal: Vec<Vec3>,
-    /// All edges with a triangle on both sides, by their triangles.
+    /// All edges with a triangle on both sides, sorted by their triangles.
     pub creases: Vec<Crease>,
     start: Vec<u32>,
     arcs: Vec<(u32, u32)>,
 }
 
 impl FaceGraph {
-    /// The graph of `mesh`; O(n log n).
+    /// Builds the graph of `mesh` in O(n log n).
     pub fn new(mesh: &TriMesh) -> Self {
         let n_faces = mesh.triangles.len();
         let center: Vec<Vec3> = (0..n_faces).map(|f| mesh.face_center(f)).collect();
@@ -94,12 +94,12 @@ impl FaceGraph {
         }
     }
 
-    /// How many triangles there are.
+    /// Number of triangles of the mesh.
     pub fn n_faces(&self) -> usize {
         self.area_mm2.len()
     }
 
-    /// The triangles beside `face`, each with the number of the edge between.
+    /// Neighbours of `face`, each with the index of the edge between.
     pub fn arcs(&self, face: u32) -> &[(u32, u32)] {
         &self.arcs[self.start[face as usize] as usize..self.start[face as usize + 1] as usize]
     }
@@ -109,11 +109,11 @@ impl FaceGraph {
         self.area_mm2.iter().sum()
     }
 
-    /// Distance of each face from the nearest of `sources` along arcs of the lengths `length` (one an edge, ≥ 0)
-    /// through faces that `allowed` lets pass, and that source's index; infinite and `u32::MAX` where none
-    /// leads.
+    /// Shortest distance of each face from `sources`, which are pairs of face and index, and the index of the
+    /// nearest source. Paths follow arcs of the lengths `length` (one per edge, ≥ 0) through faces that
+    /// `allowed` accepts. Unreachable faces get infinity and `u32::MAX`.
     ///
-    /// What a source wins is connected, as a front only advances through what it has won.
+    /// The region of each source is connected, since a front only advances through faces that it owns.
     pub fn distances(
         &self,
         sources: impl IntoIterator<Item = (u32, u32)>,
@@ -149,7 +149,7 @@ impl FaceGraph {
     }
 }
 
-/// Arcs of all faces in compressed rows: where each face's begin, and (neighbour, edge).
+/// Arcs of all faces in compressed rows: the start of each face's row, and pairs of neighbour and edge.
 fn arcs_of(n_faces: usize, creases: &[Crease]) -> (Vec<u32>, Vec<(u32, u32)>) {
     let mut start = vec![0_u32; n_faces + 1];
     for face in creases.iter().flat_map(|c| c.faces) {

@@ -1,9 +1,10 @@
-//! Division into patches about faces of least total distance.
+//! Division into patches around representative faces, by k-means.
 //!
 //! [Shlafman, Tal, Katz, *Metamorphosis of Polyhedral Surfaces using Decomposition*, Computer Graphics Forum
-//! 21(3), 2002, Sect. 4]: the distance of neighbours mixes the way from centre to centre with the angle between
-//! them; representatives start far apart and move to where the total distance to their patch is least.
-//! Deviations: on a simplified mesh, and a representative tries a sample of its patch.
+//! 21(3), 2002, Sect. 4]: the distance of neighbours mixes the path length from centre to centre with the
+//! angle between the faces. Representatives start far apart and move to the face with the least total
+//! distance to their patch. Deviations: the mesh is simplified first, and a representative tries only a
+//! sample of its patch.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -15,26 +16,26 @@ use crate::params::{no_parts, outside};
 use crate::parts::connected;
 
 const MOST_ROUNDS: usize = 12;
-/// Faces of a patch that a representative tries in each round.
+/// Number of faces of a patch that a representative tries in each round.
 const N_TRIED: usize = 24;
-/// Parts among which the number is chosen where none is asked for.
+/// Largest number of parts beyond one per component, where no number is requested.
 const MOST_PARTS: usize = 20;
-/// Then representatives are those that are at least as far from all before them, in the distance of the first two.
-/// Of 0.35, 0.45 and 0.55 none is better by 0.005 on the Princeton benchmark. The paper's rule, to stop where that
-/// distance falls most, stops at 3 parts and is worse by 0.08.
+/// Distance below which no representatives are added where no number is requested, as a share of the first
+/// two's distance. Of 0.35, 0.45 and 0.55 none is better by 0.005 on the Princeton benchmark. The paper's
+/// rule, to stop where that distance falls most, stops at 3 parts and is worse by 0.08.
 const FAR_SHARE: f64 = 0.4;
 
-/// How k-means divides a model.
+/// Parameters of the division by k-means.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KMeansParams {
-    /// Triangles that the model is simplified to. [500, 20 000]; 3000.
+    /// Number of triangles that the model is simplified to. [500, 20 000]; 3000.
     pub n_faces: usize,
-    /// Share δ of the way in the distance of neighbours, against the angle. [0, 1]; 0.5.
+    /// Share δ of path length, against the angle, in the distance of neighbours. [0, 1]; 0.5.
     pub way_share: f64,
-    /// How much of a convex angle counts. [0, 1]; 0.2: people divide along concave creases.
+    /// Weight of convex angles. [0, 1]; 0.2, since people divide along concave creases.
     pub convex_share: f64,
-    /// Parts wanted; `None`: as many as there are representatives far from all others.
+    /// Number of parts; `None`: as many as there are representatives far from all others.
     pub n_parts: Option<usize>,
 }
 
@@ -50,7 +51,7 @@ impl Default for KMeansParams {
 }
 
 impl KMeansParams {
-    /// Every problem at once, for people; empty where there is none.
+    /// Returns all problems at once, as messages for people; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         let found = [
             outside("n_faces", self.n_faces as f64, 500.0, 20_000.0),
@@ -62,7 +63,7 @@ impl KMeansParams {
     }
 }
 
-/// A part for each face of `mesh`, by k-means. No choice is random.
+/// Divides `mesh` by k-means: the part of each face. No choice is random.
 pub fn divide(params: &KMeansParams, mesh: &TriMesh) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);
@@ -70,7 +71,7 @@ pub fn divide(params: &KMeansParams, mesh: &TriMesh) -> Vec<u32> {
     connected(&fine, &coarse.bring_back(&fine, &labels)).0
 }
 
-/// A part for each face of `graph`, which is small.
+/// Divides `graph`, which should be small: the part of each face.
 pub fn divide_graph(params: &KMeansParams, graph: &FaceGraph) -> Vec<u32> {
     let (component, n_components) = connected(graph, &vec![0; graph.n_faces()]);
     let ways = ways(params, graph);
@@ -91,7 +92,7 @@ pub fn divide_graph(params: &KMeansParams, graph: &FaceGraph) -> Vec<u32> {
     connected(graph, &labels).0
 }
 
-/// The distance over each edge, in means of its two shares.
+/// Distance over each edge. Path length and angle are each measured in their mean over all edges.
 fn ways(params: &KMeansParams, graph: &FaceGraph) -> Vec<f64> {
     let angle = |rad: f64| {
         let counts = if rad > 0.0 { params.convex_share } else { 1.0 };
@@ -111,7 +112,8 @@ fn ways(params: &KMeansParams, graph: &FaceGraph) -> Vec<f64> {
         .collect()
 }
 
-/// First representatives: one of each component, then always the farthest from all.
+/// Chooses the first representatives: one per component, then repeatedly the face farthest from all chosen
+/// ones.
 fn far_apart(
     params: &KMeansParams,
     graph: &FaceGraph,
@@ -123,7 +125,7 @@ fn far_apart(
         .filter_map(|c| component.iter().position(|&d| d == c))
         .map(|f| f as u32)
         .collect();
-    // The farthest from any face is an end of the model, a better first one.
+    // The face farthest from an arbitrary face is an end of the model, which makes a better start.
     let (from_any, _) = graph.distances(chosen.iter().copied().zip(0..), ways, |_| true);
     for (c, first) in chosen.iter_mut().enumerate() {
         let mine = (0..graph.n_faces()).filter(|&f| component[f] as usize == c);
@@ -151,7 +153,7 @@ fn far_apart(
     chosen
 }
 
-/// Of a sample of the part, the face with the least total distance to all of it, by area.
+/// Face with the least total distance to its part, weighted by area, among a sample of the part and `old`.
 fn middle(graph: &FaceGraph, ways: &[f64], labels: &[u32], part: u32, old: u32) -> u32 {
     let faces: Vec<u32> = (0..labels.len() as u32)
         .filter(|&f| labels[f as usize] == part)

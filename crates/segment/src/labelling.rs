@@ -1,16 +1,16 @@
-//! Labels of least energy: what each face pays for a label, and each edge for two different ones.
+//! Labels of least energy: the sum of a cost per face and label and a cost per edge between different labels.
 
 use crate::face_graph::FaceGraph;
 use crate::max_flow::{FlowGraph, Terminal};
 
-/// Rounds over all labels; the energy seldom falls after the third.
+/// Largest number of rounds over all labels; the energy seldom falls after the third.
 const MOST_ROUNDS: usize = 8;
 
-/// Labels 0 … `n_labels` − 1 that no single expansion of a label improves, from `labels` on.
+/// Improves `labels`, which are 0 … `n_labels` − 1, until no expansion of a single label lowers the energy.
 ///
-/// The energy is the sum of `cost[face · n_labels + label]` and of `weight[edge]` (≥ 0) of each edge between
-/// different labels. The answer costs at most twice the least. [Boykov, Veksler, Zabih, *Fast Approximate
-/// Energy Minimization via Graph Cuts*, PAMI 2001]
+/// The energy is the sum of `cost[face · n_labels + label]` over all faces, and of `weight[edge]` (≥ 0) over
+/// all edges between different labels. The result costs at most twice the least energy. [Boykov, Veksler,
+/// Zabih, *Fast Approximate Energy Minimization via Graph Cuts*, PAMI 2001]
 pub fn expand(graph: &FaceGraph, n_labels: usize, cost: &[f64], weight: &[f64], labels: &mut [u32]) {
     assert_eq!(
         cost.len(),
@@ -31,7 +31,7 @@ pub fn expand(graph: &FaceGraph, n_labels: usize, cost: &[f64], weight: &[f64], 
     }
 }
 
-/// Lets `alpha` take what makes the energy least; whether it took any.
+/// Gives `alpha` the faces that lower the energy most. Returns true if any face changed.
 fn expand_one(
     graph: &FaceGraph,
     alpha: u32,
@@ -41,7 +41,7 @@ fn expand_one(
     labels: &mut [u32],
 ) -> bool {
     let mut flow = FlowGraph::new(graph.n_faces());
-    // With the source is who keeps the label, so the arc that keeping cuts is the one to the sink.
+    // Faces on the source's side keep their label, so keeping it cuts the arc to the sink.
     for (face, &label) in labels.iter().enumerate() {
         let pays = |label: u32| cost[face * n_labels + label as usize];
         if label != alpha {
@@ -56,12 +56,13 @@ fn expand_one(
                 flow.join(f, g, w, w);
             }
         } else if a == alpha {
-            // Keeping b beside alpha costs w.
+            // Keeping label b beside alpha costs w.
             flow.tie(g, 0.0, w);
         } else if b == alpha {
             flow.tie(f, 0.0, w);
         } else {
-            // Both kept: w; one changed: w; both changed: 0. As paid by the one, and an arc for the other.
+            // The cost is w if either is kept, 0 if both change. A kept f pays at the sink, a g kept alone at
+            // its arc.
             flow.tie(f, 0.0, w);
             flow.join(g, f, w, 0.0);
         }
@@ -85,7 +86,7 @@ mod tests {
 
     use super::*;
 
-    /// An octahedron: eight faces, each beside three.
+    /// An octahedron: eight faces, each with three neighbours.
     fn octahedron() -> FaceGraph {
         let (points, triangles) = shellock_testkit::plain::sphere(0, Vec3::ONE);
         FaceGraph::new(&TriMesh { points, triangles })

@@ -1,15 +1,15 @@
-//! Where people would divide a closed triangle mesh.
+//! Segmentation of a closed triangle mesh into parts, the way people would divide it.
 //!
-//! Each method is a plain function from parameters and a mesh to one label a face; parts are connected, numbered
-//! by their lowest face, and the same on any number of threads. Lengths are millimetres, though only their
-//! proportions count. This crate knows no patch, piece or plan.
+//! Each method is a plain function from parameters and a mesh to one label per face. Parts are connected,
+//! numbered by their lowest face, and the same on any number of threads. Lengths are millimetres, though only
+//! their proportions count. This crate does not know patches, pieces or plans.
 //!
-//! Meshes ought to be closed; of others, and of triangles without area, nothing is promised but an answer. Meshes
-//! that are not manifold are not simplified, and take their time.
+//! Meshes should be closed. For other meshes, and for triangles without area, nothing is promised but an
+//! answer. Meshes that are not manifold are not simplified and take longer.
 //!
-//! Where to begin: [`auto::divide`]. What the methods are worth, as 1 − Rand index by faces on half of the models of
-//! [Chen, Golovinskiy, Funkhouser, *A Benchmark for 3D Mesh Segmentation*, ACM TOG 28(3), 2009], where people among
-//! each other have 0.103:
+//! Start with [`auto::divide`]. The table compares the methods by 1 − Rand index over faces, on half of the
+//! models of [Chen, Golovinskiy, Funkhouser, *A Benchmark for 3D Mesh Segmentation*, ACM TOG 28(3), 2009].
+//! People compared with each other have 0.103 there:
 //!
 //! | method | published | here, people's number of parts | here, its own |
 //! | --- | --- | --- | --- |
@@ -19,9 +19,10 @@
 //! | [`primitives`] | 0.212 | 0.181 | 0.214 |
 //! | [`kmeans`] | 0.251 | 0.234 | 0.243 |
 //!
-//! The constants of the score of cuts were chosen on every second of these models, those of when to stop on all: the
-//! former have 0.103 with [`auto`], the others 0.114. Other seeds and twice as many cuts change it by less than 0.001;
-//! simplifying to 5000 triangles in place of 3000 costs 0.01, as creases flatten.
+//! The constants in the score of cuts were chosen on every second of these models, the constants of the
+//! stopping rule on all of them. With [`auto`] the former models have 0.103, the others 0.114. Other seeds
+//! and twice as many cuts change this by less than 0.001. Simplifying to 5000 triangles instead of 3000 costs
+//! 0.01, as creases flatten.
 
 pub mod auto;
 pub mod border;

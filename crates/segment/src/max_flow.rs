@@ -1,23 +1,24 @@
-//! The least cut of a graph between two terminals.
+//! Minimum cut of a graph between two terminals.
 //!
-//! Two trees grow from source and sink along arcs with room, paths are filled where they meet, and what a
-//! full arc cuts off is adopted again: [Boykov and Kolmogorov, *An Experimental Comparison of Min-Cut/Max-Flow
-//! Algorithms*, PAMI 2004], which is fast where most nodes are tied to a terminal.
+//! Two search trees grow from the source and the sink along arcs with residual capacity. Paths are saturated
+//! where the trees meet, and nodes behind saturated arcs are adopted by new parents: [Boykov and Kolmogorov,
+//! *An Experimental Comparison of Min-Cut/Max-Flow Algorithms*, PAMI 2004]. This is fast if most nodes are
+//! tied to a terminal.
 
 use std::collections::VecDeque;
 
 const NONE: u32 = u32::MAX;
 const TERMINAL: u32 = u32::MAX - 1;
 const ORPHAN: u32 = u32::MAX - 2;
-/// Room below this share of the largest capacity is none: what rounding leaves of an arc that was filled.
+/// Share of the largest capacity below which an arc counts as saturated: what is left is rounding.
 const NO_ROOM: f64 = 1e-12;
 
-/// On which side of the cut a node is.
+/// Side of the cut that a node is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Terminal {
-    /// With the source.
+    /// The side of the source.
     Source,
-    /// With the sink; what neither reaches is here, too.
+    /// The side of the sink, and of nodes that neither terminal reaches.
     Sink,
 }
 
@@ -28,17 +29,18 @@ struct Arc {
     room: f64,
 }
 
-/// A graph whose nodes are tied to a source, a sink and to each other. Capacities are ≥ 0, of any unit.
+/// A graph whose nodes are tied to a source, to a sink and to each other. Capacities are ≥ 0, of any unit.
 pub struct FlowGraph {
     first: Vec<u32>,
     arcs: Vec<Arc>,
-    /// Room from the source, if positive, else to the sink, negative.
+    /// Residual capacity of the terminal arc: positive from the source, negative to the sink.
     terminal: Vec<f64>,
     flow: f64,
     parent: Vec<u32>,
     is_sink: Vec<bool>,
     is_queued: Vec<bool>,
-    /// When the distance was last found right, and the distance to the terminal.
+    /// Time at which each node's distance was last verified; the next field has that distance to the
+    /// terminal.
     stamp: Vec<u32>,
     depth: Vec<u32>,
     active: VecDeque<u32>,
@@ -48,7 +50,7 @@ pub struct FlowGraph {
 }
 
 impl FlowGraph {
-    /// `n_nodes` nodes without arcs.
+    /// Creates a graph of `n_nodes` nodes without arcs.
     pub fn new(n_nodes: usize) -> Self {
         Self {
             first: vec![NONE; n_nodes],
@@ -67,7 +69,7 @@ impl FlowGraph {
         }
     }
 
-    /// Ties `node` to both terminals; amounts add up.
+    /// Ties `node` to both terminals. Repeated calls add up.
     pub fn tie(&mut self, node: u32, from_source: f64, to_sink: f64) {
         let old = self.terminal[node as usize];
         let (source, sink) = (from_source + old.max(0.0), to_sink + (-old).max(0.0));
@@ -84,7 +86,7 @@ impl FlowGraph {
         }
     }
 
-    /// The value of the least cut, and the side of each node.
+    /// Computes the minimum cut: its value, and the side of each node.
     pub fn least_cut(mut self) -> (f64, Vec<Terminal>) {
         let largest = self
             .arcs
@@ -130,12 +132,14 @@ impl FlowGraph {
         }
     }
 
-    /// Room of `arc` in the direction in which flow runs if its tail's tree is that of the source or sink.
+    /// Residual capacity of `arc` in the direction of flow, if its tail belongs to the source's or the sink's
+    /// tree.
     fn room(&self, arc: u32, is_sink: bool) -> f64 {
         self.arcs[if is_sink { arc ^ 1 } else { arc } as usize].room
     }
 
-    /// Takes in all that `node` has room to; the arc from source's tree to sink's where they meet.
+    /// Grows the tree of `node` along arcs with residual capacity. Returns the arc from the source's to the
+    /// sink's tree where the two meet.
     fn grow(&mut self, node: u32) -> Option<u32> {
         let is_sink = self.is_sink[node as usize];
         let mut arc = self.first[node as usize];
@@ -164,7 +168,7 @@ impl FlowGraph {
         None
     }
 
-    /// Fills the path through `bridge`, and makes orphans of what hung on full arcs.
+    /// Saturates the path through `bridge`. Nodes behind saturated arcs become orphans.
     fn augment(&mut self, bridge: u32) {
         let ends = [
             self.arcs[bridge as usize ^ 1].head,
@@ -208,7 +212,8 @@ impl FlowGraph {
         self.arcs[arc as usize ^ 1].room += amount;
     }
 
-    /// A new parent for `orphan`, the nearest to the terminal; else it is free and its children are orphans.
+    /// Finds a new parent for `orphan`, the one nearest to the terminal. Without any, `orphan` becomes free
+    /// and its children become orphans.
     fn adopt(&mut self, orphan: u32) {
         let is_sink = self.is_sink[orphan as usize];
         let mut best = (u32::MAX, NONE);
@@ -249,7 +254,7 @@ impl FlowGraph {
         }
     }
 
-    /// How many arcs lead from `node` to its terminal; `None` where its tree hangs on an orphan.
+    /// Number of arcs from `node` to its terminal; `None` if its path ends at an orphan.
     fn depth_to_terminal(&mut self, node: u32) -> Option<u32> {
         let (mut at, mut steps) = (node as usize, 0);
         let depth = loop {

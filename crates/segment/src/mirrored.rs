@@ -1,17 +1,19 @@
-//! Divisions that are the same on both sides of a plane.
+//! Symmetric divisions: the same parts on both sides of a plane.
 //!
 //! ```text
-//!    one side     plane   the other           what of a division is taken
+//!    one side     plane   the other           parts taken from a division
 //!   ┌────────┬──────┆──────────────┐
 //!   │ arm    │ body ┆              │   arm   lies on one side: its mirror image is a part of its own
 //!   └────────┴──────┆──────────────┘   body  lies across: it is its own mirror image
 //! ```
 //!
-//! One side's parts are drawn on both; that which has more of them, so that a limb that was cut on one side alone is
-//! cut on both. What has nothing like it on the other side, such as a vase's only handle, stays as it is.
+//! The parts of one side are copied to the other. The source is the side that gives more parts, so that a
+//! limb cut on one side only is cut on both. A part without a counterpart, such as a vase's only handle,
+//! stays as it is.
 //!
-//! Prices of cuts are each side's own. Means of an edge's and its image's blur creases, as the simplified triangles are
-//! not symmetric: on 152 models of the Princeton benchmark 1 − Rand index is 0.128 with them, 0.108 without.
+//! Each side keeps its own prices of cuts. Averaging the prices of an edge and its image would blur creases,
+//! since the simplified triangles are not symmetric. On 152 models of the Princeton benchmark 1 − Rand index
+//! is 0.128 with such means, 0.108 without.
 
 use rayon::prelude::*;
 use shellock_geom::TriMesh;
@@ -21,25 +23,25 @@ use crate::face_graph::FaceGraph;
 use crate::parts::{absorb_small, connected, sums};
 use crate::symmetry::Plane;
 
-/// A part lies on one side where that has this share of it; else across the plane.
+/// Share of a part's area on one side from which the part counts as lying there, not across the plane.
 const ON_ONE_SIDE: f64 = 0.85;
-/// A face has an image where the image of its centre is this near to the surface, in the box's diagonal.
+/// Largest distance of a mirrored face centre from the surface, as a share of the bounding box's diagonal.
 const NEAR: f64 = 0.03;
-/// A part has an image where this share of its area has.
+/// Share of a part's area that must have an image, for the part to have one.
 const MOSTLY: f64 = 0.5;
-/// What mirroring leaves over and is smaller than this share of the whole area joins a neighbour.
+/// Fragments left over by mirroring join a neighbour if smaller than this share of the whole area.
 const CRUMB_SHARE: f64 = 0.004;
 
-/// Which face is whose mirror image.
+/// Map from each face of a mesh to its mirror image.
 #[derive(Debug)]
 pub struct Mirrored {
-    /// The face on which the image of each face's centre lies; `None` where the surface is far from it.
+    /// Face nearest to the mirror image of each face's centre; `None` if the surface is far from that image.
     image: Vec<Option<u32>>,
     is_behind: Vec<bool>,
 }
 
 impl Mirrored {
-    /// The images of a mesh's faces in `plane`; `graph` is that of the mesh.
+    /// Finds the images of the mesh's faces in `plane`; `graph` is the graph of `mesh`.
     pub fn new(plane: &Plane, mesh: &TriMesh, graph: &FaceGraph) -> Self {
         let bvh = TriangleBvh::new(mesh);
         let center = &graph.center;
@@ -54,7 +56,7 @@ impl Mirrored {
         }
     }
 
-    /// `labels` made the same on both sides: connected parts, numbered by their lowest face.
+    /// Makes `labels` symmetric. Returns connected parts, numbered by their lowest face.
     pub fn labels(&self, graph: &FaceGraph, labels: &[u32]) -> Vec<u32> {
         let [front, behind] = [false, true].map(|from_behind| self.drawn_from(from_behind, graph, labels));
         let n_parts = |labels: &[u32]| labels.iter().max().map_or(0, |&l| l + 1);
@@ -65,7 +67,7 @@ impl Mirrored {
         }
     }
 
-    /// One side's parts on both; what has no image stays as it is.
+    /// Copies the parts of one side to the other. Parts without an image stay as they are.
     fn drawn_from(&self, from_behind: bool, graph: &FaceGraph, labels: &[u32]) -> Vec<u32> {
         let n = labels.iter().max().map_or(0, |&l| l as usize + 1);
         let area_where = |counts: &dyn Fn(usize) -> bool| {

@@ -1,25 +1,25 @@
-//! Values in one dimension as a mixture of bells.
+//! One-dimensional Gaussian mixtures, called bells here.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Values that a fit looks at; more are thinned out, evenly in their order.
+/// Largest number of values used by a fit; more are thinned out evenly in their sorted order.
 const MOST_VALUES: usize = 4096;
 const N_STARTS: u64 = 10;
 const MOST_ROUNDS: usize = 30;
-/// A round that gains less than this share of the likelihood is the last.
+/// Relative gain in likelihood below which refinement stops.
 const WORTH_A_ROUND: f64 = 1e-3;
-/// Least width of a bell: values are in [0, 1].
+/// Smallest standard deviation of a bell, for values in [0, 1].
 const LEAST_DEVIATION: f64 = 1e-4;
 
-/// One bell of a mixture.
+/// One Gaussian bell of a mixture.
 #[derive(Clone, Copy, Debug)]
 pub struct Bell {
-    /// Its middle.
+    /// Mean of the bell.
     pub mean: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the bell.
     pub deviation: f64,
-    /// Its share of all values.
+    /// Share of all values that belong to the bell, [0, 1].
     pub share: f64,
 }
 
@@ -29,8 +29,8 @@ impl Bell {
     }
 }
 
-/// `n_bells` bells that fit `values` in [0, 1], by ascending means: k-means from random starts, the best of them
-/// refined by expectation and maximisation.
+/// Fits `n_bells` bells to `values` in [0, 1], sorted by ascending mean. Runs k-means from random starts and
+/// refines the best result by expectation–maximisation.
 pub fn fit(values: &[f64], n_bells: usize, seed: u64) -> Vec<Bell> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -47,7 +47,7 @@ pub fn fit(values: &[f64], n_bells: usize, seed: u64) -> Vec<Bell> {
     refine(&few, bells_of(&few, &means))
 }
 
-/// For each bell how probable it is that it made `x`, sum 1; even where no bell reaches.
+/// Probability of each bell to have produced `x`; the sum is 1. Far from all bells, the nearest bell gets 1.
 pub fn memberships(bells: &[Bell], x: f64) -> Vec<f64> {
     let densities: Vec<f64> = bells.iter().map(|b| b.density(x)).collect();
     let sum: f64 = densities.iter().sum();
@@ -67,7 +67,8 @@ fn nearest(means: &[f64], x: f64) -> usize {
         .unwrap_or(0)
 }
 
-/// Sum of squared distances and ascending means, from values drawn by their squared distance to those before.
+/// Sum of squared errors and ascending means, by k-means. Starts are drawn with the squared distance to
+/// earlier ones as weight.
 fn k_means(values: &[f64], n: usize, rng: &mut ChaCha8Rng) -> (f64, Vec<f64>) {
     let mut means: Vec<f64> = Vec::with_capacity(n);
     while means.len() < n && !values.is_empty() {

@@ -1,10 +1,11 @@
-//! Parts of a division: connected sets of faces of one label.
+//! Parts of a division: connected sets of faces with one label.
 
 use std::collections::BTreeMap;
 
 use crate::face_graph::FaceGraph;
 
-/// Labels 0 … n − 1 of the connected sets of equal `labels`, numbered by their lowest face, and n.
+/// Numbers the connected sets of equal `labels` from 0, by their lowest face. Returns the part of each face
+/// and the number of parts.
 pub fn connected(graph: &FaceGraph, labels: &[u32]) -> (Vec<u32>, usize) {
     let mut part = vec![u32::MAX; labels.len()];
     let mut n_parts = 0;
@@ -28,7 +29,7 @@ pub fn connected(graph: &FaceGraph, labels: &[u32]) -> (Vec<u32>, usize) {
     (part, n_parts as usize)
 }
 
-/// Sum of `of_face` over each part.
+/// Sum of the values `of_face` over each part.
 pub fn sums(part: &[u32], n_parts: usize, of_face: &[f64]) -> Vec<f64> {
     let mut sum = vec![0.0; n_parts];
     for (&p, x) in part.iter().zip(of_face) {
@@ -37,12 +38,11 @@ pub fn sums(part: &[u32], n_parts: usize, of_face: &[f64]) -> Vec<f64> {
     sum
 }
 
-/// Merges neighbouring parts of `labels`, the cheapest pair first, while `cost` has a price for a pair; the
-/// parts that remain, connected and numbered by their lowest face.
+/// Merges neighbouring parts of `labels`, cheapest pair first, until `cost` is `None` for every pair. Returns
+/// the parts that remain, connected and numbered by their lowest face.
 ///
-/// `cost` is given the pair, the sum of `weight` (one an edge) along their border, its length (mm), the areas
-/// of both (mm²), and how many parts there are. It is asked again only where something changed, except for
-/// the number of parts, by which alone it may say `None`.
+/// `cost` is given the border of a pair; `weight` has one value per edge. Prices may depend only on the
+/// border, and `None` only on that and the number of parts.
 pub fn merge(
     graph: &FaceGraph,
     labels: &[u32],
@@ -104,22 +104,22 @@ pub fn merge(
     connected(graph, &part).0
 }
 
-/// What two neighbouring parts share.
+/// Border of two neighbouring parts, with the data that a merge depends on.
 #[derive(Clone, Copy, Debug)]
 pub struct Border {
-    /// The parts, lower number first.
+    /// Both parts, lower number first.
     pub pair: [u32; 2],
-    /// Sum of the weights of its edges.
+    /// Sum of the weights of the border's edges.
     pub weight: f64,
-    /// Its length, mm.
+    /// Length of the border, mm.
     pub length_mm: f64,
     /// Areas of both parts, mm².
     pub area_mm2: [f64; 2],
-    /// Parts that are left.
+    /// Number of parts left at present.
     pub n_parts: usize,
 }
 
-/// Merges parts smaller than `share` of the whole area into the neighbour with the longest border.
+/// Merges each part smaller than `share` of the whole area into the neighbour with the longest shared border.
 pub fn absorb_small(graph: &FaceGraph, labels: &[u32], share: f64) -> Vec<u32> {
     let limit = share * graph.total_area_mm2();
     let length: Vec<f64> = graph.creases.iter().map(|c| c.length_mm).collect();
@@ -129,8 +129,8 @@ pub fn absorb_small(graph: &FaceGraph, labels: &[u32], share: f64) -> Vec<u32> {
     })
 }
 
-/// Merges down to `n_parts`, each time the pair with the least share of the border's weight in the area of the
-/// smaller part.
+/// Merges parts until `n_parts` are left. Each step takes the pair with the least product of the border's
+/// mean salience per millimetre and the square root of the smaller part's share of the area.
 pub fn merge_to(graph: &FaceGraph, labels: &[u32], n_parts: usize, salience: &[f64]) -> Vec<u32> {
     let total = graph.total_area_mm2();
     merge(graph, labels, salience, |border| {

@@ -1,10 +1,10 @@
 //! Division into planes, spheres and cylinders.
 //!
 //! [Attene, Falcidieno, Spagnuolo, *Hierarchical mesh segmentation based on fitting primitives*, The Visual
-//! Computer 22(3), 2006]: each triangle is a part; of all neighbours those two are merged that together are
-//! nearest to a plane, a sphere or a cylinder, until there are parts few enough.
+//! Computer 22(3), 2006]: at first each triangle is a part. Each step merges the two neighbouring parts that
+//! together are nearest to a plane, a sphere or a cylinder, until few enough parts are left.
 //!
-//! Deviations: on a simplified mesh; spheres and circles by linear least squares.
+//! Deviations: the mesh is simplified first; spheres and circles are fitted by linear least squares.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -19,25 +19,26 @@ use crate::face_graph::FaceGraph;
 use crate::params::{no_parts, outside};
 use crate::parts::connected;
 
-/// Points that a fit looks at; of larger parts an even sample.
+/// Number of points that a fit uses, about; larger parts are sampled evenly.
 const MOST_POINTS: usize = 300;
 
-/// Triangles that may be a sphere or a cylinder: two across any edge lie on a sphere exactly.
+/// Smallest number of triangles fitted by spheres and cylinders. Two across any edge lie on a sphere exactly.
 const LEAST_ROUND: usize = 8;
 
-/// How far a centre may be from the middle of what is fitted, in the reach of that.
+/// Largest distance of a centre from the mean of the points, in multiples of the points' reach.
 const FARTHEST_CENTER: f64 = 1e3;
 
-/// How primitives divide a model.
+/// Parameters of the division into primitives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PrimitivesParams {
-    /// Triangles that the model is simplified to. [200, 10 000]; 2000.
+    /// Number of triangles that the model is simplified to. [200, 10 000]; 2000.
     pub n_faces: usize,
-    /// Least error of a merge that is not made where no number is asked for: root of the summed squared distances
-    /// times areas, as a share of what the whole model at its radius of gyration would have. [0, 1]; 0.03.
+    /// Error above which no merge is made, if no number of parts is requested. The error is the root of the
+    /// summed squared distances times areas, as a share of the same root for the whole model at its radius of
+    /// gyration. [0, 1]; 0.03.
     pub tolerance: f64,
-    /// Parts wanted; `None`: what `tolerance` leaves.
+    /// Number of parts; `None`: as many as `tolerance` leaves.
     pub n_parts: Option<usize>,
 }
 
@@ -52,7 +53,7 @@ impl Default for PrimitivesParams {
 }
 
 impl PrimitivesParams {
-    /// Every problem at once, for people; empty where there is none.
+    /// Returns all problems at once, as messages for people; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         let found = [
             outside("n_faces", self.n_faces as f64, 200.0, 10_000.0),
@@ -63,7 +64,7 @@ impl PrimitivesParams {
     }
 }
 
-/// A part for each face of `mesh`, by the primitives that fit. No choice is random.
+/// Divides `mesh` into parts near primitives: the part of each face. No choice is random.
 pub fn divide(params: &PrimitivesParams, mesh: &TriMesh) -> Vec<u32> {
     let fine = FaceGraph::new(mesh);
     let coarse = Coarse::new(mesh, params.n_faces);
@@ -71,10 +72,10 @@ pub fn divide(params: &PrimitivesParams, mesh: &TriMesh) -> Vec<u32> {
     connected(&fine, &coarse.bring_back(&fine, &labels)).0
 }
 
-/// A merge that may be made: its error, and both parts with their ages.
+/// A possible merge: the error's bits, both parts, and their ages, which reveal outdated offers.
 type Offer = Reverse<(u64, [u32; 2], [u32; 2])>;
 
-/// A part for each face of `mesh`, which is small, and whose graph is `graph`.
+/// Divides `mesh`, which should be small and has the graph `graph`: the part of each face.
 pub fn divide_coarse(params: &PrimitivesParams, mesh: &TriMesh, graph: &FaceGraph) -> Vec<u32> {
     let n = graph.n_faces();
     let samples = Samples::new(mesh, graph);
@@ -134,12 +135,12 @@ pub fn divide_coarse(params: &PrimitivesParams, mesh: &TriMesh, graph: &FaceGrap
     connected(graph, &labels).0
 }
 
-/// What primitives are fitted to: corners of triangles, about the middle of the model.
+/// Corners of triangles, to which primitives are fitted, relative to the model's centre.
 struct Samples<'a> {
     mesh: &'a TriMesh,
     graph: &'a FaceGraph,
     middle: Vec3,
-    /// Summed squared distance from the middle times area, mm⁴.
+    /// Sum of squared distance from the middle times area, mm⁴.
     inertia: f64,
 }
 
@@ -156,7 +157,7 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// Summed squared distance times area of the faces of both parts from their best primitive, mm⁴.
+    /// Sum of squared distance times area, mm⁴, of the faces of both parts from their best primitive.
     fn error(&self, a: &[u32], b: &[u32]) -> f64 {
         let step = (3 * (a.len() + b.len())).div_ceil(MOST_POINTS).max(1);
         let mut points: Vec<(Vec3, f64)> = Vec::new();
@@ -194,7 +195,7 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// From the plane through the points' mean, 0, that is nearest to them.
+/// Squared error of the best plane through the points' mean, which must be 0.
 fn plane_error(points: &[(Vec3, f64)]) -> f64 {
     let mut covariance = Matrix3::zeros();
     for &(p, w) in points {
@@ -204,7 +205,7 @@ fn plane_error(points: &[(Vec3, f64)]) -> f64 {
     covariance.symmetric_eigenvalues().min().max(0.0)
 }
 
-/// From the sphere, or the cylinder about `axis`, that is nearest to `points`; infinite where none is.
+/// Squared error of the best sphere, or of the best cylinder along `axis`; infinite if there is none.
 ///
 /// Centre c and radius r follow from |p|² = 2 c · p + (r² − |c|²), which is linear in c and the bracket.
 fn round_error(points: &[(Vec3, f64)], axis: Option<Vec3>) -> f64 {
@@ -232,7 +233,7 @@ fn round_error(points: &[(Vec3, f64)], axis: Option<Vec3>) -> f64 {
         return f64::INFINITY;
     };
     let center = solution.xyz();
-    // Far centres are planes, and what is left of their distances is rounding.
+    // A centre far away means a plane; its distances would be mostly rounding.
     let reach = points.iter().map(|p| p.0.length()).fold(0.0, f64::max);
     if !center.norm().is_finite() || center.norm() > FARTHEST_CENTER * reach {
         return f64::INFINITY;

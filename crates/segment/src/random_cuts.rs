@@ -1,21 +1,21 @@
 //! Division by the best of many random least cuts.
 //!
 //! [Golovinskiy, Funkhouser, *Randomized Cuts for 3D Mesh Analysis*, ACM TOG 27(5), 2008]: on a mesh of a few
-//! thousand triangles each part is cut in two many times, between random seeds that are kept apart by random
-//! margins. How many cuts run over an edge (the partition function) says how far they agree on it. Of all cuts of all
-//! parts the best is made, and again, until there are parts enough.
+//! thousand triangles each part is cut in two many times, between random seeds that random margins keep
+//! apart. The number of cuts over an edge (the partition function) measures how far the cuts agree on it. The
+//! best cut of all parts is made, and the search repeated, until there are enough parts.
 //!
-//! Deviations: least cuts between two seeds only, the kind that the paper finds best. The paper's best cut is the one
-//! on which most agree; here that counts little beside the cut's own shape:
+//! Deviations: only least cuts between two seeds are used, the kind that the paper finds best. The paper's
+//! best cut is the one with the most agreement. Here agreement counts little beside the cut's own shape:
 //!
 //! ```text
 //! score = agreement^¼ · (2 · smaller side / whole area)^0.3 · e^(−6 tightness − 2 mean price)
 //! ```
 //!
-//! where a millimetre's price is 1 on flat and convex edges and falls to 0.05 in concave creases, and the tightness is
-//! the cut's price in the length around a disk as large as its smaller side: small at a limb's root, near 1 on a
-//! plain. On every second model of the benchmark, with people's number of parts, agreement alone gives 0.21 (1 − Rand
-//! index), this 0.11.
+//! The price of a millimetre is 1 on flat and convex edges and falls to 0.05 in concave creases. The
+//! tightness is the cut's price divided by the circumference of a disk as large as the cut's smaller side:
+//! small at a limb's root, near 1 on a plain. On every second model of the benchmark, with people's number of
+//! parts, agreement alone gives 0.21 (1 − Rand index), this score 0.11.
 
 use std::f64::consts::PI;
 
@@ -35,38 +35,39 @@ use crate::parts::connected;
 use crate::symmetry::{self, Plane};
 use crate::whole::Whole;
 
-/// By how much a concavity of a radian makes the way over an edge longer, for the choice of seeds.
+/// Relative lengthening of the path over an edge per radian of concavity, used to choose seeds.
 const DETOUR_A_RAD: f64 = 4.0;
-/// How the agreement of cuts counts in their score. On 76 models of the Princeton benchmark 1 is worse by 0.02, 0 by
-/// 0.005.
+/// Exponent of the agreement in a cut's score. On 76 models of the Princeton benchmark 1 is worse by 0.02, 0
+/// by 0.005.
 const AGREEMENT_POWER: f64 = 0.25;
-/// A cut's score falls by e for each such share of its price in the length around a disk of the smaller side's area.
+/// Weight of tightness: a cut's score falls by a factor of e when its tightness grows by a sixth.
 const TIGHTNESS: f64 = 6.0;
-/// It falls by e for each such part of the mean price of a millimetre, from 1 where flat to 0.05 where concave.
+/// Weight of the mean price of a millimetre, from 0.05 where concave to 1 where flat: e for each half.
 const CONCAVITY: f64 = 2.0;
-/// Parts that no division goes beyond where none are asked for.
+/// Largest number of parts if no number is requested.
 const MOST_PARTS: usize = 36;
-/// How the size of a part counts in what cutting it is worth, as a power of its share of the area.
+/// Exponent of a part's share of the area in the worth of cutting that part.
 const WORTH_OF_SIZE: f64 = 0.3;
 
-/// How random cuts divide a model.
+/// Parameters of the division by random cuts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RandomCutsParams {
-    /// Triangles that the model is simplified to. [500, 20 000]; 3000, between the paper's 2000 and 4000.
+    /// Number of triangles that the model is simplified to. [500, 20 000]; 3000, between the paper's 2000 and
+    /// 4000.
     pub n_faces: usize,
-    /// Cuts of each part. [8, 1000]; 64.
+    /// Number of random cuts of each part. [8, 1000]; 64.
     pub n_cuts: usize,
-    /// Where no number is asked for, the first cut of a lower worth ([`Step::worth`]) is not made, nor any after
-    /// it. [0, 1]; 0.075.
+    /// Worth ([`Step::worth`]) below which cutting stops, if no number of parts is requested. [0, 1]; 0.075.
     pub least_worth: f64,
-    /// Nor is a cut of a lower share in the worth of the best of the first three. [0, 1]; 0.2.
+    /// Limit relative to the best of the first three cuts: below this share of its worth cutting stops, too.
+    /// [0, 1]; 0.2.
     pub least_worth_share: f64,
-    /// How much a cut's score falls with the share of the smaller side: its power. [0, 1]; 0.3.
+    /// Exponent of the smaller side's share of the area in a cut's score. [0, 1]; 0.3.
     pub balance: f64,
-    /// Parts wanted; `None`: until no cut is worth it.
+    /// Number of parts; `None`: cut until no cut is worth it.
     pub n_parts: Option<usize>,
-    /// Whether the division is to be the same on both sides of the plane of symmetry, where the model has one; no.
+    /// True to divide the model alike on both sides of its plane of symmetry, if there is one; false.
     pub symmetric: bool,
     /// Seed of all random choices; 0.
     pub seed: u64,
@@ -88,7 +89,7 @@ impl Default for RandomCutsParams {
 }
 
 impl RandomCutsParams {
-    /// Every problem at once, for people; empty where there is none.
+    /// Returns all problems at once, as messages for people; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         let found = [
             outside("n_faces", self.n_faces as f64, 500.0, 20_000.0),
@@ -102,26 +103,26 @@ impl RandomCutsParams {
     }
 }
 
-/// A division, and what it is the same on both sides of.
+/// A division, and the plane about which it is symmetric.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Divided {
-    /// A part for each face.
+    /// Part number of each face.
     pub part_of_face: Vec<u32>,
-    /// The plane of symmetry; `None` where there is none, or none was asked for.
+    /// Plane of symmetry; `None` if the model has none or none was requested.
     pub plane: Option<Plane>,
 }
 
-/// A part for each face of `mesh`, by random cuts.
+/// Divides `mesh` by random cuts: the part of each face.
 pub fn divide(params: &RandomCutsParams, mesh: &TriMesh) -> Vec<u32> {
     divide_keeping(params, mesh, &Whole::default()).part_of_face
 }
 
-/// The same where no border divides a set of `whole`, which goes before symmetry.
+/// Divides `mesh` without dividing a set of `whole`. Keeping these sets whole takes precedence over symmetry.
 pub fn divide_keeping(params: &RandomCutsParams, mesh: &TriMesh, whole: &Whole) -> Divided {
     divide_among(params, mesh, whole, |_| Vec::new())
 }
 
-/// The same where divisions of the coarse mesh by other methods stand for election, too.
+/// Divides like [`divide_keeping`], with divisions of the coarse mesh by other methods as further candidates.
 pub(crate) fn divide_among(
     params: &RandomCutsParams,
     mesh: &TriMesh,
@@ -142,7 +143,7 @@ pub(crate) fn divide_among(
         Some(plane) => {
             let mirrored = Mirrored::new(plane, &coarse.mesh, graph);
             let labels = coarse.bring_back(&fine, &found.mirrored(params, graph, &mirrored));
-            // Borders have settled on each side by itself.
+            // Borders have settled on each side on their own, so symmetry must be restored.
             Mirrored::new(plane, mesh, &fine).labels(&fine, &labels)
         }
         None => coarse.bring_back(&fine, &found.labels(graph, found.n_steps(params))),
@@ -154,43 +155,43 @@ pub(crate) fn divide_among(
     }
 }
 
-/// A part for each face of `graph`, which is small.
+/// Divides `graph`, which should be small: the part of each face.
 pub fn divide_graph(params: &RandomCutsParams, graph: &FaceGraph) -> Vec<u32> {
     let found = hierarchy(params, graph, &[]);
     found.labels(graph, found.n_steps(params))
 }
 
-/// A division and how it came about.
+/// A division, and the cuts that led to it.
 pub struct Hierarchy {
     part: Vec<u32>,
-    /// Parts before the first cut, components of the mesh.
+    /// Number of parts before the first cut: the components of the mesh.
     pub n_components: usize,
-    /// The cuts in the order in which they were made.
+    /// All cuts, in the order in which they were made.
     pub steps: Vec<Step>,
 }
 
-/// A cut that was made.
+/// A cut that was made, with the data of its score.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// The part that was cut; what was cut off became a new one, the next in number.
+    /// Part that was cut. The side cut off became a new part with the next free number.
     pub part: u32,
-    /// How good the cut is, [0, 1].
+    /// Quality of the cut, [0, 1].
     pub score: f64,
-    /// The smaller side's share of the whole area, [0, 0.5].
+    /// Share of the smaller side in the whole area, [0, 0.5].
     pub share: f64,
-    /// The part's share of the whole area before.
+    /// Share of the part in the whole area, before the cut.
     pub of_share: f64,
-    /// Share of random cuts over its edges, in the mean.
+    /// Mean share of random cuts that run over the cut's edges.
     pub agreement: f64,
-    /// Its price in the length around a disk of the smaller side's area.
+    /// Price of the cut, divided by the circumference of a disk as large as the smaller side.
     pub tightness: f64,
-    /// The mean price of a millimetre of it.
+    /// Mean price of a millimetre of the cut.
     pub mean_price: f64,
 }
 
 impl Step {
-    /// How much a division gains by the cut, [0, 1]: it is short for what it cuts off, concave, and what was cut is
-    /// large.
+    /// Gain of the division by the cut, [0, 1]. Large if the cut is short for the area it cuts off, if it is
+    /// concave, and if the part that was cut is large.
     pub fn worth(&self) -> f64 {
         self.shape() * self.of_share.powf(WORTH_OF_SIZE)
     }
@@ -211,7 +212,7 @@ impl Step {
 }
 
 impl Hierarchy {
-    /// How many of the cuts `params` asks for, or are worth their while.
+    /// Number of cuts that `params` asks for; if it names no number, the number of cuts that are worth it.
     pub fn n_steps(&self, params: &RandomCutsParams) -> usize {
         if let Some(n_parts) = params.n_parts {
             return n_parts.saturating_sub(self.n_components);
@@ -239,8 +240,8 @@ impl Hierarchy {
         connected(graph, &labels).0
     }
 
-    /// The parts after as many cuts as `params` asks for, made the same on both sides; after fewer, where images
-    /// make them more than were asked for.
+    /// Symmetric parts after as many cuts as `params` asks for. Uses fewer cuts if mirroring would make more
+    /// parts than requested.
     fn mirrored(&self, params: &RandomCutsParams, graph: &FaceGraph, mirrored: &Mirrored) -> Vec<u32> {
         let most = params.n_parts.unwrap_or(usize::MAX).max(self.n_components);
         let after = |n_steps: usize| mirrored.labels(graph, &self.labels(graph, n_steps));
@@ -252,15 +253,15 @@ impl Hierarchy {
     }
 }
 
-/// Cuts the best first, until there are parts enough or no cut is good enough.
+/// Makes the best cut repeatedly, until there are enough parts or no cut has a positive score.
 ///
-/// The borders of `proposals`, other divisions of `graph`, stand for election beside the random cuts.
+/// The borders of `proposals`, other divisions of `graph`, are candidates beside the random cuts.
 pub fn hierarchy(params: &RandomCutsParams, graph: &FaceGraph, proposals: &[Vec<u32>]) -> Hierarchy {
     hierarchy_keeping(params, graph, proposals, &Whole::default())
 }
 
-/// The same where an edge within a set of `whole` costs more than all others, so that a cut over it has a score
-/// of 0 and is never made.
+/// Makes cuts like [`hierarchy`], but none through a set of `whole`. Edges within a set cost more than all
+/// others together, so a cut over them has a score of 0.
 pub fn hierarchy_keeping(
     params: &RandomCutsParams,
     graph: &FaceGraph,
@@ -321,9 +322,9 @@ pub fn hierarchy_keeping(
     }
 }
 
-/// [`prices`], and within sets of `whole` a price that no cut can pay.
+/// Prices by [`prices`]; edges within sets of `whole` get a price that no cut can pay.
 fn prices_keeping(graph: &FaceGraph, whole: &Whole) -> Vec<f64> {
-    /// In prices of all edges together: e to the power of minus that is 0.
+    /// Multiple of the prices of all edges together, so large that e to the power of minus it is 0.
     const UNPAYABLE: f64 = 1e4;
     let mut price = prices(graph);
     let unpayable = UNPAYABLE * price.iter().sum::<f64>();
@@ -347,15 +348,16 @@ struct Cutter<'a> {
     params: &'a RandomCutsParams,
     graph: &'a FaceGraph,
     proposals: &'a [Vec<u32>],
-    /// What a cut pays on each edge.
+    /// Price of a cut on each edge, mm.
     price: Vec<f64>,
-    /// Length of the way over each edge.
+    /// Length of the path over each edge, lengthened by concavity, mm.
     way: Vec<f64>,
     total_mm2: f64,
 }
 
 impl Cutter<'_> {
-    /// How good a cut is: many cuts agree on it, it is short for what it cuts off, concave, and cuts off much.
+    /// Scores a cut. Good cuts have high agreement, are short for what they cut off, are concave, and cut off
+    /// much.
     fn judge(&self, share: f64, agreement: f64, price_mm: f64, mean_price: f64) -> Step {
         let around_disk_mm = (4.0 * PI * share * self.total_mm2).sqrt().max(f64::MIN_POSITIVE);
         let mut step = Step {
@@ -370,7 +372,7 @@ impl Cutter<'_> {
         step
     }
 
-    /// The best cut of `part`.
+    /// Finds the best cut of `part`, if it has any.
     fn best_cut(&self, part: &[u32], stream: u64, labels: &[u32]) -> Option<Cut> {
         if part.len() < 8 {
             return None;
@@ -416,7 +418,7 @@ struct Region<'a> {
     cutter: &'a Cutter<'a>,
     faces: &'a [u32],
     start: Vec<u32>,
-    /// (neighbour in the part, edge).
+    /// Pairs of (neighbour in the part, edge).
     arcs: Vec<(u32, u32)>,
     area_mm2: f64,
 }
@@ -467,7 +469,7 @@ impl<'a> Region<'a> {
         distance
     }
 
-    /// A face by `weight`, ≥ 0.
+    /// Draws a face with probability proportional to `weight`, ≥ 0.
     fn draw(&self, rng: &mut ChaCha8Rng, weight: impl Fn(usize) -> f64) -> u32 {
         let sum: f64 = (0..self.faces.len()).map(&weight).sum();
         let mut left = rng.random::<f64>() * sum;
@@ -478,8 +480,8 @@ impl<'a> Region<'a> {
         chosen.unwrap_or(0) as u32
     }
 
-    /// The least cut between two random seeds and what is nearer to one of them by a random margin; `None`
-    /// where it leaves nothing on a side.
+    /// Finds the least cut between two random seeds. Faces nearer to a seed than a random margin stay with
+    /// that seed. `None` if one side would be empty.
     fn random_cut(&self, rng: &mut ChaCha8Rng) -> Option<Cut> {
         let area = |f: usize| self.cutter.graph.area_mm2[self.faces[f] as usize];
         let first = self.draw(rng, area);
@@ -509,8 +511,8 @@ impl<'a> Region<'a> {
         self.cut(|f| sides[f as usize] == Terminal::Source)
     }
 
-    /// The cuts that divide what one label of `labels` has in the part from all else in it, where both hang
-    /// together.
+    /// Finds the cuts that separate one label of `labels` from the rest of the part, if both sides are
+    /// connected.
     fn proposed(&self, labels: &[u32]) -> Vec<Cut> {
         let label = |f: u32| labels[self.faces[f as usize] as usize];
         let mut found: Vec<u32> = (0..self.faces.len() as u32).map(label).collect();
@@ -523,7 +525,7 @@ impl<'a> Region<'a> {
             .collect()
     }
 
-    /// How many connected sets the faces inside and those outside of a set are.
+    /// Total number of connected components of a set of faces and of its complement.
     fn n_components(&self, is_inside: impl Fn(u32) -> bool) -> usize {
         let mut seen = vec![false; self.faces.len()];
         let mut stack = Vec::new();
@@ -547,7 +549,7 @@ impl<'a> Region<'a> {
         n
     }
 
-    /// The part cut along the border of a set; `None` where that is all or nothing.
+    /// Cuts the part along the border of a set; `None` if the set is empty or the whole part.
     fn cut(&self, is_inside: impl Fn(u32) -> bool) -> Option<Cut> {
         let n = self.faces.len();
         let n_inside = (0..n as u32).filter(|&f| is_inside(f)).count();

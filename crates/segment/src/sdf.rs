@@ -1,7 +1,8 @@
-//! Division by the shape diameter: parts are as thick throughout.
+//! Division by the shape diameter: each part has about one thickness.
 //!
-//! [Shapira, Shamir, Cohen-Or 2008, Sect. 4]: the diameters of faces as a mixture of bells, and labels of least
-//! energy between what the bells say and short borders in creases, preferably concave ones.
+//! [Shapira, Shamir, Cohen-Or 2008, Sect. 4]: the diameters of faces are fitted by a mixture of bells. Labels
+//! of least energy then balance the bells' probabilities against short borders in creases, preferably concave
+//! ones.
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::TriMesh;
@@ -13,27 +14,28 @@ use crate::parts::{absorb_small, connected, merge_to};
 use crate::shape_diameter::{diameters_mm, normalised};
 use crate::{border, mixture};
 
-/// How much of a convex edge's turning counts.
+/// Weight of a convex edge's turning, relative to a concave one's.
 const CONVEX_SHARE: f64 = 0.08;
-/// What λ = 1 weighs, in nats a flat edge's −ln.
+/// Weight of λ = 1, in nats per −ln of an edge's turning.
 const LAMBDA_UNIT: f64 = 100.0;
-/// Least probability, and least share of π by which an edge turns, under a logarithm.
+/// Lower limit for arguments of logarithms: for probabilities and for shares of π by which an edge turns.
 const LEAST: f64 = 5e-6;
 
-/// How shape diameters divide a model.
+/// Parameters of the division by shape diameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SdfParams {
-    /// Rays a face. [4, 200]; 25.
+    /// Number of rays per face. [4, 200]; 25.
     pub n_rays: usize,
-    /// Bells of the mixture, levels of thickness. [2, 20]; 5.
+    /// Number of bells of the mixture, the levels of thickness. [2, 20]; 5.
     pub n_levels: usize,
-    /// Weight λ of short borders in creases. [0, 1]; 0.26. On 152 models of the Princeton
-    /// benchmark these two give 0.174, 3 and 0.02 0.253.
+    /// Weight λ of short borders in creases. [0, 1]; 0.26. On 152 models of the Princeton benchmark
+    /// `n_levels` 5 with 0.26 gives 0.174, and 3 with 0.02 gives 0.253.
     pub smoothness: f64,
-    /// Parts smaller than this share of the area are merged into a neighbour. [0, 0.1]; 0.002.
+    /// Share of the area below which a part is merged into a neighbour. [0, 0.1]; 0.002.
     pub least_share: f64,
-    /// Parts wanted; `None`: as many as there are. Merges, never splits, but for a second try with more levels.
+    /// Number of parts; `None`: as many as there are. Surplus parts are merged, none is split. If there are
+    /// too few, up to two more levels are tried.
     pub n_parts: Option<usize>,
     /// Seed of the starts of k-means; 0.
     pub seed: u64,
@@ -53,7 +55,7 @@ impl Default for SdfParams {
 }
 
 impl SdfParams {
-    /// Every problem at once, for people; empty where there is none.
+    /// Returns all problems at once, as messages for people; empty if there are none.
     pub fn problems(&self) -> Vec<String> {
         let found = [
             outside("n_rays", self.n_rays as f64, 4.0, 200.0),
@@ -66,14 +68,14 @@ impl SdfParams {
     }
 }
 
-/// A part for each face of `mesh`, by its shape diameter.
+/// Divides `mesh` by its shape diameter: the part of each face.
 pub fn divide(params: &SdfParams, mesh: &TriMesh) -> Vec<u32> {
     let graph = FaceGraph::new(mesh);
     let values = normalised(&diameters_mm(mesh, &graph, params.n_rays));
     divide_by(params, &graph, &values)
 }
 
-/// A part for each face of `graph`, by the diameters `values` in [0, 1].
+/// Divides `graph` by the diameters `values`, in [0, 1]: the part of each face.
 pub fn divide_by(params: &SdfParams, graph: &FaceGraph, values: &[f64]) -> Vec<u32> {
     let enough = |n: usize| params.n_parts.is_none_or(|wanted| n >= wanted);
     let mut found = (Vec::new(), 0);
@@ -91,7 +93,7 @@ pub fn divide_by(params: &SdfParams, graph: &FaceGraph, values: &[f64]) -> Vec<u
     }
 }
 
-/// What a border gains on each edge, mm: its length, less what it costs there.
+/// Gain of a border on each edge, mm: its length less its price.
 fn salience(graph: &FaceGraph) -> Vec<f64> {
     let price = border::prices(graph);
     graph
@@ -122,7 +124,7 @@ fn level_labels(params: &SdfParams, n_levels: usize, graph: &FaceGraph, values: 
     labels
 }
 
-/// Weight of each edge: the less, the more it turns.
+/// Weight of each edge, smaller the more the edge turns.
 fn weights(graph: &FaceGraph, smoothness: f64) -> Vec<f64> {
     let of_turning = |rad: f64| {
         let counts = if rad > 0.0 { CONVEX_SHARE * rad } else { -rad };

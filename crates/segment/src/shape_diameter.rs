@@ -1,8 +1,9 @@
-//! How thick a body is below each face: the shape diameter.
+//! Shape diameter: the thickness of a body below each face.
 //!
 //! [Shapira, Shamir, Cohen-Or, *Consistent mesh partitioning and skeletonisation using the shape diameter
-//! function*, The Visual Computer 2008, Sect. 3]. Rays go inwards in a cone; what is far from their median is left
-//! out, the rest averaged by angle, and the values smoothed along the surface where they are alike.
+//! function*, The Visual Computer 2008, Sect. 3]. Rays go inwards in a cone. Lengths far from their median
+//! are left out, the others are averaged by angle. The values are then smoothed along the surface between
+//! faces of similar values.
 
 use std::f64::consts::PI;
 
@@ -14,21 +15,22 @@ use crate::face_graph::FaceGraph;
 
 /// Opening angle of the cone, rad.
 const CONE_RAD: f64 = 2.0 / 3.0 * PI;
-/// Where on a ray's way from the cone's axis its weight falls by e^(−1/2), rad: a third of the cone.
+/// Angle from the cone's axis at which a ray's weight is e^(−1/2), rad: a third of the opening angle.
 const WEIGHT_RAD: f64 = CONE_RAD / 3.0;
-/// Rays that are farther from the median than so many median deviations are left out.
+/// Distance from the median, in median deviations, beyond which rays are left out.
 const MOST_DEVIATIONS: f64 = 1.5;
-/// How far below the surface rays begin, as a share of the box's diagonal, so that they miss their own face.
+/// Depth below the surface at which rays begin, as a share of the bounding box's diagonal, so that they miss
+/// their own face.
 const START: f64 = 1e-6;
-/// Faces of a window of one ring; it is as many rings as the root of the faces over this, and one.
+/// Number of faces per squared ring count: the smoothing window has ⌊√(faces / 2000)⌋ + 1 rings.
 const FACES_OF_A_RING: f64 = 2000.0;
 /// Strength of the logarithm that spreads small diameters; the paper's 4.
 const SPREAD: f64 = 4.0;
-/// The golden angle, rad, by which sunflower seeds and our rays turn.
+/// Golden angle, rad, by which each ray turns from the previous one, as sunflower seeds do.
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
 
-/// The shape diameter of each face, mm, by `n_rays` rays; smoothed. Faces without a ray that leaves the body take
-/// the mean of their neighbours; 0 where there are none.
+/// Smoothed shape diameter of each face, mm, from `n_rays` rays. Faces without a ray that leaves the body
+/// take the mean of their neighbours, or 0 if these have no values, either.
 pub fn diameters_mm(mesh: &TriMesh, graph: &FaceGraph, n_rays: usize) -> Vec<f64> {
     let bvh = TriangleBvh::new(mesh);
     let reach = mesh.bounds().diagonal();
@@ -41,7 +43,8 @@ pub fn diameters_mm(mesh: &TriMesh, graph: &FaceGraph, n_rays: usize) -> Vec<f64
     smooth(graph, &filled)
 }
 
-/// Diameters in [0, 1], small ones spread: log(4 x + 1) / log 5 of their place x between least and largest.
+/// Scales diameters to [0, 1], spreading small ones: log(4 x + 1) / log 5, where x is the position between
+/// the least and the largest.
 pub fn normalised(diameters_mm: &[f64]) -> Vec<f64> {
     let least = diameters_mm.iter().copied().fold(f64::INFINITY, f64::min);
     let range = diameters_mm.iter().copied().fold(0.0, f64::max) - least;
@@ -54,7 +57,7 @@ pub fn normalised(diameters_mm: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Directions about +z, evenly over the disk that closes the cone, each with its weight.
+/// Directions around +z with their weights, spread evenly over the disk that closes the cone.
 fn cone(n_rays: usize) -> Vec<(Vec3, f64)> {
     let (sin, cos) = (0.5 * CONE_RAD).sin_cos();
     (0..n_rays)
@@ -102,7 +105,7 @@ fn diameter(
     Some(if weights > 0.0 { sum / weights } else { median })
 }
 
-/// The middle of `values`, which is not empty.
+/// Median of `values`, which must not be empty.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let half = values.len() / 2;
@@ -113,7 +116,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
-/// Faces without a value take the mean of their neighbours', ring by ring.
+/// Fills faces without a value with the mean of their neighbours, ring by ring.
 fn fill(graph: &FaceGraph, mut values: Vec<Option<f64>>) -> Vec<f64> {
     let mut empty: Vec<u32> = (0..values.len() as u32)
         .filter(|&f| values[f as usize].is_none())
@@ -141,7 +144,7 @@ fn fill(graph: &FaceGraph, mut values: Vec<Option<f64>>) -> Vec<f64> {
     values.into_iter().map(Option::unwrap_or_default).collect()
 }
 
-/// Means over a window of rings, by distance in rings and by likeness.
+/// Means over a window of rings, weighted by distance in rings and by similarity of values.
 fn smooth(graph: &FaceGraph, values: &[f64]) -> Vec<f64> {
     let n_rings = (values.len() as f64 / FACES_OF_A_RING).sqrt() as u32 + 1;
     (0..values.len() as u32)
@@ -172,11 +175,11 @@ fn smooth(graph: &FaceGraph, values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The faces within some rings of one.
+/// The faces within some rings of a face.
 #[derive(Default)]
 struct Window {
     faces: Vec<(u32, u32)>,
-    /// For each face the last window that it was in, counted from 1.
+    /// Last window that each face was in, counted from 1.
     seen: Vec<u32>,
     n_windows: u32,
 }
@@ -214,7 +217,7 @@ mod tests {
         let graph = FaceGraph::new(&mesh);
         let found = diameters_mm(&mesh, &graph, 25);
         let flat = (0..12).find(|&f| graph.normal[f].z.abs() > 0.5).unwrap();
-        // Rays lean by up to 60° and are averaged by angle: a plate seems a little thicker.
+        // Rays lean by up to 60° and are averaged by angle, so a plate seems a little thicker.
         assert!(found[flat] > 2.0 && found[flat] < 4.0, "{}", found[flat]);
         let spread = normalised(&[1.0, 3.0, 5.0]);
         assert!(spread[0] == 0.0 && spread[1] > 0.5 && spread[2] == 1.0);

@@ -1,9 +1,9 @@
-//! The plane that a surface is about the same on both sides of.
+//! Plane of approximate mirror symmetry of a surface.
 //!
-//! Many planes through the centroid are tried, the best few are turned and moved while that helps. How good a plane
-//! is, is how far the mirror images of points of the surface are from it.
+//! Many planes through the centroid are tried. The best few are then turned and moved as long as that helps.
+//! The quality of a plane is the distance of mirrored surface points from the surface.
 //!
-//! What is alike but for its pose, as a figure with one arm raised, has no such plane.
+//! Figures that are symmetric except for their pose, such as one with a raised arm, have no such plane.
 
 use std::f64::consts::PI;
 
@@ -12,55 +12,57 @@ use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3};
 
-/// A plane that a model is alike on both sides of.
+/// A plane of mirror symmetry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// A point of it, mm.
+    /// A point on the plane, mm.
     pub at: Vec3,
-    /// Its unit normal.
+    /// Unit normal of the plane.
     pub normal: Vec3,
 }
 
 impl Plane {
-    /// The mirror image of a point.
+    /// Mirror image of a point in the plane.
     pub fn image(&self, point: Vec3) -> Vec3 {
         point - 2.0 * self.height(point) * self.normal
     }
 
-    /// How far a point is from the plane, mm; negative behind it.
+    /// Signed distance of a point from the plane, mm; negative behind it.
     pub fn height(&self, point: Vec3) -> f64 {
         (point - self.at).dot(self.normal)
     }
 }
 
-/// The plane is taken where mirror images are no farther from the surface, as a root mean square in the box's diagonal.
+/// Largest root mean square distance of mirrored points from the surface, as a share of the bounding box's
+/// diagonal, for a model to count as symmetric.
 ///
-/// Koala, bust, armadillo and squirrel have 0.0006 to 0.009, a horse in mid-step 0.014, a statue 0.021; an open hand has
-/// 0.029, and a teddy that waves 0.033, so that no figure lets in the one without the other.
+/// Koala, bust, armadillo and squirrel have 0.0006 to 0.009, a horse in mid-step 0.014, a statue 0.021. An
+/// open hand has 0.029 and a waving teddy 0.033, so no value accepts the teddy without the hand.
 const TOLERANCE: f64 = 0.025;
-/// Points of the surface whose images are looked at.
+/// Number of surface points that are mirrored.
 const N_SAMPLES: usize = 1000;
-/// Every so many of them where planes are only to be told apart.
+/// Step between the samples used while planes are only ranked.
 const THINNED: usize = 4;
-/// Normals tried beside the principal axes: about 10° apart.
+/// Number of normals tried beside the principal axes, about 10° apart.
 const N_NORMALS: usize = 200;
-/// Planes that are turned and moved.
+/// Number of planes that are refined.
 const N_REFINED: usize = 4;
-/// What they are apart at least, as a cosine: 20°.
+/// Cosine of the smallest angle between the normals of two planes that are refined: 20°.
 const APART: f64 = 0.94;
 
-/// The plane of approximate mirror symmetry, and `None` where images are farther from the surface than 2.5 % of the
-/// box's diagonal; the same on any number of threads.
+/// Finds the plane of approximate mirror symmetry. `None` if mirrored points are farther from the surface
+/// than 2.5 % of the bounding box's diagonal. The result is the same on any number of threads.
 ///
-/// For meshes of some thousand triangles, 0.2 s each. Of several planes, as a vase has, one is given.
+/// Meant for meshes of some thousand triangles, which take 0.2 s each. If there are several planes, as for a
+/// vase, one is returned.
 pub fn plane(mesh: &TriMesh) -> Option<Plane> {
     nearest_plane(mesh)
         .filter(|&(deviation, _)| deviation <= TOLERANCE)
         .map(|(_, plane)| plane)
 }
 
-/// The best plane that is found, however bad, and how far images are from the surface, in the box's diagonal; `None`
-/// where there is no area.
+/// Finds the best plane, however bad, and the deviation of mirrored points from the surface, as a share of
+/// the bounding box's diagonal. `None` if the mesh has no area.
 pub fn nearest_plane(mesh: &TriMesh) -> Option<(f64, Plane)> {
     let figure = Figure::new(mesh)?;
     let few: Vec<Vec3> = figure.samples.iter().copied().step_by(THINNED).collect();
@@ -90,7 +92,7 @@ pub fn nearest_plane(mesh: &TriMesh) -> Option<(f64, Plane)> {
     Some(figure.refined(rough, &figure.samples, 0.02))
 }
 
-/// What planes are held against.
+/// Surface and sample points against which planes are judged.
 struct Figure {
     bvh: TriangleBvh,
     samples: Vec<Vec3>,
@@ -122,7 +124,7 @@ impl Figure {
         })
     }
 
-    /// The principal axes, and normals spread over half a ball along a spiral.
+    /// Candidate normals: the principal axes, and a spiral spread over half a ball.
     fn normals(&self) -> Vec<Vec3> {
         let golden = PI * (3.0 - 5.0_f64.sqrt());
         let spiral = (0..N_NORMALS).map(|i| {
@@ -134,22 +136,23 @@ impl Figure {
         self.axes.into_iter().chain(spiral).collect()
     }
 
-    /// Root mean square distance of the images of `points` from the surface, in the box's diagonal.
+    /// Root mean square distance of the images of `points` from the surface, as a share of the bounding box's
+    /// diagonal.
     fn deviation(&self, plane: &Plane, points: &[Vec3]) -> f64 {
         let distance_sq = |&p: &Vec3| {
             let nearest = self.bvh.nearest(plane.image(p), f64::INFINITY);
             nearest.map_or(0.0, |n| n.distance_sq)
         };
-        // Summed in order, so that threads make no difference.
+        // Summed in order, so that the number of threads makes no difference.
         let all: Vec<f64> = points.par_iter().map(distance_sq).collect();
         (all.iter().sum::<f64>() / all.len() as f64).sqrt() / self.diagonal_mm
     }
 
-    /// `plane` turned and moved while that brings the images of `points` nearer, by `first_rad` at first.
+    /// Turns and moves `plane` while that lowers the deviation of `points`. The first step is `first_rad`.
     fn refined(&self, plane: Plane, points: &[Vec3], first_rad: f64) -> (f64, Plane) {
-        /// Where it ends: 0.06°.
+        /// Step at which refinement ends, rad: 0.06°.
         const LAST_RAD: f64 = 1e-3;
-        /// Steps of one length at most.
+        /// Largest number of steps of one length.
         const MOST_STEPS: usize = 6;
         let mut best = (self.deviation(&plane, points), plane);
         let mut step_rad = first_rad;
@@ -171,7 +174,7 @@ impl Figure {
         best
     }
 
-    /// Planes a step from `plane`: turned about the point of it next to the centre, or moved.
+    /// Planes one step away from `plane`: turned about its point nearest to the centre, or moved.
     fn beside(&self, plane: Plane, step_rad: f64) -> [Plane; 6] {
         let Plane { normal, .. } = plane;
         let at = self.center - plane.height(self.center) * normal;
@@ -195,9 +198,9 @@ impl Figure {
     }
 }
 
-/// Points spread over the surface, each for as much area; none where there is no area.
+/// Points spread evenly by area over the surface; empty if the surface has no area.
 fn samples(mesh: &TriMesh) -> Vec<Vec3> {
-    /// Steps of Roberts' sequence in the plane: the powers of 1 over the plastic number.
+    /// Increments of Roberts' sequence in the plane: powers of 1 over the plastic number.
     const STEPS: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
     let total: f64 = (0..mesh.triangles.len()).map(|f| mesh.face_area(f)).sum();
     let mut found = Vec::with_capacity(N_SAMPLES);

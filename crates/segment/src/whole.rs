@@ -2,18 +2,19 @@
 
 use std::collections::BTreeMap;
 
-/// Sets of faces, apart from each other, each of which is to be of one part.
+/// Disjoint sets of faces, each of which must belong to one part.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Whole {
     sets: Vec<Vec<u32>>,
-    /// The set of each face, [`FREE`] for those of none; empty where there are no sets.
+    /// Set of each face, or [`FREE`] if it belongs to none; empty if there are no sets.
     set_of_face: Vec<u32>,
 }
 
 const FREE: u32 = u32::MAX;
 
 impl Whole {
-    /// Sets of a mesh of `n_faces` faces; those that share a face become one, empty ones are left out.
+    /// Creates sets for a mesh of `n_faces` faces. Sets that share a face are joined, and empty ones are left
+    /// out.
     pub fn new(n_faces: usize, sets: impl IntoIterator<Item = Vec<u32>>) -> Self {
         let mut joined: Vec<Vec<u32>> = Vec::new();
         let mut set_of_face = vec![FREE; n_faces];
@@ -44,24 +45,24 @@ impl Whole {
         }
     }
 
-    /// Whether there are none.
+    /// Returns true if there are no sets.
     pub fn is_empty(&self) -> bool {
         self.sets.is_empty()
     }
 
-    /// The sets, each in ascending order.
+    /// All sets, each in ascending order.
     pub fn sets(&self) -> &[Vec<u32>] {
         &self.sets
     }
 
-    /// Whether both faces are of one set.
+    /// Returns true if both faces belong to one set.
     pub fn has_both(&self, [f, g]: [u32; 2]) -> bool {
         let set = |face: u32| self.set_of_face.get(face as usize).copied().unwrap_or(FREE);
         set(f) != FREE && set(f) == set(g)
     }
 
-    /// The sets on a simplified mesh of `n_coarse` faces, where `of_face` is the one that each face lies on: a
-    /// simplified face is of the set that has most of the area on it, if any has half.
+    /// Transfers the sets to a simplified mesh of `n_coarse` faces. `of_face` is the simplified face on which
+    /// each face lies. A simplified face joins the set that has more than half of the area lying on it.
     pub fn on_coarse(&self, of_face: &[u32], area_mm2: &[f64], n_coarse: usize) -> Self {
         if self.is_empty() {
             return Self::default();
@@ -82,12 +83,13 @@ impl Whole {
         Self::new(n_coarse, self.sets.iter().map(on))
     }
 
-    /// Gives all faces of each set the label that most of its area has; how many faces changed theirs.
+    /// Gives all faces of each set the label with the most area in it. Returns the number of faces that
+    /// changed.
     pub fn gather(&self, labels: &mut [u32], area_mm2: &[f64]) -> usize {
         self.gather_among(labels, area_mm2, |_| true)
     }
 
-    /// The same for the faces alone whose label is one `among` which sets are gathered.
+    /// Gathers like [`Self::gather`], but considers and changes only faces with labels that `among` accepts.
     pub fn gather_among(&self, labels: &mut [u32], area_mm2: &[f64], among: impl Fn(u32) -> bool) -> usize {
         let mut n_changed = 0;
         for faces in &self.sets {
@@ -109,7 +111,7 @@ impl Whole {
         n_changed
     }
 
-    /// Whether faces of one set have both labels.
+    /// Returns true if a set has faces of both labels.
     pub fn is_parted(&self, labels: &[u32], [a, b]: [u32; 2]) -> bool {
         self.sets.iter().any(|faces| {
             let has = |label: u32| faces.iter().any(|&f| labels[f as usize] == label);

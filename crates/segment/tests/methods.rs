@@ -1,4 +1,4 @@
-//! What every method promises, on bodies whose parts are plain to see.
+//! Promises that every method keeps, tested on bodies with obvious parts.
 
 use std::f64::consts::TAU;
 
@@ -11,8 +11,8 @@ use shellock_segment::sdf::{self, SdfParams};
 use shellock_segment::whole::Whole;
 use shellock_segment::{border, coarse::Coarse, face_graph::FaceGraph, parts};
 
-/// A body of revolution about z of the outline (z, radius), bottom first, closed by a point on the axis at both
-/// ends.
+/// A body of revolution about z with the outline (z, radius), bottom first. Both ends are closed by a point
+/// on the axis.
 fn turned(outline: &[(f64, f64)], n_around: u32) -> TriMesh {
     let mut points = vec![Vec3::new(0.0, 0.0, outline[0].0)];
     for &(z, radius) in outline {
@@ -49,7 +49,7 @@ fn dumbbell() -> TriMesh {
     turned(&outline, 20)
 }
 
-/// A cylinder of radius 5 and height 20, whose faces are planes at both ends.
+/// A cylinder of radius 5 and height 20, with plane faces at both ends.
 fn cylinder() -> TriMesh {
     let ends = |z: f64| [1.25, 2.5, 3.75, 5.0].map(|r| (z, r));
     let side = (1..12).map(|i| (20.0 * f64::from(i) / 12.0, 5.0));
@@ -230,7 +230,8 @@ fn labels_come_back_from_a_coarse_mesh_to_where_they_were() {
     let top = (0..back.len())
         .max_by(|&f, &g| fine.center[f].z.total_cmp(&fine.center[g].z))
         .unwrap();
-    // On a ball shorter borders are everywhere: they go as far as they may, one and a half coarse edges of 2.1.
+    // On a ball shorter borders are everywhere, so borders move as far as allowed: one and a half coarse
+    // edges of 2.1.
     for (center, &label) in fine.center.iter().zip(&back) {
         assert!(center.z.abs() < 4.0 || (label == back[top]) == (center.z > 0.0));
     }
@@ -251,7 +252,7 @@ fn parameters_out_of_range_are_all_told_of() {
 #[test]
 fn no_border_of_cuts_divides_what_is_kept_whole() {
     let mesh = dumbbell();
-    // Around the neck, where every cut would be.
+    // A set around the neck, where every cut would run.
     let neck: Vec<u32> = (0..mesh.triangles.len() as u32)
         .filter(|&f| mesh.face_center(f as usize).z.abs() < 4.0)
         .collect();

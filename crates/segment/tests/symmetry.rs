@@ -1,4 +1,4 @@
-//! The plane of symmetry, and divisions that are the same on both sides of it.
+//! Tests of the plane of symmetry, and of divisions that are symmetric about it.
 
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::contour::contour;
@@ -8,10 +8,10 @@ use shellock_segment::random_cuts::{self, Divided, RandomCutsParams};
 use shellock_segment::symmetry::{Plane, plane};
 use shellock_segment::whole::Whole;
 
-/// From, to, radius.
+/// Start, end and radius of a capsule.
 type Capsule = (Vec3, Vec3, f64);
 
-/// A body along z with a head, two arms and two legs, the same on both sides of x = 0 and of no other plane.
+/// A body along z with a head, two arms and two legs, symmetric about x = 0 and about no other plane.
 fn figure() -> Vec<Capsule> {
     let limb = |from: [f64; 3], to: [f64; 3], radius_mm: f64| (Vec3::from(from), Vec3::from(to), radius_mm);
     let one_side = [
@@ -42,7 +42,7 @@ fn bent() -> Vec<Capsule> {
     corners.windows(2).map(|ends| (ends[0], ends[1], 5.0)).collect()
 }
 
-/// The union, turned, as triangles on a grid that knows nothing of its symmetry, each corner moved by a tenth of a
+/// Triangle mesh of the turned union, on a grid that is not symmetric. Each corner is moved by a tenth of a
 /// triangle.
 fn mesh(capsules: &[Capsule], turn: Quat) -> TriMesh {
     let turned: Vec<Capsule> = capsules
@@ -103,8 +103,8 @@ fn what_is_bent_has_no_plane_and_a_ball_has_one_through_its_centre() {
     assert_eq!(plane(&TriMesh::default()), None);
 }
 
-/// Share of the area whose image lies in its part's image: the part that has most of the part's image, where that is
-/// so the other way round.
+/// Share of the area whose mirror image lies in its part's counterpart. Two parts are counterparts if each
+/// has most of the other's image.
 fn mirrored_share(mesh: &TriMesh, plane: &Plane, part: &[u32]) -> f64 {
     let bvh = TriangleBvh::new(mesh);
     let n = part.iter().max().map_or(0, |&p| p as usize + 1);
@@ -147,7 +147,7 @@ fn a_symmetric_figure_has_symmetric_parts() {
     }
 }
 
-/// Five parts would be the body and four limbs; three a body and two of those that are alike.
+/// Five parts should be the body and four limbs; three are the body and two matching limbs.
 #[test]
 fn no_more_parts_are_made_than_are_asked_for() {
     let mesh = mesh(&figure(), turns()[1]);
@@ -197,7 +197,7 @@ fn a_limb_without_a_twin_stays_a_part_and_gets_no_image() {
     let part = |p: Vec3| found.part_of_face[bvh.nearest(p, f64::INFINITY).unwrap().face as usize];
     let body = part(flipped(root));
     assert_ne!(part(tip), body);
-    // What is there lies across the plane.
+    // The part at the missing twin's place, the body, lies across the plane.
     let reaches = |side: f64| {
         let mut faces = (0..found.part_of_face.len()).filter(|&f| found.part_of_face[f] == body);
         faces.any(|f| side * mesh.face_center(f).x > 4.0)

@@ -1,36 +1,36 @@
-//! Refusals in words.
+//! Error messages for rejected meshes.
 
 use std::fmt;
 
 use super::ClosedPart;
 use crate::{NotSolid, Vec3};
 
-/// Why a mesh is not one solid body: what, how many, where (file units), and what to do.
+/// Reason why a mesh is not one solid body: the defect, its count, a place (file units), and a remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InputError {
-    /// There is nothing, or nothing that has an area.
+    /// No triangles, or none that has an area.
     #[error("the model has no triangles; export it again as a surface mesh")]
     Empty,
-    /// A coordinate is NaN or infinite.
+    /// Coordinates that are NaN or infinite.
     #[error(
         "{count} points have a coordinate that is not a number, the first is point {vertex} (from 0); \
          repair the model where it was made"
     )]
     NotFinite {
-        /// The first such point.
+        /// First point with such a coordinate.
         vertex: usize,
-        /// How many there are.
+        /// Number of such points.
         count: usize,
     },
-    /// Coordinates with which no volume can be computed.
+    /// Coordinates so large that no volume can be computed.
     #[error(
         "{count} points lie farther than 1e30 from the origin, the first is point {vertex} (from 0); \
          the file is damaged: export the model again"
     )]
     TooFar {
-        /// The first such point.
+        /// First point that is too far away.
         vertex: usize,
-        /// How many there are.
+        /// Number of such points.
         count: usize,
     },
     /// Edges with more than two triangles.
@@ -40,112 +40,112 @@ pub enum InputError {
         plural(*count, "edge has", "edges have"), Coordinates(*at), copies(*n_copies)
     )]
     Shared {
-        /// How many edges.
+        /// Number of such edges.
         count: usize,
-        /// Middle of the first.
+        /// Midpoint of the first such edge.
         at: Vec3,
-        /// Triangles that stand there a second time.
+        /// Number of triangles that duplicate another.
         n_copies: usize,
     },
-    /// Neighbours of opposite orientation.
+    /// Neighbouring triangles of opposite orientation.
     #[error(
         "{} two triangles that face opposite ways, first near {}; \
          one of them is inside out: let a modelling program recalculate the normals (outside)",
         plural(*count, "edge joins", "edges join"), Coordinates(*at)
     )]
     Turned {
-        /// How many edges.
+        /// Number of edges between them.
         count: usize,
-        /// Middle of the first.
+        /// Midpoint of the first such edge.
         at: Vec3,
     },
-    /// The surface has holes.
+    /// Holes in the surface.
     #[error(
         "the surface is not closed: {} ({}), first near {}; fill the holes in a modelling program",
         plural(*n_holes, "hole", "holes"), plural(*count, "open edge", "open edges"), Coordinates(*at)
     )]
     Open {
-        /// Edges with one triangle.
+        /// Number of edges with one triangle.
         count: usize,
-        /// Groups of them.
+        /// Number of connected groups of open edges.
         n_holes: usize,
-        /// Middle of the first edge.
+        /// Midpoint of the first open edge.
         at: Vec3,
     },
-    /// More than one closed surface; the largest first.
+    /// More than one closed surface; the largest comes first.
     #[error("{}", Several(.0))]
     Bodies(Vec<ClosedPart>),
-    /// More open edges than triangles: a soup, or cracks everywhere.
+    /// More open edges than triangles: unconnected triangles, or cracks everywhere.
     #[error(
         "the triangles do not hang together: {} on {}, first near {}; \
          their corners do not meet exactly: merge points by distance in a modelling program",
         plural(*count, "open edge", "open edges"), plural(*n_faces, "triangle", "triangles"), Coordinates(*at)
     )]
     Loose {
-        /// Edges with one triangle.
+        /// Number of edges with one triangle.
         count: usize,
-        /// How many triangles there are.
+        /// Number of triangles in the mesh.
         n_faces: usize,
-        /// Middle of the first edge.
+        /// Midpoint of the first open edge.
         at: Vec3,
     },
-    /// Points that fell together broke the surface.
+    /// Surface broken by points that were rounded to the same place.
     #[error(
         "{count} of {n_faces} triangles have no size, since their corners are in the same place; the coordinates were \
          rounded too coarsely: move the model near the origin where it was made and export it with more digits"
     )]
     Collapsed {
-        /// Triangles with two equal corners.
+        /// Number of triangles with two equal corners.
         count: usize,
-        /// How many triangles the file has.
+        /// Number of triangles in the file.
         n_faces: usize,
     },
-    /// The surface touches itself in points.
+    /// Points in which the surface touches itself.
     #[error(
         "the surface touches itself in {}, first at {}; \
          move the touching parts a little apart or into each other and merge them in a modelling program",
         plural(*count, "single point", "single points"), Coordinates(*at)
     )]
     Pinched {
-        /// How many points.
+        /// Number of such points.
         count: usize,
-        /// The first.
+        /// Position of the first point.
         at: Vec3,
     },
-    /// The surface goes through itself.
+    /// Triangles that cross other triangles.
     #[error(
         "the surface crosses itself in {}, first near {}; \
          unite the parts that overlap in a modelling program (boolean union)",
         plural(*count, "pair of triangles", "pairs of triangles"), Coordinates(*at)
     )]
     Crossing {
-        /// How many pairs of triangles cross.
+        /// Number of crossing pairs of triangles.
         count: usize,
-        /// Where the first is.
+        /// Place of the first crossing.
         at: Vec3,
     },
-    /// Bodies that are inside out, and overlap another.
+    /// Bodies that are inside out and overlap another.
     #[error(
         "{} inside out and {} another, first near {}: \
          it is a hole or a part; export the model without it, cut it out or unite it in a modelling program",
         plural(*count, "body is", "bodies are"), if *count == 1 { "overlaps" } else { "overlap" }, Coordinates(*at)
     )]
     Cutter {
-        /// How many bodies.
+        /// Number of such bodies.
         count: usize,
-        /// The middle of the first.
+        /// Centre of the first such body.
         at: Vec3,
     },
-    /// No way to turn the triangles makes neighbours agree.
+    /// One-sided surface: no orientation of its triangles makes all neighbours agree.
     #[error(
         "the surface has one side only, like a Möbius band: {} triangles that face opposite ways however they are turned, \
          first near {}; it bounds no body: model it with a thickness",
         plural(*count, "edge joins", "edges join"), Coordinates(*at)
     )]
     OneSided {
-        /// How many edges.
+        /// Number of edges between opposite triangles.
         count: usize,
-        /// Middle of the first.
+        /// Midpoint of the first such edge.
         at: Vec3,
     },
     /// All triangles face inwards.
@@ -153,16 +153,16 @@ pub enum InputError {
         "the model is inside out: all its triangles face inwards; flip the normals (flip the faces) and export it again"
     )]
     InsideOut,
-    /// Closed, but without inside.
+    /// Closed surface that encloses no volume.
     #[error("the model is flat: its surface encloses no volume; give it a thickness")]
     Flat,
-    /// What [`crate::Solid::new`] finds beyond the above.
+    /// Defect that only [`crate::Solid::new`] detects.
     #[error("{0}; export the model again")]
     NotSolid(NotSolid),
 }
 
 impl InputError {
-    /// The first place where something is wrong, in the mesh's units; `None` where it is no place.
+    /// First place of the defect, in the mesh's units; `None` if the defect has no place.
     pub fn at(&self) -> Option<Vec3> {
         match *self {
             Self::Shared { at, .. }
@@ -178,7 +178,7 @@ impl InputError {
     }
 }
 
-/// How many bodies a message lists.
+/// Largest number of bodies that a message lists.
 const N_LISTED: usize = 3;
 
 struct Several<'a>(&'a [ClosedPart]);
@@ -215,7 +215,7 @@ impl fmt::Display for Several<'_> {
     }
 }
 
-/// A place, as messages have it.
+/// Point, formatted for messages.
 pub(crate) struct Coordinates(pub(crate) Vec3);
 
 impl fmt::Display for Coordinates {
@@ -230,7 +230,8 @@ impl fmt::Display for Coordinates {
     }
 }
 
-/// A length with four significant digits, whatever the unit of the file; three decimals from 1 upwards.
+/// Length with four significant digits in any file unit, or one decimal if that is more. Drops trailing
+/// zeros.
 pub(crate) struct Short(pub(crate) f64);
 
 impl fmt::Display for Short {
@@ -256,7 +257,7 @@ impl fmt::Display for Short {
     }
 }
 
-/// "1 hole", "2 holes".
+/// Count with its noun, such as "1 hole" or "2 holes".
 pub(crate) fn plural(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }

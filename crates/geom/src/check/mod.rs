@@ -1,7 +1,7 @@
-//! Is it one body? What is wrong with a surface, counted and placed, in words for the person who made it.
+//! Diagnosis of a mesh: is it one body? Defects are counted, located, and explained to the mesh's author.
 //!
-//! [`inspect`] counts, [`into_solid`] decides; [`crate::repair`] mends what it refuses. Not checked here:
-//! faces that cross each other, and thin walls.
+//! [`inspect`] counts, [`into_solid`] decides, and [`crate::repair`] repairs rejected meshes. Not checked
+//! here: faces that cross each other, and thin walls.
 
 mod error;
 mod groups;
@@ -15,49 +15,49 @@ use crate::weld::{Welded, close};
 use crate::{Aabb, NotSolid, Solid, TriMesh, Vec3};
 pub(crate) use groups::Groups;
 
-/// Farther from the origin, file units, products of six lengths, as exact unions form them, leave the range
-/// of numbers.
+/// Largest coordinate, file units. Beyond it, products of six lengths, which exact unions form, overflow.
 const FARTHEST: f64 = 1e30;
 
-/// What a mesh is, as far as its triangles and their neighbours tell.
+/// Result of inspecting a mesh's triangles and their neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
-    /// The edges.
+    /// Defects of the mesh's edges.
     pub edges: Edges,
     /// Points where several fans of triangles touch.
     pub pinched: Spots,
-    /// Groups of triangles connected over edges, the one of the largest box first.
+    /// Groups of triangles connected over edges, largest bounding box first.
     pub bodies: Vec<ClosedPart>,
 }
 
-/// Edges that are no plain seam between two triangles.
+/// Edges that do not join exactly two consistently oriented triangles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edges {
     /// Edges with one triangle.
     pub open: Spots,
-    /// Groups of open edges connected over points: the holes, where holes do not touch.
+    /// Number of groups of open edges connected over points. Equals the number of holes if no two holes
+    /// touch.
     pub n_holes: usize,
     /// Edges with more than two triangles.
     pub shared: Spots,
     /// Edges whose two triangles face opposite ways.
     pub turned: Spots,
-    /// Triangles over the same three points as an earlier one.
+    /// Number of triangles over the same three points as an earlier triangle.
     pub n_copies: usize,
 }
 
 impl Edges {
-    /// Whether each edge joins two triangles of the same orientation.
+    /// Returns true if each edge joins two triangles of the same orientation.
     pub fn is_closed(&self) -> bool {
         self.open.count == 0 && self.shared.count == 0 && self.turned.count == 0
     }
 }
 
-/// How often something occurs, and one place.
+/// Number of occurrences of a defect, and one place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spots {
-    /// How often.
+    /// Number of occurrences found.
     pub count: usize,
-    /// Where, file units; the origin if `count` is 0.
+    /// Place of the first occurrence, file units; the origin if `count` is 0.
     pub first: Vec3,
 }
 
@@ -70,21 +70,21 @@ impl Spots {
     }
 }
 
-/// Triangles connected over edges.
+/// Group of triangles connected over edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosedPart {
-    /// How many triangles.
+    /// Number of triangles in the group.
     pub n_faces: usize,
-    /// The box around them, file units.
+    /// Bounding box of the group, file units.
     pub bounds: Aabb,
-    /// Enclosed volume, file units cubed; below 0 where inside out, meaningless where open.
+    /// Enclosed volume, file units cubed; negative if inside out, meaningless if open.
     pub signed_volume: f64,
 }
 
-/// Makes one body of a mesh as read: merges equal points where needed, and refuses what is not one closed
+/// Turns a mesh as read into one body. Merges equal points where needed, and rejects anything but one closed
 /// surface.
 ///
-/// Returns for each triangle of the solid its number in `mesh`, ascending. O(n log n).
+/// Also returns the index in `mesh` of each triangle of the solid, ascending. O(n log n).
 pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
     check_points(mesh)?;
     let Welded {
@@ -102,7 +102,7 @@ pub fn into_solid(mesh: &TriMesh) -> Result<(Solid, Vec<u32>), InputError> {
     }
 }
 
-/// The first trouble of a mesh in the order in which a person would mend it.
+/// Returns the first defect of a mesh, in the order in which a person would repair them.
 pub(crate) fn refuse(inspection: &Inspection, n_faces: usize, n_collapsed: usize) -> Result<(), InputError> {
     let Inspection {
         edges,
@@ -177,7 +177,7 @@ pub(crate) fn check_points(mesh: &TriMesh) -> Result<(), InputError> {
 /// Counts bodies, holes and defects of a mesh whose equal points are merged. O(n log n).
 ///
 /// # Panics
-/// Where a triangle names a missing point.
+/// Panics if a triangle names a missing point.
 pub fn inspect(mesh: &TriMesh) -> Inspection {
     let sides = sides(mesh);
     let mut faces = connected_faces(mesh, &sides);
@@ -189,7 +189,7 @@ pub fn inspect(mesh: &TriMesh) -> Inspection {
     }
 }
 
-/// Triangles that edges join.
+/// Groups of triangles connected over edges.
 fn connected_faces(mesh: &TriMesh, sides: &[Side]) -> Groups {
     let mut faces = Groups::of(mesh.triangles.len());
     for edge in sides.chunk_by(Side::same_edge) {
@@ -200,7 +200,7 @@ fn connected_faces(mesh: &TriMesh, sides: &[Side]) -> Groups {
     faces
 }
 
-/// Corners of the same point whose triangles edges join: the fans.
+/// Groups of corners at the same point whose triangles are connected over edges: the fans.
 fn connected_corners(mesh: &TriMesh, sides: &[Side]) -> Groups {
     let mut corners = Groups::of(3 * mesh.triangles.len());
     for edge in sides.chunk_by(Side::same_edge) {
@@ -213,13 +213,12 @@ fn connected_corners(mesh: &TriMesh, sides: &[Side]) -> Groups {
     corners
 }
 
-/// The fans of triangles, as groups of corners: three times the triangle, plus 0, 1 or 2.
+/// Fans of triangles, as groups of corners. A corner's number is three times the triangle, plus 0, 1 or 2.
 pub(crate) fn fans(mesh: &TriMesh) -> Groups {
     connected_corners(mesh, &sides(mesh))
 }
 
-/// For each triangle the connected part it belongs to, and their number; parts are numbered by their first
-/// triangle.
+/// Connected part of each triangle, and the number of parts. Parts are numbered by their first triangle.
 pub(crate) fn components(mesh: &TriMesh) -> (Vec<u32>, usize) {
     let mut faces = connected_faces(mesh, &sides(mesh));
     let mut number = vec![None; mesh.triangles.len()];
@@ -235,12 +234,12 @@ pub(crate) fn components(mesh: &TriMesh) -> (Vec<u32>, usize) {
     (part_of_face, n_parts as usize)
 }
 
-/// An edge with one triangle, as that runs along it.
+/// Edge with one triangle, in the direction in which the triangle traverses it.
 pub(crate) struct OpenEdge {
     pub(crate) from: u32,
     pub(crate) to: u32,
     pub(crate) face: u32,
-    /// Which side of the triangle: 0, 1 or 2.
+    /// Side of the triangle: 0, 1 or 2.
     pub(crate) side: u8,
 }
 
@@ -250,7 +249,7 @@ impl OpenEdge {
     }
 }
 
-/// All edges with one triangle, in the order of their points.
+/// All edges with one triangle, sorted by their points.
 pub(crate) fn open_edges(mesh: &TriMesh) -> Vec<OpenEdge> {
     let sides = sides(mesh);
     let single = sides.chunk_by(Side::same_edge).filter(|edge| edge.len() == 1);
@@ -268,12 +267,12 @@ pub(crate) fn open_edges(mesh: &TriMesh) -> Vec<OpenEdge> {
         .collect()
 }
 
-/// The part of [`inspect`] about edges.
+/// Runs the part of [`inspect`] that counts edges.
 pub(crate) fn inspect_edges(mesh: &TriMesh) -> Edges {
     count_edges(mesh, &sides(mesh))
 }
 
-/// A triangle's side: from corner `corner` (three times the face, plus 0, 1 or 2) to the next.
+/// Side of a triangle, from corner `corner` (three times the face, plus 0, 1 or 2) to the next one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Side {
     pub(crate) low: u32,
@@ -286,7 +285,7 @@ impl Side {
         (self.low, self.high) == (other.low, other.high)
     }
 
-    /// Which of the two corners of this side is at point `end`.
+    /// Corner of this side that is at point `end`; there are two.
     fn corner_at(&self, mesh: &TriMesh, end: u32) -> u32 {
         let (face, k) = (self.corner / 3, self.corner % 3);
         if mesh.triangles[face as usize][k as usize] == end {
@@ -305,7 +304,7 @@ impl Side {
     }
 }
 
-/// All sides, those of an edge next to each other.
+/// All sides of all triangles, with sides of the same edge next to each other.
 pub(crate) fn sides(mesh: &TriMesh) -> Vec<Side> {
     let all = || {
         mesh.triangles.iter().zip(0_u32..).flat_map(|(&[a, b, c], face)| {
@@ -316,8 +315,8 @@ pub(crate) fn sides(mesh: &TriMesh) -> Vec<Side> {
             })
         })
     };
-    // Sides of the same lower point are put next to each other by counting; the few of a point are sorted
-    // then, which is several times faster than sorting all.
+    // A counting sort groups the sides by their lower point. Sorting the few sides of each point afterwards
+    // makes this several times faster than sorting all sides at once.
     let mut begin = vec![0_u32; mesh.points.len() + 1];
     all().for_each(|side| begin[side.low as usize + 1] += 1);
     for point in 0..mesh.points.len() {
@@ -403,7 +402,7 @@ fn pinched(mesh: &TriMesh, corners: &mut Groups) -> Spots {
 }
 
 fn bodies(mesh: &TriMesh, faces: &mut Groups) -> Vec<ClosedPart> {
-    /// A group that has no body yet.
+    /// Marks a group that has no body yet.
     const NEW: u32 = u32::MAX;
     let mut body_of = vec![NEW; mesh.triangles.len()];
     let mut bodies: Vec<ClosedPart> = Vec::new();

@@ -17,8 +17,8 @@ fn a_cube_is_one_body_indexed_or_not() {
 
 #[test]
 fn touching_along_an_edge_is_sound_as_indexed_and_broken_as_a_soup() {
-    // Two cubes that touch along an edge are two bodies as indexed, four triangles on an
-    // edge once their points are merged.
+    // Two cubes that touch along an edge are two bodies as indexed. Once their points are merged, that edge
+    // has four triangles.
     let mesh = both(cube(Vec3::ZERO, 1.0), cube(Vec3::new(1.0, 1.0, 0.0), 1.0));
     assert_eq!(crate::weld::close(&mesh).mesh, mesh);
     assert!(matches!(error(&mesh), InputError::Bodies(bodies) if bodies.len() == 2));
@@ -108,8 +108,8 @@ fn a_triangle_with_two_sides_is_flat() {
 
 #[test]
 fn a_pinched_point_is_found() {
-    // A torus of 3 × 3 quads that narrows to one point: all points of one meridian become one, then the two
-    // fans of the horn meet there.
+    // A torus of 3 × 3 quads that narrows to one point: all points of one meridian become one, so that the
+    // two fans of the horn meet there.
     let (n, m) = (4_u32, 3_u32);
     let turn = |i: u32, n: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
     let mut points = vec![Vec3::new(3.0, 0.0, 0.0)];

@@ -1,33 +1,33 @@
-//! How deep one solid gets into another.
+//! Penetration depth of one solid in another.
 
 use super::pair::{nearest_on, pierced_at};
 use super::{Shape, TOUCH_MM};
 use crate::{TriMesh, Vec3};
 
-/// A depth is found to within this, mm: a tenth of what a measuring gauge of a workshop tells apart.
+/// Accuracy of depths, mm: a tenth of what a workshop's measuring gauge resolves.
 pub(super) const DEPTH_TOLERANCE_MM: f64 = 1e-4;
 
-/// The deepest point found so far.
+/// Deepest point found so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Deepest {
-    /// Depth, mm, ≥ 0.
+    /// Depth of the point, mm, ≥ 0.
     pub depth_mm: f64,
-    /// Travel at which it is reached, mm.
+    /// Travel at which the depth is reached, mm.
     pub travel_mm: f64,
-    /// The point, and the nearest one of the other surface; the other solid is where its mesh is.
+    /// Deepest point, mm, in coordinates in which the other solid is at rest.
     pub point: Vec3,
-    /// The nearest point of the other surface.
+    /// Nearest point of the other surface, mm.
     pub surface: Vec3,
 }
 
-/// A triangle of the moving shape and one of the fixed one; or the two ends of an edge, which name it.
+/// Indices of a triangle of the moving shape and of one of the fixed shape, or of the two ends of an edge.
 type Pair = (u32, u32);
 
 /// A motion of one shape past another that is at rest.
 pub(super) struct Passage<'a> {
-    /// What moves.
+    /// Shape that moves past the other.
     pub moving: &'a Shape,
-    /// What it passes.
+    /// Shape that is at rest.
     pub fixed: &'a Shape,
     /// Unit vector of the motion, or zero.
     pub along: Vec3,
@@ -35,7 +35,7 @@ pub(super) struct Passage<'a> {
     pub travels: [f64; 2],
 }
 
-/// A straight line on which a point of the moving surface may be, from one travel to another.
+/// A straight line of possible points of the moving surface, from one travel to another.
 #[derive(Clone, Copy)]
 struct Track {
     ends: [Vec3; 2],
@@ -59,10 +59,10 @@ impl Track {
 }
 
 impl Passage<'_> {
-    /// Deepens `best` by what corners of the moving surface reach at any travel, and points of its edges at
-    /// the first one.
+    /// Raises `best` to the deepest point of the moving surface: corners at any travel, and edges at the
+    /// first.
     ///
-    /// `crossings` are the pairs (moving, fixed) of triangles that touch at any travel, sorted; `near` are
+    /// `crossings` are the pairs (moving, fixed) of triangles that touch at any travel, sorted. `near` are
     /// the moving triangles that may be inside.
     pub fn deepen(&self, near: &[u32], crossings: &[(u32, u32)], best: &mut Deepest) {
         let mut tracks: Vec<(Pair, Track, &[Pair])> = Vec::new();
@@ -75,7 +75,7 @@ impl Passage<'_> {
         for face in self.swallowed(near, crossings) {
             tracks.extend(self.tracks(face).map(|(name, track)| (name, track, &[][..])));
         }
-        // A track is found from each of its triangles; what crosses it crosses them all.
+        // Each triangle of an edge finds the same track, with the same crossings; one is enough.
         tracks.sort_by_key(|t| t.0);
         tracks.dedup_by_key(|t| t.0);
         for (_, track, crossed) in tracks {
@@ -85,8 +85,8 @@ impl Passage<'_> {
         }
     }
 
-    /// Paths of the three corners, named by the corner twice, and the edges at the first travel, named by
-    /// their ends.
+    /// Tracks of a triangle: paths of its three corners, named by the corner twice, and its edges at the
+    /// first travel, named by their ends.
     fn tracks(&self, face: u32) -> impl Iterator<Item = ((u32, u32), Track)> {
         let mesh = self.moving.solid.mesh();
         let t = mesh.triangles[face as usize];
@@ -114,12 +114,12 @@ impl Passage<'_> {
         paths.into_iter().filter(move |_| far > from).chain(sides)
     }
 
-    /// The parts of `track` that may be inside, given all triangles that it crosses.
+    /// Parts of `track` that may be inside, given all triangles that cross it.
     fn parts_inside(&self, track: Track, crossed: &[(u32, u32)]) -> Vec<Track> {
         let mesh = self.fixed.solid.mesh();
         let [p, q] = track.ends;
         let length_mm = p.distance(q);
-        // Places where the surface is passed, and whether it is inwards, outwards or both.
+        // Places where the track passes the surface, with two flags: inwards, and outwards.
         let mut passed: Vec<(f64, bool, bool)> = crossed
             .iter()
             .filter_map(|&(_, f)| {
@@ -143,7 +143,7 @@ impl Passage<'_> {
             .chain(&ends[1..])
             .copied()
             .collect();
-        // Beyond a place where the track only leaves, and before one where it only enters, it is outside.
+        // The track is outside after a place where it only leaves, and before one where it only enters.
         let may_be_inside =
             |w: &&[(f64, bool, bool)]| w[0].1 && w[1].2 && (w[1].0 - w[0].0) * length_mm > TOUCH_MM;
         all.windows(2)
@@ -152,10 +152,10 @@ impl Passage<'_> {
             .collect()
     }
 
-    /// Deepens `best` by the deepest point of `track`.
+    /// Raises `best` to the deepest point of `track`, by branch and bound.
     ///
-    /// Branch and bound: no point is deeper than its distance to any one triangle, and that is a convex
-    /// function, so it is greatest at an end.
+    /// No point is deeper than its distance to any one triangle. This distance is convex along the track, so
+    /// its maximum is at an end.
     fn dive(&self, track: Track, best: &mut Deepest) {
         let mesh = self.fixed.solid.mesh();
         let mut todo = vec![track];
@@ -171,7 +171,7 @@ impl Passage<'_> {
             if bound_mm <= best.depth_mm + DEPTH_TOLERANCE_MM {
                 continue;
             }
-            // Along a plane face the deeper end is the deepest point, and ends the search.
+            // Along a plane face the deeper end is the deepest point, and the search ends there.
             let end = if to_p > to_q { 0.0 } else { 1.0 };
             self.probe(track.part(end, end), best);
             if bound_mm > best.depth_mm + DEPTH_TOLERANCE_MM {
@@ -180,10 +180,11 @@ impl Passage<'_> {
         }
     }
 
-    /// Depth of a single point, negative outside, and the nearest triangle. Deepens `best`.
+    /// Depth of a single point, negative outside, and its nearest triangle. Raises `best`.
     ///
-    /// Sheets that lie within rounding of each other may cross, and then the normals there tell the wrong
-    /// side. So what would deepen `best`, which happens rarely, is asked of the whole surface.
+    /// Sheets within rounding of each other may cross, and normals there can give the wrong side. A point
+    /// that would raise `best`, which is rare, is therefore checked by the winding number of the whole
+    /// surface.
     fn probe(&self, point: Track, best: &mut Deepest) -> Option<(f64, u32)> {
         let x = point.ends[0];
         let near = self.fixed.distance.at(x, f64::INFINITY)?;
@@ -202,8 +203,8 @@ impl Passage<'_> {
         Some((near.signed_mm, near.face))
     }
 
-    /// Those triangles of `near` that are inside at every travel. Triangles that cross nothing and share
-    /// points are all on one side, so one point tells it of all.
+    /// Triangles of `near` that are inside at every travel. Connected triangles without crossings are all on
+    /// one side, so a test of one point decides for all of them.
     fn swallowed(&self, near: &[u32], crossings: &[(u32, u32)]) -> Vec<u32> {
         let mesh = self.moving.solid.mesh();
         let is_free = |f: &u32| crossings.binary_search_by_key(f, |c| c.0).is_err();
@@ -233,7 +234,7 @@ impl Passage<'_> {
     }
 }
 
-/// The leader of `v`'s group; shortens the way to it.
+/// Finds the leader of `v`'s group, and shortens the path to it.
 fn led_by(leader: &mut [u32], mut v: u32) -> u32 {
     while leader[v as usize] != v {
         leader[v as usize] = leader[leader[v as usize] as usize];
@@ -242,7 +243,7 @@ fn led_by(leader: &mut [u32], mut v: u32) -> u32 {
     v
 }
 
-/// How often a closed surface winds around `q`: 1 inside, 0 outside. [Jacobson2013, eq. 5], after
+/// Winding number of a closed surface around `q`: 1 inside, 0 outside. [Jacobson2013, eq. 5], after
 /// [VanOosterom1983].
 fn winding_number(mesh: &TriMesh, q: Vec3) -> f64 {
     let half_angles = (0..mesh.triangles.len()).map(|f| {
@@ -269,8 +270,8 @@ mod tests {
 
     #[test]
     fn a_flap_turned_inside_out_does_not_make_the_outside_deep() {
-        // The flap over the cube is as thin as rounding; what is above and below it is outside, whatever its
-        // normals say.
+        // The flap over the cube is as thin as rounding. Points above and below it are outside, although its
+        // normals may say otherwise.
         let mut mesh = cuboid([0.0; 3], [4.0; 3]).to_mesh();
         let flap = cuboid([1.0, 1.0, 4.5], [3.0, 3.0, 4.5 + 1e-7]).to_mesh();
         let first = mesh.points.len() as u32;
@@ -305,7 +306,7 @@ mod tests {
 
     #[test]
     fn depth_along_a_track_is_that_of_dense_samples() {
-        // An L: the deepest point of the diagonal is neither an end nor a middle.
+        // An L-shaped body: the deepest point of its diagonal is neither an end nor the midpoint.
         let solid = cuboid([0.0; 3], [6.0, 2.0, 3.0]).union(&cuboid([0.0; 3], [2.0, 5.0, 3.0]));
         let fixed = Shape::new(&Solid::new(solid.to_mesh()).unwrap());
         let passage = Passage {

@@ -1,19 +1,19 @@
-//! Two triangles: least distance at rest, and over all travels of one along z.
+//! Least distance of two triangles, at rest or over all travels of one along z.
 
 use super::TOUCH_MM;
 use crate::bvh::nearest_on_triangle;
 use crate::{Aabb, Vec3};
 
-/// Where two triangles come nearest.
+/// Nearest approach of two triangles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Approach {
-    /// Squared distance, mm².
+    /// Squared least distance, mm².
     pub distance_sq: f64,
-    /// Travel of the first triangle at which they are that near.
+    /// Travel of the first triangle at which the distance is least, mm.
     pub travel_mm: f64,
-    /// Point of the first triangle, moved.
+    /// Point on the first triangle at that travel.
     pub on_a: Vec3,
-    /// Point of the second one.
+    /// Point on the second triangle.
     pub on_b: Vec3,
 }
 
@@ -43,11 +43,11 @@ impl Approach {
     }
 }
 
-/// Least distance of `a + t·z` to `b` over `t` in `[from, far]`, where it is at most `√limit_sq`.
+/// Least distance of `a + t·z` to `b` over `t` in `[from, far]`; `None` if it exceeds `√limit_sq`.
 ///
-/// The distance is a convex function of `t`, and nowhere less than that of the two shadows along z. So any
-/// `t` at which the shadows' distance is attained is a least one; where it lies outside the travels, the
-/// nearer end of them is.
+/// The distance is convex in `t` and at least the distance of the two shadows along z. Any `t` that attains
+/// the shadows' distance is therefore a minimum. If that `t` is outside the travels, the nearer end of these
+/// is the minimum.
 pub(super) fn swept(a: [Vec3; 3], b: [Vec3; 3], [from, far]: [f64; 2], limit_sq: f64) -> Option<Approach> {
     let free = if from == far {
         None
@@ -67,7 +67,7 @@ pub(super) fn swept(a: [Vec3; 3], b: [Vec3; 3], [from, far]: [f64; 2], limit_sq:
     (best.distance_sq <= limit_sq).then_some(Approach { travel_mm, ..best })
 }
 
-/// Least distance of the shadows along z, and one pair of points that has it.
+/// Least distance of the shadows along z, and one pair of points that attains it.
 fn between_shadows(a: [Vec3; 3], b: [Vec3; 3]) -> Approach {
     let flat = |p: Vec3| p.with_z(0.0);
     let touch = |on_a: Vec3, on_b: Vec3| Approach {
@@ -113,7 +113,7 @@ fn between_shadows(a: [Vec3; 3], b: [Vec3; 3]) -> Approach {
     best
 }
 
-/// Least distance of two triangles, 0 where they meet, if it is at most `√limit_sq`.
+/// Least distance of two triangles, 0 where they meet; `None` if it exceeds `√limit_sq`.
 pub(super) fn at_rest(a: [Vec3; 3], b: [Vec3; 3], limit_sq: f64) -> Option<Approach> {
     let apart_sq = plane_gap_sq(a, b).max(plane_gap_sq(b, a));
     if apart_sq > limit_sq {
@@ -143,7 +143,7 @@ pub(super) fn at_rest(a: [Vec3; 3], b: [Vec3; 3], limit_sq: f64) -> Option<Appro
     (best.distance_sq <= limit_sq).then_some(best)
 }
 
-/// The point of a triangle nearest to `q`; of its edges where it has no area.
+/// Point of a triangle nearest to `q`; on its edges if the triangle has no area.
 pub(super) fn nearest_on(t: [Vec3; 3], q: Vec3) -> Vec3 {
     let longest_sq = edges(t)
         .iter()
@@ -160,8 +160,9 @@ pub(super) fn nearest_on(t: [Vec3; 3], q: Vec3) -> Vec3 {
         .unwrap_or(t[0])
 }
 
-/// Where the segment `pq` passes through triangle `t`: `u` in [0, 1] along it. A hair beyond the triangle's
-/// edges counts, so that no segment slips between two triangles; what lies in the triangle's plane does not.
+/// Parameter `u` in [0, 1] at which segment `pq` passes through triangle `t`. The triangle is minimally
+/// enlarged, so that no segment slips between two triangles. A segment in the triangle's plane does not
+/// count.
 pub(super) fn pierced_at(p: Vec3, q: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
     let n = (b - a).cross(c - a);
     let (above_p, above_q) = (n.dot(p - a), n.dot(q - a));
@@ -179,20 +180,20 @@ pub(super) fn pierced_at(p: Vec3, q: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> 
 
 /// Squared sine below which a triangle counts as having no area.
 const FLAT: f64 = 1e-24;
-/// How far outside a triangle a segment may pass and still count as piercing it, in barycentric coordinates.
+/// Distance outside a triangle at which a segment still counts as piercing it, in barycentric coordinates.
 const EDGE_SLACK: f64 = 1e-9;
 
-/// The three edges.
+/// The three edges of a triangle.
 pub(super) fn edges([a, b, c]: [Vec3; 3]) -> [(Vec3, Vec3); 3] {
     [(a, b), (b, c), (c, a)]
 }
 
-/// The box around a triangle moved by all travels.
+/// Bounding box of a triangle moved by all travels.
 pub(super) fn swept_box(t: [Vec3; 3], [from, far]: [f64; 2]) -> Aabb {
     raised(Aabb::around(t), [from, far])
 }
 
-/// A box moved along z by all travels.
+/// Bounding box of a box moved along z by all travels.
 pub(super) fn raised(b: Aabb, [from, far]: [f64; 2]) -> Aabb {
     Aabb {
         min: b.min + from * Vec3::Z,
@@ -208,7 +209,7 @@ pub(super) fn box_distance_sq(a: Aabb, b: Aabb) -> f64 {
         .length_squared()
 }
 
-/// Squared distance of `a` to the plane of `b`: 0 where it crosses the plane or `b` has none.
+/// Squared distance of `a` from the plane of `b`; 0 if `a` crosses the plane or `b` has none.
 fn plane_gap_sq(a: [Vec3; 3], b: [Vec3; 3]) -> f64 {
     let n = (b[1] - b[0]).cross(b[2] - b[0]);
     let above = a.map(|p| n.dot(p - b[0]));
@@ -224,8 +225,8 @@ fn plane_gap_sq(a: [Vec3; 3], b: [Vec3; 3]) -> f64 {
     }
 }
 
-/// Height at which the vertical line through `p` meets triangle `t`; `None` beside it and for upright
-/// triangles.
+/// Height at which the vertical line through `p` meets triangle `t`; `None` if it misses the triangle, or if
+/// that is vertical.
 fn height_over([a, b, c]: [Vec3; 3], p: Vec3) -> Option<f64> {
     let cross = |u: Vec3, v: Vec3| u.x * v.y - u.y * v.x;
     let (wa, wb, wc) = (cross(b - p, c - p), cross(c - p, a - p), cross(a - p, b - p));
@@ -237,27 +238,27 @@ fn height_over([a, b, c]: [Vec3; 3], p: Vec3) -> Option<f64> {
         .fold(0.0, f64::max);
     let is_wide = doubled_area * doubled_area > FLAT * longest_sq * longest_sq;
     let over = (is_over && is_wide).then(|| (wa * a + wb * b + wc * c) / doubled_area);
-    // Of a triangle that is upright but for rounding, signs and weights say nothing.
+    // For a triangle that is vertical up to rounding, signs and weights are meaningless.
     over.filter(|x| is_same_shadow(*x, p)).map(|x| x.z)
 }
 
-/// Whether two points are one as seen along z, to a rounding of coordinates.
+/// Returns true if two points coincide as seen along z, up to rounding of coordinates.
 fn is_same_shadow(p: Vec3, q: Vec3) -> bool {
     (p - q).truncate().length_squared() <= TOUCH_MM * TOUCH_MM
 }
 
-/// Where the shadows of `pq` and `rs` along z cross, as parameters of both.
+/// Parameters on `pq` and `rs` at which their shadows along z cross.
 fn flat_crossing(p: Vec3, q: Vec3, r: Vec3, s: Vec3) -> Option<(f64, f64)> {
     let cross = |u: Vec3, v: Vec3| u.x * v.y - u.y * v.x;
     let (p_side, q_side) = (cross(s - r, p - r), cross(s - r, q - r));
     let (r_side, s_side) = (cross(q - p, r - p), cross(q - p, s - p));
     let is_crossing = p_side * q_side < 0.0 && r_side * s_side < 0.0;
     let crossing = is_crossing.then(|| (p_side / (p_side - q_side), r_side / (r_side - s_side)));
-    // Shadows that lie on one line but for rounding seem to cross anywhere.
+    // Shadows that are collinear up to rounding seem to cross anywhere.
     crossing.filter(|&(u, v)| is_same_shadow(p.lerp(q, u), r.lerp(s, v)))
 }
 
-/// Parameter in [0, 1] of the point of `ab` nearest to `q`; 0 where the ends are one.
+/// Parameter in [0, 1] of the point of `ab` nearest to `q`; 0 if both ends coincide.
 fn nearest_parameter(a: Vec3, b: Vec3, q: Vec3) -> f64 {
     let (along, length_sq) = ((b - a).dot(q - a), (b - a).length_squared());
     if length_sq > 0.0 {
@@ -267,7 +268,7 @@ fn nearest_parameter(a: Vec3, b: Vec3, q: Vec3) -> f64 {
     }
 }
 
-/// The nearest points of two segments where both lie between the ends; other cases are a corner's.
+/// Nearest points of two segments, if both lie between the ends. Other cases are covered by the corners.
 /// [Ericson2005, 5.1.9]
 fn inner_approach(p: Vec3, q: Vec3, r: Vec3, s: Vec3) -> Option<(Vec3, Vec3)> {
     let (d, e, w) = (q - p, s - r, p - r);

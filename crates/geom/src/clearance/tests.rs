@@ -20,7 +20,7 @@ fn random_point(rng: &mut ChaCha8Rng) -> Vec3 {
     Vec3::new(rng.random(), rng.random(), rng.random())
 }
 
-/// A few random tetrahedra, joined.
+/// Body of a few random tetrahedra, united.
 fn lump(rng: &mut ChaCha8Rng, shift: Vec3) -> Volume {
     let mut part = || Volume::hull(&[0; 4].map(|_| shift + 3.0 * random_point(rng)));
     Volume::union_all(vec![part(), part(), part()])
@@ -30,7 +30,7 @@ fn moved(t: [Vec3; 3], by: Vec3) -> [Vec3; 3] {
     t.map(|p| p + by)
 }
 
-/// Least distance of all pairs of triangles, `a` moved by `by`.
+/// Least distance over all pairs of triangles, with `a` moved by `by`.
 fn by_brute_force(a: &TriMesh, b: &TriMesh, by: Vec3) -> f64 {
     let faces = |m: &TriMesh| 0..m.triangles.len();
     faces(a)
@@ -221,7 +221,7 @@ fn a_cube_in_a_channel_keeps_the_gap_of_its_walls() {
         .unwrap();
         assert!((found.gap_mm - 0.07).abs() < 1e-12, "{found:?}");
     }
-    // A ring in the way is reached when the cube is there, and entered as deep as it stands out.
+    // The cube reaches a ring in its path, and enters it as deeply as the ring protrudes.
     let ring =
         cuboid([-1.5, -1.5, 9.0], [1.5, 1.5, 11.0]).subtract(&cuboid([-0.88, -1.4, 8.0], [1.4, 1.4, 12.0]));
     let found = swept_gap(
@@ -271,7 +271,7 @@ fn a_ball_passes_a_cylinder_at_the_distance_of_their_axes() {
         5.0,
     )
     .unwrap();
-    // Axes pass at 4 mm; both are polyhedra inside their round shapes.
+    // The axes are 4 mm apart at the nearest; both bodies are polyhedra inside the round shapes.
     assert!(found.gap_mm > 0.5 && found.gap_mm < 0.53, "{found:?}");
     assert!(
         (found.travel_mm - 9.0).abs() < 0.5 && found.at.distance(Vec3::new(9.0, 2.25, 0.0)) < 0.7,
@@ -441,7 +441,7 @@ fn nearest_points_of_triangles_with_area_are_those_of_the_bvh() {
     }
 }
 
-/// Two keys' undersides that slide within one plane: their shadows lie on a line, but for rounding.
+/// Undersides of two keys that slide within one plane: their shadows are collinear up to rounding.
 #[test]
 fn where_triangles_in_one_plane_come_nearest_both_of_them_are() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -449,13 +449,13 @@ fn where_triangles_in_one_plane_come_nearest_both_of_them_are() {
         let size = 10f64.powf(1.0 - 4.0 * rng.random::<f64>());
         let along = (random_point(&mut rng) - 0.5 * Vec3::ONE).normalize();
         let (x, y) = along.any_orthonormal_pair();
-        // Not along an axis, where rounding would do no harm.
+        // The motion is not along an axis, where rounding would do no harm.
         let (sin, cos) = rng.random::<f64>().sin_cos();
         let x = cos * x + sin * y;
         let origin = 100.0 * random_point(&mut rng);
         let mut corner = || origin + size * (rng.random::<f64>() * along + rng.random::<f64>() * x);
         let (a, mut b) = ([0; 3].map(|_| corner()), [0; 3].map(|_| corner()));
-        // Beside the way, behind, or in it; near or far.
+        // The second triangle is beside, behind or in the path, near or far.
         let off_mm = size * 10f64.powi(case % 5 - 1);
         b = moved(
             b,

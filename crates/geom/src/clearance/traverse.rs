@@ -1,11 +1,11 @@
-//! Pairs of triangles that come near, found by descending two trees at once.
+//! Pairs of nearby triangles, found by descending two hierarchies at once.
 
 use super::pair::{box_distance_sq, raised, swept_box};
 use crate::bvh::TriangleBvh;
 
-/// Calls `near(i, j, limit_sq)` for all triangles `i` of `a` (moved along z by all `travels`) and `j` of `b`,
-/// in the trees' own order, whose boxes come within `√limit_sq`; `near` may lower the limit. Nearer boxes
-/// come first.
+/// Calls `near(i, j, limit_sq)` for all pairs of triangles with bounding boxes within `√limit_sq` of each
+/// other. `i` is a triangle of `a`, moved along z by all `travels`, and `j` one of `b`, both in leaf order.
+/// `near` may lower the limit. Nearer boxes come first.
 pub(super) fn for_near_pairs(
     a: &TriangleBvh,
     b: &TriangleBvh,

@@ -1,12 +1,12 @@
-//! The cheapest cut of a graph between a source and a sink: shortest loops around openings.
+//! Minimum cut of a graph between a source and a sink, which gives the shortest loops around openings.
 
 use std::collections::VecDeque;
 
-/// A graph of nodes and undirected edges that carry up to a capacity. [Dinic1970]
+/// A graph of nodes and undirected edges with capacities. [Dinic1970]
 pub(super) struct Network {
-    /// For each node the arcs that leave it.
+    /// Arcs that leave each node.
     leaving: Vec<Vec<u32>>,
-    /// Where each arc goes, and what it can still carry; arc `a ^ 1` is the way back.
+    /// Head and residual capacity of each arc; arc `a ^ 1` is its reverse.
     arcs: Vec<(u32, u64)>,
 }
 
@@ -25,8 +25,8 @@ impl Network {
         self.leaving[b as usize].push(arc + 1);
     }
 
-    /// Which nodes stay with the source where the cheapest cut parts it from the sink: of several such cuts, the
-    /// one nearest to the source.
+    /// Marks the nodes on the source's side of the minimum cut. Of several minimum cuts, takes the one
+    /// nearest to the source.
     pub(super) fn near_source(mut self, source: u32, sink: u32) -> Vec<bool> {
         loop {
             let steps = self.steps_from(source);
@@ -38,7 +38,7 @@ impl Network {
         }
     }
 
-    /// How many arcs with room each node is from the source.
+    /// Distance of each node from the source, in arcs with residual capacity.
     fn steps_from(&self, source: u32) -> Vec<Option<u32>> {
         let mut steps = vec![None; self.leaving.len()];
         steps[source as usize] = Some(0);
@@ -55,7 +55,7 @@ impl Network {
         steps
     }
 
-    /// Sends what fits along one of the shortest ways; false where none is left.
+    /// Sends flow along one of the shortest paths. Returns false if no path is left.
     fn push(&mut self, source: u32, sink: u32, steps: &[Option<u32>], tried: &mut [usize]) -> bool {
         let mut way: Vec<u32> = Vec::new();
         let mut node = source;
@@ -72,7 +72,7 @@ impl Network {
                     }
                 }
                 None => {
-                    // A dead end: one step back, and another way.
+                    // A dead end: go back one step and take another arc.
                     let Some(arc) = way.pop() else { return false };
                     node = self.arcs[(arc ^ 1) as usize].0;
                     tried[node as usize] += 1;
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn the_cheapest_of_equal_cuts_lies_nearest_to_the_source() {
-        // A row of nodes with a wide, two narrow and a wide edge.
+        // A row of nodes with one wide, two narrow and one wide edge.
         let mut row = Network::new(5);
         for (a, capacity) in [9, 2, 2, 9].into_iter().enumerate() {
             row.join(a as u32, a as u32 + 1, capacity);

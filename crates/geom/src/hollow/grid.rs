@@ -1,14 +1,15 @@
-//! A grid of nodes around a solid: which nodes lie outside it, and which grid edges its surface crosses.
+//! Grid of nodes around a solid, with the nodes inside the solid and the grid edges that its surface crosses.
 
 use crate::{Solid, TriMesh, Vec3};
 
-/// Nodes of a grid, about: cells of a fiftieth of the size of a compact figure. More find no more.
+/// Approximate number of nodes, which makes cells a fiftieth of a compact figure's size. More nodes find no
+/// more.
 const N_NODES: f64 = 130_000.0;
-/// Cells along the longest side, at most.
+/// Largest number of cells along the longest side.
 const MOST_CELLS: f64 = 128.0;
-/// Nodes beyond the box on each side; the outermost layer is free.
+/// Number of cells beyond the box on each side; the outermost layer is free.
 const MARGIN: f64 = 1.5;
-/// Nodes are moved by these shares of a cell, so that no grid line meets the edges of models on whole numbers.
+/// Shift of the nodes, in cells, so that no grid line meets the edges of models with integer coordinates.
 const SHIFT: Vec3 = Vec3::new(0.137_241, 0.211_869, 0.317_453);
 
 /// Nodes of a regular grid; x runs fastest.
@@ -16,14 +17,15 @@ pub(super) struct Grid {
     origin: Vec3,
     pub(super) cell_mm: f64,
     n: [usize; 3],
-    /// Bit `axis` of a node: the surface crosses the edge to the next node along that axis, or there is none.
+    /// Bit `axis` of a node is set if the surface crosses the edge to the next node along that axis, or that
+    /// node is missing.
     crossed: Vec<u8>,
-    /// Nodes in the solid.
+    /// True for nodes inside the solid.
     is_solid: Vec<bool>,
 }
 
 impl Grid {
-    /// The grid around `solid`; O(n) for its triangles and the grid edges that they cross.
+    /// Builds the grid around `solid`, in linear time in its triangles and the grid edges that they cross.
     pub(super) fn new(solid: &Solid) -> Self {
         let mesh = solid.mesh();
         let bounds = mesh.bounds();
@@ -73,7 +75,7 @@ impl Grid {
         [1, self.n[0], self.n[0] * self.n[1]]
     }
 
-    /// Nodes in a row along x.
+    /// Number of nodes in a row along x.
     pub(super) fn row(&self) -> usize {
         self.n[0]
     }
@@ -88,7 +90,7 @@ impl Grid {
         self.origin + self.cell_mm * Vec3::new(i as f64, j as f64, k as f64)
     }
 
-    /// Whether the node belongs to the outermost layer.
+    /// Returns true if the node belongs to the outermost layer.
     pub(super) fn is_border(&self, node: usize) -> bool {
         self.place(node)
             .iter()
@@ -96,11 +98,11 @@ impl Grid {
             .any(|(&at, n)| at == 0 || at + 1 == n)
     }
 
-    /// The nodes next to `node` that a grid edge joins to it without crossing the surface.
+    /// Neighbours of `node` along grid edges that do not cross the surface.
     pub(super) fn joined(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
         let strides = self.strides();
         let is_open = move |at: usize, axis: usize| self.crossed[at] >> axis & 1 == 0;
-        // Before the first node of a row stands the last one of another, which no edge leaves.
+        // The node before the first of a row is the last of another row, whose edge is marked as crossed.
         (0..3).flat_map(move |axis| {
             let on = is_open(node, axis).then(|| node + strides[axis]);
             let back = node.checked_sub(strides[axis]).filter(|&at| is_open(at, axis));
@@ -108,7 +110,7 @@ impl Grid {
         })
     }
 
-    /// The corners of the cell around `q`; fewer at the border.
+    /// Corners of the cell around `q`; fewer at the border.
     pub(super) fn corners_around(&self, q: Vec3) -> impl Iterator<Item = usize> + '_ {
         let at = (q - self.origin) / self.cell_mm;
         let low = at.to_array().map(|x| x.floor().max(0.0) as usize);
@@ -120,7 +122,7 @@ impl Grid {
         })
     }
 
-    /// How many free nodes have the surface on both sides along all three axes.
+    /// Number of free nodes with the surface on both sides along all three axes.
     pub(super) fn n_enclosed(&self) -> usize {
         let mut n_axes = vec![0_u8; self.len()];
         for axis in 0..3 {
@@ -140,8 +142,8 @@ impl Grid {
             .count()
     }
 
-    /// Marks the edges along `axis` that triangle `face` crosses; along z, adds to `entered` how often a line
-    /// from below has entered the solid before the node above.
+    /// Marks the edges along `axis` that triangle `face` crosses. Along z, also counts in `entered`, at the
+    /// node above, how often an upward line enters the solid there.
     fn cross(&mut self, mesh: &TriMesh, face: usize, axis: usize, entered: &mut [i32]) {
         let (right, up) = ((axis + 1) % 3, (axis + 2) % 3);
         let names = mesh.triangles[face];
@@ -185,9 +187,9 @@ impl Grid {
     }
 }
 
-/// Twice the signed area of the origin and side `k` of a triangle, and on which side it counts as lying.
+/// Twice the signed area of the origin and side `k` of a triangle, and the side on which the origin counts.
 ///
-/// Both triangles of an edge compute the same number from it, so that a line meets just one of them.
+/// Both triangles of an edge compute the same number, so that a line meets exactly one of them.
 fn turn(names: [u32; 3], plane: [[f64; 2]; 3], k: usize) -> (f64, bool) {
     let (from, to) = (k, (k + 1) % 3);
     let area = |a: usize, b: usize| plane[a][0] * plane[b][1] - plane[a][1] * plane[b][0];

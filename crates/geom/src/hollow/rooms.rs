@@ -1,4 +1,4 @@
-//! The space around a solid, divided into the open and a cavity that only narrow ways lead into.
+//! Division of the space around a solid into the open and a cavity with only narrow ways in.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -8,26 +8,27 @@ use rayon::prelude::*;
 use super::grid::Grid;
 use crate::bvh::TriangleBvh;
 
-/// The widest ball that is tried in an opening: its radius as a share of the longest side, so that openings up
-/// to a fifth of the size are found.
+/// Radius of the widest ball that is tried in an opening, as a share of the longest side. Openings up to a
+/// fifth of the size are found.
 const WIDEST_SHARE: f64 = 0.125;
-/// A cavity is wider than its openings by this factor, at least. A hollow plate of 6 mm with walls of 2 mm has
+/// Least ratio of a cavity's width to its openings' width. A hollow plate of 6 mm with walls of 2 mm has
 /// little more.
 const LEAST_WIDENING: f64 = 1.2;
-/// Radii that are tried: the first as a share of a cell, each next larger by a factor.
+/// Radii that are tried: the first as a share of a cell, then each larger by a constant factor.
 const FIRST_CELLS: f64 = 0.35;
 const STEP: f64 = 1.3;
-/// The least radius counts that cuts off this share of what any radius cuts off.
+/// Share of the largest number of nodes cut off by any radius. The least radius that reaches this share is
+/// used.
 const MOST: f64 = 0.8;
 
-/// What a free node belongs to.
+/// Region that a free node belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Room {
     Open,
     Cavity,
 }
 
-/// The room of each free node of the grid; none where fewer than `least_nodes` nodes are cut off.
+/// Region of each free node of the grid; `None` if fewer than `least_nodes` nodes are cut off.
 pub(super) fn rooms(grid: &Grid, tree: &TriangleBvh, least_nodes: f64) -> Option<Vec<Option<Room>>> {
     let longest_mm = grid.longest_mm();
     let widest_mm = WIDEST_SHARE * longest_mm;
@@ -55,15 +56,15 @@ pub(super) fn rooms(grid: &Grid, tree: &TriangleBvh, least_nodes: f64) -> Option
     Some(room)
 }
 
-/// Distance from each free node to the surface, mm, at most `limit_mm`; the limit at the border, beyond which
-/// all is free, and 0 within the solid.
+/// Distance from each free node to the surface, mm, at most `limit_mm`. Border nodes, beyond which all is
+/// free, have the limit; nodes within the solid have 0.
 fn clearances(grid: &Grid, tree: &TriangleBvh, limit_mm: f64) -> Vec<f32> {
     let mut clearance = vec![0.0; grid.len()];
     let rows = clearance.par_chunks_mut(grid.row()).enumerate();
     rows.for_each(|(row, clearances)| {
         let mut before_mm = limit_mm;
         for (node, clearance) in (row * grid.row()..).zip(clearances) {
-            // Clearances of neighbours differ by a cell at most, and a search within less is faster.
+            // Clearances of neighbours differ by at most a cell, and a smaller limit makes the search faster.
             let within_mm = limit_mm.min(before_mm + (1.0 + 1e-9) * grid.cell_mm);
             let near = || tree.nearest(grid.position(node), within_mm * within_mm);
             before_mm = match grid.is_free(node) {
@@ -80,8 +81,8 @@ fn clearances(grid: &Grid, tree: &TriangleBvh, limit_mm: f64) -> Vec<f32> {
     clearance
 }
 
-/// The nodes where a ball of `radius_mm` has room: those that it reaches from outside, and those of cavities
-/// that are wider than it. Others have no room yet.
+/// Regions of the nodes where a ball of `radius_mm` fits: open if the ball gets there from outside, cavity if
+/// the ball is cut off and the region is wider than the ball. Other nodes have no region yet.
 fn seeds(grid: &Grid, clearance: &[f32], radius_mm: f32) -> Vec<Option<Room>> {
     let has_room = |node: usize| grid.is_free(node) && clearance[node] >= radius_mm;
     let mut room = vec![None; grid.len()];
@@ -100,7 +101,7 @@ fn seeds(grid: &Grid, clearance: &[f32], radius_mm: f32) -> Vec<Option<Room>> {
         }
         part
     };
-    // The border is all free and hangs together.
+    // The border is all free and connected.
     for node in reach(0, &mut is_seen) {
         room[node] = Some(Room::Open);
     }
@@ -117,15 +118,15 @@ fn seeds(grid: &Grid, clearance: &[f32], radius_mm: f32) -> Vec<Option<Room>> {
     room
 }
 
-/// Gives each free node that a way leads to the room that the widest way comes from.
+/// Gives each reachable free node the region to which its widest path leads.
 fn grow(grid: &Grid, clearance: &[f32], room: &mut [Option<Room>]) {
     let has_way_on = |node: usize| grid.joined(node).any(|other| room[other].is_none());
-    // The narrowest place of the way to a node, and the node.
+    // Pairs of the narrowest clearance on the path to a node, and the node.
     let mut todo: BinaryHeap<(u32, Reverse<usize>)> = (0..grid.len())
         .filter(|&node| room[node].is_some() && has_way_on(node))
         .map(|node| (clearance[node].to_bits(), Reverse(node)))
         .collect();
-    // Ways that get no narrower are followed at once.
+    // Paths that get no narrower are followed at once.
     let mut at_once: VecDeque<(u32, usize)> = VecDeque::new();
     while let Some((narrowest, node)) = at_once
         .pop_front()
@@ -137,7 +138,7 @@ fn grow(grid: &Grid, clearance: &[f32], room: &mut [Option<Room>]) {
             .collect::<Vec<_>>()
         {
             room[other] = room[node];
-            // Bits of numbers from 0 upwards have their order.
+            // Non-negative floats have the same order as their bits.
             let width = clearance[other].to_bits();
             if width >= narrowest {
                 at_once.push_back((narrowest, other));

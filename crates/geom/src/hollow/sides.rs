@@ -1,4 +1,5 @@
-//! Which triangles of a hollow body bound its cavity, and the rims between them and the others.
+//! Separation of a hollow body's triangles into those of its cavity and the others, and the rims between
+//! them.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -13,33 +14,32 @@ use crate::check::Groups;
 use crate::topology::{HalfEdge, Topology, components, ends};
 use crate::{TriMesh, Vec3};
 
-/// Where a triangle looks for a node that it sees: so many cells in front of it.
+/// Distances in front of a triangle at which it looks for a visible node, in cells.
 const LOOKS_CELLS: [f64; 3] = [0.6, 0.25, 1.2];
-/// Where sight begins in front of a triangle, as a share of a cell: more than rounding, less than any gap.
+/// Distance in front of a triangle from which it looks, in cells: more than rounding, less than any gap.
 const START_SHARE: f64 = 1e-5;
-/// Connected triangles of less than this share of the area of all on their side belong to the other side: folds
-/// that no ball reaches.
+/// Share of a side's area below which connected triangles change sides: they are folds that no ball reaches.
 const ISLAND_SHARE: f64 = 0.02;
-/// An edge counts as longer by this share for each wall that it lies deeper in an opening, so that of rims of
-/// the same length the outer one is the shortest.
+/// Relative lengthening of an edge for each wall thickness of depth in an opening, so that the outer one of
+/// equally long rims is the shortest.
 const DEPTH_SHARE: f64 = 0.2;
-/// Convex edges of more than 30° count as shorter by this factor: drilled holes have such rims, and the cavity may
-/// have narrower places behind them.
+/// Factor on the length of convex edges of more than 30°. Rims of drilled holes are such edges, and the
+/// cavity may have narrower places behind them.
 const CREASE_SHARE: f64 = 0.25;
 const COS_CREASE: f64 = 0.866_025_403_784_438_6;
-/// An opening is no deeper than so many walls.
+/// Largest depth of an opening, in wall thicknesses.
 const DEEPEST_WALLS: f64 = 1.5;
-/// Steps of the capacities, a millimetre.
+/// Number of capacity units per millimetre.
 const STEPS_PER_MM: f64 = 1e6;
 
-/// The surface, and which triangles bound the cavity.
+/// Surface of a body, with the triangles that bound its cavity marked.
 pub(super) struct Sides<'a> {
     pub(super) mesh: &'a TriMesh,
     pub(super) topology: &'a Topology,
     pub(super) is_cavity: Vec<bool>,
 }
 
-/// A closed line between triangles of the cavity and others: half-edges of the others.
+/// A closed line between triangles of the cavity and others, as half-edges of the others.
 pub(super) struct Rim {
     pub(super) edges: Vec<HalfEdge>,
     pub(super) center: Vec3,
@@ -48,7 +48,7 @@ pub(super) struct Rim {
 }
 
 impl<'a> Sides<'a> {
-    /// Each triangle has the room of a node that it sees, or that of its neighbours.
+    /// Assigns each triangle the region of a node that it sees, or the region of its neighbours.
     pub(super) fn new(
         mesh: &'a TriMesh,
         topology: &'a Topology,
@@ -101,7 +101,7 @@ impl<'a> Sides<'a> {
         }
     }
 
-    /// The lines between both sides; those that share a point count as one.
+    /// Lines between both sides; lines that share a point count as one.
     pub(super) fn rims(&self) -> Vec<Rim> {
         let is_cavity = |h: HalfEdge| self.is_cavity[h as usize / 3];
         let edges: Vec<HalfEdge> = (0..self.topology.n_half_edges() as u32)
@@ -138,18 +138,18 @@ impl<'a> Sides<'a> {
         }
     }
 
-    /// Where a half-edge begins and ends.
+    /// Start and end point of a half-edge, mm.
     pub(super) fn ends(&self, h: HalfEdge) -> [Vec3; 2] {
         let (from, to) = ends(self.mesh, h);
         [from, to].map(|v| self.mesh.points[v as usize])
     }
 
-    /// Moves each rim within its opening to where it is shortest, of such lines to the outermost. Openings are as
-    /// deep as a wall of `wall_mm`, or somewhat deeper.
+    /// Moves each rim within its opening to where it is shortest. Of equally short lines it takes the
+    /// outermost. Openings are assumed to be as deep as a wall of `wall_mm`, or somewhat deeper.
     pub(super) fn tighten(&mut self, wall_mm: f64, cell_mm: f64) {
         let is_free = self.near_rims(wall_mm, cell_mm);
         let depth_mm = self.depths(&is_free);
-        // Source and sink stand for all that is fixed.
+        // Source and sink represent all fixed triangles outside and in the cavity.
         let (source, sink) = (0, 1);
         let mut node = vec![source; self.is_cavity.len()];
         let mut n_nodes = 2;
@@ -178,8 +178,8 @@ impl<'a> Sides<'a> {
         }
     }
 
-    /// For each triangle, whether it is so near a rim that it may lie in its opening: within the ball around the
-    /// rim's middle that holds a channel as wide as the rim and as deep as openings are.
+    /// Marks the triangles that may lie in an opening: those within a ball around a rim's centre. The ball
+    /// contains a channel as wide as the rim and as deep as openings are.
     fn near_rims(&self, wall_mm: f64, cell_mm: f64) -> Vec<bool> {
         let reach_mm = |rim: &Rim| rim.radius_mm.hypot(DEEPEST_WALLS * wall_mm) + 2.0 * cell_mm;
         let near: Vec<(Vec3, f64)> = self
@@ -195,7 +195,7 @@ impl<'a> Sides<'a> {
         (0..self.is_cavity.len()).map(is_near).collect()
     }
 
-    /// Length of an edge, mm, less where it is a crease.
+    /// Length of an edge, mm, reduced if it is a crease.
     fn length(&self, h: HalfEdge) -> f64 {
         let [a, b] = self.ends(h);
         let other = self.topology.opposite(h);
@@ -205,7 +205,8 @@ impl<'a> Sides<'a> {
         a.distance(b) * if is_crease { CREASE_SHARE } else { 1.0 }
     }
 
-    /// How far each free triangle is along the surface from the fixed ones outside, mm; 0 for all that is fixed.
+    /// Distance along the surface of each free triangle from the fixed ones outside, mm; 0 for fixed
+    /// triangles.
     fn depths(&self, is_free: &[bool]) -> Vec<f64> {
         let mut depth_mm = vec![f64::INFINITY; is_free.len()];
         let mut todo = BinaryHeap::new();
@@ -224,7 +225,7 @@ impl<'a> Sides<'a> {
             }
             for other in self.topology.neighbours(face as u32).map(|f| f as usize) {
                 let way = self.mesh.face_center(face).distance(self.mesh.face_center(other));
-                // From a large triangle outside the way begins at its border.
+                // From a large triangle outside the path begins at its border.
                 let there = if is_free[face] { here + way } else { 0.0 };
                 if is_free[other] && there < depth_mm[other] {
                     depth_mm[other] = there;
@@ -239,7 +240,7 @@ impl<'a> Sides<'a> {
     }
 }
 
-/// The room of a node that triangle `face` sees from its outer side.
+/// Region of a node that triangle `face` sees from its outer side.
 fn room_seen(
     mesh: &TriMesh,
     face: usize,

@@ -28,8 +28,8 @@ fn found(volume: &Volume) -> Option<HollowBody> {
     find_hollow(&solid(volume), LEAST_SHARE)
 }
 
-/// Asserts that `drained` is `whole` with `cavity` and holes, given by place and width, and that filling it gives
-/// `whole`, and every triangle its own.
+/// Asserts that `drained` is `whole` with `cavity` and holes, given by place and width. Filling must give
+/// `whole` again, with the correct source of every triangle.
 fn assert_hollow(drained: &Volume, whole: f64, cavity: f64, wall: f64, holes: &[(Vec3, f64)]) {
     let drained = solid(drained);
     let hollow = find_hollow(&drained, LEAST_SHARE).expect("it is hollow");
@@ -72,7 +72,7 @@ fn assert_hollow(drained: &Volume, whole: f64, cavity: f64, wall: f64, holes: &[
 #[test]
 fn a_hollow_ball_with_a_drain_hole_has_its_wall_and_opening() {
     let whole = sphere(Vec3::ZERO, 40.0);
-    // The second hole is narrower than a cell, the last wall thicker than its hole is wide.
+    // The second hole is narrower than a cell; the last wall is thicker than its hole is wide.
     for (wall, width, out) in [
         (2.4, 6.0, Vec3::NEG_Z),
         (1.0, 1.0, Vec3::new(0.6, 0.0, 0.8)),

@@ -1,17 +1,17 @@
-//! The lines between labels, as curves measured by their length.
+//! Seams, the lines between labels, as curves measured by arc length.
 
 use super::surface::{NO_SEAM, Place, Surface, prev};
 use crate::{HalfEdge, Topology, Vec3};
 
-/// A line of the input along which the same two labels meet, from corner to corner or closed in itself. A
-/// place on it is its distance from the start along the line, mm.
+/// A line of the input along which the same two labels meet, from corner to corner or closed. A place on the
+/// line is the distance from its start along it, mm.
 pub(super) struct Seam {
-    /// The label on the left of someone who walks along the line, outside up: the lower of both.
+    /// Label to the left of the line's direction, seen from outside: the lower of the two.
     pub left: u32,
-    /// No corner lies on it.
+    /// True if no corner lies on the line.
     pub is_closed: bool,
     points: Vec<Vec3>,
-    /// Place of each point.
+    /// Place of each point, mm.
     at_mm: Vec<f64>,
 }
 
@@ -20,7 +20,7 @@ impl Seam {
         self.at_mm.last().copied().unwrap_or(0.0)
     }
 
-    /// The point at a place; beyond the ends of an open line its end, on a closed one another turn.
+    /// Point at a place. Clamps to the ends of an open line; continues around a closed one.
     pub fn point(&self, at_mm: f64) -> Vec3 {
         let at = self.wrapped(at_mm);
         let i = self
@@ -36,7 +36,7 @@ impl Seam {
         self.points[i - 1].lerp(self.points[i], share)
     }
 
-    /// The same place in `0 .. length`, where the line is closed.
+    /// Equivalent place in `0 .. length` on a closed line; unchanged on an open one.
     pub fn wrapped(&self, at_mm: f64) -> f64 {
         if self.is_closed && self.length_mm() > 0.0 {
             at_mm.rem_euclid(self.length_mm())
@@ -46,15 +46,14 @@ impl Seam {
     }
 }
 
-/// Finds the seams of `surface` and enters them there: the seam of each half-edge and the place of each
-/// point.
+/// Finds the seams of `surface` and stores there the seam of each half-edge and the place of each point.
 pub(super) fn find_seams(surface: &mut Surface) -> Vec<Seam> {
     let n_half_edges = surface.start.len() as HalfEdge;
     for v in 0..surface.points.len() as u32 {
         let n_borders = surface.around(v).filter(|&h| is_border(surface, h)).count();
         surface.place[v as usize] = match n_borders {
             0 => Place::Inside,
-            // Which seam it is and where, the walk below finds.
+            // The walk below finds which seam it is, and the place on it.
             2 => Place::Seam { at_mm: 0.0 },
             _ => Place::Corner,
         };
@@ -78,7 +77,7 @@ fn is_border(surface: &Surface, h: HalfEdge) -> bool {
     surface.label_of(h) != surface.label_of(surface.opposite[h as usize])
 }
 
-/// Follows the border from `first`, the lower label on the left, to a corner or back.
+/// Follows the border from `first`, with the lower label on the left, to a corner or back to the start.
 fn walk(surface: &mut Surface, first: HalfEdge, name: u32) -> Seam {
     let begin = surface.start[first as usize];
     let left = surface.label_of(first);
@@ -104,7 +103,7 @@ fn walk(surface: &mut Surface, first: HalfEdge, name: u32) -> Seam {
         surface.place[to as usize] = Place::Seam {
             at_mm: seam.length_mm(),
         };
-        // Of the two border edges out of this point one has `left` on its left.
+        // Of the two border edges out of this point, only one has `left` on its left.
         let onwards = surface
             .around(to)
             .find(|&o| surface.label_of(o) == left && is_border(surface, o));
@@ -116,8 +115,7 @@ fn walk(surface: &mut Surface, first: HalfEdge, name: u32) -> Seam {
 }
 
 impl Surface {
-    /// Places of the ends of a seam's half-edge, start first, for someone who walks with the seam; `end >
-    /// start`.
+    /// Places of the ends of a seam's half-edge in the seam's direction, start first; `end > start`.
     pub fn span(&self, h: HalfEdge, seams: &[Seam]) -> [f64; 2] {
         let seam = &seams[self.seam[h as usize] as usize];
         let h = if self.label_of(h) == seam.left {
@@ -138,8 +136,8 @@ impl Surface {
         }
     }
 
-    /// The seam through a point of kind [`Place::Seam`] and the place on it this share of the way to the
-    /// middle between the neighbours there.
+    /// Seam through a point of kind [`Place::Seam`], and the new place on it after this share of the step to
+    /// the middle of its neighbours there.
     pub fn relaxed_along(&self, v: u32, share: f64, seams: &[Seam]) -> Option<(u32, f64)> {
         let onwards = self.around(v).find(|&h| {
             let seam = self.seam[h as usize];
@@ -156,12 +154,12 @@ impl Surface {
         ))
     }
 
-    /// The triangle's third corner.
+    /// Third corner of the triangle of `h`.
     pub fn apex(&self, h: HalfEdge) -> u32 {
         self.start[prev(h) as usize]
     }
 
-    /// Whether the triangle of `h` has seams on both its other edges.
+    /// Returns true if the triangle of `h` has seams on both its other edges.
     pub fn is_between_seams(&self, h: HalfEdge) -> bool {
         [Topology::next(h), prev(h)]
             .iter()

@@ -1,25 +1,26 @@
-//! A closed triangle surface that changes: splitting, merging and turning edges.
+//! A mutable closed triangle surface, with splitting, merging and flipping of edges.
 
 use crate::{HalfEdge, Topology, TriMesh, Vec3};
 
-/// No seam runs along this half-edge.
+/// Marks a half-edge without a seam.
 pub(super) const NO_SEAM: u32 = u32::MAX;
 
-/// How freely a point moves.
+/// Freedom of a point to move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Place {
-    /// Anywhere on the surface: one label around it.
+    /// Anywhere on the surface: only one label around the point.
     Inside,
-    /// Along the one seam through it.
+    /// Along the only seam through the point.
     Seam {
         /// Distance from the seam's start, mm.
         at_mm: f64,
     },
-    /// Nowhere: seams end or cross here.
+    /// Nowhere, since seams end or cross here.
     Corner,
 }
 
-/// Half-edge `3 · face + corner` starts at that corner of the triangle. Dead triangles stay as gaps.
+/// Surface of half-edges: `3 · face + corner` starts at that corner of the triangle. Dead triangles remain as
+/// gaps.
 pub(super) struct Surface {
     pub points: Vec<Vec3>,
     pub place: Vec<Place>,
@@ -27,7 +28,7 @@ pub(super) struct Surface {
     pub out: Vec<HalfEdge>,
     pub start: Vec<u32>,
     pub opposite: Vec<HalfEdge>,
-    /// The seam along each half-edge, or [`NO_SEAM`].
+    /// Seam along each half-edge, or [`NO_SEAM`].
     pub seam: Vec<u32>,
     pub label: Vec<u32>,
     pub is_dead: Vec<bool>,
@@ -38,8 +39,8 @@ pub(super) fn prev(h: HalfEdge) -> HalfEdge {
 }
 
 impl Surface {
-    /// `None` where `mesh` is not closed. Where fans of triangles meet in one point only, each gets a point
-    /// of its own.
+    /// Builds the surface; `None` if `mesh` is not closed. Where fans of triangles meet in one point only,
+    /// each fan gets its own point.
     pub fn new(mesh: &TriMesh, labels: &[u32]) -> Option<Self> {
         let topology = Topology::of_mesh(mesh)?;
         let n_half_edges = topology.n_half_edges();
@@ -97,7 +98,7 @@ impl Surface {
         self.out[v as usize] != HalfEdge::MAX
     }
 
-    /// The half-edges out of `v`, counter-clockwise seen from outside.
+    /// Half-edges that leave `v`, counter-clockwise seen from outside.
     pub fn around(&self, v: u32) -> impl Iterator<Item = HalfEdge> + '_ {
         let first = self.out[v as usize];
         let mut next = (first != HalfEdge::MAX).then_some(first);
@@ -113,7 +114,7 @@ impl Surface {
         self.around(u).any(|h| self.ends(h)[1] == v)
     }
 
-    /// Each edge once, by its lower half-edge, among those that exist now.
+    /// Each edge that exists now once, as its lower half-edge.
     pub fn edges(&self) -> Vec<HalfEdge> {
         (0..self.start.len() as HalfEdge)
             .filter(|&h| !self.is_dead[h as usize / 3] && h < self.opposite[h as usize])
@@ -125,7 +126,7 @@ impl Surface {
         self.opposite[h as usize] = g;
     }
 
-    /// A new triangle; its half-edges have no opposites yet.
+    /// Adds a triangle; its half-edges have no opposites yet.
     fn add_triangle(&mut self, corners: [u32; 3], seam: [u32; 3], label: u32) -> HalfEdge {
         let h = self.start.len() as HalfEdge;
         self.start.extend(corners);
@@ -169,7 +170,7 @@ impl Surface {
             self.start[next as usize] = m;
             self.seam[next as usize] = NO_SEAM;
         }
-        // The new triangles are the last two: the one beside h starts with m → v, the one beside g with m →
+        // The new triangles are the last two. The one beside h starts with m → v, the one beside g with m →
         // u.
         let last = self.start.len() as HalfEdge;
         self.join(g, last - 6);
@@ -179,7 +180,7 @@ impl Surface {
         m
     }
 
-    /// Puts a new point into the triangle of `h`.
+    /// Inserts a new point into the triangle of `h`.
     pub fn insert(&mut self, h: HalfEdge, point: Vec3) {
         let edges = [h, Topology::next(h), prev(h)];
         let [a, b, c] = edges.map(|e| self.start[e as usize]);
@@ -201,13 +202,13 @@ impl Surface {
         self.out[c as usize] = q;
     }
 
-    /// Joins the two opposite corners instead of the ends of `h`.
+    /// Flips edge `h`, so that it joins the two opposite corners.
     pub fn turn(&mut self, h: HalfEdge) {
         let g = self.opposite[h as usize];
         let outer = [Topology::next(h), prev(h), Topology::next(g), prev(g)];
         let [v, w, u, x] = outer.map(|e| self.start[e as usize]);
         let [vw, wu, ux, xv] = outer.map(|e| (self.opposite[e as usize], self.seam[e as usize]));
-        // (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v).
+        // Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v).
         for (slot, start, (beyond, seam)) in [
             (outer[0], w, wu),
             (outer[1], u, ux),
@@ -223,7 +224,7 @@ impl Surface {
         self.start[g as usize] = w;
     }
 
-    /// Merges the end of `h` into its start, which stays where it is.
+    /// Merges the end of `h` into its start, which stays in place.
     pub fn merge(&mut self, h: HalfEdge) {
         let [u, v] = self.ends(h);
         let fan: Vec<HalfEdge> = self.around(v).collect();
@@ -244,8 +245,8 @@ impl Surface {
         self.out[v as usize] = HalfEdge::MAX;
     }
 
-    /// Whether merging the end of `h` into its start keeps the surface a manifold, the regions, the seams and
-    /// the corners.
+    /// Returns true if merging the end of `h` into its start keeps the surface manifold, and keeps the
+    /// regions, the seams and the corners.
     pub fn may_merge(&self, h: HalfEdge) -> bool {
         let g = self.opposite[h as usize];
         let [u, v] = self.ends(h);
@@ -277,7 +278,7 @@ impl Surface {
                 == 2
     }
 
-    /// Whether turning `h` keeps the surface a manifold and the seams.
+    /// Returns true if flipping `h` keeps the surface manifold and the seams.
     pub fn may_turn(&self, h: HalfEdge) -> bool {
         let [w, x] = [h, self.opposite[h as usize]].map(|h| self.apex(h));
         self.seam[h as usize] == NO_SEAM
@@ -286,12 +287,12 @@ impl Surface {
             && !self.are_neighbours(w, x)
     }
 
-    /// Whether `h` joins two points of seams through the inside of a region.
+    /// Returns true if `h` joins two points of seams through the inside of a region.
     pub fn is_bridge(&self, h: HalfEdge) -> bool {
         self.seam[h as usize] == NO_SEAM && self.ends(h).iter().all(|&v| !self.is_inside(v))
     }
 
-    /// What is alive, points numbered by their first use.
+    /// Mesh and labels of the living triangles, with points numbered by first use.
     pub fn finish(&self) -> (TriMesh, Vec<u32>) {
         let mut name = vec![u32::MAX; self.points.len()];
         let (mut mesh, mut labels) = (TriMesh::default(), Vec::new());

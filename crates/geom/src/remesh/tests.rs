@@ -15,7 +15,7 @@ fn octant(p: Vec3) -> u32 {
     u32::from(p.x > 0.0) + 2 * u32::from(p.y > 0.0) + 4 * u32::from(p.z > 0.0)
 }
 
-/// The label of the nearest of `n` sites spread over a ball.
+/// Label of the nearest of `n` sites spread over a ball.
 fn voronoi(n: u32, radius_mm: f64) -> impl Fn(Vec3) -> u32 {
     let site = move |i: u32| {
         let (t, z) = (
@@ -34,7 +34,7 @@ fn voronoi(n: u32, radius_mm: f64) -> impl Fn(Vec3) -> u32 {
     }
 }
 
-/// Each border edge: its labels, lower first, and its end points.
+/// Border edges: their labels, lower first, and their end points.
 fn borders(mesh: &TriMesh, labels: &[u32]) -> Vec<([u32; 2], [u32; 2])> {
     let mut owner = BTreeMap::new();
     for (f, &[a, b, c]) in mesh.triangles.iter().enumerate() {
@@ -58,7 +58,7 @@ fn seam_lengths(mesh: &TriMesh, labels: &[u32]) -> BTreeMap<[u32; 2], f64> {
     lengths
 }
 
-/// Where three labels or more meet: the bits of the coordinates and the labels.
+/// Points where three or more labels meet: the bits of the coordinates, and the labels.
 fn corners(mesh: &TriMesh, labels: &[u32]) -> BTreeSet<([u64; 3], Vec<u32>)> {
     let mut around = vec![BTreeSet::new(); mesh.points.len()];
     for (t, &l) in mesh.triangles.iter().zip(labels) {
@@ -91,7 +91,7 @@ fn edge_lengths(mesh: &TriMesh, target_mm: f64) -> Vec<f64> {
     lengths
 }
 
-/// The share of edges between 0.6 and 1.5 target lengths.
+/// Share of edges between 0.6 and 1.5 target lengths.
 fn even_share(mesh: &TriMesh, target_mm: f64) -> f64 {
     let lengths = edge_lengths(mesh, target_mm);
     lengths.iter().filter(|l| (0.6..=1.5).contains(*l)).count() as f64 / lengths.len() as f64
@@ -127,7 +127,7 @@ fn n_against(mesh: &TriMesh, input: &TriMesh) -> usize {
     (0..mesh.triangles.len()).filter(|&f| is_against(f)).count()
 }
 
-/// How many connected regions each label has.
+/// Number of connected regions of each label.
 fn n_regions(mesh: &TriMesh, labels: &[u32]) -> BTreeMap<u32, usize> {
     let topology = crate::Topology::of_mesh(mesh).unwrap();
     let (component, n) =
@@ -143,7 +143,7 @@ fn n_regions(mesh: &TriMesh, labels: &[u32]) -> BTreeMap<u32, usize> {
     })
 }
 
-/// What holds for every input.
+/// Asserts the properties that every result has.
 fn assert_same_map(input: &TriMesh, labels: &[u32], out: &Remeshed) {
     assert!(Solid::new(out.mesh.clone()).is_ok());
     let euler = |m: &TriMesh| 2 * m.points.len() as i64 - m.triangles.len() as i64;
@@ -337,7 +337,7 @@ fn what_is_no_task_comes_back_unchanged() {
         TriMesh::default()
     );
 }
-/// Twelve triangles with edges of up to 128 mm: creases stay where they are to a fraction of an edge, and no
+/// For twelve triangles with edges of up to 128 mm, creases stay in place to a fraction of an edge, and no
 /// triangle is a needle.
 #[test]
 fn a_plate_of_twelve_triangles_keeps_its_shape() {
@@ -379,6 +379,6 @@ fn coarse_input_is_refined() {
     assert_same_map(&octahedron, &labels, &out);
     assert_near(out.mesh.signed_volume(), octahedron.signed_volume(), 1e-9);
     assert_near(out.mesh.area(), octahedron.area(), 1e-9);
-    // Less than on larger regions: the 24 region corners of 60° cannot have even triangles.
+    // Less than on larger regions, since the 24 region corners of 60° cannot have even triangles.
     assert!(even_share(&out.mesh, 4.0) > 0.9, "{}", even_share(&out.mesh, 4.0));
 }

@@ -1,4 +1,5 @@
-//! A surface that crosses itself: finding the pairs of triangles, and making one surface of what lies inside.
+//! Self-intersections: finding pairs of crossing triangles, and making one surface around the enclosed
+//! volume.
 
 use rayon::prelude::*;
 
@@ -7,31 +8,31 @@ use crate::boolean;
 use crate::check::{InputError, inspect, inspect_edges};
 use crate::{Aabb, TriMesh, Vec3};
 
-/// Triangles in a leaf of the boxes; 4 to 16 take about the same time.
+/// Number of triangles in a leaf of the boxes; 4 to 16 take about the same time.
 const LEAF: usize = 8;
-/// Pairs of boxes that are looked at for each leaf; more meet in the tip of a cone of twenty thousand
-/// triangles, and in hostile files, where not all crossings are found then.
+/// Largest number of pairs tested for each leaf. More occur at the tip of a cone of twenty thousand triangles
+/// and in hostile files; some crossings are missed then.
 const MAX_PAIRS_OF_LEAF: usize = 100_000;
-/// Pairs of crossing triangles that are resolved: at 1 to 5 ms each, a minute or two. Meshes that ask for
-/// more are wrecks.
+/// Largest number of crossing pairs that are resolved: at 1 to 5 ms each, a minute or two. Meshes with more
+/// are beyond repair.
 const MAX_RESOLVED: usize = 20_000;
-/// A volume of four points counts as 0 below this share of the product of its edges: 10⁶ roundings. Triangles
-/// that touch, or cross in less than that, do not count as crossing.
+/// Volume of four points that counts as 0, as a share of the product of its edges: 10⁶ roundings. Triangles
+/// that touch, or cross by less than this, do not count as crossing.
 const FLAT: f64 = 1e-10;
 
-/// Where a surface crosses itself.
+/// Number and place of a surface's self-intersections.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Crossings {
-    /// Pairs of triangles.
+    /// Number of crossing pairs of triangles.
     pub count: usize,
-    /// The middle of the first triangle of one, file units; the origin if `count` is 0.
+    /// Centre of the lowest-numbered first triangle of the pairs, file units; the origin if `count` is 0.
     pub first: Vec3,
 }
 
-/// Pairs of triangles of which an edge of one goes through the other; those that touch or lie in a plane do
-/// not count.
+/// Counts pairs of triangles of which an edge of one passes through the other. Triangles that only touch or
+/// lie in one plane do not count.
 ///
-/// O(n log n) and by the pairs whose boxes meet; the same on any number of threads.
+/// O(n log n), plus the pairs whose boxes meet. The same on any number of threads.
 pub fn crossings(mesh: &TriMesh) -> Crossings {
     let tree = Boxes::of(mesh);
     let found: Vec<(usize, Option<u32>)> = (0..tree.order.len().div_ceil(LEAF))
@@ -52,7 +53,7 @@ pub fn crossings(mesh: &TriMesh) -> Crossings {
     }
 }
 
-/// The pairs of triangles that [`crossings`] counts, the same on any number of threads.
+/// Pairs of triangles that [`crossings`] counts; the same on any number of threads.
 pub(super) fn crossing_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let tree = Boxes::of(mesh);
     let of_leaf = |leaf: usize| {
@@ -64,7 +65,7 @@ pub(super) fn crossing_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
     (0..n_leaves).into_par_iter().flat_map_iter(of_leaf).collect()
 }
 
-/// The triangles that [`crossings`] counts, each once, in order.
+/// Triangles that [`crossings`] counts, each once, in ascending order.
 pub(crate) fn crossing_faces(mesh: &TriMesh) -> Vec<u32> {
     let mut faces = crossing_pairs(mesh).into_flattened();
     faces.sort_unstable();
@@ -72,8 +73,8 @@ pub(crate) fn crossing_faces(mesh: &TriMesh) -> Vec<u32> {
     faces
 }
 
-/// One surface of what a closed surface encloses at least once; the same where it neither crosses nor touches
-/// itself. `None` where that is too much work, or cannot be made.
+/// Makes one surface around the volume that a closed surface encloses at least once. Returns a copy if the
+/// surface neither crosses nor touches itself, and `None` if the union is too much work or fails.
 pub(super) fn united(mesh: &TriMesh) -> Option<TriMesh> {
     let n = crossings(mesh).count;
     if n == 0 && inspect_edges(mesh).shared.count == 0 && matches!(touching(mesh), Ok(None)) {
@@ -82,8 +83,8 @@ pub(super) fn united(mesh: &TriMesh) -> Option<TriMesh> {
     (n <= MAX_RESOLVED).then(|| boolean::rebuild(mesh).ok()).flatten()
 }
 
-/// Makes one surface of what a surface encloses at least once, where it crosses itself, has edges of more
-/// than two triangles, or is several whose faces touch.
+/// Makes one surface around the volume that the draft encloses at least once. Acts only if the draft crosses
+/// itself, has edges of more than two triangles, or has several bodies whose faces touch.
 pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     let found = crossings(&draft.mesh);
     let shared = inspect_edges(&draft.mesh).shared;
@@ -128,10 +129,10 @@ pub(super) fn resolve(draft: &mut Draft) -> Result<Option<Repair>, InputError> {
     Ok(Some(Repair { kind, count, at }))
 }
 
-/// How many bodies there are, and the middle of the second, where faces of several touch: [`crossings`] does
-/// not see that.
+/// Number of bodies and the centre of the second, if faces of several bodies touch. [`crossings`] does not
+/// detect that.
 fn touching(mesh: &TriMesh) -> Result<Option<(usize, Vec3)>, InputError> {
-    /// Bodies that are compared two by two.
+    /// Largest number of bodies that are compared pairwise.
     const MAX_BODIES: usize = 1000;
     let bounds: Vec<Aabb> = inspect(mesh).bodies.iter().map(|body| body.bounds).collect();
     let n = bounds.len();
@@ -147,12 +148,12 @@ fn touching(mesh: &TriMesh) -> Result<Option<(usize, Vec3)>, InputError> {
     }
 }
 
-/// Triangles along a space-filling curve, in boxes of pairs of boxes.
+/// Triangles along a space-filling curve, in a hierarchy of bounding boxes.
 struct Boxes {
     order: Vec<u32>,
-    /// Around each triangle, in that order.
+    /// Bounding box of each triangle, in that order.
     boxes: Vec<Aabb>,
-    /// From the leaves up; the last has one box.
+    /// Boxes of each level, from the leaves up; the last level has one box.
     levels: Vec<Vec<Aabb>>,
 }
 
@@ -183,19 +184,19 @@ impl Boxes {
         Self { order, boxes, levels }
     }
 
-    /// Where the triangles of a leaf stand in the order.
+    /// Positions of a leaf's triangles in the order.
     fn places(&self, leaf: usize) -> std::ops::Range<usize> {
         leaf * LEAF..self.order.len().min((leaf + 1) * LEAF)
     }
 
-    /// Shows `found` each pair of a triangle of `leaf` and one of this or a later leaf that cross.
+    /// Calls `found` for each crossing pair of a triangle of `leaf` and a triangle of this or a later leaf.
     fn crossings_of(&self, mesh: &TriMesh, leaf: usize, mut found: impl FnMut([u32; 2])) {
         let own = self.places(leaf);
         let around = self.levels[0][leaf];
         let mut n_pairs = 0;
         let mut todo = vec![(self.levels.len() - 1, 0)];
         while let Some((level, at)) = todo.pop().filter(|_| n_pairs < MAX_PAIRS_OF_LEAF) {
-            // Earlier leaves have looked at this one.
+            // Earlier leaves have already been compared with this one.
             let is_earlier = (at + 1) << level <= leaf;
             if is_earlier || !self.levels[level][at].intersects(around) {
                 continue;
@@ -210,7 +211,7 @@ impl Boxes {
                 .places(at)
                 .filter(|&other| self.boxes[other].intersects(around))
             {
-                // Within the leaf each pair once.
+                // Within the leaf, each pair is tested once.
                 for place in own.clone().take_while(|&place| place < other) {
                     let faces = [place, other].map(|p| self.order[p]);
                     if self.boxes[place].intersects(self.boxes[other]) && cross(mesh, faces) {
@@ -222,7 +223,7 @@ impl Boxes {
     }
 }
 
-/// The position on a Morton curve of a point in the unit cube, 21 bits an axis.
+/// Position on a Morton curve of a point in the unit cube, 21 bits per axis.
 fn curve_position(point: Vec3) -> u64 {
     let spread = |x: f64| {
         let mut bits = (x.clamp(0.0, 1.0) * f64::from((1 << 21) - 1)) as u64;
@@ -240,7 +241,8 @@ fn curve_position(point: Vec3) -> u64 {
     spread(point.x) | spread(point.y) << 1 | spread(point.z) << 2
 }
 
-/// Whether an edge of one triangle goes through the inside of the other; those that share an edge never do.
+/// Returns true if an edge of one triangle passes through the inside of the other. False if they share an
+/// edge.
 fn cross(mesh: &TriMesh, faces: [u32; 2]) -> bool {
     let [t, u] = faces.map(|face| mesh.triangles[face as usize]);
     let shared = |t: [u32; 3], u: [u32; 3]| [0, 1, 2].map(|k| u.contains(&t[k]));
@@ -253,12 +255,12 @@ fn cross(mesh: &TriMesh, faces: [u32; 2]) -> bool {
     if n_shared == 0 {
         return (0..3).any(|k| goes_through(first, k, second) || goes_through(second, k, first));
     }
-    // Edges at the shared point touch there and nowhere else.
+    // Edges at the shared point touch the other triangle there and nowhere else.
     let opposite = |s: [bool; 3]| (s.iter().position(|s| *s).unwrap_or_default() + 1) % 3;
     goes_through(first, opposite(of_t), second) || goes_through(second, opposite(of_u), first)
 }
 
-/// Whether edge `k` of the first triangle goes through the inside of the second.
+/// Returns true if edge `k` of the first triangle passes through the inside of the second.
 fn goes_through(edges: [Vec3; 3], k: usize, [a, b, c]: [Vec3; 3]) -> bool {
     let (p, q) = (edges[k], edges[(k + 1) % 3]);
     let sign = |a: Vec3, b: Vec3, c: Vec3, d: Vec3| {

@@ -1,4 +1,4 @@
-//! Cutting closed meshes out of another.
+//! Subtraction of closed meshes from another.
 
 use rayon::prelude::*;
 
@@ -8,14 +8,14 @@ use crate::bvh::TriangleBvh;
 use crate::check::InputError;
 use crate::{TriMesh, Vec3};
 
-/// What is left of a body.
+/// Result of subtracting cutters from a body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cut {
-    /// Its surface; closed, and of any number of bodies.
+    /// Closed surface of the remaining body, which may be in several parts.
     pub mesh: TriMesh,
-    /// For each triangle the one that it is a part of.
+    /// Source triangle of each triangle.
     pub faces: Vec<CutFace>,
-    /// For each cutter whether it takes anything away.
+    /// True for each cutter that removes anything.
     pub is_met: Vec<bool>,
 }
 
@@ -26,17 +26,17 @@ pub enum CutFace {
     Body(usize),
     /// A triangle of a cutter.
     Cutter {
-        /// Place of the cutter in the list.
+        /// Index of the cutter in the list.
         cutter: usize,
-        /// The triangle in it.
+        /// Index of the triangle in the cutter.
         face: usize,
-        /// The body's triangle nearest to it.
+        /// Triangle of the body nearest to it.
         nearest: usize,
     },
 }
 
 impl CutFace {
-    /// The body's triangle that it is a part of, or lies nearest to.
+    /// Triangle of the body that this one is a part of, or is nearest to.
     pub fn nearest(self) -> usize {
         match self {
             Self::Body(face) => face,
@@ -45,20 +45,20 @@ impl CutFace {
     }
 }
 
-/// Why a cut cannot be made.
+/// Reason why a cut cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{reason}")]
 pub struct CutError {
-    /// The cutter at fault; the body where it is `None`.
+    /// Cutter at fault; `None` if it is the body.
     pub cutter: Option<usize>,
-    /// What is wrong.
+    /// Description of the problem, with a remedy.
     pub reason: String,
 }
 
-/// Cuts `cutters` out of `body`, by exact arithmetic. All of them are repaired as [`super::repair`] repairs
-/// before, and may be of several bodies.
+/// Cuts `cutters` out of `body`, by exact arithmetic. All of them are first repaired as by [`super::repair`],
+/// and may have several bodies.
 ///
-/// Refuses what bounds no volume, and a cut that leaves nothing.
+/// Fails if a mesh bounds no volume, and if the cut leaves nothing.
 pub fn cut_out(body: &TriMesh, cutters: &[&TriMesh]) -> Result<Cut, CutError> {
     let refused = |cutter| {
         move |error: InputError| CutError {
@@ -90,7 +90,7 @@ fn volume(mesh: &TriMesh) -> Result<Volume, InputError> {
     Volume::from_closed_mesh(&closed).map_err(|_| InputError::Crossing { count: 1, at })
 }
 
-/// For each triangle of a cut the one that its middle lies on: the nearest.
+/// Origin of each triangle of a cut: the source triangle nearest to its centre.
 fn origins(mesh: &TriMesh, body: &TriMesh, cutters: &[&TriMesh]) -> Vec<CutFace> {
     let of_body = TriangleBvh::new(body);
     let of_cutters: Vec<TriangleBvh> = cutters.iter().map(|cutter| TriangleBvh::new(cutter)).collect();

@@ -1,4 +1,4 @@
-//! Bodies that are inside out and overlap another one: a hole was meant, or a part that was turned by mistake.
+//! Bodies that are inside out and overlap another body: either meant as a hole, or flipped by mistake.
 
 use super::crossing::{crossing_pairs, united};
 use super::shells::{self, Shells};
@@ -6,25 +6,25 @@ use super::{Draft, Repair, RepairKind};
 use crate::check::InputError;
 use crate::{TriMesh, Volume, boolean};
 
-/// What becomes of bodies that are inside out and overlap another: they have two right answers.
+/// Treatment of bodies that are inside out and overlap another body; there are two right answers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum InsideOut {
-    /// The mesh is refused, so that its owner may say which.
+    /// Reject the mesh, so that its owner may decide.
     #[default]
     Ask,
-    /// They are cut out of what they overlap.
+    /// Cut them out of the bodies that they overlap.
     Cut,
-    /// They are turned, and united with what they overlap.
+    /// Flip them, and unite them with the bodies that they overlap.
     Unite,
 }
 
-/// Bodies count as overlapping where they have this share of the smaller in common: more than rounding where they
+/// Least common volume, as a share of the smaller body's, for two bodies to overlap: more than rounding at a
 /// touch.
 const LEAST_COMMON: f64 = 1e-9;
 
-/// Does with bodies that are inside out, and overlap one that is not, as `wanted`.
+/// Treats bodies that are inside out and overlap an upright body as `wanted`.
 ///
-/// Those that are wholly within another are cavities, and those that overlap nothing are left to
+/// Bodies entirely within another are cavities. Bodies that overlap nothing are left to
 /// [`shells::turn_outwards`].
 pub(super) fn settle(draft: &mut Draft, wanted: InsideOut) -> Result<Option<Repair>, InputError> {
     let shells = Shells::of(&draft.mesh);
@@ -62,7 +62,7 @@ pub(super) fn settle(draft: &mut Draft, wanted: InsideOut) -> Result<Option<Repa
     }
 }
 
-/// For each shell, whether it is inside out and overlaps one that is not.
+/// Marks the shells that are inside out and overlap an upright shell.
 fn cutters(mesh: &TriMesh, shells: &Shells) -> Vec<bool> {
     let n = shells.all.len();
     let mut is_cutter = vec![false; n];
@@ -88,7 +88,7 @@ fn cutters(mesh: &TriMesh, shells: &Shells) -> Vec<bool> {
     is_cutter
 }
 
-/// Whether the surfaces of two shells meet, and what they enclose too.
+/// Returns true if the surfaces of two shells meet and their enclosed volumes overlap.
 fn overlap(mesh: &TriMesh, shells: &Shells, (inverted, upright): (usize, usize), crosses: bool) -> bool {
     let both = shells.part(mesh, |shell| shell == inverted || shell == upright);
     if !crosses && boolean::touches_itself(&both) != Ok(true) {
@@ -101,7 +101,8 @@ fn overlap(mesh: &TriMesh, shells: &Shells, (inverted, upright): (usize, usize),
     a.intersect(&b).volume() > LEAST_COMMON * a.volume().min(b.volume())
 }
 
-/// Cuts the marked triangles' bodies out of the others, which are united; how much less is enclosed.
+/// Cuts the bodies of the marked triangles out of the others, which are united first. Returns the loss of
+/// enclosed volume.
 fn cut_out(draft: &mut Draft, is_cut: &[bool]) -> Option<f64> {
     let [mut cut, mut rest] = [draft.clone(), draft.clone()];
     cut.retain(is_cut);

@@ -1,4 +1,4 @@
-//! Triangles that stand there twice, and triangles turned against their neighbours.
+//! Removal of duplicate triangles, and flipping of triangles that face against their neighbours.
 
 use std::collections::VecDeque;
 
@@ -6,7 +6,7 @@ use super::{Draft, Repair, RepairKind};
 use crate::Vec3;
 use crate::check::{Side, sides};
 
-/// Removes all but one of triangles with the same corners; those that face opposite ways cancel, two and two.
+/// Removes duplicates of triangles with the same corners. Triangles that face opposite ways cancel in pairs.
 pub(super) fn drop_copies(draft: &mut Draft) -> Option<Repair> {
     let triangles = &draft.mesh.triangles;
     let mut order: Vec<([u32; 3], u32)> = triangles
@@ -49,12 +49,12 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle
 }
 
-/// Turns triangles so that neighbours agree, as few as possible in each connected part; leaves one-sided
-/// parts alone.
+/// Flips triangles so that neighbours agree, as few as possible in each connected part. Leaves one-sided
+/// parts unchanged.
 pub(super) fn turn(draft: &mut Draft) -> Option<Repair> {
     let mesh = &draft.mesh;
     let sides = sides(mesh);
-    // For each triangle its neighbours, and whether they face the other way.
+    // Neighbours of each triangle, each with a flag if it faces the other way.
     let mut across: Vec<Vec<(u32, bool)>> = vec![Vec::new(); mesh.triangles.len()];
     let mut has_turned = false;
     for edge in sides.chunk_by(Side::same_edge) {
@@ -89,7 +89,7 @@ pub(super) fn turn(draft: &mut Draft) -> Option<Repair> {
     })
 }
 
-/// The triangles to turn of the part that `start` belongs to; none where the part is one-sided.
+/// Triangles to flip in the part that `start` belongs to; none if the part is one-sided.
 fn to_turn(across: &[Vec<(u32, bool)>], state: &mut [Option<bool>], start: u32) -> Vec<u32> {
     let (mut part, mut todo) = (vec![start], VecDeque::from([start]));
     state[start as usize] = Some(false);

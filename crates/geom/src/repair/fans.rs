@@ -1,15 +1,14 @@
-//! Points in which the surface touches itself: each fan of triangles gets a point of its own.
+//! Points in which the surface touches itself: each fan of triangles gets its own point.
 
 use super::{Draft, Repair, RepairKind};
 use crate::Vec3;
 use crate::check::fans;
 
-/// Gives each fan of triangles around a point a point of its own, in the same place. The surface stays where
-/// it is.
+/// Gives each fan of triangles around a point its own copy of that point. The surface's shape stays the same.
 pub(super) fn part(draft: &mut Draft) -> Option<Repair> {
     let mut fan_of_corner = fans(&draft.mesh);
     let n_points = draft.mesh.points.len();
-    // The fans of a point: the first keeps it, each other one gets a copy.
+    // The first fan of a point keeps it; each other fan gets a copy.
     let mut first_fan = vec![None; n_points];
     let mut copy_of_fan = std::collections::BTreeMap::new();
     let (mut is_pinched, mut at) = (vec![false; n_points], Vec3::ZERO);

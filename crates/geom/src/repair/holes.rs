@@ -1,15 +1,17 @@
-//! Small holes: closed by the triangles of least area between their edges.
+//! Small holes, closed by the triangles of least area between their edges.
 
 use super::{Draft, HOLE_SHARE, Repair, RepairKind};
 use crate::check::{Side, sides};
 use crate::{Aabb, TriMesh, Vec3};
 
-/// Edges of a hole that is closed; larger ones that are that narrow are cracks of some other kind.
+/// Largest number of edges of a hole that is closed. Larger ones that are as narrow are cracks of another
+/// kind.
 const MAX_EDGES: usize = 64;
-/// Sets of three points that are looked at; some thousands of holes of usual size.
+/// Largest number of point triples that are tested: some thousands of holes of usual size.
 const MAX_WORK: usize = 300_000_000;
 
-/// Closes holes of three edges, whose shape is given, and holes narrower than [`HOLE_SHARE`] of the diagonal.
+/// Closes holes of three edges, which have only one filling, and holes narrower than [`HOLE_SHARE`] of the
+/// diagonal.
 pub(super) fn close(draft: &mut Draft) -> Option<Repair> {
     let widest_allowed = HOLE_SHARE * draft.mesh.bounds().diagonal();
     let rims = Rims::of(&draft.mesh);
@@ -26,7 +28,7 @@ pub(super) fn close(draft: &mut Draft) -> Option<Repair> {
         let width = bounds.size().max_element();
         work += points.len().pow(3) / 6;
         let is_small = points.len() == 3 || (points.len() <= MAX_EDGES && width <= widest_allowed);
-        // A triangle alone has a rim of three edges, too.
+        // A single triangle has a rim of three edges, too.
         let is_alone = points.len() == 3
             && rim
                 .points
@@ -55,10 +57,10 @@ pub(super) fn close(draft: &mut Draft) -> Option<Repair> {
     })
 }
 
-/// The triangles that close all holes of `mesh`, hole by hole, each with a triangle beside it; `None` where one has
-/// too many edges or touches itself.
+/// Triangles that close all holes of `mesh`, hole by hole, each with an adjacent triangle. `None` if a hole
+/// has too many edges or touches itself.
 pub(crate) fn cap_all(mesh: &TriMesh) -> Option<Vec<(Vec<[u32; 3]>, u32)>> {
-    /// Edges of a hole: the time goes with their cube, and for as many is a second.
+    /// Largest number of edges of a hole. Time is cubic in it, and this many edges take a second.
     const MAX_EDGES: usize = 1000;
     let rims = Rims::of(mesh);
     let loops = rims.loops();
@@ -83,19 +85,19 @@ fn is_simple(points: &[u32]) -> bool {
     sorted.windows(2).all(|pair| pair[0] != pair[1])
 }
 
-/// The rim of a hole, so that the triangles that close it run along it.
+/// Rim of a hole, in the direction of the triangles that close it.
 struct Rim {
     points: Vec<u32>,
-    /// A triangle beside it.
+    /// A triangle next to the rim.
     face: u32,
 }
 
-/// All open edges with what lies around them.
+/// All open edges of a mesh, with their surroundings.
 struct Rims<'a> {
     mesh: &'a TriMesh,
     sides: Vec<Side>,
-    /// For each corner the corner at which the neighbour's side along the same edge begins; none where the
-    /// edge is open.
+    /// Corner at which the neighbour's side along the same edge begins, for each corner; `None` if the edge
+    /// is open.
     opposite: Vec<Option<u32>>,
 }
 
@@ -124,8 +126,8 @@ impl<'a> Rims<'a> {
             .is_ok()
     }
 
-    /// Walks around each hole. Open edges next to edges of three and more triangles may have no way on: no
-    /// hole then.
+    /// Walks around each hole. Open edges next to edges of three and more triangles may lead nowhere; these
+    /// give no hole.
     fn loops(&self) -> Vec<Rim> {
         let is_single = |edge: &[Side]| edge.len() == 1;
         let mut is_open = vec![false; self.opposite.len()];
@@ -159,16 +161,16 @@ impl<'a> Rims<'a> {
         found
     }
 
-    /// The point that the side from `corner` runs to.
+    /// End point of the side that begins at `corner`.
     fn head(&self, corner: u32) -> u32 {
         self.mesh.triangles[corner as usize / 3][(corner as usize % 3 + 1) % 3]
     }
 
-    /// The open side that runs to the point that the side from `corner` begins at.
+    /// Open side that ends at the point where the side from `corner` begins.
     fn next(&self, corner: u32, is_open: &[bool]) -> Option<u32> {
         let before = |c: u32| if c.is_multiple_of(3) { c + 2 } else { c - 1 };
         let mut at = before(corner);
-        // As many steps as there are triangles around the point, at most all.
+        // The steps are as many as the triangles around the point, at most all.
         for _ in 0..self.opposite.len() {
             if is_open[at as usize] {
                 return Some(at);
@@ -179,11 +181,10 @@ impl<'a> Rims<'a> {
     }
 }
 
-/// Triangles of least area that fill a polygon without using an edge that is there already; `None` where none
-/// do.
+/// Triangles of least area that fill a polygon without using an existing edge; `None` if there are none.
 fn cap(names: &[u32], points: &[Vec3], has_edge: impl Fn(u32, u32) -> bool) -> Option<Vec<[u32; 3]>> {
     let n = names.len();
-    // The least area of the polygon from i to j, and where its triangle on the edge i j has its third corner.
+    // The least area of the polygon from i to j, and the third corner of its triangle on edge ij.
     let mut least = vec![vec![(0.0_f64, 0_usize); n]; n];
     for span in 2..n {
         for i in 0..n - span {

@@ -1,4 +1,4 @@
-//! T-junctions: an edge that is divided on one side only.
+//! T-junctions: edges that are divided on one side only.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use crate::check::{OpenEdge, open_edges};
 use crate::subdivide::fill_triangle;
 use crate::{TriMesh, Vec3};
 
-/// Pairs of an edge and a point that are looked at; hostile files have more, and stay open.
+/// Largest number of edge–point pairs that are tested. Hostile files have more, and stay open.
 const MAX_WORK: usize = 50_000_000;
 
-/// Divides triangles at the corners of others that lie on their open edges; keeps the draft where that closes
+/// Divides triangles at the corners of others that lie on their open edges. Keeps the draft if that closes
 /// nothing.
 pub(super) fn join(draft: &mut Draft) -> Option<Repair> {
     let open = open_edges(&draft.mesh);
@@ -58,7 +58,7 @@ pub(super) fn join(draft: &mut Draft) -> Option<Repair> {
     })
 }
 
-/// The ends of open edges, sorted into cells as large as a typical edge.
+/// Ends of open edges, sorted into cells as large as a typical edge.
 struct Cells {
     size: f64,
     content: BTreeMap<[i64; 3], Vec<u32>>,
@@ -95,9 +95,9 @@ impl Cells {
         point.to_array().map(|x| (x / self.size).floor() as i64)
     }
 
-    /// The points within an edge, in order along it, that are no corners of its triangle.
+    /// Points inside an edge, in order along it, that are not corners of its triangle.
     fn on_edge(&self, mesh: &TriMesh, edge: &OpenEdge, within: f64, work: &mut usize) -> Vec<u32> {
-        /// Cells that a long edge is looked for in; beyond that all points are faster.
+        /// Largest number of cells searched for a long edge; beyond that, testing all points is faster.
         const MAX_CELLS: i64 = 1000;
         let [from, to] = [edge.from, edge.to].map(|v| mesh.points[v as usize]);
         let (along, length) = (to - from, from.distance(to));
@@ -133,8 +133,8 @@ impl Cells {
         };
         let mut found: Vec<(f64, u32)> = near.into_iter().filter_map(place).collect();
         found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        // Where two lie in the same place along the edge, the surface is not divided but doubled: the first
-        // will do.
+        // If two points lie at the same place along the edge, the surface is doubled rather than divided
+        // there. The first one is enough.
         found.dedup_by(|later, earlier| (later.0 - earlier.0) * length <= within);
         found.into_iter().map(|(_, p)| p).collect()
     }

@@ -1,14 +1,15 @@
-//! Repair of surfaces without guessing: from a mesh as read to one solid body, with a word on every change.
+//! Repair of surfaces without guessing: from a mesh as read to one solid body, with a report of every change.
 //!
-//! Repaired is what has one right answer: points and triangles that stand there twice, triangles turned the
+//! A defect is repaired if there is one right answer: duplicate points and triangles, triangles that face the
 //! wrong way, cracks and corners on neighbours' edges within 10⁻⁵ of the size, holes of three edges or
-//! smaller than a hundredth of the size, points where the surface pinches itself, specks, walls inside a body,
-//! closed surfaces within others, parts that overlap, a surface that crosses itself. What would need a decision
-//! about the shape is refused with its place: larger holes, one-sided surfaces, several bodies apart from each
-//! other, and bodies that are inside out and overlap another, unless the owner says which of the two is meant.
+//! smaller than a hundredth of the size, points where the surface pinches itself, specks, walls inside a
+//! body, closed surfaces within others, parts that overlap, and a surface that crosses itself. A defect that
+//! needs a decision about the shape is rejected with its place: larger holes, one-sided surfaces, and several
+//! separate bodies. Bodies that are inside out and overlap another are rejected, too, unless the owner says
+//! how to treat them.
 //!
-//! Each stage is a function from a draft to a draft and a [`Repair`] if it changed something. A mesh that is
-//! a solid as read, and does not cross itself, comes out as [`crate::check::into_solid`] makes it, bit by
+//! Each stage is a function from a draft to a draft, and a [`Repair`] if it changed something. A mesh that is
+//! a solid as read and does not cross itself gives exactly the result of [`crate::check::into_solid`], bit by
 //! bit.
 
 mod crossing;
@@ -37,35 +38,35 @@ use crate::check::{InputError, check_points, inspect, inspect_edges, into_solid,
 use crate::weld::close;
 use crate::{Solid, TriMesh};
 
-/// Points nearer than this share of the model's diagonal are the same, where the surface is open between
-/// them: 2 µm on a model of 200 mm, a hundredth of what printers resolve, and ten times the steps of 32-bit
+/// Distance, as a share of the model's diagonal, below which points with an open surface between them are
+/// merged. 2 µm on a model of 200 mm: a hundredth of what printers resolve, and ten times the steps of 32-bit
 /// coordinates.
 const NEAR_SHARE: f64 = 1e-5;
-/// Holes smaller than this share of the model's diagonal are closed: 2 mm on a model of 200 mm, less than a
+/// Size of holes that are closed, as a share of the model's diagonal: 2 mm on a model of 200 mm, less than a
 /// wall.
 const HOLE_SHARE: f64 = 0.01;
-/// Bodies smaller than this share of the diagonal are specks, no parts of the model.
+/// Size below which bodies are specks and no parts of the model, as a share of the diagonal.
 const SPECK_SHARE: f64 = 0.01;
 
-/// What may be done to a mesh.
+/// Changes that are allowed to a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RepairMode {
-    /// Nothing: what needs repair is refused.
+    /// None: a mesh that needs repair is rejected.
     Refuse,
-    /// What has one right answer.
+    /// Repairs that have one right answer.
     Repair,
-    /// The same, and of several bodies apart from each other all but the largest are left out.
+    /// Repairs as for `Repair`; of several separate bodies only the largest is kept.
     KeepLargest,
 }
 
-/// A body that can be made, and what was done to it.
+/// A valid body, and the changes that were made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Repaired {
-    /// The body.
+    /// Solid body that the mesh became.
     pub solid: Solid,
-    /// For each triangle the one of the mesh as read that it is or lies nearest to.
+    /// Triangle of the mesh as read that each triangle is, or is nearest to.
     pub source_face: Vec<u32>,
-    /// What was changed, in the order in which it was done; nothing where the mesh was sound.
+    /// Changes in the order in which they were made; empty if the mesh was sound.
     pub repairs: Vec<Repair>,
 }
 
@@ -73,19 +74,20 @@ pub struct Repaired {
 #[derive(Clone, Debug, PartialEq)]
 struct Draft {
     mesh: TriMesh,
-    /// For each triangle the one as read.
+    /// Source triangle, as read, of each triangle.
     source: Vec<u32>,
 }
 
 /// Makes one body of a mesh as read.
 ///
-/// Refuses what cannot be repaired without guessing, by its state after what could be. O(n log n) but for
-/// overlaps, whose cost follows the pairs of triangles that cross.
+/// A mesh that cannot be repaired without guessing is rejected, with an error about its state after all
+/// possible repairs. O(n log n), except for overlaps, whose cost grows with the number of crossing pairs of
+/// triangles.
 pub fn repair(mesh: &TriMesh, mode: RepairMode) -> Result<Repaired, InputError> {
     repair_as(mesh, mode, InsideOut::Ask)
 }
 
-/// [`repair`], where the owner of the mesh has said what bodies that are inside out are there for.
+/// Repairs like [`repair`], given the owner's decision about bodies that are inside out.
 pub fn repair_as(mesh: &TriMesh, mode: RepairMode, inside_out: InsideOut) -> Result<Repaired, InputError> {
     check_points(mesh)?;
     let as_read = into_solid(mesh);
@@ -128,8 +130,8 @@ pub fn repair_as(mesh: &TriMesh, mode: RepairMode, inside_out: InsideOut) -> Res
     }
 }
 
-/// Closes a surface as far as that needs no decision: the draft, what was changed, and how many triangles
-/// collapsed.
+/// Closes a surface as far as that needs no decision. Returns the draft, the changes, and the number of
+/// collapsed triangles.
 fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
     let welded = close(mesh);
     let mut draft = Draft {
@@ -140,8 +142,8 @@ fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
         return Err(InputError::Empty);
     }
     let mut repairs = Vec::new();
-    // Cracks first, since they hide all else; holes after sheets and cracks, which they should not close; cells last,
-    // since they are those of a closed surface.
+    // Cracks come first, since they hide everything else. Holes come after sheets and cracks, which must not
+    // be closed like holes. Partitions come last, since they divide a closed surface.
     for stage in [
         near::merge,
         faces::drop_copies,
@@ -156,7 +158,7 @@ fn close_up(mesh: &TriMesh) -> Result<(Draft, Vec<Repair>, usize), InputError> {
     Ok((draft, repairs, welded.n_collapsed))
 }
 
-/// A closed surface of any number of bodies, made of a mesh as read; repaired as by [`repair`].
+/// Makes a closed surface of any number of bodies from a mesh as read, with the repairs of [`repair`].
 pub(crate) fn closed(mesh: &TriMesh) -> Result<TriMesh, InputError> {
     check_points(mesh)?;
     let mut draft = close_up(mesh)?.0;
@@ -168,7 +170,8 @@ pub(crate) fn closed(mesh: &TriMesh) -> Result<TriMesh, InputError> {
     Ok(draft.mesh)
 }
 
-/// Refuses what is open or one-sided after all. Edges with more than two triangles may still bound a volume.
+/// Rejects a draft that is still open or one-sided. Edges with more than two triangles may still bound a
+/// volume.
 fn check_edges(draft: &Draft) -> Result<(), InputError> {
     let found = inspect(&draft.mesh);
     let turned = found.edges.turned;
@@ -185,7 +188,7 @@ fn check_edges(draft: &Draft) -> Result<(), InputError> {
     }
 }
 
-/// From a closed surface to one body.
+/// Makes one body of a closed surface.
 fn finish(
     mut draft: Draft,
     mut repairs: Vec<Repair>,
@@ -207,7 +210,7 @@ fn finish(
     })
 }
 
-/// Makes a closed surface bound a volume: it faces outwards, crosses itself nowhere and is not pinched.
+/// Makes a closed surface bound a volume: facing outwards, not crossing itself, and not pinched.
 fn resolve(draft: &mut Draft, inside_out: InsideOut) -> Result<Vec<Repair>, InputError> {
     let mut repairs = Vec::new();
     repairs.extend(shells::drop_specks(draft));
@@ -219,7 +222,7 @@ fn resolve(draft: &mut Draft, inside_out: InsideOut) -> Result<Vec<Repair>, Inpu
 }
 
 impl Draft {
-    /// The triangles for which `keep` holds, and the points they use.
+    /// Keeps the marked triangles and the points that they use.
     fn retain(&mut self, is_kept: &[bool]) {
         let mut kept = is_kept.iter();
         self.source.retain(|_| kept.next() == Some(&true));
@@ -228,7 +231,8 @@ impl Draft {
         self.mesh = std::mem::take(&mut self.mesh).without_unused_points();
     }
 
-    /// Takes `mesh` for this one, whose triangles it is made of: each is a part of the nearest.
+    /// Replaces the mesh by `mesh`, which is made of it. Each new triangle takes the source of the nearest
+    /// old one.
     fn replace(&mut self, mesh: TriMesh) {
         let tree = TriangleBvh::new(&self.mesh);
         let nearest = |face: usize| {

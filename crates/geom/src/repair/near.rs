@@ -1,4 +1,4 @@
-//! Cracks: points along open edges that ought to be one.
+//! Cracks: points along open edges that should be one.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,10 @@ use crate::Vec3;
 use crate::check::open_edges;
 use crate::weld::reindex;
 
-/// Merges points on open edges within [`NEAR_SHARE`] of the diagonal; keeps the draft where that closes
-/// nothing.
+/// Merges points on open edges within [`NEAR_SHARE`] of the diagonal. Keeps the draft if that closes nothing.
 ///
-/// A point goes to the first one near it that is not merged itself, so that rows of near points do not become
-/// one.
+/// A point merges into the first one near it that is not merged itself, so that a row of near points does not
+/// become one point.
 pub(super) fn merge(draft: &mut Draft) -> Option<Repair> {
     let open = open_edges(&draft.mesh);
     if open.is_empty() {
@@ -22,7 +21,7 @@ pub(super) fn merge(draft: &mut Draft) -> Option<Repair> {
     ends.sort_unstable();
     ends.dedup();
     let mut stands_for: Vec<u32> = (0..draft.mesh.points.len() as u32).collect();
-    // Cells of the size of the distance hold few points that stand for others, as those keep that distance.
+    // Unmerged points keep this distance from each other, so cells of that size hold few of them.
     let mut standing: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     let (mut count, mut at) = (0, Vec3::ZERO);
     for point in ends {
@@ -70,7 +69,7 @@ fn cell(point: Vec3, size: f64) -> [i64; 3] {
     point.to_array().map(|x| (x / size).floor() as i64)
 }
 
-/// The cell and the 26 around it.
+/// Indices of the cell and the 26 cells around it.
 fn neighbours(at: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
     (0..27).map(move |i: i64| {
         let step = [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1];

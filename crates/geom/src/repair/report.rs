@@ -1,81 +1,82 @@
-//! What was repaired, in words.
+//! Report of repairs, in words.
 
 use std::fmt;
 
 use crate::Vec3;
 use crate::check::{Coordinates, Short, plural};
 
-/// A kind of change, how often it was made and where first.
+/// A kind of change, with its count and first place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Repair {
-    /// What was done.
+    /// Kind of the change.
     pub kind: RepairKind,
-    /// How often; at least once.
+    /// Number of changes, at least one.
     pub count: usize,
-    /// The first place, file units.
+    /// Place of the first change, file units.
     pub at: Vec3,
 }
 
-/// What can be done to a surface without guessing. Lengths and volumes are in file units.
+/// Kinds of changes that need no guessing. Lengths and volumes are in file units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RepairKind {
-    /// Points along open edges that lay closer together than `within` became one.
+    /// Merged points along open edges that were closer together than `within`.
     Merged {
-        /// The distance.
+        /// Distance within which points were merged.
         within: f64,
     },
-    /// Triangles that stood there twice, or back to back, were removed.
+    /// Removed duplicate triangles, and pairs of triangles back to back.
     Copies,
-    /// Corners in the middle of a neighbour's edge were joined to it.
+    /// Joined corners to the edges of neighbours on which they lay.
     Joined,
-    /// Triangles that faced the other way than their neighbours were turned.
+    /// Flipped triangles that faced against their neighbours.
     Turned,
-    /// Small holes were closed.
+    /// Closed small holes in the surface.
     Closed {
-        /// Width of the largest.
+        /// Width of the largest hole.
         widest: f64,
     },
-    /// Bodies that were inside out were turned.
+    /// Turned bodies that were inside out.
     Everted,
-    /// Bodies that were inside out were cut out of those that they overlapped.
+    /// Cut bodies that were inside out from the bodies that they overlapped.
     CutOut {
-        /// The volume that is enclosed no more.
+        /// Loss of enclosed volume.
         volume: f64,
     },
-    /// Walls inside the body were removed; the count is of triangles.
+    /// Removed walls inside the body; the count is of triangles.
     InnerWalls,
-    /// Bodies much smaller than the model were left out.
+    /// Left out bodies much smaller than the model.
     Specks {
-        /// Length of the largest.
+        /// Length of the largest speck.
         longest: f64,
     },
-    /// Parts that overlap, or a surface that crosses itself, became one; the count is of pairs of triangles.
+    /// United overlapping parts, or a surface that crossed itself; the count is of pairs of triangles.
     United {
-        /// Enclosed volume before; what was enclosed twice counts twice.
+        /// Enclosed volume before; regions enclosed twice count twice.
         before: f64,
-        /// Enclosed volume after.
+        /// Enclosed volume after the union.
         after: f64,
     },
-    /// Bodies that touch each other with their faces became one.
+    /// United bodies that touched each other with their faces.
     Fused,
-    /// Points and edges in which the surface touched itself were parted.
+    /// Separated the surface at points and edges in which it touched itself.
     Parted,
-    /// Closed surfaces within the body were left out.
+    /// Left out closed surfaces within the body.
     Filled {
-        /// Their volume.
+        /// Total volume of these surfaces.
         volume: f64,
     },
-    /// Openings of a cavity were closed, which made the body solid: [`crate::hollow::fill`], where it is asked for.
+    /// Closed the openings of a cavity, which made the body solid. Only on request, by
+    /// [`crate::hollow::fill`].
     Drained {
-        /// The cavity's volume.
+        /// Volume of the cavity.
         volume: f64,
     },
-    /// Bodies apart from the largest were left out.
+    /// Left out all bodies except the largest.
     LeftOut,
 }
 
 impl RepairKind {
-    /// A short name for machines.
+    /// Short name for machine-readable output.
     pub fn code(self) -> &'static str {
         match self {
             Self::Merged { .. } => "points-merged",

@@ -1,11 +1,11 @@
-//! Several closed surfaces: which is the model, which a speck, which lies inside, which is inside out.
+//! Several closed surfaces: telling apart the model, specks, inner surfaces and bodies that are inside out.
 
 use super::{Draft, Repair, RepairKind, SPECK_SHARE};
 use crate::check::components;
 use crate::{Aabb, TriMesh, Vec3};
 
-/// Solid angles that are summed to see what lies in what, a second's work; beyond that nothing is turned or
-/// left out.
+/// Largest number of solid angles summed to decide what lies inside what: a second's work. Beyond that,
+/// nothing is turned or left out.
 const MAX_WORK: usize = 20_000_000;
 
 /// Leaves out bodies that are much smaller than the largest.
@@ -27,7 +27,7 @@ pub(super) fn drop_specks(draft: &mut Draft) -> Option<Repair> {
     shells.leave_out(draft, &is_speck, RepairKind::Specks { longest })
 }
 
-/// Turns bodies that are inside out, with all that lies in them.
+/// Turns bodies that are inside out, together with everything inside them.
 pub(super) fn turn_outwards(draft: &mut Draft) -> Option<Repair> {
     let shells = Shells::of(&draft.mesh);
     let within = shells.containers(&draft.mesh)?;
@@ -49,9 +49,9 @@ pub(super) fn turn_outwards(draft: &mut Draft) -> Option<Repair> {
     })
 }
 
-/// Leaves out closed surfaces that lie within others, whichever way they face. Nothing may cross.
+/// Leaves out closed surfaces that lie within others, whichever way they face. No surfaces may cross.
 ///
-/// A cavity does not show from outside, and pieces are hollow anyway; a body within a body is not even there.
+/// A cavity is invisible from outside, and pieces are hollow anyway. A body within a body adds nothing.
 pub(super) fn fill_cavities(draft: &mut Draft) -> Option<Repair> {
     let shells = Shells::of(&draft.mesh);
     let is_inner: Vec<bool> = shells
@@ -79,11 +79,11 @@ pub(super) struct Shell {
     pub(super) bounds: Aabb,
     pub(super) volume: f64,
     n_faces: usize,
-    /// A corner of it.
+    /// A corner of one of its triangles.
     point: Vec3,
 }
 
-/// The shells of a mesh, and which of them each triangle belongs to.
+/// The shells of a mesh, and the shell of each triangle.
 pub(super) struct Shells {
     pub(super) all: Vec<Shell>,
     pub(super) of_face: Vec<u32>,
@@ -113,7 +113,7 @@ impl Shells {
         }
     }
 
-    /// The triangles of the shells that `has` accepts, with the points they use.
+    /// Triangles of the shells that `has` accepts, with the points that they use.
     pub(super) fn part(&self, mesh: &TriMesh, has: impl Fn(usize) -> bool) -> TriMesh {
         let of_part = mesh.triangles.iter().zip(&self.of_face);
         TriMesh {
@@ -126,7 +126,7 @@ impl Shells {
         .without_unused_points()
     }
 
-    /// For each shell those around it, judged by one of its corners; `None` where that is too much work.
+    /// Shells around each shell, judged by one of its corners; `None` if that is too much work.
     fn containers(&self, mesh: &TriMesh) -> Option<Vec<Vec<usize>>> {
         let mut within = vec![Vec::new(); self.all.len()];
         if self.all.len() == 1 {
@@ -180,8 +180,8 @@ impl Shells {
     }
 }
 
-/// Signed solid angle of a triangle seen from `q`, in steradians, in [−2π, 2π]; over a closed mesh they sum
-/// to ±4π at a point inside and 0 outside. [VanOosterom1983]
+/// Signed solid angle of a triangle seen from `q`, in steradians, in [−2π, 2π]. Over a closed mesh the sum is
+/// ±4π at a point inside and 0 outside. [VanOosterom1983]
 pub(super) fn solid_angle(corners: [Vec3; 3], q: Vec3) -> f64 {
     let [a, b, c] = corners.map(|p| p - q);
     let (la, lb, lc) = (a.length(), b.length(), c.length());

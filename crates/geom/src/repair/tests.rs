@@ -6,8 +6,8 @@ fn mended(mesh: &TriMesh) -> Repaired {
     repair(mesh, RepairMode::Repair).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Mends, and asserts what was done how often, that the volume is right, and that nothing is done without
-/// leave.
+/// Repairs, and asserts the kinds and counts of changes and the volume. Also asserts that nothing is done
+/// without permission.
 fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Repaired {
     let repaired = mended(mesh);
     let done: Vec<(&str, usize)> = repaired
@@ -29,7 +29,7 @@ fn assert_mended(mesh: &TriMesh, codes: &[(&str, usize)], volume: f64) -> Repair
             .all(|&f| (f as usize) < mesh.triangles.len())
     );
     assert!(repair(mesh, RepairMode::Refuse).is_err());
-    // What was repaired needs no mending.
+    // A repaired mesh needs no further repair.
     let again = mended(repaired.solid.mesh());
     assert_eq!(
         (again.repairs.len(), again.solid.mesh()),
@@ -90,7 +90,7 @@ fn copies_are_removed_and_those_back_to_back_cancel() {
     doubled.triangles.extend_from_within(..50);
     let repaired = assert_mended(&doubled, &[("copies-removed", 50)], base().signed_volume());
     assert_eq!(repaired.solid.mesh(), &base());
-    // A flap that hangs on an edge: two triangles back to back.
+    // A flap attached to an edge: two triangles back to back.
     let mut flap = base();
     let [a, b, _] = flap.triangles[7];
     flap.points.push(Vec3::splat(20.0));
@@ -118,7 +118,7 @@ fn turned_triangles_are_turned_back_and_bodies_inside_out_too() {
 #[test]
 fn corners_on_edges_are_joined() {
     let mut divided = base();
-    // Every twentieth triangle is divided on its first side, its neighbour is not.
+    // Every twentieth triangle is divided on its first side; its neighbour is not.
     for face in (0..divided.triangles.len()).step_by(20) {
         let [a, b, c] = divided.triangles[face];
         divided
@@ -138,7 +138,7 @@ fn holes_of_three_edges_and_small_ones_are_closed_and_large_ones_refused_with_th
     three.triangles.swap_remove(17);
     let repaired = assert_mended(&three, &[("holes-closed", 1)], base().signed_volume());
     assert!(repaired.repairs[0].at.distance(Vec3::new(3.0, -2.0, 1.0)) > 9.0);
-    // All triangles around a point: a hole of five or six edges.
+    // All triangles around a point are removed, which leaves a hole of five or six edges.
     let around = |mesh: &TriMesh, n: usize| {
         let mut holed = mesh.clone();
         holed.triangles.retain(|t| !t.contains(&(n as u32)));
@@ -183,7 +183,7 @@ fn touching_in_a_point_is_parted_and_touching_along_an_edge_leaves_two_bodies() 
             .abs()
             < 1e-12
     );
-    // A point of the far side drawn to one of the near side.
+    // A point of the far side is moved to a point of the near side.
     let mut pinched = base();
     let (near, far) = (pinched.triangles[0][0], pinched.triangles[300][0]);
     pinched.points[far as usize] = pinched.points[near as usize];
@@ -231,7 +231,7 @@ fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enoug
             ..
         }]
     ));
-    // Each triangle lies on the one that it is a part of.
+    // Each triangle lies on its source triangle.
     let as_read = both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3));
     for (face, &source) in repaired.source_face.iter().enumerate() {
         let [a, _, _] = as_read.corners(source as usize);
@@ -251,7 +251,7 @@ fn parts_that_overlap_are_united_and_parts_apart_are_refused_unless_one_is_enoug
 
 #[test]
 fn bodies_that_touch_with_faces_are_united() {
-    // Half of a side is common; then a part of the volume, with sides in common planes.
+    // First they share half of a side, then a part of the volume, with sides in common planes.
     for (at, volume) in [(Vec3::new(1.0, 0.5, 0.0), 2.0), (Vec3::new(0.5, 0.0, 0.0), 1.5)] {
         let pair = both(cube(Vec3::ZERO, 1.0), cube(at, 1.0));
         assert_mended(&pair, &[("bodies-united", 2)], volume);
@@ -261,7 +261,7 @@ fn bodies_that_touch_with_faces_are_united() {
 #[test]
 fn a_surface_pushed_through_itself_is_found_and_resolved() {
     let mut pushed = base();
-    // A cap of the ball goes through to beyond the other side.
+    // A cap of the ball is pushed through the other side.
     pushed
         .points
         .iter_mut()
@@ -386,7 +386,7 @@ fn tetrahedra_on_whole_numbers_are_united() {
     let repaired = repair_as(&mesh, RepairMode::Repair, InsideOut::Unite).unwrap();
     let bounds = repaired.solid.mesh().bounds();
     assert_eq!((bounds.min, bounds.max), (Vec3::ZERO, Vec3::new(4.0, 3.0, 3.0)));
-    // 2 and 2/3, of which 1/120 is common.
+    // The volumes are 2 and 2/3, of which 1/120 is common.
     assert!(
         (repaired.solid.volume() - 319.0 / 120.0).abs() < 1e-12,
         "{}",
@@ -394,7 +394,8 @@ fn tetrahedra_on_whole_numbers_are_united() {
     );
 }
 
-/// A box as its 12 triangles, without those over `missing` sides: 0 and 1 for x, 2 and 3 for y, 4 and 5 for z.
+/// A box as its 12 triangles, without those over `missing` sides: 0 and 1 for x, 2 and 3 for y, 4 and 5 for
+/// z.
 fn box_without(min: Vec3, max: Vec3, missing: &[usize]) -> TriMesh {
     let mut mesh = crate::samples::cuboid(min, max).to_mesh();
     let sides: Vec<usize> = (0..mesh.triangles.len())
@@ -411,7 +412,8 @@ fn box_without(min: Vec3, max: Vec3, missing: &[usize]) -> TriMesh {
 
 #[test]
 fn walls_between_glued_boxes_are_removed() {
-    // Four rooms around an edge, each with its four outer walls, and one wall between each two.
+    // Four rooms around an edge, each with its four outer walls, and one wall between each pair of
+    // neighbours.
     let room = |x: f64, y: f64, missing: &[usize]| {
         box_without(Vec3::new(x, y, 0.0), Vec3::new(x + 2.0, y + 3.0, 4.0), missing)
     };
@@ -422,13 +424,14 @@ fn walls_between_glued_boxes_are_removed() {
         .fold(two.clone(), both);
     let repaired = assert_mended(&unwelded(&four), &[("inner-walls-removed", 8)], 96.0);
     assert!(repaired.repairs[0].at.z.fract() != 0.0);
-    // Whichever way the walls face.
+    // The result does not depend on the way the walls face.
     let turned = both(room(0.0, 0.0, &[1]), flipped(room(2.0, 0.0, &[])));
     let repaired = mended(&unwelded(&turned));
     assert!((repaired.solid.volume() - 48.0).abs() < 1e-12);
 }
 
-/// A ball divided by the disc within its equator, of which every point is one of the ball's, and the ball's equator.
+/// A ball divided by the disc within its equator, every point of which is one of the ball's; also the
+/// equator's points.
 fn ball_with_disc() -> (TriMesh, Vec<u32>) {
     let mut ball = ball(Vec3::ZERO, 10.0, 3);
     let mut equator: Vec<u32> = (0..ball.points.len() as u32)
@@ -451,7 +454,7 @@ fn a_wall_across_a_body_is_removed_and_one_that_comes_out_is_refused() {
         &[("inner-walls-removed", equator.len() - 2)],
         whole.signed_volume(),
     );
-    // A square that touches the cube's sides where they have no points, and one that comes out of them.
+    // A square that touches the cube's sides where they have no points, and one that protrudes from them.
     let sheet = |half: f64| TriMesh {
         points: [(-half, -half), (half, -half), (half, half), (-half, half)]
             .map(|(x, y)| Vec3::new(x, y, 0.3))
@@ -474,7 +477,7 @@ fn a_wall_across_a_body_is_removed_and_one_that_comes_out_is_refused() {
         );
         assert!((refused.at().unwrap().z - 0.3).abs() < 1e-9, "{refused}");
     }
-    // Beside the cube, it bounds nothing either, but is no wall inside.
+    // Beside the cube the square bounds nothing, either, but is not a wall inside.
     let mut beside = sheet(2.0);
     beside.points.iter_mut().for_each(|p| p.x += 20.0);
     assert!(repair(&both(cube, beside), RepairMode::Repair).is_err());
@@ -531,7 +534,7 @@ fn a_body_inside_out_beside_another_or_within_it_is_no_cutter() {
         flipped(cube(Vec3::new(1.0, 0.5, 0.0), 1.0)),
     );
     assert!((mended(&touching).solid.volume() - 2.0).abs() < 1e-12);
-    // All of it is inside out: it overlaps itself alone.
+    // All of it is inside out, so it overlaps only itself.
     let all = flipped(both(base(), ball(Vec3::new(12.3, 0.4, 1.7), 6.0, 3)));
     assert_eq!(mended(&all).repairs[0].kind.code(), "body-turned");
 }

@@ -1,5 +1,5 @@
-//! Walls inside a body, as CAD programs leave them between parts that were put together: both sides of them lie
-//! within, so they bound nothing.
+//! Walls inside a body, such as CAD programs leave between parts that were joined. Both sides of such a wall
+//! lie inside the body, so the wall bounds nothing.
 
 use rayon::prelude::*;
 
@@ -9,13 +9,13 @@ use super::{Draft, NEAR_SHARE, Repair, RepairKind};
 use crate::check::{Groups, Side, inspect_edges, open_edges, sides};
 use crate::{TriMesh, Vec3};
 
-/// Solid angles that are summed to make sure that walls lie inside, some seconds' work; where it is more, they stay
-/// and the mesh is refused.
+/// Largest number of solid angles summed to confirm that walls lie inside: some seconds' work. Beyond that,
+/// walls stay and the mesh is rejected.
 const MAX_WORK: usize = 200_000_000;
 
 /// Removes open sheets that lie within a closed surface, whether they touch it or not.
 ///
-/// A sheet that comes out of the surface stays, and the mesh is refused.
+/// A sheet that protrudes from the surface stays, and the mesh is rejected.
 pub(super) fn drop_sheets(draft: &mut Draft) -> Option<Repair> {
     let mesh = &draft.mesh;
     let open = open_edges(mesh);
@@ -40,7 +40,7 @@ pub(super) fn drop_sheets(draft: &mut Draft) -> Option<Repair> {
     if crossing_pairs(&shrunk).iter().any(comes_out) {
         return None;
     }
-    // A sheet that crosses nothing lies on one side as a whole: its first triangle tells which.
+    // A sheet without crossings lies on one side as a whole, so its first triangle decides for all.
     let firsts: Vec<u32> = (0..patch.len() as u32)
         .filter(|&face| patch[face as usize] == face && is_sheet[face as usize])
         .collect();
@@ -49,10 +49,10 @@ pub(super) fn drop_sheets(draft: &mut Draft) -> Option<Repair> {
     Some(remove(draft, &is_kept))
 }
 
-/// Removes triangles between two parts of the inside of a closed surface, of which some edges have three triangles
-/// and more, and turns the others outwards.
+/// Removes triangles between two parts of the inside of a closed surface, and turns the others outwards.
+/// Applies if some edges have three or more triangles.
 ///
-/// Space is divided by the surface into cells, which meet each other around its edges; all but the outermost are
+/// The surface divides space into cells, which are connected around its edges. All but the outermost cell are
 /// inside.
 pub(super) fn drop_partitions(draft: &mut Draft) -> Option<Repair> {
     let mesh = &draft.mesh;
@@ -63,7 +63,7 @@ pub(super) fn drop_partitions(draft: &mut Draft) -> Option<Repair> {
     }
     let n_faces = mesh.triangles.len();
     let mut complexes = Groups::of(n_faces);
-    // Twice the face is its front, one more its back.
+    // Index 2 · face is the triangle's front, and 2 · face + 1 its back.
     let mut cells = Groups::of(2 * n_faces);
     for edge in edges() {
         edge[1..]
@@ -109,7 +109,7 @@ pub(super) fn drop_partitions(draft: &mut Draft) -> Option<Repair> {
     Some(remove(draft, &is_kept))
 }
 
-/// Joins the sides of triangles that see each other around an edge.
+/// Joins the sides of triangles that face each other around an edge.
 fn join_around(mesh: &TriMesh, edge: &[Side], cells: &mut Groups) {
     let [low, high] = [edge[0].low, edge[0].high].map(|v| mesh.points[v as usize]);
     let along = (high - low).normalize_or_zero();
@@ -136,7 +136,7 @@ fn join_around(mesh: &TriMesh, edge: &[Side], cells: &mut Groups) {
     }
 }
 
-/// For each complex the cell around it: the one that its triangles enclose most volume from.
+/// Cell around each complex: the cell whose triangles enclose the largest volume.
 fn outer_cells(mesh: &TriMesh, complex: &[u32], cells: &mut Groups) -> Vec<u32> {
     let n_faces = mesh.triangles.len();
     let mut volume = vec![0.0; 2 * n_faces];
@@ -163,7 +163,7 @@ fn outer_cells(mesh: &TriMesh, complex: &[u32], cells: &mut Groups) -> Vec<u32> 
     outer
 }
 
-/// Triangles joined across edges of two triangles.
+/// Groups of triangles connected across edges of two triangles.
 fn patches(mesh: &TriMesh) -> Groups {
     let mut patches = Groups::of(mesh.triangles.len());
     for edge in sides(mesh).chunk_by(Side::same_edge) {
@@ -174,8 +174,8 @@ fn patches(mesh: &TriMesh) -> Groups {
     patches
 }
 
-/// `mesh` with the rims of its sheets drawn in by some roundings, so that those that touch the surface do not cross
-/// it.
+/// Copy of `mesh` with the rims of its sheets drawn in by some roundings, so that sheets that touch the
+/// surface do not cross it.
 fn shrunk(mesh: &TriMesh, is_sheet: &[bool]) -> TriMesh {
     let within = 2.0 * NEAR_SHARE * mesh.bounds().diagonal();
     let mut inwards = vec![(Vec3::ZERO, 0.0); mesh.points.len()];
@@ -195,7 +195,7 @@ fn shrunk(mesh: &TriMesh, is_sheet: &[bool]) -> TriMesh {
         is_rim[edge[0].low as usize] = true;
         is_rim[edge[0].high as usize] = true;
     }
-    // Sheets get points of their own, since they may share some with the surface.
+    // Sheets get their own points, since they may share some with the surface.
     shrunk.points.clone_from(&mesh.points);
     for (v, &p) in mesh.points.iter().enumerate() {
         let (sum, n) = inwards[v];
@@ -234,7 +234,7 @@ fn part(mesh: &TriMesh, has: impl Fn(usize) -> bool) -> TriMesh {
     }
 }
 
-/// Something, where the middles of `faces` of `mesh` lie within the closed surface.
+/// Returns `Some` if the centres of `faces` of `mesh` lie within the closed surface.
 fn are_inside(closed: &TriMesh, mesh: &TriMesh, faces: &[u32]) -> Option<()> {
     if closed.triangles.len().saturating_mul(faces.len()) > MAX_WORK {
         return None;
@@ -242,7 +242,7 @@ fn are_inside(closed: &TriMesh, mesh: &TriMesh, faces: &[u32]) -> Option<()> {
     let is_inside = |&face: &u32| {
         let q = mesh.face_center(face as usize);
         let all = (0..closed.triangles.len()).map(|f| solid_angle(closed.corners(f), q));
-        // Half of the full angle: the surface itself would be there.
+        // Limit between 4π inside and 2π on the surface itself.
         all.sum::<f64>() > 3.0 * std::f64::consts::PI
     };
     faces.par_iter().all(is_inside).then_some(())
