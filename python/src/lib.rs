@@ -1,4 +1,5 @@
-//! What `import shellock` calls: arrays in, kits out. The package in `shellock/` has the words for people.
+//! Native half of `import shellock`: arrays in, kits out. The package in `shellock/` has the documentation
+//! for users.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,13 +25,13 @@ create_exception!(
     "Code and message of what went wrong."
 );
 
-/// How often it is looked for Ctrl-C.
+/// Interval between checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// A mesh as arrays: points (n, 3), triangles (m, 3).
+/// Arrays of a mesh: points (n, 3), triangles (m, 3).
 type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
 
-/// A kit that is made.
+/// A kit that has been made.
 #[pyclass(frozen, module = "shellock._native")]
 struct Kit(embed::Kit);
 
@@ -67,7 +68,8 @@ impl Kit {
     }
 }
 
-/// Makes a kit. `options` is a JSON object; `progress` is called with a stage, its number, how many there are, and a note.
+/// Makes a kit. `options` is a JSON object. `progress` is called with a stage, its number, the number of
+/// stages, and a note.
 #[pyfunction]
 #[pyo3(signature = (points, triangles, labels, name, options, progress))]
 fn design(
@@ -86,7 +88,7 @@ fn design(
     .map(Kit)
 }
 
-/// Makes a kit of a file's bytes.
+/// Makes a kit from the bytes of a model file.
 #[pyfunction]
 #[pyo3(signature = (file, name, options, progress))]
 fn build(
@@ -102,7 +104,7 @@ fn build(
     waited(py, progress, |news, stop| embed::design(&request, news, stop)).map(Kit)
 }
 
-/// Divides a surface: for each triangle the number of its piece, from 1.
+/// Divides a surface. Returns the number of the piece of each triangle, from 1.
 #[pyfunction]
 #[pyo3(signature = (points, triangles, labels, options, progress))]
 fn segment(
@@ -119,7 +121,7 @@ fn segment(
     })
 }
 
-/// Judges an assembly; a JSON object with `passed`, `checks` and `findings`.
+/// Verifies an assembly. Returns a JSON object with `passed`, `checks` and `findings`.
 #[pyfunction]
 fn verify(
     py: Python<'_>,
@@ -135,7 +137,7 @@ fn verify(
     Ok(told.to_string())
 }
 
-/// Checks the certificate of a kit's folder: claim, verdict and figure of each finding.
+/// Checks the certificate in a kit's folder. Returns claim, verdict and figure of each finding.
 #[pyfunction]
 fn check(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<(String, String, String)>> {
     let found = py.detach(|| shellock_check::check(&folder));
@@ -155,19 +157,19 @@ fn save(py: Python<'_>, files: Vec<(String, Vec<u8>)>, folder: PathBuf, force: b
     py.detach(|| embed::save(&files, &folder, force)).map_err(raised)
 }
 
-/// Writes one file, whole or not at all.
+/// Writes one file atomically: either all of it or nothing.
 #[pyfunction]
 fn write_file(path: PathBuf, content: &[u8]) -> PyResult<()> {
     embed::write_file(&path, content).map_err(raised)
 }
 
-/// All models below a folder but for what lies in `out`, with the paths of their kits.
+/// Lists all models below a folder, except in `out`, with the paths of their kits.
 #[pyfunction]
 fn models(folder: PathBuf, out: Option<PathBuf>) -> PyResult<Vec<(PathBuf, PathBuf)>> {
     embed::models(&folder, out.as_deref()).map_err(raised)
 }
 
-/// The tables of a batch, by the names of their files, from a JSON list of records.
+/// Returns the tables of a batch with their file names, from a JSON list of records.
 #[pyfunction]
 fn tables<'py>(py: Python<'py>, records: &str) -> PyResult<Vec<(String, Bound<'py, PyBytes>)>> {
     let files = embed::tables(records).map_err(raised)?;
@@ -175,25 +177,25 @@ fn tables<'py>(py: Python<'py>, records: &str) -> PyResult<Vec<(String, Bound<'p
     Ok(files.into_iter().map(bytes).collect())
 }
 
-/// Where the record of a kit that is made on Ray is kept, within the folder for kits.
+/// Returns the path of the record of a kit made on Ray, within the folder for kits.
 #[pyfunction]
 fn record_path(kit: &str) -> String {
     embed::record_path(kit, "ray")
 }
 
-/// Whether a file with this name, within a kit's folder, is of the kit.
+/// Returns true if a file of this name, within a kit's folder, belongs to the kit.
 #[pyfunction]
 fn is_of_kit(name: &str) -> bool {
     embed::is_of_kit(name)
 }
 
-/// All options, as a JSON list.
+/// Returns all options, as a JSON list.
 #[pyfunction]
 fn options() -> String {
     embed::options().to_string()
 }
 
-/// What is asked for, out of the interpreter's hands.
+/// Input of a job, copied so that no Python object is needed while it runs.
 struct Input {
     mesh: TriMesh,
     labels: Option<Vec<i32>>,
@@ -264,7 +266,7 @@ fn raised(problem: Problem) -> PyErr {
     Refused::new_err((problem.code, problem.message, problem.at))
 }
 
-/// News that go to another thread.
+/// Progress news on their way to another thread.
 struct Event {
     stage: String,
     number: usize,
@@ -272,8 +274,8 @@ struct Event {
     note: Option<String>,
 }
 
-/// Does `job` in a thread of its own, while this one hears of Ctrl-C and calls `progress`. The first exception stops the
-/// job and is raised when it has ended; `progress` is not called after it.
+/// Runs `job` in a thread of its own, while this thread checks for Ctrl-C and calls `progress`. The first
+/// exception stops the job and is raised after the job has ended; `progress` is not called after it.
 fn waited<T: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -281,7 +283,8 @@ fn waited<T: Send>(
 ) -> PyResult<T> {
     let stop = Arc::new(AtomicBool::new(false));
     let (send, receive) = channel();
-    // Other threads of the interpreter may go on meanwhile; a receiver alone may not be shared with this one's pause.
+    // Other Python threads may run meanwhile. The closure passed to `detach` may not borrow a bare receiver,
+    // hence the mutex.
     let receive = Mutex::new(receive);
     let mut interrupt = None;
     let ended = std::thread::scope(|scope| {
@@ -290,7 +293,7 @@ fn waited<T: Send>(
             let send = Mutex::new(send);
             let news = |news: News<'_>| {
                 let event = event(news);
-                // Nobody listens any more where the job is to stop.
+                // The receiver may be gone once the job is to stop.
                 let _ = send.lock().map(|send| send.send(event));
             };
             job(&news, &stop_of_job)

@@ -1,4 +1,4 @@
-//! Prints what the readers and the check make of mesh files and `.seg` files: `inspect FILE…`.
+//! Prints the results of the readers and of the check for mesh files and `.seg` files: `inspect FILE…`.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,9 +1,8 @@
-//! Damages files at random and reads and mends what is left, for as many rounds as asked: `mutate ROUNDS SEED
+//! Damages files at random, reads and repairs the result, for the given number of rounds: `mutate ROUNDS SEED
 //! FILE…`.
 //!
-//! The same arguments give the same damage; a panic names the round. Models within 3MF packages are damaged
-//! before they are packed again, so that checksums do not stop all of it. Coverage-guided fuzzing is in
-//! `fuzz/`.
+//! Equal arguments give equal damage; a panic names the round. Models within 3MF packages are damaged before
+//! they are packed again, so that checksums do not hide all of it. Coverage-guided fuzzing is in `fuzz/`.
 
 use std::io::{Cursor, Read as _, Write as _};
 use std::path::Path;
@@ -14,9 +13,9 @@ use rand_chacha::ChaCha8Rng;
 use shellock_formats::{read_labels, read_mesh};
 use shellock_geom::repair::{RepairMode, repair};
 
-/// Larger meshes take longer and find nothing more.
+/// Limit on mesh size: larger meshes take longer and find nothing more.
 const MOST_TRIANGLES: usize = 3000;
-/// A round that takes longer is told.
+/// Time after which a round is reported.
 const SLOW: Duration = Duration::from_secs(3);
 
 fn main() {
@@ -69,13 +68,13 @@ fn main() {
     println!("{n_rounds} rounds: {n_read} read, {n_mended} of them repaired to a body");
 }
 
-/// Tells of a file and writes it, to be looked at.
+/// Reports a file and writes it for inspection.
 fn keep(what: &str, round: u64, bytes: &[u8]) {
     let name = format!("damaged-{round}");
     println!("{what}, written to {name}: {:?}", std::fs::write(&name, bytes));
 }
 
-/// The file with a few bytes changed, copied, cut out or cut off.
+/// Returns the file with a few bytes changed, copied, cut out or cut off.
 fn damaged(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     match unpacked(bytes) {
         Some((name, model)) if rng.random_bool(0.8) => packed(&name, &scratched(&model, rng)),
@@ -84,7 +83,7 @@ fn damaged(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
 }
 
 fn scratched(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
-    /// What makes numbers and lists go wrong.
+    /// Words that make numbers and lists invalid.
     const WORDS: [&[u8]; 10] = [
         b"-1",
         b"0",
@@ -124,7 +123,7 @@ fn scratched(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     bytes
 }
 
-/// The model of a 3MF package.
+/// Unpacks the model of a 3MF package.
 fn unpacked(bytes: &[u8]) -> Option<(String, Vec<u8>)> {
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).ok()?;
     let name = "3D/3dmodel.model".to_owned();

@@ -1,40 +1,41 @@
-//! Parts made of parts: meshes that occur several times, each time moved.
+//! Parts made of parts: meshes that occur several times, each time with another transform.
 
 use glam::DAffine3;
 
 use super::ReadError;
 
-/// Occurrences of parts and triangles that are made at most; more is a file that multiplies itself.
+/// Largest number of occurrences of parts; a file with more multiplies itself.
 const MAX_OCCURRENCES: u64 = 100_000;
-/// Triangles of all occurrences.
+/// Largest number of triangles in all occurrences.
 const MAX_TRIANGLES: u64 = 20_000_000;
 
-/// A part: triangles of its own, or others that are put together. `T` is said of each place where a part goes.
+/// A part with triangles of its own, or with other parts as children, or both. `T` is an attribute of each
+/// occurrence.
 pub(super) struct Part<T> {
-    /// Its id in the file, for messages.
+    /// Id of the part in the file, for messages.
     pub(super) id: String,
-    /// How many triangles it has of its own.
+    /// Number of triangles of its own.
     pub(super) n_triangles: usize,
-    /// Other parts in their places.
+    /// Child parts with their transforms.
     pub(super) children: Vec<Occurrence<T>>,
 }
 
-/// A part in its place.
+/// A part with its transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Occurrence<T> {
     /// Index of the part.
     pub(super) part: usize,
-    /// Where it goes, in what it is put into.
+    /// Transform from the part to its parent.
     pub(super) placed: DAffine3,
-    /// What is said of it there.
+    /// Attribute of the occurrence.
     pub(super) said: T,
 }
 
-/// All places of parts with triangles below `roots`, in file order. `join` makes of what is said of a place and
-/// of a place within it what holds there.
+/// Lists all occurrences of parts with triangles below `roots`, in file order. `join` combines the attributes
+/// of an occurrence and of one within it.
 ///
-/// Refuses parts that contain themselves, and more triangles or places than are made; the work is bounded by
-/// that.
+/// Errors for parts that contain themselves, and for more triangles or occurrences than the limits, before
+/// the work is done.
 pub(super) fn occurrences<T: Copy>(
     parts: &[Part<T>],
     roots: &[Occurrence<T>],
@@ -65,7 +66,7 @@ pub(super) fn occurrences<T: Copy>(
     Ok(found)
 }
 
-/// Refuses more places of parts, or more triangles of all of them, than are made.
+/// Returns an error for more occurrences, or more triangles in all of them, than the limits.
 pub(super) fn check_limits(n_occurrences: u64, n_triangles: u64) -> Result<(), ReadError> {
     if n_occurrences > MAX_OCCURRENCES || n_triangles > MAX_TRIANGLES {
         return Err(ReadError::TooManyCopies {
@@ -76,7 +77,7 @@ pub(super) fn check_limits(n_occurrences: u64, n_triangles: u64) -> Result<(), R
     Ok(())
 }
 
-/// For each part the number of parts and of triangles below it, itself included; refuses cycles.
+/// Counts the parts and the triangles below each part, itself included; an error for cycles.
 fn sizes<T>(parts: &[Part<T>], kind: &'static str) -> Result<Vec<(u64, u64)>, ReadError> {
     #[derive(Clone, Copy, PartialEq)]
     enum State {
@@ -87,7 +88,7 @@ fn sizes<T>(parts: &[Part<T>], kind: &'static str) -> Result<Vec<(u64, u64)>, Re
     let mut state = vec![State::New; parts.len()];
     let mut sizes = vec![(0_u64, 0_u64); parts.len()];
     for start in 0..parts.len() {
-        // A part and how many of its children have been looked at.
+        // Stack of parts, each with the number of its children visited so far.
         let mut path = vec![(start, 0)];
         while let Some((part, next)) = path.pop() {
             if next == 0 && state[part] == State::Done {
@@ -122,7 +123,7 @@ mod tests {
     use super::*;
     use glam::DVec3;
 
-    /// A part whose children are moved along x; what is said is the product along the way.
+    /// A part whose children are moved along x; the attribute is the displacement.
     fn part(n_triangles: usize, children: &[(usize, f64)]) -> Part<f64> {
         let children = children.iter().map(|&(c, x)| placed(c, x)).collect();
         Part {

@@ -1,4 +1,4 @@
-//! Negative volumes made real: what the file says is cut out of an object is cut out.
+//! Negative volumes: parts that the file declares to be cut out of an object are cut out.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,8 @@ use shellock_geom::repair::{CutFace, cut_out};
 
 /// Cuts all of `loaded.cutters` out of their objects.
 ///
-/// Surfaces that a cut makes are faces of the file, too, since the file has the cutter's faces: they come
-/// after all others. Their labels are those of the nearest face of the object.
+/// New surfaces of a cut count as faces of the file, as they come from the cutter's faces, and follow all
+/// others. Their labels are those of the nearest face of the object.
 pub(super) fn carve(mut loaded: Loaded) -> Result<Loaded, ReadError> {
     let mut cutters: BTreeMap<u32, Vec<Cutter>> = BTreeMap::new();
     for cutter in std::mem::take(&mut loaded.cutters) {
@@ -25,7 +25,7 @@ pub(super) fn carve(mut loaded: Loaded) -> Result<Loaded, ReadError> {
 struct Made {
     corners: [u32; 3],
     file_face: u32,
-    /// The triangle before the cut that has its labels.
+    /// Index of the triangle before the cut from which it takes its labels.
     like: usize,
 }
 
@@ -91,7 +91,7 @@ fn carve_item(mut loaded: Loaded, item: u32, cutters: &[Cutter]) -> Result<Loade
     Ok(loaded)
 }
 
-/// The number of each cutter's first face among those of the file, of which there are `n_faces` so far.
+/// Index of each cutter's first face among those of the file, of which there are `n_faces` so far.
 fn first_faces(n_faces: u32, cutters: &[&TriMesh]) -> Vec<u32> {
     cutters
         .iter()

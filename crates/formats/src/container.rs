@@ -1,4 +1,5 @@
-//! What bytes are wrapped in: gzip, zip with a single mesh, UTF-16. Unpacking is bounded.
+//! Unwrapping of mesh files from gzip, from a zip with a single mesh, and from UTF-16. The unpacked size is
+//! limited.
 
 use std::borrow::Cow;
 use std::io::{Cursor, Read};
@@ -9,22 +10,22 @@ use zip::result::ZipError;
 
 use super::{ReadError, recognise, stl};
 
-/// Unpacked bytes that any file may have.
+/// Unpacked size that every file may have, bytes.
 const FREE_BYTES: u64 = 64 << 20;
-/// Beyond these, unpacked bytes for each packed one: text of meshes packs 4 to 20 times, deflate at most 1032
-/// times.
+/// Beyond `FREE_BYTES`, largest unpacked size per packed byte. Text of meshes is packed 4 to 20 times, and
+/// deflate packs at most 1032 times.
 const MAX_RATIO: u64 = 100;
-/// Unpacked bytes that no file may have.
+/// Unpacked size that no file may exceed, bytes.
 const MAX_BYTES: u64 = 2 << 30;
-/// Names of meshes within archives.
+/// Endings of mesh names within archives.
 const MESH_NAMES: [&[u8]; 8] = [
     b".stl", b".obj", b".ply", b".off", b".3mf", b".glb", b".gltf", b".gz",
 ];
 
-/// The mesh file itself, without the wrapping, and the name it has in a zip archive.
+/// Returns the mesh file without its wrapping, and its name in a zip archive.
 pub(super) fn unpack(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<String>), ReadError> {
     let (mut bytes, mut name) = (Cow::Borrowed(bytes), None);
-    // A packed file in an archive is usual, more layers are not.
+    // A packed file in an archive is common, more layers are not.
     for _ in 0..2 {
         if bytes.starts_with(b"\x1F\x8B") {
             let limit = limit(bytes.len());
@@ -40,12 +41,12 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<String>), Re
     Ok((bytes, name))
 }
 
-/// The most that a file of `packed` bytes may unpack to.
+/// Largest unpacked size allowed for a file of `packed` bytes.
 pub(super) fn limit(packed: usize) -> u64 {
     (FREE_BYTES + MAX_RATIO * packed as u64).min(MAX_BYTES)
 }
 
-/// All that `source` yields, refused beyond `limit` bytes.
+/// Reads `source` to its end; an error beyond `limit` bytes.
 pub(super) fn read_bounded(source: impl Read, limit: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
     source
@@ -61,14 +62,14 @@ pub(super) fn read_bounded(source: impl Read, limit: u64) -> Result<Vec<u8>, Rea
     }
 }
 
-/// Opens a zip archive.
+/// Opens a zip archive in memory.
 pub(super) fn archive(bytes: &[u8]) -> Result<ZipArchive<Cursor<&[u8]>>, ReadError> {
     ZipArchive::new(Cursor::new(bytes)).map_err(unopened)
 }
 
-/// Why an archive, or a file in one, cannot be opened.
+/// Converts an error in opening an archive, or a file in one.
 pub(super) fn unopened(error: ZipError) -> ReadError {
-    // Some are told only when the file is read, wrapped.
+    // Some errors are reported only on reading the file, wrapped in an I/O error.
     let error = match error {
         ZipError::Io(io) => io.downcast().unwrap_or_else(ZipError::Io),
         other => other,
@@ -88,7 +89,8 @@ pub(super) fn unopened(error: ZipError) -> ReadError {
     }
 }
 
-/// Whether a zip archive is a 3MF package; a damaged one is if it looks like one.
+/// Returns true if a zip archive is a 3MF package. A damaged one counts if it contains the name of a 3MF
+/// model.
 fn is_3mf(bytes: &[u8]) -> bool {
     match archive(bytes) {
         Ok(archive) => archive
@@ -123,7 +125,7 @@ fn only_mesh(bytes: &[u8]) -> Result<(Vec<u8>, String), ReadError> {
     Ok((read_bounded(file, limit(bytes.len()))?, name))
 }
 
-/// The same text as UTF-8, where it looks like UTF-16.
+/// Converts text that looks like UTF-16 to UTF-8; other bytes are unchanged.
 pub(super) fn as_utf8(bytes: Vec<u8>) -> Vec<u8> {
     if recognise::is_utf16(&bytes) {
         utf8(&bytes)
@@ -132,7 +134,7 @@ pub(super) fn as_utf8(bytes: Vec<u8>) -> Vec<u8> {
     }
 }
 
-/// UTF-16 of either byte order as UTF-8; what is no character becomes "�".
+/// Converts UTF-16 of either byte order to UTF-8; invalid characters become "�".
 fn utf8(bytes: &[u8]) -> Vec<u8> {
     let is_little_endian =
         !bytes.starts_with(b"\xFE\xFF") && (bytes.starts_with(b"\xFF\xFE") || bytes[0] != 0);

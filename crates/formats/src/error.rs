@@ -1,114 +1,114 @@
-//! Refusals of bytes, in words.
+//! Errors of the readers, with messages for users.
 
 use super::{Format, Place};
 
-/// Why bytes are no mesh (or no list of labels).
+/// Reasons why bytes are no mesh (or no list of labels).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReadError {
-    /// No bytes, or nothing but blanks.
+    /// No bytes, or nothing but white space.
     #[error("the file is empty; export it again")]
     Empty,
-    /// An archive without a model, or with several.
+    /// An archive without a mesh, or with several.
     #[error(
         "the file is a zip archive with {n_models} mesh files in it; unpack it and give the one you want"
     )]
     Archive {
-        /// Files in it whose names are those of meshes.
+        /// Number of files with names of meshes.
         n_models: usize,
     },
     /// A zip or gzip that cannot be unpacked.
     #[error("the archive is damaged ({reason}); download or export the file again")]
     Damaged {
-        /// What the unpacker says.
+        /// Message of the unpacking library.
         reason: String,
     },
-    /// An archive that is packed, or locked, in a way that is not read.
+    /// An archive with an unsupported compression, or with a password.
     #[error(
         "the archive cannot be opened ({reason}); pack it again as an ordinary zip, or give the plain mesh file"
     )]
     Packing {
-        /// What the unpacker says.
+        /// Message of the unpacking library.
         reason: String,
     },
-    /// Unpacking would take more memory than an honest file needs.
+    /// An archive that unpacks to more memory than an honest file needs.
     #[error(
         "unpacked, the file has more than {limit_mb} MB; it is broken or hostile: export a plain mesh file"
     )]
     Bomb {
-        /// The limit for a file of this size.
+        /// Limit for a file of this size, MB.
         limit_mb: u64,
     },
-    /// Parts put together from parts have too many triangles.
+    /// Too many triangles after repeated parts are put together.
     #[error("{what} gives more than {limit} triangles; simplify the model first")]
     TooManyCopies {
-        /// What multiplies.
+        /// Cause of the multiplication.
         what: &'static str,
-        /// The limit.
+        /// Largest number that is accepted.
         limit: u64,
     },
-    /// A part is made of parts that contain it.
+    /// A part that contains itself, directly or through others.
     #[error("{kind} {id} contains itself, directly or through others; export the model again")]
     Cycle {
-        /// "object" or "node".
+        /// Kind of part: "object" or "node".
         kind: &'static str,
-        /// Its id in the file.
+        /// Id of the part in the file.
         id: String,
     },
-    /// A part names another that is not there.
+    /// A reference to a part that does not exist.
     #[error("{kind} {id} is used, but is not in the file; export the model again")]
     MissingPart {
-        /// "object", "mesh", "buffer", ….
+        /// Kind of part: "object", "mesh", "buffer", ….
         kind: &'static str,
-        /// Its id in the file.
+        /// Id of the part in the file.
         id: String,
     },
-    /// Something else that people have lying beside their models.
+    /// A file of another kind, as people have beside their models.
     #[error("this is {what}, not a model; give the model itself as STL, OBJ, PLY, OFF, 3MF or glTF")]
     NotAModel {
-        /// What it is.
+        /// Description of the file's kind.
         what: &'static str,
     },
-    /// Neither the content nor the extension says what it is.
+    /// A file whose format neither content nor extension reveals.
     #[error(
         "the content is neither STL, OBJ, PLY, OFF, 3MF nor glTF; export the model in one of these formats"
     )]
     UnknownFormat,
-    /// A variant of a known format that is not read.
+    /// An unsupported variant of a known format.
     #[error("{at}: {what} is not read; export the model as 3MF, binary STL or PLY")]
     Unsupported {
-        /// The variant.
+        /// Description of the unsupported variant.
         what: &'static str,
-        /// Where it says so.
+        /// Place that declares the variant.
         at: Place,
     },
-    /// Something else stands where a certain word or number should.
+    /// A wrong word or number in place of an expected one.
     #[error("{at}: expected {expected}, found \"{found}\"; correct it there or export the file again")]
     Malformed {
-        /// Where.
+        /// Place of the wrong text.
         at: Place,
-        /// What should stand there.
+        /// Description of the expected text.
         expected: &'static str,
-        /// What stands there, shortened.
+        /// Text found there, shortened.
         found: String,
     },
-    /// A 3MF that requires an extension which is not read: its shape would be wrong without.
+    /// A 3MF that requires an unsupported extension: its shape would be wrong without.
     #[error(
         "the file requires the 3MF extension \"{name}\", which is not read; export it as a plain mesh: 3MF without \
          extensions, or STL"
     )]
     Extension {
-        /// Its name for people, or its namespace.
+        /// Common name of the extension, or its namespace.
         name: String,
     },
-    /// An object whose shape is given in a way that is not read.
+    /// An object whose shape is given in an unsupported way.
     #[error(
         "{object} is not given by a mesh alone, but by \"{shape}\", which is not read; export it as a plain mesh: 3MF \
          without extensions, or STL"
     )]
     Shape {
-        /// The object, with its name or number.
+        /// Object, by its name or number.
         object: String,
-        /// The extension, or the element.
+        /// Name of the extension, or of the element.
         shape: String,
     },
     /// Tool paths for a printer instead of a model.
@@ -116,56 +116,56 @@ pub enum ReadError {
         "this is a sliced file: it holds G-code for a printer and no model; give the project that it was sliced from (.3mf)"
     )]
     Sliced,
-    /// A file of which nothing is to be printed.
+    /// A file in which nothing is to be printed.
     #[error(
         "the file has nothing but {what} ({names}), which are left out; give a file with the model itself"
     )]
     NothingPrinted {
-        /// What there is.
+        /// Kind of the parts present.
         what: &'static str,
-        /// Its names.
+        /// Names of the parts present.
         names: String,
     },
-    /// A part that is to be cut out, and cannot be.
+    /// A negative volume that cannot be cut out.
     #[error("the negative volume {name} cannot be cut out: {reason}")]
     Cut {
-        /// The part.
+        /// Name of the part.
         name: String,
-        /// Why.
+        /// Reason why it failed.
         reason: String,
     },
-    /// No object, or no plate, of the name asked for.
+    /// A selected object or plate that does not exist.
     #[error("the file has no {what} \"{wanted}\"; it has {has}")]
     NoSuchPart {
-        /// "object" or "plate".
+        /// Kind of part: "object" or "plate".
         what: &'static str,
-        /// The name asked for.
+        /// Name that was asked for.
         wanted: String,
-        /// The names that there are.
+        /// Names that the file has.
         has: String,
     },
-    /// A part of a 3MF package that is not what it should be.
+    /// An invalid part of a 3MF package.
     #[error("{part}, {at}: {reason}; export the model again")]
     Xml {
-        /// The file within the package.
+        /// File within the package.
         part: String,
-        /// Where in it.
+        /// Place in that file.
         at: Place,
-        /// What is wrong.
+        /// Description of the problem.
         reason: String,
     },
-    /// glTF whose description is not what it should be.
+    /// glTF with an invalid description.
     #[error("the glTF cannot be read: {reason}; export the model again, with its data inside (.glb)")]
     Gltf {
-        /// What is wrong.
+        /// Description of the problem.
         reason: String,
     },
-    /// glTF that has or needs something that is not read.
+    /// glTF that has or needs an unsupported feature.
     #[error("the glTF {what}; {remedy}")]
     GltfUnsupported {
-        /// The feature that it has or needs.
+        /// Feature that it has or needs.
         what: String,
-        /// Advice.
+        /// Advice for the user.
         remedy: &'static str,
     },
     /// Paint of a triangle that is no code of PrusaSlicer or Bambu Studio.
@@ -173,53 +173,53 @@ pub enum ReadError {
         "the paint \"{code}\" of a triangle cannot be read; paint the model again in the slicer, or remove the paint"
     )]
     Paint {
-        /// The triangle within its object.
+        /// Index of the triangle within its object.
         face: u32,
-        /// The code, shortened.
+        /// Code of the paint, shortened.
         code: String,
     },
-    /// The bytes end too early.
+    /// A file that ends too early.
     #[error("{at}: the file ends in the middle of {within}; it was cut off: copy or export it again")]
     CutOff {
-        /// The end.
+        /// End of the file.
         at: Place,
-        /// What is incomplete.
+        /// Name of the incomplete part.
         within: &'static str,
     },
-    /// A header's count cannot be true.
+    /// A count in a header that cannot be true.
     #[error(
         "{at}: the header promises {promised} {what}, but the file has room for {room} only; \
          it was cut off or its header is wrong: copy or export it again"
     )]
     TooFewBytes {
-        /// Where the count or what it counts stands.
+        /// Place of the count, or of the items counted.
         at: Place,
-        /// What is counted.
+        /// Name of the items counted.
         what: &'static str,
-        /// The count of the header.
+        /// Count given in the header.
         promised: u64,
-        /// What the bytes could hold at most.
+        /// Largest count for which the bytes suffice.
         room: u64,
     },
-    /// A coordinate is NaN or infinite, or too large for a float.
+    /// A coordinate that is NaN, infinite, or too large for a float.
     #[error(
         "{at}: a coordinate is not a finite number (NaN or infinite); repair the model where it was made"
     )]
     NotFinite {
-        /// Where.
+        /// Place of the coordinate.
         at: Place,
     },
-    /// A face names a point that is not there.
+    /// A face that refers to a missing point.
     #[error(
         "{at}: a face uses point {index}, but the file has {n_points} points, counted from {first}; \
          export the model again"
     )]
     MissingPoint {
-        /// Where the face stands.
+        /// Place of the face.
         at: Place,
-        /// The index as the file has it.
+        /// Index as given in the file.
         index: i64,
-        /// How many points there are.
+        /// Number of points in the file.
         n_points: usize,
         /// Index of the first point in this format.
         first: u32,
@@ -227,31 +227,31 @@ pub enum ReadError {
     /// A face of fewer than three corners.
     #[error("{at}: a face has {n_corners} corners, it needs 3 or more; export the model again")]
     TooFewCorners {
-        /// Where.
+        /// Place of the face.
         at: Place,
-        /// How many it has.
+        /// Number of its corners.
         n_corners: usize,
     },
-    /// Points or nothing at all.
+    /// A file with only points, or without any content.
     #[error("the {format} file has no triangles ({n_points} points); export the model as a surface mesh")]
     NoTriangles {
-        /// The format.
+        /// Format of the file.
         format: Format,
-        /// How many points there are.
+        /// Number of points in the file.
         n_points: usize,
     },
-    /// More than indices of 32 bits can tell apart.
+    /// More points or triangles than 32-bit indices can address.
     #[error("{at}: more than 4 thousand million points or triangles; simplify the model first")]
     TooLarge {
-        /// Where the limit is passed.
+        /// Place where the limit is passed.
         at: Place,
     },
     /// A label below 0.
     #[error("{at}: the label {label} is negative; number the parts from 0")]
     NegativeLabel {
-        /// Where.
+        /// Place of the label.
         at: Place,
-        /// The label.
+        /// Value of the label.
         label: i64,
     },
 }

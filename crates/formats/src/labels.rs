@@ -1,9 +1,10 @@
-//! `.seg`: one whole number a line, the label of a face in file order (Princeton Segmentation Benchmark).
+//! `.seg` files: one whole number per line, the label of a face in file order (Princeton Segmentation
+//! Benchmark).
 
 use super::text::{Lines, whole, words};
 use super::{Place, ReadError, container};
 
-/// Reads one label ≥ 0 a line, in the order of the file's faces; blank lines are passed over and `3.0` counts
+/// Reads one label ≥ 0 per line, in the order of the file's faces. Blank lines are skipped, and `3.0` counts
 /// as 3.
 pub fn read_labels(bytes: &[u8]) -> Result<Vec<i64>, ReadError> {
     let (bytes, _) = container::unpack(bytes)?;
@@ -20,7 +21,7 @@ pub fn read_labels(bytes: &[u8]) -> Result<Vec<i64>, ReadError> {
     }
 }
 
-/// `labels` one a line, as [`read_labels`] reads them.
+/// Writes one label per line, in the format of [`read_labels`].
 pub fn write_labels(labels: &[u32]) -> Vec<u8> {
     labels
         .iter()
@@ -28,7 +29,7 @@ pub fn write_labels(labels: &[u32]) -> Vec<u8> {
         .collect()
 }
 
-/// The label of a line, none where the line is blank.
+/// Parses the label of a line; `None` for a blank line.
 fn label(line: &[u8], at: Place) -> Result<Option<i64>, ReadError> {
     const EXPECTED: &str = "one whole number a line";
     let mut words = words(line);

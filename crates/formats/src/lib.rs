@@ -1,21 +1,25 @@
-//! Mesh files from bytes and to bytes.
+//! Readers and writers of mesh files, from bytes and to bytes.
 //!
 //! | format | read | written |
 //! |---|---|---|
 //! | STL | binary, ASCII, colours of both dialects | binary |
 //! | OBJ | text; groups, objects, materials, colours of points | |
-//! | PLY | ASCII, binary of both byte orders, strips, face labels, colours of faces and points | binary, face labels |
+//! | PLY | ASCII, binary of both byte orders, strips, face labels | binary, face labels |
+//! | | colours of faces and points | |
 //! | OFF | text, colours of faces and points | |
-//! | 3MF | units, components, transforms, several files, materials, paint, roles of parts, negative volumes, named sets | pieces, coloured; one body, painted |
-//! | glTF, GLB | nodes, skins, morph targets, instances, all modes of triangles, materials, colours of points | |
-//! | `.seg` | one label a line | the same |
+//! | 3MF | units, components, transforms, several files, materials, paint | coloured pieces; a painted body |
+//! | | roles of parts, negative volumes, named sets | |
+//! | glTF, GLB | nodes, skins, morph targets, instances, all modes of triangles | |
+//! | | materials, colours of points | |
+//! | `.seg` | one label per line | one label per line |
 //!
-//! Any of them may be packed by gzip, lie alone in a zip archive, be stored as UTF-16 or have a wrong name.
+//! Each of them may be packed by gzip, be the only mesh in a zip archive, be stored as UTF-16, or have a
+//! wrong extension.
 //!
-//! Readers take what files in the wild hold and refuse the rest with a place: a line of a text, a byte of a
-//! file. They never panic and reserve no memory that the bytes at hand do not back. Coordinates are taken as
-//! they stand ([`Loaded::unit_mm`] says where the file has a unit) and points are not merged: that is
-//! [`shellock_geom::weld`]; whether the surface is a body is [`shellock_geom::check`].
+//! Readers accept the variants found in practice and reject the rest with a place: a line of a text, a byte
+//! of a file. They never panic, and reserve no memory that the given bytes do not justify. Coordinates are
+//! kept as they are ([`Loaded::unit_mm`] gives the file's unit, if it has one). Points are not merged: that
+//! is [`shellock_geom::weld`]. Surfaces are not checked: that is [`shellock_geom::check`].
 
 mod assembly;
 mod carve;
@@ -47,45 +51,46 @@ pub use threemf::{NamedObject, write_3mf, write_painted_3mf};
 use recognise::recognise;
 use shellock_geom::{Aabb, TriMesh};
 
-/// A mesh as its file has it, polygons cut into triangles.
+/// A mesh as stored in its file, with polygons divided into triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// Points in file units, in file order; an STL has three of its own for each triangle.
+    /// Points in file units, in file order; an STL has three points of its own per triangle.
     pub mesh: TriMesh,
-    /// The ways in which the file divides its surface, each at most once, in the order of [`LabelSource`].
+    /// Ways in which the file divides its surface, each at most once, in the order of [`LabelSource`].
     pub labellings: Vec<Labelling>,
-    /// For each triangle the face of the file it came from, counted from 0; ascending.
+    /// Index of the file's face that each triangle came from, from 0; ascending.
     pub file_face: Vec<u32>,
-    /// What the bytes turned out to be.
+    /// Format found in the content.
     pub format: Format,
-    /// Length of a file unit, mm, where the format has one.
+    /// Length of a file unit, mm, if the format has one.
     pub unit_mm: Option<f64>,
-    /// Whether the file states that unit itself; else it is what the format prescribes, which many programs
-    /// ignore.
+    /// True if the file states the unit itself. Otherwise the unit is the one that the format prescribes,
+    /// which many programs ignore.
     pub unit_is_stated: bool,
-    /// Objects of the file, by the labels of [`LabelSource::Object`]; empty where the format has no names.
+    /// Objects of the file, indexed by the labels of [`LabelSource::Object`]. Empty if the format has no
+    /// names, or if an OBJ is not wholly divided into named objects.
     pub objects: Vec<FileObject>,
-    /// Parts that are still to be cut out of others; [`read_mesh`] has done it.
+    /// Parts still to be cut out of others; empty after [`read_mesh`].
     pub cutters: Vec<Cutter>,
-    /// What a person should know about how the bytes were taken.
+    /// Notes for the user about how the bytes were read.
     pub notes: Vec<String>,
 }
 
 impl Loaded {
-    /// How many faces the file has; polygons count once.
+    /// Number of faces in the file; a polygon counts once.
     pub fn n_file_faces(&self) -> usize {
         // No reader drops a face, so the last triangle belongs to the last face.
         self.file_face.last().map_or(0, |&face| face as usize + 1)
     }
 
-    /// The box around the triangles, file units; points that none of them uses do not count.
+    /// Bounding box of the triangles, file units; unused points do not count.
     pub fn bounds(&self) -> Aabb {
         (0..self.mesh.triangles.len()).fold(Aabb::EMPTY, |bounds, face| {
             bounds.union(Aabb::around(self.mesh.corners(face)))
         })
     }
 
-    /// One label for each triangle as `source` has them; `None` where the file has none.
+    /// Returns one label per triangle for `source`; `None` if the file has none.
     pub fn labels(&self, source: LabelSource) -> Option<&[i64]> {
         self.labellings
             .iter()
@@ -93,7 +98,7 @@ impl Loaded {
             .map(|l| &l.labels[..])
     }
 
-    /// Labels that somebody gave on purpose: a property of the faces, or paint.
+    /// Returns labels that were assigned on purpose: a property of the faces, or paint.
     pub fn face_labels(&self) -> Option<&[i64]> {
         self.labels(LabelSource::Property)
             .or_else(|| self.labels(LabelSource::Paint))
@@ -103,58 +108,60 @@ impl Loaded {
 /// An object of a file, or a part of one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileObject {
-    /// What the file calls the object.
+    /// Name of the object in the file.
     pub name: Option<String>,
-    /// What the file calls the part, where the object is made of several.
+    /// Name of the part in the file, if the object consists of several.
     pub part: Option<String>,
-    /// Number of the object, from 0; its parts share it.
+    /// Number of the object, from 0; shared by its parts.
     pub item: u32,
-    /// Where the object lies in the slicer's project.
+    /// Plate of the object in the slicer's project.
     pub plate: Option<FilePlate>,
 }
 
 /// A plate of a slicer's project.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FilePlate {
-    /// From 1.
+    /// Number of the plate, from 1.
     pub number: u32,
-    /// What the project calls it.
+    /// Name of the plate in the project.
     pub name: Option<String>,
 }
 
 /// A part that is cut out of an object ("negative volume").
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cutter {
-    /// For messages.
+    /// Name of the part, for messages.
     pub name: String,
-    /// [`FileObject::item`] of what it is cut out of.
+    /// [`FileObject::item`] of the object that it is cut out of.
     pub item: u32,
-    /// In the same place as the object, file units.
+    /// Mesh of the part in the coordinates of the object, file units.
     pub mesh: TriMesh,
 }
 
-/// One label for each triangle.
+/// A division of the surface: one label per triangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labelling {
-    /// What of the file tells them apart.
+    /// Feature of the file that the labels come from.
     pub source: LabelSource,
-    /// As many as triangles. Those of [`LabelSource::Property`] stand in the file; others are numbered from 0
-    /// as they first occur, paint by its colour.
+    /// One label per triangle. Labels of [`LabelSource::Property`] are the file's own values, those of
+    /// [`LabelSource::Paint`] the numbers of colours. Others only tell classes apart; most are numbered from
+    /// 0 by first occurrence.
     pub labels: Vec<i64>,
 }
 
-/// What can divide a surface in a file.
+/// Features of a file that can divide a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LabelSource {
-    /// A whole number called "label", "segment" or the like (PLY).
+    /// Integer property of faces called "label", "segment" or the like (PLY).
     Property,
     /// Multi-material paint of PrusaSlicer, Bambu Studio and OrcaSlicer (3MF).
     Paint,
-    /// Colours of faces (STL, PLY, OFF, 3MF) or, where those do not divide it, of points (PLY, OBJ, OFF, glTF).
+    /// Colours of faces (STL, PLY, OFF, 3MF). If those do not divide the surface, colours of points (PLY,
+    /// OBJ, OFF, glTF).
     Color,
-    /// Materials (OBJ, 3MF, glTF).
+    /// Materials of faces (OBJ, 3MF, glTF).
     Material,
-    /// Groups (OBJ).
+    /// Named groups of faces (OBJ).
     Group,
     /// Named sets of triangles (3MF).
     Set,
@@ -176,24 +183,24 @@ impl fmt::Display for LabelSource {
     }
 }
 
-/// The formats that are read.
+/// File formats that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// STL, 50 bytes a triangle.
+    /// Binary STL, 50 bytes per triangle.
     StlBinary,
-    /// STL as text.
+    /// ASCII STL, as text.
     StlAscii,
-    /// Wavefront OBJ.
+    /// Wavefront OBJ, as text.
     Obj,
     /// Polygon file format, ASCII or binary.
     Ply,
     /// Object file format of Geomview.
     Off,
-    /// 3D Manufacturing Format.
+    /// 3D Manufacturing Format, a zip archive.
     ThreeMf,
-    /// glTF as text, its data within.
+    /// glTF as text, with its data inside.
     Gltf,
-    /// glTF, binary.
+    /// GLB, the binary form of glTF.
     Glb,
 }
 
@@ -212,7 +219,7 @@ impl fmt::Display for Format {
     }
 }
 
-/// Where in a file.
+/// Position in a file, for messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Line of a text, counted from 1.
@@ -230,16 +237,16 @@ impl fmt::Display for Place {
     }
 }
 
-/// Reads a mesh; the content decides what it is, and `extension` ("stl", ".OBJ") only where the content
+/// Reads a mesh. The content decides the format; `extension` ("stl", ".OBJ") counts only if the content
 /// leaves it open.
 ///
-/// Guarantees: at least one triangle, all points finite, all indices in range; what the file says is cut out
-/// is cut out. Not promised: anything about the surface.
+/// Guarantees: at least one triangle, all points finite, all indices in range, and negative volumes cut out.
+/// Not promised: anything about the surface.
 pub fn read_mesh(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
     read_selected(bytes, extension, &Selection::default())
 }
 
-/// Reads the part of a mesh file that `selection` names; otherwise as [`read_mesh`].
+/// Reads the part of a mesh file that `selection` names; otherwise like [`read_mesh`].
 pub fn read_selected(
     bytes: &[u8],
     extension: Option<&str>,
@@ -249,7 +256,7 @@ pub fn read_selected(
     carve::carve(select::select(loaded, selection)?)
 }
 
-/// All that a file holds, as it stands there.
+/// Reads all contents of a file, unchanged.
 fn read_whole(bytes: &[u8], extension: Option<&str>) -> Result<Loaded, ReadError> {
     let (bytes, name) = container::unpack(bytes)?;
     let inner = name

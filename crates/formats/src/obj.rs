@@ -1,5 +1,5 @@
-//! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces and the colours of points;
-//! normals, texture, lines and curves are passed over.
+//! Wavefront OBJ: `v` and `f`, with the groups, objects and materials of faces and the colours of points.
+//! Normals, texture coordinates, lines and curves are skipped.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, coordinate, point, quoted, whole, without_comment, words};
 use super::{FileObject, Format, LabelSource, Loaded, Place, ReadError};
 
-/// What divides the faces, as it stands in a statement.
+/// Statements that divide the faces.
 const DIVISIONS: [(&[u8], LabelSource); 3] = [
     (b"usemtl", LabelSource::Material),
     (b"g", LabelSource::Group),
@@ -62,11 +62,10 @@ const HARMLESS: [&[u8]; 36] = [
 /// Kinds of statements that the note on those that were passed over quotes at most.
 const QUOTED: usize = 4;
 
-/// The division by objects, which have names.
+/// Index of the division by objects, which have names.
 const OBJECTS: usize = 2;
 
-/// Reads an OBJ; faces may name points that come later, and count backwards from the last one with negative
-/// indices.
+/// Reads an OBJ. Faces may refer to later points; negative indices count backwards from the last point.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(1);
     let mut lines = Lines::of(bytes);
@@ -143,7 +142,7 @@ struct Extras {
     rows: Vec<[f32; 4]>,
     /// Length of the rows; `None` before the first.
     n: Option<usize>,
-    /// True if some point has no colour, or more numbers than another.
+    /// True if some point has no colour, or the points have different counts of numbers.
     is_mixed: bool,
 }
 
@@ -156,7 +155,7 @@ impl Extras {
         }
         let mut row = [0.0; 4];
         for (number, word) in row.iter_mut().zip(words) {
-            // Numbers below 0 are a normal's.
+            // Negative numbers are those of a normal.
             match coordinate(Some(word), Place::Line(0)) {
                 Ok(value) if value >= 0.0 => *number = value as f32,
                 _ => self.is_mixed = true,
@@ -165,8 +164,8 @@ impl Extras {
         self.rows.push(row);
     }
 
-    /// The colours, where all points have one: three numbers, or four with alpha last or the weight first. The
-    /// weight is first where it is 1 for all points and the last number is not.
+    /// Returns the colours if all points have one. Rows have three numbers, or four with alpha last or the
+    /// weight first. The weight is first if the first number is 1 for all points and the last one is not.
     fn channels(mut self) -> Option<Channels> {
         if self.is_mixed || self.rows.is_empty() {
             return None;
@@ -183,13 +182,13 @@ impl Extras {
     }
 }
 
-/// Names that hold for the faces after them.
+/// Names that apply to the faces after them.
 #[derive(Default)]
 struct Division<'a> {
     numbering: Numbering<Vec<&'a [u8]>>,
-    /// By label.
+    /// Names, indexed by label.
     names: Vec<Vec<&'a [u8]>>,
-    /// The first face of each stretch and its label.
+    /// First face of each stretch, with the label.
     begins: Vec<(usize, i64)>,
 }
 
@@ -202,7 +201,7 @@ impl<'a> Division<'a> {
         self.begins.push((face, label));
     }
 
-    /// The names, by label.
+    /// Objects with their names, indexed by label.
     fn objects(&self) -> Vec<FileObject> {
         let named = (0..).zip(&self.names).map(|(item, words)| FileObject {
             name: Some(String::from_utf8_lossy(&words.join(&b' ')).into_owned()).filter(|n| !n.is_empty()),
@@ -213,9 +212,9 @@ impl<'a> Division<'a> {
         named.collect()
     }
 
-    /// One label for each of `n_faces` faces; `None` where nothing was named.
+    /// Returns one label for each of `n_faces` faces; `None` if there is no name.
     fn labels(self, n_faces: usize) -> Option<Vec<i64>> {
-        // Faces before the first name have none, which is a name too.
+        // Faces before the first name have none, which counts as a name of its own.
         const NAMELESS: i64 = -1;
         let mut labels = vec![NAMELESS; self.begins.first()?.0.min(n_faces)];
         for (i, &(_, label)) in self.begins.iter().enumerate() {
@@ -225,7 +224,7 @@ impl<'a> Division<'a> {
     }
 }
 
-/// Fills `statement` with the words up to a line end without a backslash; the place is that of its first
+/// Fills `statement` with the words up to a line end without a backslash. Returns the place of its first
 /// line.
 fn next_statement<'a>(lines: &mut Lines<'a>, statement: &mut Vec<&'a [u8]>) -> Option<Place> {
     statement.clear();
@@ -249,14 +248,14 @@ fn next_statement<'a>(lines: &mut Lines<'a>, statement: &mut Vec<&'a [u8]>) -> O
     }
 }
 
-/// True if a corner has a point of the texture: `7/1`, `7/1/3`.
+/// True if a corner refers to a texture coordinate: `7/1`, `7/1/3`.
 fn names_texture(word: &[u8]) -> bool {
     word.split(|&b| b == b'/')
         .nth(1)
         .is_some_and(|texture| !texture.is_empty())
 }
 
-/// The point of a corner `7`, `7/1`, `7//3`, `7/1/3` or `-1`, counted from 0.
+/// Returns the point of a corner `7`, `7/1`, `7//3`, `7/1/3` or `-1`, counted from 0.
 fn corner(polygons: &Polygons, word: &[u8], at: Place) -> Result<u32, ReadError> {
     let index = whole(word.split(|&b| b == b'/').next(), at, "the number of a point")?;
     let from_0 = if index < 0 {

@@ -1,16 +1,16 @@
-//! OFF: points and polygons as text, with the colours of faces and points. Normals are passed over.
+//! OFF: points and polygons as text, with the colours of faces and points. Normals are skipped.
 
 use super::point_colors::{self, Channels};
 use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, coordinate, malformed, point, whole, without_bom, without_comment, words};
 use super::{Format, LabelSource, Loaded, Place, ReadError};
 
-/// Fewest bytes a point takes: `0 0 0` and a line end.
+/// Fewest bytes of a point: `0 0 0` and a line end.
 const POINT_BYTES: u64 = 6;
-/// Fewest bytes a face takes: `3 0 0 0` and a line end.
+/// Fewest bytes of a face: `3 0 0 0` and a line end.
 const FACE_BYTES: u64 = 8;
 
-/// Reads an OFF of three dimensions, one point or face a line; the first word may be missing.
+/// Reads a three-dimensional OFF with one point or face per line; the first word may be missing.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut lines = Lines::of(without_bom(bytes));
     let Header {
@@ -55,12 +55,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
         rows: of_points,
         are_whole: false,
     };
-    // Where some points have no colour, there are fewer colours than points, which divide nothing.
+    // If some points have no colour, there are fewer colours than points, and they divide nothing.
     point_colors::divide(&mut loaded, &channels.colors());
     Ok(loaded)
 }
 
-/// The colour of a point: three or four numbers.
+/// Parses the colour of a point: three or four numbers.
 fn color<'a>(words: impl Iterator<Item = &'a [u8]>) -> Option<[f32; 4]> {
     let (mut color, mut n) = ([0.0; 4], 0);
     for (channel, word) in color.iter_mut().zip(words) {
@@ -70,7 +70,7 @@ fn color<'a>(words: impl Iterator<Item = &'a [u8]>) -> Option<[f32; 4]> {
     (n >= 3).then_some(color)
 }
 
-/// The first lines.
+/// Contents of the first lines.
 struct Header {
     n_points: usize,
     n_faces: usize,
@@ -78,8 +78,8 @@ struct Header {
     color_at: Option<usize>,
 }
 
-/// The header: the counts of points and faces are on the line of the first word or the next; what the bytes
-/// cannot back is refused.
+/// Reads the header. The counts of points and faces are on the line of the first word or on the next; an
+/// error if the bytes do not suffice for them.
 fn read_header(lines: &mut Lines) -> Result<Header, ReadError> {
     let cut_off = |lines: &Lines| ReadError::CutOff {
         at: lines.place(),
@@ -136,7 +136,7 @@ fn read_header(lines: &mut Lines) -> Result<Header, ReadError> {
     })
 }
 
-/// The next line that says something.
+/// Returns the next line with content.
 fn next_line<'a>(lines: &mut Lines<'a>) -> Option<(Place, &'a [u8])> {
     lines
         .map(|(at, line)| (at, without_comment(line)))

@@ -1,11 +1,11 @@
-//! The multi-material paint of slicers: within a triangle, a tree of splits whose leaves have colours.
+//! Multi-material paint of slicers: a tree of splits within a triangle, with a colour per leaf.
 //!
 //! PrusaSlicer writes it to the attribute `slic3rpe:mmu_segmentation` of a 3MF's triangles, Bambu Studio and
-//! OrcaSlicer to `paint_color`, in the same code: hexadecimal digits, the last one first. A digit's lower two
-//! bits are the number of split sides. Where that is 0, the triangle is a leaf and the upper two bits are its
-//! colour; 3 stands for 3 plus the next digits up to one below F (Bambu Studio; others have 16 colours, which
-//! take one digit). Else the upper two bits are the special corner v₀ and the children follow, the last one
-//! first:
+//! OrcaSlicer to `paint_color`. The code is the same: hexadecimal digits, the last one first. The lower two
+//! bits of a digit are the number of split sides. If that is 0, the triangle is a leaf and the upper two bits
+//! are its colour. The colour 3 stands for 3 plus the next digits, up to and including the first below F
+//! (Bambu Studio; other slicers have 16 colours, which take one digit). Otherwise the upper two bits are the
+//! special corner v₀ and the children follow, the last one first:
 //!
 //! ```text
 //!   1 split side              2 split sides             3 split sides
@@ -27,14 +27,14 @@ use shellock_geom::subdivide::fill_triangle;
 use shellock_geom::weld::first_equal;
 use shellock_geom::{TriMesh, Vec3};
 
-/// Splits within splits that are followed; brushes stop at a tenth of a millimetre, which takes some 12.
+/// Largest depth of nested splits. Brushes stop at a tenth of a millimetre, which takes about 12.
 const MAX_DEPTH: usize = 40;
-/// What a digit F of a colour stands for; the next digit is added to it.
+/// Value of a digit F in a colour; the next digit is added to it.
 const MOST_OF_A_DIGIT: u32 = 15;
-/// Triangles that paint may make of a mesh, as memory of each digit of the file.
+/// Largest number of triangles that paint may produce, which limits the memory per digit of the file.
 const MAX_TRIANGLES: usize = 20_000_000;
 
-/// The code of a triangle that has colour `color` throughout; nothing for 0.
+/// Encodes a triangle that has colour `color` throughout; empty for 0.
 pub(super) fn whole_triangle_code(color: u32) -> String {
     match color {
         0 => String::new(),
@@ -46,18 +46,19 @@ pub(super) fn whole_triangle_code(color: u32) -> String {
     }
 }
 
-/// A mesh with the paint of its triangles made real.
+/// A mesh divided along the paint of its triangles.
 #[derive(Debug, PartialEq)]
 pub(super) struct Painted {
-    /// Triangles of one colour each; where a neighbour is split, so that no corner lies within an edge.
+    /// Triangles of one colour each, divided along splits of neighbours so that no corner lies within an
+    /// edge.
     pub(super) mesh: TriMesh,
-    /// The colour of each triangle.
+    /// Colour of each triangle.
     pub(super) colors: Vec<u32>,
-    /// The triangle each one lies in; ascending.
+    /// Original triangle of each one; ascending.
     pub(super) source: Vec<u32>,
 }
 
-/// Splits the triangles of `mesh` as `paint` says (by triangle, ascending), and their neighbours so that
+/// Splits the triangles of `mesh` as given in `paint` (by triangle, ascending), and their neighbours so that
 /// edges match.
 ///
 /// Triangles without paint have colour 0.
@@ -70,7 +71,8 @@ pub(super) fn apply(mesh: &TriMesh, paint: &[(u32, &str)]) -> Result<Painted, Re
             source: (0..n as u32).collect(),
         });
     }
-    // Points in the same place are one here, so that neighbours meet where the file does not say so.
+    // Points in the same place are merged here, so that neighbours match even if the file does not connect
+    // them.
     let stands_for = first_equal(&mesh.points);
     let mut splitter = Splitter {
         points: mesh.points.clone(),
@@ -100,7 +102,7 @@ struct Leaf {
 
 struct Splitter {
     points: Vec<Vec3>,
-    /// The point in the middle of an edge, by its ends, the lower first.
+    /// Midpoint of each split edge, by its ends, the lower first.
     middle_of: BTreeMap<(u32, u32), u32>,
     leaves: Vec<Leaf>,
 }
@@ -114,7 +116,7 @@ impl Splitter {
         };
         let mut digits = code.chars().rev().map(|c| c.to_digit(16));
         let mut digit = || digits.next().flatten().ok_or_else(wrong);
-        // Triangles whose codes are still to come, the next one last, with their depths.
+        // Stack of triangles whose codes are still to come, with their depths; the next one is last.
         let mut todo = vec![(triangle, 0)];
         while let Some((corners, depth)) = todo.pop() {
             let code = digit()?;
@@ -184,7 +186,7 @@ impl Splitter {
         })
     }
 
-    /// All leaves, divided where points of their neighbours lie on their sides.
+    /// Divides all leaves whose sides contain points of their neighbours.
     fn conforming(self) -> Result<Painted, ReadError> {
         let mut painted = Painted {
             mesh: TriMesh {
@@ -212,7 +214,7 @@ impl Splitter {
             );
             painted.colors.resize(painted.mesh.triangles.len(), color);
             painted.source.resize(painted.mesh.triangles.len(), source);
-            // Where many triangles share an edge, each takes over all its points.
+            // If many triangles share an edge, each of them takes over all points on it.
             if painted.source.len() > MAX_TRIANGLES {
                 return Err(ReadError::TooManyCopies {
                     what: "its paint",
@@ -224,7 +226,7 @@ impl Splitter {
     }
 }
 
-/// Adds the points on the edge between two points, in order from `from` to `to`. The depth of paint bounds
+/// Appends the points on the edge between two points, in order from `from` to `to`. The depth of paint bounds
 /// the recursion.
 fn add_points_between(middle_of: &BTreeMap<(u32, u32), u32>, from: u32, to: u32, found: &mut Vec<u32>) {
     if let Some(&middle) = middle_of.get(&(from.min(to), from.max(to))) {
@@ -252,7 +254,7 @@ mod tests {
                 "{code}"
             );
         }
-        // As slicers write them.
+        // Codes as slicers write them.
         assert_eq!(
             [1, 2, 3, 16, 17, 18].map(whole_triangle_code),
             ["4", "8", "0C", "DC", "EC", "0FC"]

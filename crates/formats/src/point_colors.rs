@@ -1,4 +1,4 @@
-//! Colours of points as a division of the surface.
+//! Division of a surface by the colours of its points.
 
 use super::polygons::{Numbering, divides};
 use super::{LabelSource, Labelling, Loaded};
@@ -6,22 +6,22 @@ use super::{LabelSource, Labelling, Loaded};
 /// Red, green, blue and alpha.
 pub(super) type Color = [u8; 4];
 
-/// Colours of points that divide a surface at most. Painted models have a few; scans and shaded ones have one
-/// for nearly every point.
+/// Largest number of point colours that divide a surface. Painted models have a few; scans and shaded models
+/// have one for nearly every point.
 const MAX_COLORS: usize = 64;
 
-/// Colours of points as a file has them, on a scale that only all of them together show.
+/// Colours of points as stored in a file. Only all values together reveal their scale.
 #[derive(Default)]
 pub(super) struct Channels {
-    /// Red, green, blue and alpha of each point; alpha is 0 where the file has none.
+    /// Red, green, blue and alpha of each point; alpha is 0 if the file has none.
     pub(super) rows: Vec<[f32; 4]>,
-    /// True if the numbers are whole by their type, so that 1 is nearly black.
+    /// True if the numbers have an integer type, so that 1 is nearly black.
     pub(super) are_whole: bool,
 }
 
 impl Channels {
-    /// The colours on a scale to 255. Fractions go up to 1, whole numbers to 255 or 65535; where a fraction is
-    /// more than 1, its scale is that of whole numbers.
+    /// Converts the colours to a scale of 255. Fractions reach up to 1, integers to 255 or 65535; fractions
+    /// above 1 have the scale of integers.
     pub(super) fn colors(&self) -> Vec<Color> {
         let channels = self.rows.iter().flat_map(|row| &row[..3]);
         let greatest = channels.fold(0.0_f32, |greatest, &channel| greatest.max(channel));
@@ -35,14 +35,14 @@ impl Channels {
     }
 }
 
-/// A channel from 0 to 1 in 8 bits, so that colours are the same up to rounding.
+/// Converts a channel from [0, 1] to 8 bits, so that colours are equal up to rounding.
 pub(super) fn eight_bits(channel: f64) -> u8 {
-    // Beyond the scale it is cut off; NaN becomes 0.
+    // The cast clamps values beyond the scale; NaN becomes 0.
     (channel * 255.0).round() as u8
 }
 
-/// Divides `loaded` by the colours of its points, one for each point, where its faces have no colours. A
-/// division by more colours than people paint with is none, and a note says so.
+/// Divides `loaded` by the colours of its points, one per point, unless its faces have colours. More colours
+/// than people paint with do not divide it; a note reports that.
 pub(super) fn divide(loaded: &mut Loaded, colors: &[Color]) {
     if colors.len() != loaded.mesh.points.len() || loaded.labels(LabelSource::Color).is_some() {
         return;
@@ -62,7 +62,7 @@ pub(super) fn divide(loaded: &mut Loaded, colors: &[Color]) {
     }
 }
 
-/// Number of different colours at the corners of triangles.
+/// Counts the different colours at the corners of triangles.
 fn count_used(loaded: &Loaded, colors: &[Color]) -> usize {
     let mut is_used = vec![false; colors.len()];
     let corners = loaded.mesh.triangles.as_flattened();
@@ -74,7 +74,7 @@ fn count_used(loaded: &Loaded, colors: &[Color]) -> usize {
     used.len()
 }
 
-/// A label for each triangle, by the colour of the face that it is of.
+/// Labels each triangle by the colour of its face.
 fn labels(loaded: &Loaded, colors: &[Color]) -> Vec<i64> {
     let mut numbering = Numbering::default();
     let mut labels = Vec::with_capacity(loaded.file_face.len());
@@ -82,7 +82,7 @@ fn labels(loaded: &Loaded, colors: &[Color]) -> Vec<i64> {
     for face in loaded.file_face.chunk_by(|a, b| a == b) {
         let triangles = &loaded.mesh.triangles[labels.len()..labels.len() + face.len()];
         corners.clear();
-        // A face is a fan around its first corner: each further triangle adds its last.
+        // A face is a fan around its first corner: each further triangle adds its last corner.
         corners.extend(triangles[0].map(|point| colors[point as usize]));
         corners.extend(triangles[1..].iter().map(|t| colors[t[2] as usize]));
         let label = numbering.number(of_face(&mut corners));
@@ -91,8 +91,8 @@ fn labels(loaded: &Loaded, colors: &[Color]) -> Vec<i64> {
     labels
 }
 
-/// The colour of a face whose corners have `colors`, one at least: the one that most of them have; of several,
-/// the one nearest to the mean of all, and of those the least. Independent of the order of corners.
+/// Colour of a face from the colours of its corners, at least one. The most frequent colour wins; among ties,
+/// the one nearest to the mean of all, then the least. Independent of the order of corners.
 fn of_face(colors: &mut [Color]) -> Color {
     colors.sort_unstable();
     let n = colors.len() as i64;
@@ -148,7 +148,7 @@ mod tests {
         assert_eq!(of(vec![[f32::NAN, -3.0, f32::INFINITY, 1.0]], false)[0][1], 0);
     }
 
-    /// A PLY of two triangles and a quad over five points, whose properties besides are given with their values.
+    /// A PLY of two triangles and a quad over five points, with further properties and their values.
     fn ply(declared: &str, rows: [&str; 5], of_faces: [&str; 3]) -> Loaded {
         let points = ["0 0 0", "1 0 0", "0 1 0", "0 0 1", "1 1 0"];
         let points: Vec<String> = points
@@ -196,7 +196,7 @@ mod tests {
             assert_eq!(loaded.labels(LabelSource::Color), divided, "{declared}");
             assert_eq!(loaded.notes, Vec::<String>::new());
         }
-        // Two of three are no colour.
+        // Two of three channels are no colour.
         let few = "property uchar red\nproperty uchar green\nproperty uchar gloss";
         assert_eq!(ply(few, ROWS, NO_FACE_COLORS).labellings, []);
     }
@@ -221,12 +221,12 @@ mod tests {
         let divided = Some(vec![0, 1, 0, 1]);
         assert_eq!(obj(["1 0 0", "1 0 0", "0 0 1", "0 0 1"]), Some(vec![0, 0, 1, 1]));
         assert_eq!(obj(["255 0 0", "0 9 0", "0 9 0", "255 0 0"]), divided);
-        // The same up to rounding.
+        // Colours are the same up to rounding.
         assert_eq!(obj(["0.501961 0 0", "0 1 0", "0 1 0", "0.50196 0 0"]), divided);
-        // Alpha last, or the weight first.
+        // Alpha comes last, or the weight first.
         assert_eq!(obj(["1 0 0 1", "0 1 0 1", "0 1 0 1", "1 0 0 1"]), divided);
         assert_eq!(obj(["1 0.5 0 0", "1 0 1 0", "1 0 1 0", "1 0.5 0 0"]), divided);
-        // A weight alone, a colour too few, a normal.
+        // A weight alone, a missing colour, a normal, and a word are no colours.
         assert_eq!(obj(["1", "0.5", "0.5", "1"]), None);
         assert_eq!(obj(["1 0 0", "0 1 0", "0 1 0", ""]), None);
         assert_eq!(obj(["1 0 0", "0 -1 0", "0 -1 0", "1 0 0"]), None);

@@ -3,19 +3,19 @@
 use super::{Format, LabelSource, Labelling, Loaded, Place, ReadError};
 use shellock_geom::{TriMesh, Vec3, polygon};
 
-/// The mesh so far. Polygons may name points that come later; [`Polygons::finish`] settles that.
+/// The mesh so far. Polygons may refer to later points; [`Polygons::finish`] checks that they exist.
 pub(super) struct Polygons {
     mesh: TriMesh,
     file_face: Vec<u32>,
     n_faces: u32,
-    /// The highest point named so far and where, as faces may come before their points.
+    /// Highest point index so far and its place, as faces may come before their points.
     highest: Option<(u32, Place)>,
     /// Index of the first point in the format: 1 in OBJ, otherwise 0.
     first: u32,
 }
 
 impl Polygons {
-    /// Nothing yet; the format counts its points from `first`.
+    /// Creates an empty mesh; the format counts its points from `first`.
     pub(super) fn counted_from(first: u32) -> Self {
         Self {
             mesh: TriMesh::default(),
@@ -26,7 +26,7 @@ impl Polygons {
         }
     }
 
-    /// Reserves; the caller has checked that the bytes back these counts.
+    /// Reserves memory. The caller must have checked that the bytes suffice for these counts.
     pub(super) fn reserve(&mut self, n_points: usize, n_triangles: usize) {
         self.mesh.points.reserve(n_points);
         self.mesh.triangles.reserve(n_triangles);
@@ -52,7 +52,7 @@ impl Polygons {
         Ok(index)
     }
 
-    /// An index counted from 0, which may be that of a later point.
+    /// Converts an index counted from 0, which may be that of a later point.
     pub(super) fn corner(&self, index: i64, at: Place) -> Result<u32, ReadError> {
         u32::try_from(index).map_err(|_| self.missing(index, at))
     }
@@ -80,7 +80,9 @@ impl Polygons {
         Ok(())
     }
 
-    /// The mesh, with `labels` of the file's faces handed on to the triangles.
+    /// Returns the mesh, with the `labels` of the file's faces transferred to the triangles.
+    ///
+    /// Errors if there is no triangle or if a face refers to a missing point.
     pub(super) fn finish(
         mut self,
         format: Format,
@@ -165,12 +167,12 @@ impl Polygons {
     }
 }
 
-/// Whether there are two different labels.
+/// Returns true if two labels differ.
 pub(super) fn divides(labels: &[i64]) -> bool {
     labels.windows(2).any(|pair| pair[0] != pair[1])
 }
 
-/// Numbers names or colours from 0 as they first occur.
+/// Numbers names or colours from 0 by first occurrence.
 #[derive(Default)]
 pub(super) struct Numbering<T: Ord>(std::collections::BTreeMap<T, i64>);
 

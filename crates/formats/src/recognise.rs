@@ -1,12 +1,12 @@
-//! What a file is, by its first bytes.
+//! Recognition of a file's format by its first bytes.
 
 use super::text::{Lines, without_bom, without_comment, words};
 use super::{Format, ReadError, stl};
 
-/// Bytes looked at to tell text from binary.
+/// Number of bytes examined to tell text from binary.
 const SAMPLE_BYTES: usize = 1024;
 
-/// The format of `bytes`; `extension` decides only where the content fits none.
+/// Returns the format of `bytes`. The `extension` decides only if the content fits none.
 pub(super) fn recognise(bytes: &[u8], extension: Option<&str>) -> Result<Format, ReadError> {
     let extension = extension
         .unwrap_or_default()
@@ -18,7 +18,7 @@ pub(super) fn recognise(bytes: &[u8], extension: Option<&str>) -> Result<Format,
     if bytes.starts_with(b"PK\x03\x04") {
         return Ok(Format::ThreeMf);
     }
-    // Before all words: binary files may begin with any of them, most often with "solid".
+    // Checked before all words: binary files may begin with any of them, most often with "solid".
     if stl::length_fits_binary(bytes) {
         return Ok(Format::StlBinary);
     }
@@ -45,7 +45,7 @@ pub(super) fn recognise(bytes: &[u8], extension: Option<&str>) -> Result<Format,
     }
 }
 
-/// What else a file is, by what such files begin with.
+/// Recognises other kinds of files by their first bytes. Returns a description.
 fn no_model(bytes: &[u8]) -> Option<&'static str> {
     const KINDS: [(&[u8], &str); 15] = [
         (b"<!doctype html", "a web page"),
@@ -84,16 +84,16 @@ fn by_first_word(bytes: &[u8]) -> Option<Format> {
         b"v" | b"vn" | b"vt" | b"vp" | b"f" | b"o" | b"g" | b"s" | b"l" | b"p" | b"mtllib" | b"usemtl" => {
             Some(Format::Obj)
         }
-        // JSON, and glTF is the only mesh format in it that is read.
+        // Starts JSON; glTF is the only mesh format in it that is supported.
         word if word.starts_with(b"{") => Some(Format::Gltf),
         word if word.len() <= 8 && word.ends_with(b"off") => Some(Format::Off),
         _ => None,
     }
 }
 
-/// A byte order mark, or Latin letters with a zero byte each.
+/// Returns true for a byte order mark, or for Latin letters each with a zero byte.
 pub(super) fn is_utf16(bytes: &[u8]) -> bool {
-    /// Characters that must agree; a binary header that does so by chance is unheard of.
+    /// Number of characters that must match; a binary header that does so by chance is unheard of.
     const CHARS: usize = 8;
     let by_pattern = |zero: usize| {
         bytes.len() >= 2 * CHARS

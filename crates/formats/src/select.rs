@@ -1,21 +1,21 @@
-//! Choosing one object, or one plate, of a file that has several.
+//! Selection of one object, or one plate, of a file that has several.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::polygons::divides;
 use super::{FileObject, LabelSource, Loaded, ReadError};
 
-/// Which part of a file is wanted; all of it where nothing is said.
+/// Selected part of a file; the default selects all of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
-    /// Name of an object, or of a part of one; the case of letters does not count.
+    /// Name of an object, or of a part of one, in upper or lower case.
     pub object: Option<String>,
     /// Number of a plate of a slicer's project, from 1, or its name.
     pub plate: Option<String>,
 }
 
 impl FileObject {
-    /// What people can call it by: its name, else its number from 1.
+    /// Title for messages: its name, else its number from 1.
     pub fn title(&self) -> String {
         self.name
             .clone()
@@ -38,7 +38,7 @@ impl FileObject {
     }
 }
 
-/// The part of `loaded` that is wanted.
+/// Returns the selected part of `loaded`; an error that lists the alternatives if there is none.
 pub(super) fn select(loaded: Loaded, selection: &Selection) -> Result<Loaded, ReadError> {
     let mut is_wanted = vec![true; loaded.objects.len()];
     for (what, wanted, fits) in [
@@ -68,7 +68,7 @@ pub(super) fn select(loaded: Loaded, selection: &Selection) -> Result<Loaded, Re
     }
 }
 
-/// Names of all objects, or of all plates, as they can be asked for.
+/// Names of all objects, or of all plates, in the form that can be asked for.
 fn titles(objects: &[FileObject], what: &str) -> String {
     let title = |object: &FileObject| match what {
         "plate" => object.plate.as_ref().map(|plate| match &plate.name {
@@ -84,7 +84,7 @@ fn titles(objects: &[FileObject], what: &str) -> String {
     all.into_iter().collect::<Vec<_>>().join(", ")
 }
 
-/// The objects that are wanted, with their faces numbered anew.
+/// Keeps the selected objects and renumbers their faces.
 fn keep(mut loaded: Loaded, is_wanted: &[bool]) -> Loaded {
     let object_of = loaded.object_of_triangle();
     let is_kept: Vec<bool> = object_of.iter().map(|&object| is_wanted[object]).collect();
@@ -126,7 +126,7 @@ fn retain<T>(all: &mut Vec<T>, is_kept: &[bool]) {
 }
 
 impl Loaded {
-    /// For each triangle the object that it belongs to, a place in [`Loaded::objects`].
+    /// Returns the object of each triangle, as an index into [`Loaded::objects`].
     pub(super) fn object_of_triangle(&self) -> Vec<usize> {
         self.labels(LabelSource::Object).map_or_else(
             || vec![0; self.mesh.triangles.len()],

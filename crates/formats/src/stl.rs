@@ -1,18 +1,18 @@
-//! STL, binary and ASCII. Stored normals are ignored: the order of the corners says what is outside.
+//! STL, binary and ASCII. Stored normals are ignored: the order of the corners defines the outside.
 
 use super::polygons::{Numbering, Polygons};
 use super::text::{Lines, malformed, point, words};
 use super::{Format, LabelSource, Loaded, Place, ReadError};
 use shellock_geom::TriMesh;
 
-/// Free text, then the number of triangles.
+/// Size of the header: free text, then the number of triangles.
 const HEADER_BYTES: usize = 84;
-/// Normal, three corners, 2 bytes of no agreed meaning.
+/// Size of a triangle: normal, three corners, 2 bytes without agreed meaning.
 const TRIANGLE_BYTES: usize = 50;
 /// Must not begin with "solid", which many programs take for ASCII.
 const HEADER_TEXT: &[u8] = b"binary STL by shellock, millimetres";
 
-/// Whether the length is exactly what the count in a binary header asks for.
+/// Returns true if the length is exactly that given by the count in a binary header.
 pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
     promised(bytes)
         .is_some_and(|n| n > 0 && bytes.len() as u64 == HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * n)
@@ -20,9 +20,8 @@ pub(super) fn length_fits_binary(bytes: &[u8]) -> bool {
 
 /// Reads a binary STL, or several one after the other, as `cat` makes them.
 ///
-/// A count may be 0 or all ones, as of programs that write without knowing it, or too low: what follows is
-/// taken where it looks like triangles, and passed over where it does not. A count that is too high is a file
-/// cut off.
+/// A count may be 0 or all ones, from programs that write without knowing it, or too low. Further data is read
+/// if it looks like triangles, and skipped otherwise. A count that is too high is an error: the file was cut off.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
     let (mut colors, mut notes) = (Colors::default(), Vec::new());
@@ -138,19 +137,19 @@ fn has_three_corners(bytes: &[u8]) -> bool {
     corner(0) != corner(1) && corner(1) != corner(2) && corner(2) != corner(0)
 }
 
-/// Whether the normal is a unit vector or zero and the corners are finite.
+/// Returns true if the normal is a unit vector or zero and the corners are finite.
 fn is_like_a_triangle(bytes: &[u8]) -> bool {
     let float = |i: usize| float(&bytes[4 * i..]);
     let length_sq: f32 = (0..3).map(|i| float(i) * float(i)).sum();
     (length_sq == 0.0 || (length_sq - 1.0).abs() < 0.1) && (3..12).all(|i| float(i).is_finite())
 }
 
-/// The colours in the last two bytes of triangles: 5 bits each of red, green and blue, and one that says
-/// whether they hold.
+/// Colours in the last two bytes of triangles: 5 bits each of red, green and blue, and a bit that tells if they
+/// are valid.
 #[derive(Default)]
 struct Colors {
-    /// What the highest bit is where a triangle has a colour of its own: set in most programs, not set in
-    /// Magics, whose headers have "COLOR=".
+    /// Value of the highest bit in triangles with a colour of their own: set in most programs, not set in
+    /// Magics, whose headers contain "COLOR=".
     valid: u16,
     numbering: Numbering<Option<u16>>,
     labels: Vec<i64>,
@@ -169,8 +168,7 @@ impl Colors {
     }
 }
 
-/// Reads an ASCII STL of any number of solids; upper and lower case are the same, and a missing `endsolid` is
-/// forgiven.
+/// Reads an ASCII STL of any number of solids, in upper or lower case. A missing `endsolid` is accepted.
 pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut polygons = Polygons::counted_from(0);
     let mut lines = Lines::of(bytes);
@@ -192,7 +190,7 @@ pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
             }
             (b"solid", false) => solid += 1,
             (b"endsolid" | b"color", false) => {}
-            // Half a word at the very end.
+            // The file ends in the middle of a word.
             (_, true) if lines.rest().is_empty() => break,
             (_, true) => return Err(malformed(at, "\"vertex\" or \"endfacet\"", first)),
             (_, false) => return Err(malformed(at, "\"facet\" or \"endsolid\"", first)),
@@ -207,7 +205,7 @@ pub(super) fn read_ascii(bytes: &[u8]) -> Result<Loaded, ReadError> {
     polygons.finish(Format::StlAscii, vec![(LabelSource::Object, solids)])
 }
 
-/// The keyword in lower case that `word` is; the word itself where it is none.
+/// Returns `word` as a lower-case keyword; unchanged if it is none.
 fn keyword(word: &[u8]) -> &[u8] {
     const ALL: [&[u8]; 8] = [
         b"vertex",
@@ -224,10 +222,12 @@ fn keyword(word: &[u8]) -> &[u8] {
         .unwrap_or(word)
 }
 
-/// A binary STL: normals computed (zero for degenerate triangles), coordinates rounded to `f32`.
+/// Writes a binary STL with computed normals (zero for degenerate triangles) and coordinates rounded to
+/// `f32`.
 ///
 /// # Panics
-/// Where a triangle names a missing point.
+///
+/// Panics if a triangle refers to a missing point.
 pub fn write_stl_binary(mesh: &TriMesh) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER_BYTES + TRIANGLE_BYTES * mesh.triangles.len());
     bytes.extend_from_slice(HEADER_TEXT);
@@ -246,7 +246,7 @@ pub fn write_stl_binary(mesh: &TriMesh) -> Vec<u8> {
     bytes
 }
 
-/// The number of triangles that a binary header promises.
+/// Number of triangles given in a binary header.
 fn promised(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
     Some(u64::from(u32::from_le_bytes([

@@ -50,7 +50,7 @@ fn message(text: impl AsRef<[u8]>) -> String {
     read(text).expect_err("the file is broken").to_string()
 }
 
-/// That a note of `loaded` has `words` in it.
+/// Asserts that a note of `loaded` contains `words`.
 #[track_caller]
 pub(crate) fn assert_told(loaded: &Loaded, words: &str) {
     let is_told = loaded.notes.iter().any(|note| note.contains(words));
@@ -103,7 +103,7 @@ fn stl_quirks() {
     let mut solid = write_stl_binary(&tetrahedron());
     solid[..6].copy_from_slice(b"solid ");
     assert_eq!(read(&solid).unwrap().format, Format::StlBinary);
-    // Padding after the last triangle hides the length rule, the zero bytes still give the binary away.
+    // Padding after the last triangle hides the length rule, but the zero bytes still reveal binary content.
     solid.extend_from_slice(b"\0\0");
     assert_eq!(read(&solid).unwrap().mesh.triangles.len(), 4);
 }
@@ -112,7 +112,7 @@ fn stl_quirks() {
 fn wrong_counts_trailing_bytes_and_colours_of_stl() {
     let bytes = write_stl_binary(&tetrahedron());
     let stl = |bytes: &[u8]| read_mesh(bytes, Some(".STL")).unwrap();
-    // Counts of programs that do not know them, or know them wrongly.
+    // Counts by programs that do not know them, or get them wrong.
     for count in [0_u32, 2, u32::MAX] {
         let mut other = bytes.clone();
         other[80..84].copy_from_slice(&count.to_le_bytes());
@@ -129,7 +129,7 @@ fn wrong_counts_trailing_bytes_and_colours_of_stl() {
         (stl(&trailing).mesh.triangles.len(), stl(&trailing).notes.len()),
         (4, 1)
     );
-    // Colours: the highest bit says that there is one; in files of Magics that there is none.
+    // Colours: the highest bit says that there is one; in files of Magics, that there is none.
     let mut colored = bytes;
     colored[84 + 48..84 + 50].copy_from_slice(&0x8003_u16.to_le_bytes());
     colored[84 + 98..84 + 100].copy_from_slice(&0x8003_u16.to_le_bytes());
@@ -316,7 +316,7 @@ fn what_a_file_is_wrapped_in_makes_no_difference() {
 
 #[test]
 fn bombs_are_refused_before_they_fill_the_memory() {
-    // Blanks pack to a thousandth.
+    // Blanks are compressed to a thousandth.
     let blanks = vec![b' '; 100 << 20];
     assert_eq!(read(gzip(&blanks)), Err(ReadError::Bomb { limit_mb: 73 }));
     let limit = read(zip_of(&[("3D/3dmodel.model", &blanks)]));
@@ -508,7 +508,7 @@ fn labels_are_whole_numbers_from_0() {
 #[test]
 fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
     let mesh = tetrahedron();
-    // x to y, y to −x.
+    // Maps x to y, and y to −x.
     let quarter = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
     let objects = [
         NamedObject {
@@ -557,7 +557,7 @@ fn a_3mf_holds_its_objects_and_is_the_same_each_time() {
     );
 }
 
-/// A valid file of each format.
+/// Returns a valid file of each format.
 fn valid_files() -> Vec<Vec<u8>> {
     let mesh = tetrahedron();
     let mut files = vec![
@@ -575,7 +575,7 @@ fn valid_files() -> Vec<Vec<u8>> {
     files
 }
 
-/// Everything that meets bytes from outside.
+/// Calls every reader of external bytes.
 fn read_all_ways(bytes: &[u8]) {
     let _ = read_labels(bytes);
     for extension in [

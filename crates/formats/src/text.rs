@@ -1,11 +1,11 @@
-//! Lines, words and numbers of text formats, with the place kept for messages.
+//! Lines, words and numbers of text formats, with their places for messages.
 
 use super::{Place, ReadError};
 
-/// Characters of a wrong word that a message quotes at most.
+/// Largest number of characters of a wrong word quoted in a message.
 const QUOTED_CHARS: usize = 40;
 
-/// The lines of a text with their numbers from 1; each of LF, CRLF and CR ends a line.
+/// Lines of a text with their numbers from 1; LF, CRLF and CR each end a line.
 #[derive(Clone)]
 pub(super) struct Lines<'a> {
     rest: &'a [u8],
@@ -20,12 +20,12 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// What follows the last line handed out.
+    /// Returns the text after the last line returned.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.rest
     }
 
-    /// The place of the last line handed out.
+    /// Place of the last line returned.
     pub(super) fn place(&self) -> Place {
         Place::Line(self.n_done)
     }
@@ -52,23 +52,23 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The bytes after the UTF-8 byte order mark, if there is one.
+/// Returns the bytes after the UTF-8 byte order mark, if there is one.
 pub(super) fn without_bom(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
-/// The words of a line.
+/// Splits a line into words.
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty())
 }
 
-/// The part of a line before `#`.
+/// Returns the part of a line before `#`.
 pub(super) fn without_comment(line: &[u8]) -> &[u8] {
     line.split(|&b| b == b'#').next().unwrap_or_default()
 }
 
-/// The start of `text`, made printable.
+/// Returns the start of `text`, made printable.
 fn shown(text: &[u8]) -> String {
     String::from_utf8_lossy(&text[..text.len().min(4 * QUOTED_CHARS)])
         .chars()
@@ -77,12 +77,12 @@ fn shown(text: &[u8]) -> String {
         .collect()
 }
 
-/// The start of a word in quotes, made printable.
+/// Returns the start of a word in quotes, made printable.
 pub(super) fn quoted(word: &[u8]) -> String {
     format!("\"{}\"", shown(word))
 }
 
-/// The error "expected … found …", with `found` shortened and made printable.
+/// Creates the error "expected … found …", with `found` shortened and made printable.
 pub(super) fn malformed(at: Place, expected: &'static str, found: &[u8]) -> ReadError {
     let shown = shown(found);
     let ellipsis = if found.len() > shown.len() { "…" } else { "" };
@@ -93,7 +93,7 @@ pub(super) fn malformed(at: Place, expected: &'static str, found: &[u8]) -> Read
     }
 }
 
-/// The next word as a finite coordinate.
+/// Parses a word as a finite coordinate.
 pub(super) fn coordinate(word: Option<&[u8]>, at: Place) -> Result<f64, ReadError> {
     let word = word.unwrap_or_default();
     match parse::<f64>(word) {
@@ -112,7 +112,7 @@ pub(super) fn coordinate(word: Option<&[u8]>, at: Place) -> Result<f64, ReadErro
     }
 }
 
-/// Three coordinates from the next three words.
+/// Parses three coordinates from the next three words.
 pub(super) fn point<'a>(
     words: &mut impl Iterator<Item = &'a [u8]>,
     at: Place,
@@ -124,7 +124,7 @@ pub(super) fn point<'a>(
     ])
 }
 
-/// The next word as a whole number; `3.0` is one.
+/// Parses a word as a whole number; `3.0` is accepted.
 pub(super) fn whole(word: Option<&[u8]>, at: Place, expected: &'static str) -> Result<i64, ReadError> {
     let word = word.unwrap_or_default();
     parse::<i64>(word)
@@ -132,9 +132,9 @@ pub(super) fn whole(word: Option<&[u8]>, at: Place, expected: &'static str) -> R
         .ok_or_else(|| malformed(at, expected, word))
 }
 
-/// `value` as an integer where it is one that a float holds exactly.
+/// Converts `value` to an integer, if it is one that a float holds exactly.
 pub(super) fn whole_of(value: f64) -> Option<i64> {
-    /// All integers up to here are floats, 2⁵³.
+    /// Limit up to which floats represent all integers, 2⁵³.
     const EXACT: f64 = 9_007_199_254_740_992.0;
     (value.fract() == 0.0 && value.abs() <= EXACT).then_some(value as i64)
 }

@@ -1,6 +1,6 @@
-//! A kit's own file: what `plan.json` says of a design, and reading that back.
+//! The kit's own file `plan.json`: writing it from a design, and reading it back.
 //!
-//! Bytes in, bytes out: where the file lies is the caller's business.
+//! Works on bytes. File access is left to the caller.
 
 pub mod plan_file;
 

@@ -1,8 +1,8 @@
 //! `plan.json`: pieces, order, directions and figures of a kit.
 //!
-//! There is one type for each object of the file, and fields have the file's names. Places and directions are
-//! in assembly space, lengths in mm. What a kit of an earlier version may lack is optional. Files of former versions
-//! are converted before they are read, those of later versions are refused.
+//! Each object of the file has a type, and fields have the file's names. Places and directions are in
+//! assembly space, lengths in mm. Fields that a kit of an earlier version may lack are optional. Files of
+//! earlier versions are converted before they are read, those of later versions are rejected.
 
 mod checked;
 mod entries;
@@ -29,88 +29,92 @@ pub use entries::{
 pub use error::PlanFileError;
 pub use fill::{Source, Told, piece_file};
 
-/// What `format` says.
+/// Value of the field `format`.
 pub const FORMAT: &str = "shellock-plan";
-/// What `version` says. It grows where a reader of before would misunderstand what is written now.
+/// Value of the field `version`. It grows when a reader of the previous version would misinterpret the file.
 pub const VERSION: u64 = 2;
 
-/// The whole file.
+/// All contents of `plan.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanFile {
-    /// [`FORMAT`].
+    /// Kind of file: [`FORMAT`].
     pub format: Option<String>,
-    /// [`VERSION`].
+    /// Version of the format: [`VERSION`].
     pub version: Option<u64>,
     /// Unit of lengths: "mm".
     pub units: Option<String>,
     /// Version of the program that made the kit.
     pub program: Option<String>,
-    /// The model that it was made from.
+    /// Model that the kit was made from.
     pub input: Option<InputEntry>,
     /// Seed of all random choices.
     #[serde(default)]
     pub seed: u64,
     /// Thickness of the walls, mm.
     pub shell_thickness: Option<f64>,
-    /// What the walls bear; `None` where that could not be computed.
+    /// Strength of the walls; `None` if it could not be computed.
     pub strength: Option<StrengthEntry>,
-    /// Gap between mating faces, mm: that of connectors or of both sides of a seam, whichever is more.
+    /// Gap between mating faces, mm: the larger of the connectors' clearance and the gap between both sides
+    /// of a seam.
     #[serde(default)]
     pub clearance: f64,
-    /// Size D of the connectors, mm; the largest where pairs have sizes of their own.
+    /// Size D of the connectors, mm; the largest if pairs have sizes of their own.
     pub connector_size: Option<f64>,
-    /// Sizes of pairs; only where pairs have sizes of their own.
+    /// Connector sizes of pairs; `None` if all pairs have the same size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub connector_sizes: Option<Vec<PairSizeEntry>>,
-    /// How far each side of a seam stays back, mm.
+    /// Distance by which each side of a seam is set back, mm.
     pub wall_gap: Option<f64>,
-    /// Which way is up when the model stands: a direction of any length.
+    /// Upward direction of the standing model, of any length.
     pub up: Option<[f64; 3]>,
     /// Thinnest wall that is made, mm.
     pub min_wall: Option<f64>,
-    /// The piece that goes in last.
+    /// Piece that is installed last.
     pub key_piece: Option<PatchId>,
-    /// How the key was cut; `None` where it is one of the pieces.
+    /// Cut of the key; `None` if the key is one of the pieces.
     pub key: Option<KeyEntry>,
-    /// Places where the key presses on purpose.
+    /// Press fits of the key.
     #[serde(default, deserialize_with = "null_is_none")]
     pub press_fits: Vec<PressFit>,
-    /// The pieces, each at the place of its id.
+    /// Pieces, each at the index of its id.
     pub pieces: Vec<PieceEntry>,
-    /// Their ids, first to last.
+    /// Ids of the pieces in order of installation.
     pub installation_order: Vec<PatchId>,
-    /// How good the plan is; `None` where version 1 told it in another way.
+    /// Quality of the plan; `None` if version 1 gave it in another form.
     pub plan: Option<PlanProof>,
-    /// How the plan holds by simulation; `None` where version 1 told it in another way.
+    /// Simulated resistance of the plan to separation; `None` if version 1 gave it in another form.
     pub holding: Option<Holding>,
-    /// What the kit bears, in short; `None` in kits of version 1.
+    /// Summary of the loads that the kit withstands; `None` in kits of version 1.
     pub bears: Option<Bears>,
-    /// Material of all pieces over the solid model's.
+    /// Material of all pieces divided by that of the solid model.
     pub volume_ratio: Option<f64>,
-    /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].
+    /// Length of connectors made divided by the length that the seams' geometry allows, in [0, 1].
     pub connector_share: Option<f64>,
-    /// Runs of connectors and how they came out.
+    /// Runs of connectors, with the result of carving.
     #[serde(default)]
     pub joints: Vec<JointEntry>,
-    /// Seams and what they offered for connectors.
+    /// Seams, with the length usable for connectors.
     #[serde(default)]
     pub contacts: Vec<ContactEntry>,
-    /// How near pieces come.
+    /// Least gaps between pieces.
     pub gaps: Option<GapsEntry>,
-    /// What it took to find the kit, in work: the same on any machine and number of threads.
+    /// Computing effort to find the kit, in units of work. Independent of machine and number of threads.
     pub effort: Option<Effort>,
-    /// The verdict on the finished pieces.
+    /// Verdict on the finished pieces.
     pub verification: Option<VerdictEntry>,
-    /// What the user should know.
+    /// Warnings for the user.
     #[serde(default)]
     pub warnings: Vec<WarningEntry>,
-    /// The pieces on the plates of a printer.
+    /// Layout of the pieces on the plates of a printer.
     pub printing: Option<PrintingEntry>,
 }
 
 impl PlanFile {
-    /// The plan that these bytes are. Whether its parts agree is asked by those who need them, such as
-    /// [`Self::order`].
+    /// Parses a plan from the bytes of its file.
+    ///
+    /// Consistency of its parts is checked by the methods that rely on it, such as [`Self::order`].
+    ///
+    /// Errors: no JSON, no object, another format, a later version, or a field that is missing or mistyped.
     pub fn read(bytes: &[u8]) -> Result<Self, PlanFileError> {
         let value: Value = serde_json::from_slice(bytes).map_err(PlanFileError::NotJson)?;
         if !value.is_object() {
@@ -120,9 +124,9 @@ impl PlanFile {
             .map_err(|e| PlanFileError::of_field(&e.path().to_string(), &e.inner().to_string()))
     }
 
-    /// As it is written: fields in alphabetical order, a line each.
+    /// Writes the file, with fields in alphabetical order, one per line.
     pub fn to_bytes(&self) -> Vec<u8> {
-        // By way of a value, whose fields are sorted.
+        // A JSON value sorts its fields.
         let text = serde_json::to_value(self).and_then(|value| serde_json::to_string_pretty(&value));
         let mut text = text.expect("numbers and strings can be written");
         text.push('\n');
@@ -130,18 +134,18 @@ impl PlanFile {
     }
 }
 
-/// `None` where it is of another form than `T`.
+/// Deserialises a `T`, or `None` from a value of another form.
 fn if_readable<'de, D: Deserializer<'de>, T: DeserializeOwned>(from: D) -> Result<Option<T>, D::Error> {
     let value = Value::deserialize(from)?;
     Ok(serde_json::from_value(value).ok())
 }
 
-/// An empty list for null.
+/// Deserialises a list; null gives an empty one.
 fn null_is_none<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Vec<T>, D::Error> {
     Ok(Option::<Vec<T>>::deserialize(from)?.unwrap_or_default())
 }
 
-/// Something, even if it is null.
+/// Deserialises `Some` even from null, so that null differs from a missing field.
 fn even_null<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<T>, D::Error> {
     T::deserialize(from).map(Some)
 }

@@ -1,9 +1,9 @@
-//! The booklet: a cover, all pieces with their numbers, then one step a picture, like the sheets that come
-//! with furniture.
+//! The assembly booklet: a cover, an overview of all numbered pieces, then one picture per step, like the
+//! sheets that come with furniture.
 //!
-//! What is there is grey, the new piece has its colour, and an arrow says where it goes. Each step is seen
-//! from where most of the new piece, of its place and of its way is seen (`view`); a note says so where the
-//! view changes.
+//! Pieces already in place are grey, the new piece has its colour, and an arrow shows where it goes. Each
+//! step is drawn from the viewpoint that shows most of the new piece, its place and its path (`view`). A note
+//! marks the steps where the viewpoint changes.
 
 mod bears;
 mod view;
@@ -19,14 +19,14 @@ pub use bears::{Borne, WeakPlace};
 use bears::{plain, wrapped};
 use view::{Sight, side, sights};
 
-/// Free rim of a page, mm.
+/// Margin of a page, mm.
 const RIM_MM: f64 = 14.0;
-/// Steps a page: columns and rows.
+/// Grid of steps on a page: columns and rows.
 const STEPS: [usize; 2] = [2, 2];
-/// Pieces a page: columns and rows, more where there are many.
+/// Grid of pieces on a page, columns and rows; `MANY_PIECES` is for kits that do not fit on one page of it.
 const PIECES: [usize; 2] = [3, 4];
 const MANY_PIECES: [usize; 2] = [4, 5];
-/// Pixels a mm of a step's picture, and of others.
+/// Resolution of step pictures and of all other pictures, pixels per mm.
 const STEP_DENSITY: f64 = 4.4;
 const OTHER_DENSITY: f64 = 4.0;
 
@@ -36,49 +36,50 @@ const GREY: Color = [206, 206, 204];
 const ARROW: Color = [206, 44, 30];
 const WHITE: Color = [255; 3];
 
-/// What the booklet is about.
+/// Content of a booklet: the pieces of a kit and the texts around them.
 #[derive(Default)]
 pub struct Booklet<'a> {
-    /// Heading of the cover.
+    /// Heading on the cover page.
     pub title: String,
-    /// Lines below it.
+    /// Lines of text below the heading.
     pub lines: Vec<String>,
-    /// What the finished thing bears, where that is known.
+    /// Loads that the finished kit withstands, if known.
     pub bears: Option<Borne>,
-    /// Standing on its feet: z is up, and it looks along −y. In any order.
+    /// Pieces in assembled position, in any order. z is up and the model faces −y.
     pub pieces: Vec<ReportPiece<'a>>,
-    /// What to do before the first step; no page where empty.
+    /// Sections on pages before the first step; empty for none.
     pub before: Vec<Section>,
-    /// What to know after the last; no page where empty.
+    /// Sections on pages after the last step; empty for none.
     pub after: Vec<Section>,
-    /// What it is printed on.
+    /// Paper that the booklet is printed on.
     pub paper: Paper,
 }
 
-/// Sentences under a heading.
+/// A heading with paragraphs of text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
-    /// The heading.
+    /// Heading of the section.
     pub title: String,
-    /// A paragraph each.
+    /// Paragraphs, one string each.
     pub lines: Vec<String>,
 }
 
-/// A step, as it is drawn in the booklet.
+/// One assembly step as the booklet draws it.
 pub struct Step {
-    /// What is there in grey, and the new piece in its colour, on its way.
+    /// Earlier pieces in grey and the new piece in its colour, drawn back along its path.
     pub picture: Image,
-    /// Corners of the arrow over the picture, pixels; none where the first piece has no way.
+    /// Corners of the arrow over the picture, pixels. Empty for the first piece, which has no path.
     pub arrow: Vec<[f64; 2]>,
     /// Colour and number of the new piece.
     pub piece: (Color, u32),
-    /// What to do.
+    /// Instruction, such as the side from which the piece is inserted.
     pub heading: String,
-    /// From where the picture is seen, and whether that is new.
+    /// Words for the viewpoint, and true if it differs from the previous step's.
     pub seen: (String, bool),
 }
 
-/// From where each of `pieces` is seen best as it goes in, in their order: unit vectors from the viewer to the scene.
+/// Best viewing direction for the installation of each of `pieces`, in their order: unit vectors from the
+/// viewer to the scene.
 pub fn looks(pieces: &[ReportPiece<'_>]) -> Vec<[f64; 3]> {
     let mut order: Vec<usize> = (0..pieces.len()).collect();
     order.sort_by_key(|&i| pieces[i].order);
@@ -90,20 +91,20 @@ pub fn looks(pieces: &[ReportPiece<'_>]) -> Vec<[f64; 3]> {
     looks
 }
 
-/// A piece with what is drawn of it more than once.
+/// A piece with its shading normals, which several pictures share.
 struct Drawn<'a> {
     piece: &'a ReportPiece<'a>,
     normals: Vec<[Vec3; 3]>,
 }
 
-/// The faces of a piece that a viewer can see, as pieces are closed: half the work.
+/// Front faces of a piece. Pieces are closed, so no other face is visible: half the work.
 struct Facing {
     mesh: TriMesh,
     normals: Vec<[Vec3; 3]>,
 }
 
 impl Drawn<'_> {
-    /// What is turned towards somebody who looks along `direction`.
+    /// Returns the faces turned towards a viewer who looks along `direction`.
     fn facing(&self, direction: Vec3) -> Facing {
         let mesh = self.piece.mesh;
         let seen = (0..mesh.triangles.len()).filter(|&f| mesh.area_vector_doubled(f).dot(direction) < 0.0);
@@ -130,7 +131,7 @@ impl Facing {
     }
 }
 
-/// All pieces in their colours from the front, where `shifts` puts them.
+/// Renders all pieces in their colours from the front, each moved by its entry in `shifts`.
 fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2]) -> Image {
     let camera = Camera::front();
     let facing: Vec<Facing> = drawn.par_iter().map(|d| d.facing(camera.direction)).collect();
@@ -142,7 +143,7 @@ fn all_pieces(drawn: &[Drawn<'_>], shifts: &[Vec3], [width, height]: [usize; 2])
 }
 
 impl Booklet<'_> {
-    /// The booklet as a PDF file; the same for the same pieces.
+    /// Writes the booklet as a PDF file. Deterministic: equal pieces give equal bytes.
     pub fn pdf(&self) -> Vec<u8> {
         document(&self.title, self.pages(), self.paper)
     }
@@ -165,7 +166,7 @@ impl Booklet<'_> {
         pages
     }
 
-    /// Its steps alone, in order, for what is no PDF.
+    /// Draws the steps alone, in order of installation, for output other than PDF.
     pub fn steps(&self) -> Vec<Step> {
         let drawn = self.drawn();
         let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
@@ -173,7 +174,7 @@ impl Booklet<'_> {
         let step = |i: usize| {
             let piece = drawn[i].piece;
             let (picture, way) = step_picture(&drawn, i, &sights[i], step_pixels());
-            // Arrows have sizes in mm.
+            // `arrow` takes lengths in mm, not pixels.
             let on_paper = |way: [[f64; 2]; 2]| arrow(way.map(|p| p.map(|px| px / STEP_DENSITY)));
             let in_pixels = |corner: [f64; 2]| corner.map(|mm| mm * STEP_DENSITY);
             let arrow = way.map(on_paper).unwrap_or_default();
@@ -188,7 +189,7 @@ impl Booklet<'_> {
         (0..drawn.len()).into_par_iter().map(step).collect()
     }
 
-    /// The pieces in order.
+    /// Returns the pieces in order of installation, with their normals.
     fn drawn(&self) -> Vec<Drawn<'_>> {
         let drawn = |piece| Drawn {
             piece,
@@ -237,7 +238,7 @@ impl Booklet<'_> {
     }
 }
 
-/// Sections one under the other, on as many pages as they take.
+/// Lays out sections below one another, on as many pages as they need.
 fn text_pages(title: &str, sections: &[Section]) -> Vec<Page> {
     const LINE_MM: f64 = 5.6;
     const TOP_MM: f64 = 36.0;
@@ -271,7 +272,7 @@ fn text_pages(title: &str, sections: &[Section]) -> Vec<Page> {
     pages
 }
 
-/// All pieces by number, each from inside.
+/// Lays out all pieces by number, each seen from inside.
 fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     let middle = drawn
         .iter()
@@ -317,7 +318,7 @@ fn pieces_pages(drawn: &[Drawn<'_>]) -> Vec<Page> {
     pages
 }
 
-/// What is special about a piece.
+/// Caption of a piece that has a special role: the first one or the key.
 fn role(piece: &ReportPiece<'_>) -> Option<&'static str> {
     match (piece.order, piece.is_key) {
         (0, _) => Some("the first"),
@@ -336,7 +337,7 @@ fn step_pixels() -> [usize; 2] {
     step_mm().map(|mm| (mm * STEP_DENSITY) as usize)
 }
 
-/// One step a picture, the finished thing, and what it bears.
+/// Lays out one picture per step, then the finished kit and the loads that it withstands.
 fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
     let pieces: Vec<&ReportPiece<'_>> = drawn.iter().map(|d| d.piece).collect();
     let sights = sights(&pieces);
@@ -392,16 +393,16 @@ fn steps_pages(drawn: &[Drawn<'_>], bears: Option<&Borne>) -> Vec<Page> {
     pages
 }
 
-/// Side of a second view, mm.
+/// Side length of the square second view, mm.
 const OTHER_MM: f64 = 34.0;
 
-/// Pixels of a step's picture, less what a second view below it takes.
+/// Size of a step's picture in pixels, less the strip that a second view below it needs.
 fn room_beside(sight: &Sight, [width, height]: [usize; 2]) -> [usize; 2] {
     let less = sight.other.map_or(0, |_| (OTHER_MM * STEP_DENSITY) as usize);
     [width, height - less]
 }
 
-/// What is there after step `i` with the new piece in its place, along another direction.
+/// Renders the pieces installed up to step `i`, the new one in its place, seen along `direction`.
 fn in_place(drawn: &[Drawn<'_>], i: usize, direction: Vec3, size: [usize; 2]) -> Image {
     let camera = Camera::along(direction, Vec3::Z);
     let facing: Vec<Facing> = drawn[..=i].iter().map(|d| d.facing(direction)).collect();
@@ -410,7 +411,7 @@ fn in_place(drawn: &[Drawn<'_>], i: usize, direction: Vec3, size: [usize; 2]) ->
     render(&scene, &camera, size[0], size[1])
 }
 
-/// The second view below a step's picture, with its words.
+/// Draws the second view below a step's picture, with its caption.
 fn other_view(page: &mut Page, [x, y]: [f64; 2], sight: &Sight, picture: Image) {
     let Some(direction) = sight.other else { return };
     let [width, height] = step_mm();
@@ -462,7 +463,7 @@ fn what_to_do(piece: &ReportPiece<'_>, i: usize) -> String {
     }
 }
 
-/// From where a step is seen, and whether that is another view than before.
+/// Words for the viewpoint of a step, and true if it differs from the previous step's.
 fn seen_from(sights: &[Sight], i: usize) -> (String, bool) {
     let seen = format!("seen from {}", view::side(-sights[i].direction));
     let is_new = i > 0 && sights[i].direction != sights[i - 1].direction;
@@ -481,7 +482,8 @@ fn finish_heading(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>]) {
     }
 }
 
-/// What is there after step `i`, the new piece on its way, and that way in pixels.
+/// Renders the pieces present at step `i` with the new one drawn back. Returns the picture and, after the
+/// first step, the ends of the new piece's path in pixels.
 fn step_picture(
     drawn: &[Drawn<'_>],
     i: usize,
@@ -500,7 +502,8 @@ fn step_picture(
     (image, (i > 0).then(|| [place(home + back), place(home)]))
 }
 
-/// The corners of an arrow along most of a way, mm; never so short that it is no arrow.
+/// Corners of an arrow along 90 % of a path, mm. Never shorter than 12 mm, so that its shape stays
+/// recognisable.
 fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
     const SHORTEST_MM: f64 = 12.0;
     const HEAD_MM: f64 = 6.5;
@@ -532,7 +535,7 @@ fn arrow([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
     ]
 }
 
-/// A number on a disc of a piece's colour.
+/// Draws a number on a disc in the colour of a piece.
 fn numbered(page: &mut Page, middle: [f64; 2], radius_mm: f64, color: Color, number: &str) {
     page.disc(middle, radius_mm, color);
     let is_dark = color.iter().map(|&c| u32::from(c)).sum::<u32>() < 400;
@@ -558,7 +561,8 @@ fn cell_mm(grid: [usize; 2], below_mm: f64) -> [f64; 2] {
     [room[0] / grid[0] as f64, room[1] / grid[1] as f64]
 }
 
-/// Upper left corner of the cell of the `i`-th thing.
+/// Upper left corner of the `i`-th cell, mm, counted by rows; after the last cell of a page the first
+/// follows.
 fn corner_mm(i: usize, grid: [usize; 2], cell: [f64; 2], below_mm: f64) -> [f64; 2] {
     let i = i % (grid[0] * grid[1]);
     [

@@ -1,4 +1,5 @@
-//! A piece in its pose as columns: where a vertical line through the middle of each cell of a grid is inside.
+//! A posed piece as columns: stretches of vertical lines, one through each cell of a grid, that are inside
+//! the piece.
 //!
 //! ```text
 //!        ┌──────────┐  top
@@ -9,28 +10,28 @@
 //! ───────┴──────────┴─────── plate, z = 0
 //! ```
 //!
-//! That is what supports depend on: one above another part of the same piece ends there, not on the plate.
-//! Limits: what is narrower than a cell may fall between two columns.
+//! Supports depend on these columns: a support above another part of the same piece ends there, not on the
+//! plate. Limit: a feature narrower than a cell may fall between two columns.
 
 use shellock_geom::{Aabb, TriMesh, Vec3};
 
-/// Where the lines stand in their cells, from the middle, in cells: off any round number, so that edges of
-/// boxes are not met.
+/// Offset of each line from the middle of its cell, in cells. No round numbers, so that lines do not hit the
+/// edges of boxes.
 const OFF_MIDDLE: [f64; 2] = [0.0137, -0.0219];
 
 /// A stretch of a column that is inside the piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    /// Lower end above the plate, mm.
+    /// Height of the lower end above the plate, mm.
     pub bottom_mm: f64,
-    /// Upper end above the plate, mm.
+    /// Height of the upper end above the plate, mm.
     pub top_mm: f64,
-    /// Upward part of the normal at the lower end, in [−1, 0]: −1 where it hangs flat.
+    /// Upward component of the unit normal at the lower end, in [−1, 0]; −1 for a horizontal overhang.
     pub bottom_normal: f64,
 }
 
 impl Span {
-    /// Whether a height is within.
+    /// Returns true if a height is in the span, upper end excluded.
     pub fn holds(&self, z_mm: f64) -> bool {
         self.bottom_mm <= z_mm && z_mm < self.top_mm
     }
@@ -41,18 +42,18 @@ impl Span {
 pub struct Columns {
     /// Width of a cell, mm.
     pub cell_mm: f64,
-    /// Cells along x and y.
+    /// Numbers of cells along x and y.
     pub size: [usize; 2],
-    /// Its least x and y on the axes of the plate, mm.
+    /// Least x and y of the piece in the plate's axes, mm.
     corner_mm: [f64; 2],
-    /// Of its highest point, mm.
+    /// Height of the piece, mm.
     pub height_mm: f64,
-    /// Of each column, x fastest, where its spans start; and where the last ends.
+    /// Index of each column's first span, x fastest, and the number of spans at the end.
     starts: Vec<u32>,
     spans: Vec<Span>,
 }
 
-/// A crossing of a column with a face: column, height, upward part of the normal.
+/// A crossing of a column with a face: column, height, upward component of the unit normal.
 struct Crossing {
     column: u32,
     height_mm: f64,
@@ -60,11 +61,12 @@ struct Crossing {
 }
 
 impl Columns {
-    /// Columns of a closed `mesh` turned so that `axes` are those of the plate, with its lowest point at z = 0.
+    /// Computes the columns of a closed `mesh` turned so that `axes` are those of the plate, with its lowest
+    /// point at z = 0.
     ///
-    /// A cell is `cell_mm` wide, or more where there were too many otherwise. Linear in faces and cells.
+    /// Cells are `cell_mm` wide, or wider so that the longer side has at most 160. Linear in faces and cells.
     pub fn of(mesh: &TriMesh, axes: [Vec3; 3], cell_mm: f64) -> Self {
-        /// Cells along the longer side.
+        /// Largest number of cells along the longer side.
         const MOST_CELLS: f64 = 160.0;
         let points: Vec<Vec3> = mesh
             .points
@@ -99,28 +101,28 @@ impl Columns {
         }
     }
 
-    /// The spans of a column, lowest first.
+    /// Returns the spans of a column, lowest first.
     pub fn spans(&self, column: usize) -> &[Span] {
         &self.spans[self.starts[column] as usize..self.starts[column + 1] as usize]
     }
 
-    /// Columns that meet the piece.
+    /// Columns that intersect the piece, in order.
     pub fn shaded(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.len()).filter(|&column| !self.spans(column).is_empty())
     }
 
-    /// Where the middle of a column is on the axes of the plate, mm.
+    /// Position of the middle of a column's cell in the plate's axes, mm.
     pub fn middle(&self, column: usize) -> [f64; 2] {
         let at = [column % self.size[0], column / self.size[0]];
         [0, 1].map(|k| self.corner_mm[k] + (at[k] as f64 + 0.5) * self.cell_mm)
     }
 
-    /// How many columns there are.
+    /// Number of columns, with or without spans.
     pub fn len(&self) -> usize {
         self.size[0] * self.size[1]
     }
 
-    /// Whether there are none.
+    /// Returns true if there is no column.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -131,15 +133,15 @@ impl Columns {
     }
 }
 
-/// Twice the area of `abp`, seen from above: exactly the opposite for `bap`, so that a column meets just one
-/// of two faces with a common edge.
+/// Twice the signed area of `abp`, seen from above. Exactly the negative for `bap`, so that a column crosses
+/// exactly one of two faces at a common edge.
 fn side(points: &[Vec3], a: u32, b: u32, x: f64, y: f64) -> f64 {
     let (lo, hi) = (points[a.min(b) as usize], points[a.max(b) as usize]);
     let doubled = (hi.x - lo.x) * (y - lo.y) - (hi.y - lo.y) * (x - lo.x);
     if a < b { doubled } else { -doubled }
 }
 
-/// Adds where columns cross a face, whose points are in cells along x and y.
+/// Adds the crossings of columns with a face. Points have x and y in cells and z in mm.
 fn cross(
     points: &[Vec3],
     [a, b, c]: [u32; 3],
@@ -152,7 +154,7 @@ fn cross(
     if normal.z == 0.0 {
         return;
     }
-    // In mm: the cross product is in cells along x and y.
+    // The normal in mm: the cross product has x and y in cells.
     let upward =
         normal.z / (normal.z * normal.z + (normal.x.powi(2) + normal.y.powi(2)) / cell_mm.powi(2)).sqrt();
     let range = |k: usize| {
@@ -180,7 +182,8 @@ fn cross(
     }
 }
 
-/// Where each column's spans start, and all spans: between where a line gets in and where it is out again.
+/// Start of each column's spans, and all spans. A span runs from a crossing into the piece to the crossing
+/// out of it.
 fn spans(n_columns: usize, mut crossings: Vec<Crossing>) -> (Vec<u32>, Vec<Span>) {
     crossings.sort_by(|a, b| {
         (a.column, a.height_mm)

@@ -1,7 +1,8 @@
-//! From finished pieces to the printer and the workbench: printers, plates, print time, and the booklet.
+//! From finished pieces to printing and assembly: printers, build plates, print time, and the assembly
+//! booklet.
 //!
-//! Nothing here changes a piece. Pieces come as meshes in assembled position and are only turned, moved and
-//! drawn.
+//! Nothing in this crate changes the shape of a piece. Pieces come as meshes in assembled position and are
+//! only turned, moved and drawn.
 
 pub mod booklet;
 pub mod columns;

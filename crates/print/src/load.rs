@@ -1,8 +1,8 @@
-//! What a piece in its pose asks of a printer: walls, insides and supports, from its columns.
+//! Load of a posed piece on a printer: walls, infill and supports, from the piece's columns.
 //!
-//! Slices are looked at every millimetre or so, as a slicer does every layer: how much of a slice is farther
-//! from its outline than the perimeters reach and from the surface above and below than solid layers reach
-//! (that is sparse infill, if there is enough of it), what supports take, and how much of its outlines are short loops.
+//! Slices are examined about every millimetre, where a slicer examines every layer. Each filament slice
+//! yields its sparse infill, its supports, and the length of short loops among its outlines. Sparse infill is
+//! the area beyond the reach of the perimeters and of the solid layers above and below, if large enough.
 
 use shellock_geom::{TriMesh, Vec3};
 
@@ -11,53 +11,54 @@ use crate::printer::{Printer, Process};
 
 /// Width of a cell, mm.
 pub(crate) const CELL_MM: f64 = 1.0;
-/// Most slices that are looked at, a cell's width apart.
+/// Largest number of slices, which are otherwise a cell's width apart.
 const MOST_SLICES: f64 = 120.0;
-/// Solid layers above and below.
+/// Solid layers below every top and above every bottom surface.
 const SOLID_LAYERS: f64 = 3.0;
-/// Infill of less is solid, mm².
+/// Smallest area of sparse infill, mm²; smaller areas are filled solid.
 const SOLID_BELOW_MM2: f64 = 70.0;
-/// A layer may stand out beyond the one below by so much without support, mm: half a line.
+/// Overhang of a layer over the one below that needs no support, mm: half a line.
 const OVERHANG_MM: f64 = 0.225;
-/// Loops that are shorter are laid slowly, mm: those of a radius below 6.5, as the slicer has it.
+/// Length below which a loop is printed slowly, mm: radius below 6.5, as in the slicer.
 const SHORT_MM: f64 = 41.0;
-/// Length of an outline over that of the edges of its cells.
+/// Ratio of an outline's length to that of its cells' edges.
 const OUTLINE: f64 = std::f64::consts::FRAC_PI_4;
-/// Supports keep away from the piece above by so much, mm.
+/// Gap between a support and the piece above, mm.
 const CONTACT_MM: f64 = 0.2;
 
-/// What is printed, of one piece or of several on one plate.
+/// Printing load of one piece, or of several on one plate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
-    /// Of its highest part, mm.
+    /// Height of the highest part, mm.
     pub height_mm: f64,
-    /// Of all of it, mm³.
+    /// Volume of all parts, mm³.
     pub volume_mm3: f64,
-    /// Surface as it is seen from above, mm².
+    /// Area of all upward faces as seen from above, mm².
     pub top_mm2: f64,
     /// Area of the shadow on the plate, mm².
     pub shadow_mm2: f64,
-    /// Volume of what is filled sparsely, mm³.
+    /// Volume filled with sparse infill, mm³.
     pub sparse_mm3: f64,
-    /// Short loops of all slices times their distance, mm²: they are laid slowly.
+    /// Length of short loops in all slices times slice distance, mm². Short loops are printed slowly.
     pub small_side_mm2: f64,
-    /// Volume that supports fill, mm³.
+    /// Volume filled by supports, mm³.
     pub support_mm3: f64,
-    /// The same a millimetre wider on all sides, as slicers draw it, mm³.
+    /// Volume of supports drawn a millimetre wider on all sides, as slicers do, mm³.
     pub wide_support_mm3: f64,
-    /// The sides of that, mm².
+    /// Side area of the widened supports, mm².
     pub wide_side_mm2: f64,
-    /// Its upper ends, mm².
+    /// Area of the upper ends of the widened supports, mm².
     pub wide_top_mm2: f64,
-    /// Largest area of a slice, mm²: what a layer of resin is peeled off at.
+    /// Area of the largest slice, mm²: the area over which a resin layer is peeled off.
     pub widest_mm2: f64,
-    /// Volume of cups that open upwards only, mm³: resin printers hang pieces upside down, so there resin is
-    /// caught and the film sucks. A bell, open below, drains through what lifts it off the plate.
+    /// Volume of cups that open upwards only, mm³. Resin printers hang pieces upside down, so such cups trap
+    /// resin and pull on the film. A bell, open below, drains through the supports that lift it off the
+    /// plate.
     pub cup_mm3: f64,
 }
 
 impl Load {
-    /// Both at once, on one plate.
+    /// Combined load of both on one plate: heights by maximum, everything else by sum.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -76,13 +77,15 @@ impl Load {
         }
     }
 
-    /// Of a closed `mesh` turned so that `axes` are those of the plate: what the forms of the printer's process
-    /// ask for; the rest is 0. Some ms for a piece of 20 000 triangles and 60 mm.
+    /// Computes the load of a closed `mesh` turned so that `axes` are those of the plate.
+    ///
+    /// Only figures that the time and material formulas of the printer's process use are computed; the others
+    /// are 0. Takes some ms for a piece of 20 000 triangles and 60 mm.
     pub fn of(mesh: &TriMesh, axes: [Vec3; 3], printer: &Printer) -> Self {
         Self::of_columns(mesh, axes[2], printer, &Columns::of(mesh, axes, CELL_MM))
     }
 
-    /// [`Self::of`] by columns of the mesh, whose lines run along `up`.
+    /// Computes [`Self::of`] from columns of the mesh whose lines run along `up`.
     pub(crate) fn of_columns(mesh: &TriMesh, up: Vec3, printer: &Printer, columns: &Columns) -> Self {
         let mut load = Self {
             height_mm: columns.height_mm,
@@ -108,7 +111,7 @@ impl Load {
     }
 }
 
-/// Heights of the slices that are looked at, mm, and how much each stands for, mm.
+/// Heights of the examined slices and the distance between them, both in mm.
 fn slices(columns: &Columns) -> (impl Iterator<Item = f64>, f64) {
     let n_slices = (columns.height_mm / columns.cell_mm)
         .ceil()
@@ -120,10 +123,10 @@ fn slices(columns: &Columns) -> (impl Iterator<Item = f64>, f64) {
     )
 }
 
-/// Of each column, what supports fill.
+/// Intervals filled by supports in each column.
 pub(crate) struct Supports {
     starts: Vec<u32>,
-    /// Lower and upper end, mm.
+    /// Lower and upper ends, mm.
     filled: Vec<[f64; 2]>,
 }
 
@@ -162,12 +165,12 @@ impl Supports {
     }
 }
 
-/// A slice, with a free rim of a cell around it.
+/// A slice with a margin of one empty cell around it.
 struct Slice {
     width: usize,
     /// Columns that are not empty, and their cells.
     shaded: Vec<(usize, usize)>,
-    /// Of each cell, whether it is inside the piece.
+    /// True for each cell inside the piece.
     inside: Vec<bool>,
     islands: Islands,
 }
@@ -193,17 +196,17 @@ impl Slice {
         [cell - 1, cell + 1, cell - self.width, cell + self.width]
     }
 
-    /// Numbers the lakes of what is outside; how many there are.
+    /// Labels the connected regions outside the piece. Returns their number.
     fn find_lakes(&mut self) -> usize {
         let outside: Vec<bool> = self.inside.iter().map(|inside| !inside).collect();
         self.islands.find(&outside, self.width).len()
     }
 }
 
-/// What slices of resin are asked.
+/// State of the slice-by-slice analysis of a resin print.
 struct Resin {
     slice: Slice,
-    /// Outside the piece, and air gets there from below.
+    /// True for cells outside the piece that air reaches from below.
     vented: Vec<bool>,
 }
 
@@ -228,7 +231,8 @@ impl Resin {
         }
     }
 
-    /// Lets air spread from below and from the rim; returns how many cells outside it does not reach.
+    /// Spreads air from the slice below and from the margin. Returns the number of outside cells that it does
+    /// not reach.
     fn vent(&mut self) -> usize {
         let n_lakes = self.slice.find_lakes();
         let (inside, label) = (&self.slice.inside, &self.slice.islands.label);
@@ -250,12 +254,12 @@ impl Resin {
     }
 }
 
-/// What slices of filament are asked.
+/// State of the slice-by-slice analysis of a filament print.
 struct Filament {
     slice: Slice,
-    /// Farther from the surface above and below than solid layers reach.
+    /// True for cells beyond the reach of solid layers at the surface above and below.
     deep: Vec<bool>,
-    /// In a support as it is drawn, in this slice and in the one below.
+    /// True for cells in a widened support, in this slice and in the one below.
     wide: [Vec<bool>; 2],
 }
 
@@ -284,7 +288,7 @@ impl Filament {
         }
     }
 
-    /// Draws the supports of a slice a cell wider, but not into the piece.
+    /// Widens the supports of a slice by one cell, but not into the piece.
     fn widen(&mut self, supports: &Supports, z_mm: f64) {
         self.wide.swap(0, 1);
         let (width, inside) = (self.slice.width, &self.slice.inside);
@@ -303,11 +307,11 @@ impl Filament {
         }
     }
 
-    /// Adds this slice, which stands for `step_mm`.
+    /// Adds the figures of this slice, which represents a layer of `step_mm`.
     fn add(&mut self, step_mm: f64, cell_mm: f64, load: &mut Load) {
         let (slice, cell_mm2) = (&mut self.slice, cell_mm * cell_mm);
         let width = slice.width;
-        // Perimeters take about a cell: what has a neighbour outside is no infill.
+        // Perimeters are about a cell wide, so a cell with a neighbour outside has no infill.
         let mut sparse = slice.none();
         for &(_, cell) in &slice.shaded {
             let around = slice.neighbours(cell);
@@ -328,7 +332,8 @@ impl Filament {
     }
 }
 
-/// Edges of cells along all short loops: each goes between an island and a lake.
+/// Number of cell edges along all short loops. Each loop separates an island of the piece from a region
+/// outside.
 fn short_outlines(slice: &mut Slice, cell_mm: f64) -> usize {
     let width = slice.width;
     slice.islands.find(&slice.inside, width);
@@ -345,16 +350,16 @@ fn short_outlines(slice: &mut Slice, cell_mm: f64) -> usize {
     loops.filter(is_short).sum()
 }
 
-/// Cells that are connected.
+/// Connected components of the set cells of a slice.
 #[derive(Default)]
 struct Islands {
-    /// Of each cell that is set, the number of its island.
+    /// Index of the island of each set cell; `u32::MAX` for others.
     label: Vec<u32>,
     stack: Vec<usize>,
 }
 
 impl Islands {
-    /// Numbers of cells of all islands of `set`, in rows of `width`.
+    /// Finds all islands of `set`, whose rows have `width` cells. Returns the number of cells of each.
     fn find(&mut self, set: &[bool], width: usize) -> Vec<usize> {
         self.label.clear();
         self.label.resize(set.len(), u32::MAX);
@@ -368,7 +373,8 @@ impl Islands {
             self.stack.push(first);
             while let Some(cell) = self.stack.pop() {
                 n += 1;
-                // Rows wrap around at their ends, where the rim is free: that joins nothing but the rim.
+                // Rows wrap around at their ends. The margin there is empty, so this connects the margin with
+                // nothing but itself.
                 for next in [
                     cell.wrapping_sub(1),
                     cell + 1,
@@ -396,7 +402,7 @@ mod tests {
     use crate::time::Cost;
 
     const UPRIGHT: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
-    /// Upside down.
+    /// Axes of a piece that is turned upside down.
     const TURNED: [Vec3; 3] = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z];
 
     fn load(volume: &Volume, axes: [Vec3; 3]) -> Load {
@@ -407,7 +413,7 @@ mod tests {
         Load::of(&volume.to_mesh(), axes, &Printer::sla())
     }
 
-    /// A top of 40 × 40 mm, 4 mm thick, 20 mm above the plate on a leg of 10 × 10 mm.
+    /// A table top of 40 × 40 mm, 4 mm thick, 20 mm above the plate on a leg of 10 × 10 mm.
     fn table() -> Volume {
         cuboid([0.0, 0.0, 20.0], [40.0, 40.0, 24.0]).union(&cuboid([15.0, 15.0, 0.0], [25.0, 25.0, 21.0]))
     }
@@ -447,7 +453,7 @@ mod tests {
         let caught = of_resin(&cup(), UPRIGHT).cup_mm3;
         assert!((caught / inside - 1.0).abs() < 0.08, "{caught} {inside}");
         assert_eq!(of_resin(&cup(), TURNED).cup_mm3, 0.0);
-        // With a hole in its wall at the floor, so does the cup.
+        // A hole in its wall at the floor drains the cup, too.
         let drained = cup().subtract(&cuboid([-1.0, 12.0, 3.0], [4.0, 18.0, 9.0]));
         assert_eq!(of_resin(&drained, UPRIGHT).cup_mm3, 0.0);
     }
@@ -469,10 +475,10 @@ mod tests {
             "its loops are short"
         );
     }
-    /// Name, shape, pose, seconds and cm³ as the slicer tells them.
+    /// Name, shape, pose, and the slicer's seconds and cm³.
     type Sliced = (&'static str, fn() -> Volume, [Vec3; 3], f64, f64);
 
-    /// By PrusaSlicer 2.5 with two perimeters, 15 % infill, layers of 0.2 mm and supports.
+    /// Results of PrusaSlicer 2.5 with two perimeters, 15 % infill, layers of 0.2 mm and supports.
     const SLICED: [Sliced; 2] = [
         (
             "cube of 40 mm",

@@ -1,7 +1,8 @@
 //! Pages of text, pictures and filled shapes as PDF 1.7. Lengths in mm, from the upper left corner of an A4
 //! page.
 //!
-//! Text is set in Helvetica, one of the fonts that every reader has; what it lacks becomes "?".
+//! Text is set in Helvetica, one of the fonts that every reader has. Characters that the font lacks become
+//! "?".
 
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::types::Predictor;
@@ -9,16 +10,16 @@ use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 use rayon::prelude::*;
 use shellock_render::stills::Image;
 
-/// What pages are laid out for, mm: A4.
+/// Page size of the layout, mm: A4.
 pub(crate) const PAGE_MM: [f64; 2] = [210.0, 297.0];
 
-/// What pages are printed on.
+/// Paper size for printing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Paper {
-    /// 210 × 297 mm.
+    /// ISO A4, 210 × 297 mm.
     #[default]
     A4,
-    /// 8.5 × 11 inches: pages are 6 % smaller than on A4, in the middle.
+    /// US Letter, 8.5 × 11 inches. Pages are 6 % smaller than on A4 and centred.
     Letter,
 }
 
@@ -31,17 +32,17 @@ impl Paper {
     }
 }
 const POINTS_PER_MM: f64 = 72.0 / 25.4;
-/// Share of its height from a line's foot to the middle of its digits.
+/// Distance from a line's baseline to the middle of its digits, as a share of the text size.
 const MIDDLE_OF_DIGITS: f64 = 0.36;
-/// Bold letters are about so much wider.
+/// Width of bold text relative to plain text, approximately.
 const BOLD: f64 = 1.06;
-/// How hard pictures are compressed: twice the time saves a twentieth.
+/// Compression level of pictures: a higher one that takes twice the time saves a twentieth.
 const EFFORT: u8 = 4;
 
-/// sRGB.
+/// Colour in sRGB: red, green, blue.
 pub type Color = [u8; 3];
 
-/// How text is set.
+/// Size, weight and colour of text.
 #[derive(Clone, Copy)]
 pub(crate) struct Style {
     /// Height of a line, mm.
@@ -50,7 +51,7 @@ pub(crate) struct Style {
     pub color: Color,
 }
 
-/// A page while it is drawn.
+/// A page that is being drawn.
 pub(crate) struct Page {
     content: Content,
     pictures: Vec<Image>,
@@ -58,7 +59,7 @@ pub(crate) struct Page {
     texts: Vec<TextBox>,
 }
 
-/// Where a line of text stands, mm.
+/// Bounding box of a line of text, mm.
 #[cfg(test)]
 #[derive(Clone, Debug)]
 pub(crate) struct TextBox {
@@ -67,7 +68,7 @@ pub(crate) struct TextBox {
     pub text: String,
 }
 
-/// Shares of its size that a line reaches above its foot and below.
+/// Reach of a line above and below its baseline, as shares of the text size.
 #[cfg(test)]
 const ASCENT: f64 = 0.74;
 #[cfg(test)]
@@ -83,13 +84,13 @@ impl Page {
         }
     }
 
-    /// Where its lines of text stand.
+    /// Bounding boxes of all lines of text so far.
     #[cfg(test)]
     pub fn texts(&self) -> &[TextBox] {
         &self.texts
     }
 
-    /// Text with the left end of its foot at `at`.
+    /// Draws text with the left end of its baseline at `at`.
     pub fn text(&mut self, at: [f64; 2], style: Style, text: &str) {
         let [x, y] = on_paper(at);
         #[cfg(test)]
@@ -105,19 +106,19 @@ impl Page {
         self.content.show(Str(&encoded(text))).end_text();
     }
 
-    /// The same, smaller or shortened where it would be wider than `room_mm`.
+    /// Draws text as [`Self::text`] does, smaller or shortened if it would be wider than `room_mm`.
     pub fn text_within(&mut self, at: [f64; 2], room_mm: f64, style: Style, text: &str) {
         let (style, text) = fitted(style, text, room_mm);
         self.text(at, style, &text);
     }
 
-    /// Text in the middle of `at`, in both directions.
+    /// Draws text centred on `at` in both directions.
     pub fn text_amid(&mut self, at: [f64; 2], style: Style, text: &str) {
         let left = at[0] - 0.5 * width_mm(style, text);
         self.text([left, at[1] + MIDDLE_OF_DIGITS * style.size_mm], style, text);
     }
 
-    /// A picture as wide as it is told, with its upper left corner at `at`.
+    /// Draws a picture of the given width with its upper left corner at `at`.
     pub fn picture(&mut self, at: [f64; 2], width_mm: f64, picture: Image) {
         let height_mm = width_mm * picture.height as f64 / picture.width.max(1) as f64;
         let [x, y] = on_paper([at[0], at[1] + height_mm]);
@@ -128,7 +129,7 @@ impl Page {
         self.pictures.push(picture);
     }
 
-    /// A filled polygon with a rim of `rim_mm` around it.
+    /// Draws a filled polygon with an outline of width `rim_mm`.
     pub fn polygon(&mut self, corners: &[[f64; 2]], color: Color, rim_mm: f64, rim: Color) {
         self.fill_color(color);
         let [r, g, b] = rim.map(|c| f32::from(c) / 255.0);
@@ -150,7 +151,7 @@ impl Page {
         };
     }
 
-    /// A filled disc.
+    /// Draws a filled disc as a polygon of 48 corners.
     pub fn disc(&mut self, middle: [f64; 2], radius_mm: f64, color: Color) {
         const N: u32 = 48;
         let corner = |i: u32| {
@@ -167,7 +168,7 @@ impl Page {
     }
 }
 
-/// The pages as a file; the same for the same pages.
+/// Writes the pages as a PDF file. Deterministic: equal pages give equal bytes.
 pub(crate) fn document(title: &str, pages: Vec<Page>, paper: Paper) -> Vec<u8> {
     let (catalog, tree, information) = (Ref::new(1), Ref::new(2), Ref::new(3));
     let fonts = [
@@ -246,7 +247,8 @@ pub(crate) fn document(title: &str, pages: Vec<Page>, paper: Paper) -> Vec<u8> {
     pdf.finish()
 }
 
-/// What puts a page in the middle of paper of another size, as large as that has room for; nothing for its own size.
+/// Drawing operators that centre a page on paper of another size and scale it to fit; empty for the page's
+/// own size.
 fn placed(size_mm: [f64; 2]) -> Vec<u8> {
     if size_mm == PAGE_MM {
         return Vec::new();
@@ -261,9 +263,9 @@ fn placed(size_mm: [f64; 2]) -> Vec<u8> {
     bytes
 }
 
-/// Differences to the row above, as PNG's second filter has them, on white.
+/// Compresses a picture on white, with each row as differences to the row above (PNG's filter "up").
 fn compressed(picture: &Image) -> Vec<u8> {
-    /// The filter's name within a row.
+    /// Number of the filter at the start of each row.
     const UP: u8 = 2;
     let opaque = picture.clone().on([255; 3]);
     let mut above = vec![0_u8; 3 * picture.width];
@@ -285,7 +287,7 @@ fn on_paper([x, y]: [f64; 2]) -> [f32; 2] {
     [x * POINTS_PER_MM, (PAGE_MM[1] - y) * POINTS_PER_MM].map(|p| p as f32)
 }
 
-/// Windows-1252, the encoding of the fonts.
+/// Encodes text in Windows-1252, the encoding of the fonts.
 fn encoded(text: &str) -> Vec<u8> {
     let byte = |c: char| match c {
         ' '..='~' | '\u{A0}'..='\u{FF}' => c as u32 as u8,
@@ -299,7 +301,7 @@ fn encoded(text: &str) -> Vec<u8> {
     text.chars().map(byte).collect()
 }
 
-/// A text that is no wider than `room_mm`: smaller, down to six tenths, then shortened.
+/// Fits text into a width of `room_mm`: scales it down to no less than 0.6 of its size, then shortens it.
 fn fitted(style: Style, text: &str, room_mm: f64) -> (Style, String) {
     const SMALLEST: f64 = 0.6;
     let shrunk = room_mm / width_mm(style, text).max(f64::MIN_POSITIVE);
@@ -330,7 +332,7 @@ pub(crate) fn width_mm(style: Style, text: &str) -> f64 {
     sum / 1000.0 * style.size_mm * if style.is_bold { BOLD } else { 1.0 }
 }
 
-/// Widths of Helvetica's characters from the space to the tilde, thousandths of its size.
+/// Widths of Helvetica's characters from the space to the tilde, thousandths of the text size.
 const WIDTHS: [u16; 95] = [
     278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556, 556, 556,
     556, 556, 556, 556, 556, 278, 278, 584, 584, 584, 556, 1015, 667, 667, 722, 722, 667, 611, 778, 722, 278,

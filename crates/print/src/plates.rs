@@ -1,7 +1,7 @@
-//! Pieces laid flat on the plates of a printer, as they are printed.
+//! Layout of pieces on the build plates of a printer.
 //!
-//! Each piece is laid so that its outer skin needs the least support (`orient`), then plates are packed
-//! (`pack`). Plates lie side by side, so that one file can hold all of them.
+//! Each piece is oriented so that its outer skin needs the least support (`orient`), then the plates are
+//! packed (`pack`). Plates lie side by side, so that one file can hold all of them.
 
 mod orient;
 mod pack;
@@ -14,72 +14,72 @@ use crate::printer::Printer;
 use orient::Pose;
 use pack::{Spot, pack};
 
-/// Free rim of a plate, mm: room for what slicers add at the foot of a print.
+/// Free margin of a plate, mm: room for what slicers add at the foot of a print.
 const EDGE_MM: f64 = 4.0;
 /// Gap between pieces on a plate, mm.
 const GAP_MM: f64 = 3.0;
-/// From the left edge of a plate to that of the next, in widths.
+/// Distance between the left edges of neighbouring plates, in plate widths.
 const PITCH: f64 = 1.2;
 
-/// A piece that is to be printed.
+/// A piece to be printed.
 #[derive(Clone, Debug)]
 pub struct Printable<'a> {
-    /// Closed, mm.
+    /// Closed mesh of the piece, mm.
     pub mesh: &'a TriMesh,
-    /// One for each triangle: whether it is part of the skin that is seen later.
+    /// True for each triangle of the skin that is visible on the assembled model. One entry per triangle.
     pub is_outer: Vec<bool>,
 }
 
-/// How a piece lies on its plate.
+/// Pose of a piece on its plate, with its printing load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Laid {
-    /// Position of the piece in the list.
+    /// Index of the piece in the input list.
     pub piece: usize,
-    /// Plate, from 0.
+    /// Index of the plate, from 0.
     pub plate: usize,
-    /// Where the x, y and z axes go.
+    /// Images of the x, y and z axes: the columns of the rotation.
     pub turned: [[f64; 3]; 3],
-    /// Where it is moved after that, mm: with its lowest point on z = 0, in the frame of its plate, whose
-    /// corner is the origin.
+    /// Translation after the rotation, mm. The lowest point comes to z = 0, and the origin is the corner of
+    /// the plate.
     pub moved_mm: [f64; 3],
-    /// Width, depth and height as it lies, mm.
+    /// Width, depth and height in this pose, mm.
     pub size_mm: [f64; 3],
-    /// Outer skin that needs support, mm².
+    /// Area of outer skin that needs support, mm².
     pub outer_support_mm2: f64,
-    /// All surface that needs support, mm².
+    /// Area of all surface that needs support, mm².
     pub support_mm2: f64,
-    /// What it asks of the printer as it lies.
+    /// Printing load in this pose.
     pub load: Load,
 }
 
 impl Laid {
-    /// Where a point of the piece in its assembled place is on the plate, mm.
+    /// Maps a point of the assembled piece to its position on the plate, mm.
     pub fn place(&self, p: Vec3) -> Vec3 {
         let [x, y, z] = self.turned.map(Vec3::from_array);
         p.x * x + p.y * y + p.z * z + Vec3::from_array(self.moved_mm)
     }
 
-    /// [`Self::moved_mm`] where all plates of `printer` lie side by side along x.
+    /// Returns [`Self::moved_mm`] for a layout with all plates of `printer` side by side along x.
     pub fn moved_among_plates_mm(&self, printer: &Printer) -> [f64; 3] {
         let [x, y, z] = self.moved_mm;
         [x + self.plate as f64 * PITCH * printer.bed_mm[0], y, z]
     }
 }
 
-/// All pieces on plates.
+/// Pieces laid out on plates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plates {
-    /// In order of pieces; what is too large is left out.
+    /// Poses in order of pieces, without those that are too large.
     pub laid: Vec<Laid>,
-    /// How many plates there are.
+    /// Number of plates in use.
     pub n_plates: usize,
-    /// Positions of the pieces that the printer cannot make.
+    /// Indices of the pieces that are too large for the printer.
     pub too_large: Vec<usize>,
 }
 
-/// Lays all `pieces` flat and packs them on plates of `printer`; the same for the same input.
+/// Orients all `pieces` and packs them on plates of `printer`. Deterministic: equal input gives equal plates.
 ///
-/// Some 0.3 to 1 s for a piece of 20 000 triangles: 150 poses are judged coarsely, 20 finely.
+/// Takes 0.3 to 1 s for a piece of 20 000 triangles: 150 poses are judged coarsely, 20 finely.
 pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
     let poses: Vec<Option<Pose>> = pieces
         .par_iter()
@@ -91,8 +91,8 @@ pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
         .enumerate()
         .filter_map(|(i, p)| Some((i, p?)))
         .collect();
-    // High ones first save height, large ones first save plates; the better of both is taken. Equal ones stay
-    // in order.
+    // Tall pieces first saves height, large ones first saves plates, so both orders are tried. The sort is
+    // stable, so ties stay in order.
     let by = |measure: fn(&Pose) -> f64| {
         let mut order: Vec<usize> = (0..fitting.len()).collect();
         order.sort_by(|&a, &b| measure(&fitting[b].1).total_cmp(&measure(&fitting[a].1)));
@@ -118,7 +118,7 @@ pub fn lay(printer: &Printer, pieces: &[Printable<'_>]) -> Plates {
     }
 }
 
-/// Positions in a list of poses, each with its spot.
+/// Indices into a list of poses, each with its spot on a plate.
 struct Packing(Vec<(usize, Spot)>);
 
 impl Packing {
@@ -126,9 +126,10 @@ impl Packing {
         self.0.iter().map(|(_, spot)| spot.plate + 1).max().unwrap_or(0)
     }
 
-    /// Plates, and the heights of all of them in one, mm: what takes long on printers that care.
+    /// Cost of a packing, mm: the sum of the plates' heights, which takes long on some printers, plus a price
+    /// per plate.
     fn cost(&self, poses: &[(usize, Pose)]) -> f64 {
-        /// Changing a plate is worth this height.
+        /// Price of changing a plate, as a height.
         const PLATE_MM: f64 = 15.0;
         let mut heights = vec![PLATE_MM; self.n_plates()];
         for (at, spot) in &self.0 {
@@ -138,9 +139,9 @@ impl Packing {
     }
 }
 
-/// The packing of the best order that swaps of two pieces lead to.
+/// Improves an order by swaps of two pieces. Returns the packing of the best order found.
 fn improved(printer: &Printer, poses: &[(usize, Pose)], mut order: Vec<usize>) -> Packing {
-    /// Orders that are tried: all swaps of 15 pieces twenty times, 0.1 s.
+    /// Largest number of orders tried: all swaps of 15 pieces twenty times, 0.1 s.
     const MOST_TRIES: usize = 2000;
     let mut best = packed(printer, poses, &order);
     let mut cost = best.cost(poses);
@@ -180,7 +181,7 @@ fn packed(printer: &Printer, poses: &[(usize, Pose)], order: &[usize]) -> Packin
     )
 }
 
-/// Whether a piece of this shape could be made by `printer` in some pose.
+/// Returns true if `printer` has room for a piece of this shape in some pose.
 pub fn fits(printer: &Printer, mesh: &TriMesh) -> bool {
     let piece = Printable {
         mesh,
@@ -189,7 +190,8 @@ pub fn fits(printer: &Printer, mesh: &TriMesh) -> bool {
     orient::fits(&piece, room_mm(printer))
 }
 
-/// Whether everything that fits into a box fits the printer, however it is cut.
+/// Returns true if everything in a box fits `printer`, however the box is divided. The box may be turned by
+/// quarters.
 pub fn fits_whole(printer: &Printer, bounds: Aabb) -> bool {
     let sorted = |mut sides: [f64; 3]| {
         sides.sort_by(f64::total_cmp);
@@ -199,7 +201,8 @@ pub fn fits_whole(printer: &Printer, bounds: Aabb) -> bool {
     box_mm.iter().zip(room).all(|(side, room)| *side <= room)
 }
 
-/// The pose of a solid that needs the least support, on a plate as large as it takes.
+/// Returns the pose of a solid that needs the least support, on a plate of unlimited size. `None` for a mesh
+/// without a convex hull, such as a flat one.
 pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
     let piece = Printable {
         mesh,
@@ -217,7 +220,7 @@ pub fn lay_alone(printer: &Printer, mesh: &TriMesh) -> Option<Laid> {
     ))
 }
 
-/// Width, depth and height that pieces may take, mm.
+/// Width, depth and height available for pieces, mm.
 fn room_mm(printer: &Printer) -> [f64; 3] {
     let [width, depth, height] = printer.bed_mm;
     [width - 2.0 * EDGE_MM, depth - 2.0 * EDGE_MM, height]
@@ -230,7 +233,7 @@ fn placed(piece: usize, pose: &Pose, spot: &Spot) -> Laid {
         pose.clone()
     };
     let corner = Vec3::new(spot.corner_mm[0] + EDGE_MM, spot.corner_mm[1] + EDGE_MM, 0.0);
-    // Where the axes go: the columns of the rotation.
+    // Images of the axes: the columns of the rotation.
     let turned = [0, 1, 2].map(|axis| pose.axes.map(|row| row[axis]));
     Laid {
         piece,

@@ -1,24 +1,24 @@
-//! Printers: what they can hold, and what their prints need.
+//! Printers: build volumes, clearances, tolerances and materials.
 
 use shellock_assembly::params::ParamProblem;
 use shellock_mechanics::Material;
 
-/// How a printer makes things.
+/// Printing process, by the material that it hardens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Process {
-    /// Resin, hardened layer by layer: supports leave marks.
+    /// Stereolithography: resin, hardened layer by layer. Supports leave marks.
     Sla,
-    /// Filament, laid in lines: supports leave marks, and what stands on a point falls.
+    /// Fused deposition: filament, laid in lines. Supports leave marks, and unstable pieces fall over.
     Fdm,
-    /// Powder, sintered layer by layer: no supports.
+    /// Laser sintering: powder, fused layer by layer. Needs no supports.
     Sls,
 }
 
 impl Process {
-    /// All of them, by the names that people use.
+    /// All processes by their common names.
     pub const ALL: [(&'static str, Self); 3] = [("sla", Self::Sla), ("fdm", Self::Fdm), ("sls", Self::Sls)];
 
-    /// The process called `name`.
+    /// Returns the process called `name`, in upper or lower case.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL
             .iter()
@@ -27,31 +27,32 @@ impl Process {
     }
 }
 
-/// A printer. Lengths in mm.
+/// Properties of a printer. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Printer {
-    /// What people call it.
+    /// Common name of the printer.
     pub name: String,
-    /// How it prints.
+    /// Process by which it prints.
     pub process: Process,
-    /// Width, depth and height of what it can make. [10, 5000] each.
+    /// Width, depth and height of the build volume. [10, 5000] each.
     pub bed_mm: [f64; 3],
     /// Gap between mating faces of connectors. [0.03, 0.6].
     pub clearance_mm: f64,
-    /// The same on the rails of the key. [0.03, 0.8].
+    /// Gap between mating faces on the rails of the key. [0.03, 0.8].
     pub key_clearance_mm: f64,
-    /// How far a printed face may stand out: each side of a seam stays back by as much. [0, 0.4].
+    /// Largest deviation of a printed face outwards; each side of a seam is set back by as much. [0, 0.4].
     pub tolerance_mm: f64,
-    /// Thinnest wall that it makes. [0.1, 2].
+    /// Thinnest wall that can be printed. [0.1, 2].
     pub min_wall_mm: f64,
     /// Height of a layer. [0.01, 1].
     pub layer_mm: f64,
-    /// What it prints with.
+    /// Material that it prints with.
     pub material: Material,
 }
 
 impl Printer {
-    /// A resin printer with a display of ten inches; clearances as others print them, 0.05 to 0.15 a side.
+    /// Returns a resin printer with a ten-inch display. Clearances follow others' prints, 0.05 to 0.15 a
+    /// side.
     pub fn sla() -> Self {
         Self {
             name: "sla".into(),
@@ -66,7 +67,7 @@ impl Printer {
         }
     }
 
-    /// A filament printer with a nozzle of 0.4 mm and PLA; clearances 0.15 to 0.25 a side.
+    /// Returns a filament printer with a nozzle of 0.4 mm and PLA; clearances 0.15 to 0.25 a side.
     pub fn fdm() -> Self {
         Self {
             name: "fdm".into(),
@@ -81,7 +82,7 @@ impl Printer {
         }
     }
 
-    /// The same with PETG, which oozes more: 0.25 to 0.35 a side.
+    /// Returns the filament printer with PETG, which oozes more: 0.25 to 0.35 a side.
     pub fn fdm_petg() -> Self {
         Self {
             name: "fdm-petg".into(),
@@ -93,7 +94,7 @@ impl Printer {
         }
     }
 
-    /// A sintering printer and polyamide: about 0.25 a side.
+    /// Returns a sintering printer with polyamide: about 0.25 a side.
     pub fn sls() -> Self {
         Self {
             name: "sls".into(),
@@ -108,12 +109,12 @@ impl Printer {
         }
     }
 
-    /// The printers that everybody has.
+    /// Presets of widespread printers, one per process and material.
     pub fn presets() -> Vec<Self> {
         vec![Self::sla(), Self::fdm(), Self::fdm_petg(), Self::sls()]
     }
 
-    /// Every property out of range.
+    /// Returns every property out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         let side = |name, mm| ParamProblem::unless_within(name, "mm", mm, 10.0, 5000.0);
         let [width, depth, height] = self.bed_mm;

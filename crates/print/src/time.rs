@@ -1,39 +1,39 @@
-//! Print time and material by closed forms, as PrusaSlicer tells them, where no slicer is at hand.
+//! Print time and material by closed forms, fitted to PrusaSlicer's figures, for use without a slicer.
 //!
-//! Resin printers with a display take the same time for every layer, so height alone counts:
-//! `T = n (tilt + exposure + lift) + 13 Δ − 56 Δ/11`, with n layers, Δ the longer exposure of the first one,
-//! faded over ten. That is PrusaSlicer's own form; a print that was compared differs by 0.02 %. Where something
-//! is held up, all is lifted off a pad.
+//! Resin: printers with a display take equally long for every layer, so height alone counts:
+//! `T = n (tilt + exposure + lift) + 13 Δ − 56 Δ/11`, with n layers and Δ the extra exposure of the first
+//! one, faded over ten. This is PrusaSlicer's own formula; a print that was compared differs by 0.02 %. A
+//! print that needs supports is lifted off a pad as a whole.
 //!
-//! Filament: short loops, what is filled densely and what sparsely, what lies on top, and of supports
-//! their volume, their outlines and the solid layers on top of them. The reference is
-//! PrusaSlicer with its default print settings, two perimeters, 15 % infill and supports wherever it sees fit.
-//! `cargo xtask study hours` slices pieces and finds the coefficients. Limits: they are those of curved shells and
-//! of whole models in layers of 0.2 mm. Large flat faces take less than is told (a table top of 40 mm on supports
-//! by two fifths, a cube by a sixth), and a small piece alone takes more, as the slicer waits for layers to cool.
+//! Filament: the features are short loops, dense and sparse fill, top surfaces, and for supports their
+//! volume, outlines and solid top layers. The reference is PrusaSlicer with its default print settings, two
+//! perimeters, 15 % infill and supports wherever it sees fit. `cargo xtask study hours` slices pieces and
+//! fits the coefficients. Limits: the coefficients are those of curved shells and of whole models in layers
+//! of 0.2 mm. Large flat faces take less time than predicted (a table top of 40 mm on supports by two fifths,
+//! a cube by a sixth). A small piece alone takes more, as the slicer waits for layers to cool.
 //!
-//! Powder: height, as every layer is spread alike.
+//! Powder: height alone counts, as every layer is spread alike.
 
 use crate::load::Load;
 use crate::printer::{Printer, Process};
 
-/// Tilting the vat, hardening a layer, lifting it; how much longer the first layer is hardened: seconds.
+/// Times of the steps of a resin layer, and extra exposure of the first layer, seconds.
 const TILT_S: f64 = 5.0;
 const EXPOSURE_S: f64 = 7.5;
 const LIFT_S: f64 = 0.25;
 const LONGER_S: f64 = 27.5;
-/// A layer of powder, seconds.
+/// Time of a powder layer, seconds.
 const POWDER_S: f64 = 12.0;
-/// By so much supports and a pad lift what is printed of resin, mm: 5 above a pad of 2.
+/// Height by which supports and a pad lift a resin print, mm: 5 above a pad of 2.
 const LIFTED_MM: f64 = 7.0;
-/// What the pad and the supports take for a mm² of shadow, and for a mm³ below what hangs over: mm³. Of two pieces
-/// that PrusaSlicer sliced, off by 1 % and 5 %: an order of size, no calibration.
+/// Resin for the pad and the supports, mm³ per mm² of shadow and mm³ per mm³ below overhangs. From two pieces
+/// that PrusaSlicer sliced, off by 1 % and 5 %: an order of magnitude, not a calibration.
 const RESIN_MM3: [f64; 2] = [2.9, 0.1];
 
-/// Walls of models of resin that people hollow, mm.
+/// Wall thickness to which people hollow resin models, mm.
 const HOLLOWED_MM: f64 = 2.0;
 
-/// What the time of filament is made of.
+/// Names of the features that filament print time is linear in.
 pub const TIME_FEATURES: [&str; 7] = [
     "short loops",
     "dense",
@@ -43,15 +43,15 @@ pub const TIME_FEATURES: [&str; 7] = [
     "support sides",
     "support tops",
 ];
-/// Seconds for each: a mm of a short loop; a mm² of a layer that is dense, that is sparse; a mm² as it is seen from
-/// above; a mm² of supports in a layer, a mm of their outline; a mm² of their upper ends.
+/// Seconds per unit of each feature: mm of a short loop; mm² of a dense layer, of a sparse one; mm² of top
+/// surface as seen from above; mm² of supports in a layer, mm of their outline; mm² of their upper ends.
 ///
 /// Least squares over 94 prints in layers of 0.2 mm, 80 of single pieces of seven kits and 14 of their whole
-/// models, each sliced with and without supports by PrusaSlicer 2.5: without supports the time is off by 4 % in
-/// the median and by 10 % in nine of ten; supports by 2 % and 7 % of the whole time.
+/// models, each sliced with and without supports by PrusaSlicer 2.5. Without supports the time is off by 4 %
+/// in the median and by at most 10 % in nine of ten; supports by 2 % and 7 % of the whole time.
 const TIME_S: [f64; 7] = [0.107, 0.0664, 0.00586, 0.453, 0.0038, 0.0457, 0.604];
 
-/// What the plastic of filament is made of.
+/// Names of the features that filament material is linear in.
 pub const PLASTIC_FEATURES: [&str; 6] = [
     "dense",
     "sparse",
@@ -60,12 +60,12 @@ pub const PLASTIC_FEATURES: [&str; 6] = [
     "support sides",
     "support tops",
 ];
-/// mm³ for each: a mm³ of the piece that is dense, that is sparse; a mm² as it is seen from above; a mm³ of
-/// supports, a mm² of their sides, of their upper ends. Of the same prints: 2 % in the median and 6 % in nine of
-/// ten, with supports and without.
+/// Plastic in mm³ per unit of each feature: mm³ of dense fill, of sparse fill; mm² of top surface as seen
+/// from above; mm³ of supports, mm² of their sides, of their upper ends. Fitted to the prints of `TIME_S`:
+/// off by 2 % in the median and 6 % in nine of ten, with supports and without.
 const PLASTIC_MM3: [f64; 6] = [0.836, 0.163, 0.688, 0.121, 0.473, 1.17];
 
-/// The amounts of [`TIME_FEATURES`] in layers of `layer_mm`.
+/// Amounts of [`TIME_FEATURES`] in layers of `layer_mm`.
 pub fn time_features(load: &Load, layer_mm: f64) -> [f64; 7] {
     [
         load.small_side_mm2 / layer_mm,
@@ -78,7 +78,7 @@ pub fn time_features(load: &Load, layer_mm: f64) -> [f64; 7] {
     ]
 }
 
-/// The amounts of [`PLASTIC_FEATURES`].
+/// Amounts of [`PLASTIC_FEATURES`] in a load.
 pub fn plastic_features(load: &Load) -> [f64; 6] {
     [
         (load.volume_mm3 - load.sparse_mm3).max(0.0),
@@ -98,17 +98,17 @@ fn product<const N: usize>(amounts: [f64; N], prices: [f64; N]) -> f64 {
         .sum()
 }
 
-/// What a print takes.
+/// Print time and material of a print.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
-    /// Time, s.
+    /// Print time in seconds, s.
     pub seconds: f64,
-    /// Material with supports, g.
+    /// Material including supports, g.
     pub grams: f64,
 }
 
 impl Cost {
-    /// Of one plate, about.
+    /// Estimates the cost of one plate.
     pub fn of(printer: &Printer, load: &Load) -> Self {
         Self {
             seconds: seconds(printer, load),
@@ -116,7 +116,7 @@ impl Cost {
         }
     }
 
-    /// Both, one after the other.
+    /// Cost of two prints, one after the other.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -125,9 +125,9 @@ impl Cost {
         }
     }
 
-    /// "13 h 50 min and 104 g".
+    /// Formats the cost as in "13 h 50 min and 104 g".
     pub fn words(self) -> String {
-        // By five minutes: it is no more exact.
+        // The estimate is no more exact than five minutes.
         let minutes = 5 * (self.seconds / 300.0).round() as u64;
         let time = match (minutes / 60, minutes % 60) {
             (0, minutes) => format!("{minutes} min"),
@@ -138,8 +138,8 @@ impl Cost {
     }
 }
 
-/// The whole model as people print it: filament with the same settings, resin hollowed to walls of 2 mm, powder
-/// solid. `load` is that of the solid model with `area_mm2` of surface.
+/// Load of the whole model as people print it: filament with equal settings, resin hollowed to walls of 2 mm,
+/// powder solid. `load` is that of the solid model with `area_mm2` of surface.
 pub fn whole(process: Process, load: Load, area_mm2: f64) -> Load {
     let volume_mm3 = match process {
         Process::Sla => load.volume_mm3.min(HOLLOWED_MM * area_mm2),
@@ -148,7 +148,7 @@ pub fn whole(process: Process, load: Load, area_mm2: f64) -> Load {
     Load { volume_mm3, ..load }
 }
 
-/// How people print whole models by `process`.
+/// Words for the usual way to print whole models by `process`.
 pub fn whole_words(process: Process) -> &'static str {
     match process {
         Process::Sla => "hollowed to 2 mm walls",
@@ -157,7 +157,7 @@ pub fn whole_words(process: Process) -> &'static str {
     }
 }
 
-/// Time that `printer` takes for one plate, about, s; 0 for nothing.
+/// Estimated time that `printer` takes for one plate, s; 0 for an empty load.
 pub fn seconds(printer: &Printer, load: &Load) -> f64 {
     let lifted_mm = match printer.process {
         Process::Sla if load.height_mm > 0.0 => LIFTED_MM,
@@ -166,7 +166,7 @@ pub fn seconds(printer: &Printer, load: &Load) -> f64 {
     seconds_above(printer, load, lifted_mm)
 }
 
-/// The same for what lies flat on the plate and needs no supports, which `load` has none of.
+/// Estimated time, s, for parts that lie flat on the plate without supports, of which `load` must have none.
 pub fn seconds_flat(printer: &Printer, load: &Load) -> f64 {
     seconds_above(printer, load, 0.0)
 }
@@ -183,8 +183,8 @@ fn seconds_above(printer: &Printer, load: &Load, lifted_mm: f64) -> f64 {
     }
 }
 
-/// What `printer` uses of its material for it with supports, about, g. Powder that is not sintered is not
-/// counted.
+/// Estimated material that `printer` uses for a load, including supports, g. Powder that is not sintered is
+/// not counted.
 pub fn grams(printer: &Printer, load: &Load) -> f64 {
     let mm3 = match printer.process {
         Process::Sla => load.volume_mm3 + product([load.shadow_mm2, load.support_mm3], RESIN_MM3),

@@ -1,7 +1,7 @@
-//! What people look at: one page with the pieces, their order and the checks, and still pictures.
+//! Visual output: an interactive page with the pieces, their order and the checks, and still pictures.
 //!
 //! The page is self-contained and needs no network. Its viewer (`viewer/` of the repository) knows meshes,
-//! arrows and points with labels; what they mean for shells is said here.
+//! arrows and points with labels. This crate translates shells and pieces to those.
 
 mod loads;
 mod packed;
@@ -20,135 +20,138 @@ pub use loads::{ReportArrow, ReportLoad, ReportLoads, ReportPlace};
 pub use page::{escaped, html};
 pub use pictures::{from_inside, pieces_picture};
 
-/// Everything the report says, filled by the caller.
+/// Contents of the report page, filled in by the caller.
 #[derive(Clone, Debug, Default)]
 pub struct ReportData<'a> {
     /// Heading of the page, usually the name of the input file; any text is safe.
     pub title: String,
-    /// Name and value, in the order of reading: size, wall, connector size, clearance, ….
+    /// Names and values in reading order: size, wall, connector size, clearance, ….
     pub facts: Vec<(String, String)>,
-    /// In any order.
+    /// Pieces of the kit, in any order.
     pub pieces: Vec<ReportPiece<'a>>,
-    /// What the verification found.
+    /// Results of the verification checks.
     pub checks: Vec<ReportCheck>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: &'a [Warning],
-    /// Title and SVG text of what goes below the lists.
+    /// Title and SVG text of each figure below the lists.
     pub figures: Vec<(String, String)>,
-    /// What pieces can be coloured by, besides their own colours.
+    /// Quantities by which pieces can be coloured, besides their own colours.
     pub quantities: Vec<ReportQuantity>,
-    /// What the page can play, in the order of its buttons; may be empty.
+    /// Motions that the page can play, in the order of their buttons; may be empty.
     pub motions: Vec<ReportMotion>,
-    /// What loads do to the pieces; may be empty.
+    /// Loads and the deformations that they cause; may be empty.
     pub loads: ReportLoads,
-    /// From where each piece is seen best as it goes in, in the order of `pieces`: unit vectors from the viewer to the
-    /// scene. Empty where nobody says.
+    /// Best viewing direction for the installation of each piece, in the order of `pieces`: unit vectors from
+    /// the viewer to the scene. Empty if not known.
     pub looks: Vec<[f64; 3]>,
     /// Pages of text and pictures beside the lists.
     pub tabs: Vec<ReportTab>,
 }
 
-/// A page beside the lists, such as how to print.
+/// A page beside the lists, such as printing instructions.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReportTab {
-    /// A word for its button.
+    /// One word for the page's button.
     pub name: String,
-    /// What is on it.
+    /// Sections of the page, in order.
     pub parts: Vec<ReportPart>,
 }
 
-/// Something under a heading.
+/// A section of a page, with its heading.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ReportPart {
-    /// Name and value.
+    /// Heading, and rows of name and value.
     Table(String, Vec<(String, String)>),
-    /// Sentences, each a paragraph.
+    /// Heading, and paragraphs of text.
     Text(String, Vec<String>),
-    /// A picture: what it shows, and PNG bytes.
+    /// Description of the picture, and PNG bytes.
     #[serde(serialize_with = "page::as_address")]
     Picture(String, Vec<u8>),
-    /// Files beside the page: name, and what each is for.
+    /// Heading, and files beside the page, each with its purpose.
     Files(String, Vec<(String, String)>),
 }
 
-/// One piece in assembled position.
+/// A piece in its assembled position.
 #[derive(Clone, Debug)]
 pub struct ReportPiece<'a> {
-    /// Its number, from 1: what is engraved on it.
+    /// Number engraved on the piece, from 1.
     pub number: u32,
-    /// For people, for example `"piece 3"`.
+    /// Display name, for example `"piece 3"`.
     pub name: String,
-    /// sRGB; see [`palette`].
+    /// Colour in sRGB; see [`palette`].
     pub color: [u8; 3],
-    /// mm, assembly space.
+    /// Mesh in assembly space, mm.
     pub mesh: &'a TriMesh,
-    /// Unit vector along which it moves into its place; zero where the first piece has none.
+    /// Unit vector along which the piece moves into its place; zero for a first piece without one.
     pub installation_direction: [f64; 3],
     /// Position in the order of installation, 0 for the first.
     pub order: usize,
-    /// Whether it goes in last and locks the rest.
+    /// True if the piece is installed last and locks the rest.
     pub is_key: bool,
-    /// Name and value: volume, direction, neighbours, ….
+    /// Names and values: volume, direction, neighbours, ….
     pub facts: Vec<(String, String)>,
 }
 
-/// One verified property.
+/// Result of one verification check.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReportCheck {
-    /// What must hold.
+    /// Property that must hold.
     pub name: String,
-    /// Whether it does.
+    /// True if the property holds.
     pub ok: bool,
-    /// The figure it was judged by, with unit.
+    /// Figure by which the check was decided, with unit.
     pub figure: String,
 }
 
-/// A figure of every piece.
+/// A quantity with a value per piece.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReportQuantity {
-    /// What it is, for people.
+    /// Display name of the quantity.
     pub name: String,
-    /// Of the values; empty for counts.
+    /// Unit of the values; empty for counts.
     pub unit: String,
-    /// One for each piece of the report, in its order; `None` where a piece has none.
+    /// One value per piece, in the report's order; `None` for a piece without one.
     pub values: Vec<Option<f64>>,
 }
 
-/// Pieces that move at the same time, for the page to play: how far they rattle, or how one comes out.
+/// Simultaneous motion of pieces for the page to play, such as play within the gaps or the removal of a
+/// piece.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReportMotion {
-    /// A word or two for its button.
+    /// One or two words for the motion's button.
     pub name: String,
-    /// One sentence that says what is to be seen.
+    /// One sentence that describes the motion.
     pub title: String,
-    /// Whether it goes from its last poses back to its first and on; else it stays at its last.
+    /// True if the motion returns from its last poses to its first and repeats; otherwise it stops at its
+    /// last.
     pub is_loop: bool,
-    /// Of different pieces, each with as many poses; pieces not named here stay.
+    /// Moves of different pieces, all with equally many poses. Pieces not listed stay in place.
     pub moves: Vec<ReportMove>,
 }
 
-/// How one piece moves from where it is assembled.
+/// Motion of one piece from its assembled position.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReportMove {
     /// Index into the pieces of the report.
     #[serde(rename = "mesh")]
     pub piece: usize,
-    /// The point that poses displace and turn about, mm, assembly space.
+    /// Reference point of displacements and rotations, mm, assembly space.
     pub about: [f64; 3],
-    /// Played evenly in time and with straight ways between them: displacement of `about` in mm, then a
-    /// rotation vector in radians, so that `x` goes to `about + t + R(w) (x - about)`. All zeros is the
-    /// assembled pose.
+    /// Poses at equal time steps, interpolated linearly: displacement of `about` in mm, then a rotation
+    /// vector in radians. A point `x` goes to `about + t + R(w) (x - about)`. All zeros is the assembled
+    /// pose.
     pub poses: Vec<[f64; 6]>,
 }
 
-/// How far pieces move outwards in the exploded view, as a share of their distance from the middle.
+/// Outward displacement of pieces in the exploded view, as a share of their distance from the centre.
 const EXPLODE_RADIAL: f64 = 0.75;
 
-/// How far they move against their installation direction, as a share of the assembly's diagonal.
+/// Displacement of pieces against their installation direction, as a share of the assembly's diagonal.
 const EXPLODE_ALONG: f64 = 0.12;
 
-/// Where each piece goes in the exploded view, mm: away from the middle, and a little back along its way in.
+/// Displacement of each piece in the exploded view, mm: away from the centre, and a little back along its
+/// installation direction. Zero for a piece without points.
 pub fn exploded_shifts(pieces: &[ReportPiece<'_>]) -> Vec<Vec3> {
     let all = pieces
         .iter()

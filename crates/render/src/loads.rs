@@ -1,9 +1,9 @@
-//! What loads do to the pieces, for the page to show one at a time, larger than it is.
+//! Deformation of the pieces under loads, for the page to show one load at a time, exaggerated.
 //!
 //! ```text
-//!    ▼ arrow            carriers: each piece's outer surface, coarse; their points move, and the points of the
-//!   ╭┄┄┄╮               piece that are near a triangle go with it
-//!   │   │┄ place        place: where it gives way, with the line along which
+//!    ▼ arrow            carriers: coarse outer surfaces of the pieces. Their points move,
+//!   ╭┄┄┄╮               and points of a piece follow the nearby triangles of its carrier.
+//!   │   │┄ place        place: the weakest point under this load, with the line of its seam
 //!  ─┴───┴─ floor
 //! ```
 
@@ -12,73 +12,73 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 
 use crate::page::{PointArray, TriangleArray, align, append_points, append_triangles};
 
-/// The largest displacement shows as this share of the diagonal of all carriers: enough to see where it bends, and
-/// what it is still shows.
+/// Displayed size of the largest displacement, as a share of the diagonal of all carriers. Large enough to
+/// show where the model bends, and small enough to keep its shape recognisable.
 const SEEN: f64 = 0.05;
 
-/// Largest value of what is moved, in the steps of the page.
+/// Largest value of a stored displacement, in the page's integer steps.
 const STEPS: f64 = 32_767.0;
 
-/// All loads. Lengths in mm, assembly space.
+/// All loads of a report. Lengths in mm, assembly space.
 #[derive(Clone, Debug, Default)]
 pub struct ReportLoads {
-    /// Heading of their list.
+    /// Heading of the list of loads.
     pub title: String,
-    /// What to know of all of them.
+    /// Note that applies to all loads.
     pub note: String,
-    /// For each piece of the report its outer surface, as coarsely as it bends.
+    /// Outer surface of each piece of the report, coarse, at the resolution of the deformation.
     pub carriers: Vec<TriMesh>,
-    /// In the order of their buttons; may be empty.
+    /// Loads in the order of their buttons; may be empty.
     pub loads: Vec<ReportLoad>,
-    /// What gives way before all else, in words, and where.
+    /// Description and place of the weakest spot, which gives way before all others.
     pub weakest: Option<(String, ReportPlace)>,
 }
 
-/// One load.
+/// A load with the deformation that it causes.
 #[derive(Clone, Debug, Default)]
 pub struct ReportLoad {
-    /// What is done, for its button.
+    /// Name of the load, for its button.
     pub name: String,
-    /// How much of it is borne, with unit.
+    /// Load that the kit withstands, with unit.
     pub figure: String,
-    /// One sentence that says what is to be seen.
+    /// One sentence that describes the picture.
     pub title: String,
-    /// Where it acts.
+    /// Forces of the load, drawn as arrows.
     pub arrows: Vec<ReportArrow>,
-    /// What it stands or falls on: a point of the plane and its unit normal.
+    /// Ground on which the model stands or falls: a point of the plane and its unit normal.
     pub floor: Option<[[f64; 3]; 2]>,
-    /// Where it gives way; `None` where it does not.
+    /// Place that gives way; `None` if none does.
     pub place: Option<ReportPlace>,
-    /// For each carrier, how far each of its points goes, mm.
+    /// Displacement of each point of each carrier, mm.
     pub moved_mm: Vec<Vec<Vec3>>,
 }
 
-/// A force.
+/// An arrow for a force.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReportArrow {
-    /// How much it is, or what makes it; may be empty.
+    /// Magnitude or cause of the force; may be empty.
     pub name: String,
-    /// Where its tip is.
+    /// Position of the arrow's tip, mm.
     pub tip: [f64; 3],
-    /// Unit vector.
+    /// Unit vector along the force.
     pub along: [f64; 3],
 }
 
 /// A place on the seam of two pieces.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReportPlace {
-    /// For its label.
+    /// Text of the place's label.
     pub name: String,
-    /// The place.
+    /// Position of the place, mm.
     pub at: [f64; 3],
-    /// Lines along the seam, each by its points in order.
+    /// Polylines along the seam, each as its points in order, mm.
     pub lines: Vec<Vec<[f64; 3]>>,
-    /// Index into the pieces of the report: the one that it moves with.
+    /// Index into the report's pieces of the one that the place moves with.
     #[serde(rename = "mesh")]
     pub piece: usize,
 }
 
-/// What the viewer reads.
+/// Loads in the form that the viewer reads.
 #[derive(Serialize)]
 pub(crate) struct LoadsHeader<'a> {
     title: &'a str,
@@ -102,11 +102,11 @@ struct LoadHeader<'a> {
     arrows: &'a [ReportArrow],
     floor: Option<[[f64; 3]; 2]>,
     place: Option<&'a ReportPlace>,
-    /// By how many times more than it is it shows.
+    /// Factor by which displacements are exaggerated.
     scale: f64,
-    /// Of what is moved, mm.
+    /// Step of the stored displacements, mm.
     step_mm: f64,
-    /// 3 × int16 a point of each carrier, in steps.
+    /// Displacements of each carrier: 3 × int16 per point, in steps.
     moved: Vec<MovedArray>,
 }
 
@@ -123,7 +123,7 @@ struct WeakestHeader<'a> {
 }
 
 impl<'a> LoadsHeader<'a> {
-    /// Appends the arrays of all loads to `arrays`; `None` where there is nothing to show.
+    /// Converts the loads and appends their arrays to `arrays`; `None` if there is no load.
     pub fn new(loads: &'a ReportLoads, arrays: &mut Vec<u8>) -> Option<Self> {
         if loads.loads.is_empty() {
             return None;
@@ -189,8 +189,8 @@ impl<'a> LoadHeader<'a> {
     }
 }
 
-/// By how many times a displacement shows larger than it is, in two digits, so that it shows as [`SEEN`] of
-/// what is `size_mm` large; 1 where nothing moves.
+/// Exaggeration of displacements, rounded to two digits, for which the largest shows as [`SEEN`] of
+/// `size_mm`; 1 if nothing moves.
 fn exaggeration(farthest_mm: f64, size_mm: f64) -> f64 {
     let factor = SEEN * size_mm / farthest_mm;
     if !(factor.is_finite() && factor > 0.0) {
@@ -226,7 +226,7 @@ mod tests {
     fn what_moves_farthest_shows_as_a_twentieth_of_the_whole_and_what_does_not_stays() {
         let (loads, mut arrays) = (loads(), Vec::new());
         let header = LoadsHeader::new(&loads, &mut arrays).unwrap();
-        // 100 mm of diagonal, 0.12 mm: 41.67 times, in two digits.
+        // A diagonal of 100 mm and a displacement of 0.12 mm: 41.67 times, in two digits.
         assert_eq!(
             header.loads.iter().map(|l| l.scale).collect::<Vec<_>>(),
             [42.0, 1.0]

@@ -1,28 +1,30 @@
-//! Meshes as few bytes: what a viewer draws has no order of its own, so points stand along a curve that fills their box and
-//! triangles by their first point; numbers are differences, their low bytes before their high ones. That deflates to less
-//! than half.
+//! Compact encoding of meshes.
+//!
+//! The viewer draws points and triangles in any order. Points are sorted along a space-filling curve through
+//! their bounding box, and triangles by their first point. Numbers are stored as differences, in byte planes:
+//! all low bytes before the higher ones. Deflate shrinks this to less than half.
 
 use serde::Serialize;
 use shellock_geom::{TriMesh, Vec3};
 
 use crate::page::align;
 
-/// Steps of a coordinate across the box.
+/// Number of steps of a coordinate across the box.
 const STEPS: f64 = 65_535.0;
 
-/// Where a mesh stands among the arrays, and how it is read: see `viewer/src/data.js`.
+/// Position of a mesh in the arrays, and its layout. Read by `viewer/src/data.js`.
 #[derive(Serialize)]
 pub(crate) struct PackedMesh {
     offset: usize,
     points: usize,
     triangles: usize,
-    /// Bytes of a corner: 2 or 4.
+    /// Bytes per corner index: 2 or 4.
     bytes: usize,
     min: [f64; 3],
     max: [f64; 3],
 }
 
-/// Appends `mesh` to `arrays`.
+/// Appends `mesh` to `arrays`, with coordinates rounded to 1/65 535 of its box.
 pub(crate) fn append(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PackedMesh {
     let (min, size) = if mesh.points.is_empty() {
         (Vec3::ZERO, Vec3::ZERO)
@@ -57,7 +59,7 @@ pub(crate) fn append(mesh: &TriMesh, arrays: &mut Vec<u8>) -> PackedMesh {
     packed
 }
 
-/// The bits of three coordinates, one after the other from the highest.
+/// Morton code of a point: interleaved bits of its three coordinates, highest first.
 fn along_curve(steps: [u16; 3]) -> u64 {
     (0..16).rev().fold(0, |key, bit| {
         steps
@@ -66,7 +68,7 @@ fn along_curve(steps: [u16; 3]) -> u64 {
     })
 }
 
-/// Each coordinate less that of the point before.
+/// Delta-encodes points: each coordinate less that of the previous point, modulo 2¹⁶.
 fn point_differences(points: impl Iterator<Item = [u16; 3]>) -> Vec<u32> {
     let mut last = [0u16; 3];
     points
@@ -78,7 +80,7 @@ fn point_differences(points: impl Iterator<Item = [u16; 3]>) -> Vec<u32> {
         .collect()
 }
 
-/// Triangles by their lowest corner, which stands first: it less that of the triangle before, the others less it.
+/// Delta-encodes triangles sorted by lowest index: (a − a of the previous triangle, b − a, c − a).
 fn corner_differences(mesh: &TriMesh, place: &[u32]) -> Vec<u32> {
     let mut triangles: Vec<[u32; 3]> = mesh
         .triangles
@@ -102,7 +104,7 @@ fn corner_differences(mesh: &TriMesh, place: &[u32]) -> Vec<u32> {
         .collect()
 }
 
-/// The lowest byte of each value, then the next of each, and so on.
+/// Appends the values in byte planes: the lowest byte of each value, then the next of each, and so on.
 fn append_planes(values: &[u32], bytes: usize, arrays: &mut Vec<u8>) {
     for byte in 0..bytes {
         arrays.extend(values.iter().map(|v| (v >> (8 * byte)) as u8));
@@ -115,7 +117,7 @@ mod tests {
 
     use super::*;
 
-    /// What the viewer does.
+    /// Decodes a mesh as the viewer does.
     fn unpacked(packed: &PackedMesh, arrays: &[u8]) -> (Vec<[u16; 3]>, Vec<[u32; 3]>) {
         let (n, m) = (3 * packed.points, 3 * packed.triangles);
         let value = |at: usize, i: usize, n: usize, bytes: usize| {

@@ -1,4 +1,4 @@
-//! The page: a template, a JSON header, and all arrays as one block of base64.
+//! The report page: a template, a JSON header, and all arrays as one block of base64.
 
 use std::io::Write;
 
@@ -20,13 +20,14 @@ const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("../viewer/viewer.css");
 const VIEWER: &str = include_str!("../viewer/viewer.js");
 
-/// What moves is drawn within this share of the pieces' diagonal where a machine is slow: 0.3 mm on 240 mm.
+/// Tolerance of the coarse meshes for motions on slow machines, as a share of the pieces' diagonal: 0.3 mm on
+/// 240 mm.
 const DRAFT: f64 = 1.2e-3;
 
-/// The page as one text that needs nothing else; equal data give equal bytes.
+/// Writes the report as one self-contained HTML page. Deterministic: equal data give equal bytes.
 ///
-/// Positions are kept in 1/65 535 of each piece's box, some micrometres. About 6 bytes a triangle and 0.6 MB
-/// for the viewer.
+/// Positions are rounded to 1/65 535 of each piece's box, some micrometres. About 6 bytes per triangle, and
+/// 0.6 MB for the viewer.
 pub fn html(data: &ReportData<'_>) -> String {
     let mut arrays = Vec::new();
     let shifts = exploded_shifts(&data.pieces);
@@ -57,7 +58,7 @@ pub fn html(data: &ReportData<'_>) -> String {
         tabs: &data.tabs,
     };
     let json = serde_json::to_string(&header).expect("text and finite numbers always become JSON");
-    // "<" occurs only inside strings, where the escape means the same; so no text can end the script element.
+    // "<" occurs only inside strings, where the escape means the same, so no text can end the script element.
     let json = json.replace('<', "\\u003c");
     fill(
         TEMPLATE,
@@ -71,7 +72,7 @@ pub fn html(data: &ReportData<'_>) -> String {
     )
 }
 
-/// The pieces as coarsely as they may be seen while they move.
+/// Simplified meshes of the pieces, for display in motion on slow machines.
 fn drafts(pieces: &[ReportPiece<'_>]) -> Vec<TriMesh> {
     let all = pieces
         .iter()
@@ -82,7 +83,7 @@ fn drafts(pieces: &[ReportPiece<'_>]) -> Vec<TriMesh> {
     pieces.par_iter().map(draft).collect()
 }
 
-/// What the viewer reads; its words are those of any scene, not of shells.
+/// Header that the viewer reads. Its terms are those of any scene, not of shells.
 #[derive(Serialize)]
 struct Header<'a> {
     title: &'a str,
@@ -92,7 +93,7 @@ struct Header<'a> {
     checks: &'a [ReportCheck],
     notes: Vec<Note>,
     figures: Vec<Figure<'a>>,
-    /// One value a mesh.
+    /// One value per mesh.
     quantities: &'a [ReportQuantity],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     motions: &'a [ReportMotion],
@@ -102,11 +103,11 @@ struct Header<'a> {
     tabs: &'a [ReportTab],
 }
 
-/// A picture with a title.
+/// A picture with its title.
 #[derive(Serialize)]
 struct Figure<'a> {
     title: &'a str,
-    /// A `data:` address.
+    /// Picture as a `data:` URL.
     source: String,
 }
 
@@ -126,16 +127,16 @@ struct MeshHeader<'a> {
     color: [u8; 3],
     /// Position in the order of arrival.
     step: usize,
-    /// Unit vector along which it arrives.
+    /// Unit vector along which the mesh arrives.
     travel: [f64; 3],
-    /// Where it goes in the exploded view, mm.
+    /// Displacement in the exploded view, mm.
     shift: [f64; 3],
     facts: &'a [(String, String)],
-    /// From where it is seen as it arrives, from the viewer to the scene.
+    /// Viewing direction during arrival, from the viewer to the scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     look: Option<[f64; 3]>,
     packed: PackedMesh,
-    /// Coarser, for what moves on slow machines.
+    /// Coarser mesh, for motions on slow machines.
     draft: PackedMesh,
 }
 
@@ -151,14 +152,14 @@ pub(crate) struct PointArray {
 pub(crate) struct TriangleArray {
     offset: usize,
     count: usize,
-    /// Bytes of a corner: 2 or 4.
+    /// Bytes per corner index: 2 or 4.
     bytes: usize,
 }
 
 /// A point with a label, or a label alone.
 #[derive(Serialize)]
 struct Note {
-    /// "note", "warning" or "problem".
+    /// Severity: "note", "warning" or "problem".
     severity: String,
     title: String,
     text: String,
@@ -185,7 +186,7 @@ fn note(warning: &Warning, pieces: &[ReportPiece<'_>]) -> Note {
 }
 
 impl<'a> MeshHeader<'a> {
-    /// Appends the arrays of the piece to `arrays`.
+    /// Converts a piece and appends its arrays to `arrays`.
     fn new(
         piece: &'a ReportPiece<'_>,
         draft: &TriMesh,
@@ -246,7 +247,7 @@ pub(crate) fn append_triangles(mesh: &TriMesh, arrays: &mut Vec<u8>) -> Triangle
     }
 }
 
-/// As zlib's deflate has it, the same bytes each time.
+/// Compresses with zlib. Equal input gives equal bytes.
 fn deflated(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     encoder
@@ -255,18 +256,18 @@ fn deflated(bytes: &[u8]) -> Vec<u8> {
         .expect("memory takes all bytes")
 }
 
-/// A picture's title and its `data:` address.
+/// Serialises a picture's title and its `data:` URL.
 pub(crate) fn as_address<S: Serializer>(title: &str, png: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
     (title, format!("data:image/png;base64,{}", STANDARD.encode(png))).serialize(serializer)
 }
 
-/// Typed arrays begin at multiples of their element size.
+/// Pads to a multiple of 4 bytes, as typed arrays begin at multiples of their element size.
 pub(crate) fn align(arrays: &mut Vec<u8>) {
     arrays.resize(arrays.len().next_multiple_of(4), 0);
 }
 
-/// As it may stand in an address. Charts are mostly pictures in base64, which stay as they are: encoded as a
-/// whole they were a third larger.
+/// Percent-encodes text for a URL. Charts consist mostly of pictures in base64, whose characters are kept:
+/// encoding all of them made charts a third larger.
 fn percent_encoded(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for byte in text.bytes() {
@@ -279,7 +280,7 @@ fn percent_encoded(text: &str) -> String {
     out
 }
 
-/// `text` as it stands in HTML, in attributes too.
+/// Escapes `text` for HTML, in attributes too.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -288,7 +289,7 @@ pub fn escaped(text: &str) -> String {
         .replace('\'', "&#39;")
 }
 
-/// Puts each value in place of `{{name}}`. What a value contains is never looked at again.
+/// Replaces each `{{name}}` by its value. Values are not searched again.
 fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut out = String::with_capacity(template.len() + values.iter().map(|v| v.1.len()).sum::<usize>());
     let mut rest = template;
@@ -407,7 +408,7 @@ mod tests {
     fn no_text_leaves_its_place() {
         let page = page();
         assert!(!page.contains("<script>alert"));
-        // Three script elements of the template; the viewer itself never says so.
+        // The template has three script elements; the viewer itself never contains the tag.
         assert_eq!(page.matches("</script").count(), 3);
         let header = header(&page);
         assert_eq!(header["title"], HOSTILE);

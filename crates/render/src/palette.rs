@@ -1,10 +1,10 @@
-//! Colours that tell pieces apart.
+//! Colours that distinguish the pieces.
 
-/// Hues in OKLCH, degrees, in an order in which neighbours differ much: a cycle of well-known names, warm and
-/// cold in turn.
+/// Hues in OKLCH, degrees, ordered so that neighbours differ much: a cycle of well-known names, warm and cold
+/// in turn.
 const HUES: [f64; 10] = [255.0, 55.0, 150.0, 15.0, 300.0, 95.0, 200.0, 345.0, 125.0, 275.0];
 
-/// Lightness and chroma of each turn through the hues: soft first, then darker, lighter and paler.
+/// Lightness and chroma of each pass through the hues: soft first, then darker, lighter and paler.
 const TONES: [(f64, f64); 5] = [
     (0.70, 0.125),
     (0.56, 0.11),
@@ -13,11 +13,12 @@ const TONES: [(f64, f64); 5] = [
     (0.47, 0.08),
 ];
 
-/// sRGB of the piece that is installed at place `order`; the first 100 all differ, then they repeat.
+/// Colour in sRGB of the piece at place `order` of the installation. The first 100 all differ, then they
+/// repeat.
 pub fn color(order: usize) -> [u8; 3] {
     let turn = order / HUES.len() % 10;
     let (lightness, chroma) = TONES[turn % TONES.len()];
-    // The second half of the hundred takes the hues between.
+    // The second half of the hundred uses the hues in between.
     let between = if turn >= TONES.len() { 18.0 } else { 0.0 };
     srgb_from_oklch(
         lightness,
@@ -26,7 +27,7 @@ pub fn color(order: usize) -> [u8; 3] {
     )
 }
 
-/// After Ottosson, "A perceptual color space for image processing", 2020; clipped to sRGB.
+/// Converts OKLCH to sRGB, clipped, after Ottosson, "A perceptual color space for image processing", 2020.
 fn srgb_from_oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     let (a, b) = (chroma * hue.cos(), chroma * hue.sin());
     let l = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);

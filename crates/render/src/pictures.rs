@@ -1,4 +1,4 @@
-//! The picture that goes with the pieces: assembled, exploded, and each piece from inside.
+//! Overview picture of the kit: assembled, exploded, and each piece from inside.
 
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Vec3};
@@ -6,14 +6,14 @@ use shellock_geom::{Aabb, Vec3};
 use super::stills::{Camera, Image, Painted, crease_normals, render};
 use super::{ReportPiece, exploded_shifts};
 
-/// Pixels of the four large views along each side.
+/// Side length of the four large views, pixels.
 const LARGE: usize = 600;
 
-/// Pixels of the view of one piece along each side; three to a large view's two.
+/// Side length of the view of one piece, pixels; three are as wide as two large views.
 const SMALL: usize = 400;
 
-/// Front and back of the assembly and of the exploded view, then every piece from inside in the order of
-/// installation, 1200 pixels wide on white.
+/// Renders front and back of the assembly and of the exploded view, then every piece from inside in order of
+/// installation. 1200 pixels wide, on white.
 pub fn pieces_picture(pieces: &[ReportPiece<'_>]) -> Image {
     let shifts = exploded_shifts(pieces);
     let normals: Vec<Vec<[Vec3; 3]>> = pieces.par_iter().map(|p| crease_normals(p.mesh)).collect();
@@ -51,11 +51,11 @@ fn painted<'a>(piece: &ReportPiece<'a>, shift: Vec3, normals: &'a [[Vec3; 3]]) -
     }
 }
 
-/// A piece seen from `middle`, that of the assembly: its inner side with the connectors, `side` pixels wide
-/// and high. `normals` are its [`crease_normals`].
+/// Renders a piece as seen from `middle`, the centre of the assembly: its inner side with the connectors. The
+/// picture is `side` pixels wide and high. `normals` are the piece's [`crease_normals`].
 pub fn from_inside(piece: &ReportPiece<'_>, normals: &[[Vec3; 3]], middle: Vec3, side: usize) -> Image {
     let outwards = (piece.mesh.bounds().center() - middle).normalize_or(Vec3::Y);
-    // Straight up or down, "up" has no meaning in the picture.
+    // For a vertical line of sight, z is no usable up direction in the picture.
     let up = if outwards.z.abs() > 0.9 { Vec3::Y } else { Vec3::Z };
     render(
         &[painted(piece, Vec3::ZERO, normals)],
@@ -65,7 +65,7 @@ pub fn from_inside(piece: &ReportPiece<'_>, normals: &[[Vec3; 3]], middle: Vec3,
     )
 }
 
-/// One picture above the other, both from the left edge.
+/// Stacks two pictures, aligned at the left edge.
 fn stacked(top: Image, bottom: Image) -> Image {
     let (width, height) = (top.width.max(bottom.width), top.height + bottom.height);
     let mut rgba = Vec::with_capacity(4 * width * height);

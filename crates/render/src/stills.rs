@@ -1,8 +1,8 @@
-//! Pictures without a window: a z-buffer renderer for the README, for reviews and for `pieces.png`.
+//! Rendering without a window: a z-buffer renderer for the README, for reviews and for `pieces.png`.
 //!
-//! Orthographic, four samples a pixel, light from over the viewer's left shoulder. Normals are smooth within
-//! an angle and break at creases; dark lines mark where depth, mesh or normal jumps. Rows of pixels are drawn
-//! in bands on all cores, each band alone, so the picture does not depend on how many there are.
+//! Orthographic, four samples per pixel, light from over the viewer's left shoulder. Normals are smooth
+//! within an angle and break at creases. Dark lines mark jumps of depth, mesh or normal. Bands of pixel rows
+//! are drawn in parallel, each independently, so the picture does not depend on the number of cores.
 
 mod canvas;
 mod shade;
@@ -16,40 +16,40 @@ pub use canvas::Image;
 use canvas::{Band, Sample};
 pub use shade::crease_normals;
 
-/// Samples a pixel along each axis.
+/// Samples per pixel along each axis.
 const SAMPLES: usize = 2;
 
-/// Rows of pixels in a band: enough to make the overlap cheap, few enough to keep all cores busy.
+/// Pixel rows in a band: enough to make the overlap cheap, few enough to keep all cores busy.
 const BAND_ROWS: usize = 16;
 
-/// A mesh with its colour, drawn where `shift` puts it.
+/// A mesh with its colour and displacement in the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Painted<'a> {
-    /// What is drawn; the mesh need not be closed.
+    /// Mesh to draw; it need not be closed.
     pub mesh: &'a TriMesh,
-    /// sRGB.
+    /// Colour of all triangles, sRGB.
     pub color: [u8; 3],
-    /// A colour for each triangle instead.
+    /// Colour of each triangle, sRGB; replaces `color` if present.
     pub face_colors: Option<&'a [[u8; 3]]>,
-    /// Its [`crease_normals`], for a mesh that is drawn more than once; made anew where `None`.
+    /// Shading normals from [`crease_normals`], for a mesh that is drawn more than once; computed if `None`.
     pub normals: Option<&'a [[Vec3; 3]]>,
-    /// Added to every point, mm.
+    /// Displacement added to every point, mm.
     pub shift: Vec3,
 }
 
-/// From where the scene is seen; orthographic.
+/// Orthographic viewpoint of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
-    /// Direction of sight, from the viewer to the scene; any length but 0.
+    /// Viewing direction, from the viewer to the scene; any length but 0.
     pub direction: Vec3,
-    /// What points up in the picture; not parallel to `direction`.
+    /// Direction that points up in the picture; not parallel to `direction`.
     pub up: Vec3,
-    /// What fills the picture; the scene's own box where `None`.
+    /// Box that fills the picture; the scene's own bounding box if `None`.
     pub frame: Option<Aabb>,
 }
 
 impl Camera {
-    /// A camera that fits the scene into the picture.
+    /// Returns a camera that fits the scene into the picture.
     pub fn along(direction: Vec3, up: Vec3) -> Self {
         Self {
             direction,
@@ -58,18 +58,19 @@ impl Camera {
         }
     }
 
-    /// Three-quarter view of what stands on z = 0 and looks along −y, from its left and a little above.
+    /// Returns a three-quarter view of a model that stands on z = 0 and faces −y, from its left and a little
+    /// above.
     pub fn front() -> Self {
         Self::along(Vec3::new(-0.62, 0.95, -0.42), Vec3::Z)
     }
 
-    /// The same from behind.
+    /// Returns a three-quarter view from behind, a little above.
     pub fn back() -> Self {
         Self::along(Vec3::new(0.72, -0.9, -0.42), Vec3::Z)
     }
 }
 
-/// World to samples: x to the right, y down, z towards the viewer in units of a sample.
+/// Map from world to samples: x to the right, y down, z towards the viewer in units of a sample.
 struct View {
     axes: [Vec3; 3],
     center: Vec3,
@@ -78,7 +79,7 @@ struct View {
 }
 
 impl View {
-    /// Share of the picture left free on each side.
+    /// Free margin on each side, as a share of the picture.
     const MARGIN: f64 = 0.04;
 
     fn new(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usize) -> Self {
@@ -130,18 +131,19 @@ impl View {
     }
 }
 
-/// A triangle in samples, ready to draw.
+/// A triangle in sample coordinates, ready to draw.
 struct Facet {
     corners: [[f32; 3]; 3],
-    /// Normals in view space at the corners.
+    /// Normals at the corners, in view space.
     normals: [[f32; 3]; 3],
-    /// Position of the mesh in the scene, plus 1.
+    /// Index of the mesh in the scene, plus 1.
     mesh: u16,
-    /// Linear light.
+    /// Unlit colour, in linear light.
     color: [f32; 3],
 }
 
-/// The scene on a transparent ground, `width` × `height` pixels. An empty scene gives an empty picture.
+/// Renders the scene on a transparent background, `width` × `height` pixels. An empty scene gives an empty
+/// picture.
 ///
 /// About half a second for 400 000 triangles at 1200 × 900 on two cores.
 pub fn render(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usize) -> Image {
@@ -171,8 +173,8 @@ pub fn render(scene: &[Painted<'_>], camera: &Camera, width: usize, height: usiz
     }
 }
 
-/// Where places come to lie in the picture that [`render`] makes of `scene`: pixels from its left and from
-/// its top.
+/// Returns a map from points to pixels from the left and the top of the picture that [`render`] makes of
+/// `scene`.
 pub fn projection(
     scene: &[Painted<'_>],
     camera: &Camera,
@@ -217,7 +219,7 @@ fn facets<'a>(painted: &'a Painted<'_>, mesh: usize, view: &'a View) -> Vec<Face
         .collect()
 }
 
-/// The facets that reach into each band, in order.
+/// Lists the facets that reach into each band, in order.
 fn bins(facets: &[Facet], n_bands: usize) -> Vec<Vec<u32>> {
     let mut bins = vec![Vec::new(); n_bands];
     let band_samples = (BAND_ROWS * SAMPLES) as f32;
@@ -237,7 +239,7 @@ fn bins(facets: &[Facet], n_bands: usize) -> Vec<Vec<u32>> {
     bins
 }
 
-/// Fills the samples of the band that lie in the facet and are nearer than what is there.
+/// Fills those samples of the band that lie in the facet and are nearer than their present content.
 fn draw(band: &mut Band, facet: &Facet) {
     let [a, b, c] = facet.corners;
     let doubled_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
@@ -250,7 +252,7 @@ fn draw(band: &mut Band, facet: &Facet) {
     let greatest = |v: [f32; 3]| v[0].max(v[1]).max(v[2]);
     let (x_first, x_last) = (sample_after(least(xs)), sample_after(greatest(xs)));
     let (y_first, y_last) = (sample_after(least(ys)), sample_after(greatest(ys)));
-    // Both weights are linear in x and y.
+    // Barycentric weights are linear in x and y.
     let per_area = 1.0 / doubled_area;
     let wb_of = |dx: f32, dy: f32| (dx * (c[1] - a[1]) - dy * (c[0] - a[0])) * per_area;
     let wc_of = |dx: f32, dy: f32| (dy * (b[0] - a[0]) - dx * (b[1] - a[1])) * per_area;
@@ -276,7 +278,7 @@ fn draw(band: &mut Band, facet: &Facet) {
     }
 }
 
-/// The first sample whose middle is at or after `x`.
+/// Index of the first sample whose middle is at or after `x`.
 fn sample_after(x: f32) -> i64 {
     (x - 0.5).ceil() as i64
 }
@@ -301,8 +303,8 @@ mod tests {
         }];
         let image = render(&scene, &Camera::front(), 300, 200);
         let covered: f64 = image.rgba.chunks_exact(4).map(|p| f64::from(p[3]) / 255.0).sum();
-        // The ball fits the height but for the margin of 4 % on both sides; a line surrounds it by one sample
-        // and a bit.
+        // The ball fits the height except for the margin of 4 % on both sides. A line surrounds it by one
+        // sample and a bit.
         let radius = 0.92 * 100.0;
         let exact = std::f64::consts::PI * radius * radius;
         assert!((covered / exact - 1.0).abs() < 0.01, "{covered} of {exact}");

@@ -1,8 +1,8 @@
-//! Who may ask for what: the page that this server opened, and nobody else.
+//! Access control: only the page that this server opened may send requests.
 //!
-//! A foreign page in the same browser can send requests to this port, and a foreign name can be made to lead here; so
-//! the host and the origin must be ours, and what is more than the page itself needs the token. How many requests come
-//! is bounded.
+//! A foreign page in the same browser can send requests to this port, and a foreign name can be made to
+//! resolve to it. So the host and the origin must be this server's own, and requests beyond the page itself
+//! need the token. The rate of requests is limited.
 
 use std::sync::Mutex;
 use std::time::Instant;
@@ -15,32 +15,33 @@ use axum::response::{IntoResponse, Response};
 use crate::routes::Studio;
 use crate::{Address, Refusal};
 
-/// Bytes of a token: nobody guesses 256 bits.
+/// Length of a token in bytes: nobody guesses 256 bits.
 const TOKEN_BYTES: usize = 32;
-/// Requests that may come at once, and how many more a second.
+/// Largest burst of requests, and the rate at which the budget refills, requests per second.
 const MOST_AT_ONCE: f64 = 200.0;
 const MOST_PER_SECOND: f64 = 100.0;
-/// The page asks for nothing beside what this server has.
+/// Policy of the studio's page, which loads nothing from other servers.
 const PAGE_POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; frame-src 'self'; \
                            object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
-/// A kit's own page has all it needs in itself.
+/// Policy of a kit's own page, which is self-contained.
 const KIT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; \
                           font-src data:; frame-ancestors 'self'";
 
-/// A token that nobody knows.
+/// Generates a random token, in hexadecimal digits.
 pub fn token() -> std::io::Result<String> {
     let mut bytes = [0; TOKEN_BYTES];
     getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
     Ok(bytes.iter().map(|b| format!("{b:02x}")).collect())
 }
 
-/// Whether the two are equal, in a time that does not say where they differ.
+/// Returns true if the given token is the right one. Constant time, so that the duration does not reveal
+/// where they differ.
 pub fn is_token(address: &Address, given: &str) -> bool {
     let (a, b) = (address.token.as_bytes(), given.as_bytes());
     a.len() == b.len() && a.iter().zip(b).fold(0, |differs, (x, y)| differs | (x ^ y)) == 0
 }
 
-/// How many requests came lately.
+/// Token bucket that limits the rate of requests.
 pub struct Rate(Mutex<(f64, Instant)>);
 
 impl Rate {
@@ -48,7 +49,7 @@ impl Rate {
         Self(Mutex::new((MOST_AT_ONCE, Instant::now())))
     }
 
-    /// Counts one more; false where it is one too many.
+    /// Counts one more request. Returns false if it exceeds the limit.
     fn admits(&self) -> bool {
         let mut state = self.0.lock().expect("no holder of this lock panics");
         let now = Instant::now();
@@ -60,7 +61,7 @@ impl Rate {
     }
 }
 
-/// Lets through what may be asked, and says to browsers what the answers may do.
+/// Rejects requests that are not allowed, and adds the security headers to every answer.
 pub async fn guard(State(studio): State<Studio>, request: Request, next: Next) -> Response {
     let path = request.uri().path().to_owned();
     let mut response = match refusal(&studio, &request) {
@@ -104,14 +105,14 @@ fn refusal(studio: &Studio, request: &Request) -> Option<Refusal> {
     None
 }
 
-/// Whether a header names this server.
+/// Returns true if a header names this server.
 fn is_own(address: &Address, value: Option<&HeaderValue>, scheme: &str) -> bool {
     let given = value.and_then(|v| v.to_str().ok());
     let own = |name: &str| format!("{scheme}{name}:{}", address.port);
     given.is_some_and(|given| given == own("127.0.0.1") || given == own("localhost"))
 }
 
-/// From the header, or from the address where no header can be set.
+/// Reads the token from the header, or from the query for requests that cannot set headers.
 fn given_token<'a>(request: &'a Request, headers: &'a HeaderMap) -> Option<&'a str> {
     let bearer = headers.get(header::AUTHORIZATION).and_then(|v| v.to_str().ok());
     let in_header = bearer.and_then(|v| v.strip_prefix("Bearer "));

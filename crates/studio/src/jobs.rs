@@ -1,8 +1,8 @@
-//! Kits in the making: one process runs, others wait, each can be stopped.
+//! Queue of kits to make: one process runs, others wait, each can be stopped.
 //!
-//! A process is the program itself with `--json`: its progress comes as a line of JSON each on standard error, the
-//! result on standard output. It ends where its standard input does, so none outlives this server; one that is stopped
-//! and does not end is killed.
+//! A process is the program itself with `--json`. It reports progress as lines of JSON on standard error, and
+//! the result on standard output. It ends when its standard input is closed, so none outlives this server. A
+//! stopped process that does not end is killed.
 
 use std::collections::VecDeque;
 use std::process::Stdio;
@@ -17,29 +17,30 @@ use tokio::sync::{Notify, broadcast};
 
 use crate::{Refusal, Task, Workshop};
 
-/// Notes of a job that are kept, the latest.
+/// Number of notes kept per job, the latest.
 const MOST_NOTES: usize = 200;
-/// Jobs that are remembered, and those that may wait.
+/// Number of jobs kept, and of those that may wait.
 const MOST_KEPT: usize = 50;
 const MOST_WAITING: usize = 8;
-/// Events that a slow page may miss; it then asks anew.
+/// Number of events that a slow page may be behind; it reloads the project after missing more.
 const MOST_EVENTS: usize = 256;
 /// Time that a stopped process has to end by itself before it is killed.
 ///
-/// `build` ends 0.3 s after its standard input, or when the files that it is writing are complete: `batch` waits as long.
+/// `build` ends 0.3 s after its standard input is closed, or when the files that it is writing are complete:
+/// `batch` waits as long.
 const TO_STOP: Duration = Duration::from_secs(10);
 
-/// How far a job is.
+/// Progress of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
     Waiting,
     Running,
-    /// It was made and passes.
+    /// A kit was made and passes all checks.
     Verified,
-    /// It was made, but a check failed.
+    /// A kit was made, but a check failed.
     Failed,
-    /// Nothing was made.
+    /// No kit was made, because of an error.
     Error,
     Stopped,
 }
@@ -49,20 +50,20 @@ pub enum State {
 pub struct Job {
     pub id: u64,
     pub state: State,
-    /// The stage that runs, its number from 1, and how many there are; 0 where that is not known.
+    /// Name of the current stage; its number, from 1, and the number of stages, both 0 while unknown.
     pub stage: String,
     pub number: u64,
     pub n_stages: u64,
     pub seconds_left: Option<f64>,
-    /// Since it began to run.
+    /// Time since the job began to run, s.
     pub seconds: f64,
-    /// What was tried and given up, and why.
+    /// Attempts that were given up, with the reason.
     pub notes: Vec<String>,
     pub error: Option<String>,
     pub exit_code: Option<i32>,
     #[serde(skip)]
     since: Option<Instant>,
-    /// Notified when its process is to stop.
+    /// Notified when the process is to stop.
     #[serde(skip)]
     stop: Arc<Notify>,
 }
@@ -85,7 +86,7 @@ impl Job {
         }
     }
 
-    /// Runs from now on, where it still waits.
+    /// Marks the job as running, if it still waits.
     fn begin(&mut self) {
         if self.state == State::Waiting {
             (self.state, self.since) = (State::Running, Some(Instant::now()));
@@ -107,7 +108,7 @@ impl Job {
         }
     }
 
-    /// A line of the process.
+    /// Processes a line of the process's standard error.
     fn hear(&mut self, line: &str) {
         let Ok(event) = serde_json::from_str::<Value>(line) else {
             return;
@@ -130,7 +131,7 @@ impl Job {
     }
 }
 
-/// What the page is told without asking.
+/// News pushed to the page.
 #[derive(Clone, Debug)]
 pub enum Event {
     Job(Box<Job>),
@@ -140,9 +141,9 @@ pub enum Event {
 
 /// The part of a [`Workshop`] that makes kits.
 pub trait Maker: Send + Sync + 'static {
-    /// [`Workshop::task`].
+    /// Returns the next task, as [`Workshop::task`].
     fn task(&self) -> Result<Task, Refusal>;
-    /// [`Workshop::ended`].
+    /// Reports its end, as [`Workshop::ended`].
     fn ended(&self, code: Option<i32>, output: &str);
 }
 
@@ -166,7 +167,7 @@ pub struct Jobs {
 }
 
 impl Jobs {
-    /// None yet; [`Self::run`] runs them.
+    /// Creates an empty queue; [`Self::run`] runs its jobs.
     pub fn new(maker: impl Maker) -> Arc<Self> {
         Self::with_time_to_stop(maker, TO_STOP)
     }
@@ -181,23 +182,23 @@ impl Jobs {
         })
     }
 
-    /// What happens from now on.
+    /// Subscribes to all events from now on.
     pub fn events(&self) -> broadcast::Receiver<Event> {
         self.events.subscribe()
     }
 
     /// Tells all pages that the project has changed.
     pub fn tell_project(&self) {
-        // Nobody may listen.
+        // Sending fails if no page listens, which is no error.
         let _ = self.events.send(Event::Project);
     }
 
-    /// All of them, the oldest first.
+    /// Lists all jobs, the oldest first.
     pub fn list(&self) -> Vec<Job> {
         self.lock().iter().map(Job::told).collect()
     }
 
-    /// One more kit; refuses where too many wait.
+    /// Adds a job for one more kit. Refused if too many jobs wait.
     pub fn add(&self) -> Result<Job, Refusal> {
         let mut all = self.lock();
         if all.iter().filter(|job| job.state == State::Waiting).count() >= MOST_WAITING {
@@ -214,7 +215,7 @@ impl Jobs {
         Ok(job)
     }
 
-    /// Stops a job, which may still wait.
+    /// Stops a job, running or waiting.
     pub fn stop(&self, id: u64) -> Result<Job, Refusal> {
         self.change(id, |job| {
             if !job.is_over() {
@@ -226,7 +227,7 @@ impl Jobs {
         .ok_or_else(|| Refusal::missing("there is no such job"))
     }
 
-    /// Runs job after job, for ever.
+    /// Runs job after job; never returns.
     pub async fn run(self: Arc<Self>) {
         loop {
             let next = self
@@ -244,7 +245,7 @@ impl Jobs {
     async fn run_one(&self, id: u64) {
         let begun = self.change(id, Job::begin);
         let Some(job) = begun.filter(|job| job.state == State::Running) else {
-            // It was stopped before it began.
+            // The job was stopped before it began.
             return;
         };
         let started = self.maker.task().and_then(|task| {
@@ -282,7 +283,7 @@ impl Jobs {
     fn tell(&self, id: u64) {
         let job = self.lock().iter().find(|job| job.id == id).map(Job::told);
         if let Some(job) = job {
-            // Nobody may listen.
+            // Sending fails if no page listens, which is no error.
             let _ = self.events.send(Event::Job(Box::new(job)));
         }
     }
@@ -293,7 +294,7 @@ impl Jobs {
 }
 
 impl Job {
-    /// The process has ended.
+    /// Records the end of the process.
     fn end(&mut self, code: Option<i32>, output: &str, errors: String) {
         if self.state == State::Running {
             self.seconds = self.told().seconds;
@@ -326,12 +327,12 @@ fn spawned(task: &Task) -> std::io::Result<Child> {
         .spawn()
 }
 
-/// How a process ended.
+/// Result of a process that has ended.
 #[derive(Default)]
 struct Ended {
-    /// `None` where a signal ended it.
+    /// Exit code; `None` if a signal ended the process.
     code: Option<i32>,
-    /// Its standard output.
+    /// Text of its standard output.
     output: String,
     /// Lines of its standard error that are no events.
     errors: String,
@@ -339,8 +340,8 @@ struct Ended {
 
 /// Waits for the end of `child`, and passes its events to `hear`.
 ///
-/// Once `stop` is notified, the standard input of `child` is closed. If `child` has not ended `to_stop` later, it is killed;
-/// a killed process has no output.
+/// Once `stop` is notified, the standard input of `child` is closed. If `child` has not ended `to_stop`
+/// later, it is killed; a killed process has no output.
 async fn watch(mut child: Child, stop: &Notify, to_stop: Duration, hear: impl FnMut(&str)) -> Ended {
     let stdin = child.stdin.take();
     let overdue = async {
@@ -358,29 +359,29 @@ async fn watch(mut child: Child, stop: &Notify, to_stop: Duration, hear: impl Fn
             errors,
         }
     };
-    // The pipes of a killed process may stay open in its own children, so nobody listens to them any more.
+    // Child processes of a killed one may keep its pipes open, so reading them is abandoned.
     let ended = tokio::select! {
         ended = listening => Some(ended),
         () = overdue => None,
     };
     if ended.is_none() {
-        // It fails only where the process has ended by now.
+        // Killing fails only if the process has just ended.
         let _ = child.kill().await;
     }
     ended.unwrap_or_default()
 }
 
-/// All that a process prints on its standard output.
+/// Reads a process's standard output to its end.
 async fn printed(stdout: Option<ChildStdout>) -> String {
     let mut output = Vec::new();
     if let Some(mut stdout) = stdout {
-        // Half an answer is no JSON, and is told as that.
+        // A partial answer is no JSON, and is reported as such.
         let _ = stdout.read_to_end(&mut output).await;
     }
     String::from_utf8_lossy(&output).into_owned()
 }
 
-/// Passes events on standard error to `hear`; returns the other lines.
+/// Passes events on standard error to `hear`. Returns the other lines.
 async fn progress(stderr: Option<ChildStderr>, mut hear: impl FnMut(&str)) -> String {
     let mut errors = String::new();
     let Some(stderr) = stderr else { return errors };
@@ -442,7 +443,7 @@ mod tests {
         assert_eq!((stopped.state, stopped.error), (State::Stopped, None));
     }
 
-    /// Makes "kits" by shell scripts, one after the other.
+    /// Stands in for kits: shell scripts, one after the other.
     #[cfg(unix)]
     struct Scripts(Mutex<VecDeque<&'static str>>);
 
@@ -459,7 +460,7 @@ mod tests {
         fn ended(&self, _: Option<i32>, _: &str) {}
     }
 
-    /// The job, once it is in another state than these.
+    /// Waits until the job is in none of these states, and returns it.
     #[cfg(unix)]
     async fn left(jobs: &Jobs, id: u64, states: &[State]) -> Job {
         loop {

@@ -1,4 +1,4 @@
-//! The files of a finished kit.
+//! Access to the files of a finished kit.
 
 use std::fs;
 use std::io::{Cursor, Write};
@@ -15,7 +15,7 @@ pub fn name_in_kit(path: &Path) -> String {
     parts.join("/")
 }
 
-/// All files below `folder` by their names within it, sorted, with `/` between folders.
+/// Lists all files below `folder` by their names within it, sorted, with `/` between folders.
 pub fn names(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
     let mut left = vec![PathBuf::new()];
@@ -25,7 +25,7 @@ pub fn names(folder: &Path) -> Vec<String> {
             match entry.file_type() {
                 Ok(kind) if kind.is_dir() => left.push(name),
                 Ok(kind) if kind.is_file() => names.push(name_in_kit(&name)),
-                // Links lead elsewhere.
+                // Symbolic links may lead out of the kit.
                 _ => {}
             }
         }
@@ -34,7 +34,7 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// The files with their sizes.
+/// Lists the files with their sizes, bytes.
 pub fn list(folder: &Path) -> Vec<Value> {
     let size = |name: &String| fs::metadata(folder.join(name)).map_or(0, |m| m.len());
     let names = names(folder);
@@ -44,7 +44,7 @@ pub fn list(folder: &Path) -> Vec<Value> {
         .collect()
 }
 
-/// The file called `name` within `folder`; nothing that leads out of it.
+/// Resolves `name` to a file within `folder`. Rejects names and links that lead out of it.
 pub fn file(folder: &Path, name: &str) -> Result<PathBuf, Refusal> {
     let none = || Refusal::missing("there is no such file in the kit");
     let is_plain = Path::new(name)
@@ -61,7 +61,7 @@ pub fn file(folder: &Path, name: &str) -> Result<PathBuf, Refusal> {
     }
 }
 
-/// What kind of file a browser is told it is.
+/// Content type that a browser is given for a file.
 pub fn kind(name: &str) -> &'static str {
     match name.rsplit('.').next() {
         Some("html") => "text/html; charset=utf-8",
@@ -75,7 +75,7 @@ pub fn kind(name: &str) -> &'static str {
     }
 }
 
-/// The whole kit in one archive; the same bytes for the same files.
+/// Packs the whole kit as a ZIP archive. Deterministic: equal files give equal bytes.
 pub fn archive(folder: &Path) -> Result<Vec<u8>, Refusal> {
     let names = names(folder);
     if names.is_empty() {
@@ -85,7 +85,7 @@ pub fn archive(folder: &Path) -> Result<Vec<u8>, Refusal> {
 }
 
 fn packed(folder: &Path, names: &[String]) -> Result<Vec<u8>, std::io::Error> {
-    /// Meshes of 3MF files and pictures are packed already; more effort gains little.
+    /// Meshes in 3MF files and pictures are compressed already, so more effort gains little.
     const LEVEL: i64 = 3;
     let options = SimpleFileOptions::default()
         .last_modified_time(zip::DateTime::default())

@@ -7,8 +7,8 @@
 //!     └──────────── events ◄──────────┘
 //! ```
 //!
-//! It knows HTTP, jobs and the files of a finished kit; not what a model is. It binds 127.0.0.1 alone; what is not
-//! the page itself asks for a token that is new at each start.
+//! This crate knows HTTP, jobs and the files of a finished kit, but nothing about models. The server binds
+//! 127.0.0.1 alone. Every request beyond the page itself needs a token, which is new at each start.
 
 mod guard;
 mod jobs;
@@ -30,63 +30,63 @@ use tokio::net::TcpListener;
 pub use kit::name_in_kit;
 pub use refusal::Refusal;
 
-/// Largest file that is taken, bytes.
+/// Largest accepted model file, bytes.
 pub const MOST_BYTES: u64 = 500 << 20;
-/// How often it is looked whether to end.
+/// Interval between checks of the stop flag.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What the program does for the page. All of it may be called from any thread, and several at once.
+/// Functions of the program that the page uses. They may be called from any thread, several at once.
 ///
-/// Answers are JSON as the page reads it; lengths are mm, places stand with z up.
+/// Answers are JSON in the form that the page reads. Lengths are in mm, and models stand with z up.
 pub trait Workshop: Send + Sync + 'static {
-    /// Where everything is written.
+    /// Returns the project's folder, which holds all files written.
     fn folder(&self) -> &Path;
-    /// The folder of the kit that was made last.
+    /// Returns the folder of the kit that was made last.
     fn kit_folder(&self) -> PathBuf;
-    /// All that the page shows at first, without the jobs.
+    /// Returns all that the page shows at first, except the jobs.
     fn project(&self) -> Value;
-    /// All options of a kit, what they are for and what is chosen.
+    /// Returns all options of a kit, with their purpose and current values.
     fn options(&self) -> Value;
-    /// Sets options by name; `null` unsets one. All of them or, where one is wrong, none.
+    /// Sets options by name; `null` unsets one. If one value is wrong, no option changes.
     fn choose(&self, changes: &Map<String, Value>) -> Result<(), Refusal>;
-    /// Opens the model in `file`, which is called `name`, and keeps it.
+    /// Opens the model in `file`, named `name`, and keeps a copy.
     fn open(&self, name: &str, file: &Path) -> Result<(), Refusal>;
-    /// Opens a figure of the program.
+    /// Opens one of the program's own figures.
     fn open_figure(&self, name: &str) -> Result<(), Refusal>;
-    /// The model's surface as the page draws it.
+    /// Returns the model's surface in the page's mesh format.
     fn mesh(&self) -> Result<Vec<u8>, Refusal>;
-    /// Divides the model by the options.
+    /// Divides the model by the current options.
     fn divide(&self) -> Result<Value, Refusal>;
-    /// A piece for each triangle of the mesh, from 0: 32-bit numbers, the low byte first.
+    /// Returns the piece of each triangle of the mesh, from 0: 32-bit little-endian numbers.
     fn labels(&self) -> Result<Vec<u8>, Refusal>;
-    /// What a person painted, in the same way.
+    /// Takes a division painted by the user, in the format of [`Self::labels`].
     fn paint(&self, labels: &[u8]) -> Result<Value, Refusal>;
-    /// Whether the pieces lock, and what to mend; a later call ends an earlier one.
+    /// Judges if the pieces interlock, and proposes repairs. A later call ends an earlier one.
     fn judge(&self) -> Result<Value, Refusal>;
-    /// The surface as it was judged, cut along smooth seams, and after it a piece for each of its triangles.
+    /// Returns the judged surface, cut along smooth seams, followed by the piece of each of its triangles.
     fn cut(&self) -> Result<Vec<u8>, Refusal>;
-    /// Takes the pieces as the program would mend them.
+    /// Replaces the division by the repaired one that the program proposes.
     fn mend(&self) -> Result<Value, Refusal>;
     /// Divides both sides of a symmetric model alike.
     fn mirror(&self) -> Result<Value, Refusal>;
-    /// Wants the key near a place.
+    /// Requests a key near the place `at`, mm.
     fn place_key(&self, at: [f64; 3]) -> Result<(), Refusal>;
-    /// What makes the kit.
+    /// Returns the process that makes the kit.
     fn task(&self) -> Result<Task, Refusal>;
-    /// A task has ended so, with this on its standard output.
+    /// Reports the end of a task: its exit code, `None` after a signal, and its standard output.
     fn ended(&self, code: Option<i32>, output: &str);
 }
 
-/// A process that makes a kit. It ends where its standard input does.
+/// A process that makes a kit. It must end when its standard input is closed.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// The program.
+    /// Path of the program.
     pub program: PathBuf,
-    /// What it is given.
+    /// Arguments of the program.
     pub arguments: Vec<OsString>,
 }
 
-/// Where the studio is, and its token.
+/// Port and token of a running studio.
 #[derive(Clone, Debug)]
 pub struct Address {
     port: u16,
@@ -94,15 +94,16 @@ pub struct Address {
 }
 
 impl Address {
-    /// The page's address with the token.
+    /// Returns the page's address, including the token.
     pub fn url(&self) -> String {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
     }
 }
 
-/// Serves `workshop` at `port` (0: any that is free) until `stop` becomes true; says where it is by `ready`.
+/// Serves `workshop` at `port` (0: any free one) until `stop` becomes true. Calls `ready` with the address
+/// once it listens.
 ///
-/// Fails where the port is taken or there is no randomness for a token.
+/// Fails if the port is taken or there is no randomness for a token.
 pub fn serve(
     workshop: Arc<dyn Workshop>,
     port: u16,
@@ -127,7 +128,7 @@ pub fn serve(
             () = stopped(stop) => Ok(()),
         }
     });
-    // What still computes is not waited for.
+    // Computations still in progress are not waited for.
     runtime.shutdown_background();
     ended
 }

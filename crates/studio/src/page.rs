@@ -1,4 +1,4 @@
-//! The page, as `viewer/` builds it.
+//! Files of the page, as built from `viewer/`.
 
 use axum::extract::Path;
 use axum::http::header;
@@ -20,12 +20,12 @@ const FILES: [(&str, &str, &str); 3] = [
     ),
 ];
 
-/// `GET /`.
+/// Handles `GET /`: the page itself.
 pub async fn index() -> Response {
     file(Path(String::new())).await
 }
 
-/// `GET /{name}`.
+/// Handles `GET /{name}`: a file of the page.
 pub async fn file(Path(name): Path<String>) -> Response {
     match FILES.iter().find(|f| f.0 == name) {
         Some((_, kind, text)) => ([(header::CONTENT_TYPE, *kind)], *text).into_response(),

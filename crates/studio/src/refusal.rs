@@ -1,11 +1,11 @@
-//! What is answered where something is refused.
+//! Answers to requests that are refused.
 
 use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
 
-/// Why something was not done, in a maker's words.
+/// Reason why a request was not fulfilled, in words for the user.
 #[derive(Debug, thiserror::Error)]
 #[error("{words}")]
 pub struct Refusal {
@@ -21,23 +21,23 @@ impl Refusal {
         }
     }
 
-    /// What was asked for cannot be done with what was given.
+    /// Refusal of a request that is impossible with the given input.
     pub fn wrong(words: impl Into<String>) -> Self {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, words)
     }
 
-    /// There is no such thing, or not yet.
+    /// Refusal of a request for something that does not exist, or not yet.
     pub fn missing(words: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, words)
     }
 
-    /// Something else was asked for meanwhile: no fault of anybody's, so the status is that of success and the answer
-    /// is `{"overtaken": true}`; the page asks again.
+    /// Answer to a request that a later one has superseded. This is nobody's fault, so the status is that of
+    /// success and the answer is `{"overtaken": true}`; the page asks again.
     pub fn overtaken() -> Self {
         Self::new(StatusCode::OK, "the pieces have changed meanwhile")
     }
 
-    /// The machine does not let it be done, such as a full disk.
+    /// Refusal due to the machine, such as a full disk.
     pub fn unable(words: impl Into<String>) -> Self {
         Self::new(StatusCode::INTERNAL_SERVER_ERROR, words)
     }

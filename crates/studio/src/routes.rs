@@ -1,4 +1,4 @@
-//! What can be asked of the server.
+//! Routes of the server and their handlers.
 
 use std::convert::Infallible;
 use std::io::Write;
@@ -21,10 +21,10 @@ use crate::guard::{Rate, guard, is_token};
 use crate::jobs::{Event, Job, Jobs};
 use crate::{Address, MOST_BYTES, Refusal, Workshop, kit, page};
 
-/// Longest body but for models: labels of four million triangles, bytes.
+/// Largest body of requests other than models, bytes: labels of four million triangles.
 const MOST_OTHER_BYTES: usize = 16 << 20;
 
-/// What every handler gets.
+/// State shared by all handlers.
 #[derive(Clone)]
 pub struct Studio {
     pub address: Arc<Address>,
@@ -35,7 +35,7 @@ pub struct Studio {
 
 type Answer = Result<Json<Value>, Refusal>;
 
-/// All routes, behind the guard.
+/// Builds the router with all routes, behind the guard.
 pub fn app(address: &Address, workshop: Arc<dyn Workshop>) -> Router {
     let jobs = Jobs::new(Arc::clone(&workshop));
     tokio::spawn(Arc::clone(&jobs).run());
@@ -71,7 +71,7 @@ pub fn app(address: &Address, workshop: Arc<dyn Workshop>) -> Router {
         .with_state(studio)
 }
 
-/// Does what takes its time beside the server.
+/// Runs slow work on a thread of its own, so that the server stays responsive.
 async fn apart<T: Send + 'static>(
     studio: &Studio,
     work: impl FnOnce(&dyn Workshop) -> Result<T, Refusal> + Send + 'static,
@@ -85,7 +85,7 @@ async fn apart<T: Send + 'static>(
     })
 }
 
-/// The same, after which other pages are told that the project is another.
+/// Runs work as [`apart`] does, then tells all open pages that the project has changed.
 async fn changing<T: Send + 'static>(
     studio: &Studio,
     work: impl FnOnce(&dyn Workshop) -> Result<T, Refusal> + Send + 'static,
@@ -132,7 +132,7 @@ async fn open(State(studio): State<Studio>, Query(named): Query<Named>, body: Bo
     project(State(studio)).await
 }
 
-/// The body as a file in the project's folder, which goes with it.
+/// Stores the body as a temporary file in the project's folder, deleted when dropped.
 async fn kept(studio: &Studio, body: Body) -> Result<tempfile::NamedTempFile, Refusal> {
     let unwritable = |e: std::io::Error| Refusal::unable(format!("the file could not be kept: {e}"));
     let mut file = tempfile::Builder::new()
@@ -221,7 +221,7 @@ async fn events(State(studio): State<Studio>) -> Sse<impl Stream<Item = Result<s
     let told = BroadcastStream::new(studio.jobs.events()).map(|event| {
         Ok(match event {
             Ok(Event::Job(job)) => sse::Event::default().event("job").data(json!(job).to_string()),
-            // Some were missed: the page asks for all of it.
+            // After missed events, the page reloads all of the project.
             Ok(Event::Project) | Err(_) => sse::Event::default().event("project").data("{}"),
         })
     });

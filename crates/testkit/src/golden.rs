@@ -1,11 +1,11 @@
-//! Goldens: what the program wrote and said when it was last looked at, as digests.
+//! Golden results: digests of the program's files and messages, recorded when they were last reviewed.
 //!
-//! Kits are a function of input, options and seed, on any number of threads, so a change that is to change
-//! nothing must keep every byte. `cargo xtask golden` compares and `--update` writes anew; a test compares
-//! the figures that come with the program.
+//! Kits are a function of input, options and seed, on any number of threads. A change that is not meant to
+//! change results must therefore keep every byte. `cargo xtask golden` compares and `--update` records anew.
+//! A test compares the figures that come with the program.
 //!
 //! Limits: sine, cosine and the sums of the sparse solver depend on the processor's vector units and on the C
-//! library, so digests are compared only on a machine of the kind that they were made on ([`machine`]).
+//! library. Digests are therefore compared only on a machine of the same kind ([`machine`]).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,15 +16,15 @@ use std::process::Command;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// A run of the program whose ending is known.
+/// A run of the program with a recorded result.
 pub struct Case {
-    /// Its name in the file of digests.
+    /// Name of the case in the file of digests.
     pub name: &'static str,
-    /// Command and options, but for the folder to write.
+    /// Command and options, without the output folder.
     pub args: &'static [&'static str],
 }
 
-/// Jobs on figures that come with the program, which tests run: each takes some seconds.
+/// Jobs on figures that come with the program, run by tests: each takes some seconds.
 pub const QUICK: [Case; 3] = [
     Case {
         name: "vase",
@@ -54,7 +54,7 @@ pub const QUICK: [Case; 3] = [
     },
 ];
 
-/// More of them, which take up to a minute: pieces that rattle, keys and divisions in vain, labels.
+/// More jobs on figures, of up to a minute: pieces with play, keys and divisions that fail, labels.
 pub const FIGURES: [Case; 5] = [
     Case {
         name: "torus, a piece is the key",
@@ -99,7 +99,7 @@ pub const FIGURES: [Case; 5] = [
     },
 ];
 
-/// Jobs on models from elsewhere, in the folder `models`: each takes up to two minutes.
+/// Jobs on external models, in the folder `models`: each takes up to two minutes.
 pub const MODELS: [Case; 9] = [
     Case {
         name: "teddy",
@@ -182,19 +182,19 @@ pub const MODELS: [Case; 9] = [
     },
 ];
 
-/// How a run ended.
+/// Result of a run: exit code and digests.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ending {
-    /// Its exit code; -1 where a signal ended it.
+    /// Exit code; −1 if a signal ended the run.
     pub exit_code: i32,
-    /// Digest of all that it said.
+    /// Digest of standard output and standard error.
     pub said: String,
-    /// Digests of the files that it wrote, by name.
+    /// Digests of the files written, by name.
     pub files: BTreeMap<String, String>,
 }
 
 impl Ending {
-    /// What is other than in `earlier`, in words.
+    /// Describes all differences from `earlier`, in words.
     pub fn changes_since(&self, earlier: &Self) -> Vec<String> {
         let mut changes = Vec::new();
         if self.exit_code != earlier.exit_code {
@@ -222,17 +222,17 @@ impl Ending {
     }
 }
 
-/// Endings by the names of their cases, and where they were made.
+/// Results by the names of their cases, and the kind of machine that made them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Goldens {
-    /// [`machine`] of that time.
+    /// Kind of machine at recording time, from [`machine`].
     pub machine: String,
-    /// One for each case.
+    /// One result per case, by name.
     pub endings: BTreeMap<String, Ending>,
 }
 
 impl Goldens {
-    /// Those in a file; none where there is no such file.
+    /// Reads results from a file; empty if there is no such file.
     pub fn read(path: &Path) -> io::Result<Self> {
         match fs::read(path) {
             Ok(bytes) => Ok(serde_json::from_slice(&bytes)?),
@@ -241,7 +241,7 @@ impl Goldens {
         }
     }
 
-    /// Replaces the file.
+    /// Writes the file, replacing an existing one. Creates its folder if necessary.
     pub fn write(&self, path: &Path) -> io::Result<()> {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder)?;
@@ -250,13 +250,13 @@ impl Goldens {
     }
 }
 
-/// The digests of [`QUICK`] and [`FIGURES`], in this repository.
+/// Path of the digests of [`QUICK`] and [`FIGURES`], in this repository.
 pub fn of_figures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/figures.json")
 }
 
-/// What results may depend on besides input, options and seed: the processor's vector units and the C
-/// library.
+/// Describes everything that results may depend on besides input, options and seed: the processor's vector
+/// units and the C library.
 pub fn machine() -> String {
     let mut words = vec![std::env::consts::OS, std::env::consts::ARCH];
     #[cfg(target_arch = "x86_64")]
@@ -275,8 +275,8 @@ pub fn machine() -> String {
     format!("{} {libc}", words.join(" ")).trim().to_owned()
 }
 
-/// Runs `program` on a case, on so many threads, in a folder of its own; `models` is where models from
-/// elsewhere are.
+/// Runs `program` on a case with `n_threads` threads, in a temporary folder. `models` is the folder of
+/// external models.
 pub fn run(program: &Path, case: &Case, n_threads: usize, models: Option<&Path>) -> io::Result<Ending> {
     let folder = tempfile::tempdir()?;
     let at = folder.path();
@@ -306,7 +306,7 @@ pub fn run(program: &Path, case: &Case, n_threads: usize, models: Option<&Path>)
     })
 }
 
-/// Figures with the labels of their limbs.
+/// Writes a figure with the labels of its limbs.
 fn figures(program: &Path, at: &Path) -> io::Result<()> {
     fs::create_dir(at.join("figures"))?;
     let args = [
@@ -352,7 +352,7 @@ fn digest(bytes: &[u8]) -> String {
         .collect()
 }
 
-/// Digests of all files below a folder, by their path in it.
+/// Digests of all files below a folder, by their paths within it.
 fn digests(folder: &Path) -> io::Result<BTreeMap<String, String>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];

@@ -1,15 +1,17 @@
-//! Shapes as points and triangles alone, outwards: for tests of crates that have meshes of their own, and of
-//! `shellock-geom` itself, whose tests see other copies of its types than this crate does.
+//! Shapes as plain points and triangles, oriented outwards.
+//!
+//! They serve crates with mesh types of their own, and `shellock-geom` itself, whose tests see other copies
+//! of its types than this crate does.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use shellock_geom::Vec3;
 
-/// Points, and the three of each triangle.
+/// Points, and the three point indices of each triangle.
 pub type Plain = (Vec<Vec3>, Vec<[u32; 3]>);
 
-/// An octahedron, `n_splits` times refined, on the ellipsoid with half axes `radii_mm`: 8 · 4ⁿ triangles.
+/// An octahedron, refined `n_splits` times, on the ellipsoid with half axes `radii_mm`: 8 · 4ⁿ triangles.
 pub fn sphere(n_splits: usize, radii_mm: Vec3) -> Plain {
     let mut points = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
     let mut triangles: Vec<[u32; 3]> = vec![
@@ -40,7 +42,7 @@ pub fn sphere(n_splits: usize, radii_mm: Vec3) -> Plain {
     (points.into_iter().map(|p| p * radii_mm).collect(), triangles)
 }
 
-/// A corner of the unit cube.
+/// A tetrahedron: the corner of the unit cube at the origin.
 pub fn tetrahedron() -> Plain {
     (
         vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
@@ -48,7 +50,7 @@ pub fn tetrahedron() -> Plain {
     )
 }
 
-/// A box of twelve triangles; bit k of a point's number says whether its k-th coordinate is the larger one.
+/// A box of twelve triangles. Bit k of a point's index is set if its k-th coordinate is the larger one.
 pub fn cuboid(min: Vec3, max: Vec3) -> Plain {
     let corner =
         |i: usize| Vec3::from_array([0, 1, 2].map(|k| if i >> k & 1 == 1 { max[k] } else { min[k] }));
@@ -64,7 +66,7 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Plain {
     ((0..8).map(corner).collect(), halves.collect())
 }
 
-/// A torus around z as a grid of `n_around` × `n_across` quadrilaterals, each cut in two.
+/// A torus around z as a grid of `n_around` × `n_across` quadrilaterals, each divided into two triangles.
 pub fn torus(radius_mm: f64, tube_mm: f64, [n_around, n_across]: [u32; 2]) -> Plain {
     let point = |i: u32, j: u32| {
         let turn = |i: u32, n: u32| (TAU * f64::from(i) / f64::from(n)).sin_cos();

@@ -1,11 +1,10 @@
-//! What tests of properties share: the same few cases on each run, and motions that take the lattice of
-//! directions to itself.
+//! Helpers for property tests: reproducible cases, and motions that map the lattice of directions to itself.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use shellock_geom::{TriMesh, Vec3};
 
-/// So many cases, the same ones on each run; nothing is written where one fails.
+/// Configuration of `n` cases, the same ones on each run; failures are not written to disk.
 pub fn cases(n: u32) -> ProptestConfig {
     ProptestConfig {
         cases: n,
@@ -15,15 +14,15 @@ pub fn cases(n: u32) -> ProptestConfig {
     }
 }
 
-/// One of the 24 rotations that take axes to axes. It rounds nothing.
+/// One of the 24 rotations that map axes to axes, without rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LatticeTurn {
-    /// From which coordinate each one comes, and its sign.
+    /// Source of each coordinate: index and sign.
     from: [(usize, f64); 3],
 }
 
 impl LatticeTurn {
-    /// All of them, the one that turns nothing first.
+    /// Returns all 24 rotations, the identity first.
     pub fn all() -> Vec<Self> {
         let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
         let signs = |i: usize| [0, 1, 2].map(|k| if i >> k & 1 == 0 { 1.0 } else { -1.0 });
@@ -39,12 +38,12 @@ impl LatticeTurn {
             .collect()
     }
 
-    /// A point or a direction, turned about the origin.
+    /// Rotates a point or a direction about the origin.
     pub fn apply(&self, v: Vec3) -> Vec3 {
         Vec3::from_array(self.from.map(|(k, sign)| sign * v[k]))
     }
 
-    /// A mesh, turned and then shifted.
+    /// Rotates a mesh about the origin, then shifts it.
     pub fn mesh(&self, mesh: &TriMesh, shift: Vec3) -> TriMesh {
         TriMesh {
             points: mesh.points.iter().map(|&p| self.apply(p) + shift).collect(),
@@ -53,17 +52,17 @@ impl LatticeTurn {
     }
 }
 
-/// Any of the 24 rotations.
+/// Strategy for any of the 24 rotations.
 pub fn turns() -> impl Strategy<Value = LatticeTurn> {
     prop::sample::select(LatticeTurn::all())
 }
 
-/// Any order of the numbers below `n`.
+/// Strategy for any order of the numbers below `n`.
 pub fn orders(n: usize) -> impl Strategy<Value = Vec<usize>> {
     Just((0..n).collect::<Vec<_>>()).prop_shuffle()
 }
 
-/// A vector with each component in [−`most`, `most`].
+/// Strategy for a vector with each component in [−`most`, `most`].
 pub fn vectors(most: f64) -> impl Strategy<Value = Vec3> {
     prop::array::uniform3(-most..=most).prop_map(Vec3::from_array)
 }

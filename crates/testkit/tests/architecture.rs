@@ -1,4 +1,4 @@
-//! Floors of the house and the order of its rooms, read from the sources.
+//! Order of the crates and of their modules, checked in the sources.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use syn::visit::Visit;
 
-/// Modules of a crate; each may name those before it. `plan` stands before `body` because bodies are split
+/// Order of a crate's modules; each may name those before it. `plan` precedes `body` because bodies are split
 /// along a plan.
 const DESIGN: [&str; 13] = [
     "seam",
@@ -36,7 +36,7 @@ const ASSEMBLY: [&str; 10] = [
     "certificate",
 ];
 
-/// Crates from the ground up, each with those that its product may name.
+/// Crates from the lowest up, each with those that its library or program may depend on.
 const FLOORS: [(&str, &[&str]); 13] = [
     ("geom", &[]),
     ("formats", &["geom"]),
@@ -73,7 +73,7 @@ fn crates() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
 }
 
-/// All source files of a crate.
+/// Lists all source files of a crate, sorted.
 fn sources(krate: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![crates().join(krate).join("src")];
@@ -91,7 +91,7 @@ fn sources(krate: &str) -> Vec<PathBuf> {
     found
 }
 
-/// The module path of a file within its crate: `plan/interface/blocking.rs` is `plan::interface::blocking`.
+/// Module path of a file within its crate: `plan/interface/blocking.rs` is `plan::interface::blocking`.
 fn module(krate: &str, file: &Path) -> Vec<String> {
     let inside = file
         .strip_prefix(crates().join(krate).join("src"))
@@ -107,8 +107,8 @@ fn module(krate: &str, file: &Path) -> Vec<String> {
     path
 }
 
-/// Collects the paths that a file names, from the root of its crate; those of other crates begin with an
-/// empty word.
+/// Collects the paths that a file names in its own crate, from the crate's root; paths of other crates are
+/// ignored.
 struct Names {
     at: Vec<String>,
     found: BTreeSet<Vec<String>>,
@@ -156,7 +156,7 @@ impl<'a> Visit<'a> for Names {
     }
 
     fn visit_item_mod(&mut self, item: &'a syn::ItemMod) {
-        // Tests may name anything.
+        // Tests may name any module.
         let is_test = item.attrs.iter().any(|a| a.path().is_ident("cfg"));
         if !is_test {
             self.at.push(item.ident.to_string());
@@ -184,7 +184,7 @@ fn names(krate: &str, file: &Path) -> BTreeSet<Vec<String>> {
     names.found
 }
 
-/// Names of later modules in files of earlier ones.
+/// Finds names of later modules in files of earlier ones.
 fn upward(krate: &str, order: &[&str]) -> Vec<String> {
     let place = |path: &[String]| {
         path.first()

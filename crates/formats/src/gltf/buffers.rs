@@ -10,26 +10,27 @@ use super::super::ReadError;
 use super::document::Buffer;
 use super::error;
 
-/// Characters of a file name that a message quotes at most.
+/// Largest number of characters of a file name quoted in a message.
 const QUOTED_CHARS: usize = 40;
-/// Base64 with or without its padding.
+/// Base64 decoder that accepts data with or without padding.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// The content of a buffer.
+/// Content of a buffer.
 pub(super) enum Content<'a> {
     Bytes(Cow<'a, [u8]>),
-    /// No address and no binary chunk: the fallback of compressed data, most often.
+    /// Neither URI nor binary chunk: mostly the fallback of compressed data.
     Absent,
-    /// Another file, by the beginning of its name.
+    /// Data in another file, given by the beginning of its name.
     Elsewhere(String),
-    /// An address that cannot be decoded, and why.
+    /// A URI that cannot be decoded, with the reason.
     Damaged(String),
 }
 
-/// Contents of all buffers, in order. `chunk` is the binary chunk of a GLB, which is the first buffer.
+/// Decodes the contents of all buffers, in order. `chunk` is the binary chunk of a GLB, which is the first
+/// buffer.
 ///
 /// A buffer without content is an error only when it is used: animations and images often have their own.
 pub(super) fn contents<'a>(buffers: &[Buffer], chunk: Option<&'a [u8]>) -> Vec<Content<'a>> {
@@ -42,7 +43,7 @@ pub(super) fn contents<'a>(buffers: &[Buffer], chunk: Option<&'a [u8]>) -> Vec<C
 }
 
 impl Content<'_> {
-    /// The bytes of buffer `index`; `Ok(None)` where the file has none.
+    /// Returns the bytes of buffer `index`; `Ok(None)` if the file has none.
     pub(super) fn bytes(&self, index: usize) -> Result<Option<&[u8]>, ReadError> {
         match self {
             Self::Bytes(bytes) => Ok(Some(bytes)),
@@ -53,7 +54,7 @@ impl Content<'_> {
     }
 }
 
-/// Content of a `data:` address: base64, or characters and percent codes (RFC 2397).
+/// Decodes a `data:` URI: base64, or characters and percent codes (RFC 2397).
 fn decode(uri: &str) -> Content<'static> {
     let head_and_text = uri
         .get(..5)
@@ -76,7 +77,7 @@ fn decode(uri: &str) -> Content<'static> {
     }
 }
 
-/// `text` with each `%` and its two hexadecimal digits made a byte; other `%` stay.
+/// Decodes each `%` with two hexadecimal digits to a byte; other `%` are kept.
 fn percent_decoded(text: &str) -> Cow<'_, [u8]> {
     let bytes = text.as_bytes();
     if !bytes.contains(&b'%') {

@@ -1,4 +1,4 @@
-//! The parts of a glTF document that describe triangles and where they are.
+//! Parts of a glTF document that describe triangles and their placement.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
-/// The extensions of an element, by their names.
+/// Names of the extensions of an element.
 pub(super) type Names = BTreeMap<String, IgnoredAny>;
 
 #[derive(Default, Deserialize)]
@@ -17,7 +17,7 @@ pub(super) struct Document {
     pub nodes: Vec<Node>,
     pub meshes: Vec<Mesh>,
     pub skins: Vec<Skin>,
-    /// Materials as plain JSON: a fault in one is no reason to refuse the shape.
+    /// Materials as plain JSON: an error in one is no reason to reject the shape.
     pub materials: Vec<Value>,
     pub animations: Vec<IgnoredAny>,
     pub accessors: Vec<Accessor>,
@@ -86,12 +86,12 @@ pub(super) struct Mesh {
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Primitive {
-    /// The accessor of each property of the points.
+    /// Accessor of each attribute of the points.
     pub attributes: BTreeMap<String, usize>,
     pub indices: Option<usize>,
     pub mode: Option<u32>,
     pub material: Option<usize>,
-    /// The accessors of each morph target, by property.
+    /// Accessors of each morph target, by attribute.
     pub targets: Vec<BTreeMap<String, usize>>,
     pub extensions: Names,
 }
@@ -124,7 +124,7 @@ pub(super) struct Sparse {
     pub values: SparsePart,
 }
 
-/// A place in the buffers; the type of number is that of indices only.
+/// A position in the buffers; only indices have a component type here.
 #[derive(Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct SparsePart {

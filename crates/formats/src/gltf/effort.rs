@@ -1,23 +1,23 @@
-//! The work that a document may ask for beyond what its bytes and triangles bound.
+//! Limit on the work that a document can cause beyond the amount bounded by its bytes and triangles.
 
 use std::cell::Cell;
 
 use super::super::ReadError;
 use super::error;
 
-/// Steps that are made at most: a point moved by one morph target or one joint, a row that a sparse accessor
+/// Largest number of steps: a point moved by one morph target or one joint, or a row that a sparse accessor
 /// replaces.
 ///
 /// A step takes 10 to 50 ns, so this is 20 s at worst. A face of 100 000 points with 52 targets and four
-/// joints a point takes 6 million.
+/// joints per point takes 6 million.
 const MAX_STEPS: u64 = 400_000_000;
 
-/// Counts steps.
+/// Counter of the steps so far.
 #[derive(Default)]
 pub(super) struct Effort(Cell<u64>);
 
 impl Effort {
-    /// Refuses a document that needs more steps than are made, before they are made.
+    /// Counts `n_steps` before they are made; an error beyond the limit.
     pub(super) fn spend(&self, n_steps: usize) -> Result<(), ReadError> {
         let spent = self.0.get().saturating_add(n_steps as u64);
         self.0.set(spent);

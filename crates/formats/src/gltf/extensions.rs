@@ -1,9 +1,9 @@
-//! Extensions that a document says it cannot be read without.
+//! Extensions that a document declares as required.
 
 use super::super::ReadError;
 use super::is_compressed;
 
-/// Beginnings of names of extensions that change no triangle.
+/// Prefixes of extension names that do not change any triangle.
 const KNOWN_KINDS: [&str; 8] = [
     "KHR_materials_",
     "KHR_texture_",
@@ -14,7 +14,7 @@ const KNOWN_KINDS: [&str; 8] = [
     "ADOBE_materials_",
     "VRMC_",
 ];
-/// Names of extensions that change no triangle, or that are read.
+/// Names of extensions that do not change any triangle, or that are supported.
 const KNOWN: [&str; 18] = [
     "EXT_mesh_gpu_instancing",
     "KHR_accessor_float64",
@@ -35,10 +35,10 @@ const KNOWN: [&str; 18] = [
     "MSFT_texture_dds",
     "VRM",
 ];
-/// Characters of a name that a message quotes at most.
+/// Largest number of characters of a name quoted in a message.
 const QUOTED_CHARS: usize = 40;
 
-/// Refuses the first of `required` that is not known, by its name, and all compressed data.
+/// Returns an error for compressed data and for the first of `required` that is not known, by its name.
 pub(super) fn check(required: &[String]) -> Result<(), ReadError> {
     for name in required {
         if name.contains("compression") {

@@ -1,4 +1,4 @@
-//! EXT_mesh_gpu_instancing: a mesh of a node that is shown several times.
+//! EXT_mesh_gpu_instancing: several copies of the mesh of a node.
 
 use glam::DAffine3;
 
@@ -9,7 +9,7 @@ use super::nodes::moved;
 use super::values::{Accessors, Shape, Values};
 
 impl Accessors<'_> {
-    /// Number of copies of the mesh of node `id` that are shown.
+    /// Number of visible copies of the mesh of node `id`.
     pub(super) fn n_instances(&self, id: usize) -> Result<usize, ReadError> {
         let node = &self.document.nodes[id];
         let Some(instancing) = &node.extensions.instancing else {
@@ -36,9 +36,9 @@ impl Accessors<'_> {
         }
     }
 
-    /// The places in the scene of all copies of the mesh of node `id`, which itself is at `placed`.
+    /// Transforms to the scene of all copies of the mesh of `node`, whose own transform is `placed`.
     ///
-    /// The caller has checked the number of copies.
+    /// The caller must have checked the number of copies.
     pub(super) fn places(
         &self,
         node: &Node,

@@ -1,10 +1,10 @@
-//! glTF 2.0: triangles of all nodes of the scene as a viewer shows them at rest, with skins, morph targets and
-//! instances. Lines, points, animations and images are left out, with a note; compressed and external data,
-//! and extensions that are not known but required, are refused by name.
+//! glTF 2.0: triangles of all nodes of the scene as a viewer shows them at rest, with skins, morph targets
+//! and instances. Lines, points, animations and images are left out, with a note. Compressed and external
+//! data, and unknown extensions that are required, are rejected by name.
 //!
-//! The document is read by types of our own, since files in the wild have more and less than the
-//! specification asks for, and all of it must be bounded: the node tree by `nodes`, numbers by `values`, copies
-//! by the limits of `assembly`, moves of points by `effort`.
+//! The document is read into types of this crate, since files in practice contain more and less than the
+//! specification demands. All work is bounded: the node tree by `nodes`, numbers by `values`, copies by the
+//! limits of `assembly`, point transforms by `effort`.
 
 mod buffers;
 mod document;
@@ -29,17 +29,18 @@ use primitives::Counts;
 use surface::{Figure, Surface};
 use values::Accessors;
 
-/// All lengths of glTF are metres.
+/// Length of a glTF unit, mm: all lengths are in metres.
 const UNIT_MM: f64 = 1000.0;
 const CHUNK_JSON: u32 = 0x4E4F_534A;
 const CHUNK_BINARY: u32 = 0x004E_4942;
 
-/// Reads a glTF that is text.
+/// Reads a glTF in text form.
 pub(super) fn read_text(bytes: &[u8]) -> Result<Loaded, ReadError> {
     read(super::text::without_bom(bytes), None, Format::Gltf)
 }
 
-/// Reads a GLB: a header of 12 bytes, then chunks of length, kind and content; text first, then data.
+/// Reads a GLB: a header of 12 bytes, then chunks of length, kind and content. The text comes first, then the
+/// data.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let word = |at: usize| {
         bytes
@@ -98,17 +99,17 @@ fn read(json: &[u8], data: Option<&[u8]>, format: Format) -> Result<Loaded, Read
     Ok(loaded(surface, notes, format))
 }
 
-/// The shown part of a document, counted before any of it is made.
+/// Visible part of a document, counted before any triangle is made.
 struct Scene {
     figures: Vec<Figure>,
-    /// Counts of those meshes that are shown.
+    /// Counts of the visible meshes; `None` for others.
     meshes: Vec<Option<Counts>>,
-    /// Primitives of lines or points.
+    /// Number of primitives of lines or points.
     n_without_triangles: usize,
 }
 
 impl Scene {
-    /// The nodes that are shown and have triangles; refuses more triangles or copies than are made.
+    /// Collects the visible nodes with triangles; an error for more triangles or copies than the limits.
     fn of(accessors: &Accessors, nodes: &Nodes) -> Result<Self, ReadError> {
         let document = accessors.document;
         let mut scene = Self {
@@ -148,7 +149,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The refusal of a scene without triangles.
+    /// Error for a scene without triangles.
     fn without_triangles(&self, format: Format) -> ReadError {
         if self.n_without_triangles == 0 {
             return ReadError::NoTriangles { format, n_points: 0 };
@@ -198,7 +199,7 @@ fn loaded(surface: Surface, notes: Vec<String>, format: Format) -> Loaded {
     loaded
 }
 
-/// Notes on what the document as a whole has beyond the shown triangles.
+/// Notes on what the document contains beyond the visible triangles.
 fn notes(document: &Document, nodes: &Nodes) -> Vec<String> {
     let mut notes = vec!["in glTF y points up: give --up y".to_owned()];
     notes.extend(left_out(nodes.n_hidden, "hidden mesh is", "hidden meshes are"));
@@ -215,19 +216,19 @@ fn notes(document: &Document, nodes: &Nodes) -> Vec<String> {
     notes
 }
 
-/// A note on `n` things; `one` and `several` name them.
+/// Note on `n` things left out; `one` and `several` are their names. `None` for 0.
 fn left_out(n: usize, one: &str, several: &str) -> Option<String> {
     let what = if n == 1 { one } else { several };
     (n > 0).then(|| format!("{n} {what} left out"))
 }
 
-/// The first of `extensions` that compresses data.
+/// Returns the first of `extensions` that compresses data.
 fn compression(extensions: &Names) -> Option<&str> {
     let mut names = extensions.keys().map(String::as_str);
     names.find(|name| name.contains("compression"))
 }
 
-/// The refusal of data that only extension `name` can unpack.
+/// Error for data that only extension `name` can unpack.
 fn is_compressed(name: &str) -> ReadError {
     const QUOTED_CHARS: usize = 40;
     let name: String = name

@@ -9,8 +9,8 @@ use super::primitives::Piece;
 use super::values::{Accessors, Shape};
 
 impl Accessors<'_> {
-    /// Adds to the points of `piece` the differences of each target times its weight. Targets without a
-    /// weight or without positions move nothing.
+    /// Adds the weighted differences of each target to the points of `piece`. Targets without a weight or
+    /// without positions have no effect.
     pub(super) fn morph(
         &self,
         primitive: &Primitive,

@@ -1,4 +1,4 @@
-//! The tree of nodes: where each one is, and which are shown.
+//! The tree of nodes, with their transforms and visibility.
 
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 
@@ -6,18 +6,18 @@ use super::super::ReadError;
 use super::document::{Document, Node};
 use super::{error, missing};
 
-/// The nodes of a document, all placed.
+/// The nodes of a document with their transforms.
 pub(super) struct Nodes {
-    /// Transform from each node to the scene, shown or not.
+    /// Transform from each node to the scene, visible or not.
     pub(super) placed: Vec<DAffine3>,
-    /// The nodes that are shown, each once, parents before children in the order of the file.
+    /// Visible nodes, each once, parents before children in file order.
     pub(super) shown: Vec<usize>,
-    /// Nodes of the scene that have a mesh and are hidden, themselves or with a node above.
+    /// Number of nodes in the scene that have a mesh and are hidden, by themselves or by an ancestor.
     pub(super) n_hidden: usize,
 }
 
 impl Nodes {
-    /// Places all nodes of `document`; refuses nodes of two parents and nodes below themselves.
+    /// Computes the transforms of all nodes of `document`. Errors for nodes with two parents and for cycles.
     pub(super) fn of(document: &Document) -> Result<Self, ReadError> {
         let nodes = &document.nodes;
         let parents = parents(nodes)?;
@@ -48,7 +48,7 @@ impl Nodes {
     }
 }
 
-/// The parent of each node.
+/// Returns the parent of each node.
 fn parents(nodes: &[Node]) -> Result<Vec<Option<usize>>, ReadError> {
     let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
     for (id, node) in nodes.iter().enumerate() {
@@ -64,7 +64,7 @@ fn parents(nodes: &[Node]) -> Result<Vec<Option<usize>>, ReadError> {
     Ok(parents)
 }
 
-/// All nodes, each after its parent.
+/// Returns all nodes, each after its parent.
 fn parents_first(nodes: &[Node], parents: &[Option<usize>]) -> Result<Vec<usize>, ReadError> {
     let mut order: Vec<usize> = (0..nodes.len()).filter(|&id| parents[id].is_none()).collect();
     let mut next = 0;
@@ -75,7 +75,7 @@ fn parents_first(nodes: &[Node], parents: &[Option<usize>]) -> Result<Vec<usize>
     if order.len() == nodes.len() {
         return Ok(order);
     }
-    // Each node has one parent at most, so the nodes that no root leads to are cycles and what is below them.
+    // Each node has at most one parent, so nodes unreachable from a root are cycles and their descendants.
     let mut is_reached = vec![false; nodes.len()];
     order.iter().for_each(|&id| is_reached[id] = true);
     let mut id = is_reached.iter().position(|reached| !reached).unwrap_or_default();
@@ -88,8 +88,8 @@ fn parents_first(nodes: &[Node], parents: &[Option<usize>]) -> Result<Vec<usize>
     })
 }
 
-/// The nodes of the scene that is shown; all where there is none. A node that the scene lists beside its
-/// parent comes once.
+/// Lists the nodes of the default scene; all nodes if there is no scene. A node that the scene lists beside
+/// its parent comes once.
 fn in_scene(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>, ReadError> {
     let nodes = &document.nodes;
     let scene = document.scenes.get(document.scene.unwrap_or_default());
@@ -110,7 +110,7 @@ fn in_scene(document: &Document, parents: &[Option<usize>]) -> Result<Vec<usize>
     Ok(found)
 }
 
-/// True if KHR_node_visibility hides a node and all below it.
+/// True if KHR_node_visibility hides a node and its descendants.
 fn hides(node: &Node) -> bool {
     node.extensions.visibility.as_ref().and_then(|v| v.visible) == Some(false)
 }
@@ -127,8 +127,8 @@ fn local(node: &Node) -> DAffine3 {
     }
 }
 
-/// A scaling, then a rotation by a quaternion (x, y, z, w), then a translation. The quaternion is made one of
-/// unit length; of length 0 it turns nothing.
+/// Composes a scaling, then a rotation by a quaternion (x, y, z, w), then a translation. The quaternion is
+/// normalised; one of length 0 gives no rotation.
 pub(super) fn moved(translation: [f64; 3], rotation: [f64; 4], scale: [f64; 3]) -> DAffine3 {
     let rotation = DQuat::from_array(rotation);
     let length = rotation.length();

@@ -1,4 +1,4 @@
-//! Primitives of meshes: their triangles, and the points and colours of those.
+//! Primitives of meshes: their triangles, with points and colours.
 
 use glam::DVec3;
 use serde_json::Value;
@@ -9,50 +9,50 @@ use super::document::{Mesh, Primitive};
 use super::values::{Accessors, Shape, Values};
 use super::{compression, error, is_compressed};
 
-/// Values of `mode` that give triangles; those below are points and lines.
+/// Values of `mode` for triangles; lower ones are points and lines.
 const TRIANGLES: u32 = 4;
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
-/// Colour and texture of materials of an older kind, as JSON pointers.
+/// JSON pointers to the colour and texture of an older kind of material.
 const GLOSSINESS_COLOR: &str = "/extensions/KHR_materials_pbrSpecularGlossiness/diffuseFactor";
 const GLOSSINESS_TEXTURE: &str = "/extensions/KHR_materials_pbrSpecularGlossiness/diffuseTexture";
-/// The colour of points where a file gives none, and the factor that changes nothing.
+/// Default colour of points, and neutral factor.
 const WHITE: [f64; 4] = [1.0; 4];
 
-/// The primitives of a mesh by kind.
+/// Counts of a mesh's primitives by kind.
 #[derive(Default)]
 pub(super) struct Counts {
     pub(super) n_triangles: u64,
-    /// Primitives of lines or points.
+    /// Number of primitives of lines or points.
     pub(super) n_without_triangles: usize,
-    /// The primitives that have triangles, by index.
+    /// Indices of the primitives that have triangles.
     pub(super) with_triangles: Vec<usize>,
 }
 
-/// A primitive in the mesh's own space, with the points that its triangles use and no others: many
-/// primitives may share the accessors of all points.
+/// A primitive in the mesh's own space, reduced to the points that its triangles use: many primitives may
+/// share the accessors of all points.
 pub(super) struct Piece {
-    /// The accessor of the points.
+    /// Accessor of the points.
     pub(super) position: usize,
     /// Number of rows in that accessor.
     pub(super) n_rows: usize,
-    /// The rows that are used, ascending.
+    /// Indices of the rows in use, ascending.
     pub(super) used: Vec<u32>,
-    /// A point for each of `used`.
+    /// One point for each of `used`.
     pub(super) points: Vec<DVec3>,
-    /// Corners by index into `used`.
+    /// Corners as indices into `used`.
     pub(super) triangles: Vec<[u32; 3]>,
 }
 
-/// Colours of a primitive's points, one for each of those used.
+/// Colours of a primitive's points, one for each of those in use.
 pub(super) struct Colors {
     pub(super) colors: Vec<Color>,
-    /// True if the primitive has an accessor of colours, not its material's colour only.
+    /// True if the primitive has an accessor of colours, not only its material's colour.
     pub(super) are_own: bool,
 }
 
 impl Accessors<'_> {
-    /// Counts the primitives of `mesh` by their declarations alone.
+    /// Counts the primitives of `mesh` from their declarations alone.
     pub(super) fn count(&self, mesh: &Mesh) -> Result<Counts, ReadError> {
         let mut counts = Counts::default();
         for (number, primitive) in mesh.primitives.iter().enumerate() {
@@ -82,7 +82,7 @@ impl Accessors<'_> {
         })
     }
 
-    /// The triangles of a primitive that has some.
+    /// Reads the triangles of a primitive that has some.
     pub(super) fn piece(&self, primitive: &Primitive) -> Result<Piece, ReadError> {
         let position = primitive.attributes.get("POSITION");
         let position = *position.ok_or_else(|| error("a primitive has no points"))?;
@@ -101,7 +101,7 @@ impl Accessors<'_> {
         })
     }
 
-    /// Refuses a primitive whose data only an extension can unpack.
+    /// Returns an error for a primitive whose data only an extension can unpack.
     fn check_plain(&self, primitive: &Primitive, position: usize) -> Result<(), ReadError> {
         let Some(name) = compression(&primitive.extensions) else {
             return Ok(());
@@ -115,7 +115,7 @@ impl Accessors<'_> {
         Ok(())
     }
 
-    /// Colours of the points of `piece` as they are shown: those of the points times that of the material.
+    /// Computes the displayed colours of the points of `piece`: point colours times the material's colour.
     pub(super) fn colors(&self, primitive: &Primitive, piece: &Piece) -> Result<Colors, ReadError> {
         let material = primitive.material.and_then(|m| self.document.materials.get(m));
         let factor = material.map_or(WHITE, base_color);
@@ -149,7 +149,7 @@ impl Accessors<'_> {
         })
     }
 
-    /// True if a picture colours the primitive.
+    /// True if an image colours the primitive.
     pub(super) fn has_texture(&self, primitive: &Primitive) -> bool {
         let textures = ["/pbrMetallicRoughness/baseColorTexture", GLOSSINESS_TEXTURE];
         let material = primitive.material.and_then(|m| self.document.materials.get(m));
@@ -157,14 +157,14 @@ impl Accessors<'_> {
     }
 }
 
-/// The colour that a material multiplies those of points by; numbers that are missing are 1.
+/// Colour factor of a material; missing numbers are 1.
 fn base_color(material: &Value) -> [f64; 4] {
     let factors = ["/pbrMetallicRoughness/baseColorFactor", GLOSSINESS_COLOR];
     let factor = factors.iter().find_map(|at| material.pointer(at));
     std::array::from_fn(|c| factor.and_then(|f| f.get(c)?.as_f64()).unwrap_or(1.0))
 }
 
-/// Triangles of a mode by rows of points, all less than `n_rows`.
+/// Triangles of a mode as rows of points, all less than `n_rows`.
 fn triangles(mode: Option<u32>, n_rows: usize, indices: Option<&Values>) -> Result<Vec<[u32; 3]>, ReadError> {
     let n_corners = indices.map_or(n_rows, |i| i.count);
     let corner = |i: usize| {
@@ -195,12 +195,12 @@ fn triangles(mode: Option<u32>, n_rows: usize, indices: Option<&Values>) -> Resu
     }
 }
 
-/// The rows that `triangles` use, ascending; their corners become indices into those.
+/// Returns the rows that `triangles` use, ascending, and turns their corners into indices into those.
 ///
-/// The work and the memory grow with the triangles, not with `n_rows`, which many primitives may share and
-/// which sparse accessors need not back.
+/// Work and memory grow with the triangles, not with `n_rows`: many primitives may share those rows, and
+/// sparse accessors need not back them with bytes.
 fn make_compact(triangles: &mut [[u32; 3]], n_rows: usize) -> Vec<u32> {
-    /// Rows for each corner up to which a table of all rows is faster than a search.
+    /// Ratio of rows to corners up to which a table of all rows is faster than a search.
     const SPARSE: usize = 4;
     let corners = triangles.as_flattened_mut();
     if n_rows > SPARSE * corners.len() {

@@ -1,7 +1,8 @@
 //! Skins: points moved by joints.
 //!
-//! A point of a mesh with a skin is at Σ wₖ · Gₖ · Bₖ · p: wₖ its weight for joint k, Gₖ from that joint to the
-//! scene, Bₖ the inverse bind matrix, from the mesh to the joint. The node that has the mesh moves nothing.
+//! A point p of a mesh with a skin is moved to Σ wₖ · Gₖ · Bₖ · p, where wₖ is its weight for joint k. Gₖ is
+//! the transform from that joint to the scene, Bₖ the inverse bind matrix, from the mesh to the joint. The
+//! transform of the node that has the mesh is ignored.
 
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 
@@ -12,30 +13,30 @@ use super::primitives::Piece;
 use super::values::{Accessors, Shape, Values};
 use super::{error, missing};
 
-/// Joints that points can name, in 16 bits.
+/// Largest number of joints that points can address, in 16 bits.
 const MAX_JOINTS: usize = 1 << 16;
-/// Joints that a set of JOINTS_n and WEIGHTS_n has for each point.
+/// Joints per point in a set of JOINTS_n and WEIGHTS_n.
 const JOINTS_PER_SET: usize = 4;
 
 /// A skin in the pose of its joints.
 pub(super) struct Pose {
     skin: usize,
-    /// Gₖ · Bₖ of each joint.
+    /// Matrix Gₖ · Bₖ of each joint.
     scene_from_mesh: Vec<DAffine3>,
 }
 
-/// Points in the scene.
+/// Points moved by joints, in the scene.
 pub(super) struct Posed {
     pub(super) points: Vec<DVec3>,
-    /// For each point the determinant of its blended matrix; below 0 it is mirrored there.
+    /// Determinant of each point's blended matrix; negative if the matrix mirrors.
     pub(super) determinants: Vec<f64>,
 }
 
-/// JOINTS_n and WEIGHTS_n of the same n.
+/// Pairs of JOINTS_n and WEIGHTS_n with equal n.
 type Sets<'a> = Vec<(Values<'a>, Values<'a>)>;
 
 impl Accessors<'_> {
-    /// The pose of skin `which`. Without inverse bind matrices, each of them is the identity.
+    /// Computes the pose of skin `which`. Missing inverse bind matrices are identities.
     pub(super) fn pose(&self, which: usize, nodes: &Nodes) -> Result<Pose, ReadError> {
         let skin = self.document.skins.get(which);
         let skin = skin.ok_or_else(|| missing("skin", which))?;
@@ -70,7 +71,7 @@ impl Accessors<'_> {
         })
     }
 
-    /// The points of `piece` in `pose`; `None` where the primitive has no joints or no weights.
+    /// Moves the points of `piece` to `pose`; `None` if the primitive has no joints or no weights.
     pub(super) fn posed(
         &self,
         primitive: &Primitive,
@@ -93,7 +94,7 @@ impl Accessors<'_> {
         Ok(Some(posed))
     }
 
-    /// All sets of joints and weights that a primitive has.
+    /// Reads all sets of joints and weights of a primitive.
     fn joint_sets(&self, primitive: &Primitive, piece: &Piece) -> Result<Sets<'_>, ReadError> {
         let mut sets = Vec::new();
         loop {
@@ -119,8 +120,8 @@ impl Accessors<'_> {
 }
 
 impl Pose {
-    /// The mean of the joints' matrices for the point in `row`, by its weights. Weights that do not add up to
-    /// 1 are scaled so that they do; where all are 0, the point follows its first joint, as in three.js.
+    /// Weighted mean of the joints' matrices for the point in `row`. Weights are normalised to a sum of 1. If
+    /// all are 0, the point follows its first joint, as in three.js.
     fn blend(&self, sets: &Sets, row: usize) -> Result<DAffine3, ReadError> {
         let (mut sum, mut linear, mut shift) = (0.0, DMat3::ZERO, DVec3::ZERO);
         for (joints, weights) in sets {

@@ -1,4 +1,4 @@
-//! The surface that all shown nodes make together.
+//! The combined surface of all visible nodes.
 
 use glam::{DAffine3, DVec3};
 
@@ -12,34 +12,34 @@ use super::skin::Posed;
 use super::values::Accessors;
 use shellock_geom::TriMesh;
 
-/// A node that is shown and has triangles.
+/// A visible node with triangles.
 pub(super) struct Figure {
     pub(super) node: usize,
     pub(super) mesh: usize,
     pub(super) n_instances: usize,
 }
 
-/// All triangles so far, and how they are divided.
+/// All triangles so far, with the labels that divide them.
 #[derive(Default)]
 pub(super) struct Surface {
     pub(super) mesh: TriMesh,
-    /// The material of each triangle, −1 for none.
+    /// Material of each triangle, −1 for none.
     pub(super) material: Vec<i64>,
-    /// A number for each copy of the mesh of each node: a place in `objects`.
+    /// Index into `objects` for each triangle: the copy of a node's mesh that it belongs to.
     pub(super) object: Vec<i64>,
-    /// What those copies are called.
+    /// Names of those copies.
     pub(super) objects: Vec<FileObject>,
-    /// A colour for each point.
+    /// Colour of each point.
     pub(super) colors: Vec<Color>,
     /// True if some primitive has colours of points.
     pub(super) has_colors: bool,
-    /// True if some primitive has colours of points that cannot be read.
+    /// True if some primitive has unreadable colours of points.
     pub(super) has_bad_colors: bool,
-    /// True if a picture colours some primitive.
+    /// True if an image colours some primitive.
     pub(super) has_texture: bool,
 }
 
-/// A copy of a primitive, with the labels that all its triangles have.
+/// A copy of a primitive, with labels that hold for all its triangles.
 struct Copy<'a> {
     piece: &'a Piece,
     colors: &'a [Color],
@@ -48,7 +48,7 @@ struct Copy<'a> {
 }
 
 impl Surface {
-    /// Adds all copies of the mesh of a node, whose primitives `counts` has.
+    /// Adds all copies of the mesh of a node, whose primitives are counted in `counts`.
     pub(super) fn add(
         &mut self,
         accessors: &Accessors,
@@ -97,8 +97,7 @@ impl Surface {
         Ok(())
     }
 
-    /// The colours of the points of `piece`; white where the file has some that cannot be read, as they are no
-    /// reason to refuse the shape.
+    /// Colours of the points of `piece`. Unreadable ones are no reason to reject the shape and become white.
     fn colors_of(&mut self, accessors: &Accessors, primitive: &Primitive, piece: &Piece) -> Vec<Color> {
         const WHITE: Color = [u8::MAX; 4];
         match accessors.colors(primitive, piece) {
@@ -113,7 +112,7 @@ impl Surface {
         }
     }
 
-    /// Adds a copy whose points are moved together.
+    /// Adds a copy with one transform for all points.
     fn add_placed(&mut self, copy: &Copy, placed: DAffine3) -> Result<(), ReadError> {
         let points = copy.piece.points.iter().map(|&p| placed.transform_point3(p));
         let first = self.add_points(copy, points)?;
@@ -122,8 +121,8 @@ impl Surface {
         Ok(())
     }
 
-    /// Adds a copy whose points joints have moved. Mirrored are those triangles whose corners are, on the
-    /// whole.
+    /// Adds a copy whose points are moved by joints. A triangle is mirrored if the determinants at its
+    /// corners have a negative sum.
     fn add_posed(&mut self, copy: &Copy, posed: &Posed) -> Result<(), ReadError> {
         let first = self.add_points(copy, posed.points.iter().copied())?;
         let determinant = |corner: u32| posed.determinants[corner as usize];
@@ -133,7 +132,7 @@ impl Surface {
         Ok(())
     }
 
-    /// Adds points and their colours; returns the index of the first.
+    /// Adds points and their colours. Returns the index of the first.
     fn add_points(&mut self, copy: &Copy, points: impl Iterator<Item = DVec3>) -> Result<u32, ReadError> {
         let too_large = |_| ReadError::TooLarge { at: Place::Byte(0) };
         let first = u32::try_from(self.mesh.points.len()).map_err(too_large)?;

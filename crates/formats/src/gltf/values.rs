@@ -6,7 +6,7 @@ use super::document::{Accessor, Document, Sparse};
 use super::effort::Effort;
 use super::{compression, error, is_compressed, missing};
 
-/// The shapes of rows that are read.
+/// Supported shapes of rows.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Shape {
     Scalar,
@@ -16,7 +16,7 @@ pub(super) enum Shape {
 }
 
 impl Shape {
-    /// The name in `type` and how many numbers a row has.
+    /// Name in `type`, and count of numbers in a row.
     fn name_and_columns(self) -> (&'static str, usize) {
         match self {
             Self::Scalar => ("SCALAR", 1),
@@ -27,26 +27,26 @@ impl Shape {
     }
 }
 
-/// The rows of an accessor, all of them backed by bytes or zero.
+/// Rows of an accessor, each of them backed by bytes or zero.
 pub(super) struct Values<'a> {
-    /// Rows as they are before sparse ones replace them; zeros where there are none.
+    /// Rows before sparse replacement; all zeros if absent.
     base: Option<Rows<'a>>,
     sparse: Option<Replaced<'a>>,
     component: Component,
     is_normalized: bool,
-    /// Number of rows. No byte backs it where `base` is absent.
+    /// Number of rows. No bytes back it if `base` is absent.
     pub(super) count: usize,
 }
 
-/// Rows at even distances.
+/// Rows at a constant stride.
 struct Rows<'a> {
     bytes: &'a [u8],
     stride: usize,
 }
 
-/// Rows that replace those of the base.
+/// Rows that replace rows of the base.
 struct Replaced<'a> {
-    /// The number of a row and the place of its replacement, by ascending number.
+    /// Pairs of a replaced row and the place of its replacement, ascending by row.
     places: Vec<(u32, u32)>,
     rows: Rows<'a>,
 }
@@ -71,7 +71,7 @@ impl Component {
             5123 => Self::U16,
             5125 => Self::U32,
             5126 => Self::F32,
-            // KHR_accessor_float64.
+            // Code of KHR_accessor_float64.
             5130 => Self::F64,
             _ => return Err(error(format!("{code} is no type of number"))),
         })
@@ -86,7 +86,7 @@ impl Component {
         }
     }
 
-    /// The number at the beginning of `b`, and the greatest of its type.
+    /// Reads the number at the beginning of `b`. Returns it and the greatest number of its type.
     fn read(self, b: &[u8]) -> (f64, f64) {
         match self {
             Self::I8 => (f64::from(b[0] as i8), 127.0),
@@ -107,7 +107,8 @@ impl Component {
 }
 
 impl Values<'_> {
-    /// The `N` numbers of a row; `N` is that of the shape which was asked for, `row` less than the count.
+    /// Returns the `N` numbers of a row. `N` must be that of the requested shape, and `row` less than the
+    /// count.
     pub(super) fn row<const N: usize>(&self, row: usize) -> [f64; N] {
         let replaced = self.sparse.as_ref().and_then(|sparse| {
             let place = |i: usize| (&sparse.rows, sparse.places[i].1 as usize);
@@ -130,14 +131,14 @@ impl Values<'_> {
         })
     }
 
-    /// The only number of a row as an index; what is below 0 becomes 0.
+    /// Returns the only number of a row as an index; negative ones become 0.
     pub(super) fn index(&self, row: usize) -> usize {
         let [index] = self.row(row);
         index as usize
     }
 }
 
-/// The accessors of a document and the bytes that they read.
+/// The accessors of a document, with the bytes that they read.
 pub(super) struct Accessors<'a> {
     pub(super) document: &'a Document,
     pub(super) contents: Vec<Content<'a>>,
@@ -150,7 +151,7 @@ impl Accessors<'_> {
         accessors.get(which).ok_or_else(|| missing("accessor", which))
     }
 
-    /// The shape that accessor `which` has, if it is one of `shapes`.
+    /// Returns the shape of accessor `which`; an error unless it is one of `shapes`.
     pub(super) fn shape(&self, which: usize, shapes: &[Shape]) -> Result<Shape, ReadError> {
         let kind = &self.accessor(which)?.kind;
         let found = shapes.iter().find(|shape| shape.name_and_columns().0 == kind);
@@ -160,7 +161,7 @@ impl Accessors<'_> {
         })
     }
 
-    /// The rows of accessor `which`, which must be of one shape and have data.
+    /// Returns the rows of accessor `which`, which must have the given shape and data.
     pub(super) fn values(&self, which: usize, shape: Shape) -> Result<Values<'_>, ReadError> {
         let values = self.values_or_zeros(which, shape)?;
         if values.base.is_none() && values.sparse.is_none() {
@@ -169,7 +170,7 @@ impl Accessors<'_> {
         Ok(values)
     }
 
-    /// The rows of accessor `which`; zeros where it has no data, as the specification says.
+    /// Returns the rows of accessor `which`; zeros if it has no data, as the specification demands.
     pub(super) fn values_or_zeros(&self, which: usize, shape: Shape) -> Result<Values<'_>, ReadError> {
         let accessor = self.accessor(which)?;
         self.shape(which, &[shape])?;
@@ -195,8 +196,8 @@ impl Accessors<'_> {
         })
     }
 
-    /// The rows that a sparse accessor of `count` rows replaces, ascending; the last one counts where a row
-    /// comes twice.
+    /// Lists the rows that a sparse accessor of `count` rows replaces, ascending. If a row occurs twice, the
+    /// last entry wins.
     fn replaced_rows(
         &self,
         sparse: &Sparse,
@@ -229,7 +230,7 @@ impl Accessors<'_> {
                 }
             }
         }
-        // Ascending in files that keep to the specification; the sort sees that at once.
+        // Rows are ascending in files that obey the specification, which the sort detects at once.
         places.sort();
         places.dedup_by(|later, kept| {
             let is_same = later.0 == kept.0;
@@ -241,7 +242,7 @@ impl Accessors<'_> {
         Ok(places)
     }
 
-    /// `count` rows of `row_bytes` bytes in buffer view `view`; what the bytes cannot back is refused.
+    /// Finds `count` rows of `row_bytes` bytes in buffer view `view`; an error if the bytes do not suffice.
     fn rows(
         &self,
         view: usize,

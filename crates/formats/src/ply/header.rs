@@ -1,36 +1,36 @@
-//! What a PLY file declares before its values.
+//! The header of a PLY file, which declares the values after it.
 
 use super::super::text::{Lines, malformed, words};
 use super::super::{Place, ReadError};
 
-/// How the values after the header are stored.
+/// Encoding of the values after the header.
 #[derive(Clone, Copy)]
 pub(super) enum Encoding {
     Ascii,
     Binary { big_endian: bool },
 }
 
-/// The declaration of all values.
+/// Declaration of all values.
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// True if a comment names a picture, as MeshLab writes it.
+    /// True if a comment names an image, as MeshLab writes it.
     pub(super) has_texture: bool,
 }
 
-/// `count` rows of the same properties.
+/// A table of `count` rows with the same properties.
 pub(super) struct Element {
-    /// In lower case.
+    /// Name in lower case.
     pub(super) name: String,
     pub(super) count: usize,
     pub(super) properties: Vec<Property>,
-    /// Where it is declared.
+    /// Place of the declaration.
     pub(super) at: Place,
 }
 
-/// A column.
+/// A column of an element.
 pub(super) struct Property {
-    /// In lower case.
+    /// Name in lower case.
     pub(super) name: String,
     pub(super) kind: Kind,
 }
@@ -42,7 +42,7 @@ pub(super) enum Kind {
     List { count: Scalar, item: Scalar },
 }
 
-/// The types of numbers.
+/// Types of numbers in a PLY.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Scalar {
     I8,
@@ -81,7 +81,7 @@ impl Scalar {
 }
 
 impl Header {
-    /// Reads up to `end_header`; the lines returned go on with the values.
+    /// Reads up to `end_header`. The returned lines continue with the values.
     pub(super) fn read(bytes: &[u8]) -> Result<(Self, Lines<'_>), ReadError> {
         let mut lines = Lines::of(bytes);
         let (at, magic) = lines.next().unwrap_or((Place::Line(1), b""));
@@ -131,7 +131,7 @@ impl Header {
         })
     }
 
-    /// Refuses counts that `n_bytes` of values cannot back.
+    /// Returns an error for counts that `n_bytes` of values cannot hold.
     pub(super) fn check_counts(&self, n_bytes: usize, at: Place) -> Result<(), ReadError> {
         let mut room = n_bytes as u64;
         for element in &self.elements {
@@ -139,7 +139,7 @@ impl Header {
             if row_bytes == 0 {
                 continue;
             }
-            // The last word of a text may lack the blank after it.
+            // The last word of a text may lack the white space after it.
             let fit = (room + u64::from(matches!(self.encoding, Encoding::Ascii))) / row_bytes;
             let promised = element.count as u64;
             if promised > fit {
@@ -160,7 +160,7 @@ impl Header {
         Ok(())
     }
 
-    /// The fewest bytes a row takes: empty lists, words of one digit.
+    /// Fewest bytes of a row: empty lists, words of one digit.
     fn row_bytes(&self, element: &Element) -> u64 {
         let bytes = |p: &Property| match (self.encoding, p.kind) {
             (Encoding::Ascii, _) => 2,

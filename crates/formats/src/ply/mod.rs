@@ -1,4 +1,4 @@
-//! PLY: points, polygons or strips, for each face a whole-number label or a colour, for each point a colour.
+//! PLY: points, polygons or strips, with an integer label or a colour per face, and a colour per point.
 //! Everything else is skipped.
 //!
 //! A file is a text header that declares elements (`vertex`, `face`, others) with their properties, then the
@@ -15,7 +15,7 @@ use header::{Element, Encoding, Header, Kind, Scalar};
 use shellock_geom::TriMesh;
 use source::{Binary, Source, Words};
 
-/// Names that programs give to the label of a face; where a file has several, the first of this list counts.
+/// Names that programs use for the label of a face. If a file has several, the first in this list counts.
 const LABEL_NAMES: [&str; 17] = [
     "label",
     "labels",
@@ -36,7 +36,7 @@ const LABEL_NAMES: [&str; 17] = [
     "group_id",
 ];
 
-/// Channels of a colour, the first three of them needed; the first names of which all three are there count.
+/// Names of colour channels; alpha may be missing. The first row whose red, green and blue all exist counts.
 const COLOR_NAMES: [[&str; 4]; 3] = [
     ["red", "green", "blue", "alpha"],
     ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"],
@@ -70,7 +70,7 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
             "vertex" => colors = read_points(element, &mut source, &mut polygons)?,
             "face" => labels = read_faces(element, &mut source, &mut polygons)?,
             "tristrips" => read_strips(element, &mut source, &mut polygons)?,
-            // Rows without properties have no bytes, so their count is backed by nothing.
+            // Rows without properties take no bytes, so the file size does not bound their count.
             _ if element.properties.is_empty() => {}
             _ => {
                 for _ in 0..element.count {
@@ -82,7 +82,7 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
             }
         }
     }
-    // Strips have no labels; with faces that have, they would be told apart by chance.
+    // Strips have no labels; combined with labelled faces, they would be labelled by chance.
     let mut found = labels.found;
     found.retain(|(_, labels)| labels.len() == polygons.n_faces());
     let mut loaded = polygons.finish(Format::Ply, found)?;
@@ -94,7 +94,7 @@ fn read_body(header: &Header, mut source: impl Source) -> Result<Loaded, ReadErr
     Ok(loaded)
 }
 
-/// The properties of the channels of a colour; `None` where red, green or blue lacks.
+/// Properties of the channels of a colour; `None` if red, green or blue is missing.
 fn color_properties(element: &Element) -> Option<[Option<usize>; 4]> {
     let found = COLOR_NAMES.map(|names| names.map(|name| scalar_named(element, name)));
     found
@@ -102,20 +102,20 @@ fn color_properties(element: &Element) -> Option<[Option<usize>; 4]> {
         .find(|channels| channels[..3].iter().all(Option::is_some))
 }
 
-/// The property of one number that is called `name`.
+/// Finds the scalar property called `name`.
 fn scalar_named(element: &Element, name: &str) -> Option<usize> {
     let mut properties = element.properties.iter();
     properties.position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
 }
 
-/// What divides the faces, and what a person should know about that.
+/// Labels of the faces, and a note about them for the user.
 #[derive(Default)]
 struct FaceLabels {
     found: Vec<(LabelSource, Vec<i64>)>,
     note: Option<String>,
 }
 
-/// Adds the points; returns their colours, none where they have none.
+/// Adds the points. Returns their colours, empty if they have none.
 fn read_points(
     element: &Element,
     source: &mut impl Source,
@@ -161,7 +161,7 @@ fn read_points(
     Ok(colors)
 }
 
-/// Adds the polygons; returns one label each where a property has a name for it, and one for each colour.
+/// Adds the polygons. Returns their labels from a property with a known name, and a number for each colour.
 fn read_faces(
     element: &Element,
     source: &mut impl Source,
@@ -211,7 +211,7 @@ fn read_faces(
     Ok(FaceLabels { found, note })
 }
 
-/// What is odd about the labels of a property, `None` for those that are no whole numbers.
+/// Note on unusual labels of a property. `labels` is `None` if some are no whole numbers.
 fn label_note(name: &str, labels: Option<&[i64]>) -> Option<String> {
     let Some(labels) = labels else {
         return Some(format!(
@@ -240,8 +240,8 @@ fn corners_property(element: &Element, lacking: &'static str) -> Result<usize, R
     })
 }
 
-/// Adds strips of triangles, as scans have them: each point makes a triangle with the two before it, turned
-/// every other time; −1 begins anew.
+/// Adds strips of triangles, as in scans. Each point makes a triangle with the two before it, with
+/// alternating orientation; −1 starts a new strip.
 fn read_strips(
     element: &Element,
     source: &mut impl Source,
@@ -268,7 +268,7 @@ fn read_strips(
                 }
                 let corner = polygons.corner(index, at)?;
                 let [a, b] = strip;
-                // Strips repeat a point to turn a corner: what has no area is no triangle of theirs.
+                // Strips repeat a point to turn a corner, so triangles without area do not count.
                 if n_before >= 2 && a != b && b != corner && corner != a {
                     let triangle = if n_before.is_multiple_of(2) {
                         [a, b, corner]
@@ -304,10 +304,11 @@ fn whole(source: &mut impl Source, scalar: Scalar) -> Result<i64, ReadError> {
     })
 }
 
-/// A binary little-endian PLY with coordinates as `double` and, if given, one `label` for each triangle.
+/// Writes a binary little-endian PLY with coordinates as `double` and, if given, one `label` per triangle.
 ///
 /// # Panics
-/// Where `face_labels` has another length than the triangles.
+///
+/// Panics if `face_labels` and the triangles differ in number.
 pub fn write_ply(mesh: &TriMesh, face_labels: Option<&[i32]>) -> Vec<u8> {
     assert!(
         face_labels.is_none_or(|labels| labels.len() == mesh.triangles.len()),

@@ -1,14 +1,14 @@
-//! The values of a PLY one after the other, from words or from bytes.
+//! Sequence of a PLY's values, from words or from bytes.
 
 use super::super::text::{Lines, coordinate, words};
 use super::super::{Place, ReadError};
 use super::header::Scalar;
 
-/// Hands out the next number; a float holds all types of PLY exactly.
+/// Source of the next number; `f64` represents all types of PLY exactly.
 pub(super) trait Source {
-    /// The next number, declared as `scalar`.
+    /// Reads the next number, declared as `scalar`.
     fn next(&mut self, scalar: Scalar) -> Result<f64, ReadError>;
-    /// Where the next number stands, or the last one in a text.
+    /// Place of the next number, or of the last one in a text.
     fn place(&self) -> Place;
 }
 
@@ -49,7 +49,7 @@ impl Source for Words<'_> {
     }
 }
 
-/// Values as bytes.
+/// Values as binary numbers.
 pub(super) struct Binary<'a> {
     pub(super) bytes: &'a [u8],
     pub(super) at: usize,

@@ -1,4 +1,4 @@
-//! What the build of a model holds: its objects in their places, each part by its role.
+//! The build of a model: its objects in their places, each part by its role.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,9 +13,9 @@ use super::role::{Role, Usage};
 use super::settings::{ObjectSettings, Settings};
 use shellock_geom::{TriMesh, Vec3};
 
-/// The extruder that prints where nothing else is said.
+/// Extruder used by default.
 const FIRST_EXTRUDER: u32 = 1;
-/// Names that a note lists.
+/// Largest number of names listed in a note.
 const N_LISTED: usize = 5;
 
 /// Puts the parts of the build together.
@@ -32,24 +32,24 @@ pub(super) fn read(model: &Model, settings: &Settings) -> Result<Loaded, ReadErr
     flat.finish(model, notes)
 }
 
-/// Objects ready to be put in place.
+/// Objects ready to be placed.
 struct Build<'a> {
     model: &'a Model,
     bodies: Vec<Body<'a>>,
-    /// Place of an object in the model, by the part it stands in and its id.
+    /// Index of an object in the model, by its model part and id.
     place_of: BTreeMap<(&'a str, u32), usize>,
-    /// Where each item of the build lies.
+    /// Plate of each build item.
     plates: Vec<Option<FilePlate>>,
 }
 
-/// An object with its paint made real, and what slicers note on it.
+/// An object divided along its paint, with the slicer's settings for it.
 struct Body<'a> {
     object: &'a Object,
     settings: Option<&'a ObjectSettings>,
     painted: Painted,
-    /// The volume of each triangle of the object.
+    /// Volume of each triangle of the object.
     volume_of: Vec<u16>,
-    /// The set of each triangle of the object, none where it is −1; empty where there are no sets.
+    /// Set of each triangle of the object, −1 for none; empty if there are no sets.
     set_of: Vec<i64>,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Build<'a> {
     fn new(model: &'a Model, settings: &'a Settings) -> Result<Self, ReadError> {
         let root = model.parts.first().map_or("", String::as_str);
         let bodies = model.objects.iter().map(|object| {
-            // Slicers note the ids of the root part alone.
+            // Slicers refer to ids of the root part alone.
             let of_root = (object.path == root).then(|| settings.object(object.id));
             Body::new(object, of_root.flatten())
         });
@@ -89,7 +89,7 @@ impl<'a> Build<'a> {
         self.place_of.get(&(path, id)).copied().ok_or_else(missing)
     }
 
-    /// The objects as parts, with how their components are used.
+    /// Converts the objects to parts, with the usage of their components.
     fn parts(&self) -> Result<Vec<Part<Usage<'_>>>, ReadError> {
         self.bodies.iter().map(|body| self.part(body)).collect()
     }
@@ -106,7 +106,7 @@ impl<'a> Build<'a> {
             Ok(Occurrence {
                 part,
                 placed: component.placed,
-                // A name that a slicer shows goes before that of the object.
+                // A name shown by a slicer takes precedence over that of the object.
                 said: self.bodies[part].usage().with(usage),
             })
         };
@@ -118,7 +118,7 @@ impl<'a> Build<'a> {
         })
     }
 
-    /// The objects that are built, and a note where the file does not say which.
+    /// Returns the objects of the build, or all top-level ones with a note if the build is empty.
     fn roots(&self) -> Result<(Vec<Occurrence<Usage<'_>>>, Vec<String>), ReadError> {
         let root = |part: usize, placed: DAffine3, item: usize| Occurrence {
             part,
@@ -159,7 +159,7 @@ impl<'a> Body<'a> {
     fn new(object: &'a Object, settings: Option<&'a ObjectSettings>) -> Result<Self, ReadError> {
         let n_triangles = object.mesh.triangles.len();
         let mut painted = paint::apply(&object.mesh, &object.paint_codes())?;
-        // Each occurrence costs its points: those of no triangle would be free to multiply.
+        // Each occurrence copies its points, so unused points would make multiplication free.
         painted.mesh = painted.mesh.without_unused_points();
         Ok(Self {
             object,
@@ -170,7 +170,7 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// How the object is used wherever it occurs.
+    /// Usage of the object wherever it occurs.
     fn usage(&self) -> Usage<'_> {
         let of_slicer = self.settings.and_then(|s| s.name.as_deref());
         let own = Some(&self.object.name[..]).filter(|name| !name.is_empty());
@@ -182,7 +182,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// How a triangle of the object is used within it.
+    /// Usage of a triangle of the object within it.
     fn usage_of(&self, source: u32) -> Usage<'_> {
         match (self.settings, self.volume_of.get(source as usize)) {
             (Some(settings), Some(&volume)) => settings.usage(volume),
@@ -190,7 +190,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// What the part that a triangle belongs to is called, where the object is used as `said`.
+    /// Name of the part that a triangle belongs to, if the object is used as `said`.
     fn name_of(&self, said: Usage, source: u32) -> String {
         let is_range = self
             .volume_of
@@ -203,13 +203,14 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// How many triangles it has; an object whose shape is not read counts as one, so that it is met.
+    /// Number of triangles. An object with an unsupported shape counts as at least one, so that it is
+    /// visited.
     fn n_triangles(&self) -> usize {
         let is_met = self.unread_shape().is_some();
         self.painted.mesh.triangles.len().max(usize::from(is_met))
     }
 
-    /// The name of a shape in it that is not read.
+    /// Name of an unsupported shape in the object.
     fn unread_shape(&self) -> Option<&str> {
         let object = self.object;
         let is_bare = object.mesh.triangles.is_empty() && object.components.is_empty();
@@ -218,9 +219,9 @@ impl<'a> Body<'a> {
     }
 }
 
-/// The named set of each triangle of an object; none where it is −1, the first where there are several.
+/// Named set of each triangle of an object, −1 for none; the first if there are several.
 fn sets(object: &Object) -> Vec<i64> {
-    /// Sets that have the same triangle at most; further ones are hostile and are passed over.
+    /// Largest mean number of sets per triangle; further ones are hostile and are skipped.
     const MAX_OVERLAP: usize = 8;
     if object.sets.is_empty() {
         return Vec::new();
@@ -242,7 +243,7 @@ fn sets(object: &Object) -> Vec<i64> {
     set_of
 }
 
-/// The triangles of all occurrences so far, with every way in which the file divides them.
+/// Triangles of all occurrences so far, with every division that the file gives.
 #[derive(Default)]
 struct Flat {
     mesh: TriMesh,
@@ -258,9 +259,9 @@ struct Flat {
     set_numbers: Numbering<Option<(usize, i64)>>,
     objects: Vec<FileObject>,
     cutters: Vec<Cutter>,
-    /// Parts that are no part of the model, by role.
+    /// Names of parts that do not belong to the model, by role.
     left_out: BTreeMap<Role, BTreeSet<String>>,
-    /// Triangles of colours or materials that are not there.
+    /// Number of triangles with missing colours or materials.
     n_unnamed: usize,
     has_textures: bool,
     /// Elements of objects that no specification names.
@@ -323,7 +324,7 @@ impl Flat {
         Ok(())
     }
 
-    /// Notes what the file says of the triangle at `place` of a body, which was just added.
+    /// Records the labels of the triangle at `place` of a body, which was just added.
     fn divide(&mut self, build: &Build, part: usize, place: usize, usage: Usage) {
         let (model, body) = (build.model, &build.bodies[part]);
         let source = body.painted.source[place];
@@ -349,7 +350,7 @@ impl Flat {
         self.object.push(self.objects.len() as i64);
     }
 
-    /// Everything that a person should know of what was read and what was not.
+    /// Notes for the user on what was read and what was not.
     fn notes(&self, build: &Build) -> Vec<String> {
         let mut notes = Vec::new();
         if self.objects.len() > 1 {
@@ -422,7 +423,7 @@ impl Flat {
 }
 
 impl Build<'_> {
-    /// What the object of an item is called.
+    /// Name of the object of a build item.
     fn item_name(&self, item: u32) -> Option<String> {
         let component = &self.model.items.get(item as usize)?.component;
         let part = self.find(&component.path, component.id).ok()?;
@@ -430,7 +431,7 @@ impl Build<'_> {
     }
 }
 
-/// The points of an object in their place.
+/// Transforms the points of an object; an error if some are not finite.
 fn moved(model: &Model, mesh: &TriMesh, placed: DAffine3) -> Result<Vec<Vec3>, ReadError> {
     let points: Vec<Vec3> = mesh.points.iter().map(|&p| placed.transform_point3(p)).collect();
     if points.iter().all(|p| p.is_finite()) {
@@ -443,7 +444,7 @@ fn moved(model: &Model, mesh: &TriMesh, placed: DAffine3) -> Result<Vec<Vec3>, R
     })
 }
 
-/// The mesh of some triangles, with the points that they use.
+/// Mesh of some triangles, with only the points that they use.
 fn part_of(points: &[Vec3], triangles: Vec<[u32; 3]>) -> TriMesh {
     TriMesh {
         points: points.to_vec(),
@@ -459,14 +460,14 @@ fn append(mesh: &mut TriMesh, more: TriMesh) {
         .extend(more.triangles.iter().map(|t| t.map(|v| v + first)));
 }
 
-/// What a part is called where it is used.
+/// Name of a part where it is used.
 fn name_of(usage: Usage, object: &Object) -> String {
     usage
         .name
         .map_or_else(|| format!("object {}", object.id), |name| format!("\"{name}\""))
 }
 
-/// The first names of a list, and how many more there are.
+/// First names of a list, and the number of further ones.
 fn listed(names: &BTreeSet<String>) -> String {
     let first: Vec<&str> = names.iter().take(N_LISTED).map(String::as_str).collect();
     let more = match names.len().saturating_sub(N_LISTED) {

@@ -1,13 +1,13 @@
-//! Extensions of 3MF: which are read, and by which names people know the others.
+//! Extensions of 3MF: the supported ones, and common names of the others.
 //!
 //! The core specification (1.3, section 2.3) lets a file demand extensions by the prefixes of their
-//! namespaces in `requiredextensions`; a reader that does not know one of them must not read the file.
+//! namespaces in `requiredextensions`. A reader that does not know one of them must not read the file.
 
 use std::collections::BTreeMap;
 
 use super::super::ReadError;
 
-/// Parts of namespaces whose content is read or changes no shape.
+/// Substrings of namespaces whose content is read or does not change any shape.
 const KNOWN: [&str; 10] = [
     "/3dmanufacturing/core/",
     "/3dmanufacturing/material/",
@@ -21,7 +21,7 @@ const KNOWN: [&str; 10] = [
     "www.w3.org",
 ];
 
-/// Parts of namespaces that are not read, and their names for people.
+/// Substrings of unsupported namespaces, with their common names.
 const UNREAD: [(&str, &str); 9] = [
     ("/beamlattice/", "beam lattice"),
     ("/slice/", "slices"),
@@ -34,7 +34,7 @@ const UNREAD: [(&str, &str); 9] = [
     ("/toolpath/", "tool paths"),
 ];
 
-/// Elements of objects that give a shape which is not read, by local name, and their extensions.
+/// Elements of objects that give an unsupported shape, by local name, and their extensions.
 const SHAPES: [(&str, &str); 4] = [
     ("beamlattice", "beam lattice"),
     ("booleanshape", "boolean operations"),
@@ -42,10 +42,10 @@ const SHAPES: [(&str, &str); 4] = [
     ("levelset", "volumetric"),
 ];
 
-/// The extension whose slices stand for an object's shape.
+/// Extension whose slices define an object's shape.
 pub(super) const SLICES: &str = "slices";
 
-/// The extension of a shape that an element of this local name gives.
+/// Returns the extension of the unsupported shape that an element of this local name gives.
 pub(super) fn of_shape(element: &str) -> Option<&'static str> {
     SHAPES
         .iter()
@@ -53,9 +53,9 @@ pub(super) fn of_shape(element: &str) -> Option<&'static str> {
         .map(|(_, extension)| *extension)
 }
 
-/// Refuses a part that demands an extension that is not read.
+/// Returns an error if a part demands an unsupported extension.
 ///
-/// `required` holds prefixes, `namespaces` what they stand for.
+/// `required` holds prefixes, and `namespaces` their namespaces.
 pub(super) fn check_required(required: &str, namespaces: &BTreeMap<String, String>) -> Result<(), ReadError> {
     for prefix in required.split_whitespace() {
         // Some programs give the namespace itself.
@@ -73,7 +73,7 @@ pub(super) fn check_required(required: &str, namespaces: &BTreeMap<String, Strin
     Ok(())
 }
 
-/// A namespace in a message.
+/// Shortens a namespace for a message.
 fn shown(namespace: &str) -> String {
     const MOST_CHARS: usize = 80;
     namespace.chars().take(MOST_CHARS).collect()

@@ -1,6 +1,6 @@
-//! 3MF: a zip archive of XML files (core specification 1.3, with materials, colours, sets of triangles and
-//! parts in several files), and what slicers add to it: paint, extruders, plates, and volumes that are no part
-//! of the model or are cut out of it.
+//! 3MF: a zip archive of XML files. Reads core specification 1.3, with materials, colours, sets of triangles
+//! and parts in several files, and the additions of slicers: paint, extruders, plates, and volumes that are
+//! no part of the model or are cut out of it.
 
 mod build;
 mod extension;
@@ -19,7 +19,7 @@ use model::Model;
 use package::Package;
 use settings::Settings;
 
-/// Reads a 3MF: all that its build holds, in one mesh.
+/// Reads a 3MF: all objects of its build, in one mesh.
 pub(super) fn read(bytes: &[u8]) -> Result<Loaded, ReadError> {
     let mut package = Package::open(bytes)?;
     let root = package.root()?;

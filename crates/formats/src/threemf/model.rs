@@ -1,4 +1,4 @@
-//! The model of a package: its resources and what is built of them, from all of its model parts.
+//! The model of a package: its resources and its build, from all of its model parts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,74 +10,74 @@ use super::part;
 use super::role::Role;
 use shellock_geom::TriMesh;
 
-/// Files of one package that are read as model parts at most.
+/// Largest number of files of a package that are read as model parts.
 const MAX_PARTS: usize = 1000;
 
-/// All model parts of a package, read into one.
+/// All model parts of a package, combined.
 #[derive(Default)]
 pub(super) struct Model {
-    /// mm.
+    /// Length of a file unit, mm.
     pub(super) unit_mm: f64,
-    /// Whether the file states its unit; else it is the format's default.
+    /// True if the file states its unit. Otherwise it is the format's default.
     pub(super) unit_is_stated: bool,
     pub(super) objects: Vec<Object>,
-    /// What is built.
+    /// Items of the build.
     pub(super) items: Vec<Item>,
     /// Colours of each colour group, by part and id.
     pub(super) color_groups: BTreeMap<(u32, u32), Vec<String>>,
-    /// All that triangles may have as a property, by part and id.
+    /// Groups whose entries triangles may have as a property, by part and id.
     pub(super) groups: BTreeSet<(u32, u32)>,
-    /// Those of them that are coordinates in a picture, by part and id.
+    /// Groups that are texture coordinates, by part and id.
     pub(super) textures: BTreeSet<(u32, u32)>,
     pub(super) notes: Vec<String>,
     /// Names of the parts read, in order; the root is the first.
     pub(super) parts: Vec<String>,
 }
 
-/// A mesh, or objects put together.
+/// A mesh, or an object composed of others.
 #[derive(Default)]
 pub(super) struct Object {
     pub(super) id: u32,
-    /// The model part it stands in.
+    /// Model part that contains the object.
     pub(super) path: String,
-    /// What the file calls it; often nothing.
+    /// Name in the file, often empty.
     pub(super) name: String,
-    /// What its type and Cura's marks make of it, where that is no body.
+    /// Role given by its type and Cura's marks; `None` for a body.
     pub(super) role: Option<Role>,
-    /// The extruder that Cura prints it with, from 1.
+    /// Extruder that Cura assigns to it, from 1.
     pub(super) extruder: Option<u32>,
     pub(super) mesh: TriMesh,
-    /// Paint by triangle, ascending: where its code begins and ends in `paint_text`.
+    /// Paint by triangle, ascending: range of its code in `paint_text`.
     pub(super) paint: Vec<(u32, std::ops::Range<usize>)>,
     pub(super) paint_text: String,
     pub(super) components: Vec<Component>,
-    /// The property of all triangles without one of their own.
+    /// Property of all triangles without one of their own.
     pub(super) whole: Option<Property>,
-    /// By triangle, ascending.
+    /// Property by triangle, ascending.
     pub(super) properties: Vec<(u32, Property)>,
     /// Named sets of triangles: first and last triangle, and the set, from 0.
     pub(super) sets: Vec<(u32, u32, u32)>,
-    /// The extension that gives it a shape which is not read.
+    /// Extension that gives the object an unsupported shape.
     pub(super) unread: Option<&'static str>,
-    /// An element in it that no specification names.
+    /// An element of the object that no specification names.
     pub(super) unknown: Option<String>,
 }
 
-/// An object in its place.
+/// An object with its transform.
 pub(super) struct Component {
     pub(super) path: String,
     pub(super) id: u32,
     pub(super) placed: DAffine3,
 }
 
-/// An object that is built.
+/// An object of the build.
 pub(super) struct Item {
     pub(super) component: Component,
-    /// Whether the slicer is to print it.
+    /// True if the slicer is to print it.
     pub(super) is_printed: bool,
-    /// What Cura's marks make of it, where that is no body.
+    /// Role given by Cura's marks; `None` for a body.
     pub(super) role: Option<Role>,
-    /// The extruder that Cura prints it with, from 1.
+    /// Extruder that Cura assigns to it, from 1.
     pub(super) extruder: Option<u32>,
 }
 
@@ -90,7 +90,7 @@ pub(super) struct Property {
 }
 
 impl Property {
-    /// Part and id of the group.
+    /// Returns the part and the id of the group.
     pub(super) fn group(self) -> (u32, u32) {
         (self.part, self.group)
     }
@@ -104,7 +104,7 @@ impl Object {
             .collect()
     }
 
-    /// The material or colour of a triangle.
+    /// Returns the material or colour of a triangle.
     pub(super) fn property(&self, face: u32) -> Option<Property> {
         let own = self.properties.binary_search_by_key(&face, |(f, _)| *f);
         own.map_or(self.whole, |at| Some(self.properties[at].1))
@@ -131,7 +131,7 @@ impl Model {
                 (model.unit_mm, model.unit_is_stated),
             );
             model.read_part(&next, package)?;
-            // Only the root says what is built, and in which unit.
+            // Only the root defines the build and its unit.
             model.items = items;
             (model.unit_mm, model.unit_is_stated) = unit;
         }
@@ -139,14 +139,14 @@ impl Model {
         Ok(model)
     }
 
-    /// Whether the file has that colour, or the group of that material.
+    /// Returns true if the file has the colour, or the group of the material.
     pub(super) fn has(&self, property: Property) -> bool {
         let group = property.group();
         let n_colors = self.color_groups.get(&group).map(Vec::len);
         self.groups.contains(&group) && n_colors.is_none_or(|n| (property.index as usize) < n)
     }
 
-    /// A part that a component or an item names and that is still to be read.
+    /// Returns a part that a component or an item refers to and that has not been read yet.
     fn next_part(&self) -> Option<String> {
         let named: BTreeSet<&String> = self
             .objects

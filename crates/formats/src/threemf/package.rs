@@ -1,4 +1,4 @@
-//! The archive of a 3MF: its parts by name, and how much of it may still be unpacked.
+//! The archive of a 3MF: its parts by name, and the limit on its unpacked size.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -7,19 +7,19 @@ use super::super::ReadError;
 use super::super::container::{archive, limit, read_bounded, unopened};
 use super::xml;
 
-/// The part that describes what is built, unless the package says otherwise.
+/// Root part, which describes the build, unless the package names another.
 pub(super) const USUAL_ROOT: &str = "3D/3dmodel.model";
-/// The part that names the root part.
+/// Part that names the root part.
 const RELATIONS: &str = "_rels/.rels";
-/// How the type of the relation to the root part ends.
+/// Ending of the relation type for the root part.
 const ROOT_KIND: &str = "/3dmodel";
-/// Parts that hold the paths of tools for a printer, as slicers export them.
+/// Endings of parts with tool paths for a printer, as slicers export them.
 const TOOL_PATHS: [&str; 2] = [".gcode", ".gcode.md5"];
 
-/// A 3MF archive.
+/// A 3MF archive and its remaining budget.
 pub(super) struct Package<'a> {
     archive: zip::ZipArchive<Cursor<&'a [u8]>>,
-    /// Places in the archive by [`key`], below the common folder.
+    /// Index in the archive by [`key`], below the common folder.
     places: BTreeMap<String, usize>,
     bytes_left: u64,
 }
@@ -35,7 +35,7 @@ impl<'a> Package<'a> {
         let mut places = BTreeMap::new();
         for (place, name) in keys.iter().enumerate() {
             if let Some(name) = name.strip_prefix(&folder) {
-                // Of two names that differ in case only the first counts, as it does on most disks.
+                // Of names that differ only in case, the first counts, as on most disks.
                 places.entry(name.to_owned()).or_insert(place);
             }
         }
@@ -46,7 +46,7 @@ impl<'a> Package<'a> {
         })
     }
 
-    /// The text of a part; `None` where there is none of that name.
+    /// Reads the text of a part; `None` if there is no such part.
     pub(super) fn text(&mut self, name: &str) -> Result<Option<String>, ReadError> {
         let Some(&place) = self.places.get(&key(name)) else {
             return Ok(None);
@@ -57,14 +57,14 @@ impl<'a> Package<'a> {
         Ok(Some(xml::text(bytes)))
     }
 
-    /// The name of the root part: what the package's relations name; else the usual one.
+    /// Returns the name of the root part: the one that the package's relations name, else the usual one.
     pub(super) fn root(&mut self) -> Result<String, ReadError> {
         let relations = self.text(RELATIONS)?;
         let target = relations.and_then(|relations| xml::relation_target(&relations, ROOT_KIND));
         Ok(path(target.as_deref().unwrap_or(USUAL_ROOT)))
     }
 
-    /// Names of the parts for which `is_wanted` holds, without folders and in lower case, in order.
+    /// Lists the parts for which `is_wanted` holds, as keys in order: in lower case, below the common folder.
     pub(super) fn names(&self, is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
         self.places
             .keys()
@@ -73,7 +73,7 @@ impl<'a> Package<'a> {
             .collect()
     }
 
-    /// Whether it holds what a slicer made for a printer.
+    /// Returns true if the package holds a slicer's output for a printer.
     pub(super) fn has_tool_paths(&self) -> bool {
         !self
             .names(|name| TOOL_PATHS.iter().any(|end| name.ends_with(end)))
@@ -81,7 +81,7 @@ impl<'a> Package<'a> {
     }
 }
 
-/// The path that a part refers to another by: without %XX, with "/" between folders, from the root.
+/// Normalises a reference to a part: without %XX, with "/" between folders, from the root.
 pub(super) fn path(name: &str) -> String {
     decoded(name)
         .replace('\\', "/")
@@ -89,12 +89,12 @@ pub(super) fn path(name: &str) -> String {
         .to_owned()
 }
 
-/// Two names are of the same part where their keys agree: the case of letters does not count.
+/// Key of a part's name: equal for names of the same part, which may differ in case.
 fn key(name: &str) -> String {
     path(name).to_ascii_lowercase()
 }
 
-/// `name` with each %XX replaced by its byte.
+/// Replaces each %XX in `name` by its byte.
 fn decoded(name: &str) -> String {
     let hex = |b: u8| char::from(b).to_digit(16);
     let (bytes, mut out) = (name.as_bytes(), Vec::with_capacity(name.len()));
@@ -118,8 +118,8 @@ fn decoded(name: &str) -> String {
     String::from_utf8(out).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned())
 }
 
-/// The folder, with its "/", that the whole package lies in: archives that were unpacked and packed again
-/// often have one.
+/// Finds the folder, with its "/", that contains the whole package. Archives that were unpacked and packed
+/// again often have one.
 fn common_folder(keys: &[String]) -> String {
     let usual_root = USUAL_ROOT.to_ascii_lowercase();
     let is_own = |name: &&String| !name.starts_with("__macosx/");

@@ -1,4 +1,4 @@
-//! One model part of a package, element by element.
+//! Reader of one model part of a package, element by element.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +21,7 @@ const GROUPS: [&str; 5] = [
     "compositematerials",
     "multiproperties",
 ];
-/// Elements of an object that are understood, or say nothing of its shape.
+/// Elements of an object that are supported, or do not describe its shape.
 const OBJECT_CHILDREN: [&str; 4] = ["mesh", "components", "metadatagroup", "settings"];
 
 /// Reads the part `name` into `model`.
@@ -54,30 +54,30 @@ pub(super) fn read(name: &str, text: &str, model: &mut Model) -> Result<(), Read
     }
 }
 
-/// Reads one part into the model.
+/// Reader of one part into the model.
 struct PartReader<'a, 'm> {
     elements: Elements<'a>,
     name: &'a str,
     number: u32,
     model: &'m mut Model,
-    /// The first of the model's objects that stands in this part.
+    /// Index of the model's first object from this part.
     first_object: usize,
     /// Ids of the objects so far.
     ids: BTreeSet<u32>,
     open: Open,
 }
 
-/// Elements that are open.
+/// Elements that are open at present.
 #[derive(Default)]
 struct Open {
-    /// All of them, by local name.
+    /// Local names of all open elements.
     path: Vec<String>,
     color_group: Option<(u32, Vec<String>)>,
     object: Option<Object>,
     item: Option<Item>,
     /// Name of a `metadata` or key of a `setting` whose text is still to come.
     key: Option<String>,
-    /// Sets of triangles of the open object.
+    /// Number of triangle sets in the open object.
     n_sets: u32,
 }
 
@@ -111,7 +111,7 @@ impl PartReader<'_, '_> {
         Ok(())
     }
 
-    /// Begins an element that counts within an object alone.
+    /// Begins an element that is valid only within an object.
     fn begin_in_object(&mut self, name: &str, element: &BytesStart) -> Result<(), ReadError> {
         let Some(mut object) = self.open.object.take() else {
             return Ok(());
@@ -128,7 +128,7 @@ impl PartReader<'_, '_> {
         Ok(())
     }
 
-    /// Remembers that the open object has a shape that is not read, where `name` is the element of one.
+    /// Records an unsupported shape of the open object, if `name` is the element of one.
     fn note_shape(&mut self, name: &str) {
         let is_child = self.open.path.last().is_some_and(|parent| parent == "object");
         let Some(object) = &mut self.open.object else {
@@ -211,8 +211,8 @@ impl PartReader<'_, '_> {
                 "type" => kind = value.to_ascii_lowercase(),
                 "pid" => group = Some(number(name, value)?),
                 "pindex" => index = number(name, value)?,
-                // Slices are the shape then. The mesh should be a stand-in only where `meshresolution` says so, but
-                // files of the format's own authors have a box for a sphere and do not.
+                // The slices define the shape then. The mesh should be a stand-in only if `meshresolution`
+                // says so, but files of the format's own authors have a box for a sphere and do not say so.
                 "slicestackid" => is_sliced = true,
                 _ => {}
             }
@@ -235,7 +235,7 @@ impl PartReader<'_, '_> {
 
     fn property(&self, group: u32, index: u32) -> Property {
         let part = self.number;
-        // The index is a place in the picture, not a material.
+        // The index is a texture coordinate, not a material.
         let is_texture = self.model.textures.contains(&(part, group));
         let index = if is_texture { 0 } else { index };
         Property { part, group, index }
@@ -293,7 +293,7 @@ impl PartReader<'_, '_> {
         Ok(())
     }
 
-    /// Adds the triangles of a `ref` or `refrange` to the set that is open.
+    /// Adds the triangles of a `ref` or `refrange` to the open set.
     fn read_reference(&self, element: &BytesStart, object: &mut Object) -> Result<(), ReadError> {
         let (mut first, mut last) = (None, None);
         self.elements.attributes(element, |name, value| {
@@ -339,7 +339,7 @@ impl PartReader<'_, '_> {
         })
     }
 
-    /// Points may come after the triangles that name them.
+    /// Checks corners at the end of the part, as points may come after the triangles that use them.
     fn check_corners(&self) -> Result<(), ReadError> {
         for object in &self.model.objects[self.first_object..] {
             let n_points = object.mesh.points.len();
@@ -355,13 +355,13 @@ impl PartReader<'_, '_> {
     }
 }
 
-/// The index that two corners of a triangle share; that of the first corner where all differ, or where it
-/// alone has one.
+/// Index shared by two corners of a triangle. If all differ, or only the first corner has one, that of the
+/// first.
 fn commonest([a, b, c]: [Option<u32>; 3]) -> Option<u32> {
     if b.is_some() && b == c { b } else { a }
 }
 
-/// Twelve numbers: the images of the axes and of the origin.
+/// Parses twelve numbers: the images of the axes and of the origin.
 fn transform(text: &str) -> Result<DAffine3, String> {
     let mut m = [0.0; 12];
     let mut words = text.split_ascii_whitespace();

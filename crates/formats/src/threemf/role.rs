@@ -1,22 +1,22 @@
-//! Roles of parts: what is printed, what is cut out, and what only steers a slicer.
+//! Roles of parts: printed, cut out, or only instructions to a slicer.
 
-/// What a slicer does with a part.
+/// Role of a part for a slicer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
-    /// Prints it.
+    /// Part that is printed.
     Body,
-    /// Cuts it out of the bodies of the same item.
+    /// Part that is cut out of the bodies of the same item.
     Negative,
-    /// Prints what lies in it otherwise.
+    /// Region whose content is printed with other settings.
     Modifier,
-    /// Supports the model there, or does not.
+    /// Region in which supports are enforced or blocked.
     Support,
-    /// Does nothing: the file says that it is no part of the model.
+    /// Object that the file declares to be no part of the model.
     Other,
 }
 
 impl Role {
-    /// The role that PrusaSlicer, Bambu Studio, OrcaSlicer and their kin mean by the type of a volume.
+    /// Role of a volume by its type in PrusaSlicer, Bambu Studio, OrcaSlicer and their kin.
     pub(super) fn of_volume(kind: &str) -> Self {
         match kind {
             "ModelPart" | "normal_part" => Self::Body,
@@ -26,7 +26,7 @@ impl Role {
         }
     }
 
-    /// The role that Cura means by a mark of a mesh, without its prefix; `None` where it is no such mark.
+    /// Role of a mesh by Cura's mark, without its prefix; `None` if it is no such mark.
     pub(super) fn of_cura(mark: &str) -> Option<Self> {
         match mark {
             "support_mesh" | "anti_overhang_mesh" => Some(Self::Support),
@@ -35,7 +35,7 @@ impl Role {
         }
     }
 
-    /// The role that the type of an object gives it (core specification 1.3, section 4).
+    /// Role of an object by its type (core specification 1.3, section 4); `None` for an unknown type.
     pub(super) fn of_type(kind: &str) -> Option<Self> {
         match kind {
             "" | "model" => Some(Self::Body),
@@ -45,7 +45,7 @@ impl Role {
         }
     }
 
-    /// What parts of this role are, for messages: "left out as …".
+    /// Description of parts of this role, for messages: "left out as …".
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::Body => "parts of the model",
@@ -57,20 +57,20 @@ impl Role {
     }
 }
 
-/// How a part is used where it occurs: said of an object, of a component in it, of an item of the build.
+/// Usage of a part where it occurs, as given for an object, for a component in it, or for a build item.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Usage<'a> {
     pub(super) role: Role,
-    /// Which extruder or filament prints it, from 1; `None` where nothing is said.
+    /// Number of the extruder or filament that prints it, from 1; `None` if not given.
     pub(super) extruder: Option<u32>,
-    /// The item of the build that it belongs to, from 0.
+    /// Build item that it belongs to, from 0.
     pub(super) item: u32,
-    /// What it is called.
+    /// Name of the part.
     pub(super) name: Option<&'a str>,
 }
 
 impl Usage<'_> {
-    /// A body of which nothing else is said.
+    /// A body without any further attribute.
     pub(super) const PLAIN: Self = Self {
         role: Role::Body,
         extruder: None,
@@ -80,8 +80,8 @@ impl Usage<'_> {
 }
 
 impl<'a> Usage<'a> {
-    /// How a part is used that is used as `inner` within what is used as `self`: what is around decides
-    /// whether it is printed, the part itself by which extruder.
+    /// Combines the usage `inner` of a part with the usage `self` of what contains it. The outer role decides
+    /// unless it is a body; extruder and name are the inner ones, if given.
     pub(super) fn with(self, inner: Self) -> Self {
         Self {
             role: if self.role == Role::Body {
@@ -96,7 +96,7 @@ impl<'a> Usage<'a> {
     }
 }
 
-/// Whether the text of a setting means yes.
+/// Returns true if the text of a setting means yes.
 pub(super) fn is_yes(text: &str) -> bool {
     matches!(text.trim().to_ascii_lowercase().as_str(), "true" | "1" | "yes")
 }

@@ -1,4 +1,4 @@
-//! Notes of slicers beside the model: names, plates, extruders, and volumes that are no part of the model.
+//! Slicers' settings beside the model: names, plates, extruders, and volumes that are no part of the model.
 
 use std::collections::BTreeMap;
 
@@ -8,27 +8,27 @@ use super::package::Package;
 use super::role::{Role, Usage};
 use super::xml::{Elements, Next, number};
 
-/// How the names end under which PrusaSlicer and SuperSlicer, and Bambu Studio and OrcaSlicer have them.
+/// Endings of the settings files of PrusaSlicer and SuperSlicer, and of Bambu Studio and OrcaSlicer.
 const FILE_ENDS: [&str; 2] = ["_model.config", "model_settings.config"];
-/// Volumes that have the same triangle at most; further ones are hostile and are passed over.
+/// Largest mean number of volumes per triangle; further ones are hostile and are skipped.
 const MAX_OVERLAP: usize = 8;
 
-/// All that slicers note.
+/// All settings of slicers.
 #[derive(Default)]
 pub(super) struct Settings {
-    /// By the ids of the root part's objects.
+    /// Settings by the ids of the root part's objects.
     objects: BTreeMap<u32, ObjectSettings>,
-    /// In the order of the file.
+    /// Plates in the order of the file.
     plates: Vec<Plate>,
-    /// The plate of an object's item in the build, by the object's id and the item's number among its own.
+    /// Plate of an object's build item, by the object's id and the item's number among its own.
     plate_of: BTreeMap<(u32, u32), usize>,
 }
 
-/// Notes on an object of the root part.
+/// Settings of an object of the root part.
 #[derive(Default)]
 pub(super) struct ObjectSettings {
     pub(super) name: Option<String>,
-    /// From 1; `None` where nothing is said.
+    /// Number of the extruder, from 1; `None` if not given.
     pub(super) extruder: Option<u32>,
     volumes: Vec<Volume>,
 }
@@ -41,12 +41,12 @@ struct Volume {
     extruder: Option<u32>,
 }
 
-/// What a volume is made of.
+/// Content of a volume.
 #[derive(Clone, Copy)]
 enum Of {
     /// Triangles of the object itself, first and last.
     Faces(u32, u32),
-    /// The component that names the object of this id, or the object itself.
+    /// The component that refers to the object of this id, or the object itself.
     Part(u32),
 }
 
@@ -57,19 +57,19 @@ pub(super) struct Plate {
     pub(super) name: Option<String>,
 }
 
-/// Which elements are open.
+/// Elements that are open at present.
 #[derive(Default)]
 struct Open {
     object: Option<u32>,
     in_volume: bool,
     plate: Option<Plate>,
-    /// The object and item of a plate's `model_instance`.
+    /// Object and item of a plate's `model_instance`.
     instance: Option<(Option<u32>, u32)>,
 }
 
 impl Settings {
-    /// What the package holds of them. A file that cannot be read adds nothing, since models come without it
-    /// as well.
+    /// Reads all settings in the package. A file that cannot be read adds nothing, since models without it
+    /// are valid, too.
     pub(super) fn read(package: &mut Package) -> Self {
         let mut settings = Self::default();
         for name in package.names(|name| FILE_ENDS.iter().any(|end| name.ends_with(end))) {
@@ -84,7 +84,7 @@ impl Settings {
         self.objects.get(&id)
     }
 
-    /// The plate on which the `instance`-th item of an object lies.
+    /// Returns the plate of the `instance`-th item of an object.
     pub(super) fn plate(&self, object: u32, instance: u32) -> Option<&Plate> {
         self.plate_of
             .get(&(object, instance))
@@ -118,7 +118,7 @@ impl Settings {
                 let last = attribute("lastid").unwrap_or(u32::MAX);
                 self.begin_volume(Of::Faces(first, last), Role::Body, open);
             }
-            // An object of its own, put into this one.
+            // An object of its own, placed in this one.
             "part" => {
                 let kind: Option<String> = attribute_text(elements, element, "subtype");
                 let role = kind.map_or(Role::Body, |kind| Role::of_volume(&kind));
@@ -170,7 +170,7 @@ impl Settings {
         let Some(object) = open.object.and_then(|id| self.objects.get_mut(&id)) else {
             return;
         };
-        // 0 means: as the object.
+        // 0 stands for the extruder of the object.
         let extruder = || value.parse().ok().filter(|&e: &u32| e > 0);
         let name = || Some(value.clone()).filter(|name| !name.is_empty());
         match (key.as_str(), object.volumes.last_mut().filter(|_| open.in_volume)) {
@@ -179,7 +179,7 @@ impl Settings {
             ("name", Some(volume)) => volume.name = name(),
             ("name", None) => object.name = name(),
             ("volume_type", Some(volume)) => volume.role = Role::of_volume(&value),
-            // Before volumes had types.
+            // Used before volumes had types.
             ("modifier", Some(volume)) if value == "1" => volume.role = Role::Modifier,
             _ => {}
         }
@@ -199,10 +199,11 @@ impl Plate {
 }
 
 impl ObjectSettings {
-    /// How each of an object's components is used; `ids` are those of the objects that they name.
+    /// Returns the usage of each of an object's components; `ids` are those of the objects that they refer
+    /// to.
     ///
-    /// Ids begin anew in each file of a package, so several components may have the same: volumes of that id
-    /// are for them in order.
+    /// Ids start anew in each file of a package, so several components may have the same one. Volumes of that
+    /// id belong to them in order.
     pub(super) fn of_components(&self, ids: &[u32]) -> Vec<Usage<'_>> {
         let mut usages = vec![Usage::PLAIN; ids.len()];
         let mut places: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
@@ -218,11 +219,11 @@ impl ObjectSettings {
         usages
     }
 
-    /// The volume that each of the object's own `n_triangles` triangles belongs to, for [`Self::usage`];
-    /// nothing where no volume says so.
+    /// Returns the volume of each of the object's own `n_triangles` triangles, for [`Self::usage`]; empty if
+    /// no volume has any.
     pub(super) fn of_triangles(&self, id: u32, n_triangles: usize) -> Vec<u16> {
         let mut volume_of = Vec::new();
-        // Volumes of an object share no triangles, but for the one that is the object itself.
+        // Volumes of an object share no triangles, except with one that is the object itself.
         let mut work_left = MAX_OVERLAP * n_triangles;
         for (number, volume) in (1_u16..=u16::MAX).zip(&self.volumes) {
             let (first, last) = match volume.of {
@@ -242,7 +243,7 @@ impl ObjectSettings {
         volume_of
     }
 
-    /// How a volume of [`Self::of_triangles`] is used.
+    /// Returns the usage of a volume of [`Self::of_triangles`].
     pub(super) fn usage(&self, volume: u16) -> Usage<'_> {
         let place = usize::from(volume).checked_sub(1);
         place

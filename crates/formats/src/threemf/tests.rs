@@ -9,7 +9,7 @@ use shellock_geom::check::into_solid;
 
 mod roles;
 
-/// Where PrusaSlicer, and where Bambu Studio have their settings.
+/// Settings files of PrusaSlicer and of Bambu Studio.
 const PRUSA: &str = "Metadata/Slic3r_PE_model.config";
 const BAMBU: &str = "Metadata/model_settings.config";
 const HEAD: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -51,7 +51,7 @@ fn units_components_and_transforms_put_parts_where_they_belong() {
         (loaded.format, loaded.unit_mm, loaded.mesh.triangles.len()),
         (Format::ThreeMf, Some(25.4), 8)
     );
-    // x to y, y to −x, then up.
+    // Maps x to y and y to −x, then moves up.
     assert_eq!(loaded.mesh.points[1], Vec3::new(0.0, 1.0, 100.0));
     assert_eq!(loaded.mesh.points[5], Vec3::new(0.0, 12.0, 100.0));
     assert!((loaded.mesh.signed_volume() - 9.0 / 6.0).abs() < 1e-12);
@@ -130,7 +130,7 @@ fn what_is_not_to_print_is_left_out_unless_nothing_else_is_there() {
 #[test]
 fn paint_of_both_kinds_of_slicers_becomes_triangles_with_labels() {
     for attribute in ["slic3rpe:mmu_segmentation", "paint_color"] {
-        // Three sides split; the corner at point 0 has colour 2, all else is unpainted.
+        // Three sides split; the corner at point 0 has colour 2, the rest is unpainted.
         let painted = TETRAHEDRON.replace(
             r#"v1="0" v2="1" v3="3""#,
             &format!(r#"v1="0" v2="1" v3="3" {attribute}="80003""#),
@@ -143,7 +143,7 @@ fn paint_of_both_kinds_of_slicers_becomes_triangles_with_labels() {
         let (solid, _) = into_solid(&loaded.mesh).unwrap();
         assert!((solid.volume() - 1.0 / 6.0).abs() < 1e-15);
         let labels = loaded.labels(LabelSource::Paint).unwrap();
-        // Unpainted is what the first extruder prints.
+        // Unpainted triangles are printed by the first extruder.
         let area = |label: i64| -> f64 {
             (0..labels.len())
                 .filter(|&f| labels[f] == label)

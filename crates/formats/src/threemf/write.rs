@@ -1,4 +1,4 @@
-//! Writing 3MF: a zip archive of three XML files (3MF core specification 1.3, with its base materials).
+//! Writer of 3MF: a zip archive of three XML files (3MF core specification 1.3, with its base materials).
 
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
@@ -12,22 +12,22 @@ use shellock_geom::TriMesh;
 /// An object of a 3MF model.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedObject<'a> {
-    /// Shown by slicers; any text.
+    /// Name shown by slicers; any text is safe.
     pub name: &'a str,
-    /// sRGB.
+    /// Colour in sRGB: red, green, blue.
     pub color: [u8; 3],
-    /// mm.
+    /// Mesh of the object, mm.
     pub mesh: &'a TriMesh,
-    /// How it is turned on the plate: where the x, y and z axes go; as it is where `None`.
+    /// Rotation on the plate, as images of the x, y and z axes; none if `None`.
     pub turned: Option<[[f64; 3]; 3]>,
-    /// Where it is moved after that, mm.
+    /// Translation after the rotation, mm.
     pub moved_mm: [f64; 3],
 }
 
 const TITLE: &str = "Shellock pieces";
-/// Where PrusaSlicer's attributes belong.
+/// Namespace of PrusaSlicer's attributes.
 const PAINT_NAMESPACE: &str = r#" xmlns:slic3rpe="http://schemas.slic3r.org/3mf/2017/06""#;
-/// PrusaSlicer's versions of its additions and of the paint.
+/// Versions of PrusaSlicer's additions and of the paint.
 const PAINT_VERSION: &str = "<metadata name=\"slic3rpe:Version3mf\">1</metadata>\n\
                              <metadata name=\"slic3rpe:MmPaintingVersion\">1</metadata>\n";
 const RELATIONS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -37,22 +37,23 @@ const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
 "#;
 
-/// A 3MF model with one build item for each object, in millimetres; the same objects give the same bytes
-/// everywhere.
+/// Writes a 3MF model with one build item per object, in millimetres. Deterministic: equal objects give equal
+/// bytes on every platform.
 ///
-/// Coordinates are rounded to `f32`, as slicers read them. Slicers refuse objects without triangles.
+/// Coordinates are rounded to `f32`, as slicers read them. Slicers reject objects without triangles.
 pub fn write_3mf(objects: &[NamedObject]) -> Vec<u8> {
     package(&model_xml(objects))
 }
 
-/// A 3MF of one body in millimetres whose triangles are painted: colour k, from 1 to 16, is the k-th extruder
-/// or filament.
+/// Writes a 3MF of one body in millimetres with painted triangles: colour k, from 1 to 16, is the k-th
+/// extruder or filament, and 0 is no paint.
 ///
-/// PrusaSlicer, Bambu Studio and OrcaSlicer show the paint, each reading its own attribute; there it can be
-/// changed, and [`super::super::read_mesh`] reads it back, points and all.
+/// PrusaSlicer, Bambu Studio and OrcaSlicer show the paint, each reading its own attribute, and can change
+/// it. [`super::super::read_mesh`] reads it back, with exact points.
 ///
 /// # Panics
-/// Where `colors` has another length than the triangles.
+///
+/// Panics if `colors` and the triangles differ in number.
 pub fn write_painted_3mf(name: &str, mesh: &TriMesh, colors: &[u32]) -> Vec<u8> {
     assert_eq!(colors.len(), mesh.triangles.len(), "one colour for each triangle");
     let mut xml = head("Shellock segmentation", PAINT_NAMESPACE, PAINT_VERSION);
@@ -65,7 +66,7 @@ pub fn write_painted_3mf(name: &str, mesh: &TriMesh, colors: &[u32]) -> Vec<u8> 
     package(&xml)
 }
 
-/// The archive around a model.
+/// Packs a model into an archive.
 fn package(model: &str) -> Vec<u8> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
@@ -92,7 +93,7 @@ fn package(model: &str) -> Vec<u8> {
     archive.finish().expect("memory takes all bytes").into_inner()
 }
 
-/// The text up to the resources, with a further namespace and further metadata.
+/// XML up to the resources, with an additional namespace and additional metadata.
 fn head(title: &str, namespace: &str, metadata: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
@@ -102,7 +103,7 @@ fn head(title: &str, namespace: &str, metadata: &str) -> String {
 }
 
 fn model_xml(objects: &[NamedObject]) -> String {
-    /// Resource of the colours; objects follow it.
+    /// Id of the resource with the colours; objects follow it.
     const MATERIALS_ID: usize = 1;
     let object_id = |i: usize| MATERIALS_ID + 1 + i;
 
@@ -158,7 +159,7 @@ fn add_mesh(xml: &mut String, mesh: &TriMesh, colors: Option<&[u32]>) {
         let exact = p.to_array();
         let [x, y, z] = exact.map(|x| x as f32);
         match colors {
-            // Seams of patches come closer together than floats tell apart.
+            // Points at the seams of patches are too close together for 32-bit floats to separate.
             Some(_) => add(
                 xml,
                 format_args!(
@@ -189,7 +190,7 @@ fn add(xml: &mut String, text: std::fmt::Arguments) {
     xml.write_fmt(text).expect("a string takes all text");
 }
 
-/// A text as XML attribute; characters that XML 1.0 forbids become "�".
+/// Text escaped for an XML attribute; characters that XML 1.0 forbids become "�".
 struct Escaped<'a>(&'a str);
 
 impl std::fmt::Display for Escaped<'_> {

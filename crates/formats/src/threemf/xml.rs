@@ -1,4 +1,4 @@
-//! The little of XML that 3MF needs: elements with their attributes and text, and where they stand.
+//! The subset of XML that 3MF needs: elements with their attributes, text and place.
 //!
 //! Elements and attributes are known by their local names: a prefix is the file's choice.
 
@@ -9,30 +9,30 @@ use quick_xml::reader::Reader;
 
 use super::super::{Place, ReadError, container};
 
-/// A part as text; what is no UTF-8 becomes "�" and fails where it matters.
+/// Decodes a part as text. Invalid UTF-8 becomes "�" and fails where it matters.
 pub(super) fn text(bytes: Vec<u8>) -> String {
     let bytes = container::as_utf8(bytes);
     String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned())
 }
 
-/// The elements of a part in order.
+/// Elements of a part, in order.
 pub(super) struct Elements<'a> {
     reader: Reader<&'a [u8]>,
     part: &'a str,
-    /// How many elements are open.
+    /// Number of open elements.
     depth: usize,
 }
 
-/// Elements within elements that are followed; 3MF has some 6.
+/// Largest depth of nested elements; 3MF has about 6.
 const MAX_DEPTH: usize = 64;
 
-/// What comes next.
+/// Next event of a part.
 pub(super) enum Next<'a> {
-    /// An element begins; one without content ends at once.
+    /// Begin of an element; one without content ends at once.
     Begin(BytesStart<'a>),
-    /// Text within the open element, without the blanks around it.
+    /// Text within the open element, trimmed.
     Text(String),
-    /// The element of this local name ends.
+    /// End of the element of this local name.
     End(String),
 }
 
@@ -47,7 +47,7 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// The next begin, text or end; `None` at the end of the part.
+    /// Returns the next begin, text or end; `None` at the end of the part.
     pub(super) fn next(&mut self) -> Result<Option<Next<'a>>, ReadError> {
         loop {
             match self.reader.read_event() {
@@ -76,8 +76,8 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// Hands each attribute of `element` to `take` by its local name, and refuses two of the same full name.
-    /// Declarations of namespaces are no attributes.
+    /// Calls `take` with each attribute of `element` by its local name; an error if two have the same full
+    /// name. Declarations of namespaces are no attributes.
     pub(super) fn attributes(
         &self,
         element: &BytesStart,
@@ -89,7 +89,7 @@ impl<'a> Elements<'a> {
         })
     }
 
-    /// The namespaces that `element` declares, by prefix; the default one has the prefix "".
+    /// Returns the namespaces that `element` declares, by prefix; the default one has the prefix "".
     pub(super) fn namespaces(&self, element: &BytesStart) -> Result<BTreeMap<String, String>, ReadError> {
         let mut found = BTreeMap::new();
         self.raw_attributes(element, |name, value| {
@@ -101,7 +101,7 @@ impl<'a> Elements<'a> {
         Ok(found)
     }
 
-    /// The attribute of this local name as text; nothing where it is not there.
+    /// Returns the attribute of this local name as text; empty if missing.
     pub(super) fn string(&self, element: &BytesStart, wanted: &str) -> Result<String, ReadError> {
         let mut found = String::new();
         self.attributes(element, |name, value| {
@@ -132,7 +132,7 @@ impl<'a> Elements<'a> {
         Ok(())
     }
 
-    /// "part, byte: reason".
+    /// Creates the error "part, byte: reason".
     pub(super) fn error(&self, reason: impl std::fmt::Display) -> ReadError {
         let at = Place::Byte(self.reader.buffer_position() as usize);
         ReadError::Xml {
@@ -143,12 +143,12 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// A name without its prefix.
+/// Removes the prefix of a name.
 pub(super) fn local(name: &str) -> &str {
     name.rsplit_once(':').map_or(name, |(_, local)| local)
 }
 
-/// The prefix that an attribute declares, where it is the declaration of a namespace.
+/// Returns the prefix that an attribute declares, if it declares a namespace.
 fn declared_prefix(name: &str) -> Option<&str> {
     match name.strip_prefix("xmlns")? {
         "" => Some(""),
@@ -156,7 +156,7 @@ fn declared_prefix(name: &str) -> Option<&str> {
     }
 }
 
-/// The value of an attribute as a number.
+/// Parses the value of an attribute as a number.
 pub(super) fn number<T: std::str::FromStr>(name: &str, value: &str) -> Result<T, String> {
     value.trim().parse().map_err(|_| {
         let shown: String = value.chars().take(40).collect();
@@ -164,7 +164,7 @@ pub(super) fn number<T: std::str::FromStr>(name: &str, value: &str) -> Result<T,
     })
 }
 
-/// The target of the first relation whose type ends in `kind`.
+/// Returns the target of the first relation whose type ends in `kind`.
 pub(super) fn relation_target(relations: &str, kind: &str) -> Option<String> {
     let mut elements = Elements::of("_rels/.rels", relations);
     while let Ok(Some(next)) = elements.next() {

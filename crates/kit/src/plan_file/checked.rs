@@ -1,4 +1,4 @@
-//! What others work with, once it is known that the file's parts agree.
+//! Accessors that check the file's parts against each other before others work with them.
 
 use std::ops::RangeInclusive;
 
@@ -8,9 +8,9 @@ use shellock_geom::Vec3;
 
 use super::{PlanFile, PlanFileError};
 
-/// Sizes D of connectors that pairs can have, mm.
+/// Range of connector sizes D that pairs can have, mm.
 const SIZES_MM: RangeInclusive<f64> = 0.1..=20.0;
-/// How much the square of a unit vector's length may differ from 1: files have been rounded by hand.
+/// Tolerance on the squared length of a unit vector: some files have been rounded by hand.
 const UNIT_SLACK: f64 = 0.01;
 
 fn wrong(what: String) -> PlanFileError {
@@ -24,7 +24,10 @@ fn no_direction(piece: PatchId) -> PlanFileError {
 }
 
 impl PlanFile {
-    /// The order and the directions, if every piece stands at the place of its id and is installed once.
+    /// Returns the order and the directions.
+    ///
+    /// Errors if a piece is not at the index of its id, if a direction is no unit vector, or if the order
+    /// does not name every piece exactly once.
     pub fn order(&self) -> Result<InstallationPlan, PlanFileError> {
         let mut directions = Vec::new();
         for (i, piece) in self.pieces.iter().enumerate() {
@@ -62,7 +65,7 @@ impl PlanFile {
         }
     }
 
-    /// Whether the direction of every piece is a unit vector.
+    /// Returns an error unless the direction of every piece is a unit vector.
     pub fn check_directions(&self) -> Result<(), PlanFileError> {
         let is_unit = |d: [f64; 3]| (Vec3::from(d).length_squared() - 1.0).abs() <= UNIT_SLACK;
         match self.pieces.iter().find(|p| !is_unit(p.installation_direction)) {
@@ -71,7 +74,7 @@ impl PlanFile {
         }
     }
 
-    /// Whether faces are so far apart that they can hold each other: farther, and everything touches.
+    /// Returns an error unless the clearance is within 0 to 1 mm. Everything would touch at larger ones.
     pub fn check_clearance(&self) -> Result<(), PlanFileError> {
         const MOST_MM: f64 = 1.0;
         if (0.0..=MOST_MM).contains(&self.clearance) {
@@ -83,7 +86,9 @@ impl PlanFile {
         )))
     }
 
-    /// The places where the key presses on purpose, if none presses deeper than any is made.
+    /// Returns the press fits of the key.
+    ///
+    /// Errors if the interference of one is negative or larger than any that is made.
     pub fn checked_press_fits(&self) -> Result<&[PressFit], PlanFileError> {
         let range_mm = 0.0..=PressFit::MOST_INTERFERENCE_MM;
         match self
@@ -100,13 +105,15 @@ impl PlanFile {
         }
     }
 
-    /// Thickness of the walls, mm.
+    /// Returns the wall thickness, mm; an error if the file lacks it.
     pub fn thickness_mm(&self) -> Result<f64, PlanFileError> {
         self.shell_thickness
             .ok_or_else(|| PlanFileError::missing("shell_thickness"))
     }
 
-    /// The connectors' sizes: one for all, or those of each pair.
+    /// Returns the connector sizes: one for all pairs, or those of each pair.
+    ///
+    /// Errors if the sizes are missing, empty, out of range, or name a piece that does not exist.
     pub fn sizes(&self) -> Result<ConnectorSizes, PlanFileError> {
         let default_mm = self
             .connector_size

@@ -1,4 +1,4 @@
-//! The objects within the file. Places and directions are in assembly space unless said otherwise.
+//! Objects within the file. Places and directions are in assembly space unless stated otherwise.
 
 use serde::{Deserialize, Serialize};
 use shellock::strength::Material;
@@ -7,152 +7,151 @@ use shellock_assembly::verify::{Check, Finding, ThinFeature};
 
 use super::{even_null, if_readable};
 
-/// The model that a kit was made from.
+/// Model that a kit was made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputEntry {
-    /// Name of its file, without folders.
+    /// Name of the model's file, without folders.
     #[serde(default)]
     pub file: String,
     /// SHA-256 of that file, in lower-case hexadecimal digits.
     #[serde(default)]
     pub sha256: String,
-    /// Assembly space from the file's coordinates: 4 × 4, row by row.
+    /// Transform from the file's coordinates to assembly space: 4 × 4, row by row.
     pub transform: [f64; 16],
-    /// Whether only the largest body of the file was taken.
+    /// True if only the largest body of the file was taken.
     #[serde(default)]
     pub largest_only: bool,
-    /// The object of the file that was taken, where one was chosen.
+    /// Object of the file that was taken, if one was chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
-    /// The plate of the slicer's project that was taken, where one was chosen.
+    /// Plate of the slicer's project that was taken, if one was chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plate: Option<String>,
-    /// What was changed to make one body of it.
+    /// Repairs that made one body of it.
     #[serde(default)]
     pub repairs: Vec<RepairEntry>,
 }
 
-/// What was changed to make one body.
+/// A kind of repair made to get one body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RepairEntry {
-    /// A short name for machines.
+    /// Short machine-readable name of the repair.
     pub kind: String,
-    /// How often; at least once.
+    /// Number of such repairs, at least 1.
     pub count: usize,
-    /// The first place, in the file's own units and coordinates.
+    /// Place of the first one, in the file's own units and coordinates.
     pub at: [f64; 3],
-    /// For people.
+    /// Message for the user.
     pub message: String,
 }
 
-/// What the walls bear.
+/// Strength of the walls in falls.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StrengthEntry {
-    /// What they are made of; `None` where version 1 told it in another way.
+    /// Material of the walls; `None` if version 1 gave it in another form.
     pub material: Option<Material>,
     /// Height of the falls, m.
     pub drop_m: f64,
-    /// How many falls were computed.
+    /// Number of falls computed.
     pub n_falls: usize,
-    /// The stress that counts, MPa.
+    /// Decisive stress of the walls, MPa: all but the worst 0.5 % of the hollow wall stay below.
     pub stress_mpa: f64,
-    /// Whether no wall in the limits bears its stress.
+    /// True if no wall thickness within the limits withstands its stress.
     pub is_too_weak: bool,
-    /// Where that stress is, mm.
+    /// Place of that stress, mm.
     pub at: [f64; 3],
     /// Number of the fall that decides, from 1.
     pub deciding_fall: usize,
-    /// What is down in that fall, a unit vector.
+    /// Downward direction in that fall, a unit vector.
     pub down: [f64; 3],
-    /// All thicknesses that were looked at, ascending.
+    /// All thicknesses that were examined, ascending.
     #[serde(default)]
     pub tried: Vec<TriedEntry>,
-    /// Where the model is too thin to be hollow, the largest first.
+    /// Regions where the model is too thin to be hollow, largest first.
     #[serde(default)]
     pub solid: Vec<SolidEntry>,
 }
 
-/// The stress of one thickness.
+/// Stress at one wall thickness.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TriedEntry {
     /// Thickness of the wall, mm.
     pub thickness_mm: f64,
-    /// The stress that counts, in the worst fall, MPa.
+    /// Decisive stress in the worst fall, MPa.
     pub stress_mpa: f64,
 }
 
-/// A part of the surface with no cavity below.
+/// A part of the surface without a cavity below.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolidEntry {
-    /// Its area, mm².
+    /// Area of the part, mm².
     pub area_mm2: f64,
-    /// Its middle, mm.
+    /// Middle of the part, mm.
     pub at: [f64; 3],
 }
 
 /// Size of the connectors between two pieces.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PairSizeEntry {
-    /// The two, the lower id first.
+    /// Ids of both pieces, the lower one first.
     pub pieces: [PatchId; 2],
-    /// Size D, mm.
+    /// Connector size D, mm.
     pub size_mm: f64,
 }
 
-/// How the key was cut.
+/// Geometry of the key's cut.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeyEntry {
-    /// Length of the rails that it slides on, mm; 0 where it has none.
+    /// Length of the rails that the key slides on, mm; 0 if it has none.
     pub rails: f64,
-    /// Its surface, mm².
+    /// Surface area of the key, mm².
     pub area_mm2: f64,
-    /// Share of its surface on its plane, in [0, 1].
+    /// Share of the key's surface on its plane, in [0, 1].
     pub flat_share: f64,
-    /// The same along the worse of its two sides, in [0, 1].
+    /// Share of the surface on the plane along the worse of the key's two sides, in [0, 1].
     pub side_share: f64,
-    /// The way that it slides out, a unit vector.
+    /// Direction in which the key slides out, a unit vector.
     pub slide: [f64; 3],
-    /// Normal of its plane, a unit vector.
+    /// Normal of the key's plane, a unit vector.
     pub plane_normal: [f64; 3],
 }
 
-/// A piece.
+/// A piece of the kit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PieceEntry {
-    /// Its number: the first to go in is 1. Pieces are listed in this order.
+    /// Number of the piece: the first to be installed is 1. Pieces are listed in this order.
     pub id: PatchId,
-    /// Its mesh, as a path within the kit.
+    /// Path of its mesh within the kit.
     pub file: Option<String>,
     /// Pieces that share a seam with it, ascending.
     #[serde(default)]
     pub neighbors: Vec<PatchId>,
-    /// Its volume, mm³.
+    /// Volume of the piece, mm³.
     pub volume_mm3: Option<f64>,
-    /// Along which it moves in, a unit vector.
+    /// Direction in which the piece moves into its place, a unit vector.
     pub installation_direction: [f64; 3],
-    /// Triangles of its mesh.
+    /// Number of triangles of its mesh.
     pub n_triangles: Option<usize>,
     /// Share of its volume that is thinner than the thinnest wall, in [0, 1].
     pub thin_share: Option<f64>,
-    /// Its sheets that may break off and slots that may fuse, 2 mm or longer, the longest first.
+    /// Sheets that may break off and slots that may fuse, 2 mm or longer, longest first.
     #[serde(default)]
     pub thin_places: Vec<ThinFeature>,
-    /// How far it moves within its gaps; `None` where nothing ends its motions.
+    /// Play of the piece within its gaps; `None` if nothing stops its motions.
     pub rattle: Option<RattleEntry>,
 }
 
-/// How far a piece moves while no other does.
+/// Play of a piece while no other moves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RattleEntry {
     /// Greatest displacement of its centroid, mm.
     pub translation_mm: f64,
-    /// Greatest turn, degrees.
+    /// Greatest rotation of the piece, degrees.
     pub rotation_deg: f64,
-    /// Whether no path of motions of any size goes farther.
+    /// True if it is proven that no path of motions of any size goes farther.
     #[serde(default)]
     pub is_proven: bool,
-    /// How far it moves while all but one piece may; only where that was asked for, and null where nothing is
-    /// proven.
+    /// Play of the piece if all but one may move. Present only on request, and null if nothing is proven.
     #[serde(
         default,
         deserialize_with = "even_null",
@@ -161,148 +160,148 @@ pub struct RattleEntry {
     pub together: Option<Option<PlayEntry>>,
 }
 
-/// How far a piece moves.
+/// Play of a piece, by motions of any size.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlayEntry {
     /// Greatest displacement of its centroid, mm.
     pub translation_mm: f64,
-    /// Greatest turn, degrees.
+    /// Greatest rotation of the piece, degrees.
     pub rotation_deg: f64,
-    /// Whether no path of motions of any size goes farther.
+    /// True if it is proven that no path of motions of any size goes farther.
     #[serde(default)]
     pub is_proven: bool,
 }
 
-/// A run of connectors.
+/// A run of connectors along a seam.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointEntry {
-    /// The piece with the pin.
+    /// Piece with the pin.
     pub male: PatchId,
-    /// The piece with the channel.
+    /// Piece with the channel.
     pub female: PatchId,
-    /// Length along the seam, mm; 0 where the run was given up.
+    /// Length along the seam, mm; 0 if the run was given up.
     pub length_mm: f64,
-    /// Volume of the pin and of the channel below the wall, mm³.
+    /// Volumes of the pin and of the channel below the wall, mm³.
     pub volume_mm3: [f64; 2],
     /// Share of each half that survived the carving, in [0, 1].
     pub kept: [f64; 2],
-    /// Its middle, mm.
+    /// Middle of the run, mm.
     pub at: [f64; 3],
 }
 
 /// A seam on the inner surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactEntry {
-    /// The piece installed later.
+    /// Piece that is installed later.
     pub later: PatchId,
-    /// The piece installed earlier.
+    /// Piece that is installed earlier.
     pub earlier: PatchId,
-    /// Its length, mm.
+    /// Length of the seam, mm.
     pub length_mm: f64,
-    /// Length on which a connector can be, mm.
+    /// Length usable for a connector, mm.
     pub usable_mm: f64,
-    /// A point in its middle, mm.
+    /// A point in the middle of the seam, mm.
     pub at: [f64; 3],
 }
 
-/// Least gaps between pieces, mm; beneath the rim means all but what is meant to touch. `None` where no two
-/// come near.
+/// Least gaps between pieces, mm. "Beneath the rim" means everything except faces that are meant to touch.
+/// `None` if no two pieces come near.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GapsEntry {
-    /// In the assembly, mm.
+    /// Least gap in the assembly, mm.
     pub at_rest_mm: Option<f64>,
-    /// In the assembly beneath the rim, mm.
+    /// Least gap in the assembly beneath the rim, mm.
     pub at_rest_beneath_rim_mm: Option<f64>,
-    /// On the way in, mm.
+    /// Least gap during installation, mm.
     pub on_the_way_mm: Option<f64>,
-    /// On the way in beneath the rim, mm.
+    /// Least gap during installation beneath the rim, mm.
     pub on_the_way_beneath_rim_mm: Option<f64>,
-    /// On the key's way in beneath the rim, mm.
+    /// Least gap during the key's installation beneath the rim, mm.
     pub key_on_the_way_beneath_rim_mm: Option<f64>,
-    /// How far printed faces may stand out, each on its side, mm.
+    /// Largest outward deviation of printed faces, on each side, with which the kit still fits, mm.
     pub fits_within_mm: Option<f64>,
-    /// What rattles most where they all stand back by as much; `None` where nobody looked.
+    /// Loosest piece if all faces deviate inwards by as much; `None` if it was not examined.
     #[serde(default)]
     pub loosest_if_thin: Option<LoosestEntry>,
 }
 
-/// How far a piece moves where all faces are printed thin.
+/// Play of a piece if all faces are printed thin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoosestEntry {
-    /// Which piece.
+    /// Id of the piece.
     pub piece: PatchId,
-    /// For small motions, mm; `None` where nothing ends them.
+    /// Displacement in small motions, mm; `None` if nothing stops them.
     pub translation_mm: Option<f64>,
-    /// For small motions, degrees; `None` where nothing ends them.
+    /// Rotation in small motions, degrees; `None` if nothing stops them.
     pub rotation_deg: Option<f64>,
 }
 
-/// The verdict on the finished pieces.
+/// Verdict on the finished pieces.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerdictEntry {
-    /// Whether every check holds.
+    /// True if every check holds.
     pub passed: bool,
     /// All checks, in the order they were made.
     #[serde(default)]
     pub checks: Vec<Check>,
-    /// What failed, in the same order; `None` where play without end is among it, which JSON has no number
-    /// for, or where version 1 told it in another way.
+    /// Findings of failed checks, in the same order. `None` if one is unlimited play, for which JSON has no
+    /// number, or if version 1 gave them in another form.
     #[serde(default, deserialize_with = "if_readable")]
     pub findings: Option<Vec<Finding>>,
 }
 
-/// The pieces on the plates of a printer.
+/// Layout of the pieces on the plates of a printer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PrintingEntry {
-    /// What people call the printer.
+    /// Common name of the printer.
     pub printer: String,
-    /// How it prints: "sla", "fdm" or "sls".
+    /// Process of the printer: "sla", "fdm" or "sls".
     pub process: Option<String>,
-    /// Width, depth and height of what it can make, mm.
+    /// Width, depth and height of the build volume, mm.
     pub bed: [f64; 3],
     /// Height of a layer, mm.
     pub layer: f64,
-    /// How many plates there are.
+    /// Number of plates in use.
     pub plates: usize,
-    /// How pieces lie, in order; what is too large is left out.
+    /// Poses of the pieces, in order, without those that are too large.
     #[serde(default)]
     pub laid: Vec<LaidEntry>,
-    /// Pieces that the printer cannot make.
+    /// Pieces that are too large for the printer.
     #[serde(default)]
     pub too_large: Vec<PatchId>,
-    /// Print time.
+    /// Print time and material.
     pub time: Option<TimeEntry>,
 }
 
-/// How a piece lies on its plate.
+/// Pose of a piece on its plate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LaidEntry {
-    /// The piece.
+    /// Id of the piece.
     pub piece: PatchId,
-    /// The plate, from 1.
+    /// Number of the plate, from 1.
     pub plate: usize,
-    /// Width, depth and height as it lies, mm.
+    /// Width, depth and height in this pose, mm.
     pub size: [f64; 3],
-    /// Where the x, y and z axes go.
+    /// Images of the x, y and z axes.
     pub turned: [[f64; 3]; 3],
-    /// Where it is moved after that, mm, in the frame of its plate.
+    /// Translation after the rotation, mm, in the frame of the plate.
     pub moved: [f64; 3],
-    /// All surface that needs support, mm².
+    /// Area of all surface that needs support, mm².
     pub support_mm2: f64,
-    /// Outer skin that needs support, mm².
+    /// Area of outer skin that needs support, mm².
     pub outer_support_mm2: f64,
 }
 
-/// Print time and material, with supports.
+/// Print time and material, including supports.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeEntry {
-    /// How it was found: "closed form".
+    /// Method of the estimate: "closed form".
     pub by: String,
-    /// Of all plates, s.
+    /// Print time of all plates, s.
     pub pieces_s: f64,
-    /// Of the whole model as people print it, s; 0 where the printer cannot make it.
+    /// Print time of the whole model as people print it, s; 0 if the printer cannot make it.
     pub solid_s: f64,
-    /// The one over the other; `None` where the printer cannot make the solid model.
+    /// Ratio of `pieces_s` to `solid_s`; `None` if the printer cannot make the solid model.
     pub ratio: Option<f64>,
     /// Material of all plates, g.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -310,7 +309,7 @@ pub struct TimeEntry {
     /// Material of the whole model, g.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solid_g: Option<f64>,
-    /// How people print the whole model: "at 15 % infill".
+    /// Usual way to print the whole model, such as "at 15 % infill".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solid_as: Option<String>,
 }

@@ -1,47 +1,47 @@
-//! What is wrong with a plan file, in sentences.
+//! Problems with a plan file, in sentences.
 
-/// Why a file is no plan, or a plan not enough.
+/// Reasons why a file is no plan, or lacks something that was asked of it.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanFileError {
-    /// It is no JSON.
+    /// The file is no JSON.
     #[error("not a plan: {0}")]
     NotJson(#[source] serde_json::Error),
-    /// It is JSON, but a list, a number or a text.
+    /// The file is JSON, but a list, a number or a text.
     #[error("not a plan: it holds no object, which begins with {{")]
     NotAnObject,
-    /// It says that it is something else.
+    /// `format` or `version` has another value or type.
     #[error("\"format\" and \"version\" are not \"shellock-plan\" and a number; build the kit again")]
     OtherFormat,
-    /// A later program wrote it.
+    /// The file was written in a later version of the format.
     #[error(
         "it is of version {version}, and this program reads 1 to {}: use the program that made the kit, or a later one",
         super::VERSION
     )]
     Later {
-        /// What it says.
+        /// Version given in the file.
         version: u64,
     },
-    /// A field is not there.
+    /// A field is missing in the file.
     #[error("{}", missing(field))]
     Missing {
-        /// Its path, such as `pieces[0].id`.
+        /// Path of the field, such as `pieces[0].id`.
         field: String,
     },
-    /// A field is of the wrong kind.
+    /// A field has the wrong type.
     #[error("\"{field}\" {problem}")]
     Mistyped {
-        /// Its path, such as `pieces[0].id`.
+        /// Path of the field, such as `pieces[0].id`.
         field: String,
-        /// What it is and what it should be.
+        /// Description of the value found and of the one expected.
         problem: String,
     },
-    /// All fields are what they should be, but they do not go together.
+    /// All fields have the right types, but they contradict each other.
     #[error("{0}")]
     Contradiction(String),
 }
 
 impl PlanFileError {
-    /// What serde says of the field at `path`, in a maker's words.
+    /// Converts serde's message about the field at `path` to plain words.
     pub(super) fn of_field(path: &str, said: &str) -> Self {
         let field = |name: &str| match path {
             "." | "" => name.to_owned(),
@@ -59,7 +59,7 @@ impl PlanFileError {
         }
     }
 
-    /// A field that is not there.
+    /// Error for a missing field.
     pub(super) fn missing(field: &str) -> Self {
         Self::Missing {
             field: field.to_owned(),
@@ -75,7 +75,7 @@ fn missing(field: &str) -> String {
     }
 }
 
-/// "invalid type: string "a", expected f64" as `is the text "a" where a number belongs`.
+/// Rewrites "invalid type: string "a", expected f64" as `is the text "a" where a number belongs`.
 fn problem(said: &str) -> String {
     let other = || format!("is not what a plan has there: {said}");
     let Some((found, wanted)) = said.rsplit_once(", expected ") else {

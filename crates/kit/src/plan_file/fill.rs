@@ -1,4 +1,4 @@
-//! From a design to what its file says.
+//! Conversion of a design to the contents of its file.
 
 use std::collections::BTreeSet;
 
@@ -18,49 +18,49 @@ use super::{
     StrengthEntry, TimeEntry, TriedEntry, VERSION, VerdictEntry,
 };
 
-/// The file of the model that a kit was made from.
+/// File of the model that a kit was made from.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// Its name, without folders.
+    /// Name of the file, without folders.
     pub file: &'a str,
-    /// SHA-256 of its bytes, in lower-case hexadecimal digits.
+    /// SHA-256 of the file's bytes, in lower-case hexadecimal digits.
     pub sha256: &'a str,
-    /// The model in mm, from the file's coordinates: 4 × 4, row by row.
+    /// Transform from the file's coordinates to mm: 4 × 4, row by row.
     pub transform: [f64; 16],
-    /// The object of the file that was taken, where one was chosen.
+    /// Object of the file that was taken, if one was chosen.
     pub object: Option<&'a str>,
-    /// The plate of the slicer's project that was taken, where one was chosen.
+    /// Plate of the slicer's project that was taken, if one was chosen.
     pub plate: Option<&'a str>,
-    /// What was changed to make one body of it.
+    /// Repairs that made one body of it.
     pub repairs: &'a [Repair],
 }
 
-/// What a design does not know of its kit.
+/// Facts about a kit that its design does not know.
 #[derive(Clone, Debug)]
 pub struct Told<'a> {
     /// Version of the program.
     pub program: &'a str,
-    /// The file of the model.
+    /// File of the model.
     pub source: Source<'a>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: &'a [Warning],
-    /// Material of all pieces over the solid model's.
+    /// Material of all pieces divided by that of the solid model.
     pub volume_ratio: f64,
-    /// Length of connectors made over the length that the seams' geometry allows, in [0, 1].
+    /// Length of connectors made divided by the length that the seams' geometry allows, in [0, 1].
     pub connector_share: f64,
     /// Share of each piece's volume that is thinner than the thinnest wall, in [0, 1].
     pub thin_shares: &'a [f64],
-    /// The pieces on plates.
+    /// Layout of the pieces on plates.
     pub printing: PrintingEntry,
 }
 
-/// A piece's mesh, as a path within the kit.
+/// Path of a piece's mesh within the kit.
 pub fn piece_file(piece: PatchId) -> String {
     format!("pieces/piece-{:02}.stl", piece.number())
 }
 
 impl PlanFile {
-    /// What the file of a design says.
+    /// Collects the contents of the file of a design.
     pub fn of(settings: &Settings, design: &Design, told: &Told<'_>) -> Self {
         let kit = &design.kit;
         Self {
@@ -134,7 +134,7 @@ fn pieces(design: &Design, thin_shares: &[f64]) -> Vec<PieceEntry> {
         file: Some(piece_file(p)),
         neighbors: neighbours(p).into_iter().collect(),
         volume_mm3: Some(mesh.signed_volume()),
-        // No minus before zeros.
+        // Adding 0 removes the minus sign of zeros.
         installation_direction: (-plan.separation(p).unit() + 0.0).to_array(),
         n_triangles: Some(mesh.triangles.len()),
         thin_share: thin_shares.get(usize::from(p)).copied(),
@@ -186,7 +186,7 @@ impl InputEntry {
 }
 
 impl RepairEntry {
-    /// What was done to a surface, in the file's units.
+    /// Entry of a repair to a surface, in the file's units.
     pub fn of(repair: &Repair) -> Self {
         Self {
             kind: repair.kind.code().to_owned(),
@@ -286,7 +286,8 @@ impl GapsEntry {
 }
 
 impl PrintingEntry {
-    /// Pieces on `plates` of `printer`, and what all plates and the whole model take by closed forms.
+    /// Entry of the pieces on `plates` of `printer`. `cost` is the estimate for all plates and `whole` that
+    /// for the whole model, if the printer can make it.
     pub fn of(printer: &Printer, plates: &Plates, cost: Cost, whole: Option<Cost>) -> Self {
         let process = Process::ALL.iter().find(|(_, p)| *p == printer.process);
         let laid = plates.laid.iter().map(|l| LaidEntry {

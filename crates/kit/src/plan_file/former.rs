@@ -1,7 +1,8 @@
-//! Plans of former versions as they would be written now.
+//! Conversion of plans of earlier versions to the present form.
 //!
-//! Version 1 was written by program 0.1: pieces were numbered from 0, in the last builds from 1; what no command reads
-//! ([`PlanFile::plan`], [`PlanFile::holding`], [`PlanFile::bears`], the material) had other forms and is left out then.
+//! Version 1 was written by program 0.1. It numbered pieces from 0, in its last builds from 1. Fields that no
+//! command reads ([`PlanFile::plan`], [`PlanFile::holding`], [`PlanFile::bears`], the material) had other
+//! forms then and are dropped.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -13,7 +14,7 @@ use shellock::strength::Material;
 use super::PlanFile;
 use super::{FORMAT, PlanFileError, VERSION};
 
-/// Fields that hold the number of a piece.
+/// Names of fields that hold the number of a piece.
 const NUMBER: [&str; 10] = [
     "a",
     "against",
@@ -26,7 +27,7 @@ const NUMBER: [&str; 10] = [
     "male",
     "piece",
 ];
-/// Fields that hold a list of such.
+/// Names of fields that hold a list of piece numbers.
 const NUMBERS: [&str; 7] = [
     "between",
     "installation_order",
@@ -37,8 +38,9 @@ const NUMBERS: [&str; 7] = [
     "too_large",
 ];
 
-/// The plan in this version's form; refused where it says that it is something else, or of a later version. What says
-/// nothing is of version 1.
+/// Converts a plan to the present version's form.
+///
+/// A plan of another format or of a later version is rejected. One without these fields is of version 1.
 pub(super) fn converted(mut plan: Value) -> Result<Value, PlanFileError> {
     if plan.get("format").is_some_and(|format| *format != FORMAT) {
         return Err(PlanFileError::OtherFormat);
@@ -81,7 +83,7 @@ fn number_from_1(value: &mut Value) {
     }
 }
 
-/// Adds 1 to a number; an object has numbers of its own.
+/// Adds 1 to a number. In an object, adds 1 to the numbers within.
 fn add_1(value: &mut Value) {
     match value.as_u64() {
         Some(number) => *value = number.saturating_add(1).into(),
@@ -89,7 +91,7 @@ fn add_1(value: &mut Value) {
     }
 }
 
-/// Removes a field that is of another form than `T`.
+/// Removes a field whose value is of another form than `T`.
 fn keep_if<T: DeserializeOwned>(object: &mut Value, field: &str) {
     let Some(fields) = object.as_object_mut() else {
         return;

@@ -3,7 +3,7 @@ use shellock_assembly::PressFitKind;
 
 use super::*;
 
-/// A plan of two pieces, with something in every field.
+/// A plan of two pieces, with a value in every field.
 const WHOLE: &str = r#"{
     "format": "shellock-plan", "version": 2, "units": "mm", "program": "0.2.0",
     "input": { "file": "box.stl", "sha256": "ab12", "transform": [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
@@ -64,7 +64,7 @@ fn read(value: &Value) -> Result<PlanFile, String> {
     PlanFile::read(value.to_string().as_bytes()).map_err(|e| e.to_string())
 }
 
-/// What is said where the value at `pointer` is `wrong`, or gone.
+/// Error message if the value at `pointer` is `wrong`, or removed.
 fn complaint(pointer: &str, wrong: Option<Value>) -> String {
     let mut plan = whole();
     match wrong {
@@ -227,7 +227,7 @@ fn kits_of_earlier_versions_are_read() {
     assert!(read(&other).unwrap_err().contains("\"holding"));
 }
 
-/// [`WHOLE`] as program 0.1 wrote it.
+/// The plan [`WHOLE`] as program 0.1 wrote it.
 fn numbered_from_0() -> Value {
     let mut plan = whole();
     plan["version"] = json!(1);

@@ -1,4 +1,4 @@
-//! The last cell: what the finished thing bears, and where it gives way first, drawn.
+//! The last cell of the booklet: loads that the finished kit withstands, and a picture of its weakest place.
 
 use shellock_geom::Vec3;
 use shellock_render::stills::{Camera, Painted, projection, render};
@@ -10,37 +10,37 @@ use super::{
 };
 use crate::pdf::{Page, Style, width_mm};
 
-/// Distance of lines of text, mm.
+/// Distance between lines of text, mm.
 const LINE_MM: f64 = 5.2;
-/// Half the width of the line along a seam, and radius of the mark, mm.
+/// Half the width of the line along a seam, and radius of the mark on the weakest place, mm.
 const HALF_SEAM_MM: f64 = 0.5;
 const MARK_MM: f64 = 1.25;
 
-/// What the finished thing bears.
+/// Loads that the finished kit withstands, in words and figures.
 #[derive(Clone, Debug, Default)]
 pub struct Borne {
-    /// What is done, and how much of it.
+    /// Load cases, each with the load that it withstands.
     pub figures: Vec<(String, String)>,
-    /// What the figures are worth.
+    /// Note on how reliable the figures are.
     pub note: String,
-    /// Where it gives way first.
+    /// Place that gives way first, if known.
     pub weakest: Option<WeakPlace>,
 }
 
-/// Where something gives way.
+/// Place where a kit gives way.
 #[derive(Clone, Debug)]
 pub struct WeakPlace {
-    /// When, how and where, in words.
+    /// Load case, kind of failure and place, in words.
     pub words: String,
-    /// The place, mm, where the pieces stand.
+    /// Position of the place on the assembled kit, mm.
     pub at: Vec3,
-    /// The seam through it, as lines of points.
+    /// Seam through the place, as polylines, mm.
     pub lines: Vec<Vec<Vec3>>,
-    /// Numbers of the pieces that part.
+    /// Numbers of the two pieces that separate.
     pub between: [u32; 2],
 }
 
-/// Fills the cell with its upper left corner at `[x, y]`.
+/// Fills the cell whose upper left corner is at `[x, y]`, mm.
 pub(super) fn fill(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne: &Borne) {
     let cell = cell_mm(STEPS, 0.0);
     let (left, room_mm) = (x + 1.0, cell[0] - 4.0);
@@ -75,7 +75,8 @@ pub(super) fn fill(page: &mut Page, [x, y]: [f64; 2], drawn: &[Drawn<'_>], borne
     );
 }
 
-/// The two pieces in their colours among the others in grey, with their seam and the place on it.
+/// Draws the two separating pieces in their colours among the others in grey, with the seam and the weakest
+/// place.
 fn place(
     page: &mut Page,
     [left, top]: [f64; 2],
@@ -119,7 +120,7 @@ fn place(
     }
 }
 
-/// A short line.
+/// Draws a straight line of fixed width; nothing for coinciding ends.
 fn stroke(page: &mut Page, [from, to]: [[f64; 2]; 2]) {
     let way = [to[0] - from[0], to[1] - from[1]];
     let far = way[0].hypot(way[1]);
@@ -145,7 +146,7 @@ pub(super) fn plain(color: Color) -> Style {
     }
 }
 
-/// Lines of whole words that have room.
+/// Breaks a text into lines of whole words no wider than `room_mm`. A single longer word keeps its width.
 pub(super) fn wrapped(text: &str, style: Style, room_mm: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

@@ -17,7 +17,7 @@ fn piece(mesh: &TriMesh, order: usize, along: [f64; 3]) -> ReportPiece<'_> {
     }
 }
 
-/// A tall wall behind which the second piece comes down, and a third in front.
+/// A tall wall, a second piece that is inserted behind it, and a third in front.
 fn meshes() -> [TriMesh; 3] {
     [
         cuboid([-30.0, 0.0, 0.0], [30.0, 4.0, 60.0]).to_mesh(),
@@ -77,14 +77,14 @@ fn a_booklet_has_a_cover_the_pieces_and_a_picture_a_step_and_is_the_same_each_ti
     };
     let bytes = made(None);
     let count = |what: &[u8]| bytes.windows(what.len()).filter(|w| *w == what).count();
-    // Cover, pieces, one page of three steps and the end; two pictures on the cover, one a piece, one a step,
-    // one at the end.
+    // Cover, pieces, one page of three steps and the end; two pictures on the cover, one per piece, one per
+    // step, one at the end.
     assert_eq!(
         (count(b"/Type /Page\n"), count(b"/Subtype /Image")),
         (3, 2 + 3 + 3 + 1)
     );
     assert!(bytes == made(None));
-    // What it bears has the cell after the end: on a page of its own after four steps and the end.
+    // The loads take the cell after the end: on a second page after three steps and the end.
     let bears = Borne {
         figures: vec![("pressed on its top".into(), "70 N".into())],
         note: "by simulation".into(),
@@ -134,7 +134,7 @@ fn a_place_is_looked_at_from_where_it_is_seen() {
     }
 }
 
-/// Boxes on a tower: `n` pieces, each from above.
+/// A tower of `n` boxes, stacked from below.
 fn tower(n: usize) -> Vec<TriMesh> {
     (0..n)
         .map(|i| {
@@ -193,7 +193,7 @@ fn no_text_stands_on_another_or_off_the_page_with_any_number_of_pieces_and_any_n
 
 #[test]
 fn a_place_that_is_hidden_is_shown_from_elsewhere_too() {
-    // A niche that is open to the front alone; the piece comes in from above, behind a wall of the front's height.
+    // A niche open to the front alone. The piece comes in from above, behind a wall of the front's height.
     let well = [
         cuboid([-30.0, -10.0, 0.0], [30.0, -6.0, 60.0]).to_mesh(),
         cuboid([-30.0, 6.0, 0.0], [30.0, 10.0, 60.0]).to_mesh(),

@@ -1,4 +1,4 @@
-//! From where each step is seen.
+//! Choice of the viewpoint for each assembly step.
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
@@ -6,21 +6,21 @@ use shellock_geom::{Aabb, TriMesh, Vec3};
 use shellock_render::ReportPiece;
 use shellock_render::stills::Camera;
 
-/// Points of a piece that are looked at.
+/// Sample points on a piece for visibility tests.
 const N_POINTS: usize = 48;
-/// Rays start so far off the surface, mm.
+/// Offset of ray origins from the surface, mm.
 const OFF_MM: f64 = 0.02;
-/// A way that is seen under this angle or more is seen well: its sine, 45°.
+/// Sine of the angle from which on a path counts as fully visible: 45° to the line of sight.
 const SIN_WELL: f64 = 0.707;
 
-/// How one step is seen.
+/// Viewpoint of one step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sight {
-    /// From the viewer to the scene.
+    /// Viewing direction, from the viewer to the scene.
     pub direction: Vec3,
-    /// How far the new piece stands back from its place, mm.
+    /// Distance of the new piece from its place, mm.
     pub travel_mm: f64,
-    /// From where its place is seen, where it is hidden along `direction`.
+    /// Direction of a second view that shows the piece's place, if that is hidden along `direction`.
     pub other: Option<Vec3>,
 }
 
@@ -30,7 +30,7 @@ impl Sight {
     }
 }
 
-/// A sight of each step, for `pieces` in the order in which they are installed.
+/// Chooses a viewpoint for each step. `pieces` come in order of installation.
 pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
     let trees: Vec<TriangleBvh> = pieces.par_iter().map(|p| TriangleBvh::new(p.mesh)).collect();
     let all = pieces.iter().fold(Aabb::EMPTY, |b, p| b.union(p.mesh.bounds()));
@@ -72,15 +72,16 @@ pub(super) fn sights(pieces: &[&ReportPiece<'_>]) -> Vec<Sight> {
     made
 }
 
-/// A place of which less than this share is seen is shown from elsewhere, too, where so much more is seen.
+/// Limits for a second view: less than `HIDDEN` of the place is visible, and another direction shows more
+/// than `CLEARER` in addition. Shares of the place's surface.
 const HIDDEN: f64 = 0.3;
 const CLEARER: f64 = 0.15;
 
-/// Turning the thing in one's hands is worth this much of what is seen.
+/// Score for keeping the previous viewpoint, so that the reader turns the kit less often.
 const STAYING: f64 = 0.5;
 
-/// Directions of sight: the front view first, then eight around, from a little above, from high above and
-/// from below.
+/// Candidate viewing directions, the front view first: eight around the model at each of three elevations,
+/// from a little above, from high above and from below.
 fn directions() -> Vec<Vec3> {
     let front = Camera::front().direction.normalize();
     let around = |k: u32, rise: f64| {
@@ -95,7 +96,7 @@ fn directions() -> Vec<Vec3> {
         .collect()
 }
 
-/// What people prefer where they see the same: to look from a little above, and not from below.
+/// Score of what people prefer among equally good views: from a little above, and not from below.
 fn preference(direction: Vec3) -> f64 {
     match direction.z {
         z if z > 0.0 => -0.35,
@@ -104,7 +105,7 @@ fn preference(direction: Vec3) -> f64 {
     }
 }
 
-/// How far a piece stands back: clear of its place, but near it.
+/// Distance of a piece from its place before installation, mm: clear of the place, but near it.
 fn travel_mm(piece: &ReportPiece<'_>, diagonal_mm: f64) -> f64 {
     let along = Vec3::from(piece.installation_direction);
     let heights = || piece.mesh.points.iter().map(|p| p.dot(along));
@@ -112,14 +113,15 @@ fn travel_mm(piece: &ReportPiece<'_>, diagonal_mm: f64) -> f64 {
     (0.5 * extent + 0.1 * diagonal_mm).clamp(0.16 * diagonal_mm, 0.42 * diagonal_mm)
 }
 
-/// All pieces in place, for whoever looks for a place on them.
+/// All pieces in place, for visibility tests of points on them.
 pub(super) struct Lookout {
     trees: Vec<TriangleBvh>,
     diagonal_mm: f64,
 }
 
 impl Lookout {
-    /// Places are looked at this share of the diagonal in front of them: seams are cut and meshes made coarser.
+    /// Offset of tested points towards the viewer, as a share of the diagonal. Seams are cut and meshes
+    /// simplified, so points do not lie exactly on the surface.
     const OFF: f64 = 0.012;
 
     pub fn new(pieces: &[&ReportPiece<'_>]) -> Self {
@@ -130,7 +132,7 @@ impl Lookout {
         }
     }
 
-    /// Whether somebody far away who looks along `direction` sees a place.
+    /// Returns true if a distant viewer who looks along `direction` sees `place`.
     pub fn is_seen(&self, place: Vec3, direction: Vec3) -> bool {
         let from = place - Self::OFF * self.diagonal_mm * direction;
         let far_mm = 3.0 * self.diagonal_mm;
@@ -139,9 +141,9 @@ impl Lookout {
             .all(|tree| tree.first_hit(from, -direction, far_mm).is_none())
     }
 
-    /// Along which direction a place and most of the lines through it are seen.
+    /// Returns the viewing direction that shows a place and most of the lines through it.
     pub fn best(&self, at: Vec3, lines: &[Vec<Vec3>]) -> Vec3 {
-        /// The place matters more than the lines.
+        /// Weight of the place relative to that of all lines.
         const PLACE: f64 = 2.0;
         let points: Vec<Vec3> = lines.iter().flatten().copied().collect();
         let worth = |direction: &Vec3| {
@@ -159,7 +161,7 @@ impl Lookout {
     }
 }
 
-/// One step: points of the new piece, with their normals, and what may hide them.
+/// One step: sample points of the new piece with their normals, and the earlier pieces that may hide them.
 struct Step<'a> {
     points: Vec<(Vec3, Vec3)>,
     along: Vec3,
@@ -180,12 +182,13 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// How much of the place is seen along `direction`, [0, 1]: half of a closed surface faces the viewer.
+    /// Visible share of the piece's place along `direction`, [0, 1]. Half of a closed surface faces the
+    /// viewer and counts as 1.
     fn place_seen(&self, direction: Vec3) -> f64 {
         self.share(direction, Vec3::ZERO)
     }
 
-    /// How much of the piece is seen along `direction` where it is shifted, [0, 1].
+    /// Visible share of the piece along `direction` when moved by `shift`, [0, 1].
     fn share(&self, direction: Vec3, shift: Vec3) -> f64 {
         let free = self
             .points
@@ -195,7 +198,7 @@ impl<'a> Step<'a> {
         (2.0 * free.count() as f64 / self.points.len().max(1) as f64).min(1.0)
     }
 
-    /// How much is seen along `direction`: of the piece, of its place and of its way.
+    /// Score of a direction: visible shares of the piece, of its place and of its path.
     fn seen(&self, direction: Vec3) -> f64 {
         let back = -self.travel_mm * self.along;
         let sine = self.along.cross(direction).length();
@@ -204,7 +207,7 @@ impl<'a> Step<'a> {
             + 0.8 * (sine / SIN_WELL).min(1.0)
     }
 
-    /// Whether a point is seen by somebody far away.
+    /// Returns true if no earlier piece lies between the point and a distant viewer.
     fn is_free(&self, from: Vec3, towards: Vec3) -> bool {
         self.there
             .iter()
@@ -212,7 +215,8 @@ impl<'a> Step<'a> {
     }
 }
 
-/// Centres of faces that have equal shares of the area, with their normals.
+/// Samples face centres with their normals so that each stands for the same area. Empty for a mesh without
+/// area.
 fn spread(mesh: &TriMesh) -> Vec<(Vec3, Vec3)> {
     let share = mesh.area() / N_POINTS as f64;
     if share <= 0.0 {
@@ -228,7 +232,7 @@ fn spread(mesh: &TriMesh) -> Vec<(Vec3, Vec3)> {
     points
 }
 
-/// Where something far along `towards` is, in words, for a thing that stands and looks along −y.
+/// Names the side on which something far along `towards` lies, for an upright model that faces −y.
 pub(super) fn side(towards: Vec3) -> String {
     let d = towards.normalize_or_zero();
     let words = [

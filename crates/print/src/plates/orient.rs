@@ -1,9 +1,9 @@
-//! How a piece lies best on its plate.
+//! Choice of the build orientation of a piece.
 //!
-//! Tried are the facets of its convex hull, on which it rests by itself, directions spread over the sphere, on
-//! which supports hold it, and directions near the best of them. A pose costs the time and the plastic that the
-//! closed forms tell (`time`), and in the same unit what a person does afterwards: supports leave marks on the
-//! skin that is seen, and what does not stand falls.
+//! Candidates for the direction that points up come from the facets of the convex hull, on which a piece
+//! rests by itself, and from the whole sphere, for pieces on supports. Directions near the best of these are
+//! tried, too. A pose costs the time and the plastic given by the closed forms (`time`). In the same unit, it
+//! costs the work afterwards: supports leave marks on the visible skin, and unstable pieces fall over.
 
 use rayon::prelude::*;
 use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
@@ -14,39 +14,40 @@ use crate::load::{Load, Supports};
 use crate::printer::{Printer, Process};
 use crate::time::{grams, seconds};
 
-/// A face that lies so near to the plate, mm, and as flat as this needs no support.
+/// Largest height above the plate, mm, and least cosine of the slope of a face that needs no support because
+/// it rests on the plate.
 const RESTING_MM: f64 = 0.05;
 const COS_RESTING: f64 = 0.999;
 /// Cosine of the angle from straight down within which a face of a resin print needs support: 45°.
 const COS_OVERHANG: f64 = 0.707;
-/// Facets of the hull that are tried, largest first, and the angle below which two count as one: 8°.
+/// Number of hull facets tried, largest first, and cosine of the angle below which two count as one: 8°.
 const N_FACETS: usize = 24;
 const COS_SAME: f64 = 0.99;
-/// Directions over the sphere: 18° from one to the next.
+/// Number of directions over the sphere: 18° from one to the next.
 const N_SPREAD: u32 = 120;
-/// Width of the cells by which all directions are judged first, mm; the best so many of them are judged again
-/// by cells of 1 mm, and so many of those with directions near by: 6° off.
+/// Cell width for the first judgement of all directions, mm. The best `N_AGAIN` of them are judged again with
+/// cells of 1 mm, and so are directions 6° off the best `N_NEAR`.
 const COARSE_MM: f64 = 2.0;
-/// All directions are judged by a mesh that is so near to the piece's own, mm, and has a fifth of its triangles.
+/// Deviation of the simplified mesh for the first judgement, mm. It has a fifth of the piece's triangles.
 const SIMPLE_MM: f64 = 0.15;
 const N_AGAIN: usize = 8;
-/// Directions that are judged at once.
+/// Number of directions judged at once.
 const N_AT_ONCE: usize = 12;
 const N_NEAR: usize = 2;
 const NEAR_RAD: f64 = 0.1;
-/// A piece stands on what is so near to the plate, mm, and on its supports, if its centre of mass is above
-/// that by so much on all sides, mm.
+/// Conditions for a stable piece, mm. Its foot is all that lies within `FOOT_MM` of the plate, with the
+/// supports. Its centre of mass must be above the foot, by `STANDING_MM` inside on all sides.
 const FOOT_MM: f64 = 0.3;
 const STANDING_MM: f64 = 1.0;
-/// Turns about the vertical that are tried within a quarter.
+/// Number of rotations about the vertical tried within a quarter turn.
 const N_YAWS: u32 = 36;
 
-/// A piece as it is laid, before it is moved.
+/// Orientation of a piece, before its translation on the plate.
 #[derive(Clone)]
 pub(super) struct Pose {
-    /// The axes of the plate as the piece sees them: a point is at their products with it.
+    /// Axes of the plate in the frame of the piece. Coordinates on the plate are dot products with them.
     pub axes: [Vec3; 3],
-    /// The box around the piece, in these axes.
+    /// Bounding box of the piece in these axes.
     pub bounds: Aabb,
     pub support: Support,
     pub load: Load,
@@ -58,7 +59,7 @@ impl Pose {
         size.x * size.y
     }
 
-    /// A quarter further about the vertical.
+    /// Returns the pose turned by 90° about the vertical.
     pub fn quarter_turned(&self) -> Self {
         let [x, y, z] = self.axes;
         let Aabb { min, max } = self.bounds;
@@ -75,32 +76,33 @@ impl Pose {
     }
 }
 
-/// What must be held up.
+/// Areas that need support.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Support {
     /// Area of outer skin, mm².
     pub outer_mm2: f64,
-    /// Area of everything, mm².
+    /// Area of all faces, mm².
     pub all_mm2: f64,
 }
 
-/// What counts how much, in seconds of print time.
+/// Prices of a pose's drawbacks, in seconds of print time.
 struct Prices {
-    /// A gram of material.
+    /// Price of a gram of material.
     gram_s: f64,
-    /// A mm² of outer skin with marks of supports.
+    /// Price of a mm² of outer skin with marks of supports.
     mark_s: f64,
-    /// A mm³ of a cup that the film sucks at.
+    /// Price of a mm³ of a cup that pulls on the film.
     cup_s: f64,
-    /// A mm² of the largest slice, which is peeled off.
+    /// Price of a mm² of the largest slice, which is peeled off.
     peel_s: f64,
-    /// What does not stand.
+    /// Price of a pose that is not stable.
     falling_s: f64,
 }
 
-/// Of whoever prints by `process`. Skin goes before all in resin, whose supports leave pits; after filament five
-/// minutes are spent on a cm² of marks: at three minutes, a teddy's kit took 8 % less time, and 35 cm² of its skin
-/// were marked instead of 10. A gram of filament counts two minutes, less than half of what laying it takes.
+/// Prices of somebody who prints by `process`. In resin, skin matters most, as supports leave pits. In
+/// filament, a cm² of marks costs five minutes: at three minutes, a teddy's kit took 8 % less time, and 35
+/// cm² of its skin were marked instead of 10. A gram of filament costs two minutes, less than half of the
+/// time to print it.
 fn prices(process: Process) -> Prices {
     match process {
         Process::Sla => Prices {
@@ -127,15 +129,15 @@ fn prices(process: Process) -> Prices {
     }
 }
 
-/// A direction that may point up, and what it costs, in seconds of print time.
+/// A direction that may point up, with its cost in seconds of print time.
 struct Judged {
     cost_s: f64,
     up: Vec3,
     load: Load,
 }
 
-/// The best pose within `room_mm`, width, depth and height; `None` where the piece is too large in every pose
-/// that is tried.
+/// Finds the best pose within `room_mm`: width, depth and height. `None` if the piece is too large in every
+/// pose tried, or has no convex hull.
 pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) -> Option<Pose> {
     let body = Body::of(piece)?;
     let all = |directions: Vec<Vec3>, mesh: &TriMesh, cell_mm: f64| -> Vec<Judged> {
@@ -148,7 +150,7 @@ pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) 
     let simple = simple.as_ref().unwrap_or(piece.mesh);
     let mut coarse: Vec<Judged> = Vec::new();
     let mut rest = body.by_least_cost(printer);
-    // What costs more at the least than so many that were judged need not be.
+    // A direction whose lower bound exceeds the cost of `N_AGAIN` judged ones cannot be among the best.
     while !rest.is_empty() && (coarse.len() < N_AGAIN || rest[0].0 < coarse[N_AGAIN - 1].cost_s) {
         let few = rest
             .drain(..rest.len().min(N_AT_ONCE))
@@ -172,12 +174,12 @@ pub(super) fn best(printer: &Printer, piece: &Printable<'_>, room_mm: [f64; 3]) 
         .find_map(|judged| body.turned(judged.up, judged.load, room_mm))
 }
 
-/// Stable: of equally good directions the first stays first.
+/// Sorts stably, so that the first of equally good directions stays first.
 fn cheapest_first(judged: &mut [Judged]) {
     judged.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s));
 }
 
-/// Whether some pose has room.
+/// Returns true if some pose fits into `room_mm`: width, depth and height.
 pub(super) fn fits(piece: &Printable<'_>, room_mm: [f64; 3]) -> bool {
     Body::of(piece).is_some_and(|body| {
         let mut directions = body.directions().into_iter();
@@ -185,7 +187,7 @@ pub(super) fn fits(piece: &Printable<'_>, room_mm: [f64; 3]) -> bool {
     })
 }
 
-/// Six directions around one.
+/// Returns six directions around one, 6° off.
 fn nearby(up: Vec3) -> Vec<Vec3> {
     let (x, y) = up.any_orthonormal_pair();
     (0..6)
@@ -196,7 +198,7 @@ fn nearby(up: Vec3) -> Vec<Vec3> {
         .collect()
 }
 
-/// What of a piece decides how it lies.
+/// Properties of a piece that decide its orientation.
 struct Body {
     hull: TriMesh,
     center: Vec3,
@@ -231,7 +233,7 @@ impl Body {
         })
     }
 
-    /// Directions that may point up.
+    /// Returns all candidate directions that may point up.
     fn directions(&self) -> Vec<Vec3> {
         let mut facets: Vec<(f64, Vec3)> = Vec::new();
         let n = self.hull.triangles.len();
@@ -260,8 +262,8 @@ impl Body {
         resting.chain(axes).chain(spread).collect()
     }
 
-    /// All directions with what they cost at the least, in seconds of print time: height, material without
-    /// supports, marks. That of the least first.
+    /// Returns all directions with lower bounds of their costs, in seconds of print time, cheapest first. The
+    /// bounds count print time by height, without supports, and marks on the skin.
     fn by_least_cost(&self, printer: &Printer) -> Vec<(f64, Vec3)> {
         let prices = prices(printer.process);
         let least = |up: Vec3| {
@@ -269,7 +271,7 @@ impl Body {
             let [lo, hi] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], h| {
                 [lo.min(h), hi.max(h)]
             });
-            // Columns and simplified meshes may be a little lower.
+            // Columns and simplified meshes may be slightly lower than the hull.
             let load = Load {
                 height_mm: (hi - lo - COARSE_MM).max(0.0),
                 ..Load::default()
@@ -282,7 +284,7 @@ impl Body {
         all
     }
 
-    /// What a direction costs, by cells of so many mm.
+    /// Judges the cost of a direction, with cells of `cell_mm`.
     fn judged(&self, printer: &Printer, up: Vec3, mesh: &TriMesh, cell_mm: f64) -> Judged {
         let prices = prices(printer.process);
         let (x, y) = up.any_orthonormal_pair();
@@ -299,7 +301,7 @@ impl Body {
         Judged { cost_s, up, load }
     }
 
-    /// What hangs over.
+    /// Areas of overhanging faces with `up` as the vertical, except faces that rest on the plate.
     fn support(&self, up: Vec3) -> Support {
         let heights = self.hull.points.iter().map(|p| p.dot(up));
         let lowest = heights.fold(f64::INFINITY, f64::min);
@@ -318,7 +320,7 @@ impl Body {
         support
     }
 
-    /// Whether the centre of mass is above the foot and the supports on the plate.
+    /// Returns true if the centre of mass is above the foot and the supports on the plate, with a margin.
     fn stands(&self, columns: &Columns, axes: [Vec3; 2], layer_mm: f64) -> bool {
         let supports = Supports::of(columns, layer_mm);
         let [x, y] = axes.map(|axis| self.center.dot(axis));
@@ -346,7 +348,7 @@ impl Body {
         })
     }
 
-    /// The turn about `up` with the smallest box that has room.
+    /// Returns the turn about `up` with the smallest footprint that fits into `room_mm`, if any.
     fn turned(&self, up: Vec3, load: Load, room_mm: [f64; 3]) -> Option<Pose> {
         let (x, y) = up.any_orthonormal_pair();
         let support = self.support(up);

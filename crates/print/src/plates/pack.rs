@@ -1,18 +1,19 @@
-//! Rectangles on as few plates as a greedy search needs.
+//! Packing of rectangles on few plates by a greedy search.
 //!
-//! Each plate keeps its largest free rectangles; a new one goes as far to the front as it can, upright or
-//! turned by a quarter ("maximal rectangles, bottom left"; Jylänki, "A thousand ways to pack the bin", 2010).
+//! Each plate keeps its maximal free rectangles. A new rectangle is placed as far to the front as possible,
+//! upright or turned by 90° ("maximal rectangles, bottom left"; Jylänki, "A thousand ways to pack the bin",
+//! 2010).
 
-/// Rounding that must not keep a piece off a plate that it just fits, mm.
+/// Tolerance for rounding, mm, so that a piece that just fits a plate is not rejected.
 const ROUNDING_MM: f64 = 1e-6;
 
-/// Where a rectangle went.
+/// Position of a packed rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spot {
     pub plate: usize,
-    /// Its lower left corner on the plate, mm.
+    /// Lower left corner on the plate, mm.
     pub corner_mm: [f64; 2],
-    /// Whether its sides changed places.
+    /// True if the rectangle is turned by 90°.
     pub is_turned: bool,
 }
 
@@ -36,8 +37,8 @@ impl Rect {
     }
 }
 
-/// Packs rectangles of these `sides`, each of which fits a plate of `plate` alone one way or the other, in
-/// their order.
+/// Packs rectangles of these `sides` in their order. Each must fit an empty plate of size `plate` in one of
+/// its two orientations.
 pub(super) fn pack(plate: [f64; 2], sides: &[[f64; 2]]) -> Vec<Spot> {
     let mut plates: Vec<Vec<Rect>> = Vec::new();
     let mut spots = Vec::with_capacity(sides.len());
@@ -69,7 +70,8 @@ pub(super) fn pack(plate: [f64; 2], sides: &[[f64; 2]]) -> Vec<Spot> {
     spots
 }
 
-/// The corner of the free rectangle in which the far edge stays nearest, and whether the sides change places.
+/// Returns the corner of the free rectangle in which the far edge stays nearest, and true if the sides are
+/// swapped. `None` if nothing fits.
 fn best_of(free: &[Rect], size: [f64; 2]) -> Option<([f64; 2], bool)> {
     let ways = [(size, false), ([size[1], size[0]], true)];
     let tries = free
@@ -87,7 +89,7 @@ fn best_of(free: &[Rect], size: [f64; 2]) -> Option<([f64; 2], bool)> {
     best.map(|(rect, _, is_turned)| (rect.min, is_turned))
 }
 
-/// The largest rectangles that are still free.
+/// Returns the maximal free rectangles after `taken` is occupied.
 fn without(free: &[Rect], taken: &Rect) -> Vec<Rect> {
     let mut left = Vec::new();
     for rect in free {

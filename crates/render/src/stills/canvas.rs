@@ -1,23 +1,23 @@
-//! Samples, pixels and pictures.
+//! Samples of the renderer, and the pictures made of them.
 
 use super::{SAMPLES, shade};
 
-/// How far, in samples, a line looks for a jump: lines come out twice as wide.
+/// Distance at which a line looks for a jump, in samples; lines are twice as wide.
 pub(super) const LINE_REACH: usize = 2;
 
-/// A picture: sRGB with straight alpha, 8 bits each, rows from the top.
+/// A picture in sRGB with straight alpha, 8 bits each, rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Pixels across.
+    /// Width of the picture, pixels.
     pub width: usize,
-    /// Pixels down.
+    /// Height of the picture, pixels.
     pub height: usize,
-    /// Four bytes a pixel.
+    /// Pixels in four bytes each.
     pub rgba: Vec<u8>,
 }
 
 impl Image {
-    /// The picture on an opaque ground of one colour.
+    /// Blends the picture onto an opaque background of one colour.
     pub fn on(mut self, ground: [u8; 3]) -> Self {
         for pixel in self.rgba.chunks_exact_mut(4) {
             let alpha = f32::from(pixel[3]) / 255.0;
@@ -29,8 +29,8 @@ impl Image {
         self
     }
 
-    /// Pictures side by side in rows of `columns`, each in a cell as large as the largest, in the middle of
-    /// it.
+    /// Arranges pictures in rows of `columns`. Each cell is as large as the largest picture, which is centred
+    /// in it.
     pub fn sheet(pictures: &[Self], columns: usize) -> Self {
         let columns = columns.clamp(1, pictures.len().max(1));
         let cell_width = pictures.iter().map(|p| p.width).max().unwrap_or(0);
@@ -50,11 +50,11 @@ impl Image {
         Self { width, height, rgba }
     }
 
-    /// The picture as a PNG file.
+    /// Encodes the picture as a PNG file.
     ///
     /// # Panics
     ///
-    /// Where it has no pixels: PNG cannot say that.
+    /// Panics if the picture has no pixels, which PNG cannot represent.
     pub fn png(&self) -> Vec<u8> {
         let side = |n: usize| u32::try_from(n).expect("pictures are small");
         let mut bytes = Vec::new();
@@ -70,16 +70,16 @@ impl Image {
     }
 }
 
-/// What is seen at a sample.
+/// Surface point visible at a sample.
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
-    /// Towards the viewer, in units of a sample.
+    /// Position towards the viewer, in units of a sample.
     pub depth: f32,
-    /// In view space, about unit length.
+    /// Normal in view space, about unit length.
     pub normal: [f32; 3],
-    /// 0 for nothing.
+    /// Index of the mesh plus 1; 0 for nothing.
     pub mesh: u16,
-    /// Linear light, unlit.
+    /// Unlit colour, in linear light.
     pub color: [f32; 3],
 }
 
@@ -90,8 +90,8 @@ const NOTHING: Sample = Sample {
     color: [0.0; 3],
 };
 
-/// Some rows of samples, with [`LINE_REACH`] more on both sides so that lines at the border come out the
-/// same.
+/// Some rows of samples, with [`LINE_REACH`] more on both sides, so that lines at the border do not depend on
+/// the division into bands.
 pub(super) struct Band {
     width: usize,
     /// First row that becomes pixels.
@@ -123,7 +123,7 @@ impl Band {
         (self.top + self.n_rows + LINE_REACH) as i64
     }
 
-    /// Puts a sample where it is nearer than what is there; of equals the first stays.
+    /// Stores a sample if it is nearer than the present one. On ties, the first stays.
     #[inline]
     pub fn put(&mut self, x: usize, y: i64, depth: f32, sample: impl FnOnce() -> Sample) {
         let place = &mut self.samples[(y - self.top as i64 + LINE_REACH as i64) as usize * self.width + x];
@@ -132,7 +132,7 @@ impl Band {
         }
     }
 
-    /// The pixels, four bytes each.
+    /// Resolves the samples to pixels of four bytes each.
     pub fn resolve(&self) -> Vec<u8> {
         const N: f32 = (SAMPLES * SAMPLES) as f32;
         let mut rgba = Vec::with_capacity(4 * self.width * self.n_rows / (SAMPLES * SAMPLES));
@@ -154,7 +154,7 @@ impl Band {
         rgba
     }
 
-    /// Linear light of one sample: a line, the lit surface, or nothing.
+    /// Linear light of one sample: the lit surface, darkened by a line if there is one; `None` for nothing.
     fn light_at(&self, x: usize, y: usize) -> Option<[f32; 3]> {
         let here = self.samples[y * self.width + x];
         if here.mesh == 0 {
@@ -167,7 +167,7 @@ impl Band {
         }))
     }
 
-    /// How dark the line through a sample is, in [0, 1]: 1 on silhouettes, less on creases.
+    /// Strength of the line through a sample, in [0, 1]: 1 on silhouettes, less on creases.
     fn line_at(&self, x: usize, y: usize, here: Sample) -> f32 {
         let mut strength: f32 = 0.0;
         for (dx, dy) in [(LINE_REACH, 0), (0, LINE_REACH)] {
@@ -187,7 +187,7 @@ impl Band {
     }
 }
 
-/// Linear light of an 8-bit sRGB channel, in [0, 1].
+/// Converts an 8-bit sRGB channel to linear light, in [0, 1].
 pub(super) fn linear_from_srgb(channel: u8) -> f32 {
     let c = f32::from(channel) / 255.0;
     if c <= 0.040_45 {

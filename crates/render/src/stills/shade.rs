@@ -1,4 +1,4 @@
-//! Normals, light and lines.
+//! Shading normals, lighting and contour lines.
 
 use rayon::prelude::*;
 use shellock_geom::{TriMesh, Vec3};
@@ -8,14 +8,14 @@ use super::canvas::Sample;
 /// Cosine of the angle up to which neighbouring triangles share a smooth normal: 40°.
 const SMOOTH_COS: f64 = 0.766;
 
-/// Jump of depth, in samples beyond a plane, from which a line is drawn: three pixels at a picture's scale.
+/// Depth jump beyond a plane from which a line is drawn, in samples: three pixels at a picture's scale.
 const DEPTH_JUMP: f32 = 14.0;
 
 /// Cosine of the angle between normals two samples apart from which a crease begins to show: 35°.
 const CREASE_COS: f32 = 0.82;
 
-/// Unit normals at the corners of each triangle: the mean, by area, of the triangles around the corner that
-/// face about its way.
+/// Computes unit normals at the corners of each triangle: the area-weighted mean over those triangles around
+/// the corner whose normals differ by less than 40°.
 pub fn crease_normals(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
     let (first, faces) = faces_around_points(mesh);
     let doubled: Vec<Vec3> = (0..mesh.triangles.len())
@@ -40,7 +40,7 @@ pub fn crease_normals(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
         .collect()
 }
 
-/// The triangles at each point: those of point `v` are `faces[first[v]..first[v + 1]]`.
+/// Lists the triangles at each point: those of point `v` are `faces[first[v]..first[v + 1]]`.
 fn faces_around_points(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
     let mut first = vec![0_u32; mesh.points.len() + 2];
     for &v in mesh.triangles.as_flattened() {
@@ -58,10 +58,10 @@ fn faces_around_points(mesh: &TriMesh) -> (Vec<u32>, Vec<u32>) {
     (first, faces)
 }
 
-/// Linear light that a surface of a linear colour sends to the viewer.
+/// Linear light that a surface of a given linear colour sends to the viewer.
 pub(super) fn lit(color: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
-    // Key light, fill light, and the half-way vector of the key light; x right, y down, z to the viewer; unit
-    // vectors.
+    // Key light, fill light, and the half-way vector of the key light, as unit vectors; x right, y down, z to
+    // the viewer.
     const KEY: [f32; 3] = [-0.46, -0.60, 0.654];
     const FILL: [f32; 3] = [0.80, 0.10, 0.59];
     const HALF: [f32; 3] = [-0.253, -0.330, 0.909];
@@ -77,12 +77,12 @@ pub(super) fn lit(color: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
     color.map(|c| c * diffuse + gloss)
 }
 
-/// How dark a line is at `here` with samples on both sides, in [0, 1].
+/// Strength of a line at `here`, judged by the samples on both sides, in [0, 1].
 pub(super) fn line_between(before: Sample, here: Sample, after: Sample) -> f32 {
     if before.mesh == 0 || after.mesh == 0 {
         return 1.0;
     }
-    // Only the nearer side of a jump is darkened, so that the line lies on what it bounds.
+    // Only the nearer side of a jump is darkened, so that the line lies on the surface that it bounds.
     let behind = here.depth - before.depth.min(after.depth);
     let bend = 2.0 * here.depth - before.depth - after.depth;
     if bend > DEPTH_JUMP && behind > DEPTH_JUMP {

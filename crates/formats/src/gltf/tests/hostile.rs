@@ -1,11 +1,11 @@
-//! Files that are broken, or that ask for more than they have.
+//! Broken files, and files that claim more than they contain.
 
 use proptest::prelude::*;
 
 use super::*;
 use crate::read_mesh;
 
-/// A file that has all that moves points: a skin, a sparse morph target, colours and instances.
+/// A file with everything that moves points: a skin, a sparse morph target, colours and instances.
 fn all_at_once() -> File {
     let mut file = File::tetrahedron();
     file.skin(&[json!({ "children": [2] }), json!({ "translation": [0, 0, 2] })]);
@@ -33,7 +33,7 @@ fn a_file_cut_off_anywhere_is_refused() {
     for end in 0..bytes.len() {
         assert!(read_mesh(&bytes[..end], Some("glb")).is_err(), "{end} bytes");
     }
-    // So are files whose data ends early, though their chunks are whole.
+    // Files whose data ends early are rejected, too, even if their chunks are whole.
     let mut cut = file;
     while let Some(byte) = cut.data.pop() {
         // The last values are instances, whose view is cut first; padding may make up for a few bytes.
@@ -48,7 +48,7 @@ fn a_file_cut_off_anywhere_is_refused() {
 
 #[test]
 fn copies_are_counted_before_they_are_made() {
-    // An accessor that no byte backs, and one of many copies of a row.
+    // An accessor without any bytes behind it, and one with many copies of a row.
     let mut file = File::tetrahedron();
     let by = file.sparse(None, 4_000_000_000, &[0], &[[1.0; 3]]);
     let attributes = json!({ "TRANSLATION": by });

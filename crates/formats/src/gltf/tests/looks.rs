@@ -1,4 +1,4 @@
-//! Colours of points, and what is left out with a note.
+//! Colours of points, and content that is left out with a note.
 
 use super::*;
 use crate::LabelSource;

@@ -1,4 +1,4 @@
-//! Files made by hand: a tetrahedron in many ways.
+//! Handmade files: a tetrahedron in many variants.
 
 mod hostile;
 mod looks;
@@ -12,7 +12,7 @@ use super::super::{Loaded, ReadError, read_mesh};
 use super::{CHUNK_BINARY, CHUNK_JSON};
 use shellock_geom::Vec3;
 
-/// Codes of `componentType`.
+/// Codes of `componentType` in accessors.
 const U8: u32 = 5121;
 const U16: u32 = 5123;
 const F32: u32 = 5126;
@@ -21,7 +21,7 @@ const F32: u32 = 5126;
 const POINTS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const TRIANGLES: [[u8; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
-/// A document that grows, and its data.
+/// A document under construction, and its data.
 #[derive(Clone)]
 struct File {
     json: Value,
@@ -29,7 +29,7 @@ struct File {
 }
 
 impl File {
-    /// Node 0 is shown and has mesh 0, a tetrahedron: accessor 0 has its points, accessor 1 its corners.
+    /// Node 0 is visible and has mesh 0, a tetrahedron: accessor 0 has its points, accessor 1 its corners.
     fn tetrahedron() -> Self {
         let mut file = Self {
             json: json!({
@@ -46,7 +46,7 @@ impl File {
         file
     }
 
-    /// Puts `bytes` into a buffer view of its own; returns its index.
+    /// Puts `bytes` into a buffer view of its own. Returns its index.
     fn view(&mut self, bytes: &[u8]) -> usize {
         self.data.resize(self.data.len().next_multiple_of(4), 0);
         let view = json!({ "buffer": 0, "byteOffset": self.data.len(), "byteLength": bytes.len() });
@@ -54,7 +54,7 @@ impl File {
         push(&mut self.json["bufferViews"], view)
     }
 
-    /// Adds an accessor of `bytes`; returns its index.
+    /// Adds an accessor of `bytes`. Returns its index.
     fn add(&mut self, shape: &str, component: u32, count: usize, bytes: &[u8]) -> usize {
         let view = self.view(bytes);
         let accessor =
@@ -72,7 +72,7 @@ impl File {
         self.add(shape, F32, rows.len(), &bytes_of(rows))
     }
 
-    /// Adds an accessor of rows of bytes that stand for shares of 255.
+    /// Adds an accessor of rows of normalised bytes, fractions of 255.
     fn shares<const N: usize>(&mut self, rows: &[[u8; N]]) -> usize {
         let shape = if N == 3 { "VEC3" } else { "VEC4" };
         let which = self.add(shape, U8, rows.len(), rows.as_flattened());
@@ -98,8 +98,8 @@ impl File {
         push(&mut self.json["accessors"], accessor)
     }
 
-    /// Makes node 0 follow joints: node k + 1 for each of `joints`, all of the scene's roots. The point in row
-    /// i follows joint i modulo their number.
+    /// Makes node 0 follow joints: node k + 1 for each of `joints`, all of them roots of the scene. The point
+    /// in row i follows joint i modulo their number.
     fn skin(&mut self, joints: &[Value]) {
         let names: Vec<usize> = (1..=joints.len()).collect();
         for joint in joints {
@@ -117,7 +117,7 @@ impl File {
         attributes["WEIGHTS_0"] = json!(weights);
     }
 
-    /// The attributes of the tetrahedron.
+    /// Attributes of the tetrahedron's primitive.
     fn attributes(&mut self) -> &mut Value {
         &mut self.json["meshes"][0]["primitives"][0]["attributes"]
     }
@@ -141,7 +141,7 @@ impl File {
     }
 }
 
-/// Puts `item` at the end of `list`; returns its index.
+/// Appends `item` to `list`. Returns its index.
 fn push(list: &mut Value, item: Value) -> usize {
     let list = list.as_array_mut().unwrap();
     list.push(item);
@@ -152,7 +152,7 @@ fn bytes_of<const N: usize>(rows: &[[f32; N]]) -> Vec<u8> {
     rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// A GLB of two chunks.
+/// A GLB file of two chunks.
 fn glb(json: &[u8], data: &[u8]) -> Vec<u8> {
     let (mut json, mut data) = (json.to_vec(), data.to_vec());
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -167,7 +167,7 @@ fn glb(json: &[u8], data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The points of the tetrahedron, each moved by `f`.
+/// Points of the tetrahedron, each moved by `f`.
 fn moved(f: impl Fn(Vec3) -> Vec3) -> Vec<Vec3> {
     POINTS.map(|p| f(Vec3::from_array(p.map(f64::from)))).to_vec()
 }

@@ -1,4 +1,4 @@
-//! Skins, morph targets, instances and sparse data: where points are.
+//! Skins, morph targets, instances and sparse data: positions of points.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -12,7 +12,7 @@ fn turned(p: Vec3) -> Vec3 {
     Vec3::new(-p.y, p.x, p.z)
 }
 
-/// The inverse of a shift, by columns.
+/// Inverse of a translation, by columns.
 fn shift_back(by: [f32; 3]) -> [f32; 16] {
     let [x, y, z] = by.map(|x| -x);
     [
@@ -20,7 +20,7 @@ fn shift_back(by: [f32; 3]) -> [f32; 16] {
     ]
 }
 
-/// A tetrahedron of two joints at (1, 2, 3) and, as its child, (1, 2, 5), as they were bound.
+/// A tetrahedron in its bind pose, with two joints at (1, 2, 3) and, as its child, (1, 2, 5).
 fn bound() -> File {
     let mut file = File::tetrahedron();
     file.skin(&[
@@ -43,7 +43,7 @@ fn the_node_of_a_skinned_mesh_moves_nothing() {
     file.json["nodes"][0]["translation"] = json!([10, 20, 30]);
     file.json["nodes"][0]["scale"] = json!([-5, 5, 5]);
     assert_eq!(file.read().unwrap().mesh, bound().read().unwrap().mesh);
-    // Its parent neither.
+    // The transform of its parent has no effect either.
     let mut below = bound();
     push(
         &mut below.json["nodes"],
@@ -104,7 +104,7 @@ fn a_second_set_of_joints_and_weights_of_bytes_count_too() {
     ] {
         file.attributes()[name] = json!(which);
     }
-    // Joint 7 is not there, but no weight names it.
+    // Joint 7 does not exist, but no weight refers to it.
     assert_close(&file.points(), &moved(|p| p + Vec3::new(1.0, 0.0, 0.0)));
 }
 
@@ -124,11 +124,11 @@ fn a_morph_target_of_weight_1_adds_its_differences() {
     let other = file.floats(&[[9.0; 3]; 4]);
     let primitive = &mut file.json["meshes"][0]["primitives"][0];
     primitive["targets"] = json!([{ "POSITION": target }, { "POSITION": other }, { "NORMAL": 99 }]);
-    // Without weights all are 0.
+    // Missing weights are all 0.
     assert_close(&file.points(), &moved(|p| p));
     file.json["meshes"][0]["weights"] = json!([1, 0]);
     assert_close(&file.points(), &moved(|p| p + delta));
-    // Weights of the node come before those of the mesh, and other places of the mesh keep theirs.
+    // Weights of a node override those of the mesh, and other nodes with the mesh keep its own.
     push(
         &mut file.json["nodes"],
         json!({ "mesh": 0, "weights": [-0.5, 0, 1] }),
@@ -201,7 +201,7 @@ fn sparse_data_equals_dense() {
     (all[3], all[1]) = (rows[0], rows[1]);
     let position = dense.floats(&all);
     dense.attributes()["POSITION"] = json!(position);
-    // In any order.
+    // Replaced rows may come in any order.
     for (places, rows) in [([3, 1], rows), ([1, 3], [rows[1], rows[0]])] {
         let mut sparse = File::tetrahedron();
         let position = sparse.sparse(Some(0), 4, &places, &rows);
@@ -216,7 +216,7 @@ fn sparse_data_without_a_base_is_zero_elsewhere() {
     let position = file.sparse(None, 4, &[1, 2, 3], &POINTS[1..]);
     file.attributes()["POSITION"] = json!(position);
     assert_close(&file.points(), &moved(|p| p));
-    // Morph targets most often are.
+    // Morph targets are sparse most often.
     let target = file.sparse(None, 4, &[2], &[[0.0, 4.0, 0.0]]);
     let nothing = push(
         &mut file.json["accessors"],

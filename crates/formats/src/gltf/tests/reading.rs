@@ -72,7 +72,7 @@ fn nodes_move_their_meshes_and_mirrors_keep_the_inside_inside() {
 
 #[test]
 fn strips_and_fans_are_triangles_too() {
-    // Corners 0 2 1 0 1 3 …: as a strip, every other triangle turned.
+    // Corners 0 2 1 0 1 3 …: in a strip, every other triangle is turned.
     for (mode, second) in [(5, [1, 2, 0]), (6, [0, 1, 0])] {
         let text =
             embedded(r#"[{ "mesh": 0 }]"#).replace(r#""indices""#, &format!(r#""mode": {mode}, "indices""#));

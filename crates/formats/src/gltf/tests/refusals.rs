@@ -1,4 +1,4 @@
-//! Files that are refused, and by what words.
+//! Files that are rejected, and the messages.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What is printed, what is cut out, what is left out, and what is refused, by what files say of their parts.
+//! Parts that are printed, cut out, left out or rejected, according to the file.
 
 use super::super::super::{Selection, read_selected};
 use super::*;
@@ -23,7 +23,7 @@ fn cube(id: u32, attributes: &str) -> String {
     boxed(id, attributes, "", [0.0; 3], [10.0; 3])
 }
 
-/// A box that sticks out of [`cube`] along x.
+/// A box that protrudes from [`cube`] along x.
 fn bar(id: u32, attributes: &str, more: &str) -> String {
     boxed(id, attributes, more, [8.0, 4.0, 4.0], [20.0, 6.0, 6.0])
 }
@@ -102,7 +102,7 @@ fn negative_volumes_are_cut_out_of_their_own_object_alone() {
     assert_told(&loaded, "cut out as a negative volume: \"hole\"");
     assert!(loaded.file_face.is_sorted() && loaded.n_file_faces() > 24);
     assert_eq!(loaded.file_face.len(), loaded.mesh.triangles.len());
-    // A range of an object's triangles, as PrusaSlicer has it.
+    // A range of an object's triangles, as in PrusaSlicer.
     let both = cuboid([0.0; 3], [10.0; 3]).to_mesh();
     let inner = cuboid([4.0, 4.0, 4.0], [6.0, 6.0, 20.0]).to_mesh();
     let n = both.points.len() as u32;
@@ -201,7 +201,7 @@ fn extensions_that_are_not_read_are_refused_by_name_whether_or_not_the_file_dema
     assert!(told(&shape).contains("boolean operations"));
     assert!(told("<object id=\"1\"><x:newshape/></object>").contains("newshape"));
     assert!(told(&cube(1, "s:slicestackid=\"7\"")).contains("slices"));
-    // What is not built does not matter.
+    // Objects outside the build do not matter.
     let unused = with_beams.replace("object id=\"1\"", "object id=\"9\"") + &cube(1, "");
     assert_eq!(volume(&read_model(&unused, &items(&[1])).unwrap()), 1000.0);
     let demands = |uri: &str| {
