@@ -20,13 +20,13 @@ pub struct Curve {
     pub tangents: Vec<Vec3>,
     /// Outward unit normals `N`, perpendicular to `u`.
     pub normals: Vec<Vec3>,
-    /// `v = ± N × u`, pointing from the later piece to the earlier one.
+    /// Unit vectors `v = ± N × u`, from the later piece to the earlier one.
     pub across: Vec<Vec3>,
-    /// Whether the curve runs back into itself.
+    /// True if the curve is closed.
     pub is_loop: bool,
 }
 
-/// One curve for each seam of the inner surface that is long enough to have points of its own.
+/// Makes one curve for each seam of the inner surface that is long enough to be resampled.
 pub fn curves(grid: &ShellGrid, inner: &SegmentedSurface, plan: &LatticePlan) -> Vec<Curve> {
     inner
         .seams()
