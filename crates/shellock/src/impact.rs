@@ -1,4 +1,4 @@
-//! What stops a fall (Sect. 4.3, Eq. 2): the momentum m v is gone within Δt.
+//! Impact force that stops a fall (Sect. 4.3, Eq. 2): the momentum m v vanishes within Δt.
 
 /// Standard gravity, mm/s².
 const GRAVITY_MM_S2: f64 = 9806.65;
