@@ -19,7 +19,7 @@ use form::Sculpture;
 pub enum Figure {
     /// A squirrel with an acorn and a large curled tail: the demo.
     Squirrel,
-    /// A sitting cat.
+    /// A sitting cat with its tail around it.
     Cat,
     /// A teddy bear that sits with its arms open.
     Teddy,

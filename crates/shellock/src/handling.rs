@@ -46,7 +46,7 @@ pub const DROP_MM: f64 = 2000.0;
 /// times less of a fall, but 1.25 to 1.5 times less of a press (docs/notes/stress-test.md).
 const PLAY_IN_A_FALL: f64 = 1.2;
 
-/// Gravity, mm/s².
+/// Acceleration of gravity, mm/s².
 const GRAVITY_MM_S2: f64 = 9806.65;
 /// Conversion of g/cm³ to t/mm³, so that t · mm/s² = N.
 const T_MM3_PER_G_CM3: f64 = 1e-9;
@@ -126,8 +126,8 @@ pub enum Deed {
 }
 
 impl Deed {
-    /// Returns true for loads of ordinary use. A kit may also fall on any side, but only once in a while; and
-    /// hardly any plan withstands a fall onto an ear or a tail.
+    /// Returns true for loads of ordinary use: all but falls onto any side. Such falls are rare, and hardly
+    /// any plan withstands one onto an ear or a tail.
     pub fn is_use(&self) -> bool {
         !matches!(self, Self::Fall { .. })
     }
@@ -157,7 +157,7 @@ impl Deed {
 pub struct LoadCase {
     /// Kind of the load.
     pub deed: Deed,
-    /// Total force, N.
+    /// Force of the load, N; of a grip, that of each finger.
     pub force_n: f64,
     /// Place of the load, mm.
     pub at: Vec3,

@@ -13,7 +13,7 @@
 //!    └──────────┘                                          k                     ▒▒ ┘
 //! ```
 //!
-//! [`sites`] finds such prisms: planes by random sampling, 16 slides in each, places along the rim, three
+//! [`sites`] finds such prisms: planes by random sampling, 16 slides in each, places along the rim, four
 //! sizes. [`imprint`] makes the surface inside a patch of its own, with straight seams. Later stages know
 //! only 26 directions; [`Turn`] rotates the model so that the slide is one of them.
 //!

@@ -221,7 +221,7 @@ pub enum StrengthError {
 /// Stress of one wall thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tried {
-    /// Thickness H, mm.
+    /// Thickness H of the wall, mm.
     pub thickness_mm: f64,
     /// Decisive stress in the worst case, MPa.
     pub stress_mpa: f64,

@@ -99,8 +99,8 @@ impl ShellGrid {
         })
     }
 
-    /// Face neighbours of `node`, except those behind a crack: both are inside the model, but not what is
-    /// between.
+    /// Face neighbours of `node`, except across a crack, where both nodes are inside the model but the space
+    /// between them is not.
     pub(super) fn joined_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
         let is_cut = move |other: u32| {
             let pair = (node.min(other), node.max(other));

@@ -16,7 +16,7 @@ pub struct Curve {
     pub earlier: PatchId,
     /// Points about 1 mm apart. A loop's last point is its first.
     pub points: Vec<Vec3>,
-    /// Unit tangents `u`.
+    /// Unit tangents `u` along the curve.
     pub tangents: Vec<Vec3>,
     /// Outward unit normals `N`, perpendicular to `u`.
     pub normals: Vec<Vec3>,

@@ -18,7 +18,7 @@ use crate::{Cancelled, Cause, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Wa
 /// Relative difference below which costs count as equal, against rounding.
 const COST_TIE: f64 = 1e-9;
 
-/// Greatest load factor reported; higher ones are of no interest.
+/// Greatest load factor in summaries; higher ones are of no interest.
 pub const MOST_TIMES: f64 = 10.0;
 
 /// Least components of `s` along the seam, and towards the earlier piece, that are named as the reason why a
@@ -51,7 +51,7 @@ pub struct Holding {
 pub struct LoadBorne {
     /// Kind of the load.
     pub deed: Deed,
-    /// Total force of the load, N.
+    /// Force of the load, N; of a grip, that of each finger.
     pub force_n: f64,
     /// Place of the load, mm in assembly space.
     pub at: [f64; 3],
@@ -61,7 +61,8 @@ pub struct LoadBorne {
     pub first: Option<GivesWay>,
 }
 
-/// Summary of the loads that a kit withstands. `None` where a load has no place on it, or nothing fails.
+/// Summary of the loads that a kit withstands, each at most [`MOST_TIMES`] times the load asked for. `None`
+/// where a load has no place on the kit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bears {
     /// Greatest press on the top, N.
@@ -76,7 +77,7 @@ pub struct Bears {
     pub fall_upright_m: Option<f64>,
     /// Greatest fall in the worst of all orientations, m.
     pub fall_m: Option<f64>,
-    /// First failure in use; also `None` in kits of earlier versions.
+    /// First failure in use; `None` where nothing fails, and in kits of earlier versions.
     #[serde(default)]
     pub weakest: Option<WeakestUse>,
     /// Validity of the figures, in words; empty in kits of earlier versions.

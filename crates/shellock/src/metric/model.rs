@@ -49,7 +49,8 @@ impl Default for MetricParams {
 }
 
 impl MetricParams {
-    /// Takes wall, floor β and rails from the plan's parameters, with the given material.
+    /// Takes wall, floor β and rails of the plan, and the default of `sizes`. Without a wall the usual one
+    /// counts.
     pub fn of_plan(params: &PlanParams, sizes: &ConnectorSizes, material: Material) -> Self {
         let defaults = Self::default();
         let wall_mm = if params.wall_mm > 0.0 {

@@ -47,7 +47,7 @@ pub struct FinishedJoint {
     pub is_rail: bool,
 }
 
-/// The finished pieces.
+/// The finished pieces, ready to print.
 pub struct Finished {
     /// One closed mesh a piece, turned, with coordinates that 32-bit floats hold.
     pub meshes: IdVec<PatchId, TriMesh>,
@@ -75,7 +75,7 @@ pub enum PieceError {
 
 /// Parameters of finishing pieces.
 pub struct FinishParams<'a> {
-    /// Profiles and clearances.
+    /// Profiles and clearances of connectors.
     pub connector: &'a ConnectorParams,
     /// Least gaps of the finished pieces.
     pub relief: Relief,

@@ -28,7 +28,7 @@ const NOTCH_UNEVEN_MM: f64 = 0.4;
 /// A notch for a fingernail across the key's outer surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
-    /// The key.
+    /// The key that gets the notch.
     pub key: PatchId,
     /// Middle of the notch, near the surface.
     pub at: Vec3,

@@ -69,7 +69,7 @@ const UNEVEN_MM: f64 = 1.5;
 const COS_STEEP: f64 = 0.766;
 /// Share of the thickness that the wall must have behind a number; carved walls are thinner.
 const WHOLE_WALL: f64 = 0.85;
-/// Height above the surface at which rays start, mm; cutters end at half of it.
+/// Height above a number's plane at which rays start, mm; cutters end at half of it above the surface.
 const ABOVE_MM: f64 = 2.0;
 /// Tolerance within which strokes follow the surface, mm.
 const FOLLOW_MM: f64 = 0.06;

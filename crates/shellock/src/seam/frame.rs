@@ -18,7 +18,7 @@ const SHORTEST_MM: f64 = 4.0 * STEP_MM;
 pub(crate) struct FramedLine {
     /// Points about 1 mm apart. A loop's last point is its first.
     pub points: Vec<Vec3>,
-    /// Unit tangents `u`.
+    /// Unit tangents `u` along the line.
     pub tangents: Vec<Vec3>,
     /// Outward unit normals `N`, perpendicular to `u`.
     pub normals: Vec<Vec3>,

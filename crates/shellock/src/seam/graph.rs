@@ -102,7 +102,8 @@ impl ContactGraph {
             .collect()
     }
 
-    /// Returns true if no single piece alone holds others; two pieces need one contact, one piece none.
+    /// Returns true if all pieces are connected and no single piece alone holds others. Two pieces need one
+    /// contact, one piece none.
     pub fn is_two_connected(&self) -> bool {
         self.parts().len() <= 1 && self.articulation_pieces().is_empty()
     }

@@ -91,7 +91,8 @@ pub(crate) fn stretches(
 impl SegmentedSurface {
     /// All seams, split where three or more patches meet, patch `a` on the left as seen from outside.
     ///
-    /// # Panics Where the mesh is not closed, which a `SegmentedSurface` guarantees.
+    /// # Panics
+    /// Panics if the mesh is not closed, against the guarantee of `SegmentedSurface`.
     pub fn seams(&self) -> Vec<Seam> {
         let topology = Topology::of_mesh(&self.mesh).expect("a segmented surface is closed");
         let labels: Vec<u32> = self.patch_of_face.iter().map(|p| p.0).collect();
@@ -118,14 +119,16 @@ impl SegmentedSurface {
 
     /// Contact graph in which contacts count if their longest stretch is at least `min_contact_mm`.
     ///
-    /// # Panics As [`Self::seams`].
+    /// # Panics
+    /// As [`Self::seams`].
     pub fn contact_graph(&self, min_contact_mm: f64) -> ContactGraph {
         self.contact_graph_below(0.0, min_contact_mm)
     }
 
     /// Contact graph with lengths measured on the inner side of a wall of `wall_mm`, where connectors are.
     ///
-    /// # Panics As [`Self::seams`].
+    /// # Panics
+    /// As [`Self::seams`].
     pub fn contact_graph_below(&self, wall_mm: f64, min_contact_mm: f64) -> ContactGraph {
         let lengths = self
             .seams()
