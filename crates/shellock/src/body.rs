@@ -1,8 +1,8 @@
 //! Shell bodies: the wall of the model, split into pieces that can leave (Sect. 4.1, Eq. 1).
 //!
-//! The wall `model − inner region` is split in the order of taking apart, key first, so the bodies are a
-//! partition of it but for the gap in the seams, and the outer triangles stay the model's own. Each cut is
-//! the zero level of a field
+//! The wall `model − inner region` is split in the disassembly sequence, key first. The bodies therefore
+//! partition the wall except for the gaps in the seams, and the outer triangles stay those of the model. Each
+//! cut is the zero level of a field
 //!
 //! ```text
 //! φ_p                                            beyond the sheets through p's seams (`sheets`);
@@ -14,12 +14,12 @@
 //! ```
 //!
 //! so that along every line in direction s all remaining material comes before p: p leaves freely by
-//! construction. Fragments that a cut leaves on either side are given to the other one (`fragments`): the piece
-//! keeps out of the way of what it gave, and takes along what is ahead of what it got. What comes off a body all
-//! the same, smaller than the grid sees, goes to the body beside it (`chips`). The two sides of a cut keep a small
-//! gap, the same from the inner side to the outer rim.
-//! Where outer patches hide each other a little, only the seam shifts. The first-installed piece is what is
-//! left.
+//! construction. A fragment that a cut leaves on one side is given to the other side (`fragments`). The piece
+//! then keeps out of the way of the fragments it gave, and takes along all that is ahead of those it got.
+//! Fragments smaller than the grid resolves can still break off a body; they go to the neighbouring body
+//! (`chips`). The two sides of a cut keep a small gap of constant width, from the inner side to the outer
+//! rim. Where outer patches hide each other a little, only the seam shifts. The first-installed piece is the
+//! remainder.
 
 mod chips;
 mod error;
@@ -37,24 +37,26 @@ pub use separate::{ShellBodies, build};
 
 use crate::params::ParamProblem;
 
-/// How the wall is made and cut. Lengths in mm.
+/// Parameters of making and cutting the wall. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyParams {
     /// Wall thickness, measured inwards from the model's surface. [0.8, 10]; 2.
     ///
     /// Published shells of this kind are 1.9–2.8 mm thick at 150 mm (Table 1).
     pub thickness_mm: f64,
-    /// Spacing of the grid that fields live on. (0, thickness / 2]; `None` takes the thickness over 2.5.
+    /// Spacing of the grid that fields are sampled on. (0, thickness / 2]; `None` takes the thickness over
+    /// 2.5.
     ///
-    /// At a third the inner surface is off by 0.003 mm on average; 0.8 mm for a 2 mm wall takes 0.6 of the
-    /// time of that and passes the same checks. The connectors' own shape does not depend on it.
+    /// At a third of the thickness the inner surface is off by 0.003 mm on average. For a 2 mm wall, 0.8 mm
+    /// takes 0.6 of the time of that and passes the same checks. The shape of connectors does not depend on
+    /// the spacing.
     pub cell_mm: Option<f64>,
-    /// How far each side of a seam stays back. [0, 0.4]; 0.05.
+    /// Distance by which each side of a seam stays back from the cut. [0, 0.4]; 0.05.
     pub seam_gap_mm: f64,
-    /// The same along the seams of a key that slides on rails; [0, 0.4], `None` where it does not. Such a key
-    /// is to be taken out by hand.
+    /// Seam gap of a key that slides on rails, which is to be taken out by hand. [0, 0.4]; `None` where the
+    /// key does not slide on rails.
     pub key_gap_mm: Option<f64>,
-    /// Depth of the rim, within which gaps are told apart from those beneath. [0.05, 5]; 1.
+    /// Depth of the rim, within which gaps are reported apart from those beneath. [0.05, 5]; 1.
     pub rim_mm: f64,
 }
 
@@ -71,12 +73,12 @@ impl Default for BodyParams {
 }
 
 impl BodyParams {
-    /// Grid spacing, mm.
+    /// Grid spacing in mm: the chosen one, else the thickness over 2.5.
     pub fn cell_mm(&self) -> f64 {
         self.cell_mm.unwrap_or(self.thickness_mm / 2.5)
     }
 
-    /// Every value out of range.
+    /// Lists every value out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         let cell = self.cell_mm();
         [

@@ -13,12 +13,12 @@
 //!      F└─────┘                            F└─────┴─┘─┘F
 //! ```
 //!
-//! A run of connectors is one profile swept along the seam; its shape changes smoothly with the angle between
+//! A run of connectors is one profile swept along the seam. Its shape changes smoothly with the angle between
 //! the separation direction and the surface. The socket is the swept pin grown by the clearance, so the pin
 //! can leave along the separation direction and along no other.
 //!
-//! Where a key slides along its seam no such profile holds. There its neighbour carries a straight tongue
-//! under the key's wall, and the key a groove around it (`connector::rail`).
+//! No such profile holds where a key slides along its seam. There the key's neighbour carries a straight
+//! tongue under the key's wall, and the key has a groove around it (`connector::rail`).
 
 mod frame;
 mod free;
@@ -35,31 +35,31 @@ pub use run::{RailPart, Run, RunShape, RunStation, SeamRoom, runs};
 use crate::params::ParamProblem;
 use crate::sizes::SizeChoice;
 
-/// How connectors are made. Lengths in mm.
+/// Parameters of connectors. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConnectorParams {
-    /// Connector size D, depth and width of the channel: one for all pairs of pieces, or one for each. 2.5
-    /// for all.
+    /// Connector size D, depth and width of the channel: one for all pairs of pieces, or one for each pair.
+    /// 2.5 for all.
     ///
-    /// Walls of channel and pin come out at about 0.45 D.
+    /// The walls of channel and pin come out at about 0.45 D.
     pub size: SizeChoice,
     /// Gap between mating faces. [0.03, 0.6]; 0.12.
     ///
     /// Resin printers hold 0.05–0.15 mm a side, filament printers want 0.15–0.3.
     pub clearance_mm: f64,
-    /// The same between a key that slides on rails and its neighbours, so that it can be taken out by hand;
-    /// no less than the other. [0.03, 0.8]; 0.15.
+    /// Gap between a key that slides on rails and its neighbours, so that it can be taken out by hand; never
+    /// less than the other clearance. [0.03, 0.8]; 0.15.
     pub key_clearance_mm: f64,
-    /// How far a bump on each rail presses into the key's groove before it snaps into its dimple. [0, 0.4];
+    /// Interference of the bump on each rail with the key's groove before it snaps into its dimple. [0, 0.4];
     /// 0, none.
     ///
-    /// It keeps the key from creeping out, and must bend the groove's wall on the way: a tenth of its
-    /// thickness for 0.1 mm.
+    /// The detent keeps the key from creeping out. It must bend the groove's wall on the way: by a tenth of
+    /// its thickness for 0.1 mm.
     pub detent_mm: f64,
-    /// How far ribs of a key without rails press on the pieces around it: friction is all that holds such a
+    /// Interference of the ribs of a key without rails with the pieces around it: only friction holds such a
     /// key. [0, 0.3]; 0.08.
     pub key_rib_mm: f64,
-    /// Thinnest wall left standing. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
+    /// Thinnest wall that is kept. [0.1, 2]; 0.4, one extrusion line or eight pixels of a resin printer.
     pub min_wall_mm: f64,
 }
 
@@ -77,7 +77,7 @@ impl Default for ConnectorParams {
 }
 
 impl ConnectorParams {
-    /// Gap of connectors, mm: of those of a key that slides on rails, or of all others.
+    /// Clearance of connectors, mm: that of a key that slides on rails, or that of all others.
     pub fn clearance_of(&self, is_sliding_key: bool) -> f64 {
         if is_sliding_key {
             self.key_clearance_mm.max(self.clearance_mm)
@@ -86,13 +86,13 @@ impl ConnectorParams {
         }
     }
 
-    /// Room below the wall that connectors up to `size_mm` may take, mm: a channel under the steepest
-    /// backward seam is as deep.
+    /// Depth below the wall that connectors up to `size_mm` may take, mm: that of a channel under the
+    /// steepest backward seam.
     pub fn room_mm(&self, size_mm: f64) -> f64 {
         2.1 * size_mm + self.clearance_mm
     }
 
-    /// Every value out of range.
+    /// Lists every value out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         let others = [
             ParamProblem::unless_within("clearance", "mm", self.clearance_mm, 0.03, 0.6),

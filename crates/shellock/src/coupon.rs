@@ -1,9 +1,9 @@
-//! The coupon: a small plate of real joints at five clearances, which finds those that a printer needs.
+//! The coupon: a small plate of real joints at five clearances, for finding those that a printer needs.
 //!
-//! Five numbers, each with the four parts of two joints: a *pin* that goes into a *channel* straight down, as
-//! a piece goes in beside its neighbour, and a *key* that slides on a *rail*. Profiles and gaps are those of
-//! kits: the halves of [`crate::connector`], walls that stay back from the seam by the printer's tolerance.
-//! All else is there to be held.
+//! It has five numbers, each with the four parts of two joints. A *pin* goes straight down into a *channel*,
+//! as a piece goes in beside its neighbour, and a *key* slides on a *rail*. Profiles and gaps are those of
+//! kits: the halves of [`crate::connector`], and walls that stay back from the seam by the printer's
+//! tolerance. The rest of each part is for holding it.
 //!
 //! ```text
 //!     ┌───┬─────────────┬─┐  channel, from above:     ┌───┬─────────┬─┐  rail:
@@ -14,11 +14,11 @@
 //!         └─────────────┘                                 └─────────┘
 //! ```
 //!
-//! Nothing of it needs supports. Channels and rails print with their outer side up, pins with it down, keys
-//! stand on the end that leaves first. Edges that lie on the plate where parts meet are broken, since first
+//! No part needs supports. Channels and rails print with their outer side up, pins with it down, and keys
+//! stand on the end that leaves first. Edges that lie on the plate where parts meet are bevelled, since first
 //! layers come out wider.
 //!
-//! Parts are made in their place in the joint: z points out of the wall, whose inner side is z = 0.
+//! Parts are modelled in their place in the joint: z points out of the wall, whose inner side is z = 0.
 
 mod engraving;
 #[cfg(test)]
@@ -32,64 +32,67 @@ use crate::connector::{ConnectorParams, RailPart, Run, RunShape, RunStation, Sec
 use crate::piece::whole_halves;
 use engraving::Sheet;
 
-/// How many clearances a coupon has.
+/// Number of clearances on a coupon.
 pub const N_FITS: usize = 5;
 
-/// Connector size D, mm: the least of kits, whose walls are the hardest to print.
+/// Connector size D, mm: the smallest of kits, whose walls are the hardest to print.
 const SIZE_MM: f64 = 2.0;
-/// Thickness of the walls, mm: the least of kits.
+/// Thickness of the walls, mm: the smallest of kits.
 const WALL_MM: f64 = 1.6;
-/// Length of the pin's seam, mm; the pin ends so far before the wall does.
+/// Length of the pin's seam, mm, and distance of the pin's ends from those of its wall, mm.
 const SEAM_MM: f64 = 8.6;
 const PIN_END_MM: f64 = 0.8;
-/// How far the pin's wall and the channel's go from the seam, mm; how far the cheeks embrace the pin's.
+/// Depths from the seam of the pin's wall and of the channel's, and depth to which cheeks embrace the pin's,
+/// mm.
 const PIN_DEEP_MM: f64 = 4.8;
 const CHANNEL_DEEP_MM: f64 = 1.6;
 const CHEEK_DEEP_MM: f64 = 3.5;
-/// Length of the key, mm. It stands: a resin printer takes half an hour for 6.2 mm.
+/// Length of the key, mm. It prints standing: a resin printer takes half an hour for 6.2 mm.
 const KEY_MM: f64 = 5.2;
-/// What joins the two grooves of a key besides their own walls, mm: so that its number has room.
+/// Width of the core that joins the two grooves of a key besides their own walls, mm, so that the number has
+/// room.
 const CORE_MM: f64 = 0.5;
-/// Width of what holds both ends of a seam, and both sides of a rail, mm: the left one carries the number.
+/// Widths of the holders at both ends of a seam, and at both sides of a rail, mm: the left one carries the
+/// number.
 const HOLDS_MM: [f64; 2] = [3.9, 1.2];
-/// Width of what joins the sides of a rail, mm.
+/// Width of the back that joins the sides of a rail, mm.
 const BACK_MM: f64 = 1.2;
-/// Halves reach so far into what they hang from where they end in it, mm.
+/// Depth to which halves reach into the wall they hang from where they end in it, mm.
 const ROOT_MM: f64 = 0.6;
-/// Edges of walls that lie on the plate, and those of tongues, are broken by so much, mm: a first layer comes
-/// out some 0.1 to 0.3 mm wider.
+/// Bevels of edges of walls that lie on the plate, and of tongues, mm: a first layer comes out some 0.1 to
+/// 0.3 mm wider.
 const BROKEN_MM: f64 = 0.4;
 const BROKEN_TONGUE_MM: f64 = 0.3;
-/// Parts lie so far apart on the plate, mm.
+/// Distance between parts on the plate, mm.
 const APART_MM: f64 = 3.0;
-/// A cut reaches so far past what it takes, mm.
+/// Length by which a cut reaches past the material it removes, mm.
 const PAST_MM: f64 = 1.0;
 
-/// What belongs to a number on the coupon. Lengths in mm.
+/// Clearances and tolerance of one number on the coupon. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// From 1, the tightest, to [`N_FITS`], the loosest.
+    /// Number from 1, the tightest, to [`N_FITS`], the loosest.
     pub number: u32,
     /// Gap of connectors. [0.03, 0.6].
     pub clearance_mm: f64,
     /// Gap of a key on its rails. [0.03, 0.8].
     pub key_clearance_mm: f64,
-    /// How far each side of a seam stays back. [0, 0.4].
+    /// Distance by which each side of a seam stays back. [0, 0.4].
     pub tolerance_mm: f64,
 }
 
-/// Least and greatest clearance of connectors and of keys, and greatest tolerance, mm, as everywhere.
+/// Ranges of the clearance of connectors and of keys, and greatest tolerance, mm, as everywhere.
 const CLEARANCES_MM: [f64; 2] = [0.03, 0.6];
 const KEY_CLEARANCES_MM: [f64; 2] = [0.03, 0.8];
 const MOST_TOLERANCE_MM: f64 = 0.4;
-/// From one number to the next the clearance grows by this share of the printer's, within these bounds, mm.
+/// Step of the clearance from one number to the next, as a share of the printer's, and its bounds, mm.
 const STEP_SHARE: f64 = 0.25;
 const STEPS_MM: [f64; 2] = [0.02, 0.1];
 
 /// The five fits around those of a printer, which are number 3 where the ranges allow it.
 ///
-/// What differs from number to number is how far printed faces stand out: by half a step each. So both
-/// clearances grow by the step, since two faces meet there, and the tolerance, which is of one face, by half
+/// From number to number, printed faces are assumed to stand out by half a step more. Both clearances
+/// therefore grow by the step, since two faces meet there, and the tolerance, which is of one face, by half
 /// of it.
 pub fn fits(clearance_mm: f64, key_clearance_mm: f64, tolerance_mm: f64) -> [Fit; N_FITS] {
     let hundredths = |mm: f64| (100.0 * mm).round() / 100.0;
@@ -97,7 +100,7 @@ pub fn fits(clearance_mm: f64, key_clearance_mm: f64, tolerance_mm: f64) -> [Fit
     let step_mm = hundredths((STEP_SHARE * clearance_mm).clamp(STEPS_MM[0], STEPS_MM[1]));
     let middle = (N_FITS / 2) as f64;
     let [least, most] = CLEARANCES_MM;
-    // Moved as a whole where it would leave the range.
+    // The series is shifted as a whole where it would leave the range.
     let first_mm = (clearance_mm - middle * step_mm)
         .min(most - 2.0 * middle * step_mm)
         .max(least);
@@ -113,7 +116,7 @@ pub fn fits(clearance_mm: f64, key_clearance_mm: f64, tolerance_mm: f64) -> [Fit
     })
 }
 
-/// What a part of the coupon is.
+/// Kind of a part of the coupon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// A wall with a channel under its seam.
@@ -127,10 +130,10 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them, as they lie on the plate from its back to its front.
+    /// All kinds, as they lie on the plate from its back to its front.
     pub const ALL: [Self; 4] = [Self::Channel, Self::Pin, Self::Rail, Self::Key];
 
-    /// Its name.
+    /// Name of the kind, in lower case.
     pub fn name(self) -> &'static str {
         match self {
             Self::Channel => "channel",
@@ -140,7 +143,7 @@ impl Kind {
         }
     }
 
-    /// Where the x, y and z axes of the joint go on the plate.
+    /// Directions on the plate of the x, y and z axes of the joint.
     fn turned(self) -> [[f64; 3]; 3] {
         match self {
             Self::Channel | Self::Rail => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -149,7 +152,7 @@ impl Kind {
         }
     }
 
-    /// The direction in which the joint comes apart: the pin's, or the key's.
+    /// Direction in which the joint comes apart: that of the pin, or of the key.
     pub fn separation(self) -> Vec3 {
         match self {
             Self::Channel | Self::Pin => Vec3::Z,
@@ -158,28 +161,28 @@ impl Kind {
     }
 }
 
-/// A part of the coupon.
+/// A part of the coupon, with its place on the plate.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// What it is.
+    /// Kind of the part.
     pub kind: Kind,
-    /// What it was made with.
+    /// Clearances and tolerance of the part.
     pub fit: Fit,
     /// One closed body, mm, in its place in the joint.
     pub mesh: TriMesh,
-    /// Where the x, y and z axes go on the plate.
+    /// Directions on the plate of the x, y and z axes of the joint.
     pub turned: [[f64; 3]; 3],
-    /// Where it is moved after that, mm.
+    /// Shift of the part after that rotation, mm.
     pub moved_mm: [f64; 3],
 }
 
 impl Part {
-    /// Its number and what it is: "3 channel".
+    /// Number and kind of the part: "3 channel".
     pub fn name(&self) -> String {
         format!("{} {}", self.fit.number, self.kind.name())
     }
 
-    /// The part as it lies on the plate.
+    /// Mesh of the part as it lies on the plate.
     pub fn on_plate(&self) -> TriMesh {
         let [x, y, z] = self.turned.map(Vec3::from_array);
         let moved = Vec3::from_array(self.moved_mm);
@@ -191,7 +194,8 @@ impl Part {
     }
 }
 
-/// The parts of all `fits` on a plate whose corner is the origin: a column a number, a row a kind.
+/// Lays the parts of all `fits` on a plate whose corner is the origin: one column per number, one row per
+/// kind.
 ///
 /// `min_wall_mm` is the thinnest wall that the printer makes, in [0.1, 2].
 pub fn coupon(fits: &[Fit], min_wall_mm: f64) -> Result<Vec<Part>, NotPrintable> {
@@ -224,13 +228,13 @@ pub fn coupon(fits: &[Fit], min_wall_mm: f64) -> Result<Vec<Part>, NotPrintable>
     Ok(laid)
 }
 
-/// The box around all parts on their plate, mm.
+/// Size of the box around all parts on their plate, mm.
 pub fn size_mm(parts: &[Part]) -> [f64; 3] {
     let boxes = parts.iter().map(|part| part.on_plate().bounds());
     boxes.fold(Aabb::EMPTY, Aabb::union).size().to_array()
 }
 
-/// The four parts of one number.
+/// Makes the four parts of one number.
 fn parts(fit: &Fit, min_wall_mm: f64) -> Result<[Part; 4], NotPrintable> {
     let connector = ConnectorParams {
         clearance_mm: fit.clearance_mm,
@@ -259,7 +263,7 @@ fn parts(fit: &Fit, min_wall_mm: f64) -> Result<[Part; 4], NotPrintable> {
     Ok([channel?, pin?, rail?, key?])
 }
 
-/// A box from its least to its greatest coordinates.
+/// A box, from its least to its greatest coordinates.
 fn block(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
     Volume::cuboid(Aabb {
         min: Vec3::new(x[0], y[0], z[0]),
@@ -267,7 +271,7 @@ fn block(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> Volume {
     })
 }
 
-/// The hull of two rectangles, each at a height: x, y, z.
+/// Hull of two rectangles, each given by x and y ranges and a height z.
 fn frustum(ends: [([f64; 2], [f64; 2], f64); 2]) -> Volume {
     let corners = |(x, y, z): ([f64; 2], [f64; 2], f64)| {
         [[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]].map(|[x, y]| Vec3::new(x, y, z))
@@ -275,12 +279,12 @@ fn frustum(ends: [([f64; 2], [f64; 2], f64); 2]) -> Volume {
     Volume::hull(&ends.map(corners).concat())
 }
 
-/// A range that is longer by so much at both ends.
+/// The range extended by `by_mm` at both ends.
 fn grown([least, most]: [f64; 2], by_mm: f64) -> [f64; 2] {
     [least - by_mm, most + by_mm]
 }
 
-/// The lowest of a section's parts, mm below the wall.
+/// Lowest coordinate of a section's parts, mm, at most 0; 0 is the wall's inner side.
 fn lowest<'a>(parts: impl IntoIterator<Item = &'a Option<crate::connector::Part>>) -> f64 {
     let heights = parts.into_iter().flatten().map(|part| part.s0);
     heights.fold(0.0, f64::min)
@@ -290,7 +294,7 @@ fn lowest<'a>(parts: impl IntoIterator<Item = &'a Option<crate::connector::Part>
 struct SeamJoint<'a> {
     connector: &'a ConnectorParams,
     tolerance_mm: f64,
-    /// The lowest point of the channel.
+    /// Lowest coordinate of the channel, mm.
     floor_mm: f64,
 }
 
@@ -319,7 +323,7 @@ impl<'a> SeamJoint<'a> {
         }
     }
 
-    /// Both halves of a run that is so long each way from the middle.
+    /// Both halves of a run that extends `half_mm` each way from the middle.
     fn halves(&self, half_mm: f64) -> [Volume; 2] {
         let run = Run {
             male: PatchId(0),
@@ -335,7 +339,7 @@ impl<'a> SeamJoint<'a> {
         let (gap, floor, half) = (self.tolerance_mm, self.floor_mm, 0.5 * SEAM_MM);
         let outer = [-half - HOLDS_MM[0], half + HOLDS_MM[1]];
         let [_, female] = self.halves(half + ROOT_MM + gap);
-        // As in kits, what hangs from a wall stays back with it above the clearance.
+        // As in kits, the parts that hang from a wall stay back with it above the clearance.
         let near = -0.5 * self.connector.clearance_mm;
         let above = [-self.connector.clearance_mm, WALL_MM];
         let female = female.subtract(&block(grown([-half, half], PAST_MM), [near, gap], above));
@@ -377,7 +381,7 @@ impl<'a> SeamJoint<'a> {
             ]),
         ];
         let body = Volume::union_all(wall.into_iter().chain([male]).collect());
-        // Sideways, where it has more room.
+        // The number runs sideways, where it has more room.
         let inner_side = Sheet {
             middle: Vec3::new(0.0, -0.5 * (PIN_DEEP_MM + 0.5 * SIZE_MM), 0.0),
             right: -Vec3::Y,
@@ -392,13 +396,13 @@ struct SlideJoint<'a> {
     connector: &'a ConnectorParams,
     tolerance_mm: f64,
     clearance_mm: f64,
-    /// Half the way from seam to seam.
+    /// Half the distance from seam to seam, mm.
     half_mm: f64,
-    /// From a seam to the far side of the groove.
+    /// Distance from a seam to the far side of the groove, mm.
     groove_mm: f64,
-    /// How far a tongue reaches past its seam.
+    /// Length by which a tongue reaches past its seam, mm.
     reach_mm: f64,
-    /// The lowest points of the tongue and of the key.
+    /// Lowest coordinates of the tongue and of the key, mm.
     tongue_floor_mm: f64,
     key_floor_mm: f64,
 }
@@ -426,7 +430,7 @@ impl<'a> SlideJoint<'a> {
         }
     }
 
-    /// A section of the rail whose seam is at `seam_x` and whose key lies on the side to which `side` points.
+    /// Section of the rail whose seam is at `seam_x` and whose key lies on the side to which `side` points.
     fn station(
         connector: &ConnectorParams,
         seam_x: f64,
@@ -448,7 +452,7 @@ impl<'a> SlideJoint<'a> {
         }
     }
 
-    /// Both halves of both rails, from `start_mm` behind the back seam.
+    /// Both halves of both rails, from `start_mm` along the way out from the back seam.
     fn halves(&self, start_mm: f64) -> [Volume; 2] {
         let end_mm = KEY_MM - stop_mm(SIZE_MM, self.clearance_mm);
         let places = rail_places([start_mm, end_mm], SIZE_MM, self.clearance_mm);
@@ -480,7 +484,7 @@ impl<'a> SlideJoint<'a> {
             block([below, outer[1]], along, [floor, 0.5 * WALL_MM]),
             block(outer, [gap, BACK_MM], [floor, WALL_MM]),
         ]);
-        // The edges of what is open on the plate: tongues and back.
+        // Bevels the edges of the open parts on the plate: tongues and back.
         let (open_x, open_y) = (half - self.reach_mm, [-KEY_MM - PAST_MM, gap]);
         let (open_x, past) = ([-open_x, open_x], BROKEN_TONGUE_MM + PAST_MM);
         let edges = frustum([
@@ -498,7 +502,7 @@ impl<'a> SlideJoint<'a> {
 
     fn key(&self, number: &str) -> Volume {
         let (gap, floor) = (self.tolerance_mm, self.key_floor_mm);
-        // Beneath the wall it is the clearance that counts, from the edge of the other's wall, too.
+        // Beneath the wall the clearance counts, also from the edge of the other part's wall.
         let back = gap.max(self.clearance_mm - gap);
         let [_, grooves] = self.halves(back);
         let (half, core) = (self.half_mm - gap, self.half_mm - self.groove_mm);
@@ -508,7 +512,7 @@ impl<'a> SlideJoint<'a> {
             block([-half, half], along, [0.0, WALL_MM]),
             block([-core, core], [-KEY_MM, -back], [floor, 0.5 * WALL_MM]),
         ]);
-        // As in kits, what hangs from a wall stays back with it above the clearance.
+        // As in kits, the parts that hang from a wall stay back with it above the clearance.
         let beside = |from: f64, z: [f64; 2]| {
             let (from, to) = (self.half_mm - from, self.half_mm + PAST_MM);
             [[from, to], [-to, -from]].map(|x| block(x, grown(along, PAST_MM), z))
@@ -518,7 +522,7 @@ impl<'a> SlideJoint<'a> {
             beside(gap, [-0.5 * self.clearance_mm, WALL_MM + PAST_MM]),
         ]
         .concat();
-        // The end that stands on the plate is smaller.
+        // The end that stands on the plate is bevelled.
         let front = -KEY_MM + BROKEN_MM;
         let ends = [
             (

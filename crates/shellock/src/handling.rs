@@ -1,21 +1,21 @@
-//! What people do to a finished kit, and what of it the kit bears.
+//! Loads on a finished kit in use, and the share of them that the kit withstands.
 //!
-//! The one place that declares loads and limits. A load is a force on every point of the outer surface; what
-//! of it does not balance, inertia bears. All answers are *load factors*: by how many times the load may grow
+//! This module alone declares loads and limits. A load is a force on every point of the outer surface;
+//! inertia balances the remainder. All results are *load factors*: the factor by which the load may grow
 //! until a seam opens by [`OPEN_SIZES`] connector sizes or a pin is bent beyond the material's strength.
-//! Contacts without clearance open in proportion to the load, so one solve says it.
+//! Contacts without clearance open in proportion to the load, so a single solve gives the factor.
 //!
 //! ```text
-//!      │ 70 N            a press: on what faces it within 10 mm; the floor answers with pressure alone, which
-//!      ▼                 no place of it can pull
+//!      │ 70 N            a press: on all that faces it within 10 mm; the floor answers with pressure
+//!      ▼                 alone and cannot pull
 //!    ┌───┐
 //!   ─┘   └─              a fall: the floor stops M v within Δt, and the walls' inertia answers (Eq. 2)
 //!   ↑↑  ↑↑↑
 //!   ═══════   floor      a grip: two fingers on opposite sides
 //! ```
 //!
-//! Limits: static, without friction but at the key, without clearance; what is narrower than
-//! [`Handling::least_width_mm`] is not pressed.
+//! Limits: static, without friction except at the key, without clearance. Places narrower than
+//! [`Handling::least_width_mm`] are not pressed.
 
 pub(crate) mod region;
 #[cfg(test)]
@@ -33,32 +33,32 @@ use crate::PatchId;
 use crate::impact::impact_n;
 use region::{around, highest_of, lowest, spread};
 
-/// An opening of this many connector sizes shows, and is half of what lets a pin out.
+/// Limit of a seam's opening, in connector sizes: it is visible, and half of what lets a pin out.
 pub const OPEN_SIZES: f64 = 0.3;
 
-/// A weighted opening under the separation force that counts as once; only ratios of it matter.
+/// Weighted opening under the separation force that counts as load factor 1, mm; only ratios of it matter.
 const PULLED_MM: f64 = 0.1;
 
 /// Height of falls, mm: the paper's.
 pub const DROP_MM: f64 = 2000.0;
 
-/// A fall counts as so many times harder than it is: seams have no play here, and finished pieces, which do, bear 1.4 to
-/// 1.7 times less of a fall but 1.25 to 1.5 times less of a press (docs/notes/stress-test.md).
+/// Factor on the force of a fall. Seams have no play here. Finished pieces, which do, withstand 1.4 to 1.7
+/// times less of a fall, but 1.25 to 1.5 times less of a press (docs/notes/stress-test.md).
 const PLAY_IN_A_FALL: f64 = 1.2;
 
-/// Gravity, mm/s².
+/// Acceleration of gravity, mm/s².
 const GRAVITY_MM_S2: f64 = 9806.65;
-/// g/cm³ in t/mm³, so that t · mm/s² = N.
+/// Conversion of g/cm³ to t/mm³, so that t · mm/s² = N.
 const T_MM3_PER_G_CM3: f64 = 1e-9;
 
-/// What is done to the kit. Forces in N, lengths in mm.
+/// Parameters of the loads on a kit. Forces in N, lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Handling {
-    /// Which way is up where it stands.
+    /// Direction that is up when the kit stands.
     pub up: [f64; 3],
     /// Force of a press. (0, 10⁵]; 70, the paper's punch.
     pub press_n: f64,
-    /// Radius of what presses. (0, 100]; 10.
+    /// Radius of the pressed area. (0, 100]; 10.
     pub press_radius_mm: f64,
     /// Force of each of two fingers. (0, 10⁵]; 20.
     pub grip_n: f64,
@@ -66,13 +66,13 @@ pub struct Handling {
     pub finger_radius_mm: f64,
     /// Height of a fall. (0, 10⁵]; 2000, the paper's.
     pub drop_mm: f64,
-    /// Falls besides that onto its feet, in even directions. [0, 1000]; 12.
+    /// Number of falls besides that onto the feet, in even directions. [0, 1000]; 12.
     pub n_falls: usize,
-    /// What is narrower is neither pressed nor gripped: tips of ears, tails. [0, 1000]; 15.
+    /// Least width of places that are pressed or gripped: excludes tips of ears and tails. [0, 1000]; 15.
     pub least_width_mm: f64,
     /// Wall thickness. (0, 20].
     pub wall_mm: f64,
-    /// What the walls are made of.
+    /// Material of the walls.
     pub material: Material,
 }
 
@@ -94,50 +94,50 @@ impl Handling {
     }
 }
 
-/// One thing that is done. Directions are unit vectors.
+/// One kind of load on the kit. Directions are unit vectors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Deed {
-    /// It stands and is pressed on its top.
+    /// The kit stands and is pressed on its top.
     PressTop,
-    /// It stands and is pressed on the highest place above its middle.
+    /// The kit stands and is pressed on the highest place above its middle.
     PressMiddle,
-    /// It lies and is pressed on the side that faces `toward`.
+    /// The kit lies and is pressed on the side that faces `toward`.
     PressSide {
-        /// Out of that side.
+        /// Direction out of the pressed side.
         toward: [f64; 3],
     },
-    /// Two fingers press where it is narrowest, but wide enough.
+    /// Two fingers press where the kit is narrowest, but wide enough.
     GripNarrow,
-    /// Two fingers press where it is widest.
+    /// Two fingers press where the kit is widest.
     GripWide,
-    /// It falls onto its feet.
+    /// The kit falls onto its feet.
     FallUpright,
-    /// It falls onto what is lowest along `down`.
+    /// The kit falls onto its lowest place along `down`.
     Fall {
-        /// Towards the floor.
+        /// Direction towards the floor.
         down: [f64; 3],
     },
-    /// Its weight, where one piece is held.
+    /// The kit hangs by its weight from one piece.
     Hang {
-        /// That piece.
+        /// The piece that is held.
         piece: PatchId,
     },
 }
 
 impl Deed {
-    /// Whether a kit is used like that. It may fall on any side, too, but only once in a while; and what
-    /// lands on an ear or a tail hardly any plan bears.
+    /// Returns true for loads of ordinary use: all but falls onto any side. Such falls are rare, and hardly
+    /// any plan withstands one onto an ear or a tail.
     pub fn is_use(&self) -> bool {
         !matches!(self, Self::Fall { .. })
     }
 
-    /// Whether it is told by the height of a fall.
+    /// Returns true if the load is reported as the height of a fall.
     pub fn is_fall(&self) -> bool {
         matches!(self, Self::Fall { .. } | Self::FallUpright)
     }
 
-    /// What is done, as in "where it is …".
+    /// Description of the load, as in "where it is …".
     pub fn done(&self) -> &'static str {
         match self {
             Self::PressTop => "pressed on its top",
@@ -152,20 +152,20 @@ impl Deed {
     }
 }
 
-/// A load.
+/// One load on the kit as forces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadCase {
-    /// What is done.
+    /// Kind of the load.
     pub deed: Deed,
-    /// How much of it, N.
+    /// Force of the load, N; of a grip, that of each finger.
     pub force_n: f64,
-    /// Where, mm.
+    /// Place of the load, mm.
     pub at: Vec3,
     /// Force on each point of the outer surface, N.
     pub forces_n: Vec<Vec3>,
 }
 
-/// All loads on `assembly`; those that have no place on it are left out.
+/// All loads on `assembly`, except those that have no place on it.
 pub fn load_cases(handling: &Handling, assembly: &ShellAssembly) -> Vec<LoadCase> {
     let bench = Bench::new(handling, assembly);
     let up = Vec3::from_array(handling.up).normalize_or(Vec3::Z);
@@ -193,12 +193,13 @@ pub fn load_cases(handling: &Handling, assembly: &ShellAssembly) -> Vec<LoadCase
     cases
 }
 
-/// The highest point of `assembly` that is wide enough to be pressed and above what it stands on.
+/// The highest point of `assembly` that is wide enough to be pressed and above its feet; `None` if there is
+/// none.
 pub(crate) fn top(handling: &Handling, assembly: &ShellAssembly) -> Option<usize> {
     Bench::new(handling, assembly).top(Vec3::from_array(handling.up).normalize_or(Vec3::Z))
 }
 
-/// Directions that are as even as few can be: a spiral of equal areas about `pole`.
+/// Directions as evenly spread as a few can be: a spiral of equal areas about `pole`.
 fn even_directions(pole: Vec3, n: usize) -> impl Iterator<Item = Vec3> {
     let (x, y) = pole.any_orthonormal_pair();
     (0..n).map(move |i| {
@@ -209,7 +210,7 @@ fn even_directions(pole: Vec3, n: usize) -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// What all loads need to know of the surface.
+/// Properties of the surface that all loads need.
 struct Bench<'a> {
     handling: &'a Handling,
     assembly: &'a ShellAssembly,
@@ -239,13 +240,13 @@ impl<'a> Bench<'a> {
         density_t_mm3 * self.handling.wall_mm * self.areas_mm2.iter().sum::<f64>()
     }
 
-    /// The highest place that is wide enough to be pressed, above what the model stands on: elsewhere it would
-    /// tip over.
+    /// The highest place that is wide enough to be pressed, above the feet: elsewhere the model would tip
+    /// over.
     fn top(&self, up: Vec3) -> Option<usize> {
         highest_of(self.assembly, up, self.pressed(up).into_iter())
     }
 
-    /// Of these places the one nearest to the middle of what it stands on.
+    /// The pressable place nearest to the vertical line through the middle of the feet.
     fn middle(&self, up: Vec3) -> Option<usize> {
         let feet = lowest(self.assembly, up);
         let weight: f64 = feet.iter().map(|v| self.areas_mm2[*v as usize]).sum();
@@ -262,7 +263,7 @@ impl<'a> Bench<'a> {
     }
 
     fn pressed(&self, up: Vec3) -> Vec<usize> {
-        /// Cosine between the press and a surface that it does not slip off.
+        /// Least cosine between the press and a surface that it does not slip off.
         const FACING: f64 = 0.5;
         let feet = lowest(self.assembly, up);
         let width_mm = self.handling.least_width_mm;
@@ -275,9 +276,10 @@ impl<'a> Bench<'a> {
         (0..self.assembly.points.len()).filter(is_pressed).collect()
     }
 
-    /// Upwards, where it was laid on its sides and came to rest: no pose twice, and not as it stands.
+    /// Up directions of the poses in which the model rests when laid on its sides: no pose twice, and not
+    /// upright or upside down.
     fn sides(&self, up: Vec3) -> Vec<Vec3> {
-        /// Cosine of what counts as one pose.
+        /// Least cosine between directions of one pose.
         const SAME: f64 = 0.9;
         let hull = Volume::hull(&self.assembly.points).to_mesh();
         let mut poses = vec![up, -up];
@@ -289,7 +291,7 @@ impl<'a> Bench<'a> {
         poses.split_off(2)
     }
 
-    /// Of the walls' mass.
+    /// Centre of the walls' mass.
     fn center(&self) -> Vec3 {
         let total: f64 = self.areas_mm2.iter().sum();
         let moment: Vec3 = self
@@ -302,7 +304,8 @@ impl<'a> Bench<'a> {
         moment / total.max(f64::MIN_POSITIVE)
     }
 
-    /// Share of the mass that resists a blow at `at` along `along`: less than all where the blow turns it.
+    /// Share of the mass that resists a blow at `at` along `along`, in (0, 1]: less than 1 where the blow
+    /// turns it.
     fn share_struck(&self, at: Vec3, along: Vec3) -> f64 {
         let center = self.center();
         let total: f64 = self.areas_mm2.iter().sum();
@@ -316,7 +319,7 @@ impl<'a> Bench<'a> {
         1.0 / (1.0 + turned)
     }
 
-    /// A press from `toward` on point `hit`, and the floor's answer.
+    /// A press from `toward` on point `hit`, with the reaction of the floor; `None` without a point.
     fn press(&self, deed: Deed, toward: Vec3, hit: Option<usize>) -> Option<LoadCase> {
         let (hit, force_n) = (hit?, self.handling.press_n);
         let fist = around(self.assembly, toward, hit, self.handling.press_radius_mm);
@@ -330,15 +333,16 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Adds the pressure of the floor below, linear in its plane and nowhere negative, that balances
-    /// `forces_n` as far as such pressure can: where it would tip over, inertia has the rest.
+    /// Adds the pressure of the floor below that balances `forces_n` as far as possible. The pressure is
+    /// linear in the floor's plane and nowhere negative. Where the model would tip over, inertia balances the
+    /// rest.
     fn floor(&self, up: Vec3, forces_n: &mut [Vec3]) {
         let feet = lowest(self.assembly, up);
         let (x, y) = up.any_orthonormal_pair();
         let points = || feet.iter().map(|&v| self.assembly.points[v as usize]);
         let center = points().sum::<Vec3>() / feet.len().max(1) as f64;
         let reach_mm = points().map(|p| p.distance(center)).fold(1.0, f64::max);
-        // What pressure works on: a shift along `up` and the two turns about the plane's axes.
+        // Components that pressure can balance: a shift along `up` and the two turns about the plane's axes.
         let modes = |p: Vec3| {
             [
                 1.0,
@@ -362,7 +366,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Two fingers where it is narrowest, but no narrower than what is gripped, and where it is widest.
+    /// Two grips: where the model is narrowest, but no narrower than the least width, and where it is widest.
     fn grips(&self) -> Vec<LoadCase> {
         let widths = region::widths(self.assembly, &self.mesh, &self.bvh);
         let wide = || {
@@ -397,7 +401,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The floor stops it.
+    /// A fall that the floor stops.
     fn fall(&self, deed: Deed, down: Vec3) -> LoadCase {
         let feet = lowest(self.assembly, -down);
         let at = feet
@@ -415,7 +419,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Its weight, held at one piece by forces linear over it.
+    /// Weight of the kit, held at one piece by forces linear over that piece.
     fn hang(&self, piece: PatchId, up: Vec3) -> LoadCase {
         let weight_n = self.mass_t() * GRAVITY_MM_S2;
         let total_mm2: f64 = self.areas_mm2.iter().sum();
@@ -438,36 +442,36 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// What gives way first.
+/// Kind of failure of a kit under load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Failure {
     /// A seam opens too far.
     Opens,
-    /// A pin is bent beyond what the material bears.
+    /// A pin is bent beyond the strength of the material.
     PinYields,
-    /// A wall is.
+    /// A wall is stressed beyond the strength of the material.
     WallYields,
 }
 
-/// How much of one load a plan bears.
+/// Load factor of a plan under one load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Borne {
-    /// By how many times the load may grow; infinite where nothing gives way.
+    /// Factor by which the load may grow; infinite where nothing fails.
     pub factor: f64,
-    /// What gives way first, and at which station.
+    /// First failure, and its station; `None` where nothing fails.
     pub first: Option<(Failure, u32)>,
 }
 
 impl Borne {
-    /// Of a load that nothing gives way to.
+    /// Result for a load under which nothing fails.
     pub const ANY: Self = Self {
         factor: f64::INFINITY,
         first: None,
     };
 
-    /// Of the separation force: by how many times it may grow until the seam that decides the plan's quality opens
-    /// by 0.1 mm; only ratios of it matter.
+    /// Load factor of the separation force: growth until the seam that decides the plan's quality opens by
+    /// 0.1 mm; only ratios of it matter.
     pub fn of_pull(opening: &Opening) -> Self {
         match opening.worst {
             Some(station) => Self::ANY.and(PULLED_MM / -opening.quality_mm, Failure::Opens, station),
@@ -475,8 +479,8 @@ impl Borne {
         }
     }
 
-    /// The less of this and of a failure at a station. What is no number has no answer: such a plan bears
-    /// nothing.
+    /// The lesser of this factor and that of a failure at a station. NaN means that there is no solution: the
+    /// factor is then 0.
     fn and(self, factor: f64, failure: Failure, station: u32) -> Self {
         let factor = if factor.is_nan() { 0.0 } else { factor };
         if factor < self.factor {
@@ -489,7 +493,7 @@ impl Borne {
         }
     }
 
-    /// With the openings of all joints of `plan`.
+    /// Adds the openings of all joints of `plan`.
     fn opening(self, plan: &[Meeting], opening_mm: &[f64]) -> Self {
         let joints = (0..).zip(plan.iter().zip(opening_mm));
         joints.fold(self, |least, (i, (meeting, mm))| match meeting.joint {
@@ -499,7 +503,7 @@ impl Borne {
     }
 }
 
-/// The load factor of what `bearing` says of a plan under one load.
+/// Load factor of a plan under the load that `bearing` was solved for.
 pub fn borne(plan: &[Meeting], bearing: &Bearing, strength_mpa: f64) -> Borne {
     let opened = Borne::ANY.opening(plan, &bearing.opening_mm);
     match robust_pin(plan, bearing) {
@@ -508,15 +512,16 @@ pub fn borne(plan: &[Meeting], bearing: &Bearing, strength_mpa: f64) -> Borne {
     }
 }
 
-/// Share of the pins' volume that may be bent more than the stress that counts.
+/// Share of the pins' volume that may be bent more than the decisive stress.
 ///
-/// A station has one stress, so a single one in a corner would decide. Against the solid model, whose stress all
-/// but 0.5 % of the connectors' volume stays under, load factors of 40 random plans on three models agree best
-/// from 0.03 on (least ρ of any use on a teddy 0.95, a gargoyle 0.93, a bunny 0.85; without it 0.30, 0.50, 0.75).
+/// A station has one stress, so a single one in a corner would decide. The solid model counts the stress that
+/// all but 0.5 % of the connectors' volume stays under. Load factors of 40 random plans on three models agree
+/// best with it from 0.03 on (least ρ of any use on a teddy 0.95, a gargoyle 0.93, a bunny 0.85; without it
+/// 0.30, 0.50, 0.75).
 const PIN_PEAK_SHARE: f64 = 0.03;
 
-/// The station whose pin all but [`PIN_PEAK_SHARE`] of the pins' volume are bent no more than, and that stress,
-/// MPa. `None` where there are no pins.
+/// Station and value of the decisive pin stress, MPa: all but [`PIN_PEAK_SHARE`] of the pins' volume are bent
+/// no more. `None` where there are no pins.
 fn robust_pin(plan: &[Meeting], bearing: &Bearing) -> Option<(u32, f64)> {
     let volume = |(i, meeting): (usize, &Meeting)| {
         let joint = meeting.joint?;
@@ -534,8 +539,9 @@ fn robust_pin(plan: &[Meeting], bearing: &Bearing) -> Option<(u32, f64)> {
     robust.or(pins.last()).map(|pin| (pin.0, pin.1))
 }
 
-/// The same of what the solid model says: there walls yield, too; where they or pins do is not known as a
-/// station, so the one that opens most stands for it. `None` where parts come off.
+/// Load factor by the solid model, where walls can yield, too. The station at which walls or pins yield is
+/// not known, so the station that opens most is reported. Factor 0 where `loaded` is `None`: parts come
+/// apart.
 pub fn borne_by_solids(plan: &[Meeting], loaded: Option<&Loaded>, strength_mpa: f64) -> Borne {
     let Some(loaded) = loaded else {
         return Borne {

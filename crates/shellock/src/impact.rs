@@ -1,6 +1,6 @@
-//! What stops a fall (Sect. 4.3, Eq. 2): the momentum m v is gone within Δt.
+//! Impact force that stops a fall (Sect. 4.3, Eq. 2): the momentum m v vanishes within Δt.
 
-/// Standard gravity, mm/s².
+/// Standard acceleration of gravity, mm/s².
 const GRAVITY_MM_S2: f64 = 9806.65;
 /// Duration of the impact, s.
 const IMPACT_S: f64 = 1.0 / 300.0;

@@ -1,8 +1,8 @@
-//! Where a key can be, and cutting it (Sect. 6.1): no hand of the user is needed.
+//! Search for places where a key can be, and cutting it (Sect. 6.1), without any help of the user.
 //!
-//! A key is what a half-infinite prism takes from the surface. The prism lies on a plane that the surface
-//! follows and is open towards the slide `s`, so it takes the rim along, and whatever is in it can leave
-//! along `s`: the way out is free by construction.
+//! A key is the part of the surface inside a half-infinite prism. The prism lies on a plane that the surface
+//! follows and is open towards the slide `s`. It therefore takes the rim along, and everything in it can
+//! leave along `s`: the way out is free by construction.
 //!
 //! ```text
 //!        side               plane, seen from outside          section along s
@@ -13,11 +13,11 @@
 //!    └──────────┘                                          k                     ▒▒ ┘
 //! ```
 //!
-//! [`sites`] finds such prisms: planes by random sampling, 16 slides in each, places along the rim, three
-//! sizes. [`imprint`] gives what is inside to a patch of its own, with straight seams. Stages after that know
-//! 26 directions; [`Turn`] lays the model so that the slide is one of them.
+//! [`sites`] finds such prisms: planes by random sampling, 16 slides in each, places along the rim, four
+//! sizes. [`imprint`] makes the surface inside a patch of its own, with straight seams. Later stages know
+//! only 26 directions; [`Turn`] rotates the model so that the slide is one of them.
 //!
-//! Where we leave the paper: there the user draws the key.
+//! Deviation from the paper: there the user draws the key.
 
 mod conditions;
 mod imprint;
@@ -38,7 +38,7 @@ pub use turn::Turn;
 
 use crate::segmentation::KeepWhole;
 
-/// What a key needs. Lengths in mm.
+/// Requirements of a key. Lengths in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeyParams {
     /// Seed of the planes that are tried; any number.
@@ -49,11 +49,11 @@ pub struct KeyParams {
     pub size_mm: f64,
     /// Area of an ordinary piece, mm². > 0; 4000. A key takes a third of that or less.
     pub piece_mm2: f64,
-    /// Which way is up when the model stands; a key underneath is preferred. Any length but 0; +z.
+    /// Direction that is up when the model stands; a key underneath is preferred. Any length but 0; +z.
     pub up: [f64; 3],
-    /// Regions, resolved, that no key is cut from; none.
+    /// Resolved regions from which no key is cut; none.
     pub keep_whole: Vec<KeepWhole>,
-    /// Where the middle of its outer side is wanted; anywhere.
+    /// Wanted position of the middle of the key's outer side; anywhere if `None`.
     pub near: Option<[f64; 3]>,
 }
 
@@ -72,13 +72,14 @@ impl Default for KeyParams {
 }
 
 impl KeyParams {
-    /// How deep below the plane the key's rim reaches, mm: past its grooves, with room for the connectors of
-    /// the seam there.
+    /// Depth of the key's rim below the plane, mm: past its grooves, with room for the connectors of the seam
+    /// there.
     pub fn depth_mm(&self) -> f64 {
         self.wall_mm + 2.2 * self.size_mm + 1.0
     }
 
-    /// The narrowest key, mm: two grooves, and a connector at the back between the gaps at its corners.
+    /// Width of the narrowest key, mm: two grooves, and a connector at the back between the gaps at its
+    /// corners.
     pub fn least_width_mm(&self) -> f64 {
         5.5 * self.size_mm
     }

@@ -1,8 +1,8 @@
-//! How well a plan holds, by simulation (Sect. 5.1 and 5.2).
+//! Quality of a plan, by simulation (Sect. 5.1 and 5.2).
 //!
-//! [`PlanModel`] is the segmented surface as mechanics sees it: a coarse mesh of each patch and stations
+//! [`PlanModel`] is the mechanical model of the segmented surface: a coarse mesh of each patch, and stations
 //! along the seams. A plan makes a joint of each station that can carry a connector; the solvers of
-//! `shellock-mechanics` then say how far the seams open. The quality `Q = −max w d` is in mm at the
+//! `shellock-mechanics` then compute the openings of the seams. The quality `Q = −max w d` is in mm at the
 //! separation force of 10 N/m; higher is better.
 
 mod choice;

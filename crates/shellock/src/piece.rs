@@ -1,9 +1,9 @@
 //! Finished pieces: bodies with their connectors, carved so that every path stays free, ready to print.
 //!
-//! Pieces are taken in the order of taking apart. From a piece's half connectors goes whatever lies in its
-//! own way out, and whatever a later piece, its bodies and its connectors, passes on its way out: the socket
-//! is what the pin sweeps. Where a joined piece still comes too near to another, that is taken off too. Last,
-//! its number is cut into the inner side of its wall.
+//! Pieces are carved in the disassembly sequence. A piece's half connectors lose the parts that block its own
+//! way out, and the parts that a later piece, with its bodies and connectors, passes on its way out: the
+//! socket is the swept volume of the pin. Where a joined piece still comes too near to another, that is cut
+//! off too. Last, its number is engraved into the inner side of its wall.
 
 mod carve;
 mod finish;
@@ -23,7 +23,7 @@ use shellock_geom::Volume;
 
 use crate::connector::{ConnectorParams, Run};
 
-/// The male and the female half of a run as they are before anything is carved.
+/// The male and the female half of a run, before carving.
 pub(crate) fn whole_halves(params: &ConnectorParams, run: &Run) -> [Volume; 2] {
     [carve::Half::Male, carve::Half::Female].map(|half| carve::whole_half(params, run, half))
 }

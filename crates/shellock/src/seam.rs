@@ -1,5 +1,4 @@
-//! Seams: where two patches meet, which pieces they make neighbours of, and the rules for connectors under
-//! them.
+//! Seams: the borders of patches, the neighbours that they make, and the rules for connectors under them.
 
 mod frame;
 pub mod graph;

@@ -1,5 +1,5 @@
-//! How large connectors are, pair by pair of pieces (Sect. 4.3): by the stress at their boundary, and by what
-//! fits.
+//! Connector sizes for each pair of pieces (Sect. 4.3), chosen by the stress at their boundary and by the
+//! room.
 //!
 //! ```text
 //!   D = D_min + min(α max σ, 1) (D_max − D_min)                                      (Eq. 3)
@@ -10,20 +10,20 @@
 //! saturates boundaries that are far from failing; a smaller one never reaches D_max, since walls are made so
 //! thick that no stress exceeds the strength.
 //!
-//! What fits comes first. A short seam gets no larger connectors than leave it a contact; and between the
-//! wall of a narrow limb and the one opposite must be room for a channel:
+//! Room comes first. A short seam gets no larger connectors than leave it a contact. And there must be room
+//! for a channel between the wall of a narrow limb and the opposite wall:
 //!
 //! ```text
 //!   ═══════╤═══════  wall H       t: thickness of the model, along the normal
-//!      F│M│ │F                    a channel that leaves straight out is 1.05 D + c deep, and c away from the wall opposite:
-//!      F│ ┘ │F       cavity         1.05 D + 2 c ≤ t − 2 H
+//!      F│M│ │F                    a channel that leaves straight out is 1.05 D + c deep, and
+//!      F│ ┘ │F       cavity      stays c away from the wall opposite: 1.05 D + 2 c ≤ t − 2 H
 //!      F└───┘F
 //!   ═══════════════  wall H
 //! ```
 //!
 //! Limits: the plan is not known yet, so neither is the angle of a connector, and a channel that leans may be
-//! twice as deep; connectors on the wall opposite are not looked at. What does not fit after all is left out
-//! or carved, as with any size.
+//! twice as deep. Connectors on the opposite wall are not considered. Connectors that still do not fit are
+//! left out or carved, as with any size.
 
 use shellock_mechanics::connector::CHANNEL_DEPTH;
 use std::collections::BTreeMap;
@@ -38,28 +38,30 @@ use crate::params::ParamProblem;
 use crate::warning::SizeLimit;
 use crate::{Cancelled, Cause, Ctx, PatchId, Seam, SegmentedSurface, Warning};
 
-/// A seam this long, in connector sizes, has room for a run of 2.5 between the gaps of 1.5 at its ends.
+/// Length of a seam, in connector sizes, with room for a run of 2.5 between the gaps of 1.5 at its ends.
 pub(crate) const CONTACT_SIZES: f64 = 5.6;
-/// Thin limbs have no longer seams. Half round an arm 13 mm thick, runs end where the pin changes sides;
-/// below this nothing was left.
+/// Least length of a seam that counts as a contact, in connector sizes, for thin limbs, which have no longer
+/// seams. Half round an arm 13 mm thick, runs end where the pin changes sides; below this length none was
+/// left.
 pub(crate) const LEAST_CONTACT_SIZES: f64 = 4.2;
-/// A closed seam has no ends that need gaps: only the run.
+/// Length of a closed seam, in connector sizes: only the run, as it has no ends that need gaps.
 const LOOP_SIZES: f64 = 2.5;
 
-/// Share of a pair's seams on which the cavity must have room for the size; the rest is left out or carved.
+/// Share of a pair's seams on which the cavity must have room for the size; elsewhere connectors are left out
+/// or carved.
 const ROOM_SHARE: f64 = 0.8;
-/// Distance between the places where the cavity is measured, mm: below the smallest connector.
+/// Spacing of the places where the cavity is measured, mm: below the smallest connector.
 const STEP_MM: f64 = 1.5;
-/// Rays begin this far below the surface, mm, so that they do not meet where they start.
+/// Depth below the surface at which rays begin, mm, so that they do not hit their own start.
 const BELOW_MM: f64 = 0.01;
-/// A size that is smaller by no more than this, mm, is none that a user would care about.
+/// Least reduction of a size that is reported, mm; users would not care about a smaller one.
 const TOLD_FROM_MM: f64 = 0.25;
 
-/// The greatest von Mises stress of all load cases at a place of the outer surface, MPa.
+/// Greatest von Mises stress of all load cases at a point of the outer surface, MPa.
 pub type StressField<'a> = &'a (dyn Fn(Vec3) -> f64 + Sync);
 
-/// Depth of a channel below the wall where the piece leaves straight out, mm; `clearance_mm` between the pin
-/// and the floor.
+/// Depth of a channel below the wall where the piece leaves straight out, mm, with `clearance_mm` between the
+/// pin and the floor.
 pub fn depth_mm(size_mm: f64, clearance_mm: f64) -> f64 {
     CHANNEL_DEPTH * size_mm + clearance_mm
 }
@@ -68,7 +70,7 @@ pub fn depth_mm(size_mm: f64, clearance_mm: f64) -> f64 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConnectorSizes {
     default_mm: f64,
-    /// The lower id first.
+    /// Size of each pair, mm, with the lower id first.
     by_pair: BTreeMap<[PatchId; 2], f64>,
 }
 
@@ -79,7 +81,7 @@ impl Default for ConnectorSizes {
 }
 
 impl ConnectorSizes {
-    /// The same size for all pairs.
+    /// Gives all pairs one size.
     pub fn uniform(size_mm: f64) -> Self {
         Self {
             default_mm: size_mm,
@@ -87,7 +89,8 @@ impl ConnectorSizes {
         }
     }
 
-    /// Sizes of their own for some pairs, named in either order; the last counts where one is named twice.
+    /// Gives some pairs sizes of their own, named in either order; where a pair is named twice the last one
+    /// counts.
     pub fn with_pairs(default_mm: f64, sizes_mm: impl IntoIterator<Item = ([PatchId; 2], f64)>) -> Self {
         let sorted = |([a, b], size_mm): ([PatchId; 2], f64)| ([a.min(b), a.max(b)], size_mm);
         Self {
@@ -101,7 +104,7 @@ impl ConnectorSizes {
         self.by_pair.insert([a.min(b), a.max(b)], size_mm);
     }
 
-    /// Lets no pair with `piece` have a larger size than `most_mm`.
+    /// Limits the sizes of all pairs with `piece` to `most_mm`.
     fn cap(&mut self, piece: PatchId, most_mm: f64) {
         self.by_pair
             .iter_mut()
@@ -109,7 +112,7 @@ impl ConnectorSizes {
             .for_each(|(_, mm)| *mm = mm.min(most_mm));
     }
 
-    /// The size between two pieces, in either order.
+    /// The size between two pieces, in either order, mm.
     pub fn of(&self, a: PatchId, b: PatchId) -> f64 {
         self.by_pair
             .get(&[a.min(b), a.max(b)])
@@ -117,39 +120,39 @@ impl ConnectorSizes {
             .unwrap_or(self.default_mm)
     }
 
-    /// The size of pairs without one of their own, such as those that meet on the inner surface only.
+    /// The size of pairs without one of their own, mm, such as those that meet only on the inner surface.
     pub fn default_mm(&self) -> f64 {
         self.default_mm
     }
 
-    /// The pairs with a size of their own, the lower id first; sorted.
+    /// Pairs with a size of their own, the lower id first; sorted.
     pub fn pairs(&self) -> impl Iterator<Item = ([PatchId; 2], f64)> {
         self.by_pair.iter().map(|(pair, size_mm)| (*pair, *size_mm))
     }
 
-    /// The largest size that any pair may have: what the cavity must have room for.
+    /// The largest size that any pair may have, mm, for which the cavity must have room.
     pub fn largest_mm(&self) -> f64 {
         self.by_pair.values().copied().fold(self.default_mm, f64::max)
     }
 }
 
-/// Where connector sizes come from.
+/// Source of the connector sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SizeChoice {
-    /// One size for all, mm. [1.5, 6].
+    /// One size for all pairs, mm. [1.5, 6].
     Fixed(f64),
-    /// By stress and by what fits.
+    /// Sizes by stress and by room.
     Auto(SizeRange),
 }
 
-/// What Eq. 3 chooses from.
+/// Range and slope of the sizes of Eq. 3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeRange {
-    /// D_min, mm: for boundaries without stress. [1.5, 6]; 2, as published.
+    /// Smallest size D_min, mm, for boundaries without stress. [1.5, 6]; 2, as published.
     pub min_mm: f64,
-    /// D_max, mm. [D_min, 6]; 4, as published.
+    /// Largest size D_max, mm. [D_min, 6]; 4, as published.
     pub max_mm: f64,
-    /// α, 1/MPa. [0, 10]; 1 over the material's strength where `None`.
+    /// Slope α, 1/MPa. [0, 10]; 1 over the material's strength where `None`.
     pub alpha_per_mpa: Option<f64>,
 }
 
@@ -170,14 +173,13 @@ impl Default for SizeChoice {
 }
 
 impl SizeChoice {
-    /// The size for all pairs where nothing else is said, mm: its walls come out at 1.1 mm.
+    /// Size for all pairs unless another is chosen, mm: its walls come out at 1.1 mm.
     pub const DEFAULT_MM: f64 = 2.5;
 
     /// The least size that a pair may get, mm.
     ///
-    /// Segmentation, which comes before any size, counts a seam as a contact that has room for this one:
-    /// longer seams get larger connectors, but a seam is a contact if there is any size with which it can be
-    /// one.
+    /// Segmentation, which comes before any size, counts a seam as a contact if it has room for this size.
+    /// Longer seams get larger connectors, but a seam is a contact if it has room for any size.
     pub fn smallest_mm(&self) -> f64 {
         match self {
             Self::Fixed(size_mm) => *size_mm,
@@ -185,7 +187,7 @@ impl SizeChoice {
         }
     }
 
-    /// The size that a pair gets where nothing presses on it and there is room.
+    /// The size that a pair gets without stress and with enough room, mm.
     pub fn usual_mm(&self) -> f64 {
         match self {
             Self::Fixed(size_mm) => *size_mm,
@@ -193,7 +195,7 @@ impl SizeChoice {
         }
     }
 
-    /// Every value out of range.
+    /// Lists every value out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         const MM: [f64; 2] = [1.5, 6.0];
         let size = |name, value, least| ParamProblem::unless_within(name, "mm", value, least, MM[1]);
@@ -226,7 +228,7 @@ impl std::fmt::Display for SizeChoice {
 impl FromStr for SizeChoice {
     type Err = NoSize;
 
-    /// `auto`, or a size in mm.
+    /// Parses `auto`, or a size in mm.
     fn from_str(text: &str) -> Result<Self, NoSize> {
         if text == "auto" {
             return Ok(Self::Auto(SizeRange::default()));
@@ -235,77 +237,78 @@ impl FromStr for SizeChoice {
     }
 }
 
-/// A text that says no size.
+/// Error: the text names no size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("neither \"auto\" nor a number of mm")]
 pub struct NoSize;
 
-/// How sizes are chosen.
+/// Parameters of choosing sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeParams {
-    /// Where they come from.
+    /// Source of the sizes.
     pub choice: SizeChoice,
     /// Wall thickness H, mm. (0, 10].
     pub wall_mm: f64,
     /// Gap between mating faces, mm. [0.03, 0.6].
     pub clearance_mm: f64,
-    /// Stress that the material bears, MPa. > 0; 42 for the paper's resin.
+    /// Strength of the material, MPa. > 0; 42 for the paper's resin.
     pub strength_mpa: f64,
 }
 
-/// Sizes, and where they are smaller than the stress asks for.
+/// Chosen sizes, and the pairs whose size is smaller than the stress asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChosenSizes {
-    /// The sizes.
+    /// The size of each pair.
     pub sizes: ConnectorSizes,
-    /// The pairs whose size was limited by more than a user would overlook, sorted.
+    /// Pairs whose size was reduced by more than a user would overlook, sorted.
     pub limited: Vec<LimitedSize>,
-    /// What fits at most between a pair, mm, the lower id first, and a place of its seam; empty where the user
-    /// says the size.
+    /// Largest size that fits between each pair, mm, the lower id first, and a place of its seam; empty where
+    /// the user gives the size.
     most: BTreeMap<[PatchId; 2], (f64, Vec3)>,
     /// Pairs whose connectors are larger than the stress asks for.
     raised: Vec<RaisedSize>,
 }
 
-/// A pair whose connectors are larger than Eq. 3 has them, for the sake of use.
+/// A pair whose connectors are larger than by Eq. 3, for the sake of use.
 #[derive(Clone, Debug, PartialEq)]
 struct RaisedSize {
     pair: [PatchId; 2],
     at: Vec3,
     from_mm: f64,
     to_mm: f64,
-    /// What is done to the kit, as in "where it is …".
+    /// Description of the use, as in "where it is …".
     done: &'static str,
 }
 
-/// A pair whose connectors are smaller than Eq. 3 has them.
+/// A pair whose connectors are smaller than by Eq. 3.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitedSize {
     /// The pair, the lower id first.
     pub pair: [PatchId; 2],
-    /// The middle of its longest seam, mm.
+    /// Middle of the pair's longest seam, mm.
     pub at: Vec3,
-    /// By Eq. 3, mm.
+    /// Size by Eq. 3, mm.
     pub wanted_mm: f64,
-    /// What it got, mm.
+    /// Size that the pair got, mm.
     pub given_mm: f64,
-    /// What there is no room in.
+    /// Reason for the reduction: the seam or the cavity.
     pub limit: SizeLimit,
 }
 
-/// Eq. 3: the size for a greatest stress of `stress_mpa`, mm in [D_min, D_max]. No number counts as no
-/// stress.
+/// Size for a greatest stress of `stress_mpa` by Eq. 3, mm in [D_min, D_max]. NaN counts as no stress.
 pub fn size_for_stress_mm(range: &SizeRange, strength_mpa: f64, stress_mpa: f64) -> f64 {
     let alpha = range.alpha_per_mpa.unwrap_or(1.0 / strength_mpa);
-    // `max` takes the number of a number and NaN.
+    // `max` of a number and NaN is the number.
     let share = (alpha * stress_mpa).max(0.0);
     let share = share.min(1.0);
     range.min_mm + share * (range.max_mm - range.min_mm)
 }
 
-/// A size for each pair that shares a seam of `surface`; without a stress field as if there were no stress.
+/// Chooses a size for each pair that shares a seam of `surface`. Without a stress field, stress counts as
+/// zero.
 ///
-/// Limited sizes are told by [`ChosenSizes::tell`], so that a kit tells those of its own segmentation only.
+/// Limited sizes are reported by [`ChosenSizes::tell`], so that a kit reports only those of its own
+/// segmentation.
 pub fn choose(
     ctx: &Ctx<'_>,
     params: &SizeParams,
@@ -390,7 +393,7 @@ fn longest(seams: &[Seam], wall_mm: f64) -> (f64, Vec3) {
     })
 }
 
-/// The inside of the model, as rays see it.
+/// Inside of the model, measured by rays.
 struct Cavity {
     bvh: TriangleBvh,
     far_mm: f64,
@@ -417,24 +420,24 @@ impl Cavity {
     }
 }
 
-/// The largest size whose channel fits where the model is so thick, the clearance away from the wall
-/// opposite, mm; may be < 0.
+/// The largest size whose channel fits in a model `thickness_mm` thick, the clearance away from the opposite
+/// wall, mm; may be < 0.
 fn size_within_mm(params: &SizeParams, thickness_mm: f64) -> f64 {
     (thickness_mm - 2.0 * (params.wall_mm + params.clearance_mm)) / CHANNEL_DEPTH
 }
 
 impl ChosenSizes {
-    /// Lets no pair with `piece` have a larger size than `most_mm`, now and when sizes are raised.
+    /// Limits the sizes of all pairs with `piece` to `most_mm`, now and when sizes are raised.
     pub fn cap(&mut self, piece: PatchId, most_mm: f64) {
         self.sizes.cap(piece, most_mm);
         let own = self.most.iter_mut().filter(|(pair, _)| pair.contains(&piece));
         own.for_each(|(_, most)| most.0 = most.0.min(most_mm));
     }
 
-    /// Makes the connectors of a pair as large as fit, for the sake of what is done to the kit; whether they
-    /// grew.
+    /// Enlarges the connectors of a pair to the largest size that fits, for the use `done` to the kit.
+    /// Returns true if they grew.
     pub fn raise(&mut self, [a, b]: [PatchId; 2], done: &'static str) -> bool {
-        /// Less is no change, mm.
+        /// Least growth that counts as a change, mm.
         const LEAST_MM: f64 = 0.05;
         let pair = [a.min(b), a.max(b)];
         let from_mm = self.sizes.of(a, b);
@@ -452,9 +455,9 @@ impl ChosenSizes {
         true
     }
 
-    /// Warns with `connectors-for-use` of each pair that got larger ones than the stress asks for, and with
-    /// `connector-limited`: once for all seams that are too short, once for all cavities that are
-    /// too narrow.
+    /// Warns with `connectors-for-use` of each pair whose connectors are larger than the stress asks for.
+    /// Warns with `connector-limited` once for all seams that are too short, and once for all cavities that
+    /// are too narrow.
     pub fn tell(&self, ctx: &Ctx<'_>) {
         for raised in &self.raised {
             ctx.warn(Warning {
@@ -470,7 +473,7 @@ impl ChosenSizes {
         for limit in [SizeLimit::Seam, SizeLimit::Cavity] {
             let limited: Vec<&LimitedSize> = self.limited.iter().filter(|l| l.limit == limit).collect();
             let lost_mm = |l: &LimitedSize| l.wanted_mm - l.given_mm;
-            // Of equals the pair with the lower ids.
+            // Ties go to the pair with the lower ids.
             let worst = limited
                 .iter()
                 .copied()

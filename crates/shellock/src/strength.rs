@@ -1,10 +1,10 @@
-//! How thick the wall must be so that a fall does not break it (Sect. 4.3, Eq. 2).
+//! Wall thickness that a fall does not break (Sect. 4.3, Eq. 2).
 //!
 //! The model falls in a few random orientations. In each, the region that meets the ground stops the model
 //! within Δt, while the region on top is held:
 //!
 //! ```text
-//!     ▒▒▒▒▒▒▒    top: holds in the mean (see `mechanics::shell`)
+//!     ▒▒▒▒▒▒▒    top: held in the mean (see `mechanics::shell`)
 //!    ╱       ╲
 //!   │  shell  │  │ v = √(2 g h)
 //!    ╲       ╱   ▼
@@ -15,11 +15,11 @@
 //! wall bends. The least H whose stress stays below the material's strength is found on a bracket that
 //! shrinks by interpolating log σ over log H.
 //!
-//! Two rules. Where the model is too thin to be hollow with that H it is solid, and no shell: these places do
-//! not count (`SolidRegion`). And the stress that counts in a case is the one that all but a small share of
-//! the other area stays below: the few worst triangles, in creases and at tips, tell more of the mesh than of
-//! the model, and their stress grows with every refinement. docs/notes/strength.md has what the share and the
-//! mesh change.
+//! Two rules apply. Where the model is too thin to be hollow with that H it is solid, not a shell: these
+//! places do not count (`SolidRegion`). And the decisive stress of a case is the one that all but a small
+//! share of the other area stays below. The few worst triangles, in creases and at tips, say more about the
+//! mesh than about the model, and their stress grows with every refinement. docs/notes/strength.md shows the
+//! effect of that share and of the mesh.
 
 pub mod chart;
 mod falls;
@@ -46,68 +46,68 @@ use crate::{Cancelled, Cause, Ctx, Warning};
 use falls::{Fallen, Falls};
 pub use thin::SolidRegion;
 
-/// Least area of a solid place that is told, mm².
+/// Least area of a solid place that is reported, mm².
 const TOLD_SOLID_MM2: f64 = 50.0;
 /// Width of the bracket at which the search ends, mm.
 const RESOLUTION_MM: f64 = 0.05;
-/// Thicknesses looked at in search of one that bears its stress, at most.
+/// Greatest number of thicknesses tried in search of one whose stress is low enough.
 const MOST_WITHOUT_BRACKET: usize = 4;
-/// Thicknesses after which the search bisects.
+/// Number of thicknesses tried after which the search bisects.
 const MOST_INTERPOLATED: usize = 6;
-/// Wall of a model that no wall saves, if thicker ones help little and the limits allow it, mm: the thickness that is
-/// printed where nothing is computed.
+/// Thickness of the wall of a model whose stress is too high with every wall, mm, unless a thicker one helps
+/// or the limits forbid it. Equal to the thickness that is printed where nothing is computed.
 const USUAL_MM: f64 = 2.0;
-/// Stress over the least there is that no thicker wall is worth avoiding.
+/// Ratio to the least stress of all walls up to which a thicker wall is not worth its material.
 const WORTH_MORE_WALL: f64 = 1.05;
-/// Points of the mesh that shows how the stress depends on the thickness.
+/// Points of the coarse mesh, which shows how the stress depends on the thickness.
 const COARSE_POINTS: f64 = 2000.0;
-/// Points of the mesh whose stress counts; docs/notes/strength.md has what more of them change.
+/// Points of the fine mesh, whose stress counts; docs/notes/strength.md shows the effect of more.
 const FINE_POINTS: f64 = 6000.0;
-/// Stress on the fine mesh over that on the coarse one, as far as nothing is known: it is 1.0 to 1.05 on most
+/// Initial guess of the stress on the fine mesh over that on the coarse one: it is 1.0 to 1.05 on most
 /// models.
 const USUAL_RATIO: f64 = 1.025;
-/// Change of the two meshes' ratio, in its logarithm, at which the search ends.
+/// Change of the logarithm of the two meshes' ratio at which the search ends.
 const RATIO_TOLERANCE: f64 = 0.01;
-/// Thicknesses looked at on the coarse mesh, and on the fine one, at most.
+/// Greatest numbers of thicknesses tried on the coarse mesh, and on the fine one.
 const MOST_TRIED: usize = 30;
 const MOST_FINE: usize = 5;
-/// Least share of the surface with a cavity below: a model with less is as good as solid, and no wall to be
-/// computed.
+/// Least share of the surface with a cavity below. A model with less is as good as solid, and no wall is
+/// computed for it.
 const LEAST_HOLLOW: f64 = 0.1;
-/// No wall is so thick that it leaves less than this share of what the thinnest one leaves, of the cavity or of the
-/// room for connectors: thin legs would be solid and hold nothing, for the sake of a fall that they hardly bear.
+/// Least share of the thinnest wall's cavity, and of its room for connectors, that any wall must leave. With
+/// thicker walls thin legs would be solid and hold nothing, for the sake of a fall that they barely survive.
 const LEAST_LEFT: f64 = 0.75;
-/// Depth of the cavity below a wall that is room for a connector, mm.
+/// Depth of the cavity below a wall that counts as room for a connector, mm.
 const ROOM_MM: f64 = 1.5;
-/// Share of the surface that has such room below the wall of a model that is not thin.
+/// Least share of the surface with such room below the wall; a model with less is thin.
 const ROOMY: f64 = 0.8;
-/// A wall that is thinner than the usual least one by more is told, mm.
+/// Least difference from the usual least wall at which a thinner one is reported, mm.
 const TOLD_THINNER_MM: f64 = 0.1;
 
-/// What a wall must bear. Lengths in mm.
+/// Loads and limits of the wall. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrengthParams {
-    /// What pieces are printed of.
+    /// Material that pieces are printed of.
     pub material: Material,
-    /// Height that the model falls from, m. [0.01, 20]; 1.275, which gives the paper's 5 m/s.
+    /// Height of the fall, m. [0.01, 20]; 1.275, which gives the paper's 5 m/s.
     pub drop_m: f64,
-    /// Orientations. [1, 200]; 12, the paper's.
+    /// Number of orientations. [1, 200]; 12, the paper's.
     pub n_cases: usize,
     /// Seed of the orientations.
     pub seed: u64,
-    /// Thinnest wall of a model with room for connectors. [0.4, 5]; 1.6, four lines of an ordinary nozzle: a seam's
-    /// two sides need two each.
+    /// Thinnest wall of a model with room for connectors. [0.4, 5]; 1.6, four lines of an ordinary nozzle:
+    /// the two sides of a seam need two lines each.
     pub least_mm: f64,
-    /// Thinnest wall of a model with bars or sheets so thin that `least_mm` leaves connectors little room. [0.4,
-    /// `least_mm`]; 1.2, three lines.
+    /// Thinnest wall of a model with bars or sheets so thin that `least_mm` leaves connectors little room.
+    /// [0.4, `least_mm`]; 1.2, three lines.
     pub thin_mm: f64,
-    /// Thickest wall to look at. [`least_mm`, 20]; 3. The paper looks up to 10 mm and finds 1.9 to 2.8;
-    /// thicker walls leave a figure of 150 mm little cavity, and where 3 mm do not bear the stress, 10 hardly
-    /// do (docs/notes/strength.md).
+    /// Thickest wall to try. [`least_mm`, 20]; 3. The paper tries up to 10 mm and finds 1.9 to 2.8. Thicker
+    /// walls leave a figure of 150 mm little cavity, and where 3 mm are too weak, 10 mm rarely suffice
+    /// (docs/notes/strength.md).
     pub most_mm: f64,
-    /// Share of the hollow area whose stress may be above the one that counts. [0, 0.2]; 0.005.
+    /// Share of the hollow area whose stress may exceed the decisive one. [0, 0.2]; 0.005.
     pub peak_share: f64,
-    /// Factor on the points of the analysis mesh. [0.1, 20]; 1.
+    /// Factor on the number of points of the analysis mesh. [0.1, 20]; 1.
     pub refinement: f64,
 }
 
@@ -129,8 +129,9 @@ impl Default for StrengthParams {
 }
 
 impl StrengthParams {
-    /// The same with no wall so thick that it leaves hardly any cavity, or connectors too little room, and as thin a
-    /// least wall as they need; `None` where the thinnest leaves hardly any cavity.
+    /// Adapts the limits to the model: no wall so thick that it leaves too little cavity or room for
+    /// connectors, and the least wall as thin as connectors need. `None` where even the thinnest wall leaves
+    /// too little cavity.
     fn leaving_cavity(&self, falls: &Falls) -> Option<Self> {
         let hollow_mm2 = |mm: f64| falls.hollow_areas(mm).iter().sum::<f64>();
         let room_mm2 = |mm: f64| hollow_mm2(mm + ROOM_MM);
@@ -154,7 +155,7 @@ impl StrengthParams {
         })
     }
 
-    /// Every value out of range.
+    /// Lists every value out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         [
             ParamProblem::unless_within("drop height", "m", self.drop_m, 0.01, 20.0),
@@ -177,8 +178,8 @@ impl StrengthParams {
     }
 }
 
-/// The thickest wall between `low_mm` and `high_mm` that `does`, where every thinner one does, too; `low_mm` where
-/// none does.
+/// The thickest wall between `low_mm` and `high_mm` for which `does` holds, mm. `does` must hold for every
+/// thinner wall, too. `low_mm` where it holds for none.
 fn thickest(low_mm: f64, high_mm: f64, does: impl Fn(f64) -> bool) -> f64 {
     /// Rounds of bisection: to a hundredth of a millimetre.
     const ROUNDS: usize = 8;
@@ -197,13 +198,13 @@ fn thickest(low_mm: f64, high_mm: f64, does: impl Fn(f64) -> bool) -> f64 {
     low_mm
 }
 
-/// Why there is no stress to speak of.
+/// Reason why there is no stress to report.
 #[derive(Debug, thiserror::Error)]
 pub enum StrengthError {
-    /// The shell could not be solved.
+    /// The shell's equations could not be solved.
     #[error("the wall's stress could not be computed ({0}); give the thickness with --thickness")]
     Shell(#[from] ShellError),
-    /// Hardly anywhere is there a cavity between two walls.
+    /// There is almost no cavity between two walls.
     #[error(
         "the model is hardly anywhere thicker than two walls of {wall_mm} mm, the thinnest that is made, so there is nothing to hollow \
          out; print it solid, make it larger, or give a thinner wall with --thickness"
@@ -217,49 +218,48 @@ pub enum StrengthError {
     Cancelled(#[from] Cancelled),
 }
 
-/// The stress of one thickness.
+/// Stress of one wall thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tried {
-    /// Thickness H, mm.
+    /// Thickness H of the wall, mm.
     pub thickness_mm: f64,
-    /// The stress that counts, in the worst case, MPa.
+    /// Decisive stress in the worst case, MPa.
     pub stress_mpa: f64,
 }
 
-/// The thickness and what it bears.
+/// Wall thickness found, and its stress.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Strength {
-    /// The least thickness in the limits whose stress stays below the strength, mm.
+    /// Least thickness in the limits whose stress stays below the strength, mm.
     pub thickness_mm: f64,
-    /// The thickest wall that was allowed, mm: none that leaves connectors too little room.
+    /// Thickest wall allowed, mm: none that leaves connectors too little room.
     pub most_mm: f64,
-    /// The stress that counts with it, MPa.
+    /// Decisive stress with that thickness, MPa.
     pub stress_mpa: f64,
-    /// True where the stress exceeds the strength. Where the thickness was sought, the stress of every wall in the limits
-    /// does, by more than the search resolves. The thickness is then the least that no thicker one betters by much, but
-    /// at least 2 mm, or `most_mm` where that is less.
+    /// True where the stress exceeds the strength. After a search, the stress of every wall in the limits
+    /// then does, by more than the search resolves. The thickness is in that case the least that no thicker
+    /// one betters by much, but at least 2 mm, or `most_mm` where that is less.
     pub is_too_weak: bool,
-    /// All thicknesses that were looked at, ascending, with the fine mesh's stress as the coarse one lets
-    /// expect it.
+    /// All thicknesses tried, ascending, with the stress on the fine mesh as predicted from the coarse one.
     pub tried: Vec<Tried>,
-    /// The orientation that decides: number of the fall and the direction that is down then.
+    /// Decisive orientation: number of the fall, and the direction that is down in it.
     pub deciding: (usize, Vec3),
-    /// Where the stress that counts is, mm.
+    /// Place of the decisive stress, mm.
     pub at: Vec3,
-    /// The analysis mesh.
+    /// Mesh on which stresses were computed.
     pub mesh: TriMesh,
-    /// Von Mises' stress of each of its triangles in the fall that decides, MPa.
+    /// Von Mises stress of each triangle in the decisive fall, MPa.
     pub deciding_mpa: Vec<f64>,
-    /// The largest of each triangle over all falls, MPa.
+    /// Largest stress of each triangle over all falls, MPa.
     pub largest_mpa: Vec<f64>,
-    /// Which triangles have no cavity below.
+    /// True for triangles with no cavity below.
     pub is_solid: Vec<bool>,
-    /// Where the model is too thin to be hollow, the largest first.
+    /// Regions where the model is too thin to be hollow, the largest first.
     pub solid: Vec<SolidRegion>,
 }
 
 impl Strength {
-    /// The same where the model, and all directions with it, are turned by `turn`.
+    /// Rotates the model, and all directions with it, by `turn`.
     pub fn turned(mut self, turn: impl Fn(Vec3) -> Vec3) -> Self {
         self.deciding.1 = turn(self.deciding.1);
         self.at = turn(self.at);
@@ -280,7 +280,7 @@ impl Strength {
             / self.mesh.area()
     }
 
-    /// What the user should know: a wall that is too weak, and where the model is solid.
+    /// Warnings for the user: a wall that is too weak, and regions where the model is solid.
     pub fn warnings(&self, params: &StrengthParams) -> Vec<Warning> {
         let weak = self.is_too_weak.then(|| Warning {
             cause: Cause::WallTooWeak {
@@ -308,7 +308,8 @@ impl Strength {
         weak.into_iter().chain(solid).collect()
     }
 
-    /// That the wall found is thinner than the usual least one, for the sake of connectors; nothing where it is not.
+    /// Warning that the wall found is thinner than the usual least one, for the sake of connectors; `None` if
+    /// not.
     pub fn told_thinner(&self, params: &StrengthParams) -> Option<Warning> {
         let (thickness_mm, usual_mm) = (self.thickness_mm, params.least_mm);
         (thickness_mm < usual_mm - TOLD_THINNER_MM).then_some(Warning {
@@ -322,14 +323,14 @@ impl Strength {
     }
 }
 
-/// The largest stress of all falls, by place.
+/// Largest stress of all falls, by place.
 pub struct StressMap<'a> {
     bvh: TriangleBvh,
     largest_mpa: &'a [f64],
 }
 
 impl<'a> StressMap<'a> {
-    /// Of the analysis mesh's triangles.
+    /// Indexes the analysis mesh's triangles.
     pub fn new(strength: &'a Strength) -> Self {
         Self {
             bvh: TriangleBvh::new(&strength.mesh),
@@ -337,7 +338,7 @@ impl<'a> StressMap<'a> {
         }
     }
 
-    /// Of the triangle nearest to `place`, MPa.
+    /// Largest stress of the triangle nearest to `place`, MPa.
     pub fn at(&self, place: Vec3) -> f64 {
         self.bvh
             .nearest(place, f64::INFINITY)
@@ -347,8 +348,8 @@ impl<'a> StressMap<'a> {
 
 /// Finds the thickness of the wall of `model` (mm).
 ///
-/// A coarse mesh shows how the stress depends on the thickness, a fine one by how much the coarse one is
-/// wrong: their ratio hardly depends on the thickness.
+/// A coarse mesh shows how the stress depends on the thickness. A fine mesh corrects it by a ratio that
+/// hardly depends on the thickness.
 pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Result<Strength, StrengthError> {
     ctx.stage("thickness", 0)?;
     let falls = |points: f64| Falls::new(params, model, points);
@@ -374,7 +375,7 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
         }
         let exact = fine.worst(estimate.thickness_mm)?;
         let before = ratio;
-        // Of a wall without any load nothing can be learned.
+        // A wall without any load teaches nothing.
         if exact.tried.stress_mpa > 0.0 && estimate.stress_mpa > 0.0 {
             ratio = exact.tried.stress_mpa / estimate.stress_mpa;
         }
@@ -383,8 +384,8 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
             break;
         }
     }
-    // Where the two meshes disagree from thickness to thickness, the thinnest that bears its stress counts,
-    // or the last.
+    // Where the ratio of the meshes varies with the thickness, the thinnest wall of sufficient strength
+    // counts, else the last.
     let bears = |e: &Fallen| e.tried.stress_mpa <= (1.0 + RATIO_TOLERANCE) * strength_mpa;
     let last = exacts.len() - 1;
     let thinnest = |i: &usize, j: &usize| {
@@ -414,8 +415,8 @@ pub fn thickness(ctx: &Ctx<'_>, params: &StrengthParams, model: &Solid) -> Resul
     })
 }
 
-/// The thickness that the coarse mesh asks for where stresses above `limit_mpa` are too much, with its stress
-/// there; what was looked at on the way is added to `tried`.
+/// Thickness that the coarse mesh suggests for a limit of `limit_mpa`, with its stress there. Thicknesses
+/// tried on the way are added to `tried`.
 fn estimate(
     ctx: &Ctx<'_>,
     params: &StrengthParams,
@@ -441,14 +442,14 @@ fn estimate(
     Ok(usual)
 }
 
-/// Keeps thicknesses ascending.
+/// Inserts a result, keeping thicknesses ascending.
 fn insert(tried: &mut Vec<Tried>, new: Tried) {
     let at = tried.partition_point(|t| t.thickness_mm < new.thickness_mm);
     tried.insert(at, new);
 }
 
-/// The thinnest wall that bears its stress; where none does, the thinnest one that hardly any thicker one
-/// betters.
+/// The thinnest wall of sufficient strength; where there is none, the thinnest that no thicker one betters by
+/// much.
 fn choice(tried: &[Tried], limit_mpa: f64) -> Tried {
     let bearable_mpa = bearable_mpa(tried, limit_mpa);
     tried
@@ -458,7 +459,7 @@ fn choice(tried: &[Tried], limit_mpa: f64) -> Tried {
         .unwrap_or(tried[0])
 }
 
-/// The limit, or where no wall stays below it a little more than the least stress.
+/// The stress limit, MPa; where no wall stays below it, a little more than the least stress.
 fn bearable_mpa(tried: &[Tried], limit_mpa: f64) -> f64 {
     let least_mpa = tried.iter().map(|t| t.stress_mpa).fold(f64::INFINITY, f64::min);
     if least_mpa <= limit_mpa {
@@ -468,7 +469,7 @@ fn bearable_mpa(tried: &[Tried], limit_mpa: f64) -> f64 {
     }
 }
 
-/// The stress of a given thickness, mm.
+/// Computes the stress of a wall of a given thickness, mm.
 pub fn stress(
     ctx: &Ctx<'_>,
     params: &StrengthParams,
@@ -486,9 +487,9 @@ pub fn stress(
     ))
 }
 
-/// The thickness to look at next, if any: both ends of the range; where even the thickest wall is too weak a
-/// few between, since what is solid does not count; and in the bracket about the first that [`bearable_mpa`]
-/// allows, until that is narrow enough.
+/// The thickness to try next, mm; `None` at the end. First both ends of the range. If even the thickest wall
+/// is too weak, a few between, since solid regions do not count. Then inside the bracket about the first
+/// thickness within [`bearable_mpa`], until that is narrow enough.
 fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64> {
     let (thinnest, thickest) = (tried.first()?, tried.last()?);
     let is_bearable = tried.iter().any(|t| t.stress_mpa <= limit_mpa);
@@ -513,7 +514,8 @@ fn next(tried: &[Tried], params: &StrengthParams, limit_mpa: f64) -> Option<f64>
     if width_mm <= RESOLUTION_MM {
         return None;
     }
-    // Interpolated, and moved a little into the wider side, so that the bracket closes from both.
+    // The guess is interpolated, and moved a little into the wider side, so that the bracket closes from
+    // both.
     let share = (low.stress_mpa / limit_mpa).ln() / (low.stress_mpa / high.stress_mpa).ln();
     let guess_mm = low.thickness_mm * (high.thickness_mm / low.thickness_mm).powf(share.clamp(0.0, 1.0));
     let is_nearer_low = guess_mm - low.thickness_mm < 0.5 * width_mm;

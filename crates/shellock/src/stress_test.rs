@@ -1,15 +1,15 @@
-//! What a punch on top and a fall do to the assembled pieces (Sect. 7, Fig. 15), and what they would do to
-//! worse ones.
+//! Stress test of the assembled pieces by a punch on top and a fall (Sect. 7, Fig. 15), compared with worse
+//! designs.
 //!
-//! What is tested is what is printed (`printed`): the finished meshes, with the gaps that they have, without
-//! friction and with some. Punch: the force presses on what faces upwards within [`PUNCH_RADIUS_MM`] of the
-//! top, or of the highest place in the middle; what stands on the table is held. Fall: the model lands on its
-//! feet and is stopped within 1/300 s (Sect. 4.3); the floor pushes with `M v / Δt` on what touches it, and
-//! inertia balances it.
+//! The test is of the pieces as printed (`printed`): the finished meshes with their gaps, without friction
+//! and with some. Punch: the force presses on the surface that faces upwards within [`PUNCH_RADIUS_MM`] of
+//! the top, or of the highest place in the middle; the points on the table are held. Fall: the model lands on
+//! its feet and is stopped within 1/300 s (Sect. 4.3); the floor pushes with `M v / Δt` on the points that
+//! touch it, and inertia balances the force.
 //!
 //! Worse designs have no finished pieces. [`compare`] makes walls and connectors of tetrahedra for them, as
-//! in the volume metric, and for the kit's own plan, too, so that like is compared with like: without gaps,
-//! without friction but at the key, with connectors everywhere where the plan has room.
+//! in the volume metric. For a fair comparison it does so for the kit's own plan, too: without gaps, without
+//! friction except at the key, with connectors wherever the plan has room.
 //!
 //! Limits: static and linear; the fall is upright.
 
@@ -42,12 +42,12 @@ pub use printed::FRICTION;
 /// Radius of the fist, mm.
 pub const PUNCH_RADIUS_MM: f64 = 10.0;
 
-/// How far a seam with connectors of that size may open and still hold, mm.
+/// Opening up to which a seam with connectors of that size holds, mm.
 fn limit_mm(connector_mm: f64) -> f64 {
     OPEN_SIZES * connector_mm
 }
 
-/// Size of the largest connectors, mm.
+/// Size of the largest connectors, mm; 0 where there are none.
 fn largest_mm(meetings: &[Meeting]) -> f64 {
     meetings
         .iter()
@@ -56,7 +56,7 @@ fn largest_mm(meetings: &[Meeting]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The point that the punch hits.
+/// The point that the punch hits; `None` on an empty surface.
 fn hit(params: &StressParams, assembly: &ShellAssembly) -> Option<usize> {
     let up = Vec3::from_array(params.plan.up).normalize_or(Vec3::Z);
     match params.punch_at {
@@ -68,7 +68,7 @@ fn hit(params: &StressParams, assembly: &ShellAssembly) -> Option<usize> {
     }
 }
 
-/// Whether some connector has come out too far.
+/// Returns true if any connector has opened too far.
 fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
     meetings
         .iter()
@@ -76,24 +76,24 @@ fn is_open(opening_mm: &[f64], meetings: &[Meeting]) -> bool {
         .any(|(m, d)| m.joint.is_some_and(|joint| *d >= limit_mm(joint.size_mm)))
 }
 
-/// Where the punch lands.
+/// Place where the punch lands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PunchAt {
-    /// On the highest place that is wide enough and above what it stands on, as kits are made for; on the highest
-    /// point where there is none.
+    /// The highest place that is wide enough and above the feet, as kits are made for; the highest point
+    /// where there is none.
     #[default]
     Top,
-    /// On the highest place above the middle of the surface.
+    /// The highest place above the middle of the surface.
     Middle,
 }
 
-/// What is done to the pieces, and what they are.
+/// Loads of the test, and properties of the pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StressParams {
     /// Force on the top, N. (0, 10⁵]; 70, as in the paper.
     pub punch_n: f64,
-    /// Where it presses. The top.
+    /// Place that the punch presses on; the top by default.
     pub punch_at: PunchAt,
     /// Height of the fall, mm. (0, 10⁵]; 2000, as in the paper.
     pub drop_mm: f64,
@@ -101,12 +101,12 @@ pub struct StressParams {
     pub cell_mm: f64,
     /// Walls, connectors and material.
     pub metric: MetricParams,
-    /// Connectors of each pair of pieces.
+    /// Connector sizes of each pair of pieces.
     pub sizes: ConnectorSizes,
-    /// How plans are drawn; `up` says where the top is.
+    /// Parameters of drawing plans; `up` is the direction of the top.
     pub plan: PlanParams,
-    /// How the model is turned so that the pieces' ways out are lattice directions, as those of plans that are
-    /// drawn are.
+    /// Rotation of the model by which the pieces' ways out become lattice directions, as those of drawn plans
+    /// are.
     pub turn: Turn,
 }
 
@@ -126,7 +126,7 @@ impl Default for StressParams {
 }
 
 impl StressParams {
-    /// Every problem at once.
+    /// Lists every problem of the parameters.
     pub fn problems(&self) -> Vec<String> {
         let mut problems = self.plan.problems();
         problems.extend(self.metric.problems().iter().map(ToString::to_string));
@@ -150,91 +150,93 @@ impl StressParams {
     }
 }
 
-/// How a test ends, from best to worst.
+/// Verdict of a test, from best to worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StressVerdict {
-    /// Seams stay closed, and the material bears it.
+    /// Seams stay closed, and the stress is within the strength.
     Holds,
     /// A seam opens by [0.3, 0.6) connector sizes.
     Opens,
-    /// The stress in walls or connectors is more than the material bears.
+    /// The stress in walls or connectors exceeds the strength of the material.
     Yields,
     /// A pin leaves its channel, or nothing stops some piece.
     ComesApart,
 }
 
-/// What one test did.
+/// Result of one test.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// How it ends.
+    /// Verdict of the test.
     pub verdict: StressVerdict,
     /// Force on the model, N.
     pub force_n: f64,
     /// The widest opening, mm; infinite (`null`) where nothing stops some piece.
     pub opening_mm: f64,
-    /// How much of it is play: what a hundredth of the force does; 0 where there are no gaps.
+    /// Part of the opening that is play, mm: the opening under a hundredth of the force; 0 where there are no
+    /// gaps.
     pub play_mm: f64,
-    /// How far the key slides out on its way, where nothing but friction or a detent holds it, mm; no part of the
-    /// opening. 0 by the model without gaps, which holds the key fast.
+    /// Distance by which the key slides out on its way, where only friction or a detent holds it, mm; no part
+    /// of the opening. 0 by the model without gaps, which holds the key fast.
     pub key_slides_mm: f64,
-    /// How far the connectors there may come out and still hold, mm.
+    /// Opening up to which the connectors at the widest place hold, mm.
     pub limit_mm: f64,
-    /// The pieces that part there.
+    /// The two pieces at the widest opening.
     pub between: Option<[PatchId; 2]>,
-    /// The place, mm in assembly space.
+    /// Place of the widest opening, mm in assembly space.
     pub at: Option<[f64; 3]>,
-    /// Joints whose pins have left their channels.
+    /// Number of joints whose pins have left their channels.
     pub n_lost: usize,
     /// Stress that all but 0.5 % of the walls' volume stays under, MPa (von Mises).
     pub wall_mpa: f64,
-    /// The same of pins and channels.
+    /// Stress that all but 0.5 % of the volume of pins and channels stays under, MPa (von Mises).
     pub connector_mpa: f64,
-    /// The largest stress anywhere, which grows with the fineness of the mesh, MPa.
+    /// Largest stress anywhere, MPa, which grows with the fineness of the mesh.
     pub peak_mpa: f64,
-    /// The larger of the first two over the strength.
+    /// Ratio of the larger of wall and connector stress to the strength.
     pub strength_share: f64,
 }
 
-/// Both tests of one design.
+/// Both tests of one design without gaps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pair {
-    /// Punched on the top.
+    /// Result of the punch on the top.
     pub punch: Outcome,
-    /// Fallen.
+    /// Result of the fall onto the feet.
     pub drop: Outcome,
-    /// The plan's score, which is the least load factor of what people do to it (higher is better); `None` for half
-    /// connectors, whose plan is the kit's.
+    /// Score of the plan: its least load factor in use; higher is better. `None` for half connectors, whose
+    /// plan is the kit's.
     pub score: Option<f64>,
     /// Size of the largest connectors, mm.
     pub connector_mm: f64,
 }
 
-/// Both tests of the finished pieces.
+/// Both tests of the finished pieces, at one friction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Printed {
     /// Coefficient of friction between pieces.
     pub friction: f64,
-    /// Punched on the top.
+    /// Result of the punch on the top.
     pub punch: Outcome,
-    /// Fallen.
+    /// Result of the fall onto the feet.
     pub drop: Outcome,
 }
 
-/// The tests of the kit's plan and of two designs that ought to be worse, by the model of walls and
-/// connectors without gaps.
+/// Tests of the kit's plan and of two designs that ought to be worse, by the model of walls and connectors
+/// without gaps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
-    /// The kit's plan.
+    /// Tests of the kit's plan.
     pub kit: Pair,
-    /// With connectors of half the size.
+    /// Tests with connectors of half the size.
     pub half_connectors: Pair,
-    /// With the plan of those drawn whose score is nearest to twice as bad; none if none holds at all.
+    /// Tests of the drawn plan whose score is nearest to half the kit's, by ratio; `None` if none of them
+    /// holds at all.
     pub half_score: Option<Pair>,
 }
 
 impl Comparison {
-    /// The designs with their names, the kit's first.
+    /// Designs with their names, the kit's first.
     pub fn designs(&self) -> Vec<(&'static str, &Pair)> {
         let mut all = vec![
             ("kit's plan", &self.kit),
@@ -245,21 +247,21 @@ impl Comparison {
     }
 }
 
-/// The tests of a kit.
+/// All tests of a kit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StressReport {
-    /// The finished pieces, with each friction of [`FRICTION`].
+    /// Tests of the finished pieces, with each friction of [`FRICTION`].
     pub printed: Vec<Printed>,
-    /// Worse designs, where they were asked for.
+    /// Tests of worse designs, if requested.
     pub compared: Option<Comparison>,
     /// Mass of the pieces, g.
     pub mass_g: f64,
-    /// What the material bears, MPa.
+    /// Strength of the material, MPa.
     pub strength_mpa: f64,
 }
 
 impl StressReport {
-    /// Whether the finished pieces hold in both tests, whatever the friction.
+    /// Returns true if the finished pieces hold in both tests, at every friction.
     pub fn passed(&self) -> bool {
         self.printed
             .iter()
@@ -267,7 +269,7 @@ impl StressReport {
             .all(|o| o.verdict == StressVerdict::Holds)
     }
 
-    /// Name, punch and fall of all that was tested, the finished pieces first.
+    /// Name, punch and fall of everything tested, the finished pieces first.
     pub fn rows(&self) -> Vec<(String, &Outcome, &Outcome)> {
         let printed = self.printed.iter();
         let mut rows: Vec<_> = printed
@@ -279,13 +281,13 @@ impl StressReport {
     }
 }
 
-/// Why the tests could not be made.
+/// Reason why the tests could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StressError {
-    /// Parameters out of range.
+    /// Some parameters are out of range.
     #[error("{}", .0.join("; "))]
     Params(Vec<String>),
-    /// The plan is not one of this surface.
+    /// The plan belongs to another surface.
     #[error("the plan has {steps} pieces, the surface {patches}: they do not belong together")]
     Plan {
         /// Steps of the plan.
@@ -293,10 +295,10 @@ pub enum StressError {
         /// Patches of the surface.
         patches: usize,
     },
-    /// There must be one finished piece for each patch.
+    /// The number of finished pieces differs from that of patches.
     #[error("{pieces} finished pieces of a surface of {patches}: they do not belong together")]
     Pieces {
-        /// How many were given.
+        /// Number of pieces given.
         pieces: usize,
         /// Patches of the surface.
         patches: usize,
@@ -307,10 +309,10 @@ pub enum StressError {
     /// The simulation of finished pieces failed.
     #[error("the simulation of the finished pieces failed: {0}")]
     Finished(#[from] SolidError),
-    /// A way out is none of the 26, once the model is turned.
+    /// A way out is none of the 26 directions, once the model is rotated.
     #[error("piece {0} leaves along a direction that no plan of this program has")]
     Direction(PatchId),
-    /// The simulation failed.
+    /// The simulation of walls and connectors failed.
     #[error("the simulation failed: {0}")]
     Volume(#[from] VolumeError),
     /// The surface metric failed.
@@ -321,7 +323,7 @@ pub enum StressError {
     Cancelled(#[from] Cancelled),
 }
 
-/// The same of the turned model.
+/// Parameters with the up direction of the rotated model.
 fn turned(params: &StressParams) -> StressParams {
     let mut turned = params.clone();
     turned.plan.up = params.turn.apply(Vec3::from(params.plan.up)).to_array();
@@ -335,9 +337,9 @@ fn turned_surface(params: &StressParams, surface: &SegmentedSurface) -> Segmente
     }
 }
 
-/// The plan with the directions of the turned model.
+/// The plan with the directions of the rotated model.
 fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, StressError> {
-    /// A direction that is farther off, degrees, is another.
+    /// Greatest angle to a lattice direction, degrees, within which a direction counts as it.
     const MOST_OFF_DEG: f64 = 1.0;
     let step = |step: &InstallationStep| {
         let out = params.turn.apply(step.separation.unit());
@@ -347,7 +349,7 @@ fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, S
             .then_some((step.piece, nearest))
             .ok_or(StressError::Direction(step.piece))
     };
-    // The first piece goes nowhere.
+    // The first piece does not move, so its direction does not matter.
     let first = plan
         .steps
         .first()
@@ -357,10 +359,10 @@ fn laid(params: &StressParams, plan: &InstallationPlan) -> Result<LatticePlan, S
     steps.map(LatticePlan::new)
 }
 
-/// Tests the finished `pieces`, one for each patch of `surface` where they are when put together, which `plan`
-/// joins; 10 to 60 s for kits of 10 pieces.
+/// Tests the finished `pieces`, one for each patch of `surface`, in their assembled places; `plan` joins
+/// them. Takes 10 to 60 s for kits of 10 pieces.
 ///
-/// `compared` is what [`compare`] found, for the report.
+/// `compared` is the result of [`compare`], for the report.
 pub fn stress_test(
     ctx: &Ctx<'_>,
     params: &StressParams,

@@ -1,4 +1,4 @@
-//! The outer surface with its patches: what segmentation hands to every later stage.
+//! The outer surface with its patches, the result of segmentation that all later stages use.
 
 use shellock_geom::{TriMesh, Vec3};
 
@@ -14,9 +14,9 @@ pub struct SegmentedSurface {
     pub mesh: TriMesh,
     /// The patch of each triangle of `mesh`.
     pub patch_of_face: Vec<PatchId>,
-    /// The triangle of the uncut model that each triangle of `mesh` is a part of.
+    /// The triangle of the uncut model that contains each triangle of `mesh`.
     pub source_face: Vec<u32>,
-    /// How many patches there are; their ids are 0 … n − 1.
+    /// Number of patches; their ids are 0 … n − 1.
     pub n_patches: usize,
 }
 
@@ -39,15 +39,15 @@ impl Seam {
         self.points.windows(2).map(|w| w[0].distance(w[1])).sum()
     }
 
-    /// Whether the seam runs back into itself.
+    /// Returns true if the seam is closed.
     pub fn is_loop(&self) -> bool {
         self.points.len() > 2 && self.points.first() == self.points.last()
     }
 }
 
 impl Seam {
-    /// `n` + 1 points with their unnormalised normals at equal distances along the seam; none where it has no
-    /// length.
+    /// Resamples the seam at `n` + 1 points at equal distances, with their unnormalised normals; none where
+    /// the seam has no length.
     pub(crate) fn resampled(&self, n: usize) -> Vec<(Vec3, Vec3)> {
         let total = self.length();
         if self.points.len() < 2
@@ -80,8 +80,8 @@ impl Seam {
         out
     }
 
-    /// `n` + 1 points at equal distances along the seam, moved inwards by `depth_mm`: where a wall of that
-    /// thickness has its inner edge, up to the detail of the surface, which is smoothed away.
+    /// Moves `n` + 1 points at equal distances along the seam inwards by `depth_mm`, to the inner edge of a
+    /// wall of that thickness. Details of the surface are smoothed away.
     pub(crate) fn below(&self, depth_mm: f64, n: usize) -> Vec<Vec3> {
         /// Rounds of averaging the normals with their neighbours: bumps narrower than some steps do not show
         /// inside.
@@ -104,7 +104,7 @@ impl Seam {
     /// Length along the inner edge of a wall of `depth_mm`, mm: shorter than outside where the surface
     /// bulges, as round a limb.
     pub fn length_below(&self, depth_mm: f64) -> f64 {
-        /// Coarse enough that bumps do not lengthen the line, mm.
+        /// Spacing of the points, mm: so coarse that bumps do not lengthen the line.
         const STEP_MM: f64 = 2.0;
         if depth_mm <= 0.0 {
             return self.length();

@@ -1,8 +1,8 @@
-//! Parts of a body that came off it: seams that meet in a sharp fold of the surface leave some smaller than a cell
-//! of the grid.
+//! Chips: fragments of a body that broke off it. Seams that meet in a sharp fold of the surface leave some
+//! that are smaller than a grid cell.
 //!
-//! One that carries outer skin is given to the body that it lies against, over a bridge in the gap between them;
-//! else there would be a hole. What hangs on nothing is dropped.
+//! A chip with outer skin is given to the body that it touches most, over a bridge in the gap between them;
+//! otherwise the surface would have a hole there. A chip that cannot be joined to any body is dropped.
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
@@ -12,15 +12,15 @@ use shellock_geom::{Aabb, Vec3, Volume};
 use super::grid::ShellGrid;
 use crate::{Cause, Ctx, PatchId, Warning};
 
-/// Chips up to this volume are dropped, mm³; what is missing then is a scratch.
+/// Chips up to this volume are dropped, mm³: the loss is no more than a scratch.
 const CRUMB_MM3: f64 = 0.2;
-/// What is dropped is told from this volume on, mm³, and what is given from this one.
+/// Least volumes that are reported, mm³: of dropped chips together, and of a chip given to another body.
 const TOLD_MM3: f64 = 0.5;
 const GIVEN_TOLD_MM3: f64 = 5.0;
-/// A bridge reaches so much farther than both sides' gaps, mm: its neck is about as wide.
+/// Reach of a bridge beyond the gaps of both sides, mm; its neck is about as wide.
 const BRIDGE_MM: f64 = 0.3;
 
-/// A body in parts: the largest, its cavities filled, and what came off.
+/// A body in parts: the largest component with its cavities filled, and the chips that broke off.
 struct Parts {
     piece: PatchId,
     body: Volume,
@@ -31,13 +31,13 @@ impl Parts {
     fn of((piece, part): (PatchId, Volume)) -> Self {
         let mut parts = part.components().into_iter();
         let body = parts.next().unwrap_or_else(Volume::empty);
-        // Cavities of their own, as in the knee of a leg, are filled: nothing could run out of them.
+        // Cavities inside the solid, as in the knee of a leg, are filled: resin could not drain from them.
         let chips = parts.filter(|c| c.signed_volume() > 0.0).collect();
         Self { piece, body, chips }
     }
 }
 
-/// One connected body for each piece. Those that come `gap_mm` near to each other stay apart.
+/// Makes one connected body for each piece. Bodies closer than `gap_mm` to each other stay apart.
 pub(super) fn whole_bodies(
     ctx: &Ctx,
     grid: &ShellGrid,
@@ -73,7 +73,7 @@ pub(super) fn whole_bodies(
     parts.into_iter().map(|p| (p.piece, p.body)).collect()
 }
 
-/// Whether a chip reaches the surface of the model.
+/// Returns true if a chip reaches the surface of the model.
 fn has_skin(grid: &ShellGrid, chip: &Volume) -> bool {
     let skin_mm = 0.5 * grid.band.cell_mm();
     let depth = |p: &Vec3| grid.band.sample(&grid.depth, *p);
@@ -83,7 +83,8 @@ fn has_skin(grid: &ShellGrid, chip: &Volume) -> bool {
         .any(|p| depth(p).is_some_and(|d| d < skin_mm))
 }
 
-/// Gives a chip to the body that it lies against most of those that it can be bridged to; which, if any.
+/// Merges a chip into the body with the largest shared area to which a bridge can be built. Returns the index
+/// of that body; `None` where no bridge can be built.
 fn give(grid: &ShellGrid, gap_mm: f64, parts: &mut [Parts], chip: &Volume) -> Option<usize> {
     let reach_mm = gap_mm + BRIDGE_MM;
     let around = grown(chip, reach_mm)?.intersect(&grid.solid);
@@ -115,7 +116,7 @@ fn give(grid: &ShellGrid, gap_mm: f64, parts: &mut [Parts], chip: &Volume) -> Op
     None
 }
 
-/// What of `body` lies in `room`.
+/// The part of `body` that lies in `room`.
 fn part_in(body: &Volume, room: Aabb) -> Volume {
     if body.bounds().intersects(room) {
         body.intersect(&Volume::cuboid(room))
@@ -124,7 +125,7 @@ fn part_in(body: &Volume, room: Aabb) -> Volume {
     }
 }
 
-/// How much of the chip's surface is no farther than `reach_mm` from `body`, mm².
+/// Area of the chip's surface no farther than `reach_mm` from `body`, mm².
 fn contact_mm2(chip: &Volume, body: &Volume, reach_mm: f64) -> f64 {
     let (chip, body) = (chip.to_mesh(), body.to_mesh());
     if body.triangles.is_empty() {

@@ -1,16 +1,17 @@
-//! Parts of a side of a cut that hang on nothing there.
+//! Fragments of a cut: parts of one side that are not connected to the rest of that side.
 
 use rayon::prelude::*;
 
 use super::grid::ShellGrid;
 
-/// A fragment that is given lies this far on the other side, in cells.
+/// Field value of a fragment after it is given to the other side, in cells from the cut.
 const GIVEN_CELLS: f64 = 0.45;
 
-/// Finds what hangs on nothing. Chips of the wall itself do so on any side: they do not count.
+/// Finds fragments of both sides of a cut. Detached chips of the wall itself do not count: they are detached
+/// on any side.
 pub(super) struct Fragments<'a> {
     grid: &'a ShellGrid,
-    /// The nodes of the largest connected part of the wall.
+    /// True for the nodes of the largest connected part of the wall.
     wall: Vec<bool>,
 }
 
@@ -24,8 +25,8 @@ impl<'a> Fragments<'a> {
         Self { grid, wall }
     }
 
-    /// Gives each fragment of either side of the cut `g` through the `rest` to the other side, which surrounds
-    /// it. `None` where there are none.
+    /// Gives each fragment of either side of the cut `g` through the `rest` to the side that surrounds it.
+    /// `None` where there are none.
     pub fn give(&self, g: &mut [f32], rest: &[f32]) -> Option<Given> {
         let away_mm = GIVEN_CELLS as f32 * self.grid.band.cell_mm() as f32;
         let fragments = |side: f32| {
@@ -40,15 +41,16 @@ impl<'a> Fragments<'a> {
     }
 }
 
-/// Fragments that changed sides.
+/// Fragments that have changed sides.
 pub(super) struct Given {
-    /// Nodes of those that the piece which is cut off got.
+    /// Nodes of fragments that went to the piece that is cut off.
     gained: Vec<u32>,
     away_mm: f32,
 }
 
 impl Given {
-    /// Positive in what the piece got, as far as a cell beyond it.
+    /// Field that is positive in the fragments the piece got, and up to a cell beyond them; `None` where it
+    /// got none.
     pub fn gained(&self, grid: &ShellGrid) -> Option<Vec<f32>> {
         let mut field = vec![-grid.cutoff_mm(); grid.band.len()];
         for &n in &self.gained {
@@ -61,7 +63,7 @@ impl Given {
     }
 }
 
-/// Connected components of the member nodes, all but the largest; connected across cell edges.
+/// Connected components of the member nodes, all but the largest. Nodes connect along cell edges.
 fn minor_components(grid: &ShellGrid, mut member: Vec<bool>) -> Vec<Vec<u32>> {
     let mut components: Vec<Vec<u32>> = Vec::new();
     for seed in 0..member.len() {

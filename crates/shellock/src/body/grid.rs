@@ -13,41 +13,41 @@ use super::BodyParams;
 use super::sheets::Sheets;
 use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
-/// Values are cut off this far from the level, in cells: nothing farther than a few cells shapes a contour,
+/// Distance from the level at which values are cut off, in cells. Only the nearest few cells shape a contour,
 /// and bounded fields interpolate without jumps.
 const CUTOFF_CELLS: f64 = 3.5;
 /// Width of the band outside the surface, in cells: the cuts must reach past the surface.
 const OUTSIDE_CELLS: f64 = 2.5;
-/// Root mean square distance by which the inner surface of the wall may be simplified, mm. No printer shows
-/// it; all that follows has a fifth of the triangles to deal with.
+/// Root mean square distance by which the wall's inner surface may be simplified, mm. No printer resolves it,
+/// and all later steps have a fifth of the triangles to deal with.
 const INNER_TOLERANCE_MM: f64 = 0.05;
 
-/// Nodes near the model's surface and their depth below it. Depends on the model alone.
+/// Grid nodes near the model's surface and their depth below it. Depends on the model alone.
 pub struct ShellGrid {
-    /// The nodes.
+    /// The nodes of the band.
     pub band: Band,
-    /// Signed distance to the surface, mm, positive inside: φ0. Exact down to a few cells below the wall.
+    /// Signed distance to the surface (φ0), mm, positive inside. Exact down to a few cells below the wall.
     pub depth: Vec<f32>,
     /// Wall thickness H, mm.
     pub thickness_mm: f64,
     /// Depth to which the band reaches, mm.
     pub reach_mm: f64,
-    /// The model.
+    /// The model as a solid volume.
     pub(super) solid: Volume,
-    /// The model less its cavity.
+    /// The wall: the model less its cavity.
     pub wall: Volume,
-    /// Neighbouring nodes inside the model with a crack between them, of which no node tells: the lower one
-    /// first, sorted.
+    /// Pairs of neighbouring nodes inside the model with a crack between them that the depth at nodes does
+    /// not show. The lower node comes first; pairs are sorted.
     cracks: Vec<(u32, u32)>,
 }
 
-/// Why the wall cannot be made.
+/// Reason why the wall cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GridError {
-    /// Too many steps along one axis.
+    /// The grid has too many steps along one axis.
     #[error(transparent)]
     TooFine(#[from] GridTooFine),
-    /// A mesh that the boolean library does not take.
+    /// The boolean library rejects the mesh.
     #[error(
         "the model's surface touches itself in a way that cannot be cut: {0}; separate the touching parts or repair the mesh"
     )]
@@ -57,7 +57,7 @@ pub enum GridError {
         "inside and outside of the model cannot be told apart everywhere, so it cannot be hollowed out: its surface crosses itself; make its parts one solid (a boolean union) and try again"
     )]
     NoInside,
-    /// Nothing of the model is deeper than the wall is thick.
+    /// No part of the model is deeper than the wall is thick.
     #[error(
         "the model has no cavity between two walls of {thickness_mm:.2} mm that the grid could resolve, so there is nothing to hollow out; print it solid, make it larger or choose a thinner wall"
     )]
@@ -99,7 +99,8 @@ impl ShellGrid {
         })
     }
 
-    /// The nodes next to `node` with nothing but the model in between, where both are inside of it.
+    /// Face neighbours of `node`, except across a crack, where both nodes are inside the model but the space
+    /// between them is not.
     pub(super) fn joined_neighbours(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
         let is_cut = move |other: u32| {
             let pair = (node.min(other), node.max(other));
@@ -113,17 +114,17 @@ impl ShellGrid {
         (CUTOFF_CELLS * self.band.cell_mm()) as f32
     }
 
-    /// Whether a node is deep enough below the wall that no body reaches it.
+    /// Returns true if a node is so deep below the wall that no body reaches it.
     pub(super) fn is_below_wall(&self, node: usize) -> bool {
         f64::from(self.depth[node]) > self.thickness_mm + OUTSIDE_CELLS * self.band.cell_mm()
     }
 }
 
-/// See [`ShellGrid::cracks`].
+/// Finds the pairs of nodes of [`ShellGrid::cracks`].
 fn cracks(distance: &SignedDistance, band: &Band, depth: &[f32]) -> Vec<(u32, u32)> {
     let cell = band.cell_mm() as f32;
     let is_crack = |n: u32, m: u32| {
-        // Where the surface passes between two nodes, they are no farther from it than from each other.
+        // Where the surface passes between two nodes, the sum of their depths is at most a cell.
         let (a, b) = (depth[n as usize], depth[m as usize]);
         let position = |n: u32| band.position(n as usize);
         b > 0.0 && a + b <= 1.001 * cell && distance.is_between(position(n), position(m))
@@ -146,21 +147,20 @@ fn deeper_than(band: &Band, depth: &[f32], depth_mm: f64) -> Result<Volume, NotA
     Volume::from_closed_mesh(&decimate(mesh, &tolerance))
 }
 
-/// A patch and its distance, mm.
+/// A patch and the distance to it, mm.
 type Entry = (u32, f32);
 
-/// For each node of the wall, the distances to the patches near it: sparse, since most nodes see one patch
-/// alone.
+/// Distances from each node of the wall to the patches near it. Sparse, since most nodes see only one patch.
 pub struct PatchDistances {
-    /// Entries of node n are `start[n] .. start[n + 1]`.
+    /// Offsets into the entries: those of node n are `start[n] .. start[n + 1]`.
     start: Vec<u32>,
     entries: Vec<Entry>,
     sheets: Sheets,
 }
 
 impl PatchDistances {
-    /// Measures from every node of the wall to every patch that comes within twice the cutoff of its nearest
-    /// one.
+    /// Measures from every node of the wall to every patch whose distance is within twice the cutoff of that
+    /// to the nearest one.
     pub fn measure(grid: &ShellGrid, surface: &SegmentedSurface) -> Self {
         let groups: Vec<u32> = surface.patch_of_face.iter().map(|p| p.0).collect();
         let bvh = TriangleBvh::with_groups(&surface.mesh, &groups);
@@ -210,8 +210,9 @@ impl PatchDistances {
         }
     }
 
-    /// Positive on the side of `p`, which leaves along `separation` from what `remains`: near their seams the
-    /// distance to the sheets through them, elsewhere [`Self::preference`].
+    /// Field that is positive on the side of `p`, which leaves along `separation` from the patches in
+    /// `remains`. Near their seams it is the distance to the sheets through them, elsewhere
+    /// [`Self::preference`].
     pub fn side_of(
         &self,
         grid: &ShellGrid,
@@ -224,8 +225,8 @@ impl PatchDistances {
         side
     }
 
-    /// `½ (min over remaining j ≠ p of d_j − d_p)` at every node, cut off at ±`cutoff`: positive nearer to
-    /// `p`. `remains[j]` says whether patch j is still there.
+    /// `½ (min over remaining j ≠ p of d_j − d_p)` at every node, cut off at ±`cutoff`; positive nearer to
+    /// `p`. `remains[j]` is true while patch j is still there.
     pub fn preference(&self, p: PatchId, remains: &[bool], cutoff: f32) -> Vec<f32> {
         (0..self.start.len() - 1)
             .into_par_iter()
@@ -239,7 +240,7 @@ impl PatchDistances {
                         others = others.min(d);
                     }
                 }
-                // Far from both it does not matter: the node belongs to a piece that has left.
+                // Far from p the value does not matter: the node belongs to a piece that has left.
                 if own == f32::INFINITY {
                     -cutoff
                 } else {
@@ -250,17 +251,18 @@ impl PatchDistances {
     }
 }
 
-/// Nodes along an edge of the blocks that are asked for their patches at once.
+/// Edge length, in nodes, of the blocks whose patches are looked up at once.
 const BLOCK: u16 = 4;
 
-/// Blocks of nodes that see one patch alone, most of all: their nodes' distance to it is the depth.
+/// Blocks of nodes that see only one patch, as most do: the distance of their nodes to it is the depth.
 struct LonelyBlocks {
     /// Block and patch, sorted by block.
     patch_of: Vec<([u16; 3], u32)>,
 }
 
 impl LonelyBlocks {
-    /// A node sees the patches that come nearer than its nearest one and `span` mm.
+    /// Finds the blocks. A node sees all patches whose distance exceeds that of its nearest one by at most
+    /// `span` mm.
     fn find(grid: &ShellGrid, bvh: &TriangleBvh, span: f64) -> Self {
         let is_asked = |&n: &usize| !grid.is_below_wall(n);
         let mut members: Vec<([u16; 3], u32)> = (0..grid.band.len())
@@ -275,7 +277,8 @@ impl LonelyBlocks {
             .filter_map(|block| {
                 let node = block[block.len() / 2].1 as usize;
                 let radius = f64::from(BLOCK - 1) * 3f64.sqrt() * grid.band.cell_mm();
-                // Whatever a node of the block sees is at most twice the way there farther from this one.
+                // A patch that any node of the block sees is farther from this node by at most twice the
+                // radius.
                 let limit = f64::from(grid.depth[node].abs()) * 1.0001 + 1e-4 + span + 2.0 * radius;
                 let mut found = Vec::new();
                 bvh.nearest_by_group(grid.band.position(node), limit * limit, &mut found);
@@ -293,7 +296,7 @@ impl LonelyBlocks {
     }
 }
 
-/// A field on the nodes of a box.
+/// A field on the nodes inside a box.
 #[derive(Clone, Debug)]
 pub struct LocalField {
     nodes: Vec<u32>,
@@ -301,21 +304,21 @@ pub struct LocalField {
 }
 
 impl LocalField {
-    /// The part of `field` in `room`.
+    /// Copies the part of `field` that lies in `room`.
     pub fn cut_out(band: &Band, field: &[f32], room: Aabb) -> Self {
         let nodes = band.nodes_in(room);
         let values = nodes.iter().map(|&n| field[n as usize]).collect();
         Self { nodes, values }
     }
 
-    /// Raises `field` to this one's values where those are greater.
+    /// Raises `field` to this field's values where those are greater.
     pub(super) fn raise(&self, field: &mut [f32]) {
         for (&n, &v) in self.nodes.iter().zip(&self.values) {
             field[n as usize] = field[n as usize].max(v);
         }
     }
 
-    /// The whole field again, `elsewhere` at all other nodes.
+    /// Spreads this field over all nodes of the band, with the value `elsewhere` at the others.
     pub fn spread(&self, band: &Band, elsewhere: f32) -> Vec<f32> {
         let mut field = vec![elsewhere; band.len()];
         for (&n, &v) in self.nodes.iter().zip(&self.values) {

@@ -1,4 +1,4 @@
-//! Splitting the wall, piece by piece, in the order of taking apart.
+//! Splitting the wall, piece by piece, in the disassembly sequence.
 
 use std::cell::Cell;
 
@@ -17,50 +17,53 @@ use super::{BodyError, BodyParams};
 use crate::plan::LatticePlan;
 use crate::{Cancelled, Ctx, IdVec, LatticeDirection, PatchId, SegmentedSurface};
 
-/// Outer skin of a piece that other pieces' paths must not take from it, in cells. [geometry notes: 1.5]
+/// Depth of a piece's outer skin that other pieces' paths must not take from it, in cells. [geometry notes:
+/// 1.5]
 const SKIN_CELLS: f64 = 1.5;
-/// What remains is grown by this many cells before it is swept, so that interpolation leaves no rub.
+/// Cells by which the remaining material is grown before it is swept, so that interpolation leaves no
+/// rubbing.
 const MARGIN_CELLS: f64 = 0.15;
-/// What is nearer than this to the key's cut is its seam, mm.
+/// Distance from the key's cut within which a node counts as part of its seam, mm.
 const KEY_REACH_MM: f32 = 1.5;
-/// Cutting tools are simplified by at most this share of the gap and this many mm where they cut, so that
-/// paths stay free, and by more where they end outside the wall, farther from it than so many cells.
+/// Limits to the simplification of cutting tools. Where they cut, at most this share of the gap and this many
+/// mm, so that paths stay free. Where they end outside the wall, farther from it than so many cells, the
+/// larger tolerance applies.
 const GAP_SHARE: f64 = 0.2;
 const CUT_TOLERANCE_MM: f64 = 0.02;
 const FREE_TOLERANCE_MM: f64 = 0.05;
 const TIGHT_CELLS: f64 = 1.2;
-/// Collars end this far from the wall, in cells, in a field that falls by this much a mm.
+/// Distance from the wall at which collars end, in cells, and the slope of that limit, field mm per mm.
 const LIMIT_CELLS: f32 = 1.8;
 const LIMIT_SLOPE: f32 = 5.0;
 /// Width of a collar beyond the cut, in cells; one is enough for its contour to end where the cut is.
 const COLLAR_CELLS: usize = 3;
-/// A part was not separated by a cut where more of its points than this, and than 0.5 %, lie beyond a cell on
-/// each side.
+/// Stray points of a part up to which a cut counts as separating it. A cut leaks if, on each side, more
+/// points than this and than 0.5 % of all lie beyond a cell.
 const MOST_STRAY: usize = 10;
-/// Rounds of giving fragments to the other side of a cut; new ones can appear where p must keep out of the
-/// way of what it gave.
+/// Rounds of giving fragments to the other side of a cut. New fragments can appear where p must keep out of
+/// the way of those it gave.
 const MOST_GIVINGS: usize = 4;
-/// A piece that could take less than this share of its wall along is not made.
+/// Least share of its wall that a piece must be able to take along; below, the piece is blocked.
 const LEAST_KEPT: f64 = 0.5;
 
-/// The separated bodies and what later stages need of the separation.
+/// The separated bodies, and the fields of the separation that later stages need.
 pub struct ShellBodies {
     /// The body of each piece, one connected volume.
     pub bodies: IdVec<PatchId, Volume>,
     /// The inner surface of the wall, each triangle with the piece behind it; `None` where there is no
     /// cavity.
     pub inner: Option<SegmentedSurface>,
-    /// Where a piece may have no connectors: positive where bodies lie in its way out, or where it would lie
-    /// in a later piece's way. On the nodes around its patch.
+    /// Field that is positive where a piece may have no connectors: where bodies block its way out, or where
+    /// it would block a later piece's way. On the nodes around its patch.
     pub blocked: IdVec<PatchId, LocalField>,
-    /// Positive on each piece's own side of all cuts; with the wall's limits it is the body. On the nodes
-    /// around its patch.
+    /// Field that is positive on each piece's own side of all cuts. Together with the wall's limits it bounds
+    /// the body. On the nodes around its patch.
     pub side: IdVec<PatchId, LocalField>,
-    /// How far each side of a cut stays away from it, mm, on all nodes.
+    /// Distance by which each side of a cut stays back from it, mm, on all nodes.
     pub gap_mm: Vec<f32>,
 }
 
-/// Splits the wall along the plan. The result is a partition of the wall but for the gap inside the seams.
+/// Splits the wall along the plan. The bodies partition the wall except for the gaps inside the seams.
 pub fn build(
     ctx: &Ctx,
     params: &BodyParams,
@@ -146,7 +149,7 @@ fn of_every_piece(fields: Vec<Option<LocalField>>) -> IdVec<PatchId, LocalField>
         .collect()
 }
 
-/// A piece and the field of its cut, positive on its side; the first-installed piece has none.
+/// A piece and the field of its cut, positive on its side; `None` for the first-installed piece.
 struct Cut {
     piece: PatchId,
     field: Option<LocalField>,
@@ -156,13 +159,13 @@ struct Splitter<'a> {
     ctx: &'a Ctx<'a>,
     params: &'a BodyParams,
     grid: &'a ShellGrid,
-    /// How far each side of a cut stays away from it, mm.
+    /// Distance by which each side of a cut stays back from it, mm.
     gap_mm: &'a [f32],
 }
 
-/// Divides `wall` among the pieces of `cuts`, which stand in the order of taking apart: first into the
-/// earlier and the later half of them, then each half on its own. Every triangle so takes part in log n
-/// booleans, not in n.
+/// Divides `wall` among the pieces of `cuts`, given in the disassembly sequence: first between the earlier
+/// and the later half of them, then each half recursively. Every triangle thus takes part in log n booleans,
+/// not in n.
 fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId, Volume)>, Cancelled> {
     if let [only] = cuts {
         with.ctx.step()?;
@@ -180,7 +183,7 @@ fn split(with: &Splitter<'_>, wall: Volume, cuts: &[Cut]) -> Result<Vec<(PatchId
 }
 
 impl Splitter<'_> {
-    /// Positive on the side of any of `leaving`.
+    /// Field that is positive on the side of any of the `leaving` pieces.
     fn preference(&self, leaving: &[Cut]) -> Vec<f32> {
         let mut g = vec![-self.grid.cutoff_mm(); self.grid.band.len()];
         for cut in leaving {
@@ -194,11 +197,12 @@ impl Splitter<'_> {
 
     /// The part of `wall` where `sign · g` is positive, less the gap.
     ///
-    /// A collar along the cut, on the other side of it, is taken out of the wall; then the wall falls apart,
-    /// and what lies on the wanted side is kept. The collar has far fewer triangles than a whole side. Should
-    /// it not separate the sides, the whole side cuts.
+    /// A collar along the cut, on its other side, is subtracted from the wall. The wall then falls apart, and
+    /// the parts on the wanted side are kept. The collar has far fewer triangles than a whole side. If the
+    /// collar does not separate the sides, the whole side cuts instead.
     fn side(&self, wall: &Volume, g: &[f32], sign: f32) -> Volume {
-        // Both sides' collars see the same side of the cut, so that they have the same triangles there.
+        // Both collars resolve corners on the same side of the cut, so that they have the same triangles
+        // there.
         let apart = if sign > 0.0 {
             Corners::Positive
         } else {
@@ -216,12 +220,12 @@ impl Splitter<'_> {
             .unwrap_or_else(|| wall.intersect(&self.whole_side(g, sign)))
     }
 
-    /// The parts of `apart` on the wanted side; `None` where a part lies on both.
+    /// The parts of `apart` on the wanted side; `None` where a part lies on both sides.
     fn half(&self, apart: &Volume, g: &[f32], sign: f32) -> Option<Volume> {
         let cell = self.grid.band.cell_mm();
         let leaks = Cell::new(false);
         let half = apart.retain(|points| {
-            // Samples beside jumps of g may have the wrong sign; most have not.
+            // Samples beside jumps of g may have the wrong sign, so the sum decides.
             let (mut sum, mut n_points, mut n_beyond) = (0.0, 0, [0usize; 2]);
             for h in points
                 .filter_map(|p| self.grid.band.sample(g, p))
@@ -239,13 +243,13 @@ impl Splitter<'_> {
         (!leaks.get()).then_some(half)
     }
 
-    /// All of the wanted side, less the gap.
+    /// The whole of the wanted side, less the gap.
     fn whole_side(&self, g: &[f32], sign: f32) -> Volume {
         let field: Vec<f32> = (0..g.len())
             .into_par_iter()
             .map(|n| (sign * g[n] - self.gap_mm[n]).min(self.limits(n)))
             .collect();
-        // The same corners as the other side's collar cuts apart.
+        // Corners are cut apart on the same side as in the other side's collar.
         let apart = if sign > 0.0 {
             Corners::Negative
         } else {
@@ -255,9 +259,9 @@ impl Splitter<'_> {
         Volume::from_closed_mesh(&mesh).expect("contours are manifold")
     }
 
-    /// Positive where tools reach. Nothing is cut below the wall or far outside: cuts are unknown there. The
-    /// limits are so steep that within a cell of the wall they are above all values of the cut: both sides'
-    /// collars must agree there.
+    /// Field that is positive where tools reach. Nothing is cut below the wall or far outside: cuts are
+    /// unknown there. Within a cell of the wall the limits exceed all values of the cut, because both sides'
+    /// collars must agree there; hence the steep slope.
     fn limits(&self, n: usize) -> f32 {
         let (depth, reach) = (self.grid.depth[n], LIMIT_CELLS * self.grid.band.cell_mm() as f32);
         (self.grid.thickness_mm as f32 + reach - depth).min(depth + reach) * LIMIT_SLOPE
@@ -273,7 +277,7 @@ impl Splitter<'_> {
         decimate(collar, &tolerance)
     }
 
-    /// Positive in the collar: from the gap's border on the side of `sign` to some cells on the other side of
+    /// Field that is positive in the collar: from the gap's border on the side of `sign` to some cells beyond
     /// the cut.
     fn collar_field(&self, g: &[f32], sign: f32) -> Vec<f32> {
         let (cell, cutoff) = (self.grid.band.cell_mm() as f32, self.grid.cutoff_mm());
@@ -311,8 +315,8 @@ impl Splitter<'_> {
         field
     }
 
-    /// How much a collar may be simplified at `p`, mm, where `sign · g` is `h`: well within the gap where it
-    /// cuts, freely where it meets nothing that stays.
+    /// Tolerance by which a collar may be simplified at `p`, mm, where `sign · g` is `h`: a small share of
+    /// the gap where it cuts, larger where it meets no remaining material.
     fn tolerance_mm(&self, p: Vec3, h: f64) -> f64 {
         let cell = self.grid.band.cell_mm();
         let (params, reach) = (self.params, TIGHT_CELLS * cell);
@@ -328,23 +332,24 @@ impl Splitter<'_> {
     }
 }
 
-/// How far each side of a cut stays away from it, mm: more along the key's seams where it has its own gap.
+/// Distance by which each side of a cut stays back at node `n`, mm. The key's seams can have a gap of their
+/// own.
 fn gap_mm(params: &BodyParams, key_side: Option<&[f32]>, n: usize) -> f32 {
     let is_at_key = key_side.is_some_and(|key| key[n].abs() < KEY_REACH_MM);
     let own = params.key_gap_mm.filter(|_| is_at_key);
     own.unwrap_or(params.seam_gap_mm) as f32
 }
 
-/// The state between two removals.
+/// State between two removals of pieces.
 struct Separation<'a> {
     grid: &'a ShellGrid,
     fragments: Fragments<'a>,
     distances: &'a PatchDistances,
     sweeper: Sweeper<'a>,
     remains: Vec<bool>,
-    /// Positive where the material is that has not left, apart from the wall's own limits.
+    /// Field that is positive in the material that has not left, regardless of the wall's own limits.
     rest: Vec<f32>,
-    /// Positive where a later piece passes on its way out, or lies.
+    /// Field that is positive where a later piece lies or passes on its way out.
     in_later_ways: Vec<f32>,
 }
 
@@ -366,20 +371,20 @@ impl<'a> Separation<'a> {
         self.remains.iter().filter(|r| **r).count()
     }
 
-    /// The wall, positive inside, extended outwards by `beyond_mm`.
+    /// Wall thickness field at a node, positive inside, extended outwards by `beyond_mm`.
     fn wall(&self, node: usize, beyond_mm: f32) -> f32 {
         let depth = self.grid.depth[node];
         (depth + beyond_mm).min(self.grid.thickness_mm as f32 - depth)
     }
 
-    /// `g_p`: positive on the side of p.
+    /// Field `g_p` of the cut: positive on the side of p.
     fn cut(&self, p: PatchId, separation: LatticeDirection) -> Vec<f32> {
         let cutoff = self.grid.cutoff_mm();
         let cell = self.grid.band.cell_mm() as f32;
         let (skin_mm, margin) = (SKIN_CELLS as f32 * cell, MARGIN_CELLS as f32 * cell);
         let along = separation.step();
         let mut phi = self.distances.side_of(self.grid, p, &self.remains, separation);
-        // What remains is swept a margin larger.
+        // The remaining material is swept with a margin.
         phi.par_iter_mut()
             .for_each(|phi| *phi = (*phi + margin).min(cutoff));
         let at = |node: usize, side: f32| self.wall(node, cell).min(side).min(self.rest[node]);
@@ -397,8 +402,8 @@ impl<'a> Separation<'a> {
             .into_par_iter()
             .map(|n| phi[n].max(ahead_of_skin[n]).min(-behind_staying[n]))
             .collect();
-        // What is given back stays, and p keeps out of its way too; what p gets leaves with all that is ahead
-        // of it.
+        // Fragments that p gives stay, so p must keep out of their way as well. Fragments that p gets leave
+        // together with all that is ahead of them.
         for _ in 0..MOST_GIVINGS {
             let Some(given) = self.fragments.give(&mut g, &self.rest) else {
                 break;
@@ -437,7 +442,7 @@ impl<'a> Separation<'a> {
         kept as f64 / own.max(1) as f64
     }
 
-    /// Takes p away; returns where p may have no connectors.
+    /// Removes p. Returns the field that is positive where p may have no connectors.
     fn remove(&mut self, p: PatchId, separation: LatticeDirection, g: &[f32]) -> Vec<f32> {
         let cutoff = self.grid.cutoff_mm();
         let along = separation.step();
@@ -468,7 +473,7 @@ impl<'a> Separation<'a> {
     }
 }
 
-/// The inner surface of the wall while its owners are found.
+/// The inner surface of the wall while its owners are being found.
 struct InnerSurface {
     mesh: TriMesh,
     owner: Vec<Option<PatchId>>,
@@ -482,7 +487,7 @@ impl InnerSurface {
         Self { mesh, owner }
     }
 
-    /// Gives to `p` what lies on its side of the cut `g`.
+    /// Gives `p` the unowned part of the surface on its side of the cut `g`.
     fn give(&mut self, p: PatchId, g: &[f32], band: &Band) {
         let mut is_open = vec![false; self.mesh.points.len()];
         for (triangle, _) in self

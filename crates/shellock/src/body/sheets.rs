@@ -1,5 +1,5 @@
-//! The sheets along which the wall is cut: through each seam and straight inwards, or leaning as far as the
-//! piece needs that leaves.
+//! Sheets along which the wall is cut: through each seam and straight inwards, or leaning as far as the
+//! leaving piece needs.
 //!
 //! ```text
 //!            B ↑ into the piece that leaves
@@ -17,9 +17,9 @@
 //! ```
 //!
 //! with c(x) the point of the surface nearest to x: implicit moving least squares [Kolluri 2005] with the
-//! weights of the surface. It is zero on the seam, has slope 1, and is as smooth as the seam. (The difference
-//! of distances to the two patches has no slope where the surface is flat, and is zero in the whole wedge
-//! below a concave edge.)
+//! weights of the surface. The field is zero on the seam, has slope 1, and is as smooth as the seam. (The
+//! difference of distances to the two patches has no slope where the surface is flat, and vanishes in the
+//! whole wedge below a concave edge.)
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
@@ -27,24 +27,24 @@ use shellock_geom::Vec3;
 use super::ShellGrid;
 use crate::{LatticeDirection, PatchId, SegmentedSurface};
 
-/// Distance between samples along a seam, mm: a seam with a radius of 3 mm is met within 4 µm.
+/// Distance between samples along a seam, mm: a seam with a radius of 3 mm is followed within 4 µm.
 const STEP_MM: f64 = 0.3;
-/// Rounds of averaging normals and tangents with those of the samples beside them: a bell of 0.95 mm (one
-/// sigma), so that bumps smaller than the wall is thick do not bend a sheet. Chosen by eye.
+/// Rounds of averaging normals and tangents with those of the neighbouring samples. They amount to a Gaussian
+/// of 0.95 mm (one sigma), so that bumps smaller than the wall thickness do not bend a sheet. Chosen by eye.
 const SMOOTHING_ROUNDS: usize = 20;
-/// ε, mm: a sixth of the step, so that a sheet passes through the samples. Chosen by eye.
+/// Softening length ε, mm: a sixth of the step, so that a sheet passes through the samples. Chosen by eye.
 const LEAST_MM: f64 = 0.05;
-/// R, in cells: as far as fields are kept.
+/// Reach R of the weights, in cells: as far as fields are kept.
 const REACH_CELLS: f64 = 3.5;
-/// From this share of R on the sheet gives way to the distances to the patches. Chosen by eye.
+/// Share of R from which on the sheet blends into the distances to the patches. Chosen by eye.
 const SURE: f64 = 0.6;
-/// A piece leaves a sheet at no less than this angle, rad: the field of what remains is read off a grid, and
-/// would shave a sheet that is merely parallel to the way out.
+/// Least angle between a sheet and the way out, rad. The field of the remaining material is sampled on a
+/// grid, and would shave a sheet that is merely parallel to the way out.
 const DRAFT: f64 = 0.05;
-/// Sheets lean by no more, rad: beyond lie feather edges.
+/// Greatest lean of a sheet, rad; beyond it edges become feather-thin.
 const MOST_LEAN: f64 = 1.0;
-/// Where the way out is along the seam within this, as a sine, a sheet need not lean; beyond the second it
-/// must.
+/// Sine of the angle between the way out and the seam up to which a sheet need not lean, and that from which
+/// on it must lean in full.
 const ALONG: [f64; 2] = [0.1, 0.3];
 
 /// A point of a seam with the frame of its sheet.
@@ -52,7 +52,7 @@ const ALONG: [f64; 2] = [0.1, 0.3];
 struct Sample {
     point: Vec3,
     tangent: Vec3,
-    /// Out of the surface, perpendicular to the tangent.
+    /// Outward surface normal, perpendicular to the tangent.
     normal: Vec3,
     /// The patches to the left and to the right of the tangent, as seen from outside.
     sides: [PatchId; 2],
@@ -61,7 +61,7 @@ struct Sample {
 /// All seams of a surface, sampled.
 pub(super) struct Sheets {
     samples: Vec<Sample>,
-    /// Nodes that lie near seams, and the points of the surface nearest to them, mm.
+    /// Nodes near seams, each with its nearest point of the surface, mm.
     feet: Vec<(u32, Vec3)>,
     reach_mm: f64,
 }
@@ -94,7 +94,8 @@ impl Sheets {
         }
     }
 
-    /// Replaces `preference`, positive on the side of `p`, near the seams that `p` shares with what remains.
+    /// Replaces `preference`, positive on the side of `p`, near the seams that `p` shares with remaining
+    /// patches.
     pub fn shape(
         &self,
         grid: &ShellGrid,
@@ -139,8 +140,8 @@ impl Sheets {
     }
 }
 
-/// φ at `x`, whose nearest point of the surface is `foot`, and how far from it the nearest sample is, mm;
-/// `None` where none is within reach.
+/// Value of φ at `x`, whose nearest point of the surface is `foot`, and the distance from `foot` to the
+/// nearest sample, mm; `None` where no sample is within reach.
 fn mean_distance(
     planes: impl Iterator<Item = (Vec3, Vec3)>,
     x: Vec3,
@@ -162,8 +163,8 @@ fn mean_distance(
 }
 
 impl Sample {
-    /// The normal of its sheet into the patch to the left (`towards` 1) or to the right (−1), so that what
-    /// leaves along `s` does not rub.
+    /// Unit normal of the sample's sheet, into the patch to the left (`towards` 1) or to the right (−1). The
+    /// sheet leans so that a piece that leaves along `s` does not rub.
     fn leaning(&self, towards: f64, s: Vec3) -> Vec3 {
         let b = towards * self.normal.cross(self.tangent).normalize_or_zero();
         let across = s - s.dot(self.tangent) * self.tangent;
@@ -182,7 +183,7 @@ impl Sample {
     }
 }
 
-/// Samples of a seam, with smoothed frames.
+/// Samples a seam, with smoothed frames.
 fn sampled(seam: &crate::Seam) -> Vec<Sample> {
     let n = (seam.length() / STEP_MM).ceil().max(1.0) as usize;
     let stations = seam.resampled(n);
@@ -217,7 +218,7 @@ fn sampled(seam: &crate::Seam) -> Vec<Sample> {
         .collect()
 }
 
-/// The stations before and after one; the first and the last of a loop are the same place.
+/// Stations before and after station `i` of `n`; the first and the last of a loop are the same place.
 fn neighbours(i: usize, n: usize, is_loop: bool) -> (usize, usize) {
     match (is_loop && n > 2, i) {
         (true, 0) => (n - 2, 1),
@@ -226,10 +227,10 @@ fn neighbours(i: usize, n: usize, is_loop: bool) -> (usize, usize) {
     }
 }
 
-/// Points sorted into cubes as wide as they are asked for.
+/// Points sorted into cubes whose edge is the search radius.
 struct Buckets {
     edge_mm: f64,
-    /// Cube and point, sorted.
+    /// Cubes with the indices of their points, sorted.
     of: Vec<([i32; 3], u32)>,
 }
 
@@ -251,12 +252,12 @@ impl Buckets {
         (p / edge_mm).floor().to_array().map(|x| x as i32)
     }
 
-    /// The points of the 27 cubes around `q`, always in the same order.
+    /// Points of the 27 cubes around `q`, always in the same order.
     fn around(&self, q: Vec3) -> impl Iterator<Item = u32> + '_ {
         let [i, j, k] = Self::cube(q, self.edge_mm);
         (0..9).flat_map(move |at| {
             let (x, y) = (i + at / 3 - 1, j + at % 3 - 1);
-            // Cubes that differ in z alone stand side by side.
+            // Cubes that differ only in z are adjacent in the sorted list.
             let from = self.of.partition_point(|e| e.0 < [x, y, k - 1]);
             self.of[from..]
                 .iter()
@@ -270,7 +271,7 @@ impl Buckets {
 mod tests {
     use super::*;
 
-    /// A seam along x, the surface facing z; patch 0 to its left, where y > 0.
+    /// A seam along x on a surface that faces z; patch 0 is on its left, where y > 0.
     fn sample() -> Sample {
         Sample {
             point: Vec3::ZERO,

@@ -68,8 +68,8 @@ fn bodies_part_the_wall_and_leave_freely() {
     let (grid, built) = built(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     let total: f64 = bodies.as_slice().iter().map(Volume::volume).sum();
-    // Twelve seams of a quarter circle, two gaps of 0.05 mm wide over 2 mm. Where three of them meet the pieces
-    // keep out of each other's ways.
+    // Twelve seams of a quarter circle with two gaps each, 0.05 mm wide over 2 mm. Pieces keep out of each
+    // other's ways where three seams meet, so that more is lost there.
     let gaps = 12.0 * 0.5 * std::f64::consts::PI * (RADIUS_MM - 1.0) * 0.1 * 2.0;
     let lost = grid.wall.volume() - total;
     assert!(
@@ -88,8 +88,8 @@ fn cut_faces_stand_straight_under_their_seams_at_the_gap_from_them() {
     let (mut n_points, mut worst) = (0, 0.0f64);
     for body in bodies.as_slice() {
         for p in body.to_mesh().points {
-            // Between the wall's two sides, where its inner one is not near (the fields of both meet there), away
-            // from the triple points: where one coordinate alone is small.
+            // Points between the two sides of the wall, not near the inner one, where the fields of both
+            // meet. They are away from triple points: only one coordinate is small.
             let mut off = p.abs().to_array();
             off.sort_unstable_by(f64::total_cmp);
             if off[0] < 0.5 && off[1] > 3.0 && (p.length() - RADIUS_MM + 0.85).abs() < 0.75 {
@@ -118,8 +118,8 @@ fn a_fragment_goes_to_what_surrounds_it_and_the_piece_keeps_out_of_its_way() {
     let (_, built) = built(&BodyParams::default(), &surface, &plan);
     let bodies = built.unwrap().bodies;
     assert!(bodies.as_slice().iter().all(|b| b.components().len() == 1));
-    // What surrounds the island has it: the first octant is as large as the others, but for what carving
-    // shifts.
+    // The octant around the island got it: the first octant is as large as the others, except for what
+    // carving shifts.
     assert!(bodies[plan.steps[0].piece].volume() > 0.8 * bodies[plan.steps[3].piece].volume());
     assert_leave_freely(&bodies, &plan, 0.05);
 }

@@ -16,17 +16,17 @@ pub struct Curve {
     pub earlier: PatchId,
     /// Points about 1 mm apart. A loop's last point is its first.
     pub points: Vec<Vec3>,
-    /// Unit tangents `u`.
+    /// Unit tangents `u` along the curve.
     pub tangents: Vec<Vec3>,
     /// Outward unit normals `N`, perpendicular to `u`.
     pub normals: Vec<Vec3>,
-    /// `v = ± N × u`, pointing from the later piece to the earlier one.
+    /// Unit vectors `v = ± N × u`, from the later piece to the earlier one.
     pub across: Vec<Vec3>,
-    /// Whether the curve runs back into itself.
+    /// True if the curve is closed.
     pub is_loop: bool,
 }
 
-/// One curve for each seam of the inner surface that is long enough to have points of its own.
+/// Makes one curve for each seam of the inner surface that is long enough to be resampled.
 pub fn curves(grid: &ShellGrid, inner: &SegmentedSurface, plan: &LatticePlan) -> Vec<Curve> {
     inner
         .seams()

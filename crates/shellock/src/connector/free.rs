@@ -1,4 +1,4 @@
-//! Whether a piece may have material at a point below the wall.
+//! Test of points below the wall: may a piece have material there?
 
 use rayon::prelude::*;
 use shellock_geom::Vec3;
@@ -7,8 +7,8 @@ use super::ConnectorParams;
 use crate::PatchId;
 use crate::body::{ShellBodies, ShellGrid};
 
-/// For a piece and a point: `None` in or above the wall, else whether connectors of the piece may be there:
-/// neither in its way out nor in a later piece's, by the clearance.
+/// Returns a test of a piece and a point: `None` in or above the wall, else true if connectors of the piece
+/// may be there. The point must be clear of its way out and of later pieces' ways, by the clearance.
 pub fn is_unobstructed<'a>(
     params: &ConnectorParams,
     grid: &'a ShellGrid,

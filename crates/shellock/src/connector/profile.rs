@@ -1,4 +1,4 @@
-//! The cross-section of a connector.
+//! Cross-section of a connector: rectangles of pin, foot and channel.
 
 use shellock_geom::Vec3;
 use shellock_mechanics::connector::{FLOOR, FOOT_WIDTH, PIN_DEPTH, PIN_WIDTH};
@@ -9,18 +9,18 @@ use super::{ConnectorParams, RunShape, RunStation};
 /// A rectangle of the cross-section: from `n0` to `n1` along the frame's `n`, from `s0` to `s1` along ŝ, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
-    /// Least coordinate along `n`.
+    /// Least coordinate along `n`, mm.
     pub n0: f64,
-    /// Greatest coordinate along `n`.
+    /// Greatest coordinate along `n`, mm.
     pub n1: f64,
-    /// Least coordinate along ŝ.
+    /// Least coordinate along ŝ, mm.
     pub s0: f64,
-    /// Greatest coordinate along ŝ.
+    /// Greatest coordinate along ŝ, mm.
     pub s1: f64,
 }
 
 impl Part {
-    /// The rectangle with all sides moved outwards.
+    /// The rectangle with all sides moved outwards by `by_mm`.
     pub fn grown(self, by_mm: f64) -> Self {
         Self {
             n0: self.n0 - by_mm,
@@ -30,7 +30,7 @@ impl Part {
         }
     }
 
-    /// Its four corners at a station.
+    /// Corners of the rectangle in space, at a station.
     pub fn corners(self, at: &RunStation) -> [Vec3; 4] {
         [
             (self.n0, self.s0),
@@ -45,28 +45,27 @@ impl Part {
 /// The cross-section at a station: convex parts whose unions are the male and the female half.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// The pin below the seam; then, where the male leaves sideways, the foot that joins it to its body.
+    /// Pin below the seam; then, where the male leaves sideways, the foot that joins it to its body.
     pub male: [Option<Part>; 2],
     /// Bottom, far wall and near wall of the channel.
     pub female: [Option<Part>; 3],
-    /// What fills the corner between a tongue and the edge of the wall that it hangs from, a slot as narrow as
-    /// the clearance; it reaches beyond the wall's side of the seam.
+    /// Filling of the corner between a tongue and the edge of the wall that it hangs from, a slot as narrow
+    /// as the clearance. Reaches beyond the wall's side of the seam.
     pub corner: Option<Part>,
 }
 
-/// Below this angle between ŝ and the surface normal, in radians, the pin is a tongue and needs a foot: at
-/// −40°.
+/// Angle between ŝ and the surface normal below which the pin is a tongue and needs a foot, rad: −40°.
 const TONGUE_ANGLE: f64 = -0.698;
-/// How far parts reach into the wall they hang from, mm.
+/// Depth to which parts reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.6;
-/// How far what fills a tongue's corner reaches into tongue and wall, mm.
+/// Depth to which the filling of a tongue's corner reaches into tongue and wall, mm.
 const CORNER_MM: f64 = 0.1;
 
-/// How far the lip of a key's groove stays from the seam, mm.
+/// Distance of the lip of a key's groove from the seam, mm.
 const LIP_GAP_MM: f64 = 0.1;
-/// How much smaller the tip of a rail's tongue is, mm: so that the groove finds it.
+/// Reduction of the tip of a rail's tongue, mm, so that the groove finds it.
 const LEAD_IN_MM: f64 = 0.3;
-/// How far a rail reaches up into walls that are not quite as flat as it, mm.
+/// Height to which a rail reaches up into walls that are less flat than the rail, mm.
 const RAIL_ROOT_MM: f64 = 1.2;
 
 impl Section {
@@ -78,8 +77,8 @@ impl Section {
         }
     }
 
-    /// A tongue of the male under the female's wall, and the female's groove around it; ŝ points out of the
-    /// surface.
+    /// Cross-section of a rail: a tongue of the male under the female's wall, and the female's groove around
+    /// it; ŝ points out of the surface.
     ///
     /// ```text
     ///      M M M M│F F F F F F
@@ -140,15 +139,15 @@ impl Section {
         }
     }
 
-    /// The cross-section for the angle `T` of a station: −90° a tongue under the female (forward connector),
-    /// 0 a pin that pulls straight out, up to 60° backward.
+    /// Cross-section of a seam for the angle `T` of a station: −90° a tongue under the female (forward
+    /// connector), 0 a pin that pulls straight out, up to 60° backward.
     ///
     /// Lengths along ŝ are divided by the station's depth factor, so that they are right when measured across
     /// the seam.
     fn seam(station: &RunStation) -> Self {
         let (d, c) = (station.size_mm, station.clearance_mm);
         let (forward, backward) = ((-station.theta).max(0.0), station.theta.max(0.0));
-        // Stretch along ŝ; ŝ leans against the seam by the angle whose cosine is `depth`.
+        // Stretch along ŝ, which leans against the seam by the angle whose cosine is `depth`.
         let k = 1.0 / station.depth.max(0.4);
         let (pin_width, foot_width) = (PIN_WIDTH * d, FOOT_WIDTH * d);
         let (wall, bottom) = (PIN_WIDTH * d - c, FLOOR * d);
@@ -286,7 +285,8 @@ mod tests {
                     assert!((wall.n1 - wall.n0).min(wall.s1 - wall.s0) >= params.min_wall_mm);
                 }
                 let lip = section.female[0].unwrap();
-                // The key's wall lies above the tongue, its lip below: neither lets it out across.
+                // The key's wall lies above the tongue and its lip below: neither lets the tongue out across
+                // the seam.
                 assert!(tongue.s1 < 0.0 && tongue.n1 > 0.5 && lip.s1 < tongue.s0 && lip.n0 < 0.3 * tongue.n1);
             }
             assert!(

@@ -1,8 +1,8 @@
 //! Rails for a key that slides along its seam (Sect. 6.1, Fig. 6).
 //!
-//! The neighbour has a straight tongue under the key's wall; the key has a groove around it. Everything of
-//! the key so lies within its own outline and leaves with it through the opening that its rim leaves. The
-//! tongue's tip is narrower, and the groove ends just beyond it, so the key stops where it belongs.
+//! The neighbour has a straight tongue under the key's wall; the key has a groove around it. All parts of the
+//! key thus lie within its own outline, and leave with it through the opening in the rim of its neighbours.
+//! The tongue's tip is narrower, and the groove ends just beyond it, so the key stops in its place.
 
 use shellock_geom::Vec3;
 
@@ -11,22 +11,22 @@ use super::frame::Curve;
 use super::run::{RailPart, Run, RunShape, RunStation, has_room};
 use crate::seam::rules::{MAX_ALONG_SEAM, MAX_OUT_OF_RAIL, SHORTEST_RAIL_SIZES, end_gap_mm};
 
-/// The seam may leave a straight line by this much across, and the wall's inner side by this much up and
-/// down, in connector sizes.
+/// Greatest deviation of the seam from a straight line, across, and of the wall's inner side, up and down, in
+/// connector sizes.
 const MOST_ASIDE_SIZES: f64 = 0.16;
 const MOST_UNEVEN_SIZES: f64 = 0.3;
-/// What passes over a tongue is no farther across from the seam than this, in connector sizes.
+/// Greatest distance from the seam of points that pass over a tongue, across, in connector sizes.
 const REACH_SIZES: f64 = 1.2;
-/// Length of the narrow tip and of the stop, in connector sizes.
+/// Lengths of the narrow tip and of the stop, in connector sizes.
 const LEAD_IN_SIZES: f64 = 0.5;
 const STOP_SIZES: f64 = 0.45;
-/// Places at which room is looked for along a rail.
+/// Number of steps at whose ends a rail is tested for room.
 const N_PLACES: usize = 12;
 
-/// A point of the seam: along the slide, towards the key, out of the surface.
+/// Coordinates of a point of the seam: along the slide, towards the key, out of the surface; mm.
 type Place = [f64; 3];
 
-/// The axes of a rail.
+/// Axes of a rail, unit vectors.
 struct Axes {
     slide: Vec3,
     to_key: Vec3,
@@ -39,8 +39,8 @@ impl Axes {
     }
 }
 
-/// The rails under `curve`, one of `curves`, along which the key leaves on `slide`, and the length of seam
-/// that would do for one, mm.
+/// Rails under `curve`, one of `curves`, for a key that leaves along `slide`, and the length of seam that
+/// would be usable for rails, mm.
 pub(super) fn rails(
     params: &ConnectorParams,
     curves: &[Curve],
@@ -80,7 +80,7 @@ pub(super) fn rails(
     (rails, usable_mm)
 }
 
-/// Stretches of the curve that run along the slide, away from its ends, as index ranges with both ends.
+/// Stretches of the curve that run along the slide, away from its ends, as inclusive index ranges.
 fn along_slide(curve: &Curve, slide: Vec3, size_mm: f64) -> Vec<(usize, usize)> {
     let mut arc_mm = vec![0.0];
     for w in curve.points.windows(2) {
@@ -110,8 +110,9 @@ fn along_slide(curve: &Curve, slide: Vec3, size_mm: f64) -> Vec<(usize, usize)> 
     found
 }
 
-/// Both ends of the longest straight line that the points follow: back, then front. It lies under the lowest
-/// of them and under whatever of the key's `outline` is behind its front, since all of that passes over it.
+/// Back and front end of the longest straight line that the points follow; `None` where it is too short. The
+/// line lies under the lowest point, and under all of the key's `outline` behind the front, which passes over
+/// it.
 fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Option<[Place; 2]> {
     let mut places: Vec<Place> = points.iter().map(|p| axes.place(p)).collect();
     places.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -140,7 +141,7 @@ fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Op
             let at = |along: f64| [along, middle[1] + slope * (along - middle[0]), low];
             return Some([at(rest[0][0]), at(rest[rest.len() - 1][0])]);
         }
-        // What bends away does so at an end.
+        // The points deviate most at an end, so the worse end is dropped.
         rest = if excess(&rest[0]) > excess(&rest[rest.len() - 1]) {
             &rest[1..]
         } else {
@@ -149,12 +150,12 @@ fn straight(points: &[Vec3], outline: &[Place], axes: &Axes, size_mm: f64) -> Op
     }
 }
 
-/// How far across the slide the middle of the places is.
+/// Mean coordinate of the places across the slide, mm.
 fn middle_of(places: &[Place]) -> f64 {
     places.iter().map(|p| p[1]).sum::<f64>() / places.len() as f64
 }
 
-/// Centre of the places and slope of the line of least squares towards the key.
+/// Centre of the places, and slope towards the key of the least-squares line through them.
 fn fitted(places: &[Place]) -> (Place, f64) {
     let n = places.len() as f64;
     let middle: Place = std::array::from_fn(|axis| places.iter().map(|p| p[axis]).sum::<f64>() / n);
@@ -215,8 +216,8 @@ fn rail(
     })
 }
 
-/// Where the sections of a rail are whose tongue reaches from `start_mm` to `end_mm` of its line: the tongue, its
-/// tip, and beyond it the groove's end.
+/// Positions and parts of the sections of a rail whose tongue reaches from `start_mm` to `end_mm` of its
+/// line: the tongue, its tip, and beyond them the groove's end.
 pub(crate) fn rail_places(
     [start_mm, end_mm]: [f64; 2],
     size_mm: f64,
@@ -231,12 +232,12 @@ pub(crate) fn rail_places(
     ]
 }
 
-/// How far a key's groove reaches beyond the tongue's tip, mm.
+/// Length by which a key's groove reaches beyond the tongue's tip, mm.
 pub(crate) fn stop_mm(size_mm: f64, clearance_mm: f64) -> f64 {
     clearance_mm + STOP_SIZES * size_mm
 }
 
-/// The longest row of `true`, as an index range with both ends.
+/// The longest row of `true`, as an inclusive index range.
 fn longest(row: &[bool]) -> Option<(usize, usize)> {
     let mut best: Option<(usize, usize)> = None;
     let mut from = 0;
@@ -275,7 +276,7 @@ mod tests {
         assert!((back[2] + 0.1).abs() < 0.02 && back[2] == front[2]);
         let slope = (front[1] - back[1]) / (front[0] - back[0]);
         assert!((slope - 0.05).abs() < 0.03, "{slope}");
-        // What is behind passes over the rail; what is in front of it or far aside does not.
+        // Outline points behind the front pass over the rail; those ahead of it or far aside do not.
         let [behind, ahead, aside] = [[-4.0, 1.0, -0.5], [39.0, 1.0, -3.0], [-4.0, 9.0, -3.0]];
         let lower = straight(&points, &[behind, ahead, aside], &axes, 2.5).unwrap();
         assert_eq!(lower[0][2], -0.5);

@@ -1,4 +1,4 @@
-//! Where connectors can be, and the runs they form.
+//! Runs of connectors, and the places where connectors can be.
 
 use shellock_geom::Vec3;
 
@@ -10,17 +10,17 @@ use crate::seam::later_is_male;
 use crate::seam::rules::{MAX_ALONG_SEAM, MAX_BACKWARD_RAD, SHARPEST_TURN, SHORTEST_RUN_SIZES, end_gap_mm};
 use crate::{ConnectorSizes, PatchId};
 
-/// A cell of a run may leave its curve by this much, mm, turn by this much, rad, and be this long, mm.
+/// Limits of a run's cell: deviation from the curve, mm, turn, rad, and length, mm.
 const CELL_SAG_MM: f64 = 0.03;
 const CELL_TURN: f64 = 0.12;
 const CELL_LENGTH_MM: f64 = 6.0;
-/// Share of a section's sample points that must be free for a connector to be worth making there.
+/// Least share of a section's sample points that must be free for a connector to be worth making there.
 const LEAST_FREE: f64 = 0.6;
 
 /// A place on a run, with the frame of its cross-section.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunStation {
-    /// On the edge between the wall and the inner surface.
+    /// Point on the edge between the wall and the inner surface.
     pub point: Vec3,
     /// Unit tangent `u` of the seam.
     pub tangent: Vec3,
@@ -28,10 +28,10 @@ pub struct RunStation {
     pub n: Vec3,
     /// ŝ: unit direction in which the male leaves the female.
     pub s: Vec3,
-    /// T: angle from the outward normal to ŝ, seen along the seam, positive towards the female; rad in [−π/2,
+    /// Angle T from the outward normal to ŝ, seen along the seam, positive towards the female; rad in [−π/2,
     /// π/2].
     pub theta: f64,
-    /// Length of ŝ across the seam, in (0, 1].
+    /// Length of ŝ projected across the seam, in (0, 1].
     pub depth: f64,
     /// Distance along the curve, mm.
     pub arc_mm: f64,
@@ -39,27 +39,27 @@ pub struct RunStation {
     pub size_mm: f64,
     /// Gap between the two halves, mm.
     pub clearance_mm: f64,
-    /// What the section looks like.
+    /// Kind of the cross-section.
     pub shape: RunShape,
 }
 
-/// The kinds of sections.
+/// The kinds of cross-sections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunShape {
-    /// Pin and channel of a seam that is left across.
+    /// Pin and channel of a seam that the piece leaves across.
     Seam,
-    /// Tongue and groove of a seam that a key slides along; `n` leads to the key, ŝ out of the surface.
+    /// Tongue and groove of a seam that a key slides along; `n` points to the key, ŝ out of the surface.
     Rail(RailPart),
 }
 
-/// Where on a rail a section is.
+/// Position of a section on a rail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RailPart {
-    /// The tongue is whole.
+    /// The tongue in full width.
     Full,
     /// The tip of the tongue, narrower so that the groove finds it.
     LeadIn,
-    /// Beyond the tongue: the end of the groove, which stops the key.
+    /// The end of the groove beyond the tongue, which stops the key.
     Stop,
 }
 
@@ -83,23 +83,23 @@ impl Run {
             .sum()
     }
 
-    /// Whether it is a rail of the key.
+    /// Returns true if the run is a rail of the key.
     pub fn is_rail(&self) -> bool {
         self.stations[0].shape != RunShape::Seam
     }
 
-    /// Gap between its two halves, mm.
+    /// Gap between the two halves, mm.
     pub fn clearance_mm(&self) -> f64 {
         self.stations[0].clearance_mm
     }
 
-    /// The middle station's place.
+    /// Point of the middle station.
     pub fn middle(&self) -> Vec3 {
         self.stations[self.stations.len() / 2].point
     }
 }
 
-/// What a seam between two pieces offers.
+/// Room for connectors on a seam between two pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeamRoom {
     /// The piece installed later.
@@ -110,13 +110,13 @@ pub struct SeamRoom {
     pub length_mm: f64,
     /// Length on which angles, ends and turns allow a connector, mm.
     pub usable_mm: f64,
-    /// A point in its middle.
+    /// A point in the middle of the seam.
     pub at: Vec3,
 }
 
-/// The runs along all curves, and what each curve offered. `is_free(piece, point)` says whether `piece` may
-/// have material at a point below the wall; `None` where the point lies in or above the wall and does not
-/// count. `slide` is the key's direction where it slides on rails.
+/// Runs along all curves, and the room of each curve. `is_free(piece, point)` is true where `piece` may have
+/// material at a point below the wall; `None` where the point lies in or above the wall and does not count.
+/// `slide` is the key's direction where it slides on rails.
 pub fn runs(
     params: &ConnectorParams,
     sizes: &ConnectorSizes,
@@ -184,7 +184,7 @@ fn sides(curve: &Curve, later_is_male: bool) -> (PatchId, PatchId) {
     }
 }
 
-/// Whether the later piece carries the pin at each point.
+/// Roles along a curve: true where the later piece carries the pin.
 fn roles(curve: &Curve, separation: Vec3) -> Vec<bool> {
     let n = curve.normals.len() - usize::from(curve.is_loop);
     let mut roles = later_is_male(&curve.normals[..n], separation, curve.is_loop);
@@ -221,7 +221,7 @@ fn station(curve: &Curve, i: usize, separation: Vec3, later_is_male: bool, size_
     }
 }
 
-/// Where ends, roles, angles and turns allow a connector.
+/// True at the points where ends, roles, angles and turns allow a connector.
 fn allowed(size_mm: f64, curve: &Curve, stations: &[RunStation], later_is_male: &[bool]) -> Vec<bool> {
     let n = stations.len();
     let length = stations[n - 1].arc_mm;
@@ -234,14 +234,15 @@ fn allowed(size_mm: f64, curve: &Curve, stations: &[RunStation], later_is_male: 
             let near = i.saturating_sub(1)..=(i + 1).min(n - 1);
             let same_role = near.clone().all(|j| later_is_male[j] == later_is_male[i]);
             let gentle = near.clone().all(|j| !turns(i, j));
-            // Just below −90° is a tongue that hysteresis kept; anything beyond is the other side's pin.
+            // An angle just below −90° is a tongue that hysteresis kept; beyond that the other side has the
+            // pin.
             let sound = s.theta <= MAX_BACKWARD_RAD && s.theta >= -1.75;
             clear_of_ends && same_role && gentle && sound && s.s.dot(s.tangent).abs() <= MAX_ALONG_SEAM
         })
         .collect()
 }
 
-/// Whether both halves keep most of their section.
+/// Returns true if both halves have room for most of their section.
 pub(super) fn has_room(
     params: &ConnectorParams,
     station: &RunStation,
@@ -267,7 +268,7 @@ pub(super) fn has_room(
     })
 }
 
-/// Maximal stretches of allowed points with one role, as index ranges with both ends.
+/// Maximal stretches of allowed points with one role, as inclusive index ranges.
 fn stretches(allowed: &[bool], role: &[bool]) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     let mut from = 0;
@@ -284,7 +285,7 @@ fn stretches(allowed: &[bool], role: &[bool]) -> Vec<(usize, usize)> {
     found
 }
 
-/// The fewest stations whose cells follow the run within the sag and turn limits.
+/// Selects as few stations as possible whose cells keep the limits of sag, turn and length.
 fn thinned(stations: &[RunStation]) -> Vec<RunStation> {
     let mut kept = vec![stations[0]];
     let mut from = 0;

@@ -1,15 +1,15 @@
-//! Figures cut into flat faces, in seven strokes a digit: straight strokes as wide as two lines of a nozzle.
+//! Digits engraved into flat faces, in seven straight strokes as wide as two lines of a nozzle.
 
 use shellock_geom::{Vec3, Volume};
 
-/// Height and width of a digit between the middles of its strokes, and from one digit to the next, mm.
+/// Height and width of a digit between the middles of its strokes, and advance to the next digit, mm.
 const HEIGHT_MM: f64 = 3.0;
 const WIDTH_MM: f64 = 1.6;
 const ADVANCE_MM: f64 = 3.2;
 /// Width and depth of strokes, mm, as those of pieces' numbers.
 const STROKE_MM: f64 = 0.8;
 const DEPTH_MM: f64 = 0.4;
-/// Cuts reach so far out of the face, mm.
+/// Height of cuts above the face, mm.
 const ABOVE_MM: f64 = 0.5;
 
 /// The strokes of each digit: top, upper right, lower right, bottom, lower left, upper left, middle.
@@ -25,7 +25,7 @@ const DIGITS: [[u8; 7]; 10] = [
     [1, 1, 1, 1, 1, 1, 1],
     [1, 1, 1, 1, 0, 1, 1],
 ];
-/// Ends of those strokes, in widths and heights.
+/// Ends of those strokes, in widths and heights of a digit.
 const ENDS: [[[f64; 2]; 2]; 7] = [
     [[0.0, 1.0], [1.0, 1.0]],
     [[1.0, 0.5], [1.0, 1.0]],
@@ -36,22 +36,22 @@ const ENDS: [[[f64; 2]; 2]; 7] = [
     [[0.0, 0.5], [1.0, 0.5]],
 ];
 
-/// A flat face as its reader sees it; the face looks along `right` × `up`.
+/// A flat face with the axes that its reader sees; the face looks along `right` × `up`.
 pub(super) struct Sheet {
-    /// Where the middle of the text goes.
+    /// Position of the middle of the text.
     pub middle: Vec3,
     pub right: Vec3,
     pub up: Vec3,
 }
 
 impl Sheet {
-    /// What the digits of `text` take off the face; other characters leave a gap.
+    /// Volumes that the digits of `text` cut from the face; other characters leave a gap.
     pub(super) fn strokes(&self, text: &str) -> Vec<Volume> {
         let first = -0.5 * (ADVANCE_MM * (text.chars().count() as f64 - 1.0) + WIDTH_MM);
         let mut cuts = Vec::new();
         for (i, c) in text.chars().enumerate() {
             let Some(digit) = c.to_digit(10) else { continue };
-            // A lone stroke stands in the middle of its place.
+            // The digit 1 has only strokes on one side, so it is centred.
             let aside = if digit == 1 { -0.5 * WIDTH_MM } else { 0.0 };
             let left = first + i as f64 * ADVANCE_MM + aside;
             let at = |[x, y]: [f64; 2]| [left + x * WIDTH_MM, (y - 0.5) * HEIGHT_MM];
@@ -61,7 +61,7 @@ impl Sheet {
         cuts
     }
 
-    /// A straight stroke, along one of the axes.
+    /// Volume of a straight stroke along one of the axes.
     fn stroke(&self, [a, b]: [[f64; 2]; 2]) -> Volume {
         let half = 0.5 * STROKE_MM;
         let normal = self.right.cross(self.up);

@@ -1,4 +1,4 @@
-//! What holds of a coupon's parts and of the joints that they make.
+//! Properties of a coupon's parts and of the joints that they make.
 
 use shellock_geom::Solid;
 use shellock_geom::clearance::{Scope, Shape, Translation, least_gap, swept_gap};
@@ -14,7 +14,7 @@ const PRINTERS: [[f64; 4]; 4] = [
     [0.3, 0.32, 0.14, 0.45],
     [0.25, 0.28, 0.12, 0.6],
 ];
-/// Coordinates are rounded to single precision, mm.
+/// Rounding of coordinates to single precision, mm.
 const ROUNDING_MM: f64 = 1e-5;
 const REST: Translation = Translation {
     along: Vec3::ZERO,
@@ -30,7 +30,7 @@ fn coupons() -> Vec<(Vec<Part>, f64)> {
     PRINTERS.map(made).into()
 }
 
-/// The moving part and the other of each joint of a coupon.
+/// The moving and the fixed part of each joint of a coupon.
 fn joints(parts: &[Part]) -> Vec<[&Part; 2]> {
     let of = |number, kind| {
         let is_it = |part: &&Part| part.fit.number == number && part.kind == kind;
@@ -50,7 +50,7 @@ fn shape(part: &Part) -> Shape {
     Shape::new(&Solid::new(part.mesh.clone()).unwrap())
 }
 
-/// Whether a face of a moving part belongs to its pin or its grooves: not to its wall.
+/// Returns true if a face of a moving part belongs to its pin or its grooves, not to its wall.
 fn is_beneath_wall(part: &Part, face: usize) -> bool {
     let corners = part.mesh.corners(face);
     let wall = corners.iter().any(|p| p.z > ROUNDING_MM) || corners.iter().all(|p| p.z > -ROUNDING_MM);
@@ -152,7 +152,7 @@ fn what_is_pushed_into_the_wall_meets_it_after_the_clearance() {
 
 #[test]
 fn joints_come_apart_along_one_of_26_directions() {
-    /// Farther than any gap, and less than any part is thick.
+    /// Length of the push, mm: farther than any gap, and less than any part is thick.
     const PUSH_MM: f64 = 1.0;
     for (parts, _) in coupons() {
         for [moving, fixed] in joints(&parts) {

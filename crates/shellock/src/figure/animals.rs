@@ -1,5 +1,4 @@
-//! The figures with limbs. Coordinates in units (1/150 of the size), x to the figure's left, y backwards, z
-//! up.
+//! Figures with limbs. Coordinates in units (1/150 of the size), x to the figure's left, y backwards, z up.
 
 use std::f64::consts::TAU;
 

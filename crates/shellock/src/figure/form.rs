@@ -1,17 +1,17 @@
-//! Simple bodies and their smooth union: fields that are positive inside and fall about 1 a unit.
+//! Simple bodies and their smooth union, as fields that are positive inside and fall by about 1 per unit.
 //!
-//! Rounded cone and smooth union after Quilez, "3D signed distance functions" and "smooth minimum".
+//! Rounded cone and smooth union follow Quilez, "3D signed distance functions" and "smooth minimum".
 
 use glam::DQuat;
 use shellock_geom::{Aabb, Vec3};
 
-/// A simple body.
+/// A simple body of a figure.
 #[derive(Clone, Debug)]
 pub(super) enum Form {
     Ellipsoid {
         center: Vec3,
         half_axes: Vec3,
-        /// Turns the axes of the ellipsoid into those of the figure.
+        /// Rotation from the axes of the ellipsoid to those of the figure.
         turn: DQuat,
     },
     /// The hull of two balls.
@@ -35,7 +35,7 @@ pub(super) enum Form {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sculpture {
     parts: Vec<Part>,
-    /// The limb that forms are added to.
+    /// The limb that forms are currently added to.
     limb: u32,
 }
 
@@ -53,7 +53,7 @@ struct Part {
 const FOOT_FILLET: f64 = 2.0;
 
 impl Sculpture {
-    /// Adds a form; `blend` is the width, in units, over which it runs into what is there.
+    /// Adds a form; `blend` is the width, in units, over which the form runs into those before.
     pub fn add(&mut self, form: Form, blend: f64) -> &mut Self {
         let bounds = form.bounds();
         self.parts.push(Part {
@@ -81,18 +81,18 @@ impl Sculpture {
         )
     }
 
-    /// What is added from now on is another limb.
+    /// Begins another limb, to which later forms are added.
     pub fn limb(&mut self) -> &mut Self {
         self.limb += 1;
         self
     }
 
-    /// How many limbs there are, the trunk among them.
+    /// Number of limbs, the trunk included.
     pub fn n_limbs(&self) -> u32 {
         self.limb + 1
     }
 
-    /// The limb that a place of the surface is on: 0 is the trunk.
+    /// The limb at a place of the surface: 0 is the trunk.
     pub fn limb_at(&self, p: Vec3) -> u32 {
         let value = |part: &Part| part.form.value(p, f64::NEG_INFINITY);
         self.parts
@@ -101,11 +101,11 @@ impl Sculpture {
             .map_or(0, |part| part.limb)
     }
 
-    /// Positive inside.
+    /// Field of the sculpture, positive inside.
     pub fn value(&self, p: Vec3) -> f64 {
         let mut value = f64::NEG_INFINITY;
         for part in &self.parts {
-            // What is that far behind the nearest form has no part in the blend.
+            // A form that far behind the nearest one has no part in the blend.
             if part.bounds.distance_sq(p).sqrt() < part.blend - value {
                 value = smooth_max(value, part.form.value(p, value - part.blend), part.blend);
             }
@@ -128,7 +128,7 @@ impl Sculpture {
     }
 }
 
-/// Steps between two stations of a tube; more only cost time at the bends that figures have.
+/// Steps between two stations of a tube; more steps only cost time at the bends that figures have.
 const SPLINE_STEPS: usize = 4;
 
 /// Points and radii along the Catmull-Rom spline through `stations`.
@@ -155,15 +155,15 @@ pub(super) fn spline(stations: &[(Vec3, f64)]) -> Vec<(Vec3, f64)> {
     curve
 }
 
-/// The greater of both, raised by up to `width / 4` where they are equal; exact where they differ by `width`
-/// or more.
+/// Maximum of both, raised by up to `width / 4` where they are equal; exact where they differ by `width` or
+/// more.
 fn smooth_max(a: f64, b: f64, width: f64) -> f64 {
     let overlap = (width - (a - b).abs()).max(0.0) / width.max(1e-9);
     a.max(b) + 0.25 * width * overlap * overlap
 }
 
 impl Form {
-    /// A ball.
+    /// A ball around `center`.
     pub fn ball(center: Vec3, radius: f64) -> Self {
         Self::ellipsoid(center, Vec3::splat(radius))
     }
@@ -225,8 +225,8 @@ impl Form {
         }
     }
 
-    /// Positive inside; where it is below `floor` any value up to `floor` may come, which spares a chain most
-    /// of its work.
+    /// Field of the form, positive inside. Below `floor` any value up to `floor` may be returned, which
+    /// spares a chain most of its work.
     fn value(&self, p: Vec3, floor: f64) -> f64 {
         match *self {
             Self::Ellipsoid {
@@ -236,8 +236,8 @@ impl Form {
             } => {
                 let q = turn.inverse() * (p - center);
                 let k = (q / half_axes).length();
-                // Distance to first order near the surface; the least half axis at the centre, where the
-                // formula is 0/0.
+                // First-order distance near the surface; the least half axis at the centre, where the formula
+                // is 0/0.
                 let slope = (q / (half_axes * half_axes)).length();
                 if slope < 1e-9 {
                     half_axes.min_element()
@@ -253,7 +253,7 @@ impl Form {
             } => round_cone(p, a, b, radius_a, radius_b),
             Self::Chain { ref stations } => stations.windows(2).fold(floor, |value, w| {
                 let [(a, radius_a), (b, radius_b)] = [w[0], w[1]];
-                // No closer than the ball around both ends: spares most of the work.
+                // The segment is no closer than the ball around both ends: this test spares most of the work.
                 let reach = 0.5 * a.distance(b) + radius_a.max(radius_b);
                 if reach - p.distance(0.5 * (a + b)) <= value {
                     return value;
@@ -314,7 +314,7 @@ impl Form {
     }
 }
 
-/// Signed distance, positive inside; one ball where it contains the other.
+/// Signed distance to a rounded cone, positive inside; to one ball where it contains the other.
 fn round_cone(p: Vec3, a: Vec3, b: Vec3, radius_a: f64, radius_b: f64) -> f64 {
     let along = b - a;
     let (length, taper) = (along.length(), radius_a - radius_b);

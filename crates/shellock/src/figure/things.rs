@@ -1,4 +1,4 @@
-//! A vase, a ring, and a body with arms.
+//! A vase, a torus, and a body with arms.
 
 use std::f64::consts::TAU;
 
@@ -58,14 +58,14 @@ pub(super) fn torus() -> Sculpture {
     torus
 }
 
-/// A body with six round arms of 12 to 40 units: what necks of these widths hold.
+/// A body with six round arms of 12 to 40 units: a test of the strength of necks of these widths.
 pub(super) fn arms() -> Sculpture {
     let mut arms = Sculpture::default();
     arms.add(
         Form::ellipsoid(Vec3::new(0.0, 0.0, 42.0), Vec3::new(40.0, 40.0, 46.0)),
         0.0,
     );
-    // Thick ones far from each other.
+    // Thick arms are placed far from each other.
     for (i, radius) in [20.0, 6.0, 13.0, 10.0, 16.0, 8.0].into_iter().enumerate() {
         let turn = TAU * i as f64 / 6.0;
         let along = |far: f64| Vec3::new(far * turn.cos(), far * turn.sin(), 42.0);

@@ -1,4 +1,4 @@
-//! Where forces act on a model that stands, and where it is held.
+//! Regions of a standing model on which forces act, and where it is held.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use shellock_geom::bvh::TriangleBvh;
@@ -6,16 +6,16 @@ use shellock_geom::{Topology, TriMesh, Vec3};
 use shellock_mechanics::ShellAssembly;
 use std::f64::consts::{PI, TAU};
 
-/// What lies within this share of the height above the lowest point touches the floor.
+/// Height above the lowest point up to which points touch the floor, as a share of the total height.
 const FOOT_SHARE: f64 = 0.02;
 
-/// Points of a part that hold it: with fewer it could turn.
+/// Least number of points by which a part touches the floor; with fewer it could turn.
 const LEAST_POINTS: usize = 3;
 
-/// The points (ascending) that touch the floor: the lowest 2 % of the height, or as much more as one part
-/// needs to stand firmly.
+/// Points (ascending) that touch the floor: the lowest 2 % of the height, or as much more as one part needs
+/// to stand firmly.
 ///
-/// Parts that touch it with fewer than three points are left out.
+/// Parts that touch the floor with fewer than three points are left out.
 pub fn lowest(assembly: &ShellAssembly, up: Vec3) -> Vec<u32> {
     let up = up.normalize_or(Vec3::Z);
     let height = |p: &Vec3| p.dot(up);
@@ -43,7 +43,7 @@ pub fn lowest(assembly: &ShellAssembly, up: Vec3) -> Vec<u32> {
     (0..assembly.points.len() as u32).collect()
 }
 
-/// The highest point.
+/// The highest point of the model.
 pub fn highest(assembly: &ShellAssembly, up: Vec3) -> Option<usize> {
     highest_of(assembly, up, 0..assembly.points.len())
 }
@@ -69,7 +69,7 @@ pub fn highest_of(assembly: &ShellAssembly, up: Vec3, points: impl Iterator<Item
     points.reduce(|best, i| if height(i) > height(best) { i } else { best })
 }
 
-/// The points (ascending) that face upwards around point `hit`, no farther from it sideways or below than
+/// Points (ascending) that face upwards around point `hit`, no farther from it sideways or below than
 /// `radius_mm`.
 pub fn around(assembly: &ShellAssembly, up: Vec3, hit: usize, radius_mm: f64) -> Vec<u32> {
     let is_hit = |i: &usize| {
@@ -84,7 +84,7 @@ pub fn around(assembly: &ShellAssembly, up: Vec3, hit: usize, radius_mm: f64) ->
         .collect()
 }
 
-/// Whether a ball of `width_mm` has room below point `i`, but for a fifth of its radius.
+/// Returns true if a ball of `width_mm` has room below point `i`, but for a fifth of its radius.
 pub fn is_wide(assembly: &ShellAssembly, surface: &TriangleBvh, width_mm: f64, i: usize) -> bool {
     /// Share of the ball's radius that may stick out.
     const GIVE: f64 = 0.2;
@@ -95,15 +95,16 @@ pub fn is_wide(assembly: &ShellAssembly, surface: &TriangleBvh, width_mm: f64, i
         .is_none()
 }
 
-/// Whether nothing of the model is above point `i`.
+/// Returns true if no part of the model is above point `i`.
 pub fn sees_sky(assembly: &ShellAssembly, surface: &TriangleBvh, up: Vec3, i: usize) -> bool {
-    /// Where rays begin above the surface, mm: clear of the triangles at the point.
+    /// Height above the surface at which rays begin, mm: clear of the triangles at the point.
     const ABOVE_MM: f64 = 0.5;
     let from = assembly.points[i] + ABOVE_MM * assembly.normals[i];
     surface.first_hit(from, up, f64::INFINITY).is_none()
 }
 
-/// Whether the vertical line through `p` meets what the `feet` span: pressed there, nothing tips over.
+/// Returns true if the vertical line through `p` meets the hull of the `feet`: pressed there, nothing tips
+/// over.
 pub fn is_over(assembly: &ShellAssembly, feet: &[u32], up: Vec3, p: Vec3) -> bool {
     let (x, y) = up.any_orthonormal_pair();
     let angle = |v: &u32| {
@@ -122,14 +123,14 @@ pub fn is_over(assembly: &ShellAssembly, feet: &[u32], up: Vec3, p: Vec3) -> boo
     widest <= PI
 }
 
-/// How the model comes to lie when it is laid down with `up` upwards: it rolls over the edges of its convex
-/// hull until its `center` is above what it rests on.
+/// Up direction after the model is laid down with `up` upwards: it rolls over the edges of its convex hull
+/// until its `center` is above the face it rests on. `None` if the hull is empty or not closed.
 pub fn at_rest(hull: &TriMesh, center: Vec3, up: Vec3) -> Option<Vec3> {
     let topology = Topology::of_mesh(hull)?;
     let normal = |face: usize| hull.area_vector_doubled(face).normalize_or_zero();
     let lowest = |a: &usize, b: &usize| normal(*a).dot(up).total_cmp(&normal(*b).dot(up));
     let mut face = (0..hull.triangles.len()).min_by(lowest)?;
-    // Each step lowers the center, so no face comes twice.
+    // Each step lowers the centre, so no face comes twice.
     for _ in 0..hull.triangles.len() {
         let outside = |k: usize| {
             let [from, to] = [k, (k + 1) % 3].map(|k| hull.points[hull.triangles[face][k] as usize]);
@@ -143,7 +144,7 @@ pub fn at_rest(hull: &TriMesh, center: Vec3, up: Vec3) -> Option<Vec3> {
     Some(-normal(face))
 }
 
-/// How wide the model is between two points of its surface.
+/// Width of the model between two points of its surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Width {
     pub ends: [usize; 2],
@@ -152,9 +153,9 @@ pub struct Width {
 
 /// Widths straight through the model from each point, where the other side faces away from it.
 pub fn widths(assembly: &ShellAssembly, mesh: &TriMesh, surface: &TriangleBvh) -> Vec<Width> {
-    /// Cosine between opposite sides that two fingers do not slip off.
+    /// Greatest cosine between the normals of opposite sides that two fingers do not slip off.
     const OPPOSITE: f64 = -0.8;
-    /// Where rays begin below the surface, mm.
+    /// Depth below the surface at which rays begin, mm.
     const BELOW_MM: f64 = 0.01;
     let width = |i: usize| {
         let (p, n) = (assembly.points[i], assembly.normals[i]);
@@ -175,13 +176,13 @@ pub fn widths(assembly: &ShellAssembly, mesh: &TriMesh, surface: &TriangleBvh) -
     (0..assembly.points.len()).filter_map(width).collect()
 }
 
-/// Pressures `max(0, a + b x + c y)` times the areas of `soles`, whose sums with 1, x and y are `asked`, N; as
-/// near to it as such pressures come.
+/// Pressures `max(0, a + b x + c y)` times the areas of `soles`, N. Their sums with 1, x and y are `asked`,
+/// or as near as such pressures come.
 ///
 /// Newton's method on the convex energy of a bed of springs that cannot pull.
 pub fn pressures(soles: &[([f64; 3], f64)], asked: Vector3<f64>) -> Vec<f64> {
     const MOST_STEPS: usize = 60;
-    /// Beside the stiffness of the whole bed: keeps a footing on a line from turning about it.
+    /// Added stiffness, as a share of the whole bed's: keeps a footing on a line from turning about it.
     const LEAST: f64 = 1e-9;
     let total: f64 = soles.iter().map(|s| s.1).sum();
     let press = |bed: &Vector3<f64>, (modes, area): &([f64; 3], f64)| {
@@ -219,8 +220,8 @@ pub fn pressures(soles: &[([f64; 3], f64)], asked: Vector3<f64>) -> Vec<f64> {
     soles.iter().map(|s| press(&bed, s)).collect()
 }
 
-/// Adds forces on the points `own`, each its area times a shift and a turn that all have in common, that
-/// balance `forces_n`.
+/// Adds forces on the points `own` that balance `forces_n`: each is the point's area times a common shift and
+/// turn.
 pub fn hold(assembly: &ShellAssembly, areas_mm2: &[f64], own: &[usize], forces_n: &mut [Vec3]) {
     let total: f64 = own.iter().map(|v| areas_mm2[*v]).sum();
     let center = own
@@ -258,7 +259,7 @@ pub fn hold(assembly: &ShellAssembly, areas_mm2: &[f64], own: &[usize], forces_n
     }
 }
 
-/// `force_n` over `points`, each by its share of their area; evenly where they have none.
+/// Spreads `force_n` over `points` in proportion to their area; evenly where they have none.
 pub fn spread(assembly: &ShellAssembly, points: &[u32], force_n: Vec3) -> Vec<Vec3> {
     let area_mm2 = assembly.point_areas_mm2();
     let total: f64 = points.iter().map(|&p| area_mm2[p as usize]).sum();

@@ -21,7 +21,7 @@ fn assembly(surface: &SegmentedSurface) -> ShellAssembly {
     PlanModel::new(&MetricParams::default(), surface, &ConnectorSizes::default()).assembly
 }
 
-/// Sum of forces and of torques about the origin.
+/// Sum of forces and of torques about the origin, N and N·mm.
 fn wrench(assembly: &ShellAssembly, case: &LoadCase) -> [Vec3; 2] {
     let all = || assembly.points.iter().zip(&case.forces_n);
     [
@@ -91,7 +91,7 @@ fn a_body_laid_down_rests_on_the_side_below_its_middle() {
     ])
     .to_mesh();
     let center = Vec3::splat(7.0);
-    // Balanced on a tip it falls on a side; all sides are below its middle, so each laid on stays.
+    // Balanced on a tip it falls on a side. All sides are below its middle, so it stays on each.
     for side in [Vec3::X, Vec3::Y, Vec3::Z] {
         let rest = region::at_rest(&hull, center, side).unwrap();
         assert!((rest - side).length() < 1e-9, "{rest}");
@@ -106,7 +106,7 @@ fn a_body_laid_down_rests_on_the_side_below_its_middle() {
 
 #[test]
 fn a_floor_presses_as_a_lever_says_and_never_pulls() {
-    // Feet at −1 and 1; pressed at x between them, each bears its share.
+    // Feet at −1 and 1: a force at x between them is shared as by a lever.
     let feet = [
         ([1.0, -1.0, 0.0], 2.0),
         ([1.0, 1.0, 0.0], 2.0),
@@ -148,7 +148,7 @@ fn the_factor_is_that_of_the_joint_that_gives_way_first() {
         n_iterations: 1,
         error: 0.0,
     };
-    // 0.6 mm and 1.2 mm are what these connectors may open.
+    // The openings of 0.6 mm and 1.2 mm are the limits of these connectors.
     let opens = borne(&plan, &bearing([0.3, 9.0, 0.4], [1.0, 0.0, 1.0]), 42.0);
     assert_eq!(opens.first, Some((Failure::Opens, 0)));
     assert!((opens.factor - 2.0).abs() < 1e-12);

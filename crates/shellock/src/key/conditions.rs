@@ -1,33 +1,32 @@
-//! What a key's shape must be so that it slides on rails [Yao2017, Sect. 4.2 and 6.1], for a piece that the
-//! user chose.
+//! Conditions on the shape of a user's key, so that it slides on rails [Yao2017, Sect. 4.2 and 6.1].
 
 use shellock_geom::Vec3;
 
 use super::plane::{Plane, Spot};
 use crate::{Cause, PatchId, SegmentedSurface, Warning};
 
-/// Least share of a key on its plane.
+/// Least share of a key's area on its plane.
 const LEAST_FLAT: f64 = 0.5;
 /// Least straight seam along the slide on one side, in connector sizes: shorter rails do not guide.
 const LEAST_STRAIGHT_SIZES: f64 = 3.0;
-/// A seam runs along the slide where |t·s| is above the first, and slides within the surface where |s·N| is
-/// below the second.
+/// Bounds for a seam to run along the slide: least |t·s|, and greatest |s·N| for it to stay within the
+/// surface.
 const ALONG: f64 = 0.95;
 const MOST_OUTWARDS: f64 = 0.25;
-/// Planes tried, through places spread over the piece.
+/// Number of planes tried, through places spread over the piece.
 const N_PLANES: usize = 64;
-/// A straight stretch leaves its line by no more than this, mm.
+/// Greatest deviation of a straight stretch from its line, mm.
 const STRAIGHT_MM: f64 = 0.4;
 
-/// How well a piece meets the conditions.
+/// Measures of a piece against the conditions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyConditions {
-    /// Share of its area on the plane nearest to it.
+    /// Share of the piece's area on the plane nearest to it, in [0, 1].
     pub flat_share: f64,
-    /// The point that is farthest from that plane, and how far, mm.
+    /// The point farthest from that plane, and its distance, mm.
     pub farthest: (Vec3, f64),
-    /// The longest straight stretch of its seams along the slide, mm, and its middle; where there is none, 0
-    /// and where the seam comes nearest to it.
+    /// Length of the longest straight stretch of the piece's seams along the slide, mm, and its middle.
+    /// Without any stretch, 0 and the place where the seam comes nearest to the condition.
     pub straight: (f64, Vec3),
 }
 
@@ -43,8 +42,8 @@ pub fn conditions(surface: &SegmentedSurface, key: PatchId, slide: Vec3) -> Opti
 }
 
 impl KeyConditions {
-    /// What is broken, in words and with places. `connector_mm` is the size of its connectors; whether a key
-    /// `may_be_cut` instead, which was not tried.
+    /// Warnings for the conditions that are broken, with places. `connector_mm` is the size of the key's
+    /// connectors; `may_be_cut` is true if cutting a key instead is possible and was not tried.
     pub fn problems(&self, key: PatchId, connector_mm: f64, may_be_cut: bool) -> Vec<Warning> {
         let warning = |at: Vec3, cause: Cause| Warning {
             cause,

@@ -1,4 +1,4 @@
-//! Giving what lies in a prism to a patch of its own.
+//! Imprint of a key: makes the surface inside a prism a patch of its own.
 
 use shellock_geom::level_cut::{Side, cut_at_zero};
 use shellock_geom::subdivide::halve_edges;
@@ -8,18 +8,18 @@ use shellock_geom::{Solid, Topology, TriMesh};
 use super::KeyPrism;
 use crate::{PatchId, SegmentedSurface};
 
-/// Near the new seam edges are at most so long, mm: its corners are round to within a tenth of a millimetre.
+/// Greatest edge length near the new seam, mm: corners are round to within a tenth of a millimetre.
 const EDGE_MM: f64 = 1.2;
-/// Rounds of halving at most: from 40 mm down.
+/// Greatest number of halvings of edges: enough from 40 mm down.
 const MOST_HALVINGS: usize = 6;
-/// No point lies nearer to the cut, mm, so that no triangle is a sliver.
+/// Least distance of points from the cut, mm, so that no triangle is a sliver.
 const LEAST_MM: f64 = 0.02;
-/// A fragment of a patch stays a patch where it has more than this share of an ordinary one; else it joins
-/// its longest neighbour.
+/// Least share of an ordinary patch's area with which a fragment remains a patch; a smaller one joins the
+/// neighbour with the longest common border.
 const FRAGMENT_SHARE: f64 = 0.08;
 
-/// The surface with what lies in `prism` as a patch of its own, and its id; `None` where that is nothing, or
-/// everything, or not nearly all of one patch.
+/// The surface with the part in `prism` as a patch of its own, and the id of that patch. `None` where the
+/// part is empty, or everything, or not nearly all of one patch.
 ///
 /// Patches that the key cuts in two become two, or lose a small part to a neighbour. Ids change.
 pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(SegmentedSurface, PatchId)> {
@@ -55,9 +55,9 @@ pub fn imprint(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(Segmente
     (n_patches > 2).then_some((surface, key))
 }
 
-/// The patch that most of the surface in `prism` belongs to, where it has nearly all of it and little else.
+/// The patch with most of the surface in `prism`, if it contains nearly all of that and little else.
 pub fn patch_in(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<PatchId> {
-    /// Least share, of either in the other.
+    /// Least share of the patch in the prism, and of the prism's surface in the patch.
     const LEAST: f64 = 0.8;
     let mut inside = vec![0.0; surface.n_patches];
     let mut whole = vec![0.0; surface.n_patches];
@@ -73,7 +73,7 @@ pub fn patch_in(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<PatchId>
     (inside[best] > LEAST * total && inside[best] > LEAST * whole[best]).then(|| PatchId::from(best))
 }
 
-/// The surface with short edges near the prism's sides.
+/// Refines the surface so that edges near the prism's sides are short.
 fn refined(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(TriMesh, Vec<PatchId>, Vec<u32>)> {
     let mut solid = Solid::new(surface.mesh.clone()).ok()?;
     let (mut patch, mut source) = (surface.patch_of_face.clone(), surface.source_face.clone());
@@ -83,8 +83,8 @@ fn refined(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(TriMesh, Vec
         let is_long = |a: u32, b: u32| {
             let (a, b) = (a as usize, b as usize);
             let length = mesh.points[a].distance(mesh.points[b]);
-            // Inside, distances end at the corner radius, so the seam may be nearer than they say by no more
-            // than that.
+            // Inside, distances are capped at the corner radius, so the seam may be nearer than they say by
+            // no more than that.
             length > EDGE_MM
                 && inside[a].min(inside[b]) < prism.corner_mm
                 && inside[a].max(inside[b]) > -length
@@ -104,9 +104,8 @@ fn refined(surface: &SegmentedSurface, prism: &KeyPrism) -> Option<(TriMesh, Vec
     Some((solid.into_mesh(), patch, source))
 }
 
-/// Labels such that every patch is connected: fragments that are small join the neighbour they have the
-/// longest border with, others become patches. Numbers follow the old ones; the second result is how many
-/// there are.
+/// Relabels so that every patch is connected: small fragments join the neighbour with the longest common
+/// border, others become patches. Numbers keep the order of the old ones. Also returns the number of patches.
 fn without_fragments(
     mesh: &TriMesh,
     topology: &Topology,
@@ -127,7 +126,7 @@ fn without_fragments(
                 .filter(|&d| of[d] == of[c])
                 .all(|d| area[d] < area[c] || d == c)
         };
-        // Of the key only one part remains; a patch may fall into several large ones, or vanish.
+        // Only one part of the key remains; a patch may fall into several large ones, or vanish.
         let is_fragment = |c: usize| {
             if of[c] == key {
                 !largest(c)
@@ -151,7 +150,7 @@ fn without_fragments(
     }
 }
 
-/// The label of the component that `c` has the longest border with; the key only where there is no other.
+/// Label of the component with the longest border to `c`; the key only where there is no other.
 fn neighbour(
     mesh: &TriMesh,
     topology: &Topology,
@@ -180,7 +179,7 @@ fn neighbour(
         .map(|(k, _)| k)
 }
 
-/// Components numbered by their old label, then by their lowest face.
+/// Numbers components by their old label, then by their lowest face.
 fn numbered(component: &[u32], of: &[u32], n: usize) -> (Vec<u32>, usize) {
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by_key(|&c| (of[c], c));

@@ -3,24 +3,24 @@
 use nalgebra::Matrix3;
 use shellock_geom::{TriMesh, Vec3};
 
-/// Farthest from the plane, as share of the model's longest edge, that a face lies on it: 1.2 mm at 150 mm.
+/// Greatest distance of a face from its plane, as a share of the model's longest edge: 1.2 mm at 150 mm.
 const INLIER_SHARE: f64 = 0.008;
 
-/// Least cosine between a face and the plane it lies on (26°).
+/// Least cosine between the normals of a face and of the plane it lies on (26°).
 const INLIER_COSINE: f64 = 0.9;
 
-/// A face as sampling sees it.
+/// A sampled face, which may stand for several.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spot {
     pub center: Vec3,
-    /// Unit, or zero.
+    /// Unit normal, or zero.
     pub normal: Vec3,
-    /// Of the face and of those it stands for, mm².
+    /// Area of the face and of those it stands for, mm².
     pub area: f64,
 }
 
 impl Spot {
-    /// Every `step`-th of `faces`, each standing for so many.
+    /// Samples every `step`-th of `faces`, each with `step` times its area.
     pub fn sample(mesh: &TriMesh, faces: impl IntoIterator<Item = usize>, step: usize) -> Vec<Self> {
         let spot = |f: usize| Self {
             center: mesh.face_center(f),
@@ -31,7 +31,7 @@ impl Spot {
     }
 }
 
-/// A plane and how far from it faces may lie.
+/// A plane, and the tolerance within which faces lie on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Plane {
     pub at: Vec3,
@@ -40,23 +40,23 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// How far from a plane faces of a model of this size may lie, mm.
+    /// Greatest distance from a plane at which faces of a model of this size lie on it, mm.
     pub fn tolerance_mm(longest_edge_mm: f64) -> f64 {
         INLIER_SHARE * longest_edge_mm
     }
 
-    /// Whether the face lies on the plane and faces the same way.
+    /// Returns true if the face lies on the plane and faces the same way.
     pub fn has(&self, s: &Spot) -> bool {
         (s.center - self.at).dot(self.normal).abs() < self.tolerance_mm
             && s.normal.dot(self.normal) > INLIER_COSINE
     }
 
-    /// Area of `spots` on it, mm².
+    /// Area of the `spots` on the plane, mm².
     pub fn area_mm2(&self, spots: &[Spot]) -> f64 {
         spots.iter().filter(|s| self.has(s)).map(|s| s.area).sum()
     }
 
-    /// The plane of least squares through those of `spots` that lie on this one, where more lie on it.
+    /// Least-squares plane through the `spots` on this plane, if more area lies on it; else this plane.
     pub fn refined(self, spots: &[Spot]) -> Self {
         let inliers: Vec<Spot> = spots.iter().copied().filter(|s| self.has(s)).collect();
         let Some((at, normal)) = least_squares_plane(&inliers, self.normal) else {
@@ -71,7 +71,7 @@ impl Plane {
     }
 }
 
-/// Centre and unit normal of the plane with least squared distance, by area, turned towards `towards`.
+/// Centre and unit normal of the least-squares plane, weighted by area; the normal points towards `towards`.
 fn least_squares_plane(spots: &[Spot], towards: Vec3) -> Option<(Vec3, Vec3)> {
     let area: f64 = spots.iter().map(|s| s.area).sum();
     if area <= 0.0 {

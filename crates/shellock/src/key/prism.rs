@@ -1,9 +1,8 @@
-//! The half-infinite prism that a key is cut by.
+//! The half-infinite prism by which a key is cut.
 
 use shellock_geom::Vec3;
 
-/// How far each side leans away from the slide, as a tangent: 3°, so that the key is loose as soon as it
-/// moves.
+/// Lean of each side away from the slide, as a tangent: 3°, so that the key is loose as soon as it moves.
 const FLARE: f64 = 0.0524;
 
 /// A convex region, open towards `slide`: everything in it can leave along `slide` without meeting anything
@@ -18,7 +17,7 @@ pub struct KeyPrism {
     pub normal: Vec3,
     /// Half the width at the back, mm.
     pub half_width_mm: f64,
-    /// How far it reaches below the plane, mm.
+    /// Depth of the prism below the plane, mm.
     pub depth_mm: f64,
     /// Radius of the edges where two sides meet, mm.
     pub corner_mm: f64,
@@ -36,23 +35,23 @@ impl KeyPrism {
         [d.dot(self.slide), d.dot(self.across()), -d.dot(self.normal)]
     }
 
-    /// Length of the key along the slide, on the plane, mm: as much as its width at the back.
+    /// Length of the key along the slide, on the plane, mm; equal to its width at the back.
     pub fn length_mm(&self) -> f64 {
         2.0 * self.half_width_mm
     }
 
-    /// The middle of what it takes of the plane.
+    /// Middle of the key's area on the plane.
     pub fn middle(&self) -> Vec3 {
         self.origin + 0.5 * self.length_mm() * self.slide
     }
 
-    /// Half the width so far along the slide, mm.
+    /// Half the width of the prism at `along_mm` from the back edge, mm.
     pub fn half_width_at(&self, along_mm: f64) -> f64 {
         self.half_width_mm + FLARE * along_mm
     }
 
-    /// How far inside `p` lies, mm: positive inside, no farther than the corner radius, exact there; negative
-    /// outside, exact but for the cosine of the flare.
+    /// Signed distance of `p` from the prism's surface, mm. Inside it is positive, exact up to the corner
+    /// radius and capped there. Outside it is negative, exact but for the cosine of the flare.
     pub fn inside_mm(&self, p: Vec3) -> f64 {
         let [along, across, below] = self.coordinates(p);
         let inside = [
@@ -64,7 +63,7 @@ impl KeyPrism {
         self.corner_mm - Vec3::from(lacks).length()
     }
 
-    /// Whether `p` is inside.
+    /// Returns true if `p` is inside the prism.
     pub fn contains(&self, p: Vec3) -> bool {
         self.inside_mm(p) > 0.0
     }

@@ -1,4 +1,4 @@
-//! The search for places where a key can be.
+//! Search for places where a key can be.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,58 +11,58 @@ use super::plane::{Plane, Spot};
 use super::{KeyParams, KeyPrism, Turn};
 use crate::{Cancelled, Ctx, SegmentedSurface, segmentation};
 
-/// Faces looked at, so that a fine mesh costs no more than a coarse one.
+/// Greatest number of faces sampled, so that a fine mesh costs no more than a coarse one.
 const MOST_SPOTS: usize = 20_000;
-/// Planes drawn, and how many different ones are kept.
+/// Number of planes drawn, and greatest number of different ones kept.
 const N_DRAWN: usize = 400;
 const MOST_PLANES: usize = 16;
-/// Slides tried in each plane.
+/// Number of slides tried in each plane.
 const N_SLIDES: usize = 16;
-/// Edges of square keys, as shares of an ordinary piece's, largest first.
+/// Edges of square keys, as shares of the edge of an ordinary piece, largest first.
 const SIZES: [f64; 4] = [0.6, 0.5, 0.4, 0.3];
-/// A key takes at most this share of an ordinary piece's area: the rim included.
+/// Greatest area of a key, rim included, as a share of an ordinary piece's.
 const MOST_AREA: f64 = 0.9;
-/// Places across the slide are this share of the width apart.
+/// Spacing of places across the slide, as a share of the width.
 const STEP_SHARE: f64 = 0.25;
 /// Radius of a key's corners, in connector sizes.
 const CORNER_SIZES: f64 = 0.8;
-/// Flatness at the sides is measured so far on either side of the seam, mm.
+/// Width of the band on either side of the seam in which flatness at the sides is measured, mm.
 const SIDE_BAND_MM: f64 = 2.0;
-/// How much less a key on top is liked than one underneath, and one for which the model must be turned.
+/// Loss of score, as shares, of a key on top instead of underneath, and of one that needs the model turned.
 const VISIBLE_COST: f64 = 0.4;
 const TURN_COST: f64 = 0.1;
-/// Candidates whose rails are looked for, those that are looked at closely, and sites that are returned.
+/// Greatest numbers of candidates whose rails are measured, of those examined closely, and of sites returned.
 const MOST_PROBED: usize = 400;
 const MOST_CANDIDATES: usize = 60;
 const MOST_SITES: usize = 6;
-/// A key or the rest counts as one component where all others have less than this share of its area.
+/// Share of the largest component's area below which all other components together are ignored.
 const CRUMBS: f64 = 0.02;
-/// A key that is wanted somewhere is liked half as much so far from there, in edges of an ordinary piece.
+/// Distance from the wanted place at which the score of a key halves, in edges of an ordinary piece.
 const NEAR_SHARE: f64 = 0.05;
-/// Least share of the places along its sides under which there is room for the grooves.
+/// Least share of the places along a key's sides that must have room for the grooves below.
 const LEAST_ROOM: f64 = 0.7;
 
-/// A place for a key.
+/// A place for a key, with its measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeySite {
-    /// What is cut out.
+    /// The prism that cuts the key.
     pub prism: KeyPrism,
-    /// Share of its surface on the plane, in [0, 1].
+    /// Share of the key's surface on the plane, in [0, 1].
     pub flat_share: f64,
-    /// The same along the worse of its two sides, where the rails are.
+    /// Share of flat surface along the worse of the two sides, where the rails are, in [0, 1].
     pub side_share: f64,
-    /// Length of straight rails that fit under the worse of its sides, by estimate, mm.
+    /// Estimated length of straight rails that fit under the worse side, mm.
     pub rail_mm: f64,
-    /// Its surface, mm².
+    /// Area of the key's surface, mm².
     pub area_mm2: f64,
-    /// How much of it one sees from above, in [0, 1]: 0 underneath, 1 on top.
+    /// Visibility of the key from above, in [0, 1]: 0 underneath, 1 on top.
     pub shown: f64,
-    /// How well it is liked; larger is better.
+    /// Quality of the site; larger is better.
     pub score: f64,
 }
 
-/// The best places for a key on `surface`, best first; none where there is no room. Same answer on any number
-/// of threads.
+/// The best places for a key on `surface`, best first; none where there is no room. The answer is the same on
+/// any number of threads.
 pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Result<Vec<KeySite>, Cancelled> {
     ctx.stage("key", 0)?;
     let mesh = &surface.mesh;
@@ -125,7 +125,7 @@ pub fn sites(ctx: &Ctx, params: &KeyParams, surface: &SegmentedSurface) -> Resul
     Ok(found)
 }
 
-/// Middles of the faces of which no key is cut.
+/// Centres of the faces from which no key is cut.
 fn kept(params: &KeyParams, surface: &SegmentedSurface, topology: &Topology) -> Vec<Vec3> {
     let mesh = &surface.mesh;
     let whole = segmentation::whole(&params.keep_whole, mesh, topology, &surface.source_face, 0.0);
@@ -133,7 +133,7 @@ fn kept(params: &KeyParams, surface: &SegmentedSurface, topology: &Topology) -> 
     faces.map(|&f| mesh.face_center(f as usize)).collect()
 }
 
-/// Whether one of `kept` is inside the prism, or nearer than `beside_mm` to it.
+/// Returns true if a point of `kept` is inside the prism, or nearer than `beside_mm` to it.
 fn overlaps(prism: &KeyPrism, beside_mm: f64, kept: &[Vec3]) -> bool {
     kept.iter().any(|&p| prism.inside_mm(p) > -beside_mm)
 }
@@ -149,7 +149,7 @@ fn planes(params: &KeyParams, mesh: &TriMesh, spots: &[Spot]) -> Vec<Plane> {
     let reach_mm = piece_edge_mm(params);
     let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
     let total: f64 = spots.iter().map(|s| s.area).sum();
-    // By area: a fine mesh of a small detail is no better a place.
+    // Drawing is by area: a small detail is no better a place for its fine mesh.
     let mut at: Vec<f64> = (0..N_DRAWN).map(|_| rng.random::<f64>() * total).collect();
     at.sort_by(f64::total_cmp);
     let mut drawn = Vec::new();
@@ -188,10 +188,10 @@ fn planes(params: &KeyParams, mesh: &TriMesh, spots: &[Spot]) -> Vec<Plane> {
     kept
 }
 
-/// The plane, exactly level or upright where it is nearly so: nobody wants a model turned by a tenth of a
+/// Snaps a plane that is nearly level or upright to exactly so: nobody wants a model turned by a tenth of a
 /// degree.
 fn snapped(p: Plane) -> Plane {
-    /// Cosine of 2°.
+    /// Cosine of the snapping angle, 2°.
     const NEARLY: f64 = 0.9994;
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|a| [a, -a]);
     axes.into_iter()
@@ -352,16 +352,16 @@ fn scored(
     })
 }
 
-/// Length of the longest straight rail under the worse side: all of the key behind its front passes over it,
-/// so it must lie below that, and yet reach up to the wall at the side.
+/// Length of the longest straight rail under the worse side, mm. All of the key behind the rail's front
+/// passes over the rail, so the rail must lie below it, and yet reach up to the wall at the side.
 fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPrism) -> f64 {
     const N_ALONG: usize = 24;
-    /// Places beside the seam, up to so far inwards, in connector sizes.
+    /// Number of places beside the seam, and their greatest distance inwards, in connector sizes.
     const N_BESIDE: usize = 3;
     const BESIDE_SIZES: f64 = 0.8;
-    /// How far a tongue reaches up to an uneven wall, in connector sizes.
+    /// Greatest height to which a tongue reaches up to an uneven wall, in connector sizes.
     const UNEVEN_SIZES: f64 = 0.3;
-    /// Rays begin so far outside the plane, mm.
+    /// Distance outside the plane at which rays begin, mm.
     const ABOVE_MM: f64 = 8.0;
     let length_mm = prism.length_mm();
     let below = |along: f64, across: f64| {
@@ -371,7 +371,7 @@ fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPri
         outer.map_or(f64::INFINITY, |(_, mm)| mm - ABOVE_MM)
     };
     let step_mm = length_mm / N_ALONG as f64;
-    // At the seam, then inwards.
+    // A row of heights from the seam inwards.
     let row = |i: usize, side: f64| -> [f64; N_BESIDE] {
         let along = (i as f64 + 0.5) * step_mm;
         let inwards = |j: usize| BESIDE_SIZES * params.size_mm * j as f64 / (N_BESIDE - 1) as f64;
@@ -400,9 +400,10 @@ fn rail_mm(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, prism: &KeyPri
     longest(-1.0).min(longest(1.0))
 }
 
-/// Whether the model is thick enough below the key's sides for its wall, its grooves and the wall across.
+/// Returns true if the model below the key's sides is thick enough for the wall, the grooves and the wall
+/// across.
 fn has_room(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, site: &KeySite) -> bool {
-    /// Rays start below what bumps the plane allows, mm.
+    /// Depth at which rays start, mm: below the bumps that the plane allows.
     const START_MM: f64 = 1.5;
     const N_ALONG: usize = 6;
     let prism = &site.prism;
@@ -424,7 +425,7 @@ fn has_room(params: &KeyParams, mesh: &TriMesh, bvh: &TriangleBvh, site: &KeySit
     n_free as f64 >= LEAST_ROOM * f64::from(n_all)
 }
 
-/// Whether what is inside the prism and what is not are one component each.
+/// Returns true if the inside of the prism and the rest are one component each.
 fn parts_in_two(mesh: &TriMesh, topology: &Topology, prism: &KeyPrism) -> bool {
     let inside: Vec<bool> = (0..mesh.triangles.len())
         .map(|f| prism.contains(mesh.face_center(f)))

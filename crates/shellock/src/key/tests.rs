@@ -1,4 +1,4 @@
-//! What a key is and what cutting it does, on made-up surfaces.
+//! Keys and the effect of cutting them, on made-up surfaces.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -74,7 +74,7 @@ fn laying_turns_as_little_as_it_can_and_not_at_all_where_all_fits() {
         assert!(axis.abs().max_element() > 1.0 - 1e-12 && axis.dot(along.unit()).abs() < 1e-12);
         let p = 100.0 * random_unit(&mut rng);
         assert!(turn.inverse().apply(turn.apply(p)).distance(p) < 1e-10);
-        // At most to the corner of a cube from its face, and half of 45° within the face.
+        // The turn goes at most from a cube's face to its corner, and half of 45° within the face.
         assert!(turn.angle() < 1.2, "{}", turn.angle());
     }
     for s in LatticeDirection::all().filter(|s| s.step()[2] == 0) {
@@ -130,7 +130,7 @@ fn a_plain_ball_and_an_egg_have_a_place_for_a_key_too_and_a_thin_plate_has_none(
     assert_eq!(sites_of(&plate), []);
 }
 
-/// Area of each patch.
+/// Area of each patch, mm².
 fn areas(surface: &SegmentedSurface) -> Vec<f64> {
     surface.areas().as_slice().to_vec()
 }
@@ -184,7 +184,7 @@ fn the_sides_of_an_imprinted_key_are_straight() {
 
 #[test]
 fn every_patch_is_connected_after_a_key_cut_one_in_two_and_crumbs_joined_their_neighbours() {
-    // Stripes: the key cuts some of them in two.
+    // Stripes, some of which the key cuts in two.
     let mut mesh: TriMesh = sphere(6, Vec3::splat(50.0));
     mesh.points.iter_mut().for_each(|p| p.z = p.z.max(-30.0));
     let stripes = label(mesh, 6, |p| (((p.y + 50.0) / 16.7) as u32).min(5));

@@ -1,4 +1,4 @@
-//! Laying the model so that a key's slide is one of the 26 directions.
+//! Rotation of the model so that a key's slide is one of the 26 directions.
 
 use glam::{DMat3, DQuat};
 use shellock_geom::{NotSolid, Solid, TriMesh, Vec3, Volume};
@@ -7,7 +7,7 @@ use super::{KeyPrism, KeySite};
 use crate::LatticeDirection;
 use crate::segmentation::KeepWhole;
 
-/// A smaller turn, rad, is none: over 300 mm it moves nothing by more than a thousandth of a millimetre.
+/// Least rotation that counts, rad: a smaller one moves nothing by more than 0.001 mm over 300 mm.
 const LEAST_TURN: f64 = 3e-6;
 
 /// A rotation about the origin, from the model as it was given to the model as its pieces are made.
@@ -21,8 +21,8 @@ impl Default for Turn {
 }
 
 impl Turn {
-    /// The smallest turn that takes `normal` to an axis and `slide`, perpendicular to it, to a lattice
-    /// direction within that axis' plane; and that direction.
+    /// Smallest rotation that takes `normal` to an axis and `slide`, perpendicular to it, to a lattice
+    /// direction perpendicular to that axis. Also returns that direction.
     pub fn laying(normal: Vec3, slide: Vec3) -> (Self, LatticeDirection) {
         let axis = [Vec3::X, Vec3::Y, Vec3::Z]
             .into_iter()
@@ -42,27 +42,27 @@ impl Turn {
         (if is_none { Self::default() } else { Self(whole) }, direction)
     }
 
-    /// Whether nothing turns.
+    /// Returns true if the rotation is the identity.
     pub fn is_none(&self) -> bool {
         self.0 == DMat3::IDENTITY
     }
 
-    /// The angle, rad, in [0, π].
+    /// Rotation angle, rad, in [0, π].
     pub fn angle(&self) -> f64 {
         DQuat::from_mat3(&self.0).to_axis_angle().1.abs()
     }
 
-    /// The other way.
+    /// The inverse of this rotation.
     pub fn inverse(&self) -> Self {
         Self(self.0.transpose())
     }
 
-    /// A point or a direction, turned.
+    /// Rotates a point or a direction.
     pub fn apply(&self, v: Vec3) -> Vec3 {
         if self.is_none() { v } else { self.0 * v }
     }
 
-    /// A mesh, turned.
+    /// Rotates a mesh, keeping its triangles.
     pub fn mesh(&self, mesh: &TriMesh) -> TriMesh {
         TriMesh {
             points: mesh.points.iter().map(|&p| self.apply(p)).collect(),
@@ -70,12 +70,12 @@ impl Turn {
         }
     }
 
-    /// A solid, turned; fails where rounding leaves no volume.
+    /// Rotates a solid; fails where rounding leaves no volume.
     pub fn solid(&self, solid: &Solid) -> Result<Solid, NotSolid> {
         Solid::new(self.mesh(solid.mesh()))
     }
 
-    /// A region, turned.
+    /// Rotates the region of a volume.
     pub fn volume(&self, volume: &Volume) -> Volume {
         if self.is_none() {
             volume.clone()
@@ -84,7 +84,7 @@ impl Turn {
         }
     }
 
-    /// A region to keep whole, turned.
+    /// Rotates a region to keep whole; those given by faces stay.
     pub fn region(&self, region: &KeepWhole) -> KeepWhole {
         match region {
             KeepWhole::Sphere { center_mm, radius_mm } => KeepWhole::Sphere {
@@ -95,7 +95,7 @@ impl Turn {
         }
     }
 
-    /// A prism, turned.
+    /// Rotates a key's prism.
     pub fn prism(&self, prism: &KeyPrism) -> KeyPrism {
         let KeyPrism {
             origin,
@@ -111,7 +111,7 @@ impl Turn {
         }
     }
 
-    /// A site, turned; its slide then is exactly `along`.
+    /// Rotates a site; its slide then is exactly `along`.
     pub fn site(&self, site: &KeySite, along: LatticeDirection) -> KeySite {
         let prism = KeyPrism {
             slide: along.unit(),

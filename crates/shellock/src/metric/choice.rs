@@ -1,4 +1,4 @@
-//! The plan that bears most of those that the search allows, and what is weak about it (Sect. 6.2).
+//! Choice of the strongest plan that the search allows, and its weak places (Sect. 6.2).
 
 use serde::{Deserialize, Serialize};
 use shellock_geom::Vec3;
@@ -15,90 +15,90 @@ use crate::plan::{
 };
 use crate::{Cancelled, Cause, ConnectorSizes, Ctx, PatchId, SegmentedSurface, Warning};
 
-/// Costs that differ by less than this share are the same but for rounding.
+/// Relative difference below which costs count as equal, against rounding.
 const COST_TIE: f64 = 1e-9;
 
-/// Nobody cares for more than that many times a load.
+/// Greatest load factor in summaries; higher ones are of no interest.
 pub const MOST_TIMES: f64 = 10.0;
 
-/// Share of `s` along the seam, or towards the earlier piece, from which that is named as the reason why a
+/// Least components of `s` along the seam, and towards the earlier piece, that are named as the reason why a
 /// seam is weak.
 const ALONG_SHARE: f64 = 0.7;
 const BACKWARD_SHARE: f64 = 0.5;
 
-/// How a plan resists the separation force of 10 N/m, by the surface metric.
+/// Resistance of a plan to the separation force of 10 N/m, by the surface metric.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Holding {
     /// `Q = −max w d`, mm; higher is better. `None` where pieces come apart in the simulation.
     pub quality_mm: Option<f64>,
-    /// Pieces that come apart in the simulation, which knows no friction but the key's; empty where all hold.
+    /// Pieces that come apart in the simulation, which has no friction but the key's; empty where all hold.
     pub loose: Vec<LoosePiece>,
-    /// The seams, weakest first; those without a connector are left out. Empty where pieces come apart.
+    /// Seams with a connector, weakest first. Empty where pieces come apart.
     pub seams: Vec<SeamHolding>,
-    /// Plans that were compared.
+    /// Number of plans that were compared.
     pub n_compared: usize,
-    /// What the kit bears of each load, by simulation without a print to compare.
+    /// Load factors of the kit, by simulation without a print to compare.
     #[serde(default)]
     pub bears: Vec<LoadBorne>,
-    /// The play of each piece that was foreseen from the plan: displacement, mm, and turn, degrees; zeros for
-    /// the key.
+    /// Predicted play of each piece from the plan: displacement, mm, and turn, degrees; zeros for the key.
     pub foreseen_play: Vec<[f64; 2]>,
-    /// By how many times that is more than the piece may.
+    /// Ratio of the predicted play to the allowed play of each piece.
     pub foreseen_excess: Vec<f64>,
 }
 
-/// How much of one load a kit bears.
+/// Load factor of a kit under one load.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadBorne {
-    /// What is done.
+    /// Kind of the load.
     pub deed: Deed,
-    /// How much of it, N.
+    /// Force of the load, N; of a grip, that of each finger.
     pub force_n: f64,
-    /// Where, mm in assembly space.
+    /// Place of the load, mm in assembly space.
     pub at: [f64; 3],
-    /// By how many times the load may grow; `None` where nothing gives way.
+    /// Factor by which the load may grow; `None` where nothing fails.
     pub factor: Option<f64>,
-    /// What gives way first.
+    /// First failure under the growing load; `None` where nothing fails.
     pub first: Option<GivesWay>,
 }
 
-/// What a kit bears, in short. `None` where a load has no place on it, or nothing gives way.
+/// Summary of the loads that a kit withstands, each at most [`MOST_TIMES`] times the load asked for. `None`
+/// where a load has no place on the kit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bears {
-    /// A press on its top, N.
+    /// Greatest press on the top, N.
     pub top_n: Option<f64>,
-    /// On the highest place above its middle, N.
+    /// Greatest press on the highest place above the middle, N.
     pub middle_n: Option<f64>,
-    /// On the weakest of its sides as it lies, N.
+    /// Greatest press on the weakest of the sides as the kit lies, N.
     pub sides_n: Option<f64>,
-    /// The weaker of two grips, N a finger.
+    /// Greatest force of the weaker of two grips, N a finger.
     pub grip_n: Option<f64>,
-    /// A fall onto its feet, m.
+    /// Greatest fall onto the feet, m.
     pub fall_upright_m: Option<f64>,
-    /// The worst of all falls, m.
+    /// Greatest fall in the worst of all orientations, m.
     pub fall_m: Option<f64>,
-    /// Where it gives way first when it is used; `None` in kits of earlier versions, too.
+    /// First failure in use; `None` where nothing fails, and in kits of earlier versions.
     #[serde(default)]
     pub weakest: Option<WeakestUse>,
-    /// What the figures are worth, in words; empty in kits of earlier versions.
+    /// Validity of the figures, in words; empty in kits of earlier versions.
     #[serde(default)]
     pub basis: String,
 }
 
-/// Said wherever figures of the simulation stand.
+/// Remark that goes with all figures of the simulation.
 pub const BY_SIMULATION: &str = "by simulation, without a print to compare";
 
-/// The use that a kit bears least of, and what it does to it.
+/// The use with the least load factor, and its failure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeakestUse {
-    /// What is done.
+    /// Kind of the use.
     pub deed: Deed,
-    /// What gives way, and where.
+    /// Kind and place of the failure.
     pub first: GivesWay,
 }
 
 impl Holding {
-    /// What the kit bears, in short; `None` where no loads were simulated.
+    /// Summary of the loads that the kit withstands; `None` where no loads were simulated.
     pub fn summary(&self) -> Option<Bears> {
         let least = |is: fn(&Deed) -> bool| {
             let factors = self
@@ -109,7 +109,7 @@ impl Holding {
             factors.min_by(|a, b| a.0.total_cmp(&b.0))
         };
         let newtons = |is| least(is).map(|(factor, load)| factor * load.force_n);
-        // Forces go with the root of the height.
+        // Forces go with the root of the height, so heights go with the square of the factor.
         let metres = |is| least(is).map(|(factor, _)| 1e-3 * DROP_MM * factor * factor);
         (!self.bears.is_empty()).then(|| Bears {
             top_n: newtons(|d| *d == Deed::PressTop),
@@ -126,7 +126,7 @@ impl Holding {
         })
     }
 
-    /// The use of which the kit bears least beside what is asked.
+    /// The use with the least load factor; `None` where nothing fails in any use.
     pub fn weakest_use(&self) -> Option<&LoadBorne> {
         let uses = self
             .bears
@@ -140,78 +140,78 @@ impl Holding {
     }
 }
 
-/// Where a kit gives way, and how.
+/// Place and kind of a failure of the kit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GivesWay {
-    /// What happens.
+    /// Kind of the failure.
     pub how: Failure,
-    /// The pieces that part.
+    /// The two pieces at the place of the failure.
     pub between: [PatchId; 2],
-    /// The place, mm in assembly space.
+    /// Place of the failure, mm in assembly space.
     pub at: [f64; 3],
 }
 
-/// A piece that comes apart.
+/// A piece that comes apart in the simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoosePiece {
-    /// The piece.
+    /// The piece that comes apart.
     pub piece: PatchId,
-    /// A place in its middle, mm in assembly space.
+    /// Point near the middle of the piece, mm in assembly space.
     pub at: [f64; 3],
 }
 
-/// How one pair of pieces resists.
+/// Resistance of one pair of pieces, at its weakest place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeamHolding {
     /// The piece installed later.
     pub later: PatchId,
-    /// The other one.
+    /// The piece installed earlier.
     pub earlier: PatchId,
-    /// `max w d` along the seam, mm.
+    /// Greatest weighted opening `max w d` along the seam, mm.
     pub score_mm: f64,
-    /// How far it opens there, mm.
+    /// Opening at the weakest place, mm.
     pub opening_mm: f64,
-    /// Weight `w` of Eq. 4 there.
+    /// Weight `w` of Eq. 4 at the weakest place.
     pub weight: f64,
-    /// The place, mm in assembly space.
+    /// Weakest place, mm in assembly space.
     pub at: [f64; 3],
-    /// Why it is weak there, for people; it says "the later one" and "the earlier".
+    /// Reason of the weakness, for people; it says "the later one" and "the earlier".
     pub reason: String,
 }
 
-/// What a plan is chosen for.
+/// Input of the choice of a plan.
 pub struct Choice<'a> {
-    /// How plans are judged.
+    /// Parameters by which plans are judged.
     pub params: &'a PlanParams,
-    /// The pieces.
+    /// Surface of the pieces.
     pub surface: &'a SegmentedSurface,
-    /// Connectors of each pair.
+    /// Connector sizes of each pair.
     pub sizes: &'a ConnectorSizes,
-    /// Of the pieces.
+    /// Survey of the pieces.
     pub survey: &'a PlanSurvey,
-    /// What earlier kits taught.
+    /// Constraints learned from earlier kits.
     pub constraints: &'a PlanConstraints,
-    /// What the kit is to bear.
+    /// Loads that the kit is to withstand.
     pub handling: &'a Handling,
-    /// How much may be looked at.
+    /// Limits of the climb's effort.
     pub climb: ClimbParams,
 }
 
-/// The plan that bears most.
+/// The strongest plan, and its properties.
 pub struct Chosen {
-    /// What the search found, with that plan in its place.
+    /// Result of the search, with that plan in place of its own.
     pub found: FoundPlan,
-    /// How the plan holds.
+    /// Resistance of the plan.
     pub holding: Holding,
-    /// How the pieces move under what people are told that it bears.
+    /// Motion of the pieces under the loads that are reported.
     pub deformed: Deformed,
 }
 
-/// Climbs from the plans of the pool to one that bears more and costs at most a quarter more than the least,
-/// and that is not foreseen to rattle where any is not; it takes the place of `found`'s.
+/// Climbs from the plans of the pool to a stronger one that costs at most a quarter more than the least.
+/// Plans predicted to rattle are excluded, as long as some are not. The result replaces the plan of `found`.
 ///
-/// Warns with `comes-apart` where it does not hold without friction, and with `piece-loose` of each piece
-/// that hardly anything holds by the estimate of the costs.
+/// Warns with `comes-apart` where the plan does not hold without friction, and with `piece-loose` of each
+/// piece that hardly anything holds by the estimate of the costs.
 pub fn choose(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
@@ -268,7 +268,7 @@ pub fn choose(
     })
 }
 
-/// The plan that bears most, and how many were looked at.
+/// The strongest plan, and the number of plans compared.
 fn most_bearing<'b>(
     ctx: &Ctx<'_>,
     choice: &Choice<'_>,
@@ -292,7 +292,7 @@ fn most_bearing<'b>(
     }
 }
 
-/// What a plan bears, in assembly space.
+/// Load factors of a plan, in assembly space.
 pub(super) fn bears(model: &PlanModel, bench: &Bench<'_>, rated: &Rated<'_>) -> Vec<LoadBorne> {
     let one = |(case, borne): (&LoadCase, &Borne)| LoadBorne {
         deed: case.deed,
@@ -320,7 +320,7 @@ fn warn_of_use(ctx: &Ctx<'_>, weakest: &LoadBorne) {
     let (Some(factor), Some(first)) = (weakest.factor, weakest.first) else {
         return;
     };
-    // Forces go with the root of the height.
+    // Forces go with the root of the height, so heights go with the square of the factor.
     let much = |factor: f64| {
         if weakest.deed.is_fall() {
             format!("a fall of {:.1} m", 1e-3 * DROP_MM * factor * factor)
@@ -370,7 +370,7 @@ fn middle_of(model: &PlanModel, piece: PatchId) -> Vec3 {
         .unwrap_or(mean)
 }
 
-/// Puts the stations' openings together by pairs of pieces.
+/// Collects the stations' openings by pairs of pieces.
 fn holding(model: &PlanModel, plan: &LatticePlan, meetings: &[Meeting], resistance: &Resistance) -> Holding {
     let (opening, loose) = match resistance {
         Resistance::Holds(opening) => (opening, Vec::new()),
@@ -446,7 +446,7 @@ fn weakest_places(
     worst.into_iter().map(seam).collect()
 }
 
-/// Why it is weak there, without names: those of the kit's pieces are not known yet.
+/// Reason why the seam is weak at a station, without names: those of the kit's pieces are not known yet.
 fn reason(model: &PlanModel, plan: &LatticePlan, station: usize, later: PatchId) -> &'static str {
     let s = plan.separation(later).unit();
     let frame = &model.assembly.stations[station];
@@ -464,7 +464,7 @@ fn reason(model: &PlanModel, plan: &LatticePlan, station: usize, later: PatchId)
     }
 }
 
-/// Why no plan was chosen.
+/// Reason why no plan was chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChoiceError {
     /// The search's pool is empty.

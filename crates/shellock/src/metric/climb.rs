@@ -1,13 +1,15 @@
-//! The plan that bears most: a climb of the least load factor under the conditions of the search (Sect. 6.2).
+//! Climb to the strongest plan: raises the least load factor under the conditions of the search (Sect. 6.2).
 //!
-//! Plans of the pool are rated goal by goal, worst first, and given up with the first use that they bear less
-//! of than the best so far. From the best ones the climb moves one piece at a time, another way or another
-//! place in the order. What decides a goal is a station between two pieces, so their moves and their
-//! neighbours' are tried. A move is kept that lets the kit bear more of the worst use; where none does, more
-//! of the next without losing any of those before (leximin). Then the same for the pull on all seams, without
-//! losing of any use, and for falls, without losing of both.
+//! Plans of the pool are rated goal by goal, worst first, and rejected at the first use with a lower load
+//! factor than that of the best so far. From the best plans the climb moves one piece at a time, along
+//! another direction or to another place in the order. The station that decides a goal lies between two
+//! pieces, so moves of these and of their neighbours are tried. A move is kept if it raises the load factor
+//! of the worst use. If none does, moves for the next use are tried, without loss in those before (leximin).
+//! The climb then continues for the pull on all seams, without loss in any use, and for falls, without loss
+//! in both.
 //!
-//! Batches are of fixed size, no clock is read and ties go to the first, so threads play no part.
+//! Batches are of fixed size, no clock is read and ties go to the first, so the result does not depend on
+//! threads.
 
 use std::collections::BTreeSet;
 
@@ -18,20 +20,20 @@ use super::rating::{Bench, Rank, Rated};
 use crate::plan::{LatticePlan, Neighbourhood, RankedPlan};
 use crate::{Cancelled, Ctx, PatchId};
 
-/// Moves that are tried side by side before the best of them is taken.
+/// Number of moves tried in parallel before the best of them is taken.
 const BATCH: usize = 8;
-/// What counts as bearing more, and what as no less.
+/// Ratios of load factors from which on one counts as more, and as no less.
 const MORE: f64 = 1.01;
 const NO_LESS: f64 = 0.99;
-/// What was reached of a goal is not given up below this share for what is less important.
+/// Share of the best value reached of a goal that must be kept for the sake of less important goals.
 const LEAST_OF_PEAK: f64 = 0.97;
 
-/// How much a climb may do.
+/// Limits of a climb's effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClimbParams {
-    /// Loads that may be solved.
+    /// Greatest number of loads that may be solved.
     pub n_solves: usize,
-    /// Plans that are climbed from.
+    /// Number of plans from which the climb starts.
     pub n_starts: usize,
 }
 
@@ -45,7 +47,7 @@ impl Default for ClimbParams {
 }
 
 impl ClimbParams {
-    /// Loads that may be solved until the goals of a rank, and those before, are climbed.
+    /// Number of loads that may be solved until the goals of a rank, and those before, are climbed.
     fn until(&self, rank: Rank) -> usize {
         let tenths = match rank {
             Rank::Use => 6,
@@ -56,23 +58,23 @@ impl ClimbParams {
     }
 }
 
-/// What a climb found.
+/// Result of a climb.
 pub struct Climbed<'a> {
-    /// The plan that bears most.
+    /// The strongest plan found.
     pub best: Rated<'a>,
-    /// Plans that were looked at.
+    /// Number of plans that were rated.
     pub n_plans: usize,
-    /// Loads that were solved.
+    /// Number of loads that were solved.
     pub n_solves: usize,
 }
 
-/// Why a climb ended without a plan.
+/// Reason why a climb ended without a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ClimbError {
-    /// There was nothing to begin with.
+    /// There was no plan to start from.
     #[error("there is no plan to begin with")]
     NoPlan,
-    /// A plan's system could not be solved.
+    /// The equations of a plan could not be solved.
     #[error(transparent)]
     Solve(#[from] SparseError),
     /// The user asked to stop.
@@ -80,7 +82,7 @@ pub enum ClimbError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Climbs from `starts`, which keep all conditions; `may_be` is asked of a plan before it is taken.
+/// Climbs from `starts`, which keep all conditions. `may_be` must accept a plan before it is taken.
 pub fn climb<'b>(
     ctx: &Ctx<'_>,
     params: ClimbParams,
@@ -102,7 +104,7 @@ pub fn climb<'b>(
     let (n, until) = (starts.len(), params.until(Rank::Use));
     let mut best: Option<Rated<'b>> = None;
     for (i, start) in starts.into_iter().enumerate() {
-        // Each has its share of what is left.
+        // Each start gets its share of the remaining solves.
         let left = until.saturating_sub(climber.n_solves);
         let top = climber.ascend(start, Rank::Use, climber.n_solves + left / (n - i))?;
         if best.as_ref().is_none_or(|b| is_above(&top, b, Rank::Use)) {
@@ -121,8 +123,8 @@ pub fn climb<'b>(
     })
 }
 
-/// Whether `a` bears more: of the first goal of that rank, from the worst on, that they meet differently;
-/// where there is none, of the next rank.
+/// Returns true if `a` is stronger than `b`: in the first goal of that rank, from the worst on, in which they
+/// differ. If they differ in no use, the pull decides.
 fn is_above(a: &Rated<'_>, b: &Rated<'_>, rank: Rank) -> bool {
     let factors = |r: &Rated<'_>, rank| -> Vec<f64> { r.factors(rank) };
     let pairs = factors(a, rank).into_iter().zip(factors(b, rank));
@@ -141,12 +143,12 @@ struct Climber<'c, 'b> {
     may_be: &'c (dyn Fn(&RankedPlan) -> bool + Sync),
     n_plans: usize,
     n_solves: usize,
-    /// What may not be lost of each goal of the ranks that were climbed.
+    /// Least load factor to keep of each goal of the ranks that were climbed.
     floors: Vec<f64>,
 }
 
 impl<'b> Climber<'_, 'b> {
-    /// The starts that bear most of their worst uses, best first.
+    /// The starts with the greatest load factors of their worst uses, best first.
     fn best_starts(&mut self, starts: &[RankedPlan], n: usize) -> Result<Vec<Rated<'b>>, ClimbError> {
         let allowed: Vec<RankedPlan> = (starts.par_iter())
             .filter_map(|start| self.around.ranked(start.plan.clone()))
@@ -160,7 +162,7 @@ impl<'b> Climber<'_, 'b> {
         let mut best = vec![first];
         for batch in others.chunks(BATCH) {
             self.ctx.check()?;
-            // What the last one kept bears least decides who else is kept.
+            // The least load factor of the last start kept is the bar for further starts.
             let floor = if best.len() < n {
                 0.0
             } else {
@@ -181,7 +183,7 @@ impl<'b> Climber<'_, 'b> {
         Ok(best)
     }
 
-    /// Asks for all goals of a rank.
+    /// Solves all goals of a rank.
     fn complete(&mut self, plan: &mut Rated<'b>, rank: Rank) -> Result<(), ClimbError> {
         for goal in self.bench.goals(rank) {
             self.n_solves += usize::from(plan.ask(goal, None)?);
@@ -189,8 +191,8 @@ impl<'b> Climber<'_, 'b> {
         Ok(())
     }
 
-    /// Those of `plans`, which are like `like`, that meet the goals as `asked`; the others are given up with
-    /// the first that they do not meet.
+    /// Returns those of `plans` that meet the goals as `asked`. The others are rejected at the first goal
+    /// that they do not meet. `like` is a similar plan, whose solutions are the starting points.
     fn tried(
         &mut self,
         plans: &[RankedPlan],
@@ -213,8 +215,8 @@ impl<'b> Climber<'_, 'b> {
         Ok(all.into_iter().filter_map(|t| t.0).collect())
     }
 
-    /// To where no move helps the goals of a rank any more, or `most_solves` are done. What is reached counts
-    /// as a floor for the ranks that come after.
+    /// Climbs until no move improves the goals of a rank any more, or `most_solves` is reached. The load
+    /// factors reached become floors for the ranks that follow.
     fn ascend(&mut self, start: Rated<'b>, rank: Rank, most_solves: usize) -> Result<Rated<'b>, ClimbError> {
         let mut at = start;
         self.complete(&mut at, rank)?;
@@ -237,8 +239,8 @@ impl<'b> Climber<'_, 'b> {
         Ok(at)
     }
 
-    /// What a move must keep so that more is borne of the goal at that place of `order`, that goal first: most
-    /// moves do not help it.
+    /// Goals and least load factors of a move that improves the goal at `place` of `order`. That goal comes
+    /// first, as most moves do not improve it.
     fn asked(
         &self,
         at: &Rated<'b>,
@@ -264,7 +266,8 @@ impl<'b> Climber<'_, 'b> {
         asked
     }
 
-    /// A move that meets more of the goal at that place of `order`, and no less of those before.
+    /// A move that improves the goal at `place` of `order`, without loss in those before; `None` if there is
+    /// none.
     fn step(
         &mut self,
         at: &Rated<'b>,
@@ -293,7 +296,7 @@ impl<'b> Climber<'_, 'b> {
         Ok(None)
     }
 
-    /// The plan that bears most of those that may be; the first of equals.
+    /// The strongest of the plans that `may_be` accepts; the first of equals.
     fn highest(&self, mut plans: Vec<Rated<'b>>, rank: Rank) -> Option<Rated<'b>> {
         while !plans.is_empty() {
             let best = (1..plans.len()).fold(0, |best, i| {
@@ -311,7 +314,7 @@ impl<'b> Climber<'_, 'b> {
         None
     }
 
-    /// The pieces whose moves may help a goal: the two that part, then their neighbours.
+    /// The pieces whose moves may improve a goal: the two at its decisive station, then their neighbours.
     fn movers(&self, at: &Rated<'b>, goal: usize) -> Vec<Vec<PatchId>> {
         let Some(station) = at.station(goal) else {
             return Vec::new();
@@ -328,7 +331,7 @@ impl<'b> Climber<'_, 'b> {
         vec![two.to_vec(), near]
     }
 
-    /// Those of `moves` that keep all conditions.
+    /// The `moves` that keep all conditions, with their costs.
     fn allowed(&self, moves: Vec<LatticePlan>) -> Vec<RankedPlan> {
         let ranked: Vec<Option<RankedPlan>> = moves
             .into_par_iter()

@@ -1,14 +1,15 @@
-//! The boundary-based, data-driven metric (Sect. 5.3, Eq. 6), and one that asks each piece as a whole.
+//! The boundary-based, data-driven metric (Sect. 5.3, Eq. 6), and one that tests each piece as a whole.
 //!
 //! ```text
-//!   d_k = max over places i on the boundary of piece k and tests f of  w_i d(u_i, v_i, s_i, f)        Q = −max_k d_k
+//!   d_k = max over places i on the boundary of piece k and tests f of  w_i d(u_i, v_i, s_i, f)
+//!   Q = −max_k d_k
 //! ```
 //!
-//! with f over the directions in which the piece separates from its neighbours (translation) and over
-//! ± (x_i − x_a) × (x_b − x_a) for the ends x_a, x_b of the boundary (rotation). The study
-//! (docs/notes/metrics.md) shows that the maximum hides interlocking: every boundary opens along its own
-//! direction, whatever holds the piece elsewhere. [`pieces_alone`] therefore simulates each piece with its
-//! neighbours held. It, too, depends only on the directions on the piece's own boundaries.
+//! with f over the directions in which the piece separates from its neighbours (translation) and over ± (x_i
+//! − x_a) × (x_b − x_a) for the ends x_a, x_b of the boundary (rotation). The study (docs/notes/metrics.md)
+//! shows that the maximum hides interlocking: every boundary opens along its own direction, no matter how the
+//! piece is held elsewhere. [`pieces_alone`] therefore simulates each piece with its neighbours held. That
+//! metric, too, depends only on the directions on the piece's own boundaries.
 
 use shellock_geom::Vec3;
 use shellock_geom::sparse::SparseError;
@@ -19,13 +20,13 @@ use crate::PatchId;
 use crate::plan::interface::SeamFrame;
 use crate::plan::local_tests::LocalTests;
 
-/// Eq. 6 as published: the quality in mm, higher is better; 0 where nothing is joined.
+/// Quality by Eq. 6 as published, mm; higher is better; 0 where nothing is joined.
 pub fn data_driven(model: &PlanModel, tests: &LocalTests, plan: &[Meeting]) -> f64 {
     let pieces = (0..model.assembly.n_parts).map(PatchId::from);
     -pieces.map(|k| piece(model, tests, plan, k)).fold(0.0, f64::max)
 }
 
-/// `d_k` of Eq. 6, mm.
+/// Greatest weighted opening `d_k` of piece k (Eq. 6), mm.
 fn piece(model: &PlanModel, tests: &LocalTests, plan: &[Meeting], k: PatchId) -> f64 {
     let own: Vec<Place> = places_of(model, plan, k);
     let mut pulls: Vec<Vec3> = Vec::new();
@@ -49,15 +50,15 @@ fn piece(model: &PlanModel, tests: &LocalTests, plan: &[Meeting], k: PatchId) ->
     worst
 }
 
-/// A joined station as one of its pieces sees it.
+/// A joined station, from the side of one of its pieces.
 struct Place {
     station: usize,
     is_a: bool,
-    /// The frame with side a as the later piece; a later b pulled along s is an earlier a pulled along −s.
+    /// Frame with side a as the later piece; a later b pulled along s is an earlier a pulled along −s.
     frame: SeamFrame,
-    /// Along which side a is pulled from side b.
+    /// Direction in which side a is pulled from side b.
     pull_on_a: Vec3,
-    /// Along which the piece is pulled.
+    /// Direction in which the piece is pulled.
     pull: Vec3,
     weight: f64,
 }
@@ -89,13 +90,13 @@ fn places_of(model: &PlanModel, plan: &[Meeting], k: PatchId) -> Vec<Place> {
 }
 
 impl Place {
-    /// The opening where the piece is pulled by the unit vector `f`, mm.
+    /// Opening of the place where the piece is pulled by the unit vector `f`, mm.
     fn opening_mm(&self, tests: &LocalTests, f: Vec3) -> f64 {
         tests.opening_mm(&self.frame, self.pull_on_a, if self.is_a { f } else { -f })
     }
 
     /// Direction in which the place moves when the piece turns about the ends of its boundary; zero on a
-    /// straight one.
+    /// straight boundary.
     fn turn(&self, model: &PlanModel) -> Vec3 {
         let [from, to] = model.seam_ends(self.station);
         (model.place_of(self.station) - from)
@@ -104,10 +105,10 @@ impl Place {
     }
 }
 
-/// `−max_k` of what piece k opens where all others are held, mm: higher is better. The key, which friction
-/// holds, is left out.
+/// Quality `−max_k` of the openings of each piece k with all others held, mm; higher is better. The key,
+/// which friction holds, is left out.
 ///
-/// `None` where some piece comes off even so.
+/// `None` where some piece comes apart even then.
 pub fn pieces_alone(
     model: &PlanModel,
     solver: &SurfaceModel,

@@ -1,7 +1,7 @@
-//! How pieces move under the loads that people are told of: for pictures, in no file.
+//! Motion of the pieces under the reported loads, for pictures; not written to any file.
 //!
-//! A kit bears a load up to the first seam that opens too far; what is seen of it is how walls bend and seams
-//! open, in proportion to the load, since contacts have no clearance.
+//! A kit withstands a load up to the first seam that opens too far. Pictures show the bending of walls and
+//! the opening of seams, which are proportional to the load, since contacts have no clearance.
 
 use rayon::prelude::*;
 use shellock_geom::sparse::SparseError;
@@ -12,29 +12,29 @@ use super::{LoadBorne, PlanModel};
 use crate::PatchId;
 use crate::handling::{Deed, LoadCase};
 
-/// What people are told that a kit bears, each by the load of its kind that it bears least of.
+/// Kinds of loads that are reported, each by the load of the kind with the least load factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
-    /// A press on its top.
+    /// A press on the top.
     Top,
-    /// A press on the highest place above its middle.
+    /// A press on the highest place above the middle.
     Middle,
-    /// A press on one of its sides as it lies.
+    /// A press on one of the sides, as the kit lies.
     Side,
-    /// Two fingers where it is narrow.
+    /// Two fingers where the kit is narrow.
     GripNarrow,
-    /// Two fingers where it is wide.
+    /// Two fingers where the kit is wide.
     GripWide,
-    /// A fall onto its feet.
+    /// A fall onto the feet.
     Feet,
-    /// A fall onto any side, its feet included.
+    /// A fall onto any side, the feet included.
     AnySide,
-    /// Its weight, held by one piece.
+    /// The weight of the kit, held by one piece.
     Lifted,
 }
 
 impl Told {
-    /// All, in the order in which they are told.
+    /// All kinds, in the order of reports.
     pub const ALL: [Self; 8] = [
         Self::Top,
         Self::Middle,
@@ -59,7 +59,7 @@ impl Told {
         }
     }
 
-    /// The place of its load among `bears`; `None` where no load of the kind has a place on the model.
+    /// Index of the load of this kind in `bears`; `None` where no load of the kind has a place on the model.
     pub fn among(self, bears: &[LoadBorne]) -> Option<usize> {
         let factor = |i: &usize| bears[*i].factor.unwrap_or(f64::INFINITY);
         let own = (0..bears.len()).filter(|i| self.is(&bears[*i].deed));
@@ -67,44 +67,44 @@ impl Told {
     }
 }
 
-/// The outer surface as mechanics sees it, and how it moves under loads. Lengths in mm, in assembly space.
+/// Outer surface of the mechanical model, and its motion under loads. Lengths in mm, in assembly space.
 #[derive(Clone, Debug, Default)]
 pub struct Deformed {
-    /// Even triangles, fewer than pictures need; points of seams are there once for each piece.
+    /// Even triangles, fewer than pictures need; points of seams occur once for each piece.
     pub surface: TriMesh,
     /// The piece of each point.
     pub piece_of_point: Vec<PatchId>,
-    /// In the order of [`Told::ALL`]; those that have no place on the model are left out, and lifting where
-    /// something else gives way before.
+    /// Loads in the order of [`Told::ALL`]. Those that have no place on the model are left out, and lifting
+    /// where something else fails before.
     pub loads: Vec<DeformedLoad>,
 }
 
-/// One load and what moves.
+/// One load and the motion under it.
 #[derive(Clone, Debug)]
 pub struct DeformedLoad {
-    /// As what it is told.
+    /// Kind of the load in reports.
     pub told: Told,
-    /// How much of it the kit bears.
+    /// Load factor of the kit under the load.
     pub borne: LoadBorne,
-    /// Where it acts, that nearest to [`LoadBorne::at`] first: what presses, then the floor's answer; both
-    /// fingers of a grip.
+    /// Places where the load acts, the nearest to [`LoadBorne::at`] first: the press, then the reaction of
+    /// the floor; both fingers of a grip.
     pub touches: Vec<Touch>,
-    /// How far each point of the surface goes where the load is [`LoadBorne::force_n`]; how the whole moves as
-    /// a rigid body is left out.
+    /// Displacement of each point of the surface under the force [`LoadBorne::force_n`], without rigid motion
+    /// of the whole.
     pub moved_mm: Vec<Vec3>,
 }
 
-/// What acts on the model at one place.
+/// A force that acts on the model at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
-    /// The middle of the place.
+    /// Middle of the place.
     pub at: Vec3,
-    /// The force, N.
+    /// Force at the place, N.
     pub force_n: Vec3,
 }
 
 impl Deformed {
-    /// Of the loads of `bench` that people are told of; `bears` says how much the plan bears of each.
+    /// Computes the motion under the reported loads of `bench`; `bears` gives the load factors of the plan.
     pub(super) fn of(
         model: &PlanModel,
         bench: &Bench<'_>,
@@ -145,7 +145,7 @@ impl Deformed {
     }
 }
 
-/// Where a load acts: all of its forces are along one line, this way or that.
+/// Places where a load acts. All of its forces are parallel to one line, in either direction.
 fn touches(points: &[Vec3], case: &LoadCase) -> Vec<Touch> {
     let hardest = case.forces_n.iter().copied();
     let hardest = hardest.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));

@@ -1,8 +1,8 @@
-//! The play of pieces, foreseen from a plan before anything is built.
+//! Prediction of the play of pieces from a plan, before anything is built.
 //!
-//! At a station the walls of two pieces are a clearance apart, and so are a pin and its channel on all sides
-//! but the one that the pin leaves by. Each is a limit on small motions of a piece while its neighbours rest;
-//! a linear program for a piece says how far it gets.
+//! At a station the walls of two pieces are a clearance apart. So are a pin and its channel, on all sides
+//! except the one by which the pin leaves. Each gap limits the small motions of a piece while its neighbours
+//! rest; a linear program for each piece gives its greatest motion.
 //!
 //! ```text
 //!   ───a──┐┌──b───   walls: at the outside and at the inside of the wall
@@ -11,8 +11,8 @@
 //!       └────┘
 //! ```
 //!
-//! Limits: rails and ribs are not known, so nothing is said of a key; pins are taken as long as their
-//! stations' seams.
+//! Limits: rails and ribs are not known, so a key has no prediction; pins are taken to be as long as the
+//! seams of their stations.
 
 use std::collections::BTreeMap;
 
@@ -25,18 +25,18 @@ use crate::PatchId;
 use crate::motion::{Contact, farthest, most_play};
 use crate::plan::LatticePlan;
 
-/// A pin goes on to a station that is no farther than this many times their mean length.
+/// Greatest distance to the next station of a pin, in mean lengths of the two stations.
 const NEXT: f64 = 1.6;
-/// How far each piece but the key goes, and by how much that is more than it may: at most 1 where it is not.
+/// Predicted play of each piece except the key, and its ratio to the allowed play: at most 1 where allowed.
 pub struct Foreseen {
-    /// Displacement of the middle of its surface, mm, and turn, degrees, no less than the greatest along the
-    /// coordinate axes and no more than √3 of that; zeros for the key.
+    /// Displacement of the middle of each piece's surface, mm, and turn, degrees. Each is no less than the
+    /// greatest along the coordinate axes and no more than √3 of that; zeros for the key.
     pub play: Vec<[f64; 2]>,
-    /// Of each piece, in the same order; 0 for the key.
+    /// Ratio of each piece's play to the allowed play, in the same order; 0 for the key.
     pub excess: Vec<f64>,
 }
 
-/// How far pieces go, and whether they may. `size_mm` is the longest side of the model.
+/// Predicts the play of the pieces and compares it to the limits. `size_mm` is the longest side of the model.
 pub fn foreseen(
     model: &PlanModel,
     plan: &LatticePlan,
@@ -80,10 +80,10 @@ fn plays(model: &PlanModel, plan: &LatticePlan, meetings: &[Meeting], clearance_
     contacts.iter().enumerate().map(of_piece).collect()
 }
 
-/// Names a seam: its pieces and its ends.
+/// Name of a seam: its pieces and its ends.
 type SeamName = ([PatchId; 2], [[u64; 3]; 2]);
 
-/// Whether the pin of each station ends there, against the seam's tangent and along it.
+/// Ends of pins: true for each station whose pin ends there, against the seam's tangent and along it.
 fn pin_ends(model: &PlanModel, meetings: &[Meeting]) -> Vec<[bool; 2]> {
     let seam = |station: usize| -> SeamName {
         (
@@ -111,7 +111,7 @@ fn pin_ends(model: &PlanModel, meetings: &[Meeting]) -> Vec<[bool; 2]> {
     ends
 }
 
-/// What a station stops; `ends` as [`pin_ends`] says.
+/// Contacts of a station; `ends` as from [`pin_ends`].
 fn at_station(
     model: &PlanModel,
     station: usize,
@@ -153,7 +153,7 @@ fn at_station(
     found
 }
 
-/// The middle of each part's surface, mm.
+/// Centre of each part's surface, weighted by area, mm.
 fn centers(model: &PlanModel) -> Vec<Vec3> {
     let assembly = &model.assembly;
     let mut sums = vec![(Vec3::ZERO, 0.0); assembly.n_parts];

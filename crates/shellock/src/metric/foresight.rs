@@ -1,4 +1,4 @@
-//! How far the pieces of each plan that a search found will rattle, before any of them is simulated.
+//! Predicted play of the pieces of each plan that a search found, before any of them is simulated.
 
 use rayon::prelude::*;
 
@@ -6,31 +6,32 @@ use super::choice::Choice;
 use super::{MetricParams, PlanModel, foreseen};
 use crate::plan::{FoundPlan, LatticePlan, RankedPlan};
 
-/// Plans whose cost is at most this share above the least may be chosen.
+/// Greatest excess of a plan's cost over the least, as a share, with which it may be chosen.
 ///
-/// Costs know what the verification asks for and the simulation does not (what carving takes, how firmly pins
-/// hold). With 0.15 three of five kits bear a tenth to a quarter less of the worst use, with 0.5 one bears a
-/// third more and the others, up to what is enough, hardly more: docs/notes/metrics.md.
+/// Costs contain requirements of the verification that the simulation does not know: losses by carving, and
+/// how firmly pins hold. With 0.15, three of five kits have load factors of the worst use lower by a tenth to
+/// a quarter. With 0.5 one has a third more and the others, up to what is enough, hardly more:
+/// docs/notes/metrics.md.
 pub(super) const COST_SLACK: f64 = 0.25;
 
-/// Play is foreseen within a factor of about one and a half; pieces that are foreseen to have less than this
-/// share of what they may have hardly ever rattle.
+/// Share of the allowed play below which pieces hardly ever rattle. The prediction is right within a factor
+/// of about one and a half.
 const SURE_PLAY: f64 = 0.85;
 
-/// Plans whose widest play is within this share of the least are alike.
+/// Relative difference of the widest play up to which plans count as alike.
 const PLAY_TIE: f64 = 0.05;
 
-/// The pieces as mechanics sees them, and the plans that may be chosen.
+/// Mechanical model of the pieces, and the plans that may be chosen.
 pub struct Foresight {
     pub(super) model: PlanModel,
-    /// With how far each piece goes, as a share of what it may.
+    /// Plans with the predicted play of each piece, as a share of the allowed play.
     plans: Vec<(RankedPlan, Vec<f64>)>,
     size_mm: f64,
     clearance_mm: f64,
 }
 
 impl Foresight {
-    /// Of those plans of `found` that cost little enough.
+    /// Predicts the play for those plans of `found` that cost little enough.
     pub fn of(choice: &Choice<'_>, found: &FoundPlan) -> Self {
         let model = PlanModel::new(
             &MetricParams::of_plan(choice.params, choice.sizes, choice.handling.material),
@@ -51,27 +52,27 @@ impl Foresight {
         foresight
     }
 
-    /// How far each piece goes, as a share of what it may.
+    /// Predicted play of each piece, as a share of the allowed play.
     fn excess(&self, plan: &LatticePlan) -> Vec<f64> {
         let meetings = self.model.meetings(plan);
         foreseen(&self.model, plan, &meetings, self.size_mm, self.clearance_mm).excess
     }
 
-    /// The plan whose loosest piece rattles least, the first of equals, and how far each of its pieces goes, as
-    /// a share of what it may.
+    /// The plan whose loosest piece has the least play, the first of equals, with the play of each piece as a
+    /// share of the allowed play.
     pub fn steadiest(&self) -> Option<(&RankedPlan, &[f64])> {
         let steadiest = (self.plans.iter()).min_by(|a, b| widest(&a.1).total_cmp(&widest(&b.1)))?;
         Some((&steadiest.0, &steadiest.1))
     }
 
-    /// Plans that rattle about as little as any.
+    /// Plans with about the least play.
     pub(super) fn steady(&self) -> Vec<RankedPlan> {
         let most = self.most();
         let steady = self.plans.iter().filter(|p| widest(&p.1) <= most);
         steady.map(|p| p.0.clone()).collect()
     }
 
-    /// Whether a plan does.
+    /// Returns true if a plan has about the least play.
     pub(super) fn is_steady(&self, plan: &LatticePlan) -> bool {
         widest(&self.excess(plan)) <= self.most()
     }
@@ -86,7 +87,7 @@ impl Foresight {
     }
 }
 
-/// How far the loosest piece goes; no less than what surely passes.
+/// Play of the loosest piece, as a share of the allowed play; at least the share that surely passes.
 fn widest(excess: &[f64]) -> f64 {
     excess.iter().copied().fold(SURE_PLAY, f64::max)
 }

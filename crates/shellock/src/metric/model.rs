@@ -1,4 +1,4 @@
-//! The segmented surface as parts and stations, and what a plan makes of them.
+//! The segmented surface as parts and stations, and the joints that a plan makes of the stations.
 
 use shellock_geom::remesh::{RemeshParams, Remeshed, remesh};
 use shellock_geom::sparse::SparseError;
@@ -16,7 +16,7 @@ use crate::seam::rules::end_gap_mm;
 use crate::seam::{seam_half_edges, stretches};
 use crate::{ConnectorSizes, LatticeDirection, PatchId, SegmentedSurface};
 
-/// How the model is made.
+/// Parameters of the mechanical model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetricParams {
     /// Wall thickness, mm. [0.1, 10]; 2.
@@ -25,14 +25,13 @@ pub struct MetricParams {
     pub connector_mm: f64,
     /// Floor β of the connector weight (Eq. 4). [0, 1]; 0.1.
     pub beta: f64,
-    /// Length of triangle edges, in square roots of the area per thousand points. [0.2, 5]; 1.
+    /// Length of triangle edges, relative to that of about 1000 points. [0.2, 5]; 1.
     ///
-    /// 1 gives about 1000 points, on which a plan takes some milliseconds; see the study for what finer
-    /// meshes change.
+    /// With 1 a plan takes some milliseconds. The study shows the effect of finer meshes.
     pub edge_share: f64,
-    /// What the pieces are printed of. E in [1, 10⁶] MPa, ν in [0, 0.45].
+    /// Material that pieces are printed of. E in [1, 10⁶] MPa, ν in [0, 0.45].
     pub material: Material,
-    /// The key that slides on rails, and along what; none by default.
+    /// The key that slides on rails, and its direction; none by default.
     pub rails: Option<(PatchId, LatticeDirection)>,
 }
 
@@ -50,7 +49,8 @@ impl Default for MetricParams {
 }
 
 impl MetricParams {
-    /// The same wall and floor as the plan's, of that material.
+    /// Takes wall, floor β and rails of the plan, and the default of `sizes`. Without a wall the usual one
+    /// counts.
     pub fn of_plan(params: &PlanParams, sizes: &ConnectorSizes, material: Material) -> Self {
         let defaults = Self::default();
         let wall_mm = if params.wall_mm > 0.0 {
@@ -69,7 +69,7 @@ impl MetricParams {
         }
     }
 
-    /// Every value out of range: no model can be made of such.
+    /// Lists every value out of range; no model can be made of such.
     pub fn problems(&self) -> Vec<ParamProblem> {
         let Material {
             youngs_modulus_mpa,
@@ -87,7 +87,7 @@ impl MetricParams {
         checks.into_iter().flatten().collect()
     }
 
-    /// The surface metric's parameters with these sizes.
+    /// Parameters of the surface metric for these values.
     pub fn surface(&self) -> SurfaceParams {
         let (wall_mm, connector_mm, material) = (self.wall_mm, self.connector_mm, self.material);
         SurfaceParams {
@@ -99,24 +99,24 @@ impl MetricParams {
     }
 }
 
-/// What the metrics know of a segmented surface; the same for all plans.
+/// Mechanical model of a segmented surface; the same for all plans.
 #[derive(Clone, Debug)]
 pub struct PlanModel {
-    /// Parts are pieces, by the same numbers.
+    /// Parts and stations; parts are pieces, by the same numbers.
     pub assembly: ShellAssembly,
-    /// What it was made with.
+    /// Parameters of the model.
     pub params: MetricParams,
     seams: Vec<StationSeam>,
 }
 
-/// Where a station is.
+/// Seam of a station, with its pieces and its room.
 #[derive(Clone, Copy, Debug)]
 struct StationSeam {
     a: PatchId,
     b: PatchId,
     /// Connector size D, mm.
     size_mm: f64,
-    /// Whether it is far enough from the ends of an open seam for a connector.
+    /// True where the station is far enough from the ends of an open seam for a connector.
     has_room: bool,
     /// First and last point of the seam.
     ends: [Vec3; 2],
@@ -126,7 +126,7 @@ impl PlanModel {
     /// Remeshes `surface` evenly and finds the stations: all points inside seams. `params` must have no
     /// [`problems`](MetricParams::problems).
     pub fn new(params: &MetricParams, surface: &SegmentedSurface, sizes: &ConnectorSizes) -> Self {
-        /// Points of a mesh of equilateral triangles: one each √3/2 l².
+        /// Points of the mesh with `edge_share` 1; equilateral triangles have one for each √3/2 l².
         const POINTS_AT_ONE: f64 = 1000.0;
         let area_mm2 = surface.mesh.area();
         let target_edge_mm = params.edge_share * (area_mm2 / (POINTS_AT_ONE * 0.75f64.sqrt())).sqrt();
@@ -149,7 +149,7 @@ impl PlanModel {
         )
     }
 
-    /// The model of a closed mesh with these labels as it is.
+    /// Builds the model of a closed mesh with these labels, without remeshing.
     fn of_mesh(
         params: &MetricParams,
         mesh: &TriMesh,
@@ -164,7 +164,7 @@ impl PlanModel {
         };
         let topology = Topology::of_mesh(mesh).expect("a remeshed surface is closed");
         let normals = point_normals(mesh);
-        // The copy of a mesh point in a part: parts() numbers points by part, then by point.
+        // Index of a mesh point's copy in a part: parts() numbers points by part, then by point.
         let copies = copies(mesh, labels);
         let copy = |part: u32, v: u32| {
             copies
@@ -195,11 +195,12 @@ impl PlanModel {
         model
     }
 
-    /// Adds the stations of a seam, patch a on its left: all points but the ends; of a loop all points once.
+    /// Adds the stations of a seam, with patch a on its left: all points but the ends; of a loop all points
+    /// once.
     ///
-    /// Lengths are those on the inner side of the wall, where connectors are.
+    /// Lengths are measured on the inner side of the wall, where connectors are.
     fn add_seam(&mut self, [a, b]: [PatchId; 2], size_mm: f64, points: &[(Vec3, Vec3, [u32; 2])]) {
-        /// Share of a station's stretch that must be far enough from the ends for a connector, against
+        /// Least share of a station's stretch that must be far enough from the ends for a connector, against
         /// rounding.
         const LEAST_SHARE: f64 = 1e-6;
         let n = points.len() - 1;
@@ -227,8 +228,8 @@ impl PlanModel {
                 .reject_from_normalized(normal)
                 .normalize_or(normal.any_orthonormal_vector());
             let across = tangent.cross(normal);
-            // A station stands for the seam up to halfway to the next ones, at the ends of open seams for all
-            // that is left.
+            // A station stands for the seam up to halfway to the next stations, and at the ends of open seams
+            // for all that is left.
             let half = |from: f64, to: f64| 0.5 * (from + to);
             let start = if is_loop || i > 1 {
                 half(arc_mm[i], before_mm(i))
@@ -269,7 +270,7 @@ impl PlanModel {
         }
     }
 
-    /// What `plan` makes of each station.
+    /// Walls and joints that `plan` makes of each station.
     pub fn meetings(&self, plan: &LatticePlan) -> Vec<Meeting> {
         let mut position = vec![0; self.assembly.n_parts];
         plan.steps
@@ -304,17 +305,17 @@ impl PlanModel {
         [self.seams[station].a, self.seams[station].b]
     }
 
-    /// The ends of the station's seam, mm; the same point twice where it is a loop.
+    /// Ends of the station's seam, mm; the same point twice for a loop.
     pub fn seam_ends(&self, station: usize) -> [Vec3; 2] {
         self.seams[station].ends
     }
 
-    /// The place of a station on the outer surface, mm.
+    /// Position of a station on the outer surface, mm.
     pub fn place_of(&self, station: usize) -> Vec3 {
         self.assembly.points[self.assembly.stations[station].points[0] as usize]
     }
 
-    /// The volume metric's solver.
+    /// Solver of the volume metric.
     pub fn volume_model(&self) -> Result<VolumeModel, VolumeError> {
         let MetricParams {
             wall_mm, material, ..
@@ -327,14 +328,14 @@ impl PlanModel {
         VolumeModel::new(&params, &self.assembly)
     }
 
-    /// The surface metric's solver.
+    /// Solver of the surface metric.
     pub fn surface_model(&self) -> Result<SurfaceModel, SparseError> {
         SurfaceModel::new(&self.params.surface(), &self.assembly)
     }
 }
 
-/// Splits edges of seams that have fewer than three, the longest first: two stations are the least that hold
-/// a turn.
+/// Splits edges of seams that have fewer than three, the longest first: a seam needs at least two stations to
+/// resist a turn.
 fn split_short_seams(coarse: &mut Remeshed) {
     const LEAST_EDGES: usize = 3;
     let topology = Topology::of_mesh(&coarse.mesh).expect("a remeshed surface is closed");
@@ -363,7 +364,7 @@ fn split_short_seams(coarse: &mut Remeshed) {
     }
 }
 
-/// Puts point `middle` on the edge between `u` and `v`: each triangle at it becomes two.
+/// Inserts point `middle` into the edge between `u` and `v`: each triangle at the edge becomes two.
 fn split_edge(coarse: &mut Remeshed, u: u32, v: u32, middle: u32) {
     for i in 0..coarse.mesh.triangles.len() {
         let triangle = coarse.mesh.triangles[i];
@@ -378,7 +379,7 @@ fn split_edge(coarse: &mut Remeshed, u: u32, v: u32, middle: u32) {
     }
 }
 
-/// The parts' own points in order: by part, then by point of `mesh`.
+/// Pairs of part and point of `mesh`, in the order in which parts number their own points.
 fn copies(mesh: &TriMesh, labels: &[u32]) -> Vec<(u32, u32)> {
     let mut copies: Vec<(u32, u32)> = mesh
         .triangles
@@ -410,15 +411,14 @@ fn parts(mesh: &TriMesh, labels: &[u32], n_parts: usize) -> ShellAssembly {
     }
 }
 
-/// Least cosine between a point's normal and those of its triangles, so that a wall stands on each.
+/// Least cosine between a point's normal and those of its triangles, so that a wall can be built on each.
 const LEAST_COSINE: f64 = 0.2;
 
-/// The mesh with points moved towards their neighbours where triangles fold so sharply that no wall stands on
-/// them.
+/// Moves points towards their neighbours where triangles fold so sharply that no wall can be built on them.
 ///
 /// At ears and in ditches narrower than an edge a coarse mesh has a few such points in two thousand.
 fn relaxed(mut mesh: TriMesh) -> TriMesh {
-    /// Most folds are gone after two rounds.
+    /// Greatest number of rounds; most folds are gone after two.
     const MOST_ROUNDS: usize = 50;
     for _ in 0..MOST_ROUNDS {
         let normals = point_normals(&mesh);
@@ -437,7 +437,7 @@ fn relaxed(mut mesh: TriMesh) -> TriMesh {
             .iter()
             .flat_map(|&f| mesh.triangles[f])
             .for_each(|v| is_moved[v as usize] = true);
-        // Of each point the sum of itself and its neighbours, which the triangles around name twice, and
+        // For each point the sum of itself and its neighbours, which the triangles around name twice, and
         // their number.
         let mut sums: Vec<(Vec3, f64)> = mesh.points.iter().map(|p| (2.0 * *p, 2.0)).collect();
         for t in &mesh.triangles {
@@ -462,10 +462,11 @@ fn relaxed(mut mesh: TriMesh) -> TriMesh {
 /// Outward unit normals: the mean of the triangles by area, turned until every triangle at the point is seen
 /// from outside.
 ///
-/// At ears and folds the mean may lie along a triangle, and no wall would stand on it. Where no direction
+/// At ears and folds the mean may lie along a triangle, and no wall could be built on it. Where no direction
 /// sees all of a point's triangles, the last one tried is kept.
 fn point_normals(mesh: &TriMesh) -> Vec<Vec3> {
-    /// A turn adds the worst triangle's normal (the perceptron's rule, which ends where there is an answer).
+    /// Greatest number of turns. Each adds the worst triangle's normal: the perceptron's rule, which ends if
+    /// a solution exists.
     const MOST_TURNS: usize = 100;
     let mut normals = vec![Vec3::ZERO; mesh.points.len()];
     let mut around: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.points.len()];

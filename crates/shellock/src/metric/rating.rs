@@ -1,11 +1,11 @@
-//! What plans bear: goals in ranks, and as much of them solved as is asked for.
+//! Load factors of plans: goals in ranks, solved only as far as needed.
 //!
 //! ```text
 //!   rank    goals                                        enough
-//!   use     presses, grips, the fall onto its feet       ENOUGH times the load
+//!   use     presses, grips, the fall onto the feet       ENOUGH times the load
 //!   pull    the separation force on all seams            there is no enough
 //!   fall    falls onto any side                          ENOUGH times the load
-//!   hang    its weight, held at one piece                ENOUGH times the load: all plans bear it several times
+//!   hang    the weight, held at one piece                ENOUGH times the load, exceeded several times
 //! ```
 
 use rayon::prelude::*;
@@ -17,19 +17,19 @@ use super::PlanModel;
 use crate::handling::{Borne, Deed, Handling, LoadCase, borne, load_cases};
 use crate::plan::{LatticePlan, RankedPlan};
 
-/// Loads that are borne that many times over are not worth a move.
+/// Load factor above which a further increase is not worth a move.
 pub const ENOUGH: f64 = 1.5;
 
-/// What goals are for, most important first.
+/// Ranks of goals, most important first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Rank {
-    /// What people do to a kit.
+    /// Ordinary use of a kit by people.
     Use,
-    /// How little seams open when all are pulled apart.
+    /// Small openings of the seams when all are pulled apart.
     Pull,
-    /// What happens once in a while; what lands on an ear or a tail hardly any plan bears.
+    /// Rare falls onto any side; hardly any plan withstands those onto an ear or a tail.
     Fall,
-    /// Its own weight.
+    /// The kit's own weight.
     Hang,
 }
 
@@ -42,33 +42,33 @@ impl Rank {
         }
     }
 
-    /// What is more than this counts as this.
+    /// Load factor above which all values count as equal; infinite for the pull.
     pub fn enough(self) -> f64 {
         if self == Self::Pull { f64::INFINITY } else { ENOUGH }
     }
 }
 
-/// The loads on one division and what solves them.
+/// The loads on one division of the model, and their solvers.
 pub struct Bench<'a> {
     pub(super) model: &'a PlanModel,
     pub(super) surface: SurfaceModel,
-    /// What is done.
+    /// Loads, which are the first goals.
     pub cases: Vec<LoadCase>,
     drifts: Vec<Drift>,
     strength_mpa: f64,
-    /// Of each goal: the cases, then the pull.
+    /// Rank of each goal: the cases, then the pull.
     pub(super) ranks: Vec<Rank>,
 }
 
-/// A plan and how much of each load it bears.
+/// A plan and its load factors.
 #[derive(Clone)]
 pub struct Rated<'a> {
-    /// With its costs.
+    /// The plan with its costs.
     pub ranked: RankedPlan,
-    /// What it makes of each station.
+    /// Walls and joints that the plan makes of each station.
     pub meetings: Vec<Meeting>,
     bench: &'a Bench<'a>,
-    /// Of each goal that was asked for.
+    /// Answer to each goal that was solved.
     answers: Vec<Option<Answer>>,
     joined: JoinedParts<'a>,
 }
@@ -80,12 +80,12 @@ struct Answer {
 }
 
 impl<'a> Bench<'a> {
-    /// Loads of `handling` on the pieces of `model`.
+    /// Prepares the loads of `handling` on the pieces of `model`.
     pub fn new(handling: &Handling, model: &'a PlanModel) -> Result<Self, SparseError> {
         Self::of(handling, model, load_cases(handling, &model.assembly))
     }
 
-    /// Those of its loads alone that people put on a kit.
+    /// Prepares only the loads of ordinary use.
     pub(super) fn of_uses(handling: &Handling, model: &'a PlanModel) -> Result<Self, SparseError> {
         let mut cases = load_cases(handling, &model.assembly);
         cases.retain(|c| Rank::of(&c.deed) == Rank::Use);
@@ -113,7 +113,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The least load factor of what people do to a kit of that plan: its score.
+    /// Least load factor of a plan in use, which is its score.
     pub fn least_use(&self, plan: &LatticePlan) -> Result<f64, SparseError> {
         let meetings = self.model.meetings(plan);
         let joined = self.surface.joined(&meetings)?;
@@ -129,7 +129,7 @@ impl<'a> Bench<'a> {
         .try_fold(f64::INFINITY, |least, factor| Ok(least.min(factor?)))
     }
 
-    /// All goals of a plan.
+    /// Solves all goals of a plan.
     pub fn rated(&self, ranked: RankedPlan) -> Result<Rated<'_>, SparseError> {
         let mut rated = self.begun(ranked, None)?;
         for goal in 0..self.ranks.len() {
@@ -138,7 +138,7 @@ impl<'a> Bench<'a> {
         Ok(rated)
     }
 
-    /// A plan of which nothing is asked yet; beginning `from` one that is nearly the same.
+    /// A plan with no goal solved yet; starts `from` a similar plan, if given.
     pub(super) fn begun<'b>(
         &'b self,
         ranked: RankedPlan,
@@ -155,14 +155,14 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The goals of a rank.
+    /// Indices of the goals of a rank.
     pub(super) fn goals(&self, rank: Rank) -> Vec<usize> {
         (0..self.ranks.len()).filter(|g| self.ranks[*g] == rank).collect()
     }
 }
 
 impl<'b> Rated<'b> {
-    /// The least load factor of what people do to it; infinite where nothing gives way.
+    /// Least load factor in use; infinite where nothing fails.
     pub fn least(&self) -> f64 {
         let uses = self.bench.goals(Rank::Use);
         uses.into_iter()
@@ -170,8 +170,7 @@ impl<'b> Rated<'b> {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// How much it bears of each load, in the order of the bench's cases; without end where that was not
-    /// asked.
+    /// Load factors of the plan, in the order of the bench's cases; infinite for those not solved.
     pub fn borne(&self) -> Vec<Borne> {
         (0..self.bench.cases.len())
             .map(|goal| self.answer(goal))
@@ -182,18 +181,18 @@ impl<'b> Rated<'b> {
         self.answers[goal].as_ref().map_or(Borne::ANY, |a| a.borne)
     }
 
-    /// The load factor of a goal; infinite where it was not asked.
+    /// Load factor of a goal; infinite where it was not solved.
     pub(super) fn factor(&self, goal: usize) -> f64 {
         self.answer(goal).factor
     }
 
-    /// Where it gives way first under a goal.
+    /// Station of the first failure under a goal.
     pub(super) fn station(&self, goal: usize) -> Option<u32> {
         self.answer(goal).first.map(|f| f.1)
     }
 
-    /// Asks for a goal; what was asked already is not solved again. `like` is a plan that is nearly the same.
-    /// Whether anything was solved.
+    /// Solves a goal, unless already solved; returns true if it was solved now. The solution starts from that
+    /// of `like`, a similar plan.
     pub(super) fn ask(&mut self, goal: usize, like: Option<&Rated<'b>>) -> Result<bool, SparseError> {
         if self.answers[goal].is_some() {
             return Ok(false);
@@ -214,12 +213,12 @@ impl<'b> Rated<'b> {
         Ok(true)
     }
 
-    /// The least load factor of a rank.
+    /// Least load factor of a rank.
     pub(super) fn least_of(&self, rank: Rank) -> f64 {
         self.factors(rank).first().copied().unwrap_or(f64::INFINITY)
     }
 
-    /// Load factors of a rank, the least first; what is more than enough counts as enough.
+    /// Load factors of a rank, ascending; each is capped at the value that is enough.
     pub(super) fn factors(&self, rank: Rank) -> Vec<f64> {
         let capped = |g| self.factor(g).min(rank.enough());
         let mut factors: Vec<f64> = self.bench.goals(rank).into_iter().map(capped).collect();
@@ -227,14 +226,14 @@ impl<'b> Rated<'b> {
         factors
     }
 
-    /// How far each point of the outer surface goes under a case, mm.
+    /// Displacement of each point of the outer surface under a case, mm.
     pub(super) fn moved_mm(&self, case: usize) -> Result<Vec<Vec3>, SparseError> {
         let forces_n = &self.bench.cases[case].forces_n;
         let closed = self.answers[case].as_ref().map(|a| &a.closed);
         self.joined.moved_mm(forces_n, closed)
     }
 
-    /// Goals of a rank that are not met enough, worst first.
+    /// Goals of a rank with less than enough, worst first.
     pub(super) fn worst_first(&self, rank: Rank) -> Vec<usize> {
         let mut goals = self.bench.goals(rank);
         goals.retain(|g| self.factor(*g) < rank.enough());

@@ -149,7 +149,7 @@ fn a_piece_opens_no_farther_with_its_neighbours_held_than_free() {
 
 #[test]
 fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction() {
-    // Whatever holds a piece elsewhere: this is what the maximum of Eq. 6 hides.
+    // The openings do not depend on how a piece is held elsewhere: this is what the maximum of Eq. 6 hides.
     let model = octants();
     let tests = crate::plan::local_tests::LocalTests::simulate(&model.params.surface()).unwrap();
     let meetings = model.meetings(&plan(outwards));
@@ -167,7 +167,7 @@ fn the_published_metric_is_at_least_what_each_seam_opens_along_its_own_direction
     }
 }
 
-/// The plan that is chosen for `surface`, how it holds, and what is warned of at that.
+/// The plan that is chosen for `surface`, its resistance, and the warnings on the way.
 fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
     let ctx = Ctx::quiet();
     let (params, sizes) = (
@@ -207,7 +207,8 @@ fn chosen(surface: &SegmentedSurface) -> (FoundPlan, Holding, Vec<Warning>) {
     (found, holding, ctx.into_warnings())
 }
 
-/// What is shown of a kit is told of it, all of it moves, and no point goes far where nothing gives way.
+/// Asserts that pictures show reported loads, that all pieces move, and that no point goes far where nothing
+/// fails.
 fn check_deformed(holding: &Holding, deformed: &Deformed) {
     assert!(deformed.loads.iter().any(|l| l.told == Told::Feet));
     let n_points = deformed.surface.points.len();

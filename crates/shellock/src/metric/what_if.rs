@@ -1,4 +1,4 @@
-//! What a plan would bear with other connectors or walls: uses alone, by the surface model.
+//! Load factors of a plan with other connectors or walls: uses alone, by the surface model.
 
 use shellock_geom::sparse::SparseError;
 
@@ -9,7 +9,7 @@ use crate::handling::Handling;
 use crate::plan::{PlanParams, RankedPlan};
 use crate::{ConnectorSizes, SegmentedSurface};
 
-/// How much `plan` bears of each use with connectors of these sizes and walls as thick as `handling` and
+/// Load factors of `plan` in each use, with connectors of these sizes and walls as thick as `handling` and
 /// `params` say.
 pub fn bears_with(
     params: &PlanParams,

@@ -1,4 +1,4 @@
-//! Half connectors as volumes, and what is carved from them.
+//! Half connectors as volumes, and the swept volumes that are carved from them.
 
 use rayon::prelude::*;
 use shellock_geom::{Aabb, Vec3, Volume};
@@ -6,11 +6,11 @@ use shellock_geom::{Aabb, Vec3, Volume};
 use crate::connector::{ConnectorParams, Part, Run, RunStation, Section};
 use crate::{LatticeDirection, PatchId};
 
-/// The socket is grown by this much less than the clearance, mm: the channel's section already keeps the
-/// clearance, and faces that would coincide stay apart.
+/// Difference between the clearance and the growth of the socket, mm. The channel's section already keeps the
+/// clearance; the difference keeps faces from coinciding.
 const SOCKET_SLACK_MM: f64 = 0.01;
 
-/// Which half of a run, or what fills the corner between tongue and wall.
+/// One half of a run, or the filling of the corner between tongue and wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Half {
     Male,
@@ -21,8 +21,8 @@ pub(super) enum Half {
 /// The corners of one convex cell of a run.
 type Cell = [Vec3; 8];
 
-/// The corners of each part of one half's section, station by station. With `grown_mm`, every part is larger
-/// by that on all sides, lengthwise at the run's ends.
+/// Corners of each part of one half's section, station by station. Every part is grown by `grown_mm` on all
+/// sides, lengthwise at the run's ends.
 fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Vec<Option<[Vec3; 4]>>> {
     let last = run.stations.len() - 1;
     run.stations
@@ -54,7 +54,7 @@ fn rings(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
         .collect()
 }
 
-/// The convex cells of one half, grown: for each part of the section, one between each two stations.
+/// Convex cells of one half, grown by `grown_mm`: one for each part of the section between two stations.
 fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<Cell> {
     let mut cells = Vec::new();
     for pair in rings(params, run, half, grown_mm).windows(2) {
@@ -67,12 +67,12 @@ fn cells(params: &ConnectorParams, run: &Run, half: Half, grown_mm: f64) -> Vec<
     cells
 }
 
-/// One half of a run as it is before anything is carved.
+/// One half of a run, before carving.
 pub(super) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Volume {
     let rings = rings(params, run, half, 0.0);
     let n_parts = rings[0].len();
     let lofts = (0..n_parts).flat_map(|part| {
-        // A part that some sections lack gives several lofts.
+        // A part that some sections lack becomes several lofts.
         let line: Vec<Option<[Vec3; 4]>> = rings.iter().map(|r| r[part]).collect();
         let stretches: Vec<Volume> = line
             .split(Option::is_none)
@@ -83,7 +83,7 @@ pub(super) fn whole_half(params: &ConnectorParams, run: &Run, half: Half) -> Vol
     Volume::union_all(lofts.collect())
 }
 
-/// What a piece sweeps with its half connectors on its way out.
+/// Swept volume of a piece's half connectors on its way out.
 pub(super) struct SweptVolume {
     pub piece: PatchId,
     cells: Vec<(Cell, Aabb)>,
@@ -91,7 +91,7 @@ pub(super) struct SweptVolume {
 }
 
 impl SweptVolume {
-    /// The swept volume of all half connectors of `piece`.
+    /// Collects the swept volume of all half connectors of `piece`.
     pub(super) fn of(
         params: &ConnectorParams,
         runs: &[Run],
@@ -115,7 +115,7 @@ impl SweptVolume {
         }
     }
 
-    /// The parts of the swept volume that can meet `room`, each cut to the distances at which it does.
+    /// Parts of the swept volume that can meet `room`, each limited to the distances at which it does.
     fn meeting(&self, room: Aabb, far_mm: f64) -> Vec<Volume> {
         self.cells
             .iter()
@@ -131,7 +131,8 @@ impl SweptVolume {
     }
 }
 
-/// The least and greatest t in [0, `far_mm`] for which `moving + t·along` meets `room`.
+/// Least and greatest t in [0, `far_mm`] for which `moving + t·along` meets `room`; `None` where it never
+/// does.
 pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm: f64) -> Option<(f64, f64)> {
     let (mut from, mut to) = (0.0f64, far_mm);
     for axis in 0..3 {
@@ -153,7 +154,7 @@ pub(super) fn distances_that_meet(moving: Aabb, along: Vec3, room: Aabb, far_mm:
     (from <= to).then_some((from, to))
 }
 
-/// `volume` less everything that `swept_volumes` sweep through it.
+/// Subtracts from `volume` all that the `swept_volumes` sweep through it.
 pub(super) fn carved<'a>(
     volume: &Volume,
     swept_volumes: impl IntoIterator<Item = &'a SweptVolume>,

@@ -1,4 +1,4 @@
-//! From bodies and runs to printable meshes.
+//! Finishing: from bodies and runs to printable meshes.
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
@@ -20,15 +20,15 @@ use crate::key::Turn;
 use crate::plan::LatticePlan;
 use crate::{Cancelled, Cause, Ctx, IdVec, PatchId, Warning};
 
-/// How far connectors reach into the wall they hang from, mm.
+/// Depth to which connectors reach into the wall they hang from, mm.
 const ROOT_MM: f64 = 0.4;
-/// A run of which less than this share of either half survives the carving is given up, both halves.
+/// Least share of either half that must survive the carving; below, both halves of the run are given up.
 const LEAST_KEPT: f64 = 0.25;
 
-/// Ribs stay so far off the rim, mm.
+/// Distance of ribs from the rim, mm.
 const RIB_MARGIN_MM: f64 = 0.1;
 
-/// How one run came out.
+/// Result of carving one run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FinishedJoint {
     /// The piece with the pin.
@@ -41,31 +41,31 @@ pub struct FinishedJoint {
     pub volume_mm3: [f64; 2],
     /// Share of each half that survived the carving, in [0, 1].
     pub kept: [f64; 2],
-    /// Its middle.
+    /// Middle of the run.
     pub at: Vec3,
-    /// Whether it is a rail of the key.
+    /// True if the run is a rail of the key.
     pub is_rail: bool,
 }
 
-/// The finished pieces.
+/// The finished pieces, ready to print.
 pub struct Finished {
     /// One closed mesh a piece, turned, with coordinates that 32-bit floats hold.
     pub meshes: IdVec<PatchId, TriMesh>,
     /// One joint a run.
     pub joints: Vec<FinishedJoint>,
-    /// What presses on the key's way in, on purpose.
+    /// Features that press on purpose on the key's way in.
     pub press_fits: Vec<PressFit>,
 }
 
-/// Why a piece could not be finished.
+/// Reason why a piece could not be finished.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PieceError {
-    /// Its surface cannot be written.
+    /// The piece's surface cannot be written.
     #[error("piece {piece}: {reason}")]
     NotPrintable {
-        /// The piece.
+        /// The piece that cannot be written.
         piece: PatchId,
-        /// What is wrong with it.
+        /// The defect of its surface.
         reason: NotPrintable,
     },
     /// The user asked to stop.
@@ -73,31 +73,31 @@ pub enum PieceError {
     Cancelled(#[from] Cancelled),
 }
 
-/// How pieces are finished.
+/// Parameters of finishing pieces.
 pub struct FinishParams<'a> {
-    /// Profiles and clearances.
+    /// Profiles and clearances of connectors.
     pub connector: &'a ConnectorParams,
     /// Least gaps of the finished pieces.
     pub relief: Relief,
-    /// Ribs stay so far below the model's surface, mm.
+    /// Least depth of ribs below the model's surface, mm.
     pub rim_mm: f64,
-    /// The notch that the key is to have.
+    /// The notch for the key, if one is wanted.
     pub grip: Option<Grip>,
-    /// How numbers are engraved, if they are: the first piece to go in is 1.
+    /// Parameters of engraved numbers, if wanted: the first-installed piece is 1.
     pub label: Option<LabelParams>,
-    /// How meshes are turned at last, before they are rounded.
+    /// Final rotation of the meshes, before coordinates are rounded.
     pub turn: Turn,
 }
 
-/// Both halves of a run while they are carved.
+/// Both halves of a run while they are being carved: volumes before carving, mm³, and carved shapes.
 #[derive(Clone)]
 struct Halves {
     raw: [f64; 2],
     carved: [Volume; 2],
 }
 
-/// Carves every half connector in the order of taking apart and joins it to its body; takes off what is too
-/// near to others; a key gets its detents and its notch, every piece its number.
+/// Carves every half connector in the disassembly sequence and joins it to its body. Cuts off what comes too
+/// near to other pieces. Gives a key its detents and its notch, and every piece its number.
 pub fn make(
     ctx: &Ctx,
     finish: &FinishParams<'_>,
@@ -145,7 +145,7 @@ pub fn make(
     })
 }
 
-/// Both halves of each run, carved in the order of taking apart.
+/// Carves both halves of each run in the disassembly sequence.
 fn carved_halves(
     ctx: &Ctx,
     params: &ConnectorParams,
@@ -186,7 +186,7 @@ fn carved_halves(
             if h == 1 {
                 return (whole.volume(), carved(&free, &swept_volumes, far_mm));
             }
-            // A corner ends where its wall does: the field of what obstructs is too coarse there, and the other
+            // A corner ends where its wall does. The field of obstructions is too coarse there, and the other
             // wall's way, with the clearance of connectors around it, too wide.
             let is_partner = |w: &&SweptVolume| w.piece == runs[r].female;
             let pin = carved(&free, swept_volumes.iter().filter(is_partner), far_mm);
@@ -205,7 +205,7 @@ fn carved_halves(
     Ok(halves)
 }
 
-/// The notch, or a word why there is none.
+/// The notch; warns where there is none.
 fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Change> {
     let cut = notch(grip, &shell.bodies[grip.key].to_mesh());
     if cut.is_none() {
@@ -218,15 +218,15 @@ fn notch_or_warning(ctx: &Ctx, grip: &Grip, shell: &ShellBodies) -> Option<Chang
     cut
 }
 
-/// Where the half connectors of one piece may be.
+/// Room for the half connectors of one piece.
 struct Room<'a> {
     grid: &'a ShellGrid,
     clearance_mm: f32,
-    /// How far the piece stays away from the cuts, mm, on all nodes.
+    /// Distance that the piece keeps from the cuts, mm, on all nodes.
     gap_mm: &'a [f32],
-    /// Positive where the piece may not be: what its way out or a later piece's takes.
+    /// Field that is positive where the piece may not be: in its way out or in a later piece's.
     blocked: Vec<f32>,
-    /// Positive on its own side of the cuts.
+    /// Field that is positive on the piece's own side of the cuts.
     side: Vec<f32>,
 }
 
@@ -246,7 +246,7 @@ impl<'a> Room<'a> {
         }
     }
 
-    /// Where `field` is positive around `whole`.
+    /// The region around `whole` where `field` is positive.
     fn region(&self, whole: &Volume, field: &dyn Fn(usize) -> f32) -> Volume {
         let (part, nodes) = self
             .grid
@@ -256,12 +256,12 @@ impl<'a> Room<'a> {
         Volume::from_closed_mesh(&contour(&part, &field, OffBand::Outside)).expect("contours are manifold")
     }
 
-    /// Connectors reach so near to the outer surface, mm below it.
+    /// Least depth of connectors below the outer surface, mm.
     fn ceiling(&self) -> f32 {
         (self.grid.thickness_mm - ROOT_MM) as f32
     }
 
-    /// What fills the corners of a run's tongue where it has room, as far off the cuts as the wall.
+    /// Filling of the corners of a run's tongue where the tongue has room, as far off the cuts as the wall.
     fn corner(&self, params: &ConnectorParams, run: &Run) -> Volume {
         let has_tongue: Vec<bool> = run
             .stations
@@ -291,7 +291,7 @@ impl<'a> Room<'a> {
         }))
     }
 
-    /// Whether a tongue has room in its middle, on both sides of the seam.
+    /// Returns true if a tongue has room in its middle, on both sides of the seam.
     fn has_tongue(&self, params: &ConnectorParams, station: &RunStation) -> bool {
         let section = Section::at(params, station);
         let (Some(_), Some(tongue)) = (section.corner, section.male[0]) else {
@@ -308,20 +308,19 @@ impl<'a> Room<'a> {
             .all(|share| is_free(share * tongue.s0))
     }
 
-    /// What of `whole` has room: below the wall, a root's depth into it, `clearance_mm` away from what is
-    /// blocked, and as far off what other pieces have of the wall: below the wall by that, or so far on the
-    /// piece's own side of the cuts.
+    /// The part of `whole` that has room. It lies below the wall or a root's depth within it, and
+    /// `clearance_mm` away from obstructions. From the wall of other pieces it keeps the same distance: below
+    /// the wall by that much, or on the piece's own side of the cuts by the gap.
     ///
-    /// A body's edge along the inner end of a seam is sharp. The one field of what obstructs the piece rounds it
-    /// off by up to a third of a cell, more than the clearance; two smooth ones, united after they are
-    /// contoured, keep it. (Filling the angle in one field instead takes the connectors of narrow cavities
-    /// away.)
+    /// A body's edge along the inner end of a seam is sharp. The single field of obstructions rounds it off
+    /// by up to a third of a cell, more than the clearance. Two smooth fields, united after contouring, keep
+    /// the edge. (Filling the angle in one field instead removes the connectors of narrow cavities.)
     fn cut(&self, whole: &Volume) -> Volume {
         let region = |field: &dyn Fn(usize) -> f32| self.region(whole, field);
         let (ceiling, floor) = (self.ceiling(), self.grid.thickness_mm as f32 + self.clearance_mm);
         let depth = &self.grid.depth;
         let cell = self.grid.band.cell_mm() as f32;
-        // A piece's wall reaches to its gap, so what hangs from it does, too: slots between the two would fuse.
+        // A piece's wall reaches to its gap, so its connectors must too: slots between the two would fuse.
         let away = |n: usize| {
             let below = ((depth[n] - floor) / cell).clamp(0.0, 1.0);
             self.gap_mm[n] + (self.clearance_mm - self.gap_mm[n]).max(0.0) * below
@@ -356,7 +355,7 @@ fn joint(run: &Run, halves: &Halves) -> FinishedJoint {
     }
 }
 
-/// The bodies with what hangs from them.
+/// Unites the bodies with the half connectors that were kept.
 fn joined(shell: &ShellBodies, joints: &[FinishedJoint], halves: &[Halves]) -> IdVec<PatchId, Volume> {
     let ids: Vec<PatchId> = shell.bodies.ids().collect();
     let pieces: Vec<Volume> = ids
@@ -377,7 +376,7 @@ fn joined(shell: &ShellBodies, joints: &[FinishedJoint], halves: &[Halves]) -> I
     pieces.into_iter().collect()
 }
 
-/// Ribs around a key that slides on no rails, or a word that there is no place for any.
+/// Ribs around a key that slides on no rails; warns where there is no place for any.
 fn ribs_of_key(
     ctx: &Ctx,
     interference_mm: f64,
@@ -402,7 +401,7 @@ fn ribs_of_key(
         others
             .triangles
             .extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
-        // Where one cannot be measured no rib is known to fit.
+        // If one piece cannot be measured, no rib is known to fit.
         shapes = shapes.zip(Solid::new(mesh).ok()).map(|(mut shapes, solid)| {
             shapes.push(Shape::new(&solid));
             shapes
@@ -432,7 +431,7 @@ fn ribs_of_key(
     made
 }
 
-/// The pieces with all changes and their numbers as meshes that can be written.
+/// Applies all changes and numbers to the pieces, and makes meshes that can be written.
 fn printed(
     ctx: &Ctx,
     finish: &FinishParams<'_>,
@@ -458,7 +457,7 @@ fn printed(
                 .as_ref()
                 .and_then(|params| label::cut(params, grid, plan.position(q) + 1, &piece));
             let printable = |piece: &Volume| printable_body(&finish.turn.volume(piece));
-            // A number is worth less than a piece that can be written.
+            // A number matters less than a piece that can be written.
             let numbered = number.and_then(|cut| printable(&piece.subtract(&cut)).ok());
             let has_number = numbered.is_some();
             let mesh = numbered.map_or_else(|| printable(&piece), Ok);
@@ -483,7 +482,7 @@ fn printed(
     Ok(meshes.into_iter().map(|made| made.0).collect())
 }
 
-/// Says which pieces carry no number.
+/// Warns of the pieces without a number.
 fn warn_of_missing_numbers(ctx: &Ctx, pieces: Vec<PatchId>) {
     if pieces.is_empty() {
         return;

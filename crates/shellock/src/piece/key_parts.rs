@@ -1,4 +1,4 @@
-//! What only keys have: detents that click, and a notch to pull at.
+//! Features of keys alone: detents that click, and a notch to pull at.
 
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::{TriMesh, Vec3, Volume};
@@ -7,45 +7,45 @@ use crate::PatchId;
 use crate::connector::{ConnectorParams, Run, RunStation, Section};
 use crate::{PressFit, PressFitKind};
 
-/// Where on a rail the detent sits, mm from its back end, so that it presses on the last millimetres of the
-/// way alone; half its length at its foot and at its top.
+/// Position of the detent on a rail, mm from its back end, so that it presses only on the last millimetres of
+/// the way; half its length at the foot and at the top.
 const AT_MM: f64 = 1.3;
 const FOOT_MM: f64 = 0.9;
 const TOP_MM: f64 = 0.3;
-/// How far its foot stands in the tongue, and how much larger the dimple is, mm.
+/// Depth of the bump's foot in the tongue, and excess size of the dimple, mm.
 const ROOT_MM: f64 = 0.2;
 const PLAY_MM: f64 = 0.08;
-/// A notch is as deep, mm, as the verification does not yet take for a hole.
+/// Depth of a notch, mm: as deep as possible without the verification taking it for a hole.
 const NOTCH_MM: f64 = crate::verify::limits::WIDEST_HALF_GAP_MM;
-/// Half its length along the slide, and its width.
+/// Half the notch's length along the slide, and its width, mm.
 const NOTCH_HALF_MM: f64 = 1.6;
 const NOTCH_WIDTH_MM: f64 = 12.0;
-/// The surface is looked for up to so far above and below the notch's middle, mm.
+/// Distance above and below the notch's middle in which the surface is looked for, mm.
 const NOTCH_LOOK_MM: f64 = 2.0;
-/// The surface below a notch is uneven by less than this, mm.
+/// Greatest unevenness of the surface below a notch, mm.
 const NOTCH_UNEVEN_MM: f64 = 0.4;
 
 /// A notch for a fingernail across the key's outer surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
-    /// The key.
+    /// The key that gets the notch.
     pub key: PatchId,
     /// Middle of the notch, near the surface.
     pub at: Vec3,
     /// Unit vector along which the key is pulled.
     pub slide: Vec3,
-    /// Outward unit normal of its plane.
+    /// Outward unit normal of the key's plane.
     pub normal: Vec3,
 }
 
-/// Something added to a piece or cut from it.
+/// A volume added to a piece or cut from it.
 pub(super) struct Change {
     pub piece: PatchId,
     pub volume: Volume,
     pub is_added: bool,
 }
 
-/// Bumps and dimples of the rails among `runs`, where the parameters want any.
+/// Bumps and dimples of the rails among `runs`; none where `detent_mm` is 0.
 pub(super) fn detents(params: &ConnectorParams, runs: &[Run]) -> (Vec<PressFit>, Vec<Change>) {
     let (mut made, mut changes) = (Vec::new(), Vec::new());
     for run in runs.iter().filter(|r| params.detent_mm > 0.0 && r.is_rail()) {
@@ -92,10 +92,10 @@ fn wedge(station: &RunStation, [foot, top]: [f64; 2], [s0, s1]: [f64; 2], play_m
     Volume::hull(&points)
 }
 
-/// The notch, to be cut from the key whose body is `body`; `None` where the surface is too uneven for one.
+/// The notch, as a cut from the key with the body `body`; `None` where the surface is too uneven.
 pub(super) fn notch(grip: &Grip, body: &TriMesh) -> Option<Change> {
     let across = grip.normal.cross(grip.slide);
-    // Seen from outside, all over the place of the notch.
+    // Heights of the surface, seen from outside, all over the place of the notch.
     let surface = TriangleBvh::new(body);
     let height = |along: f64, aside: f64| {
         let from = grip.at + along * grip.slide + aside * across + NOTCH_LOOK_MM * grip.normal;
@@ -113,7 +113,7 @@ pub(super) fn notch(grip: &Grip, body: &TriMesh) -> Option<Change> {
     if highest - lowest > NOTCH_UNEVEN_MM {
         return None;
     }
-    // Deepest in front, where the nail pushes; running out towards the back.
+    // The notch is deepest in front, where the nail pushes, and runs out towards the back.
     let mut points = Vec::new();
     for (along, height) in [
         (NOTCH_HALF_MM, lowest - NOTCH_MM),
@@ -196,14 +196,14 @@ mod tests {
         let cut = notch(&grip, &plate(0.0)).unwrap();
         assert!((cut.volume.bounds().min.z + NOTCH_MM).abs() < 1e-9 && !cut.is_added);
         assert!(notch(&grip, &plate(0.3)).is_none());
-        // As coarse as a plane can be.
+        // A plane with as few triangles as possible.
         let corners = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
         let coarse = TriMesh {
             points: corners.into(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
         assert!(notch(&grip, &coarse).is_some());
-        // The notch reaches over the plate's edge.
+        // This notch reaches over the plate's edge.
         assert!(
             notch(
                 &Grip {

@@ -1,5 +1,4 @@
-//! The number of each piece, engraved on the inner side of its wall, where nobody sees it once the thing
-//! stands.
+//! Piece numbers, engraved on the inner side of the wall, where nobody sees them once the model is assembled.
 //!
 //! ```text
 //!        ┌┐  ┌┐  ┌┐        strokes about as deep everywhere, whatever the wall's curvature
@@ -8,9 +7,9 @@
 //!   ────────────────────   outer side
 //! ```
 //!
-//! A place is good where rays from the cavity meet nothing but the inner side, close to a plane, and pass
-//! through the whole wall behind it: that keeps numbers off connectors, seams, notches and carved walls. The
-//! largest size that has a good place is taken, as near to the middle of the wall as it goes.
+//! A place is suitable where rays from the cavity meet only the inner side, close to a plane, and pass
+//! through the whole wall behind it. That keeps numbers off connectors, seams, notches and carved walls. The
+//! largest size with a suitable place is taken, as near to the middle of the wall as possible.
 
 mod digits;
 
@@ -21,14 +20,14 @@ use crate::body::ShellGrid;
 use crate::params::ParamProblem;
 use digits::Drawing;
 
-/// How numbers are engraved. Lengths in mm.
+/// Parameters of engraved numbers. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LabelParams {
-    /// Depth of the strokes. [0.1, 1]; 0.4, which shows in every process, as two layers of filament do.
+    /// Depth of the strokes. [0.1, 1]; 0.4, visible in every process, as two layers of filament are.
     pub depth_mm: f64,
     /// Width of the strokes. [0.4, 2]; 0.8: two lines of a 0.4 nozzle.
     pub stroke_mm: f64,
-    /// What is left of the wall, at least. [0.1, 5]; 0.8.
+    /// Least wall thickness left behind a stroke. [0.1, 5]; 0.8.
     pub least_wall_mm: f64,
 }
 
@@ -43,7 +42,7 @@ impl Default for LabelParams {
 }
 
 impl LabelParams {
-    /// Every parameter out of range.
+    /// Lists every parameter out of range.
     pub fn problems(&self) -> Vec<ParamProblem> {
         let checks = [
             ParamProblem::unless_within("depth of numbers", "mm", self.depth_mm, 0.1, 1.0),
@@ -56,36 +55,36 @@ impl LabelParams {
 
 /// Heights of digits that are tried, mm, largest first; below the last their loops would close.
 const HEIGHTS_MM: [f64; 4] = [8.0, 6.5, 5.2, 4.2];
-/// Free rim around a number, mm.
+/// Free margin around a number, mm.
 const RIM_MM: f64 = 1.2;
-/// Distance of the rays that look at a place, mm.
+/// Spacing of the rays that test a place, mm.
 const LOOK_MM: f64 = 0.9;
-/// Places that are tried lie about so far apart, mm.
+/// Approximate spacing of the places that are tried, mm.
 const SPACING_MM: f64 = 2.0;
-/// The wall's inner side is known to this, mm: a quarter of a cell and its decimation.
+/// Uncertainty of the wall's inner side, mm: a quarter of a cell and its decimation.
 const INNER_MM: f64 = 0.3;
-/// The surface leaves the plane of a number by less than this, mm.
+/// Greatest deviation of the surface from the plane of a number, mm.
 const UNEVEN_MM: f64 = 1.5;
 /// Least cosine between a number's normal and the surface's: strokes get steeper beyond 40°.
 const COS_STEEP: f64 = 0.766;
-/// Share of the thickness that the wall must have behind a number; it is thinner where it was carved.
+/// Share of the thickness that the wall must have behind a number; carved walls are thinner.
 const WHOLE_WALL: f64 = 0.85;
-/// Above the surface rays start and cutters end here, mm.
+/// Height above a number's plane at which rays start, mm; cutters end at half of it above the surface.
 const ABOVE_MM: f64 = 2.0;
-/// Strokes follow the surface to this, mm.
+/// Tolerance within which strokes follow the surface, mm.
 const FOLLOW_MM: f64 = 0.06;
-/// Shorter strokes are not divided, mm.
+/// Length below which strokes are not divided, mm.
 const SHORTEST_MM: f64 = 0.6;
-/// Directions in which a number may run: turned by so much, radians.
+/// Directions in which a number may run, as rotations in rad.
 const TURNS: [f64; 4] = [0.0, 0.5, -0.5, 1.57];
 
-/// What to cut from `piece` so that it carries its `number`; `None` where no place has room for it.
+/// The volume to cut from `piece` to engrave its `number`; `None` where no place has room for it.
 pub(super) fn cut(params: &LabelParams, grid: &ShellGrid, number: usize, piece: &Volume) -> Option<Volume> {
     let depth = |p: Vec3| grid.band.sample(&grid.depth, p);
     Wall::new(params, piece.to_mesh(), grid.thickness_mm, &depth).engraved(u32::try_from(number).ok()?)
 }
 
-/// A piece's wall as a number needs to know it.
+/// A piece's wall, with the data that placing a number needs.
 struct Wall<'a> {
     params: &'a LabelParams,
     mesh: TriMesh,
@@ -95,12 +94,12 @@ struct Wall<'a> {
     depth: &'a dyn Fn(Vec3) -> Option<f64>,
 }
 
-/// A plane in the cavity to write on: `right` and `up` as a reader in the cavity sees them.
+/// Writing plane in the cavity, with `right` and `up` as a reader in the cavity sees them.
 struct Sheet {
     corner: Vec3,
     right: Vec3,
     up: Vec3,
-    /// Out of the wall, into the cavity.
+    /// Unit normal out of the wall, into the cavity.
     normal: Vec3,
 }
 
@@ -172,7 +171,8 @@ impl<'a> Wall<'a> {
         (self.depth)(p).is_some_and(|d| (d - self.thickness_mm).abs() < INNER_MM)
     }
 
-    /// The sheet in the plane of `face` with the drawing in its middle, if the wall has room for it there.
+    /// A sheet in the plane of `face` with the drawing in its middle; `None` where the wall has no room for
+    /// it.
     fn sheet(&self, face: usize, turn: f64, drawing: &Drawing) -> Option<Sheet> {
         let normal = self.mesh.face_normal(face);
         // Numbers stand upright where the wall does.
@@ -192,7 +192,7 @@ impl<'a> Wall<'a> {
         let rim = RIM_MM + 0.5 * self.params.stroke_mm;
         let n = size.map(|side| ((side + 2.0 * rim) / LOOK_MM).ceil() as usize);
         let place = |axis: usize, i: usize| i as f64 / n[axis] as f64 * (size[axis] + 2.0 * rim) - rim;
-        // The corners first: most places that are bad are so there.
+        // The corners come first: most unsuitable places fail there.
         let ends = [[0, 0], [n[0], 0], [0, n[1]], [n[0], n[1]]];
         let all = (0..=n[0]).flat_map(|i| (0..=n[1]).map(move |j| [i, j]));
         let mut looks = ends
@@ -202,8 +202,8 @@ impl<'a> Wall<'a> {
         looks.all(|at| self.has_whole_wall(&sheet, at)).then_some(sheet)
     }
 
-    /// Whether the inner side lies below a place of the sheet, about parallel to it, with the whole wall
-    /// behind it.
+    /// Returns true if the inner side lies below a place of the sheet, about parallel to it, with the whole
+    /// wall behind it.
     fn has_whole_wall(&self, sheet: &Sheet, at: [f64; 2]) -> bool {
         let Some((face, height_mm)) = self.below(sheet, at) else {
             return false;
@@ -214,7 +214,7 @@ impl<'a> Wall<'a> {
         if !(is_flat && self.is_inner(point)) {
             return false;
         }
-        /// Behind the surface that was met, mm.
+        /// Distance behind the surface that was met, mm.
         const PAST_MM: f64 = 1e-3;
         let wall_mm = WHOLE_WALL * self.thickness_mm;
         self.bvh
@@ -222,14 +222,14 @@ impl<'a> Wall<'a> {
             .is_none()
     }
 
-    /// The first face below a place of the sheet, and its height over the sheet, mm.
+    /// First face below a place of the sheet, and its height over the sheet, mm.
     fn below(&self, sheet: &Sheet, at: [f64; 2]) -> Option<(usize, f64)> {
         let origin = sheet.at(at) + ABOVE_MM * sheet.normal;
         let (face, far_mm) = self.bvh.first_hit(origin, -sheet.normal, 2.0 * ABOVE_MM)?;
         Some((face as usize, ABOVE_MM - far_mm))
     }
 
-    /// The region that the strokes of `drawing` take off the wall.
+    /// Volume that the strokes of `drawing` cut from the wall.
     fn cutter(&self, drawing: &Drawing, sheet: &Sheet) -> Option<Volume> {
         let mut parts = Vec::new();
         for stroke in &drawing.strokes {
@@ -241,8 +241,8 @@ impl<'a> Wall<'a> {
         Some(Volume::union_all(parts)).filter(|cut| !cut.is_empty())
     }
 
-    /// Adds blocks along a straight stroke between two places with their heights; in halves where the surface
-    /// bends.
+    /// Adds blocks along a straight stroke between two places with their heights. Halves the stroke where the
+    /// surface bends.
     fn cut_along(&self, sheet: &Sheet, ends: [([f64; 2], f64); 2], parts: &mut Vec<Volume>) -> Option<()> {
         let [(a, height_a), (b, height_b)] = ends;
         let along = [b[0] - a[0], b[1] - a[1]];

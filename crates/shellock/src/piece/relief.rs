@@ -1,9 +1,9 @@
-//! Relief: what of a piece comes too near to another one on its way out is taken off.
+//! Relief: cuts off the parts of a piece that come too near to another one on its way out.
 //!
 //! Carving keeps the clearances wherever sampled fields are smooth. Where seams of three pieces meet, or a
-//! wall is crooked within a cell of the grid, they come out smaller in spots, and in the worst ones surfaces
-//! cross. So the exact gaps of the finished pieces are asked, and each triangle that a piece
-//! passes too near by is swollen by the clearance, drawn out against the piece's way, and cut from it.
+//! wall is crooked within a grid cell, clearances are too small in spots, and in the worst spots surfaces
+//! cross. Relief therefore measures the exact gaps of the finished pieces. Each triangle that a piece passes
+//! too near is grown by the clearance, swept against the piece's way, and cut from the piece.
 
 use rayon::prelude::*;
 use shellock_geom::clearance::{Passed, Translation, faces_passed};
@@ -13,33 +13,33 @@ use super::carve::distances_that_meet;
 use crate::plan::LatticePlan;
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Gaps smaller than wanted by up to this much stay, mm: sockets are half as much tighter by design, and what
-/// is cut must be worth it.
+/// Amount by which a gap may fall short without being cut, mm. Sockets are half as much tighter by design,
+/// and smaller cuts are not worth making.
 const TOLERANCE_MM: f64 = 0.0195;
-/// What is cut keeps this much less than the gap wanted, mm: faces that would coincide with a socket's stay
-/// apart.
+/// Amount by which cuts fall short of the wanted gap, mm, so that their faces do not coincide with a
+/// socket's.
 const SHY_MM: f64 = 0.005;
-/// Triangles within this of a plane, so parallel to it and together no larger are cut out as one.
+/// Limits within which triangles are cut out as one: distance from a plane, mm, cosine to it, and size, mm.
 const FLAT_MM: f64 = 0.02;
 const FLAT_COS: f64 = 0.97;
 const FLAT_SIZE_MM: f64 = 4.0;
 
-/// Least gaps, mm.
+/// Least gaps between finished pieces, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relief {
-    /// Between any two pieces.
+    /// Least gap between any two pieces, mm.
     pub gap_mm: f64,
-    /// Between the key and any other piece.
+    /// Least gap between the key and any other piece, mm.
     pub key_gap_mm: f64,
 }
 
-/// The surface of a piece.
+/// Surface mesh of a piece, with its bounding box.
 struct Skin {
     mesh: TriMesh,
     bounds: Aabb,
 }
 
-/// Takes off each of `pieces` what comes too near to an earlier-installed one on its way out.
+/// Cuts off the parts of each of `pieces` that come too near to an earlier-installed one on its way out.
 pub(super) fn relieve(
     ctx: &Ctx,
     params: &Relief,
@@ -71,7 +71,7 @@ pub(super) fn relieve(
     Ok(())
 }
 
-/// What must go of a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`.
+/// Volumes to cut from a piece so that it keeps `gap_mm` from an `earlier` one on its way `along`.
 fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
     if distances_that_meet(piece.bounds.grown(gap_mm), along, earlier.bounds, f64::INFINITY).is_none() {
         return Vec::new();
@@ -89,7 +89,7 @@ fn cuts(piece: &Skin, earlier: &Skin, along: Vec3, gap_mm: f64) -> Vec<Volume> {
     drawn_out.collect()
 }
 
-/// Triangles that lie about in a plane, and what passes them.
+/// Triangles in about one plane, and the bounding box of what passes them.
 struct Flat {
     normal: Vec3,
     corners: Vec<Vec3>,
@@ -97,8 +97,8 @@ struct Flat {
     passed_by: Aabb,
 }
 
-/// The passed triangles of `mesh`, those of about one plane together: carving leaves many slivers, and each
-/// alone would be cut out.
+/// Groups the passed triangles of `mesh` by plane: carving leaves many slivers, and each would otherwise be
+/// cut out alone.
 fn flats(mesh: &TriMesh, passed: &[Passed]) -> Vec<Flat> {
     let mut flats: Vec<Flat> = Vec::new();
     for p in passed {
@@ -131,7 +131,8 @@ fn flats(mesh: &TriMesh, passed: &[Passed]) -> Vec<Flat> {
 }
 
 impl Flat {
-    /// What it sweeps of that which passes it when it is swollen by `by_mm` and moves against `along`.
+    /// Volume swept by the triangles, grown by `by_mm` and moved against `along`, within the box that passes
+    /// them.
     fn drawn_out(&self, along: Vec3, by_mm: f64) -> Option<Volume> {
         let swollen = self.swollen(by_mm);
         let bounds = Aabb::around(swollen.iter().copied());
@@ -142,8 +143,9 @@ impl Flat {
         Some(Volume::hull(&ends.collect::<Vec<_>>()))
     }
 
-    /// Corners whose hull holds all points within `by_mm`: a prism along the normal over an octagon, two of whose
-    /// sides run along an edge. Few corners, as unions of what is drawn out cost most of the relief.
+    /// Corners whose hull contains all points within `by_mm`: a prism along the normal over an octagon, two
+    /// of whose sides run along an edge. Corners are few, since the unions of such sweeps cost most of the
+    /// relief.
     fn swollen(&self, by_mm: f64) -> Vec<Vec3> {
         let origin = self.corners[0];
         let (u, v) = self.axes();
@@ -169,8 +171,8 @@ impl Flat {
         octagon.into_iter().flat_map(corner).collect()
     }
 
-    /// Unit vectors in the plane, along and across an edge of the first triangle: that around which all corners
-    /// have the smallest rectangle.
+    /// Unit vectors in the plane, along and across an edge of the first triangle: the edge that gives all
+    /// corners the smallest bounding rectangle.
     fn axes(&self) -> (Vec3, Vec3) {
         let (other, _) = self.normal.any_orthonormal_pair();
         let edges = [[0, 1], [1, 2], [2, 0]].map(|[a, b]| self.corners[b] - self.corners[a]);
@@ -189,7 +191,7 @@ impl Flat {
             .expect("there is one at least")
     }
 
-    /// How far the corners reach along `d` from the first, mm.
+    /// Range of the corners along `d`, from the first corner, mm.
     fn range(&self, d: Vec3) -> [f64; 2] {
         let along = self.corners.iter().map(|p| (*p - self.corners[0]).dot(d));
         along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| {
@@ -240,8 +242,8 @@ mod tests {
         }
     }
 
-    /// A block below an overhang that its way out touches by 0.03 mm: it leaves past it at the gap that was
-    /// asked for.
+    /// A block below an overhang that its way out touches by 0.03 mm: after the cut it passes the overhang
+    /// with the wanted gap.
     #[test]
     fn what_was_too_near_on_the_way_keeps_the_gap_afterwards_and_the_rest_stays() {
         let skin = |volume: &Volume| Skin {

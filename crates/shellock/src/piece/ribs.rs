@@ -1,8 +1,8 @@
-//! Friction ribs: what holds a key that pulls out and has no rails to click on.
+//! Friction ribs, which hold a key that pulls out and has no rails to click on.
 //!
 //! A rib stands on the key's side of a seam or of a connector, below the rim, along the way out, and reaches
-//! a little farther than the other piece's side. Pressed in, the ribs are flattened or bend the walls, and
-//! their friction keeps the key in its seat.
+//! a little beyond the other piece's side. Pressed in, ribs are flattened or bend the walls, and their
+//! friction keeps the key in its seat.
 
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::clearance::{Scope, Shape, Translation, swept_gap};
@@ -12,51 +12,51 @@ use super::key_parts::Change;
 use crate::PatchId;
 use crate::{PressFit, PressFitKind};
 
-/// Length along the way out, mm; half its width at the foot and at the top; how far the foot stands in the
-/// key.
+/// Length of a rib along the way out, half its width at the foot and at the top, and the depth of its foot in
+/// the key, mm.
 const LENGTH_MM: f64 = 1.8;
 const FOOT_MM: f64 = 0.5;
 const TOP_MM: f64 = 0.15;
 const ROOT_MM: f64 = 0.2;
-/// Both ends run out over this length, mm.
+/// Length over which both ends taper, mm.
 const LEAD_MM: f64 = 0.5;
-/// At most so many, no two nearer than this, mm.
+/// Greatest number of ribs, and least distance between two, mm.
 const MOST: usize = 6;
 const APART_MM: f64 = 6.0;
-/// The side leans from the way out by at most this, as |n·s|.
+/// Greatest lean of the key's side from the way out, as |n·s|.
 const MOST_ACROSS: f64 = 0.2;
-/// The other side is this near, mm; at a rib's corners it is nearer than at its middle, and farther, by at
-/// most these.
+/// Greatest gap to the other side, mm, and the amounts by which the gap at a rib's corners may be smaller or
+/// larger than at its middle.
 const WIDEST_GAP_MM: f64 = 0.4;
 const NEARER_MM: f64 = 0.02;
 const FARTHER_MM: f64 = 0.1;
-/// A rib that crosses a piece anywhere on its way by so much more than it is to press stands in the wrong
-/// place, mm.
+/// Amount beyond its interference by which a rib may cross a piece on its way, mm; beyond that its place is
+/// unsuitable.
 const DEEPER_MM: f64 = 0.02;
-/// Places that are measured exactly, at most.
+/// Greatest number of places that are measured exactly.
 const MOST_MEASURED: usize = 60;
-/// The way on which a rib rubs is measured in such steps, up to this, mm.
+/// Step and greatest length of the way over which rubbing is measured, mm.
 const TRAVEL_STEP_MM: f64 = 0.5;
 const MOST_TRAVEL_MM: f64 = 100.0;
-/// A side is looked at in places so far apart, mm.
+/// Spacing of the places tried on a side, mm.
 const STEP_MM: f64 = 0.8;
 
-/// What a rib needs to know of its surroundings.
+/// Surroundings of the ribs: the key and all other pieces.
 pub(super) struct Seat<'a> {
-    /// The key, and its finished mesh.
+    /// The key and its finished mesh.
     pub key: PatchId,
     pub mesh: &'a TriMesh,
     /// All other pieces, for rays.
     pub others: &'a TriangleBvh,
-    /// The same, one by one, for exact gaps.
+    /// Shapes of all other pieces, one each, for exact gaps.
     pub shapes: &'a [Shape],
-    /// Unit vector of the way out.
+    /// Unit vector of the key's way out.
     pub along: Vec3,
-    /// Least depth below the model's surface, mm: what lies higher is rim.
+    /// Least depth below the model's surface, mm; above it is the rim.
     pub least_depth_mm: f64,
 }
 
-/// Where a rib can stand.
+/// A place where a rib can stand.
 #[derive(Clone, Copy)]
 struct Place {
     at: Vec3,
@@ -65,7 +65,7 @@ struct Place {
 }
 
 /// Ribs that press by `interference_mm` on the pieces around the key, spread over its seams; none where no
-/// side lies along the way out. `depth` is that below the model's surface, mm.
+/// side lies along the way out. `depth` gives the depth below the model's surface, mm.
 pub(super) fn ribs(
     interference_mm: f64,
     seat: &Seat<'_>,
@@ -92,8 +92,8 @@ pub(super) fn ribs(
     )
 }
 
-/// Whether the rib, measured over its whole way and against all pieces, crosses none of them deeper than it
-/// is to press.
+/// Returns true if the rib, measured over its whole way and against all pieces, crosses none of them deeper
+/// than intended.
 fn presses_only_as_meant(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> bool {
     let Ok(rib) = Solid::new(rib(place, seat.along, place.gap_mm + interference_mm).to_mesh()) else {
         return false;
@@ -111,7 +111,7 @@ fn presses_only_as_meant(seat: &Seat<'_>, place: &Place, interference_mm: f64) -
         .all(|gap| gap.gap_mm >= -(interference_mm + DEEPER_MM))
 }
 
-/// From how far before its end a rib rubs on the way in, mm.
+/// Length of the way in over which a rib rubs, mm.
 fn travel_mm(seat: &Seat<'_>, place: &Place, interference_mm: f64) -> f64 {
     let rubs = |t: &f64| {
         let top = place.at + (t + 0.5 * LENGTH_MM - LEAD_MM) * seat.along;
@@ -143,7 +143,7 @@ fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
             let corners = [(-0.5, -1.0), (-0.5, 1.0), (0.5, -1.0), (0.5, 1.0)];
             let goes_on = corners.into_iter().all(|(l, w)| {
                 let corner = at + l * LENGTH_MM * seat.along + w * FOOT_MM * across;
-                // From inside the key, so that a side that leans over is seen too.
+                // The ray starts inside the key, so that a side that leans over is seen too.
                 let apart = gap(corner - ROOT_MM * normal, normal).map(|mm| mm - ROOT_MM - gap_mm);
                 depth(corner) >= seat.least_depth_mm
                     && apart.is_some_and(|mm| (-NEARER_MM..FARTHER_MM).contains(&mm))
@@ -156,7 +156,7 @@ fn places(seat: &Seat<'_>, depth: impl Fn(Vec3) -> f64) -> Vec<Place> {
     found
 }
 
-/// Points about [`STEP_MM`] apart inside a triangle; its middle where it is small.
+/// Points about [`STEP_MM`] apart inside a triangle; its centroid where it is small.
 fn grid_on([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let n = (longest / STEP_MM).ceil().clamp(1.0, 200.0) as usize;
@@ -173,8 +173,8 @@ fn grid_on([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
         .map(move |[u, v]| a + u * (b - a) + v * (c - a))
 }
 
-/// Up to [`MOST`] of `places` that fit, each as far from those before as can be, the first as far from the
-/// middle.
+/// Chooses up to [`MOST`] of `places` that fit, each as far as possible from those before, the first as far
+/// as possible from the middle.
 fn spread(places: Vec<Place>, fits: impl Fn(&Place) -> bool) -> Vec<Place> {
     let middle = places.iter().map(|p| p.at).sum::<Vec3>() / places.len().max(1) as f64;
     let mut apart_mm: Vec<f64> = places.iter().map(|p| p.at.distance(middle)).collect();
@@ -230,7 +230,7 @@ mod tests {
     use super::*;
     use shellock_testkit::shapes::cuboid;
 
-    /// A block of 20 mm in the middle of a tray that is 0.1 mm wider on each side; it leaves upwards.
+    /// Ribs of a block of 20 mm in a tray that is 0.1 mm wider on each side; the block leaves upwards.
     fn ribs_of_a_block(least_depth_mm: f64) -> (Vec<PressFit>, Vec<Change>) {
         let tray =
             cuboid([-5.0, -5.0, -5.0], [25.0, 25.0, 10.0]).subtract(&cuboid([-0.1; 3], [20.1, 20.1, 11.0]));
@@ -260,7 +260,7 @@ mod tests {
             assert!((beyond - 0.18).abs() < 1e-9, "{b:?}");
             assert!(b.min.z > -1.0 && b.max.z < 8.5 + 1e-9);
         }
-        // Each rubs from where its upper end passes the tray's rim.
+        // Each rib rubs from where its upper end passes the tray's rim.
         for (fit, change) in fits.iter().zip(&changes) {
             let way_mm = 10.0 - change.volume.bounds().min.z;
             assert!(

@@ -1,5 +1,5 @@
-//! Sheets that carving leaves of pins and of the wall's inner side, and that no printer makes: shaved off where
-//! nobody sees it.
+//! Thin sheets that carving leaves of pins and of the wall's inner side, and that no printer can make. They
+//! are shaved off where nobody sees it.
 //!
 //! ```text
 //!      ┌──┐ ┌┐            ┌──┐
@@ -7,8 +7,8 @@
 //!   ───┘  └─┘└───      ───┘  └──────
 //! ```
 //!
-//! They are found by rays, from points of the surface straight to the other side, and cut with boxes as thick as
-//! what was met there. That takes nothing from the freedom of any piece.
+//! Sheets are found by rays from points of the surface straight to the other side, and cut with boxes as
+//! thick as the sheet there. Shaving never reduces the freedom of any piece.
 
 use std::collections::BTreeSet;
 
@@ -18,23 +18,23 @@ use shellock_geom::{Aabb, TriMesh, Vec3, Volume};
 use crate::verify::{ThinPoint, thin_points};
 use crate::{Cancelled, Ctx, IdVec, PatchId};
 
-/// Sheets up to this are shaved where the printer's least wall is thicker: connectors' own walls are no
-/// thinner, mm.
+/// Greatest thickness of sheets that are shaved, mm, also where the printer's least wall is thicker: the
+/// connectors' own walls are no thinner.
 const MOST_SHEET_MM: f64 = 0.5;
-/// Half of a box's width, mm: rays are about as far apart.
+/// Half the width of a box, mm: rays are about as far apart.
 const HALF_MM: f64 = 0.4;
-/// A box is at least so thick, mm, so that it cuts no slot into what a sheet hangs on, and reaches so far
-/// beyond either side.
+/// Least thickness of a box, mm, so that it cuts no slot into the material that a sheet hangs on, and its
+/// reach beyond either side.
 const LEAST_CUT_MM: f64 = 0.35;
 const BEYOND_MM: f64 = 0.05;
-/// Of points in one cube of this side, mm, one is worked on.
+/// Side of the cubes, mm, in each of which one point is worked on.
 const SPACING_MM: f64 = 0.3;
-/// What lies less deep below the outer surface stays as it is, mm.
+/// Depth below the outer surface down to which material is kept, mm.
 const SKIN_MM: f64 = 0.6;
-/// What two rounds leave is told.
+/// Rounds of shaving; sheets that remain after them are reported.
 const MOST_ROUNDS: usize = 2;
 
-/// Depth below the outer surface, mm, where it is known: near the wall.
+/// Depth below the outer surface, mm; `None` away from the wall, where it is unknown.
 pub(super) type Depth<'a> = dyn Fn(Vec3) -> Option<f64> + Sync + 'a;
 
 /// Shaves the sheets thinner than `least_wall_mm` off each piece.
@@ -60,7 +60,7 @@ pub(super) fn shave(
     Ok(())
 }
 
-/// `None` where nothing is thin.
+/// The piece without its thin sheets; `None` where nothing is thin.
 fn shaved(piece: &Volume, limit_mm: f64, depth: &Depth<'_>) -> Option<Volume> {
     let mut shaved = None;
     for _ in 0..MOST_ROUNDS {
@@ -79,8 +79,9 @@ fn shaved(piece: &Volume, limit_mm: f64, depth: &Depth<'_>) -> Option<Volume> {
     shaved
 }
 
-/// The largest part of `body` without the boxes. A part that has some of the outer surface must not come off:
-/// the boxes around it stay uncut, and the sheet by which it hangs is told. `None` where all of them do.
+/// The largest part of `body` after the boxes are cut. A part with some of the outer surface must not break
+/// off: the boxes around it stay uncut, and the sheet by which it hangs is reported. `None` if none may be
+/// cut.
 fn less(body: &Volume, mut boxes: Vec<Volume>, depth: &Depth<'_>) -> Option<Volume> {
     while !boxes.is_empty() {
         let mut parts = body
@@ -104,13 +105,13 @@ fn less(body: &Volume, mut boxes: Vec<Volume>, depth: &Depth<'_>) -> Option<Volu
     None
 }
 
-/// Whether a corner of `part` lies on the outer surface or so little below it that a hole would show there.
+/// Returns true if a corner of `part` is so near to the outer surface that a hole would show there.
 fn has_skin(part: &Volume, depth: &Depth<'_>) -> bool {
     let is_near = |p: &Vec3| depth(*p).is_some_and(|mm| mm < SKIN_MM);
     part.to_mesh().points.iter().any(is_near)
 }
 
-/// Where a piece is thin, below the skin; one point a cube.
+/// Points below the skin where a piece is thin, one per cube.
 fn points(mesh: &TriMesh, limit_mm: f64, depth: &Depth<'_>) -> Vec<ThinPoint> {
     let is_deep = |p: Vec3| depth(p).is_none_or(|mm| mm > SKIN_MM);
     let mut taken = BTreeSet::new();
@@ -122,7 +123,7 @@ fn points(mesh: &TriMesh, limit_mm: f64, depth: &Depth<'_>) -> Vec<ThinPoint> {
     found
 }
 
-/// A box around the middle between both sides.
+/// A box around the midpoint between both sides.
 fn slab(p: &ThinPoint, thick_mm: f64) -> Volume {
     let (u, v) = p.across.any_orthonormal_pair();
     let middle = p.at + 0.5 * p.thickness_mm * p.across;
@@ -151,12 +152,12 @@ mod tests {
         shave(&Ctx::quiet(), 0.4, &|_| None, &mut pieces).unwrap();
         let made = &pieces[PatchId(0)];
         assert_eq!(thin_places(&made.to_mesh(), 0.4, 0.2), []);
-        // Its root keeps a step or a groove.
+        // The root of the fin keeps a step or a groove.
         assert!((made.volume() - 720.0).abs() < 2.0, "{}", made.volume());
         assert_eq!(made.components().len(), 1);
     }
 
-    /// Two blocks that hang together by a sheet, the smaller with some of the outer surface: the sheet stays.
+    /// Two blocks joined by a sheet, the smaller with some of the outer surface: the sheet stays.
     #[test]
     fn what_has_outer_surface_does_not_come_off_with_a_sheet() {
         let tip = cuboid([2.0, 0.0, 8.0], [10.0, 4.0, 11.0]);

@@ -1,4 +1,4 @@
-//! Smooth lines with a frame at every point: what a connector is swept along, and what a plan expects of it.
+//! Smooth lines with a frame at every point: connectors are swept along them, and plans predict from them.
 
 use shellock_geom::Vec3;
 
@@ -7,10 +7,10 @@ use super::rules::ROLE_HYSTERESIS;
 /// Distance between the points of a line, mm: half the finest connector, so that smoothing keeps the seam's
 /// shape.
 const STEP_MM: f64 = 1.0;
-/// Rounds of averaging with the neighbours. They take out the grid's ripple (period one to two cells) and
+/// Rounds of averaging with the neighbours. They remove the grid's ripple (period one to two cells) and
 /// little else.
 const SMOOTHING_ROUNDS: usize = 6;
-/// Shortest line that has points of its own, mm.
+/// Shortest line that is resampled, mm.
 const SHORTEST_MM: f64 = 4.0 * STEP_MM;
 
 /// A smooth line on the inner side of the wall.
@@ -18,15 +18,15 @@ const SHORTEST_MM: f64 = 4.0 * STEP_MM;
 pub(crate) struct FramedLine {
     /// Points about 1 mm apart. A loop's last point is its first.
     pub points: Vec<Vec3>,
-    /// Unit tangents `u`.
+    /// Unit tangents `u` along the line.
     pub tangents: Vec<Vec3>,
     /// Outward unit normals `N`, perpendicular to `u`.
     pub normals: Vec<Vec3>,
 }
 
 impl FramedLine {
-    /// The smooth line along `polyline`; `outward(at, point)` is the surface's outward normal where the point
-    /// lies, `at` counted in vertices of the polyline. `None` where it is too short, or its normals vanish.
+    /// Smooths and resamples `polyline`. `outward(at, point)` is the surface's outward normal at the point;
+    /// `at` counts vertices of the polyline. `None` where the line is too short, or its normals vanish.
     pub fn along(polyline: &[Vec3], is_loop: bool, outward: impl Fn(f64, Vec3) -> Vec3) -> Option<Self> {
         let length_mm: f64 = polyline.windows(2).map(|w| w[0].distance(w[1])).sum();
         if length_mm < SHORTEST_MM {
@@ -58,9 +58,10 @@ impl FramedLine {
     }
 }
 
-/// Whether the later piece, which leaves along `separation`, carries the pin at each place with these outward
-/// normals: where it leaves outwards. Places that do not say clearly which go with the nearest that do, so that
-/// roles do not flicker; the answer is the same whichever way the line is walked. A loop's first place comes once.
+/// Roles along a line with these outward normals: true where the later piece, which leaves along
+/// `separation`, carries the pin, because it leaves outwards there. Unclear places take the role of the
+/// nearest clear one, so that roles do not flicker. The answer does not depend on the direction of the line.
+/// A loop's first place comes once.
 pub(crate) fn later_is_male(normals: &[Vec3], separation: Vec3, is_loop: bool) -> Vec<bool> {
     let outwards: Vec<f64> = normals.iter().map(|n| n.dot(separation)).collect();
     let n = outwards.len();
@@ -87,8 +88,8 @@ pub(crate) fn later_is_male(normals: &[Vec3], separation: Vec3, is_loop: bool) -
     (0..n).map(role).collect()
 }
 
-/// The polyline again with points at equal distances of about `step_mm` along it, ends kept: where each lies,
-/// counted in vertices of the polyline, and the point.
+/// Resamples the polyline at equal distances of about `step_mm`, ends kept: the position, counted in vertices
+/// of the polyline, and the point.
 fn resampled(line: &[Vec3], step_mm: f64) -> Vec<(f64, Vec3)> {
     let mut at = vec![0.0];
     for w in line.windows(2) {
@@ -114,7 +115,7 @@ fn resampled(line: &[Vec3], step_mm: f64) -> Vec<(f64, Vec3)> {
         .collect()
 }
 
-/// Repeated averaging ¼ ½ ¼ along a line; ends stay, a loop's first and last value stay equal.
+/// Averages repeatedly by ¼ ½ ¼ along a line; ends stay, a loop's first and last value stay equal.
 fn smoothed(mut values: Vec<Vec3>, is_loop: bool, rounds: usize) -> Vec<Vec3> {
     let n = values.len();
     for _ in 0..rounds {
@@ -172,7 +173,7 @@ mod tests {
         assert_eq!(back, roles(&line, false));
         // On a loop the first place has neighbours on both sides.
         assert_eq!(roles(&[0.05, -0.5, -0.5, -0.5], true), [false; 4]);
-        // Where no place is clear, all are one.
+        // If no place is clear, all get one role.
         assert_eq!(roles(&[-0.05, 0.06], true), [true; 2]);
     }
 

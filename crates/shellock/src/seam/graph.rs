@@ -1,6 +1,6 @@
-//! Which pieces hold each other, and whether the whole hangs together twice.
+//! Contact graph of the patches: which of them hold each other, and is the whole 2-connected?
 //!
-//! A plan can lock all pieces only if this graph is 2-connected: if one piece separates a set S from the key,
+//! A plan can lock all pieces only if this graph is 2-connected. If one piece separates a set S from the key,
 //! every joint between S and the rest slides along that piece's direction, and S leaves as one cluster.
 
 use crate::PatchId;
@@ -14,11 +14,11 @@ pub struct Adjacency {
     pub b: PatchId,
     /// Length of all stretches between the two, mm.
     pub total_mm: f64,
-    /// Length of the longest stretch, mm: what connectors have room on.
+    /// Length of the longest stretch, mm, on which connectors have room.
     pub longest_mm: f64,
 }
 
-/// Patches and the seams between them; a contact counts where its longest stretch has room for a connector.
+/// Patches and the seams between them. A contact counts where its longest stretch has room for a connector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactGraph {
     n_patches: usize,
@@ -27,7 +27,8 @@ pub struct ContactGraph {
 }
 
 impl ContactGraph {
-    /// The graph of `n_patches` patches from the lengths of the seam stretches between them, in any order.
+    /// Builds the graph of `n_patches` patches from the lengths of the seam stretches between them, in any
+    /// order.
     pub fn from_stretches(
         n_patches: usize,
         min_contact_mm: f64,
@@ -54,22 +55,22 @@ impl ContactGraph {
         }
     }
 
-    /// How many patches there are.
+    /// Number of patches in the graph.
     pub fn n_patches(&self) -> usize {
         self.n_patches
     }
 
-    /// All pairs that share a seam, by ids, also those whose stretches are too short to count.
+    /// All pairs that share a seam, by ids, including those whose stretches are too short to count.
     pub fn contacts(&self) -> &[Adjacency] {
         &self.contacts
     }
 
-    /// Whether the contact has room for a connector.
+    /// Returns true if the contact has room for a connector.
     pub fn counts(&self, contact: &Adjacency) -> bool {
         contact.longest_mm >= self.min_contact_mm
     }
 
-    /// The patches that hold `patch`, by id.
+    /// Patches that hold `patch` by contacts that count, sorted by id.
     pub fn neighbours(&self, patch: PatchId) -> Vec<PatchId> {
         let mut found: Vec<PatchId> = self
             .contacts
@@ -81,17 +82,17 @@ impl ContactGraph {
         found
     }
 
-    /// The connected parts, each by id, in order of their lowest id.
+    /// Connected components, each sorted by id, in order of their lowest id.
     pub fn parts(&self) -> Vec<Vec<PatchId>> {
         self.parts_avoiding(None)
     }
 
-    /// The connected parts of what is left without `patch`, in order of their lowest id.
+    /// Connected components of the rest without `patch`, in order of their lowest id.
     pub fn parts_without(&self, patch: PatchId) -> Vec<Vec<PatchId>> {
         self.parts_avoiding(Some(patch))
     }
 
-    /// The pieces without which the rest falls into more parts, by id.
+    /// Pieces without which the rest falls into more components, sorted by id.
     pub fn articulation_pieces(&self) -> Vec<PatchId> {
         let n_parts = self.parts().len();
         let isolated = |p| self.neighbours(p).is_empty();
@@ -101,13 +102,14 @@ impl ContactGraph {
             .collect()
     }
 
-    /// Whether no single piece holds others alone; two pieces need one contact, one piece none.
+    /// Returns true if all pieces are connected and no single piece alone holds others. Two pieces need one
+    /// contact, one piece none.
     pub fn is_two_connected(&self) -> bool {
         self.parts().len() <= 1 && self.articulation_pieces().is_empty()
     }
 
-    /// How far from 2-connected: parts too many, three times, and those that come of taking each single piece
-    /// away; 0 where it is.
+    /// Distance from 2-connected: three times the surplus components, plus the surplus components after
+    /// removal of each single piece; 0 if 2-connected.
     pub fn n_faults(&self) -> usize {
         let hanging =
             (0..self.n_patches).map(|p| self.parts_without(PatchId::from(p)).len().saturating_sub(1));

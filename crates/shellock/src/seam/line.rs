@@ -5,8 +5,8 @@ use shellock_geom::{HalfEdge, Topology, TriMesh, Vec3};
 
 use crate::{ContactGraph, PatchId, Seam, SegmentedSurface};
 
-/// A chain of half-edges, each in a triangle of patch `a` with a triangle of patch `b` > `a` across, from
-/// triple point to triple point or around a loop.
+/// A chain of half-edges from triple point to triple point or around a loop. Each lies in a triangle of patch
+/// `a` and has a triangle of patch `b` > `a` across.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Stretch {
     pub a: u32,
@@ -25,7 +25,7 @@ impl Stretch {
     }
 }
 
-/// The half-edges of `faces` that separate a patch from one with a higher id, in order.
+/// Half-edges of `faces` that separate a patch from one with a higher id, in order.
 pub(crate) fn seam_half_edges(
     topology: &Topology,
     labels: &[u32],
@@ -37,8 +37,8 @@ pub(crate) fn seam_half_edges(
         .collect()
 }
 
-/// Chains all seam half-edges of a labelled closed mesh. They start in order of their first half-edge: open
-/// stretches, then loops.
+/// Chains all seam half-edges of a labelled closed mesh, in order of their first half-edge: open stretches,
+/// then loops.
 pub(crate) fn stretches(
     mesh: &TriMesh,
     topology: &Topology,
@@ -50,7 +50,7 @@ pub(crate) fn stretches(
         .flat_map(|&h| <[u32; 2]>::from(ends(mesh, h)))
         .collect();
     touched.sort_unstable();
-    // Two seam edges at a point: the seam goes on; any other number: it ends there.
+    // A point with two seam edges continues the seam; with any other number the seam ends there.
     let goes_on = |v: u32| touched.partition_point(|&x| x <= v) - touched.partition_point(|&x| x < v) == 2;
     let sides = |h: HalfEdge| (labels[h as usize / 3], labels[topology.opposite(h) as usize / 3]);
     let following = |h: HalfEdge| {
@@ -92,7 +92,7 @@ impl SegmentedSurface {
     /// All seams, split where three or more patches meet, patch `a` on the left as seen from outside.
     ///
     /// # Panics
-    /// Where the mesh is not closed, which a `SegmentedSurface` promises to be.
+    /// Panics if the mesh is not closed, against the guarantee of `SegmentedSurface`.
     pub fn seams(&self) -> Vec<Seam> {
         let topology = Topology::of_mesh(&self.mesh).expect("a segmented surface is closed");
         let labels: Vec<u32> = self.patch_of_face.iter().map(|p| p.0).collect();
@@ -117,7 +117,7 @@ impl SegmentedSurface {
             .collect()
     }
 
-    /// The graph of contacts whose longest stretch is at least `min_contact_mm`.
+    /// Contact graph in which contacts count if their longest stretch is at least `min_contact_mm`.
     ///
     /// # Panics
     /// As [`Self::seams`].
@@ -125,7 +125,7 @@ impl SegmentedSurface {
         self.contact_graph_below(0.0, min_contact_mm)
     }
 
-    /// The same with lengths measured on the inner side of a wall of `wall_mm`, where connectors are.
+    /// Contact graph with lengths measured on the inner side of a wall of `wall_mm`, where connectors are.
     ///
     /// # Panics
     /// As [`Self::seams`].

@@ -93,7 +93,7 @@ fn for_the_sake_of_use_connectors_grow_once_to_what_fits_and_that_is_told() {
     let told = ctx.into_warnings().remove(0);
     assert_eq!(told.pieces, [A, B]);
     assert!(told.to_string().contains("4.0 mm instead of 2.0 mm"), "{told}");
-    // A narrow limb has room for no more than the stress asked for; neither have a key's rails.
+    // Connectors at a cap, as that of a key's rails, cannot grow.
     capped.cap(B, 2.0);
     assert!(!capped.raise([A, B], "dropped") && capped.sizes.of(A, B) == 2.0);
     let fixed = SizeParams {
@@ -108,7 +108,7 @@ fn where_all_fits_the_greatest_stress_of_a_seam_alone_decides() {
     let surface = halves(Vec3::splat(40.0));
     let (none, warnings) = chosen(&surface, &PARAMS, None);
     assert!(none.sizes.of(A, B) == 2.0 && warnings.is_empty());
-    // A peak at one place of the seam; what lies off the seam does not count.
+    // A peak at one place of the seam; stress off the seam does not count.
     let field = |p: Vec3| if p.z.abs() > 10.0 { 42.0 } else { 21.0 * p.x / 40.0 };
     let (some, warnings) = chosen(&surface, &PARAMS, Some(&field));
     assert!(
@@ -145,7 +145,7 @@ fn in_a_narrow_limb_the_channel_stays_off_the_wall_opposite() {
         warnings[0].to_string()
     );
     assert!(Vec3::from_array(warnings[0].at.unwrap()).z.abs() < 1.0);
-    // Where nothing fits the least size is left.
+    // Where nothing fits, the least size remains.
     assert_eq!(thick(2.0).0.sizes.of(A, B), 2.0);
 }
 
@@ -166,7 +166,7 @@ fn a_short_seam_gets_the_largest_size_with_which_it_is_a_contact() {
             "{pair:?} {size_mm} {expected_mm}"
         );
     }
-    // All twelve are short, and one warning says so.
+    // All twelve seams are short, and one warning covers them.
     assert_eq!(
         (found.limited.len(), warnings.len(), warnings[0].pieces.len()),
         (12, 1, 8)
@@ -192,7 +192,7 @@ fn a_wish_that_is_missed_by_little_is_not_told() {
             Some(&move |_| stress_mpa),
         )
     };
-    // 23 MPa ask for 3.1 mm where 3.05 fit.
+    // A stress of 23 MPa asks for 3.1 mm where 3.05 mm fit.
     let (found, warnings) = at(23.0);
     assert!(found.sizes.of(A, B) < 3.09 && warnings.is_empty(), "{found:?}");
     assert_eq!(at(42.0).1.len(), 1);

@@ -1,5 +1,5 @@
-//! What the falls do to the wall (Fig. 7): the stress of the fall that decides, the stress along the seams
-//! with the connectors that it asks for, and how the stress depends on the thickness.
+//! Chart of the falls (Fig. 7): the stress in the decisive fall, the stress along the seams with the
+//! connector sizes that it asks for, and the stress over the thickness.
 
 use std::fmt::Write;
 
@@ -14,12 +14,12 @@ use shellock_render::svg::{begin, end, text};
 
 /// Pixels of a view along each side.
 const VIEW_PX: usize = 420;
-/// Pixels of the chart, and of the colours' scale, across.
+/// Width of the chart and of the colour scale, pixels.
 const CHART_PX: f64 = 440.0;
-/// Pixels of a row: a title, two views, a line of words.
+/// Height of a row, pixels: a title, two views, a line of words.
 const ROW_PX: f64 = VIEW_PX as f64 + 60.0;
-/// Colours from no stress to the strength, evenly apart, sRGB: they grow lighter, so that they are told apart
-/// in grey.
+/// Colours from no stress to the strength, evenly spaced, sRGB. They grow lighter, so that they remain
+/// distinct in grey.
 const SCALE: [[u8; 3]; 5] = [
     [68, 1, 84],
     [59, 82, 139],
@@ -27,28 +27,28 @@ const SCALE: [[u8; 3]; 5] = [
     [94, 201, 98],
     [253, 231, 37],
 ];
-/// Above the strength.
+/// Colour of stresses above the strength.
 const TOO_MUCH: [u8; 3] = [214, 39, 40];
-/// Where the model is solid.
+/// Colour of places where the model is solid.
 const SOLID: [u8; 3] = [170, 170, 170];
-/// The model below its seams.
+/// Colour of the model below its seams.
 const PALE: [u8; 3] = [225, 222, 215];
-/// Sides of the tube that shows a seam.
+/// Number of sides of the tube that shows a seam.
 const TUBE_SIDES: u32 = 8;
 
-/// A seam, its stress and its connectors.
+/// A seam with its stress and its connector size.
 #[derive(Clone, Debug)]
 pub struct SeamStress {
     /// Points in order, mm.
     pub points: Vec<Vec3>,
-    /// The largest of all falls at each point, MPa.
+    /// Largest stress of all falls at each point, MPa.
     pub stress_mpa: Vec<f64>,
-    /// Connector size D, mm; the tube is as thick.
+    /// Connector size D, mm, equal to the diameter of the tube.
     pub size_mm: f64,
 }
 
-/// An SVG text with embedded pictures, about 1300 × 960 pixels. `stand` turns the model so that it stands on
-/// z = 0.
+/// Draws the chart as SVG text with embedded pictures, about 1300 × 960 pixels. `stand` turns the model so
+/// that it stands on z = 0.
 pub fn strength_chart(
     strength: &Strength,
     strength_mpa: f64,
@@ -111,7 +111,7 @@ pub fn strength_chart(
     page(strength, strength_mpa, seams, &pictures)
 }
 
-/// A share of the strength as a colour.
+/// Colour of a share of the strength.
 fn color(share: f64) -> [u8; 3] {
     if share > 1.0 {
         return TOO_MUCH;
@@ -124,7 +124,7 @@ fn color(share: f64) -> [u8; 3] {
     })
 }
 
-/// A tube about each seam, open at its ends, and the colours of its triangles.
+/// Tube around each seam, open at its ends, and the colours of its triangles.
 fn tubes(seams: &[SeamStress], strength_mpa: f64) -> (TriMesh, Vec<[u8; 3]>) {
     let mut mesh = TriMesh::default();
     let mut colors = Vec::new();
@@ -195,7 +195,7 @@ fn page(strength: &Strength, strength_mpa: f64, seams: &[SeamStress], pictures: 
     end(svg)
 }
 
-/// What the colours mean.
+/// Draws the legend of the colours.
 fn legend(svg: &mut String, [x, y]: [f64; 2], strength_mpa: f64) {
     const STEPS: u32 = 60;
     const STEP_PX: f64 = 4.0;
@@ -227,7 +227,8 @@ fn legend(svg: &mut String, [x, y]: [f64; 2], strength_mpa: f64) {
     }
 }
 
-/// Stress over thickness, as far as it was looked at; the strength as a line, the chosen thickness as a dot.
+/// Draws the stress over the thickness, as far as computed, with the strength as a line and the choice as a
+/// dot.
 fn curve(svg: &mut String, [x, y]: [f64; 2], strength: &Strength, strength_mpa: f64) {
     const SIZE: [f64; 2] = [330.0, 290.0];
     text(

@@ -1,23 +1,23 @@
-//! A shell that falls in some orientations, and the stress that counts.
+//! Falls of a shell in some orientations, and their decisive stress.
 
 use super::*;
 
-/// Height of the regions that hold and that meet the ground, as a share of the model's height in that
+/// Height of the held region and of the one that meets the ground, as a share of the model's height in that
 /// orientation.
 const ZONE_SHARE: f64 = 0.1;
-/// Least area of such a region, as a share of the surface: a tip's zone grows until it has as much.
+/// Least area of such a region, as a share of the surface; at a tip the region grows until it has as much.
 const LEAST_ZONE_AREA: f64 = 0.01;
 
-/// A shell and its falls.
+/// A shell and the falls that it is tested in.
 pub(super) struct Falls {
     pub mesh: TriMesh,
     pub shell: ShellModel,
-    /// The load of each where a mm³ of material falls, N.
+    /// Load of each fall, N, per mm³ of falling material.
     pub cases: Vec<LoadCase>,
     pub down: Vec<Vec3>,
     pub bvh: TriangleBvh,
     pub peak_share: f64,
-    /// Of the model, mm³.
+    /// Volume of the model, mm³.
     pub volume_mm3: f64,
 }
 
@@ -83,7 +83,7 @@ impl Falls {
         })
     }
 
-    /// What there is to say of `worst`.
+    /// Collects the results of the fall `worst`.
     pub fn strength(self, worst: Fallen, is_too_weak: bool, tried: Vec<Tried>) -> Strength {
         let Fallen {
             case,
@@ -108,7 +108,7 @@ impl Falls {
         }
     }
 
-    /// The area of each triangle below which there is a cavity, and 0 of those where the model is solid, mm².
+    /// Area of each triangle with a cavity below, mm²; 0 where the model is solid.
     pub fn hollow_areas(&self, thickness_mm: f64) -> Vec<f64> {
         let area = |t: usize| {
             let is_solid = thin::is_solid(&self.mesh, &self.bvh, t, thickness_mm);
@@ -118,20 +118,20 @@ impl Falls {
     }
 }
 
-/// All falls with one thickness.
+/// Results of all falls with one thickness.
 pub(super) struct Fallen {
     pub tried: Tried,
-    /// The fall that decides.
+    /// Index of the decisive fall.
     pub case: usize,
-    /// The triangle that has the stress that counts.
+    /// Triangle with the decisive stress.
     pub triangle: usize,
     pub hollow_mm2: Vec<f64>,
-    /// Of each fall and triangle.
+    /// Stress of each triangle in each fall, MPa.
     pub stresses_mpa: Vec<Vec<f64>>,
 }
 
-/// The triangle and the stress that all but `peak_share` of the area stays below or at; 0 where there is no
-/// area.
+/// Triangle and value of the decisive stress, which all but `peak_share` of the area does not exceed; 0 where
+/// there is no area.
 fn counting(stress_mpa: &[f64], areas: &[f64], peak_share: f64) -> (usize, f64) {
     let mut order: Vec<usize> = (0..areas.len()).filter(|&t| areas[t] > 0.0).collect();
     order.sort_by(|&i, &j| stress_mpa[j].total_cmp(&stress_mpa[i]));
@@ -143,9 +143,9 @@ fn counting(stress_mpa: &[f64], areas: &[f64], peak_share: f64) -> (usize, f64) 
     found.map_or((0, 0.0), |&t| (t, stress_mpa[t]))
 }
 
-/// Even triangles on about `n_points` points.
+/// Remeshes to even triangles on about `n_points` points.
 fn analysis_mesh(mesh: &TriMesh, n_points: f64) -> TriMesh {
-    // One point for each √3/2 l² of a mesh of equilateral triangles.
+    // A mesh of equilateral triangles of edge l has one point for each √3/2 l² of area.
     let target_edge_mm = (mesh.area() / (n_points * 0.75f64.sqrt())).sqrt();
     remesh(
         &RemeshParams {
@@ -158,7 +158,7 @@ fn analysis_mesh(mesh: &TriMesh, n_points: f64) -> TriMesh {
     .mesh
 }
 
-/// Directions that are as even as few directions can be, turned at random: a spiral of equal areas.
+/// Directions as evenly spread as a few can be, rotated at random: a spiral of equal areas.
 ///
 /// Directions drawn one by one leave gaps and clusters, and the thickness depends on them:
 /// docs/notes/strength.md.
@@ -175,7 +175,7 @@ fn even_directions(rng: &mut ChaCha8Rng, n: usize) -> Vec<Vec3> {
     (0..n).map(on_spiral).collect()
 }
 
-/// A random direction, all alike.
+/// A random direction, uniform on the sphere.
 fn on_sphere(rng: &mut ChaCha8Rng) -> Vec3 {
     loop {
         let p = Vec3::new(
@@ -190,7 +190,7 @@ fn on_sphere(rng: &mut ChaCha8Rng) -> Vec3 {
     }
 }
 
-/// The load of a fall along `down`: `total_n` on the bottom, spread by area, which is by mass.
+/// Load of a fall along `down`: `total_n` on the bottom, spread by area, which is by mass.
 fn fall(mesh: &TriMesh, areas_mm2: &[f64], down: Vec3, total_n: f64) -> LoadCase {
     let bottom = zone(mesh, areas_mm2, down);
     let zone_mm2: f64 = bottom.iter().map(|&v| areas_mm2[v as usize]).sum();
@@ -205,7 +205,7 @@ fn fall(mesh: &TriMesh, areas_mm2: &[f64], down: Vec3, total_n: f64) -> LoadCase
     }
 }
 
-/// The points furthest along `way`: a [`ZONE_SHARE`] of the height, and no less than [`LEAST_ZONE_AREA`] of
+/// Points furthest along `way`: those in [`ZONE_SHARE`] of the height, and at least [`LEAST_ZONE_AREA`] of
 /// the surface.
 fn zone(mesh: &TriMesh, areas_mm2: &[f64], way: Vec3) -> Vec<u32> {
     let mut order: Vec<(f64, u32)> = mesh.points.iter().map(|p| p.dot(way)).zip(0..).collect();

@@ -1,4 +1,4 @@
-//! How much of a model can be hollow, before anything is made of it.
+//! Estimates of how much of a model can be hollow, before anything is made of it.
 
 use rayon::prelude::*;
 use shellock_geom::bvh::TriangleBvh;
@@ -8,43 +8,43 @@ use super::ROOM_MM;
 use super::thin::LEAST_SHARE;
 use crate::verify::sample::{Sample, on_surface};
 
-/// Points of the surface that are looked at: shares are known to 2 % (two sigma at one half).
+/// Number of sampled points of the surface: shares are known to 2 % (two sigma at one half).
 const N_SAMPLES: usize = 3000;
 const SEED: u64 = 0x686f_6c6c;
-/// Walls that are tried at each point: from the thinnest on, each thicker by this factor.
+/// Walls tried at each point: the thinnest, mm, the factor from one to the next, and their number.
 const THINNEST_MM: f64 = 0.2;
 const STEP: f64 = 1.1;
 const N_STEPS: i32 = 60;
-/// Where less of the surface has a cavity below, there is nothing to hollow out.
+/// Least share of the surface with a cavity below for hollowing out to make sense.
 const LEAST_HOLLOW: f64 = 1.0 / 3.0;
-/// What is proposed leaves this share hollow, at least.
+/// Least hollow share that a proposal leaves.
 const PROPOSED_HOLLOW: f64 = 0.5;
 
-/// Where less of the surface has room for a connector behind the thinnest wall, nothing would hold pieces
-/// together. At 150 mm a shell of 4.7 mm has none behind walls of 1.2 mm; of 163 models of a benchmark and figures,
-/// the one with the least has 3 %, and its kit passes.
+/// Least share of the surface with room for a connector behind the thinnest wall; with less, nothing would
+/// hold pieces together. At 150 mm a shell of 4.7 mm has none behind walls of 1.2 mm. Of 163 models of a
+/// benchmark and figures, the one with the least has 3 %, and its kit passes.
 const LEAST_ROOM: f64 = 0.015;
 /// Thinnest walls that are proposed, mm: two lines of an ordinary nozzle.
 const THINNEST_PROPOSED_MM: f64 = 0.8;
 
-/// A model that is too thin for walls so thick.
+/// Error: the model is too thin for walls of that thickness.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "only {:.0} % of the surface has room for a cavity behind walls of {wall_mm:.2} mm: the model is too thin to be hollow; make it about {size_mm:.0} mm large (--size) or its walls {better_mm:.2} mm thin (--thickness) at most, or print it as it is (--allow-thin makes pieces all the same)",
     100.0 * share
 )]
 pub struct TooThin {
-    /// Of the surface, below which there would be a cavity, in [0, 1].
+    /// Share of the surface below which there would be a cavity, in [0, 1].
     pub share: f64,
-    /// The walls, mm.
+    /// Wall thickness asked for, mm.
     pub wall_mm: f64,
-    /// The longest edge at which half of the surface has a cavity below, mm.
+    /// Longest edge of the model at which half of the surface would have a cavity below, mm.
     pub size_mm: f64,
-    /// Walls with which it has as the model is, mm.
+    /// Wall thickness at which half of the surface would have a cavity at the current size, mm.
     pub better_mm: f64,
 }
 
-/// A model in which connectors have no room behind walls so thick.
+/// Error: connectors have no room behind walls of that thickness.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "half of the model is no thicker than {thickness_mm:.1} mm, and nowhere is room for connectors behind walls of \
@@ -53,24 +53,24 @@ pub struct TooThin {
     thinner(*better_mm)
 )]
 pub struct NoRoom {
-    /// Median thickness, mm.
+    /// Median thickness of the model, mm.
     pub thickness_mm: f64,
-    /// The walls, mm.
+    /// Wall thickness asked for, mm.
     pub wall_mm: f64,
-    /// The longest edge at which half of the surface has room behind such walls, mm.
+    /// Longest edge of the model at which half of the surface would have room behind such walls, mm.
     pub size_mm: f64,
-    /// Walls behind which half of the surface has room, mm; `None` where they would be too thin to print.
+    /// Wall thickness at which half of the surface would have room, mm; `None` where it is too thin to print.
     pub better_mm: Option<f64>,
 }
 
-/// A proposal of thinner walls in words.
+/// Proposal of thinner walls, in words; empty if `None`.
 fn thinner(better_mm: Option<f64>) -> String {
     better_mm.map_or_else(String::new, |mm| {
         format!(", make its walls {mm:.2} mm thin (--thickness)")
     })
 }
 
-/// Whether connectors have room behind walls of `wall_mm` anywhere, and what would do where they have not.
+/// Checks that connectors have room behind walls of `wall_mm` somewhere; else proposes a size and walls.
 /// Takes a tenth of a second.
 pub fn has_room(model: &Solid, wall_mm: f64) -> Result<(), NoRoom> {
     let mesh = model.mesh();
@@ -87,14 +87,14 @@ pub fn has_room(model: &Solid, wall_mm: f64) -> Result<(), NoRoom> {
     Err(NoRoom {
         thickness_mm: (1.0 + LEAST_SHARE) * median_mm,
         wall_mm,
-        // Walls are tried in steps.
+        // Walls are tried in steps, so the size is a step too small.
         size_mm: mesh.bounds().size().max_element() * STEP * needed_mm / median_mm,
         better_mm: (better_mm >= THINNEST_PROPOSED_MM).then_some(better_mm),
     })
 }
 
-/// Whether at least a third of the surface has a cavity below walls of `wall_mm`, and what would do where it
-/// has not. Takes a tenth of a second.
+/// Checks that at least a third of the surface has a cavity below walls of `wall_mm`; else proposes a size
+/// and walls. Takes a tenth of a second.
 pub fn is_hollow(model: &Solid, wall_mm: f64) -> Result<(), TooThin> {
     let mesh = model.mesh();
     let mut thickest_mm = thickest_walls(mesh);
@@ -111,13 +111,13 @@ pub fn is_hollow(model: &Solid, wall_mm: f64) -> Result<(), TooThin> {
     Err(TooThin {
         share,
         wall_mm,
-        // Walls are tried in steps.
+        // Walls are tried in steps, so the size is a step too small.
         size_mm: mesh.bounds().size().max_element() * STEP * wall_mm / better_mm,
         better_mm,
     })
 }
 
-/// At points all over the surface: the thickest wall with a cavity below, mm.
+/// Thickest wall with a cavity below, mm, at points spread over the surface.
 fn thickest_walls(mesh: &TriMesh) -> Vec<f64> {
     let bvh = TriangleBvh::new(mesh);
     let thickest = |s: &Sample| {
@@ -149,7 +149,7 @@ mod tests {
         assert_eq!(is_hollow(&plate(6.0), 2.0), Ok(()));
         let thin = is_hollow(&plate(3.0), 2.0).unwrap_err();
         assert!(thin.share < 0.1, "{thin}");
-        // Half of 3 mm is left to each of its walls, and less for what is between.
+        // Half of 3 mm is left to each of its walls, and less for the cavity between.
         assert!((1.2..1.6).contains(&thin.better_mm), "{thin}");
         assert!((135.0..185.0).contains(&thin.size_mm), "{thin}");
     }
@@ -212,7 +212,7 @@ mod tests {
         let mm = refused.better_mm.expect("walls of 0.8 mm leave room");
         assert_eq!(has_room(&goblet(4.7), mm), Ok(()));
         assert_eq!(has_room(&goblet(8.0), 1.2), Ok(()));
-        // Cavities there would be, so that the other check has nothing to say.
+        // There would be cavities, so the other check passes.
         assert_eq!(is_hollow(&goblet(4.7), 1.2), Ok(()));
         assert_eq!(has_room(&plate(3.0), 1.2).unwrap_err().better_mm, None);
     }

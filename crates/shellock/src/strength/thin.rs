@@ -1,33 +1,33 @@
-//! Where a model is too thin to be hollow.
+//! Regions where a model is too thin to be hollow.
 //!
-//! Below a point of the surface there is a cavity if the point H below it is as far from the whole surface:
-//! else the wall of the other side, or of a near bend, meets this one, and the piece is solid there.
+//! There is a cavity below a point of the surface if the point H below it is as far from the whole surface.
+//! Otherwise the wall of the other side, or of a near bend, meets this one, and the piece is solid there.
 
 use serde::Serialize;
 use shellock_geom::bvh::TriangleBvh;
 use shellock_geom::topology::components;
 use shellock_geom::{Topology, TriMesh, Vec3};
 
-/// Share of H that the point below must be away from the surface; flat faces of a coarse mesh lie a little
-/// inside it.
+/// Least distance of the point below from the surface, as a share of H: flat faces of a coarse mesh lie a
+/// little inside the surface.
 pub(super) const LEAST_SHARE: f64 = 0.9;
 
 /// A connected part of the surface with no cavity below.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SolidRegion {
-    /// Its area, mm².
+    /// Area of the region, mm².
     pub area_mm2: f64,
-    /// Its middle, by area, mm.
+    /// Centre of the region, weighted by area, mm.
     pub at: [f64; 3],
 }
 
-/// Whether walls of `thickness_mm` leave no cavity below triangle `t`.
+/// Returns true if walls of `thickness_mm` leave no cavity below triangle `t`.
 pub(super) fn is_solid(mesh: &TriMesh, bvh: &TriangleBvh, t: usize, thickness_mm: f64) -> bool {
     let below = mesh.face_center(t) - thickness_mm * mesh.face_normal(t);
     bvh.nearest(below, (LEAST_SHARE * thickness_mm).powi(2)).is_some()
 }
 
-/// The connected regions of triangles with no hollow area, the largest first.
+/// Connected regions of triangles with no hollow area, the largest first.
 pub(super) fn regions(mesh: &TriMesh, hollow_mm2: &[f64]) -> Vec<SolidRegion> {
     let Some(topology) = Topology::of_mesh(mesh) else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! Openings and stresses of all designs as bars, in SVG.
+//! Chart of the openings and stresses of all designs, as bars in SVG.
 
 use std::fmt::Write;
 
@@ -9,26 +9,26 @@ use super::{Outcome, StressReport, StressVerdict};
 const ROW_PX: f64 = 26.0;
 const NAME_PX: f64 = 130.0;
 const LONGEST_PX: f64 = 300.0;
-/// The label of a bar: figure and verdict.
+/// Width of a bar's label, pixels: figure and verdict.
 const LABEL_PX: f64 = 150.0;
 const PANEL_PX: f64 = NAME_PX + LONGEST_PX + LABEL_PX + 20.0;
 
-/// One bar.
+/// One bar of the chart.
 struct Row {
     design: String,
     value: f64,
-    /// It holds below this.
+    /// Value below which the design holds.
     limit: f64,
     label: String,
     color: &'static str,
 }
 
-/// A name and its bars for each of the two tests.
+/// Name and bars of each of the two tests.
 type Groups = [(String, Vec<Row>); 2];
 
-/// Two panels side by side: the widest opening, and the stress as a share of the strength; in each the
-/// designs under the punch, then in the fall. A line marks the limit of each bar. The verdict of the test
-/// stands at its opening.
+/// Draws two panels side by side: the widest opening, and the stress as a share of the strength. Each panel
+/// shows the designs under the punch, then in the fall. A line marks the limit of each bar. The verdict of a
+/// test is written at its opening.
 pub fn chart(report: &StressReport) -> String {
     let (width, height) = (2.0 * PANEL_PX, ROW_PX * (2.0 * report.rows().len() as f64 + 6.0));
     let mut svg = begin(width, height);
@@ -94,7 +94,7 @@ fn groups(report: &StressReport, row: fn(String, &Outcome) -> Row) -> Groups {
     ]
 }
 
-/// A title, and for each test its name and its bars.
+/// Draws a panel: a title, and for each test its name and its bars.
 fn panel(svg: &mut String, x: f64, title: &str, groups: &Groups) {
     let values = groups
         .iter()
@@ -120,7 +120,7 @@ fn panel(svg: &mut String, x: f64, title: &str, groups: &Groups) {
     }
 }
 
-/// Name, bar, limit and figure. What is not finite gets the longest bar.
+/// Draws name, bar, limit and figure. A value that is not finite gets the longest bar.
 fn bar(svg: &mut String, [left, y]: [f64; 2], px_per_unit: f64, row: &Row) {
     let length = if row.value.is_finite() {
         row.value * px_per_unit

@@ -1,5 +1,5 @@
-//! The same tests of worse designs, which have no finished pieces: walls and connectors of tetrahedra with contact,
-//! made anew from surface and plan, as in the volume metric, without gaps.
+//! Stress tests of worse designs, which have no finished pieces: walls and connectors of tetrahedra with
+//! contact, made from surface and plan as in the volume metric, without gaps.
 
 use shellock_geom::Vec3;
 use shellock_mechanics::{Joint, Loaded, Meeting, StressLevel, VolumeError, VolumeModel, VolumeParams};
@@ -15,10 +15,10 @@ use crate::metric::{self, MetricParams, PlanModel};
 use crate::plan::{LatticePlan, random_plans, survey};
 use crate::{Ctx, InstallationPlan, SegmentedSurface};
 
-/// Plans drawn at random, among which one of half the score is looked for.
+/// Number of random plans among which one of half the score is looked for.
 const N_DRAWN: usize = 100;
 
-/// The same with a connector half as large.
+/// The meeting with a connector of half the size.
 fn with_half_the_size(meeting: &Meeting) -> Meeting {
     let half = |joint: Joint| Joint {
         size_mm: joint.size_mm / 2.0,
@@ -30,8 +30,8 @@ fn with_half_the_size(meeting: &Meeting) -> Meeting {
     }
 }
 
-/// Tests walls and connectors of `surface` under `plan`, with connectors of half the size, and under a plan of
-/// half the score: all made anew, without gaps.
+/// Tests walls and connectors of `surface` under `plan`, with connectors of half the size, and under a plan
+/// of half the score. All are made anew, without gaps.
 pub fn compare(
     ctx: &Ctx<'_>,
     params: &StressParams,
@@ -68,11 +68,11 @@ pub fn compare(
     })
 }
 
-/// Lengths of the edges to try, as shares of what is asked for: where a coarse mesh folds so that no wall
-/// stands on it, a somewhat finer or coarser one mostly does not.
+/// Edge lengths to try, as shares of the requested one. Where a coarse mesh folds so that no wall can be
+/// built on it, a somewhat finer or coarser mesh usually does not.
 const EDGE_SHARES: [f64; 6] = [1.0, 0.9, 0.8, 1.1, 0.7, 1.25];
 
-/// The model on the first mesh on which walls stand.
+/// The model on the first of these meshes on which walls can be built.
 fn sound_model(
     ctx: &Ctx<'_>,
     params: &StressParams,
@@ -104,7 +104,7 @@ fn sound_model(
     Err(failure.map_or(VolumeError::Contact, |e| e).into())
 }
 
-/// The plan of those drawn whose least load factor is nearest, by ratio, to half of `score`.
+/// The drawn plan whose least load factor is nearest, by ratio, to half of `score`, with that factor.
 fn half_as_good(
     ctx: &Ctx<'_>,
     params: &StressParams,
@@ -129,9 +129,9 @@ fn half_as_good(
 pub(super) struct Bench<'a> {
     params: &'a StressParams,
     model: &'a PlanModel,
-    /// Held where it stands.
+    /// Solver with the model held where it stands.
     standing: VolumeModel,
-    /// Held nowhere.
+    /// Solver with the model held nowhere.
     free: VolumeModel,
 }
 
@@ -222,7 +222,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Infinite at the stations of `parts`, which come off, and nothing elsewhere.
+    /// Openings at all stations: infinite at those of `parts`, which come apart, and 0 elsewhere.
     fn openings_of(&self, parts: &[u32]) -> Vec<f64> {
         let is_loose = |i: usize| {
             self.model

@@ -1,4 +1,4 @@
-//! The tests of the pieces as they are printed: their finished meshes, with the gaps that these have.
+//! Stress tests of the pieces as they are printed: their finished meshes with their gaps.
 
 use shellock_geom::signed_distance::SignedDistance;
 use shellock_geom::{Solid, Vec3};
@@ -15,12 +15,13 @@ use crate::metric::PlanModel;
 use crate::plan::LatticePlan;
 use crate::{Ctx, PatchId, SegmentedSurface};
 
-/// Coefficients of friction: none, and little for printed plastic on itself. What is between holds between.
+/// Coefficients of friction tested: none, and a low one for printed plastic on itself. Results for friction
+/// in between lie between the two.
 pub const FRICTION: [f64; 2] = [0.0, 0.2];
-/// What is deeper than the wall by this is connector, mm.
+/// Depth below the wall from which material counts as connector, mm.
 const BELOW_WALL_MM: f64 = 0.15;
 
-/// The pieces, standing and falling.
+/// The finished pieces, standing and falling.
 pub(super) struct Bench<'a> {
     params: &'a StressParams,
     model: &'a PlanModel,
@@ -86,7 +87,7 @@ impl<'a> Bench<'a> {
         self.solid.mass_t()
     }
 
-    /// The punch with that friction.
+    /// Runs the punch with the given friction.
     pub fn punch(&mut self, ctx: &Ctx<'_>, friction: f64) -> Result<Outcome, StressError> {
         let up = Vec3::from_array(self.params.plan.up).normalize_or(Vec3::Z);
         let assembly = &self.model.assembly;
@@ -96,7 +97,7 @@ impl<'a> Bench<'a> {
         self.outcome(ctx, &forces_n, Answer::Held, self.params.punch_n, friction)
     }
 
-    /// The fall with that friction.
+    /// Runs the fall with the given friction.
     pub fn drop(&mut self, ctx: &Ctx<'_>, friction: f64) -> Result<Outcome, StressError> {
         let up = Vec3::from_array(self.params.plan.up).normalize_or(Vec3::Z);
         let force_n = impact_n(self.mass_t(), self.params.drop_mm);
@@ -121,7 +122,7 @@ impl<'a> Bench<'a> {
         };
         let loaded = forces_n.iter().enumerate().filter(|f| *f.1 != Vec3::ZERO);
         let all: Vec<Push> = loaded.map(push).collect();
-        // Where relief or a fragment took the surface away, the places about it bear its share.
+        // Where relief or a fragment removed the surface, the places around take over its share of the load.
         let has_material = |push: &&Push| self.solid.spot(push.part, push.at).is_some();
         let mut pushes: Vec<Push> = all.iter().filter(has_material).copied().collect();
         let total = |pushes: &[Push]| pushes.iter().map(|p| p.force_n.length()).sum::<f64>();
@@ -150,7 +151,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// What became of the seams.
+/// Motion of the pieces at the seams, under one load.
 struct Seen<'a> {
     model: &'a PlanModel,
     meetings: &'a [Meeting],
@@ -160,7 +161,7 @@ struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    /// How far the second piece goes from the first at each place of a station.
+    /// Displacement of the second piece relative to the first at each place of a station, mm.
     fn apart<'s>(
         &'s self,
         station: usize,
@@ -169,7 +170,7 @@ impl Seen<'_> {
         self.places[station].iter().map(|[a, b]| motion(b) - motion(a))
     }
 
-    /// How far the key goes out of its way there, of what the pieces go apart; 0 between others.
+    /// Part of the displacement `apart` by which the key goes out of its way, mm; 0 between other pieces.
     fn slid_mm(&self, station: usize, apart: Vec3) -> f64 {
         let [a, b] = self.model.pieces_at(station);
         let (key, out) = self.key;
@@ -181,8 +182,8 @@ impl Seen<'_> {
         outward.max(0.0)
     }
 
-    /// The widest opening of a station, mm. That the key slides on its way out, where nothing but friction or a
-    /// detent is to hold it, opens nothing.
+    /// Widest opening of a station, mm. Sliding of the key on its way out does not count: there only friction
+    /// or a detent holds it.
     fn widest_mm(&self, station: usize, motion: &dyn Fn(&Spot) -> Vec3) -> f64 {
         let openings = self.apart(station, motion).map(|apart| {
             let slid_mm = self.slid_mm(station, apart);
@@ -204,7 +205,7 @@ impl Seen<'_> {
         }
     }
 
-    /// How far the key slides out, mm.
+    /// Greatest distance by which the key slides out, mm.
     fn key_slides_mm(&self) -> f64 {
         let moved = |spot: &Spot| self.moved.moved_mm(spot);
         let slides = (0..self.meetings.len()).flat_map(|i| {
@@ -262,7 +263,7 @@ impl Seen<'_> {
     }
 }
 
-/// Friction that is farther from its law, as a share of the load, is told.
+/// Deviation of friction from its law, as a share of the load, above which it is reported.
 const FRICTION_OFF: f64 = 0.02;
 
 fn stopped(ctx: &Ctx<'_>, error: SolidError) -> StressError {

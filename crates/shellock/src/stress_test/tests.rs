@@ -12,7 +12,7 @@ fn octants() -> SegmentedSurface {
     label(sphere(4, Vec3::splat(40.0)), 8, octant)
 }
 
-/// Every octant leaves outwards.
+/// A plan in which every octant leaves outwards.
 fn outwards() -> LatticePlan {
     let direction =
         |i: u32| Vec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0));
@@ -29,7 +29,7 @@ fn as_it_lies(plan: &LatticePlan) -> InstallationPlan {
     InstallationPlan::new(plan.steps.iter().map(|s| (s.piece, s.separation.into())))
 }
 
-/// A coarse mesh: what is tested here holds on any.
+/// Parameters of a coarse mesh: the results tested here hold on any.
 fn coarse() -> StressParams {
     StressParams {
         metric: MetricParams {
@@ -83,8 +83,8 @@ fn finished_octants(gap_mm: f64) -> Vec<Solid> {
     (0..8).map(octant).collect()
 }
 
-/// Nothing but its shape holds a ball that is cut into octants without connectors: on a table it stands under
-/// a light touch no better than its gaps let it, and the report says of what it is.
+/// A ball cut into octants without connectors is held by nothing but its shape, so it comes apart. The report
+/// is of the printed pieces, of which there must be one for each patch.
 #[test]
 fn what_is_tested_is_what_is_printed() {
     let ctx = Ctx::quiet();
@@ -96,7 +96,7 @@ fn what_is_tested_is_what_is_printed() {
         stress_test(&ctx, &params, &octants(), &as_it_lies(&outwards()), pieces, None)
     };
     let tested = test(&finished_octants(0.2)).unwrap();
-    // Walls of 2 mm about a ball of 40 mm, of 1.15 g/cm³.
+    // Walls of 2 mm around a ball of 40 mm, of 1.15 g/cm³.
     let shell_g = 4.0 / 3.0 * std::f64::consts::PI * (40.0_f64.powi(3) - 38.0_f64.powi(3)) * 1.15e-3;
     assert!((tested.mass_g / shell_g - 1.0).abs() < 0.03, "{}", tested.mass_g);
     assert_eq!(tested.printed.len(), FRICTION.len());
@@ -146,7 +146,7 @@ fn half_connectors_fare_worse_than_whole_ones_and_the_chart_says_so() {
 
 #[test]
 fn a_stronger_material_bears_what_a_weaker_one_does_not() {
-    // So light a touch opens nothing; the verdict is the material's alone.
+    // A touch so light opens nothing; the verdict depends on the material alone.
     let with_strength = |strength_mpa: f64| {
         let mut params = StressParams {
             punch_n: 1.0,

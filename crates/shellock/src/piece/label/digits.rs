@@ -1,12 +1,12 @@
-//! Digits as strokes.
+//! Digits as strokes of polylines.
 
 /// A point in units of a digit's height: x to the right, y up.
 type Point = [f64; 2];
 
-/// From the left edge of a digit to that of the next; digits are 0.6 wide.
+/// Distance from the left edge of a digit to that of the next, and width of a digit, in digit heights.
 const ADVANCE: f64 = 0.9;
 const WIDTH: f64 = 0.6;
-/// Where the line below a number is.
+/// Height of the line below a number.
 const UNDERLINE: f64 = -0.28;
 
 const ZERO: &[Point] = &[
@@ -85,7 +85,7 @@ const EIGHT: &[Point] = &[
     [0.6, 0.38],
     [0.45, 0.53],
 ];
-/// Six upside down.
+/// The strokes of six, turned upside down.
 const NINE: &[Point] = &[
     [0.1, 0.0],
     [0.4, 0.18],
@@ -107,7 +107,7 @@ pub(super) struct Drawing {
 }
 
 impl Drawing {
-    /// `number` in digits of `height_mm`, underlined where it would be another number upside down.
+    /// Draws `number` in digits of `height_mm`, underlined where it would be another number upside down.
     pub fn of(number: u32, height_mm: f64) -> Self {
         let digits: Vec<usize> = number
             .to_string()
@@ -132,14 +132,14 @@ impl Drawing {
         Self { strokes }
     }
 
-    /// Width and height, mm.
+    /// Width and height of the drawing, mm.
     pub fn size_mm(&self) -> [f64; 2] {
         let points = || self.strokes.iter().flatten();
         [0, 1].map(|k| points().map(|p| p[k]).fold(0.0, f64::max))
     }
 }
 
-/// Whether the digits read as another number upside down.
+/// Returns true if the digits read as another number upside down.
 fn is_ambiguous(digits: &[usize]) -> bool {
     let turned: Option<Vec<usize>> = digits
         .iter()
